@@ -1,0 +1,144 @@
+"""The only home of the compiler: cached kernels, and laws called by address from inside them.
+
+Compiling costs some seconds once for each installation; the result is kept beside the environment
+(or in the user's cache folder where that is read-only) under a hash of the kernels' sources, so that
+an upgrade never runs a stale kernel.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+from llvmlite import ir
+from numba import types
+from numba.core import config
+from numba.experimental.structref import StructRefProxy, define_proxy, register
+from numba.extending import intrinsic
+
+__all__ = [
+    "ADVANCE",
+    "BEGIN",
+    "FORCE",
+    "StructRefProxy",
+    "StructType",
+    "advance_law",
+    "begin_law",
+    "cache_folder",
+    "call_advance",
+    "call_begin",
+    "call_force",
+    "compiled",
+    "define_proxy",
+    "force_law",
+    "is_warm",
+    "register",
+]
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_POINTER = types.CPointer(types.float64)
+# force(p, s, z, v): parameters, memory, sinkage, sinkage rate -> force on the reference face
+FORCE = types.float64(_POINTER, _POINTER, types.float64, types.float64)
+# begin(p, s): at first touch, once s[SPEED] and s[MASS] are latched
+BEGIN = types.void(_POINTER, _POINTER)
+# advance(p, s, z, v, h): one accepted step of a law's own hidden states, in place
+ADVANCE = types.void(_POINTER, _POINTER, types.float64, types.float64, types.float64)
+
+
+class StructType(types.StructRef):  # type: ignore[misc]
+    """Type of a bundle of arrays that kernels take as one pointer."""
+
+    def preprocess_fields(self, fields: Any) -> Any:
+        """Forget literal values, as the compiler asks."""
+        return tuple((name, types.unliteral(kind)) for name, kind in fields)
+
+
+def _sources_hash() -> str:
+    root = Path(__file__).resolve().parent.parent
+    digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
+    for folder in ("ground", "rollover"):
+        for path in sorted((root / folder).glob("*.py")):
+            text = path.read_bytes()
+            # all of ground/: its constants are frozen into the laws' kernels, also those of files that compile nothing
+            if folder == "ground" or b"compiled" in text:
+                digest.update(path.name.encode() + text)
+    return digest.hexdigest()[:16]
+
+
+def cache_folder() -> Path:
+    """Folder of the compiled kernels of these very sources."""
+    local = Path(sys.prefix) / "var" / "rollover-kernels"
+    if not os.access(sys.prefix, os.W_OK):
+        local = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "rollover-kernels"
+    return local / _SOURCES
+
+
+_SOURCES = _sources_hash()
+
+
+@contextmanager
+def _own_cache() -> Iterator[None]:
+    before = config.CACHE_DIR
+    config.CACHE_DIR = before or str(cache_folder())
+    try:
+        yield
+    finally:
+        config.CACHE_DIR = before
+
+
+def compiled(function: F) -> F:
+    """Compile at the first call and keep the machine code on disk."""
+    with _own_cache():
+        return numba.njit(cache=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+
+
+def force_law(function: Callable[..., float]) -> Any:
+    """Compile ``force(p, s, z, v) -> F`` of a ground law so that kernels can call it by address."""
+    with _own_cache():
+        return numba.cfunc(FORCE, cache=True, error_model="numpy")(function)
+
+
+def advance_law(function: Callable[..., None]) -> Any:
+    """Compile ``advance(p, s, z, v, h)`` of a law with hidden states of its own."""
+    with _own_cache():
+        return numba.cfunc(ADVANCE, cache=True, error_model="numpy")(function)
+
+
+def begin_law(function: Callable[..., None]) -> Any:
+    """Compile ``begin(p, s)``: what a law works out once for each touch."""
+    with _own_cache():
+        return numba.cfunc(BEGIN, cache=True, error_model="numpy")(function)
+
+
+def is_warm() -> bool:
+    """Whether kernels of these sources have been compiled on this machine before."""
+    return cache_folder().is_dir()
+
+
+def _by_address(signature: Any) -> Any:
+    @intrinsic  # type: ignore[untyped-decorator]
+    def call(typingctx: Any, address: Any, arguments: Any) -> Any:
+        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            kind = ir.FunctionType(
+                context.get_value_type(signature.return_type), [context.get_value_type(a) for a in signature.args]
+            )
+            pointer = builder.inttoptr(args[0], kind.as_pointer())
+            values = [builder.extract_value(args[1], i) for i in range(len(signature.args))]
+            result = builder.call(pointer, values)
+            return context.get_dummy_value() if signature.return_type == types.void else result
+
+        return signature.return_type(types.intp, types.Tuple(signature.args)), codegen
+
+    return call
+
+
+call_force = _by_address(FORCE)
+call_begin = _by_address(BEGIN)
+call_advance = _by_address(ADVANCE)

@@ -1,0 +1,192 @@
+"""The compiled inner loop over touched elements: force to be tried, memory to be committed.
+
+An element that is in contact moves with the vehicle's point above it (restitution 0, no separation while it is
+loaded), so its sinkage and sinkage rate are the point's and its mass goes into the vehicle's mass matrix.
+`normal_force` and `friction_force` are pure; only `commit` and `commit_friction` write.
+
+Memory of an element, one row of `memory` each; forces there are per reference area, so that a contact area
+that grows or shrinks only multiplies them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ground.compiled import call_advance, call_force, compiled
+from ground.law import BRANCH, REFERENCE_AREA
+
+# columns of memory (float)
+SINKAGE = 0  # z at the last commit, m
+LINE_Z = 1  # deepest sinkage so far: where the unloading line starts, m
+LINE_F = 2  # force there, N per reference area
+LINE_K = 3  # K_u, N/m per reference area
+LINE_C = 4  # dashpot of the unloading line, N s/m per reference area
+AREA = 5  # contact area now, m2
+MASS_B = 6  # co-moving mass m_b1, kg
+SHEAR = 7  # 7, 8, 9: shear displacement since the last slip, world axes, m
+PLACE = 10  # 10, 11, 12: the owning point at the last commit, world, m
+OWNER_R = 13  # 13, 14, 15: the owning point in its body's axes about its centre of mass, m
+NORMAL = 16  # 16, 17, 18: unit normal of the undisturbed surface, world, up
+OFFSET = 19  # normal . (a point of the undisturbed surface), m
+FORCE = 20  # normal force at the start of the step, N
+FRICTION = 21  # 21, 22, 23: friction force at the start of the step, N
+TOUCH_SPEED = 24  # latched normal impact speed, m/s
+COLUMNS = 25
+
+# columns of state (int)
+CELL, BODY, MODE, FLAGS, OWNER, HITS = 0, 1, 2, 3, 4, 5
+STATE_COLUMNS = 6
+IDLE, LOADING, UNLOADING = 0, 1, 2
+
+# columns of the law's settings
+PLASTIC, REST_STIFFNESS, GRAVITY, ADDRESS_FORCE, ADDRESS_ADVANCE, ADDRESS_BEGIN = 0, 1, 2, 3, 4, 5
+
+# outcomes of a commit, as bits
+BRANCHED, ARRESTED, RELEASED = 1, 2, 4
+
+
+@compiled
+def normal_force(law: Any, p: Any, s: Any, row: Any, z: float, v: float) -> float:
+    """Spring force of one element at sinkage z and rate v, N: never a pull; memory is only read.
+
+    Loading follows the law; below the deepest sinkage the line of stiffness K_u with its dashpot, capped by
+    the loading curve at the line's start.
+    """
+    if z <= 0.0:
+        return 0.0
+    if law[PLASTIC] == 0 or z >= row[LINE_Z]:
+        f = call_force(law[ADDRESS_FORCE], (p.ctypes, s.ctypes, z, v))
+    else:
+        f = min(row[LINE_F] - row[LINE_K] * (row[LINE_Z] - z) + row[LINE_C] * v, row[LINE_F])
+    return max(f, 0.0) * row[AREA] / REFERENCE_AREA  # type: ignore[no-any-return]
+
+
+@compiled
+def rut_depth(row: Any) -> float:
+    """Sinkage below which the unloaded element gives no force: the rut that stays, m."""
+    if row[LINE_K] <= 0.0:
+        return 0.0
+    return max(row[LINE_Z] - row[LINE_F] / row[LINE_K], 0.0)  # type: ignore[no-any-return]
+
+
+@compiled
+def set_line(law: Any, p: Any, s: Any, row: Any, z: float, mass: float) -> None:
+    """Start the unloading line at (z, F(z)): K_u = K'(z)/recovery, or eq (6) read literally."""
+    f = call_force(law[ADDRESS_FORCE], (p.ctypes, s.ctypes, z, 0.0))
+    row[LINE_Z] = z
+    row[LINE_F] = f
+    row[LINE_K] = f / (p[0] * z) if z > 0.0 else 0.0
+    if law[REST_STIFFNESS] != 0 and z > 0.0:
+        # (6): K_b3 = 9.81 m_s / z_p,max; a secant through the origin, hence the drop at the line's start
+        row[LINE_K] = 9.81 * mass * REFERENCE_AREA / row[AREA] / z
+        row[LINE_F] = row[LINE_K] * z
+
+
+@compiled
+def enter_from_the_side(law: Any, p: Any, s: Any, row: Any, z: float, force: float) -> None:
+    """Let a sinkage that was not swept by normal motion begin on the reloading line with `force` (N).
+
+    A member that slides into an element pushes its soil aside: the element's work was not done, so its force
+    must not be there at once. It climbs K_u to the loading curve as the member sinks further.
+    """
+    per_reference = force * REFERENCE_AREA / max(row[AREA], 1e-12)
+    f = call_force(law[ADDRESS_FORCE], (p.ctypes, s.ctypes, z, 0.0))
+    if f <= per_reference or z <= 0.0:
+        return
+    row[LINE_K] = f / (p[0] * z)
+    row[LINE_Z] = z + (f - per_reference) / row[LINE_K]
+    row[LINE_F] = f
+    row[LINE_C] = 0.0
+
+
+@compiled
+def commit(law: Any, p: Any, s: Any, row: Any, state: Any, z: float, v: float, h: float, mass: float) -> int:
+    """Accept a step that ended at (z, v): move the deepest point, turn round, or let go. Returns outcome bits.
+
+    `mass` (kg) is the share of the effective mass above the element; it only enters the literal eq (6).
+    """
+    outcome = 0
+    before = row[SINKAGE]
+    row[SINKAGE] = z
+    if law[ADDRESS_ADVANCE] != 0:
+        # the mean rate makes a law's own states second order in the step
+        call_advance(law[ADDRESS_ADVANCE], (p.ctypes, s.ctypes, z, (z - before) / h, h))
+    if law[PLASTIC] == 0:
+        if z <= 0.0:
+            outcome |= RELEASED
+        return outcome
+    if state[MODE] == LOADING:
+        if z > row[LINE_Z]:
+            if before < s[BRANCH] <= z:
+                outcome |= BRANCHED
+            if v > 0.0 and law[REST_STIFFNESS] != 0:
+                f = call_force(law[ADDRESS_FORCE], (p.ctypes, s.ctypes, z, 0.0))
+                row[LINE_Z], row[LINE_F], row[LINE_K] = z, f, f / (p[0] * z)
+            else:
+                set_line(law, p, s, row, z, mass)
+        if v <= 0.0:
+            state[MODE] = UNLOADING
+            outcome |= ARRESTED
+    elif z > row[LINE_Z]:
+        state[MODE] = LOADING
+        set_line(law, p, s, row, z, mass)
+        if v <= 0.0:
+            state[MODE] = UNLOADING
+    if z <= rut_depth(row) and v <= 0.0:
+        outcome |= RELEASED
+    return outcome
+
+
+@compiled
+def friction_force(
+    mu: float,
+    stick: float,
+    relaxation: float,
+    force: float,
+    shear: Any,
+    moved: Any,
+    velocity: Any,
+    normal: Any,
+    out: Any,
+) -> None:
+    """F_t = -mu F_n (d + tau v_t)/d_s, |F_t| <= mu F_n, into out (3,); d = committed shear plus what has moved since.
+
+    All vectors in world axes; only their parts along the surface count.
+    """
+    out[:] = 0.0
+    if mu <= 0.0 or force <= 0.0:
+        return
+    d = np.empty(3)
+    along = 0.0
+    for k in range(3):
+        d[k] = shear[k] + moved[k] + relaxation * velocity[k]
+        along += d[k] * normal[k]
+    size = 0.0
+    for k in range(3):
+        d[k] -= along * normal[k]
+        size += d[k] * d[k]
+    size = math.sqrt(size)
+    if size > 0.0:
+        factor = -mu * force / max(size, stick)
+        for k in range(3):
+            out[k] = factor * d[k]
+
+
+@compiled
+def commit_friction(stick: float, shear: Any, moved: Any, normal: Any) -> None:
+    """Add what has moved to the shear displacement and cut it at d_s: the rest was slip."""
+    along = 0.0
+    for k in range(3):
+        shear[k] += moved[k]
+        along += shear[k] * normal[k]
+    size = 0.0
+    for k in range(3):
+        shear[k] -= along * normal[k]
+        size += shear[k] * shear[k]
+    size = math.sqrt(size)
+    if size > stick:
+        for k in range(3):
+            shear[k] *= stick / size

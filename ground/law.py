@@ -1,0 +1,140 @@
+"""What a ground law is: parameters only; the element's memory is handed in; the table of laws.
+
+A law says which force one element of the reference area puts against the striker while it is being
+pushed deeper: the **loading curve** ``F(z, v)``. The array does the rest for every law alike: it scales by
+area, latches the impact speed, lets the co-moving mass take part, unloads plastically and keeps the rut.
+
+The whole of a new law, in one file of this folder::
+
+    @parameters
+    class Peat(GroundLaw):
+        '''F = k z: a linear soil.'''
+
+        kind: Literal["peat"] = "peat"
+        stiffness: Annotated[float, Quantity("N/m", "secant stiffness on the reference face", above=0)] = 3.0e4
+
+        @staticmethod
+        @force_law
+        def force(p, s, z, v):
+            return p[1] * z
+
+``p`` holds the law's numbers in the order of its fields (``p[0]`` is `GroundLaw.recovery`), ``s`` the
+element's memory: ``s[SPEED]`` the latched impact speed (m/s), ``s[MASS]`` the striker's mass (kg), ``s[BRANCH]``
+the sinkage at which the loading curve changes branch (m, infinite if it never does), then `hidden` states
+of the law's own, which ``begin(p, s)`` sets at the touch and ``advance(p, s, z, v, h)`` moves once for each
+accepted step. ``force`` only reads: it is asked several times within a step.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import pkgutil
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ground.quantity import Quantity, parameters
+
+# places in an element's memory s
+SPEED, MASS, BRANCH, HIDDEN = 0, 1, 2, 3
+
+REFERENCE_AREA = 0.140 * 0.045  # m2, face of the drop-test striker, Ye 2006 Fig. 5
+REFERENCE_MASS = 132.0  # kg, the same striker
+
+
+@dataclass(frozen=True, kw_only=True)
+class Domain:
+    """Where a law was calibrated; a load from outside is legal and carries a flag (see `array.FLAGS`)."""
+
+    speed_least: float = 0.0  # m/s, normal impact speed
+    speed_most: float = math.inf
+    momentum_most: float = math.inf  # N s, striker mass times impact speed
+    area: float = math.nan  # m2, footprint; nan: any
+    virgin_only: bool = False  # no second hit on the same rut
+    obliquity_most: float = math.inf  # rad, angle between approach velocity and ground normal
+
+    @property
+    def vector(self) -> NDArray[np.float64]:
+        """The bounds as the kernel reads them."""
+        return np.array(
+            [self.speed_least, self.speed_most, self.momentum_most, self.area, self.virgin_only, self.obliquity_most]
+        )
+
+
+@parameters
+class GroundLaw:
+    """A loading curve F(z, v) on the reference area, and how the ground unloads."""
+
+    recovery: Annotated[
+        float,
+        Quantity("1", "share of the deepest sinkage that springs back: K_u = K'(z_max)/recovery", above=0, below=1),
+    ] = 0.02
+
+    force: ClassVar[Any]
+    begin: ClassVar[Any] = None
+    advance: ClassVar[Any] = None
+    hidden: ClassVar[int] = 0
+    plastic: ClassVar[bool] = True  # False: the loading curve is followed in both directions
+
+    @property
+    def p(self) -> NDArray[np.float64]:
+        """The law's numbers in the order of its fields."""
+        values = (getattr(self, f.name) for f in fields(self))
+        return np.array([v for v in values if isinstance(v, (int, float)) and not isinstance(v, bool)], dtype=float)
+
+    @property
+    def unloads_at_rest_stiffness(self) -> bool:
+        """Whether the literal eq (6) replaces plastic unloading."""
+        return False
+
+    @property
+    def domain(self) -> Domain:
+        """Where the law's numbers come from."""
+        return Domain()
+
+
+def laws() -> dict[str, type[GroundLaw]]:
+    """Every law of this folder by its `kind`; a name given twice is an error."""
+    for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
+        importlib.import_module(f"ground.{module.name}")
+    table: dict[str, type[GroundLaw]] = {}
+    todo = list(GroundLaw.__subclasses__())
+    while todo:
+        law = todo.pop(0)
+        todo += law.__subclasses__()
+        kind = getattr(law, "kind", None)
+        if not isinstance(kind, str):
+            raise TypeError(f"{law.__module__}.{law.__name__}: a law needs a field `kind` with its name as default")
+        if kind in table:
+            raise TypeError(f"{law.__module__}.{law.__name__}: law name {kind!r} is taken by {table[kind].__module__}")
+        table[kind] = law
+    return dict(sorted(table.items()))
+
+
+def evaluate(law: GroundLaw, z: float, v: float = 0.0, *, speed: float, mass: float = REFERENCE_MASS) -> float:
+    """F(z, v) of one element of the reference area on its loading curve, N, for plots, tests and fits.
+
+    `z` sinkage (m, positive down), `v` sinkage rate (m/s), `speed` latched impact speed (m/s), `mass` (kg).
+    """
+    p, s = law.p, touched(law, speed=speed, mass=mass)
+    return float(law.force.ctypes(_address(p), _address(s), z, v))
+
+
+def touched(law: GroundLaw, *, speed: float, mass: float = REFERENCE_MASS) -> NDArray[np.float64]:
+    """Memory of an element of this law just after its first touch."""
+    s = np.zeros(HIDDEN + law.hidden)
+    s[SPEED], s[MASS], s[BRANCH] = speed, mass, math.inf
+    if law.begin is not None:
+        p = law.p
+        law.begin.ctypes(_address(p), _address(s))
+    return s
+
+
+def _address(array: NDArray[np.float64]) -> Any:
+    import ctypes
+
+    return array.ctypes.data_as(ctypes.POINTER(ctypes.c_double))

@@ -1,0 +1,94 @@
+"""What exists: shipped files, laws, effects, channels, paths; and whether a file is in order."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from ground.law import laws as known_laws
+from rollover import channels as table
+from rollover import document
+from rollover import scenario as scenarios
+from rollover.effects import effects as known_effects
+from rollover.rops import Rops
+
+Row = dict[str, Any]
+
+
+def files(folder: str) -> list[Row]:
+    """Shipped files of a folder, each with the first sentence of its opening comment."""
+    shelf = document.shipped_folder() / folder
+    return [{"name": path.stem, "is": headline(path)} for path in sorted(shelf.glob("*.yaml"))]
+
+
+def headline(path: Path) -> str:
+    """First paragraph of the comment that a file opens with, up to its first full stop."""
+    lines = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        if not line.startswith("#") or not line.strip("# "):
+            break
+        lines.append(line.strip("# "))
+    first, stop, _ = " ".join(lines).partition(". ")
+    return first.rstrip(".") if stop else first
+
+
+def laws() -> list[Row]:
+    """Ground laws by kind."""
+    return [{"kind": kind, "is": _first_line(law)} for kind, law in known_laws().items()]
+
+
+def effects() -> list[Row]:
+    """Effects by id."""
+    return [{"id": name, "is": _first_line(effect)} for name, effect in known_effects().items()]
+
+
+def channels() -> list[Row]:
+    """All channels with their units."""
+    return [vars(channel) for channel in table.CHANNELS.values()]
+
+
+def paths(name: str) -> list[Row]:
+    """Every value of a scenario with the path by which it is replaced."""
+    return [leaf._asdict() for leaf in document.paths(scenarios.load(name))]
+
+
+TABLES: dict[str, Callable[[], list[Row]]] = {
+    "scenarios": lambda: files(""),
+    "vehicles": lambda: files("vehicles"),
+    "soils": lambda: files("soils"),
+    "laws": laws,
+    "effects": effects,
+    "channels": channels,
+}
+
+
+def check(name: str) -> str:
+    """Validate a scenario, vehicle, ROPS or soil file and say which of these it is. Raises `InputError`."""
+    path = document.find(name)
+    keys = document.headings(path)
+    kind = keys["kind"].plain if "kind" in keys else None
+    for what, annotation, meant in (
+        ("soil", scenarios.AnyLaw, kind in known_laws()),
+        ("vehicle", scenarios.AnyVehicle, kind in document.slot_of(scenarios.AnyVehicle).kinds),
+        ("rops", Rops, "mounts" in keys),
+    ):
+        if meant:
+            document.load(path, annotation)
+            return what
+    scenarios.load(path)
+    return "scenario"
+
+
+def text(value: Any) -> str:
+    """A value as a file would have it."""
+    if isinstance(value, bool) or value is None:
+        return {True: "true", False: "false", None: "null"}[value]
+    if isinstance(value, list):
+        return f"[{', '.join(map(text, value))}]"
+    return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
+
+
+def _first_line(thing: type) -> str:
+    return (inspect.getdoc(thing) or "").partition("\n")[0]

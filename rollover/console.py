@@ -1,0 +1,111 @@
+"""What people read while a command works and when it is done: progress, tables, sentences."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rollover.loads import PeakLoad
+    from rollover.run import Run
+
+QUIET = 2.0  # s of wall time: a run that is shorter shows no progress
+EVERY = 5.0  # s between lines of progress where there is no terminal
+
+# SI unit -> unit that an engineer reads, and how many of the one make one of the other
+_READABLE = {"N": ("kN", 1e-3), "J": ("kJ", 1e-3), "m": ("mm", 1e3), "N s": ("N s", 1.0), "m/s2": ("g", 1.0 / 9.80665)}
+
+
+def say(sentence: str) -> None:
+    """One line on standard error."""
+    print(sentence, file=sys.stderr, flush=True)
+
+
+@contextmanager
+def progress(what: str, start: float, end: float) -> Iterator[Callable[[float, float], None]]:
+    """Give a callback that shows simulated time and speed: a bar on a terminal, otherwise a line now and then."""
+    if sys.stderr.isatty():
+        from rich.progress import BarColumn, Progress, TextColumn
+
+        columns = (TextColumn(what), BarColumn(), TextColumn("{task.fields[state]}"))
+        with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+            task = bar.add_task(what, total=end - start, visible=False, state="")
+
+            def show(simulated: float, wall: float) -> None:
+                state = _state(simulated, wall, start, end)
+                bar.update(task, completed=simulated - start, visible=wall > QUIET, state=state)
+
+            yield show
+        return
+    last = [time.monotonic() + QUIET - EVERY]
+
+    def line(simulated: float, wall: float) -> None:
+        if wall > QUIET and time.monotonic() - last[0] >= EVERY:
+            last[0] = time.monotonic()
+            say(f"{what}: {_state(simulated, wall, start, end)}")
+
+    yield line
+
+
+def _state(simulated: float, wall: float, start: float, end: float) -> str:
+    speed = (simulated - start) / wall if wall > 0.0 else 0.0
+    return f"{simulated:.2f} of {end:g} s, {speed:.2g} x real time"
+
+
+def readable(value: float | None, unit: str) -> str:
+    """A number in the unit that an engineer reads it in, without the unit."""
+    if value is None or value != value:
+        return "-"
+    return f"{value * _READABLE.get(unit, (unit, 1.0))[1]:.4g}"
+
+
+def report(run: Run, peaks: Sequence[PeakLoad], answer: Mapping[str, Any], folder: str) -> None:
+    """The answer of a run on standard output."""
+    out = Console(highlight=False, markup=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
+    out.print(run.scenario.title, style="bold")
+    if run.status == "done":
+        speed = (run.stop_time - float(run.recording.time[0])) / run.wall_time if run.wall_time > 0.0 else 0.0
+        out.print(f"{run.stop_time:g} s simulated in {run.wall_time:.2g} s ({speed:.2g} x real time)")
+    else:
+        out.print(f"FAILED: {run.sentence}", style="bold red")
+    if peaks:
+        out.print(_table(peaks))
+    if run.domain_flags:
+        out.print(
+            f"Outside the ground law's calibrated domain: {', '.join(run.domain_flags)}. "
+            "Loads marked * were taken there: an extrapolation, not a measured range.",
+            style="yellow",
+        )
+    half = answer["half_step"]
+    if half is not None and half["status"] != "done":
+        out.print(f"At half the step the run failed: {half['sentence']}", style="yellow")
+    out.print(f"Results: {folder}")
+
+
+def _table(peaks: Sequence[PeakLoad]) -> Table:
+    table = Table(box=None, pad_edge=False)
+    table.add_column("peak load")
+    table.add_column("unit")
+    for heading in ("raw", "at s", f"CFC {peaks[0].cfc}", "at s", "impulse N s", "half step"):
+        table.add_column(heading, justify="right")
+    for peak in peaks:
+        change = "-" if peak.half_step_change is None else f"{100.0 * peak.half_step_change:+.2g} %"
+        table.add_row(
+            peak.channel + (" *" if peak.domain_flags else ""),
+            _READABLE.get(peak.unit, (peak.unit, 1.0))[0],
+            readable(peak.raw, peak.unit),
+            f"{peak.raw_time:.3f}",
+            readable(peak.filtered, peak.unit),
+            "-" if peak.filtered_time is None else f"{peak.filtered_time:.3f}",
+            "-" if peak.impulse is None else f"{peak.impulse:.4g}",
+            change,
+        )
+    return table

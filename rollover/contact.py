@@ -1,0 +1,268 @@
+"""From a scenario to the tables of the kernels: bodies, points, wheels, mounts, joints, ground and its memory."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ground.friction import Coulomb
+from ground.kernel import COLUMNS, STATE_COLUMNS
+from ground.law import HIDDEN, REFERENCE_MASS, GroundLaw
+from ground.surface import normal
+from rollover import tables as c
+from rollover.inertia import MassProperties
+from rollover.scenario import Ground, Scenario
+from rollover.shapes import Disc, Shape, SurfacePoints, rectangle, sample
+from rollover.tables import Tables
+from rollover.vehicle import Striker, Vehicle, Wheel, chassis_of
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """A rigid body in the design position; `surfaces` are its named points in vehicle axes."""
+
+    name: str
+    inertia: MassProperties
+    surfaces: tuple[tuple[str, SurfacePoints], ...]
+
+    @property
+    def centre(self) -> Array:
+        """Centre of mass in vehicle axes, (3,)."""
+        return np.array(self.inertia.centre_of_mass)
+
+    @property
+    def tensor(self) -> Array:
+        """Inertia tensor about the centre of mass, (3, 3)."""
+        xx, yy, zz = self.inertia.inertia
+        xy, xz, yz = self.inertia.products
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def bodies_of(vehicle: Vehicle | Striker) -> tuple[Body, ...]:
+    """Bodies with their contact points: striker; or chassis, front axle, ROPS as far as there are any."""
+    spacing = vehicle.contact_spacing
+    if isinstance(vehicle, Striker):
+        height = 0.5 * (vehicle.face_length + vehicle.face_width)
+        half = np.array([0.5 * vehicle.face_length, 0, 0]), np.array([0, 0.5 * vehicle.face_width, 0])
+        face = rectangle(np.zeros(3), half[0], -half[1], spacing)
+        m, a, b = vehicle.mass, vehicle.face_length, vehicle.face_width
+        block = (m * (b * b + height**2) / 12, m * (a * a + height**2) / 12, m * (a * a + b * b) / 12)
+        inertia = MassProperties(mass=m, centre_of_mass=(0.0, 0.0, 0.5 * height), inertia=block)
+        return (Body(name="striker", inertia=inertia, surfaces=(("face", face),)),)
+
+    def sampled(shapes: tuple[Shape, ...]) -> list[tuple[str, SurfacePoints]]:
+        return [(shape.name, sample(shape, spacing)) for shape in shapes]
+
+    def walls(carrier: str) -> list[tuple[str, SurfacePoints]]:
+        return [
+            (disc.name, sample(disc, spacing))
+            for wheel in vehicle.wheels
+            if wheel.carrier == carrier
+            for disc in side_walls(wheel)
+        ]
+
+    found = [
+        Body(
+            name="chassis",
+            inertia=chassis_of(vehicle),
+            surfaces=tuple(sampled(vehicle.outline) + walls("chassis")),
+        )
+    ]
+    if vehicle.front_axle is not None:
+        found.append(Body(name="front_axle", inertia=vehicle.front_axle.body, surfaces=tuple(walls("front_axle"))))
+    if vehicle.rops is not None:
+        found.append(Body(name="rops", inertia=vehicle.rops.body, surfaces=tuple(sampled(vehicle.rops.members))))
+    return tuple(found)
+
+
+def side_walls(wheel: Wheel) -> tuple[Disc, Disc]:
+    """Both side walls of a tyre, within the radius that does not bend away; the tread's edges are the tyre's own."""
+    x, y, z = wheel.centre
+    half, radius = 0.5 * wheel.tyre.width, wheel.tyre.side_wall * wheel.tyre.radius
+
+    def side(word: str, sign: float) -> Disc:
+        name = f"{wheel.name}_{word}_wall"
+        return Disc(name=name, centre=(x, y + sign * half, z), normal=(0.0, sign, 0.0), radius=radius)
+
+    return side("left", 1.0), side("right", -1.0)
+
+
+def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
+    """All tables of a scenario, memory empty, poses not yet set."""
+    vehicle, ground = scenario.vehicle, scenario.ground
+    row = {body.name: b for b, body in enumerate(bodies)}
+    nb = len(bodies)
+    mass = np.zeros((6 * nb, 6 * nb))
+    for b, body in enumerate(bodies):
+        mass[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = body.inertia.mass * np.eye(3)
+        mass[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = body.tensor
+    points, members_f, members_i, owner = [], [], [], []
+    start = 0
+    for b, body in enumerate(bodies):
+        for _, surface in body.surfaces:
+            r = surface.position - body.centre
+            middle = 0.5 * (r.min(axis=0) + r.max(axis=0))
+            members_f.append([*middle, float(np.linalg.norm(r - middle, axis=1).max()) + 1e-6])
+            members_i.append([b, start, start + len(r)])
+            points.append((r, surface.normal, surface.area))
+            owner += [b] * len(r)
+            start += len(r)
+    wheels = vehicle.wheels if isinstance(vehicle, Vehicle) else ()
+    wheel_f = np.zeros((len(wheels), c.WHEEL_COLUMNS))
+    for w, wheel in enumerate(wheels):
+        tyre = wheel.tyre
+        centre = np.array(wheel.centre) - bodies[row[wheel.carrier]].centre
+        wheel_f[w] = [
+            *centre,
+            *(0.0, 1.0, 0.0),
+            tyre.radius,
+            0.5 * tyre.width,
+            tyre.crown,
+            tyre.vertical_stiffness,
+            tyre.lateral_stiffness,
+            tyre.vertical_damping,
+            tyre.friction,
+        ]
+    mount_f, mount_i = _mounts(vehicle, bodies, row)
+    joint_i, joint_f, axle_f, axle_i = _joints(vehicle, bodies, row)
+    n = normal(ground.surface)
+    nx, ny = ground.elements.count
+    elements = ground.elements
+    law: GroundLaw = ground.law
+    number = start
+    capacity = 2 * number + 64
+    hidden = HIDDEN + law.hidden
+    return Tables(
+        mass=mass,
+        inverse=np.linalg.inv(mass),
+        joint_i=joint_i,
+        joint_f=joint_f,
+        point_r=np.ascontiguousarray(np.concatenate([p[0] for p in points] or [np.zeros((0, 3))])),
+        point_n=np.ascontiguousarray(np.concatenate([p[1] for p in points] or [np.zeros((0, 3))])),
+        point_a=np.concatenate([p[2] for p in points] or [np.zeros(0)]),
+        point_body=np.array(owner, dtype=np.int64),
+        member_f=np.array(members_f).reshape(-1, 4),
+        member_i=np.array(members_i, dtype=np.int64).reshape(-1, 3),
+        wheel_f=wheel_f,
+        wheel_i=np.array([row[w.carrier] for w in wheels], dtype=np.int64),
+        mount_f=mount_f,
+        mount_i=mount_i,
+        axle_f=axle_f,
+        axle_i=axle_i,
+        law=np.array(
+            [
+                int(law.plastic),
+                int(law.unloads_at_rest_stiffness),
+                0,
+                law.force.address,
+                law.advance.address if law.advance is not None else 0,
+                law.begin.address if law.begin is not None else 0,
+            ],
+            dtype=np.int64,
+        ),
+        p=law.p,
+        soil=_soil(ground),
+        domain=law.domain.vector,
+        plane=np.array([*n, 0.0]),
+        grid_f=np.array(
+            [
+                elements.centre[0] - 0.5 * nx * elements.spacing[0],
+                elements.centre[1] - 0.5 * ny * elements.spacing[1],
+                *elements.spacing,
+            ]
+        ),
+        grid_i=np.array([nx, ny], dtype=np.int64),
+        slot_of=np.full(nx * ny, -1, dtype=np.int32),
+        memory=np.zeros((capacity, COLUMNS)),
+        state=np.zeros((capacity, STATE_COLUMNS), dtype=np.int64),
+        s=np.zeros((capacity, hidden)),
+        active=np.zeros(capacity, dtype=np.int64),
+        trial=np.zeros((capacity, c.TRIAL_COLUMNS)),
+        found=np.zeros((capacity, 3)),
+        touched=np.zeros(number + 1, dtype=np.int64),
+        candidate_i=np.zeros((number + 1, 2), dtype=np.int64),
+        candidate_f=np.zeros(number + 1),
+        wheel_memory=np.zeros((len(wheels), c.EDGE_COLUMNS)),
+        mount_memory=np.zeros((len(mount_f), c.SET_COLUMNS)),
+        axle_memory=np.zeros(c.AXLE_MEMORY),
+        pose=np.zeros((nb, c.POSE_COLUMNS)),
+        counts=np.zeros(c.COUNTS, dtype=np.int64),
+        work=np.zeros(c.WORKS),
+        resultant=np.zeros((nb, c.RESULTANT_COLUMNS)),
+        event=np.zeros((number + 256, c.EVENT_COLUMNS)),
+    )
+
+
+def grown(t: Tables) -> Tables:
+    """The same tables with room for as many new elements as there are points, or `t` itself if there is room."""
+    capacity, need = len(t.memory), int(t.counts[c.SLOTS]) + len(t.point_a) + 1
+    if need <= capacity:
+        return t
+    more = 2 * need
+
+    def longer(a: NDArray[np.generic]) -> NDArray[np.generic]:
+        return np.concatenate([a, np.zeros((more - capacity, *a.shape[1:]), dtype=a.dtype)])
+
+    return t._replace(
+        **{name: longer(getattr(t, name)) for name in ("memory", "state", "s", "active", "trial", "found")}
+    )
+
+
+def _soil(ground: Ground) -> Array:
+    rule = {"reference": c.RULE_REFERENCE, "effective": c.RULE_EFFECTIVE, "clamped": c.RULE_CLAMPED}
+    friction = cast(Coulomb, ground.friction)
+    return np.array(
+        [
+            friction.coefficient,
+            friction.stick_displacement,
+            friction.stick_relaxation,
+            ground.co_moving_mass.fraction,
+            rule[ground.striker_mass],
+            REFERENCE_MASS,
+            ground.law.domain.momentum_most,
+        ]
+    )
+
+
+def _mounts(
+    vehicle: Vehicle | Striker, bodies: tuple[Body, ...], row: dict[str, int]
+) -> tuple[Array, NDArray[np.int64]]:
+    if isinstance(vehicle, Striker) or vehicle.rops is None:
+        return np.zeros((0, c.MOUNT_COLUMNS)), np.zeros(2, dtype=np.int64)
+    a, b = row["chassis"], row["rops"]
+    rows = []
+    for mount in vehicle.rops.mounts:
+        place = np.array(mount.position)
+        rows.append(
+            [
+                *(place - bodies[b].centre),
+                *(place - bodies[a].centre),
+                *mount.stiffness,
+                *mount.damping,
+                *mount.rotational_stiffness,
+                *mount.rotational_damping,
+                *(math.inf if f is None else f for f in mount.yield_force),
+            ]
+        )
+    return np.array(rows), np.array([a, b], dtype=np.int64)
+
+
+def _joints(
+    vehicle: Vehicle | Striker, bodies: tuple[Body, ...], row: dict[str, int]
+) -> tuple[NDArray[np.int64], Array, Array, NDArray[np.int64]]:
+    axle_f, axle_i = np.zeros(0), np.zeros(2, dtype=np.int64)
+    if isinstance(vehicle, Striker):
+        return np.array([[c.GUIDE, 0, -1]], dtype=np.int64), np.zeros((1, 6)), axle_f, axle_i
+    if vehicle.front_axle is None:
+        return np.zeros((0, 3), dtype=np.int64), np.zeros((0, 6)), axle_f, axle_i
+    a, b = row["chassis"], row["front_axle"]
+    axle, pivot = vehicle.front_axle, np.array(vehicle.front_axle.pivot)
+    points = np.array([[*(pivot - bodies[a].centre), *(pivot - bodies[b].centre)]])
+    axle_f = np.array([axle.swing, axle.stop_stiffness, axle.stop_damping])
+    return np.array([[c.PIVOT, a, b]], dtype=np.int64), points, axle_f, np.array([a, b], dtype=np.int64)

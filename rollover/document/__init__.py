@@ -1,0 +1,47 @@
+"""The door between files and parameter classes: strict reading, replacing by path, writing back.
+
+It serves any class made with `ground.quantity.parameters`; `rollover.scenario` uses it for scenarios.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rollover.document.check import check
+from rollover.document.include import expand, find, headings, shipped_folder
+from rollover.document.replace import parse_setting, replaced
+from rollover.document.resolved import Leaf, content_hash, dump, paths, to_mapping
+from rollover.document.schema import schema
+from rollover.document.slot import slot_of
+from rollover.document.tree import Node, read
+
+__all__ = [
+    "Leaf",
+    "Node",
+    "check",
+    "content_hash",
+    "dump",
+    "find",
+    "headings",
+    "load",
+    "parse_setting",
+    "paths",
+    "read",
+    "replaced",
+    "schema",
+    "shipped_folder",
+    "slot_of",
+    "to_mapping",
+]
+
+
+def load(path: str | Path, kind: Any) -> Any:
+    """Object of a parameter class (or of an annotation that offers several) from a file. Raises `InputError`."""
+    path = Path(path)
+    slot = slot_of(kind)
+    root = read(path)
+    if not isinstance(root.value, Mapping):
+        raise root.place.fault("", f"not a mapping, got {root.plain!r}; {slot.allowed()} is needed")
+    return check(expand(root, slot, (path.resolve(),)), kind)

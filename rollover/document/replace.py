@@ -1,0 +1,106 @@
+"""One addressing language: values replaced by path, checked exactly like a file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import is_dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from rollover.document.check import check
+from rollover.document.include import expand
+from rollover.document.resolved import paths, to_mapping
+from rollover.document.slot import Slot, slot_of
+from rollover.document.tree import Node, Place, parse, planted
+from rollover.faults import Fault, InputError, nearest
+
+T = TypeVar("T")
+
+
+def replaced(thing: T, changes: Mapping[str, Any], origin: str = "replaced") -> T:
+    """Return `thing` with values replaced: ``{"ground.law.stiffness_scale": 1.2}``. Raises `InputError`.
+
+    Elements of a list are addressed by their name or their place. A value may be a number, text, a list, a
+    mapping, an object of a parameter class or the name of a .yaml file. A new `kind` starts that part afresh:
+    what belonged to the other kind is gone. `origin` stands for the file in messages.
+    """
+    place = Place(file=origin, line=None, folder=Path.cwd())
+    tree = to_mapping(thing)
+    fresh: set[int] = set()
+    # a whole part before what is below it, and a kind before what belongs to it
+    for path in sorted(changes, key=lambda p: (p.count("."), not p.endswith("kind"))):
+        _put(thing, tree, path, changes[path], place, fresh)
+    slot = slot_of(type(thing))
+    result: T = check(expand(planted(tree, place), slot, ()), type(thing))
+    return result
+
+
+def parse_setting(text: str, origin: str = "--set") -> tuple[str, Node]:
+    """Split ``PATH=VALUE``; the value is read as in a file. Raises `InputError`."""
+    path, equals, value = text.partition("=")
+    if not equals or not path.strip() or not value.strip():
+        raise InputError(Fault(file=origin, message=f"not a setting, got {text!r}; PATH=VALUE is needed"))
+    return path.strip(), parse(value, Place(file=origin, line=None, folder=Path.cwd()))
+
+
+def _put(thing: Any, tree: dict[str, Any], path: str, value: Any, place: Place, fresh: set[int]) -> None:
+    *above, last = path.split(".")
+    part: Any = tree
+    slot: Slot | None = slot_of(type(thing))
+    for step in above:
+        if slot and slot.by_key and isinstance(part, dict):
+            fresh.add(id(part.setdefault(step, {})))  # an effect is switched on by naming one of its parameters
+        kind = part.get("kind") if isinstance(part, dict) else None
+        index = _index(part, step) if isinstance(part, list) else None
+        slot = slot and (slot.child(step, kind) if index is None else slot.element(index))
+        part = part.get(step) if isinstance(part, dict) else None if index is None else part[index]
+        if not isinstance(part, (dict, list)):
+            raise _unknown(thing, path, place)
+    bare = _bare(value, path, place)
+    key: Any = _index(part, last) if isinstance(part, list) else last
+    if isinstance(part, list):
+        if key is None:
+            raise _unknown(thing, path, place)
+    elif last == "kind" and "kind" in part:
+        if part["kind"] != (bare.plain if isinstance(bare, Node) else bare):
+            part.clear()
+            fresh.add(id(part))
+    elif last not in part and id(part) not in fresh and not (slot and slot.by_key):
+        raise _unknown(thing, path, place)
+    part[key] = bare
+    if isinstance(bare, dict):
+        fresh.add(id(bare))
+
+
+def _index(elements: list[Any], step: str) -> int | None:
+    for i, element in enumerate(elements):
+        if isinstance(element, dict) and element.get("name") == step:
+            return i
+    return int(step) if step.isdecimal() and int(step) < len(elements) else None
+
+
+def _bare(value: Any, path: str, place: Place) -> Any:
+    if isinstance(value, Node):
+        # text of the command line; a mapping is opened, so that what is below it can be set as well
+        return dict(value.value) if isinstance(value.value, Mapping) else value
+    if is_dataclass(value) and not isinstance(value, type):
+        return to_mapping(value)
+    if isinstance(value, Mapping):
+        return {str(k): _bare(v, f"{path}.{k}", place) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_bare(v, f"{path}.{i}", place) for i, v in enumerate(value)]
+    if isinstance(value, (np.generic, np.ndarray)):
+        return _bare(value.tolist(), path, place)
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    raise place.fault(path, f"not a value of a file, got {type(value).__name__}; a number, text, list or mapping")
+
+
+def _unknown(thing: Any, path: str, place: Place) -> InputError:
+    known = [leaf.path for leaf in paths(thing)]
+    parts = {p.rsplit(".", n)[0] for p in known for n in range(1, p.count(".") + 1)}
+    close = [p for p in nearest(path, [*known, *sorted(parts)], most=4) if p != path][:3]
+    help_ = f"did you mean {' or '.join(map(repr, close))}?" if close else "see `rollover list paths SCENARIO`"
+    return place.fault(path, f"no such path; {help_}")

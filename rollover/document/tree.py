@@ -1,0 +1,201 @@
+"""YAML text to a tree whose every value knows its file and line, and back. The only YAML home."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
+
+from rollover.faults import Fault, InputError
+
+MOST_VALUES = 1_000_000  # a few aliases can stand for any number of values
+_TAG = "tag:yaml.org,2002:"
+
+Scalar = str | int | float | bool | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """Where a value was written: the file as messages name it, and the folder that its includes start from."""
+
+    file: str
+    line: int | None
+    folder: Path
+
+    def fault(self, path: str, message: str) -> InputError:
+        """Say that something is wrong here."""
+        return InputError(Fault(file=self.file, line=self.line, path=path, message=message))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Node:
+    """A value with its place; `key` is the place of the key that it stands under."""
+
+    value: Scalar | Mapping[str, Node] | tuple[Node, ...]
+    place: Place
+    key: Place
+
+    @property
+    def plain(self) -> Any:
+        """The bare value: dicts, lists and scalars."""
+        if isinstance(self.value, Mapping):
+            return {key: child.plain for key, child in self.value.items()}
+        if isinstance(self.value, tuple):
+            return [child.plain for child in self.value]
+        return self.value
+
+    @property
+    def kind(self) -> Scalar:
+        """The scalar under the key `kind`, if there is one."""
+        child = self.value.get("kind") if isinstance(self.value, Mapping) else None
+        return None if child is None or isinstance(child.value, (Mapping, tuple)) else child.value
+
+
+def read(path: Path) -> Node:
+    """Read a file. Raises `InputError`."""
+    start = Place(file=shown(path), line=1, folder=path.parent)
+    try:
+        data = path.read_bytes()
+        text = data.decode("utf-8-sig")
+    except OSError as e:
+        raise replace(start, line=None).fault("", f"cannot be read: {e.strerror}") from None
+    except UnicodeDecodeError as e:
+        line = data.count(b"\n", 0, e.start) + 1
+        raise replace(start, line=line).fault("", f"not UTF-8 text, got byte 0x{data[e.start]:02x}") from None
+    return parse(text, start)
+
+
+def shown(path: Path) -> str:
+    """How messages name a file: relative where it lies below the working folder."""
+    try:
+        return str(path.resolve().relative_to(Path.cwd()))
+    except ValueError:
+        return str(path)
+
+
+def parse(text: str, start: Place) -> Node:
+    """Read YAML 1.2 text; `start` names the file, without a line for text that is not from one. Raises `InputError`."""
+
+    def at(line: int) -> Place:
+        return start if start.line is None else replace(start, line=line + 1)
+
+    try:
+        root = YAML(typ="safe", pure=True).compose(text)
+        if root is None:
+            raise at(0).fault("", "empty, got nothing but comments; a mapping is needed")
+        builder = _Builder(at)
+        node = builder.build(root, at(0), "", ())
+    except MarkedYAMLError as e:
+        mark = e.problem_mark or e.context_mark
+        reason = ", ".join(str(part) for part in (e.context, e.problem) if part)
+        raise at(mark.line if mark else 0).fault("", f"not valid YAML: {reason}") from None
+    except YAMLError as e:  # a character that YAML does not allow
+        line = text.count("\n", 0, getattr(e, "position", 0))
+        reason = getattr(e, "reason", str(e).splitlines()[0])
+        raise at(line).fault("", f"not valid YAML: {reason}") from None
+    except RecursionError:
+        raise at(0).fault("", "nested too deeply") from None
+    if builder.faults:
+        raise InputError(*builder.faults)
+    return node
+
+
+class _Builder:
+    def __init__(self, at: Any) -> None:
+        self.at = at
+        self.faults: list[Fault] = []
+        self.count = 0
+        self.scalars = YAML(typ="safe", pure=True).constructor
+
+    def build(self, node: Any, key: Place, path: str, inside: tuple[int, ...]) -> Node:
+        place: Place = self.at(node.start_mark.line)
+        self.count += 1
+        if self.count > MOST_VALUES:
+            raise place.fault(path, f"too large, got more than {MOST_VALUES} values")
+        if id(node) in inside:
+            raise place.fault(path, "contains itself through an alias")
+        inside = (*inside, id(node))
+        if isinstance(node, MappingNode):
+            return Node(value=self._mapping(node, path, inside), place=place, key=key)
+        if isinstance(node, SequenceNode):
+            children = [
+                self.build(child, self.at(child.start_mark.line), _join(path, str(i)), inside)
+                for i, child in enumerate(node.value)
+            ]
+            return Node(value=tuple(children), place=place, key=key)
+        if not node.value and not node.style:
+            place = key  # nothing written: the mark stands wherever the next token is
+        return Node(value=self._scalar(node, place, path), place=place, key=key)
+
+    def _mapping(self, node: Any, path: str, inside: tuple[int, ...]) -> dict[str, Node]:
+        found: dict[str, Node] = {}
+        for key_node, child in node.value:
+            place = self.at(key_node.start_mark.line)
+            if not isinstance(key_node, ScalarNode):
+                raise place.fault(path, "a key is not text, got a list or mapping; keys are plain words")
+            key = key_node.value
+            below = _join(path, key)
+            if key in found:
+                first = found[key].key.line
+                self._fault(place, below, f"given twice, first on line {first}; once is allowed")
+            found[key] = self.build(child, place, below, inside)
+        return found
+
+    def _scalar(self, node: Any, place: Place, path: str) -> Scalar:
+        tag = str(node.tag)
+        name = tag.removeprefix(_TAG)
+        if name in ("int", "float", "bool", "null"):
+            try:
+                value: Scalar = self.scalars.construct_object(node, deep=True)
+            except ValueError:
+                return str(node.value)
+            return value
+        if name not in ("str", "timestamp", "merge", "value"):
+            self._fault(place, path, f"unknown tag, got {tag}; plain values are allowed")
+        return str(node.value)
+
+    def _fault(self, place: Place, path: str, message: str) -> None:
+        self.faults.append(Fault(file=place.file, line=place.line, path=path, message=message))
+
+
+def _join(path: str, key: str) -> str:
+    return f"{path}.{key}" if path else key
+
+
+def planted(value: Any, place: Place) -> Node:
+    """A tree of bare values that all stand at one place; `Node`s among them keep their own."""
+    if isinstance(value, Node):
+        return value
+    if isinstance(value, Mapping):
+        return Node(value={str(k): planted(v, place) for k, v in value.items()}, place=place, key=place)
+    if isinstance(value, (list, tuple)):
+        return Node(value=tuple(planted(v, place) for v in value), place=place, key=place)
+    return Node(value=value, place=place, key=place)
+
+
+def write(mapping: Mapping[str, Any]) -> str:
+    """YAML 1.2 text of a tree of bare values; lists of scalars stand on one line, floats keep every bit."""
+    yaml = YAML(typ="rt", pure=True)
+    yaml.width = 120
+    yaml.indent(mapping=2, sequence=4, offset=2)
+    stream = io.StringIO()
+    yaml.dump(_styled(mapping), stream)
+    return stream.getvalue()
+
+
+def _styled(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return CommentedMap({key: _styled(child) for key, child in value.items()})
+    if isinstance(value, (list, tuple)):
+        styled = CommentedSeq(_styled(child) for child in value)
+        if not any(isinstance(child, (Mapping, list, tuple)) for child in value):
+            styled.fa.set_flow_style()
+        return styled
+    return value

@@ -1,0 +1,48 @@
+"""What is wrong with an input, one line for each fault."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fault:
+    """``file:line: path: what is wrong, got X; what is allowed``; parts that do not apply are left out."""
+
+    message: str
+    file: str | None = None
+    line: int | None = None
+    path: str = ""
+
+    def __str__(self) -> str:
+        where = self.file if self.line is None else f"{self.file}:{self.line}"
+        return ": ".join(part for part in (where, self.path, self.message) if part)
+
+
+class InputError(ValueError):
+    """The input is wrong: all faults that were found, each worth a line."""
+
+    def __init__(self, *faults: Fault) -> None:
+        super().__init__("\n".join(map(str, faults)))
+        self.faults = list(faults)
+
+    def __reduce__(self) -> tuple[type[InputError], tuple[Fault, ...]]:
+        return type(self), tuple(self.faults)
+
+
+def nearest(word: str, known: Iterable[str], most: int = 1) -> list[str]:
+    """Which of the `known` words may have been meant, the likeliest first."""
+    by_lower = {k.lower(): k for k in known}
+    return [by_lower[m] for m in difflib.get_close_matches(word.lower(), by_lower, n=most, cutoff=0.6)]
+
+
+def hint(word: str, known: Iterable[str], most_listed: int = 16) -> str:
+    """What to try instead of an unknown word: the nearest match, and all that is known where that is little."""
+    known = list(known)
+    close = nearest(word, known)
+    parts = [f"did you mean {close[0]!r}?"] if close else []
+    if len(known) <= most_listed or not close:
+        parts.append(f"allowed: {', '.join(known) or 'none'}")
+    return " ".join(parts)

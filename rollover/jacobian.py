@@ -1,0 +1,164 @@
+"""Compiled: what the forces' stiffness and damping do to Newton's matrix: sum of (f k + f' c) J' J.
+
+A symmetric approximation without the terms of turning frames: it decides how fast the iteration converges, never
+where to.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ground.compiled import call_force, compiled
+from ground.kernel import ADDRESS_FORCE, AREA, BODY, LINE_C, LINE_K, LINE_Z, NORMAL, OWNER_R, PLASTIC
+from ground.law import REFERENCE_AREA
+from rollover.forces import TYRE_RELAXATION, cross, to_body, tyre_stiffness
+from rollover.tables import (
+    A_C,
+    A_K,
+    ACTIVE,
+    E_FORCE_NOW,
+    E_POINT,
+    FN,
+    M_TORQUE_NOW,
+    MU,
+    RELAXATION,
+    ROT,
+    STICK,
+    T_C,
+    T_CR,
+    T_K,
+    T_KR,
+    T_ROPS,
+    W_C,
+    W_KY,
+    W_KZ,
+    ZDOT,
+    X,
+    Z,
+)
+
+
+@compiled
+def direction_row(row: Any, r: Any, d: Any, J: Any) -> None:
+    """J (6,) with speed of the point r of a body along the world direction d = J [v, omega]."""
+    local, arm = np.empty(3), np.empty(3)
+    to_body(row, d, local)
+    cross(r, local, arm)
+    for k in range(3):
+        J[k], J[3 + k] = d[k], arm[k]
+
+
+@compiled
+def add_block(K: Any, factor: float, a: Any, at: int, b: Any, bt: int) -> None:
+    """K += factor a b' on the block at rows `at`, columns `bt`."""
+    for j in range(6):
+        for k in range(6):
+            K[at + j, bt + k] += factor * a[j] * b[k]
+
+
+@compiled
+def add_point(K: Any, row: Any, b: int, r: Any, n: Any, normal: float, tangential: float) -> None:
+    """A spring `normal` along n and `tangential` across it at the point r of body b."""
+    J, d = np.empty(6), np.zeros(3)
+    direction_row(row, r, n, J)
+    add_block(K, normal - tangential, J, 6 * b, J, 6 * b)
+    if tangential > 0.0:
+        for k in range(3):
+            d[0], d[1], d[2] = 0.0, 0.0, 0.0
+            d[k] = 1.0
+            direction_row(row, r, d, J)
+            add_block(K, tangential, J, 6 * b, J, 6 * b)
+
+
+@compiled
+def add_pair(K: Any, factor: float, a: Any, at: int, b: Any, bt: int) -> None:
+    """A spring between two bodies: K += factor (a - b)(a - b)'."""
+    add_block(K, factor, a, at, a, at)
+    add_block(K, factor, b, bt, b, bt)
+    add_block(K, -factor, a, at, b, bt)
+    add_block(K, -factor, b, bt, a, at)
+
+
+@compiled
+def stiffness(t: Any, f: float, fd: float, K: Any) -> None:
+    """K (6 nb, 6 nb) = f (-dQ/dq) + fd (-dQ/dq') at the state that was tried last."""
+    for i in range(K.shape[0]):
+        for k in range(K.shape[1]):
+            K[i, k] = 0.0
+    n = t.plane[:3]
+    for a in range(t.counts[ACTIVE]):
+        i = t.active[a]
+        m, trial = t.memory[i], t.trial[i]
+        z, v = trial[Z], trial[ZDOT]
+        if trial[FN] <= 0.0:
+            continue
+        area = m[AREA] / REFERENCE_AREA
+        if t.law[PLASTIC] != 0 and z < m[LINE_Z]:
+            normal = area * (f * m[LINE_K] + fd * m[LINE_C])
+        else:
+            s, force = t.s[i], t.law[ADDRESS_FORCE]
+            here = call_force(force, (t.p.ctypes, s.ctypes, z, v))
+            deeper = call_force(force, (t.p.ctypes, s.ctypes, z + 1e-6, v))
+            faster = call_force(force, (t.p.ctypes, s.ctypes, z, v + 1e-6))
+            normal = area * (f * (deeper - here) + fd * (faster - here)) * 1e6
+        stick = t.soil[MU] * trial[FN] / t.soil[STICK]
+        b = t.state[i, BODY]
+        add_point(
+            K,
+            t.pose[b],
+            b,
+            m[OWNER_R : OWNER_R + 3],
+            m[NORMAL : NORMAL + 3],
+            normal,
+            stick * (f + fd * t.soil[RELAXATION]),
+        )
+    for w in range(t.wheel_i.size):
+        g, c = t.wheel_memory[w], t.wheel_f[w]
+        if g[E_FORCE_NOW] > 0.0:
+            b = t.wheel_i[w]
+            k, _ = tyre_stiffness(c, 0.0)
+            normal = f * k + fd * c[W_C] * k / c[W_KZ]
+            add_point(K, t.pose[b], b, g[E_POINT : E_POINT + 3], n, normal, c[W_KY] * (f + fd * TYRE_RELAXATION))
+    add_mounts(t, f, fd, K)
+    if t.axle_f.size > 0 and t.axle_memory[M_TORQUE_NOW] != 0.0:
+        c, b = t.axle_i[0], t.axle_i[1]
+        add_pair(K, f * t.axle_f[A_K] + fd * t.axle_f[A_C], spin_row(t, c, c, 0), 6 * c, spin_row(t, c, b, 0), 6 * b)
+
+
+@compiled
+def spin_row(t: Any, c: int, b: int, k: int) -> Any:
+    """Row (6,) of the angular velocity of body b about axis k of body c."""
+    J, axis, local = np.zeros(6), np.empty(3), np.empty(3)
+    for m in range(3):
+        axis[m] = t.pose[c, ROT + 3 * m + k]
+    to_body(t.pose[b], axis, local)
+    for m in range(3):
+        J[3 + m] = local[m]
+    return J
+
+
+@compiled
+def add_mounts(t: Any, f: float, fd: float, K: Any) -> None:
+    """Springs of the ROPS' mounts along and about the chassis axes."""
+    if t.mount_f.shape[0] == 0:
+        return
+    c, b = t.mount_i[0], t.mount_i[1]
+    chassis, rops = t.pose[c], t.pose[b]
+    J, L, axis, arm, local = np.empty(6), np.empty(6), np.empty(3), np.empty(3), np.empty(3)
+    for i in range(t.mount_f.shape[0]):
+        g = t.mount_f[i]
+        for k in range(3):  # where the mounting point of the ROPS stands, in chassis axes
+            arm[k] = rops[X + k] - chassis[X + k]
+            for m in range(3):
+                arm[k] += rops[ROT + 3 * k + m] * g[T_ROPS + m]
+        to_body(chassis, arm, local)
+        for k in range(3):
+            for m in range(3):
+                axis[m] = chassis[ROT + 3 * m + k]
+            direction_row(rops, g[T_ROPS : T_ROPS + 3], axis, J)
+            direction_row(chassis, local, axis, L)
+            add_pair(K, f * g[T_K + k] + fd * g[T_C + k], J, 6 * b, L, 6 * c)
+            factor = f * g[T_KR + k] + fd * g[T_CR + k]
+            add_pair(K, factor, spin_row(t, c, b, k), 6 * b, spin_row(t, c, c, k), 6 * c)

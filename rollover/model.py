@@ -1,0 +1,177 @@
+"""Scenario -> Exudyn system: bodies, pivot or guide, gravity; everything else enters as one generalised force.
+
+The kernels' forces and the co-moving masses of the elements reach the solver through one ObjectGenericODE2 that
+shares the bodies' nodes. The generalised-alpha solver evaluates them several times within a step; the contact set
+and all memory are frozen meanwhile and move on once, after the step.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rollover.contact import Body
+from rollover.forces import added_mass, generalised_forces
+from rollover.jacobian import stiffness
+from rollover.placement import Start
+from rollover.tables import ACTIVE, PIVOT, Handle, Tables
+
+os.environ.setdefault("EXUDYN_NO_USER_SETTINGS", "1")  # a user's settings file must not change results
+
+import exudyn as exu
+from exudyn.itemInterface import (
+    GenericJoint,
+    LoadMassProportional,
+    MarkerBodyMass,
+    MarkerBodyRigid,
+    NodeRigidBodyRotVecLG,
+    ObjectGenericODE2,
+    ObjectGround,
+    ObjectRigidBody,
+)
+
+exu.config.printToConsole = False
+exu.config.suppressWarnings = True
+
+
+@dataclass
+class Live:
+    """What the callbacks share; both are replaced when the memory grows."""
+
+    tables: Tables
+    handle: Handle
+    error: BaseException | None = None
+
+
+def solve(
+    *,
+    bodies: tuple[Body, ...],
+    live: Live,
+    start: Start,
+    gravity: float,
+    step: float,
+    steps: int,
+    spectral_radius: float,
+    after_step: Callable[[float, Any, Any, Any], bool],
+) -> str:
+    """Run the time loop; returns "" or why the solver gave up.
+
+    `after_step(time, q, qd, qdd)` is called once for the start and after each accepted step with views on the
+    state, which it may write; False ends the run. Its exceptions are raised here.
+    """
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    nodes, handles = [], []
+    for b, body in enumerate(bodies):
+        node = mbs.AddNode(
+            NodeRigidBodyRotVecLG(
+                referenceCoordinates=[0.0] * 6,
+                initialCoordinates=start.q[6 * b : 6 * b + 6].tolist(),
+                initialVelocities=start.qd[6 * b : 6 * b + 6].tolist(),
+            )
+        )
+        J = body.tensor
+        inertia = [J[0, 0], J[1, 1], J[2, 2], J[1, 2], J[0, 2], J[0, 1]]
+        handle = mbs.AddObject(ObjectRigidBody(mass=body.inertia.mass, inertia=inertia, nodeNumber=node))
+        marker = mbs.AddMarker(MarkerBodyMass(bodyNumber=handle))
+        mbs.AddLoad(LoadMassProportional(markerNumber=marker, loadVector=[0.0, 0.0, -gravity]))
+        nodes.append(node)
+        handles.append(handle)
+    _add_joints(mbs, live.tables, handles, start)
+
+    n = 6 * len(bodies)
+    Q, M, K = np.zeros(n), np.zeros((n, n)), np.zeros((n, n))
+    added = exu.MatrixContainer()
+    added.SetWithDenseMatrix(M, useDenseMatrix=True)
+    newton = exu.MatrixContainer()
+    newton.SetWithDenseMatrix(M, useDenseMatrix=True)
+    nothing = exu.MatrixContainer()
+    nothing.SetWithDenseMatrix(M, useDenseMatrix=True)
+    views: list[Any] = []
+
+    def force(_mbs: Any, _t: float, _item: int, _q: Any, _qd: Any) -> list[float]:
+        generalised_forces(live.handle, views[0], views[1], Q)
+        return Q.tolist()
+
+    def mass(_mbs: Any, _t: float, _item: int, _q: Any, _qd: Any) -> Any:
+        if live.tables.counts[ACTIVE] == 0:
+            return nothing
+        added_mass(live.handle, views[0], M)
+        added.SetWithDenseMatrix(M, useDenseMatrix=True)
+        return added
+
+    def jacobian(_mbs: Any, _t: float, _item: int, _q: Any, _qd: Any, fq: float, fqd: float) -> Any:
+        stiffness(live.handle, fq, fqd, K)
+        newton.SetWithDenseMatrix(K, useDenseMatrix=True)
+        return newton
+
+    def after(_mbs: Any, t: float) -> bool:
+        try:
+            return after_step(t, views[0], views[1], views[2])
+        except BaseException as error:
+            live.error = error
+            return False
+
+    mbs.AddObject(
+        ObjectGenericODE2(
+            nodeNumbers=nodes,
+            massMatrix=np.zeros((n, n)),
+            forceUserFunction=force,
+            massMatrixUserFunction=mass,
+            jacobianUserFunction=jacobian,
+        )
+    )
+    mbs.SetPostStepUserFunction(after)
+    mbs.Assemble()
+    data = mbs.systemData
+    # views, fetched once: their addresses stay; the joints have no coordinates of this kind
+    views += [data.GetODE2Coordinates(copy=False), data.GetODE2Coordinates_t(copy=False)]
+    views += [data.GetODE2Coordinates_tt(copy=False)]
+
+    settings = exu.SimulationSettings()
+    settings.timeIntegration.numberOfSteps = steps
+    settings.timeIntegration.startTime = 0.0
+    settings.timeIntegration.endTime = steps * step
+    settings.timeIntegration.verboseMode = 0
+    settings.timeIntegration.newton.relativeTolerance = 1e-5
+    settings.timeIntegration.newton.absoluteTolerance = 1e-5
+    settings.timeIntegration.generalizedAlpha.spectralRadius = spectral_radius
+    settings.solution.file.write = False
+    failure = ""
+    try:
+        mbs.SolveDynamic(
+            settings, solverType=exu.DynamicSolverType.GeneralizedAlpha, showHints=False, storeSolver=False
+        )
+    except ValueError as error:  # exudyn's solver errors are ValueErrors
+        failure = " ".join(str(error).split())[:300]
+    finally:
+        # callbacks hold mbs and mbs holds them: without this every run would leak
+        mbs.SetPostStepUserFunction(0)
+        views.clear()
+        mbs.Reset()
+        container.Reset()
+    if live.error is not None:
+        raise live.error
+    return failure
+
+
+def _add_joints(mbs: Any, t: Tables, handles: list[int], start: Start) -> None:
+    for j in range(len(t.joint_i)):
+        kind, a, b = (int(k) for k in t.joint_i[j])
+        if kind == PIVOT:
+            markers = [
+                mbs.AddMarker(MarkerBodyRigid(bodyNumber=handles[body], localPosition=t.joint_f[j, k : k + 3].tolist()))
+                for body, k in ((a, 0), (b, 3))
+            ]
+            mbs.AddObject(GenericJoint(markerNumbers=markers, constrainedAxes=[1, 1, 1, 0, 1, 1]))
+        else:
+            ground = mbs.AddObject(ObjectGround(referencePosition=start.q[6 * a : 6 * a + 3].tolist()))
+            markers = [
+                mbs.AddMarker(MarkerBodyRigid(bodyNumber=body, localPosition=[0.0, 0.0, 0.0]))
+                for body in (ground, handles[a])
+            ]
+            mbs.AddObject(GenericJoint(markerNumbers=markers, constrainedAxes=[1, 1, 0, 1, 1, 1]))

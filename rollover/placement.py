@@ -1,0 +1,95 @@
+"""Where and how fast the bodies are when a run begins, from the scenario's initiation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ground.surface import Surface, height
+from rollover.contact import Body
+from rollover.equilibrium import ROLL, Equilibrium, tread_point
+from rollover.frames import from_angles, rotation_vector
+from rollover.initiation import Drop, Standing, TipOver
+from rollover.scenario import Scenario
+from rollover.tables import Tables
+from rollover.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """Generalised coordinates and velocities, (6 nb,) each, and the time at which they hold."""
+
+    q: Array
+    qd: Array
+    time: float
+
+
+def place(scenario: Scenario, bodies: tuple[Body, ...], t: Tables) -> Start:
+    """Begin the scenario. Raises ``ValueError`` where no such start exists, with the reason."""
+    initiation = scenario.initiation
+    if isinstance(initiation, Drop):
+        return _dropped(initiation, scenario, bodies, t)
+    assert isinstance(scenario.vehicle, Vehicle)
+    if isinstance(initiation, TipOver):
+        return _tipped(initiation, scenario, scenario.vehicle, bodies, t)
+    return _standing(initiation, scenario, bodies, t)
+
+
+def _dropped(drop: Drop, scenario: Scenario, bodies: tuple[Body, ...], t: Tables) -> Start:
+    R = from_angles(math.radians(drop.roll_deg), math.radians(drop.pitch_deg), math.radians(drop.yaw_deg))
+    q = _rigid(bodies, np.zeros(3), R)
+    lowest = _deepest(bodies, t, R, scenario.ground.surface)
+    # first contact at t = 0, a hair's breadth below the surface so that it is found there
+    rise = lowest + drop.speed * drop.lead_time - 0.5 * scenario.gravity * drop.lead_time**2 - 1e-9
+    q[2::6] += rise
+    qd = np.zeros(6 * len(bodies))
+    qd[2::6] = -(drop.speed - scenario.gravity * drop.lead_time)
+    return Start(q=q, qd=qd, time=-drop.lead_time)
+
+
+def _deepest(bodies: tuple[Body, ...], t: Tables, R: Array, surface: Surface) -> float:
+    """How far the lowest contact point or tread edge lies below the surface, along z, with the origin at z = 0."""
+    depth = -math.inf
+    for body in bodies:
+        for _, points in body.surfaces:
+            x = points.position @ R.T
+            depth = max(depth, float(np.max(height(surface, x[:, 0], x[:, 1]) - x[:, 2])))
+    for w in range(len(t.wheel_i)):
+        x = tread_point(t, bodies, w, R)
+        depth = max(depth, float(height(surface, x[0], x[1]) - x[2]))
+    return depth
+
+
+def _rigid(bodies: tuple[Body, ...], origin: Array, R: Array) -> Array:
+    """Coordinates of all bodies moved as one: vehicle origin and R_WV."""
+    return np.concatenate([np.concatenate([origin + R @ body.centre, rotation_vector(R)]) for body in bodies])
+
+
+def _standing(standing: Standing, scenario: Scenario, bodies: tuple[Body, ...], t: Tables) -> Start:
+    statics = Equilibrium(bodies, t, math.radians(standing.heading_deg), scenario.gravity)
+    u = statics.solve(statics.guess()) if len(t.wheel_i) else None
+    if u is None:
+        raise ValueError(
+            "initiation: the vehicle does not stand on this surface, got no static equilibrium; 'drop' or 'tip-over'"
+        )
+    return Start(q=statics.coordinates(u), qd=statics.rates(u, standing.roll_rate), time=0.0)
+
+
+def _tipped(tip: TipOver, scenario: Scenario, vehicle: Vehicle, bodies: tuple[Body, ...], t: Tables) -> Start:
+    if not vehicle.wheels:
+        raise ValueError("initiation.kind: needs a vehicle with wheels, got 'tip-over' without; 'drop' suits it")
+    sign = -1.0 if tip.side == "left" else 1.0  # roll > 0 lowers the right side
+    statics = Equilibrium(bodies, t, math.radians(tip.heading_deg), scenario.gravity)
+    swing = vehicle.front_axle.swing if vehicle.front_axle is not None else 0.0
+    u = statics.balance(sign, swing)
+    if u is not None and tip.excess_deg > 0.0:
+        u[ROLL] += sign * math.radians(tip.excess_deg)
+        u = statics.solve(u, fixed=(ROLL,))
+    if u is None:
+        raise ValueError("initiation: no balance on two wheels was found on this surface; change heading or side")
+    return Start(q=statics.coordinates(u), qd=statics.rates(u, sign * tip.roll_rate), time=0.0)

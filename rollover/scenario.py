@@ -1,0 +1,141 @@
+"""Scenario: everything one run needs, from a YAML file or from Python, checked alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from ground.array import CoMovingMass, Elements
+from ground.friction import Coulomb
+from ground.kinds import ByKey, ByKind
+from ground.law import GroundLaw, laws
+from ground.quantity import Quantity, parameters
+from ground.surface import Plane, Surface
+from rollover import document
+from rollover.effects import effects
+from rollover.initiation import Drop, Initiation, Standing, TipOver
+from rollover.vehicle import Striker, Vehicle
+
+AnyVehicle = Annotated[Vehicle | Striker, ByKind()]
+AnyLaw = Annotated[GroundLaw, ByKind(laws)]  # whatever law stands in the folder `ground`
+
+
+@parameters
+class Ground:
+    """Surface, array of impact elements and their laws."""
+
+    surface: Surface = Plane()
+    elements: Elements
+    law: AnyLaw
+    friction: Coulomb = Coulomb()
+    co_moving_mass: CoMovingMass = CoMovingMass()
+    striker_mass: Annotated[
+        Literal["reference", "effective", "clamped"],
+        "m_s in the law: the drop test's 132 kg per reference area, the element's share of the effective mass, "
+        "or the latter with m v clamped to the calibrated momentum",
+    ] = "reference"
+
+
+@parameters
+class Simulation:
+    """Time, step and solver."""
+
+    duration: Annotated[float, Quantity("s", "simulated after t = 0", above=0, most=120)]
+    step: Annotated[float, Quantity("s", "of the solver", above=0, most=0.01)] = 0.001
+    output_step: Annotated[float, Quantity("s", "between rows of the channels; a multiple of step", above=0)] = 0.001
+    spectral_radius: Annotated[float, Quantity("1", "of generalized-alpha at infinity", least=0, most=1)] = 0.7
+    stop_at_rest: Annotated[bool, "end early once everything has come to rest"] = False
+
+    def validate(self) -> None:
+        """Refuse rows that fall between two steps, and a run without any."""
+        steps = self.output_step / self.step
+        if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:
+            raise ValueError(
+                f"output_step: not a multiple of step ({self.step!r} s), got {self.output_step!r}; "
+                f"such as {max(1, round(steps)) * self.step:.12g}"
+            )
+        if self.duration < self.output_step:
+            raise ValueError(f"duration: less than output_step ({self.output_step!r} s), got {self.duration!r}; longer")
+
+
+@parameters
+class Loads:
+    """How loads are reported."""
+
+    cfc: Annotated[Literal[60, 180, 600, 1000], "filter class of the filtered peaks, SAE J211"] = 60
+
+
+@parameters
+class Scenario:
+    """One drop or rollover."""
+
+    format: Literal["rollover-scenario/1"] = "rollover-scenario/1"
+    title: Annotated[str, "one line that says what happens"]
+    vehicle: AnyVehicle
+    ground: Ground
+    initiation: Initiation
+    simulation: Simulation
+    loads: Loads = Loads()
+    gravity: Annotated[float, Quantity("m/s2", "acceleration of free fall, along -z", least=0, most=30)] = 9.81
+    effects: Annotated[
+        Mapping[str, Any], ByKey("effect", effects), "terms beyond the basic model, by effect id, with their parameters"
+    ] = field(default_factory=dict, hash=False)
+
+    def validate(self) -> None:
+        """Refuse parts that do not fit together."""
+        for name, parameters_ in self.effects.items():
+            if name not in effects():
+                raise ValueError(f"effects: unknown effect, got {name!r}; allowed: {', '.join(effects()) or 'none'}")
+            if not isinstance(parameters_, effects()[name]):
+                raise ValueError(f"effects: not parameters of {name}, got {parameters_!r}; {effects()[name].__name__}")
+        _check_start(self.vehicle, self.initiation)
+
+    def replaced(self, changes: Mapping[str, Any], *, origin: str = "replaced") -> Scenario:
+        """Return this scenario with values replaced by path, checked exactly like a file.
+
+        ``{"ground.law.stiffness_scale": 1.2, "vehicle.wheels.rear_left.tyre.friction": 0.6}``; elements of a
+        list by name or place, a new `kind` starts its part afresh. Raises `InputError`.
+        """
+        return document.replaced(self, changes, origin)
+
+
+def _check_start(vehicle: Vehicle | Striker, start: Drop | TipOver | Standing) -> None:
+    if isinstance(vehicle, Striker):
+        if not isinstance(start, Drop):
+            raise ValueError(f"initiation.kind: a striker cannot begin so, got {start.kind!r}; 'drop' is allowed")
+        for name in ("roll_deg", "pitch_deg", "yaw_deg"):
+            if getattr(start, name) != 0.0:
+                raise ValueError(
+                    f"initiation.{name}: a striker keeps level on its guide, got {getattr(start, name)!r}; 0 is allowed"
+                )
+        return
+    sides = [w.centre[1] for w in vehicle.wheels]
+    left, right = sum(y > 0.0 for y in sides), sum(y < 0.0 for y in sides)
+    if isinstance(start, TipOver):
+        count = left if start.side == "left" else right
+        if count < 2 or left + right <= count:
+            raise ValueError(
+                f"initiation.side: nothing to tip over, got {count} wheels on the {start.side} "
+                f"and {left + right - count} on the other side; at least 2 and 1 are needed"
+            )
+    elif isinstance(start, Standing):
+        if len(sides) < 3 or not left or not right:
+            raise ValueError(
+                f"initiation.kind: 'standing' needs at least 3 wheels on both sides, got {left} left and {right} right"
+            )
+    elif not (vehicle.outline or vehicle.wheels or (vehicle.rops and vehicle.rops.members)):
+        raise ValueError("vehicle.outline: nothing can touch the ground, got no outline, wheels or ROPS members")
+
+
+def load(path: str | Path) -> Scenario:
+    """Scenario from a file or, by its name, one of the shipped ones. Raises `InputError`."""
+    scenario: Scenario = document.load(document.find(path), Scenario)
+    return scenario
+
+
+def schema(part: Literal["scenario", "vehicle", "soil"] = "scenario") -> dict[str, Any]:
+    """JSON Schema of a scenario file, or of a vehicle or soil file on its own."""
+    kind: Any = {"scenario": Scenario, "vehicle": AnyVehicle, "soil": AnyLaw}[part]
+    return document.schema(kind, f"rollover {part}")

@@ -1,0 +1,169 @@
+"""Shapes whose surface can touch the ground, and the points that stand for it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ground.kinds import ByKind
+from ground.quantity import Label, Quantity, parameters
+
+Point = tuple[float, float, float]
+
+
+@parameters
+class Box:
+    """A block with faces along the vehicle axes."""
+
+    kind: Literal["box"] = "box"
+    name: Annotated[str, Label()]
+    low: Annotated[Point, Quantity("m", "corner with the smallest x, y, z")]
+    high: Annotated[Point, Quantity("m", "corner with the largest x, y, z")]
+
+    def validate(self) -> None:
+        """Refuse a box turned inside out."""
+        if any(a >= b for a, b in zip(self.low, self.high, strict=True)):
+            raise ValueError(f"high: must lie beyond low on every axis, got {list(self.high)} against {list(self.low)}")
+
+
+@parameters
+class Tube:
+    """A round tube between two points, closed at its ends."""
+
+    kind: Literal["tube"] = "tube"
+    name: Annotated[str, Label()]
+    start: Annotated[Point, Quantity("m")]
+    end: Annotated[Point, Quantity("m")]
+    diameter: Annotated[float, Quantity("m", above=0)]
+
+    def validate(self) -> None:
+        """Refuse a tube without length."""
+        if self.start == self.end:
+            raise ValueError(f"end: same as start, got {list(self.end)}; another point")
+
+
+@parameters
+class Disc:
+    """One side of a flat round plate, such as a tyre's side wall; the normal says which side."""
+
+    kind: Literal["disc"] = "disc"
+    name: Annotated[str, Label()]
+    centre: Annotated[Point, Quantity("m")]
+    normal: Annotated[Point, Quantity("1", "outward")]
+    radius: Annotated[float, Quantity("m", above=0)]
+
+
+Shape = Annotated[Box | Tube | Disc, ByKind()]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SurfacePoints:
+    """Points on a surface with outward normals and the area each stands for: (n, 3), (n, 3), (n,)."""
+
+    position: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    area: NDArray[np.float64]
+
+
+def sample(shape: Shape, spacing: float) -> SurfacePoints:
+    """Points no further apart than `spacing` (m) on the surface of a shape, its edges and corners among them.
+
+    Weights are those of the trapezoidal rule, so that areas add up to the surface's; edges are drawn in by
+    1e-9 of the size, so that a face as large as a ground element stays inside it.
+    """
+    if isinstance(shape, Box):
+        return _sample_box(np.array(shape.low), np.array(shape.high), spacing)
+    if isinstance(shape, Tube):
+        return _sample_tube(np.array(shape.start), np.array(shape.end), 0.5 * shape.diameter, spacing)
+    return _sample_disc(np.array(shape.centre), np.array(shape.normal, dtype=float), shape.radius, spacing)
+
+
+def rectangle(
+    centre: NDArray[np.float64], u: NDArray[np.float64], v: NDArray[np.float64], spacing: float
+) -> SurfacePoints:
+    """Points on the rectangle centre + a u + b v, |a|, |b| <= 1, with normal along u x v."""
+    a, wa = _nodes(2.0 * float(np.linalg.norm(u)), spacing)
+    b, wb = _nodes(2.0 * float(np.linalg.norm(v)), spacing)
+    position = centre + a[:, None, None] * u + b[None, :, None] * v
+    n = np.cross(u, v)
+    area = 4.0 * float(np.linalg.norm(n)) * wa[:, None] * wb[None, :]
+    count = a.size * b.size
+    return SurfacePoints(
+        position=position.reshape(count, 3), normal=np.tile(n / np.linalg.norm(n), (count, 1)), area=area.reshape(count)
+    )
+
+
+def _nodes(length: float, spacing: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    count = max(1, math.ceil(length / spacing - 1e-9))
+    x = np.linspace(-1.0, 1.0, count + 1) * (1.0 - 1e-9)
+    w = np.full(count + 1, 1.0 / count)
+    w[[0, -1]] *= 0.5
+    return x, w
+
+
+def _joined(parts: list[SurfacePoints]) -> SurfacePoints:
+    return SurfacePoints(
+        position=np.concatenate([p.position for p in parts]),
+        normal=np.concatenate([p.normal for p in parts]),
+        area=np.concatenate([p.area for p in parts]),
+    )
+
+
+def _sample_box(low: NDArray[np.float64], high: NDArray[np.float64], spacing: float) -> SurfacePoints:
+    centre, half = 0.5 * (low + high), 0.5 * (high - low)
+    parts = []
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            outward = np.zeros(3)
+            outward[axis] = side * half[axis]
+            u, v = np.zeros(3), np.zeros(3)
+            u[(axis + 1) % 3] = half[(axis + 1) % 3]
+            v[(axis + 2) % 3] = side * half[(axis + 2) % 3]
+            parts.append(rectangle(centre + outward, u, v, spacing))
+    return _joined(parts)
+
+
+def _sample_tube(start: NDArray[np.float64], end: NDArray[np.float64], radius: float, spacing: float) -> SurfacePoints:
+    axis = end - start
+    length = float(np.linalg.norm(axis))
+    e, u, v = axes_along(axis)
+    x, w = _nodes(length, spacing)
+    around = max(8, math.ceil(2.0 * math.pi * radius / spacing))
+    angle = 2.0 * math.pi * np.arange(around) / around
+    normal = np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * v
+    position = 0.5 * (start + end) + 0.5 * length * x[:, None, None] * e + radius * normal[None]
+    area = 2.0 * math.pi * radius * length * w[:, None] * np.full(around, 1.0 / around)[None]
+    wall = SurfacePoints(position=position.reshape(-1, 3), normal=np.tile(normal, (x.size, 1)), area=area.reshape(-1))
+    return _joined([wall, _sample_disc(start, -e, radius, spacing), _sample_disc(end, e, radius, spacing)])
+
+
+def _sample_disc(
+    centre: NDArray[np.float64], normal: NDArray[np.float64], radius: float, spacing: float
+) -> SurfacePoints:
+    e, u, v = axes_along(normal)
+    rings = max(1, math.ceil(radius / spacing))
+    position, area = [], []
+    for i in range(rings):
+        inner, outer = radius * i / rings, radius * (i + 1) / rings
+        # the outermost ring of points stands on the rim, so that first touch is where it should be
+        r = radius * (1.0 - 1e-9) if i == rings - 1 else 0.5 * (inner + outer)
+        count = max(6, math.ceil(2.0 * math.pi * r / spacing))
+        angle = 2.0 * math.pi * (np.arange(count) + 0.5 * (i % 2)) / count
+        position.append(centre + r * (np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * v))
+        area.append(np.full(count, math.pi * (outer**2 - inner**2) / count))
+    points = np.concatenate(position)
+    return SurfacePoints(position=points, normal=np.tile(e, (len(points), 1)), area=np.concatenate(area))
+
+
+def axes_along(direction: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Right-handed unit axes (e, u, v) with e along `direction`."""
+    e = direction / np.linalg.norm(direction)
+    helper = np.zeros(3)
+    helper[int(np.argmin(np.abs(e)))] = 1.0
+    u = np.cross(helper, e)
+    u /= np.linalg.norm(u)
+    return e, u, np.cross(e, u)

@@ -1,0 +1,248 @@
+"""One run: the time loop, its events and phases, the energy ledger."""
+
+from __future__ import annotations
+
+import math
+import time as clock
+from collections.abc import Callable
+from typing import Any, Literal, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover import history, model
+from rollover import tables as c
+from rollover.contact import Body, bodies_of, grown, tables_of
+from rollover.frames import matrices, quaternions
+from rollover.history import History, States
+from rollover.initiation import Standing
+from rollover.placement import place
+from rollover.recording import Recording
+from rollover.run import ContactForce, Event, GroundTrack, Motion, Run
+from rollover.scenario import Scenario
+from rollover.step import end_of_step, evaluate, stand, start_step
+from rollover.tables import Tables, handle
+from rollover.vehicle import Striker, Vehicle
+
+Array = NDArray[np.float64]
+FRAME_RATE = 100.0  # Hz, of motion for pictures
+TRACK_RATE = 50.0  # Hz, of the ground's deformation
+REST_SPEED = 0.02  # m/s: slower than this, all bodies, for REST_TIME is rest
+REST_TIME = 0.2
+
+KINDS: dict[int, str] = {
+    c.TOUCH: "first-touch",
+    c.BRANCH_CHANGE: "branch-change",
+    c.TURN: "unloading",
+    c.WHEEL_OFF: "lift-off",
+    c.WHEEL_ON: "touch-down",
+    c.AXLE_STOP: "axle-stop",
+    c.HINGE: "plastic-hinge",
+}
+
+
+class Diverged(Exception):
+    """The state left what can be: not finite, or faster than anything that falls."""
+
+
+def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None = None) -> Run:
+    """Simulate a scenario. A run that fails is returned with its sentence and what was recorded until then.
+
+    `progress(simulated time, wall time)` is called a few times a second. Raises ``ValueError`` for a start that does
+    not exist, and lets a keyboard interrupt through.
+    """
+    began = clock.perf_counter()
+    bodies = bodies_of(scenario.vehicle)
+    t = tables_of(scenario, bodies)
+    start = place(scenario, bodies, t)
+    settings = scenario.simulation
+    h = settings.step
+    steps = round((settings.duration - start.time) / h)
+    every = max(1, round(settings.output_step / h))
+    track_every = max(1, round(1.0 / (TRACK_RATE * every * h)))
+    rows = np.zeros((steps // every + 2, history.row_length(t)))
+    past = History(scenario=scenario, bodies=bodies, time=np.zeros(len(rows)), rows=rows)
+    live = model.Live(tables=t, handle=handle(t))
+    Q = np.zeros(6 * len(bodies))
+    evaluate(live.handle, start.q, start.qd, Q)
+    stand(live.handle)
+    evaluate(live.handle, start.q, start.qd, Q)
+    start_step(live.handle)
+    events: list[Event] = []
+    seen: set[tuple[int, int]] = set()
+    touched = isinstance(scenario.initiation, Standing)  # what balances before it falls is not at rest
+    landed = {(c.TOUCH, b) for b in range(len(bodies))}
+    state = {"rows": 0, "last": 0.0, "quiet": 0.0, "next": began + 0.25}
+
+    def after_step(time: float, q: Any, qd: Any, qdd: Any) -> bool:
+        t = live.tables
+        now = start.time + time
+        dt = time - state["last"]  # the solver halves a step that does not converge
+        state["last"] = time
+        end_of_step(live.handle, q, qd, qdd, dt, Q)
+        if t.counts[c.EVENTS] > 0:
+            _collect(t, now, bodies, scenario, events, seen)
+        speed = float(np.abs(qd).max())
+        if not math.isfinite(speed) or speed > 1e3 or not math.isfinite(float(Q.sum())):
+            raise Diverged(f"diverged at t = {now:.4f} s: a velocity of {speed:.3g} (m/s or rad/s)")
+        if t.counts[c.OUTSIDE] > 0:
+            raise Diverged(
+                f"left the array of ground elements at t = {now:.4f} s: "
+                "enlarge ground.elements.length, .width or move .centre"
+            )
+        if (larger := grown(t)) is not t:
+            live.tables, live.handle = larger, handle(larger)
+        k = int(state["rows"])
+        if time >= k * every * h - 1e-9:
+            past.add(now, live.handle, q, qd, qdd)
+            if k % track_every == 0:
+                past.add_track(now, live.tables)
+            state["rows"] = k + 1
+        settled = speed < REST_SPEED and (touched or not seen.isdisjoint(landed))
+        state["quiet"] = state["quiet"] + dt if settled else 0.0
+        if progress is not None and k % 20 == 0 and clock.perf_counter() >= state["next"]:
+            progress(now, clock.perf_counter() - began)
+            state["next"] = clock.perf_counter() + 0.25
+        if state["quiet"] >= REST_TIME and "rest" not in {e.kind for e in events}:
+            events.append(Event(time=now - REST_TIME, kind="rest", subject=bodies[0].name, place=_point(q[:3])))
+            if settings.stop_at_rest:
+                return False
+        return True
+
+    sentence = ""
+    try:
+        sentence = model.solve(
+            bodies=bodies,
+            live=live,
+            start=start,
+            gravity=scenario.gravity,
+            step=h,
+            steps=steps,
+            spectral_radius=settings.spectral_radius,
+            after_step=after_step,
+        )
+        if sentence:
+            sentence = f"the solver gave up at t = {past.time[max(past.count - 1, 0)]:.4f} s: {sentence}"
+    except Diverged as reason:
+        sentence = str(reason)
+    return _result(scenario, bodies, live.tables, past, events, sentence, clock.perf_counter() - began)
+
+
+def _point(x: Any) -> tuple[float, float, float]:
+    return (float(x[0]), float(x[1]), float(x[2]))
+
+
+def _collect(
+    t: Tables, now: float, bodies: tuple[Body, ...], scenario: Scenario, events: list[Event], seen: set[tuple[int, int]]
+) -> None:
+    """Turn the kernel's event rows into events: the first of its kind for each subject, wheels each time."""
+    vehicle = scenario.vehicle
+    for k in range(int(t.counts[c.EVENTS])):
+        kind, who = int(t.event[k, c.EV_KIND]), int(t.event[k, c.EV_SUBJECT])
+        if (kind, who) in seen and kind not in (c.WHEEL_OFF, c.WHEEL_ON):
+            continue
+        seen.add((kind, who))
+        value, detail = float(t.event[k, c.EV_VALUE]), ""
+        if kind in (c.WHEEL_OFF, c.WHEEL_ON) and isinstance(vehicle, Vehicle):
+            subject = vehicle.wheels[who].name
+        elif kind == c.HINGE and isinstance(vehicle, Vehicle) and vehicle.rops is not None:
+            subject, detail = vehicle.rops.mounts[who].name, f"yields along {'xyz'[int(value)]}"
+        elif kind == c.AXLE_STOP:
+            subject, detail = "front_axle", f"{math.degrees(value):.1f} deg"
+        else:
+            subject = bodies[who].name
+            detail = f"{value:.3g} m/s" if kind == c.TOUCH else f"sinkage {1e3 * value:.1f} mm"
+        place = _point(t.event[k, c.EV_PLACE : c.EV_PLACE + 3])
+        events.append(Event(time=now, kind=cast(Any, KINDS[kind]), subject=subject, place=place, detail=detail))
+    t.counts[c.EVENTS] = 0
+
+
+def _result(
+    scenario: Scenario,
+    bodies: tuple[Body, ...],
+    t: Tables,
+    past: History,
+    events: list[Event],
+    sentence: str,
+    wall: float,
+) -> Run:
+    count = max(past.count, 1)
+    time = past.time[:count].copy()
+    s = history.states(past.rows[:count], len(bodies), len(t.wheel_i), len(t.mount_f))
+    found = history.channels(scenario, s, t, bodies)
+    wanted = np.arange(time[0], time[-1] + 1e-9, 1.0 / FRAME_RATE)
+    frames = np.unique(np.minimum(np.searchsorted(time, wanted - 1e-9), count - 1))
+    track_time, element, sinkage = past.sinkage(t)
+    status: Literal["done", "failed"] = "failed" if sentence else "done"
+    flags = int(np.bitwise_or.reduce(s.flags))
+    recording = Recording(title=scenario.title, time=time, channels=found, source="simulation")
+    return Run(
+        scenario=scenario,
+        status=status,
+        sentence=sentence,
+        recording=recording,
+        flags=s.flags,
+        events=tuple(sorted(events, key=lambda e: e.time)),
+        phases=_phases(scenario, time, events),
+        frame_time=time[frames],
+        motion=_motion(s, bodies, frames),
+        contact=_contact(scenario, s, bodies, frames, t),
+        track=GroundTrack(time=track_time, element=element, sinkage=sinkage),
+        domain_flags=flag_names(flags),
+        ledger={name.split("/")[1]: float(v[-1]) for name, v in found.items() if name.startswith("energy/")},
+        released=_released(found),
+        wall_time=wall,
+        stop_time=float(time[-1]),
+    )
+
+
+def flag_names(flags: int) -> tuple[str, ...]:
+    """Names of the domain flags in a bit field."""
+    return tuple(name for bit, name in c.FLAG_NAMES.items() if flags & bit)
+
+
+def _released(found: dict[str, Array]) -> float:
+    """Energy that the run had to give, J: kinetic at the start and the deepest fall of the centre of mass."""
+    start = found["energy/kinetic"][0] + found["energy/collision"][0]
+    return float(start - found["energy/potential"].min())
+
+
+def _phases(scenario: Scenario, time: Array, events: list[Event]) -> tuple[tuple[float, str], ...]:
+    """Start and name of each phase: approach or support, tipping, impact, rest."""
+    first = min((e.time for e in events if e.kind == "first-touch"), default=math.inf)
+    rest = min((e.time for e in events if e.kind == "rest"), default=math.inf)
+    wheels = isinstance(scenario.vehicle, Vehicle) and scenario.vehicle.wheels
+    tipping = min((e.time for e in events if e.kind == "lift-off"), default=math.inf)
+    if wheels and scenario.initiation.kind == "tip-over":
+        tipping = float(time[0])
+    marks = [(float(time[0]), "support" if wheels else "approach")]
+    marks += [(at, name) for at, name in ((tipping, "tipping"), (first, "impact"), (rest, "rest")) if math.isfinite(at)]
+    return tuple(m for k, m in enumerate(marks) if k + 1 == len(marks) or marks[k + 1][0] > m[0])
+
+
+def _motion(s: States, bodies: tuple[Body, ...], frames: NDArray[np.int64]) -> dict[str, Motion]:
+    found = {}
+    for b, body in enumerate(bodies):
+        q = s.q[frames, b]
+        origin = q[:, :3] - matrices(q[:, 3:]) @ body.centre
+        found[body.name] = Motion(origin=origin, quaternion=quaternions(q[:, 3:]))
+    return found
+
+
+def _contact(
+    scenario: Scenario, s: States, bodies: tuple[Body, ...], frames: NDArray[np.int64], t: Tables
+) -> dict[str, ContactForce]:
+    found = {}
+    for b, body in enumerate(bodies):
+        r = s.resultant[frames, b]
+        weight = r[:, c.R_WEIGHT : c.R_WEIGHT + 1]
+        loaded = np.abs(weight) > 1e-9
+        point = np.where(loaded, r[:, c.R_POINT : c.R_POINT + 3] / np.where(loaded, weight, 1.0), s.q[frames, b, :3])
+        force = r[:, c.R_NORMAL : c.R_NORMAL + 3] + r[:, c.R_TANGENT : c.R_TANGENT + 3]
+        found[body.name] = ContactForce(point=point, force=force)
+    if isinstance(scenario.vehicle, Striker):
+        return found
+    for w, wheel in enumerate(scenario.vehicle.wheels):
+        force = s.wheels[frames, w, :1] * t.plane[:3] + s.wheels[frames, w, 1:4]
+        found[wheel.name] = ContactForce(point=s.wheels[frames, w, 4:7], force=force)
+    return found

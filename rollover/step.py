@@ -1,0 +1,339 @@
+"""Compiled: the end of an accepted step. What the step did is booked and committed, then contacts are renewed.
+
+Work is the mean of the forces at both ends of the step times the way between them: exact for what is linear in
+a step, and second order for the rest.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ground.compiled import compiled
+from ground.kernel import (
+    AREA,
+    ARRESTED,
+    BODY,
+    BRANCHED,
+    FLAGS,
+    FORCE,
+    FRICTION,
+    IDLE,
+    LINE_C,
+    LINE_K,
+    MASS_B,
+    MODE,
+    NORMAL,
+    OWNER_R,
+    PLACE,
+    RELEASED,
+    SHEAR,
+    SINKAGE,
+    UNLOADING,
+    commit,
+    commit_friction,
+)
+from ground.law import REFERENCE_AREA
+from rollover.dense import dot, times
+from rollover.forces import (
+    depth_row,
+    place_and_velocity,
+    read_poses,
+    try_axle,
+    try_elements,
+    try_mounts,
+    try_wheels,
+)
+from rollover.impact import depth_acceleration, mobility
+from rollover.tables import (
+    A_SWING,
+    ACC,
+    ACTIVE,
+    ALPHA,
+    AXLE,
+    AXLE_STOP,
+    BRANCH_CHANGE,
+    COLLISION,
+    E_ANCHOR,
+    E_DAMPING,
+    E_DAMPING_NOW,
+    E_DEPTH,
+    E_DEPTH_NOW,
+    E_ENERGY,
+    E_ENERGY_NOW,
+    E_FORCE,
+    E_FORCE_NOW,
+    E_FRICTION,
+    E_FRICTION_NOW,
+    E_MOVED,
+    E_PLACE,
+    E_POINT,
+    E_SHEAR,
+    E_WHERE,
+    FLAGS_NOW,
+    FN,
+    FRICTION_WORK,
+    FT,
+    HINGE,
+    HITS_NOW,
+    M_ANGLE,
+    M_ANGLE_NOW,
+    M_TORQUE,
+    M_TORQUE_NOW,
+    MOVED,
+    OUT_OF_AREA,
+    R_IMPULSE_NOW,
+    R_NORMAL,
+    R_POINT,
+    R_TANGENT,
+    R_WEIGHT,
+    ROPS,
+    S_ANGLE,
+    S_ANGLE_NOW,
+    S_DELTA,
+    S_DELTA_NOW,
+    S_FORCE,
+    S_FORCE_NOW,
+    S_SET,
+    S_TORQUE,
+    S_TORQUE_NOW,
+    SOIL,
+    STICK,
+    T_K,
+    T_YIELD,
+    TURN,
+    TYRE,
+    W_KY,
+    W_MU,
+    WHEEL_OFF,
+    WHEEL_ON,
+    ZDOT,
+    Z,
+)
+from rollover.touch import drop_mass, note_event, touch
+
+
+@compiled
+def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
+    """Book, commit, renew the contacts, exchange momentum with what was newly hit (writes qd)."""
+    evaluate(t, q, qd, Q)
+    for b in range(t.pose.shape[0]):
+        for k in range(3):
+            t.pose[b, ACC + k] = qdd[6 * b + k]
+            t.pose[b, ALPHA + k] = qdd[6 * b + 3 + k]
+    for b in range(t.pose.shape[0]):
+        t.resultant[b, R_NORMAL:R_WEIGHT] = 0.0
+        t.resultant[b, R_WEIGHT] = 0.0
+        t.resultant[b, R_IMPULSE_NOW] = 0.0
+    t.counts[HITS_NOW] = 0
+    finish_elements(t, h)
+    finish_wheels(t)
+    finish_mounts(t)
+    finish_axle(t)
+    t.work[COLLISION] += touch(t, qd, h)
+    settle(t)
+    evaluate(t, q, qd, Q)
+    start_step(t)
+
+
+@compiled
+def evaluate(t: Any, q: Any, qd: Any, Q: Any) -> None:
+    """Try all forces at a state, for what they leave in the tables."""
+    Q[:] = 0.0
+    read_poses(t.pose, q, qd)
+    try_elements(t, Q)
+    try_wheels(t, Q)
+    try_mounts(t, Q)
+    try_axle(t, Q)
+
+
+@compiled
+def finish_elements(t: Any, h: float) -> None:
+    """Work, contact forces and commit of the elements in contact."""
+    x, v = np.empty(3), np.empty(3)
+    flags, footprint = 0, 0.0
+    for a in range(t.counts[ACTIVE]):
+        i = t.active[a]
+        m, state, trial = t.memory[i], t.state[i], t.trial[i]
+        b = state[BODY]
+        t.work[SOIL] += 0.5 * (m[FORCE] + trial[FN]) * (trial[Z] - m[SINKAGE])
+        for k in range(3):
+            t.work[FRICTION_WORK] -= 0.5 * (m[FRICTION + k] + trial[FT + k]) * trial[MOVED + k]
+        # what the ground and the vehicle exert on each other: (1) without the collision, F_s = F + m_b1 a
+        contact = trial[FN]
+        if m[MASS_B] > 0.0:
+            contact += m[MASS_B] * depth_acceleration(t, b, m[OWNER_R : OWNER_R + 3], m[NORMAL : NORMAL + 3])
+            if contact < 0.0:
+                # the mass would have to be pulled along: it leaves, and stays in the soil
+                drop_mass(t, i)
+                contact = trial[FN]
+        place_and_velocity(t.pose[b], m[OWNER_R : OWNER_R + 3], x, v)
+        result = t.resultant[b]
+        for k in range(3):
+            result[R_NORMAL + k] += contact * m[NORMAL + k]
+            result[R_TANGENT + k] += trial[FT + k]
+            result[R_POINT + k] += contact * x[k]
+        result[R_WEIGHT] += contact
+        if trial[FN] > 0.0:
+            flags |= state[FLAGS]
+            footprint += m[AREA]
+        outcome = commit(t.law, t.p, t.s[i], m, state, trial[Z], trial[ZDOT], h, t.s[i, 1] * m[AREA] / REFERENCE_AREA)
+        commit_friction(t.soil[STICK], m[SHEAR : SHEAR + 3], trial[MOVED : MOVED + 3], m[NORMAL : NORMAL + 3])
+        for k in range(3):
+            m[PLACE + k] += trial[MOVED + k]
+        if outcome & BRANCHED:
+            note_event(t, BRANCH_CHANGE, b, x, trial[Z])
+        if outcome & ARRESTED:
+            note_event(t, TURN, b, x, trial[Z])
+        if outcome & RELEASED:
+            state[MODE] = IDLE
+    if footprint > 0.0 and abs(footprint - t.domain[3]) > 0.01 * t.domain[3]:
+        flags |= OUT_OF_AREA
+    t.counts[FLAGS_NOW] = flags
+
+
+@compiled
+def settle(t: Any) -> None:
+    """Give newly arrested elements the dashpot that settles what stands on them critically.
+
+    c = 2 K_u / omega with omega^2 the Rayleigh quotient of the unloading stiffnesses of all elements under the
+    body against mass and co-moving masses, for the motion that a push through them gives; for one element this
+    is c = 2 sqrt(K_u (m_s + m_b1)).
+    """
+    nb6 = t.mass.shape[0]
+    for body in range(t.pose.shape[0]):
+        wanted = False
+        for a in range(t.counts[ACTIVE]):
+            i = t.active[a]
+            if t.state[i, BODY] == body and t.state[i, MODE] == UNLOADING and t.memory[i, LINE_C] == 0.0:
+                wanted = True
+        if not wanted:
+            continue
+        J = np.zeros(6)
+        g = np.zeros(nb6)
+        for a in range(t.counts[ACTIVE]):
+            i = t.active[a]
+            if t.state[i, BODY] == body:
+                m = t.memory[i]
+                depth_row(t.pose[body], m[OWNER_R : OWNER_R + 3], m[NORMAL : NORMAL + 3], J)
+                for k in range(6):
+                    g[6 * body + k] += m[LINE_K] * m[AREA] / REFERENCE_AREA * J[k]
+        motion = times(mobility(t), g)
+        inertia, stiffness = dot(motion, times(t.mass, motion)), 0.0
+        for a in range(t.counts[ACTIVE]):
+            i = t.active[a]
+            if t.state[i, BODY] == body:
+                m = t.memory[i]
+                depth_row(t.pose[body], m[OWNER_R : OWNER_R + 3], m[NORMAL : NORMAL + 3], J)
+                w = 0.0
+                for k in range(6):
+                    w += J[k] * motion[6 * body + k]
+                stiffness += m[LINE_K] * m[AREA] / REFERENCE_AREA * w * w
+                inertia += m[MASS_B] * w * w
+        if stiffness <= 0.0:
+            continue
+        omega = math.sqrt(stiffness / inertia)
+        for a in range(t.counts[ACTIVE]):
+            i = t.active[a]
+            if t.state[i, BODY] == body and t.state[i, MODE] == UNLOADING and t.memory[i, LINE_C] == 0.0:
+                t.memory[i, LINE_C] = 2.0 * t.memory[i, LINE_K] / omega
+
+
+@compiled
+def finish_wheels(t: Any) -> None:
+    """Work and commit of the tyres; lift-off and touch-down as events."""
+    for w in range(t.wheel_i.size):
+        g = t.wheel_memory[w]
+        t.work[TYRE] += g[E_ENERGY_NOW] - g[E_ENERGY]
+        t.work[TYRE] += 0.5 * (g[E_DAMPING] + g[E_DAMPING_NOW]) * (g[E_DEPTH_NOW] - g[E_DEPTH])
+        for k in range(3):
+            t.work[FRICTION_WORK] -= 0.5 * (g[E_FRICTION + k] + g[E_FRICTION_NOW + k]) * g[E_MOVED + k]
+        if g[E_FORCE_NOW] > 0.0:
+            stick = max(t.wheel_f[w, W_MU] * g[E_FORCE_NOW] / t.wheel_f[w, W_KY], 1e-9)
+            commit_friction(stick, g[E_SHEAR : E_SHEAR + 3], g[E_MOVED : E_MOVED + 3], t.plane[:3])
+        else:
+            for k in range(3):
+                g[E_SHEAR + k] = 0.0
+        # the tread's lowest point moves over the crown: friction takes hold of the new one
+        for k in range(3):
+            g[E_ANCHOR + k], g[E_PLACE + k] = g[E_POINT + k], g[E_WHERE + k]
+        if (g[E_FORCE] > 0.0) != (g[E_FORCE_NOW] > 0.0):
+            kind = WHEEL_ON if g[E_FORCE_NOW] > 0.0 else WHEEL_OFF
+            note_event(t, kind, w, g[E_WHERE : E_WHERE + 3], g[E_FORCE_NOW])
+
+
+@compiled
+def finish_mounts(t: Any) -> None:
+    """Work and permanent set of the mounts; the first yielding of each as an event."""
+    for i in range(t.mount_f.shape[0]):
+        f, g = t.mount_f[i], t.mount_memory[i]
+        for k in range(3):
+            t.work[ROPS] -= 0.5 * (g[S_FORCE + k] + g[S_FORCE_NOW + k]) * (g[S_DELTA_NOW + k] - g[S_DELTA + k])
+            t.work[ROPS] -= 0.5 * (g[S_TORQUE + k] + g[S_TORQUE_NOW + k]) * (g[S_ANGLE_NOW + k] - g[S_ANGLE + k])
+            most = f[T_YIELD + k] / f[T_K + k]
+            elastic = g[S_DELTA_NOW + k] - g[S_SET + k]
+            if abs(elastic) > most:
+                if g[S_SET + k] == 0.0:
+                    note_event(t, HINGE, i, t.pose[t.mount_i[1], :3], float(k))
+                g[S_SET + k] = g[S_DELTA_NOW + k] - math.copysign(most, elastic)
+
+
+@compiled
+def finish_axle(t: Any) -> None:
+    """Work of the axle stops; reaching one is an event."""
+    if t.axle_f.size == 0:
+        return
+    g = t.axle_memory
+    t.work[AXLE] -= 0.5 * (g[M_TORQUE] + g[M_TORQUE_NOW]) * (g[M_ANGLE_NOW] - g[M_ANGLE])
+    if abs(g[M_ANGLE]) <= t.axle_f[A_SWING] < abs(g[M_ANGLE_NOW]):
+        note_event(t, AXLE_STOP, 0, t.pose[t.axle_i[1], :3], g[M_ANGLE_NOW])
+
+
+@compiled
+def stand(t: Any) -> None:
+    """Let the tyres' stick springs begin where the tyres stand now, unstrained."""
+    for w in range(t.wheel_i.size):
+        g = t.wheel_memory[w]
+        for k in range(3):
+            g[E_ANCHOR + k], g[E_PLACE + k], g[E_SHEAR + k] = g[E_POINT + k], g[E_WHERE + k], 0.0
+
+
+@compiled
+def start_step(t: Any) -> None:
+    """Remember forces and places at the start of the next step."""
+    for a in range(t.counts[ACTIVE]):
+        i = t.active[a]
+        m, trial = t.memory[i], t.trial[i]
+        m[FORCE], m[SINKAGE] = trial[FN], trial[Z]
+        for k in range(3):
+            m[FRICTION + k] = trial[FT + k]
+            m[PLACE + k] += trial[MOVED + k]
+    for w in range(t.wheel_i.size):
+        g = t.wheel_memory[w]
+        g[E_DEPTH], g[E_FORCE], g[E_DAMPING] = g[E_DEPTH_NOW], g[E_FORCE_NOW], g[E_DAMPING_NOW]
+        g[E_ENERGY] = g[E_ENERGY_NOW]
+        for k in range(3):
+            g[E_FRICTION + k] = g[E_FRICTION_NOW + k]
+    for i in range(t.mount_f.shape[0]):
+        g = t.mount_memory[i]
+        for k in range(3):
+            g[S_DELTA + k], g[S_FORCE + k] = g[S_DELTA_NOW + k], g[S_FORCE_NOW + k]
+            g[S_ANGLE + k], g[S_TORQUE + k] = g[S_ANGLE_NOW + k], g[S_TORQUE_NOW + k]
+    if t.axle_f.size > 0:
+        t.axle_memory[M_ANGLE], t.axle_memory[M_TORQUE] = t.axle_memory[M_ANGLE_NOW], t.axle_memory[M_TORQUE_NOW]
+
+
+@compiled
+def kinetic_of_soil(t: Any) -> float:
+    """Kinetic energy of the co-moving masses, J."""
+    total = 0.0
+    x, v = np.empty(3), np.empty(3)
+    for a in range(t.counts[ACTIVE]):
+        m = t.memory[t.active[a]]
+        if m[MASS_B] > 0.0:
+            place_and_velocity(t.pose[t.state[t.active[a], BODY]], m[OWNER_R : OWNER_R + 3], x, v)
+            speed = m[NORMAL] * v[0] + m[NORMAL + 1] * v[1] + m[NORMAL + 2] * v[2]
+            total += 0.5 * m[MASS_B] * speed * speed
+    return total

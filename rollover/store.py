@@ -1,0 +1,196 @@
+"""Results on disk: a run's folder is written whole or not at all, and never over another run's."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import platform
+import shutil
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rollover.document import content_hash, dump
+from rollover.faults import Fault, InputError
+from rollover.recording import write_parquet
+
+if TYPE_CHECKING:
+    from rollover.loads import PeakLoad
+    from rollover.run import Run
+
+FORMAT = "rollover-run/1"
+RUN, SCENARIO, CHANNELS, EVENTS, PICTURE = (
+    "run.json",
+    "scenario.yaml",
+    "channels.parquet",
+    "events.json",
+    "recording.rrd",
+)
+FILES = (RUN, SCENARIO, CHANNELS, EVENTS, PICTURE)
+
+
+def versions() -> dict[str, str]:
+    """Versions of all that a result depends on."""
+    packages = ("rollover", "exudyn", "numba", "numpy", "scipy")
+    return {
+        **{name: metadata.version(name) for name in packages},
+        "python": platform.python_version(),
+        "platform": f"{platform.system()} {platform.machine()}".lower(),
+    }
+
+
+def claim(folder: Path, scenario_hash: str, *, force: bool = False) -> Path:
+    """Resolve a results folder after making sure that it may be written. Raises `InputError`, changes nothing.
+
+    Results of the same scenario and versions may be written again; others only with `force`. A folder that holds
+    anything but results is never touched.
+    """
+    target = folder.resolve()
+    if not target.exists():
+        return target
+    if not target.is_dir():
+        raise _refused(folder, "not a folder, but a file; another --out is needed")
+    names = sorted(p.name for p in target.iterdir())
+    foreign = [name for name in names if name not in FILES]
+    if foreign or (names and RUN not in names):
+        what = foreign[0] if foreign else names[0]
+        raise _refused(folder, f"holds files that are not results, got {what!r}; another --out is needed")
+    if not names or force:
+        return target
+    found = read_run_json(target)
+    if found.get("scenario_hash") != scenario_hash:
+        title = found.get("title", "")
+        raise _refused(folder, f"holds another run, got {title!r}; --force replaces it, --out leaves it")
+    if found.get("versions") != versions():
+        raise _refused(folder, "holds this run by other versions; --force replaces it, --out leaves it")
+    return target
+
+
+def write(
+    folder: Path,
+    run: Run,
+    peaks: Sequence[PeakLoad],
+    *,
+    half_step: Run | None = None,
+    picture: Callable[[Path], None] | None = None,
+    force: bool = False,
+) -> dict[str, Any]:
+    """Write a run's folder and return what its run.json says.
+
+    Everything goes to a temporary folder beside it, which takes its place at the very end; `picture` writes the
+    .rrd there. Whatever happens before that, an interrupt too, leaves nothing behind.
+    """
+    scenario_hash = content_hash(run.scenario)
+    target = claim(folder, scenario_hash, force=force)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    part = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent))
+    try:
+        part.chmod(0o777 & ~_umask())  # mkdtemp makes it private
+        head = f"{run.scenario.title}\nEvery value of the run beside this file; run it again: rollover run {SCENARIO}"
+        (part / SCENARIO).write_text(dump(run.scenario, head), encoding="utf-8")
+        write_parquet(run.recording, part / CHANNELS)
+        _write_json(part / EVENTS, [asdict(event) for event in run.events])
+        if picture is not None:
+            picture(part / PICTURE)
+        answer = _answer(run, scenario_hash, peaks, half_step, sorted([*(p.name for p in part.iterdir()), RUN]))
+        _write_json(part / RUN, answer)
+        _swap(part, target)
+    except BaseException:
+        shutil.rmtree(part, ignore_errors=True)
+        raise
+    return answer
+
+
+def read_run_json(folder: Path) -> dict[str, Any]:
+    """What the run.json of a results folder says. Raises `InputError`."""
+    path = folder / RUN
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise _refused(folder, f"not a results folder, got no {RUN}") from None
+    except (OSError, ValueError) as e:
+        raise _refused(path, f"cannot be read: {e}") from None
+    if not isinstance(found, dict) or found.get("format") != FORMAT:
+        raise _refused(path, f"not the {RUN} of a run; format {FORMAT!r} is needed")
+    return found
+
+
+def _answer(
+    run: Run, scenario_hash: str, peaks: Sequence[PeakLoad], half_step: Run | None, files: list[str]
+) -> dict[str, Any]:
+    plain: dict[str, Any] = _plain(
+        {
+            "format": FORMAT,
+            "title": run.scenario.title,
+            "status": run.status,
+            "sentence": run.sentence,
+            "versions": versions(),
+            "scenario_hash": scenario_hash,
+            "wall_time": run.wall_time,
+            "stop_time": run.stop_time,
+            "domain_flags": run.domain_flags,
+            "phases": [{"start": start, "name": name} for start, name in run.phases],
+            "energy_ledger": run.ledger,
+            "energy_released": run.released,
+            "peak_loads": [asdict(peak) for peak in peaks],
+            "half_step": None
+            if half_step is None
+            else {
+                "step": half_step.scenario.simulation.step,
+                "status": half_step.status,
+                "sentence": half_step.sentence,
+                "wall_time": half_step.wall_time,
+            },
+            "files": files,
+        }
+    )
+    return plain
+
+
+def _swap(part: Path, target: Path) -> None:
+    if not target.exists():
+        os.rename(part, target)
+        return
+    old = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".old", dir=target.parent))
+    try:
+        os.rename(target, old / "was")
+        os.rename(part, target)
+    except BaseException:
+        if (old / "was").exists() and not target.exists():
+            os.rename(old / "was", target)
+        raise
+    finally:
+        shutil.rmtree(old, ignore_errors=True)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _refused(path: Path, message: str) -> InputError:
+    return InputError(Fault(file=str(path), message=message))
+
+
+def _write_json(path: Path, value: Any) -> None:
+    path.write_text(json.dumps(_plain(value), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _plain(value: Any) -> Any:
+    """Bare JSON values; what is not a number becomes null."""
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if isinstance(value, (np.generic, np.ndarray)):
+        return _plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,195 @@
+"""The tables that the compiled kernels share: constants of the vehicle and the ground, and their memory.
+
+One named tuple of plain arrays, so that a kernel is handed everything in one argument. Bodies are rows of
+`pose`; their generalised coordinates are [position of the centre of mass (world), rotation vector], their
+velocities [velocity (world), angular velocity (body axes)], as Exudyn's NodeRigidBodyRotVecLG has them.
+Body axes are parallel to the vehicle's axes in the design position; points are given about the centre of mass.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from ground.compiled import StructRefProxy, StructType, compiled, define_proxy, register
+
+# columns of pose
+X, ROT, VEL, OMEGA, ACC, ALPHA, POSE_COLUMNS = 0, 3, 12, 15, 18, 21, 24
+
+# columns of wheel_f
+W_CENTRE, W_AXIS, W_RADIUS, W_HALF, W_CROWN, W_KZ, W_KY, W_C, W_MU, WHEEL_COLUMNS = 0, 3, 6, 7, 8, 9, 10, 11, 12, 13
+# columns of wheel_memory: anchor of the stick spring in the carrier's axes, its place and shear; then what was found
+# at the start of the step (depth, normal force, damping force, elastic energy, friction) and what is found now
+E_ANCHOR, E_PLACE, E_SHEAR, E_DEPTH, E_FORCE, E_DAMPING, E_ENERGY, E_FRICTION = 0, 3, 6, 9, 10, 11, 12, 13
+E_DEPTH_NOW, E_FORCE_NOW, E_DAMPING_NOW, E_ENERGY_NOW, E_FRICTION_NOW, E_MOVED, E_POINT, E_WHERE, EDGE_COLUMNS = (
+    16,
+    17,
+    18,
+    19,
+    20,
+    23,
+    26,
+    29,
+    32,
+)
+
+# columns of mount_f: point on the ROPS, point on the chassis, stiffness, damping, both again for rotation, yield
+T_ROPS, T_CHASSIS, T_K, T_C, T_KR, T_CR, T_YIELD, MOUNT_COLUMNS = 0, 3, 6, 9, 12, 15, 18, 21
+# columns of mount_memory: set, deflection, force, angle, torque at the start of the step; the same now
+S_SET, S_DELTA, S_FORCE, S_ANGLE, S_TORQUE, S_DELTA_NOW, S_FORCE_NOW, S_ANGLE_NOW, S_TORQUE_NOW, SET_COLUMNS = (
+    0,
+    3,
+    6,
+    9,
+    12,
+    15,
+    18,
+    21,
+    24,
+    27,
+)
+
+# columns of axle_f and axle_memory
+A_SWING, A_K, A_C, AXLE_COLUMNS = 0, 1, 2, 3
+M_ANGLE, M_TORQUE, M_ANGLE_NOW, M_TORQUE_NOW, AXLE_MEMORY = 0, 1, 2, 3, 4
+
+# rows of joint_i: kind, body a, body b (or -1); columns of joint_f: point on a, point on b, about the centres of mass
+PIVOT, GUIDE = 0, 1
+
+# places in soil
+MU, STICK, RELAXATION, FRACTION, MASS_RULE, MASS_GIVEN, MOMENTUM_MOST, SOIL_COLUMNS = 0, 1, 2, 3, 4, 5, 6, 7
+RULE_REFERENCE, RULE_EFFECTIVE, RULE_CLAMPED = 0, 1, 2
+
+# places in counts
+SLOTS, ACTIVE, EVENTS, OUTSIDE, HITS_NOW, FLAGS_NOW, COUNTS = 0, 1, 2, 3, 4, 5, 6
+
+# places in work (J taken from the vehicle since the start)
+SOIL, TYRE, ROPS, FRICTION_WORK, COLLISION, AXLE, WORKS = 0, 1, 2, 3, 4, 5, 6
+
+# columns of trial: what the last evaluation found for each active element
+Z, ZDOT, FN, FT, MOVED, TRIAL_COLUMNS = 0, 1, 2, 3, 6, 9
+
+# columns of resultant, one row for each body: normal contact force, friction force (world), point, weight, impulse
+R_NORMAL, R_TANGENT, R_POINT, R_WEIGHT, R_IMPULSE, R_IMPULSE_NOW, RESULTANT_COLUMNS = 0, 3, 6, 9, 10, 13, 14
+
+# columns of event: time is added by the caller
+EV_KIND, EV_SUBJECT, EV_PLACE, EV_VALUE, EVENT_COLUMNS = 0, 1, 2, 5, 6
+TOUCH, BRANCH_CHANGE, TURN, WHEEL_OFF, WHEEL_ON, AXLE_STOP, HINGE, HIT = 0, 1, 2, 3, 4, 5, 6, 7
+
+# bits of an element's domain flags, and their names
+OUT_OF_SPEED, OUT_OF_MOMENTUM, OUT_OF_AREA, NOT_VIRGIN, OBLIQUE = 1, 2, 4, 8, 16
+FLAG_NAMES = {
+    OUT_OF_SPEED: "impact-speed",
+    OUT_OF_MOMENTUM: "momentum",
+    OUT_OF_AREA: "contact-area",
+    NOT_VIRGIN: "second-hit",
+    OBLIQUE: "oblique-impact",
+}
+
+
+class Tables(NamedTuple):
+    """See the column names above; sizes: nb bodies, np points, nm members, nw wheels, nt mounts, ns slots."""
+
+    # vehicle
+    mass: Any  # (6 nb, 6 nb) constant mass matrix
+    inverse: Any  # (6 nb, 6 nb)
+    joint_i: Any  # (nj, 3)
+    joint_f: Any  # (nj, 6)
+    point_r: Any  # (np, 3)
+    point_n: Any  # (np, 3)
+    point_a: Any  # (np,)
+    point_body: Any  # (np,)
+    member_f: Any  # (nm, 4) centre and radius of a sphere around the member's points
+    member_i: Any  # (nm, 3) body, first point, end
+    wheel_f: Any  # (nw, WHEEL_COLUMNS)
+    wheel_i: Any  # (nw,) carrier
+    mount_f: Any  # (nt, MOUNT_COLUMNS)
+    mount_i: Any  # (2,) chassis and ROPS rows
+    axle_f: Any  # (AXLE_COLUMNS,) or (0,)
+    axle_i: Any  # (2,) chassis and axle rows
+    # ground
+    law: Any  # (6,) see ground.kernel
+    p: Any
+    soil: Any  # (SOIL_COLUMNS,)
+    domain: Any  # (6,)
+    plane: Any  # (4,) normal and offset
+    grid_f: Any  # (4,) x0, y0, dx, dy
+    grid_i: Any  # (2,) nx, ny
+    # memory
+    slot_of: Any  # (nx ny,) int32, -1: never touched
+    memory: Any  # (ns, COLUMNS)
+    state: Any  # (ns, STATE_COLUMNS)
+    s: Any  # (ns, 3 + hidden)
+    active: Any  # (ns,)
+    trial: Any  # (ns, TRIAL_COLUMNS)
+    found: Any  # (ns, 3) deepest sinkage, area and owning point, found by the search
+    touched: Any  # (np,) slots found by the search
+    candidate_i: Any  # (np, 2) slot and point
+    candidate_f: Any  # (np,) projected area
+    wheel_memory: Any  # (nw, EDGE_COLUMNS)
+    mount_memory: Any  # (nt, SET_COLUMNS)
+    axle_memory: Any  # (AXLE_MEMORY,)
+    pose: Any  # (nb, POSE_COLUMNS)
+    counts: Any  # (COUNTS,)
+    work: Any  # (WORKS,)
+    resultant: Any  # (nb, RESULTANT_COLUMNS)
+    event: Any  # (ne, EVENT_COLUMNS)
+
+
+@register  # type: ignore[untyped-decorator]
+class TablesType(StructType):
+    """The kernels' view of `Tables`: one pointer, so that a call costs half a microsecond and compiles quickly."""
+
+
+class Handle(StructRefProxy):  # type: ignore[misc]
+    """What kernels take as their first argument; made by `handle`, shares the arrays."""
+
+
+define_proxy(Handle, TablesType, list(Tables._fields))
+
+
+@compiled
+def handle(t: Any) -> Any:
+    """Bundle the arrays of `Tables` for the kernels; to be made again when an array is replaced."""
+    return Handle(
+        t.mass,
+        t.inverse,
+        t.joint_i,
+        t.joint_f,
+        t.point_r,
+        t.point_n,
+        t.point_a,
+        t.point_body,
+        t.member_f,
+        t.member_i,
+        t.wheel_f,
+        t.wheel_i,
+        t.mount_f,
+        t.mount_i,
+        t.axle_f,
+        t.axle_i,
+        t.law,
+        t.p,
+        t.soil,
+        t.domain,
+        t.plane,
+        t.grid_f,
+        t.grid_i,
+        t.slot_of,
+        t.memory,
+        t.state,
+        t.s,
+        t.active,
+        t.trial,
+        t.found,
+        t.touched,
+        t.candidate_i,
+        t.candidate_f,
+        t.wheel_memory,
+        t.mount_memory,
+        t.axle_memory,
+        t.pose,
+        t.counts,
+        t.work,
+        t.resultant,
+        t.event,
+    )

@@ -1,0 +1,288 @@
+"""Compiled: which elements the vehicle touches, and how each contact begins and ends."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ground.compiled import call_begin, compiled
+from ground.kernel import (
+    ADDRESS_BEGIN,
+    AREA,
+    BODY,
+    CELL,
+    FLAGS,
+    FORCE,
+    HITS,
+    IDLE,
+    LINE_Z,
+    LOADING,
+    MASS_B,
+    MODE,
+    NORMAL,
+    OFFSET,
+    OWNER,
+    OWNER_R,
+    PLACE,
+    PLASTIC,
+    REST_STIFFNESS,
+    SHEAR,
+    SINKAGE,
+    TOUCH_SPEED,
+    UNLOADING,
+    enter_from_the_side,
+    rut_depth,
+    set_line,
+)
+from ground.law import BRANCH, MASS, REFERENCE_AREA, SPEED
+from rollover.forces import (
+    place_and_velocity,
+    to_world,
+)
+from rollover.impact import depth_acceleration, exchange, share_mass
+from rollover.tables import (
+    ACTIVE,
+    EVENTS,
+    HITS_NOW,
+    MASS_GIVEN,
+    MASS_RULE,
+    MOMENTUM_MOST,
+    NOT_VIRGIN,
+    OBLIQUE,
+    OUT_OF_MOMENTUM,
+    OUT_OF_SPEED,
+    OUTSIDE,
+    RULE_CLAMPED,
+    RULE_REFERENCE,
+    SLOTS,
+    SOIL,
+    TOUCH,
+    X,
+)
+
+
+@compiled
+def note_event(t: Any, kind: int, subject: int, x: Any, value: float) -> None:
+    """Append to the events of this step; a full list drops the rest (the caller empties it every step)."""
+    e = t.counts[EVENTS]
+    if e < t.event.shape[0]:
+        t.event[e, 0], t.event[e, 1] = kind, subject
+        for k in range(3):
+            t.event[e, 2 + k] = x[k]
+        t.event[e, 5] = value
+        t.counts[EVENTS] = e + 1
+
+
+@compiled
+def search(t: Any) -> int:
+    """Find what lies under the vehicle's points; returns the number of elements, their slots in `touched`.
+
+    `found` then holds for each: deepest sinkage, projected area of the points of the same body, owning point.
+    """
+    n, offset = t.plane[:3], t.plane[3]
+    x, f = np.empty(3), np.empty(3)
+    candidates, count = 0, 0
+    for member in range(t.member_i.shape[0]):
+        row = t.pose[t.member_i[member, 0]]
+        to_world(row, t.member_f[member, :3], x)
+        gap = n[0] * (x[0] + row[X]) + n[1] * (x[1] + row[X + 1]) + n[2] * (x[2] + row[X + 2]) - offset
+        if gap > t.member_f[member, 3]:
+            continue
+        for i in range(t.member_i[member, 1], t.member_i[member, 2]):
+            to_world(row, t.point_r[i], x)
+            for k in range(3):
+                x[k] += row[X + k]
+            z = offset - (n[0] * x[0] + n[1] * x[1] + n[2] * x[2])
+            if z <= 0.0:
+                continue
+            to_world(row, t.point_n[i], f)
+            facing = -(n[0] * f[0] + n[1] * f[1] + n[2] * f[2])
+            if facing <= 1e-6:
+                continue
+            ix = int(math.floor((x[0] - t.grid_f[0]) / t.grid_f[2]))
+            iy = int(math.floor((x[1] - t.grid_f[1]) / t.grid_f[3]))
+            if ix < 0 or iy < 0 or ix >= t.grid_i[0] or iy >= t.grid_i[1]:
+                t.counts[OUTSIDE] += 1
+                continue
+            slot = slot_at(t, ix * t.grid_i[1] + iy)
+            # an element at rest keeps its rut: it is touched only beyond it
+            if t.state[slot, MODE] == IDLE and z <= rut_depth(t.memory[slot]):
+                continue
+            t.candidate_i[candidates, 0], t.candidate_i[candidates, 1] = slot, i
+            t.candidate_f[candidates] = facing * t.point_a[i]
+            candidates += 1
+            if t.found[slot, 0] <= 0.0:
+                t.touched[count] = slot
+                count += 1
+                t.found[slot, 1] = 0.0
+            if z > t.found[slot, 0]:
+                t.found[slot, 0], t.found[slot, 2] = z, i
+    for c in range(candidates):
+        slot, i = t.candidate_i[c, 0], t.candidate_i[c, 1]
+        if t.point_body[i] == t.point_body[int(t.found[slot, 2])]:
+            t.found[slot, 1] += t.candidate_f[c]
+    return count
+
+
+@compiled
+def slot_at(t: Any, cell: int) -> int:
+    """Memory row of an element; made at its first touch, so that untouched elements cost nothing."""
+    slot = t.slot_of[cell]
+    if slot < 0:
+        slot = t.counts[SLOTS]
+        t.slot_of[cell] = slot
+        t.counts[SLOTS] = slot + 1
+        t.memory[slot, :] = 0.0
+        t.state[slot, :] = 0
+        t.state[slot, CELL] = cell
+        t.found[slot, 0] = 0.0
+    return slot  # type: ignore[no-any-return]
+
+
+@compiled
+def drop_mass(t: Any, slot: int) -> None:
+    """Let an element's co-moving mass go; its kinetic energy stays in the soil."""
+    m, b = t.memory[slot], t.state[slot, BODY]
+    if m[MASS_B] > 0.0:
+        x, v = np.empty(3), np.empty(3)
+        place_and_velocity(t.pose[b], m[OWNER_R : OWNER_R + 3], x, v)
+        speed = m[NORMAL] * v[0] + m[NORMAL + 1] * v[1] + m[NORMAL + 2] * v[2]
+        t.work[SOIL] += 0.5 * m[MASS_B] * speed * speed
+        m[MASS_B] = 0.0
+
+
+@compiled
+def let_go(t: Any) -> None:
+    """End the contacts that are released or that no point covers any more; the rut stays."""
+    kept = 0
+    for a in range(t.counts[ACTIVE]):
+        slot = t.active[a]
+        if t.state[slot, MODE] == IDLE or t.found[slot, 0] <= 0.0:
+            drop_mass(t, slot)
+            t.state[slot, MODE] = IDLE
+            t.memory[slot, FORCE] = 0.0
+        else:
+            t.active[kept] = slot
+            kept += 1
+    t.counts[ACTIVE] = kept
+
+
+@compiled
+def domain_flags(t: Any, speed: float, mass: float, obliquity: float, hits: int) -> int:
+    """Bits of `tables.FLAG_NAMES` for one touch; the contact area is judged for the whole footprint elsewhere."""
+    flags = 0
+    # a touch is latched within a step: what lies on the bound lies within
+    if speed < t.domain[0] * (1.0 - 1e-3) or speed > t.domain[1] * (1.0 + 1e-3):
+        flags |= OUT_OF_SPEED
+    if mass * speed > t.domain[2] * (1.0 + 1e-3):
+        flags |= OUT_OF_MOMENTUM
+    if t.domain[4] > 0.0 and hits > 1:
+        flags |= NOT_VIRGIN
+    if obliquity > t.domain[5]:
+        flags |= OBLIQUE
+    return flags
+
+
+@compiled
+def touch(t: Any, qd: Any, h: float) -> float:
+    """Renew the contact set from the search; latch, share masses, exchange momentum. Returns the energy lost, J.
+
+    Elements that no point covers any more are let go, owners and areas are renewed, new contacts begin.
+    """
+    count = search(t)
+    let_go(t)
+    fresh, hits = np.empty(count, np.int64), 0
+    x, v = np.empty(3), np.empty(3)
+    for c in range(count):
+        slot = t.touched[c]
+        m, state = t.memory[slot], t.state[slot]
+        i = int(t.found[slot, 2])
+        b = t.point_body[i]
+        z = t.found[slot, 0]
+        place_and_velocity(t.pose[b], t.point_r[i], x, v)
+        speed = -(t.plane[0] * v[0] + t.plane[1] * v[1] + t.plane[2] * v[2])
+        known = state[MODE] != IDLE
+        # what normal motion swept in one step; beyond it the element was entered from the side
+        swept = max(1.05 * speed * h, 0.0) + 1e-6
+        before = m[FORCE] if known else 0.0
+        jump = z - (m[SINKAGE] if known else 0.0)
+        was = m[AREA]
+        m[AREA] = t.found[slot, 1]
+        if known and (state[OWNER] != i or state[BODY] != b):
+            if m[MASS_B] > 0.0 and state[BODY] != b:
+                m[MASS_B] = 0.0
+            for k in range(3):
+                m[OWNER_R + k] = t.point_r[i, k]
+            state[OWNER], state[BODY] = i, b
+            if jump > swept and t.law[PLASTIC] != 0 and t.law[REST_STIFFNESS] == 0:
+                enter_from_the_side(t.law, t.p, t.s[slot], m, z, before * m[AREA] / max(was, 1e-12))
+                state[MODE] = LOADING if z >= m[LINE_Z] else UNLOADING
+        for k in range(3):
+            m[PLACE + k] = x[k]
+        m[SINKAGE] = z
+        if not known:
+            for k in range(3):
+                m[OWNER_R + k] = t.point_r[i, k]
+                m[NORMAL + k] = t.plane[k]
+                m[SHEAR + k] = 0.0
+            m[OFFSET] = t.plane[3]
+            state[OWNER], state[BODY] = i, b
+            state[HITS] += 1
+            acceleration = depth_acceleration(t, b, t.point_r[i], t.plane[:3])
+            start = max(z - swept, rut_depth(m))
+            # v_s at the surface, not up to a step later: K_b1 grows with its 18.7th power
+            latched = math.sqrt(max(speed * abs(speed) - 2.0 * acceleration * min(z - start, swept), 0.0))
+            m[TOUCH_SPEED] = latched
+            m[MASS_B] = 0.0
+            total = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+            angle = math.acos(min(max(speed / total, -1.0), 1.0)) if total > 1e-9 else 0.0
+            t.found[slot, 1], t.found[slot, 2] = start, angle
+            m[FORCE] = 0.0
+            t.active[t.counts[ACTIVE]] = slot
+            fresh[hits] = t.counts[ACTIVE]
+            hits += 1
+            t.counts[ACTIVE] += 1
+        t.found[slot, 0] = 0.0
+    if hits == 0:
+        return 0.0
+    share = np.zeros(hits)
+    share_mass(t, fresh, hits, share)
+    moving = 0
+    for k in range(hits):
+        slot = t.active[fresh[k]]
+        begin(t, slot, share[k])
+        if t.memory[slot, MASS_B] > 0.0:
+            moving += 1
+    t.counts[HITS_NOW] = hits
+    return exchange(t, fresh, hits, qd) if moving > 0 else 0.0
+
+
+@compiled
+def begin(t: Any, slot: int, share: float) -> None:
+    """Start an element's memory for this touch: the law's mass, latched terms, flags, where the line starts."""
+    m, state, s = t.memory[slot], t.state[slot], t.s[slot]
+    speed, start, angle = m[TOUCH_SPEED], t.found[slot, 1], t.found[slot, 2]
+    s[:] = 0.0
+    s[SPEED] = speed
+    rule = t.soil[MASS_RULE]
+    mass = t.soil[MASS_GIVEN] if rule == RULE_REFERENCE else share * REFERENCE_AREA / max(m[AREA], 1e-12)
+    if rule == RULE_CLAMPED and speed > 0.0:
+        mass = min(mass, t.soil[MOMENTUM_MOST] / speed)
+    s[MASS] = mass
+    s[BRANCH] = math.inf
+    if t.law[ADDRESS_BEGIN] != 0:
+        call_begin(t.law[ADDRESS_BEGIN], (t.p.ctypes, s.ctypes))
+    state[FLAGS] = domain_flags(t, speed, mass, angle, state[HITS])
+    state[MODE] = LOADING
+    if t.law[PLASTIC] != 0:
+        if m[LINE_Z] > 0.0:
+            # a second hit starts from the rut, on a reloading line that meets this hit's loading curve
+            set_line(t.law, t.p, s, m, m[LINE_Z], share)
+        if start > rut_depth(m) + 1e-6 and start > m[LINE_Z] * (1.0 - 1e-9):
+            enter_from_the_side(t.law, t.p, s, m, start, 0.0)
+        if m[SINKAGE] < m[LINE_Z]:
+            state[MODE] = UNLOADING
+    x = m[PLACE : PLACE + 3]
+    note_event(t, TOUCH, state[BODY], x, speed)

@@ -1,0 +1,282 @@
+"""Every shipped file: loads, opens with comments, says where its numbers come from, fits the JSON schema."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from dataclasses import is_dataclass
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+
+from ground.array import Elements
+from ground.soils import soils
+from rollover import catalogue, document
+from rollover import scenario as scenarios
+from rollover.document import Leaf
+from rollover.provenance import Provenance
+from rollover.rops import Rops
+from rollover.scenario import Scenario, load, schema
+from rollover.vehicle import Striker, Vehicle, chassis_of
+
+FOLDER = document.shipped_folder()
+FILES = sorted(FOLDER.rglob("*.yaml"))
+SCENARIOS = [path for path in FILES if path.parent == FOLDER]
+VEHICLES = [path for path in FILES if path.parent.name == "vehicles"]
+SOILS = [path for path in FILES if path.parent.name == "soils"]
+FRAMES = [path for path in FILES if path.parent.name == "rops"]
+
+
+def name_of(path: Path) -> str:
+    return path.relative_to(FOLDER).with_suffix("").as_posix()
+
+
+def test_there_are_files_of_every_sort() -> None:
+    assert {"drop_test", "rops_drop", "side_overturn", "side_overturn_slope"} <= {p.stem for p in SCENARIOS}
+    assert {"utility_tractor", "compact_tractor", "rops_rig"} <= {p.stem for p in VEHICLES}
+    assert {"natural_clay"} <= {p.stem for p in SOILS}
+    assert set(FILES) == {*SCENARIOS, *VEHICLES, *SOILS, *FRAMES}
+
+
+@pytest.mark.parametrize("path", FILES, ids=name_of)
+def test_every_file_is_in_order(path: Path) -> None:
+    sort = {"vehicles": "vehicle", "soils": "soil", "rops": "rops"}.get(path.parent.name, "scenario")
+    assert catalogue.check(str(path)) == sort
+
+
+@pytest.mark.parametrize("path", FILES, ids=name_of)
+def test_every_file_opens_with_comments(path: Path) -> None:
+    lines = path.read_text(encoding="utf-8").splitlines()
+    opening = lines[: next(i for i, line in enumerate(lines) if not line.startswith("#"))]
+    assert len(opening) >= (5 if path in SCENARIOS else 3)
+    assert 20 <= len(catalogue.headline(path)) <= 120
+    if path in SCENARIOS:
+        text = " ".join(line.strip("# ") for line in opening)
+        assert "Look at" in text, "a scenario says what to look at"
+
+
+# ---------------------------------------------------------------- provenance
+
+
+def uncovered(thing: Any, provenance: tuple[Provenance, ...]) -> list[str]:
+    """Paths of numbers that no entry covers; parts with a provenance of their own answer for themselves."""
+    prefixes = [prefix for entry in provenance for prefix in entry.of]
+    own = [f.name for f in _parts(thing) if getattr(getattr(thing, f.name), "provenance", ())]
+    return [
+        leaf.path
+        for leaf in document.paths(thing)
+        if _is_number(leaf)
+        and leaf.path.split(".")[0] not in own
+        and not any(leaf.path == prefix or leaf.path.startswith(f"{prefix}.") for prefix in prefixes)
+    ]
+
+
+def _parts(thing: Any) -> list[Any]:
+    from dataclasses import fields
+
+    return [f for f in fields(thing) if is_dataclass(getattr(thing, f.name))]
+
+
+def _is_number(leaf: Leaf) -> bool:
+    values = leaf.value if isinstance(leaf.value, list) else [leaf.value]
+    return any(isinstance(value, float) for value in values)
+
+
+def idle(thing: Any, provenance: tuple[Provenance, ...]) -> list[str]:
+    """Entries that cover nothing, such as one with a misspelt path."""
+    paths = [leaf.path for leaf in document.paths(thing)]
+    prefixes = [prefix for entry in provenance for prefix in entry.of]
+    return [p for p in prefixes if not any(path == p or path.startswith(f"{p}.") for path in paths)]
+
+
+@pytest.mark.parametrize("path", [*VEHICLES, *FRAMES], ids=name_of)
+def test_every_number_says_where_it_comes_from(path: Path) -> None:
+    thing = document.load(path, Rops if path in FRAMES else scenarios.AnyVehicle)
+    assert uncovered(thing, thing.provenance) == []
+    assert idle(thing, thing.provenance) == []
+    assert all(len(entry.source) > 30 for entry in thing.provenance)
+
+
+def test_a_number_without_source_is_found() -> None:
+    vehicle = document.load(VEHICLES[0], scenarios.AnyVehicle)
+    assert "whole.mass" in uncovered(vehicle, vehicle.provenance[1:])
+    assert uncovered(vehicle, ()) != []
+
+
+# ---------------------------------------------------------------- JSON schema
+
+
+@pytest.fixture(scope="module")
+def schemas(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("schemas")
+    parts = {"scenario": schema(), "vehicle": schema("vehicle"), "soil": schema("soil")}
+    parts["rops"] = document.schema(Rops, "rollover rops")
+    for name, content in parts.items():
+        jsonschema.Draft202012Validator.check_schema(content)
+        (folder / f"{name}.json").write_text(json.dumps(content))
+    return {name: folder / f"{name}.json" for name in parts}
+
+
+@pytest.mark.parametrize(
+    ("part", "files"), [("scenario", SCENARIOS), ("vehicle", VEHICLES), ("soil", SOILS), ("rops", FRAMES)]
+)
+def test_the_schema_accepts_all_shipped_files(schemas: dict[str, Path], part: str, files: list[Path]) -> None:
+    command = [sys.executable, "-m", "check_jsonschema", "--schemafile", str(schemas[part]), *map(str, files)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_schema_accepts_resolved_scenarios_and_refuses_what_the_loader_refuses() -> None:
+    validator = jsonschema.Draft202012Validator(schema())
+    for path in SCENARIOS:
+        whole = document.to_mapping(load(path))
+        assert validator.is_valid(whole)
+        for break_ in (
+            lambda m: m.pop("title"),
+            lambda m: m.update(zzz=1),
+            lambda m: m["simulation"].update(duration=0.0),
+            lambda m: m["simulation"].update(duraton=1.0),
+            lambda m: m["ground"]["law"].update(kind="ye-2005"),
+            lambda m: m["ground"]["law"].pop("kind"),
+            lambda m: m["ground"]["elements"].update(spacing=[0.1]),
+            lambda m: m["loads"].update(cfc=61),
+            lambda m: m.update(effects={"nope": {}}),
+        ):
+            broken = json.loads(json.dumps(whole))
+            break_(broken)
+            assert not validator.is_valid(broken)
+
+
+def test_the_schema_knows_base_and_file_names() -> None:
+    validator = jsonschema.Draft202012Validator(schema())
+    assert validator.is_valid({"base": "a.yaml", "simulation": {"duration": 2}, "ground": {"law": "soil.yaml"}})
+    assert not validator.is_valid({"base": "a.yaml", "simulation": {"duraton": 2}})
+    assert not validator.is_valid({"base": "a.yaml", "ground": {"law": "soil.txt"}})
+    assert not validator.is_valid({"simulation": {"duration": 2}})
+
+
+def test_the_schema_tells_units_and_meanings() -> None:
+    drop = schema()["$defs"]["Drop"]["else"]["properties"]
+    assert drop["speed"]["description"] == "downward, at first contact [m/s]"
+    assert (drop["speed"]["exclusiveMinimum"], drop["speed"]["maximum"]) == (0, 20)
+
+
+def test_every_field_of_a_scenario_has_a_unit_or_a_meaning() -> None:
+    for path in SCENARIOS:
+        for leaf in document.paths(load(path)):
+            last = leaf.path.rsplit(".", 1)[-1]
+            if _is_number(leaf):
+                assert leaf.unit, leaf.path
+            elif not isinstance(leaf.value, str):
+                assert leaf.meaning or last in ("cfc",) or leaf.value in (None, []), leaf.path
+
+
+# ---------------------------------------------------------------- what the numbers have to be
+
+
+def test_the_soils_are_those_of_the_ground_package() -> None:
+    for name, soil in soils().items():
+        law = document.load(FOLDER / "soils" / f"{name.replace('-', '_')}.yaml", scenarios.AnyLaw)
+        assert type(law) is type(soil.law)
+        assert law.p == pytest.approx(soil.law.p, rel=1e-3)
+    assert document.load(FOLDER / "soils" / "natural_clay.yaml", scenarios.AnyLaw) == soils()["natural-clay"].law
+
+
+def test_the_drop_test_is_the_rig_of_the_paper() -> None:
+    scenario = load("drop_test")
+    assert isinstance(scenario.vehicle, Striker)
+    striker = (scenario.vehicle.mass, scenario.vehicle.face_length, scenario.vehicle.face_width)
+    assert striker == (132.0, 0.140, 0.045)
+    assert scenario.ground.elements == Elements(length=0.140, width=0.045, spacing=(0.140, 0.045))
+    assert scenario.ground.elements.count == (1, 1)
+    assert scenario.replaced({"initiation.speed": 3.5}).vehicle == scenario.vehicle
+
+
+def side_load_curve(rops: Rops, height: float) -> tuple[float, float]:
+    """Stiffness and yield load of a side load at a height: mounts in parallel, sway and tilt of the frame in series."""
+    lateral = sum(m.stiffness[1] for m in rops.mounts)
+    tilting = sum(m.stiffness[2] * m.position[1] ** 2 + m.rotational_stiffness[0] for m in rops.mounts)
+    arm = height - rops.mounts[0].position[2]
+    yields = [m.yield_force[1] for m in rops.mounts]
+    return 1.0 / (1.0 / lateral + arm**2 / tilting), math.fsum(y for y in yields if y is not None)
+
+
+def test_the_utility_rops_has_the_measured_side_load_curve() -> None:
+    # MF 178 side test: 34 kN, 5437 J at 213 mm (one specimen, +-5 %); elastic, perfectly plastic: 0.32 MN/m
+    rops = document.load(FOLDER / "vehicles/rops/two_post_rear_3t.yaml", Rops)
+    stiffness, load_ = side_load_curve(rops, 2.46)
+    assert load_ == 34_000.0
+    assert stiffness == pytest.approx(0.32e6, rel=0.01)
+    assert load_ * (0.213 - 0.5 * load_ / stiffness) == pytest.approx(5437.0, rel=0.01)
+
+
+def test_the_compact_rops_takes_the_side_energy_of_its_tractor() -> None:
+    rops = document.load(FOLDER / "vehicles/rops/two_post_rear_2t.yaml", Rops)
+    stiffness, load_ = side_load_curve(rops, 2.265)
+    assert load_ * (0.200 - 0.5 * load_ / stiffness) == pytest.approx(3600.0, rel=0.01)
+    assert load_ * (0.200 - 0.5 * load_ / stiffness) > 1.75 * 2000.0
+
+
+# class: mass, wheelbase, centre of mass ahead of the rear axle, tracks rear and front, heights of the centre of mass
+# and the pivot, rear tyre width, Ixx, Iyy, Izz, ROPS top and half width
+CLASSES = {
+    "utility_tractor": (3000, 2.25, 0.90, 1.50, 1.45, 0.82, 0.55, 0.42, 1300, 3000, 3300, 2.5, 0.60),
+    "compact_tractor": (2000, 1.90, 0.75, 1.35, 1.30, 0.72, 0.50, 0.32, 650, 1500, 1650, 2.3, 0.55),
+}
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_the_tractors_are_those_of_their_class(name: str) -> None:
+    m, L, a, rear, front, h, pivot, width, xx, yy, zz, top, half = CLASSES[name]
+    vehicle = document.load(FOLDER / "vehicles" / f"{name}.yaml", scenarios.AnyVehicle)
+    assert isinstance(vehicle, Vehicle)
+    assert vehicle.front_axle is not None
+    assert vehicle.rops is not None
+    wheels = {wheel.name: wheel for wheel in vehicle.wheels}
+    assert (vehicle.whole.mass, vehicle.whole.centre_of_mass, vehicle.whole.inertia) == (m, (a, 0, h), (xx, yy, zz))
+    assert wheels["front_left"].centre[0] == L == vehicle.front_axle.pivot[0]
+    assert wheels["rear_left"].centre[1] - wheels["rear_right"].centre[1] == rear
+    assert wheels["front_left"].centre[1] - wheels["front_right"].centre[1] == front
+    assert (vehicle.front_axle.pivot[2], wheels["rear_left"].tyre.width) == (pivot, width)
+    assert vehicle.rops.corner[1:] == (half, top)
+    assert vehicle.front_axle.body.mass == pytest.approx(0.12 * m)
+    # wheels stand at their loaded radius
+    for end, share in (("rear", 1.0 - a / L), ("front", a / L)):
+        tyre = wheels[f"{end}_left"].tyre
+        sag = 0.5 * share * m * 9.81 / tyre.vertical_stiffness
+        assert wheels[f"{end}_left"].centre[2] == pytest.approx(tyre.radius - sag, abs=1.5e-3)
+    assert chassis_of(vehicle).mass > 0.8 * m
+    assert np.hypot(vehicle.rops.corner[0], vehicle.rops.corner[1]) < 1.0
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_on_its_side_a_tractor_lies_on_rear_tyre_and_rops(name: str) -> None:
+    # the plane through the rear tyre's outer edge and the ROPS corner leaves everything else on its inner side
+    vehicle = document.load(FOLDER / "vehicles" / f"{name}.yaml", scenarios.AnyVehicle)
+    rear = {wheel.name: wheel for wheel in vehicle.wheels}["rear_left"]
+    y0, z0 = rear.centre[1] + 0.5 * rear.tyre.width, rear.centre[2]
+    lean = (y0 - vehicle.rops.corner[1]) / (vehicle.rops.corner[2] - z0)
+    for box in vehicle.outline:
+        assert box.high[1] < y0 - lean * (box.high[2] - z0) - 0.05
+    for end in ("front", "rear"):
+        wheel = {w.name: w for w in vehicle.wheels}[f"{end}_left"]
+        for post in vehicle.rops.members:
+            if post.name == "post_left":  # posts clear the rear tyres
+                high = wheel.centre[2] + wheel.tyre.radius
+                along = min(1.0, (high - post.start[2]) / (post.end[2] - post.start[2]))
+                y = post.start[1] + along * (post.end[1] - post.start[1]) + 0.5 * post.diameter
+                assert end == "front" or y < wheel.centre[1] - 0.5 * wheel.tyre.width
+
+
+def test_the_slope_falls_to_the_side_it_tips_to() -> None:
+    scenario = load("side_overturn_slope")
+    assert isinstance(scenario, Scenario)
+    gx, gy = scenario.ground.surface.gradient
+    assert gx == pytest.approx(0.0, abs=1e-15)
+    assert gy == pytest.approx(-math.tan(math.radians(20.0)))
+    assert scenario.replaced({"ground.surface.kind": "plane"}).vehicle == load("side_overturn").vehicle

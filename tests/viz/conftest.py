@@ -1,0 +1,40 @@
+"""Recordings of the made-up runs, written once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rollover.run import Run
+from tests.viz import example
+
+pytest.importorskip("rerun", reason="no rerun wheel for this platform")
+
+
+@pytest.fixture(scope="session")
+def overturn() -> Run:
+    return example.overturn()
+
+
+@pytest.fixture(scope="session")
+def drop() -> Run:
+    return example.drop()
+
+
+@pytest.fixture(scope="session")
+def overturn_rrd(overturn: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from viz.log import write_rrd
+
+    path = tmp_path_factory.mktemp("rrd") / "overturn.rrd"
+    write_rrd(overturn, path, peaks=example.peaks(overturn))
+    return path
+
+
+@pytest.fixture(scope="session")
+def drop_rrd(drop: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from viz.log import write_rrd
+
+    path = tmp_path_factory.mktemp("rrd") / "drop.rrd"
+    write_rrd(drop, path)
+    return path

@@ -1,0 +1,168 @@
+"""How a recording is laid out in the viewer: scene and phases to the left, loads first to the right."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from fnmatch import fnmatchcase
+
+import numpy as np
+import rerun.blueprint as rrb
+from numpy.typing import NDArray
+
+from rollover.run import Run
+from rollover.scenario import Scenario
+from rollover.vehicle import Striker
+from viz.entities import TIMELINE, series
+from viz.scene import extent
+
+BACKGROUND = 0x2B313CFF
+_FIELD_OF_VIEW = math.radians(55.0)  # the viewer's own, vertical
+
+# title, patterns of channels; a plot of which no channel was recorded is left out
+_Plots = tuple[tuple[str, tuple[str, ...]], ...]
+_TOP: _Plots = (
+    ("ROPS force, kN", ("rops/force",)),
+    ("Ground force, kN", ("ground/force_normal", "ground/force_tangential")),
+)
+_LOADS: _Plots = (
+    ("ROPS by axis, kN", ("rops/force_?",)),
+    ("Wheels, kN", ("wheel/*/force_normal",)),
+    ("Sinkage, mm", ("ground/sinkage", "rops/deflection")),
+    ("Impulse, N s", ("ground/impulse_normal", "rops/impulse")),
+    ("Contact area, cm\N{SUPERSCRIPT TWO}", ("ground/contact_area",)),
+)
+_MOTION: _Plots = (
+    ("Roll, deg", ("chassis/roll",)),
+    ("Striker acceleration, m/s\N{SUPERSCRIPT TWO}", ("striker/acceleration_z",)),
+    ("Energy, kJ", ("energy/*", "rops/energy")),
+    ("Rates, deg/s", ("chassis/angular_velocity_?",)),
+    ("Striker speed, m/s", ("striker/velocity_z",)),
+    ("Striker position, m", ("striker/position_z",)),
+    ("Acceleration, m/s\N{SUPERSCRIPT TWO}", ("chassis/acceleration_?",)),
+    ("Attitude, deg", ("chassis/pitch", "chassis/yaw", "axle/*/angle")),
+    ("Position, m", ("chassis/position_?",)),
+    ("Velocity, m/s", ("chassis/velocity_?",)),
+)
+_MOUNTS = "rops/mount/*"
+
+
+def blueprint(run: Run, scene_title: str) -> rrb.Blueprint:
+    """Layout for one run: what answers "how high were the loads, and when" is in front in every place."""
+    # a plot of nothing but zeros says less than its absence, but for the load that is asked for
+    channels = [c for c, v in run.recording.channels.items() if c == "rops/force" or np.any(np.nan_to_num(v))]
+    top = _views(channels, _TOP)
+    left = rrb.Vertical(
+        scene(run, scene_title),
+        rrb.StateTimelineView(origin="/phase", contents=["+ /phase"], name="Phase"),
+        row_shares=[7, 1],
+    )
+    rows = [
+        top[:1],
+        _mounts(channels) + top[1:] + _views(channels, _LOADS),
+        _views(channels, _MOTION) + _others(channels),
+        [
+            rrb.TextDocumentView(origin="/report/verdict", contents=["+ /report/verdict"], name="How high, and when"),
+            rrb.TextLogView(origin="/events", contents=["+ /events"], name="Events"),
+            rrb.TextDocumentView(origin="/report/scenario", contents=["+ /report/scenario"], name="Scenario"),
+        ],
+    ]
+    shares = [share for row, share in zip(rows, (3, 2, 2, 3.4), strict=True) if row]
+    right = rrb.Vertical(
+        *(row[0] if len(row) == 1 else rrb.Tabs(*row, active_tab=0) for row in rows if row), row_shares=shares
+    )
+    return rrb.Blueprint(
+        rrb.Horizontal(left, right, column_shares=[3, 2]),
+        rrb.TimePanel(timeline=TIMELINE, playback_speed=0.25, loop_mode="all", state="collapsed"),
+        rrb.BlueprintPanel(state="hidden"),
+        rrb.SelectionPanel(state="hidden"),
+        auto_layout=False,
+        auto_views=False,
+    )
+
+
+def scene(run: Run, title: str) -> rrb.Spatial3DView:
+    """The picture in space, seen so that the whole run stays in it."""
+    position, target = eye(run)
+    return rrb.Spatial3DView(
+        origin="/world",
+        contents=["+ /world/**"],
+        name=title,
+        background=np.array([BACKGROUND], dtype=np.uint32),
+        line_grid=False,
+        eye_controls=rrb.EyeControls3D(position=position, look_target=target, eye_up=(0.0, 0.0, 1.0)),
+    )
+
+
+def eye(run: Run) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Position and target of the eye: from the side to which the vehicle falls, from above and a little behind.
+
+    There the ROPS and the ground below it are in sight from first touch to rest.
+    """
+    centre, radius = extent(run)
+    centre = centre - np.array([0.0, 0.0, 0.15 * radius])  # the sky may be cut, the ground may not
+    if isinstance(run.scenario.vehicle, Striker):
+        direction = np.array([0.3, -0.9, 0.38])
+    else:
+        direction = np.array([-0.45, 0.8 * _side(run), 0.52])
+        heading = math.radians(_heading(run.scenario))
+        c, s = math.cos(heading), math.sin(heading)
+        direction = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ direction
+    distance = 0.92 * radius / math.sin(0.5 * _FIELD_OF_VIEW)
+    return centre + distance * direction / np.linalg.norm(direction), centre
+
+
+def _heading(scenario: Scenario) -> float:
+    start = scenario.initiation
+    return start.yaw_deg if start.kind == "drop" else start.heading_deg
+
+
+def _side(run: Run) -> float:
+    """+1 if it falls to its left."""
+    if run.scenario.initiation.kind == "tip-over":
+        return 1.0 if run.scenario.initiation.side == "left" else -1.0
+    roll = run.recording.channels.get("chassis/roll", np.zeros(1))
+    return -1.0 if float(roll[int(np.nanargmax(np.abs(roll)))]) > 0.0 else 1.0
+
+
+def _views(channels: Sequence[str], plots: _Plots) -> list[rrb.TimeSeriesView]:
+    found = []
+    for title, patterns in plots:
+        matching = [c for p in patterns for c in channels if fnmatchcase(c, p)]
+        if matching:
+            found.append(plot(title, matching))
+    return found
+
+
+def plot(title: str, channels: Iterable[str]) -> rrb.TimeSeriesView:
+    """Plot of some channels, with whatever is recorded beside the simulated values: measured, limit, peak."""
+    paths = [series(c).path for c in channels]
+    return rrb.TimeSeriesView(
+        origin="/" + paths[0].partition("/")[0],
+        contents=[f"+ /{path}/**" for path in paths],
+        name=title,
+        axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
+        plot_legend=rrb.PlotLegend("RightTop"),
+    )
+
+
+def _mounts(channels: Sequence[str]) -> list[rrb.Container]:
+    """One tab with a plot for each mount; the axes have the same colours in each."""
+    of_mount: dict[str, list[str]] = {}
+    for channel in channels:
+        if fnmatchcase(channel, _MOUNTS):
+            of_mount.setdefault(channel.split("/")[2], []).append(channel)
+    plots = [plot(f"Mount {name}, kN", found) for name, found in of_mount.items()]
+    if not plots:
+        return []
+    return [rrb.Grid(*plots, grid_columns=min(2, len(plots)), name="Mounts, kN")]
+
+
+def _others(channels: Sequence[str]) -> list[rrb.TimeSeriesView]:
+    """What no plot above shows; nothing recorded is out of reach."""
+    patterns = [p for plots in (_TOP, _LOADS, _MOTION) for _, found in plots for p in found] + [_MOUNTS]
+    rest: dict[str, list[str]] = {}
+    for channel in channels:
+        if not any(fnmatchcase(channel, p) for p in patterns):
+            rest.setdefault(series(channel).unit, []).append(channel)
+    return [plot(f"Other, {unit}" if unit else "Other, SI", found) for unit, found in rest.items()]

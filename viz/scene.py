@@ -1,0 +1,310 @@
+"""What stands in the picture besides the ground: bodies, wheels, the clearance zone, the drop rig. Arrays only.
+
+Parts are given in the axes of the entity they hang under: a body's parts in vehicle axes, drawn with that
+body's pose; parts of the world in world axes. Nothing here knows the viewer.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.inertia import MassProperties
+from rollover.rops import ClearanceZone, Rops
+from rollover.run import Run
+from rollover.shapes import Box, Disc, Point, Shape, Tube, axes_along
+from rollover.vehicle import Striker, Vehicle, Wheel
+from viz.entities import escaped
+
+PAINT = (0x4C8C46FF, 0x417C3DFF, 0x569A4EFF, 0x386E36FF)  # the chassis, part by part
+FRAME, JOINT = 0xF2C81EFF, 0xF2C81EFF
+STEEL, DARK_STEEL = 0x8E98A3FF, 0x5C6670FF
+TREAD, LUG, SIDE_WALL = 0x2B2E33FF, 0x3B3F46FF, 0x34383EFF
+RIM, RIM_MARK = 0xD8D8D0FF, 0x6F7378FF
+ZONE = 0x5FD3F5FF
+STEEL_DENSITY = 7850.0  # kg/m3, for the size of a block of which only the mass is known
+_AROUND = 48  # facets of a tyre
+
+
+@dataclass(frozen=True, kw_only=True)
+class Block:
+    """A solid cuboid along the axes of its entity."""
+
+    path: str
+    centre: Point
+    size: Point
+    colour: int
+    see_through: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rod:
+    """A solid round bar with flat ends at `start` and `end`."""
+
+    path: str
+    start: Point
+    end: Point
+    radius: float
+    colour: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Balls:
+    """Solid balls."""
+
+    path: str
+    centres: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    colour: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hull:
+    """A mesh: vertices (n, 3) with normals (n, 3) and colours (n,), triangles (m, 3)."""
+
+    path: str
+    vertices: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    colours: NDArray[np.uint32]
+    triangles: NDArray[np.int64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wire:
+    """Lines, each (k, 3)."""
+
+    path: str
+    strips: tuple[NDArray[np.float64], ...]
+    colour: int
+    radius: float
+
+
+Part = Block | Rod | Balls | Hull | Wire
+
+
+def body_path(body: str) -> str:
+    """Entity of a body: carries its pose, its parts are children."""
+    return f"world/{escaped(body)}"
+
+
+def parts(run: Run) -> tuple[Part, ...]:
+    """Everything that is drawn besides ground, forces and events."""
+    vehicle = run.scenario.vehicle
+    if isinstance(vehicle, Striker):
+        return _rig(run, vehicle)
+    return _vehicle(vehicle)
+
+
+def _vehicle(vehicle: Vehicle) -> tuple[Part, ...]:
+    chassis, axle = body_path("chassis"), body_path("front_axle")
+    found: list[Part] = []
+    for i, shape in enumerate(vehicle.outline):
+        found.append(_solid(shape, f"{chassis}/{escaped(shape.name)}", PAINT[i % len(PAINT)]))
+    if not vehicle.outline:
+        # nothing was said of its shape: the cuboid with the same mass, centre and moments of inertia
+        found.append(_equivalent(vehicle.whole, f"{chassis}/equivalent_cuboid"))
+    for wheel in vehicle.wheels:
+        found += _wheel(wheel, f"{body_path(wheel.carrier)}/{escaped(wheel.name)}")
+    rear = [w for w in vehicle.wheels if w.carrier == "chassis"]
+    for i, (a, b) in enumerate(_opposite(rear)):
+        # not part of the model: without it the wheels would hang in the air
+        found.append(_beam(a.centre, b.centre, f"{chassis}/axle_{i}"))
+    if vehicle.front_axle is not None:
+        for wheel in (w for w in vehicle.wheels if w.carrier == "front_axle"):
+            found.append(_beam(vehicle.front_axle.pivot, wheel.centre, f"{axle}/beam_{escaped(wheel.name)}"))
+        x, y, z = vehicle.front_axle.pivot
+        found.append(Rod(path=f"{axle}/pivot", start=(x - 0.15, y, z), end=(x + 0.15, y, z), radius=0.05, colour=STEEL))
+    if vehicle.rops is not None:
+        found += _rops(vehicle.rops)
+    return tuple(found)
+
+
+def _rops(rops: Rops) -> list[Part]:
+    root = body_path("rops")
+    found: list[Part] = [_solid(shape, f"{root}/{escaped(shape.name)}", FRAME) for shape in rops.members]
+    tubes = [s for s in rops.members if isinstance(s, Tube)]
+    ends = Counter(end for tube in tubes for end in (tube.start, tube.end))
+    joints = [end for end, count in ends.items() if count > 1]
+    if joints:
+        # flat ends leave a notch where two tubes meet
+        radii = [max(0.5 * t.diameter for t in tubes if end in (t.start, t.end)) for end in joints]
+        found.append(Balls(path=f"{root}/joints", centres=np.array(joints), radii=np.array(radii), colour=JOINT))
+    mounts = np.array([m.position for m in rops.mounts])
+    found.append(
+        Balls(
+            path=f"{body_path('chassis')}/rops_mounts",
+            centres=mounts,
+            radii=np.full(len(mounts), 0.06),
+            colour=DARK_STEEL,
+        )
+    )
+    if rops.clearance_zone is not None:
+        found.append(_zone(rops.clearance_zone, f"{body_path('chassis')}/clearance_zone"))
+    return found
+
+
+def _zone(zone: ClearanceZone, path: str) -> Wire:
+    corners = zone.corners()
+    rings = [corners[[*range(k, k + 6), k]] for k in (0, 6)]
+    edges = [corners[[k, k + 6]] for k in range(6)]
+    return Wire(path=path, strips=(*rings, *edges), colour=ZONE, radius=0.008)
+
+
+def _solid(shape: Shape, path: str, colour: int) -> Part:
+    if isinstance(shape, Box):
+        low, high = np.array(shape.low), np.array(shape.high)
+        return Block(path=path, centre=_point(0.5 * (low + high)), size=_point(high - low), colour=colour)
+    if isinstance(shape, Tube):
+        return Rod(path=path, start=shape.start, end=shape.end, radius=0.5 * shape.diameter, colour=colour)
+    assert isinstance(shape, Disc)
+    # a side of a plate has no thickness; 5 mm inwards are enough to be seen
+    outward = axes_along(np.array(shape.normal, dtype=float))[0]
+    back = _point(np.array(shape.centre) - 0.005 * outward)
+    return Rod(path=path, start=back, end=shape.centre, radius=shape.radius, colour=SIDE_WALL)
+
+
+def _equivalent(body: MassProperties, path: str) -> Block:
+    total = 0.5 * sum(body.inertia)
+    squares = [12.0 / body.mass * max(total - i, 0.0) for i in body.inertia]
+    size = (math.sqrt(squares[0]), math.sqrt(squares[1]), math.sqrt(squares[2]))
+    return Block(path=path, centre=body.centre_of_mass, size=size, colour=PAINT[0])
+
+
+def _opposite(wheels: list[Wheel]) -> list[tuple[Wheel, Wheel]]:
+    """Pairs of wheels at the same place along x and z."""
+    return [
+        (a, b)
+        for i, a in enumerate(wheels)
+        for b in wheels[:i]
+        if math.hypot(a.centre[0] - b.centre[0], a.centre[2] - b.centre[2]) < 0.02
+    ]
+
+
+def _beam(start: Point, end: Point, path: str) -> Rod:
+    return Rod(path=path, start=start, end=end, radius=0.06, colour=DARK_STEEL)
+
+
+def _wheel(wheel: Wheel, path: str) -> list[Part]:
+    x, y, z = wheel.centre
+    radius, half = wheel.tyre.radius, 0.5 * wheel.tyre.width
+    rim, out = 0.5 * radius, math.copysign(1.0, y)
+    hub = Rod(
+        path=f"{path}/hub",
+        start=(x, y, z),
+        end=(x, y + out * 0.95 * half, z),
+        radius=0.16 * radius,
+        colour=STEEL,
+    )
+    return [_tyre(np.array(wheel.centre), radius, half, rim, path), hub]
+
+
+def _tyre(centre: NDArray[np.float64], radius: float, half: float, rim: float, path: str) -> Hull:
+    """A body of revolution about y: tread to the full radius at full width but for a small shoulder, dished rim."""
+    # (y, r, colour of even facets, colour of odd facets) along the section; each stretch keeps its own vertices,
+    # so that edges stay sharp and the rim can carry marks by which the attitude is seen
+    dish = 0.45 * half
+    section = [(-dish, 0.0), (-dish, rim), (-half, 1.1 * rim), (-half, 0.93 * radius), (-0.92 * half, radius)]
+    section += [(-y, r) for y, r in reversed(section)]
+    paint = [(RIM, RIM), (RIM, RIM), (SIDE_WALL, SIDE_WALL), (LUG, TREAD)]
+    paint += [(LUG, TREAD), *reversed(paint)]
+    angle = 2.0 * math.pi * np.arange(_AROUND + 1) / _AROUND
+    vertices, normals, colours = [], [], []
+    for (y0, r0), (y1, r1), shades in zip(section[:-1], section[1:], paint, strict=True):
+        along = np.array([y1 - y0, r1 - r0])
+        ny, nr = np.array([-along[1], along[0]]) / np.linalg.norm(along)
+        for k in range(_AROUND):
+            even, odd = shades
+            shade = even if k % 2 == 0 else odd
+            if r0 == 0.0 or r1 == 0.0:
+                shade = RIM_MARK if k // (_AROUND // 8) % 2 else RIM
+            for r, y, a in ((r0, y0, angle[k]), (r1, y1, angle[k]), (r1, y1, angle[k + 1]), (r0, y0, angle[k + 1])):
+                vertices.append((r * math.cos(a), y, r * math.sin(a)))
+                normals.append((nr * math.cos(a), ny, nr * math.sin(a)))
+                colours.append(shade)
+    first = 4 * np.arange(len(vertices) // 4)[:, None, None]
+    return Hull(
+        path=path,
+        vertices=centre + np.array(vertices),
+        normals=np.array(normals),
+        colours=np.array(colours, dtype=np.uint32),
+        triangles=(first + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3),
+    )
+
+
+def _rig(run: Run, striker: Striker) -> tuple[Part, ...]:
+    """The striker and its guide; the striker's origin lies in the middle of its face.
+
+    Above the face a nose long enough to be seen from the deepest rut, above it a steel cube with the mass, beside
+    it two upright bars from the ground to above the cube's highest place, and a crossbar.
+    """
+    a, b = striker.face_length, striker.face_width
+    side = (striker.mass / STEEL_DENSITY) ** (1.0 / 3.0)
+    path = body_path("striker")
+    origin = run.motion["striker"].origin if "striker" in run.motion else np.zeros((0, 3))
+    x, y, _ = origin[0] if len(origin) else np.zeros(3)
+    highest, lowest = float(origin[:, 2].max(initial=0.0)), float(origin[:, 2].min(initial=0.0))
+    nose = 0.8 * side - lowest
+    top = highest + nose + 1.15 * side
+    apart = 0.5 * side + 0.025
+
+    def bar(name: str, start: Point, end: Point) -> Rod:
+        return Rod(path=f"world/guide/{name}", start=start, end=end, radius=0.01, colour=DARK_STEEL)
+
+    return (
+        # the ground's force acts inside its outline
+        Block(path=f"{path}/nose", centre=(0.0, 0.0, 0.5 * nose), size=(a, b, nose), colour=STEEL, see_through=True),
+        Block(path=f"{path}/mass", centre=(0.0, 0.0, nose + 0.5 * side), size=(side, side, side), colour=FRAME),
+        bar("front", (x + apart, y, 0.0), (x + apart, y, top)),
+        bar("rear", (x - apart, y, 0.0), (x - apart, y, top)),
+        bar("cross", (x + apart, y, top), (x - apart, y, top)),
+    )
+
+
+def _point(values: NDArray[np.float64]) -> Point:
+    x, y, z = values.tolist()
+    return (x, y, z)
+
+
+def extent(run: Run) -> tuple[NDArray[np.float64], float]:
+    """Centre and radius of a ball around all that moves, over the whole run; world, m."""
+    found = [np.zeros((0, 3))]
+    for part in parts(run):
+        motion = next((m for body, m in run.motion.items() if part.path.startswith(body_path(body) + "/")), None)
+        points = _reach(part)
+        if motion is None:
+            found.append(points)
+            continue
+        some = np.linspace(0, len(motion.origin) - 1, 12).round().astype(int) if len(motion.origin) else ()
+        found += [motion.origin[i] + points @ rotation(motion.quaternion[i]).T for i in some]
+    points = np.concatenate(found)
+    if not len(points):
+        return np.zeros(3), 1.0
+    low, high = points.min(axis=0), points.max(axis=0)
+    return 0.5 * (low + high), float(0.5 * np.linalg.norm(high - low))
+
+
+def _reach(part: Part) -> NDArray[np.float64]:
+    if isinstance(part, Block):
+        corners = np.array(np.meshgrid(*[(-0.5, 0.5)] * 3)).reshape(3, -1).T
+        return np.asarray(np.array(part.centre) + corners * np.array(part.size))
+    if isinstance(part, Rod):
+        return np.array([part.start, part.end])
+    if isinstance(part, Hull):
+        return part.vertices[::7]
+    return np.concatenate(part.strips) if isinstance(part, Wire) else part.centres
+
+
+def rotation(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotation matrix of a unit quaternion x, y, z, w."""
+    x, y, z, w = quaternion
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )

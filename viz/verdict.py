@@ -1,0 +1,245 @@
+"""The answer in words, for the first page of a recording: how high the loads were, and when. Markdown only."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ground.law import Domain
+from rollover.run import Run
+from viz.entities import series, shown
+
+
+class Peak(Protocol):
+    """Peak of one load, SI; what is unknown is None or NaN."""
+
+    @property
+    def channel(self) -> str:
+        """Channel it is the peak of."""
+
+    @property
+    def unit(self) -> str:
+        """SI unit of `raw` and `filtered`."""
+
+    @property
+    def raw(self) -> float:
+        """Largest value as computed, with its sign."""
+
+    @property
+    def raw_time(self) -> float:
+        """When, s."""
+
+    @property
+    def filtered(self) -> float | None:
+        """Largest value after the filter."""
+
+    @property
+    def filtered_time(self) -> float | None:
+        """When, s."""
+
+    @property
+    def cfc(self) -> int | None:
+        """Filter class."""
+
+    @property
+    def impulse(self) -> float | None:
+        """Integral or collision impulse that belongs to the load, N s."""
+
+    @property
+    def domain_flags(self) -> Sequence[str]:
+        """Why the load lies outside the ground law's calibrated domain."""
+
+    @property
+    def half_step_change(self) -> float | None:
+        """Relative change of the peak with half the time step, 0.01 for one per cent."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RawPeak:
+    """Peak read off a channel, where nobody gave a better one."""
+
+    channel: str
+    unit: str
+    raw: float
+    raw_time: float
+    filtered: float | None = None
+    filtered_time: float | None = None
+    cfc: int | None = None
+    impulse: float | None = None
+    domain_flags: Sequence[str] = ()
+    half_step_change: float | None = None
+
+
+def ranked(run: Run, peaks: Sequence[Peak]) -> tuple[Peak, ...]:
+    """The given peaks, or those of the channels if none are given; what an engineer asks for first comes first."""
+    found: Sequence[Peak] = peaks or _of_channels(run)
+    order = ("rops/force", "ground/force_normal", "rops/mount/", "rops/force_", "rops/", "ground/", "wheel/", "")
+
+    def place(peak: Peak) -> tuple[int, str]:
+        same = next((i for i, p in enumerate(order) if peak.channel == p), None)
+        begins = next(i for i, p in enumerate(order) if p not in order[:2] and peak.channel.startswith(p))
+        return (begins if same is None else same, peak.channel)
+
+    return tuple(sorted(found, key=place))
+
+
+def _of_channels(run: Run) -> list[Peak]:
+    found: list[Peak] = []
+    for channel, values in run.recording.channels.items():
+        unit = {"kN": "N", "mm": "m"}.get(series(channel).unit)
+        # nothing but gaps and zeros is left out, unless it is the load that is asked for
+        if unit is None or (channel != "rops/force" and not np.any(np.abs(values) > 0.0)):
+            continue
+        at = int(np.argmax(np.nan_to_num(np.abs(values))))
+        found.append(RawPeak(channel=channel, unit=unit, raw=float(values[at]), raw_time=float(run.recording.time[at])))
+    return found
+
+
+def amount(value: float, unit: str, factor: float = 1.0) -> str:
+    """A number for people, three figures and the unit: ``amount(63210.0, "kN", 1e-3) == "63.2 kN"``."""
+    number = value * factor
+    digits = max(0, 2 - math.floor(math.log10(abs(number)))) if number and math.isfinite(number) else 0
+    return f"{number:.{min(digits, 3)}f} {unit}".rstrip()
+
+
+def newtons(value: float) -> str:
+    """A force, from N."""
+    return amount(value, *shown("N"))
+
+
+def joules(value: float) -> str:
+    """An energy, from J; small ones in J, so that a residual does not read as zero."""
+    return amount(value, "J") if abs(value) < 1e3 else amount(value, *shown("J"))
+
+
+def high(peak: Peak, value: float) -> str:
+    """A value of a load in the unit in which its channel is plotted."""
+    s = series(peak.channel)
+    return amount(value, s.unit, s.factor) if s.unit else amount(value, *shown(peak.unit))
+
+
+def raw(peak: Peak) -> str:
+    """How high and when: ``63.2 kN at 1.362 s``."""
+    if peak.raw == 0.0:
+        return "none"
+    return f"{high(peak, peak.raw)} at {peak.raw_time:.3f} s"
+
+
+def filtered(peak: Peak) -> str:
+    """The same after the filter; empty if it was not filtered."""
+    if peak.filtered is None or peak.filtered_time is None or not known(peak.filtered):
+        return ""
+    return f"{high(peak, peak.filtered)} at {peak.filtered_time:.3f} s"
+
+
+def known(value: float | None) -> bool:
+    """Whether there is a number."""
+    return value is not None and math.isfinite(value)
+
+
+def title_of(peak: Peak) -> str:
+    """Name of the load, as a heading begins."""
+    name = series(peak.channel).name
+    return name[:1].upper() + name[1:]
+
+
+def verdict(run: Run, peaks: Sequence[Peak], scales: Sequence[str] = ()) -> str:
+    """The first page: the load that matters and when, all peaks, what they are worth, the energy ledger."""
+    found = ranked(run, peaks)
+    lines = _headline(run, found)
+    if found:
+        lines += _table(found)
+        lines += _domain(run, found)
+    lines += _ledger(run)
+    if run.status == "done":
+        lines += ["", f"**{run.scenario.title}:** {run.sentence or 'done'}."]
+    lines += ["", "**To read the picture:** " + "; ".join(scales) + "." if scales else ""]
+    lines += ["", "Numbers are taken from the channels, never from a plot."]
+    return "\n".join(lines) + "\n"
+
+
+def _headline(run: Run, found: Sequence[Peak]) -> list[str]:
+    lines = []
+    if run.status == "failed":
+        lines += [f"# Run failed at {run.stop_time:.3f} s", "", f"**{run.sentence or 'no reason given'}**", ""]
+        lines += ["What follows holds until then.", ""]
+    if not found:
+        return [*lines, "# No load was recorded", "", f"{run.scenario.title}.", ""]
+    first = found[0]
+    lines += [f"# {title_of(first)}: {raw(first)}", ""]
+    worth = []
+    if known(first.filtered):
+        worth.append(f"CFC {first.cfc}: **{filtered(first)}**")
+    count = len({*run.domain_flags, *(flag for p in found for flag in p.domain_flags)})
+    if count:
+        worth.append(f"outside the calibrated domain in {count} {'ways' if count > 1 else 'way'}, see below")
+    if worth:
+        lines += ["; ".join(worth) + ".", ""]
+    return lines
+
+
+def _table(found: Sequence[Peak]) -> list[str]:
+    classes = sorted({p.cfc for p in found if p.cfc is not None and known(p.filtered)})
+    heading = "CFC " + "/".join(str(c) for c in classes) if classes else "filtered"
+    columns = ["load", "raw peak"]
+    shows_filtered = any(known(p.filtered) for p in found)
+    shows_impulse = any(known(p.impulse) for p in found)
+    shows_change = any(known(p.half_step_change) for p in found)
+    columns += [heading] if shows_filtered else []
+    columns += ["impulse"] if shows_impulse else []
+    columns += ["half step"] if shows_change else []
+    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+    for p in found:
+        row = [title_of(p), raw(p)]
+        if shows_filtered:
+            row.append(filtered(p))
+        if shows_impulse:
+            row.append(amount(p.impulse, "N s") if p.impulse is not None and known(p.impulse) else "")
+        if shows_change:
+            change = p.half_step_change
+            row.append(f"{100.0 * change:+.1f} %" if change is not None and known(change) else "")
+        lines.append("| " + " | ".join(row) + " |")
+    return [*lines, ""]
+
+
+def _domain(run: Run, found: Sequence[Peak]) -> list[str]:
+    """Domain flags in words, each with the loads it concerns."""
+    concerned: dict[str, list[str]] = {flag: [] for flag in run.domain_flags}
+    for p in found:
+        for flag in p.domain_flags:
+            concerned.setdefault(flag, []).append(title_of(p))
+    if not concerned:
+        return ["All loads lie within the domain in which the ground law was calibrated.", ""]
+    lines = ["**Outside the domain in which the ground law was calibrated:**", ""]
+    for flag, loads in concerned.items():
+        where = f" ({', '.join(loads[:4])}{' and others' if len(loads) > 4 else ''})" if loads else ""
+        lines.append(f"- {in_words(flag, run.scenario.ground.law.domain)}{where}")
+    return [*lines, ""]
+
+
+def in_words(flag: str, domain: Domain) -> str:
+    """A domain flag as a sentence, with the bound that was crossed."""
+    words: Mapping[str, str] = {
+        "impact-speed": f"impact speed outside {domain.speed_least:g} to {domain.speed_most:g} m/s",
+        "momentum": f"momentum of the striking mass above {domain.momentum_most:.3g} N s",
+        "contact-area": f"contact area unlike the tested face of {1e4 * domain.area:.3g} cm\N{SUPERSCRIPT TWO}",
+        "second-hit": "a second hit on the same rut; virgin soil was tested",
+        "oblique-impact": f"impact more than {math.degrees(domain.obliquity_most):.3g} deg off the ground's normal",
+    }
+    return words.get(flag, flag.replace("-", " "))
+
+
+def _ledger(run: Run) -> list[str]:
+    if not run.ledger:
+        return []
+    residual = run.ledger.get("residual", math.nan)
+    share = abs(residual) / run.released if run.released > 0.0 else math.nan
+    judged = f", {100.0 * share:.2g} % of the {joules(run.released)} released" if math.isfinite(share) else ""
+    names = [name for name, value in run.ledger.items() if name != "residual" and value]
+    lines = [f"**Energy:** {joules(residual)} unaccounted for{judged}.", ""]
+    lines += ["| " + " | ".join(names) + " |", "|" + "---|" * len(names)]
+    return [*lines, "| " + " | ".join(joules(run.ledger[name]) for name in names) + " |"]
