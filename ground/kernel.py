@@ -13,8 +13,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from ground.compiled import call_advance, call_force, compiled
 from ground.law import BRANCH, REFERENCE_AREA
 
@@ -142,51 +140,29 @@ def commit(law: Any, p: Any, s: Any, row: Any, state: Any, z: float, v: float, h
 
 @compiled
 def friction_force(
-    mu: float,
-    stick: float,
-    relaxation: float,
-    force: float,
-    shear: Any,
-    moved: Any,
-    velocity: Any,
-    normal: Any,
-    out: Any,
-) -> None:
-    """F_t = -mu F_n (d + tau v_t)/d_s, |F_t| <= mu F_n, into out (3,); d = committed shear plus what has moved since.
+    mu: float, stick: float, relaxation: float, force: float, shear: Any, moved: Any, v: Any, n: Any
+) -> Any:
+    """F_t = -mu F_n (d + tau v_t)/d_s, |F_t| <= mu F_n; d = committed shear plus what has moved since.
 
-    All vectors in world axes; only their parts along the surface count.
+    Vectors are in world axes; only their parts along the surface of normal n count. Returns three components.
     """
-    out[:] = 0.0
     if mu <= 0.0 or force <= 0.0:
-        return
-    d = np.empty(3)
-    along = 0.0
-    for k in range(3):
-        d[k] = shear[k] + moved[k] + relaxation * velocity[k]
-        along += d[k] * normal[k]
-    size = 0.0
-    for k in range(3):
-        d[k] -= along * normal[k]
-        size += d[k] * d[k]
-    size = math.sqrt(size)
-    if size > 0.0:
-        factor = -mu * force / max(size, stick)
-        for k in range(3):
-            out[k] = factor * d[k]
+        return 0.0, 0.0, 0.0
+    x = shear[0] + moved[0] + relaxation * v[0]
+    y = shear[1] + moved[1] + relaxation * v[1]
+    z = shear[2] + moved[2] + relaxation * v[2]
+    along = x * n[0] + y * n[1] + z * n[2]
+    x, y, z = x - along * n[0], y - along * n[1], z - along * n[2]
+    factor = -mu * force / max(math.sqrt(x * x + y * y + z * z), stick)
+    return factor * x, factor * y, factor * z
 
 
 @compiled
-def commit_friction(stick: float, shear: Any, moved: Any, normal: Any) -> None:
+def commit_friction(stick: float, shear: Any, moved: Any, n: Any) -> None:
     """Add what has moved to the shear displacement and cut it at d_s: the rest was slip."""
-    along = 0.0
-    for k in range(3):
-        shear[k] += moved[k]
-        along += shear[k] * normal[k]
-    size = 0.0
-    for k in range(3):
-        shear[k] -= along * normal[k]
-        size += shear[k] * shear[k]
-    size = math.sqrt(size)
-    if size > stick:
-        for k in range(3):
-            shear[k] *= stick / size
+    x, y, z = shear[0] + moved[0], shear[1] + moved[1], shear[2] + moved[2]
+    along = x * n[0] + y * n[1] + z * n[2]
+    x, y, z = x - along * n[0], y - along * n[1], z - along * n[2]
+    size = math.sqrt(x * x + y * y + z * z)
+    factor = stick / size if size > stick else 1.0
+    shear[0], shear[1], shear[2] = factor * x, factor * y, factor * z

@@ -105,7 +105,8 @@ def run(
     folder = out or Path("out", "run", path.stem)
     store.claim(folder, document.content_hash(chosen), force=force)  # before a run that may take minutes
     done, again = _simulated(chosen, half_step)
-    peaks = loads.peak_loads(done, again if again and again.status == "done" else None)
+    # what a run that broke off reached is in its channels; a peak of it would pass for the peak
+    peaks = loads.peak_loads(done, again if again and again.status == "done" else None) if done.status == "done" else ()
     answer = store.write(folder, done, peaks, half_step=again, picture=_picture(done, peaks), force=force)
     if as_json:
         print(json.dumps(answer, indent=2))

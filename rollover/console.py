@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -45,11 +44,11 @@ def progress(what: str, start: float, end: float) -> Iterator[Callable[[float, f
 
             yield show
         return
-    last = [time.monotonic() + QUIET - EVERY]
+    last = [-EVERY]
 
     def line(simulated: float, wall: float) -> None:
-        if wall > QUIET and time.monotonic() - last[0] >= EVERY:
-            last[0] = time.monotonic()
+        if wall > QUIET and wall - last[0] >= EVERY:
+            last[0] = wall
             say(f"{what}: {_state(simulated, wall, start, end)}")
 
     yield line
@@ -94,10 +93,10 @@ def _table(peaks: Sequence[PeakLoad]) -> Table:
     table = Table(box=None, pad_edge=False)
     table.add_column("peak load")
     table.add_column("unit")
-    for heading in ("raw", "at s", f"CFC {peaks[0].cfc}", "at s", "impulse N s", "half step"):
+    for heading in ("raw", "at s", f"CFC {peaks[0].cfc}", "at s", "impulse N s", "moves at half step"):
         table.add_column(heading, justify="right")
     for peak in peaks:
-        change = "-" if peak.half_step_change is None else f"{100.0 * peak.half_step_change:+.2g} %"
+        change = "-" if peak.half_step_change is None else f"{100.0 * peak.half_step_change:.2g} %"
         table.add_row(
             peak.channel + (" *" if peak.domain_flags else ""),
             _READABLE.get(peak.unit, (peak.unit, 1.0))[0],

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq, root
+from scipy.optimize import brentq
 
 from rollover.contact import Body
 from rollover.forces import generalised_forces, tyre_point
 from rollover.frames import from_angles, rotation_vector
+from rollover.jacobian import stiffness
 from rollover.tables import E_DEPTH_NOW, E_FORCE_NOW, POSE_COLUMNS, ROT, W_KZ, W_MU, Tables, handle
 
 Array = NDArray[np.float64]
@@ -114,31 +117,51 @@ class Equilibrium:
 
     def residual(self, u: Array) -> Array:
         """Virtual work for each coordinate over the weight, (size,)."""
-        q = self.coordinates(u)
-        Q = np.zeros_like(q)
+        return self._work(u)[0]
+
+    @contextmanager
+    def _without_friction(self) -> Iterator[None]:
+        """No stick: the tyres may move sideways as the vehicle settles."""
         friction = self.t.wheel_f[:, W_MU].copy()
         self.t.wheel_f[:, W_MU] = 0.0
-        generalised_forces(self.handle, q, np.zeros_like(q), Q)
-        self.t.wheel_f[:, W_MU] = friction
-        return np.asarray(self.tangents(u) @ (Q + self.weight) / self.scale)
+        try:
+            yield
+        finally:
+            self.t.wheel_f[:, W_MU] = friction
+
+    def _work(self, u: Array) -> tuple[Array, Array]:
+        """Residual at u and the tangents that it was found with."""
+        q = self.coordinates(u)
+        Q = np.zeros_like(q)
+        with self._without_friction():
+            generalised_forces(self.handle, q, np.zeros_like(q), Q)
+        T = self.tangents(u)
+        return np.asarray(T @ (Q + self.weight) / self.scale), T
 
     def solve(self, guess: Array, fixed: tuple[int, ...] = ()) -> Array | None:
-        """Equilibrium near a guess, some coordinates held, or None."""
+        """Equilibrium near a guess by a damped Newton iteration, some coordinates held, or None."""
         free = [k for k in range(self.size) if k not in fixed]
         if len(self.bodies) == 1 or self.bodies[1].name != "front_axle":
             free = [k for k in free if k != AXLE]
-
-        def of(v: Array) -> Array:
-            u = guess.copy()
-            u[free] = v
-            return np.asarray(self.residual(u)[free])
-
-        for method in ("hybr", "lm"):
-            found = root(of, guess[free], method=method, tol=1e-12)
-            if float(np.max(np.abs(of(found.x)))) < TOLERANCE:
-                u = guess.copy()
-                u[free] = found.x
+        u, K = guess.copy(), np.zeros((self.weight.size, self.weight.size))
+        r, T = self._work(u)
+        for _ in range(80):
+            size = float(np.max(np.abs(r[free])))
+            if size < TOLERANCE:
                 return u
+            with self._without_friction():
+                stiffness(self.handle, 1.0, 0.0, K)
+            A = (T @ K @ T.T / self.scale)[np.ix_(free, free)]
+            step = np.linalg.solve(A + 1e-3 * np.eye(len(free)), r[free])
+            step *= min(1.0, 0.1 / max(float(np.max(np.abs(step))), 1e-12))
+            for _ in range(8):
+                trial = u.copy()
+                trial[free] += step
+                r, T = self._work(trial)
+                if float(np.max(np.abs(r[free]))) < size:
+                    break
+                step *= 0.5
+            u = trial
         return None
 
     def balance(self, sign: float, swing: float) -> Array | None:
@@ -161,12 +184,12 @@ class Equilibrium:
             settled = found
             return sign * float(self.residual(found)[ROLL])
 
-        for roll in np.radians(np.arange(5.0, 75.0, 2.5)):
+        for roll in np.radians(np.arange(20.0, 80.0, 6.0)):
             value = moment(float(roll))
             if math.isnan(value):
                 continue
             if last is not None and last[1] < 0.0 <= value:
-                at = float(brentq(moment, last[0], float(roll), xtol=1e-10))
+                at = float(brentq(moment, last[0], float(roll), xtol=1e-8))
                 moment(at)
                 return settled
             last = (float(roll), value)

@@ -5,6 +5,8 @@ Frames are letters: W world, V vehicle; R_WV takes vector components from V to W
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -13,13 +15,25 @@ Array = NDArray[np.float64]
 
 
 def from_angles(roll: float, pitch: float, yaw: float) -> Array:
-    """R_WV of ISO 8855 angles (rad), (3, 3)."""
-    return np.asarray(Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix())
+    """R_WV of ISO 8855 angles (rad), (3, 3): turn by yaw about z, then pitch about y, then roll about x."""
+    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
 
 
 def rotation_vector(R: Array) -> Array:
-    """Rotation vector of a matrix, (3,), rad."""
-    return np.asarray(Rotation.from_matrix(R).as_rotvec())
+    """Rotation vector of a matrix, (3,), rad, shorter than pi."""
+    axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    sine, cosine = 0.5 * math.sqrt(float(axis @ axis)), 0.5 * (float(np.trace(R)) - 1.0)
+    if sine > 1e-7:
+        return np.asarray(axis * (0.5 * math.atan2(sine, cosine) / sine))
+    return np.asarray(Rotation.from_matrix(R).as_rotvec())  # no turn, or half a turn
 
 
 def matrices(vectors: Array) -> Array:

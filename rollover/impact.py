@@ -25,35 +25,14 @@ from ground.kernel import (
     TOUCH_SPEED,
 )
 from rollover.dense import add_outer, dot, norm, solve_in_place, times
-from rollover.forces import (
-    centripetal_depth,
-    cross,
-    depth_row,
-    to_body,
-    to_world,
-)
 from rollover.tables import (
-    ACC,
     ACTIVE,
-    ALPHA,
     FRACTION,
     GUIDE,
     R_IMPULSE,
     R_IMPULSE_NOW,
 )
-
-
-@compiled
-def depth_acceleration(t: Any, b: int, r: Any, n: Any) -> float:
-    """Second derivative of the depth of the point r of body b, m/s2."""
-    row = t.pose[b]
-    a, w = np.empty(3), np.empty(3)
-    cross(row[ALPHA : ALPHA + 3], r, a)
-    to_world(row, a, w)
-    linear = 0.0
-    for k in range(3):
-        linear -= n[k] * (row[ACC + k] + w[k])
-    return linear + centripetal_depth(row, r, n)  # type: ignore[no-any-return]
+from rollover.vectors import depth_row, direction_row, to_body, to_world
 
 
 @compiled
@@ -61,7 +40,7 @@ def constraints(t: Any) -> Any:
     """G (5 nj, 6 nb) with G v = 0 for the joints: front axle pivot and the rig's guide."""
     nj, nb = t.joint_i.shape[0], t.pose.shape[0]
     G = np.zeros((5 * nj, 6 * nb))
-    e, w, local, arm = np.zeros(3), np.empty(3), np.empty(3), np.empty(3)
+    e = np.zeros(3)
     for j in range(nj):
         a, b = t.joint_i[j, 1], t.joint_i[j, 2]
         if t.joint_i[j, 0] == GUIDE:
@@ -70,25 +49,20 @@ def constraints(t: Any) -> Any:
             for k in range(3):
                 G[5 * j + 2 + k, 6 * a + 3 + k] = 1.0
             continue
+        p = t.joint_f[j]
         for k in range(3):
-            e[:] = 0.0
+            e[0], e[1], e[2] = 0.0, 0.0, 0.0
             e[k] = 1.0
-            for side in range(2):
-                body = a if side == 0 else b
-                sign = 1.0 if side == 0 else -1.0
-                to_body(t.pose[body], e, local)
-                cross(t.joint_f[j, 3 * side : 3 * side + 3], local, arm)
-                for m in range(3):
-                    G[5 * j + k, 6 * body + m] = sign * e[m]
-                    G[5 * j + k, 6 * body + 3 + m] = sign * arm[m]
-        for k in range(2):
-            e[:] = 0.0
-            e[1 + k] = 1.0  # the pivot turns about x of body a: not about its y and z
-            to_world(t.pose[a], e, w)
-            to_body(t.pose[b], w, local)
+            direction_row(t.pose[a], p[:3], e[0], e[1], e[2], G[5 * j + k, 6 * a : 6 * a + 6])
+            direction_row(t.pose[b], p[3:], -e[0], -e[1], -e[2], G[5 * j + k, 6 * b : 6 * b + 6])
+        for k in range(1, 3):
+            e[0], e[1], e[2] = 0.0, 0.0, 0.0
+            e[k] = 1.0  # the pivot turns about x of body a: not about its y and z
+            x, y, z = to_world(t.pose[a], e[0], e[1], e[2])
+            local = to_body(t.pose[b], x, y, z)
             for m in range(3):
-                G[5 * j + 3 + k, 6 * a + 3 + m] = e[m]
-                G[5 * j + 3 + k, 6 * b + 3 + m] = -local[m]
+                G[5 * j + 2 + k, 6 * a + 3 + m] = e[m]
+                G[5 * j + 2 + k, 6 * b + 3 + m] = -local[m]
     return G
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from ground.compiled import call_force, compiled
 from ground.kernel import ADDRESS_FORCE, AREA, BODY, LINE_C, LINE_K, LINE_Z, NORMAL, OWNER_R, PLASTIC
 from ground.law import REFERENCE_AREA
-from rollover.forces import TYRE_RELAXATION, cross, to_body, tyre_stiffness
+from rollover.forces import TYRE_RELAXATION, tyre_stiffness
 from rollover.tables import (
     A_C,
     A_K,
@@ -34,20 +34,12 @@ from rollover.tables import (
     W_C,
     W_KY,
     W_KZ,
+    W_MU,
     ZDOT,
     X,
     Z,
 )
-
-
-@compiled
-def direction_row(row: Any, r: Any, d: Any, J: Any) -> None:
-    """J (6,) with speed of the point r of a body along the world direction d = J [v, omega]."""
-    local, arm = np.empty(3), np.empty(3)
-    to_body(row, d, local)
-    cross(r, local, arm)
-    for k in range(3):
-        J[k], J[3 + k] = d[k], arm[k]
+from rollover.vectors import direction_row, place, to_body
 
 
 @compiled
@@ -62,13 +54,13 @@ def add_block(K: Any, factor: float, a: Any, at: int, b: Any, bt: int) -> None:
 def add_point(K: Any, row: Any, b: int, r: Any, n: Any, normal: float, tangential: float) -> None:
     """A spring `normal` along n and `tangential` across it at the point r of body b."""
     J, d = np.empty(6), np.zeros(3)
-    direction_row(row, r, n, J)
+    direction_row(row, r, n[0], n[1], n[2], J)
     add_block(K, normal - tangential, J, 6 * b, J, 6 * b)
     if tangential > 0.0:
         for k in range(3):
             d[0], d[1], d[2] = 0.0, 0.0, 0.0
             d[k] = 1.0
-            direction_row(row, r, d, J)
+            direction_row(row, r, d[0], d[1], d[2], J)
             add_block(K, tangential, J, 6 * b, J, 6 * b)
 
 
@@ -120,7 +112,8 @@ def stiffness(t: Any, f: float, fd: float, K: Any) -> None:
             b = t.wheel_i[w]
             k, _ = tyre_stiffness(c, 0.0)
             normal = f * k + fd * c[W_C] * k / c[W_KZ]
-            add_point(K, t.pose[b], b, g[E_POINT : E_POINT + 3], n, normal, c[W_KY] * (f + fd * TYRE_RELAXATION))
+            stick = c[W_KY] * (f + fd * TYRE_RELAXATION) if c[W_MU] > 0.0 else 0.0
+            add_point(K, t.pose[b], b, g[E_POINT : E_POINT + 3], n, normal, stick)
     add_mounts(t, f, fd, K)
     if t.axle_f.size > 0 and t.axle_memory[M_TORQUE_NOW] != 0.0:
         c, b = t.axle_i[0], t.axle_i[1]
@@ -130,12 +123,8 @@ def stiffness(t: Any, f: float, fd: float, K: Any) -> None:
 @compiled
 def spin_row(t: Any, c: int, b: int, k: int) -> Any:
     """Row (6,) of the angular velocity of body b about axis k of body c."""
-    J, axis, local = np.zeros(6), np.empty(3), np.empty(3)
-    for m in range(3):
-        axis[m] = t.pose[c, ROT + 3 * m + k]
-    to_body(t.pose[b], axis, local)
-    for m in range(3):
-        J[3 + m] = local[m]
+    J = np.zeros(6)
+    J[3], J[4], J[5] = to_body(t.pose[b], t.pose[c, ROT + k], t.pose[c, ROT + 3 + k], t.pose[c, ROT + 6 + k])
     return J
 
 
@@ -146,19 +135,15 @@ def add_mounts(t: Any, f: float, fd: float, K: Any) -> None:
         return
     c, b = t.mount_i[0], t.mount_i[1]
     chassis, rops = t.pose[c], t.pose[b]
-    J, L, axis, arm, local = np.empty(6), np.empty(6), np.empty(3), np.empty(3), np.empty(3)
+    J, L, local = np.empty(6), np.empty(6), np.empty(3)
     for i in range(t.mount_f.shape[0]):
         g = t.mount_f[i]
-        for k in range(3):  # where the mounting point of the ROPS stands, in chassis axes
-            arm[k] = rops[X + k] - chassis[X + k]
-            for m in range(3):
-                arm[k] += rops[ROT + 3 * k + m] * g[T_ROPS + m]
-        to_body(chassis, arm, local)
+        x, y, z = place(rops, g[T_ROPS], g[T_ROPS + 1], g[T_ROPS + 2])
+        local[0], local[1], local[2] = to_body(chassis, x - chassis[X], y - chassis[X + 1], z - chassis[X + 2])
         for k in range(3):
-            for m in range(3):
-                axis[m] = chassis[ROT + 3 * m + k]
-            direction_row(rops, g[T_ROPS : T_ROPS + 3], axis, J)
-            direction_row(chassis, local, axis, L)
+            x, y, z = chassis[ROT + k], chassis[ROT + 3 + k], chassis[ROT + 6 + k]
+            direction_row(rops, g[T_ROPS : T_ROPS + 3], x, y, z, J)
+            direction_row(chassis, local, x, y, z, L)
             add_pair(K, f * g[T_K + k] + fd * g[T_C + k], J, 6 * b, L, 6 * c)
             factor = f * g[T_KR + k] + fd * g[T_CR + k]
             add_pair(K, factor, spin_row(t, c, b, k), 6 * b, spin_row(t, c, c, k), 6 * c)

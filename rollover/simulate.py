@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rollover import history, model
 from rollover import tables as c
 from rollover.contact import Body, bodies_of, grown, tables_of
+from rollover.forces import generalised_forces
 from rollover.frames import matrices, quaternions
 from rollover.history import History, States
 from rollover.initiation import Standing
@@ -20,7 +21,7 @@ from rollover.placement import place
 from rollover.recording import Recording
 from rollover.run import ContactForce, Event, GroundTrack, Motion, Run
 from rollover.scenario import Scenario
-from rollover.step import end_of_step, evaluate, stand, start_step
+from rollover.step import end_of_step, stand, start_step
 from rollover.tables import Tables, handle
 from rollover.vehicle import Striker, Vehicle
 
@@ -64,9 +65,9 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
     past = History(scenario=scenario, bodies=bodies, time=np.zeros(len(rows)), rows=rows)
     live = model.Live(tables=t, handle=handle(t))
     Q = np.zeros(6 * len(bodies))
-    evaluate(live.handle, start.q, start.qd, Q)
+    generalised_forces(live.handle, start.q, start.qd, Q)
     stand(live.handle)
-    evaluate(live.handle, start.q, start.qd, Q)
+    generalised_forces(live.handle, start.q, start.qd, Q)
     start_step(live.handle)
     events: list[Event] = []
     seen: set[tuple[int, int]] = set()

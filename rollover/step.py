@@ -37,16 +37,8 @@ from ground.kernel import (
 )
 from ground.law import REFERENCE_AREA
 from rollover.dense import dot, times
-from rollover.forces import (
-    depth_row,
-    place_and_velocity,
-    read_poses,
-    try_axle,
-    try_elements,
-    try_mounts,
-    try_wheels,
-)
-from rollover.impact import depth_acceleration, mobility
+from rollover.forces import generalised_forces
+from rollover.impact import mobility
 from rollover.tables import (
     A_SWING,
     ACC,
@@ -113,19 +105,20 @@ from rollover.tables import (
     Z,
 )
 from rollover.touch import drop_mass, note_event, touch
+from rollover.vectors import depth_acceleration, depth_row, place, velocity
 
 
 @compiled
 def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
     """Book, commit, renew the contacts, exchange momentum with what was newly hit (writes qd)."""
-    evaluate(t, q, qd, Q)
+    generalised_forces(t, q, qd, Q)
     for b in range(t.pose.shape[0]):
         for k in range(3):
             t.pose[b, ACC + k] = qdd[6 * b + k]
             t.pose[b, ALPHA + k] = qdd[6 * b + 3 + k]
     for b in range(t.pose.shape[0]):
-        t.resultant[b, R_NORMAL:R_WEIGHT] = 0.0
-        t.resultant[b, R_WEIGHT] = 0.0
+        for k in range(R_NORMAL, R_WEIGHT + 1):
+            t.resultant[b, k] = 0.0
         t.resultant[b, R_IMPULSE_NOW] = 0.0
     t.counts[HITS_NOW] = 0
     finish_elements(t, h)
@@ -134,25 +127,13 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
     finish_axle(t)
     t.work[COLLISION] += touch(t, qd, h)
     settle(t)
-    evaluate(t, q, qd, Q)
+    generalised_forces(t, q, qd, Q)
     start_step(t)
-
-
-@compiled
-def evaluate(t: Any, q: Any, qd: Any, Q: Any) -> None:
-    """Try all forces at a state, for what they leave in the tables."""
-    Q[:] = 0.0
-    read_poses(t.pose, q, qd)
-    try_elements(t, Q)
-    try_wheels(t, Q)
-    try_mounts(t, Q)
-    try_axle(t, Q)
 
 
 @compiled
 def finish_elements(t: Any, h: float) -> None:
     """Work, contact forces and commit of the elements in contact."""
-    x, v = np.empty(3), np.empty(3)
     flags, footprint = 0, 0.0
     for a in range(t.counts[ACTIVE]):
         i = t.active[a]
@@ -164,12 +145,12 @@ def finish_elements(t: Any, h: float) -> None:
         # what the ground and the vehicle exert on each other: (1) without the collision, F_s = F + m_b1 a
         contact = trial[FN]
         if m[MASS_B] > 0.0:
-            contact += m[MASS_B] * depth_acceleration(t, b, m[OWNER_R : OWNER_R + 3], m[NORMAL : NORMAL + 3])
+            contact += m[MASS_B] * depth_acceleration(t.pose[b], m[OWNER_R : OWNER_R + 3], m[NORMAL : NORMAL + 3])
             if contact < 0.0:
                 # the mass would have to be pulled along: it leaves, and stays in the soil
                 drop_mass(t, i)
                 contact = trial[FN]
-        place_and_velocity(t.pose[b], m[OWNER_R : OWNER_R + 3], x, v)
+        x = place(t.pose[b], m[OWNER_R], m[OWNER_R + 1], m[OWNER_R + 2])
         result = t.resultant[b]
         for k in range(3):
             result[R_NORMAL + k] += contact * m[NORMAL + k]
@@ -261,7 +242,7 @@ def finish_wheels(t: Any) -> None:
             g[E_ANCHOR + k], g[E_PLACE + k] = g[E_POINT + k], g[E_WHERE + k]
         if (g[E_FORCE] > 0.0) != (g[E_FORCE_NOW] > 0.0):
             kind = WHEEL_ON if g[E_FORCE_NOW] > 0.0 else WHEEL_OFF
-            note_event(t, kind, w, g[E_WHERE : E_WHERE + 3], g[E_FORCE_NOW])
+            note_event(t, kind, w, (g[E_WHERE], g[E_WHERE + 1], g[E_WHERE + 2]), g[E_FORCE_NOW])
 
 
 @compiled
@@ -276,7 +257,7 @@ def finish_mounts(t: Any) -> None:
             elastic = g[S_DELTA_NOW + k] - g[S_SET + k]
             if abs(elastic) > most:
                 if g[S_SET + k] == 0.0:
-                    note_event(t, HINGE, i, t.pose[t.mount_i[1], :3], float(k))
+                    note_event(t, HINGE, i, place(t.pose[t.mount_i[1]], 0.0, 0.0, 0.0), float(k))
                 g[S_SET + k] = g[S_DELTA_NOW + k] - math.copysign(most, elastic)
 
 
@@ -288,7 +269,7 @@ def finish_axle(t: Any) -> None:
     g = t.axle_memory
     t.work[AXLE] -= 0.5 * (g[M_TORQUE] + g[M_TORQUE_NOW]) * (g[M_ANGLE_NOW] - g[M_ANGLE])
     if abs(g[M_ANGLE]) <= t.axle_f[A_SWING] < abs(g[M_ANGLE_NOW]):
-        note_event(t, AXLE_STOP, 0, t.pose[t.axle_i[1], :3], g[M_ANGLE_NOW])
+        note_event(t, AXLE_STOP, 0, place(t.pose[t.axle_i[1]], 0.0, 0.0, 0.0), g[M_ANGLE_NOW])
 
 
 @compiled
@@ -329,11 +310,10 @@ def start_step(t: Any) -> None:
 def kinetic_of_soil(t: Any) -> float:
     """Kinetic energy of the co-moving masses, J."""
     total = 0.0
-    x, v = np.empty(3), np.empty(3)
     for a in range(t.counts[ACTIVE]):
         m = t.memory[t.active[a]]
         if m[MASS_B] > 0.0:
-            place_and_velocity(t.pose[t.state[t.active[a], BODY]], m[OWNER_R : OWNER_R + 3], x, v)
+            v = velocity(t.pose[t.state[t.active[a], BODY]], m[OWNER_R], m[OWNER_R + 1], m[OWNER_R + 2])
             speed = m[NORMAL] * v[0] + m[NORMAL + 1] * v[1] + m[NORMAL + 2] * v[2]
             total += 0.5 * m[MASS_B] * speed * speed
     return total

@@ -37,11 +37,7 @@ from ground.kernel import (
     set_line,
 )
 from ground.law import BRANCH, MASS, REFERENCE_AREA, SPEED
-from rollover.forces import (
-    place_and_velocity,
-    to_world,
-)
-from rollover.impact import depth_acceleration, exchange, share_mass
+from rollover.impact import exchange, share_mass
 from rollover.tables import (
     ACTIVE,
     EVENTS,
@@ -59,8 +55,8 @@ from rollover.tables import (
     SLOTS,
     SOIL,
     TOUCH,
-    X,
 )
+from rollover.vectors import depth_acceleration, place, to_world, velocity
 
 
 @compiled
@@ -82,33 +78,30 @@ def search(t: Any) -> int:
     `found` then holds for each: deepest sinkage, projected area of the points of the same body, owning point.
     """
     n, offset = t.plane[:3], t.plane[3]
-    x, f = np.empty(3), np.empty(3)
     candidates, count = 0, 0
     for member in range(t.member_i.shape[0]):
         row = t.pose[t.member_i[member, 0]]
-        to_world(row, t.member_f[member, :3], x)
-        gap = n[0] * (x[0] + row[X]) + n[1] * (x[1] + row[X + 1]) + n[2] * (x[2] + row[X + 2]) - offset
+        x, y, z = place(row, t.member_f[member, 0], t.member_f[member, 1], t.member_f[member, 2])
+        gap = n[0] * x + n[1] * y + n[2] * z - offset
         if gap > t.member_f[member, 3]:
             continue
         for i in range(t.member_i[member, 1], t.member_i[member, 2]):
-            to_world(row, t.point_r[i], x)
-            for k in range(3):
-                x[k] += row[X + k]
-            z = offset - (n[0] * x[0] + n[1] * x[1] + n[2] * x[2])
-            if z <= 0.0:
+            x, y, z = place(row, t.point_r[i, 0], t.point_r[i, 1], t.point_r[i, 2])
+            depth = offset - (n[0] * x + n[1] * y + n[2] * z)
+            if depth <= 0.0:
                 continue
-            to_world(row, t.point_n[i], f)
-            facing = -(n[0] * f[0] + n[1] * f[1] + n[2] * f[2])
+            f, g, h = to_world(row, t.point_n[i, 0], t.point_n[i, 1], t.point_n[i, 2])
+            facing = -(n[0] * f + n[1] * g + n[2] * h)
             if facing <= 1e-6:
                 continue
-            ix = int(math.floor((x[0] - t.grid_f[0]) / t.grid_f[2]))
-            iy = int(math.floor((x[1] - t.grid_f[1]) / t.grid_f[3]))
+            ix = int(math.floor((x - t.grid_f[0]) / t.grid_f[2]))
+            iy = int(math.floor((y - t.grid_f[1]) / t.grid_f[3]))
             if ix < 0 or iy < 0 or ix >= t.grid_i[0] or iy >= t.grid_i[1]:
                 t.counts[OUTSIDE] += 1
                 continue
             slot = slot_at(t, ix * t.grid_i[1] + iy)
             # an element at rest keeps its rut: it is touched only beyond it
-            if t.state[slot, MODE] == IDLE and z <= rut_depth(t.memory[slot]):
+            if t.state[slot, MODE] == IDLE and depth <= rut_depth(t.memory[slot]):
                 continue
             t.candidate_i[candidates, 0], t.candidate_i[candidates, 1] = slot, i
             t.candidate_f[candidates] = facing * t.point_a[i]
@@ -117,8 +110,8 @@ def search(t: Any) -> int:
                 t.touched[count] = slot
                 count += 1
                 t.found[slot, 1] = 0.0
-            if z > t.found[slot, 0]:
-                t.found[slot, 0], t.found[slot, 2] = z, i
+            if depth > t.found[slot, 0]:
+                t.found[slot, 0], t.found[slot, 2] = depth, i
     for c in range(candidates):
         slot, i = t.candidate_i[c, 0], t.candidate_i[c, 1]
         if t.point_body[i] == t.point_body[int(t.found[slot, 2])]:
@@ -146,8 +139,7 @@ def drop_mass(t: Any, slot: int) -> None:
     """Let an element's co-moving mass go; its kinetic energy stays in the soil."""
     m, b = t.memory[slot], t.state[slot, BODY]
     if m[MASS_B] > 0.0:
-        x, v = np.empty(3), np.empty(3)
-        place_and_velocity(t.pose[b], m[OWNER_R : OWNER_R + 3], x, v)
+        v = velocity(t.pose[b], m[OWNER_R], m[OWNER_R + 1], m[OWNER_R + 2])
         speed = m[NORMAL] * v[0] + m[NORMAL + 1] * v[1] + m[NORMAL + 2] * v[2]
         t.work[SOIL] += 0.5 * m[MASS_B] * speed * speed
         m[MASS_B] = 0.0
@@ -194,14 +186,14 @@ def touch(t: Any, qd: Any, h: float) -> float:
     count = search(t)
     let_go(t)
     fresh, hits = np.empty(count, np.int64), 0
-    x, v = np.empty(3), np.empty(3)
     for c in range(count):
         slot = t.touched[c]
         m, state = t.memory[slot], t.state[slot]
         i = int(t.found[slot, 2])
         b = t.point_body[i]
         z = t.found[slot, 0]
-        place_and_velocity(t.pose[b], t.point_r[i], x, v)
+        r = t.point_r[i]
+        x, v = place(t.pose[b], r[0], r[1], r[2]), velocity(t.pose[b], r[0], r[1], r[2])
         speed = -(t.plane[0] * v[0] + t.plane[1] * v[1] + t.plane[2] * v[2])
         known = state[MODE] != IDLE
         # what normal motion swept in one step; beyond it the element was entered from the side
@@ -214,7 +206,7 @@ def touch(t: Any, qd: Any, h: float) -> float:
             if m[MASS_B] > 0.0 and state[BODY] != b:
                 m[MASS_B] = 0.0
             for k in range(3):
-                m[OWNER_R + k] = t.point_r[i, k]
+                m[OWNER_R + k] = r[k]
             state[OWNER], state[BODY] = i, b
             if jump > swept and t.law[PLASTIC] != 0 and t.law[REST_STIFFNESS] == 0:
                 enter_from_the_side(t.law, t.p, t.s[slot], m, z, before * m[AREA] / max(was, 1e-12))
@@ -224,13 +216,13 @@ def touch(t: Any, qd: Any, h: float) -> float:
         m[SINKAGE] = z
         if not known:
             for k in range(3):
-                m[OWNER_R + k] = t.point_r[i, k]
+                m[OWNER_R + k] = r[k]
                 m[NORMAL + k] = t.plane[k]
                 m[SHEAR + k] = 0.0
             m[OFFSET] = t.plane[3]
             state[OWNER], state[BODY] = i, b
             state[HITS] += 1
-            acceleration = depth_acceleration(t, b, t.point_r[i], t.plane[:3])
+            acceleration = depth_acceleration(t.pose[b], r, t.plane[:3])
             start = max(z - swept, rut_depth(m))
             # v_s at the surface, not up to a step later: K_b1 grows with its 18.7th power
             latched = math.sqrt(max(speed * abs(speed) - 2.0 * acceleration * min(z - start, swept), 0.0))
@@ -284,5 +276,4 @@ def begin(t: Any, slot: int, share: float) -> None:
             enter_from_the_side(t.law, t.p, s, m, start, 0.0)
         if m[SINKAGE] < m[LINE_Z]:
             state[MODE] = UNLOADING
-    x = m[PLACE : PLACE + 3]
-    note_event(t, TOUCH, state[BODY], x, speed)
+    note_event(t, TOUCH, state[BODY], (m[PLACE], m[PLACE + 1], m[PLACE + 2]), speed)

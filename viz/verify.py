@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,11 +19,20 @@ from viz.entities import TIMELINE
 
 def read_entities(path: Path) -> dict[str, set[str]]:
     """Entities of a recording (with a leading slash) and the components that each holds."""
+    return _entities(_chunks(path))
+
+
+def _chunks(path: Path) -> list[tuple[str, Any, Any]]:
+    """Entity, chunk and its table of everything but the recording's properties."""
+    chunks = RrdReader(path).stream().drop(content="/__properties/**").to_chunks()
+    return [(str(c.entity_path), c, c.to_record_batch()) for c in chunks if str(c.entity_path) != "/__properties"]
+
+
+def _entities(chunks: list[tuple[str, Any, Any]]) -> dict[str, set[str]]:
     found: dict[str, set[str]] = {}
-    for chunk in RrdReader(path).stream().to_chunks():
-        names = [n for n in chunk.to_record_batch().schema.names if ":" in n]
-        found.setdefault(str(chunk.entity_path), set()).update(names)
-    return {entity: names for entity, names in found.items() if not entity.startswith("/__properties")}
+    for entity, _, batch in chunks:
+        found.setdefault(entity, set()).update(n for n in batch.schema.names if ":" in n)
+    return found
 
 
 def read_column(path: Path, entity: str, component: str) -> tuple[NDArray[np.int64], list[Any]]:
@@ -69,12 +79,13 @@ def blueprint_queries(path: Path) -> Iterator[tuple[str, str]]:
 def check_rrd(path: Path) -> list[str]:
     """What is wrong with a recording, one sentence each; empty if it is as it should be."""
     try:
-        RrdReader(path).store()
-        entities = read_entities(path)
+        with warnings.catch_warnings(action="ignore"):  # that a footer is missing is said below
+            RrdReader(path).store()
+        chunks = _chunks(path)
     except Exception as e:
         # the reader raises whatever its decoder does; the sentence is what matters here
         return [f"{path.name}: cannot be read as a whole recording: {e}"]
-    return [*_layout(path, entities), *_times(path), *_aggregation(path, entities)]
+    return [*_layout(path, _entities(chunks)), *_times(chunks), *_aggregation(chunks)]
 
 
 def _layout(path: Path, entities: dict[str, set[str]]) -> Iterator[str]:
@@ -87,11 +98,10 @@ def _layout(path: Path, entities: dict[str, set[str]]) -> Iterator[str]:
             yield f"{path.name}: view {view!r} asks for {rule}, which nothing was logged to"
 
 
-def _times(path: Path) -> Iterator[str]:
-    for chunk in RrdReader(path).stream().drop(content="/__properties/**").to_chunks():
+def _times(chunks: list[tuple[str, Any, Any]]) -> Iterator[str]:
+    for entity, chunk, batch in chunks:
         if chunk.is_static:
             continue
-        entity, batch = str(chunk.entity_path), chunk.to_record_batch()
         if list(chunk.timeline_names) != [TIMELINE]:
             yield f"{entity}: time lines {list(chunk.timeline_names)}, not {TIMELINE} alone"
             continue
@@ -102,11 +112,9 @@ def _times(path: Path) -> Iterator[str]:
             yield f"{entity}: time has gaps or runs backwards"
 
 
-def _aggregation(path: Path, entities: dict[str, set[str]]) -> Iterator[str]:
-    policy = "SeriesLines:aggregation_policy"
-    for entity, components in entities.items():
-        if "Scalars:scalars" not in components or "SeriesPoints:markers" in components:
-            continue
-        values = read_column(path, entity, policy)[1] if policy in components else []
-        if values != [[rr.components.AggregationPolicy.MinMax.value]]:
+def _aggregation(chunks: list[tuple[str, Any, Any]]) -> Iterator[str]:
+    component, most = "SeriesLines:aggregation_policy", [rr.components.AggregationPolicy.MinMax.value]
+    safe = {e for e, _, b in chunks if component in b.schema.names and b[component].to_pylist() == [most]}
+    for entity, components in _entities(chunks).items():
+        if "Scalars:scalars" in components and "SeriesPoints:markers" not in components and entity not in safe:
             yield f"{entity}: drawn without MinMax, a short peak would be drawn lower than it was"

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from types import FrameType
@@ -36,13 +37,16 @@ def open_viewer(path: Path) -> int:
     if not path.is_file():
         raise FileNotFoundError(f"{path}: no such recording")
     binary = viewer_binary()
-    subprocess.run([binary, "analytics", "disable"], check=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    return wait_for([str(binary), "--bind", "127.0.0.1", "--port", "auto", "--hide-welcome-screen", str(path)])
+    quiet = {"RUST_LOG": "error", **os.environ}
+    nowhere = subprocess.DEVNULL
+    subprocess.run([binary, "analytics", "disable"], check=False, stdout=nowhere, stderr=nowhere, env=quiet)
+    here = ["--bind", "127.0.0.1", "--port", "auto"]
+    return wait_for([str(binary), *here, "--hide-welcome-screen", str(path)], quiet)
 
 
-def wait_for(command: list[str]) -> int:
+def wait_for(command: list[str], environment: Mapping[str, str] | None = None) -> int:
     """Run a child to its end; it does not outlive this call, however this call ends."""
-    with _terminated_like_interrupted(), subprocess.Popen(command) as child:
+    with _terminated_like_interrupted(), subprocess.Popen(command, env=environment) as child:
         try:
             return child.wait()
         finally:

@@ -58,7 +58,7 @@ def without(old: str, new: str) -> str:
     return TEXT.replace(old, new)
 
 
-ONE_FAULT = {
+ONE_FAULT: dict[str, tuple[str | bytes, str]] = {
     "quoted number": (
         without("speed: 3.0", "speed: '1e6'"),
         f"bad.yaml:8: initiation.speed: not a number, got text '1e6'; {SPEED} (without quotes)",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -102,7 +103,7 @@ def test_nothing_is_left_of_a_write_that_breaks_off(folder: Path, reason: type[B
 def test_a_write_that_breaks_off_leaves_the_earlier_results(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = run_of(load("drop_test"))
     before = store.write(folder, run, PEAKS)
-    rename, calls = store.os.rename, []
+    rename, calls = os.rename, []
 
     def breaks_the_second_time(a: Path, b: Path) -> None:
         calls.append(b)
@@ -110,7 +111,7 @@ def test_a_write_that_breaks_off_leaves_the_earlier_results(folder: Path, monkey
             raise KeyboardInterrupt
         rename(a, b)
 
-    monkeypatch.setattr(store.os, "rename", breaks_the_second_time)
+    monkeypatch.setattr(os, "rename", breaks_the_second_time)
     with pytest.raises(KeyboardInterrupt):
         store.write(folder, replace(run, sentence="later"), PEAKS)
     assert len(calls) == 3

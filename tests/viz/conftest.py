@@ -9,8 +9,6 @@ import pytest
 from rollover.run import Run
 from tests.viz import example
 
-pytest.importorskip("rerun", reason="no rerun wheel for this platform")
-
 
 @pytest.fixture(scope="session")
 def overturn() -> Run:
@@ -24,17 +22,15 @@ def drop() -> Run:
 
 @pytest.fixture(scope="session")
 def overturn_rrd(overturn: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from viz.log import write_rrd
-
+    log = pytest.importorskip("viz.log", reason="no rerun wheel for this platform", exc_type=ImportError)
     path = tmp_path_factory.mktemp("rrd") / "overturn.rrd"
-    write_rrd(overturn, path, peaks=example.peaks(overturn))
+    log.write_rrd(overturn, path, peaks=example.peaks(overturn))
     return path
 
 
 @pytest.fixture(scope="session")
 def drop_rrd(drop: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from viz.log import write_rrd
-
+    log = pytest.importorskip("viz.log", reason="no rerun wheel for this platform", exc_type=ImportError)
     path = tmp_path_factory.mktemp("rrd") / "drop.rrd"
-    write_rrd(drop, path)
+    log.write_rrd(drop, path)
     return path

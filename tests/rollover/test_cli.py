@@ -1,0 +1,395 @@
+"""The commands: what they answer, where, and with which exit status. Runs are made up by hand."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import types
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+import viz
+from rollover import document, simulate, store
+from rollover.channels import CHANNELS
+from rollover.cli import app
+from rollover.scenario import Scenario, load
+from tests.rollover.example import TEXT, Peak, run_of
+
+runner = CliRunner()
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def rollover(*arguments: str) -> Any:
+    return runner.invoke(app, list(arguments))
+
+
+SIMULATIO = "--set: simulatio: no such path; did you mean 'simulation' or 'simulation.step' or 'simulation.duration'?\n"
+
+
+class Bench:
+    """Stands in for the simulator, the loads and the pictures, and remembers what it was asked."""
+
+    def __init__(self) -> None:
+        self.asked: list[Scenario] = []
+        self.sentence = ""
+        self.finer_sentence = ""
+        self.halves: list[bool] = []
+
+    def run(self, scenario: Scenario, *, progress: Callable[[float, float], None] | None = None) -> Any:
+        self.asked.append(scenario)
+        assert progress is not None
+        progress(0.1, 0.2)
+        return run_of(scenario, self.finer_sentence if len(self.asked) > 1 else self.sentence)
+
+    def peak_loads(self, run: Any, half_step: Any) -> tuple[Peak, ...]:
+        self.halves.append(half_step is not None)
+        return (Peak(domain_flags=("speed",), half_step_change=0.001 if half_step else None),)
+
+
+@pytest.fixture
+def bench(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Bench:
+    bench = Bench()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(simulate, "run", bench.run)
+    loads, log = types.ModuleType("rollover.loads"), types.ModuleType("viz.log")
+    loads.peak_loads = bench.peak_loads  # type: ignore[attr-defined]
+    log.write_rrd = lambda run, path, peaks: path.write_bytes(b"rrd")  # type: ignore[attr-defined]
+    for module in (loads, log):
+        monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.setattr("rollover.loads", loads, raising=False)
+    monkeypatch.setattr(viz, "log", log, raising=False)
+    return bench
+
+
+# ---------------------------------------------------------------- run
+
+
+def test_run_writes_results_and_prints_peaks(bench: Bench) -> None:
+    done = rollover("run", "drop_test")
+    assert done.exit_code == 0, done.stderr
+    folder = Path("out/run/drop_test")
+    assert sorted(p.name for p in folder.iterdir()) == sorted(store.FILES)
+    assert [s.simulation.step for s in bench.asked] == [0.0002, 0.0001]
+    assert bench.asked[0] == load("drop_test")
+    assert "ground/force_normal *" in done.stdout
+    assert "3.552" in done.stdout  # kN
+    assert "calibrated domain: speed." in done.stdout
+    assert f"Results: {folder}" in done.stdout
+
+
+def test_run_as_json_prints_nothing_else(bench: Bench) -> None:
+    done = rollover("run", "drop_test", "--json", "--out", "here")
+    assert done.exit_code == 0
+    assert json.loads(done.stdout) == store.read_run_json(Path("here"))
+    assert done.stderr == ""
+
+
+def test_run_sets_values_and_leaves_out_the_half_step(bench: Bench) -> None:
+    done = rollover("run", "drop_test", "--no-half-step", "--set", "initiation.speed=2", "--set", "title=A: b")
+    assert done.exit_code == 2
+    assert done.stderr == "--set: title: not text, got a mapping (A); text is allowed\n"
+    done = rollover("run", "drop_test", "--no-half-step", "--set", "initiation.speed=2", "--set", "title=A b")
+    assert done.exit_code == 0
+    assert bench.asked == [load("drop_test").replaced({"initiation.speed": 2.0, "title": "A b"})]
+    assert bench.halves == [False]
+    assert store.read_run_json(Path("out/run/drop_test"))["half_step"] is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "lines"),
+    [
+        (["drop_tst"], "drop_tst: no such file; did you mean 'drop_test'?\n"),
+        (
+            ["bad.yaml"],
+            "bad.yaml:8: initiation.speed: out of bounds, got -3; "
+            "a number greater than 0 and at most 20 m/s is allowed\n",
+        ),
+        (["drop_test", "--set", "x"], "--set: not a setting, got 'x'; PATH=VALUE is needed\n"),
+        (["drop_test", "--set", "title=a", "--set", "title=b"], "--set: title: given twice; once is allowed\n"),
+        (["drop_test", "--set", "simulatio=3"], SIMULATIO),
+    ],
+)
+def test_wrong_input_is_2_and_nothing_is_run_or_written(bench: Bench, arguments: list[str], lines: str) -> None:
+    Path("bad.yaml").write_text(TEXT.replace("speed: 3.0", "speed: -3"))
+    done = rollover("run", *arguments)
+    assert (done.exit_code, done.stderr, done.stdout) == (2, lines, "")
+    assert bench.asked == []
+    assert not Path("out").exists()
+
+
+def test_another_runs_results_are_kept_before_anything_is_simulated(bench: Bench) -> None:
+    assert rollover("run", "drop_test").exit_code == 0
+    again = rollover("run", "drop_test")
+    assert again.exit_code == 0  # the same run
+    asked = len(bench.asked)
+    other = rollover("run", "drop_test", "--set", "initiation.speed=2.0")
+    assert other.exit_code == 2
+    assert "holds another run" in other.stderr
+    assert len(bench.asked) == asked
+    assert rollover("run", "drop_test", "--set", "initiation.speed=2.0", "--force").exit_code == 0
+
+
+def test_a_failed_run_is_3_with_its_results(bench: Bench) -> None:
+    bench.sentence = "diverged at t = 0.0100 s"
+    done = rollover("run", "drop_test", "--json")
+    assert done.exit_code == 3
+    assert done.stderr.endswith("drop_test.yaml: the simulation failed: diverged at t = 0.0100 s\n")
+    assert (json.loads(done.stdout)["status"], json.loads(done.stdout)["peak_loads"]) == ("failed", [])
+    assert len(bench.asked) == 1  # no half step after a failure
+    assert store.read_run_json(Path("out/run/drop_test"))["sentence"] == bench.sentence
+
+
+def test_a_half_step_that_fails_is_told_and_not_compared(bench: Bench) -> None:
+    bench.finer_sentence = "diverged at t = 0.0100 s"
+    done = rollover("run", "drop_test")
+    assert done.exit_code == 0
+    assert "At half the step the run failed: diverged at t = 0.0100 s" in done.stdout
+    assert bench.halves == [False]
+
+
+def test_without_rerun_everything_but_the_picture_is_written(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(viz, "log")
+    monkeypatch.delitem(sys.modules, "viz.log")
+    monkeypatch.setitem(sys.modules, "rerun", None)  # importing it fails as where it is not installed
+    done = rollover("run", "drop_test")
+    assert done.exit_code == 0, done.output
+    assert done.stderr == "No rerun wheel for this platform: recording.rrd was not written.\n"
+    assert not Path("out/run/drop_test/recording.rrd").exists()
+    assert Path("out/run/drop_test/run.json").exists()
+
+
+def test_an_interrupt_leaves_nothing(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(scenario: Scenario, *, progress: Any = None) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(simulate, "run", interrupted)
+    done = rollover("run", "drop_test")
+    assert (done.exit_code, done.stderr) == (130, "Interrupted.\n")
+    assert not Path("out").exists()
+
+
+def test_the_first_run_says_that_it_compiles(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ground.compiled.is_warm", lambda: False)
+    done = rollover("run", "drop_test")
+    assert done.stderr.startswith("Compiling the contact kernels, once per installation: about ")
+    assert done.stderr.count("\n") == 1
+
+
+def test_progress_in_lines_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    from rollover import console
+
+    with console.progress("simulating", -0.5, 3.0) as show:
+        show(0.1, 1.0)  # too short to speak of
+        show(0.5, 2.5)
+        show(0.6, 2.6)  # too soon after
+    assert capsys.readouterr().err == "simulating: 0.50 of 3 s, 0.4 x real time\n"
+
+
+# ---------------------------------------------------------------- list, check, schema, view
+
+
+@pytest.mark.parametrize(
+    ("what", "names"),
+    [
+        ("scenarios", {"drop_test", "side_overturn"}),
+        ("vehicles", {"utility_tractor", "rops_rig"}),
+        ("soils", {"natural_clay"}),
+        ("laws", {"ye-2006", "treated"}),
+        ("effects", set()),
+        ("channels", set(CHANNELS)),
+    ],
+)
+def test_list(what: str, names: set[str]) -> None:
+    done = rollover("list", what)
+    assert done.exit_code == 0
+    assert names <= {line.split()[0] for line in done.stdout.splitlines()}
+    rows = json.loads(rollover("list", what, "--json").stdout)
+    assert len(rows) == len(done.stdout.splitlines())
+    assert names <= {next(iter(row.values())) for row in rows}
+
+
+def test_list_paths() -> None:
+    lines = rollover("list", "paths", "drop_test").stdout.splitlines()
+    assert any(
+        line.split() == ["initiation.speed", "3", "m/s", "downward,", "at", "first", "contact"] for line in lines
+    )
+    rows = json.loads(rollover("list", "paths", "drop_test", "--json").stdout)
+    assert {"path": "initiation.speed", "value": 3.0, "unit": "m/s", "meaning": "downward, at first contact"} in rows
+
+
+def test_list_refuses_what_does_not_fit() -> None:
+    assert rollover("list", "nothing").exit_code == 2
+    assert rollover("list", "paths").stderr == "rollover list paths: whose paths, got no scenario; name one\n"
+    assert rollover("list", "laws", "x").exit_code == 2
+
+
+def test_check_tells_all_faults_of_all_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a.yaml").write_text(TEXT.replace("speed: 3.0", "sped: 3.0"))
+    Path("b.yaml").write_text(TEXT)
+    Path("c.yaml").write_text("kind: ye-2006\nrecovery: 2\n")
+    done = rollover("check", "a.yaml", "b.yaml", "c.yaml", "nope")
+    assert done.exit_code == 2
+    assert done.stdout == "b.yaml: scenario, in order\n"
+    assert [line.split(": ")[0] for line in done.stderr.splitlines()] == ["a.yaml:6", "a.yaml:8", "c.yaml:2", "nope"]
+    answer = json.loads(rollover("check", "a.yaml", "b.yaml", "--json").stdout)
+    assert answer["ok"] is False
+    assert [len(file["faults"]) for file in answer["files"]] == [2, 0]
+    assert answer["files"][0]["faults"][1]["line"] == 8
+    assert json.loads(rollover("check", "b.yaml", "--json").stdout)["ok"] is True
+
+
+def test_check_follows_base_to_see_what_a_file_is() -> None:
+    shelf = document.shipped_folder()
+    files = [
+        "drop_test",
+        "side_overturn_slope",
+        "vehicles/rops_rig",
+        "soils/natural_clay_soft",
+        "vehicles/rops/two_post_rear_3t",
+    ]
+    done = rollover("check", *(str(shelf / f"{name}.yaml") for name in files))
+    assert done.exit_code == 0, done.stderr
+    assert [line.split(": ")[1].split(",")[0] for line in done.stdout.splitlines()] == [
+        "scenario",
+        "scenario",
+        "vehicle",
+        "soil",
+        "rops",
+    ]
+
+
+def test_schema() -> None:
+    assert json.loads(rollover("schema").stdout)["title"] == "rollover scenario"
+    assert json.loads(rollover("schema", "soil", "--json").stdout)["title"] == "rollover soil"
+
+
+def test_view(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: list[Path] = []
+
+    def open_viewer(path: Path) -> int:
+        shown.append(path)
+        return 0 if len(shown) < 3 else 7
+
+    monkeypatch.setattr("viz.viewer.open_viewer", open_viewer)
+    done = rollover("view", str(tmp_path))
+    assert (done.exit_code, done.stderr) == (2, f"{tmp_path}: no recording.rrd there; `rollover run` writes one\n")
+    picture = tmp_path / "recording.rrd"
+    picture.write_bytes(b"rrd")
+    assert rollover("view", str(tmp_path)).exit_code == 0
+    assert rollover("view", str(picture)).exit_code == 0
+    assert shown == [picture, picture]
+    assert "it ended with status 7" in rollover("view", str(picture)).stderr
+
+
+# ---------------------------------------------------------------- the process
+
+
+def python(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    env = {**os.environ, "PYTHONPATH": str(ROOT), **environment}
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=env, check=False)
+
+
+MAIN = "import sys; sys.argv = ['rollover', {arguments}]; from rollover.cli import main; main()"
+
+
+def test_help_answers_at_once() -> None:
+    def best(code: str) -> float:
+        spent = []
+        for _ in range(5):
+            start = time.perf_counter()
+            assert python(code).returncode == 0
+            spent.append(time.perf_counter() - start)
+        return min(spent)
+
+    ask, least = best(MAIN.format(arguments="'--help'")), best("import typer, rich.console")
+    print(f"rollover --help {ask:.2f} s, typer and rich alone {least:.2f} s")
+    assert ask < max(0.5, 4.0 * least)
+
+
+def test_help_imports_nothing_heavy() -> None:
+    code = MAIN.format(arguments="'--help'").replace("main()", "app(standalone_mode=False)").replace("main;", "app;")
+    done = python(
+        f"{code}\nprint(sorted({{'numba', 'exudyn', 'pydantic_core', 'rerun', 'pyarrow', 'scipy'}} & set(sys.modules)))"
+    )
+    assert done.stdout.splitlines()[-1] == "[]", done.stderr
+
+
+def test_a_bug_shows_its_traceback_and_is_neither_of_the_answers() -> None:
+    code = "import rollover.catalogue as c\nc.TABLES['laws'] = lambda: 1 / 0\n" + MAIN.format(
+        arguments="'list', 'laws'"
+    )
+    done = python(code)
+    assert done.returncode == 70
+    assert "ZeroDivisionError" in done.stderr
+    assert "Traceback" in done.stderr
+
+
+def test_wrong_usage_is_2() -> None:
+    assert rollover("rn").exit_code == 2
+    assert rollover("run").exit_code == 2
+    assert rollover("run", "drop_test", "--jbs", "3").exit_code == 2
+
+
+SLOW = """
+import sys, time
+from rollover import store
+from rollover.scenario import load
+from tests.rollover.example import run_of
+
+def picture(path):
+    path.write_bytes(b"half")
+    print("writing", flush=True)
+    time.sleep(60.0)
+
+from pathlib import Path
+import rollover.catalogue as c
+c.TABLES["laws"] = lambda: store.write(Path("out/slow"), run_of(load("drop_test")), (), picture=picture)
+"""
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_while_writing_leaves_nothing(tmp_path: Path, number: signal.Signals, status: int) -> None:
+    code = SLOW + MAIN.format(arguments="'list', 'laws'")
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(
+        [sys.executable, "-c", code], cwd=tmp_path, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as child:
+        assert child.stdout is not None
+        assert child.stdout.readline() == "writing\n"
+        child.send_signal(number)
+        child.communicate(timeout=30)
+    assert child.returncode == status
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+# ---------------------------------------------------------------- import names that others own
+
+
+@pytest.mark.parametrize("name", ["ground", "viz"])
+def test_a_foreign_package_of_our_name_is_named(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).mkdir()
+    (tmp_path / name / "__init__.py").write_text("raise SystemExit('foreign code ran')\n")
+    done = python(f"import sys; sys.path[:0] = [{str(tmp_path)!r}]; import rollover")
+    assert done.returncode == 1
+    line = done.stderr.strip().splitlines()[-1]
+    assert line.startswith(
+        f"ImportError: import {name}: taken by another package, got {tmp_path / name / '__init__.py'}; "
+    )
+    (tmp_path / name / "__init__.py").unlink()
+    done = python(f"import sys; sys.path[:0] = [{str(tmp_path)!r}]; import rollover")
+    assert done.returncode == 0, "a folder without __init__ does not stand before a package"
+
+
+def test_the_version_is_that_of_the_distribution() -> None:
+    import rollover as package
+
+    assert store.versions()["rollover"] == package.__version__
