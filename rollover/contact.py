@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Body:
-    """A rigid body in the design position; `surfaces` are its named points in vehicle axes."""
+    """A rigid body in the design position; `surfaces` are its named patches in vehicle axes."""
 
     name: str
     inertia: MassProperties
@@ -57,14 +57,15 @@ def bodies_of(vehicle: Vehicle | Striker) -> tuple[Body, ...]:
         return (Body(name="striker", inertia=inertia, surfaces=(("face", face),)),)
 
     def sampled(shapes: tuple[Shape, ...]) -> list[tuple[str, SurfacePoints]]:
-        return [(shape.name, sample(shape, spacing)) for shape in shapes]
+        return [(shape.name, patch) for shape in shapes for patch in sample(shape, spacing)]
 
     def walls(carrier: str) -> list[tuple[str, SurfacePoints]]:
         return [
-            (disc.name, sample(disc, spacing))
+            (disc.name, patch)
             for wheel in vehicle.wheels
             if wheel.carrier == carrier
             for disc in side_walls(wheel)
+            for patch in sample(disc, spacing)
         ]
 
     found = [
@@ -107,8 +108,8 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
     for b, body in enumerate(bodies):
         for _, surface in body.surfaces:
             r = surface.position - body.centre
-            middle = 0.5 * (r.min(axis=0) + r.max(axis=0))
-            members_f.append([*middle, float(np.linalg.norm(r - middle, axis=1).max()) + 1e-6])
+            middle, half = 0.5 * (r.min(axis=0) + r.max(axis=0)), 0.5 * (r.max(axis=0) - r.min(axis=0)) + 1e-6
+            members_f.append([*middle, *half, *(surface.normal[0] if surface.is_flat else (0.0, 0.0, 0.0))])
             members_i.append([b, start, start + len(r)])
             points.append((r, surface.normal, surface.area))
             owner += [b] * len(r)
@@ -147,7 +148,7 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         point_n=np.ascontiguousarray(np.concatenate([p[1] for p in points] or [np.zeros((0, 3))])),
         point_a=np.concatenate([p[2] for p in points] or [np.zeros(0)]),
         point_body=np.array(owner, dtype=np.int64),
-        member_f=np.array(members_f).reshape(-1, 4),
+        member_f=np.array(members_f).reshape(-1, 9),
         member_i=np.array(members_i, dtype=np.int64).reshape(-1, 3),
         wheel_f=wheel_f,
         wheel_i=np.array([row[w.carrier] for w in wheels], dtype=np.int64),

@@ -68,9 +68,14 @@ class SurfacePoints:
     normal: NDArray[np.float64]
     area: NDArray[np.float64]
 
+    @property
+    def is_flat(self) -> bool:
+        """Whether all normals are the same: the whole patch faces the ground or none of it."""
+        return bool(np.all(self.normal == self.normal[0]))
 
-def sample(shape: Shape, spacing: float) -> SurfacePoints:
-    """Points no further apart than `spacing` (m) on the surface of a shape, its edges and corners among them.
+
+def sample(shape: Shape, spacing: float) -> tuple[SurfacePoints, ...]:
+    """Patches of points no further apart than `spacing` (m) on a shape, its edges and corners among them.
 
     Weights are those of the trapezoidal rule, so that areas add up to the surface's; edges are drawn in by
     1e-9 of the size, so that a face as large as a ground element stays inside it.
@@ -79,7 +84,7 @@ def sample(shape: Shape, spacing: float) -> SurfacePoints:
         return _sample_box(np.array(shape.low), np.array(shape.high), spacing)
     if isinstance(shape, Tube):
         return _sample_tube(np.array(shape.start), np.array(shape.end), 0.5 * shape.diameter, spacing)
-    return _sample_disc(np.array(shape.centre), np.array(shape.normal, dtype=float), shape.radius, spacing)
+    return (_sample_disc(np.array(shape.centre), np.array(shape.normal, dtype=float), shape.radius, spacing),)
 
 
 def rectangle(
@@ -105,15 +110,7 @@ def _nodes(length: float, spacing: float) -> tuple[NDArray[np.float64], NDArray[
     return x, w
 
 
-def _joined(parts: list[SurfacePoints]) -> SurfacePoints:
-    return SurfacePoints(
-        position=np.concatenate([p.position for p in parts]),
-        normal=np.concatenate([p.normal for p in parts]),
-        area=np.concatenate([p.area for p in parts]),
-    )
-
-
-def _sample_box(low: NDArray[np.float64], high: NDArray[np.float64], spacing: float) -> SurfacePoints:
+def _sample_box(low: NDArray[np.float64], high: NDArray[np.float64], spacing: float) -> tuple[SurfacePoints, ...]:
     centre, half = 0.5 * (low + high), 0.5 * (high - low)
     parts = []
     for axis in range(3):
@@ -124,7 +121,7 @@ def _sample_box(low: NDArray[np.float64], high: NDArray[np.float64], spacing: fl
             u[(axis + 1) % 3] = half[(axis + 1) % 3]
             v[(axis + 2) % 3] = side * half[(axis + 2) % 3]
             parts.append(rectangle(centre + outward, u, v, spacing))
-    return _joined(parts)
+    return tuple(parts)
 
 
 def _sample_tube(start: NDArray[np.float64], end: NDArray[np.float64], radius: float, spacing: float) -> SurfacePoints:
@@ -138,7 +135,7 @@ def _sample_tube(start: NDArray[np.float64], end: NDArray[np.float64], radius: f
     position = 0.5 * (start + end) + 0.5 * length * x[:, None, None] * e + radius * normal[None]
     area = 2.0 * math.pi * radius * length * w[:, None] * np.full(around, 1.0 / around)[None]
     wall = SurfacePoints(position=position.reshape(-1, 3), normal=np.tile(normal, (x.size, 1)), area=area.reshape(-1))
-    return _joined([wall, _sample_disc(start, -e, radius, spacing), _sample_disc(end, e, radius, spacing)])
+    return wall, _sample_disc(start, -e, radius, spacing), _sample_disc(end, e, radius, spacing)
 
 
 def _sample_disc(

@@ -98,7 +98,7 @@ class Tables(NamedTuple):
     point_n: Any  # (np, 3)
     point_a: Any  # (np,)
     point_body: Any  # (np,)
-    member_f: Any  # (nm, 4) centre and radius of a sphere around the member's points
+    member_f: Any  # (nm, 9) centre and half size of a box around a patch's points, normal of a flat patch or 0
     member_i: Any  # (nm, 3) body, first point, end
     wheel_f: Any  # (nw, WHEEL_COLUMNS)
     wheel_i: Any  # (nw,) carrier

@@ -56,7 +56,7 @@ from rollover.tables import (
     SOIL,
     TOUCH,
 )
-from rollover.vectors import depth_acceleration, place, to_world, velocity
+from rollover.vectors import depth_acceleration, place, to_body, to_world, velocity
 
 
 @compiled
@@ -81,9 +81,13 @@ def search(t: Any) -> int:
     candidates, count = 0, 0
     for member in range(t.member_i.shape[0]):
         row = t.pose[t.member_i[member, 0]]
-        x, y, z = place(row, t.member_f[member, 0], t.member_f[member, 1], t.member_f[member, 2])
-        gap = n[0] * x + n[1] * y + n[2] * z - offset
-        if gap > t.member_f[member, 3]:
+        m = t.member_f[member]
+        down = to_body(row, n[0], n[1], n[2])
+        if down[0] * m[6] + down[1] * m[7] + down[2] * m[8] > -1e-6 and m[6] * m[6] + m[7] * m[7] + m[8] * m[8] > 0.0:
+            continue  # a flat patch that does not face the ground
+        x, y, z = place(row, m[0], m[1], m[2])
+        reach = abs(down[0]) * m[3] + abs(down[1]) * m[4] + abs(down[2]) * m[5]
+        if n[0] * x + n[1] * y + n[2] * z - offset > reach:
             continue
         for i in range(t.member_i[member, 1], t.member_i[member, 2]):
             x, y, z = place(row, t.point_r[i, 0], t.point_r[i, 1], t.point_r[i, 2])

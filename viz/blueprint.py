@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 from rollover.run import Run
 from rollover.scenario import Scenario
 from rollover.vehicle import Striker
-from viz.entities import TIMELINE, series
-from viz.scene import extent
+from viz.entities import FOLLOWED, TIMELINE, series
+from viz.scene import extent, path_of_centre
 
 BACKGROUND = 0x2B313CFF
 _FIELD_OF_VIEW = math.radians(55.0)  # the viewer's own, vertical
+
+_FAR = 2.6  # times the vehicle's own size: a run that covers more shows the vehicle too small
 
 # title, patterns of channels; a plot of which no channel was recorded is left out
 _Plots = tuple[tuple[str, tuple[str, ...]], ...]
@@ -53,7 +55,7 @@ def blueprint(run: Run, scene_title: str) -> rrb.Blueprint:
     channels = [c for c, v in run.recording.channels.items() if c == "rops/force" or np.any(np.nan_to_num(v))]
     top = _views(channels, _TOP)
     left = rrb.Vertical(
-        scene(run, scene_title),
+        _scenes(run, scene_title),
         rrb.StateTimelineView(origin="/phase", contents=["+ /phase"], name="Phase"),
         row_shares=[7, 1],
     )
@@ -81,35 +83,43 @@ def blueprint(run: Run, scene_title: str) -> rrb.Blueprint:
     )
 
 
-def scene(run: Run, title: str) -> rrb.Spatial3DView:
-    """The picture in space, seen so that the whole run stays in it."""
-    position, target = eye(run)
+def _scenes(run: Run, title: str) -> rrb.Spatial3DView | rrb.Tabs:
+    """The whole run in one picture and, for a vehicle, a picture that goes with it; in front, what shows more."""
+    (centre, radius), (_, own) = extent(run), extent(run, at=0)
+    # the sky may be cut, the ground may not
+    whole = _scene(title, "/world", centre - [0.0, 0.0, 0.15 * radius], radius, _seen_from(run))
+    if not len(path_of_centre(run)):
+        return whole
+    following = _scene("Following", f"/{FOLLOWED}", np.zeros(3), 1.25 * own, _seen_from(run))
+    return rrb.Tabs(whole, following, active_tab=1 if radius > _FAR * own else 0)
+
+
+def _scene(
+    name: str, origin: str, target: NDArray[np.float64], radius: float, direction: NDArray[np.float64]
+) -> rrb.Spatial3DView:
+    distance = 0.92 * radius / math.sin(0.5 * _FIELD_OF_VIEW)
+    position = target + distance * direction / np.linalg.norm(direction)
     return rrb.Spatial3DView(
-        origin="/world",
+        origin=origin,
         contents=["+ /world/**"],
-        name=title,
+        name=name,
         background=np.array([BACKGROUND], dtype=np.uint32),
         line_grid=False,
         eye_controls=rrb.EyeControls3D(position=position, look_target=target, eye_up=(0.0, 0.0, 1.0)),
     )
 
 
-def eye(run: Run) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Position and target of the eye: from the side to which the vehicle falls, from above and a little behind.
+def _seen_from(run: Run) -> NDArray[np.float64]:
+    """Direction to the eye: the side to which the vehicle falls, from above and a little behind.
 
-    There the ROPS and the ground below it are in sight from first touch to rest.
+    There the ROPS and the ground below it are in sight from first touch to rest. A striker is seen across the guide,
+    before the section through the soil.
     """
-    centre, radius = extent(run)
-    centre = centre - np.array([0.0, 0.0, 0.15 * radius])  # the sky may be cut, the ground may not
     if isinstance(run.scenario.vehicle, Striker):
-        direction = np.array([0.3, -0.9, 0.38])
-    else:
-        direction = np.array([-0.45, 0.8 * _side(run), 0.52])
-        heading = math.radians(_heading(run.scenario))
-        c, s = math.cos(heading), math.sin(heading)
-        direction = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ direction
-    distance = 0.92 * radius / math.sin(0.5 * _FIELD_OF_VIEW)
-    return centre + distance * direction / np.linalg.norm(direction), centre
+        return np.array([0.3, -0.9, 0.38])
+    heading = math.radians(_heading(run.scenario))
+    c, s = math.cos(heading), math.sin(heading)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ [-0.45, 0.8 * _side(run), 0.52]
 
 
 def _heading(scenario: Scenario) -> float:

@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 
 from rollover.run import Event, Run
 from rollover.vehicle import Striker
-from viz.entities import BODY, FILTERED, LIMIT, SIMULATED, force_path
-from viz.scene import Balls, Block, Hull, Part, Rod, Wire, body_path, extent, parts
+from viz.entities import BODY, FILTERED, FOLLOWED, LIMIT, SIMULATED, force_path
+from viz.scene import Balls, Block, Hull, Part, Rod, Wire, body_path, extent, parts, path_of_centre
 from viz.stream import Stream, colour, stamps
-from viz.terrain import GRID, Terrain, corner, cut_open, frames, nice, terrain
+from viz.terrain import GRID, Terrain, corner, cut_open, frames, nice, terrain, thinned
 from viz.verdict import Peak, newtons, raw
 
 WARNINGS = ("axle-stop", "plastic-hinge")
+_TOUCHED = "world/ground/touched"
 _MOST_MARKS = 200  # of events
 _LABEL_TIME = 0.3  # s that an event's label stands
 
@@ -54,10 +55,13 @@ def picture(run: Run) -> Picture:
     if isinstance(run.scenario.vehicle, Striker):
         elements, touched = cut_open(elements, touched)
         outer = (*outer[:2], corner(elements)[1], outer[3])
-    forces = [float(np.linalg.norm(c.force, axis=1).max(initial=0.0)) for c in run.contact.values()]
-    highest = max(forces, default=0.0)
-    # about as long as the vehicle is wide and high; as the striker's nose, inside of which it stands
-    longest = (0.3 if isinstance(run.scenario.vehicle, Striker) else 1.3) * radius
+    highest = {body: float(np.linalg.norm(c.force, axis=1).max(initial=0.0)) for body, c in run.contact.items()}
+    if isinstance(run.scenario.vehicle, Striker):  # it stands inside the nose
+        longest = 0.3 * radius
+    else:
+        longest = 1.3 * extent(run, at=0)[1]
+    # the load that is asked for sets the scale, unless others would reach out of the picture
+    per_metre = max(highest.get("rops", 0.0), 0.4 * max(highest.values(), default=0.0)) / longest
     return Picture(
         ground=terrain(
             run.scenario.ground.surface,
@@ -68,7 +72,7 @@ def picture(run: Run) -> Picture:
             thickness=max(1.2 * deepest, 0.05 * radius),
         ),
         soil=soil,
-        force=nice(highest / longest) if highest > 0.0 else 1e3,
+        force=nice(per_metre) if per_metre > 0.0 else 1e3,
         size=float(np.clip(radius, 0.3, 3.0)),
     )
 
@@ -87,8 +91,8 @@ def standing(out: Stream, run: Run, with_: Picture) -> None:
     if len(ground.grid):
         lines = rr.LineStrips3D(ground.grid, colors=colour(GRID), radii=[rr.Radius.ui_points(0.8)])
         out.static("world/ground/grid", lines)
-    if len(ground.base):
-        out.static("world/ground/touched", rr.Mesh3D.from_fields(triangle_indices=ground.triangles))
+    for patch in ground.patches:
+        out.static(f"{_TOUCHED}/{patch.name}", rr.Mesh3D.from_fields(triangle_indices=patch.triangles))
     for part in parts(run):
         out.static(part.path, _drawn(part))
     for body in run.contact:
@@ -102,6 +106,9 @@ def moving(out: Stream, run: Run, with_: Picture) -> None:
     for body, motion in run.motion.items():
         pose = rr.Transform3D.columns(translation=motion.origin, quaternion=motion.quaternion)
         out.columns(body_path(body), run.frame_time, pose)
+    centre = path_of_centre(run)
+    if len(centre):
+        out.columns(FOLLOWED, run.frame_time, rr.Transform3D.columns(translation=centre))
     _forces(out, run, with_.force)
     _marks(out, run, with_.size)
 
@@ -148,20 +155,18 @@ def upright_to(direction: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _ground(out: Stream, run: Run, with_: Picture) -> None:
-    ground = with_.ground
-    if not len(ground.base):
-        return
-    kept = frames(run.track, len(ground.base))
-    rows, time = run.track.sinkage[kept], run.track.time[kept]
-    start = min([*run.frame_time[:1], *run.recording.time[:1], *run.track.time[:1]])
-    if not time.size or time[0] > start:  # before the first touch the ground is there, and flat
-        rows = np.concatenate([np.zeros((1, run.track.element.size)), rows])
-        time = np.concatenate([[start], time])
-    mesh = rr.Mesh3D.columns(
-        vertex_positions=np.concatenate([ground.positions(row) for row in rows]),
-        vertex_colors=np.concatenate([ground.colours(row, with_.soil) for row in rows]),
-    )
-    out.columns("world/ground/touched", time, mesh.partition(np.full(len(rows), len(ground.base))))
+    track, patches = run.track, with_.ground.patches
+    start = min([*run.frame_time[:1], *run.recording.time[:1], *track.time[:1]])
+    for patch, kept in zip(patches, thinned([frames(track, p) for p in patches], patches), strict=True):
+        rows, time = track.sinkage[kept], track.time[kept]
+        if not time.size or time[0] > start:  # before the first touch the ground is there, and flat
+            rows = np.concatenate([np.zeros((1, track.element.size)), rows])
+            time = np.concatenate([[start], time])
+        mesh = rr.Mesh3D.columns(
+            vertex_positions=np.concatenate([patch.positions(row) for row in rows]),
+            vertex_colors=np.concatenate([patch.colours(row, with_.soil) for row in rows]),
+        )
+        out.columns(f"{_TOUCHED}/{patch.name}", time, mesh.partition(np.full(len(rows), len(patch.base))))
 
 
 def _forces(out: Stream, run: Run, scale: float) -> None:

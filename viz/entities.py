@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from rollover.channels import describe, is_known
 
 TIMELINE = "sim_time"
+FOLLOWED = "world/followed"  # goes with the vehicle without turning
 
 # 0xRRGGBBAA. The same thing has the same colour in every view: what answers the question is blue.
 SIMULATED, MEASURED, LIMIT = 0x5B9BFFFF, 0xFF8C26FF, 0xF0434EFF
@@ -75,6 +76,7 @@ class Series:
     group: str  # first part of the path: loads, wheels, mounts, sinkage, motion, energy, other
     path: str  # without the source
     name: str  # without the unit, which stands in the title of a plot
+    legend: str  # shorter, where the title says the rest
     unit: str  # for people; empty if the channel is unknown
     factor: float
     colour: int
@@ -121,6 +123,7 @@ def series(channel: str) -> Series:
         group=group,
         path=f"{group}/{escaped(last)}",
         name=name,
+        legend=channel[-1] if group == "mounts" else name,
         unit=unit,
         factor=factor,
         colour=colour,

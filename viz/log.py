@@ -84,7 +84,7 @@ def _looks(out: Stream, run: Run, peaks: Sequence[Peak]) -> None:
     for channel in run.recording.channels:
         s = series(channel)
         look = rr.SeriesLines(
-            names=[s.name],
+            names=[s.legend],
             colors=colour(s.colour),
             widths=[2.0 if channel in _MARKED else 1.5],
             aggregation_policy=rr.components.AggregationPolicy.MinMax,

@@ -269,8 +269,8 @@ def _point(values: NDArray[np.float64]) -> Point:
     return (x, y, z)
 
 
-def extent(run: Run) -> tuple[NDArray[np.float64], float]:
-    """Centre and radius of a ball around all that moves, over the whole run; world, m."""
+def extent(run: Run, *, at: int | None = None) -> tuple[NDArray[np.float64], float]:
+    """Centre and radius of a ball around all that moves, over the whole run or in one frame; world, m."""
     found = [np.zeros((0, 3))]
     for part in parts(run):
         motion = next((m for body, m in run.motion.items() if part.path.startswith(body_path(body) + "/")), None)
@@ -278,13 +278,26 @@ def extent(run: Run) -> tuple[NDArray[np.float64], float]:
         if motion is None:
             found.append(points)
             continue
-        some = np.linspace(0, len(motion.origin) - 1, 12).round().astype(int) if len(motion.origin) else ()
+        count = len(motion.origin)
+        some = (
+            np.linspace(0, count - 1, 12).round().astype(int) if at is None and count else range(count)[at or 0 :][:1]
+        )
         found += [motion.origin[i] + points @ rotation(motion.quaternion[i]).T for i in some]
     points = np.concatenate(found)
     if not len(points):
         return np.zeros(3), 1.0
     low, high = points.min(axis=0), points.max(axis=0)
     return 0.5 * (low + high), float(0.5 * np.linalg.norm(high - low))
+
+
+def path_of_centre(run: Run) -> NDArray[np.float64]:
+    """Where the vehicle's centre of mass was at the frame times, as if it were rigid, (n, 3); world, m."""
+    vehicle = run.scenario.vehicle
+    if isinstance(vehicle, Striker) or "chassis" not in run.motion:
+        return np.zeros((0, 3))
+    motion, centre = run.motion["chassis"], np.array(vehicle.whole.centre_of_mass)
+    turned = [rotation(q) @ centre for q in motion.quaternion]
+    return np.asarray(motion.origin + np.array(turned).reshape(-1, 3))
 
 
 def _reach(part: Part) -> NDArray[np.float64]:

@@ -7,6 +7,7 @@ independent of each other, and a picture that smoothed them would show ruts that
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,6 +24,7 @@ GRID = 0x463824FF
 _MOST_VERTICES = 20_000  # of the part that never changes
 _MOST_ROWS = 8_000_000  # vertices times frames of the part that does
 _LEAST_INTERVAL = 0.02  # s, 50 Hz
+_TILE = 12  # elements along the edge of a patch
 
 Rectangle = tuple[float, float, float, float]  # smallest and largest x, smallest and largest y, m
 
@@ -32,28 +34,27 @@ _RAMP = np.array([(0x6B, 0x56, 0x38), (0x8A, 0x5A, 0x2C), (0xD9, 0x5F, 0x1E), (0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Terrain:
-    """Mesh of the ground; world axes, m.
+class Patch:
+    """A part of the mesh that sinks: vertices `base` (b, 3) and `triangles`; world axes, m.
 
-    `fixed` (a, 3) with `fixed_triangles` and `fixed_colours` never changes. `base` (b, 3) with `triangles` holds what
-    sinks along `down`: `column` (b,) is each vertex's column in the track, -1: none; where `is_side` (b,) it belongs
-    to the side of the block of soil and keeps its colour. `grid` holds the ends of lines on the undisturbed surface,
-    (l, 2, 3), `grid_step` m apart.
+    Each vertex sinks along `down` by what stands in its `column` (b,) of the track, -1: not at all. Where `is_side`
+    (b,) it belongs to the side of the block of soil and keeps its colour.
     """
 
-    fixed: NDArray[np.float64]
-    fixed_triangles: NDArray[np.int64]
-    fixed_colours: NDArray[np.uint32]
+    name: str
     base: NDArray[np.float64]
     triangles: NDArray[np.int64]
     column: NDArray[np.int64]
     is_side: NDArray[np.bool_]
     down: NDArray[np.float64]
-    grid: NDArray[np.float64]
-    grid_step: float
+
+    @property
+    def columns(self) -> NDArray[np.int64]:
+        """Columns of the track on which this patch depends."""
+        return np.unique(self.column[self.column >= 0])
 
     def sinkage(self, row: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Sinkage of each vertex that moves, (b,), from one row of the track."""
+        """Sinkage of each vertex, (b,), from one row of the track."""
         return np.asarray(np.append(row, 0.0)[self.column])
 
     def positions(self, row: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -63,6 +64,22 @@ class Terrain:
     def colours(self, row: NDArray[np.float64], scale: float) -> NDArray[np.uint32]:
         """Colours (b,) for one row of the track; `scale` (m) as in `ramp`."""
         return np.where(self.is_side, np.uint32(SIDE), ramp(self.sinkage(row), scale)).astype(np.uint32)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Terrain:
+    """Mesh of the ground; world axes, m.
+
+    `fixed` (a, 3) with `fixed_triangles` and `fixed_colours` never changes; `patches` do, each at its own times.
+    `grid` holds the ends of lines on the undisturbed surface, (l, 2, 3), `grid_step` m apart.
+    """
+
+    fixed: NDArray[np.float64]
+    fixed_triangles: NDArray[np.int64]
+    fixed_colours: NDArray[np.uint32]
+    patches: tuple[Patch, ...]
+    grid: NDArray[np.float64]
+    grid_step: float
 
 
 def nice(value: float) -> float:
@@ -86,20 +103,22 @@ def corner(elements: Elements) -> tuple[float, float]:
     return cx - 0.5 * nx * dx, cy - 0.5 * ny * dy
 
 
-def frames(track: GroundTrack, vertices: int) -> NDArray[np.int64]:
-    """Rows of the track worth drawing: those where the ground changed, at most 50 a second, the last state kept."""
-    if not track.time.size or not track.element.size:
+def frames(track: GroundTrack, patch: Patch) -> NDArray[np.int64]:
+    """Rows of the track worth drawing: those where the patch changed, at most 50 a second, the last state kept."""
+    if not track.time.size or not patch.columns.size:
         return np.empty(0, dtype=np.int64)
     slot = np.floor((track.time - track.time[0]) / _LEAST_INTERVAL + 1e-9)
     last_of_slot = np.flatnonzero(np.append(slot[1:] != slot[:-1], True))
-    kept, before = [], np.zeros(track.element.size)
-    for i in last_of_slot.tolist():
-        if not np.array_equal(track.sinkage[i], before):
-            kept.append(i)
-            before = track.sinkage[i]
-    thinner = math.ceil(len(kept) * vertices / _MOST_ROWS) if kept else 1
-    # counted from the end, so that how the ground was left is always among them
-    return np.array(kept[::-1][:: max(thinner, 1)][::-1], dtype=np.int64)
+    mine = track.sinkage[np.ix_(last_of_slot, patch.columns)]
+    changed = np.any(np.diff(mine, axis=0, prepend=0.0) != 0.0, axis=1)
+    return last_of_slot[changed]
+
+
+def thinned(kept: Sequence[NDArray[np.int64]], patches: Sequence[Patch]) -> list[NDArray[np.int64]]:
+    """Rows for all patches, fewer where a recording would grow beyond what a viewer holds; last states stay."""
+    rows = sum(len(k) * len(p.base) for k, p in zip(kept, patches, strict=True))
+    every = max(1, math.ceil(rows / _MOST_ROWS))
+    return [k[::-1][::every][::-1] for k in kept]
 
 
 def cut_open(elements: Elements, touched: NDArray[np.int64]) -> tuple[Elements, NDArray[np.int64]]:
@@ -149,6 +168,14 @@ def terrain(
     # that stays, none does
     sinks = _is_open(elements, base[rim], outer)
     upper = [np.where(sinks, column[rim[:, k]], -1) for k in (0, 1)]
+    whole = Patch(
+        name="",
+        base=np.concatenate([base, side]),
+        triangles=np.concatenate([_squares(moving.size), _walls(moving, nx, ny), len(base) + _squares(len(side) // 4)]),
+        column=np.concatenate([column, np.stack([*upper, *np.full((2, len(rim)), -1)], axis=1).ravel()]),
+        is_side=np.repeat([False, True], [len(base), len(side)]),
+        down=-normal(surface),
+    )
     parts = (fixed, around, fixed_side)
     return Terrain(
         fixed=np.concatenate(parts),
@@ -160,14 +187,31 @@ def terrain(
             ]
         ),
         fixed_colours=np.repeat(np.array([SOIL, BEYOND, SIDE], dtype=np.uint32), [len(p) for p in parts]),
-        base=np.concatenate([base, side]),
-        triangles=np.concatenate([_squares(moving.size), _walls(moving, nx, ny), len(base) + _squares(len(side) // 4)]),
-        column=np.concatenate([column, np.stack([*upper, *np.full((2, len(rim)), -1)], axis=1).ravel()]),
-        is_side=np.repeat([False, True], [len(base), len(side)]),
-        down=-normal(surface),
+        patches=_patches(elements, whole),
         grid=_grid(surface, outer, grid_step),
         grid_step=grid_step,
     )
+
+
+def _patches(elements: Elements, whole: Patch) -> tuple[Patch, ...]:
+    """Cut a mesh into tiles: at any instant few elements move, and a mesh can only be written as a whole."""
+    middle = whole.base[whole.triangles].mean(axis=1)[:, :2] - corner(elements)
+    tile = np.floor(middle / (_TILE * np.array(elements.spacing)) + 1e-9).astype(np.int64)
+    found = []
+    for i, j in np.unique(tile, axis=0).tolist():
+        mine = whole.triangles[(tile == (i, j)).all(axis=1)]
+        vertices, triangles = np.unique(mine, return_inverse=True)
+        found.append(
+            replace(
+                whole,
+                name=f"{i}_{j}",
+                base=whole.base[vertices],
+                triangles=triangles.reshape(-1, 3),
+                column=whole.column[vertices],
+                is_side=whole.is_side[vertices],
+            )
+        )
+    return tuple(found)
 
 
 def _bounds(elements: Elements) -> Rectangle:

@@ -340,7 +340,8 @@ def test_wrong_usage_is_2() -> None:
 
 
 SLOW = """
-import sys, time
+import signal, sys, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that runs tests in the background ignores it
 from rollover import store
 from rollover.scenario import load
 from tests.rollover.example import run_of

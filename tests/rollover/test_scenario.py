@@ -283,6 +283,9 @@ def test_files_are_looked_for_beside_the_including_file_and_then_among_the_shipp
     Path("mine/b.yaml").write_text(TEXT.replace("{kind: ye-2006}", "soils/natural_clay.yaml"))
     assert load("mine/a.yaml").ground.law.recovery == 0.3
     assert load("mine/b.yaml").ground.law == Ye2006()
+    Path("mine/soils").mkdir()
+    Path("mine/soils/natural_clay.yaml").write_text("kind: ye-2006\nrecovery: 0.4\n")
+    assert load("mine/b.yaml").ground.law.recovery == 0.4
 
 
 def test_shipped_scenarios_are_found_by_name() -> None:
