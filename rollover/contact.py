@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ground.friction import Coulomb
 from ground.kernel import COLUMNS, STATE_COLUMNS
 from ground.law import HIDDEN, REFERENCE_MASS, GroundLaw
 from ground.surface import normal
@@ -217,7 +215,7 @@ def grown(t: Tables) -> Tables:
 
 def _soil(ground: Ground) -> Array:
     rule = {"reference": c.RULE_REFERENCE, "effective": c.RULE_EFFECTIVE, "clamped": c.RULE_CLAMPED}
-    friction = cast(Coulomb, ground.friction)
+    friction = ground.friction
     return np.array(
         [
             friction.coefficient,

@@ -26,7 +26,7 @@ def tread_point(t: Tables, bodies: tuple[Body, ...], w: int, R: Array) -> Array:
     row, e, x = np.zeros(POSE_COLUMNS), np.zeros(3), np.zeros(3)
     row[ROT : ROT + 9] = R.ravel()
     tyre_point(row, t.wheel_f[w], t.plane[:3], e, x)
-    return np.asarray(x + R @ bodies[int(t.wheel_i[w])].centre)
+    return x + R @ bodies[int(t.wheel_i[w])].centre
 
 
 def _cross(a: Array, b: Array) -> Array:

@@ -32,7 +32,7 @@ def filtered(values: NDArray[np.float64], step: float, cfc: int, *, constant: fl
         raise ValueError(f"cfc: no such filter class, got {cfc!r}; {', '.join(map(str, CLASSES))} are allowed")
     if 1.0 / step < least_rate(cfc) * (1.0 - 1e-9):
         raise ValueError(
-            f"cfc: sampled too slowly for CFC {cfc}, got {1.0 / step:.6g} Hz; at least {least_rate(cfc):.0f} Hz is allowed"
+            f"cfc: sampled too slowly for CFC {cfc}, got {1.0 / step:.6g} Hz; at least {least_rate(cfc):.0f} Hz"
         )
     if values.size < 2:
         return np.array(values, dtype=float)

@@ -163,10 +163,11 @@ def energies(s: States, t: Tables, bodies: tuple[Body, ...], gravity: float) -> 
     n = len(s.axle)
     flat = s.qd.reshape(n, -1)
     kinetic = 0.5 * np.einsum("ni,ij,nj->n", flat, t.mass, flat) + s.soil_kinetic
-    potential = gravity * sum(body.inertia.mass * s.q[:, b, 2] for b, body in enumerate(bodies))
+    masses = np.array([body.inertia.mass for body in bodies])
+    potential = gravity * s.q[:, :, 2] @ masses
     ledger = {
         "kinetic": kinetic,
-        "potential": np.asarray(potential - potential[0]),
+        "potential": potential - potential[0],
         "soil": s.work[:, c.SOIL],
         "tyre": s.work[:, c.TYRE],
         "rops": s.work[:, c.ROPS],
@@ -174,7 +175,7 @@ def energies(s: States, t: Tables, bodies: tuple[Body, ...], gravity: float) -> 
         "collision": s.work[:, c.COLLISION],
         "axle": s.work[:, c.AXLE],
     }
-    total = sum(ledger.values())
+    total = np.sum(list(ledger.values()), axis=0)
     ledger["residual"] = np.asarray(total[0] - total)
     return ledger
 
@@ -255,4 +256,4 @@ def corner_deflection(
         world = s.q[:, b, :3] + R_rops @ (place - bodies[b].centre)
         local = np.einsum("nji,nj->ni", R, world - s.q[:, chassis, :3])
         ways.append(np.linalg.norm(local - (place - bodies[chassis].centre), axis=1))
-    return np.max(ways, axis=0)
+    return np.asarray(np.max(ways, axis=0))

@@ -152,7 +152,7 @@ def solve(
         failure = " ".join(str(error).split())[:300]
     finally:
         # callbacks hold mbs and mbs holds them: without this every run would leak
-        mbs.SetPostStepUserFunction(0)
+        mbs.SetPostStepUserFunction(0)  # type: ignore[arg-type]
         views.clear()
         mbs.Reset()
         container.Reset()

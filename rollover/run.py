@@ -28,7 +28,7 @@ class Event:
 
 @dataclass(frozen=True, kw_only=True)
 class Motion:
-    """Pose of one body's vehicle-axes frame at the frame times: the origin of vehicle axes (n, 3) and quaternion xyzw (n, 4).
+    """Pose of one body's vehicle-axes frame at the frame times: its origin (n, 3) and quaternion xyzw (n, 4).
 
     Geometry given in vehicle axes (outline, members, wheels) is drawn with this pose directly.
     """

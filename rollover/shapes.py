@@ -124,7 +124,9 @@ def _sample_box(low: NDArray[np.float64], high: NDArray[np.float64], spacing: fl
     return tuple(parts)
 
 
-def _sample_tube(start: NDArray[np.float64], end: NDArray[np.float64], radius: float, spacing: float) -> SurfacePoints:
+def _sample_tube(
+    start: NDArray[np.float64], end: NDArray[np.float64], radius: float, spacing: float
+) -> tuple[SurfacePoints, ...]:
     axis = end - start
     length = float(np.linalg.norm(axis))
     e, u, v = axes_along(axis)

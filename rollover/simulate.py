@@ -42,7 +42,7 @@ KINDS: dict[int, str] = {
 }
 
 
-class Diverged(Exception):
+class DivergedError(Exception):
     """The state left what can be: not finite, or faster than anything that falls."""
 
 
@@ -85,9 +85,9 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
             _collect(t, now, bodies, scenario, events, seen)
         speed = float(np.abs(qd).max())
         if not math.isfinite(speed) or speed > 1e3 or not math.isfinite(float(Q.sum())):
-            raise Diverged(f"diverged at t = {now:.4f} s: a velocity of {speed:.3g} (m/s or rad/s)")
+            raise DivergedError(f"diverged at t = {now:.4f} s: a velocity of {speed:.3g} (m/s or rad/s)")
         if t.counts[c.OUTSIDE] > 0:
-            raise Diverged(
+            raise DivergedError(
                 f"left the array of ground elements at t = {now:.4f} s: "
                 "enlarge ground.elements.length, .width or move .centre"
             )
@@ -124,7 +124,7 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
         )
         if sentence:
             sentence = f"the solver gave up at t = {past.time[max(past.count - 1, 0)]:.4f} s: {sentence}"
-    except Diverged as reason:
+    except DivergedError as reason:
         sentence = str(reason)
     return _result(scenario, bodies, live.tables, past, events, sentence, clock.perf_counter() - began)
 

@@ -135,7 +135,7 @@ class Tables(NamedTuple):
     event: Any  # (ne, EVENT_COLUMNS)
 
 
-@register  # type: ignore[untyped-decorator]
+@register
 class TablesType(StructType):
     """The kernels' view of `Tables`: one pointer, so that a call costs half a microsecond and compiles quickly."""
 

@@ -98,8 +98,8 @@ def search(t: Any) -> int:
             facing = -(n[0] * f + n[1] * g + n[2] * h)
             if facing <= 1e-6:
                 continue
-            ix = int(math.floor((x - t.grid_f[0]) / t.grid_f[2]))
-            iy = int(math.floor((y - t.grid_f[1]) / t.grid_f[3]))
+            ix = math.floor((x - t.grid_f[0]) / t.grid_f[2])
+            iy = math.floor((y - t.grid_f[1]) / t.grid_f[3])
             if ix < 0 or iy < 0 or ix >= t.grid_i[0] or iy >= t.grid_i[1]:
                 t.counts[OUTSIDE] += 1
                 continue

@@ -49,13 +49,16 @@ _MOTION: _Plots = (
 _MOUNTS = "rops/mount/*"
 
 
-def blueprint(run: Run, scene_title: str) -> rrb.Blueprint:
-    """Layout for one run: what answers "how high were the loads, and when" is in front in every place."""
+def blueprint(run: Run, scales: str) -> rrb.Blueprint:
+    """Layout for one run: what answers "how high were the loads, and when" is in front in every place.
+
+    `scales` says what lengths and colours in the scene mean.
+    """
     # a plot of nothing but zeros says less than its absence, but for the load that is asked for
     channels = [c for c, v in run.recording.channels.items() if c == "rops/force" or np.any(np.nan_to_num(v))]
     top = _views(channels, _TOP)
     left = rrb.Vertical(
-        _scenes(run, scene_title),
+        _scenes(run, scales),
         rrb.StateTimelineView(origin="/phase", contents=["+ /phase"], name="Phase"),
         row_shares=[7, 1],
     )
@@ -65,7 +68,12 @@ def blueprint(run: Run, scene_title: str) -> rrb.Blueprint:
         _views(channels, _MOTION) + _others(channels),
         [
             rrb.TextDocumentView(origin="/report/verdict", contents=["+ /report/verdict"], name="How high, and when"),
-            rrb.TextLogView(origin="/events", contents=["+ /events"], name="Events"),
+            rrb.TextLogView(
+                origin="/events",
+                contents=["+ /events"],
+                name="Events",
+                columns=rrb.TextLogColumns(timeline_columns=[TIMELINE], text_log_columns=["loglevel", "body"]),
+            ),
             rrb.TextDocumentView(origin="/report/scenario", contents=["+ /report/scenario"], name="Scenario"),
         ],
     ]
@@ -83,15 +91,21 @@ def blueprint(run: Run, scene_title: str) -> rrb.Blueprint:
     )
 
 
-def _scenes(run: Run, title: str) -> rrb.Spatial3DView | rrb.Tabs:
+def _scenes(run: Run, scales: str) -> rrb.Spatial3DView | rrb.Tabs:
     """The whole run in one picture and, for a vehicle, a picture that goes with it; in front, what shows more."""
     (centre, radius), (_, own) = extent(run), extent(run, at=0)
-    # the sky may be cut, the ground may not
-    whole = _scene(title, "/world", centre - [0.0, 0.0, 0.15 * radius], radius, _seen_from(run))
+    centre = centre - np.array([0.0, 0.0, 0.15 * radius])  # the sky may be cut, the ground may not
+    towards, stays, goes = _seen_from(run), "Scene", "Following"
     if not len(path_of_centre(run)):
-        return whole
-    following = _scene("Following", f"/{FOLLOWED}", np.zeros(3), 1.25 * own, _seen_from(run))
-    return rrb.Tabs(whole, following, active_tab=1 if radius > _FAR * own else 0)
+        return _scene(f"{stays}: {scales}", "/world", centre, radius, towards)
+    # tabs are narrow: the one in front says what lengths and colours mean
+    far = radius > _FAR * own
+    stays, goes = (stays, f"{goes}: {scales}") if far else (f"{stays}: {scales}", goes)
+    return rrb.Tabs(
+        _scene(stays, "/world", centre, radius, towards),
+        _scene(goes, f"/{FOLLOWED}", np.zeros(3), 1.25 * own, towards),
+        active_tab=int(far),
+    )
 
 
 def _scene(

@@ -56,10 +56,8 @@ def picture(run: Run) -> Picture:
         elements, touched = cut_open(elements, touched)
         outer = (*outer[:2], corner(elements)[1], outer[3])
     highest = {body: float(np.linalg.norm(c.force, axis=1).max(initial=0.0)) for body, c in run.contact.items()}
-    if isinstance(run.scenario.vehicle, Striker):  # it stands inside the nose
-        longest = 0.3 * radius
-    else:
-        longest = 1.3 * extent(run, at=0)[1]
+    # the arrow at a striker stands inside the nose
+    longest = 0.3 * radius if isinstance(run.scenario.vehicle, Striker) else 1.3 * extent(run, at=0)[1]
     # the load that is asked for sets the scale, unless others would reach out of the picture
     per_metre = max(highest.get("rops", 0.0), 0.4 * max(highest.values(), default=0.0)) / longest
     return Picture(

@@ -42,7 +42,7 @@ def write_rrd(run: Run, path: Path, *, peaks: Sequence[Peak] = ()) -> None:
     try:
         with catch_and_log_exceptions("recording", strict=True), _closed(rec):
             with_ = picture(run)
-            rec.save(part, default_blueprint=blueprint(run, "Scene: " + ", ".join(with_.scales)))
+            rec.save(part, default_blueprint=blueprint(run, ", ".join(with_.scales)))
             rec.set_log_time_enabled(False)
             out, found = Stream(rec), ranked(run, peaks)
             standing(out, run, with_)

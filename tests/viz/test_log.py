@@ -53,7 +53,7 @@ def test_recording_is_whole_and_holds_what_its_layout_asks_for(name: str, reques
 
 def test_layout_answers_the_loads_first(overturn_rrd: Path, drop_rrd: Path) -> None:
     views = dict(blueprint_queries(overturn_rrd))
-    assert {"ROPS force, kN", "Mount left, kN", "How high, and when", "Events", "Phase"} <= set(views)
+    assert {"ROPS force, kN", "Mount left, kN", "How high, and when", "Events", "Phase", "Following"} <= set(views)
     rig = dict(blueprint_queries(drop_rrd))
     assert {"Ground force, kN", "Sinkage, mm", "Striker acceleration, m/s²"} <= set(rig)
     assert not any("ROPS" in view or "Mount" in view for view in rig)
@@ -276,7 +276,8 @@ def test_a_recording_is_written_whole_or_not_at_all(
 
 
 def test_mistakes_are_errors_and_not_warnings(overturn: Run, tmp_path: Path) -> None:
-    motion = {"chassis": dataclasses.replace(overturn.motion["chassis"], origin=overturn.motion["chassis"].origin[:-1])}
+    short = dataclasses.replace(overturn.motion["rops"], origin=overturn.motion["rops"].origin[:-1])
+    motion = {**overturn.motion, "rops": short}
     with pytest.raises(ValueError, match=r"rows|length"):
         log.write_rrd(dataclasses.replace(overturn, motion=motion), tmp_path / "wrong.rrd")
     assert list(tmp_path.iterdir()) == []

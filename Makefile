@@ -1,0 +1,41 @@
+# make demo   a tractor tips over onto the ground array: loads in the terminal, recording in out/demo
+# make test   lint, types, import rules, tests
+# Both set everything up in .venv first (Python >= 3.11 with pip is all they need).
+
+PYTHON ?= python3
+UV := $(shell command -v uv 2>/dev/null || echo .tools/bin/uv)
+READY := .venv/.ready
+
+.PHONY: demo test view setup lint bench clean
+
+demo: setup
+	.venv/bin/rollover run side_overturn --out out/demo --force
+	@echo "Look at it with: .venv/bin/rollover view out/demo"
+
+test: setup lint
+	.venv/bin/pytest -n auto tests
+
+lint: setup
+	.venv/bin/ruff check .
+	.venv/bin/ruff format --check .
+	.venv/bin/mypy
+	.venv/bin/lint-imports --no-logo
+
+bench: setup
+	$(UV) sync --locked --quiet --group benchmark
+	.venv/bin/pytest -m benchmark tests/benchmarks -s
+
+view: setup
+	.venv/bin/rollover view out/demo
+
+setup: $(READY)
+
+$(READY): pyproject.toml uv.lock
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "rollover needs Python 3.11 or newer; name one with: make PYTHON=python3.12" >&2; exit 2; }
+	@command -v $(UV) >/dev/null 2>&1 || $(PYTHON) -m pip install -q --disable-pip-version-check --target .tools 'uv==0.13.8'
+	$(UV) sync --locked --quiet --python $(PYTHON)
+	@touch $(READY)
+
+clean:
+	rm -rf .venv .tools out

@@ -1,0 +1,151 @@
+"""Bodies, the rig, and from where they are seen; what is drawn of them is read back in `test_log`."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from rollover.initiation import TipOver
+from rollover.inertia import MassProperties
+from rollover.run import Run
+from rollover.shapes import Disc
+from rollover.vehicle import Striker, Vehicle
+from tests.viz import example
+from viz.scene import Balls, Block, Hull, Rod, extent, parts, path_of_centre, rotation
+
+
+def by_path(run: Run) -> dict[str, object]:
+    found = {p.path: p for p in parts(run)}
+    assert len(found) == len(parts(run))  # each part is an entity of its own
+    return found
+
+
+def with_vehicle(run: Run, vehicle: Vehicle) -> Run:
+    return dataclasses.replace(run, scenario=dataclasses.replace(run.scenario, vehicle=vehicle))
+
+
+def test_striker_stands_on_its_face_and_weighs_what_it_should(drop: Run) -> None:
+    found = by_path(drop)
+    nose, mass = found["world/striker/nose"], found["world/striker/mass"]
+    assert isinstance(nose, Block)
+    assert isinstance(mass, Block)
+    striker = drop.scenario.vehicle
+    assert isinstance(striker, Striker)
+    assert nose.size[:2] == (striker.face_length, striker.face_width)
+    assert nose.centre[2] == pytest.approx(0.5 * nose.size[2], rel=1e-12)  # the face lies in the origin's plane
+    assert math.prod(mass.size) * 7850.0 == pytest.approx(132.0, rel=1e-12)  # steel
+    # the rut is never deeper than the nose is long
+    assert nose.size[2] > -drop.motion["striker"].origin[:, 2].min()
+
+
+def test_guide_reaches_from_the_ground_over_the_block(drop: Run) -> None:
+    found = by_path(drop)
+    bar, mass = found["world/guide/front"], found["world/striker/mass"]
+    assert isinstance(bar, Rod)
+    assert isinstance(mass, Block)
+    assert bar.start[2] == 0.0
+    assert bar.end[2] > drop.motion["striker"].origin[:, 2].max() + mass.centre[2] + 0.5 * mass.size[2]
+    assert bar.start[0] - bar.radius > 0.5 * mass.size[0]
+
+
+def test_vehicle_without_outline_is_its_equivalent_cuboid(overturn: Run) -> None:
+    vehicle = overturn.scenario.vehicle
+    assert isinstance(vehicle, Vehicle)
+    a, b, c, m = 2.0, 0.8, 0.6, 1200.0
+    whole = MassProperties(
+        mass=m,
+        centre_of_mass=(0.3, 0.0, 0.9),
+        inertia=(m * (b * b + c * c) / 12, m * (a * a + c * c) / 12, m * (a * a + b * b) / 12),
+    )
+    rig = dataclasses.replace(vehicle, whole=whole, outline=(), wheels=(), front_axle=None)
+    block = by_path(with_vehicle(overturn, rig))["world/chassis/equivalent_cuboid"]
+    assert isinstance(block, Block)
+    assert block.size == pytest.approx((a, b, c), rel=1e-9)
+    assert block.centre == whole.centre_of_mass
+
+
+def test_tubes_that_meet_have_a_joint_as_thick_as_the_thickest(overturn: Run) -> None:
+    joints = by_path(overturn)["world/rops/joints"]
+    assert isinstance(joints, Balls)
+    np.testing.assert_allclose(joints.centres, [(-0.25, 0.55, 2.35), (-0.25, -0.55, 2.35)])
+    assert joints.radii.tolist() == [0.04, 0.04]
+
+
+def test_outer_face_of_a_disc_lies_where_it_is_said(overturn: Run) -> None:
+    vehicle = overturn.scenario.vehicle
+    assert isinstance(vehicle, Vehicle)
+    disc = Disc(name="plate", centre=(0.1, 0.9, 0.7), normal=(0.0, 2.0, 0.0), radius=0.4)
+    plate = by_path(with_vehicle(overturn, dataclasses.replace(vehicle, outline=(disc,))))["world/chassis/plate"]
+    assert isinstance(plate, Rod)
+    assert plate.end == disc.centre
+    assert plate.start == pytest.approx((0.1, 0.895, 0.7), abs=1e-12)
+
+
+def test_the_attitude_of_a_wheel_can_be_seen(overturn: Run) -> None:
+    wheel = by_path(overturn)["world/chassis/rear_left"]
+    assert isinstance(wheel, Hull)
+    near_hub = np.hypot(wheel.vertices[:, 0], wheel.vertices[:, 2] - 0.71) < 0.01
+    assert len(set(wheel.colours[near_hub].tolist())) == 2
+    np.testing.assert_allclose(np.linalg.norm(wheel.normals, axis=1), 1.0, atol=1e-12)
+
+
+def test_rotation_is_that_of_the_quaternion() -> None:
+    half = 0.5 * math.radians(90.0)
+    # 90 degrees about z: forward becomes left
+    turned = rotation(np.array([0.0, 0.0, math.sin(half), math.cos(half)])) @ np.array([1.0, 0.0, 0.0])
+    np.testing.assert_allclose(turned, [0.0, 1.0, 0.0], atol=1e-12)
+
+
+def test_path_of_the_centre_turns_with_the_vehicle(overturn: Run, drop: Run) -> None:
+    centre = path_of_centre(overturn)
+    i = 120
+    roll = float(np.interp(overturn.frame_time[i], overturn.recording.time, overturn.recording["chassis/roll"]))
+    height = overturn.motion["chassis"].origin[i, 2] + 0.78 * math.cos(roll)  # centre of mass 0.78 m up, on the middle
+    assert centre[i, 2] == pytest.approx(height, abs=1e-9)
+    assert centre.shape == (overturn.frame_time.size, 3)
+    assert path_of_centre(drop).shape == (0, 3)
+
+
+def test_ball_around_the_run_holds_every_wheel_in_every_frame(overturn: Run) -> None:
+    centre, radius = extent(overturn)
+    vehicle = overturn.scenario.vehicle
+    assert isinstance(vehicle, Vehicle)
+    for wheel in vehicle.wheels:
+        motion = overturn.motion[wheel.carrier]
+        places = [o + rotation(q) @ wheel.centre for o, q in zip(motion.origin, motion.quaternion, strict=True)]
+        assert np.linalg.norm(np.array(places) - centre, axis=1).max() < radius
+    assert extent(overturn, at=0)[1] < radius
+
+
+@pytest.mark.parametrize(("side", "sign"), [("left", 1.0), ("right", -1.0)])
+def test_the_eye_is_where_the_vehicle_falls_to(overturn: Run, side: str, sign: float) -> None:
+    blueprint = pytest.importorskip("viz.blueprint", reason="no rerun wheel for this platform", exc_type=ImportError)
+    start = TipOver(side=side, heading_deg=90.0)
+    run = dataclasses.replace(overturn, scenario=dataclasses.replace(overturn.scenario, initiation=start))
+    towards = blueprint._seen_from(run)
+    # headed along y, left is -x and behind is -y
+    assert towards[0] * sign < 0.0
+    assert towards[1] < 0.0
+    assert towards[2] > 0.0
+
+
+def test_arrows_stay_in_the_picture(overturn: Run) -> None:
+    draw = pytest.importorskip("viz.draw", reason="no rerun wheel for this platform", exc_type=ImportError)
+    force = overturn.contact["rops"].force
+    own = extent(overturn, at=0)[1]
+    longest = np.linalg.norm(force, axis=1).max() / draw.picture(overturn).force
+    assert 0.5 * own < longest <= 1.3 * own
+    # a chassis that is hit ten times as hard makes the ROPS's arrow shorter, but not ten times
+    chassis = dataclasses.replace(overturn.contact["chassis"], force=10.0 * force)
+    hit = dataclasses.replace(overturn, contact={**overturn.contact, "chassis": chassis})
+    assert 1.3 * own < 10.0 * np.linalg.norm(force, axis=1).max() / draw.picture(hit).force <= 3.25 * own
+
+
+def test_a_run_without_frames_still_has_an_extent() -> None:
+    run = dataclasses.replace(example.drop(), motion={}, frame_time=np.zeros(0))
+    centre, radius = extent(run)
+    assert np.all(np.isfinite(centre))
+    assert radius > 0.0
