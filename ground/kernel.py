@@ -71,16 +71,20 @@ def rut_depth(row: Any) -> float:
 
 
 @compiled
-def set_line(law: Any, p: Any, s: Any, row: Any, z: float, mass: float) -> None:
-    """Start the unloading line at (z, F(z)): K_u = K'(z)/recovery, or eq (6) read literally."""
+def set_line(law: Any, p: Any, s: Any, row: Any, z: float) -> None:
+    """Start the unloading line at (z, F(z)) with K_u = K'(z)/recovery."""
     f = call_force(law[ADDRESS_FORCE], (p.ctypes, s.ctypes, z, 0.0))
     row[LINE_Z] = z
     row[LINE_F] = f
     row[LINE_K] = f / (p[0] * z) if z > 0.0 else 0.0
-    if law[REST_STIFFNESS] != 0 and z > 0.0:
-        # (6): K_b3 = 9.81 m_s / z_p,max; a secant through the origin, hence the drop at the line's start
-        row[LINE_K] = 9.81 * mass * REFERENCE_AREA / row[AREA] / z
-        row[LINE_F] = row[LINE_K] * z
+
+
+@compiled
+def set_rest_line(row: Any, mass: float) -> None:
+    """(6) read literally, K_b3 = 9.81 m_s / z_p,max: a secant through the origin, so the force drops to the weight."""
+    if row[LINE_Z] > 0.0:
+        row[LINE_K] = 9.81 * mass * REFERENCE_AREA / row[AREA] / row[LINE_Z]
+        row[LINE_F] = row[LINE_K] * row[LINE_Z]
 
 
 @compiled
@@ -116,23 +120,17 @@ def commit(law: Any, p: Any, s: Any, row: Any, state: Any, z: float, v: float, h
         if z <= 0.0:
             outcome |= RELEASED
         return outcome
-    if state[MODE] == LOADING:
-        if z > row[LINE_Z]:
-            if before < s[BRANCH] <= z:
-                outcome |= BRANCHED
-            if v > 0.0 and law[REST_STIFFNESS] != 0:
-                f = call_force(law[ADDRESS_FORCE], (p.ctypes, s.ctypes, z, 0.0))
-                row[LINE_Z], row[LINE_F], row[LINE_K] = z, f, f / (p[0] * z)
-            else:
-                set_line(law, p, s, row, z, mass)
-        if v <= 0.0:
-            state[MODE] = UNLOADING
-            outcome |= ARRESTED
-    elif z > row[LINE_Z]:
+    if z > row[LINE_Z]:
+        if state[MODE] == LOADING and before < s[BRANCH] <= z:
+            outcome |= BRANCHED
         state[MODE] = LOADING
-        set_line(law, p, s, row, z, mass)
-        if v <= 0.0:
-            state[MODE] = UNLOADING
+        set_line(law, p, s, row, z)
+    if state[MODE] == LOADING and v <= 0.0:
+        state[MODE] = UNLOADING
+        row[LINE_C] = 0.0  # a new line asks for its dashpot
+        outcome |= ARRESTED
+        if law[REST_STIFFNESS] != 0:
+            set_rest_line(row, mass)
     if z <= rut_depth(row) and v <= 0.0:
         outcome |= RELEASED
     return outcome

@@ -78,11 +78,9 @@ def report(run: Run, peaks: Sequence[PeakLoad], answer: Mapping[str, Any], folde
     if peaks:
         out.print(_table(peaks))
     if run.domain_flags:
-        out.print(
-            f"Outside the ground law's calibrated domain: {', '.join(run.domain_flags)}. "
-            "Loads marked * were taken there: an extrapolation, not a measured range.",
-            style="yellow",
-        )
+        marked = " Loads marked * were taken there: an extrapolation, not a measured range." if peaks else ""
+        flags = ", ".join(run.domain_flags)
+        out.print(f"Outside the ground law's calibrated domain: {flags}.{marked}", style="yellow")
     half = answer["half_step"]
     if half is not None and half["status"] != "done":
         out.print(f"At half the step the run failed: {half['sentence']}", style="yellow")
@@ -96,6 +94,8 @@ def _table(peaks: Sequence[PeakLoad]) -> Table:
     for heading in ("raw", "at s", f"CFC {peaks[0].cfc}", "at s", "impulse N s", "moves at half step"):
         table.add_column(heading, justify="right")
     for peak in peaks:
+        if peak.raw == 0.0:
+            continue  # a wheel that never touched
         change = "-" if peak.half_step_change is None else f"{100.0 * peak.half_step_change:.2g} %"
         table.add_row(
             peak.channel + (" *" if peak.domain_flags else ""),

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ground.array import Elements
 from ground.kernel import COLUMNS, STATE_COLUMNS
 from ground.law import HIDDEN, REFERENCE_MASS, GroundLaw
 from ground.surface import normal
@@ -42,9 +43,15 @@ class Body:
         return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def bodies_of(vehicle: Vehicle | Striker) -> tuple[Body, ...]:
-    """Bodies with their contact points: striker; or chassis, front axle, ROPS as far as there are any."""
-    spacing = vehicle.contact_spacing
+POINTS_IN_ELEMENT = 0.8  # contact points are never further apart than this share of an element
+
+
+def bodies_of(vehicle: Vehicle | Striker, elements: Elements) -> tuple[Body, ...]:
+    """Bodies with their contact points: striker; or chassis, front axle, ROPS as far as there are any.
+
+    Points stand for areas, elements keep the ruts: an element without a point would be a gap under the body.
+    """
+    spacing = min(vehicle.contact_spacing, POINTS_IN_ELEMENT * min(elements.spacing))
     if isinstance(vehicle, Striker):
         height = 0.5 * (vehicle.face_length + vehicle.face_width)
         half = np.array([0.5 * vehicle.face_length, 0, 0]), np.array([0, 0.5 * vehicle.face_width, 0])

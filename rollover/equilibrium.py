@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +12,11 @@ from rollover.contact import Body
 from rollover.forces import generalised_forces, tyre_point
 from rollover.frames import from_angles, rotation_vector
 from rollover.jacobian import stiffness
-from rollover.tables import E_DEPTH_NOW, E_FORCE_NOW, POSE_COLUMNS, ROT, W_KZ, W_MU, Tables, handle
+from rollover.step import stand
+from rollover.tables import E_DEPTH_NOW, E_FORCE_NOW, POSE_COLUMNS, ROT, W_KZ, Tables, handle
 
 Array = NDArray[np.float64]
-ROLL, PITCH, AXLE, SHIFT, TILT = 1, 2, 3, 4, 7  # places in u; 0 is the height
+ROLL, PITCH, AXLE, SLIDE, YAW, SHIFT, TILT = 1, 2, 3, 4, 6, 7, 10  # places in u; 0 is the height
 TOLERANCE = 1e-7  # of forces and moments over the weight
 
 
@@ -35,10 +34,11 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 class Equilibrium:
-    """Few coordinates u: height, roll, pitch, axle angle, shift (3) and tilt (3) of the ROPS on its mounts.
+    """Few coordinates u: height, roll, pitch, axle angle, slide (2), yaw; shift (3) and tilt (3) of the ROPS.
 
-    Roll and pitch turn about the vehicle's origin, after the heading; the residuals are the virtual work of all
-    forces for each coordinate, over the weight. The tyres' stick springs are unstrained.
+    Height is along the surface's normal, slide along it; roll, pitch and yaw turn about the vehicle's origin. The
+    residuals are the virtual work of all forces for each coordinate, over the weight. The tyres' stick springs hold
+    the vehicle where the search began, so that on a slope it leans on them.
     """
 
     def __init__(self, bodies: tuple[Body, ...], t: Tables, heading: float, gravity: float) -> None:
@@ -46,18 +46,23 @@ class Equilibrium:
         self.handle = handle(t)
         self.weight = np.zeros(6 * len(bodies))
         self.weight[2::6] = [-gravity * b.inertia.mass for b in bodies]
-        self.size = 10 if bodies[-1].name == "rops" else 4
+        n = from_angles(0.0, 0.0, heading).T @ t.plane[:3]
+        self.level = -math.asin(n[1]), math.atan2(n[0], n[2])  # roll and pitch of a vehicle flat on the surface
+        n = t.plane[:3]
+        x = np.array([n[2], 0.0, -n[0]]) / math.hypot(n[0], n[2])
+        self.along = np.array([x, _cross(n, x)])  # two directions in the surface
+        self.size = 13 if bodies[-1].name == "rops" else 7
         self.scale = max(-float(self.weight.sum()), 1.0)
 
     def guess(self, roll: float = 0.0, axle: float = 0.0) -> Array:
-        """Start of a search: turned by `roll`, pitched so that front and rear tyres touch, pressed in by the weight."""
+        """Start of a search: rolled against the surface, pitched so that both axles touch, pressed in by the weight."""
         u = np.zeros(self.size)
-        u[ROLL], u[AXLE] = roll, axle
+        u[ROLL], u[AXLE] = self.level[0] + roll, axle
         centres = [self.bodies[int(b)].centre[0] for b in self.t.wheel_i] + self.t.wheel_f[:, 0]
         front = centres > 0.5 * (centres.min() + centres.max())
 
         def depths(pitch: float) -> Array:
-            u[PITCH] = pitch
+            u[PITCH] = self.level[1] + pitch
             self.residual(u)
             return self.t.wheel_memory[:, E_DEPTH_NOW].copy()
 
@@ -66,13 +71,17 @@ class Equilibrium:
             return float(d[front].max() - d[~front].max())
 
         if front.any() and not front.all() and uneven(-0.4) * uneven(0.4) < 0.0:
-            u[PITCH] = brentq(uneven, -0.4, 0.4, xtol=1e-4)
-        deepest = float(depths(float(u[PITCH])).max())
-        u[0] += deepest / self.t.plane[2] - self.scale / float(self.t.wheel_f[:, W_KZ].sum())
+            deepest = float(depths(brentq(uneven, -0.4, 0.4, xtol=1e-4)).max())
+        else:
+            deepest = float(depths(0.0).max())
+        u[0] += deepest - self.scale / float(self.t.wheel_f[:, W_KZ].sum())
         return u
 
+    def _origin(self, u: Array) -> Array:
+        return np.asarray(u[0] * self.t.plane[:3] + u[SLIDE : SLIDE + 2] @ self.along)
+
     def _rotations(self, u: Array) -> list[Array]:
-        R = from_angles(u[ROLL], u[PITCH], self.heading)
+        R = from_angles(u[ROLL], u[PITCH], self.heading + u[YAW])
         found = []
         for body in self.bodies:
             if body.name == "front_axle":
@@ -86,7 +95,7 @@ class Equilibrium:
     def coordinates(self, u: Array) -> Array:
         """Generalised coordinates (6 nb,) of all bodies."""
         turns = self._rotations(u)
-        R, origin = turns[0], np.array([0.0, 0.0, u[0]])
+        R, origin = turns[0], self._origin(u)
         parts = []
         for body, turn in zip(self.bodies, turns, strict=True):
             x = origin + R @ body.centre
@@ -98,13 +107,16 @@ class Equilibrium:
             parts += [x, rotation_vector(turn)]
         return np.concatenate(parts)
 
-    def tangents(self, u: Array) -> Array:
-        """Velocities (size, 6 nb) of all bodies (world; angular in body axes) for a unit rate of each coordinate."""
-        turns, q = self._rotations(u), self.coordinates(u)
-        R, origin = turns[0], np.array([0.0, 0.0, u[0]])
-        spins = {ROLL: R[:, 0], PITCH: from_angles(0.0, 0.0, self.heading)[:, 1]}
+    def tangents(self, u: Array, q: Array) -> Array:
+        """Velocities (size, 6 nb) of all bodies (world; angular in body axes) for a unit rate of each u; q as of u."""
+        turns = self._rotations(u)
+        R, origin = turns[0], self._origin(u)
+        level = from_angles(0.0, 0.0, self.heading + u[YAW])
+        spins = {ROLL: R[:, 0], PITCH: level[:, 1], YAW: level[:, 2]}
         rows = np.zeros((self.size, q.size))
-        rows[0, 2::6] = 1.0
+        for b in range(len(self.bodies)):
+            rows[0, 6 * b : 6 * b + 3] = self.t.plane[:3]
+            rows[SLIDE : SLIDE + 2, 6 * b : 6 * b + 3] = self.along
         for b, (body, turn) in enumerate(zip(self.bodies, turns, strict=True)):
             x, at = q[6 * b : 6 * b + 3], 6 * b
             for k, spin in spins.items():
@@ -122,57 +134,67 @@ class Equilibrium:
 
     def residual(self, u: Array) -> Array:
         """Virtual work for each coordinate over the weight, (size,)."""
-        return self._work(u)[0]
-
-    @contextmanager
-    def _without_friction(self) -> Iterator[None]:
-        """No stick: the tyres may move sideways as the vehicle settles."""
-        friction = self.t.wheel_f[:, W_MU].copy()
-        self.t.wheel_f[:, W_MU] = 0.0
-        try:
-            yield
-        finally:
-            self.t.wheel_f[:, W_MU] = friction
-
-    def _work(self, u: Array) -> tuple[Array, Array]:
-        """Residual at u and the tangents that it was found with."""
         q = self.coordinates(u)
         Q = np.zeros_like(q)
-        with self._without_friction():
-            generalised_forces(self.handle, q, np.zeros_like(q), Q)
-        T = self.tangents(u)
-        return np.asarray(T @ (Q + self.weight) / self.scale), T
+        generalised_forces(self.handle, q, np.zeros_like(q), Q)
+        return np.asarray(self.tangents(u, q) @ (Q + self.weight) / self.scale)
 
     def solve(self, guess: Array, fixed: tuple[int, ...] = ()) -> Array | None:
         """Equilibrium near a guess by a damped Newton iteration, some coordinates held, or None."""
         free = [k for k in range(self.size) if k not in fixed]
         if len(self.bodies) == 1 or self.bodies[1].name != "front_axle":
             free = [k for k in free if k != AXLE]
-        u, K = guess.copy(), np.zeros((self.weight.size, self.weight.size))
-        r, T = self._work(u)
-        for _ in range(80):
-            size = float(np.max(np.abs(r[free])))
+        u = guess.copy()
+        self.residual(u)
+        stand(self.handle)
+        r = self.residual(u)[free]
+        for _ in range(100):
+            size = float(np.max(np.abs(r)))
             if size < TOLERANCE:
                 return u
-            with self._without_friction():
-                stiffness(self.handle, 1.0, 0.0, K)
-            A = (T @ K @ T.T / self.scale)[np.ix_(free, free)]
-            step = np.linalg.solve(A + 1e-3 * np.eye(len(free)), r[free])
-            step *= min(1.0, 0.1 / max(float(np.max(np.abs(step))), 1e-12))
-            for _ in range(8):
-                trial = u.copy()
-                trial[free] += step
-                r, T = self._work(trial)
-                if float(np.max(np.abs(r[free]))) < size:
+            # differences see all of the geometry, near the end; kinks on the way lead them astray, springs are patient
+            far = (self._by_springs, self._by_differences)
+            for direction in far if size > 0.02 else far[::-1]:
+                better, u_next, r_next = self._descend(u, r, direction(u, r, free), free)
+                if better:
                     break
-                step *= 0.5
-            u = trial
+            u, r = u_next, r_next
         return None
+
+    def _descend(self, u: Array, r: Array, step: Array, free: list[int]) -> tuple[bool, Array, Array]:
+        """Go along a step, at most 0.1 in any coordinate, halved until the residual falls; whether it did."""
+        step = step * min(1.0, 0.1 / max(float(np.max(np.abs(step))), 1e-12))
+        size = float(np.max(np.abs(r)))
+        for _ in range(8):
+            trial = u.copy()
+            trial[free] += step
+            found = self.residual(trial)[free]
+            if float(np.max(np.abs(found))) < size:
+                return True, trial, found
+            step = 0.5 * step
+        return False, trial, found
+
+    def _by_differences(self, u: Array, r: Array, free: list[int]) -> Array:
+        eps = 1e-7
+        slopes = np.empty((len(free), len(free)))
+        for column, k in enumerate(free):
+            nudged = u.copy()
+            nudged[k] += eps
+            slopes[:, column] = (self.residual(nudged)[free] - r) / eps
+        return -np.asarray(np.linalg.lstsq(slopes, r, rcond=1e-10)[0])
+
+    def _by_springs(self, u: Array, r: Array, free: list[int]) -> Array:
+        K = np.zeros((self.weight.size, self.weight.size))
+        self.residual(u)
+        stiffness(self.handle, 1.0, 0.0, K)
+        T = self.tangents(u, self.coordinates(u))
+        A = (T @ K @ T.T / self.scale)[np.ix_(free, free)]
+        return np.asarray(np.linalg.solve(A + 1e-3 * np.eye(len(free)), r))
 
     def balance(self, sign: float, swing: float) -> Array | None:
         """Unstable equilibrium on the wheels of one side: sign 1 tips to the right, -1 to the left; or None.
 
-        For each roll angle the other coordinates settle; the balance is where the roll moment changes its sign.
+        For each roll angle against the surface the other coordinates settle; the balance is where the roll moment changes its sign.
         """
         last: tuple[float, float] | None = None
         settled = self.guess()
@@ -180,11 +202,11 @@ class Equilibrium:
         def moment(roll: float) -> float:
             nonlocal settled
             start = settled.copy()
-            start[ROLL] = sign * roll
+            start[ROLL] = self.level[0] + sign * roll
             found = self.solve(start, fixed=(ROLL,))
             if found is None:
                 found = self.solve(self.guess(sign * roll, -sign * min(roll, 1.01 * swing)), fixed=(ROLL,))
-            if found is None or abs(found[PITCH]) > 0.5:
+            if found is None or abs(found[PITCH] - self.level[1]) > 0.5:
                 return math.nan
             settled = found
             return sign * float(self.residual(found)[ROLL])
@@ -204,9 +226,9 @@ class Equilibrium:
         """Velocities (6 nb,) while the vehicle rolls at `rate` about its most loaded tyre's contact."""
         if rate == 0.0:
             return np.zeros(6 * len(self.bodies))
-        v = self.tangents(u)[ROLL] * rate
+        v = self.tangents(u, self.coordinates(u))[ROLL] * rate
         self.residual(u)
-        R = from_angles(u[ROLL], u[PITCH], self.heading)
+        R = from_angles(u[ROLL], u[PITCH], self.heading + u[YAW])
         w = int(np.argmax(self.t.wheel_memory[:, E_FORCE_NOW]))
         shift = _cross(R @ np.array([rate, 0.0, 0.0]), tread_point(self.t, self.bodies, w, R))
         for b in range(len(self.bodies)):

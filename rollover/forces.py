@@ -77,6 +77,7 @@ from rollover.vectors import (
     velocity,
 )
 
+FLAT = 0.03  # cos^2 of the camber, 80 degrees, from which a tyre begins to lie on its side
 TYRE_RELAXATION = 0.002  # s, dashpot over stick spring of a tyre
 
 
@@ -138,16 +139,16 @@ def tyre_point(row: Any, wheel: Any, n: Any, e: Any, x: Any) -> float:
 
 @compiled
 def tyre_stiffness(wheel: Any, lean: float) -> Any:
-    """k(lean^2) and its derivative: radial and lateral springs in series, faded out from 60 degrees of camber.
+    """k(lean^2) and its derivative: radial and lateral springs in series, faded out over the last 10 degrees.
 
-    1/k = cos^2/k_z + sin^2/k_y; a tyre on its side bears on its side wall, which the ground's elements carry.
+    1/k = cos^2/k_z + sin^2/k_y; a tyre flat on its side has no lowest point: its side wall bears, on the elements.
     """
     s2 = min(lean * lean, 1.0)
     series = (1.0 - s2) / wheel[W_KZ] + s2 / wheel[W_KY]
     slope = 1.0 / wheel[W_KY] - 1.0 / wheel[W_KZ]
     fade, fall = 1.0, 0.0
-    if s2 > 0.75:
-        fade, fall = 4.0 * (1.0 - s2), -4.0
+    if 1.0 - s2 < FLAT:
+        fade, fall = (1.0 - s2) / FLAT, -1.0 / FLAT
     return fade / series, fall / series - fade * slope / (series * series)
 
 

@@ -115,7 +115,8 @@ def share_mass(t: Any, new: Any, total: int, share: Any) -> None:
     Contact i has effective mass 1/W_ii, W = J A J'. Its share is a_i / sum_j a_j |c_ij|, with the areas a and the
     correlations c_ij = W_ij / sqrt(W_ii W_jj) of all contacts: like contacts divide the mass by area, unrelated ones
     do not. By Gershgorin's theorem (scaled by a) the masses of one set never exceed the fraction of M in any
-    direction; those that move along already are taken off, and what is left over is scaled down.
+    direction; a set of its own is scaled so that it reaches that fraction, one that joins masses which move along
+    already gets what they leave.
     """
     n = t.mass.shape[0]
     A = mobility(t)
@@ -152,11 +153,14 @@ def share_mass(t: Any, new: Any, total: int, share: Any) -> None:
             for m in range(n):
                 N[i, m] += P[i, m]
         after = largest_eigenvalue(A, N)
-        if after > fraction * (1.0 + 1e-9) and after > before:
+        factor = 1.0
+        if before == 0.0 and after > 0.0:
+            factor = fraction / after  # a set of its own takes its whole fraction in the direction that feels it most
+        elif after > fraction * (1.0 + 1e-9) and after > before:
             # the largest eigenvalue is convex in the factor: the chord never overshoots
             factor = max(min((fraction - before) / (after - before), 1.0), 0.0)
-            for k in range(total):
-                t.memory[t.active[new[k]], MASS_B] *= factor
+        for k in range(total):
+            t.memory[t.active[new[k]], MASS_B] *= factor
 
 
 @compiled

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from ground.surface import Surface, height
 from rollover.contact import Body
 from rollover.equilibrium import ROLL, Equilibrium, tread_point
+from rollover.forces import generalised_forces
 from rollover.frames import from_angles, rotation_vector
 from rollover.initiation import Drop, Standing, TipOver
 from rollover.scenario import Scenario
-from rollover.tables import Tables
+from rollover.step import stand
+from rollover.tables import Tables, handle
 from rollover.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -47,6 +49,9 @@ def _dropped(drop: Drop, scenario: Scenario, bodies: tuple[Body, ...], t: Tables
     # first contact at t = 0, a hair's breadth below the surface so that it is found there
     rise = lowest + drop.speed * drop.lead_time - 0.5 * scenario.gravity * drop.lead_time**2 - 1e-9
     q[2::6] += rise
+    kernels = handle(t)
+    generalised_forces(kernels, q, np.zeros_like(q), np.zeros_like(q))
+    stand(kernels)
     qd = np.zeros(6 * len(bodies))
     qd[2::6] = -(drop.speed - scenario.gravity * drop.lead_time)
     return Start(q=q, qd=qd, time=-drop.lead_time)

@@ -21,7 +21,7 @@ from rollover.placement import place
 from rollover.recording import Recording
 from rollover.run import ContactForce, Event, GroundTrack, Motion, Run
 from rollover.scenario import Scenario
-from rollover.step import end_of_step, stand, start_step
+from rollover.step import end_of_step, keep_strain, start_step
 from rollover.tables import Tables, handle
 from rollover.vehicle import Striker, Vehicle
 
@@ -53,7 +53,7 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
     not exist, and lets a keyboard interrupt through.
     """
     began = clock.perf_counter()
-    bodies = bodies_of(scenario.vehicle)
+    bodies = bodies_of(scenario.vehicle, scenario.ground.elements)
     t = tables_of(scenario, bodies)
     start = place(scenario, bodies, t)
     settings = scenario.simulation
@@ -66,7 +66,7 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
     live = model.Live(tables=t, handle=handle(t))
     Q = np.zeros(6 * len(bodies))
     generalised_forces(live.handle, start.q, start.qd, Q)
-    stand(live.handle)
+    keep_strain(live.handle)
     generalised_forces(live.handle, start.q, start.qd, Q)
     start_step(live.handle)
     events: list[Event] = []

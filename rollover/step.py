@@ -231,15 +231,8 @@ def finish_wheels(t: Any) -> None:
         t.work[TYRE] += 0.5 * (g[E_DAMPING] + g[E_DAMPING_NOW]) * (g[E_DEPTH_NOW] - g[E_DEPTH])
         for k in range(3):
             t.work[FRICTION_WORK] -= 0.5 * (g[E_FRICTION + k] + g[E_FRICTION_NOW + k]) * g[E_MOVED + k]
-        if g[E_FORCE_NOW] > 0.0:
-            stick = max(t.wheel_f[w, W_MU] * g[E_FORCE_NOW] / t.wheel_f[w, W_KY], 1e-9)
-            commit_friction(stick, g[E_SHEAR : E_SHEAR + 3], g[E_MOVED : E_MOVED + 3], t.plane[:3])
-        else:
-            for k in range(3):
-                g[E_SHEAR + k] = 0.0
-        # the tread's lowest point moves over the crown: friction takes hold of the new one
-        for k in range(3):
-            g[E_ANCHOR + k], g[E_PLACE + k] = g[E_POINT + k], g[E_WHERE + k]
+        grip(t, w)
+        hold(g)  # the tread's lowest point moves over the crown: friction takes hold of the new one
         if (g[E_FORCE] > 0.0) != (g[E_FORCE_NOW] > 0.0):
             kind = WHEEL_ON if g[E_FORCE_NOW] > 0.0 else WHEEL_OFF
             note_event(t, kind, w, (g[E_WHERE], g[E_WHERE + 1], g[E_WHERE + 2]), g[E_FORCE_NOW])
@@ -278,7 +271,36 @@ def stand(t: Any) -> None:
     for w in range(t.wheel_i.size):
         g = t.wheel_memory[w]
         for k in range(3):
-            g[E_ANCHOR + k], g[E_PLACE + k], g[E_SHEAR + k] = g[E_POINT + k], g[E_WHERE + k], 0.0
+            g[E_SHEAR + k] = 0.0
+        hold(g)
+
+
+@compiled
+def keep_strain(t: Any) -> None:
+    """Take what the stick springs have been strained by since `stand` as their strain at the start of a run."""
+    for w in range(t.wheel_i.size):
+        g = t.wheel_memory[w]
+        grip(t, w)
+        hold(g)
+
+
+@compiled
+def grip(t: Any, w: int) -> None:
+    """Add what a tyre's anchor has moved to its stick spring, as far as friction holds; off the ground it is free."""
+    g = t.wheel_memory[w]
+    if g[E_FORCE_NOW] > 0.0:
+        stick = max(t.wheel_f[w, W_MU] * g[E_FORCE_NOW] / t.wheel_f[w, W_KY], 1e-9)
+        commit_friction(stick, g[E_SHEAR : E_SHEAR + 3], g[E_MOVED : E_MOVED + 3], t.plane[:3])
+    else:
+        for k in range(3):
+            g[E_SHEAR + k] = 0.0
+
+
+@compiled
+def hold(g: Any) -> None:
+    """Let the stick spring take hold of the tread's lowest point as it stands now."""
+    for k in range(3):
+        g[E_ANCHOR + k], g[E_PLACE + k] = g[E_POINT + k], g[E_WHERE + k]
 
 
 @compiled

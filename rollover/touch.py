@@ -273,9 +273,9 @@ def begin(t: Any, slot: int, share: float) -> None:
     state[FLAGS] = domain_flags(t, speed, mass, angle, state[HITS])
     state[MODE] = LOADING
     if t.law[PLASTIC] != 0:
-        if m[LINE_Z] > 0.0:
+        if m[LINE_Z] > 0.0 and t.law[REST_STIFFNESS] == 0:
             # a second hit starts from the rut, on a reloading line that meets this hit's loading curve
-            set_line(t.law, t.p, s, m, m[LINE_Z], share)
+            set_line(t.law, t.p, s, m, m[LINE_Z])
         if start > rut_depth(m) + 1e-6 and start > m[LINE_Z] * (1.0 - 1e-9):
             enter_from_the_side(t.law, t.p, s, m, start, 0.0)
         if m[SINKAGE] < m[LINE_Z]:

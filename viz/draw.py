@@ -27,19 +27,23 @@ _LABEL_TIME = 0.3  # s that an event's label stands
 
 @dataclass(frozen=True, kw_only=True)
 class Picture:
-    """What a run's scene is drawn with: mesh of the ground, m of sinkage at the brightest, N for 1 m of arrow, size."""
+    """What a run's scene is drawn with.
+
+    Mesh of the ground, m of sinkage from which the soil is brightest, N for 1 m of arrow, and a length by which
+    arrows and marks are sized, m.
+    """
 
     ground: Terrain
     soil: float
     force: float
-    size: float  # m, by which arrows and marks are sized
+    size: float
 
     @property
     def scales(self) -> tuple[str, ...]:
         """What the reader must know to read lengths and colours."""
         return (
             f"arrows 1 m = {1e-3 * self.force:g} kN",
-            f"soil from brown to yellow at {1e3 * self.soil:g} mm",
+            f"soil yellow from {1e3 * self.soil:g} mm",
             f"grid {self.ground.grid_step:g} m",
         )
 
@@ -48,7 +52,9 @@ def picture(run: Run) -> Picture:
     """Choose the scales of a run's scene from what happened in it."""
     (x, y, _), radius = extent(run)
     deepest = float(run.track.sinkage.max(initial=0.0))
-    soil = nice(deepest) if deepest > 0.0 else 0.01
+    left = run.track.sinkage.max(axis=0, initial=0.0)
+    # one deep hole must not make all other ruts look alike
+    soil = nice(float(np.quantile(left[left > 0.0], 0.8))) if deepest > 0.0 else 0.01
     elements, touched = run.scenario.ground.elements, run.track.element
     reach = 1.2 * radius
     outer = (x - reach, x + reach, y - reach, y + reach)
@@ -59,7 +65,7 @@ def picture(run: Run) -> Picture:
     # the arrow at a striker stands inside the nose
     longest = 0.3 * radius if isinstance(run.scenario.vehicle, Striker) else 1.3 * extent(run, at=0)[1]
     # the load that is asked for sets the scale, unless others would reach out of the picture
-    per_metre = max(highest.get("rops", 0.0), 0.4 * max(highest.values(), default=0.0)) / longest
+    per_metre = max(highest.get("rops", 0.0), 0.7 * max(highest.values(), default=0.0)) / longest
     return Picture(
         ground=terrain(
             run.scenario.ground.surface,

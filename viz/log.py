@@ -6,7 +6,7 @@ import contextlib
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -133,9 +133,18 @@ def _documents(out: Stream, run: Run, words: str) -> None:
         "stop_time_s": run.stop_time,
         "wall_time_s": run.wall_time,
         "energy_residual_J": float(run.ledger.get("residual", np.nan)),
-        **{f"version_{name.replace('-', '_')}": version(name) for name in ("rollover", "exudyn", "numpy", "rerun-sdk")},
+        **{
+            f"version_{name.replace('-', '_')}": _version(name) for name in ("rollover", "exudyn", "numpy", "rerun-sdk")
+        },
     }
     out.rec.send_property("run", rr.AnyValues(**facts))
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:  # run from a checkout that is not installed
+        return "not installed"
 
 
 def _phases(out: Stream, run: Run) -> None:

@@ -106,7 +106,7 @@ def _included(node: Node, slot: Slot, chain: tuple[Path, ...], path: str) -> Nod
     root = read(file)
     if not isinstance(root.value, Mapping):
         raise root.place.fault("", f"not a mapping, got {root.plain!r}; {slot.allowed()} is needed")
-    return expand(replace(root, key=node.key), slot, (*chain, file.resolve()), path)
+    return expand(root, slot, (*chain, file.resolve()), path)
 
 
 def _join(path: str, key: str) -> str:

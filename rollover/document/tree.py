@@ -12,6 +12,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
+from ruamel.yaml.scalarstring import DoubleQuotedScalarString
 
 from rollover.faults import Fault, InputError
 
@@ -198,4 +199,6 @@ def _styled(value: Any) -> Any:
         if not any(isinstance(child, (Mapping, list, tuple)) for child in value):
             styled.fa.set_flow_style()
         return styled
+    if isinstance(value, str) and not value.isprintable():
+        return DoubleQuotedScalarString(value)  # any other style takes some rare characters for line breaks
     return value
