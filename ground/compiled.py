@@ -11,7 +11,7 @@ import hashlib
 import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -38,6 +38,7 @@ __all__ = [
     "define_proxy",
     "force_law",
     "is_warm",
+    "mark_warm",
     "register",
 ]
 
@@ -118,8 +119,15 @@ def begin_law(function: Callable[..., None]) -> Any:
 
 
 def is_warm() -> bool:
-    """Whether kernels of these sources have been compiled on this machine before."""
-    return cache_folder().is_dir()
+    """Whether a run with kernels of these very sources has finished on this machine before."""
+    return (cache_folder() / "warm").exists()
+
+
+def mark_warm() -> None:
+    """Note that all kernels have been compiled; where nothing can be written the next run compiles anew."""
+    with suppress(OSError):
+        cache_folder().mkdir(parents=True, exist_ok=True)
+        (cache_folder() / "warm").touch()
 
 
 def _by_address(signature: Any) -> Any:

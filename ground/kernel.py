@@ -17,7 +17,7 @@ from ground.compiled import call_advance, call_force, compiled
 from ground.law import BRANCH, REFERENCE_AREA
 
 # columns of memory (float)
-SINKAGE = 0  # z at the last commit, m
+SINKAGE = 0  # deepest point's z at the last commit, m
 LINE_Z = 1  # deepest sinkage so far: where the unloading line starts, m
 LINE_F = 2  # force there, N per reference area
 LINE_K = 3  # K_u, N/m per reference area
@@ -25,14 +25,15 @@ LINE_C = 4  # dashpot of the unloading line, N s/m per reference area
 AREA = 5  # contact area now, m2
 MASS_B = 6  # co-moving mass m_b1, kg
 SHEAR = 7  # 7, 8, 9: shear displacement since the last slip, world axes, m
-PLACE = 10  # 10, 11, 12: the owning point at the last commit, world, m
-OWNER_R = 13  # 13, 14, 15: the owning point in its body's axes about its centre of mass, m
+PLACE = 10  # 10, 11, 12: that centroid at the last commit, world, m
+OWNER_R = 13  # 13, 14, 15: centroid of the covered area in its body's axes about its centre of mass, m
 NORMAL = 16  # 16, 17, 18: unit normal of the undisturbed surface, world, up
 OFFSET = 19  # normal . (a point of the undisturbed surface), m
 FORCE = 20  # normal force at the start of the step, N
 FRICTION = 21  # 21, 22, 23: friction force at the start of the step, N
 TOUCH_SPEED = 24  # latched normal impact speed, m/s
-COLUMNS = 25
+SPREAD = 25  # how far the mean of the covered area stands above its deepest point, m
+COLUMNS = 26
 
 # columns of state (int)
 CELL, BODY, MODE, FLAGS, OWNER, HITS = 0, 1, 2, 3, 4, 5
@@ -42,6 +43,8 @@ IDLE, LOADING, UNLOADING = 0, 1, 2
 # columns of the law's settings
 PLASTIC, REST_STIFFNESS, GRAVITY, ADDRESS_FORCE, ADDRESS_ADVANCE, ADDRESS_BEGIN = 0, 1, 2, 3, 4, 5
 
+SAME = 1e-10  # m: sinkages closer than this are one, so that rounding does not switch a loaded element to its line
+
 # outcomes of a commit, as bits
 BRANCHED, ARRESTED, RELEASED = 1, 2, 4
 
@@ -50,13 +53,14 @@ BRANCHED, ARRESTED, RELEASED = 1, 2, 4
 def normal_force(law: Any, p: Any, s: Any, row: Any, z: float, v: float) -> float:
     """Spring force of one element at sinkage z and rate v, N: never a pull; memory is only read.
 
+    z is that of the deepest point; the law is asked once, at the mean of the covered area (midpoint rule).
     Loading follows the law; below the deepest sinkage the line of stiffness K_u with its dashpot, capped by
     the loading curve at the line's start.
     """
     if z <= 0.0:
         return 0.0
-    if law[PLASTIC] == 0 or z >= row[LINE_Z]:
-        f = call_force(law[ADDRESS_FORCE], (p.ctypes, s.ctypes, z, v))
+    if law[PLASTIC] == 0 or z >= row[LINE_Z] - SAME:
+        f = call_force(law[ADDRESS_FORCE], (p.ctypes, s.ctypes, max(z - row[SPREAD], 0.0), v))
     else:
         f = min(row[LINE_F] - row[LINE_K] * (row[LINE_Z] - z) + row[LINE_C] * v, row[LINE_F])
     return max(f, 0.0) * row[AREA] / REFERENCE_AREA  # type: ignore[no-any-return]
@@ -73,7 +77,7 @@ def rut_depth(row: Any) -> float:
 @compiled
 def set_line(law: Any, p: Any, s: Any, row: Any, z: float) -> None:
     """Start the unloading line at (z, F(z)) with K_u = K'(z)/recovery."""
-    f = call_force(law[ADDRESS_FORCE], (p.ctypes, s.ctypes, z, 0.0))
+    f = call_force(law[ADDRESS_FORCE], (p.ctypes, s.ctypes, max(z - row[SPREAD], 0.0), 0.0))
     row[LINE_Z] = z
     row[LINE_F] = f
     row[LINE_K] = f / (p[0] * z) if z > 0.0 else 0.0
@@ -95,7 +99,7 @@ def enter_from_the_side(law: Any, p: Any, s: Any, row: Any, z: float, force: flo
     must not be there at once. It climbs K_u to the loading curve as the member sinks further.
     """
     per_reference = force * REFERENCE_AREA / max(row[AREA], 1e-12)
-    f = call_force(law[ADDRESS_FORCE], (p.ctypes, s.ctypes, z, 0.0))
+    f = call_force(law[ADDRESS_FORCE], (p.ctypes, s.ctypes, max(z - row[SPREAD], 0.0), 0.0))
     if f <= per_reference or z <= 0.0:
         return
     row[LINE_K] = f / (p[0] * z)
@@ -115,7 +119,7 @@ def commit(law: Any, p: Any, s: Any, row: Any, state: Any, z: float, v: float, h
     row[SINKAGE] = z
     if law[ADDRESS_ADVANCE] != 0:
         # the mean rate makes a law's own states second order in the step
-        call_advance(law[ADDRESS_ADVANCE], (p.ctypes, s.ctypes, z, (z - before) / h, h))
+        call_advance(law[ADDRESS_ADVANCE], (p.ctypes, s.ctypes, max(z - row[SPREAD], 0.0), (z - before) / h, h))
     if law[PLASTIC] == 0:
         if z <= 0.0:
             outcome |= RELEASED

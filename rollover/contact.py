@@ -134,6 +134,7 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
             tyre.lateral_stiffness,
             tyre.vertical_damping,
             tyre.friction,
+            float(wheel.rolls),
         ]
     mount_f, mount_i = _mounts(vehicle, bodies, row)
     joint_i, joint_f, axle_f, axle_i = _joints(vehicle, bodies, row)
@@ -190,10 +191,10 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         s=np.zeros((capacity, hidden)),
         active=np.zeros(capacity, dtype=np.int64),
         trial=np.zeros((capacity, c.TRIAL_COLUMNS)),
-        found=np.zeros((capacity, 3)),
+        found=np.zeros((capacity, 7)),
         touched=np.zeros(number + 1, dtype=np.int64),
         candidate_i=np.zeros((number + 1, 2), dtype=np.int64),
-        candidate_f=np.zeros(number + 1),
+        candidate_f=np.zeros((number + 1, 2)),
         wheel_memory=np.zeros((len(wheels), c.EDGE_COLUMNS)),
         mount_memory=np.zeros((len(mount_f), c.SET_COLUMNS)),
         axle_memory=np.zeros(c.AXLE_MEMORY),

@@ -25,7 +25,7 @@ def tread_point(t: Tables, bodies: tuple[Body, ...], w: int, R: Array) -> Array:
     row, e, x = np.zeros(POSE_COLUMNS), np.zeros(3), np.zeros(3)
     row[ROT : ROT + 9] = R.ravel()
     tyre_point(row, t.wheel_f[w], t.plane[:3], e, x)
-    return x + R @ bodies[int(t.wheel_i[w])].centre
+    return np.asarray(x + R @ bodies[int(t.wheel_i[w])].centre)
 
 
 def _cross(a: Array, b: Array) -> Array:
@@ -194,7 +194,7 @@ class Equilibrium:
     def balance(self, sign: float, swing: float) -> Array | None:
         """Unstable equilibrium on the wheels of one side: sign 1 tips to the right, -1 to the left; or None.
 
-        For each roll angle against the surface the other coordinates settle; the balance is where the roll moment changes its sign.
+        For each roll angle against the surface the other coordinates settle; at the balance the moment changes sign.
         """
         last: tuple[float, float] | None = None
         settled = self.guess()

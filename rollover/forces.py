@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ground.compiled import compiled
-from ground.kernel import BODY, MASS_B, NORMAL, OFFSET, OWNER_R, PLACE, SHEAR, friction_force, normal_force
+from ground.kernel import BODY, MASS_B, NORMAL, OFFSET, OWNER_R, PLACE, SHEAR, SPREAD, friction_force, normal_force
 from rollover.tables import (
     A_C,
     A_K,
@@ -60,6 +60,7 @@ from rollover.tables import (
     W_KZ,
     W_MU,
     W_RADIUS,
+    W_ROLLS,
     ZDOT,
     X,
     Z,
@@ -104,7 +105,7 @@ def try_elements(t: Any, Q: Any) -> None:
         r, n = m[OWNER_R : OWNER_R + 3], m[NORMAL : NORMAL + 3]
         x, y, z = place(row, r[0], r[1], r[2])
         v = velocity(row, r[0], r[1], r[2])
-        depth = m[OFFSET] - (n[0] * x + n[1] * y + n[2] * z)
+        depth = m[OFFSET] - (n[0] * x + n[1] * y + n[2] * z) + m[SPREAD]
         rate = -(n[0] * v[0] + n[1] * v[1] + n[2] * v[2])
         force = normal_force(t.law, t.p, t.s[i], m, depth, rate)
         trial[Z], trial[ZDOT], trial[FN] = depth, rate, force
@@ -153,6 +154,14 @@ def tyre_stiffness(wheel: Any, lean: float) -> Any:
 
 
 @compiled
+def along_axle(e: Any, n: Any, lean: float, v: Any) -> Any:
+    """Part of a world vector along the axle's direction in the surface."""
+    a, b, c = e[0] - lean * n[0], e[1] - lean * n[1], e[2] - lean * n[2]
+    factor = (a * v[0] + b * v[1] + c * v[2]) / max(1.0 - lean * lean, 1e-12)
+    return factor * a, factor * b, factor * c
+
+
+@compiled
 def try_wheels(t: Any, Q: Any) -> None:
     """Tyre forces on the undisturbed surface: energy k(camber) depth^2/2, a dashpot, friction on a stick spring."""
     e, x = np.empty(3), np.empty(3)
@@ -182,6 +191,12 @@ def try_wheels(t: Any, Q: Any) -> None:
         force = spring + damping
         g[E_FORCE_NOW], g[E_DAMPING_NOW], g[E_ENERGY_NOW] = force, damping, 0.5 * spring * depth
         stick = max(c[W_MU] * force / c[W_KY], 1e-9)
+        if c[W_ROLLS] > 0.0:
+            # a wheel that turns freely holds only along its axle; what goes the other way is rolling
+            v = along_axle(e, n, lean, v)
+            ahead = along_axle(e, n, lean, (g[E_MOVED], g[E_MOVED + 1], g[E_MOVED + 2]))
+            for k in range(3):
+                g[E_MOVED + k] = ahead[k]
         f = friction_force(
             c[W_MU], stick, TYRE_RELAXATION, force, g[E_SHEAR : E_SHEAR + 3], g[E_MOVED : E_MOVED + 3], v, n
         )

@@ -70,7 +70,10 @@ def load_channels(recording: Recording) -> list[tuple[str, tuple[str, ...], str 
 
 def magnitude(recording: Recording, parts: tuple[str, ...], cfc: int | None) -> NDArray[np.float64]:
     """Magnitude (n,) of one channel or of the vector of several, each filtered first."""
-    step = float(np.median(np.diff(recording.time))) if recording.time.size > 1 else 1.0
+    if recording.time.size < 2:
+        cfc, step = None, 1.0  # nothing to filter
+    else:
+        step = float(np.median(np.diff(recording.time)))
     columns = [recording[p] if cfc is None else filtered(recording[p], step, cfc) for p in parts]
     return np.abs(columns[0]) if len(columns) == 1 else np.sqrt(sum(v * v for v in columns))
 

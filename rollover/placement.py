@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ground.surface import Surface, height
 from rollover.contact import Body
 from rollover.equilibrium import ROLL, Equilibrium, tread_point
+from rollover.faults import Fault, InputError
 from rollover.forces import generalised_forces
 from rollover.frames import from_angles, rotation_vector
 from rollover.initiation import Drop, Standing, TipOver
@@ -79,15 +80,22 @@ def _standing(standing: Standing, scenario: Scenario, bodies: tuple[Body, ...], 
     statics = Equilibrium(bodies, t, math.radians(standing.heading_deg), scenario.gravity)
     u = statics.solve(statics.guess()) if len(t.wheel_i) else None
     if u is None:
-        raise ValueError(
-            "initiation: the vehicle does not stand on this surface, got no static equilibrium; 'drop' or 'tip-over'"
+        raise InputError(
+            Fault(
+                path="initiation",
+                message="the vehicle does not stand on this surface, got no static equilibrium; 'drop' or 'tip-over'",
+            )
         )
     return Start(q=statics.coordinates(u), qd=statics.rates(u, standing.roll_rate), time=0.0)
 
 
 def _tipped(tip: TipOver, scenario: Scenario, vehicle: Vehicle, bodies: tuple[Body, ...], t: Tables) -> Start:
     if not vehicle.wheels:
-        raise ValueError("initiation.kind: needs a vehicle with wheels, got 'tip-over' without; 'drop' suits it")
+        raise InputError(
+            Fault(
+                path="initiation.kind", message="needs a vehicle with wheels, got 'tip-over' without; 'drop' suits it"
+            )
+        )
     sign = -1.0 if tip.side == "left" else 1.0  # roll > 0 lowers the right side
     statics = Equilibrium(bodies, t, math.radians(tip.heading_deg), scenario.gravity)
     swing = vehicle.front_axle.swing if vehicle.front_axle is not None else 0.0
@@ -96,5 +104,9 @@ def _tipped(tip: TipOver, scenario: Scenario, vehicle: Vehicle, bodies: tuple[Bo
         u[ROLL] += sign * math.radians(tip.excess_deg)
         u = statics.solve(u, fixed=(ROLL,))
     if u is None:
-        raise ValueError("initiation: no balance on two wheels was found on this surface; change heading or side")
+        raise InputError(
+            Fault(
+                path="initiation", message="no balance on two wheels was found on this surface; change heading or side"
+            )
+        )
     return Start(q=statics.coordinates(u), qd=statics.rates(u, sign * tip.roll_rate), time=0.0)

@@ -10,6 +10,7 @@ from typing import Any, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from ground.compiled import mark_warm
 from rollover import history, model
 from rollover import tables as c
 from rollover.contact import Body, bodies_of, grown, tables_of
@@ -77,7 +78,7 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
 
     def after_step(time: float, q: Any, qd: Any, qdd: Any) -> bool:
         t = live.tables
-        now = start.time + time
+        now = round(start.time + time, 9)  # step times are sums: 0.6, not 0.5999999999999643
         dt = time - state["last"]  # the solver halves a step that does not converge
         state["last"] = time
         end_of_step(live.handle, q, qd, qdd, dt, Q)
@@ -105,7 +106,9 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
             progress(now, clock.perf_counter() - began)
             state["next"] = clock.perf_counter() + 0.25
         if state["quiet"] >= REST_TIME and "rest" not in {e.kind for e in events}:
-            events.append(Event(time=now - REST_TIME, kind="rest", subject=bodies[0].name, place=_point(q[:3])))
+            events.append(
+                Event(time=round(now - REST_TIME, 9), kind="rest", subject=bodies[0].name, place=_point(q[:3]))
+            )
             if settings.stop_at_rest:
                 return False
         return True
@@ -126,6 +129,7 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
             sentence = f"the solver gave up at t = {past.time[max(past.count - 1, 0)]:.4f} s: {sentence}"
     except DivergedError as reason:
         sentence = str(reason)
+    mark_warm()
     return _result(scenario, bodies, live.tables, past, events, sentence, clock.perf_counter() - began)
 
 

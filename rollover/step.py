@@ -1,7 +1,6 @@
 """Compiled: the end of an accepted step. What the step did is booked and committed, then contacts are renewed.
 
-Work is the mean of the forces at both ends of the step times the way between them: exact for what is linear in
-a step, and second order for the rest.
+Work is the mean of the forces at both ends of the step, as the solver saw them, times the way between them.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ from ground.kernel import (
 )
 from ground.law import REFERENCE_AREA
 from rollover.dense import dot, times
-from rollover.forces import generalised_forces
+from rollover.forces import generalised_forces, read_poses
 from rollover.impact import mobility
 from rollover.tables import (
     A_SWING,
@@ -125,10 +124,10 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
     finish_wheels(t)
     finish_mounts(t)
     finish_axle(t)
+    start_step(t)
     t.work[COLLISION] += touch(t, qd, h)
     settle(t)
-    generalised_forces(t, q, qd, Q)
-    start_step(t)
+    read_poses(t.pose, q, qd)  # the impact changed the velocities
 
 
 @compiled
@@ -160,6 +159,9 @@ def finish_elements(t: Any, h: float) -> None:
         if trial[FN] > 0.0:
             flags |= state[FLAGS]
             footprint += m[AREA]
+        m[FORCE] = trial[FN]
+        for k in range(3):
+            m[FRICTION + k] = trial[FT + k]
         outcome = commit(t.law, t.p, t.s[i], m, state, trial[Z], trial[ZDOT], h, t.s[i, 1] * m[AREA] / REFERENCE_AREA)
         commit_friction(t.soil[STICK], m[SHEAR : SHEAR + 3], trial[MOVED : MOVED + 3], m[NORMAL : NORMAL + 3])
         for k in range(3):
@@ -305,14 +307,11 @@ def hold(g: Any) -> None:
 
 @compiled
 def start_step(t: Any) -> None:
-    """Remember forces and places at the start of the next step."""
-    for a in range(t.counts[ACTIVE]):
-        i = t.active[a]
-        m, trial = t.memory[i], t.trial[i]
-        m[FORCE], m[SINKAGE] = trial[FN], trial[Z]
-        for k in range(3):
-            m[FRICTION + k] = trial[FT + k]
-            m[PLACE + k] += trial[MOVED + k]
+    """What was found at the end of a step is what the next one starts from.
+
+    The elements' part is in `finish_elements`: a contact that changes after the step enters the solver, and so the
+    ledger, with the force that it has at the end of its first step.
+    """
     for w in range(t.wheel_i.size):
         g = t.wheel_memory[w]
         g[E_DEPTH], g[E_FORCE], g[E_DAMPING] = g[E_DEPTH_NOW], g[E_FORCE_NOW], g[E_DAMPING_NOW]

@@ -16,7 +16,8 @@ from ground.compiled import StructRefProxy, StructType, compiled, define_proxy, 
 X, ROT, VEL, OMEGA, ACC, ALPHA, POSE_COLUMNS = 0, 3, 12, 15, 18, 21, 24
 
 # columns of wheel_f
-W_CENTRE, W_AXIS, W_RADIUS, W_HALF, W_CROWN, W_KZ, W_KY, W_C, W_MU, WHEEL_COLUMNS = 0, 3, 6, 7, 8, 9, 10, 11, 12, 13
+W_CENTRE, W_AXIS, W_RADIUS, W_HALF, W_CROWN, W_KZ, W_KY, W_C, W_MU, W_ROLLS = 0, 3, 6, 7, 8, 9, 10, 11, 12, 13
+WHEEL_COLUMNS = 14
 # columns of wheel_memory: anchor of the stick spring in the carrier's axes, its place and shear; then what was found
 # at the start of the step (depth, normal force, damping force, elastic energy, friction) and what is found now
 E_ANCHOR, E_PLACE, E_SHEAR, E_DEPTH, E_FORCE, E_DAMPING, E_ENERGY, E_FRICTION = 0, 3, 6, 9, 10, 11, 12, 13
@@ -121,10 +122,10 @@ class Tables(NamedTuple):
     s: Any  # (ns, 3 + hidden)
     active: Any  # (ns,)
     trial: Any  # (ns, TRIAL_COLUMNS)
-    found: Any  # (ns, 3) deepest sinkage, area and owning point, found by the search
+    found: Any  # (ns, 7) deepest sinkage, area, deepest point, mean sinkage, centroid (3): found by the search
     touched: Any  # (np,) slots found by the search
     candidate_i: Any  # (np, 2) slot and point
-    candidate_f: Any  # (np,) projected area
+    candidate_f: Any  # (np, 2) projected area, depth
     wheel_memory: Any  # (nw, EDGE_COLUMNS)
     mount_memory: Any  # (nt, SET_COLUMNS)
     axle_memory: Any  # (AXLE_MEMORY,)

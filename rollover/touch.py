@@ -30,6 +30,7 @@ from ground.kernel import (
     REST_STIFFNESS,
     SHEAR,
     SINKAGE,
+    SPREAD,
     TOUCH_SPEED,
     UNLOADING,
     enter_from_the_side,
@@ -75,7 +76,8 @@ def note_event(t: Any, kind: int, subject: int, x: Any, value: float) -> None:
 def search(t: Any) -> int:
     """Find what lies under the vehicle's points; returns the number of elements, their slots in `touched`.
 
-    `found` then holds for each: deepest sinkage, projected area of the points of the same body, owning point.
+    `found` then holds for each: the deepest point and its sinkage; projected area, mean sinkage and centroid of the
+    points of the same body.
     """
     n, offset = t.plane[:3], t.plane[3]
     candidates, count = 0, 0
@@ -108,18 +110,28 @@ def search(t: Any) -> int:
             if t.state[slot, MODE] == IDLE and depth <= rut_depth(t.memory[slot]):
                 continue
             t.candidate_i[candidates, 0], t.candidate_i[candidates, 1] = slot, i
-            t.candidate_f[candidates] = facing * t.point_a[i]
+            t.candidate_f[candidates, 0], t.candidate_f[candidates, 1] = facing * t.point_a[i], depth
             candidates += 1
             if t.found[slot, 0] <= 0.0:
                 t.touched[count] = slot
                 count += 1
-                t.found[slot, 1] = 0.0
+                for k in range(1, 7):
+                    t.found[slot, k] = 0.0
             if depth > t.found[slot, 0]:
                 t.found[slot, 0], t.found[slot, 2] = depth, i
     for c in range(candidates):
         slot, i = t.candidate_i[c, 0], t.candidate_i[c, 1]
-        if t.point_body[i] == t.point_body[int(t.found[slot, 2])]:
-            t.found[slot, 1] += t.candidate_f[c]
+        f = t.found[slot]
+        if t.point_body[i] == t.point_body[int(f[2])]:
+            area = t.candidate_f[c, 0]
+            f[1] += area
+            f[3] += area * t.candidate_f[c, 1]
+            for k in range(3):
+                f[4 + k] += area * t.point_r[i, k]
+    for c in range(count):
+        f = t.found[t.touched[c]]
+        for k in range(3, 7):
+            f[k] /= f[1]
     return count
 
 
@@ -147,6 +159,24 @@ def drop_mass(t: Any, slot: int) -> None:
         speed = m[NORMAL] * v[0] + m[NORMAL + 1] * v[1] + m[NORMAL + 2] * v[2]
         t.work[SOIL] += 0.5 * m[MASS_B] * speed * speed
         m[MASS_B] = 0.0
+
+
+@compiled
+def change_owner(t: Any, slot: int, b: int, r: Any, speed: float) -> None:
+    """Move an element's contact to the centroid r of body b; the co-moving mass stays with its body.
+
+    Its kinetic energy changes with the point that it follows: the soil gives or takes the difference.
+    """
+    m = t.memory[slot]
+    if t.state[slot, BODY] != b:
+        drop_mass(t, slot)
+        t.state[slot, BODY] = b
+    elif m[MASS_B] > 0.0:
+        v = velocity(t.pose[b], m[OWNER_R], m[OWNER_R + 1], m[OWNER_R + 2])
+        before = m[NORMAL] * v[0] + m[NORMAL + 1] * v[1] + m[NORMAL + 2] * v[2]
+        t.work[SOIL] += 0.5 * m[MASS_B] * (before * before - speed * speed)
+    for k in range(3):
+        m[OWNER_R + k] = r[k]
 
 
 @compiled
@@ -196,7 +226,7 @@ def touch(t: Any, qd: Any, h: float) -> float:
         i = int(t.found[slot, 2])
         b = t.point_body[i]
         z = t.found[slot, 0]
-        r = t.point_r[i]
+        r = t.found[slot, 4:7]
         x, v = place(t.pose[b], r[0], r[1], r[2]), velocity(t.pose[b], r[0], r[1], r[2])
         speed = -(t.plane[0] * v[0] + t.plane[1] * v[1] + t.plane[2] * v[2])
         known = state[MODE] != IDLE
@@ -206,13 +236,11 @@ def touch(t: Any, qd: Any, h: float) -> float:
         jump = z - (m[SINKAGE] if known else 0.0)
         was = m[AREA]
         m[AREA] = t.found[slot, 1]
-        if known and (state[OWNER] != i or state[BODY] != b):
-            if m[MASS_B] > 0.0 and state[BODY] != b:
-                m[MASS_B] = 0.0
-            for k in range(3):
-                m[OWNER_R + k] = r[k]
-            state[OWNER], state[BODY] = i, b
-            if jump > swept and t.law[PLASTIC] != 0 and t.law[REST_STIFFNESS] == 0:
+        m[SPREAD] = z - t.found[slot, 3]
+        if known:
+            change_owner(t, slot, b, r, speed)
+            state[OWNER] = i
+            if jump > 1e-6 and t.law[PLASTIC] != 0 and t.law[REST_STIFFNESS] == 0:
                 enter_from_the_side(t.law, t.p, t.s[slot], m, z, before * m[AREA] / max(was, 1e-12))
                 state[MODE] = LOADING if z >= m[LINE_Z] else UNLOADING
         for k in range(3):

@@ -38,12 +38,13 @@ class Tyre:
 
 @parameters
 class Wheel:
-    """A tyre at its place; a parked wheel does not turn."""
+    """A tyre at its place, locked or turning freely."""
 
     name: Annotated[str, Label("front_left, front_right, rear_left, rear_right")]
     centre: Annotated[Point, Quantity("m", "wheel centre, vehicle axes")]
     tyre: Tyre
     carrier: Literal["chassis", "front_axle"] = "chassis"
+    rolls: Annotated[bool, "turns freely, as undriven and unbraked wheels do; else it is locked"] = False
 
 
 @parameters

@@ -22,7 +22,7 @@ from viz.verdict import Peak, newtons, raw
 WARNINGS = ("axle-stop", "plastic-hinge")
 _TOUCHED = "world/ground/touched"
 _MOST_MARKS = 200  # of events
-_LABEL_TIME = 0.3  # s that an event's label stands
+_LABEL_TIME, _LABEL_SHARE = 0.3, 0.1  # s that an event's label stands, and the most of the run
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -232,10 +232,11 @@ def _marks(out: Stream, run: Run, size: float) -> None:
         radii=np.full(int(counts.sum()), radius),
     )
     out.columns("world/events/marks", time, marks.partition(counts))
+    stands = min(_LABEL_TIME, _LABEL_SHARE * float(np.ptp(run.recording.time)))
     rows: list[tuple[float, Sequence[Event]]] = [(g[0].time, g) for g in groups]
     # an empty row when a label's time is over; not after the end, which would make the time line longer than the run
     ends = zip(time.tolist(), [*time[1:].tolist(), run.stop_time], strict=True)
-    rows += [(t + _LABEL_TIME, ()) for t, following in ends if t + _LABEL_TIME < following]
+    rows += [(t + stands, ()) for t, following in ends if t + stands < following]
     rows.sort(key=lambda row: row[0])
     labelled = [e for _, group in rows for e in group]
     labels = rr.Points3D.columns(

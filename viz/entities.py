@@ -113,9 +113,13 @@ def shown(unit: str) -> tuple[str, float]:
 
 
 def series(channel: str) -> Series:
-    """How a channel is shown; a channel that the table of channels lacks goes to the group ``other``, in SI."""
-    group, name, colour = _describe(channel) if is_known(channel) else ("other", channel, _any(channel))
-    unit, factor = _BY_CHANNEL.get(channel) or shown(describe(channel).unit if is_known(channel) else "")
+    """How a channel is shown; one that the table of channels lacks goes to the group ``other``, in SI.
+
+    ``rops/mount/NAME/force``, which has no channel, is known as the magnitude of its components.
+    """
+    entry = next((c for c in (channel, f"{channel}_x") if is_known(c)), None)
+    group, name, colour = _describe(channel) if entry is not None else ("other", channel, _any(channel))
+    unit, factor = _BY_CHANNEL.get(channel) or shown(describe(entry).unit if entry is not None else "")
     slug = unit.replace("/", "_").replace(" ", "").replace("\N{SUPERSCRIPT TWO}", "2")
     last = "_".join(filter(None, (channel.replace("/", "_"), slug)))
     return Series(
@@ -137,6 +141,8 @@ def _describe(channel: str) -> tuple[str, str, int]:
             return "loads", "ROPS force", BODY["rops"]
         case ["rops", "force_x" | "force_y" | "force_z" as what]:
             return "loads", f"ROPS force, {what[-1]}", AXIS[what[-1]]
+        case ["rops", "mount", name, "force"]:
+            return "mounts", f"mount {name}", SIMULATED
         case ["rops", "mount", name, what]:
             return "mounts", f"mount {name}, {what[-1]}", AXIS[what[-1]]
         case ["rops", "impulse"]:

@@ -43,7 +43,6 @@ def write_rrd(run: Run, path: Path, *, peaks: Sequence[Peak] = ()) -> None:
         with catch_and_log_exceptions("recording", strict=True), _closed(rec):
             with_ = picture(run)
             rec.save(part, default_blueprint=blueprint(run, ", ".join(with_.scales)))
-            rec.set_log_time_enabled(False)
             out, found = Stream(rec), ranked(run, peaks)
             standing(out, run, with_)
             _looks(out, run, found)
@@ -159,6 +158,5 @@ def _events(out: Stream, run: Run, peaks: Sequence[Peak]) -> None:
     entries += [(p.raw_time, "PEAK", f"{title_of(p)}: {raw(p)}") for p in _marked(run, peaks)]
     # the way the run ended belongs there too, and the log is never empty
     entries.append((run.stop_time, "ERROR" if run.status == "failed" else "INFO", run.sentence or "end of the run"))
-    entries.sort(key=lambda e: e[0])
     text = rr.TextLog.columns(text=[e[2] for e in entries], level=[e[1] for e in entries])
     out.columns("events", np.array([e[0] for e in entries]), text)

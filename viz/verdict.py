@@ -47,7 +47,7 @@ class Peak(Protocol):
 
     @property
     def impulse(self) -> float | None:
-        """Integral or collision impulse that belongs to the load, N s."""
+        """Momentum that collisions took on this path and no force history shows, N s."""
 
     @property
     def domain_flags(self) -> Sequence[str]:
@@ -55,7 +55,7 @@ class Peak(Protocol):
 
     @property
     def half_step_change(self) -> float | None:
-        """Relative change of the peak with half the time step, 0.01 for one per cent."""
+        """Relative change of the filtered peak with half the time step, 0.01 for one per cent."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,9 +74,16 @@ class RawPeak:
     half_step_change: float | None = None
 
 
+_ALSO = ("rops/deflection", "ground/sinkage")
+
+
 def ranked(run: Run, peaks: Sequence[Peak]) -> tuple[Peak, ...]:
-    """The given peaks, or those of the channels if none are given; what an engineer asks for first comes first."""
-    found: Sequence[Peak] = peaks or _of_channels(run)
+    """The given peaks, or those of the channels if none are given; what an engineer asks for first comes first.
+
+    Deflection and sinkage are always among them: they are no loads, but are asked for in the same breath.
+    """
+    given = {p.channel for p in peaks}
+    found = [*peaks, *(p for p in _of_channels(run) if not given or p.channel in {*_ALSO} - given)]
     order = ("rops/force", "ground/force_normal", "rops/mount/", "rops/force_", "rops/", "ground/", "wheel/", "")
 
     def place(peak: Peak) -> tuple[int, str]:
@@ -131,7 +138,7 @@ def raw(peak: Peak) -> str:
 
 def filtered(peak: Peak) -> str:
     """The same after the filter; empty if it was not filtered."""
-    if peak.filtered is None or peak.filtered_time is None or not known(peak.filtered):
+    if peak.filtered is None or peak.filtered_time is None or not known(peak.filtered) or not peak.raw:
         return ""
     return f"{high(peak, peak.filtered)} at {peak.filtered_time:.3f} s"
 
@@ -156,9 +163,10 @@ def verdict(run: Run, peaks: Sequence[Peak], scales: Sequence[str] = ()) -> str:
         lines += _domain(run, found)
     lines += _ledger(run)
     if run.status == "done":
-        lines += ["", f"**{run.scenario.title}:** {run.sentence or 'done'}."]
-    lines += ["", "**To read the picture:** " + "; ".join(scales) + "." if scales else ""]
-    lines += ["", "Numbers are taken from the channels, never from a plot."]
+        lines += [f"**{run.scenario.title}:** {run.sentence or 'done'}.", ""]
+    if scales:
+        lines += [f"**To read the picture:** {'; '.join(scales)}.", ""]
+    lines += ["Numbers are taken from the channels, never from a plot."]
     return "\n".join(lines) + "\n"
 
 
@@ -190,7 +198,7 @@ def _table(found: Sequence[Peak]) -> list[str]:
     shows_impulse = any(known(p.impulse) for p in found)
     shows_change = any(known(p.half_step_change) for p in found)
     columns += [heading] if shows_filtered else []
-    columns += ["impulse"] if shows_impulse else []
+    columns += ["collision impulse"] if shows_impulse else []
     columns += ["half step"] if shows_change else []
     lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
     for p in found:
@@ -201,7 +209,7 @@ def _table(found: Sequence[Peak]) -> list[str]:
             row.append(amount(p.impulse, "N s") if p.impulse is not None and known(p.impulse) else "")
         if shows_change:
             change = p.half_step_change
-            row.append(f"{100.0 * change:+.1f} %" if change is not None and known(change) else "")
+            row.append(f"{100.0 * change:.1f} %" if change is not None and known(change) else "")
         lines.append("| " + " | ".join(row) + " |")
     return [*lines, ""]
 
@@ -215,8 +223,10 @@ def _domain(run: Run, found: Sequence[Peak]) -> list[str]:
     if not concerned:
         return ["All loads lie within the domain in which the ground law was calibrated.", ""]
     lines = ["**Outside the domain in which the ground law was calibrated:**", ""]
+    flagged = [title_of(p) for p in found if p.domain_flags]
     for flag, loads in concerned.items():
-        where = f" ({', '.join(loads[:4])}{' and others' if len(loads) > 4 else ''})" if loads else ""
+        # naming all of them would say nothing
+        where = f" ({', '.join(loads)})" if loads and loads != flagged else ""
         lines.append(f"- {in_words(flag, run.scenario.ground.law.domain)}{where}")
     return [*lines, ""]
 
@@ -242,4 +252,4 @@ def _ledger(run: Run) -> list[str]:
     names = [name for name, value in run.ledger.items() if name != "residual" and value]
     lines = [f"**Energy:** {joules(residual)} unaccounted for{judged}.", ""]
     lines += ["| " + " | ".join(names) + " |", "|" + "---|" * len(names)]
-    return [*lines, "| " + " | ".join(joules(run.ledger[name]) for name in names) + " |"]
+    return [*lines, "| " + " | ".join(joules(run.ledger[name]) for name in names) + " |", ""]

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 import rerun as rr
 from numpy.typing import NDArray
 from rerun.chunk import RrdReader
@@ -47,7 +46,7 @@ def read_column(path: Path, entity: str, component: str) -> tuple[NDArray[np.int
         if chunk.is_static:
             static += values
             continue
-        rows += zip(batch[TIMELINE].cast(pa.int64()).to_pylist(), values, strict=True)
+        rows += zip(batch[TIMELINE].cast("int64").to_pylist(), values, strict=True)
     rows.sort(key=lambda row: row[0])
     return np.array([t for t, _ in rows], dtype=np.int64), static + [v for _, v in rows]
 
@@ -106,9 +105,9 @@ def _times(chunks: list[tuple[str, Any, Any]]) -> Iterator[str]:
             yield f"{entity}: time lines {list(chunk.timeline_names)}, not {TIMELINE} alone"
             continue
         column = batch[TIMELINE]
-        if column.type != pa.duration("ns"):
+        if str(column.type) != "duration[ns]":
             yield f"{entity}: time is {column.type}, not a duration in ns"
-        elif column.null_count or np.any(np.diff(column.cast(pa.int64()).to_numpy()) < 0):
+        elif column.null_count or np.any(np.diff(column.cast("int64").to_numpy()) < 0):
             yield f"{entity}: time has gaps or runs backwards"
 
 

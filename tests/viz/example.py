@@ -350,8 +350,10 @@ class Peak:
 def peaks(run: Run) -> tuple[Peak, ...]:
     """Peaks of some loads of the overturn; what is filtered is made up."""
     found = []
-    for channel in ("wheel/rear_left/force_normal", "rops/mount/left/force_z", "ground/force_normal", "rops/force"):
-        values, time = run.recording[channel], run.recording.time
+    time = run.recording.time
+    for channel in ("wheel/rear_left/force_normal", "rops/mount/left/force", "ground/force_normal", "rops/force"):
+        parts = [c for c in (channel, *(f"{channel}_{axis}" for axis in "xyz")) if c in run.recording.channels]
+        values = run.recording[channel] if channel in parts else np.hypot.reduce([run.recording[c] for c in parts])
         at = int(np.argmax(np.abs(values)))
         found.append(
             Peak(

@@ -31,6 +31,7 @@ def test_every_known_channel_has_a_place_of_its_own() -> None:
     [
         ("rops/force", "loads/rops_force_kN", "kN", 1e-3),
         ("rops/mount/left/force_z", "mounts/rops_mount_left_force_z_kN", "kN", 1e-3),
+        ("rops/mount/left/force", "mounts/rops_mount_left_force_kN", "kN", 1e-3),  # a magnitude, no channel
         ("chassis/roll", "motion/chassis_roll_deg", "deg", 180.0 / math.pi),
         ("chassis/angular_velocity_x", "motion/chassis_angular_velocity_x_deg_s", "deg/s", 180.0 / math.pi),
         ("ground/sinkage", "sinkage/ground_sinkage_mm", "mm", 1e3),

@@ -83,6 +83,10 @@ def test_a_peak_of_one_sample_is_there_and_is_drawn_as_high_as_it_is(overturn_rr
     assert [*flat(overturn_rrd, "/" + s.peak)] == [[1_362_000_000], [example.SPIKE * 1e-3]]
     assert one(overturn_rrd, "/" + s.peak, "SeriesPoints:names") == ["peak 63.2 kN at 1.362 s"]
     assert one(overturn_rrd, "/" + s.filtered_peak, "SeriesPoints:names") == ["CFC 60: 44.2 kN at 1.370 s"]
+    assert one(overturn_rrd, "/" + s.simulated, "SeriesLines:names") == ["ROPS force"]
+    mount = series("rops/mount/left/force_z")
+    assert one(overturn_rrd, "/" + mount.simulated, "SeriesLines:names") == ["z"]  # the title names the mount
+    assert one(overturn_rrd, "/" + mount.simulated, "SeriesLines:colors") == [mount.colour]
     # averaging policies draw a short peak at half its height or less
     lines = [e for e, parts in read_entities(overturn_rrd).items() if "SeriesLines:names" in parts]
     assert len(lines) > 30
@@ -185,19 +189,18 @@ def test_arrows_have_the_stated_scale_and_vanish_without_force(overturn: Run, ov
 
 
 def test_ground_begins_flat_and_ends_as_it_was_left(overturn: Run, overturn_rrd: Path) -> None:
-    patches = [e for e in read_entities(overturn_rrd) if e.startswith("/world/ground/touched/")]
+    patches = picture(overturn).ground.patches
     assert len(patches) > 1
-    deepest = []
-    for entity in patches:
+    untouched = np.zeros(overturn.track.element.size)
+    for patch in patches:
+        entity = f"/world/ground/touched/{patch.name}"
         time, rows = read_column(overturn_rrd, entity, "Mesh3D:vertex_positions")
         assert time[0] == 0
         assert len(time) < 3 or np.diff(time[1:]).min() >= 19_999_999  # 50 Hz
-        first, last = np.array(rows[0]), np.array(rows[-1])
-        assert np.all(first[:, 2] <= 0.0)
-        deepest.append(float((first[:, 2] - last[:, 2]).max()))
+        np.testing.assert_array_equal(np.array(rows[0], dtype=np.float32), patch.positions(untouched))
+        np.testing.assert_array_equal(np.array(rows[-1], dtype=np.float32), patch.positions(overturn.track.sinkage[-1]))
         triangles = np.array(one(overturn_rrd, entity, "Mesh3D:triangle_indices"))
-        assert triangles.max() == len(first) - 1
-    assert max(deepest) == pytest.approx(overturn.track.sinkage[-1].max(), rel=1e-5)
+        assert triangles.max() == len(rows[0]) - 1
 
 
 def test_events_peaks_and_phases_are_told_in_order(overturn: Run, overturn_rrd: Path) -> None:
@@ -304,6 +307,18 @@ def test_a_broken_recording_is_found(overturn_rrd: Path, tmp_path: Path) -> None
     cut = tmp_path / "cut.rrd"
     cut.write_bytes(overturn_rrd.read_bytes()[:-2000])
     assert "cannot be read as a whole recording" in check_rrd(cut)[0]
+
+
+def test_a_recording_without_its_end_is_found(tmp_path: Path) -> None:
+    path = tmp_path / "crashed.rrd"
+    rec = rr.RecordingStream("crashed", recording_id="crashed")
+    rec.save(path, write_footer=False)
+    rec.send_columns(
+        "phase", [rr.TimeColumn("sim_time", duration=stamps(np.zeros(1)))], rr.Scalars.columns(scalars=[1.0])
+    )
+    rec.flush()
+    rec.disconnect()
+    assert "cannot be read as a whole recording" in check_rrd(path)[0]
 
 
 def test_check_finds_what_is_wrong(tmp_path: Path) -> None:

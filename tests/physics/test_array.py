@@ -1,0 +1,98 @@
+"""The array: cost and memory with what is touched, loads that do not depend on its size, fineness or place."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ground.kernel import COLUMNS
+from rollover.contact import bodies_of, tables_of
+from rollover.initiation import Drop
+from rollover.loads import peak_loads
+from rollover.run import Run
+from rollover.simulate import run
+from tests.ground.reference_drop import solve
+from tests.physics.scenes import block, drop, shipped
+
+
+def peak(result: Run, channel: str) -> float:
+    """Filtered peak of a load channel, N."""
+    assert result.status == "done", result.sentence
+    return next(p.filtered for p in peak_loads(result) if p.channel == channel)
+
+
+def test_a_million_elements_cost_memory_only_where_touched() -> None:
+    few, many = (
+        block(Drop(speed=2.0), duration=0.3).replaced(
+            {"ground.elements": {"length": size, "width": size, "spacing": [0.05, 0.05]}}
+        )
+        for size in (2.0, 50.0)
+    )
+    assert many.ground.elements.count == (1000, 1000)
+    first, second = run(few), run(many)
+    for name, values in first.recording.channels.items():
+        assert np.array_equal(values, second.recording[name]), name
+    assert len(second.track.element) == len(first.track.element) < 400
+    tables = tables_of(many, bodies_of(many.vehicle, many.ground.elements))
+    assert tables.slot_of.nbytes == 4_000_000
+    assert tables.memory.nbytes < 3 * len(tables.point_a) * COLUMNS * 8 + 1e5
+
+
+def test_one_element_is_an_array_too() -> None:
+    scenario = drop(2.0).replaced({"ground.elements": {"length": 0.14, "width": 0.045, "spacing": [0.14, 0.045]}})
+    assert scenario.ground.elements.count == (1, 1)
+    assert run(scenario).recording["ground/sinkage"].max() == pytest.approx(solve(2.0).z_max, rel=5e-3)
+
+
+def test_leaving_the_array_ends_the_run_with_the_cure() -> None:
+    scenario = block(Drop(speed=2.0)).replaced({"ground.elements": {"length": 0.5, "width": 6.0}})
+    result = run(scenario)
+    assert result.status == "failed"
+    assert "enlarge ground.elements" in result.sentence
+    assert result.recording.time.size >= 1
+
+
+@pytest.mark.parametrize("roll_deg", [0.0, 12.0])
+def test_peak_does_not_depend_on_the_fineness_of_the_array(roll_deg: float) -> None:
+    """A block falls flat and on its edge: array 2x and 4x finer, peaks within 3 %, and closer the finer."""
+    peaks = [
+        peak(run(block(Drop(speed=3.0, roll_deg=roll_deg), spacing=0.08 / n, duration=0.4)), "ground/force_normal")
+        for n in (1, 2, 4)
+    ]
+    change = [abs(b / a - 1.0) for a, b in zip(peaks, peaks[1:], strict=False)]
+    assert max(change) < 0.03, f"peaks {peaks}"
+    assert change[1] <= change[0] + 1e-3, f"peaks {peaks}"
+
+
+def test_rops_peak_converges_with_the_fineness_of_the_array() -> None:
+    """The corner of a ROPS with a tractor's mass behind it: array 2x and 4x finer changes the peak by less than 3 %."""
+    base = shipped("rops_drop").replaced({"simulation.duration": 0.2})
+    peaks = [
+        peak(run(base.replaced({"ground.elements.spacing": [0.05 / n, 0.05 / n]})), "rops/force") for n in (1, 2, 4)
+    ]
+    change = [abs(b / a - 1.0) for a, b in zip(peaks, peaks[1:], strict=False)]
+    assert max(change) < 0.03, f"peaks {peaks}"
+
+
+def test_second_hit_starts_from_the_rut() -> None:
+    """An element let go keeps its rut: hit again at the same speed it gives no force before the rut's depth."""
+    from ground.kernel import LINE_C, LINE_Z, MODE, STATE_COLUMNS, commit, normal_force, rut_depth
+    from ground.law import touched
+    from ground.ye import Ye2006
+
+    law, row, state = Ye2006(), np.zeros(COLUMNS), np.zeros(STATE_COLUMNS, dtype=np.int64)
+    row[5] = 0.14 * 0.045
+    state[MODE] = 1
+    s, p = touched(law, speed=2.0), law.p
+    settings = np.array([1, 0, 0, law.force.address, 0, law.begin.address])
+    for z in np.linspace(0.001, 0.1, 100):
+        commit(settings, p, s, row, state, z, 1.0, 1e-3, 132.0)
+    commit(settings, p, s, row, state, 0.0999, -0.1, 1e-3, 132.0)
+    assert row[LINE_Z] == pytest.approx(0.1)
+    assert rut_depth(row) == pytest.approx(0.098)  # recovery 2 %
+    assert normal_force(settings, p, s, row, 0.0979, 0.0) == 0.0
+    halfway = normal_force(settings, p, s, row, 0.099, 0.0)
+    top = normal_force(settings, p, s, row, 0.1, 0.0)
+    assert halfway == pytest.approx(0.5 * top, rel=1e-9)
+    row[LINE_C] = 1e5
+    assert normal_force(settings, p, s, row, 0.099, -1.0) == 0.0  # never a pull, however fast it leaves
