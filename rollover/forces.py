@@ -27,6 +27,7 @@ from rollover.tables import (
     E_PLACE,
     E_POINT,
     E_SHEAR,
+    E_SLIP,
     E_WHERE,
     FN,
     FT,
@@ -78,7 +79,7 @@ from rollover.vectors import (
     velocity,
 )
 
-FLAT = 0.03  # cos^2 of the camber, 80 degrees, from which a tyre begins to lie on its side
+FLAT = 0.12  # cos^2 of the camber, 70 degrees, from which a tyre begins to lie on its side
 TYRE_RELAXATION = 0.002  # s, dashpot over stick spring of a tyre
 
 
@@ -140,7 +141,7 @@ def tyre_point(row: Any, wheel: Any, n: Any, e: Any, x: Any) -> float:
 
 @compiled
 def tyre_stiffness(wheel: Any, lean: float) -> Any:
-    """k(lean^2) and its derivative: radial and lateral springs in series, faded out over the last 10 degrees.
+    """k(lean^2) and its derivative: radial and lateral springs in series, faded out over the last 20 degrees.
 
     1/k = cos^2/k_z + sin^2/k_y; a tyre flat on its side has no lowest point: its side wall bears, on the elements.
     """
@@ -185,23 +186,24 @@ def try_wheels(t: Any, Q: Any) -> None:
             continue
         v = velocity(row, r[0], r[1], r[2])
         rate = -(n[0] * v[0] + n[1] * v[1] + n[2] * v[2])
+        hold = g[E_ANCHOR : E_ANCHOR + 3]
+        v = velocity(row, hold[0], hold[1], hold[2])
         stiffness, slope = tyre_stiffness(c, lean)
         spring = stiffness * depth
         damping = max(c[W_C] * stiffness / c[W_KZ] * rate, -spring)  # never a pull
         force = spring + damping
         g[E_FORCE_NOW], g[E_DAMPING_NOW], g[E_ENERGY_NOW] = force, damping, 0.5 * spring * depth
         stick = max(c[W_MU] * force / c[W_KY], 1e-9)
+        slip = (g[E_MOVED], g[E_MOVED + 1], g[E_MOVED + 2])
+        shear = (g[E_SHEAR], g[E_SHEAR + 1], g[E_SHEAR + 2])
         if c[W_ROLLS] > 0.0:
             # a wheel that turns freely holds only along its axle; what goes the other way is rolling
-            v = along_axle(e, n, lean, v)
-            ahead = along_axle(e, n, lean, (g[E_MOVED], g[E_MOVED + 1], g[E_MOVED + 2]))
-            for k in range(3):
-                g[E_MOVED + k] = ahead[k]
-        f = friction_force(
-            c[W_MU], stick, TYRE_RELAXATION, force, g[E_SHEAR : E_SHEAR + 3], g[E_MOVED : E_MOVED + 3], v, n
-        )
+            v, slip, shear = along_axle(e, n, lean, v), along_axle(e, n, lean, slip), along_axle(e, n, lean, shear)
+        g[E_SLIP], g[E_SLIP + 1], g[E_SLIP + 2] = slip
+        f = friction_force(c[W_MU], stick, TYRE_RELAXATION, force, shear, slip, v, n)
         g[E_FRICTION_NOW], g[E_FRICTION_NOW + 1], g[E_FRICTION_NOW + 2] = f
-        add_force(row, b, r, force * n[0] + f[0], force * n[1] + f[1], force * n[2] + f[2], Q)
+        add_force(row, b, r, force * n[0], force * n[1], force * n[2], Q)
+        add_force(row, b, hold, f[0], f[1], f[2], Q)  # friction holds the tread where it took hold of it
         # the stiffness falls with camber: the moment that goes with it keeps the spring conservative
         moment = -slope * lean * depth * depth
         ex, ey, ez = cross(e[0], e[1], e[2], n[0], n[1], n[2])

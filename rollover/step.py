@@ -62,6 +62,7 @@ from rollover.tables import (
     E_PLACE,
     E_POINT,
     E_SHEAR,
+    E_SLIP,
     E_WHERE,
     FLAGS_NOW,
     FN,
@@ -292,7 +293,7 @@ def grip(t: Any, w: int) -> None:
     g = t.wheel_memory[w]
     if g[E_FORCE_NOW] > 0.0:
         stick = max(t.wheel_f[w, W_MU] * g[E_FORCE_NOW] / t.wheel_f[w, W_KY], 1e-9)
-        commit_friction(stick, g[E_SHEAR : E_SHEAR + 3], g[E_MOVED : E_MOVED + 3], t.plane[:3])
+        commit_friction(stick, g[E_SHEAR : E_SHEAR + 3], g[E_SLIP : E_SLIP + 3], t.plane[:3])
     else:
         for k in range(3):
             g[E_SHEAR + k] = 0.0

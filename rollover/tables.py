@@ -21,17 +21,10 @@ WHEEL_COLUMNS = 14
 # columns of wheel_memory: anchor of the stick spring in the carrier's axes, its place and shear; then what was found
 # at the start of the step (depth, normal force, damping force, elastic energy, friction) and what is found now
 E_ANCHOR, E_PLACE, E_SHEAR, E_DEPTH, E_FORCE, E_DAMPING, E_ENERGY, E_FRICTION = 0, 3, 6, 9, 10, 11, 12, 13
-E_DEPTH_NOW, E_FORCE_NOW, E_DAMPING_NOW, E_ENERGY_NOW, E_FRICTION_NOW, E_MOVED, E_POINT, E_WHERE, EDGE_COLUMNS = (
-    16,
-    17,
-    18,
-    19,
-    20,
-    23,
-    26,
-    29,
-    32,
-)
+E_DEPTH_NOW, E_FORCE_NOW, E_DAMPING_NOW, E_ENERGY_NOW, E_FRICTION_NOW = 16, 17, 18, 19, 20
+# way of the anchor since the start of the step and what of it strains the spring; the tread's lowest point in the
+# carrier's axes and in the world
+E_MOVED, E_SLIP, E_POINT, E_WHERE, EDGE_COLUMNS = 23, 26, 29, 32, 35
 
 # columns of mount_f: point on the ROPS, point on the chassis, stiffness, damping, both again for rotation, yield
 T_ROPS, T_CHASSIS, T_K, T_C, T_KR, T_CR, T_YIELD, MOUNT_COLUMNS = 0, 3, 6, 9, 12, 15, 18, 21
