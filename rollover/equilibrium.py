@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from rollover.forces import generalised_forces, tyre_point
 from rollover.frames import from_angles, rotation_vector
 from rollover.jacobian import stiffness
 from rollover.step import stand
-from rollover.tables import E_DEPTH_NOW, E_FORCE_NOW, POSE_COLUMNS, ROT, W_KZ, Tables, handle
+from rollover.tables import E_DEPTH_NOW, E_FORCE_NOW, POSE_COLUMNS, ROT, W_CENTRE, W_HALF, W_KZ, Tables, handle
 
 Array = NDArray[np.float64]
 ROLL, PITCH, AXLE, SLIDE, YAW, SHIFT, TILT = 1, 2, 3, 4, 6, 7, 10  # places in u; 0 is the height
@@ -64,7 +65,7 @@ class Equilibrium:
         def depths(pitch: float) -> Array:
             u[PITCH] = self.level[1] + pitch
             self.residual(u)
-            return self.t.wheel_memory[:, E_DEPTH_NOW].copy()
+            return np.array(self.t.wheel_memory[:, E_DEPTH_NOW])
 
         def uneven(pitch: float) -> float:
             d = depths(pitch)
@@ -196,14 +197,15 @@ class Equilibrium:
 
         For each roll angle against the surface the other coordinates settle; at the balance the moment changes sign.
         """
-        last: tuple[float, float] | None = None
-        settled = self.guess()
+        settled: Array | None = None
 
         def moment(roll: float) -> float:
             nonlocal settled
-            start = settled.copy()
-            start[ROLL] = self.level[0] + sign * roll
-            found = self.solve(start, fixed=(ROLL,))
+            found = None
+            if settled is not None:
+                start = settled.copy()
+                start[ROLL] = self.level[0] + sign * roll
+                found = self.solve(start, fixed=(ROLL,))
             if found is None:
                 found = self.solve(self.guess(sign * roll, -sign * min(roll, 1.01 * swing)), fixed=(ROLL,))
             if found is None or abs(found[PITCH] - self.level[1]) > 0.5:
@@ -211,16 +213,35 @@ class Equilibrium:
             settled = found
             return sign * float(self.residual(found)[ROLL])
 
-        for roll in np.radians(np.arange(20.0, 80.0, 6.0)):
-            value = moment(float(roll))
-            if math.isnan(value):
-                continue
-            if last is not None and last[1] < 0.0 <= value:
-                at = float(brentq(moment, last[0], float(roll), xtol=1e-8))
-                moment(at)
-                return settled
-            last = (float(roll), value)
+        # where a rigid vehicle balances on its outer edges, a little less; tyres and axle move it by some degrees
+        height = sum(b.inertia.mass * b.centre[2] for b in self.bodies) / sum(b.inertia.mass for b in self.bodies)
+        edge = max(
+            abs(self.bodies[int(b)].centre[1] + f[W_CENTRE + 1]) + f[W_HALF]
+            for b, f in zip(self.t.wheel_i, self.t.wheel_f, strict=True)
+        )
+        tilt = -sign * (math.asin(float(from_angles(0.0, 0.0, self.heading)[:, 1] @ self.t.plane[:3])))
+        roll = math.atan2(edge, height) - tilt
+        value, step = moment(roll), math.radians(3.0)
+        for _ in range(15):
+            below = value < 0.0 or math.isnan(value)
+            before, roll = (roll, value), roll + (step if below else -step)
+            value = moment(roll)
+            if before[1] * value <= 0.0:  # a nan never is
+                return settled if self._between(moment, before, (roll, value)) else None
         return None
+
+    def _between(self, moment: Callable[[float], float], a: tuple[float, float], b: tuple[float, float]) -> bool:
+        """Close in on the zero between two points by the Illinois variant of false position."""
+        for _ in range(40):
+            x = b[0] - b[1] * (b[0] - a[0]) / (b[1] - a[1]) if a[1] != b[1] else 0.5 * (a[0] + b[0])
+            y = moment(x)
+            if math.isnan(y):
+                return False
+            if abs(y) < 10.0 * TOLERANCE or abs(b[0] - a[0]) < 1e-9:
+                return True
+            a = b if y * b[1] < 0.0 else (a[0], 0.5 * a[1])
+            b = (x, y)
+        return True
 
     def rates(self, u: Array, rate: float) -> Array:
         """Velocities (6 nb,) while the vehicle rolls at `rate` about its most loaded tyre's contact."""

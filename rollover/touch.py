@@ -240,7 +240,7 @@ def touch(t: Any, qd: Any, h: float) -> float:
         if known:
             change_owner(t, slot, b, r, speed)
             state[OWNER] = i
-            if jump > 1e-6 and t.law[PLASTIC] != 0 and t.law[REST_STIFFNESS] == 0:
+            if jump > swept and t.law[PLASTIC] != 0 and t.law[REST_STIFFNESS] == 0:
                 enter_from_the_side(t.law, t.p, t.s[slot], m, z, before * m[AREA] / max(was, 1e-12))
                 state[MODE] = LOADING if z >= m[LINE_Z] else UNLOADING
         for k in range(3):

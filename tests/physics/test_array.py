@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -52,14 +54,14 @@ def test_leaving_the_array_ends_the_run_with_the_cure() -> None:
     assert result.recording.time.size >= 1
 
 
-@pytest.mark.parametrize("roll_deg", [0.0, 12.0])
+@pytest.mark.parametrize("roll_deg", [0.0, 20.0])
 def test_peak_does_not_depend_on_the_fineness_of_the_array(roll_deg: float) -> None:
     """A block falls flat and on its edge: array 2x and 4x finer, peaks within 3 %, and closer the finer."""
     peaks = [
-        peak(run(block(Drop(speed=3.0, roll_deg=roll_deg), spacing=0.08 / n, duration=0.4)), "ground/force_normal")
+        peak(run(block(Drop(speed=3.0, roll_deg=roll_deg), mu=0.5, spacing=0.08 / n, duration=0.1)), "ground/force_normal")
         for n in (1, 2, 4)
     ]
-    change = [abs(b / a - 1.0) for a, b in zip(peaks, peaks[1:], strict=False)]
+    change = [abs(b / a - 1.0) for a, b in pairwise(peaks)]
     assert max(change) < 0.03, f"peaks {peaks}"
     assert change[1] <= change[0] + 1e-3, f"peaks {peaks}"
 
@@ -70,7 +72,7 @@ def test_rops_peak_converges_with_the_fineness_of_the_array() -> None:
     peaks = [
         peak(run(base.replaced({"ground.elements.spacing": [0.05 / n, 0.05 / n]})), "rops/force") for n in (1, 2, 4)
     ]
-    change = [abs(b / a - 1.0) for a, b in zip(peaks, peaks[1:], strict=False)]
+    change = [abs(b / a - 1.0) for a, b in pairwise(peaks)]
     assert max(change) < 0.03, f"peaks {peaks}"
 
 

@@ -44,7 +44,7 @@ class Element:
 def test_never_pulls_and_dissipates_over_any_path(
     law: GroundLaw, turns: list[float], speed: float, rate: float
 ) -> None:
-    """Work done on the element from the surface back to the surface is never negative: it gives back no more than it took."""
+    """Work done on the element from the surface and back is never negative: it gives back no more than it took."""
     element, h, z, work, before = Element(law, speed), 1e-3, 0.0, 0.0, 0.0
     for target in [*turns, 0.0]:
         steps = max(2, int(abs(target - z) / (rate * h)))
