@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rollover.scenario import Scenario
 
 WRONG_INPUT, FAILED, INTERRUPTED, BUG = 2, 3, 130, 70
-COMPILING = 40  # s, roughly, on two cores
+COMPILING = 25  # s, roughly, on two cores
 
 C = TypeVar("C", bound=Callable[..., None])
 
@@ -94,14 +94,15 @@ def run(
     from rollover import console, document
 
     path = document.find(scenario)
-    if not is_warm():
-        console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
-    from rollover import loads, store
     from rollover import scenario as scenarios
 
     chosen = scenarios.load(path)
     if set_:
         chosen = chosen.replaced(_settings(set_), origin="--set")
+    if not is_warm():
+        console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
+    from rollover import loads, store
+
     folder = out or Path("out", "run", path.stem)
     store.claim(folder, document.content_hash(chosen), force=force)  # before a run that may take minutes
     done, again = _simulated(chosen, half_step)

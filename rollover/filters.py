@@ -11,7 +11,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, filtfilt
 
 CFC = Literal[60, 180, 600, 1000]
 J211, ISO_6487 = 2.0775, 1.25 / 0.6
@@ -36,6 +35,8 @@ def filtered(values: NDArray[np.float64], step: float, cfc: int, *, constant: fl
         )
     if values.size < 2:
         return np.array(values, dtype=float)
+    from scipy.signal import butter, filtfilt  # slow to import, and a scenario's check needs only the rates
+
     b, a = butter(2, cfc * constant, fs=1.0 / step)
     pad = min(max(round(0.01 / step), 100), values.size - 1)
     return np.asarray(filtfilt(b, a, values, padtype="odd", padlen=pad))

@@ -148,8 +148,9 @@ def solve(
         mbs.SolveDynamic(
             settings, solverType=exu.DynamicSolverType.GeneralizedAlpha, showHints=False, storeSolver=False
         )
-    except ValueError as error:  # exudyn's solver errors are ValueErrors
-        failure = " ".join(str(error).split())[:300]
+    except (ValueError, RuntimeError) as error:  # what exudyn's own errors derive from
+        said = " ".join(str(error).split())[:300]
+        failure = "Newton's iteration does not converge, even at a shorter step" if "terminated" in said else said
     finally:
         # callbacks hold mbs and mbs holds them: without this every run would leak
         mbs.SetPostStepUserFunction(0)  # type: ignore[arg-type]

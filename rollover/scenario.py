@@ -15,6 +15,7 @@ from ground.quantity import Quantity, parameters
 from ground.surface import Plane, Surface
 from rollover import document
 from rollover.effects import effects
+from rollover.filters import least_rate
 from rollover.initiation import Drop, Initiation, Standing, TipOver
 from rollover.vehicle import Striker, Vehicle
 
@@ -90,6 +91,12 @@ class Scenario:
                 raise ValueError(f"effects: unknown effect, got {name!r}; allowed: {', '.join(effects()) or 'none'}")
             if not isinstance(parameters_, effects()[name]):
                 raise ValueError(f"effects: not parameters of {name}, got {parameters_!r}; {effects()[name].__name__}")
+        rate = 1.0 / self.simulation.output_step
+        if rate < least_rate(self.loads.cfc) * (1.0 - 1e-9):
+            raise ValueError(
+                f"simulation.output_step: too coarse for filter class CFC {self.loads.cfc}, got {rate:.6g} rows/s; "
+                f"at most {1.0 / least_rate(self.loads.cfc):.3g} s is allowed"
+            )
         _check_start(self.vehicle, self.initiation)
 
     def replaced(self, changes: Mapping[str, Any], *, origin: str = "replaced") -> Scenario:

@@ -188,7 +188,7 @@ def _result(
         recording=recording,
         flags=s.flags,
         events=tuple(sorted(events, key=lambda e: e.time)),
-        phases=_phases(scenario, time, events),
+        phases=_phases(scenario, time, events, found["ground/force_normal"]),
         frame_time=time[frames],
         motion=_motion(s, bodies, frames),
         contact=_contact(scenario, s, bodies, frames, t),
@@ -212,11 +212,15 @@ def _released(found: dict[str, Array]) -> float:
     return float(start - found["energy/potential"].min())
 
 
-def _phases(scenario: Scenario, time: Array, events: list[Event]) -> tuple[tuple[float, str], ...]:
+def _phases(scenario: Scenario, time: Array, events: list[Event], force: Array) -> tuple[tuple[float, str], ...]:
     """Start and name of each phase: approach or support, tipping, impact, rest."""
     first = min((e.time for e in events if e.kind == "first-touch"), default=math.inf)
     rest = min((e.time for e in events if e.kind == "rest"), default=math.inf)
     wheels = isinstance(scenario.vehicle, Vehicle) and scenario.vehicle.wheels
+    if isinstance(scenario.vehicle, Vehicle) and wheels:
+        # a tyre's side wall leans on the ground long before anything hits it
+        heavy = force > 0.1 * scenario.vehicle.whole.mass * scenario.gravity
+        first = float(time[int(np.argmax(heavy))]) if heavy.any() else math.inf
     tipping = min((e.time for e in events if e.kind == "lift-off"), default=math.inf)
     if wheels and scenario.initiation.kind == "tip-over":
         tipping = float(time[0])

@@ -58,7 +58,10 @@ def test_leaving_the_array_ends_the_run_with_the_cure() -> None:
 def test_peak_does_not_depend_on_the_fineness_of_the_array(roll_deg: float) -> None:
     """A block falls flat and on its edge: array 2x and 4x finer, peaks within 3 %, and closer the finer."""
     peaks = [
-        peak(run(block(Drop(speed=3.0, roll_deg=roll_deg), mu=0.5, spacing=0.08 / n, duration=0.1)), "ground/force_normal")
+        peak(
+            run(block(Drop(speed=3.0, roll_deg=roll_deg), mu=0.5, spacing=0.08 / n, duration=0.1)),
+            "ground/force_normal",
+        )
         for n in (1, 2, 4)
     ]
     change = [abs(b / a - 1.0) for a, b in pairwise(peaks)]

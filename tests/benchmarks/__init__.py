@@ -1,0 +1,1 @@
+"""Speed: ratios taken in one run, printed rather than asserted."""

@@ -1,0 +1,49 @@
+"""Points that stand for surfaces: areas add up, corners are among them, normals look out."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from rollover.shapes import Box, Disc, Tube, sample
+
+
+@pytest.mark.parametrize("spacing", [0.5, 0.07, 0.02])
+def test_box(spacing: float) -> None:
+    box = Box(name="b", low=(-0.3, 0.1, 0.0), high=(0.5, 0.4, 1.2))
+    patches = sample(box, spacing)
+    assert sum(p.area.sum() for p in patches) == pytest.approx(2 * (0.8 * 0.3 + 0.3 * 1.2 + 0.8 * 1.2), rel=1e-12)
+    points = np.concatenate([p.position for p in patches])
+    assert points.max(axis=0) == pytest.approx(box.high, abs=1e-8)
+    assert points.min(axis=0) == pytest.approx(box.low, abs=1e-8)
+    middle = 0.5 * (np.array(box.low) + np.array(box.high))
+    for patch in patches:
+        assert patch.is_flat
+        assert np.all(np.einsum("ij,ij->i", patch.position - middle, patch.normal) > 0)
+
+
+def test_tube_projects_to_its_width() -> None:
+    """Half of the wall faces down; its projection is length times diameter."""
+    tube = Tube(name="t", start=(0, 0, 0), end=(0, 2.0, 0), diameter=0.08)
+    wall, *ends = sample(tube, 0.01)
+    assert wall.area.sum() == pytest.approx(math.pi * 0.08 * 2.0, rel=1e-12)
+    assert (wall.area * np.maximum(-wall.normal[:, 2], 0)).sum() == pytest.approx(2.0 * 0.08, rel=5e-3)
+    assert [round(float(e.normal[0, 1])) for e in ends] == [-1, 1]
+    assert sum(e.area.sum() for e in ends) == pytest.approx(2 * math.pi * 0.04**2, rel=1e-12)
+
+
+def test_disc_reaches_its_rim() -> None:
+    disc = Disc(name="d", centre=(1, 2, 3), normal=(0, 1, 0), radius=0.5)
+    (patch,) = sample(disc, 0.05)
+    assert patch.area.sum() == pytest.approx(math.pi * 0.25, rel=1e-12)
+    assert np.linalg.norm(patch.position - [1, 2, 3], axis=1).max() == pytest.approx(0.5, abs=1e-8)
+    assert patch.position[:, 1] == pytest.approx(2.0)
+
+
+def test_impossible_shapes_are_refused() -> None:
+    with pytest.raises(ValueError, match="beyond low"):
+        Box(name="b", low=(0, 0, 0), high=(1, 0, 1))
+    with pytest.raises(ValueError, match="same as start"):
+        Tube(name="t", start=(1, 1, 1), end=(1, 1, 1), diameter=0.1)
