@@ -196,6 +196,11 @@ def list_(
     if as_json:
         print(json.dumps(rows, indent=2))
         return
+    if not rows:
+        from rollover import console
+
+        console.say(f"There are no {what.value} in this version.")
+        return
     cells = [[catalogue.text(value) for value in row.values()] for row in rows]
     widths = [min(48, max(map(len, column))) for column in zip(*cells, strict=True)]
     for row in cells:
