@@ -59,6 +59,7 @@ def bench(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Bench:
     bench = Bench()
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(simulate, "run", bench.run)
+    monkeypatch.setattr("ground.compiled.is_warm", lambda: True)
     loads, log = types.ModuleType("rollover.loads"), types.ModuleType("viz.log")
     loads.peak_loads = bench.peak_loads  # type: ignore[attr-defined]
     log.write_rrd = lambda run, path, peaks: path.write_bytes(b"rrd")  # type: ignore[attr-defined]
