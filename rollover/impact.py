@@ -24,7 +24,7 @@ from ground.kernel import (
     OWNER_R,
     TOUCH_SPEED,
 )
-from rollover.dense import add_outer, dot, norm, solve_in_place, times
+from rollover.dense import add_outer, dot, solve_in_place, times
 from rollover.tables import (
     ACTIVE,
     FRACTION,
@@ -82,13 +82,32 @@ def joined(M: Any, G: Any, columns: int) -> Any:
 
 @compiled
 def mobility(t: Any) -> Any:
-    """A (6 nb, 6 nb): the velocities that unit impulses give, joints respected: [[M, G'], [G, 0]] [A; .] = [1; 0]."""
-    n = t.mass.shape[0]
-    K, B = joined(t.mass, constraints(t), n)
-    for k in range(n):
-        B[k, k] = 1.0
-    solve_in_place(K, B)
-    return B[:n]
+    """A (6 nb, 6 nb), the velocities that unit impulses give: M^-1 - M^-1 G' (G M^-1 G')^-1 G M^-1."""
+    G = constraints(t)
+    n, c = t.mass.shape[0], G.shape[0]
+    A = t.inverse.copy()
+    if c == 0:
+        return A
+    X, S, L = np.zeros((c, n)), np.zeros((c, c)), np.zeros((c, n))
+    for r in range(c):
+        for k in range(n):
+            if G[r, k] != 0.0:
+                at = 6 * (k // 6)
+                for j in range(at, at + 6):
+                    X[r, j] += G[r, k] * t.inverse[k, j]
+    for r in range(c):
+        for k in range(n):
+            L[r, k] = X[r, k]
+        for q in range(c):
+            for k in range(n):
+                S[r, q] += X[r, k] * G[q, k]
+    solve_in_place(S, L)
+    for r in range(c):
+        for j in range(n):
+            if X[r, j] != 0.0:
+                for k in range(n):
+                    A[j, k] -= X[r, j] * L[r, k]
+    return A
 
 
 @compiled
@@ -97,14 +116,30 @@ def largest_eigenvalue(A: Any, P: Any) -> float:
     x = np.ones(A.shape[0])
     for k in range(x.shape[0]):
         x[k] += 0.01 * k  # no symmetry of the vehicle may hide the direction
-    value = 0.0
+    value, last, n = 0.0, 0.0, x.shape[0]
+    y = np.zeros(n)
     for _ in range(60):
-        x = times(A, times(P, x))
-        value = norm(x)
+        for i in range(n):
+            at = 6 * (i // 6)
+            total = 0.0
+            for k in range(at, at + 6):
+                total += P[i, k] * x[k]
+            y[i] = total
+        value = 0.0
+        for i in range(n):
+            total = 0.0
+            for k in range(n):
+                total += A[i, k] * y[k]
+            x[i] = total
+            value += total * total
+        value = math.sqrt(value)
         if value == 0.0:
             return 0.0
-        for k in range(x.shape[0]):
+        for k in range(n):
             x[k] /= value
+        if abs(value - last) <= 1e-9 * value:
+            break
+        last = value
     return value
 
 

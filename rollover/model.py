@@ -89,8 +89,6 @@ def solve(
     added.SetWithDenseMatrix(M, useDenseMatrix=True)
     newton = exu.MatrixContainer()
     newton.SetWithDenseMatrix(M, useDenseMatrix=True)
-    nothing = exu.MatrixContainer()
-    nothing.SetWithDenseMatrix(M, useDenseMatrix=True)
     views: list[Any] = []
 
     def force(_mbs: Any, _t: float, _item: int, _q: Any, _qd: Any) -> list[float]:
@@ -98,10 +96,6 @@ def solve(
         return Q.tolist()
 
     def mass(_mbs: Any, _t: float, _item: int, _q: Any, _qd: Any) -> Any:
-        if live.tables.counts[ACTIVE] == 0:
-            return nothing
-        added_mass(live.handle, views[0], M)
-        added.SetWithDenseMatrix(M, useDenseMatrix=True)
         return added
 
     def jacobian(_mbs: Any, _t: float, _item: int, _q: Any, _qd: Any, fq: float, fqd: float) -> Any:
@@ -111,7 +105,12 @@ def solve(
 
     def after(_mbs: Any, t: float) -> bool:
         try:
-            return after_step(t, views[0], views[1], views[2])
+            goes_on = after_step(t, views[0], views[1], views[2])
+            # like the contact set, the soil's mass matrix is that of the step's start
+            if live.tables.counts[ACTIVE] > 0 or M.any():
+                added_mass(live.handle, views[0], M)
+                added.SetWithDenseMatrix(M, useDenseMatrix=True)
+            return goes_on
         except BaseException as error:
             live.error = error
             return False
@@ -141,8 +140,10 @@ def solve(
     settings.timeIntegration.newton.absoluteTolerance = 1e-5
     # contacts come and go with every step: one new Jacobian a step halves the iterations
     settings.timeIntegration.newton.modifiedNewtonJacUpdatePerStep = True
+    settings.timeIntegration.generalizedAlpha.lieGroupAddTangentOperator = False  # only speeds up Newton on large turns
     settings.timeIntegration.generalizedAlpha.spectralRadius = spectral_radius
     settings.solution.file.write = False
+    settings.linearSolver.solverType = exu.LinearSolverType.EigenDense  # at some twenty coordinates
     failure = ""
     try:
         mbs.SolveDynamic(

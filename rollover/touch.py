@@ -57,7 +57,7 @@ from rollover.tables import (
     SOIL,
     TOUCH,
 )
-from rollover.vectors import depth_acceleration, place, to_body, to_world, velocity
+from rollover.vectors import depth_acceleration, place, to_body, velocity
 
 
 @compiled
@@ -91,15 +91,20 @@ def search(t: Any) -> int:
         reach = abs(down[0]) * m[3] + abs(down[1]) * m[4] + abs(down[2]) * m[5]
         if n[0] * x + n[1] * y + n[2] * z - offset > reach:
             continue
+        base = offset - n[0] * row[0] - n[1] * row[1] - n[2] * row[2]
+        facing = -(down[0] * m[6] + down[1] * m[7] + down[2] * m[8])
+        is_flat = m[6] * m[6] + m[7] * m[7] + m[8] * m[8] > 0.0
+        d0, d1, d2 = down
         for i in range(t.member_i[member, 1], t.member_i[member, 2]):
-            x, y, z = place(row, t.point_r[i, 0], t.point_r[i, 1], t.point_r[i, 2])
-            depth = offset - (n[0] * x + n[1] * y + n[2] * z)
+            a, b, c = t.point_r[i, 0], t.point_r[i, 1], t.point_r[i, 2]
+            depth = base - (d0 * a + d1 * b + d2 * c)
             if depth <= 0.0:
                 continue
-            f, g, h = to_world(row, t.point_n[i, 0], t.point_n[i, 1], t.point_n[i, 2])
-            facing = -(n[0] * f + n[1] * g + n[2] * h)
-            if facing <= 1e-6:
-                continue
+            if not is_flat:
+                facing = -(d0 * t.point_n[i, 0] + d1 * t.point_n[i, 1] + d2 * t.point_n[i, 2])
+                if facing <= 1e-6:
+                    continue
+            x, y, z = place(row, a, b, c)
             ix = math.floor((x - t.grid_f[0]) / t.grid_f[2])
             iy = math.floor((y - t.grid_f[1]) / t.grid_f[3])
             if ix < 0 or iy < 0 or ix >= t.grid_i[0] or iy >= t.grid_i[1]:

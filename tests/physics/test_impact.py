@@ -142,7 +142,8 @@ def test_effective_mass_at_the_upper_corner() -> None:
     scenario = block(Drop(speed=1.0))
     bodies = bodies_of(scenario.vehicle, scenario.ground.elements)
     t = tables_of(scenario, bodies)
-    t = t._replace(mass=np.diag([mass] * 3 + [1300.0, 3000.0, 3300.0]))
+    whole = np.diag([mass] * 3 + [1300.0, 3000.0, 3300.0])
+    t = t._replace(mass=whole, inverse=np.linalg.inv(whole))
     from rollover.impact import mobility
     from rollover.tables import ROT
     from rollover.vectors import depth_row
