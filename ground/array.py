@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from ground.quantity import Quantity, parameters
+from ground.ye import CO_MOVING_FRACTIONS, mass_fraction
+
+Estimate = Literal["ye-2006", "lorenz-1934-low", "lorenz-1934-high", "kundt-1987", "kroeber-1988", "pietzsch-1991"]
 
 MOST_ELEMENTS = 4_000_000
 
@@ -35,6 +38,26 @@ class Elements:
 
 @parameters
 class CoMovingMass:
-    """Soil that moves with the striker, as a share of the effective mass at its contact; Ye 2006, eq (10)."""
+    """Soil that moves with the striker, as a share of the effective mass at its contact.
+
+    Given as such, by the name of an estimate in Ye 2006, Table 1, or by the loss share x of eq (10), y = x/(1 - x).
+    """
 
     fraction: Annotated[float, Quantity("1", "m_b1/m_s, 0.10 by Kroeber 1988 and Ye 2006", least=0, most=10)] = 0.10
+    estimate: Annotated[Estimate | None, "takes the fraction from Table 1 instead"] = None
+    loss_share: Annotated[
+        float | None,
+        Quantity("1", "x, share lost to sound and vibration; takes the fraction from (10)", least=0, below=1),
+    ] = None
+
+    def validate(self) -> None:
+        """Refuse two answers to one question."""
+        if self.estimate is not None and self.loss_share is not None:
+            raise ValueError(f"loss_share: got {self.loss_share!r} beside estimate {self.estimate!r}; one of both")
+
+    @property
+    def share(self) -> float:
+        """The fraction that is meant, m_b1/m_s."""
+        if self.estimate is not None:
+            return CO_MOVING_FRACTIONS[self.estimate]
+        return self.fraction if self.loss_share is None else mass_fraction(self.loss_share)

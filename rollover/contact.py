@@ -229,7 +229,7 @@ def _soil(ground: Ground) -> Array:
             friction.coefficient,
             friction.stick_displacement,
             friction.stick_relaxation,
-            ground.co_moving_mass.fraction,
+            ground.co_moving_mass.share,
             rule[ground.striker_mass],
             REFERENCE_MASS,
             ground.law.domain.momentum_most,

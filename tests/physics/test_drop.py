@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ground.ye import CO_MOVING_FRACTIONS
 from rollover.loads import peak_loads
 from rollover.run import Run
 from rollover.simulate import run
@@ -142,3 +143,24 @@ def test_domain_flags_say_what_lies_outside() -> None:
     assert "impact-speed" in run(drop(0.5, duration=0.02)).domain_flags
     wide = drop(2.0, duration=0.02).replaced({"vehicle.face_length": 0.2})
     assert "contact-area" in run(wide).domain_flags
+
+
+@pytest.mark.parametrize(
+    ("given", "fraction"),
+    [({"estimate": "kundt-1987"}, 0.33), ({"loss_share": 0.09}, 0.0989), ({"fraction": 0.2}, 0.2)],
+)
+def test_co_moving_mass_is_given_by_table_or_by_loss(given: dict[str, object], fraction: float) -> None:
+    """Table 1 by name, or (10): y = x/(1 - x), 9 % gives 9.89 %."""
+    result = run(drop(2.0, duration=0.02).replaced({"ground.co_moving_mass": given}))
+    kinetic = 0.5 * 132.0 * 4.0
+    assert result.ledger["collision"] == pytest.approx(kinetic * fraction / (1 + fraction), rel=2e-4)
+
+
+def test_two_sources_of_the_co_moving_mass_are_refused() -> None:
+    with pytest.raises(ValueError, match="one of both"):
+        drop(2.0).replaced({"ground.co_moving_mass": {"estimate": "kundt-1987", "loss_share": 0.1}})
+
+
+def test_every_estimate_of_table_1_can_be_named() -> None:
+    for name, fraction in CO_MOVING_FRACTIONS.items():
+        assert drop(2.0).replaced({"ground.co_moving_mass.estimate": name}).ground.co_moving_mass.share == fraction
