@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from ground.kernel import commit_friction, friction_force
 from ground.surface import Slope
 from rollover.initiation import Drop
 from rollover.simulate import run
@@ -46,3 +47,21 @@ def test_too_little_friction_slides_by_the_difference() -> None:
     a = math.radians(ANGLE)
     assert way[-1] == pytest.approx(0.5 * 9.81 * (math.sin(a) - 0.2 * math.cos(a)) * time[-1] ** 2, rel=0.06)
     assert work == pytest.approx(0.2 * 500.0 * 9.81 * math.cos(a) * way[-1], rel=0.06)
+
+
+def test_slip_is_forgotten_when_the_motion_turns_round() -> None:
+    """After a long slide the stick spring is strained by d_s, no more: 2 d_s back and it pulls the other way in full."""
+    mu, stick, force = 0.5, 0.002, 1000.0
+    n, shear, still = np.array([0.0, 0.0, 1.0]), np.zeros(3), np.zeros(3)
+
+    def move(dx: float) -> float:
+        moved = np.array([dx, 0.0, 0.3])  # the part along the normal does not count
+        pull = friction_force(mu, stick, 0.0, force, shear, moved, still, n)
+        commit_friction(stick, shear, moved, n)
+        assert np.linalg.norm(shear) <= stick * (1 + 1e-12)
+        return float(pull[0])
+
+    assert [move(0.01) for _ in range(10)] == pytest.approx([-mu * force] * 10)
+    assert move(-stick) == pytest.approx(0.0, abs=1e-9)
+    assert move(-stick) == pytest.approx(mu * force)
+    assert move(-0.05) == pytest.approx(mu * force)

@@ -13,12 +13,16 @@ from ground.friction import Coulomb
 from ground.surface import Slope
 from ground.ye import Ye2006
 from rollover.contact import bodies_of, tables_of
+from rollover.equilibrium import tread_point
+from rollover.forces import generalised_forces
+from rollover.frames import from_angles, matrices, rotation_vector
 from rollover.inertia import MassProperties
 from rollover.initiation import Drop, Standing
 from rollover.placement import place
 from rollover.scenario import Ground, Scenario, Simulation
 from rollover.shapes import Box
 from rollover.simulate import run
+from rollover.tables import E_ENERGY_NOW, handle
 from rollover.vehicle import FrontAxle, Tyre, Vehicle, Wheel
 
 # the utility tractor of the closed forms: half support width at the tyres' outer edges, m
@@ -192,3 +196,36 @@ def test_vehicle_that_cannot_stand_says_so() -> None:
     with pytest.raises(ValueError, match="does not stand"):
         run(rigid_tractor(swing_deg=None).replaced({"ground.surface": {"kind": "slope", "angle_deg": 55.0}}))
     assert Slope(angle_deg=55.0).gradient[1] > 1.0
+
+
+@pytest.mark.parametrize("camber_deg", [1.0, 25.0, 55.0, 76.0, 120.0])
+def test_tyre_forces_are_the_gradient_of_their_energy(camber_deg: float) -> None:
+    """Q = -dU/dq with U = k(camber) depth^2/2, without damping and friction, by central differences."""
+    scenario = rigid_tractor(swing_deg=None, stiffness=3e5)
+    changes: dict[str, object] = {}
+    for wheel in ("rear_left", "rear_right", "front_left", "front_right"):
+        tyre = f"vehicle.wheels.{wheel}.tyre"
+        changes |= {f"{tyre}.lateral_stiffness": 1e5, f"{tyre}.crown": 0.04, f"{tyre}.friction": 0.0}
+        changes |= {f"{tyre}.vertical_damping": 0.0}
+    scenario = scenario.replaced(changes)
+    bodies = bodies_of(scenario.vehicle, scenario.ground.elements)
+    t = tables_of(scenario, bodies)
+    kernels = handle(t)
+    R = from_angles(math.radians(camber_deg), 0.05, 0.3)
+    lowest = min(float(tread_point(t, bodies, w, R)[2]) for w in range(4))
+    place_at = np.array([0.0, 0.0, -lowest - 0.06]) + R @ bodies[0].centre
+
+    def at(x: np.ndarray, turn: np.ndarray) -> tuple[float, np.ndarray]:
+        q, Q = np.concatenate([x, rotation_vector(turn)]), np.zeros(6)
+        generalised_forces(kernels, q, np.zeros(6), Q)
+        return float(t.wheel_memory[:, E_ENERGY_NOW].sum()), Q
+
+    energy, Q = at(place_at, R)
+    assert energy > 1.0
+    eps = 1e-6
+    for k in range(3):
+        e = np.eye(3)[k]
+        slope = (at(place_at + eps * e, R)[0] - at(place_at - eps * e, R)[0]) / (2 * eps)
+        assert Q[k] == pytest.approx(-slope, rel=1e-5, abs=1e-3)
+        spun = [at(place_at, R @ matrices((s * eps * e)[None])[0])[0] for s in (1.0, -1.0)]
+        assert Q[3 + k] == pytest.approx(-(spun[0] - spun[1]) / (2 * eps), rel=1e-5, abs=1e-2)
