@@ -50,7 +50,7 @@ def test_too_little_friction_slides_by_the_difference() -> None:
 
 
 def test_slip_is_forgotten_when_the_motion_turns_round() -> None:
-    """After a long slide the stick spring is strained by d_s, no more: 2 d_s back and it pulls the other way in full."""
+    """After a long slide the stick spring is strained by d_s, no more: 2 d_s back and it pulls the other way."""
     mu, stick, force = 0.5, 0.002, 1000.0
     n, shear, still = np.array([0.0, 0.0, 1.0]), np.zeros(3), np.zeros(3)
 
