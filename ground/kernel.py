@@ -36,12 +36,12 @@ SPREAD = 25  # how far the mean of the covered area stands above its deepest poi
 COLUMNS = 26
 
 # columns of state (int)
-CELL, BODY, MODE, FLAGS, OWNER, HITS = 0, 1, 2, 3, 4, 5
-STATE_COLUMNS = 6
+CELL, BODY, MODE, FLAGS, HITS = 0, 1, 2, 3, 4
+STATE_COLUMNS = 5
 IDLE, LOADING, UNLOADING = 0, 1, 2
 
 # columns of the law's settings
-PLASTIC, REST_STIFFNESS, GRAVITY, ADDRESS_FORCE, ADDRESS_ADVANCE, ADDRESS_BEGIN = 0, 1, 2, 3, 4, 5
+PLASTIC, REST_STIFFNESS, ADDRESS_FORCE, ADDRESS_ADVANCE, ADDRESS_BEGIN = 0, 1, 2, 3, 4
 
 SAME = 1e-10  # m: sinkages closer than this are one, so that rounding does not switch a loaded element to its line
 

@@ -166,7 +166,6 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
             [
                 int(law.plastic),
                 int(law.unloads_at_rest_stiffness),
-                0,
                 law.force.address,
                 law.advance.address if law.advance is not None else 0,
                 law.begin.address if law.begin is not None else 0,

@@ -30,7 +30,6 @@ from rollover.tables import (
     FRACTION,
     GUIDE,
     R_IMPULSE,
-    R_IMPULSE_NOW,
 )
 from rollover.vectors import depth_row, direction_row, to_body, to_world
 
@@ -251,7 +250,6 @@ def exchange(t: Any, new: Any, total: int, qd: Any) -> float:
         b = t.state[i, BODY]
         contact_row(t, i, J)
         impulse = t.memory[i, MASS_B] * dot(J, after[6 * b : 6 * b + 6])
-        t.resultant[b, R_IMPULSE_NOW] += impulse
         for m in range(3):
             t.resultant[b, R_IMPULSE + m] += impulse * t.memory[i, NORMAL + m]
     lost = 0.5 * dot(qd, before) - 0.5 * dot(after, times(full, after))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -95,13 +94,4 @@ def _peak(run: Run, channel: str, parts: tuple[str, ...], impulse: str | None) -
         impulse=float(recording[impulse][-1]) if impulse is not None and impulse in recording.channels else None,
         domain_flags=flag_names(flags),
         half_step_change=None,
-    )
-
-
-def is_converged(peak: PeakLoad, limit: float = 0.02) -> bool | None:
-    """Whether halving the step moves the filtered peak by less than `limit`; None if that was not examined."""
-    return (
-        None
-        if peak.half_step_change is None
-        else math.isfinite(peak.half_step_change) and peak.half_step_change < limit
     )

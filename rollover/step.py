@@ -69,14 +69,12 @@ from rollover.tables import (
     FRICTION_WORK,
     FT,
     HINGE,
-    HITS_NOW,
     M_ANGLE,
     M_ANGLE_NOW,
     M_TORQUE,
     M_TORQUE_NOW,
     MOVED,
     OUT_OF_AREA,
-    R_IMPULSE_NOW,
     R_NORMAL,
     R_POINT,
     R_TANGENT,
@@ -116,11 +114,8 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
         for k in range(3):
             t.pose[b, ACC + k] = qdd[6 * b + k]
             t.pose[b, ALPHA + k] = qdd[6 * b + 3 + k]
-    for b in range(t.pose.shape[0]):
         for k in range(R_NORMAL, R_WEIGHT + 1):
             t.resultant[b, k] = 0.0
-        t.resultant[b, R_IMPULSE_NOW] = 0.0
-    t.counts[HITS_NOW] = 0
     finish_elements(t, h)
     finish_wheels(t)
     finish_mounts(t)

@@ -54,7 +54,7 @@ MU, STICK, RELAXATION, FRACTION, MASS_RULE, MASS_GIVEN, MOMENTUM_MOST, SOIL_COLU
 RULE_REFERENCE, RULE_EFFECTIVE, RULE_CLAMPED = 0, 1, 2
 
 # places in counts
-SLOTS, ACTIVE, EVENTS, OUTSIDE, HITS_NOW, FLAGS_NOW, COUNTS = 0, 1, 2, 3, 4, 5, 6
+SLOTS, ACTIVE, EVENTS, OUTSIDE, FLAGS_NOW, COUNTS = 0, 1, 2, 3, 4, 5
 
 # places in work (J taken from the vehicle since the start)
 SOIL, TYRE, ROPS, FRICTION_WORK, COLLISION, AXLE, WORKS = 0, 1, 2, 3, 4, 5, 6
@@ -63,11 +63,11 @@ SOIL, TYRE, ROPS, FRICTION_WORK, COLLISION, AXLE, WORKS = 0, 1, 2, 3, 4, 5, 6
 Z, ZDOT, FN, FT, MOVED, TRIAL_COLUMNS = 0, 1, 2, 3, 6, 9
 
 # columns of resultant, one row for each body: normal contact force, friction force (world), point, weight, impulse
-R_NORMAL, R_TANGENT, R_POINT, R_WEIGHT, R_IMPULSE, R_IMPULSE_NOW, RESULTANT_COLUMNS = 0, 3, 6, 9, 10, 13, 14
+R_NORMAL, R_TANGENT, R_POINT, R_WEIGHT, R_IMPULSE, RESULTANT_COLUMNS = 0, 3, 6, 9, 10, 13
 
 # columns of event: time is added by the caller
 EV_KIND, EV_SUBJECT, EV_PLACE, EV_VALUE, EVENT_COLUMNS = 0, 1, 2, 5, 6
-TOUCH, BRANCH_CHANGE, TURN, WHEEL_OFF, WHEEL_ON, AXLE_STOP, HINGE, HIT = 0, 1, 2, 3, 4, 5, 6, 7
+TOUCH, BRANCH_CHANGE, TURN, WHEEL_OFF, WHEEL_ON, AXLE_STOP, HINGE = 0, 1, 2, 3, 4, 5, 6
 
 # bits of an element's domain flags, and their names
 OUT_OF_SPEED, OUT_OF_MOMENTUM, OUT_OF_AREA, NOT_VIRGIN, OBLIQUE = 1, 2, 4, 8, 16
@@ -101,7 +101,7 @@ class Tables(NamedTuple):
     axle_f: Any  # (AXLE_COLUMNS,) or (0,)
     axle_i: Any  # (2,) chassis and axle rows
     # ground
-    law: Any  # (6,) see ground.kernel
+    law: Any  # (5,) see ground.kernel
     p: Any
     soil: Any  # (SOIL_COLUMNS,)
     domain: Any  # (6,)

@@ -23,7 +23,6 @@ from ground.kernel import (
     MODE,
     NORMAL,
     OFFSET,
-    OWNER,
     OWNER_R,
     PLACE,
     PLASTIC,
@@ -42,7 +41,6 @@ from rollover.impact import exchange, share_mass
 from rollover.tables import (
     ACTIVE,
     EVENTS,
-    HITS_NOW,
     MASS_GIVEN,
     MASS_RULE,
     MOMENTUM_MOST,
@@ -228,8 +226,7 @@ def touch(t: Any, qd: Any, h: float) -> float:
     for c in range(count):
         slot = t.touched[c]
         m, state = t.memory[slot], t.state[slot]
-        i = int(t.found[slot, 2])
-        b = t.point_body[i]
+        b = t.point_body[int(t.found[slot, 2])]
         z = t.found[slot, 0]
         r = t.found[slot, 4:7]
         x, v = place(t.pose[b], r[0], r[1], r[2]), velocity(t.pose[b], r[0], r[1], r[2])
@@ -244,7 +241,6 @@ def touch(t: Any, qd: Any, h: float) -> float:
         m[SPREAD] = z - t.found[slot, 3]
         if known:
             change_owner(t, slot, b, r, speed)
-            state[OWNER] = i
             if jump > swept and t.law[PLASTIC] != 0 and t.law[REST_STIFFNESS] == 0:
                 enter_from_the_side(t.law, t.p, t.s[slot], m, z, before * m[AREA] / max(was, 1e-12))
                 state[MODE] = LOADING if z >= m[LINE_Z] else UNLOADING
@@ -257,7 +253,7 @@ def touch(t: Any, qd: Any, h: float) -> float:
                 m[NORMAL + k] = t.plane[k]
                 m[SHEAR + k] = 0.0
             m[OFFSET] = t.plane[3]
-            state[OWNER], state[BODY] = i, b
+            state[BODY] = b
             state[HITS] += 1
             acceleration = depth_acceleration(t.pose[b], r, t.plane[:3])
             start = max(z - swept, rut_depth(m))
@@ -278,14 +274,12 @@ def touch(t: Any, qd: Any, h: float) -> float:
         return 0.0
     share = np.zeros(hits)
     share_mass(t, fresh, hits, share)
-    moving = 0
+    moving = False
     for k in range(hits):
         slot = t.active[fresh[k]]
         begin(t, slot, share[k])
-        if t.memory[slot, MASS_B] > 0.0:
-            moving += 1
-    t.counts[HITS_NOW] = hits
-    return exchange(t, fresh, hits, qd) if moving > 0 else 0.0
+        moving = moving or t.memory[slot, MASS_B] > 0.0
+    return exchange(t, fresh, hits, qd) if moving else 0.0
 
 
 @compiled

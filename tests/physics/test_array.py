@@ -89,7 +89,7 @@ def test_second_hit_starts_from_the_rut() -> None:
     row[5] = 0.14 * 0.045
     state[MODE] = 1
     s, p = touched(law, speed=2.0), law.p
-    settings = np.array([1, 0, 0, law.force.address, 0, law.begin.address])
+    settings = np.array([1, 0, law.force.address, 0, law.begin.address])
     for z in np.linspace(0.001, 0.1, 100):
         commit(settings, p, s, row, state, z, 1.0, 1e-3, 132.0)
     commit(settings, p, s, row, state, 0.0999, -0.1, 1e-3, 132.0)

@@ -24,7 +24,7 @@ class Element:
         self.row[AREA], self.state[MODE] = 2.0 * REFERENCE_AREA, LOADING
         self.p, self.s = law.p, touched(law, speed=speed)
         address = [f.address if f is not None else 0 for f in (law.force, law.advance, law.begin)]
-        self.law = np.array([int(law.plastic), int(law.unloads_at_rest_stiffness), 0, *address], dtype=np.int64)
+        self.law = np.array([int(law.plastic), int(law.unloads_at_rest_stiffness), *address], dtype=np.int64)
 
     def force(self, z: float, v: float) -> float:
         return float(normal_force(self.law, self.p, self.s, self.row, z, v))
