@@ -1,0 +1,12 @@
+"""The commands, one file each; each puts itself into `door.app` when it is imported."""
+# ruff: noqa: I001  # the order of `rollover --help`
+
+from __future__ import annotations
+
+from rollover.commands import run
+from rollover.commands import view
+from rollover.commands import listing
+from rollover.commands import check
+from rollover.commands import schema
+
+__all__ = ["check", "listing", "run", "schema", "view"]

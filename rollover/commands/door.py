@@ -1,0 +1,63 @@
+"""What all commands share: the application, exit status, options, and how wrong input is answered.
+
+Exit status: 0 done, 1 the answer is no, 2 the input is wrong, 3 the simulation failed.
+"""
+
+from __future__ import annotations
+
+import functools
+import sys
+from collections.abc import Callable
+from typing import Annotated, Any, TypeVar
+
+import typer
+
+# what takes long to import is imported by the command that needs it: `rollover --help` answers at once
+from rollover.faults import Fault, InputError
+
+THE_ANSWER_IS_NO, WRONG_INPUT, FAILED, INTERRUPTED, BUG = 1, 2, 3, 130, 70
+COMPILING = 25  # s, roughly, on two cores
+
+C = TypeVar("C", bound=Callable[..., None])
+
+app = typer.Typer(
+    help="Vehicle rollover load studies: what the ground does to a ROPS.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+AsJson = Annotated[bool, typer.Option("--json", help="Print the answer as JSON on standard output.")]
+Setting = Annotated[
+    list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Replace a value; may be repeated.")
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace another run's results.")]
+
+
+def answering(command: C) -> C:
+    """Turn wrong input and an interrupt into their exit status; any other exception is a bug and stays one."""
+
+    @functools.wraps(command)
+    def wrapped(*args: Any, **kwargs: Any) -> None:
+        try:
+            command(*args, **kwargs)
+        except InputError as e:
+            print(e, file=sys.stderr)
+            raise typer.Exit(WRONG_INPUT) from None
+        except KeyboardInterrupt:
+            print("Interrupted.", file=sys.stderr)
+            raise typer.Exit(INTERRUPTED) from None
+
+    return wrapped  # type: ignore[return-value]
+
+
+def settings(given: list[str]) -> dict[str, Any]:
+    from rollover import document
+
+    settings: dict[str, Any] = {}
+    for text in given:
+        path, value = document.parse_setting(text)
+        if path in settings:
+            raise InputError(Fault(file="--set", path=path, message="given twice; once is allowed"))
+        settings[path] = value
+    return settings

@@ -1,0 +1,85 @@
+"""`rollover run`: one scenario."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rollover.commands.door import COMPILING, FAILED, AsJson, Force, Setting, answering, app, settings
+
+if TYPE_CHECKING:
+    from rollover.loads import PeakLoad
+    from rollover.run import Run
+    from rollover.scenario import Scenario
+
+
+@app.command()
+@answering
+def run(
+    scenario: Annotated[str, typer.Argument(help="A scenario file, or the name of a shipped one.")],
+    set_: Setting = None,
+    out: Annotated[Path | None, typer.Option(help="Results folder  [default: out/run/NAME]")] = None,
+    force: Force = False,
+    half_step: Annotated[
+        bool, typer.Option("--half-step/--no-half-step", help="Run again at half the step to see what it changes.")
+    ] = True,
+    as_json: AsJson = False,
+) -> None:
+    """Simulate one scenario: results, peak loads and a recording to look at."""
+    from ground.compiled import is_warm
+    from rollover import console, document
+
+    path = document.find(scenario)
+    from rollover import scenario as scenarios
+
+    chosen = scenarios.load(path)
+    if set_:
+        chosen = chosen.replaced(settings(set_), origin="--set")
+    if not is_warm():
+        console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
+    from rollover import loads, store
+
+    folder = out or Path("out", "run", path.stem)
+    store.claim(folder, document.content_hash(chosen), force=force)  # before a run that may take minutes
+    done, again = _simulated(chosen, half_step)
+    # what a run that broke off reached is in its channels; a peak of it would pass for the peak
+    peaks = loads.peak_loads(done, again if again and again.status == "done" else None) if done.status == "done" else ()
+    answer = store.write(folder, done, peaks, half_step=again, picture=_picture(done, peaks), force=force)
+    if as_json:
+        print(json.dumps(answer, indent=2))
+    else:
+        console.report(done, peaks, answer, str(folder))
+    if done.status == "failed":
+        console.say(f"{path}: the simulation failed: {done.sentence}")
+        raise typer.Exit(FAILED)
+
+
+def _simulated(scenario: Scenario, half_step: bool) -> tuple[Run, Run | None]:
+    from rollover import console, simulate
+
+    lead = getattr(scenario.initiation, "lead_time", 0.0)
+    times = scenario.simulation
+    with console.progress("simulating", -lead, times.duration) as show:
+        done = simulate.run(scenario, progress=show)
+    if not half_step or done.status == "failed":
+        return done, None
+    finer = scenario.replaced({"simulation.step": 0.5 * times.step})
+    with console.progress("again at half the step", -lead, times.duration) as show:
+        return done, simulate.run(finer, progress=show)
+
+
+def _picture(done: Run, peaks: Sequence[PeakLoad]) -> Callable[[Path], None] | None:
+    from rollover import console
+
+    try:
+        from viz import log
+    except ImportError as e:
+        if (e.name or "").partition(".")[0] != "rerun":
+            raise
+        console.say("No rerun wheel for this platform: recording.rrd was not written.")
+        return None
+    return lambda path: log.write_rrd(done, path, peaks=peaks)
