@@ -1,5 +1,5 @@
 """The commands, one file each; each puts itself into `door.app` when it is imported."""
-# ruff: noqa: I001  # the order of `rollover --help`
+# ruff: noqa: I001
 
 from __future__ import annotations
 
