@@ -52,6 +52,7 @@ def answering(command: C) -> C:
 
 
 def settings(given: list[str]) -> dict[str, Any]:
+    """Path -> value of each `--set PATH=VALUE`. Raises `InputError`."""
     from rollover import document
 
     settings: dict[str, Any] = {}
