@@ -1,0 +1,152 @@
+"""Requirements: worked values, continuity at every breakpoint, and formulae that must agree with one another."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from rollover.earth_moving import excavator, piece_at
+from rollover.standards import (
+    MACHINES,
+    STANDARDS,
+    Tractor,
+    code_3,
+    code_4,
+    code_6,
+    code_7,
+    impact_speed,
+    iso_3471_requirements,
+    osha,
+    pendulum_energy,
+    pitch_inertia_of_both_formulae,
+    side_height,
+)
+
+
+def by_name(rows: tuple, name: str):
+    return next(r for r in rows if r.name == name)
+
+
+@pytest.mark.parametrize(
+    ("mass", "rear", "side", "crush", "height", "osha_side"),
+    [
+        (800, 1120, 1400, 16e3, 0.185, 1937),
+        (2000, 2800, 3500, 40e3, 0.425, 3372),
+        (3000, 4200, 5250, 60e3, 0.575, 4567),
+        (4000, 5600, 7000, 80e3, 0.725, 5763),
+        (6000, 8400, 10_500, 120e3, 1.025, 8154),
+    ],
+)
+def test_worked_values(mass: float, rear: float, side: float, crush: float, height: float, osha_side: float) -> None:
+    """1.4 M, 1.75 M, 20 M, the side height of the pendulum, and 980 + 1.196 M J, to the last printed digit."""
+    tractor = Tractor(mass=mass)
+    static = code_4(tractor)
+    assert by_name(static, "longitudinal load, rear").value == pytest.approx(rear, abs=0.5)
+    assert by_name(static, "side load").value == pytest.approx(side, abs=0.5)
+    assert by_name(static, "crush, rear").value == by_name(static, "crush, front").value == pytest.approx(crush)
+    assert by_name(code_3(tractor), "side impact").value == pytest.approx(height, abs=5e-4)
+    assert by_name(osha(tractor), "side load").value == pytest.approx(osha_side, abs=1.0)
+
+
+def test_order_and_side_of_the_static_loads() -> None:
+    """The first load comes from the heavier end, crush follows at the same end; a folding frame is loaded once more."""
+    names = [r.name for r in code_4(Tractor(mass=3000.0, rear_share=0.6))]
+    assert names == ["longitudinal load, rear", "crush, rear", "side load", "crush, front"]
+    names = [r.name for r in code_4(Tractor(mass=3000.0, rear_share=0.49, folding=True))]
+    assert names == [
+        "longitudinal load, front", "crush, front", "side load", "crush, rear", "second longitudinal load, rear",
+    ]  # fmt: skip
+    assert by_name(code_4(Tractor(mass=3000.0, folding=True)), "second longitudinal load, front").value == 1050.0
+
+
+def test_pendulum_heights_meet_at_2000_kg_and_the_rear_formulae_at_0378() -> None:
+    """25 + 0.2 M = 125 + 0.15 M = 425 mm, 25 + 0.07 M = 165 mm = 125 + 0.02 M at 2000 kg; I = 0.378 M L^2."""
+    for just_below, at in ((1999.999, 2000.0),):
+        assert side_height(just_below) == pytest.approx(side_height(at), abs=1e-3)
+        low, high = (by_name(code_3(Tractor(mass=m)), "front impact").value for m in (just_below, at))
+        assert low == pytest.approx(high, abs=1e-6)
+        assert high == pytest.approx(0.165)
+    L, M = 2.25, 3000.0
+    inertia = pitch_inertia_of_both_formulae(M, L)
+    assert inertia / (M * L**2) == pytest.approx(0.378, abs=5e-4)
+    rows = code_3(Tractor(mass=M, wheelbase=L, pitch_inertia=inertia, rear_share=0.6))
+    first, second = rows[0].value, rows[1].value
+    assert first == pytest.approx(second, rel=1e-12)
+    assert first == pytest.approx(2.165e-11 * M * 2250.0**2)
+    # a tractor that is heavier in front is not struck from behind
+    assert "rear impact, by wheelbase" not in {r.name for r in code_3(Tractor(mass=M, wheelbase=L, rear_share=0.5))}
+
+
+def test_energy_of_the_block_is_not_that_of_the_structure() -> None:
+    """At 3000 kg the block brings 11.3 kJ to the side, the static test asks for 5.25 kJ; v = sqrt(2 g H)."""
+    height = by_name(code_3(Tractor(mass=3000.0)), "side impact").value
+    assert pendulum_energy(height) == pytest.approx(11.3e3, rel=5e-3)
+    assert impact_speed(height) == pytest.approx(math.sqrt(2 * pendulum_energy(height) / 2000.0), rel=1e-12)
+
+
+def test_narrow_tractors() -> None:
+    """Code 6 widens the side energy with the structure: (B6 + B)/(2 B); Code 7 does not; both 500 + 0.5 M along."""
+    tractor = Tractor(mass=1500.0, width=1.0, rops_width=0.8)
+    assert by_name(code_6(tractor), "side load").value == pytest.approx(1.75 * 1500.0 * 0.9)
+    assert "not given" in by_name(code_6(Tractor(mass=1500.0)), "side load").formula
+    assert by_name(code_7(tractor), "side load").value == pytest.approx(2625.0)
+    assert by_name(code_7(tractor), "longitudinal load").value == pytest.approx(1250.0)
+    assert by_name(code_6(tractor), "lateral stability").value == pytest.approx(math.radians(38.0))
+
+
+def test_rear_energy_of_osha_is_that_of_code_4() -> None:
+    """0.47 W ft lbf = 1.405 M J: two recalled numbers that vouch for each other within 0.4 %."""
+    tractor = Tractor(mass=2500.0)
+    assert by_name(osha(tractor), "rear load").value == pytest.approx(1.405 * 2500.0, rel=1e-3)
+    assert by_name(osha(tractor), "rear load").value == pytest.approx(code_4(tractor)[0].value, rel=4e-3)
+
+
+BREAKS = [
+    (name, kind, piece.up_to)
+    for name, machine in MACHINES.items()
+    for kind in ("force", "energy")
+    for piece in getattr(machine, kind)[:-1]
+]
+
+
+@pytest.mark.parametrize(("machine", "kind", "mass"), BREAKS)
+def test_iso_3471_is_continuous_at_every_breakpoint(machine: str, kind: str, mass: float) -> None:
+    pieces = getattr(MACHINES[machine], kind)
+    below, above = piece_at(pieces, mass), piece_at(pieces, mass * (1 + 1e-9))
+    assert below is not above
+    assert above.value(mass) == pytest.approx(below.value(mass), rel=2.5e-3)
+
+
+def test_iso_3471_worked_value_and_scope() -> None:
+    """A 20 t crawler: F = 70 000 2^1.2 = 160 818 N, U = 13 000 2^1.25 = 30 920 J, vertical 392.2 kN, 0.8 F along."""
+    rows = iso_3471_requirements("crawler", 20_000.0)
+    assert by_name(rows, "side force").value == pytest.approx(160_818, abs=5)
+    assert by_name(rows, "side energy").value == pytest.approx(30_920, abs=5)
+    assert by_name(rows, "vertical force").value == pytest.approx(392_200)
+    assert by_name(rows, "longitudinal force").value == pytest.approx(128_655, abs=5)
+    assert by_name(iso_3471_requirements("crawler", 4000.0), "side force").formula == "6 M"
+    with pytest.raises(ValueError, match="more than 700 kg"):
+        iso_3471_requirements("crawler", 700.0)
+    with pytest.raises(ValueError, match="crawler, grader"):
+        iso_3471_requirements("skidder", 5000.0)
+    assert excavator(10_000.0)["vertical force"] == pytest.approx(127_500.0)
+
+
+def test_every_requirement_says_where_it_stands_and_how_sure_it_is() -> None:
+    tractor = Tractor(mass=3000.0, wheelbase=2.25, pitch_inertia=5430.0, width=1.9, rops_width=1.2, folding=True)
+    rows = [r for standard in STANDARDS.values() for r in standard(tractor)]
+    rows += [r for name in MACHINES for r in iso_3471_requirements(name, 12_000.0)]
+    assert len(rows) > 50
+    for r in rows:
+        assert all((r.standard, r.name, r.formula, r.clause, r.source)), r
+        assert r.confidence in ("seen", "recalled-high", "recalled", "recalled-low")
+        assert r.value > 0.0
+        assert r.unit == {"energy": "J", "force": "N", "height": "m", "angle": "rad", "deflection": "m"}[r.quantity]
+
+
+def test_refused() -> None:
+    with pytest.raises(ValueError, match="mass: not a mass, got 0"):
+        Tractor(mass=0.0)
+    with pytest.raises(ValueError, match="rear_share"):
+        Tractor(mass=1.0, rear_share=1.5)
