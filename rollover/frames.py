@@ -49,6 +49,11 @@ def quaternions(vectors: Array) -> Array:
     return q
 
 
+def from_quaternions(quaternions: Array) -> Array:
+    """Matrices of quaternions xyzw (n, 4) -> (n, 3, 3)."""
+    return np.asarray(Rotation.from_quat(quaternions).as_matrix())
+
+
 def angles(vectors: Array) -> tuple[Array, Array, Array]:
     """Roll, pitch, yaw (n,) of rotation vectors (n, 3), roll and yaw unwrapped along n."""
     R = matrices(vectors)

@@ -70,6 +70,7 @@ class Run:
     phases: tuple[tuple[float, str], ...]  # (start, name): approach | support, tipping, impact, rest
     frame_time: NDArray[np.float64]  # (n,) of motion and contact
     motion: Mapping[str, Motion]  # "chassis", "front_axle", "rops" or "striker"
+    pose: Mapping[str, Motion]  # the same at every row of the recording
     contact: Mapping[str, ContactForce]  # "chassis", "rops" or "striker", and each wheel by its name
     track: GroundTrack
     domain_flags: tuple[str, ...]  # over the whole run

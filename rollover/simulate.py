@@ -191,6 +191,7 @@ def _result(
         phases=_phases(scenario, time, events, found["ground/force_normal"]),
         frame_time=time[frames],
         motion=_motion(s, bodies, frames),
+        pose=_motion(s, bodies, np.arange(len(time))),
         contact=_contact(scenario, s, bodies, frames, t),
         track=GroundTrack(time=track_time, element=element, sinkage=sinkage),
         domain_flags=flag_names(flags),

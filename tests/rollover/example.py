@@ -62,6 +62,7 @@ def run_of(scenario: Scenario, sentence: str = "") -> Run:
         phases=((0.0, "impact"),),
         frame_time=np.array([0.0, 0.01]),
         motion={"striker": Motion(origin=pose, quaternion=np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)))},
+        pose={"striker": Motion(origin=pose, quaternion=np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)))},
         contact={"striker": ContactForce(point=pose, force=pose)},
         track=GroundTrack(time=np.array([0.01]), element=np.array([0]), sinkage=np.array([[0.1]])),
         domain_flags=("speed",),

@@ -232,6 +232,7 @@ def overturn(*, failed: bool = False, slope_deg: float = 0.0) -> Run:
         phases=tuple(p for p in phases if p[0] <= end),
         frame_time=frame_time,
         motion=motion,
+        pose=motion,
         contact=contact,
         track=track,
         domain_flags=("oblique-impact", "momentum"),
@@ -316,6 +317,7 @@ def drop(speed: float = 3.0) -> Run:
         phases=((-0.1, "approach"), (0.0, "impact"), (0.0415, "rest")),
         frame_time=frame_time,
         motion={"striker": Motion(origin=origin, quaternion=np.tile([0.0, 0.0, 0.0, 1.0], (n, 1)))},
+        pose={"striker": Motion(origin=origin, quaternion=np.tile([0.0, 0.0, 0.0, 1.0], (n, 1)))},
         contact={
             "striker": ContactForce(
                 point=origin.copy(), force=np.stack([np.zeros(n), np.zeros(n), force[::10]], axis=1)
