@@ -48,7 +48,7 @@ def signed_distance(zone: ClearanceZone, points: Array) -> Array:
     along = np.maximum(low - points[..., 0], points[..., 0] - high)
     across = _polygon_distance(ring, points[..., 1:])
     outside = np.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0))
-    return np.where((along > 0.0) | (across > 0.0), outside, np.maximum(along, across))
+    return np.asarray(np.where((along > 0.0) | (across > 0.0), outside, np.maximum(along, across)))
 
 
 def _polygon_distance(ring: Array, points: Array) -> Array:

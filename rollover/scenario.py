@@ -66,6 +66,10 @@ class Loads:
     """How loads are reported."""
 
     cfc: Annotated[Literal[60, 180, 600, 1000], "filter class of the filtered peaks, SAE J211"] = 60
+    standards: Annotated[
+        tuple[Literal["code-3", "code-4", "code-6", "code-7", "sae-j1194", "sae-j2194"], ...],
+        "whose requirements the run is held against",
+    ] = ("code-4",)
 
 
 @parameters

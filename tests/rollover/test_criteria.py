@@ -1,0 +1,83 @@
+"""A run against the standards."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rollover.criteria import criteria, rops_share, tractor_of
+from rollover.run import Motion
+from rollover.vehicle import Vehicle
+from tests.physics.scenes import shipped
+from tests.viz import example
+
+
+def overturn(**channels: float):
+    """The stand-in run of the utility tractor with a constant in some channels, and no motion."""
+    run = example.overturn()
+    n = run.recording.time.size
+    still = Motion(origin=np.zeros((n, 3)), quaternion=np.tile([0.0, 0.0, 0.0, 1.0], (n, 1)))
+    values = {**run.recording.channels, **{k.replace("__", "/"): np.full(n, v) for k, v in channels.items()}}
+    recording = replace(run.recording, channels=values)
+    scenario = shipped("side_overturn")
+    return replace(run, scenario=scenario, recording=recording, pose={"chassis": still, "rops": still}, status="done")
+
+
+def test_energy_and_force_beside_the_static_test() -> None:
+    """3000 kg: 5250 J from the side, 60 kN crush. 8000 J are 1.52 times as much; 15 kN down are a quarter."""
+    run = overturn(rops__energy=8000.0, rops__force_z=-15e3)
+    rows = {c.requirement.name: c for c in criteria(run)}
+    assert rows["side load"].simulated == 8000.0
+    assert rows["side load"].margin == pytest.approx(8000.0 / 5250.0 - 1.0)
+    assert rows["crush, rear"].margin == pytest.approx(-0.75)
+    assert rows["side load"].verdict == rows["crush, rear"].verdict == "compared"
+    assert rops_share(replace(run, released=16e3)) == pytest.approx(0.5)
+
+
+def test_zone_is_a_verdict() -> None:
+    """Standing still, the zone's floor is 1.15 m above the ground; sunk by 2 m it is 0.85 m below."""
+    run = overturn()
+    rows = {c.requirement.name: c for c in criteria(run)}
+    assert rows["distance of the structure"].verdict == "met"
+    assert rows["distance of the ground"].simulated == pytest.approx(1.15)
+    n = run.recording.time.size
+    origin = np.zeros((n, 3))
+    origin[n // 2 :, 2] = -2.0
+    sunk = Motion(origin=origin, quaternion=run.pose["chassis"].quaternion)
+    rows = {c.requirement.name: c for c in criteria(replace(run, pose={"chassis": sunk, "rops": sunk}))}
+    assert rows["distance of the ground"].verdict == "not met"
+    assert rows["distance of the ground"].margin == pytest.approx(-0.85)
+    assert f"first entered at {run.recording.time[n // 2]:.3f} s" in rows["distance of the ground"].note
+    assert rows["distance of the structure"].verdict == "met"
+
+
+def test_elastic_deflection_counts_against_what_was_left() -> None:
+    run = overturn()
+    n = run.recording.time.size
+    way = np.zeros(n)
+    way[n // 2] = 0.30
+    way[-1] = 0.10
+    scenario = run.scenario.replaced({"loads.standards": ["code-3"]})
+    recording = replace(run.recording, channels={**run.recording.channels, "rops/deflection": way})
+    rows = {c.requirement.name: c for c in criteria(replace(run, scenario=scenario, recording=recording))}
+    assert rows["elastic deflection"].simulated == pytest.approx(0.20)
+    assert rows["elastic deflection"].margin == pytest.approx(0.2)
+    assert not {"side impact", "front impact"} & set(rows), "heights are no results"
+
+
+def test_tractor_of_the_utility_vehicle() -> None:
+    """Wheelbase 2.25, centre of mass 0.9 ahead of the rear axle: 60 % behind; tyres out to 0.75 + 0.21."""
+    vehicle = shipped("side_overturn").vehicle
+    assert isinstance(vehicle, Vehicle)
+    tractor = tractor_of(vehicle)
+    assert (tractor.mass, tractor.wheelbase) == (3000.0, 2.25)
+    assert tractor.rear_share == pytest.approx(0.6)
+    assert tractor.width == pytest.approx(1.92)
+    assert tractor.rops_width == pytest.approx(1.2)
+
+
+def test_nothing_to_hold_a_striker_or_a_failed_run_against() -> None:
+    assert criteria(example.drop()) == ()
+    assert criteria(replace(overturn(), status="failed")) == ()
