@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time as clock
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,7 @@ from rich.table import Table
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from rollover.baseline import Answer
     from rollover.loads import PeakLoad
     from rollover.run import Run
 
@@ -50,6 +52,28 @@ def progress(what: str, start: float, end: float) -> Iterator[Callable[[float, f
         if wall > QUIET and wall - last[0] >= EVERY:
             last[0] = wall
             say(f"{what}: {_state(simulated, wall, start, end)}")
+
+    yield line
+
+
+@contextmanager
+def counting(what: str) -> Iterator[Callable[[int, int], None]]:
+    """Give a callback that shows how many of all are done: a bar on a terminal, otherwise a line now and then."""
+    if sys.stderr.isatty():
+        from rich.progress import MofNCompleteColumn, Progress
+
+        with Progress(*Progress.get_default_columns()[:2], MofNCompleteColumn(), console=Console(stderr=True)) as bar:
+            task = bar.add_task(what, total=None)
+            yield lambda done, of: bar.update(task, completed=done, total=of)
+        return
+    began = last = clock.monotonic()
+
+    def line(done: int, of: int) -> None:
+        nonlocal last
+        now = clock.monotonic()
+        if now - began > QUIET and now - last >= EVERY:
+            last = now
+            say(f"{done} of {of} {what}")
 
     yield line
 
@@ -108,3 +132,40 @@ def _table(peaks: Sequence[PeakLoad]) -> Table:
             change,
         )
     return table
+
+
+def regression(answers: Sequence[Answer], folder: str) -> None:
+    """What changed, and one line for each scenario, on standard output."""
+    out = Console(highlight=False, markup=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
+    table = Table(box=None, pad_edge=False)
+    for heading in ("scenario", "", "runs", "wall s"):
+        table.add_column(heading, justify="right" if heading in ("runs", "wall s") else "left")
+    table.add_column("", overflow="fold")
+    for a in answers:
+        style = "" if a.ok else "bold red"
+        table.add_row(a.scenario, a.verdict, str(a.starts or "-"), f"{a.wall_time:.1f}", a.sentence, style=style)
+    out.print(table)
+    changed = [(a, d) for a in answers for d in a.differences if not d.same]
+    if changed:
+        loads = Table(box=None, pad_edge=False)
+        for heading in ("scenario", "load", "filter", "unit"):
+            loads.add_column(heading)
+        for heading in ("was", "is", "change", "allowed"):
+            loads.add_column(heading, justify="right")
+        for a, d in changed:
+            unit = _READABLE.get(d.unit, (d.unit, 1.0))[0]
+            change = "-" if d.change is None else f"{100.0 * d.change:+.3g} %"
+            allowed = "-" if d.tolerance is None else f"{100.0 * d.tolerance:.2g} %"
+            was, now = (readable(v, d.unit) for v in (d.was, d.now))
+            loads.add_row(a.scenario, d.load, d.filter, unit, was, now, change, allowed)
+        out.print()
+        out.print(loads)
+    for a in answers:
+        for note in a.notes:
+            out.print(f"{a.scenario}: {note}", style="yellow")
+    bad = sum(not a.ok for a in answers)
+    updated = sum(a.verdict == "updated" for a in answers)
+    verdict = f"{updated} baselines written" if updated else f"{bad} of {len(answers)} scenarios are not as they were"
+    if not bad and not updated:
+        verdict = f"all {len(answers)} scenarios are as they were"
+    out.print(f"{verdict[0].upper()}{verdict[1:]}. Everything: {folder}", style="bold")

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 import os
 import platform
 import shutil
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
@@ -25,14 +27,15 @@ if TYPE_CHECKING:
     from rollover.run import Run
 
 FORMAT = "rollover-run/1"
-RUN, SCENARIO, CHANNELS, EVENTS, PICTURE = (
+RUN, SCENARIO, CHANNELS, EVENTS, PICTURE, PAGE = (
     "run.json",
     "scenario.yaml",
     "channels.parquet",
     "events.json",
     "recording.rrd",
+    "report.html",
 )
-FILES = (RUN, SCENARIO, CHANNELS, EVENTS, PICTURE)
+FILES = (RUN, SCENARIO, CHANNELS, EVENTS, PICTURE, PAGE)
 
 
 def versions() -> dict[str, str]:
@@ -51,16 +54,7 @@ def claim(folder: Path, scenario_hash: str, *, force: bool = False) -> Path:
     Results of the same scenario and versions may be written again; others only with `force`. A folder that holds
     anything but results is never touched.
     """
-    target = folder.resolve()
-    if not target.exists():
-        return target
-    if not target.is_dir():
-        raise _refused(folder, "not a folder, but a file; another --out is needed")
-    names = sorted(p.name for p in target.iterdir())
-    foreign = [name for name in names if name not in FILES]
-    if foreign or (names and RUN not in names):
-        what = foreign[0] if foreign else names[0]
-        raise _refused(folder, f"holds files that are not results, got {what!r}; another --out is needed")
+    target, names = _own_files(folder, FILES, RUN)
     if not names or force:
         return target
     found = read_run_json(target)
@@ -72,6 +66,55 @@ def claim(folder: Path, scenario_hash: str, *, force: bool = False) -> Path:
     return target
 
 
+def claim_account(
+    folder: Path, form: str, about: Mapping[str, Any], files: Sequence[str], *, force: bool = False
+) -> Path:
+    """Like `claim`, for what other commands write: `files`, the first of them JSON of the format `form`.
+
+    The same command's account of the same things, those that `about` names, is written again without `force`.
+    """
+    target, names = _own_files(folder, files, files[0])
+    if not names or force:
+        return target
+    try:
+        found = json.loads((target / files[0]).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        found = {}
+    if found.get("format") != form or any(found.get(key) != value for key, value in about.items()):
+        raise _refused(folder, f"holds results of something else; --force replaces {files[0]}, --out leaves it")
+    return target
+
+
+def _own_files(folder: Path, files: Sequence[str], first: str) -> tuple[Path, list[str]]:
+    """The resolved folder and the names in it, none of which is foreign to `files`."""
+    target = folder.resolve()
+    if not target.exists():
+        return target, []
+    if not target.is_dir():
+        raise _refused(folder, "not a folder, but a file; another --out is needed")
+    names = sorted(p.name for p in target.iterdir())
+    foreign = [name for name in names if name not in files]
+    if foreign or (names and first not in names):
+        what = foreign[0] if foreign else names[0]
+        raise _refused(folder, f"holds files that are not results, got {what!r}; another --out is needed")
+    return target, names
+
+
+@contextmanager
+def whole(folder: Path) -> Iterator[Path]:
+    """Fill a temporary folder that takes the place of `folder` at the very end, or leaves nothing behind."""
+    target = folder.resolve()
+    target.parent.mkdir(parents=True, exist_ok=True)
+    part = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent))
+    try:
+        part.chmod(0o777 & ~_umask())  # mkdtemp makes it private
+        yield part
+        _swap(part, target)
+    except BaseException:
+        shutil.rmtree(part, ignore_errors=True)
+        raise
+
+
 def write(
     folder: Path,
     run: Run,
@@ -79,31 +122,29 @@ def write(
     *,
     half_step: Run | None = None,
     picture: Callable[[Path], None] | None = None,
+    page: Callable[[Mapping[str, Any]], str] | None = None,
     force: bool = False,
 ) -> dict[str, Any]:
     """Write a run's folder and return what its run.json says.
 
     Everything goes to a temporary folder beside it, which takes its place at the very end; `picture` writes the
-    .rrd there. Whatever happens before that, an interrupt too, leaves nothing behind.
+    .rrd there, `page` gives the text of the report from what run.json says. Whatever happens before that, an
+    interrupt too, leaves nothing behind.
     """
     scenario_hash = content_hash(run.scenario)
     target = claim(folder, scenario_hash, force=force)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    part = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent))
-    try:
-        part.chmod(0o777 & ~_umask())  # mkdtemp makes it private
+    with whole(target) as part:
         head = f"{run.scenario.title}\nEvery value of the run beside this file; run it again: rollover run {SCENARIO}"
         (part / SCENARIO).write_text(dump(run.scenario, head), encoding="utf-8")
         write_parquet(run.recording, part / CHANNELS)
-        _write_json(part / EVENTS, [asdict(event) for event in run.events])
+        write_json(part / EVENTS, [asdict(event) for event in run.events])
         if picture is not None:
             picture(part / PICTURE)
-        answer = _answer(run, scenario_hash, peaks, half_step, sorted([*(p.name for p in part.iterdir()), RUN]))
-        _write_json(part / RUN, answer)
-        _swap(part, target)
-    except BaseException:
-        shutil.rmtree(part, ignore_errors=True)
-        raise
+        names = sorted([*(p.name for p in part.iterdir()), RUN, *([PAGE] if page is not None else [])])
+        answer = _answer(run, scenario_hash, peaks, half_step, names)
+        write_json(part / RUN, answer)
+        if page is not None:
+            (part / PAGE).write_text(page(answer), encoding="utf-8")
     return answer
 
 
@@ -124,7 +165,7 @@ def read_run_json(folder: Path) -> dict[str, Any]:
 def _answer(
     run: Run, scenario_hash: str, peaks: Sequence[PeakLoad], half_step: Run | None, files: list[str]
 ) -> dict[str, Any]:
-    plain: dict[str, Any] = _plain(
+    answer: dict[str, Any] = plain(
         {
             "format": FORMAT,
             "title": run.scenario.title,
@@ -150,7 +191,7 @@ def _answer(
             "files": files,
         }
     )
-    return plain
+    return answer
 
 
 def _swap(part: Path, target: Path) -> None:
@@ -179,18 +220,28 @@ def _refused(path: Path, message: str) -> InputError:
     return InputError(Fault(file=str(path), message=message))
 
 
-def _write_json(path: Path, value: Any) -> None:
-    path.write_text(json.dumps(_plain(value), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+def write_json(path: Path, value: Any) -> None:
+    """Write bare values as JSON."""
+    path.write_text(json.dumps(plain(value), indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
-def _plain(value: Any) -> Any:
+def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write rows with the keys of the first as the header; what is None or no number stays empty."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        if rows:
+            writer.writerow(rows[0])
+        writer.writerows([plain(v) for v in row.values()] for row in rows)
+
+
+def plain(value: Any) -> Any:
     """Bare JSON values; what is not a number becomes null."""
     if isinstance(value, Mapping):
-        return {str(k): _plain(v) for k, v in value.items()}
+        return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
+        return [plain(v) for v in value]
     if isinstance(value, (np.generic, np.ndarray)):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

@@ -8,5 +8,6 @@ from rollover.commands import view
 from rollover.commands import listing
 from rollover.commands import check
 from rollover.commands import schema
+from rollover.commands import regress
 
-__all__ = ["check", "listing", "run", "schema", "view"]
+__all__ = ["check", "listing", "regress", "run", "schema", "view"]

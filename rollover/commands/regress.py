@@ -1,0 +1,99 @@
+"""`rollover regress`: peak loads against baselines."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rollover.commands.door import COMPILING, FAILED, THE_ANSWER_IS_NO, AsJson, Force, answering, app
+from rollover.faults import Fault, InputError
+
+if TYPE_CHECKING:
+    from rollover.baseline import Answer
+
+
+@app.command()
+@answering
+def regress(
+    scenarios: Annotated[
+        list[str] | None,
+        typer.Argument(help="Scenarios or folders of them  [default: all shipped]", metavar="[SCENARIO]..."),
+    ] = None,
+    update: Annotated[bool, typer.Option("--update", help="Write the baselines anew; needs --reason.")] = False,
+    reason: Annotated[str, typer.Option(help="Why the loads may be others from now on; kept in the baseline.")] = "",
+    out: Annotated[Path, typer.Option(help="Folder of the full account.")] = Path("out/regress"),
+    workers: Annotated[int | None, typer.Option(help="Runs at once  [default: number of cores]", min=0)] = None,
+    time_limit: Annotated[float, typer.Option(help="Wall time for each run, s.", min=1.0)] = 600.0,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Compare peak loads with their baselines; exit status 1 if any has changed."""
+    if update and not reason.strip():
+        raise InputError(Fault(file="--update", message="without a reason; --reason TEXT is needed"))
+    if reason.strip() and not update:
+        raise InputError(Fault(file="--reason", message="nothing to give a reason for; --update is needed"))
+    from ground.compiled import is_warm
+    from rollover import console, regression, store
+
+    choice = regression.chosen(scenarios or [])
+    selection = sorted(f.stem for f in choice.files)
+    store.claim_account(out, FORMAT, {"scenarios": selection}, ACCOUNT, force=force)
+    if not is_warm():
+        console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
+    failed: list[Answer] = []
+    with console.counting("runs") as show:
+        if update:
+            try:
+                answers = regression.updated(choice, reason.strip(), workers=workers, time_limit=time_limit, show=show)
+            except regression.FailedUpdateError as e:
+                answers = failed = e.answers
+        else:
+            answers = regression.compared(choice, workers=workers, time_limit=time_limit, show=show)
+    account = _account(selection, answers)
+    with store.whole(out) as part:
+        store.write_json(part / JSON, account)
+        store.write_csv(part / CSV, _rows(answers))
+        (part / PAGE).write_text(_page(answers, selection), encoding="utf-8")
+    if as_json:
+        print(json.dumps(account, indent=2))
+    else:
+        console.regression(answers, str(out))
+    if failed:
+        console.say("Nothing was written to the baselines.")
+        raise typer.Exit(FAILED)
+    if not account["ok"]:
+        raise typer.Exit(THE_ANSWER_IS_NO)
+
+
+FORMAT = "rollover-regress/1"
+JSON, CSV, PAGE = "regress.json", "regress.csv", "report.html"
+ACCOUNT = (JSON, CSV, PAGE)
+
+
+def _account(selection: list[str], answers: list[Answer]) -> dict[str, Any]:
+    from rollover import store
+
+    found: dict[str, Any] = store.plain(
+        {
+            "format": FORMAT,
+            "ok": all(a.ok for a in answers),
+            "scenarios": selection,
+            "versions": store.versions(),
+            "answers": [asdict(a) for a in answers],
+        }
+    )
+    return found
+
+
+def _rows(answers: list[Answer]) -> list[dict[str, Any]]:
+    return [{"scenario": a.scenario, "verdict": a.verdict, **asdict(d)} for a in answers for d in a.differences]
+
+
+def _page(answers: list[Answer], selection: list[str]) -> str:
+    from viz import regression
+
+    return regression.page(answers, command=" ".join(["rollover regress", *selection]))

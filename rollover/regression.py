@@ -1,0 +1,216 @@
+"""The regression of peak loads: which scenarios, their runs in child processes, their answers, their new baselines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from rollover import baseline as baselines
+from rollover import document
+from rollover.baseline import Answer, Baseline
+from rollover.ensemble import Extreme, measured, neighbours
+from rollover.execute import Outcome, map_cases
+from rollover.faults import Fault, InputError
+from rollover.scenario import Scenario, load
+
+TIME_LIMIT = 600.0  # s of wall time, for one run
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """One run that is needed: of which scenario, at half its step or not."""
+
+    file: Path
+    scenario: Scenario
+    half_step: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chosen:
+    """Scenario files to work on, and the answers that need no run: folders judged as wholes."""
+
+    files: tuple[Path, ...]
+    answers: tuple[Answer, ...] = ()
+
+
+Show = Callable[[int, int], None]  # runs done, of all
+
+
+def chosen(names: Sequence[str]) -> Chosen:
+    """Scenarios by name or file, all of a folder for a folder, all shipped ones for nothing. Raises `InputError`."""
+    files: dict[Path, None] = {}
+    answers: list[Answer] = []
+    for name in names or [str(document.shipped_folder())]:
+        if (folder := Path(name)).is_dir():
+            found = sorted(folder.glob("*.yaml"))
+            if not found:
+                raise InputError(Fault(file=name, message="no scenario there; a folder with .yaml files is needed"))
+            files.update(dict.fromkeys(found))
+            answers += baselines.strangers(folder)
+        else:
+            files[document.find(name)] = None
+    stems = [f.stem for f in files]
+    if twice := next((s for s in stems if stems.count(s) > 1), None):
+        raise InputError(
+            Fault(file=twice, message="two scenarios of that name, and results go by names; one at a time")
+        )
+    return Chosen(files=tuple(files), answers=tuple(answers))
+
+
+def compared(
+    choice: Chosen, *, workers: int | None = None, time_limit: float = TIME_LIMIT, show: Show | None = None
+) -> list[Answer]:
+    """Each chosen scenario against its baseline, in the order of the files. Raises `InputError`."""
+    answers = list(choice.answers)
+    known: dict[Path, tuple[Baseline, Scenario]] = {}
+    starts: list[Start] = []
+    faults: list[Fault] = []
+    for file in choice.files:
+        answer, kept = _without_runs(file)
+        if answer is not None:
+            answers.append(answer)
+            continue
+        try:
+            found, scenario = baselines.read(kept), load(file)
+        except InputError as e:
+            faults += e.faults
+            continue
+        known[file] = (found, scenario)
+        starts += [Start(file=file, scenario=s, half_step=False) for s in neighbours(scenario, found.starts)]
+    if faults:
+        raise InputError(*faults)
+    outcomes = _worked_off(starts, workers, time_limit, show)
+    for file, (found, scenario) in known.items():
+        mine = outcomes[file]
+        failed = _failed(mine)
+        ensemble = [o.value for o in mine if o.value is not None]
+        answer = (
+            Answer(scenario=file.stem, verdict="failed", sentence=failed, starts=found.starts)
+            if failed
+            else baselines.against(found, scenario, ensemble)
+        )
+        answers.append(replace(answer, wall_time=sum(o.wall_time for o in mine)))
+    order = {f.stem: k for k, f in enumerate(choice.files)}
+    return sorted(answers, key=lambda a: order.get(a.scenario, len(order)))
+
+
+class FailedUpdateError(Exception):
+    """No baseline was written, as a run failed; `answers` say which."""
+
+    def __init__(self, answers: Sequence[Answer]) -> None:
+        super().__init__("\n".join(f"{a.scenario}: {a.sentence}" for a in answers))
+        self.answers = list(answers)
+
+
+def updated(
+    choice: Chosen,
+    reason: str,
+    *,
+    workers: int | None = None,
+    time_limit: float = TIME_LIMIT,
+    show: Show | None = None,
+) -> list[Answer]:
+    """Draw up and write the baselines of all chosen scenarios that are not excluded, or of none.
+
+    Raises `InputError`, also for a tolerance set by hand that has become too small, and `FailedUpdateError`.
+    """
+    answers: list[Answer] = []
+    known: dict[Path, Scenario] = {}
+    starts: list[Start] = []
+    for file in choice.files:
+        answer, _ = _without_runs(file)
+        if answer is not None and answer.verdict == "excluded":
+            answers.append(answer)
+            continue
+        known[file] = scenario = load(file)
+        for again in neighbours(scenario, baselines.STARTS):
+            half = again.replaced({"simulation.step": 0.5 * scenario.simulation.step})
+            starts += [
+                Start(file=file, scenario=again, half_step=False),
+                Start(file=file, scenario=half, half_step=True),
+            ]
+    outcomes = _worked_off(starts, workers, time_limit, show)
+    failed = [
+        Answer(scenario=file.stem, verdict="failed", sentence=sentence)
+        for file in known
+        if (sentence := _failed(outcomes[file]))
+    ]
+    if failed:
+        raise FailedUpdateError(failed)
+    new: dict[Path, Baseline] = {}
+    for file, scenario in known.items():
+        path = baselines.path_of(file)
+        before = baselines.read(path) if path.is_file() else None
+        mine = [(o.case.half_step, o.value) for o in outcomes[file] if o.value is not None]
+        plain, half_ = ([v for h, v in mine if h is finer] for finer in (False, True))
+        new[path] = baselines.drawn_up(file.stem, scenario, plain, half_, reason, before)
+        answers.append(_written(new[path], before, scenario, plain, sum(o.wall_time for o in outcomes[file])))
+    baselines.write(new)
+    return answers
+
+
+def _written(
+    new: Baseline, before: Baseline | None, scenario: Scenario, ensemble: list[tuple[Extreme, ...]], wall: float
+) -> Answer:
+    """What an update changed, and which of its tolerances guard little."""
+    loose = [x for x in new.loads if x.tolerance > baselines.LOOSE]
+    notes = [
+        f"{x.load}, {x.filter}: a tolerance of {100 * x.tolerance:.0f} % guards little ({x.reason})" for x in loose
+    ]
+    sentence = f"{len(new.loads)} loads written"
+    differences = baselines.against(new, scenario, ensemble[: new.starts]).differences
+    if before is not None:
+        old = baselines.against(before, scenario, ensemble[: before.starts])
+        sentence, differences = f"{sentence}; {old.sentence}", old.differences
+    return Answer(
+        scenario=new.scenario,
+        verdict="updated",
+        sentence=sentence,
+        starts=new.starts,
+        wall_time=wall,
+        differences=differences,
+        notes=tuple(notes),
+    )
+
+
+def _without_runs(file: Path) -> tuple[Answer | None, Path]:
+    path = baselines.path_of(file)
+    reason = baselines.excluded(file.parent).get(file.stem)
+    if path.is_file():
+        return None, path
+    if reason is not None:
+        return Answer(scenario=file.stem, verdict="excluded", sentence=reason), path
+    sentence = (
+        f"no baseline; `rollover regress {file.stem} --update --reason TEXT` makes one, "
+        f"or {baselines.FOLDER}/{baselines.EXCLUDED} says why there is none"
+    )
+    return Answer(scenario=file.stem, verdict="missing", sentence=sentence), path
+
+
+def _work(start: Start) -> tuple[Extreme, ...]:
+    return measured(start.scenario)
+
+
+def _worked_off(
+    starts: Sequence[Start], workers: int | None, time_limit: float, show: Show | None
+) -> Mapping[Path, list[Outcome[Start, tuple[Extreme, ...]]]]:
+    found: list[Outcome[Start, tuple[Extreme, ...]]] = []
+    for outcome in map_cases(_work, starts, workers=workers, time_limit=time_limit):
+        found.append(outcome)
+        if show is not None:
+            show(len(found), len(starts))
+    by_file: dict[Path, list[Outcome[Start, tuple[Extreme, ...]]]] = {}
+    for outcome in sorted(found, key=lambda o: o.index):
+        by_file.setdefault(outcome.case.file, []).append(outcome)
+    return by_file
+
+
+def _failed(outcomes: Sequence[Outcome[Start, tuple[Extreme, ...]]]) -> str:
+    """Why there is no ensemble, or nothing."""
+    for k, outcome in enumerate(outcomes):
+        if outcome.failure is not None:
+            which = f"start {k + 1} of {len(outcomes)}" if len(outcomes) > 1 else "the run"
+            half = " at half the step" if outcome.case.half_step else ""
+            return f"{which}{half} failed: {outcome.failure.sentence}"
+    return ""
