@@ -115,7 +115,9 @@ def _table(peaks: Sequence[PeakLoad]) -> Table:
     table = Table(box=None, pad_edge=False)
     table.add_column("peak load")
     table.add_column("unit")
-    for heading in ("raw", "at s", f"CFC {peaks[0].cfc}", "at s", "impulse N s", "moves at half step"):
+    ensemble = any(peak.scatter is not None for peak in peaks)
+    spread = (f"mean of {peaks[0].starts}", "scatter") if ensemble else ()
+    for heading in ("raw", "at s", f"CFC {peaks[0].cfc}", "at s", "impulse N s", "moves at half step", *spread):
         table.add_column(heading, justify="right")
     for peak in peaks:
         if peak.raw == 0.0:
@@ -130,6 +132,7 @@ def _table(peaks: Sequence[PeakLoad]) -> Table:
             "-" if peak.filtered_time is None else f"{peak.filtered_time:.3f}",
             "-" if peak.impulse is None else f"{peak.impulse:.4g}",
             change,
+            *([readable(peak.mean, peak.unit), f"{100.0 * (peak.scatter or 0.0):.2g} %"] if ensemble else []),
         )
     return table
 

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rollover import simulate
 from rollover.faults import Fault, InputError
-from rollover.loads import peak_loads
+from rollover.execute import map_cases
+from rollover.loads import PeakLoad, peak_loads
 from rollover.run import Run
 from rollover.scenario import Scenario
 
@@ -123,4 +124,26 @@ def spreads(ensemble: Sequence[Sequence[Extreme]]) -> tuple[Spread, ...]:
                 values=values,
             )
         )
+    return tuple(found)
+
+
+def with_scatter(
+    peaks: Sequence[PeakLoad], scenario: Scenario, starts: int, workers: int | None = None
+) -> tuple[PeakLoad, ...]:
+    """Peaks of a run with mean and scatter over it and `starts` - 1 neighbours, which run in child processes.
+
+    Raises `FailedRunError` if one of them fails.
+    """
+    ensemble = [{(p.channel, f"CFC {p.cfc}"): p.filtered for p in peaks}]
+    for outcome in map_cases(measured, neighbours(scenario, starts)[1:], workers=workers):
+        if outcome.value is None:
+            assert outcome.failure is not None
+            raise FailedRunError(f"neighbouring start {outcome.index + 2} of {starts}: {outcome.failure.sentence}")
+        ensemble.append({e.key: e.value for e in outcome.value})
+    found = []
+    for peak in peaks:
+        values = [start[peak.channel, f"CFC {peak.cfc}"] for start in ensemble]
+        mean = statistics.fmean(values)
+        scatter = statistics.stdev(values) / mean if mean > 0.0 else 0.0
+        found.append(replace(peak, starts=starts, mean=mean, scatter=scatter))
     return tuple(found)

@@ -19,7 +19,8 @@ class PeakLoad:
 
     `impulse` (N s) is the momentum that collisions at restitution 0 took on this path, which no force history shows;
     `domain_flags` name what lay outside the ground law's calibrated domain within 50 ms of the peak;
-    `half_step_change` is the relative change of the filtered peak at half the step, None if not examined.
+    `half_step_change` is the relative change of the filtered peak at half the step, None if not examined; `mean` and
+    `scatter` (standard deviation over the mean) are those of the filtered peak over an ensemble of `starts`, if any.
     """
 
     channel: str
@@ -32,6 +33,9 @@ class PeakLoad:
     impulse: float | None
     domain_flags: tuple[str, ...]
     half_step_change: float | None
+    starts: int | None = None
+    mean: float | None = None
+    scatter: float | None = None
 
 
 WINDOW = 0.05  # s, around a peak, whose touches are judged against the calibrated domain

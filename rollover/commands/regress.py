@@ -94,6 +94,6 @@ def _rows(answers: list[Answer]) -> list[dict[str, Any]]:
 
 
 def _page(answers: list[Answer], selection: list[str]) -> str:
-    from viz import regression
+    from viz.regression import page
 
-    return regression.page(answers, command=" ".join(["rollover regress", *selection]))
+    return page(answers, command=" ".join(["rollover regress", *selection]))

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+import shlex
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -27,6 +28,10 @@ def run(
     half_step: Annotated[
         bool, typer.Option("--half-step/--no-half-step", help="Run again at half the step to see what it changes.")
     ] = True,
+    ensemble: Annotated[
+        int,
+        typer.Option(help="Starts that nobody could tell apart, for mean and scatter of each load.", min=1, max=100),
+    ] = 1,
     as_json: AsJson = False,
 ) -> None:
     """Simulate one scenario: results, peak loads and a recording to look at."""
@@ -48,7 +53,18 @@ def run(
     done, again = _simulated(chosen, half_step)
     # what a run that broke off reached is in its channels; a peak of it would pass for the peak
     peaks = loads.peak_loads(done, again if again and again.status == "done" else None) if done.status == "done" else ()
-    answer = store.write(folder, done, peaks, half_step=again, picture=_picture(done, peaks), force=force)
+    if peaks and ensemble > 1:
+        peaks = _with_scatter(peaks, chosen, ensemble)
+    command = " ".join(["rollover", "run", scenario, *(f"--set {shlex.quote(s)}" for s in set_ or [])])
+    answer = store.write(
+        folder,
+        done,
+        peaks,
+        half_step=again,
+        picture=_picture(done, peaks),
+        page=lambda answer: _page(done, peaks, answer, command),
+        force=force,
+    )
     if as_json:
         print(json.dumps(answer, indent=2))
     else:
@@ -70,6 +86,24 @@ def _simulated(scenario: Scenario, half_step: bool) -> tuple[Run, Run | None]:
     finer = scenario.replaced({"simulation.step": 0.5 * times.step})
     with console.progress("again at half the step", -lead, times.duration) as show:
         return done, simulate.run(finer, progress=show)
+
+
+def _with_scatter(peaks: Sequence[PeakLoad], scenario: Scenario, starts: int) -> tuple[PeakLoad, ...]:
+    from rollover import console
+    from rollover.ensemble import FailedRunError, with_scatter
+
+    try:
+        return with_scatter(peaks, scenario, starts)
+    except FailedRunError as e:
+        console.say(f"No scatter: {e}")
+        return tuple(peaks)
+
+
+def _page(done: Run, peaks: Sequence[PeakLoad], answer: Mapping[str, Any], command: str) -> str:
+    from rollover.criteria import criteria
+    from viz import report
+
+    return report.page(done, peaks, answer, rows=criteria(done), command=command)
 
 
 def _picture(done: Run, peaks: Sequence[PeakLoad]) -> Callable[[Path], None] | None:

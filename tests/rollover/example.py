@@ -38,6 +38,9 @@ class Peak:
     impulse: float | None = 36.0
     domain_flags: tuple[str, ...] = ()
     half_step_change: float | None = 0.001
+    starts: int | None = None
+    mean: float | None = None
+    scatter: float | None = None
 
 
 def run_of(scenario: Scenario, sentence: str = "") -> Run:
