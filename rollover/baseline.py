@@ -11,7 +11,7 @@ import os
 import tempfile
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -25,6 +25,7 @@ from rollover.store import versions
 FOLDER, EXCLUDED = "baselines", "excluded.yaml"
 STARTS = 5  # of an ensemble; one is enough where the loads are smooth
 CHAOTIC = 1e-3  # scatter of a load above which the mean over the starts is compared
+DIGITS = 10  # of a value in a file
 FLOOR = 1e-6  # relative, what another processor or mathematical library may change in a smooth load
 QUIET = 1e-6  # a load below this share of the scenario's largest of its unit is as good as none
 LOOSE = 0.1  # a tolerance above this guards little, and is said to
@@ -41,7 +42,7 @@ class Load:
     value: float
     time: Annotated[float, Quantity("s", "of the peak in the first start")]
     half_step_change: Annotated[float, Quantity("1", "relative change of the mean at half the step", least=0)]
-    scatter: Annotated[float, Quantity("1", "standard deviation over starts that nobody could tell apart", least=0)]
+    scatter: Annotated[float, Quantity("1", "standard deviation over starts, at this step and at half of it", least=0)]
     tolerance: Annotated[float, Quantity("1", "relative", least=0)]
     reason: Annotated[str, "for the tolerance"]
 
@@ -259,15 +260,15 @@ def drawn_up(
     """
     found = spreads(ensemble)
     finer = {(s.load, s.filter): s for s in spreads(half_step)}
-    starts = len(ensemble) if any(s.scatter > CHAOTIC for s in found) else 1
-    if starts == 1:
-        found = tuple(Spread(**{**vars(s), "mean": s.values[0]}) for s in found)
+    scatters = {(s.load, s.filter): _pooled(s, finer.get((s.load, s.filter))) for s in found}
+    starts = len(ensemble) if any(v > CHAOTIC for v in scatters.values()) else 1
     kept = {load.key: load for load in before.loads if by_hand(load, before.starts)} if before else {}
     loads, faults = [], []
     for s in found:
         half = finer.get((s.load, s.filter))
+        value = float(f"{s.mean if starts > 1 else s.values[0]:.{DIGITS}g}")
         change = abs(half.mean - s.mean) / abs(s.mean) if half is not None and s.mean != 0.0 else 0.0
-        change, scatter = _rounded(change), _rounded(s.scatter)
+        change, scatter = _rounded(change), _rounded(scatters[s.load, s.filter])
         tolerance, why = allowed(change, scatter, starts)
         if old := kept.get((s.load, s.filter)):
             tolerance, why = old.tolerance, old.reason
@@ -277,7 +278,7 @@ def drawn_up(
                     load=s.load,
                     filter=s.filter,
                     unit=s.unit,
-                    value=s.mean,
+                    value=value,
                     time=s.time,
                     half_step_change=change,
                     scatter=scatter,
@@ -289,7 +290,7 @@ def drawn_up(
             faults.append(Fault(file=f"{FOLDER}/{name}.yaml", message=str(e)))
     if faults:
         raise InputError(*faults)
-    return Baseline(
+    new = Baseline(
         scenario=name,
         scenario_hash=document.content_hash(scenario),
         versions=_versions(),
@@ -298,14 +299,21 @@ def drawn_up(
         loads=tuple(loads),
         history=(_former(before), *before.history) if before else (),
     )
+    if before is not None and new == replace(before, reason=new.reason, history=new.history):
+        return before  # nothing to have a reason for
+    return new
+
+
+def _pooled(s: Spread, half: Spread | None) -> float:
+    return s.scatter if half is None else math.sqrt(0.5 * (s.scatter**2 + half.scatter**2))
 
 
 def allowed(half_step_change: float, scatter: float, starts: int) -> tuple[float, str]:
     """Tolerance of a load and the reason for it: the largest of three, never below the discretisation error.
 
     Another processor changes a smooth load by less than 1e-6; half the step, by `half_step_change`; two ensembles of
-    the same physics, n starts each, differ by more than t s sqrt(2/n) once in a thousand, t being Student's with the
-    8 degrees of freedom of two ensembles of five.
+    the same physics, n starts each, differ by more than t s sqrt(2/n) once in a thousand. s is pooled over the ensemble
+    and that of half the step, five starts each, so t is Student's with 8 degrees of freedom.
     """
     from scipy.special import stdtrit
 

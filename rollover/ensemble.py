@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rollover import simulate
-from rollover.faults import Fault, InputError
 from rollover.execute import map_cases
+from rollover.faults import Fault, InputError
 from rollover.loads import PeakLoad, peak_loads
 from rollover.run import Run
 from rollover.scenario import Scenario

@@ -33,7 +33,7 @@ def clearance_figure(run: Run) -> Figure | None:
     ring = vehicle.rops.clearance_zone.corners()
     normal, distance = _ground(run, R, chassis.origin[k])
     views = []
-    for title, axes, across in (("from behind", FRONT, "y, m (left to the left)"), ("from the right", SIDE, "x, m")):
+    for title, axes, across in (("from behind", FRONT, "to the right, m"), ("from the right", SIDE, "forward, m")):
         flip = np.array([-1.0, 1.0]) if axes == FRONT else np.ones(2)
         shapes = [
             Outline(name="vehicle", points=flip * _edges(shape)[:, axes], role="muted")
@@ -53,13 +53,16 @@ def clearance_figure(run: Run) -> Figure | None:
         shapes.append(Outline(name="clearance zone", points=flip * zone[:, axes], role="third", filled=True))
         if (cut := _line(normal[list(axes)], distance, ring.mean(axis=0), axes, normal)) is not None:
             shapes.append(Outline(name="ground", points=flip * cut, role="second", closed=False))
-        views.append(View(title=title, across=across, up="z, m", shapes=shapes))
+        views.append(View(title=title, across=across, up="up, m", shapes=shapes))
     texts = []
     for a in found:
         of = f"the structure ({a.nearest})" if a.what == "structure" else "the undisturbed ground"
         inside = f", inside from {a.first_intrusion:.3f} s on" if a.first_intrusion is not None else ""
         texts.append(f"{of} came within {1e3 * a.least:.0f} mm at {a.time:.3f} s{inside}")
-    caption = f"Clearance zone at {nearest.time:.3f} s, in vehicle axes: {'; '.join(texts)}. Negative is inside."
+    caption = (
+        f"Clearance zone at {nearest.time:.3f} s, in vehicle axes: {'; '.join(texts)}. Negative is inside. "
+        "The ground is the undisturbed surface, cut through the middle of the zone."
+    )
     return Figure(svg=plots.outlines(views), caption=caption)
 
 

@@ -33,7 +33,8 @@ COLOURS: dict[str, str] = {
     "grid": "#d5dae0",
 }
 CYCLE: tuple[Role, ...] = ("first", "second", "third", "fourth", "muted")
-MOST_POINTS = 2400  # of a curve, a few for each pixel across
+MOST_POINTS = 1600  # of a curve, a few for each pixel across
+LETTERS = 14  # of a legend to an inch
 WIDTH, HEIGHT = 7.2, 2.7  # inch
 
 
@@ -289,7 +290,12 @@ def _finish(axes: Any, across: str, label: str, *, margins: tuple[float, float],
         spine.set_visible(side in ("left", "bottom"))
         spine.set_color(COLOURS["grid"])
     if legend and any(not t.startswith("_") for t in axes.get_legend_handles_labels()[1]):
-        axes.legend(frameon=False, fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, borderpad=0.1)
+        names = axes.get_legend_handles_labels()[1]
+        room = LETTERS * axes.get_figure().get_figwidth()
+        columns = max(1, min(4, int(room / (max(map(len, names)) + 6))))
+        axes.legend(
+            frameon=False, fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderpad=0.1
+        )
 
 
 class _Svg:
@@ -329,7 +335,11 @@ def _cleaned(svg: str) -> str:
     svg = svg[svg.index("<svg") :].strip()
     svg = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->|<style.*?</style>", "", svg, flags=re.DOTALL)
     svg = re.sub(r'\sxmlns(:\w+)?="[^"]*"|\sversion="[^"]*"', "", svg).replace("xlink:href", "href")
-    svg = re.sub(r'<svg[^>]*?viewBox="([^"]*)"[^>]*>', r'<svg role="img" viewBox="\1">', svg, count=1)
+    box = re.search(r'viewBox="([^"]*)"', svg)
+    assert box is not None
+    wide = float(box[1].split()[2]) * 4.0 / 3.0  # px to a pt, so that letters are as large in all figures
+    head = f'<svg role="img" viewBox="{box[1]}" style="max-width: {wide:.0f}px">'
+    svg = re.sub(r"<svg[^>]*>", head, svg, count=1)
     svg = re.sub(r"\s*font-family: [^;\"]*;?", "", svg)
     svg = _NUMBER.sub(lambda m: f"{float(m[0]):.2f}".rstrip("0").rstrip("."), svg)
     for role, colour in COLOURS.items():

@@ -166,7 +166,7 @@ def _histories(run: Run, peaks: Sequence[PeakLoad]) -> list[Block]:
                 role = plots.CYCLE[len(group) % len(plots.CYCLE)]
                 group.append(Curve(name=f"{s.name}, CFC {cfc}", x=time, y=smooth.y, role=role))
             continue
-        both = [Curve(name="raw", x=time, y=s.factor * magnitude(run.recording, parts, None), thin=True), smooth]
+        both = [_raw(run, parts, s.factor), smooth]
         svg = plots.history(both, label=f"{s.name}, {s.unit}", phases=run.phases)
         text = next((f"; peak {raw(p)} raw" for p in peaks if p.channel == channel), "")
         figures.append(Figure(svg=svg, caption=f"{title(s.name)} over time, raw and CFC {cfc}{text}. Shading: phases."))
@@ -184,6 +184,11 @@ def _histories(run: Run, peaks: Sequence[PeakLoad]) -> list[Block]:
         svg = plots.xy([curve], across=f"sinkage, {depth.unit}", label=f"ground force, {force.unit}")
         figures.insert(0, Figure(svg=svg, caption="Force of the ground over sinkage, raw: loading and unloading."))
     return [Section(title="Histories", blocks=figures)]
+
+
+def _raw(run: Run, parts: tuple[str, ...], factor: float) -> Curve:
+    values = factor * magnitude(run.recording, parts, None)
+    return Curve(name="raw", x=run.recording.time, y=values, role="second", thin=True)
 
 
 def _structure(run: Run, rows: Sequence[Criterion]) -> list[Block]:
