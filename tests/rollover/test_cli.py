@@ -63,10 +63,14 @@ def bench(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Bench:
     loads, log = types.ModuleType("rollover.loads"), types.ModuleType("viz.log")
     loads.peak_loads = bench.peak_loads  # type: ignore[attr-defined]
     log.write_rrd = lambda run, path, peaks: path.write_bytes(b"rrd")  # type: ignore[attr-defined]
-    for module in (loads, log):
+    report = types.ModuleType("viz.report")
+    report.page = lambda run, peaks, answer, rows, command: f"<p>{command}</p>"  # type: ignore[attr-defined]
+    for module in (loads, log, report):
         monkeypatch.setitem(sys.modules, module.__name__, module)
     monkeypatch.setattr("rollover.loads", loads, raising=False)
+    monkeypatch.setattr("rollover.criteria.criteria", lambda run: ())
     monkeypatch.setattr(viz, "log", log, raising=False)
+    monkeypatch.setattr(viz, "report", report, raising=False)
     return bench
 
 

@@ -1,0 +1,131 @@
+"""Figures: no peak is lost, the same data gives the same bytes, nothing is fetched, colours follow the page."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from xml.etree import ElementTree
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from viz import plots
+from viz.plots import COLOURS, Curve, Level, Outline, View, thinned
+
+Array = NDArray[np.float64]
+T = np.linspace(0.0, 4.0, 401)
+SINE = Curve(name="CFC 60", x=T, y=np.sin(8.0 * T))
+RAW = Curve(name="raw", x=T, y=np.cos(8.0 * T), role="second", thin=True)
+SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+
+FIGURES: dict[str, Callable[[], str]] = {
+    "history": lambda: plots.history(
+        [RAW, SINE],
+        label="ROPS force, kN",
+        phases=((0.0, "tipping"), (1.7, "impact")),
+        levels=[Level(name="L", value=1.2)],
+    ),
+    "xy": lambda: plots.xy(
+        [SINE],
+        across="deflection, mm",
+        label="energy, kJ",
+        levels=[Level(name="asked", value=1.5)],
+        points=[("max", 1.0, 1.0)],
+    ),
+    "overlay": lambda: plots.overlay(RAW, SINE, label="force, kN", phases=((0.0, "loading"),)),
+    "bars": lambda: plots.bars({"soil": 4.0, "potential": -7.4, "residual": float("nan")}, label="kJ"),
+    "tornado": lambda: plots.tornado(["mass", "slope"], [1.0, 2.0], [1.5, 4.0], centre=1.4, label="kN"),
+    "scatter": lambda: plots.scatter([SINE], across="speed, m/s", label="force, kN", line=RAW),
+    "polar": lambda: plots.polar([Curve(name="pivot free", x=T, y=40.0 + SINE.y), RAW], label="angle, deg"),
+    "outlines": lambda: plots.outlines(
+        [View(title="from behind", across="m", up="m", shapes=[Outline(name="zone", points=SQUARE, filled=True)])]
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_a_figure_is_whole_and_its_colours_are_the_pages(name: str) -> None:
+    svg = FIGURES[name]()
+    root = ElementTree.fromstring(svg)
+    assert root.tag == "svg"
+    assert root.attrib["viewBox"].startswith("0 0 ")
+    ids = re.findall(r'\sid="([^"]*)"', svg)
+    assert len(ids) == len(set(ids))
+    assert {*re.findall(r'href="#([^"]*)"', svg), *re.findall(r"url\(#([^)]*)\)", svg)} <= {*ids}
+    assert "://" not in svg
+    assert "<style" not in svg, "a style sheet in a figure is one for the whole page"
+    bare = re.sub(r"var\(--\w+, #[0-9a-f]{6}\)|=\"#[^\"]*\"|url\(#[^)]*\)", "", svg)
+    assert "#" not in bare
+    inked = [t for t in root.iter("text") if "fill: var(--" not in t.attrib["style"]]
+    assert not inked, "text that would be black on black"
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_the_same_data_gives_the_same_bytes_whatever_the_users_settings(name: str) -> None:
+    first = FIGURES[name]()
+    with mpl.rc_context({"font.size": 21.0, "lines.linewidth": 9.0, "xtick.major.size": 12.0, "svg.fonttype": "path"}):
+        assert FIGURES[name]() == first
+
+
+def test_no_two_figures_share_an_id() -> None:
+    ids = [i for name in FIGURES for i in re.findall(r'\sid="([^"]*)"', FIGURES[name]())]
+    assert len(ids) == len(set(ids))
+
+
+def points_of(svg: str, role: str) -> Array:
+    """Vertices of the widest path of a role's colour, in the figure's own units."""
+    paths = re.findall(r'<path d="([^"]*)"[^>]*?stroke: var\(--' + role, svg)
+    found = [np.array([[float(v) for v in pair] for pair in re.findall(r"[ML] (\S+) (\S+)", path)]) for path in paths]
+    return max(found, key=lambda p: float(np.ptp(p[:, 0])))
+
+
+@pytest.mark.parametrize("at", [0, 1, 4_999, 123_456, 199_998, 200_000])
+def test_a_spike_of_one_sample_among_many_is_drawn_as_high_as_it_is(at: int) -> None:
+    time = np.linspace(0.0, 4.0, 200_001)
+    force = np.where(np.arange(time.size) == at, 63.2, 0.0)
+    drawn = points_of(plots.history([Curve(name="raw", x=time, y=force)], label="kN"), "first")
+    few = np.unique(np.array([0, at - 1, at, at + 1, 200_000]).clip(0, 200_000))
+    plain = points_of(plots.history([Curve(name="raw", x=time[few], y=force[few])], label="kN"), "first")
+    assert len(drawn) < 2000
+    assert drawn[:, 1].min() == plain[:, 1].min()
+    assert drawn[np.argmin(drawn[:, 1]), 0] == pytest.approx(plain[np.argmin(plain[:, 1]), 0], abs=0.02)
+    assert drawn[:, 1].max() == plain[:, 1].max()
+
+
+def test_extremes_of_both_coordinates_and_gaps_survive_thinning() -> None:
+    draw = np.random.default_rng(3)
+    x, y = draw.normal(size=50_000), draw.normal(size=50_000)
+    y[20_000:20_400] = np.nan
+    a, b = thinned(x, y)
+    assert len(a) <= plots.MOST_POINTS + 402
+    good = np.isfinite(y)
+    assert (a.min(), a.max()) == (x[good].min(), x[good].max())
+    assert (np.nanmin(b), np.nanmax(b)) == (np.nanmin(y), np.nanmax(y))
+    assert np.isnan(b).any()
+    assert len(thinned(x[:10], y[:10])[0]) == 10
+
+
+def test_the_residual_is_measured_less_simulated() -> None:
+    measured = Curve(name="measured", x=np.array([0.0, 1.0, 2.0]), y=np.array([1.0, 3.0, 1.0]))
+    simulated = Curve(name="simulated", x=np.array([0.0, 2.0]), y=np.array([1.0, 1.0]))
+    peak = points_of(plots.overlay(measured, simulated, label="kN"), "muted")
+    assert peak[1, 1] < peak[0, 1]  # upwards is less in a figure: +2 at the middle stamp
+    assert peak[0, 1] == peak[2, 1]
+
+
+def test_a_tornado_shows_the_widest_first() -> None:
+    svg = plots.tornado(["small", "large"], [1.0, 0.0], [1.2, 4.0], centre=1.1, label="kN")
+    assert svg.index(">small<") != -1
+    heights = {n: float(re.search(rf'y="([\d.]+)"[^>]*>{n}<', svg)[1]) for n in ("small", "large")}  # type: ignore[index]
+    assert heights["large"] < heights["small"]
+
+
+def test_colours_of_figures_and_of_the_page_are_the_same() -> None:
+    css = (Path(plots.__file__).parent / "templates" / "page.css").read_text()
+    light = css[: css.index("@media")]
+    for role, colour in COLOURS.items():
+        assert f"--{role}: {colour}" in light
+        assert css.count(f"--{role}:") == 3, "light, dark and paper"
