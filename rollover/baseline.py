@@ -141,7 +141,7 @@ def path_of(scenario: Path) -> Path:
 
 
 def read(path: Path) -> Baseline:
-    """A baseline. Raises `InputError`, for a tolerance below the discretisation error too."""
+    """Read a baseline. Raises `InputError`, for a tolerance below the discretisation error too."""
     found: Baseline = document.load(path, Baseline)
     if found.scenario != path.stem:
         raise InputError(
@@ -350,9 +350,9 @@ def write(folder_of: Mapping[Path, Baseline]) -> None:
                 part_.unlink()
 
 
-HEAD = """Peak loads of {name} as they ought to be: `rollover regress {name}` compares, `--update --reason` rewrites.
-Tolerances are relative. Raise one by hand, with the reason, and an update keeps it; below the change at half the
-step or the scatter it is refused."""
+HEAD = """Peak loads of {name} as they ought to be.
+`rollover regress {name}` compares them, `--update --reason TEXT` rewrites them. Tolerances are relative. Raise
+one by hand, with the reason, and an update keeps it; below the change at half the step or the scatter it is refused."""
 
 
 def _former(before: Baseline) -> Former:

@@ -65,10 +65,15 @@ TABLES: dict[str, Callable[[], list[Row]]] = {
 
 
 def check(name: str) -> str:
-    """Validate a scenario, vehicle, ROPS or soil file and say which of these it is. Raises `InputError`."""
+    """Validate a scenario, vehicle, ROPS, soil or baseline file and say which of these it is. Raises `InputError`."""
     path = document.find(name)
     keys = document.headings(path)
     kind = keys["kind"].plain if "kind" in keys else None
+    if str(keys["format"].plain if "format" in keys else "").startswith("rollover-baseline/"):
+        from rollover import baseline  # brings the simulator along, which the other files need not
+
+        baseline.read(path)
+        return "baseline"
     for what, annotation, meant in (
         ("soil", scenarios.AnyLaw, kind in known_laws()),
         ("vehicle", scenarios.AnyVehicle, kind in document.slot_of(scenarios.AnyVehicle).kinds),

@@ -25,11 +25,12 @@ from rollover.scenario import Scenario, load, schema
 from rollover.vehicle import Striker, Vehicle, chassis_of
 
 FOLDER = document.shipped_folder()
-FILES = sorted(FOLDER.rglob("*.yaml"))
+FILES = sorted(path for path in FOLDER.rglob("*.yaml") if path.name != "excluded.yaml")
 SCENARIOS = [path for path in FILES if path.parent == FOLDER]
 VEHICLES = [path for path in FILES if path.parent.name == "vehicles"]
 SOILS = [path for path in FILES if path.parent.name == "soils"]
 FRAMES = [path for path in FILES if path.parent.name == "rops"]
+BASELINES = [path for path in FILES if path.parent.name == "baselines"]
 
 
 def name_of(path: Path) -> str:
@@ -40,12 +41,14 @@ def test_there_are_files_of_every_sort() -> None:
     assert {"drop_test", "rops_drop", "side_overturn", "side_overturn_slope"} <= {p.stem for p in SCENARIOS}
     assert {"utility_tractor", "compact_tractor", "rops_rig"} <= {p.stem for p in VEHICLES}
     assert {"natural_clay"} <= {p.stem for p in SOILS}
-    assert set(FILES) == {*SCENARIOS, *VEHICLES, *SOILS, *FRAMES}
+    assert set(FILES) == {*SCENARIOS, *VEHICLES, *SOILS, *FRAMES, *BASELINES}
 
 
 @pytest.mark.parametrize("path", FILES, ids=name_of)
 def test_every_file_is_in_order(path: Path) -> None:
-    sort = {"vehicles": "vehicle", "soils": "soil", "rops": "rops"}.get(path.parent.name, "scenario")
+    sort = {"vehicles": "vehicle", "soils": "soil", "rops": "rops", "baselines": "baseline"}.get(
+        path.parent.name, "scenario"
+    )
     assert catalogue.check(str(path)) == sort
 
 
