@@ -34,7 +34,7 @@ _ENERGY = {
     "potential": "of all bodies in gravity, zero at the start",
     "soil": "put into the ground's loading curve, less what came back",
     "tyre": "stored and lost in the tyres",
-    "rops": "stored and lost in the ROPS mounts",
+    "rops": "stored and lost in the mounts and hinges of the ROPS",
     "friction": "lost in sliding",
     "collision": "lost in the collision with the co-moving mass, eq (8)",
     "axle": "stored and lost in the front axle's stops",
@@ -63,11 +63,16 @@ CHANNELS: dict[str, Channel] = {
         *_axes("rops/force", "N", "ground on the ROPS, vehicle axes"),
         Channel(name="rops/force", unit="N", meaning="ground on the ROPS, resultant"),
         *_axes("rops/mount/NAME/force", "N", "load through the mount, vehicle axes"),
+        *_axes("rops/mount/NAME/moment", "N m", "through the mount, vehicle axes"),
+        *_axes("rops/hinge/NAME/force", "N", "load through the hinge on the upper part, axes of the lower"),
+        *_axes("rops/hinge/NAME/moment", "N m", "through the hinge on the upper part, axes of the lower"),
+        *_axes("rops/hinge/NAME/angle", "rad", "turn of the upper part against the lower, rotation vector"),
         Channel(name="rops/impulse", unit="N s", meaning="collision impulse on the ROPS, accumulated"),
         Channel(name="rops/deflection", unit="m", meaning="of the loaded upper corner against the chassis"),
         Channel(name="rops/energy", unit="J", meaning="absorbed by the ROPS"),
         Channel(name="wheel/NAME/force_normal", unit="N", meaning="ground on the tyre"),
         Channel(name="axle/front/angle", unit="rad", meaning="of the front axle about its pivot"),
+        Channel(name="axle/front/impulse", unit="N m s", meaning="of the axle on its stops, accumulated"),
         *[Channel(name=f"energy/{name}", unit="J", meaning=meaning) for name, meaning in _ENERGY.items()],
     ]
 }
@@ -126,6 +131,16 @@ UNITS: dict[str, dict[str, float]] = {
         **dict.fromkeys(("N s", "Ns", "N·s", "N*s", "kg m/s", "kg*m/s"), 1.0),
         **dict.fromkeys(("kN s", "kNs", "kN·s", "kN*s"), 1e3),
         **dict.fromkeys(("lbf s", "lbf*s", "lbf·s"), _POUND),
+    },
+    "N m": {
+        **dict.fromkeys(("N m", "Nm", "N·m", "N*m"), 1.0),
+        **dict.fromkeys(("kN m", "kNm", "kN·m", "kN*m"), 1e3),
+        **dict.fromkeys(("ft lbf", "ft*lbf", "ft-lbf", "ft·lbf", "lbf ft"), _FOOT * _POUND),
+        **dict.fromkeys(("in lbf", "in*lbf", "in-lbf", "lbf in"), _INCH * _POUND),
+    },
+    "N m s": {
+        **dict.fromkeys(("N m s", "Nms", "N·m·s", "N*m*s"), 1.0),
+        **dict.fromkeys(("kN m s", "kNms"), 1e3),
     },
     "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6, "km": 1e3, "in": _INCH, "ft": _FOOT},
     "m2": {

@@ -17,7 +17,7 @@ from rollover.inertia import MassProperties
 from rollover.scenario import Ground, Scenario
 from rollover.shapes import Disc, Shape, SurfacePoints, rectangle, sample
 from rollover.tables import Tables
-from rollover.vehicle import Striker, Vehicle, Wheel, chassis_of
+from rollover.vehicle import Striker, Vehicle, Wheel, carried
 
 Array = NDArray[np.float64]
 
@@ -64,6 +64,9 @@ def bodies_of(vehicle: Vehicle | Striker, elements: Elements) -> tuple[Body, ...
     def sampled(shapes: tuple[Shape, ...]) -> list[tuple[str, SurfacePoints]]:
         return [(shape.name, patch) for shape in shapes for patch in sample(shape, spacing)]
 
+    def loads(carrier: str) -> list[tuple[str, SurfacePoints]]:
+        return [patch for a in vehicle.attached if a.carried_by == carrier for patch in sampled(a.outline)]
+
     def walls(carrier: str) -> list[tuple[str, SurfacePoints]]:
         return [
             (disc.name, patch)
@@ -76,14 +79,20 @@ def bodies_of(vehicle: Vehicle | Striker, elements: Elements) -> tuple[Body, ...
     found = [
         Body(
             name="chassis",
-            inertia=chassis_of(vehicle),
-            surfaces=tuple(sampled(vehicle.outline) + walls("chassis")),
+            inertia=carried(vehicle, "chassis"),
+            surfaces=tuple(sampled(vehicle.outline) + loads("chassis") + walls("chassis")),
         )
     ]
     if vehicle.front_axle is not None:
-        found.append(Body(name="front_axle", inertia=vehicle.front_axle.body, surfaces=tuple(walls("front_axle"))))
+        inertia = carried(vehicle, "front_axle")
+        surfaces = tuple(walls("front_axle") + loads("front_axle"))
+        found.append(Body(name="front_axle", inertia=inertia, surfaces=surfaces))
     if vehicle.rops is not None:
-        found.append(Body(name="rops", inertia=vehicle.rops.body, surfaces=tuple(sampled(vehicle.rops.members))))
+        for name, (inertia, members) in vehicle.rops.parts.items():
+            if name == "rops":
+                inertia = carried(vehicle, "rops")
+            extra = loads("rops") if name == "rops" else []
+            found.append(Body(name=name, inertia=inertia, surfaces=tuple(sampled(members) + extra)))
     return tuple(found)
 
 
@@ -135,6 +144,8 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
             tyre.vertical_damping,
             tyre.friction,
             float(wheel.rolls),
+            math.inf if tyre.bottoming is None else tyre.bottoming * tyre.radius,
+            tyre.bottoming_stiffness,
         ]
     mount_f, mount_i = _mounts(vehicle, bodies, row)
     joint_i, joint_f, axle_f, axle_i = _joints(vehicle, bodies, row)
@@ -197,6 +208,7 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         wheel_memory=np.zeros((len(wheels), c.EDGE_COLUMNS)),
         mount_memory=np.zeros((len(mount_f), c.SET_COLUMNS)),
         axle_memory=np.zeros(c.AXLE_MEMORY),
+        clock=np.zeros(1),
         pose=np.zeros((nb, c.POSE_COLUMNS)),
         counts=np.zeros(c.COUNTS, dtype=np.int64),
         work=np.zeros(c.WORKS),
@@ -240,23 +252,18 @@ def _mounts(
     vehicle: Vehicle | Striker, bodies: tuple[Body, ...], row: dict[str, int]
 ) -> tuple[Array, NDArray[np.int64]]:
     if isinstance(vehicle, Striker) or vehicle.rops is None:
-        return np.zeros((0, c.MOUNT_COLUMNS)), np.zeros(2, dtype=np.int64)
-    a, b = row["chassis"], row["rops"]
-    rows = []
-    for mount in vehicle.rops.mounts:
-        place = np.array(mount.position)
-        rows.append(
-            [
-                *(place - bodies[b].centre),
-                *(place - bodies[a].centre),
-                *mount.stiffness,
-                *mount.damping,
-                *mount.rotational_stiffness,
-                *mount.rotational_damping,
-                *(math.inf if f is None else f for f in mount.yield_force),
-            ]
-        )
-    return np.array(rows), np.array([a, b], dtype=np.int64)
+        return np.zeros((0, c.MOUNT_COLUMNS)), np.zeros((0, 2), dtype=np.int64)
+    rows, pairs = [], []
+    for joints, below, above in (
+        (vehicle.rops.mounts, "chassis", "rops"),
+        (vehicle.rops.hinges, "rops", "rops_upper"),
+    ):
+        for joint in joints:
+            a, b, place = row[below], row[above], np.array(joint.position)
+            far = float(joint.turns_far)
+            rows.append([*(place - bodies[b].centre), *(place - bodies[a].centre), *joint.row, far])
+            pairs.append([a, b])
+    return np.array(rows), np.array(pairs, dtype=np.int64)
 
 
 def _joints(
@@ -270,5 +277,6 @@ def _joints(
     a, b = row["chassis"], row["front_axle"]
     axle, pivot = vehicle.front_axle, np.array(vehicle.front_axle.pivot)
     points = np.array([[*(pivot - bodies[a].centre), *(pivot - bodies[b].centre)]])
-    axle_f = np.array([axle.swing, axle.stop_stiffness, axle.stop_damping])
+    impact = float(axle.stop == "impact")
+    axle_f = np.array([axle.swing, axle.stop_stiffness, axle.stop_damping, impact, axle.stop_restitution])
     return np.array([[c.PIVOT, a, b]], dtype=np.int64), points, axle_f, np.array([a, b], dtype=np.int64)

@@ -14,10 +14,23 @@ from rollover.forces import generalised_forces, tyre_point
 from rollover.frames import from_angles, rotation_vector
 from rollover.jacobian import stiffness
 from rollover.step import stand
-from rollover.tables import E_DEPTH_NOW, E_FORCE_NOW, POSE_COLUMNS, ROT, W_CENTRE, W_HALF, W_KZ, Tables, handle
+from rollover.tables import (
+    E_DEPTH_NOW,
+    E_FORCE_NOW,
+    POSE_COLUMNS,
+    ROT,
+    S_FORCE_NOW,
+    S_SET,
+    T_PLAY,
+    W_CENTRE,
+    W_HALF,
+    W_KZ,
+    Tables,
+    handle,
+)
 
 Array = NDArray[np.float64]
-ROLL, PITCH, AXLE, SLIDE, YAW, SHIFT, TILT = 1, 2, 3, 4, 6, 7, 10  # places in u; 0 is the height
+ROLL, PITCH, AXLE, SLIDE, YAW, PARTS = 1, 2, 3, 4, 6, 7  # places in u; 0 is the height
 TOLERANCE = 1e-7  # of forces and moments over the weight
 
 
@@ -35,7 +48,7 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 class Equilibrium:
-    """Few coordinates u: height, roll, pitch, axle angle, slide (2), yaw; shift (3) and tilt (3) of the ROPS.
+    """Few coordinates u: height, roll, pitch, axle angle, slide (2), yaw; shift (3) and tilt (3) of each ROPS body.
 
     Height is along the surface's normal, slide along it; roll, pitch and yaw turn about the vehicle's origin. The
     residuals are the virtual work of all forces for each coordinate, over the weight. The tyres' stick springs hold
@@ -52,7 +65,12 @@ class Equilibrium:
         n = t.plane[:3]
         x = np.array([n[2], 0.0, -n[0]]) / math.hypot(n[0], n[2])
         self.along = np.array([x, _cross(n, x)])  # two directions in the surface
-        self.size = 13 if bodies[-1].name == "rops" else 7
+        frames = [b.name for b in bodies if b.name.startswith("rops")]
+        self.shift = {name: PARTS + 6 * i for i, name in enumerate(frames)}  # tilt stands three places on
+        self.size = PARTS + 6 * len(frames)
+        # in its play a part has no place of its own: it is found without, then put where it bears
+        self.play = t.mount_f[:, T_PLAY : T_PLAY + 6].copy()
+        t.mount_f[:, T_PLAY : T_PLAY + 6] = 0.0
         self.scale = max(-float(self.weight.sum()), 1.0)
 
     def guess(self, roll: float = 0.0, axle: float = 0.0) -> Array:
@@ -87,8 +105,9 @@ class Equilibrium:
         for body in self.bodies:
             if body.name == "front_axle":
                 found.append(R @ from_angles(u[AXLE], 0.0, 0.0))
-            elif body.name == "rops":
-                found.append(R @ from_angles(*u[TILT : TILT + 3]))
+            elif body.name in self.shift:
+                at = self.shift[body.name] + 3
+                found.append(R @ from_angles(*u[at : at + 3]))
             else:
                 found.append(R)
         return found
@@ -103,8 +122,9 @@ class Equilibrium:
             if body.name == "front_axle":
                 pivot = self.t.joint_f[0, 3:6]  # about the axle's centre of mass
                 x = x + R @ pivot - turn @ pivot
-            elif body.name == "rops":
-                x = x + R @ u[SHIFT : SHIFT + 3]
+            elif body.name in self.shift:
+                shift = self.shift[body.name]
+                x = x + R @ u[shift : shift + 3]
             parts += [x, rotation_vector(turn)]
         return np.concatenate(parts)
 
@@ -126,11 +146,12 @@ class Equilibrium:
             if body.name == "front_axle":
                 rows[AXLE, at : at + 3] = _cross(R[:, 0], -turn @ self.t.joint_f[0, 3:6])
                 rows[AXLE, at + 3 : at + 6] = turn.T @ R[:, 0]
-            elif body.name == "rops":
-                tilt = [turn[:, 0], R @ from_angles(0.0, 0.0, u[TILT + 2])[:, 1], R[:, 2]]
+            elif body.name in self.shift:
+                shift = self.shift[body.name]
+                tilt = [turn[:, 0], R @ from_angles(0.0, 0.0, u[shift + 5])[:, 1], R[:, 2]]
                 for k in range(3):
-                    rows[SHIFT + k, at : at + 3] = R[:, k]
-                    rows[TILT + k, at + 3 : at + 6] = turn.T @ tilt[k]
+                    rows[shift + k, at : at + 3] = R[:, k]
+                    rows[shift + 3 + k, at + 3 : at + 6] = turn.T @ tilt[k]
         return rows
 
     def residual(self, u: Array) -> Array:
@@ -161,6 +182,27 @@ class Equilibrium:
                     break
             u, r = u_next, r_next
         return None
+
+    def seated(self, u: Array, fixed: tuple[int, ...] = ()) -> Array:
+        """The same equilibrium with the parts of the ROPS where they bear at the end of their play; play is given back.
+
+        A connector that bears with force F stands off by its play to that side: without play, but with this as its
+        permanent set, it has the same force. Where no side is found to stay, parts begin to move when the run does.
+        """
+        sets = self.t.mount_memory[:, S_SET : S_SET + 6]
+        for _ in range(5 if self.play.any() else 0):
+            self.residual(u)
+            sides = -np.sign(self.t.mount_memory[:, S_FORCE_NOW : S_FORCE_NOW + 6])
+            if np.array_equal(sets, sides * self.play):
+                break
+            sets[:] = sides * self.play
+            found = self.solve(u, fixed)
+            if found is None:
+                break
+            u = found
+        sets[:] = 0.0
+        self.t.mount_f[:, T_PLAY : T_PLAY + 6] = self.play
+        return u
 
     def _descend(self, u: Array, r: Array, step: Array, free: list[int]) -> tuple[bool, Array, Array]:
         """Go along a step, at most 0.1 in any coordinate, halved until the residual falls; whether it did."""

@@ -12,8 +12,10 @@ import numpy as np
 
 from ground.compiled import compiled
 from ground.kernel import BODY, MASS_B, NORMAL, OFFSET, OWNER_R, PLACE, SHEAR, SPREAD, friction_force, normal_force
+from rollover.connectors import try_mounts
 from rollover.tables import (
     A_C,
+    A_IMPACT,
     A_K,
     A_SWING,
     ACTIVE,
@@ -32,31 +34,23 @@ from rollover.tables import (
     FN,
     FT,
     M_ANGLE_NOW,
+    M_FREE,
+    M_REACH,
     M_TORQUE_NOW,
     MOVED,
     MU,
     OMEGA,
     RELAXATION,
     ROT,
-    S_ANGLE_NOW,
-    S_DELTA_NOW,
-    S_FORCE_NOW,
-    S_SET,
-    S_TORQUE_NOW,
     STICK,
-    T_C,
-    T_CHASSIS,
-    T_CR,
-    T_K,
-    T_KR,
-    T_ROPS,
-    T_YIELD,
     VEL,
     W_AXIS,
+    W_BOTTOM,
     W_C,
     W_CENTRE,
     W_CROWN,
     W_HALF,
+    W_KB,
     W_KY,
     W_KZ,
     W_MU,
@@ -140,6 +134,16 @@ def tyre_point(row: Any, wheel: Any, n: Any, e: Any, x: Any) -> float:
 
 
 @compiled
+def lying(lean: float) -> Any:
+    """Share of the tread's springs that is left when a tyre lies down, 1 up to a camber of 70 degrees, and its slope.
+
+    The slope is that over lean^2.
+    """
+    s2 = min(lean * lean, 1.0)
+    return ((1.0 - s2) / FLAT, -1.0 / FLAT) if 1.0 - s2 < FLAT else (1.0, 0.0)
+
+
+@compiled
 def tyre_stiffness(wheel: Any, lean: float) -> Any:
     """k(lean^2) and its derivative: radial and lateral springs in series, faded out over the last 20 degrees.
 
@@ -148,9 +152,7 @@ def tyre_stiffness(wheel: Any, lean: float) -> Any:
     s2 = min(lean * lean, 1.0)
     series = (1.0 - s2) / wheel[W_KZ] + s2 / wheel[W_KY]
     slope = 1.0 / wheel[W_KY] - 1.0 / wheel[W_KZ]
-    fade, fall = 1.0, 0.0
-    if 1.0 - s2 < FLAT:
-        fade, fall = (1.0 - s2) / FLAT, -1.0 / FLAT
+    fade, fall = lying(lean)
     return fade / series, fall / series - fade * slope / (series * series)
 
 
@@ -189,10 +191,15 @@ def try_wheels(t: Any, Q: Any) -> None:
         hold = g[E_ANCHOR : E_ANCHOR + 3]
         v = velocity(row, hold[0], hold[1], hold[2])
         stiffness, slope = tyre_stiffness(c, lean)
-        spring = stiffness * depth
+        spring, energy, beyond = stiffness * depth, 0.5 * stiffness * depth * depth, max(depth - c[W_BOTTOM], 0.0)
+        fade, fall = lying(lean)
+        if beyond > 0.0:
+            # the rim bottoms: a second spring in parallel, with an energy of its own
+            spring += fade * c[W_KB] * beyond
+            energy += 0.5 * fade * c[W_KB] * beyond * beyond
         damping = max(c[W_C] * stiffness / c[W_KZ] * rate, -spring)  # never a pull
         force = spring + damping
-        g[E_FORCE_NOW], g[E_DAMPING_NOW], g[E_ENERGY_NOW] = force, damping, 0.5 * spring * depth
+        g[E_FORCE_NOW], g[E_DAMPING_NOW], g[E_ENERGY_NOW] = force, damping, energy
         stick = max(c[W_MU] * force / c[W_KY], 1e-9)
         slip = (g[E_MOVED], g[E_MOVED + 1], g[E_MOVED + 2])
         shear = (g[E_SHEAR], g[E_SHEAR + 1], g[E_SHEAR + 2])
@@ -205,59 +212,12 @@ def try_wheels(t: Any, Q: Any) -> None:
         add_force(row, b, r, force * n[0], force * n[1], force * n[2], Q)
         add_force(row, b, hold, f[0], f[1], f[2], Q)  # friction holds the tread where it took hold of it
         # the stiffness falls with camber: the moment that goes with it keeps the spring conservative
-        moment = -slope * lean * depth * depth
+        moment = -slope * lean * depth * depth - fall * c[W_KB] * lean * beyond * beyond
         ex, ey, ez = cross(e[0], e[1], e[2], n[0], n[1], n[2])
         ex, ey, ez = to_body(row, moment * ex, moment * ey, moment * ez)
         Q[6 * b + 3] += ex
         Q[6 * b + 4] += ey
         Q[6 * b + 5] += ez
-
-
-@compiled
-def relative_angle(a: Any, b: Any, k: int) -> float:
-    """Component k of the rotation of body b against body a, in a's axes; exact to second order in the angle."""
-    i, j = (k + 1) % 3, (k + 2) % 3
-    ji, ij = 0.0, 0.0
-    for m in range(3):
-        ji += a[ROT + 3 * m + j] * b[ROT + 3 * m + i]
-        ij += a[ROT + 3 * m + i] * b[ROT + 3 * m + j]
-    return 0.5 * (ji - ij)
-
-
-@compiled
-def try_mounts(t: Any, Q: Any) -> None:
-    """Loads through the mounts: on the ROPS, and their reaction on the chassis at the same point."""
-    if t.mount_f.shape[0] == 0:
-        return
-    c, b = t.mount_i[0], t.mount_i[1]
-    chassis, rops = t.pose[c], t.pose[b]
-    local = np.empty(3)
-    x, y, z = spin(rops)
-    turn = to_body(chassis, x, y, z)
-    for i in range(t.mount_f.shape[0]):
-        f, g = t.mount_f[i], t.mount_memory[i]
-        r = f[T_ROPS : T_ROPS + 3]
-        x, y, z = place(rops, r[0], r[1], r[2])
-        # the mounting point of the ROPS, in chassis axes about the chassis' centre of mass
-        local[0], local[1], local[2] = to_body(chassis, x - chassis[X], y - chassis[X + 1], z - chassis[X + 2])
-        v, w = velocity(rops, r[0], r[1], r[2]), velocity(chassis, local[0], local[1], local[2])
-        rate = to_body(chassis, v[0] - w[0], v[1] - w[1], v[2] - w[2])
-        for k in range(3):
-            delta = local[k] - f[T_CHASSIS + k]
-            spring = f[T_K + k] * (delta - g[S_SET + k])
-            spring = min(max(spring, -f[T_YIELD + k]), f[T_YIELD + k])
-            angle = relative_angle(chassis, rops, k)
-            g[S_DELTA_NOW + k], g[S_ANGLE_NOW + k] = delta, angle
-            g[S_FORCE_NOW + k] = -spring - f[T_C + k] * rate[k]
-            g[S_TORQUE_NOW + k] = -f[T_KR + k] * angle - f[T_CR + k] * (turn[k] - chassis[OMEGA + k])
-        x, y, z = to_world(chassis, g[S_FORCE_NOW], g[S_FORCE_NOW + 1], g[S_FORCE_NOW + 2])
-        add_force(rops, b, r, x, y, z, Q)
-        add_force(chassis, c, local, -x, -y, -z, Q)
-        x, y, z = to_world(chassis, g[S_TORQUE_NOW], g[S_TORQUE_NOW + 1], g[S_TORQUE_NOW + 2])
-        torque = to_body(rops, x, y, z)
-        for k in range(3):
-            Q[6 * b + 3 + k] += torque[k]
-            Q[6 * c + 3 + k] -= g[S_TORQUE_NOW + k]
 
 
 @compiled
@@ -275,10 +235,14 @@ def try_axle(t: Any, Q: Any) -> None:
     x, y, z = spin(axle)
     rate = to_body(chassis, x, y, z)[0] - chassis[OMEGA]
     torque = 0.0
-    if angle > t.axle_f[A_SWING]:
-        torque = min(-t.axle_f[A_K] * (angle - t.axle_f[A_SWING]) - t.axle_f[A_C] * rate, 0.0)
-    elif angle < -t.axle_f[A_SWING]:
-        torque = max(-t.axle_f[A_K] * (angle + t.axle_f[A_SWING]) - t.axle_f[A_C] * rate, 0.0)
+    # a stop that has been struck holds from where that was; before, it is the impact that turns the axle round
+    swing = max(t.axle_f[A_SWING], t.axle_memory[M_REACH])
+    if t.axle_f[A_IMPACT] > 0.0 and t.axle_memory[M_FREE] > 0.0:
+        swing = math.inf
+    if angle > swing:
+        torque = min(-t.axle_f[A_K] * (angle - swing) - t.axle_f[A_C] * rate, 0.0)
+    elif angle < -swing:
+        torque = max(-t.axle_f[A_K] * (angle + swing) - t.axle_f[A_C] * rate, 0.0)
     t.axle_memory[M_ANGLE_NOW], t.axle_memory[M_TORQUE_NOW] = angle, torque
     Q[6 * c + 3] -= torque
     x, y, z = to_world(chassis, torque, 0.0, 0.0)

@@ -13,6 +13,7 @@ from ground.kernel import AREA, CELL, LINE_Z, SINKAGE
 from rollover import tables as c
 from rollover.contact import Body
 from rollover.frames import angles, matrices
+from rollover.rops import Rops
 from rollover.scenario import Scenario
 from rollover.step import kinetic_of_soil
 from rollover.tables import (
@@ -22,7 +23,9 @@ from rollover.tables import (
     E_WHERE,
     FLAGS_NOW,
     M_ANGLE,
+    M_IMPULSE,
     RESULTANT_COLUMNS,
+    S_DELTA_NOW,
     S_FORCE_NOW,
     WORKS,
     Handle,
@@ -35,7 +38,7 @@ Array = NDArray[np.float64]
 
 @compiled
 def write_row(t: Any, q: Any, qd: Any, qdd: Any, row: Any) -> None:
-    """State, contact resultants, wheel and mount forces, axle angle, work, soil's kinetic energy, sinkage, flags."""
+    """State, contact resultants, wheel, mount and hinge forces, axle, work, soil's kinetic energy, sinkage, flags."""
     n, nb = q.size, t.pose.shape[0]
     for j in range(n):
         row[j], row[n + j], row[2 * n + j] = q[j], qd[j], qdd[j]
@@ -52,11 +55,12 @@ def write_row(t: Any, q: Any, qd: Any, qdd: Any, row: Any) -> None:
             row[k + 4 + j] = g[E_WHERE + j]
         k += 7
     for i in range(t.mount_f.shape[0]):
-        for j in range(3):
-            row[k] = t.mount_memory[i, S_FORCE_NOW + j]
-            k += 1
-    row[k] = t.axle_memory[M_ANGLE]
-    k += 1
+        for j in range(6):
+            row[k + j] = t.mount_memory[i, S_FORCE_NOW + j]
+            row[k + 6 + j] = t.mount_memory[i, S_DELTA_NOW + j]
+        k += 12
+    row[k], row[k + 1] = t.axle_memory[M_ANGLE], t.axle_memory[M_IMPULSE]
+    k += 2
     for j in range(WORKS):
         row[k] = t.work[j]
         k += 1
@@ -73,7 +77,7 @@ def write_row(t: Any, q: Any, qd: Any, qdd: Any, row: Any) -> None:
 def row_length(t: Tables) -> int:
     """Columns that `write_row` fills."""
     n = len(t.mass)
-    return int(3 * n + len(t.pose) * RESULTANT_COLUMNS + 7 * len(t.wheel_i) + 3 * len(t.mount_f) + 1 + WORKS + 1 + 3)
+    return int(3 * n + len(t.pose) * RESULTANT_COLUMNS + 7 * len(t.wheel_i) + 12 * len(t.mount_f) + 2 + WORKS + 1 + 3)
 
 
 @dataclass
@@ -118,8 +122,8 @@ class States:
     qdd: Array
     resultant: Array  # (n, nb, RESULTANT_COLUMNS)
     wheels: Array  # (n, nw, 7): normal force, friction (3), place (3)
-    mounts: Array  # (n, nt, 3)
-    axle: Array  # (n,)
+    mounts: Array  # (n, nt, 12): force and moment on body b, deflection and turn, all in body a's axes
+    axle: Array  # (n, 2): angle, impulse of the stop
     work: Array  # (n, WORKS)
     soil_kinetic: Array
     sinkage: Array
@@ -145,8 +149,8 @@ def states(rows: Array, nb: int, nw: int, nt: int) -> States:
         qdd=take(nb, 6),
         resultant=take(nb, RESULTANT_COLUMNS),
         wheels=take(nw, 7),
-        mounts=take(nt, 3),
-        axle=take(),
+        mounts=take(nt, 12),
+        axle=take(2),
         work=take(WORKS),
         soil_kinetic=take(),
         sinkage=take(),
@@ -202,13 +206,15 @@ def channels(scenario: Scenario, s: States, t: Tables, bodies: tuple[Body, ...])
     else:
         found |= _chassis(s, row["chassis"])
     if "rops" in row:
-        found |= _rops(scenario, s, bodies, row["chassis"], row["rops"])
+        found |= _rops(scenario, s, bodies, row)
     vehicle = scenario.vehicle
     if not isinstance(vehicle, Striker):
         for w, wheel in enumerate(vehicle.wheels):
             found[f"wheel/{wheel.name}/force_normal"] = s.wheels[:, w, 0]
         if vehicle.front_axle is not None:
-            found["axle/front/angle"] = s.axle
+            found["axle/front/angle"] = s.axle[:, 0]
+            if vehicle.front_axle.stop == "impact":
+                found["axle/front/impulse"] = s.axle[:, 1]
     for name, values in energies(s, t, bodies, scenario.gravity).items():
         found[f"energy/{name}"] = values
     return {name: np.ascontiguousarray(values) for name, values in found.items()}
@@ -227,33 +233,52 @@ def _chassis(s: States, b: int) -> dict[str, Array]:
     return found
 
 
-def _rops(scenario: Scenario, s: States, bodies: tuple[Body, ...], chassis: int, b: int) -> dict[str, Array]:
+def _rops(scenario: Scenario, s: States, bodies: tuple[Body, ...], row: dict[str, int]) -> dict[str, Array]:
     vehicle = scenario.vehicle
     assert not isinstance(vehicle, Striker)
     assert vehicle.rops is not None
-    R = matrices(s.q[:, chassis, 3:])
-    world = s.resultant[:, b, c.R_NORMAL : c.R_NORMAL + 3] + s.resultant[:, b, c.R_TANGENT : c.R_TANGENT + 3]
+    parts = [row[name] for name in vehicle.rops.parts]
+    R = matrices(s.q[:, row["chassis"], 3:])
+    resultant = s.resultant[:, parts].sum(axis=1)
+    world = resultant[:, c.R_NORMAL : c.R_NORMAL + 3] + resultant[:, c.R_TANGENT : c.R_TANGENT + 3]
     force = np.einsum("nji,nj->ni", R, world)
     found = {"rops/force": np.linalg.norm(world, axis=1)}
+    joined = [f"mount/{m.name}" for m in vehicle.rops.mounts] + [f"hinge/{m.name}" for m in vehicle.rops.hinges]
     for k, axis in enumerate("xyz"):
         found[f"rops/force_{axis}"] = force[:, k]
-        for m, mount in enumerate(vehicle.rops.mounts):
-            found[f"rops/mount/{mount.name}/force_{axis}"] = s.mounts[:, m, k]
-    found["rops/impulse"] = np.linalg.norm(s.resultant[:, b, c.R_IMPULSE : c.R_IMPULSE + 3], axis=1)
-    found["rops/deflection"] = corner_deflection(vehicle.rops.corner, s, bodies, chassis, b)
+        for m, name in enumerate(joined):
+            found[f"rops/{name}/force_{axis}"] = s.mounts[:, m, k]
+            found[f"rops/{name}/moment_{axis}"] = s.mounts[:, m, 3 + k]
+            if name.startswith("hinge/"):
+                found[f"rops/{name}/angle_{axis}"] = s.mounts[:, m, 9 + k]
+    found["rops/impulse"] = np.linalg.norm(resultant[:, c.R_IMPULSE : c.R_IMPULSE + 3], axis=1)
+    found["rops/deflection"] = corner_deflection(vehicle.rops, s, bodies, row["chassis"], parts)
     found["rops/energy"] = s.work[:, c.ROPS]
     return found
 
 
-def corner_deflection(
-    corner: tuple[float, float, float], s: States, bodies: tuple[Body, ...], chassis: int, b: int
-) -> Array:
-    """Way of the more deflected upper corner against the chassis, m, (n,)."""
-    R, R_rops = matrices(s.q[:, chassis, 3:]), matrices(s.q[:, b, 3:])
-    ways = []
-    for sign in (1.0, -1.0):
-        place = np.array([corner[0], sign * corner[1], corner[2]])
+def corner_deflection(rops: Rops, s: States, bodies: tuple[Body, ...], chassis: int, parts: list[int]) -> Array:
+    """Way of the loaded upper corner against the chassis, m, (n,).
+
+    Loaded is the corner closest to where the ground's force acts, or last acted; before any, the more deflected one.
+    """
+    R, R_rops, b = matrices(s.q[:, chassis, 3:]), matrices(s.q[:, parts[-1], 3:]), parts[-1]
+    places = [np.array([x, sign * y, z]) for x, y, z in (rops.corner, *rops.other_corners) for sign in (1.0, -1.0)]
+    ways, apart = [], []
+    resultant = s.resultant[:, parts].sum(axis=1)
+    weight = resultant[:, c.R_WEIGHT]
+    loaded = np.flatnonzero(weight > 0.0)
+    for place in places:
         world = s.q[:, b, :3] + R_rops @ (place - bodies[b].centre)
         local = np.einsum("nji,nj->ni", R, world - s.q[:, chassis, :3])
         ways.append(np.linalg.norm(local - (place - bodies[chassis].centre), axis=1))
-    return np.asarray(np.max(ways, axis=0))
+        force_at = resultant[loaded, c.R_POINT : c.R_POINT + 3] / weight[loaded, None]
+        apart.append(np.linalg.norm(world[loaded] - force_at, axis=1))
+    ways_ = np.array(ways)
+    if not len(loaded):
+        return np.asarray(ways_.max(axis=0))
+    # rows between two loaded ones belong to the earlier
+    since = np.searchsorted(loaded, np.arange(len(weight)), side="right") - 1
+    corner = np.argmin(apart, axis=0)[np.maximum(since, 0)]
+    way = ways_[corner, np.arange(len(weight))]
+    return np.asarray(np.where(since < 0, ways_.max(axis=0), way))

@@ -26,10 +26,12 @@ from ground.kernel import (
 )
 from rollover.dense import add_outer, dot, solve_in_place, times
 from rollover.tables import (
+    A_RESTITUTION,
     ACTIVE,
     FRACTION,
     GUIDE,
     R_IMPULSE,
+    ROT,
 )
 from rollover.vectors import depth_row, direction_row, to_body, to_world
 
@@ -256,3 +258,50 @@ def exchange(t: Any, new: Any, total: int, qd: Any) -> float:
     for k in range(n):
         qd[k] = after[k]
     return lost
+
+
+SLOW_STOP = 0.05  # rad/s: an axle that meets its stop more slowly stays there; below this a bounce lasts a few steps
+
+
+@compiled
+def strike_stop(t: Any, side: float, qd: Any) -> Any:
+    """Impact of the front axle on a stop: writes the velocities, returns the kinetic energy lost, J, and the impulse.
+
+    With s v the rate of the axle against the chassis about the pivot, towards the stop, and e the restitution,
+
+        (M + P) (v+ - v-) + G' l + s' p = 0,   G v+ = G v-,   s v+ = -e s v-:
+
+    angular momentum about the pivot is exchanged, the joint gives what it must, soil that moves along takes part.
+    """
+    n = t.mass.shape[0]
+    c, b = t.axle_i[0], t.axle_i[1]
+    P, J = t.mass.copy(), np.zeros(6)
+    for a in range(t.counts[ACTIVE]):
+        i = t.active[a]
+        if t.memory[i, MASS_B] > 0.0:
+            contact_row(t, i, J)
+            add_outer(P, t.memory[i, MASS_B], J, 6 * t.state[i, BODY])
+    joints = constraints(t)
+    last = joints.shape[0]
+    G = np.zeros((last + 1, n))
+    G[:last] = joints
+    x, y, z = to_body(t.pose[b], t.pose[c, ROT], t.pose[c, ROT + 3], t.pose[c, ROT + 6])
+    G[last, 6 * c + 3] = -side
+    G[last, 6 * b + 3], G[last, 6 * b + 4], G[last, 6 * b + 5] = side * x, side * y, side * z
+    kept = times(G, qd)
+    approach = kept[last]
+    if approach <= 0.0:
+        return 0.0, 0.0
+    kept[last] = -t.axle_f[A_RESTITUTION] * approach if approach > SLOW_STOP else 0.0
+    before = times(P, qd)
+    K, B = joined(P, G, 1)
+    for k in range(n):
+        B[k, 0] = before[k]
+    for k in range(last + 1):
+        B[n + k, 0] = kept[k]
+    solve_in_place(K, B)
+    after = B[:n, 0].copy()
+    lost = 0.5 * dot(qd, before) - 0.5 * dot(after, times(P, after))
+    for k in range(n):
+        qd[k] = after[k]
+    return lost, B[n + last, 0]

@@ -18,6 +18,7 @@ from rollover.tables import (
     A_C,
     A_K,
     ACTIVE,
+    E_DEPTH_NOW,
     E_FORCE_NOW,
     E_POINT,
     FN,
@@ -25,13 +26,16 @@ from rollover.tables import (
     MU,
     RELAXATION,
     ROT,
+    S_DELTA_NOW,
+    S_SET,
     STICK,
+    T_B,
     T_C,
-    T_CR,
     T_K,
-    T_KR,
-    T_ROPS,
+    T_PLAY,
+    W_BOTTOM,
     W_C,
+    W_KB,
     W_KY,
     W_KZ,
     W_MU,
@@ -111,7 +115,8 @@ def stiffness(t: Any, f: float, fd: float, K: Any) -> None:
         if g[E_FORCE_NOW] > 0.0:
             b = t.wheel_i[w]
             k, _ = tyre_stiffness(c, 0.0)
-            normal = f * k + fd * c[W_C] * k / c[W_KZ]
+            bottom = c[W_KB] if g[E_DEPTH_NOW] > c[W_BOTTOM] else 0.0
+            normal = f * (k + bottom) + fd * c[W_C] * k / c[W_KZ]
             stick = c[W_KY] * (f + fd * TYRE_RELAXATION) if c[W_MU] > 0.0 else 0.0
             add_point(K, t.pose[b], b, g[E_POINT : E_POINT + 3], n, normal, stick)
     add_mounts(t, f, fd, K)
@@ -130,20 +135,26 @@ def spin_row(t: Any, c: int, b: int, k: int) -> Any:
 
 @compiled
 def add_mounts(t: Any, f: float, fd: float, K: Any) -> None:
-    """Springs of the ROPS' mounts along and about the chassis axes."""
-    if t.mount_f.shape[0] == 0:
-        return
-    c, b = t.mount_i[0], t.mount_i[1]
-    chassis, rops = t.pose[c], t.pose[b]
+    """Springs of mounts and hinges along and about the axes of body a; none where they move in their play."""
     J, L, local = np.empty(6), np.empty(6), np.empty(3)
     for i in range(t.mount_f.shape[0]):
-        g = t.mount_f[i]
-        x, y, z = place(rops, g[T_ROPS], g[T_ROPS + 1], g[T_ROPS + 2])
-        local[0], local[1], local[2] = to_body(chassis, x - chassis[X], y - chassis[X + 1], z - chassis[X + 2])
+        g, m = t.mount_f[i], t.mount_memory[i]
+        c, b = t.mount_i[i, 0], t.mount_i[i, 1]
+        under, upper = t.pose[c], t.pose[b]
+        x, y, z = place(upper, g[T_B], g[T_B + 1], g[T_B + 2])
+        local[0], local[1], local[2] = to_body(under, x - under[X], y - under[X + 1], z - under[X + 2])
         for k in range(3):
-            x, y, z = chassis[ROT + k], chassis[ROT + 3 + k], chassis[ROT + 6 + k]
-            direction_row(rops, g[T_ROPS : T_ROPS + 3], x, y, z, J)
-            direction_row(chassis, local, x, y, z, L)
-            add_pair(K, f * g[T_K + k] + fd * g[T_C + k], J, 6 * b, L, 6 * c)
-            factor = f * g[T_KR + k] + fd * g[T_CR + k]
-            add_pair(K, factor, spin_row(t, c, b, k), 6 * b, spin_row(t, c, c, k), 6 * c)
+            x, y, z = under[ROT + k], under[ROT + 3 + k], under[ROT + 6 + k]
+            direction_row(upper, g[T_B : T_B + 3], x, y, z, J)
+            direction_row(under, local, x, y, z, L)
+            if not loose(g, m, k):
+                add_pair(K, f * g[T_K + k] + fd * g[T_C + k], J, 6 * b, L, 6 * c)
+            if not loose(g, m, 3 + k):
+                factor = f * g[T_K + 3 + k] + fd * g[T_C + 3 + k]
+                add_pair(K, factor, spin_row(t, c, b, k), 6 * b, spin_row(t, c, c, k), 6 * c)
+
+
+@compiled
+def loose(f: Any, g: Any, j: int) -> bool:
+    """Whether axis j of a connector moves inside its play."""
+    return f[T_PLAY + j] > 0.0 and abs(g[S_DELTA_NOW + j] - g[S_SET + j]) <= f[T_PLAY + j]  # type: ignore[no-any-return]

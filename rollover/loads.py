@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.channels import describe
 from rollover.filters import filtered
 from rollover.recording import Recording
 from rollover.run import Run
@@ -66,6 +67,10 @@ def load_channels(recording: Recording) -> list[tuple[str, tuple[str, ...], str 
         found.append(("rops/force", ("rops/force",), "rops/impulse"))
     mounts = sorted({n.rsplit("/", 1)[0] for n in names if n.startswith("rops/mount/")})
     found += [(f"{m}/force", tuple(f"{m}/force_{axis}" for axis in "xyz"), None) for m in mounts]
+    hinges = sorted({n.rsplit("/", 1)[0] for n in names if n.startswith("rops/hinge/")})
+    found += [
+        (f"{m}/{what}", tuple(f"{m}/{what}_{k}" for k in "xyz"), None) for m in hinges for what in ("force", "moment")
+    ]
     found.append(("ground/force_normal", ("ground/force_normal",), "ground/impulse_normal"))
     found += [(n, (n,), None) for n in names if n.startswith("wheel/")]
     return found
@@ -89,7 +94,7 @@ def _peak(run: Run, channel: str, parts: tuple[str, ...], impulse: str | None) -
     flags = int(np.bitwise_or.reduce(run.flags[near])) if not channel.startswith("wheel/") else 0
     return PeakLoad(
         channel=channel,
-        unit="N",
+        unit=describe(parts[0]).unit,
         raw=float(raw[i]),
         raw_time=float(recording.time[i]),
         filtered=float(smooth[k]),

@@ -44,6 +44,7 @@ class Live:
 
     tables: Tables
     handle: Handle
+    time: float = 0.0  # of the last accepted step
     error: BaseException | None = None
 
 
@@ -91,7 +92,8 @@ def solve(
     newton.SetWithDenseMatrix(M, useDenseMatrix=True)
     views: list[Any] = []
 
-    def force(_mbs: Any, _t: float, _item: int, _q: Any, _qd: Any) -> list[float]:
+    def force(_mbs: Any, t: float, _item: int, _q: Any, _qd: Any) -> list[float]:
+        live.tables.clock[0] = t - live.time
         generalised_forces(live.handle, views[0], views[1], Q)
         return Q.tolist()
 
@@ -106,6 +108,7 @@ def solve(
     def after(_mbs: Any, t: float) -> bool:
         try:
             goes_on = after_step(t, views[0], views[1], views[2])
+            live.time = t
             # like the contact set, the soil's mass matrix is that of the step's start
             if live.tables.counts[ACTIVE] > 0 or M.any():
                 added_mass(live.handle, views[0], M)

@@ -86,6 +86,7 @@ def _standing(standing: Standing, scenario: Scenario, bodies: tuple[Body, ...], 
                 message="the vehicle does not stand on this surface, got no static equilibrium; 'drop' or 'tip-over'",
             )
         )
+    u = statics.seated(u)
     return Start(q=statics.coordinates(u), qd=statics.rates(u, standing.roll_rate), time=0.0)
 
 
@@ -109,4 +110,5 @@ def _tipped(tip: TipOver, scenario: Scenario, vehicle: Vehicle, bodies: tuple[Bo
                 path="initiation", message="no balance on two wheels was found on this surface; change heading or side"
             )
         )
+    u = statics.seated(u, fixed=(ROLL,))
     return Start(q=statics.coordinates(u), qd=statics.rates(u, sign * tip.roll_rate), time=0.0)

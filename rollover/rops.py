@@ -1,4 +1,4 @@
-"""The roll-over protective structure: members, mounts with their load-deflection law, clearance zone (data only)."""
+"""The roll-over protective structure: members, mounts and hinges, clearance zone (data only)."""
 
 from __future__ import annotations
 
@@ -7,31 +7,11 @@ from typing import Annotated, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ground.quantity import Label, Quantity, parameters
+from ground.quantity import Quantity, parameters
+from rollover.connector import Connector
 from rollover.inertia import MassProperties
 from rollover.provenance import Provenance
 from rollover.shapes import Point, Shape
-
-
-@parameters
-class Mount:
-    """What joins the ROPS to the chassis: per axis an elastic, perfectly plastic spring with a dashpot.
-
-    The frame is rigid in the model: the sway of its posts is part of the mounts' compliance. Force on each axis
-    (vehicle axes): clip(k (delta - delta_p), +-F_y), delta_p the permanent set; no yield force, no yielding.
-    """
-
-    name: Annotated[str, Label("in channels: rops/mount/NAME/force_x")]
-    position: Annotated[Point, Quantity("m", "vehicle axes")]
-    stiffness: Annotated[Point, Quantity("N/m", "along x, y, z", above=0)]
-    damping: Annotated[Point, Quantity("N s/m", "along x, y, z", least=0)]
-    rotational_stiffness: Annotated[Point, Quantity("N m/rad", "about x, y, z", least=0)] = (0.0, 0.0, 0.0)
-    rotational_damping: Annotated[Point, Quantity("N m s/rad", "about x, y, z", least=0)] = (0.0, 0.0, 0.0)
-    yield_force: Annotated[tuple[float | None, float | None, float | None], Quantity("N", "F_y", above=0)] = (
-        None,
-        None,
-        None,
-    )
 
 
 @parameters
@@ -61,21 +41,56 @@ class ClearanceZone:
 
 
 @parameters
+class Upper:
+    """The upper part of a frame in two parts: a body of its own on hinges.
+
+    A fold, a plastic hinge at a post's foot, a weld at mid-height: what the hinges' axes let through.
+    """
+
+    body: MassProperties
+    hinges: Annotated[tuple[Connector, ...], "between the lower and the upper part"]
+    members: Annotated[tuple[Shape, ...], "tubes and boxes of the upper part that can touch the ground"]
+
+
+@parameters
 class Rops:
-    """A frame on its mounts."""
+    """A frame on its mounts, in one part or two; the frame is rigid, the sway of its posts is in mounts and hinges."""
 
     frame: Literal["two-post-rear", "two-post-front", "four-post", "cab"]
-    body: MassProperties
-    mounts: tuple[Mount, ...]
+    body: Annotated[MassProperties, "of the frame; without its upper part if there is one"]
+    mounts: Annotated[tuple[Connector, ...], "between the chassis and the frame"]
     members: Annotated[tuple[Shape, ...], "tubes and boxes that can touch the ground"]
+    upper: Upper | None = None
     corner: Annotated[Point, Quantity("m", "upper corner whose deflection is reported; the left one, y > 0")]
+    other_corners: Annotated[
+        tuple[Point, ...], Quantity("m", "further upper corners, left ones; of all, the loaded one is reported")
+    ] = ()
     clearance_zone: ClearanceZone | None = None
     provenance: tuple[Provenance, ...] = ()
 
     def validate(self) -> None:
-        """Refuse a frame that nothing holds, or mounts that share a name."""
-        names = [m.name for m in self.mounts]
-        if not names:
-            raise ValueError("mounts: none given; at least one mount")
-        if len(set(names)) != len(names):
-            raise ValueError(f"mounts: two mounts share a name, got {names}; each name once")
+        """Refuse a frame that nothing holds, or joints that share a name."""
+        for what, joints in (("mounts", self.mounts), ("upper.hinges", self.hinges)):
+            names = [m.name for m in joints]
+            if not names and (what == "mounts" or self.upper is not None):
+                raise ValueError(f"{what}: none given; at least one")
+            if len(set(names)) != len(names):
+                raise ValueError(f"{what}: two share a name, got {names}; each name once")
+
+    @property
+    def hinges(self) -> tuple[Connector, ...]:
+        """Between the lower and the upper part, none if the frame is in one part."""
+        return self.upper.hinges if self.upper is not None else ()
+
+    @property
+    def connectors(self) -> tuple[Connector, ...]:
+        """Mounts, then hinges."""
+        return self.mounts + self.hinges
+
+    @property
+    def parts(self) -> dict[str, tuple[MassProperties, tuple[Shape, ...]]]:
+        """Bodies of the frame by name, from below: mass properties and members."""
+        found = {"rops": (self.body, self.members)}
+        if self.upper is not None:
+            found["rops_upper"] = (self.upper.body, self.upper.members)
+        return found

@@ -40,6 +40,7 @@ KINDS: dict[int, str] = {
     c.WHEEL_ON: "touch-down",
     c.AXLE_STOP: "axle-stop",
     c.HINGE: "plastic-hinge",
+    c.AXLE_BLOW: "axle-stop",
 }
 
 
@@ -151,7 +152,10 @@ def _collect(
         if kind in (c.WHEEL_OFF, c.WHEEL_ON) and isinstance(vehicle, Vehicle):
             subject = vehicle.wheels[who].name
         elif kind == c.HINGE and isinstance(vehicle, Vehicle) and vehicle.rops is not None:
-            subject, detail = vehicle.rops.mounts[who].name, f"yields along {'xyz'[int(value)]}"
+            way = "along" if value < 3 else "about"
+            subject, detail = vehicle.rops.connectors[who].name, f"yields {way} {'xyz'[int(value) % 3]}"
+        elif kind == c.AXLE_BLOW:
+            subject, detail = "front_axle", f"strikes with {value:.3g} N m s"
         elif kind == c.AXLE_STOP:
             subject, detail = "front_axle", f"{math.degrees(value):.1f} deg"
         else:

@@ -37,13 +37,15 @@ from ground.kernel import (
 from ground.law import REFERENCE_AREA
 from rollover.dense import dot, times
 from rollover.forces import generalised_forces, read_poses
-from rollover.impact import mobility
+from rollover.impact import mobility, strike_stop
 from rollover.tables import (
+    A_IMPACT,
     A_SWING,
     ACC,
     ACTIVE,
     ALPHA,
     AXLE,
+    AXLE_BLOW,
     AXLE_STOP,
     BRANCH_CHANGE,
     COLLISION,
@@ -71,6 +73,9 @@ from rollover.tables import (
     HINGE,
     M_ANGLE,
     M_ANGLE_NOW,
+    M_FREE,
+    M_IMPULSE,
+    M_REACH,
     M_TORQUE,
     M_TORQUE_NOW,
     MOVED,
@@ -80,19 +85,16 @@ from rollover.tables import (
     R_TANGENT,
     R_WEIGHT,
     ROPS,
-    S_ANGLE,
-    S_ANGLE_NOW,
     S_DELTA,
     S_DELTA_NOW,
+    S_FLOWED,
+    S_FLOWED_NOW,
     S_FORCE,
     S_FORCE_NOW,
     S_SET,
-    S_TORQUE,
-    S_TORQUE_NOW,
+    S_SET_NOW,
     SOIL,
     STICK,
-    T_K,
-    T_YIELD,
     TURN,
     TYRE,
     W_KY,
@@ -109,6 +111,7 @@ from rollover.vectors import depth_acceleration, depth_row, place, velocity
 @compiled
 def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
     """Book, commit, renew the contacts, exchange momentum with what was newly hit (writes qd)."""
+    t.clock[0] = h
     generalised_forces(t, q, qd, Q)
     for b in range(t.pose.shape[0]):
         for k in range(3):
@@ -121,6 +124,8 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
     finish_mounts(t)
     finish_axle(t)
     start_step(t)
+    if strike(t, qd):
+        read_poses(t.pose, q, qd)
     t.work[COLLISION] += touch(t, qd, h)
     settle(t)
     read_poses(t.pose, q, qd)  # the impact changed the velocities
@@ -238,18 +243,15 @@ def finish_wheels(t: Any) -> None:
 
 @compiled
 def finish_mounts(t: Any) -> None:
-    """Work and permanent set of the mounts; the first yielding of each as an event."""
+    """Work and permanent set of mounts and hinges; the first yielding of each axis as an event."""
     for i in range(t.mount_f.shape[0]):
-        f, g = t.mount_f[i], t.mount_memory[i]
-        for k in range(3):
-            t.work[ROPS] -= 0.5 * (g[S_FORCE + k] + g[S_FORCE_NOW + k]) * (g[S_DELTA_NOW + k] - g[S_DELTA + k])
-            t.work[ROPS] -= 0.5 * (g[S_TORQUE + k] + g[S_TORQUE_NOW + k]) * (g[S_ANGLE_NOW + k] - g[S_ANGLE + k])
-            most = f[T_YIELD + k] / f[T_K + k]
-            elastic = g[S_DELTA_NOW + k] - g[S_SET + k]
-            if abs(elastic) > most:
-                if g[S_SET + k] == 0.0:
-                    note_event(t, HINGE, i, place(t.pose[t.mount_i[1]], 0.0, 0.0, 0.0), float(k))
-                g[S_SET + k] = g[S_DELTA_NOW + k] - math.copysign(most, elastic)
+        g = t.mount_memory[i]
+        for axis in range(3):
+            for k in (axis, 3 + axis):
+                t.work[ROPS] -= 0.5 * (g[S_FORCE + k] + g[S_FORCE_NOW + k]) * (g[S_DELTA_NOW + k] - g[S_DELTA + k])
+                if g[S_FLOWED_NOW + k] > 0.0 and g[S_FLOWED + k] == 0.0:
+                    note_event(t, HINGE, i, place(t.pose[t.mount_i[i, 1]], 0.0, 0.0, 0.0), float(k))
+                g[S_SET + k], g[S_FLOWED + k] = g[S_SET_NOW + k], g[S_FLOWED_NOW + k]
 
 
 @compiled
@@ -257,10 +259,28 @@ def finish_axle(t: Any) -> None:
     """Work of the axle stops; reaching one is an event."""
     if t.axle_f.size == 0:
         return
-    g = t.axle_memory
+    g, swing = t.axle_memory, t.axle_f[A_SWING]
     t.work[AXLE] -= 0.5 * (g[M_TORQUE] + g[M_TORQUE_NOW]) * (g[M_ANGLE_NOW] - g[M_ANGLE])
-    if abs(g[M_ANGLE]) <= t.axle_f[A_SWING] < abs(g[M_ANGLE_NOW]):
+    if abs(g[M_ANGLE]) <= swing < abs(g[M_ANGLE_NOW]):
         note_event(t, AXLE_STOP, 0, place(t.pose[t.axle_i[1]], 0.0, 0.0, 0.0), g[M_ANGLE_NOW])
+    if abs(g[M_ANGLE_NOW]) < swing:
+        g[M_FREE], g[M_REACH] = 1.0, swing
+
+
+@compiled
+def strike(t: Any, qd: Any) -> bool:
+    """Let an axle that has swung freely into its stop strike it: momentum, energy, event; whether it did."""
+    if t.axle_f.size == 0 or t.axle_f[A_IMPACT] == 0.0:
+        return False
+    g = t.axle_memory
+    if g[M_FREE] == 0.0 or abs(g[M_ANGLE_NOW]) < t.axle_f[A_SWING]:
+        return False
+    g[M_FREE], g[M_REACH] = 0.0, abs(g[M_ANGLE_NOW])
+    lost, impulse = strike_stop(t, math.copysign(1.0, g[M_ANGLE_NOW]), qd)
+    t.work[AXLE] += lost
+    g[M_IMPULSE] += impulse
+    note_event(t, AXLE_BLOW, 0, place(t.pose[t.axle_i[1]], 0.0, 0.0, 0.0), impulse)
+    return True
 
 
 @compiled
@@ -316,9 +336,8 @@ def start_step(t: Any) -> None:
             g[E_FRICTION + k] = g[E_FRICTION_NOW + k]
     for i in range(t.mount_f.shape[0]):
         g = t.mount_memory[i]
-        for k in range(3):
+        for k in range(6):
             g[S_DELTA + k], g[S_FORCE + k] = g[S_DELTA_NOW + k], g[S_FORCE_NOW + k]
-            g[S_ANGLE + k], g[S_TORQUE + k] = g[S_ANGLE_NOW + k], g[S_TORQUE_NOW + k]
     if t.axle_f.size > 0:
         t.axle_memory[M_ANGLE], t.axle_memory[M_TORQUE] = t.axle_memory[M_ANGLE_NOW], t.axle_memory[M_TORQUE_NOW]
 

@@ -17,7 +17,8 @@ X, ROT, VEL, OMEGA, ACC, ALPHA, POSE_COLUMNS = 0, 3, 12, 15, 18, 21, 24
 
 # columns of wheel_f
 W_CENTRE, W_AXIS, W_RADIUS, W_HALF, W_CROWN, W_KZ, W_KY, W_C, W_MU, W_ROLLS = 0, 3, 6, 7, 8, 9, 10, 11, 12, 13
-WHEEL_COLUMNS = 14
+# deflection at which the rim bottoms and the stiffness that it adds
+W_BOTTOM, W_KB, WHEEL_COLUMNS = 14, 15, 16
 # columns of wheel_memory: anchor of the stick spring in the carrier's axes, its place and shear; then what was found
 # at the start of the step (depth, normal force, damping force, elastic energy, friction) and what is found now
 E_ANCHOR, E_PLACE, E_SHEAR, E_DEPTH, E_FORCE, E_DAMPING, E_ENERGY, E_FRICTION = 0, 3, 6, 9, 10, 11, 12, 13
@@ -26,25 +27,20 @@ E_DEPTH_NOW, E_FORCE_NOW, E_DAMPING_NOW, E_ENERGY_NOW, E_FRICTION_NOW = 16, 17, 
 # carrier's axes and in the world
 E_MOVED, E_SLIP, E_POINT, E_WHERE, EDGE_COLUMNS = 23, 26, 29, 32, 35
 
-# columns of mount_f: point on the ROPS, point on the chassis, stiffness, damping, both again for rotation, yield
-T_ROPS, T_CHASSIS, T_K, T_C, T_KR, T_CR, T_YIELD, MOUNT_COLUMNS = 0, 3, 6, 9, 12, 15, 18, 21
-# columns of mount_memory: set, deflection, force, angle, torque at the start of the step; the same now
-S_SET, S_DELTA, S_FORCE, S_ANGLE, S_TORQUE, S_DELTA_NOW, S_FORCE_NOW, S_ANGLE_NOW, S_TORQUE_NOW, SET_COLUMNS = (
-    0,
-    3,
-    6,
-    9,
-    12,
-    15,
-    18,
-    21,
-    24,
-    27,
-)
+# columns of mount_f, mounts of the ROPS and its hinges alike: point on body b, on body a; then for the six axes (along
+# x, y, z of body a, about them) stiffness, damping, yield, hardening, play, rate D of the rate factor as a speed (0: no
+# factor); its exponent q; whether it may turn far
+T_B, T_A, T_K, T_C, T_YIELD, T_HARD, T_PLAY, T_RATE, T_Q, T_FAR, MOUNT_COLUMNS = 0, 3, 6, 12, 18, 24, 30, 36, 42, 43, 44
+# columns of mount_memory, each for the six axes: permanent set, plastic way, deflection and force at the start of the
+# step; the same now
+S_SET, S_FLOWED, S_DELTA, S_FORCE, S_SET_NOW, S_FLOWED_NOW, S_DELTA_NOW, S_FORCE_NOW = 0, 6, 12, 18, 24, 30, 36, 42
+SET_COLUMNS = 48
 
 # columns of axle_f and axle_memory
-A_SWING, A_K, A_C, AXLE_COLUMNS = 0, 1, 2, 3
-M_ANGLE, M_TORQUE, M_ANGLE_NOW, M_TORQUE_NOW, AXLE_MEMORY = 0, 1, 2, 3, 4
+A_SWING, A_K, A_C, A_IMPACT, A_RESTITUTION, AXLE_COLUMNS = 0, 1, 2, 3, 4, 5
+# angle and torque at the start of the step and now; whether the next touch of a stop is an impact, the angle at which
+# the last one was, and the angular impulse of all
+M_ANGLE, M_TORQUE, M_ANGLE_NOW, M_TORQUE_NOW, M_FREE, M_REACH, M_IMPULSE, AXLE_MEMORY = 0, 1, 2, 3, 4, 5, 6, 7
 
 # rows of joint_i: kind, body a, body b (or -1); columns of joint_f: point on a, point on b, about the centres of mass
 PIVOT, GUIDE = 0, 1
@@ -67,7 +63,7 @@ R_NORMAL, R_TANGENT, R_POINT, R_WEIGHT, R_IMPULSE, RESULTANT_COLUMNS = 0, 3, 6, 
 
 # columns of event: time is added by the caller
 EV_KIND, EV_SUBJECT, EV_PLACE, EV_VALUE, EVENT_COLUMNS = 0, 1, 2, 5, 6
-TOUCH, BRANCH_CHANGE, TURN, WHEEL_OFF, WHEEL_ON, AXLE_STOP, HINGE = 0, 1, 2, 3, 4, 5, 6
+TOUCH, BRANCH_CHANGE, TURN, WHEEL_OFF, WHEEL_ON, AXLE_STOP, HINGE, AXLE_BLOW = 0, 1, 2, 3, 4, 5, 6, 7
 
 # bits of an element's domain flags, and their names
 OUT_OF_SPEED, OUT_OF_MOMENTUM, OUT_OF_AREA, NOT_VIRGIN, OBLIQUE = 1, 2, 4, 8, 16
@@ -97,7 +93,7 @@ class Tables(NamedTuple):
     wheel_f: Any  # (nw, WHEEL_COLUMNS)
     wheel_i: Any  # (nw,) carrier
     mount_f: Any  # (nt, MOUNT_COLUMNS)
-    mount_i: Any  # (2,) chassis and ROPS rows
+    mount_i: Any  # (nt, 2) rows of body a and body b
     axle_f: Any  # (AXLE_COLUMNS,) or (0,)
     axle_i: Any  # (2,) chassis and axle rows
     # ground
@@ -122,6 +118,7 @@ class Tables(NamedTuple):
     wheel_memory: Any  # (nw, EDGE_COLUMNS)
     mount_memory: Any  # (nt, SET_COLUMNS)
     axle_memory: Any  # (AXLE_MEMORY,)
+    clock: Any  # (1,) length of the step that is tried, s
     pose: Any  # (nb, POSE_COLUMNS)
     counts: Any  # (COUNTS,)
     work: Any  # (WORKS,)
@@ -181,6 +178,7 @@ def handle(t: Any) -> Any:
         t.wheel_memory,
         t.mount_memory,
         t.axle_memory,
+        t.clock,
         t.pose,
         t.counts,
         t.work,

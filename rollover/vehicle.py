@@ -1,8 +1,8 @@
 """What falls or rolls: a vehicle with wheels, front axle and ROPS, or the striker of the drop rig (data only).
 
 Vehicle axes (ISO 8855): x forward, y left, z up; origin on level ground below the middle of the rear axle.
-Masses and inertias of a vehicle are those of the whole, as they are measured; what the axle and the ROPS carry
-is taken off to find the chassis.
+Masses and inertias of a vehicle are those of the whole, as they are measured; what the axle and the ROPS weigh
+is taken off to find the chassis. Attached masses (ballast, driver, implement) come on top of the whole.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import math
 from typing import Annotated, Literal
 
 from ground.quantity import Label, Quantity, parameters
-from rollover.inertia import MassProperties
+from rollover.inertia import MassProperties, combined, cuboid
 from rollover.provenance import Provenance
 from rollover.rops import Rops
 from rollover.shapes import Point, Shape
@@ -34,6 +34,10 @@ class Tyre:
     vertical_damping: Annotated[float, Quantity("N s/m", least=0)] = 0.0
     lateral_stiffness: Annotated[float, Quantity("N/m", "k_y, also of the stick spring", above=0)]
     friction: Annotated[float, Quantity("1", "mu between tyre and ground", least=0, most=2)] = 0.8
+    bottoming: Annotated[
+        float | None, Quantity("1", "deflection at which the rim bottoms, as a share of the radius", above=0, most=1)
+    ] = None
+    bottoming_stiffness: Annotated[float, Quantity("N/m", "added to k_z once the rim bottoms", least=0)] = 0.0
 
 
 @parameters
@@ -56,11 +60,51 @@ class FrontAxle:
     swing_deg: Annotated[float, Quantity("deg", "free swing to either side", above=0, most=45)]
     stop_stiffness: Annotated[float, Quantity("N m/rad", above=0)]
     stop_damping: Annotated[float, Quantity("N m s/rad", least=0)] = 0.0
+    stop: Annotated[
+        Literal["compliant", "impact"],
+        "how a stop is met: on its spring and dashpot, or by an exchange of momentum, after which they hold",
+    ] = "compliant"
+    stop_restitution: Annotated[float, Quantity("1", "of an impact on a stop", least=0, most=1)] = 0.0
 
     @property
     def swing(self) -> float:
         """Free swing to either side, rad."""
         return math.radians(self.swing_deg)
+
+
+Carrier = Literal["chassis", "front_axle", "rops"]
+
+
+@parameters
+class Attached:
+    """What a vehicle carries: ballast, implement, driver, filled tank; fixed to the body that carries it.
+
+    Its inertia about its centre of mass is given, or that of a solid cuboid of the given size.
+    """
+
+    name: Annotated[str, Label()]
+    mass: Annotated[float, Quantity("kg", above=0)]
+    centre_of_mass: Annotated[Point, Quantity("m", "vehicle axes")]
+    inertia: Annotated[Point | None, Quantity("kg m2", "Ixx, Iyy, Izz about its centre of mass", above=0)] = None
+    size: Annotated[
+        Point | None, Quantity("m", "edges of a cuboid along x, y, z, in place of the inertia", above=0)
+    ] = None
+    carried_by: Carrier = "chassis"
+    outline: Annotated[tuple[Shape, ...], "what of it can touch the ground"] = ()
+
+    def validate(self) -> None:
+        """Refuse an inertia given twice or not at all."""
+        if (self.inertia is None) == (self.size is None):
+            raise ValueError("inertia: give either inertia or size, got both or none; one of them")
+        self.body  # noqa: B018  raises for an inertia that no body can have
+
+    @property
+    def body(self) -> MassProperties:
+        """Its mass properties."""
+        if self.size is not None:
+            return cuboid(self.mass, self.centre_of_mass, self.size)
+        assert self.inertia is not None
+        return MassProperties(mass=self.mass, centre_of_mass=self.centre_of_mass, inertia=self.inertia)
 
 
 @parameters
@@ -69,11 +113,12 @@ class Vehicle:
 
     kind: Literal["vehicle"] = "vehicle"
     name: str
-    whole: MassProperties
+    whole: Annotated[MassProperties, "of the vehicle with axle and ROPS, without what is attached"]
     wheels: tuple[Wheel, ...] = ()
     front_axle: FrontAxle | None = None
     rops: Rops | None = None
     outline: Annotated[tuple[Shape, ...], "what of the chassis can touch the ground: bonnet, fenders, mass block"] = ()
+    attached: Annotated[tuple[Attached, ...], "masses beyond the whole: ballast, implement, driver, tank"] = ()
     contact_spacing: Annotated[float, Quantity("m", "of the contact points on outlines and members", above=0)] = 0.03
     provenance: tuple[Provenance, ...] = ()
 
@@ -86,6 +131,12 @@ class Vehicle:
             raise ValueError(
                 "wheels: a wheel is carried by 'front_axle' but there is none; give front_axle or 'chassis'"
             )
+        for a in self.attached:
+            if (a.carried_by == "front_axle" and self.front_axle is None) or (a.carried_by == "rops" and not self.rops):
+                raise ValueError(f"attached.{a.name}.carried_by: there is none, got {a.carried_by!r}; 'chassis'")
+        masses = [a.name for a in self.attached]
+        if len(set(masses)) != len(masses):
+            raise ValueError(f"attached: two masses share a name, got {masses}; each name once")
         chassis_of(self)
 
 
@@ -102,39 +153,53 @@ class Striker:
 
 
 def chassis_of(vehicle: Vehicle) -> MassProperties:
-    """Mass properties of the chassis: the whole less front axle and ROPS.
+    """Mass properties of the chassis: the whole less front axle and ROPS, without attached masses.
 
     Raises ``ValueError`` if the parts weigh more than the whole or leave an inertia that no body can have.
     """
     whole = vehicle.whole
-    parts = [p for p in (vehicle.front_axle and vehicle.front_axle.body, vehicle.rops and vehicle.rops.body) if p]
-    mass = whole.mass - sum(p.mass for p in parts)
-    if mass <= 0.0:
+    parts = [] if vehicle.front_axle is None else [vehicle.front_axle.body]
+    if vehicle.rops is not None:
+        parts += [body for body, _ in vehicle.rops.parts.values()]
+    heavy = sum(p.mass for p in parts)
+    if whole.mass <= heavy:
         raise ValueError(
             f"whole.mass: front axle and ROPS weigh more than the vehicle, got {whole.mass:g} kg; "
-            f"greater than {whole.mass - mass:g} kg is allowed"
+            f"greater than {heavy:g} kg is allowed"
         )
-    first = [
-        whole.mass * c - sum(p.mass * p.centre_of_mass[i] for p in parts) for i, c in enumerate(whole.centre_of_mass)
-    ]
-    centre = (first[0] / mass, first[1] / mass, first[2] / mass)
-
-    def about_origin(p: MassProperties, sign: float) -> list[float]:
-        x, y, z = (c - w for c, w in zip(p.centre_of_mass, centre, strict=True))
-        m = p.mass
-        diagonal = [m * (y * y + z * z), m * (x * x + z * z), m * (x * x + y * y)]
-        off = [-m * x * y, -m * x * z, -m * y * z]
-        return [sign * (i + s) for i, s in zip((*p.inertia, *p.products), diagonal + off, strict=True)]
-
-    total = [
-        sum(terms) for terms in zip(about_origin(whole, 1.0), *(about_origin(p, -1.0) for p in parts), strict=True)
-    ]
     try:
-        return MassProperties(
-            mass=mass,
-            centre_of_mass=centre,
-            inertia=(total[0], total[1], total[2]),
-            products=(total[3], total[4], total[5]),
-        )
+        return combined([whole], less=parts)
     except ValueError as e:
         raise ValueError(f"whole.inertia: leaves the chassis, without front axle and ROPS, an impossible {e}") from None
+
+
+def carried(vehicle: Vehicle, carrier: Carrier) -> MassProperties:
+    """Mass properties of a body of the vehicle with the masses that it carries."""
+    if carrier == "chassis":
+        own = chassis_of(vehicle)
+    else:
+        part = vehicle.front_axle if carrier == "front_axle" else vehicle.rops
+        assert part is not None
+        own = part.body
+    extra = [a.body for a in vehicle.attached if a.carried_by == carrier]
+    return combined([own, *extra]) if extra else own
+
+
+def laden(vehicle: Vehicle) -> MassProperties:
+    """Mass properties of the vehicle with everything that is attached to it."""
+    return combined([vehicle.whole, *(a.body for a in vehicle.attached)]) if vehicle.attached else vehicle.whole
+
+
+def pitch_inertia(vehicle: Vehicle) -> tuple[float, float] | None:
+    """I about the rear axle = Iyy + m (a^2 + (h - r)^2) of the whole, and 0.378 M L^2, kg m2; None without axles.
+
+    The second is where the two formulae of the pendulum test of OECD Code 3 for a rear impact agree, H = 2.165e-8 M L^2
+    and H = 5.73e-2 I (mm); a tractor far from it has an unusual pitch inertia, or a wrong one.
+    """
+    sides = [w for w in vehicle.wheels if w.carrier == "chassis"], [w for w in vehicle.wheels if w.carrier != "chassis"]
+    if not all(sides):
+        return None
+    rear, front = sides[0][0].centre, sides[1][0].centre
+    m, (x, _, z) = vehicle.whole.mass, vehicle.whole.centre_of_mass
+    about = vehicle.whole.inertia[1] + m * ((x - rear[0]) ** 2 + (z - rear[2]) ** 2)
+    return about, 0.378 * m * (front[0] - rear[0]) ** 2
