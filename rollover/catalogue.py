@@ -13,6 +13,7 @@ from rollover import document
 from rollover import scenario as scenarios
 from rollover.effects import effects as known_effects
 from rollover.rops import Rops
+from rollover.vehicle import Vehicle, pitch_inertia
 
 Row = dict[str, Any]
 
@@ -32,6 +33,25 @@ def headline(path: Path) -> str:
         lines.append(line.strip("# "))
     first, stop, _ = " ".join(lines).partition(". ")
     return first.rstrip(".") if stop else first
+
+
+def vehicles() -> list[Row]:
+    """Shipped vehicles, with their pitch inertia about the rear axle beside what pendulum tests expect."""
+    shelf = document.shipped_folder() / "vehicles"
+    found = []
+    for row in files("vehicles"):
+        vehicle = document.load(shelf / f"{row['name']}.yaml", scenarios.AnyVehicle)
+        inertia = pitch_inertia(vehicle) if isinstance(vehicle, Vehicle) else None
+        found.append({**row, "pitch": "" if inertia is None else pitch_line(*inertia)})
+    return found
+
+
+def pitch_line(about: float, anchor: float) -> str:
+    """A pitch inertia about the rear axle against 0.378 M L^2, as vehicle files state it."""
+    change = 100.0 * (about / anchor - 1.0)
+    return (
+        f"pitch inertia about the rear axle {about:.0f} kg m2 against 0.378 M L^2 = {anchor:.0f} kg m2, {change:+.1f} %"
+    )
 
 
 def laws() -> list[Row]:
@@ -56,7 +76,7 @@ def paths(name: str) -> list[Row]:
 
 TABLES: dict[str, Callable[[], list[Row]]] = {
     "scenarios": lambda: files(""),
-    "vehicles": lambda: files("vehicles"),
+    "vehicles": vehicles,
     "soils": lambda: files("soils"),
     "laws": laws,
     "effects": effects,

@@ -63,7 +63,7 @@ class Rops:
     upper: Upper | None = None
     corner: Annotated[Point, Quantity("m", "upper corner whose deflection is reported; the left one, y > 0")]
     other_corners: Annotated[
-        tuple[Point, ...], Quantity("m", "further upper corners, left ones; of all, the loaded one is reported")
+        tuple[Point, ...], "further upper corners, left ones, m; of all, the loaded one is reported"
     ] = ()
     clearance_zone: ClearanceZone | None = None
     provenance: tuple[Provenance, ...] = ()

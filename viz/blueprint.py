@@ -32,6 +32,7 @@ _LOADS: _Plots = (
     ("Wheels, kN", ("wheel/*/force_normal",)),
     ("Sinkage, mm", ("ground/sinkage", "rops/deflection")),
     ("Impulse, N s", ("ground/impulse_normal", "rops/impulse")),
+    ("Axle stop, N m s", ("axle/*/impulse",)),
     ("Contact area, cm\N{SUPERSCRIPT TWO}", ("ground/contact_area",)),
 )
 _MOTION: _Plots = (
@@ -46,7 +47,8 @@ _MOTION: _Plots = (
     ("Position, m", ("chassis/position_?",)),
     ("Velocity, m/s", ("chassis/velocity_?",)),
 )
-_MOUNTS = "rops/mount/*"
+_MOUNTS = ("rops/mount/*/force_?", "rops/hinge/*/force_?")
+_MOMENTS = ("rops/mount/*/moment_?", "rops/hinge/*/moment_?", "rops/hinge/*/angle_?")
 
 
 def blueprint(run: Run, scales: str) -> rrb.Blueprint:
@@ -64,7 +66,7 @@ def blueprint(run: Run, scales: str) -> rrb.Blueprint:
     )
     rows = [
         top[:1],
-        _mounts(channels) + top[1:] + _views(channels, _LOADS),
+        _mounts(channels) + top[1:] + _views(channels, _LOADS) + _moments(channels),
         _views(channels, _MOTION) + _others(channels),
         [
             rrb.TextDocumentView(origin="/report/verdict", contents=["+ /report/verdict"], name="How high, and when"),
@@ -171,20 +173,30 @@ def plot(title: str, channels: Iterable[str]) -> rrb.TimeSeriesView:
 
 
 def _mounts(channels: Sequence[str]) -> list[rrb.Container]:
-    """One tab with a plot for each mount; the axes have the same colours in each."""
-    of_mount: dict[str, list[str]] = {}
+    """One tab with a plot for each mount and hinge; the axes have the same colours in each."""
+    return _joints(channels, _MOUNTS, "Mounts, kN")
+
+
+def _moments(channels: Sequence[str]) -> list[rrb.Container]:
+    """One tab with the moments through mounts and hinges, and how far these turn."""
+    return _joints(channels, _MOMENTS, "Moments, kN m")
+
+
+def _joints(channels: Sequence[str], patterns: tuple[str, ...], title: str) -> list[rrb.Container]:
+    found: dict[str, list[str]] = {}
     for channel in channels:
-        if fnmatchcase(channel, _MOUNTS):
-            of_mount.setdefault(channel.split("/")[2], []).append(channel)
-    plots = [plot(f"Mount {name}, kN", found) for name, found in of_mount.items()]
-    if not plots:
-        return []
-    return [rrb.Grid(*plots, grid_columns=min(2, len(plots)), name="Mounts, kN")]
+        if any(fnmatchcase(channel, pattern) for pattern in patterns):
+            _, what, name, part = channel.split("/")
+            load = "" if part.startswith("force") else f" {part[:-2]}"
+            found.setdefault(f"{what.capitalize()} {name}{load}, {series(channel).unit}", []).append(channel)
+    plots = [plot(name, of_joint) for name, of_joint in found.items()]
+    return [rrb.Grid(*plots, grid_columns=min(2, len(plots)), name=title)] if plots else []
 
 
 def _others(channels: Sequence[str]) -> list[rrb.TimeSeriesView]:
     """What no plot above shows; nothing recorded is out of reach."""
-    patterns = [p for plots in (_TOP, _LOADS, _MOTION) for _, found in plots for p in found] + [_MOUNTS]
+    patterns = [p for plots in (_TOP, _LOADS, _MOTION) for _, found in plots for p in found]
+    patterns += [*_MOUNTS, *_MOMENTS]
     rest: dict[str, list[str]] = {}
     for channel in channels:
         if not any(fnmatchcase(channel, p) for p in patterns):

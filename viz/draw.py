@@ -65,7 +65,8 @@ def picture(run: Run) -> Picture:
     # the arrow at a striker stands inside the nose
     longest = 0.3 * radius if isinstance(run.scenario.vehicle, Striker) else 1.3 * extent(run, at=0)[1]
     # the load that is asked for sets the scale, unless others would reach out of the picture
-    per_metre = max(highest.get("rops", 0.0), 0.7 * max(highest.values(), default=0.0)) / longest
+    rops = max(highest.get("rops", 0.0), highest.get("rops_upper", 0.0))
+    per_metre = max(rops, 0.7 * max(highest.values(), default=0.0)) / longest
     return Picture(
         ground=terrain(
             run.scenario.ground.surface,
@@ -177,13 +178,13 @@ def _forces(out: Stream, run: Run, scale: float) -> None:
     for body, contact in run.contact.items():
         size = np.linalg.norm(contact.force, axis=1)
         there = size > 0.0
-        name = "ROPS" if body == "rops" else body.replace("_", " ")
+        name = body.replace("_", " ").replace("rops", "ROPS")
         arrows = rr.Arrows3D.columns(
             origins=contact.point[there],
             vectors=contact.force[there] / scale,
             labels=[f"{name} {newtons(f)}" for f in size[there]],
             # wheels carry their load all the time: labels on them would hide the others
-            show_labels=np.full(int(there.sum()), body in ("rops", "chassis", "striker")),
+            show_labels=np.full(int(there.sum()), body in ("rops", "rops_upper", "chassis", "striker")),
         )
         # a time without force has a row without arrow, or the last one would stand for ever
         out.columns(force_path(scale, body), run.frame_time, arrows.partition(there.astype(np.int64)))
@@ -191,13 +192,13 @@ def _forces(out: Stream, run: Run, scale: float) -> None:
 
 def peak_place(out: Stream, run: Run, peak: Peak, size: float) -> None:
     """Mark in the scene where the load acted at its peak, from then on."""
-    contact = run.contact.get("striker" if isinstance(run.scenario.vehicle, Striker) else "rops")
-    if contact is None:
-        return
-    loaded = np.flatnonzero(np.linalg.norm(contact.force, axis=1) > 0.0)
+    names = ("striker",) if isinstance(run.scenario.vehicle, Striker) else ("rops", "rops_upper")
+    sizes = {name: np.linalg.norm(run.contact[name].force, axis=1) for name in names if name in run.contact}
+    loaded = np.flatnonzero(sum(sizes.values(), start=np.zeros(len(run.frame_time))) > 0.0)
     if not loaded.size:
         return
     nearest = loaded[int(np.argmin(np.abs(run.frame_time[loaded] - peak.raw_time)))]
+    contact = run.contact[max(sizes, key=lambda name: float(sizes[name][nearest]))]
     point = rr.Points3D.columns(
         positions=contact.point[[nearest]],
         radii=[0.025 * size],
@@ -210,7 +211,7 @@ def peak_place(out: Stream, run: Run, peak: Peak, size: float) -> None:
 
 def sentence(event: Event) -> str:
     """An event in words."""
-    subject = "ROPS" if event.subject == "rops" else event.subject.replace("_", " ")
+    subject = event.subject.replace("_", " ").replace("rops", "ROPS")
     detail = f": {event.detail}" if event.detail else ""
     return f"{event.kind.replace('-', ' ')}, {subject}{detail}"
 

@@ -37,6 +37,7 @@ LEDGER = {
 }
 BODY = {  # a body's ground force, in the plots and as the arrow in the scene
     "rops": SIMULATED,
+    "rops_upper": SIMULATED,
     "striker": SIMULATED,
     "chassis": 0xF2F2F2FF,
     "ground": SIMULATED,
@@ -57,6 +58,7 @@ _CYCLE = (0x66D9C2FF, 0xF4D35EFF, 0xE78AC3FF, 0x8FCB6BFF, 0xB79CF5FF, 0xFF7043FF
 _SHOWN = {
     "N": ("kN", 1e-3),
     "J": ("kJ", 1e-3),
+    "N m": ("kN m", 1e-3),
     "rad": ("deg", 180.0 / math.pi),
     "rad/s": ("deg/s", 180.0 / math.pi),
     "m/s2": ("m/s\N{SUPERSCRIPT TWO}", 1.0),
@@ -141,10 +143,11 @@ def _describe(channel: str) -> tuple[str, str, int]:
             return "loads", "ROPS force", BODY["rops"]
         case ["rops", "force_x" | "force_y" | "force_z" as what]:
             return "loads", f"ROPS force, {what[-1]}", AXIS[what[-1]]
-        case ["rops", "mount", name, "force"]:
-            return "mounts", f"mount {name}", SIMULATED
-        case ["rops", "mount", name, what]:
-            return "mounts", f"mount {name}, {what[-1]}", AXIS[what[-1]]
+        case ["rops", "mount" | "hinge" as what, name, "force" | "moment" as load]:
+            return "mounts", f"{what} {name}" + (", moment" if load == "moment" else ""), SIMULATED
+        case ["rops", "mount" | "hinge" as what, name, part]:
+            quantity = "" if part.startswith("force") else f"{part[:-2]} "
+            return "mounts", f"{what} {name}, {quantity}{part[-1]}", AXIS[part[-1]]
         case ["rops", "impulse"]:
             return "loads", "collision impulse on the ROPS", BODY["rops"]
         case ["rops", "deflection"]:
@@ -165,8 +168,8 @@ def _describe(channel: str) -> tuple[str, str, int]:
             return "wheels", f"wheel {name.replace('_', ' ')}", WHEEL.get(name, _any(name))
         case ["energy", name]:
             return "energy", name, LEDGER.get(name, _any(name))
-        case ["axle", name, _]:
-            return "motion", f"{name} axle angle", _CYCLE[1]
+        case ["axle", name, what]:
+            return "motion", f"{name} axle {what}", _CYCLE[1 if what == "angle" else 2]
         case ["chassis" | "striker" as body, what]:
             return "motion", *_motion(body, what)
     return "other", channel, _any(channel)

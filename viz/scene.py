@@ -6,6 +6,7 @@ body's pose; parts of the world in world axes. Nothing here knows the viewer.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections import Counter
 from dataclasses import dataclass
@@ -17,11 +18,12 @@ from rollover.inertia import MassProperties
 from rollover.rops import ClearanceZone, Rops
 from rollover.run import Run
 from rollover.shapes import Box, Disc, Point, Shape, Tube, axes_along
-from rollover.vehicle import Striker, Vehicle, Wheel
+from rollover.vehicle import Striker, Vehicle, Wheel, laden
 from viz.entities import escaped
 
 PAINT = (0x4C8C46FF, 0x417C3DFF, 0x569A4EFF, 0x386E36FF)  # the chassis, part by part
-FRAME, JOINT = 0xF2C81EFF, 0xF2C81EFF
+FRAME, UPPER = 0xF2C81EFF, 0xF29A2EFF
+LOAD = 0x3F6FB5FF  # what is attached
 STEEL, DARK_STEEL = 0x8E98A3FF, 0x5C6670FF
 TREAD, LUG, SIDE_WALL = 0x2B2E33FF, 0x3B3F46FF, 0x34383EFF
 RIM, RIM_MARK = 0xD8D8D0FF, 0x6F7378FF
@@ -120,30 +122,38 @@ def _vehicle(vehicle: Vehicle) -> tuple[Part, ...]:
         found.append(Rod(path=f"{axle}/pivot", start=(x - 0.15, y, z), end=(x + 0.15, y, z), radius=0.05, colour=STEEL))
     if vehicle.rops is not None:
         found += _rops(vehicle.rops)
+    for mass in vehicle.attached:
+        root = f"{body_path(mass.carried_by)}/{escaped(mass.name)}"
+        found += [_solid(shape, f"{root}/{escaped(shape.name)}", LOAD) for shape in mass.outline]
+        if not mass.outline:
+            # it cannot touch anything: seen through, in the size that its inertia gives it
+            found.append(dataclasses.replace(_equivalent(mass.body, f"{root}/mass"), colour=LOAD, see_through=True))
     return tuple(found)
 
 
 def _rops(rops: Rops) -> list[Part]:
-    root = body_path("rops")
-    found: list[Part] = [_solid(shape, f"{root}/{escaped(shape.name)}", FRAME) for shape in rops.members]
-    tubes = [s for s in rops.members if isinstance(s, Tube)]
+    found: list[Part] = []
+    for (body, (_, members)), colour in zip(rops.parts.items(), (FRAME, UPPER), strict=False):
+        found += _frame(members, body_path(body), colour)
+    for below, joints, name in (("chassis", rops.mounts, "rops_mounts"), ("rops", rops.hinges, "hinges")):
+        if joints:
+            places = np.array([m.position for m in joints])
+            radii = np.full(len(places), 0.06)
+            found.append(Balls(path=f"{body_path(below)}/{name}", centres=places, radii=radii, colour=DARK_STEEL))
+    if rops.clearance_zone is not None:
+        found.append(_zone(rops.clearance_zone, f"{body_path('chassis')}/clearance_zone"))
+    return found
+
+
+def _frame(members: tuple[Shape, ...], root: str, colour: int) -> list[Part]:
+    found: list[Part] = [_solid(shape, f"{root}/{escaped(shape.name)}", colour) for shape in members]
+    tubes = [s for s in members if isinstance(s, Tube)]
     ends = Counter(end for tube in tubes for end in (tube.start, tube.end))
     joints = [end for end, count in ends.items() if count > 1]
     if joints:
         # flat ends leave a notch where two tubes meet
         radii = [max(0.5 * t.diameter for t in tubes if end in (t.start, t.end)) for end in joints]
-        found.append(Balls(path=f"{root}/joints", centres=np.array(joints), radii=np.array(radii), colour=JOINT))
-    mounts = np.array([m.position for m in rops.mounts])
-    found.append(
-        Balls(
-            path=f"{body_path('chassis')}/rops_mounts",
-            centres=mounts,
-            radii=np.full(len(mounts), 0.06),
-            colour=DARK_STEEL,
-        )
-    )
-    if rops.clearance_zone is not None:
-        found.append(_zone(rops.clearance_zone, f"{body_path('chassis')}/clearance_zone"))
+        found.append(Balls(path=f"{root}/joints", centres=np.array(joints), radii=np.array(radii), colour=colour))
     return found
 
 
@@ -295,7 +305,7 @@ def path_of_centre(run: Run) -> NDArray[np.float64]:
     vehicle = run.scenario.vehicle
     if isinstance(vehicle, Striker) or "chassis" not in run.motion:
         return np.zeros((0, 3))
-    motion, centre = run.motion["chassis"], np.array(vehicle.whole.centre_of_mass)
+    motion, centre = run.motion["chassis"], np.array(laden(vehicle).centre_of_mass)
     turned = [rotation(q) @ centre for q in motion.quaternion]
     return np.asarray(motion.origin + np.array(turned).reshape(-1, 3))
 

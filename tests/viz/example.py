@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from ground.array import Elements
 from ground.surface import Slope
 from ground.ye import Ye2006
+from rollover.connector import Connector
 from rollover.inertia import MassProperties
 from rollover.initiation import Drop, TipOver
 from rollover.recording import Recording
-from rollover.rops import ClearanceZone, Mount, Rops
+from rollover.rops import ClearanceZone, Rops
 from rollover.run import ContactForce, Event, GroundTrack, Motion, Run
 from rollover.scenario import Ground, Scenario, Simulation
 from rollover.shapes import Box, Tube
@@ -51,8 +52,8 @@ def tractor() -> Vehicle:
             frame="two-post-rear",
             body=MassProperties(mass=75.0, centre_of_mass=(-0.2, 0.0, 1.75), inertia=(25.0, 14.0, 14.0)),
             mounts=(
-                Mount(name="left", position=(-0.2, 0.52, 0.95), stiffness=stiff, damping=damp),
-                Mount(name="right", position=(-0.2, -0.52, 0.95), stiffness=stiff, damping=damp),
+                Connector(name="left", position=(-0.2, 0.52, 0.95), stiffness=stiff, damping=damp),
+                Connector(name="right", position=(-0.2, -0.52, 0.95), stiffness=stiff, damping=damp),
             ),
             members=(
                 Tube(name="left_post", start=(-0.2, 0.52, 0.95), end=(-0.25, 0.55, 2.35), diameter=0.08),
