@@ -19,8 +19,10 @@ from rollover.tables import (
     E_FORCE_NOW,
     POSE_COLUMNS,
     ROT,
+    S_DELTA_NOW,
     S_FORCE_NOW,
     S_SET,
+    T_K,
     T_PLAY,
     W_CENTRE,
     W_HALF,
@@ -32,6 +34,7 @@ from rollover.tables import (
 Array = NDArray[np.float64]
 ROLL, PITCH, AXLE, SLIDE, YAW, PARTS = 1, 2, 3, 4, 6, 7  # places in u; 0 is the height
 TOLERANCE = 1e-7  # of forces and moments over the weight
+FREE = 1.0  # m or rad: a play that no part of a ROPS leaves
 
 
 def tread_point(t: Tables, bodies: tuple[Body, ...], w: int, R: Array) -> Array:
@@ -184,24 +187,36 @@ class Equilibrium:
         return None
 
     def seated(self, u: Array, fixed: tuple[int, ...] = ()) -> Array:
-        """The same equilibrium with the parts of the ROPS where they bear at the end of their play; play is given back.
+        """The equilibrium u with the parts of the ROPS where they bear at the ends of their play, which is given back.
 
-        A connector that bears with force F stands off by its play to that side: without play, but with this as its
-        permanent set, it has the same force. Where no side is found to stay, parts begin to move when the run does.
+        Each axis with play is taken to bear at one end of it, there as a spring that stands off by the play, or to be
+        free; what would pull is set free, what goes beyond its play bears, until nothing changes. Where that does not
+        end, parts begin to move when the run does.
         """
-        sets = self.t.mount_memory[:, S_SET : S_SET + 6]
-        for _ in range(5 if self.play.any() else 0):
-            self.residual(u)
-            sides = -np.sign(self.t.mount_memory[:, S_FORCE_NOW : S_FORCE_NOW + 6])
-            if np.array_equal(sets, sides * self.play):
-                break
+        if not self.play.any():
+            return u
+        memory, gap = self.t.mount_memory, self.t.mount_f[:, T_PLAY : T_PLAY + 6]
+        sets = memory[:, S_SET : S_SET + 6]
+        self.residual(u)
+        force = memory[:, S_FORCE_NOW : S_FORCE_NOW + 6]
+        sides = -np.sign(np.where(np.abs(force) > 1e-4 * self.scale, force, 0.0)) * (self.play > 0.0)
+        for _ in range(20):
+            gap[:] = np.where((sides == 0.0) & (self.play > 0.0), FREE, 0.0)
             sets[:] = sides * self.play
             found = self.solve(u, fixed)
             if found is None:
                 break
             u = found
-        sets[:] = 0.0
-        self.t.mount_f[:, T_PLAY : T_PLAY + 6] = self.play
+            way, after = memory[:, S_DELTA_NOW : S_DELTA_NOW + 6], sides.copy()
+            beyond = (sides == 0.0) & (self.play > 0.0) & (np.abs(way) > self.play)
+            after[beyond] = np.sign(way[beyond])
+            pull = np.where(sides == 0.0, 0.0, (self.play - way * sides) * self.t.mount_f[:, T_K : T_K + 6])
+            if not beyond.any() and pull.max() > 0.0:
+                after[np.unravel_index(int(np.argmax(pull)), pull.shape)] = 0.0  # one at a time: the others may bear
+            if np.array_equal(after, sides):
+                break
+            sides = after
+        sets[:], gap[:] = 0.0, self.play
         return u
 
     def _descend(self, u: Array, r: Array, step: Array, free: list[int]) -> tuple[bool, Array, Array]:

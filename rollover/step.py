@@ -277,6 +277,8 @@ def strike(t: Any, qd: Any) -> bool:
         return False
     g[M_FREE], g[M_REACH] = 0.0, abs(g[M_ANGLE_NOW])
     lost, impulse = strike_stop(t, math.copysign(1.0, g[M_ANGLE_NOW]), qd)
+    if impulse == 0.0:
+        return False
     t.work[AXLE] += lost
     g[M_IMPULSE] += impulse
     note_event(t, AXLE_BLOW, 0, place(t.pose[t.axle_i[1]], 0.0, 0.0, 0.0), impulse)

@@ -22,7 +22,8 @@ from rollover.document import Leaf
 from rollover.provenance import Provenance
 from rollover.rops import Rops
 from rollover.scenario import Scenario, load, schema
-from rollover.vehicle import Striker, Vehicle, chassis_of
+from rollover.shapes import Tube
+from rollover.vehicle import Striker, Vehicle, chassis_of, pitch_inertia
 
 FOLDER = document.shipped_folder()
 FILES = sorted(path for path in FOLDER.rglob("*.yaml") if path.name != "excluded.yaml")
@@ -40,6 +41,9 @@ def name_of(path: Path) -> str:
 def test_there_are_files_of_every_sort() -> None:
     assert {"drop_test", "rops_drop", "side_overturn", "side_overturn_slope"} <= {p.stem for p in SCENARIOS}
     assert {"utility_tractor", "compact_tractor", "rops_rig"} <= {p.stem for p in VEHICLES}
+    more = {"vineyard_tractor", "row_crop_tractor", "large_tractor", "mf178", "light_vehicle"}
+    assert more <= {p.stem for p in VEHICLES}
+    assert {document.load(p, Rops).frame for p in FRAMES} == {"two-post-rear", "two-post-front", "four-post", "cab"}
     assert {"natural_clay"} <= {p.stem for p in SOILS}
     assert set(FILES) == {*SCENARIOS, *VEHICLES, *SOILS, *FRAMES, *BASELINES}
 
@@ -218,6 +222,72 @@ def test_the_utility_rops_has_the_measured_side_load_curve() -> None:
     assert load_ * (0.213 - 0.5 * load_ / stiffness) == pytest.approx(5437.0, rel=0.01)
 
 
+def test_the_mf_178_rops_has_the_measured_side_load_curve() -> None:
+    rops = document.load(FOLDER / "vehicles/rops/two_post_rear_mf178.yaml", Rops)
+    stiffness, load_ = side_load_curve(rops, 2.40)
+    assert load_ == 34_000.0
+    assert stiffness == pytest.approx(0.32e6, rel=0.01)
+    assert load_ / stiffness == pytest.approx(0.106, abs=0.002)  # where it yields
+    assert load_ * (0.213 - 0.5 * load_ / stiffness) == pytest.approx(5437.0, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("name", "height", "mass"),
+    [
+        ("two_post_front_1500", 2.165, 1500.0),
+        ("two_post_folding_2t", 2.265, 2000.0),
+        ("four_post_4500", 2.655, 4500.0),
+        ("cab_7000", 2.925, 7000.0),
+        ("two_post_rear_450", 1.725, 450.0),
+    ],
+)
+def test_an_estimated_rops_takes_the_side_energy_of_its_tractor(name: str, height: float, mass: float) -> None:
+    rops = document.load(FOLDER / f"vehicles/rops/{name}.yaml", Rops)
+    stiffness, load_ = side_load_curve(rops, height)
+    assert 1.0 <= load_ * (0.200 - 0.5 * load_ / stiffness) / (1.75 * mass) < 1.05
+
+
+def test_a_folded_rops_is_the_upright_one_turned_about_its_hinges() -> None:
+    upright, folded = (
+        document.load(FOLDER / f"vehicles/rops/two_post_{name}_2t.yaml", Rops) for name in ("folding", "folded")
+    )
+    assert upright.body == folded.body
+    assert upright.members == folded.members
+    assert [h.position for h in upright.hinges] == [h.position for h in folded.hinges]
+    x, z = upright.hinges[0].position[0], upright.hinges[0].position[2]
+    for before, after in zip(upright.upper.members, folded.upper.members, strict=True):  # type: ignore[union-attr]
+        for a, b in ((before.start, after.start), (before.end, after.end)):  # type: ignore[union-attr]
+            assert np.hypot(a[0] - x, a[2] - z) == pytest.approx(np.hypot(b[0] - x, b[2] - z), abs=2e-3)
+            assert a[1] == pytest.approx(b[1], abs=1e-9)
+    bar = folded.upper.members[-1].start  # type: ignore[union-attr]
+    assert math.degrees(math.atan2(x - bar[0], bar[2] - z)) == pytest.approx(115.0, abs=0.1)
+    assert folded.corner[2] < upright.corner[2] - 0.7
+    assert folded.upper.body.mass == upright.upper.body.mass  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("path", [p for p in VEHICLES if p.stem != "rops_rig"], ids=name_of)
+def test_the_stated_pitch_inertia_is_the_computed_one(path: Path) -> None:
+    """I = Iyy + m (a^2 + (h - r)^2) about the rear axle, against 0.378 M L^2, as `rollover list vehicles` words it."""
+    vehicle = document.load(path, scenarios.AnyVehicle)
+    said = [entry.source for entry in vehicle.provenance if "whole" in entry.of]
+    wheels = {wheel.name: wheel.centre for wheel in vehicle.wheels}
+    m, (a, _, h), L = vehicle.whole.mass, vehicle.whole.centre_of_mass, wheels["front_left"][0]
+    about = vehicle.whole.inertia[1] + m * (a**2 + (h - wheels["rear_left"][2]) ** 2)
+    assert pitch_inertia(vehicle) == pytest.approx((about, 0.378 * m * L**2), rel=1e-12)
+    line = catalogue.pitch_line(*pitch_inertia(vehicle))
+    assert line[0].upper() + line[1:] + "." in said[0]
+
+
+def test_the_list_of_vehicles_shows_their_pitch_inertia() -> None:
+    shown = {row["name"]: row["pitch"] for row in catalogue.vehicles()}
+    assert shown["utility_tractor"].endswith("5493 kg m2 against 0.378 M L^2 = 5741 kg m2, -4.3 %")
+    assert shown["rops_rig"] == ""
+
+
+def test_without_axles_there_is_no_pitch_inertia_to_state() -> None:
+    assert pitch_inertia(document.load(FOLDER / "vehicles/rops_rig.yaml", scenarios.AnyVehicle)) is None
+
+
 def test_the_compact_rops_takes_the_side_energy_of_its_tractor() -> None:
     rops = document.load(FOLDER / "vehicles/rops/two_post_rear_2t.yaml", Rops)
     stiffness, load_ = side_load_curve(rops, 2.265)
@@ -229,6 +299,9 @@ def test_the_compact_rops_takes_the_side_energy_of_its_tractor() -> None:
 # and the pivot, rear tyre width, Ixx, Iyy, Izz, ROPS top and half width
 CLASSES = {
     "utility_tractor": (3000, 2.25, 0.90, 1.50, 1.45, 0.82, 0.55, 0.42, 1300, 3000, 3300, 2.5, 0.60),
+    "vineyard_tractor": (1500, 1.70, 0.80, 0.95, 0.95, 0.70, 0.45, 0.28, 350, 900, 1000, 2.2, 0.45),
+    "row_crop_tractor": (4500, 2.45, 1.05, 1.60, 1.60, 0.95, 0.65, 0.47, 2300, 6000, 6500, 2.7, 0.75),
+    "large_tractor": (7000, 2.80, 1.30, 1.85, 1.85, 1.10, 0.75, 0.58, 5000, 12000, 13500, 3.0, 0.85),
     "compact_tractor": (2000, 1.90, 0.75, 1.35, 1.30, 0.72, 0.50, 0.32, 650, 1500, 1650, 2.3, 0.55),
 }
 
@@ -269,7 +342,8 @@ def test_on_its_side_a_tractor_lies_on_rear_tyre_and_rops(name: str) -> None:
     for end in ("front", "rear"):
         wheel = {w.name: w for w in vehicle.wheels}[f"{end}_left"]
         for post in vehicle.rops.members:
-            if post.name == "post_left":  # posts clear the rear tyres
+            near = isinstance(post, Tube) and abs(post.start[0]) < wheel.tyre.radius
+            if near and post.name in ("post_left", "rear_post_left"):  # posts clear the rear tyres
                 high = wheel.centre[2] + wheel.tyre.radius
                 along = min(1.0, (high - post.start[2]) / (post.end[2] - post.start[2]))
                 y = post.start[1] + along * (post.end[1] - post.start[1]) + 0.5 * post.diameter

@@ -11,8 +11,9 @@ import pytest
 from rollover.inertia import MassProperties
 from rollover.initiation import TipOver
 from rollover.run import Run
+from rollover.scenario import load
 from rollover.shapes import Disc
-from rollover.vehicle import Striker, Vehicle
+from rollover.vehicle import Attached, Striker, Vehicle
 from tests.viz import example
 from viz.scene import Balls, Block, Hull, Rod, extent, parts, path_of_centre, rotation
 
@@ -160,3 +161,34 @@ def test_a_run_without_frames_still_has_an_extent() -> None:
     centre, radius = extent(run)
     assert np.all(np.isfinite(centre))
     assert radius > 0.0
+
+
+def test_an_upper_part_and_what_is_carried_hang_under_their_own_bodies(overturn: Run) -> None:
+    vehicle = load("side_overturn").replaced({"vehicle": "vehicles/compact_tractor_folding.yaml"}).vehicle
+    assert isinstance(vehicle, Vehicle)
+    found = by_path(with_vehicle(overturn, vehicle))
+    bar, post = found["world/rops_upper/crossbar"], found["world/rops/post_left"]
+    assert isinstance(bar, Rod)
+    assert isinstance(post, Rod)
+    assert bar.colour != post.colour
+    assert "world/rops/crossbar" not in found
+    hinges = found["world/rops/hinges"]
+    assert isinstance(hinges, Balls)
+    assert hinges.centres[:, 2] == pytest.approx([1.45, 1.45])
+    weights, driver = found["world/chassis/ballast/weights"], found["world/chassis/driver/mass"]
+    assert isinstance(weights, Block)
+    assert isinstance(driver, Block)
+    assert weights.size == pytest.approx((0.30, 0.60, 0.30))
+    assert not weights.see_through
+    assert driver.see_through  # it cannot touch anything
+    assert driver.size == pytest.approx((0.40, 0.45, 0.85))
+
+
+def test_the_centre_that_is_followed_is_the_laden_one(overturn: Run) -> None:
+    vehicle = overturn.scenario.vehicle
+    assert isinstance(vehicle, Vehicle)
+    heavy = Attached(name="tank", mass=vehicle.whole.mass, centre_of_mass=(5.0, 0.0, 2.0), size=(1.0, 1.0, 1.0))
+    before = path_of_centre(overturn)
+    after = path_of_centre(with_vehicle(overturn, dataclasses.replace(vehicle, attached=(heavy,))))
+    way = 0.5 * (np.array([5.0, 0.0, 2.0]) - np.array(vehicle.whole.centre_of_mass))
+    assert np.linalg.norm(after - before, axis=1) == pytest.approx(np.linalg.norm(way), rel=1e-9)
