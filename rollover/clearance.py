@@ -102,9 +102,10 @@ def _of_structure(zone: ClearanceZone, run: Run, vehicle: Vehicle) -> dict[str, 
     assert vehicle.rops is not None
     chassis = run.pose["chassis"]
     found = {}
-    for member in vehicle.rops.members:
-        points, thickness = _stand_ins(member)
-        found[member.name] = _in_chassis(points, run.pose["rops"], chassis, zone) - thickness
+    for body, (_, members) in vehicle.rops.parts.items():
+        for member in members:
+            points, thickness = _stand_ins(member)
+            found[member.name] = _in_chassis(points, run.pose[body], chassis, zone) - thickness
     return found
 
 
@@ -148,7 +149,8 @@ def protected_margin(vehicle: Vehicle) -> float:
         raise ValueError("rops.clearance_zone: none given, got no zone to protect; a vehicle with one")
     from scipy.spatial import ConvexHull
 
-    hard = [patch.position for shape in (*vehicle.outline, *vehicle.rops.members) for patch in sample(shape, 0.05)]
+    structure = [shape for _, members in vehicle.rops.parts.values() for shape in members]
+    hard = [patch.position for shape in (*vehicle.outline, *structure) for patch in sample(shape, 0.05)]
     angle = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
     for wheel in vehicle.wheels:
         x, y, z = wheel.centre

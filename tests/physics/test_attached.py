@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from rollover.clearance import protected_margin
 from rollover.contact import bodies_of, tables_of
 from rollover.forces import generalised_forces
 from rollover.frames import from_angles, rotation_vector
@@ -206,3 +207,16 @@ def test_the_share_of_the_energy_that_a_light_rops_takes() -> None:
     assert shares == sorted(shares)
     assert shares[0] < 0.25
     assert 0.38 < shares[2] < 0.61
+
+
+def test_the_clearance_zone_sees_the_upper_part() -> None:
+    """Upright, the zone lies within the frame in two parts as within the one in one part; folded back not."""
+    margins = {
+        name: protected_margin(vehicle)
+        for name in ("compact_tractor", "compact_tractor_folding", "compact_tractor_folded")
+        if isinstance(
+            vehicle := shipped("side_overturn").replaced({"vehicle": f"vehicles/{name}.yaml"}).vehicle, Vehicle
+        )
+    }
+    assert margins["compact_tractor_folding"] == pytest.approx(margins["compact_tractor"], abs=0.05)
+    assert margins["compact_tractor_folded"] < margins["compact_tractor"] - 0.2
