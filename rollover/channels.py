@@ -60,6 +60,9 @@ CHANNELS: dict[str, Channel] = {
         Channel(name="chassis/yaw", unit="rad", meaning="ISO 8855"),
         *_axes("chassis/angular_velocity", "rad/s", "body axes"),
         *_axes("chassis/acceleration", "m/s2", "centre of mass, body axes, coordinate acceleration"),
+        *_axes("chassis/quaternion", "1", "attitude, body axes to world, scalar first", "wxyz"),
+        *_axes("sensor/NAME/acceleration", "m/s2", "of an accelerometer, at its place, its own axes"),
+        *_axes("sensor/NAME/angular_velocity", "rad/s", "of a gyroscope, its own axes"),
         *_axes("rops/force", "N", "ground on the ROPS, vehicle axes"),
         Channel(name="rops/force", unit="N", meaning="ground on the ROPS, resultant"),
         *_axes("rops/mount/NAME/force", "N", "load through the mount, vehicle axes"),
@@ -112,6 +115,7 @@ _POUND, _FOOT, _INCH, _MILE, _G = 4.4482216152605, 0.3048, 0.0254, 1609.344, 9.8
 
 # unit of the channel -> spelling -> factor; a table for each dimension, so that g is never a gram and Nm never a length
 UNITS: dict[str, dict[str, float]] = {
+    "1": {"1": 1.0, "-": 1.0, "": 1.0, "%": 0.01},
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0},
     "N": {
         "N": 1.0,

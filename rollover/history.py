@@ -12,7 +12,7 @@ from ground.compiled import compiled
 from ground.kernel import AREA, CELL, LINE_Z, SINKAGE
 from rollover import tables as c
 from rollover.contact import Body
-from rollover.frames import angles, matrices
+from rollover.frames import angles, matrices, quaternions
 from rollover.rops import Rops
 from rollover.scenario import Scenario
 from rollover.step import kinetic_of_soil
@@ -225,6 +225,8 @@ def _chassis(s: States, b: int) -> dict[str, Array]:
     roll, pitch, yaw = angles(s.q[:, b, 3:])
     acceleration = np.einsum("nji,nj->ni", R, s.qdd[:, b, :3])
     found = {"chassis/roll": roll, "chassis/pitch": pitch, "chassis/yaw": yaw}
+    attitude = quaternions(s.q[:, b, 3:])
+    found |= {f"chassis/quaternion_{axis}": attitude[:, k] for k, axis in enumerate("xyzw")}
     for k, axis in enumerate("xyz"):
         found[f"chassis/position_{axis}"] = s.q[:, b, k]
         found[f"chassis/velocity_{axis}"] = s.qd[:, b, k]

@@ -15,7 +15,7 @@ import pytest
 from rollover import store
 from rollover.document import content_hash
 from rollover.faults import InputError
-from rollover.recording import Recording, read_parquet, write_parquet
+from rollover.recording import Clock, Recording, Sensor, read_parquet, write_parquet
 from rollover.scenario import load
 from tests.rollover.example import Peak, run_of
 
@@ -187,3 +187,16 @@ def test_reading_what_is_not_a_run(tmp_path: Path, text: str | None, message: st
     with pytest.raises(InputError) as caught:
         store.read_run_json(tmp_path)
     assert message in str(caught.value)
+
+
+def test_how_a_channel_was_measured_survives_too(tmp_path: Path) -> None:
+    sensor = Sensor(body="rops", position=(0.1, 0.2, 1.5), matrix=((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
+    recording = replace(
+        run_of(load("drop_test")).recording,
+        clock=Clock(zero="unknown"),
+        sensors={"ground/force_normal": sensor},
+        notes=("a note",),
+    )
+    write_parquet(recording, tmp_path / "c.parquet")
+    again = read_parquet(tmp_path / "c.parquet")
+    assert (again.clock, again.sensors, again.notes) == (recording.clock, recording.sensors, recording.notes)

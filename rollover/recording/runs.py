@@ -1,50 +1,16 @@
-"""Recording: named channels over time, simulated and measured alike; Parquet files of them."""
+"""Channels of a run: one Parquet file that says all about itself."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict
 from pathlib import Path
-
-import numpy as np
-from numpy.typing import NDArray
 
 from rollover.channels import describe
 from rollover.faults import Fault, InputError
+from rollover.recording.record import Clock, Recording, Sensor
 
 FORMAT = "rollover-channels/1"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Recording:
-    """Channels (see `channels.CHANNELS`), SI, one value each per time stamp; gaps are NaN.
-
-    `time` (n,) strictly increasing, s; `channels` name -> (n,); `noise` name -> 1 sigma; `cfc` name -> class
-    of the filter already applied.
-    """
-
-    title: str
-    time: NDArray[np.float64]
-    channels: Mapping[str, NDArray[np.float64]]
-    source: str = ""
-    conditions: Mapping[str, float] = field(default_factory=dict)
-    noise: Mapping[str, float] = field(default_factory=dict)
-    cfc: Mapping[str, int] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        if self.time.ndim != 1 or self.time.size == 0:
-            raise ValueError(f"time: empty or not one column, got shape {self.time.shape}; at least one stamp")
-        if not np.all(np.diff(self.time) > 0):
-            at = int(np.argmin(np.diff(self.time)))
-            raise ValueError(f"time: does not increase, got {self.time[at + 1]!r} after {self.time[at]!r}")
-        for name, values in self.channels.items():
-            if values.shape != self.time.shape:
-                raise ValueError(f"{name}: got {values.shape} values for {self.time.shape} time stamps; one each")
-
-    def __getitem__(self, name: str) -> NDArray[np.float64]:
-        """Values of a channel, (n,)."""
-        return self.channels[name]
 
 
 def write_parquet(recording: Recording, path: Path) -> None:
@@ -65,6 +31,9 @@ def write_parquet(recording: Recording, path: Path) -> None:
         "conditions": dict(recording.conditions),
         "noise": dict(recording.noise),
         "cfc": dict(recording.cfc),
+        "clock": asdict(recording.clock),
+        "sensors": {name: asdict(sensor) for name, sensor in recording.sensors.items()},
+        "notes": list(recording.notes),
     }
     schema = pa.schema(fields, metadata={"rollover": json.dumps(about)})
     pq.write_table(pa.table([pa.array(values) for values in table.values()], schema=schema), path)
@@ -83,4 +52,16 @@ def read_parquet(path: Path) -> Recording:
     if about.pop("format", None) != FORMAT:
         raise InputError(Fault(file=str(path), message=f"not channels of a run; a file of format {FORMAT} is needed"))
     columns = {name: table[name].to_numpy() for name in table.column_names}
+    about["clock"] = Clock(**about.get("clock", {}))
+    about["sensors"] = {name: _sensor(values) for name, values in about.get("sensors", {}).items()}
+    about["notes"] = tuple(about.get("notes", ()))
     return Recording(time=columns.pop("time"), channels=columns, **about)
+
+
+def _sensor(values: dict[str, object]) -> Sensor:
+    """Lists of JSON back to the tuples they were."""
+    return Sensor(**{k: _tuples(v) for k, v in values.items()})  # type: ignore[arg-type]
+
+
+def _tuples(value: object) -> object:
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value

@@ -1,0 +1,8 @@
+"""Recording: named channels over time, simulated and measured alike; tables of them on disk. The only pyarrow home."""
+
+from __future__ import annotations
+
+from rollover.recording.record import Clock, Recording, Sensor
+from rollover.recording.runs import FORMAT, read_parquet, write_parquet
+
+__all__ = ["FORMAT", "Clock", "Recording", "Sensor", "read_parquet", "write_parquet"]
