@@ -16,6 +16,7 @@ from rollover.document.resolved import Leaf, content_hash, dump, paths, to_mappi
 from rollover.document.schema import schema
 from rollover.document.slot import slot_of
 from rollover.document.tree import Node, read
+from rollover.document.tree import write as dump_mapping
 
 __all__ = [
     "Leaf",
@@ -23,6 +24,7 @@ __all__ = [
     "check",
     "content_hash",
     "dump",
+    "dump_mapping",
     "find",
     "headings",
     "load",

@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from rollover.recording.record import Clock, Recording, Sensor
-from rollover.recording.runs import FORMAT, read_parquet, write_parquet
+from rollover.recording.runs import FORMAT, is_run, read_parquet, write_parquet
 
-__all__ = ["FORMAT", "Clock", "Recording", "Sensor", "read_parquet", "write_parquet"]
+__all__ = ["FORMAT", "Clock", "Recording", "Sensor", "is_run", "read_parquet", "write_parquet"]

@@ -39,6 +39,17 @@ def write_parquet(recording: Recording, path: Path) -> None:
     pq.write_table(pa.table([pa.array(values) for values in table.values()], schema=schema), path)
 
 
+def is_run(path: Path) -> bool:
+    """Whether a Parquet file holds the channels of a run."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        return b"rollover" in (pq.read_schema(path).metadata or {})
+    except (OSError, pa.ArrowException, ValueError):
+        return False
+
+
 def read_parquet(path: Path) -> Recording:
     """Read what `write_parquet` wrote, to the last bit. Raises `InputError`."""
     import pyarrow as pa
@@ -48,14 +59,20 @@ def read_parquet(path: Path) -> Recording:
         table = pq.read_table(path)
     except (OSError, pa.ArrowInvalid) as e:
         raise InputError(Fault(file=str(path), message=f"cannot be read: {str(e).splitlines()[0]}")) from None
-    about = json.loads((table.schema.metadata or {}).get(b"rollover", b"{}"))
-    if about.pop("format", None) != FORMAT:
-        raise InputError(Fault(file=str(path), message=f"not channels of a run; a file of format {FORMAT} is needed"))
-    columns = {name: table[name].to_numpy() for name in table.column_names}
-    about["clock"] = Clock(**about.get("clock", {}))
-    about["sensors"] = {name: _sensor(values) for name, values in about.get("sensors", {}).items()}
-    about["notes"] = tuple(about.get("notes", ()))
-    return Recording(time=columns.pop("time"), channels=columns, **about)
+    not_a_run = Fault(file=str(path), message=f"not channels of a run; a file of format {FORMAT} is needed")
+    try:
+        about = json.loads((table.schema.metadata or {}).get(b"rollover", b"{}"))
+        if about.pop("format", None) != FORMAT:
+            raise InputError(not_a_run)
+        columns = {name: table[name].to_numpy() for name in table.column_names}
+        about["clock"] = Clock(**about.get("clock", {}))
+        about["sensors"] = {name: _sensor(values) for name, values in about.get("sensors", {}).items()}
+        about["notes"] = tuple(about.get("notes", ()))
+        return Recording(time=columns.pop("time"), channels=columns, **about)
+    except InputError:
+        raise
+    except (AttributeError, KeyError, TypeError, ValueError):  # someone else wrote it
+        raise InputError(not_a_run) from None
 
 
 def _sensor(values: dict[str, object]) -> Sensor:

@@ -1,0 +1,173 @@
+"""What stands beside a table of numbers: the sidecar of a recording, and the profile of a foreign file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+from ground.quantity import Quantity, parameters
+from rollover import document
+from rollover.channels import describe, factor
+from rollover.document import Node
+from rollover.faults import Fault, InputError
+from rollover.recording import Clock, Sensor
+
+MOST_BYTES = 1 << 18  # of a sidecar: what is longer is no sidecar, and would take long to be refused
+T = TypeVar("T")
+
+
+@parameters
+class Column:
+    """What one column of a file is: its number times `scale` plus `offset` is the channel's value in `unit`."""
+
+    channel: Annotated[str, "see `rollover list channels`"]
+    unit: Annotated[str | None, "of the column; a profile may leave it to a file that says so itself"] = None
+    noise: Annotated[float | None, Quantity("", "1 sigma, in the unit", least=0)] = None
+    cfc: Annotated[Literal[60, 180, 600, 1000] | None, "filter class already applied"] = None
+    sensor: Annotated[Sensor | None, "where it was measured"] = None
+    scale: Annotated[float, Quantity("1", "factor on the file's numbers")] = 1.0
+    offset: Annotated[float, Quantity("", "added after the factor, in the unit")] = 0.0
+
+    def validate(self) -> None:
+        """Refuse what is no channel, a unit of another dimension, and an instrument without a place."""
+        try:
+            describe(self.channel)
+        except ValueError as e:
+            raise ValueError(f"channel: {e}") from None
+        if self.unit is not None:
+            try:
+                factor(self.unit, self.channel)
+            except ValueError as e:
+                raise ValueError(f"unit: {e}") from None
+        if self.channel.startswith("sensor/") and self.sensor is None:
+            raise ValueError(
+                f"sensor: missing for {self.channel}; a mapping (body, position, orientation_deg, gravity)"
+            )
+
+
+@parameters
+class Csv:
+    """How a CSV file is written."""
+
+    delimiter: Annotated[str, "one character"] = ","
+    decimal: Literal[".", ","] = "."
+    encoding: Annotated[str, "such as utf-8, cp1252, iso-8859-1, utf-16"] = "utf-8"
+    names_row: Annotated[int, "which row holds the names; blank lines and comments do not count"] = 1
+    units_row: Annotated[int | None, "which row holds the units, below the names"] = None
+    data_row: Annotated[int | None, "which row is the first of numbers; else the one after names and units"] = None
+    comment: Annotated[str, "what a comment line begins with"] = "#"
+
+    def validate(self) -> None:
+        """Refuse rows out of order, a delimiter of several characters and an encoding that Python does not know."""
+        import codecs
+
+        if len(self.delimiter) != 1 or self.delimiter == self.decimal or not self.delimiter.isascii():
+            raise ValueError(f"delimiter: got {self.delimiter!r}; one character, and not the decimal mark")
+        try:
+            codecs.lookup(self.encoding)
+        except LookupError:
+            raise ValueError(f"encoding: unknown, got {self.encoding!r}; such as utf-8, cp1252, utf-16") from None
+        if self.names_row < 1 or (self.units_row is not None and self.units_row <= self.names_row):
+            raise ValueError(f"units_row: not below the names, got {self.units_row}; after row {self.names_row}")
+        if self.data_row is not None and self.data_row <= (self.units_row or self.names_row):
+            raise ValueError(f"data_row: not below names and units, got {self.data_row}; a later row")
+
+
+@parameters
+class Sidecar:
+    """`NAME.yaml` of a recording."""
+
+    format: Literal["rollover-recording/1"]
+    title: str = ""
+    source: Annotated[str, "who measured it, licence, citation"] = ""
+    conditions: Annotated[Mapping[str, Any], "scenario path -> value this was run with"] = field(default_factory=dict)
+    clock: Clock = field(default_factory=Clock)
+    notes: tuple[str, ...] = ()
+    channels: Annotated[Mapping[str, Any], "column -> what it is"]
+
+
+@parameters
+class Profile:
+    """What a foreign file's columns are; one profile serves all files that an instrument writes."""
+
+    format: Literal["rollover-profile/1"]
+    title: str = ""
+    source: Annotated[str, "who measured it, licence, citation"] = ""
+    conditions: Annotated[Mapping[str, Any], "scenario path -> value this was run with"] = field(default_factory=dict)
+    clock: Clock = field(default_factory=Clock)
+    notes: tuple[str, ...] = ()
+    csv: Csv = field(default_factory=Csv)
+    rate: Annotated[float | None, Quantity("Hz", "where the file has no time column", above=0)] = None
+    start: Annotated[float, Quantity("s", "time of the first sample, with `rate`")] = 0.0
+    channels: Annotated[Mapping[str, Any], "column -> what it is"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Described:
+    """A sidecar or profile with its columns, and the lines on which they stand, for messages."""
+
+    file: str
+    about: Sidecar | Profile
+    columns: Mapping[str, Column]
+    lines: Mapping[str, int | None]
+
+    def refuse(self, column: str, message: str) -> InputError:
+        """A fault at a column's description."""
+        return InputError(
+            Fault(file=self.file, line=self.lines.get(column), path=f"channels.{column}", message=message)
+        )
+
+
+def read_described(path: Path, kind: type[Sidecar] | type[Profile]) -> Described:
+    """Read a sidecar or a profile. Raises `InputError` with all faults, each with its line."""
+    try:
+        size = path.stat().st_size
+    except (OSError, RuntimeError) as e:
+        raise InputError(Fault(file=str(path), message=f"cannot be read: {getattr(e, 'strerror', e)}")) from None
+    if size > MOST_BYTES:
+        raise InputError(Fault(file=str(path), message=f"too long, got {size} bytes; at most {MOST_BYTES} are allowed"))
+    root = document.read(path)
+    if not isinstance(root.value, Mapping):
+        raise root.place.fault("", f"not a mapping, got {str(root.plain)[:40]!r}; format, channels are needed")
+    faults: list[Fault] = []
+    about = _checked(root, kind, "", faults)
+    for path_, child in _conditions(root):
+        if isinstance(child.value, Mapping):
+            faults += child.place.fault(f"conditions.{path_}", "not a value, got a mapping; write a.b: 1").faults
+    columns: dict[str, Column] = {}
+    lines: dict[str, int | None] = {}
+    first: dict[str, str] = {}
+    entries = root.value.get("channels")
+    for name, node in entries.value.items() if entries and isinstance(entries.value, Mapping) else ():
+        column = _checked(node, Column, f"channels.{name}", faults)
+        if column is None:
+            continue
+        columns[name], lines[name] = column, node.key.line
+        if column.channel in first:
+            what = f"second column of {column.channel}, first {first[column.channel]!r}; one column a channel"
+            faults += node.key.fault(f"channels.{name}", what).faults
+        first.setdefault(column.channel, name)
+        if kind is Sidecar and column.unit is None:
+            faults += node.key.fault(f"channels.{name}", "unit: missing; the column's unit is needed").faults
+    if faults:
+        raise InputError(*faults)
+    assert about is not None
+    if not columns:
+        raise root.place.fault("channels", "empty; at least time and one channel are needed")
+    return Described(file=str(path), about=about, columns=columns, lines=lines)
+
+
+def _checked(node: Node, kind: type[T], path: str, faults: list[Fault]) -> T | None:
+    try:
+        found: T = document.check(node, kind)
+    except InputError as e:
+        faults += [replace(f, path=".".join(p for p in (path, f.path) if p)) for f in e.faults]
+        return None
+    return found
+
+
+def _conditions(root: Node) -> list[tuple[str, Node]]:
+    below = root.value.get("conditions") if isinstance(root.value, Mapping) else None
+    return list(below.value.items()) if below and isinstance(below.value, Mapping) else []
