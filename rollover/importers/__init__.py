@@ -1,3 +1,92 @@
-"""Recordings from files: our own format and those of instruments and viewers."""
+"""Recordings from files: our own format, those of instruments and viewers, and published sets of recordings."""
 
 from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from pathlib import Path
+
+from rollover.faults import Fault, InputError, hint
+from rollover.importers import iso_mme, plain
+from rollover.importers.cone_drops import CONE_DROPS
+from rollover.importers.csv_profile import CSV
+from rollover.importers.cube_tosses import CUBE_TOSSES
+from rollover.importers.falling_balls import FALLING_BALLS
+from rollover.importers.hdf5 import HDF5
+from rollover.importers.importer import Collection, Importer
+from rollover.importers.mat import MAT
+from rollover.importers.mcap import MCAP
+from rollover.importers.mdf import MDF
+from rollover.importers.sidecar import Described, Profile, read_described
+from rollover.importers.soil_penetrometer import SOIL_PENETROMETER
+from rollover.importers.tdms import TDMS
+from rollover.recording import Recording
+
+__all__ = ["COLLECTIONS", "Collection", "Importer", "importers", "read_profile", "read_recording", "write_recording"]
+
+PLAIN = Importer(name="plain", meaning="CSV or Parquet with a sidecar", sniff=plain.sniff, read=plain.read)
+_OWN = {i.name: i for i in (PLAIN, iso_mme.ISO_MME, MAT, TDMS, MDF, HDF5, MCAP, CSV)}
+COLLECTIONS: dict[str, Collection] = {c.name: c for c in (CUBE_TOSSES, FALLING_BALLS, SOIL_PENETROMETER, CONE_DROPS)}
+ENTRY_POINTS = "rollover.importers"
+
+
+@functools.cache  # what is installed does not change while we run
+def importers() -> Mapping[str, Importer]:
+    """Importers by name: our own, and those that installed packages offer. Raises ``ValueError`` for a name twice."""
+    from importlib.metadata import entry_points
+
+    found = dict(_OWN)
+    for point in entry_points(group=ENTRY_POINTS):
+        importer: Importer = point.load()
+        if importer.name in found:
+            raise ValueError(f"importer {importer.name!r}: a second one, from {point.value}; another name is needed")
+        found[importer.name] = importer
+    return found
+
+
+def read_recording(path: str | Path, *, profile: str | Path | Described | None = None, kind: str = "") -> Recording:
+    """Recording from any file that an importer knows, or a run's folder; SI. Raises `InputError`.
+
+    `profile` says what the columns of a foreign file are; `kind` names the importer instead of finding it.
+    """
+    path = Path(path)
+    try:
+        if (path / "channels.parquet").is_file():
+            path = path / "channels.parquet"
+        exists = path.exists()
+    except (OSError, RuntimeError) as e:  # a link that leads to itself
+        raise InputError(Fault(file=str(path), message=f"cannot be read: {getattr(e, 'strerror', e)}")) from None
+    if not exists:
+        raise InputError(Fault(file=str(path), message="no such file"))
+    given = profile if isinstance(profile, Described) or profile is None else read_profile(profile)
+    return _importer(path, given, kind).read(path, given)
+
+
+def write_recording(recording: Recording, path: str | Path, *, force: bool = False) -> None:
+    """Write `NAME.csv` or `NAME.parquet` with its sidecar, or an ISO-MME test (`NAME.mme.zip`, or a folder `NAME.mme`).
+
+    Whole or not at all, over nothing without `force`. Raises `InputError`.
+    """
+    path = Path(path)
+    is_mme = path.name.endswith((".mme.zip", ".mme"))
+    (iso_mme.write if is_mme else plain.write)(recording, path, force=force)
+
+
+def read_profile(path: str | Path) -> Described:
+    """What the columns of a foreign file are, from a `rollover-profile/1` file. Raises `InputError`."""
+    return read_described(Path(path), Profile)
+
+
+def _importer(path: Path, given: Described | None, kind: str) -> Importer:
+    table = importers()
+    if kind:
+        if kind not in table:
+            raise InputError(Fault(file=str(path), message=f"no such importer, got {kind!r}; {hint(kind, table)}"))
+        return table[kind]
+    for importer in table.values():
+        if importer.sniff(path) and not (importer is PLAIN and given is not None):
+            return importer
+    if path.is_dir():
+        raise InputError(Fault(file=str(path), message="a folder, and neither a run, an ISO-MME test nor a ROS bag"))
+    message = f"no importer knows this file; {', '.join(table)} are known, --profile says what its columns are"
+    raise InputError(Fault(file=str(path), message=message))

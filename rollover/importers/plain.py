@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from rollover.channels import describe
 from rollover.document import dump_mapping, to_mapping
 from rollover.faults import Fault, InputError
@@ -54,11 +56,10 @@ def read(path: Path, profile: Described | None = None) -> Recording:
     names = csv_heading(table)[0] if is_csv else parquet_names(table)
     wanted = [name for name in given.columns if name in names]
     values = read_csv(table, wanted) if is_csv else read_parquet_columns(table, wanted)
-    blank = Signal(values=next(iter(values.values()))) if values else None
-    signals = {n: Signal(values=values.pop(n)) if n in wanted else blank for n in names}
+    nothing = Signal(values=np.empty(0))  # a column that is not described is not read
     return assemble(
         table,
-        {name: signal for name, signal in signals.items() if signal is not None},
+        {name: Signal(values=values.pop(name)) if name in wanted else nothing for name in names},
         given,
         line=(lambda row: line_of_row(table, row)) if is_csv else lambda row: None,
     )

@@ -94,6 +94,18 @@ def read_csv(path: Path, columns: Sequence[str], dialect: Dialect = PLAIN) -> di
     return _numpy(table, columns)
 
 
+def read_words(path: Path, columns: Sequence[str], dialect: Dialect = PLAIN) -> dict[str, list[str]]:
+    """Some columns of a short CSV file as text. Raises `InputError`."""
+    names, _ = csv_heading(path, dialect)
+    for name in columns:
+        if name not in names:
+            _refuse(path, f"no column {name}, got {', '.join(names[:12])}")
+    lines = _lines(path, dialect)
+    _skip(lines, dialect.before + 1 + dialect.between)
+    rows = [_cells(text, dialect) for _, text in lines]
+    return {name: [row[names.index(name)] for row in rows if len(row) == len(names)] for name in columns}
+
+
 def line_of_row(path: Path, row: int, dialect: Dialect = PLAIN) -> int:
     """Line of a CSV file on which a row of numbers stands, both for messages; the first row is 0."""
     lines = _lines(path, dialect)

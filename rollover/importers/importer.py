@@ -1,0 +1,85 @@
+"""What an importer is, and what they share: the optional library that is missing, the file that cannot be read."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rollover.faults import Fault, InputError
+from rollover.importers.sidecar import Described
+from rollover.recording import Recording
+
+MOST_VALUES = 500_000_000  # of one file, 4 GB of float64
+
+
+@dataclass(frozen=True, kw_only=True)
+class Importer:
+    """A file format: `sniff` tells from a path, quickly, whether it is one; `read` gives the recording.
+
+    A lab's own format is one of these under the entry point group `rollover.importers`.
+    """
+
+    name: str
+    meaning: str
+    sniff: Callable[[Path], bool]
+    read: Callable[[Path, Described | None], Recording]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Collection:
+    """A published set of recordings that a user downloads; `read` gives those whose name fits one of the patterns."""
+
+    name: str
+    meaning: str
+    citation: str
+    licence: str
+    where: str
+    read: Callable[[Path, Sequence[str]], Iterator[tuple[str, Recording]]]
+
+    @property
+    def source(self) -> str:
+        """What a recording says about where it comes from."""
+        return f"{self.citation}; {self.where}; licence: {self.licence}"
+
+
+def starts_with(path: Path, *marks: bytes) -> bool:
+    """Whether a file begins with one of these bytes."""
+    try:
+        with path.open("rb") as file:
+            return file.read(max(map(len, marks))).startswith(marks)
+    except OSError:
+        return False
+
+
+def library(name: str, extra: str, path: Path) -> Any:
+    """An optional library. Raises `InputError` that says how to get it."""
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        package = name.partition(".")[0]
+        message = f"needs {package}, which is not installed; pip install 'rollover[{extra}]'"
+        raise InputError(Fault(file=str(path), message=message)) from None
+
+
+@contextlib.contextmanager
+def reading(path: Path, what: str) -> Iterator[None]:
+    """Turn whatever a library says about a broken file into one line. Raises `InputError`."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as e:  # every library has its own
+        reason = (str(e).splitlines() or [""])[0][:160] or type(e).__name__
+        raise InputError(Fault(file=str(path), message=f"not a readable {what} file: {reason}")) from None
+
+
+def check_claim(path: Path, values: int, *, most_per_byte: float = 1000.0) -> None:
+    """Refuse a file whose header claims more values than it can hold, before anything is made room for."""
+    size = path.stat().st_size
+    if values < 0 or values > MOST_VALUES or values > most_per_byte * size:
+        message = f"claims too much, got {values} values in {size} bytes; at most {MOST_VALUES} values are allowed"
+        raise InputError(Fault(file=str(path), message=message))

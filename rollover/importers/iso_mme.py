@@ -1,0 +1,255 @@
+"""ISO-MME (ISO/TS 13499): a test as a folder, zip or tar of text files; read and written.
+
+NAME.mme about the test, Channel/NAME.chn the list of channels, Channel/NAME.001 ... one channel each: lines
+`Name :value`, then one value a line. Values along and about y and z are in SAE J211 polarity there.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.channels import describe, is_known
+from rollover.faults import Fault, InputError
+from rollover.importers import mme_codes as codes
+from rollover.importers.importer import Importer
+from rollover.importers.mme_archive import content, names_in
+from rollover.importers.polarity import sign
+from rollover.importers.sidecar import Described
+from rollover.importers.signals import Signal, assemble
+from rollover.recording import Recording
+
+NOVALUE = "NOVALUE"
+_HEADER = re.compile(r"([^:]*?)\s*:(.*)")
+_CHANNEL_FILE = re.compile(r"(.*)\.\d{3,}$")
+_NUMBER = re.compile(r"\s*[-+]?(\d|\.\d|nan|inf|novalue)", re.IGNORECASE)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Channel:
+    file: str
+    head: Mapping[str, str]
+    values: NDArray[np.float64]
+
+    @property
+    def code(self) -> str:
+        return self.head.get("channel code", "").strip()
+
+
+def _sniff(path: Path) -> bool:
+    if path.suffix.lower() == ".mme":
+        return path.is_file()
+    if path.is_dir():
+        return any(p.suffix.lower() == ".mme" for p in path.iterdir())
+    return path.suffix.lower() in (".zip", ".tar", ".tgz", ".gz", ".bz2", ".xz") and path.is_file()
+
+
+def _read(path: Path, profile: Described | None) -> Recording:
+    place = path.parent if path.suffix.lower() == ".mme" else path
+    names = names_in(place)
+    tests = sorted((n for n in names if n.lower().endswith(".mme")), key=lambda n: (n.count("/"), n))
+    if not tests:
+        _refuse(path, "no ISO-MME test, got no .mme file inside")
+    chosen = path.name if place != path else tests[0]
+    test = _header(place, chosen, content(place, chosen))[0]
+    above = PurePosixPath(chosen).parent
+    files = [n for n in names if _CHANNEL_FILE.match(n) and PurePosixPath(n).parent.parent == above]
+    files = [n for n in files if PurePosixPath(n).parent.name.lower() == "channel"]
+    if not files:
+        _refuse(path, f"no channels, got no Channel/*.001 beside {chosen}")
+    channels = [_channel(place, name) for name in sorted(files)]
+    signals: dict[str, Signal] = {}
+    for channel in channels:
+        key, signal = _signal(place, channel, channels)
+        signals[f"{key} ({channel.file})" if key in signals else key] = signal
+    title = _value(test, "title") or _value(test, "type of the test") or PurePosixPath(chosen).stem
+    laboratory = _value(test, "laboratory name")
+    found = assemble(path, signals, profile)
+    more = {} if profile and profile.about.title else {"title": title}
+    if laboratory and not (profile and profile.about.source):
+        more["source"] = laboratory
+    flipped = {name: sign(name) * values for name, values in found.channels.items() if sign(name) < 0.0}
+    kept = {
+        field: getattr(found, field) for field in ("time", "conditions", "noise", "cfc", "clock", "sensors", "notes")
+    }
+    return Recording(
+        **{"title": found.title, "source": found.source, **more, **kept, "channels": {**found.channels, **flipped}}
+    )
+
+
+def write(recording: Recording, path: Path, *, force: bool = False) -> None:
+    """Write a recording as an ISO-MME test: a folder, or one file where `path` ends in .zip. Raises `InputError`.
+
+    The whole test stands there at the end or nothing; numbers keep every bit. The name of our channel goes into
+    `Name of the channel`, so that reading the test gives the same channels again.
+    """
+    if path.exists() and not force:
+        raise InputError(Fault(file=str(path), message="exists; --force replaces it, another name leaves it"))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    name = path.name.removesuffix(".zip")
+    part = Path(tempfile.mkdtemp(prefix=".mme.", suffix=".part", dir=path.parent))
+    try:
+        folder = part / name
+        (folder / "Channel").mkdir(parents=True)
+        for file, text in _files(recording, name).items():
+            (folder / file).write_text(text, encoding="utf-8")
+        done = folder
+        if path.suffix == ".zip":
+            done = part / "whole.zip"
+            with zipfile.ZipFile(done, "w", zipfile.ZIP_DEFLATED) as archive:
+                for inside in sorted(folder.rglob("*")):
+                    archive.write(inside, inside.relative_to(folder).as_posix())
+        if path.is_dir():
+            shutil.rmtree(path)
+        os.replace(done, path)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def _files(recording: Recording, name: str) -> dict[str, str]:
+    time = recording.time
+    step = (time[-1] - time[0]) / (time.size - 1) if time.size > 1 else 1.0
+    regular = bool(np.all(np.abs(time - (time[0] + step * np.arange(time.size))) < 1e-12))
+    table = {n: sign(n) * values for n, values in recording.channels.items()}
+    if not regular:
+        table = {"time": time, **table}
+    entries = {n: codes.code_of(n, recording.cfc.get(n, 0)) for n in table}
+    files = {f"{name}.mme": _text({"Data format edition number": "1.6", **_test(recording)})}
+    listing = {"Instrumentation standard": "SAE J211", "Number of channels": str(len(table))}
+    for i, (channel, values) in enumerate(table.items(), start=1):
+        listing[f"Name of channel {i:03d}"] = f"{entries[channel]} / {channel}"
+        head = {
+            "Test object number": "1",
+            "Name of the channel": channel,
+            "Channel code": entries[channel],
+            "Unit": describe(channel).unit,
+            "Channel frequency class": str(recording.cfc.get(channel, NOVALUE)),
+            "Reference channel": "implicit" if regular else "explicit",
+            "Reference channel name": NOVALUE if regular else entries["time"],
+            "Sampling interval": repr(float(step)) if regular else NOVALUE,
+            "Time of first sample": repr(float(time[0])),
+            "Number of samples": str(values.size),
+        }
+        numbers = "\n".join(NOVALUE if v != v else repr(v) for v in values.tolist())
+        files[f"Channel/{name}.{i:03d}"] = f"{_text(head)}{numbers}\n"
+    return {**files, f"Channel/{name}.chn": _text(listing)}
+
+
+def _test(recording: Recording) -> dict[str, str]:
+    return {
+        "Laboratory name": " ".join(recording.source.split()) or NOVALUE,
+        "Title": " ".join(recording.title.split()) or NOVALUE,
+        "Type of the test": "rollover",
+        "Name of test object 1": "vehicle",
+    }
+
+
+def _text(head: Mapping[str, str]) -> str:
+    return "".join(f"{key:<28}:{value}\n" for key, value in head.items())
+
+
+def _header(place: Path, name: str, data: bytes) -> tuple[dict[str, str], list[str], int]:
+    """Head of a file, its other lines, and the number of the first of them."""
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("iso-8859-1")
+    if "\0" in text:
+        _refuse(place, f"{name}: not a text file, got a NUL byte")
+    lines = text.splitlines()
+    head: dict[str, str] = {}
+    for i, line in enumerate(lines):
+        match = _HEADER.fullmatch(line)
+        if match is None and (_NUMBER.match(line) or line.strip().lower() == "start of data"):
+            return head, lines[i:], i + 1
+        if match:
+            head.setdefault(match[1].strip().lower(), match[2].strip())
+    return head, [], len(lines)
+
+
+def _channel(place: Path, name: str) -> _Channel:
+    head, lines, first = _header(place, name, content(place, name))
+    code = head.get("channel code", "").strip()
+    if len(code) != 16 or not re.fullmatch(r"[A-Za-z0-9?]{16}", code):
+        _refuse(place, f"{name}: Channel code: got {code!r}; 16 letters and digits are needed")
+    if lines and lines[0].strip().lower() == "start of data":
+        lines, first = lines[1:], first + 1
+    words = [line.strip() for line in lines]
+    while words and not words[-1]:
+        words.pop()
+    try:
+        values = np.array(["nan" if w.upper() == NOVALUE else w for w in words], dtype=np.float64)
+    except ValueError:
+        row = next(i for i, w in enumerate(words) if not _is_number(w))
+        _refuse(place, f"{name}: line {first + row}: not a number, got {words[row][:40]!r}; one number a line")
+    claimed = _value(head, "number of samples")
+    if claimed and (not claimed.isdigit() or int(claimed) != values.size):
+        _refuse(place, f"{name}: Number of samples: says {claimed[:20]}, got {values.size}; a whole file is needed")
+    if not values.size:
+        _refuse(place, f"{name}: empty, got no samples")
+    return _Channel(file=PurePosixPath(name).name, head=head, values=values)
+
+
+def _signal(place: Path, channel: _Channel, channels: list[_Channel]) -> tuple[str, Signal]:
+    """Name of a channel (its code, or ours that it carries) and its samples on their own clock."""
+    head = channel.head
+    name = _value(head, "name of the channel")
+    known = name if is_known(name) else codes.channel_of(channel.code) or ""
+    dimension = codes.dimension_of(channel.code)
+    unit = _value(head, "unit") or codes.DEFAULT_UNITS.get(dimension, "")
+    if dimension == "TI" or known == "time":
+        return channel.code, Signal(values=channel.values, unit=unit)
+    time = _time(place, channel, channels)
+    cfc = codes.cfc_of(channel.code)
+    return channel.code, Signal(values=channel.values, unit=unit, time=time, cfc=cfc, channel=known)
+
+
+def _time(place: Path, channel: _Channel, channels: list[_Channel]) -> NDArray[np.float64]:
+    head = channel.head
+    if head.get("reference channel", "implicit").lower() == "explicit":
+        wanted = head.get("reference channel name", "").strip()
+        for other in channels:
+            if wanted and wanted in (other.code, other.head.get("name of the channel", "")):
+                if other.values.size != channel.values.size:
+                    what = f"got {channel.values.size} values for {other.values.size} time stamps in {other.file}"
+                    _refuse(place, f"{channel.file}: {what}; one each")
+                return other.values
+        _refuse(place, f"{channel.file}: Reference channel name: no such channel, got {wanted!r}; the code of another")
+    try:
+        step, start = float(head["sampling interval"]), float(_value(head, "time of first sample") or 0.0)
+    except (KeyError, ValueError):
+        got = head.get("sampling interval", "nothing")
+        _refuse(place, f"{channel.file}: Sampling interval: got {got!r}; a time in s, or an explicit reference channel")
+    if not (np.isfinite(start) and 0.0 < step < 1e6):
+        _refuse(place, f"{channel.file}: Sampling interval: got {step!r}; a time greater than 0 s")
+    return np.asarray(start + step * np.arange(channel.values.size))
+
+
+def _value(head: Mapping[str, str], key: str) -> str:
+    value = head.get(key, "").strip()
+    return "" if value.upper() == NOVALUE else value
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float("nan" if word.upper() == NOVALUE else word)
+    except ValueError:
+        return False
+    return True
+
+
+def _refuse(path: Path, message: str) -> NoReturn:
+    raise InputError(Fault(file=str(path), message=message))
+
+
+ISO_MME = Importer(name="iso-mme", meaning="ISO-MME, ISO/TS 13499: folder, zip or tar", sniff=_sniff, read=_read)
