@@ -17,7 +17,7 @@ RATE = 148.0  # Hz
 MASS, INERTIA, EDGE = 0.37, 8.1e-4, 0.1048  # kg, kg m2 about each axis, m
 COLUMNS = ("x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz")
 _NOTES = (
-    f"a cube of {MASS} kg, edge {EDGE} m, inertia {INERTIA} kg m2 about each axis; table at z = 0, so z = edge/2 at rest",
+    f"a cube of {MASS} kg, edge {EDGE} m, inertia {INERTIA} kg m2 about each axis; the table is at z = 0",
     "velocities are filtered differences of the tracked poses, not measured by themselves",
 )
 

@@ -1,0 +1,141 @@
+"""Single samples and runs of them: flat tops, stuck and missing samples, spikes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from rollover.prechecks.finding import Finding, Trace
+
+CHANCE = 0.001  # that a clean channel shows a spike or a stuck run
+FLAT = 3  # samples exactly alike at the very top: what a peak that is measured does not do
+AROUND = 6  # samples on either side that say what a sample should be
+
+
+def clipping(t: Trace, unit: str) -> Iterator[Finding]:
+    """Runs of exactly equal samples at the largest or smallest value, entered and left in a step."""
+    for extreme, side in ((float(t.values.max()), "top"), (float(t.values.min()), "bottom")):
+        if extreme == 0.0:
+            continue  # forces and sinkage have a natural floor
+        starts, lengths = _runs(t.values, np.abs(t.values - extreme) <= 1e-9 * abs(extreme))
+        inside = (starts > 0) & (starts + lengths < t.values.size)
+        flat = inside & (lengths >= max(FLAT, _usual_run(t.values, extreme)))
+        if not flat.any():
+            continue
+        first, last = int(starts[flat][0]), int((starts + lengths)[flat][-1]) - 1
+        jump = np.abs(t.values[starts[flat] - 1] - extreme).max()
+        if jump <= 1e-6 * abs(extreme):
+            continue
+        yield Finding(
+            check="clipping",
+            channel=t.channel,
+            start=float(t.time[first]),
+            end=float(t.time[last]),
+            value=extreme,
+            unit=unit,
+            error=None,
+            sentence=f"flat {side} at {extreme:.5g} {unit} over {int(lengths[flat].sum())} samples: "
+            "the range was exceeded, what lies beyond is lost",
+        )
+
+
+def _usual_run(values: NDArray[np.float64], extreme: float) -> int:
+    """What a digitised signal makes alike by itself: three times the longest run at any other level, plus one."""
+    same = np.abs(np.diff(values)) == 0.0
+    other = same & (np.abs(values[1:] - extreme) > 1e-9 * abs(extreme)) & (values[1:] != 0.0)
+    if not other.any():
+        return 0
+    starts, lengths = _runs(values[1:], other)
+    inner = lengths[(starts > 0) & (starts + lengths < other.size)]
+    # the usual level, not one stuck stretch
+    return 3 * (int(np.quantile(inner, 0.99)) + 1) + 1 if inner.size > 20 else 0
+
+
+def stuck(t: Trace, unit: str) -> Iterator[Finding]:
+    """Interior runs of one repeated value, away from the extremes, longer than the digitising explains."""
+    if t.floor.sigma == 0.0:
+        return
+    same = np.diff(t.values) == 0.0
+    starts, lengths = _runs(t.values[1:], same)
+    if not starts.size:
+        return
+    level = t.values[starts]
+    away = (level != t.values.max()) & (level != t.values.min()) & (level != 0.0)
+    away &= (starts > 0) & (starts + lengths < same.size)
+    usual = (same.sum() - lengths.max()) / max(1, same.size - lengths.max())  # chance that a sample repeats
+    most = 2.0 if usual <= 0.0 else max(2.0, math.log(t.values.size / CHANCE) / -math.log(min(0.99, usual)))
+    for start, length in zip(starts[away & (lengths > most)], lengths[away & (lengths > most)], strict=True):
+        yield Finding(
+            check="stuck",
+            channel=t.channel,
+            start=float(t.time[start]),
+            end=float(t.time[start + length]),
+            value=float(t.values[start]),
+            unit=unit,
+            error=None,
+            sentence=f"{int(length) + 1} samples in a row read exactly {t.values[start]:.6g} {unit}: "
+            "the logger repeated a sample",
+        )
+
+
+def gaps(t: Trace) -> Iterator[Finding]:
+    """Samples missing from an otherwise even clock."""
+    if not t.regular:
+        return
+    steps = np.diff(t.time)
+    wide = np.flatnonzero(steps > 1.5 * t.step)
+    if wide.size:
+        lost = int(np.sum(np.round(steps[wide] / t.step) - 1))
+        yield Finding(
+            check="gap",
+            channel=t.channel,
+            start=float(t.time[wide[0]]),
+            end=float(t.time[wide[-1] + 1]),
+            value=float(lost),
+            unit="samples",
+            error=None,
+            sentence=f"{lost} samples missing in {wide.size} places at {1.0 / t.step:.6g} Hz: dropped by the logger",
+        )
+
+
+def spikes(t: Trace, unit: str) -> Iterator[Finding]:
+    """Single samples far from what a cubic through their neighbours says, where these agree."""
+    if not t.regular or t.floor.sigma == 0.0:
+        return
+    offsets = np.array([k for k in range(-AROUND, AROUND + 1) if k != 0])
+    basis = np.vander(offsets / AROUND, 4)
+    weights = np.linalg.pinv(basis)[-1]  # value of the cubic at 0
+    taps = np.insert(weights, AROUND, 0.0)
+    error = t.values - np.convolve(t.values, taps[::-1], mode="same")
+    error[:AROUND] = error[-AROUND:] = 0.0
+    inner = np.abs(error[AROUND:-AROUND])
+    quiet = inner[inner <= np.median(inner) * 6.0]
+    scale = float(np.median(quiet)) / 0.6745
+    limit = float(norm.isf(0.5 * CHANCE / t.values.size))
+    spread = np.eye(2 * AROUND) - basis @ np.linalg.pinv(basis)
+    likely = t.floor.sigma * math.sqrt(2 * AROUND - 4)
+    for i in np.flatnonzero(np.abs(error) > limit * scale):
+        left = spread @ t.values[i + offsets]
+        if np.linalg.norm(left) > 1.6 * likely or abs(error[i]) < np.abs(error[i + offsets[[5, 6]]]).max():
+            continue  # something quick happens here, or the neighbour is the spike
+        yield Finding(
+            check="spike",
+            channel=t.channel,
+            start=float(t.time[i]),
+            end=float(t.time[i]),
+            value=float(error[i]),
+            unit=unit,
+            error=scale,
+            sentence=f"one sample lies {error[i]:.4g} {unit} off its neighbours, {abs(error[i]) / scale:.1f} sigma: "
+            "a disturbance, not a force",
+        )
+
+
+def _runs(values: NDArray[np.float64], where: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Starts and lengths of the runs where `where` holds and the value stays the same."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(np.int8)))
+    return edges[::2], edges[1::2] - edges[::2]
