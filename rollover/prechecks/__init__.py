@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from rollover.channels import describe
 from rollover.noise import NoiseFloor
 from rollover.prechecks.finding import Finding, Trace, trace
-from rollover.prechecks.kinematic import kinematic
+from rollover.prechecks.kinematic import disagreements
 from rollover.prechecks.levels import free_fall, rest
 from rollover.prechecks.samples import clipping, gaps, spikes, stuck
 from rollover.recording import Recording
@@ -35,7 +35,7 @@ def prechecks(
     traces = _traces(recording)
     stated = recording.conditions.get("vehicle.mass")
     mass = float(stated) if mass is None and isinstance(stated, (int, float)) else mass
-    found = [*free_fall(traces, gravity), *rest(traces, mass, gravity), *kinematic(traces, seed=seed)]
+    found = [*free_fall(traces, gravity), *rest(traces, mass, gravity), *disagreements(traces, seed=seed)]
     for name, t in traces.items():
         unit = describe(name).unit
         found += [*clipping(t, unit), *stuck(t, unit), *gaps(t), *spikes(t, unit)]

@@ -89,7 +89,7 @@ def _moves(t: Trace, x: Array) -> bool:
     s = np.linspace(-1.0, 1.0, x.size)
     error = t.floor.of_mean(x.size)
     slope, bend = float(np.mean(x * s)) * np.sqrt(3.0), float(np.mean(x * (3.0 * s * s - 1.0))) * np.sqrt(5.0) / 2.0
-    return max(abs(slope), abs(bend)) > 3.0 * error
+    return bool(max(abs(slope), abs(bend)) > 3.0 * error)
 
 
 def _constant(values: Array, at_end: bool) -> slice | None:

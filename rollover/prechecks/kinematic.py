@@ -2,10 +2,11 @@
 
 With a the accelerometer's reading, v = int a, x = int v from the first sample on, and contact at t_c,
 
-    p(t) = c_0 + c_1 t + c_2 (t - t_c)_+ + G x + b t^2/2 - lag v - drift t v                        (K1)
-    u(t) = c_0 + c_2 H(t - t_c)         + G v + b t     - lag a - drift t a                         (K2)
+    p(t) - x = c_0 + c_1 t + c_2 (t - t_c)_+ + { (G - 1) x | b t^2/2 | -lag v | -drift t v }        (K1)
+    u(t) - v = c_0 + c_2 H(t - t_c)          + { (G - 1) v | b t     | -lag a | -drift t a }        (K2)
 
-for a position p and a speed u; c_2 takes a collision that is shorter than a sample. Least squares; the standard errors
+for a position p and a speed u; c_2 takes a collision that is shorter than a sample. The four are tried one at a time:
+the one that leaves the others nothing to explain is found, and those that would do as well are named. Standard errors
 are those of the same fit to noise drawn with each channel's own level and colour.
 """
 
@@ -30,7 +31,7 @@ LEAST = {"gain": 0.005, "bias": 0.02, "lag": 0.0, "drift": 1e-3}  # what samplin
 MOST_SAMPLES = 20_000
 
 
-def kinematic(traces: Mapping[str, Trace], *, seed: int = 0) -> Iterator[Finding]:
+def disagreements(traces: Mapping[str, Trace], *, seed: int = 0) -> Iterator[Finding]:
     """Findings of the first pair of channels that is there for each kind of disagreement."""
     for higher, lower, order in PAIRS:
         if higher in traces and lower in traces:
@@ -47,70 +48,91 @@ def _pair(p: Trace, a: Trace, order: int, random: np.random.Generator) -> Iterat
     if float(np.std(values)) < 10.0 * a.floor.sigma:
         return  # nothing happens
     higher = np.interp(time, p.time, p.values)
-    columns = _columns(time, values, order, "trapezoid")
-    fit = _solve(columns, higher)
-    other = _solve(_columns(time, values, order, "left"), higher)
-    spread = _drawn(columns, fit, p, a, time, order, random).std(axis=0)
-    quadrature = 0.1 * np.abs(other - fit)  # the trapezoid errs by far less than this share of what the rectangle does
+    effects, nuisance = _columns(time, values, order)
+    left = higher - effects["gain"]
+    noise = _noise(p, a, time, order, random)
     unit = "m/s2" if order == 2 or "velocity" in p.channel else "m/s"
-    start, end = float(time[0]), float(time[-1])
     size = float(np.abs(values).max())
-    for k, (name, neutral) in enumerate((("gain", 1.0), ("bias", 0.0), ("lag", 0.0), ("drift", 0.0))):
-        value, error = float(fit[k]), float(np.hypot(spread[k], quadrature[k]))
-        least = {"bias": 0.002 * size, "lag": 0.5 * max(p.step, a.step)}.get(name, LEAST[name])
-        if abs(value - neutral) <= max(1.2 * SURE * error, least):
+    least = {**LEAST, "bias": 0.002 * size, "lag": 0.5 * max(p.step, a.step)}
+    for _ in range(2):
+        z = _scores(effects, nuisance, left, noise)
+        if max(abs(value) / error for value, error in z.values()) < 1.2 * SURE:
+            return
+        after = {name: _after(name, effects, nuisance, left, noise) for name in z}
+        chosen = min(after, key=lambda name: after[name])
+        value, error = z[chosen]
+        if abs(value) < least[chosen]:
+            return
+        as_well = [name for name in after if name != chosen and after[name] < max(SURE, 1.5 * after[chosen])]
+        yield _finding(chosen, value, error, as_well, p, a, unit, time)
+        nuisance = np.column_stack([nuisance, effects.pop(chosen)])
+
+
+def _finding(
+    name: str, value: float, error: float, as_well: list[str], p: Trace, a: Trace, unit: str, time: Array
+) -> Finding:
+    said = {
+        "gain": f"{p.channel} moves {1.0 + value:.4g} times as far as {a.channel} says: a gain of one of the two",
+        "bias": f"the integral of {a.channel} drifts by {value:.3g} {unit} against {p.channel}: a bias",
+        "lag": f"{p.channel} comes {1e3 * value:.3g} ms after {a.channel}",
+        "drift": f"{p.channel} and {a.channel} run apart by {1e3 * value:.3g} ms a second: two clocks",
+    }[name]
+    return Finding(
+        check={"lag": "lag", "drift": "clock-drift"}.get(name, "double-integral"),
+        channel=p.channel,
+        start=float(time[0]),
+        end=float(time[-1]),
+        value=value,
+        unit={"gain": "1", "bias": unit, "lag": "s", "drift": "s/s"}[name],
+        error=error,
+        sentence=said + (f" ({' or '.join(as_well)} would explain it as well)" if as_well else ""),
+    )
+
+
+def _scores(effects: Mapping[str, Array], nuisance: Array, left: Array, noise: Array) -> dict[str, tuple[float, float]]:
+    """Value and standard error of each effect, alone beside the nuisances."""
+    Q, _ = np.linalg.qr(nuisance / np.linalg.norm(nuisance, axis=0))
+    found = {}
+    for name, column in effects.items():
+        e = column - Q @ (Q.T @ column)
+        if e @ e < 1e-12 * (column @ column):
             continue
-        check = {"lag": "lag", "drift": "clock-drift"}.get(name, "double-integral")
-        said = {
-            "gain": f"{p.channel} moves {value:.4g} times as far as {a.channel} says: a gain of one of the two",
-            "bias": f"the integral of {a.channel} drifts by {value:.3g} {unit} against {p.channel}: a bias",
-            "lag": f"{p.channel} comes {1e3 * value:.3g} ms after {a.channel}",
-            "drift": f"{p.channel} and {a.channel} run apart by {1e3 * value:.3g} ms a second: two clocks",
-        }[name]
-        used = {"gain": "1", "bias": unit, "lag": "s", "drift": "s/s"}[name]
-        yield Finding(
-            check=check, channel=p.channel, start=start, end=end, value=value, unit=used, error=error, sentence=said
-        )
+        found[name] = (float(e @ left / (e @ e)), float(np.std(noise @ e / (e @ e))))
+    return found
 
 
-def _columns(time: Array, a: Array, order: int, rule: str) -> Array:
-    """Right-hand sides of (K1) or (K2), (n, k): gain, bias, lag, drift first."""
+def _after(name: str, effects: Mapping[str, Array], nuisance: Array, left: Array, noise: Array) -> float:
+    """How sure the surest of the other effects still is once this one has been taken out."""
+    others = {other: column for other, column in effects.items() if other != name}
+    rest = _scores(others, np.column_stack([nuisance, effects[name]]), left, noise)
+    return max((abs(value) / error for value, error in rest.values()), default=0.0)
+
+
+def _columns(time: Array, a: Array, order: int) -> tuple[dict[str, Array], Array]:
+    """Right-hand sides of (K1) or (K2): each effect, (n,), and what is always fitted, (n, k)."""
     t = time - time[0]
-    v = _integral(t, a, rule)
-    x = _integral(t, v, rule)
+    v = _integral(t, a)
     contact = float(t[int(np.argmax(np.abs(np.diff(a))))])
     late = np.maximum(t - contact, 0.0)
     ones = np.ones_like(t)
     if order == 2:
-        return np.column_stack([x, 0.5 * t * t, -v, -t * v, ones, t, late])
-    return np.column_stack([v, t, -a, -t * a, ones, (late > 0.0).astype(float)])
+        x = _integral(t, v)
+        return {"gain": x, "bias": 0.5 * t * t, "lag": -v, "drift": -t * v}, np.column_stack([ones, t, late])
+    return {"gain": v, "bias": t, "lag": -a, "drift": -t * a}, np.column_stack([ones, (late > 0.0).astype(float)])
 
 
-def _integral(t: Array, y: Array, rule: str) -> Array:
-    steps = np.diff(t)
-    area = 0.5 * (y[1:] + y[:-1]) * steps if rule == "trapezoid" else y[:-1] * steps
-    return np.concatenate([[0.0], np.cumsum(area)])
+def _integral(t: Array, y: Array) -> Array:
+    """Integral along the last axis from the first sample on, by the trapezoid."""
+    area = 0.5 * (y[..., 1:] + y[..., :-1]) * np.diff(t)
+    return np.concatenate([np.zeros((*y.shape[:-1], 1)), np.cumsum(area, axis=-1)], axis=-1)
 
 
-def _solve(columns: Array, y: Array) -> Array:
-    scale = np.linalg.norm(columns, axis=0)
-    scale[scale == 0.0] = 1.0
-    return np.asarray(np.linalg.lstsq(columns / scale, y, rcond=1e-9)[0] / scale)
-
-
-def _drawn(
-    columns: Array, fit: Array, p: Trace, a: Trace, time: Array, order: int, random: np.random.Generator
-) -> Array:
-    """What the noise of both channels does to the fit, to first order, in many draws (d, k)."""
-    noise = a.floor.drawn(time.size, random, DRAWS)
-    once = np.pad(np.cumsum(0.5 * (noise[:, 1:] + noise[:, :-1]) * np.diff(time), axis=1), ((0, 0), (1, 0)))
-    twice = np.pad(np.cumsum(0.5 * (once[:, 1:] + once[:, :-1]) * np.diff(time), axis=1), ((0, 0), (1, 0)))
-    t = time - time[0]
-    x, v = (twice, once) if order == 2 else (once, noise)
+def _noise(p: Trace, a: Trace, time: Array, order: int, random: np.random.Generator) -> Array:
+    """What the noise of both channels makes of the left-hand side, in many draws (d, n)."""
+    integral = a.floor.drawn(time.size, random, DRAWS)
+    for _ in range(order):
+        integral = _integral(time, integral)
     higher = p.floor.drawn(p.time.size, random, DRAWS)
     if p.time.size != time.size:
         higher = np.array([np.interp(time, p.time, row) for row in higher])
-    left = higher - fit[0] * x + (fit[2] + fit[3] * t) * v
-    scale = np.linalg.norm(columns, axis=0)
-    scale[scale == 0.0] = 1.0
-    return np.asarray(left @ np.linalg.pinv(columns / scale, rcond=1e-9).T / scale)
+    return np.asarray(higher - integral)
