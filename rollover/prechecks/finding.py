@@ -86,7 +86,7 @@ def plateau(t: Trace, *, at_end: bool = False) -> slice | None:
 
 def _moves(t: Trace, x: Array) -> bool:
     """Whether a stretch has a slope or a bend beyond its noise."""
-    s = np.linspace(-1.0, 1.0, x.size)
+    s, x = np.linspace(-1.0, 1.0, x.size), x - x.mean()
     error = t.floor.of_mean(x.size)
     slope, bend = float(np.mean(x * s)) * np.sqrt(3.0), float(np.mean(x * (3.0 * s * s - 1.0))) * np.sqrt(5.0) / 2.0
     return bool(max(abs(slope), abs(bend)) > 3.0 * error)

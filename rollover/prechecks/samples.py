@@ -12,7 +12,9 @@ from scipy.stats import norm
 from rollover.prechecks.finding import Finding, Trace
 
 CHANCE = 0.001  # that a clean channel shows a spike or a stuck run
+FEWEST = 300  # samples, to know what is usual
 FLAT = 3  # samples exactly alike at the very top: what a peak that is measured does not do
+APART = 60  # samples within which a disturbance stands alone
 AROUND = 6  # samples on either side that say what a sample should be
 
 
@@ -45,14 +47,14 @@ def clipping(t: Trace, unit: str) -> Iterator[Finding]:
 
 def _usual_run(values: NDArray[np.float64], extreme: float) -> int:
     """What a digitised signal makes alike by itself: three times the longest run at any other level, plus one."""
-    same = np.abs(np.diff(values)) == 0.0
+    same = np.diff(values) == 0.0
     other = same & (np.abs(values[1:] - extreme) > 1e-9 * abs(extreme)) & (values[1:] != 0.0)
     if not other.any():
         return 0
     starts, lengths = _runs(values[1:], other)
     inner = lengths[(starts > 0) & (starts + lengths < other.size)]
-    # the usual level, not one stuck stretch
-    return 3 * (int(np.quantile(inner, 0.99)) + 1) + 1 if inner.size > 20 else 0
+    # a few long runs are stuck stretches, many short ones the digitising
+    return 3 * (int(np.quantile(inner, 0.9)) + 1) + 1 if inner.size > 3 else FLAT + 1
 
 
 def stuck(t: Trace, unit: str) -> Iterator[Finding]:
@@ -104,7 +106,7 @@ def gaps(t: Trace) -> Iterator[Finding]:
 
 def spikes(t: Trace, unit: str) -> Iterator[Finding]:
     """Single samples far from what a cubic through their neighbours says, where these agree."""
-    if not t.regular or t.floor.sigma == 0.0:
+    if not t.regular or t.floor.sigma == 0.0 or t.values.size < FEWEST:
         return
     offsets = np.array([k for k in range(-AROUND, AROUND + 1) if k != 0])
     basis = np.vander(offsets / AROUND, 4)
@@ -118,7 +120,13 @@ def spikes(t: Trace, unit: str) -> Iterator[Finding]:
     limit = float(norm.isf(0.5 * CHANCE / t.values.size))
     spread = np.eye(2 * AROUND) - basis @ np.linalg.pinv(basis)
     likely = t.floor.sigma * math.sqrt(2 * AROUND - 4)
-    for i in np.flatnonzero(np.abs(error) > limit * scale):
+    beyond = np.abs(error) > limit * scale
+    if np.mean(np.abs(error) > 3.0 * scale) > 0.05:
+        return  # sampled too slowly for what happens: a neighbour says little
+    for i in np.flatnonzero(beyond):
+        near = slice(max(0, i - APART), i + APART + 1)
+        if beyond[near].sum() > beyond[max(0, i - AROUND) : i + AROUND + 1].sum():
+            continue  # one of several: something quick happens
         left = spread @ t.values[i + offsets]
         if np.linalg.norm(left) > 1.6 * likely or abs(error[i]) < np.abs(error[i + offsets[[5, 6]]]).max():
             continue  # something quick happens here, or the neighbour is the spike
