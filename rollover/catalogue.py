@@ -69,6 +69,17 @@ def channels() -> list[Row]:
     return [vars(channel) for channel in table.CHANNELS.values()]
 
 
+def importers() -> list[Row]:
+    """File formats that `rollover import` reads, and published sets of recordings."""
+    from rollover.importers import COLLECTIONS
+    from rollover.importers import importers as known
+
+    formats = [{"name": i.name, "is": i.meaning, "where": ""} for i in known().values()]
+    return formats + [
+        {"name": c.name, "is": c.meaning, "where": f"{c.where}, {c.licence}"} for c in COLLECTIONS.values()
+    ]
+
+
 def paths(name: str) -> list[Row]:
     """Every value of a scenario with the path by which it is replaced."""
     return [leaf._asdict() for leaf in document.paths(scenarios.load(name))]
@@ -81,6 +92,7 @@ TABLES: dict[str, Callable[[], list[Row]]] = {
     "laws": laws,
     "effects": effects,
     "channels": channels,
+    "importers": importers,
 }
 
 

@@ -7,7 +7,8 @@ from rollover.commands import run
 from rollover.commands import view
 from rollover.commands import listing
 from rollover.commands import check
+from rollover.commands import importing
 from rollover.commands import schema
 from rollover.commands import regress
 
-__all__ = ["check", "listing", "regress", "run", "schema", "view"]
+__all__ = ["check", "importing", "listing", "regress", "run", "schema", "view"]

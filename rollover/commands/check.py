@@ -1,9 +1,10 @@
-"""`rollover check`: validate files."""
+"""`rollover check`: validate files, and say what recordings tell about their sensors."""
 
 from __future__ import annotations
 
 import json
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
@@ -14,24 +15,93 @@ from rollover.faults import Fault, InputError
 @app.command()
 @answering
 def check(
-    files: Annotated[list[str], typer.Argument(help="Scenarios, vehicles or soils.", metavar="FILE...")],
+    files: Annotated[list[str], typer.Argument(help="Scenarios, vehicles, soils or recordings.", metavar="FILE...")],
+    profile: Annotated[Path | None, typer.Option(help="What the columns of foreign recordings are.")] = None,
+    scenario: Annotated[str | None, typer.Option(help="Whose values the recordings' conditions must be.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Validate files and run nothing."""
-    from rollover import catalogue
-
-    rows, faults = [], []
+    """Validate files and run nothing; recordings are searched for faults of their sensors."""
+    rows: list[dict[str, Any]] = []
+    faults: list[Fault] = []
     for name in files:
         found: list[Fault] = []
+        row: dict[str, Any] = {"file": name, "is": ""}
         try:
-            what = catalogue.check(name)
+            row |= _recording(name, profile, scenario) if _is_recording(name) or profile else _document(name)
         except InputError as e:
-            what, found = "", e.faults
+            found = e.faults
         faults += found
-        rows.append({"file": name, "is": what, "faults": [{**vars(f), "text": str(f)} for f in found]})
+        rows.append({**row, "faults": [{**vars(f), "text": str(f)} for f in found]})
         if not as_json and not found:
-            print(f"{name}: {what}, in order")
+            _print(name, row)
     if as_json:
         print(json.dumps({"ok": not faults, "files": rows}, indent=2))
     if faults:
         raise InputError(*faults)
+
+
+def _document(name: str) -> dict[str, Any]:
+    from rollover import catalogue
+
+    return {"is": catalogue.check(name)}
+
+
+def _is_recording(name: str) -> bool:
+    """Whatever is there and no YAML of ours; a sidecar by its format."""
+    path = Path(name)
+    if path.suffix.lower() not in (".yaml", ".yml"):
+        return bool(path.suffix) or path.is_dir()
+    try:
+        with path.open("rb") as file:
+            return b"rollover-recording/" in file.read(2000)
+    except OSError:
+        return False
+
+
+def _recording(name: str, profile: Path | None, scenario: str | None) -> dict[str, Any]:
+    from rollover.channels import describe
+    from rollover.importers import read_recording
+    from rollover.prechecks import noise_floors, prechecks
+
+    recording = read_recording(name, profile=profile)
+    gravity = 9.81
+    if scenario is not None:
+        from rollover import scenario as scenarios
+
+        gravity = scenarios.load(scenario).replaced(recording.conditions, origin=f"{name}: conditions").gravity
+    floors = noise_floors(recording)
+    return {
+        "is": "recording",
+        "title": recording.title,
+        "samples": recording.time.size,
+        "start": float(recording.time[0]),
+        "end": float(recording.time[-1]),
+        "notes": list(recording.notes),
+        "channels": [
+            {
+                "channel": channel,
+                "unit": describe(channel).unit,
+                "noise": floors[channel].sigma if channel in floors else None,
+                "independence": floors[channel].independence if channel in floors else None,
+            }
+            for channel in recording.channels
+        ],
+        "findings": [vars(finding) for finding in prechecks(recording, gravity=gravity)],
+    }
+
+
+def _print(name: str, row: dict[str, Any]) -> None:
+    if row["is"] != "recording":
+        print(f"{name}: {row['is']}, in order")
+        return
+    span = f"{row['samples']} samples, {row['start']:.6g} to {row['end']:.6g} s"
+    print(f"{name}: recording, in order: {row['title']}, {span}")
+    for channel in row["channels"]:
+        noise = "noise not known" if channel["noise"] is None else f"noise {channel['noise']:.3g} {channel['unit']}"
+        print(f"  {channel['channel']}: {noise}")
+    for note in row["notes"]:
+        print(f"  note: {note}")
+    for f in row["findings"]:
+        print(f"  {f['check']}: {f['channel']}, {f['start']:.6g} to {f['end']:.6g} s: {f['sentence']}")
+    if not row["findings"]:
+        print("  no fault of a sensor found")

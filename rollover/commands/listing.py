@@ -21,6 +21,7 @@ class Listed(StrEnum):
     laws = "laws"
     effects = "effects"
     channels = "channels"
+    importers = "importers"
     paths = "paths"
 
 

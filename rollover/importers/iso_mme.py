@@ -47,15 +47,13 @@ class _Channel:
 
 
 def _sniff(path: Path) -> bool:
-    if path.suffix.lower() == ".mme":
-        return path.is_file()
     if path.is_dir():
         return any(p.suffix.lower() == ".mme" for p in path.iterdir())
-    return path.suffix.lower() in (".zip", ".tar", ".tgz", ".gz", ".bz2", ".xz") and path.is_file()
+    return path.suffix.lower() in (".mme", ".zip", ".tar", ".tgz", ".gz", ".bz2", ".xz") and path.is_file()
 
 
 def _read(path: Path, profile: Described | None) -> Recording:
-    place = path.parent if path.suffix.lower() == ".mme" else path
+    place = path.parent if path.suffix.lower() == ".mme" and path.is_file() else path
     names = names_in(place)
     tests = sorted((n for n in names if n.lower().endswith(".mme")), key=lambda n: (n.count("/"), n))
     if not tests:
@@ -96,7 +94,7 @@ def write(recording: Recording, path: Path, *, force: bool = False) -> None:
     if path.exists() and not force:
         raise InputError(Fault(file=str(path), message="exists; --force replaces it, another name leaves it"))
     path.parent.mkdir(parents=True, exist_ok=True)
-    name = path.name.removesuffix(".zip")
+    name = path.name.removesuffix(".zip").removesuffix(".mme")
     part = Path(tempfile.mkdtemp(prefix=".mme.", suffix=".part", dir=path.parent))
     try:
         folder = part / name

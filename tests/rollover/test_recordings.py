@@ -1,0 +1,180 @@
+"""`rollover-recording/1`: a table and a sidecar, read and written; and what stands in the published sets."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rollover.faults import InputError
+from rollover.importers import COLLECTIONS, read_recording, write_recording
+from rollover.recording import Clock, Recording, Sensor, write_parquet
+from rollover.scenario import load
+
+TABLE = """\
+# a drop
+t,F,z,spare
+
+-1,0,1.5,x
+# halfway
+0, 2.5 ,,y
+1e0,NaN,3,z
+"""
+SIDECAR = """\
+format: rollover-recording/1
+title: Drop on clay
+source: the lab
+conditions:
+  initiation.speed: 3.0
+channels:
+  t: {channel: time, unit: ms}
+  F: {channel: ground/force_normal, unit: kN, noise: 0.05}
+  z: {channel: striker/acceleration_z, unit: g, cfc: 180}
+"""
+
+
+def written(folder: Path, table: str | bytes = TABLE, sidecar: str = SIDECAR) -> Path:
+    (folder / "d.csv").write_bytes(table.encode() if isinstance(table, str) else table)
+    (folder / "d.yaml").write_text(sidecar)
+    return folder / "d.csv"
+
+
+def test_a_table_and_its_sidecar(tmp_path: Path) -> None:
+    path = written(tmp_path)
+    for name in (path, path.with_suffix(".yaml")):
+        found = read_recording(name)
+        assert found.time.tolist() == [-0.001, 0.0, 0.001]
+        assert found["ground/force_normal"] == pytest.approx([0.0, 2500.0, np.nan], nan_ok=True)
+        assert found["striker/acceleration_z"] == pytest.approx([1.5 * 9.80665, np.nan, 3.0 * 9.80665], nan_ok=True)
+        assert (found.title, found.source, found.conditions) == (
+            "Drop on clay", "the lab", {"initiation.speed": 3.0},
+        )  # fmt: skip
+        assert found.noise == {"ground/force_normal": pytest.approx(50.0)}
+        assert found.cfc == {"striker/acceleration_z": 180}
+        assert found.clock.zero == "known"
+        assert found.notes == ("columns without a description, left out: spare",)
+
+
+def test_a_byte_order_mark_and_windows_lines(tmp_path: Path) -> None:
+    path = written(tmp_path, b"\xef\xbb\xbf" + TABLE.replace("\n", "\r\n").encode())
+    assert read_recording(path)["ground/force_normal"][1] == 2500.0
+
+
+def test_conditions_are_scenario_values(tmp_path: Path) -> None:
+    found = read_recording(written(tmp_path, sidecar=SIDECAR.replace("3.0", "2.5")))
+    assert load("drop_test").replaced(found.conditions).initiation.speed == 2.5  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_nothing_is_lost_on_the_way(tmp_path: Path, ending: str) -> None:
+    values = np.random.default_rng(3).normal(size=(2, 100)) * 1e3
+    values[1, 7:20] = np.nan
+    sensor = Sensor(body="rops", position=(0.1, -0.2, 1.7), orientation_deg=(0.0, 90.0, 10.0), gravity="proper")
+    made = Recording(
+        title="Odd: # 'title'",
+        source="a, b\nc",
+        time=np.cumsum(np.random.default_rng(4).uniform(1e-4, 1e-3, 100)) - 0.01,
+        channels={"sensor/top/acceleration_x": values[0], "rops/mount/left/force_x": values[1]},
+        conditions={"initiation.speed": 3.1, "initiation.kind": "drop"},
+        noise={"rops/mount/left/force_x": 0.1},
+        cfc={"rops/mount/left/force_x": 600},
+        clock=Clock(zero="unknown"),
+        sensors={"sensor/top/acceleration_x": sensor},
+        notes=("one", "two"),
+    )
+    write_recording(made, tmp_path / "deep" / f"r.{ending}")
+    assert sorted(p.name for p in (tmp_path / "deep").iterdir()) == sorted([f"r.{ending}", "r.yaml"])
+    found = read_recording(tmp_path / "deep" / f"r.{ending}")
+    assert found.time.tobytes() == made.time.tobytes()
+    for name, column in made.channels.items():
+        assert np.array_equal(found[name], column, equal_nan=True)
+    for part in ("title", "source", "conditions", "noise", "cfc", "clock", "sensors", "notes"):
+        assert getattr(found, part) == getattr(made, part), part
+
+
+def test_writing_is_refused_over_what_is_there_and_leaves_nothing_half_done(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = read_recording(written(tmp_path))
+    with pytest.raises(InputError, match=r"d\.csv: exists; --force replaces it"):
+        write_recording(made, tmp_path / "d.csv")
+    write_recording(made, tmp_path / "d.csv", force=True)
+    assert read_recording(tmp_path / "d.csv")["ground/force_normal"][1] == 2500.0
+
+    def breaks(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = sorted(tmp_path.iterdir())
+    monkeypatch.setattr(os, "replace", breaks)
+    with pytest.raises(KeyboardInterrupt):
+        write_recording(made, tmp_path / "other.csv")
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_channels_of_a_run_are_a_recording(tmp_path: Path) -> None:
+    made = Recording(title="run", time=np.arange(3.0), channels={"ground/sinkage": np.arange(3.0)}, source="simulation")
+    write_parquet(made, tmp_path / "channels.parquet")
+    for path in (tmp_path, tmp_path / "channels.parquet"):
+        assert np.array_equal(read_recording(path)["ground/sinkage"], np.arange(3.0))
+
+
+# ---- published sets
+
+
+def data(name: str) -> Path:
+    if "ROLLOVER_DATA" not in os.environ:
+        pytest.skip("ROLLOVER_DATA names no folder of measured recordings: real recordings are not tested")
+    return Path(os.environ["ROLLOVER_DATA"], name.replace("-", "_"))
+
+
+def only(name: str, *select: str) -> dict[str, Recording]:
+    return dict(COLLECTIONS[name].read(data(name), select or ("*",)))
+
+
+def test_cube_tosses() -> None:
+    found = only("cube-tosses", "toss00*")
+    assert list(found) == [f"toss00{i}" for i in range(10)]
+    toss = found["toss003"]
+    q = np.column_stack([toss[f"chassis/quaternion_{a}"] for a in "wxyz"])
+    assert np.linalg.norm(q, axis=1) == pytest.approx(np.ones(len(q)))
+    assert (np.sum(q[1:] * q[:-1], axis=1) > 0.9).all()  # no jumps of sign
+    # a body that came to rest on a face: its centre half an edge up, pitch or roll a multiple of 90 deg
+    assert toss["chassis/position_z"][-1] == pytest.approx(0.0524, abs=0.002)
+    # in free fall the velocity that is stated is the slope of the position, and gravity that of the velocity
+    early = slice(0, 20)
+    slope = np.polyfit(toss.time[early], toss["chassis/velocity_z"][early], 1)[0]
+    assert slope == pytest.approx(-9.81, rel=0.1)
+
+
+def test_falling_balls() -> None:
+    found = only("falling-balls")
+    assert len(found) == 14
+    assert found["golf-ball-1"].conditions["vehicle.mass"] == pytest.approx(1.62 * 0.0283495, rel=1e-4)
+    assert found["whiffle-ball-1-1"].conditions["vehicle.mass"] == pytest.approx(0.0283495, rel=1e-4)
+    assert found["volleyball-1"].conditions == {}
+    assert found["baseball-1"]["striker/position_z"][0] == pytest.approx(47.7, abs=0.1)
+
+
+def test_penetrometer() -> None:
+    found = only("soil-penetrometer")
+    assert len(found) == 4
+    for drop in found.values():
+        assert "from a18g" in drop.notes[0]  # the 2 g one is clipped in every drop
+        assert drop.time[0] == pytest.approx(-3.0)
+        assert drop.clock.zero == "unknown"
+    at_rest = found["bLog0D31"]["striker/acceleration_z"][-500:]
+    assert at_rest.mean() == pytest.approx(0.0, abs=0.1)  # 1 g taken off
+
+
+def test_cone_drops() -> None:
+    found = only("cone-drops", "SR60100*")
+    assert len(found) == 6
+    drop = found["SR601001"]
+    assert drop.conditions["initiation.speed"] == pytest.approx(math.sqrt(2.0 * 9.81 * 1.0))
+    assert drop.conditions["vehicle.mass"] == pytest.approx(0.5228 + 0.0300 + 0.0343 + 0.0025)
+    falling = drop["striker/acceleration_z"][drop.time < -0.01]
+    assert falling.mean() == pytest.approx(-9.81, abs=0.3)
+    assert load("drop_test").replaced(drop.conditions)
