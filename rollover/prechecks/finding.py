@@ -12,7 +12,7 @@ from rollover.recording import Recording
 
 Array = NDArray[np.float64]
 
-SURE = 4.2  # standard errors: about 1 in 40 000 by chance, and a record is asked some twenty questions
+SURE = 3.5  # standard errors: 1 in 2000 by chance, and a record is asked some ten such questions
 
 
 SHORTEST = 0.05  # s of a level that is one

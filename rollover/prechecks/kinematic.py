@@ -26,7 +26,7 @@ PAIRS = (
     ("striker/velocity_z", "striker/acceleration_z", 1),
     ("striker/position_z", "striker/velocity_z", 1),
 )
-DRAWS = 100
+DRAWS = 50
 LEAST = {"gain": 0.005, "bias": 0.02, "lag": 0.0, "drift": 1e-3}  # what sampling and quadrature may do by themselves
 MOST_SAMPLES = 20_000
 
@@ -56,7 +56,7 @@ def _pair(p: Trace, a: Trace, order: int, random: np.random.Generator) -> Iterat
     least = {**LEAST, "bias": 0.002 * size, "lag": 0.5 * max(p.step, a.step)}
     for _ in range(2):
         z = _scores(effects, nuisance, left, noise)
-        if max(abs(value) / error for value, error in z.values()) < 1.2 * SURE:
+        if max(abs(value) / error for value, error in z.values()) < 1.4 * SURE:
             return
         after = {name: _after(name, effects, nuisance, left, noise) for name in z}
         chosen = min(after, key=lambda name: after[name])

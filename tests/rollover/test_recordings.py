@@ -143,10 +143,9 @@ def test_cube_tosses() -> None:
     assert (np.sum(q[1:] * q[:-1], axis=1) > 0.9).all()  # no jumps of sign
     # a body that came to rest on a face: its centre half an edge up, pitch or roll a multiple of 90 deg
     assert toss["chassis/position_z"][-1] == pytest.approx(0.0524, abs=0.002)
-    # in free fall the velocity that is stated is the slope of the position, and gravity that of the velocity
-    early = slice(0, 20)
-    slope = np.polyfit(toss.time[early], toss["chassis/velocity_z"][early], 1)[0]
-    assert slope == pytest.approx(-9.81, rel=0.1)
+    # before contact the height falls as gravity says: the bend of z over the first rows, the median of ten tosses
+    bends = [2.0 * np.polyfit(r.time[:8], r["chassis/position_z"][:8], 2)[0] for r in found.values()]
+    assert np.median(bends) == pytest.approx(-9.81, rel=0.1)
 
 
 def test_falling_balls() -> None:

@@ -1,0 +1,173 @@
+"""Pre-checks: silent on clean noisy drops, and each planted fault found, of a size of five standard errors or so."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from rollover.prechecks import noise_floors, prechecks
+from rollover.recording import Recording
+
+G, MASS, SPEED, STIFFNESS = 9.81, 132.0, 3.0, 9000.0
+N, STEP = 4000, 5e-4
+A, P, F = "striker/acceleration_z", "striker/position_z", "ground/force_normal"
+SIGMA = {A: 0.5, P: 5e-4, F: 20.0}
+Fault = Callable[[np.ndarray, dict[str, np.ndarray]], np.ndarray]
+
+
+def truth() -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """A drop onto a spring with a strong damper: free fall, pulse, rest, in closed form.
+
+    After contact m p'' = -m g - c p' - k p with c = 2 d m and d = 0.85 w: p = p_eq + e^(-d t) (A cos + B sin).
+    """
+    t = -0.4 + STEP * np.arange(N)
+    w = np.sqrt(STIFFNESS / MASS)
+    d = 0.85 * w
+    wd, rest = np.sqrt(w * w - d * d), -MASS * G / STIFFNESS
+    a0, b0 = -rest, (-SPEED - d * rest) / wd
+    e, c, s = np.exp(-d * np.maximum(t, 0.0)), np.cos(wd * t), np.sin(wd * t)
+    p = rest + e * (a0 * c + b0 * s)
+    u = e * ((b0 * wd - d * a0) * c - (a0 * wd + d * b0) * s)
+    a = -2.0 * d * u - w * w * (p - rest)
+    fall = t < 0.0
+    p[fall] = -SPEED * t[fall] - 0.5 * G * t[fall] ** 2
+    a[fall] = -G
+    return t, {A: a, P: p, F: MASS * (a + G)}
+
+
+TIME, TRUE = truth()
+
+
+def drop(seed: int, colour: float = 0.0) -> Recording:
+    random = np.random.default_rng(seed)
+    channels = {}
+    for name, values in TRUE.items():
+        white = random.standard_normal(N + 200)
+        if colour:
+            white = lfilter([1.0], [1.0, -colour], white) * np.sqrt(1.0 - colour**2)
+        channels[name] = values + SIGMA[name] * white[200:]
+    return Recording(title="drop", time=TIME.copy(), channels=channels, conditions={"vehicle.mass": MASS})
+
+
+def test_fewer_than_5_of_100_clean_drops_are_blamed() -> None:
+    blamed = [seed for seed in range(200) if prechecks(drop(seed, colour=0.6 * (seed % 2)))]
+    assert len(blamed) < 10
+
+
+def bias(t: np.ndarray, c: dict[str, np.ndarray]) -> np.ndarray:
+    c[A] += 0.1  # about 800 samples of free fall: 0.5 / sqrt(800) = 0.018 is one standard error
+    return t
+
+
+def load_cell_bias(t: np.ndarray, c: dict[str, np.ndarray]) -> np.ndarray:
+    c[F] += 5.0  # 20 / sqrt(800) = 0.7
+    return t
+
+
+def load_cell_gain(t: np.ndarray, c: dict[str, np.ndarray]) -> np.ndarray:
+    c[F] *= 1.01  # 13 N of the weight
+    return t
+
+
+def accelerometer_gain(t: np.ndarray, c: dict[str, np.ndarray]) -> np.ndarray:
+    c[A] *= 0.98
+    return t
+
+
+def position_gain(t: np.ndarray, c: dict[str, np.ndarray]) -> np.ndarray:
+    c[P] *= 1.08
+    return t
+
+
+def two_clocks(t: np.ndarray, c: dict[str, np.ndarray]) -> np.ndarray:
+    c[P] = np.interp(t - 0.03 * (t - t[0]), t, c[P])
+    return t
+
+
+def clipped(t: np.ndarray, c: dict[str, np.ndarray]) -> np.ndarray:
+    np.minimum(c[F], 0.9 * TRUE[F].max(), out=c[F])
+    return t
+
+
+def repeated(t: np.ndarray, c: dict[str, np.ndarray]) -> np.ndarray:
+    c[A][2000:2005] = c[A][2000]
+    return t
+
+
+def dropped(t: np.ndarray, c: dict[str, np.ndarray]) -> np.ndarray:
+    for name in c:
+        c[name] = np.delete(c[name], [500, 1200, 1201])
+    return np.delete(t, [500, 1200, 1201])
+
+
+def disturbed(t: np.ndarray, c: dict[str, np.ndarray]) -> np.ndarray:
+    c[A][2500] = TRUE[A][2500] + 7.0 * SIGMA[A]
+    return t
+
+
+def gap_in_one(t: np.ndarray, c: dict[str, np.ndarray]) -> np.ndarray:
+    c[P][1500:1520] = np.nan
+    return t
+
+
+@pytest.mark.parametrize(
+    ("fault", "check", "channel"),
+    [
+        (bias, "free-fall", A),
+        (bias, "rest", A),
+        (load_cell_bias, "free-fall", F),
+        (load_cell_gain, "rest", F),
+        (accelerometer_gain, "free-fall", A),
+        (position_gain, "double-integral", P),
+        (two_clocks, "clock-drift", P),
+        (clipped, "clipping", F),
+        (repeated, "stuck", A),
+        (dropped, "gap", F),
+        (gap_in_one, "gap", P),
+        (disturbed, "spike", A),
+    ],
+)
+def test_a_planted_fault_is_found(fault: Fault, check: str, channel: str) -> None:
+    seen = 0
+    for seed in range(1000, 1005):
+        clean = drop(seed)
+        channels = {name: values.copy() for name, values in clean.channels.items()}
+        time = fault(clean.time.copy(), channels)
+        found = prechecks(replace(clean, time=time, channels=channels))
+        seen += any((f.check, f.channel) == (check, channel) for f in found)
+        assert all(f.sentence and f.start <= f.end for f in found)
+    assert seen >= 4
+
+
+def test_what_a_finding_says() -> None:
+    clean = drop(7)
+    (found,) = [
+        f
+        for f in prechecks(replace(clean, channels={**clean.channels, A: clean[A] + 0.3, P: np.full(N, np.nan)}))
+        if f.check == "free-fall"
+    ]
+    assert found.value == pytest.approx(0.3, abs=0.1)
+    assert found.start == pytest.approx(-0.4)
+    assert found.end == pytest.approx(0.0, abs=0.05)
+    assert "a bias of the accelerometer" in found.sentence
+    stuck = {**clean.channels, F: np.minimum(clean[F], 3000.0)}
+    (flat,) = [f for f in prechecks(replace(clean, channels=stuck)) if f.check == "clipping"]
+    assert flat.value == 3000.0
+
+
+def test_stated_noise_that_is_too_small() -> None:
+    found = prechecks(replace(drop(3), noise={A: 0.1, F: 20.0}))
+    assert [(f.check, f.channel) for f in found] == [("stated-noise", A)]
+
+
+def test_noise_floors_of_the_channels() -> None:
+    floors = noise_floors(drop(3))
+    assert {name: floor.sigma for name, floor in floors.items()} == pytest.approx(SIGMA, rel=0.1)
+
+
+def test_a_simulation_has_no_sensors() -> None:
+    assert prechecks(Recording(title="s", time=TIME, channels=TRUE, source="simulation")) == ()
