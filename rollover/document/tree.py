@@ -91,6 +91,8 @@ def parse(text: str, start: Place) -> Node:
         root = YAML(typ="safe", pure=True).compose(text)
         if root is None:
             raise at(0).fault("", "empty, got nothing but comments; a mapping is needed")
+        if _size(root, {}) > MOST_VALUES:
+            raise at(0).fault("", f"too large, got more than {MOST_VALUES} values")
         builder = _Builder(at)
         node = builder.build(root, at(0), "", ())
     except MarkedYAMLError as e:
@@ -106,6 +108,16 @@ def parse(text: str, start: Place) -> Node:
     if builder.faults:
         raise InputError(*builder.faults)
     return node
+
+
+def _size(node: Any, known: dict[int, int]) -> int:
+    """How many values a node stands for, aliases counted in full; each node is looked at once."""
+    if id(node) not in known:
+        known[id(node)] = 1  # should it contain itself
+        children = [n for pair in node.value for n in pair] if isinstance(node, MappingNode) else node.value
+        below = children if isinstance(node, (MappingNode, SequenceNode)) else ()
+        known[id(node)] = 1 + sum(_size(child, known) for child in below)
+    return known[id(node)]
 
 
 class _Builder:

@@ -57,7 +57,8 @@ def read_recording(path: str | Path, *, profile: str | Path | Described | None =
     except (OSError, RuntimeError) as e:  # a link that leads to itself
         raise InputError(Fault(file=str(path), message=f"cannot be read: {getattr(e, 'strerror', e)}")) from None
     if not exists:
-        raise InputError(Fault(file=str(path), message="no such file"))
+        what = "cannot be read: a link that leads nowhere" if path.is_symlink() else "no such file"
+        raise InputError(Fault(file=str(path), message=what))
     given = profile if isinstance(profile, Described) or profile is None else read_profile(profile)
     return _importer(path, given, kind).read(path, given)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,6 +17,7 @@ from rollover.recording import Clock, Sensor
 
 MOST_BYTES = 1 << 18  # of a sidecar: what is longer is no sidecar, and would take long to be refused
 T = TypeVar("T")
+_DEEP = re.compile(rb"(?:[\[{]\s*){60}")  # the parser needs seconds to give up on brackets in brackets
 
 
 @parameters
@@ -128,6 +130,9 @@ def read_described(path: Path, kind: type[Sidecar] | type[Profile]) -> Described
         raise InputError(Fault(file=str(path), message=f"cannot be read: {getattr(e, 'strerror', e)}")) from None
     if size > MOST_BYTES:
         raise InputError(Fault(file=str(path), message=f"too long, got {size} bytes; at most {MOST_BYTES} are allowed"))
+    if size and (deep := _DEEP.search(path.read_bytes())):
+        line = path.read_bytes()[: deep.start()].count(b"\n") + 1
+        raise InputError(Fault(file=str(path), line=line, message="nested too deeply"))
     root = document.read(path)
     if not isinstance(root.value, Mapping):
         raise root.place.fault("", f"not a mapping, got {str(root.plain)[:40]!r}; format, channels are needed")

@@ -114,7 +114,9 @@ def check_time(path: Path, time: Array, line: Line = lambda row: None) -> None:
     if wrong.size:
         row = int(wrong[0]) + 1
         what = "repeated stamp" if time[row] == time[row - 1] else "runs backwards"
-        raise _at(path, line, row, f"time: {what}, got {time[row]!r} after {time[row - 1]!r}; it must increase")
+        raise _at(
+            path, line, row, f"time: {what}, got {float(time[row])!r} after {float(time[row - 1])!r}; it must increase"
+        )
 
 
 def check_values(path: Path, name: str, values: Array, line: Line = lambda row: None) -> None:

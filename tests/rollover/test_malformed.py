@@ -114,7 +114,7 @@ def mme(text: str = MME, code: str = "", **more: bytes) -> Callable[[Path], str]
 
 
 def bomb(folder: Path) -> str:
-    return mme(n=MME.encode() + b"0\n" * 50_000_000)(folder)
+    return mme(n=MME.encode() + b"0\n" * 2_000_000)(folder)
 
 
 def tar_bomb(folder: Path) -> str:
@@ -138,7 +138,7 @@ def mat(folder: Path) -> str:
 def tdms(folder: Path) -> str:
     nptdms = pytest.importorskip("nptdms", reason="nptdms is not installed: TDMS is not tested")
     with nptdms.TdmsWriter(str(folder / "a.tdms")) as file:
-        file.write_segment([nptdms.ChannelObject("g", "F", np.zeros(7))])
+        file.write_segment([nptdms.ChannelObject("g", "rops/force_x", np.ones(7))])
     data = (folder / "a.tdms").read_bytes()
     assert data.count(struct.pack("<Q", 7)) == 1
     return raw("a.tdms", data.replace(struct.pack("<Q", 7), struct.pack("<Q", 10 * 2**27)))(folder)
@@ -235,7 +235,7 @@ CASES: dict[str, tuple[Callable[[Path], str], str]] = {
     "Parquet spoilt": (parquet(middle), "a.parquet: cannot be read"),
     "Parquet of words": (parquet(t=[0.0, 1.0], F=["a", "b"]), "column F: not numbers, got string"),
     "Parquet backwards": (parquet(t=[1.0, 0.0], F=[1.0, 2.0]), "time: runs backwards"),
-    "Parquet of 8 GB in little": (constant(40_000_000), "a.parquet: claims too much"),
+    "Parquet of much in little": (constant(4_000_000), "a.parquet: claims too much"),
     "MME wrong code": (mme(code="10ROPS"), "a.001: Channel code: got '10ROPS'"),
     "MME unknown code": (mme(code="10XXXX000000XXXX"), "no column is a channel"),
     "MME says 10 GB": (mme(MME.replace(":3", ":1250000000")), "Number of samples: says 1250000000, got 3"),
@@ -247,7 +247,7 @@ CASES: dict[str, tuple[Callable[[Path], str], str]] = {
     "MAT says 10 GB": (mat, "a.mat: claims too much"),
     "MAT junk": (raw("a.mat", b"MATLAB 5.0 MAT-file" + bytes(200)), "a.mat: not a readable MATLAB 5 file"),
     "TDMS says 10 GB": (tdms, "a.tdms: claims too much"),
-    "TDMS junk": (raw("a.tdms", b"TDSm" + b"\xff" * 100), "a.tdms: not a readable TDMS file"),
+    "TDMS junk": (raw("a.tdms", b"TDSm" + b"\xff" * 100), "a.tdms: no column is a channel, got none"),
     "HDF5 says 16 GB": (hdf5, "a.h5: claims too much"),
     "HDF5 junk": (raw("a.h5", b"\x89HDF\r\n\x1a\n" + b"\xff" * 100), "a.h5: not a readable HDF5 file"),
     "MCAP junk": (raw("a.mcap", b"\x89MCAP0\r\n" + b"\xff" * 100), "a.mcap: not a readable MCAP"),
@@ -290,7 +290,7 @@ def asked(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[int, floa
             file = make(folder)
         except pytest.skip.Exception:
             continue
-        profile = "p.yaml" if (folder / "p.yaml").exists() and not file.endswith((".zip", ".parquet")) else ""
+        profile = "p.yaml" if (folder / "p.yaml").exists() and not file.endswith((".zip", ".parquet", ".tdms")) else ""
         names.append(name)
         before[name] = (folder, sorted(os.listdir(folder)))
         lines.append(f"{folder}\t{file}\t{profile}\n")
