@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rollover.faults import Fault, InputError
 from rollover.importers.importer import Importer, check_claim, library, reading, starts_with
 from rollover.importers.sidecar import Described
 from rollover.importers.signals import Signal, assemble
@@ -16,6 +17,9 @@ def _read(path: Path, profile: Described | None) -> Recording:
     nptdms = library("nptdms", "tdms", path)
     signals: dict[str, Signal] = {}
     with reading(path, "TDMS"), nptdms.TdmsFile.open(str(path)) as file:
+        if file.file_status.incomplete_final_segment:
+            message = "cut off, got less than its last segment claims; a whole file is needed"
+            raise InputError(Fault(file=str(path), message=message))
         channels = [channel for group in file.groups() for channel in group.channels()]
         check_claim(path, sum(len(channel) for channel in channels), most_per_byte=1.0)
         for channel in channels:
@@ -26,11 +30,11 @@ def _read(path: Path, profile: Described | None) -> Recording:
             values = np.asarray(channel[:])
             if values.dtype.kind not in "fiu":
                 continue
-            regular = "wf_increment" in channel.properties
+            step, start = (channel.properties.get(key) for key in ("wf_increment", "wf_start_offset"))
             signals[name] = Signal(
                 values=values.astype(np.float64),
                 unit=str(channel.properties.get("unit_string", "")),
-                time=channel.time_track() if regular else None,
+                time=None if step is None else np.asarray((start or 0.0) + float(step) * np.arange(values.size)),
                 channel=str(channel.properties.get("rollover_channel", channel.name)),
             )
     return assemble(path, signals, profile)
