@@ -135,17 +135,6 @@ def mat(folder: Path) -> str:
     return raw("a.mat", bytes(data))(folder)
 
 
-def tdms(folder: Path) -> str:
-    nptdms = pytest.importorskip("nptdms", reason="nptdms is not installed: TDMS is not tested")
-    with nptdms.TdmsWriter(str(folder / "a.tdms")) as file:
-        file.write_segment(
-            [nptdms.ChannelObject("g", "rops/force_x", np.ones(7), {"unit_string": "N", "wf_increment": 0.1})]
-        )
-    data = (folder / "a.tdms").read_bytes()
-    assert data.count(struct.pack("<Q", 7)) == 1
-    return raw("a.tdms", data.replace(struct.pack("<Q", 7), struct.pack("<Q", 10 * 2**27)))(folder)
-
-
 def hdf5(folder: Path) -> str:
     h5py = pytest.importorskip("h5py", reason="h5py is not installed: HDF5 is not tested")
     with h5py.File(folder / "a.h5", "w") as file:
@@ -248,7 +237,6 @@ CASES: dict[str, tuple[Callable[[Path], str], str]] = {
     "MME cut off": (raw("a.zip", b"PK\x03\x04" + bytes(50)), "a.zip: neither a folder nor a readable zip or tar"),
     "MAT says 10 GB": (mat, "a.mat: claims too much"),
     "MAT junk": (raw("a.mat", b"MATLAB 5.0 MAT-file" + bytes(200)), "a.mat: not a readable MATLAB 5 file"),
-    "TDMS says 10 GB": (tdms, "a.tdms: empty"),
     "TDMS junk": (raw("a.tdms", b"TDSm" + b"\xff" * 100), "a.tdms: no column is a channel, got none"),
     "HDF5 says 16 GB": (hdf5, "a.h5: claims too much"),
     "HDF5 junk": (raw("a.h5", b"\x89HDF\r\n\x1a\n" + b"\xff" * 100), "a.h5: not a readable HDF5 file"),
