@@ -38,6 +38,8 @@ _ENERGY = {
     "friction": "lost in sliding",
     "collision": "lost in the collision with the co-moving mass, eq (8)",
     "axle": "stored and lost in the front axle's stops",
+    "device": "taken by the devices of a test stand, less what they put in",
+    "lashing": "stored and lost in the lashings of a test stand",
     "residual": "what the ledger does not explain",
 }
 
@@ -74,6 +76,9 @@ CHANNELS: dict[str, Channel] = {
         Channel(name="rops/deflection", unit="m", meaning="of the loaded upper corner against the chassis"),
         Channel(name="rops/energy", unit="J", meaning="absorbed by the ROPS"),
         Channel(name="wheel/NAME/force_normal", unit="N", meaning="ground on the tyre"),
+        Channel(name="device/force", unit="N", meaning="of the test stand's beam, block or exciter on what it loads"),
+        Channel(name="device/deflection", unit="m", meaning="of the loaded point along the load, since it began"),
+        Channel(name="device/energy", unit="J", meaning="put in by the device since the load began"),
         Channel(name="axle/front/angle", unit="rad", meaning="of the front axle about its pivot"),
         Channel(name="axle/front/impulse", unit="N m s", meaning="of the axle on its stops, accumulated"),
         *[Channel(name=f"energy/{name}", unit="J", meaning=meaning) for name, meaning in _ENERGY.items()],

@@ -208,12 +208,18 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         wheel_memory=np.zeros((len(wheels), c.EDGE_COLUMNS)),
         mount_memory=np.zeros((len(mount_f), c.SET_COLUMNS)),
         axle_memory=np.zeros(c.AXLE_MEMORY),
-        clock=np.zeros(1),
+        clock=np.zeros(2),
         pose=np.zeros((nb, c.POSE_COLUMNS)),
         counts=np.zeros(c.COUNTS, dtype=np.int64),
         work=np.zeros(c.WORKS),
         resultant=np.zeros((nb, c.RESULTANT_COLUMNS)),
         event=np.zeros((number + 256, c.EVENT_COLUMNS)),
+        device_i=np.zeros((0, 0), dtype=np.int64),
+        device_f=np.zeros((0, 0)),
+        device_memory=np.zeros((0, 0)),
+        device_q=np.zeros((0, 6 * nb)),
+        device_x=np.zeros((nb, 6)),
+        device_out=np.zeros(c.OUT_COLUMNS),
     )
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from ground.compiled import compiled
 from ground.kernel import BODY, MASS_B, NORMAL, OFFSET, OWNER_R, PLACE, SHEAR, SPREAD, friction_force, normal_force
 from rollover.connectors import try_mounts
+from rollover.devices import try_devices
 from rollover.tables import (
     A_C,
     A_IMPACT,
@@ -261,6 +262,7 @@ def generalised_forces(t: Any, q: Any, qd: Any, Q: Any) -> None:
     try_wheels(t, Q)
     try_mounts(t, Q)
     try_axle(t, Q)
+    try_devices(t, Q)
 
 
 @compiled

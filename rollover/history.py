@@ -24,6 +24,7 @@ from rollover.tables import (
     FLAGS_NOW,
     M_ANGLE,
     M_IMPULSE,
+    OUT_COLUMNS,
     RESULTANT_COLUMNS,
     S_DELTA_NOW,
     S_FORCE_NOW,
@@ -72,12 +73,18 @@ def write_row(t: Any, q: Any, qd: Any, qdd: Any, row: Any) -> None:
     row[k + 1] = deepest
     row[k + 2] = t.counts[FLAGS_NOW]
     row[k + 3] = footprint
+    k += 4
+    if t.device_i.shape[0] > 0:
+        for j in range(OUT_COLUMNS):
+            row[k + j] = t.device_out[j]
 
 
 def row_length(t: Tables) -> int:
     """Columns that `write_row` fills."""
     n = len(t.mass)
-    return int(3 * n + len(t.pose) * RESULTANT_COLUMNS + 7 * len(t.wheel_i) + 12 * len(t.mount_f) + 2 + WORKS + 1 + 3)
+    out = OUT_COLUMNS if len(t.device_i) else 0
+    parts = len(t.pose) * RESULTANT_COLUMNS + 7 * len(t.wheel_i) + 12 * len(t.mount_f)
+    return int(3 * n + parts + 2 + WORKS + 1 + 3 + out)
 
 
 @dataclass
@@ -129,6 +136,7 @@ class States:
     sinkage: Array
     flags: NDArray[np.int64]
     footprint: Array
+    device: Array  # (n, OUT_COLUMNS), or (n, 0) without a test stand
 
 
 def states(rows: Array, nb: int, nw: int, nt: int) -> States:
@@ -156,13 +164,15 @@ def states(rows: Array, nb: int, nw: int, nt: int) -> States:
         sinkage=take(),
         flags=take().astype(np.int64),
         footprint=take(),
+        device=rows[:, at:],
     )
 
 
 def energies(s: States, t: Tables, bodies: tuple[Body, ...], gravity: float) -> dict[str, Array]:
     """The ledger over time, J, each (n,): what the bodies hold and what was taken from them; `residual` is the rest.
 
-    kinetic + potential + soil + tyre + rops + friction + collision + axle - (their sum at the start) = -residual.
+    kinetic + potential + soil + tyre + rops + friction + collision + axle - (their sum at the start) = -residual;
+    on a test stand also what its devices and lashings took, less than zero for what they put in.
     """
     n = len(s.axle)
     flat = s.qd.reshape(n, -1)
@@ -179,6 +189,9 @@ def energies(s: States, t: Tables, bodies: tuple[Body, ...], gravity: float) -> 
         "collision": s.work[:, c.COLLISION],
         "axle": s.work[:, c.AXLE],
     }
+    if len(t.device_i):
+        ledger["device"] = s.work[:, c.DEVICE]
+        ledger["lashing"] = s.work[:, c.LASHING]
     total = np.sum(list(ledger.values()), axis=0)
     ledger["residual"] = np.asarray(total[0] - total)
     return ledger
@@ -215,6 +228,8 @@ def channels(scenario: Scenario, s: States, t: Tables, bodies: tuple[Body, ...])
             found["axle/front/angle"] = s.axle[:, 0]
             if vehicle.front_axle.stop == "impact":
                 found["axle/front/impulse"] = s.axle[:, 1]
+    for k, name in enumerate(("force", "deflection", "energy") if s.device.size else ()):
+        found[f"device/{name}"] = s.device[:, k]
     for name, values in energies(s, t, bodies, scenario.gravity).items():
         found[f"energy/{name}"] = values
     return {name: np.ascontiguousarray(values) for name, values in found.items()}

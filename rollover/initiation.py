@@ -1,4 +1,4 @@
-"""How a scenario begins (data): dropped, tipped over its balance, or standing."""
+"""How a scenario begins (data): dropped, tipped over its balance, standing, or on a test stand."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from ground.kinds import ByKind
 from ground.quantity import Quantity, parameters
+from rollover.stand import PendulumBlow, StaticTest, TiltTable
 
 
 @parameters
@@ -42,4 +43,4 @@ class Standing:
     roll_rate: Annotated[float, Quantity("rad/s", "at release", least=-10, most=10)] = 0.0
 
 
-Initiation = Annotated[Drop | TipOver | Standing, ByKind()]
+Initiation = Annotated[Drop | TipOver | Standing | StaticTest | PendulumBlow | TiltTable, ByKind()]

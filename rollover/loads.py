@@ -65,6 +65,8 @@ def load_channels(recording: Recording) -> list[tuple[str, tuple[str, ...], str 
     found: list[tuple[str, tuple[str, ...], str | None]] = []
     if "rops/force" in names:
         found.append(("rops/force", ("rops/force",), "rops/impulse"))
+    if "device/force" in names:
+        found.append(("device/force", ("device/force",), None))
     mounts = sorted({n.rsplit("/", 1)[0] for n in names if n.startswith("rops/mount/")})
     found += [(f"{m}/force", tuple(f"{m}/force_{axis}" for axis in "xyz"), None) for m in mounts]
     hinges = sorted({n.rsplit("/", 1)[0] for n in names if n.startswith("rops/hinge/")})

@@ -16,8 +16,10 @@ import numpy as np
 
 from rollover.contact import Body
 from rollover.forces import added_mass, generalised_forces
+from rollover.frames import matrices
 from rollover.jacobian import stiffness
 from rollover.placement import Start
+from rollover.rig import Hinge
 from rollover.tables import ACTIVE, PIVOT, Handle, Tables
 
 os.environ.setdefault("EXUDYN_NO_USER_SETTINGS", "1")  # a user's settings file must not change results
@@ -57,6 +59,8 @@ def solve(
     step: float,
     steps: int,
     spectral_radius: float,
+    held: tuple[int, ...] = (),
+    hinges: tuple[Hinge, ...] = (),
     after_step: Callable[[float, Any, Any, Any], bool],
 ) -> str:
     """Run the time loop; returns "" or why the solver gave up.
@@ -83,6 +87,7 @@ def solve(
         nodes.append(node)
         handles.append(handle)
     _add_joints(mbs, live.tables, handles, start)
+    _add_stand(mbs, handles, start, held, hinges)
 
     n = 6 * len(bodies)
     Q, M, K = np.zeros(n), np.zeros((n, n)), np.zeros((n, n))
@@ -92,8 +97,10 @@ def solve(
     newton.SetWithDenseMatrix(M, useDenseMatrix=True)
     views: list[Any] = []
 
+    clock, zero = live.tables.clock, start.time
+
     def force(_mbs: Any, t: float, _item: int, _q: Any, _qd: Any) -> list[float]:
-        live.tables.clock[0] = t - live.time
+        clock[0], clock[1] = t - live.time, zero + t
         generalised_forces(live.handle, views[0], views[1], Q)
         return Q.tolist()
 
@@ -182,3 +189,24 @@ def _add_joints(mbs: Any, t: Tables, handles: list[int], start: Start) -> None:
                 for body in (ground, handles[a])
             ]
             mbs.AddObject(GenericJoint(markerNumbers=markers, constrainedAxes=[1, 1, 0, 1, 1, 1]))
+
+
+def _add_stand(mbs: Any, handles: list[int], start: Start, held: tuple[int, ...], hinges: tuple[Hinge, ...]) -> None:
+    """Bodies that a test stand holds as they stand, and those that turn about an axis of it."""
+    for b in held:
+        place, R = start.q[6 * b : 6 * b + 3], matrices(start.q[None, 6 * b + 3 : 6 * b + 6])[0]
+        ground = mbs.AddObject(ObjectGround(referencePosition=place.tolist()))
+        markers = [mbs.AddMarker(MarkerBodyRigid(bodyNumber=body)) for body in (ground, handles[b])]
+        mbs.AddObject(GenericJoint(markerNumbers=markers, constrainedAxes=[1] * 6, rotationMarker0=R))
+    for hinge in hinges:
+        at = 6 * hinge.body
+        R = matrices(start.q[None, at + 3 : at + 6])[0]
+        pivot = start.q[at : at + 3] + R @ np.array(hinge.point)
+        ground = mbs.AddObject(ObjectGround(referencePosition=pivot.tolist()))
+        markers = [
+            mbs.AddMarker(MarkerBodyRigid(bodyNumber=ground)),
+            mbs.AddMarker(MarkerBodyRigid(bodyNumber=handles[hinge.body], localPosition=list(hinge.point))),
+        ]
+        free = [1, 1, 1, 1, 1, 1]
+        free[3 + hinge.axis] = 0
+        mbs.AddObject(GenericJoint(markerNumbers=markers, constrainedAxes=free))

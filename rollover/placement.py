@@ -40,6 +40,7 @@ def place(scenario: Scenario, bodies: tuple[Body, ...], t: Tables) -> Start:
     assert isinstance(scenario.vehicle, Vehicle)
     if isinstance(initiation, TipOver):
         return _tipped(initiation, scenario, scenario.vehicle, bodies, t)
+    assert isinstance(initiation, Standing)  # test stands put the vehicle down themselves
     return _standing(initiation, scenario, bodies, t)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,18 @@ class Event:
 
     time: float
     kind: Literal[
-        "first-touch", "branch-change", "unloading", "lift-off", "touch-down", "axle-stop", "plastic-hinge", "rest"
+        "first-touch",
+        "branch-change",
+        "unloading",
+        "lift-off",
+        "touch-down",
+        "axle-stop",
+        "plastic-hinge",
+        "rest",
+        "load-begins",
+        "load-reached",
+        "blow",
+        "overturn",
     ]
     subject: str  # "rops", "chassis", "front_left", "axle", a mount's name
     place: tuple[float, float, float]
@@ -80,3 +91,4 @@ class Run:
     released: float  # J, energy the run had to give; the residual is judged against it
     wall_time: float
     stop_time: float
+    tests: tuple[Mapping[str, Any], ...] = ()  # one for each load, blow or tilt of a test stand

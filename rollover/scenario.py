@@ -15,8 +15,10 @@ from ground.quantity import Quantity, parameters
 from ground.surface import Plane, Surface
 from rollover import document
 from rollover.effects import effects
+from rollover.excitation import Excitation
 from rollover.filters import least_rate
 from rollover.initiation import Drop, Initiation, Standing, TipOver
+from rollover.stand import PendulumBlow, StaticTest, TiltTable
 from rollover.vehicle import Striker, Vehicle
 
 AnyVehicle = Annotated[Vehicle | Striker, ByKind()]
@@ -82,6 +84,7 @@ class Scenario:
     ground: Ground
     initiation: Initiation
     simulation: Simulation
+    excitation: Annotated[Excitation | None, "what drives a striker besides its weight"] = None
     loads: Loads = Loads()
     gravity: Annotated[float, Quantity("m/s2", "acceleration of free fall, along -z", least=0, most=30)] = 9.81
     effects: Annotated[
@@ -101,6 +104,10 @@ class Scenario:
                 f"simulation.output_step: too coarse for filter class CFC {self.loads.cfc}, got {rate:.6g} rows/s; "
                 f"at most {1.0 / least_rate(self.loads.cfc):.3g} s is allowed"
             )
+        if self.excitation is not None and not isinstance(self.vehicle, Striker):
+            raise ValueError(
+                f"excitation: drives a striker only, got a vehicle of kind {self.vehicle.kind!r}; 'striker' is allowed"
+            )
         _check_start(self.vehicle, self.initiation)
 
     def replaced(self, changes: Mapping[str, Any], *, origin: str = "replaced") -> Scenario:
@@ -112,7 +119,7 @@ class Scenario:
         return document.replaced(self, changes, origin)
 
 
-def _check_start(vehicle: Vehicle | Striker, start: Drop | TipOver | Standing) -> None:
+def _check_start(vehicle: Vehicle | Striker, start: Initiation) -> None:
     if isinstance(vehicle, Striker):
         if not isinstance(start, Drop):
             raise ValueError(f"initiation.kind: a striker cannot begin so, got {start.kind!r}; 'drop' is allowed")
@@ -122,6 +129,8 @@ def _check_start(vehicle: Vehicle | Striker, start: Drop | TipOver | Standing) -
                     f"initiation.{name}: a striker keeps level on its guide, got {getattr(start, name)!r}; 0 is allowed"
                 )
         return
+    if isinstance(start, (StaticTest, PendulumBlow)) and (vehicle.rops is None or not vehicle.rops.members):
+        raise ValueError(f"initiation.kind: {start.kind!r} loads a ROPS, got a vehicle without; one with members")
     sides = [w.centre[1] for w in vehicle.wheels]
     left, right = sum(y > 0.0 for y in sides), sum(y < 0.0 for y in sides)
     if isinstance(start, TipOver):
@@ -131,12 +140,13 @@ def _check_start(vehicle: Vehicle | Striker, start: Drop | TipOver | Standing) -
                 f"initiation.side: nothing to tip over, got {count} wheels on the {start.side} "
                 f"and {left + right - count} on the other side; at least 2 and 1 are needed"
             )
-    elif isinstance(start, Standing):
+    elif isinstance(start, (Standing, PendulumBlow, TiltTable)):
         if len(sides) < 3 or not left or not right:
             raise ValueError(
-                f"initiation.kind: 'standing' needs at least 3 wheels on both sides, got {left} left and {right} right"
+                f"initiation.kind: {start.kind!r} needs at least 3 wheels on both sides, "
+                f"got {left} left and {right} right"
             )
-    elif not (vehicle.outline or vehicle.wheels or (vehicle.rops and vehicle.rops.members)):
+    elif isinstance(start, Drop) and not (vehicle.outline or vehicle.wheels or (vehicle.rops and vehicle.rops.members)):
         raise ValueError("vehicle.outline: nothing can touch the ground, got no outline, wheels or ROPS members")
 
 

@@ -13,15 +13,17 @@ from numpy.typing import NDArray
 from ground.compiled import mark_warm
 from rollover import history, model
 from rollover import tables as c
-from rollover.contact import Body, bodies_of, grown, tables_of
+from rollover.contact import Body, grown
+from rollover.control import Control, control_of
 from rollover.forces import generalised_forces
-from rollover.frames import matrices, quaternions
+from rollover.frames import matrices, quaternions, rotation_vector
 from rollover.history import History, States
 from rollover.initiation import Standing
-from rollover.placement import place
 from rollover.recording import Recording
+from rollover.rig import set_up
 from rollover.run import ContactForce, Event, GroundTrack, Motion, Run
 from rollover.scenario import Scenario
+from rollover.stand import StaticTest, TiltTable
 from rollover.step import end_of_step, keep_strain, start_step
 from rollover.tables import Tables, handle
 from rollover.vehicle import Striker, Vehicle
@@ -55,9 +57,9 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
     not exist, and lets a keyboard interrupt through.
     """
     began = clock.perf_counter()
-    bodies = bodies_of(scenario.vehicle, scenario.ground.elements)
-    t = tables_of(scenario, bodies)
-    start = place(scenario, bodies, t)
+    rig = set_up(scenario)
+    bodies, t, start = rig.bodies, rig.tables, rig.start
+    control = control_of(scenario, rig)
     settings = scenario.simulation
     h = settings.step
     steps = round((settings.duration - start.time) / h)
@@ -82,6 +84,7 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
         now = round(start.time + time, 9)  # step times are sums: 0.6, not 0.5999999999999643
         dt = time - state["last"]  # the solver halves a step that does not converge
         state["last"] = time
+        t.clock[1] = now
         end_of_step(live.handle, q, qd, qdd, dt, Q)
         if t.counts[c.EVENTS] > 0:
             _collect(t, now, bodies, scenario, events, seen)
@@ -95,6 +98,7 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
             )
         if (larger := grown(t)) is not t:
             live.tables, live.handle = larger, handle(larger)
+        goes_on = control is None or control.after(now, dt, q, qd, live.tables)
         k = int(state["rows"])
         if time >= k * every * h - 1e-9:
             past.add(now, live.handle, q, qd, qdd)
@@ -112,7 +116,7 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
             )
             if settings.stop_at_rest:
                 return False
-        return True
+        return goes_on
 
     sentence = ""
     try:
@@ -124,6 +128,8 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
             step=h,
             steps=steps,
             spectral_radius=settings.spectral_radius,
+            held=rig.held,
+            hinges=rig.hinges,
             after_step=after_step,
         )
         if sentence:
@@ -131,7 +137,7 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
     except DivergedError as reason:
         sentence = str(reason)
     mark_warm()
-    return _result(scenario, bodies, live.tables, past, events, sentence, clock.perf_counter() - began)
+    return _result(scenario, bodies, live.tables, past, events, control, sentence, clock.perf_counter() - began)
 
 
 def _point(x: Any) -> tuple[float, float, float]:
@@ -172,6 +178,7 @@ def _result(
     t: Tables,
     past: History,
     events: list[Event],
+    control: Control | None,
     sentence: str,
     wall: float,
 ) -> Run:
@@ -191,10 +198,10 @@ def _result(
         sentence=sentence,
         recording=recording,
         flags=s.flags,
-        events=tuple(sorted(events, key=lambda e: e.time)),
+        events=tuple(sorted([*events, *(control.events if control else ())], key=lambda e: e.time)),
         phases=_phases(scenario, time, events, found["ground/force_normal"]),
         frame_time=time[frames],
-        motion=_motion(s, bodies, frames),
+        motion=_motion(s, bodies, frames) | _beam(scenario, s, frames),
         pose=_motion(s, bodies, np.arange(len(time))),
         contact=_contact(scenario, s, bodies, frames, t),
         track=GroundTrack(time=track_time, element=element, sinkage=sinkage),
@@ -203,6 +210,7 @@ def _result(
         released=_released(found),
         wall_time=wall,
         stop_time=float(time[-1]),
+        tests=control.results() if control else (),
     )
 
 
@@ -212,9 +220,10 @@ def flag_names(flags: int) -> tuple[str, ...]:
 
 
 def _released(found: dict[str, Array]) -> float:
-    """Energy that the run had to give, J: kinetic at the start and the deepest fall of the centre of mass."""
+    """Energy that the run had to give, J: kinetic at the start, the deepest fall, and what a device put in."""
     start = found["energy/kinetic"][0] + found["energy/collision"][0]
-    return float(start - found["energy/potential"].min())
+    put_in = -found["energy/device"].min() if "energy/device" in found else 0.0
+    return float(start - found["energy/potential"].min() + put_in)
 
 
 def _phases(scenario: Scenario, time: Array, events: list[Event], force: Array) -> tuple[tuple[float, str], ...]:
@@ -243,6 +252,21 @@ def _motion(s: States, bodies: tuple[Body, ...], frames: NDArray[np.int64]) -> d
     return found
 
 
+def _beam(scenario: Scenario, s: States, frames: NDArray[np.int64]) -> dict[str, Motion]:
+    if not isinstance(scenario.initiation, StaticTest):
+        return {}
+    device = s.device[frames]
+    turns = np.array([rotation_vector(_facing(way)) for way in device[:, c.O_WAY : c.O_WAY + 3]])
+    return {"beam": Motion(origin=device[:, c.O_POINT : c.O_POINT + 3], quaternion=quaternions(turns))}
+
+
+def _facing(way: Array) -> Array:
+    """Rotation whose x is a unit direction, y level."""
+    level = np.array([-way[1], way[0], 0.0]) if math.hypot(way[0], way[1]) > 0.1 else np.array([0.0, 1.0, 0.0])
+    level /= np.linalg.norm(level)
+    return np.column_stack([way, level, np.cross(way, level)])
+
+
 def _contact(
     scenario: Scenario, s: States, bodies: tuple[Body, ...], frames: NDArray[np.int64], t: Tables
 ) -> dict[str, ContactForce]:
@@ -254,6 +278,13 @@ def _contact(
         point = np.where(loaded, r[:, c.R_POINT : c.R_POINT + 3] / np.where(loaded, weight, 1.0), s.q[frames, b, :3])
         force = r[:, c.R_NORMAL : c.R_NORMAL + 3] + r[:, c.R_TANGENT : c.R_TANGENT + 3]
         found[body.name] = ContactForce(point=point, force=force)
+    if s.device.size:
+        out = s.device[frames]
+        way, size = out[:, c.O_WAY : c.O_WAY + 3], out[:, c.O_FORCE : c.O_FORCE + 1]
+        name = "device"
+        if isinstance(scenario.initiation, TiltTable):  # what turns there is the weight
+            name, size = "weight", np.full_like(size, scenario.gravity * sum(body.inertia.mass for body in bodies))
+        found[name] = ContactForce(point=out[:, c.O_POINT : c.O_POINT + 3], force=size * way)
     if isinstance(scenario.vehicle, Striker):
         return found
     for w, wheel in enumerate(scenario.vehicle.wheels):

@@ -36,6 +36,7 @@ from ground.kernel import (
 )
 from ground.law import REFERENCE_AREA
 from rollover.dense import dot, times
+from rollover.devices import finish_devices, keep_poses
 from rollover.forces import generalised_forces, read_poses
 from rollover.impact import mobility, strike_stop
 from rollover.tables import (
@@ -49,6 +50,7 @@ from rollover.tables import (
     AXLE_STOP,
     BRANCH_CHANGE,
     COLLISION,
+    DEVICE,
     E_ANCHOR,
     E_DAMPING,
     E_DAMPING_NOW,
@@ -123,12 +125,14 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
     finish_wheels(t)
     finish_mounts(t)
     finish_axle(t)
+    finish_devices(t, h, DEVICE)
     start_step(t)
     if strike(t, qd):
         read_poses(t.pose, q, qd)
     t.work[COLLISION] += touch(t, qd, h)
     settle(t)
     read_poses(t.pose, q, qd)  # the impact changed the velocities
+    keep_poses(t)
 
 
 @compiled

@@ -179,6 +179,7 @@ def _answer(
             "phases": [{"start": start, "name": name} for start, name in run.phases],
             "energy_ledger": run.ledger,
             "energy_released": run.released,
+            "tests": run.tests,
             "peak_loads": [asdict(peak) for peak in peaks],
             "half_step": None
             if half_step is None

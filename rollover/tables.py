@@ -53,13 +53,16 @@ RULE_REFERENCE, RULE_EFFECTIVE, RULE_CLAMPED = 0, 1, 2
 SLOTS, ACTIVE, EVENTS, OUTSIDE, FLAGS_NOW, COUNTS = 0, 1, 2, 3, 4, 5
 
 # places in work (J taken from the vehicle since the start)
-SOIL, TYRE, ROPS, FRICTION_WORK, COLLISION, AXLE, WORKS = 0, 1, 2, 3, 4, 5, 6
+SOIL, TYRE, ROPS, FRICTION_WORK, COLLISION, AXLE, DEVICE, LASHING, WORKS = 0, 1, 2, 3, 4, 5, 6, 7, 8
 
 # columns of trial: what the last evaluation found for each active element
 Z, ZDOT, FN, FT, MOVED, TRIAL_COLUMNS = 0, 1, 2, 3, 6, 9
 
 # columns of resultant, one row for each body: normal contact force, friction force (world), point, weight, impulse
 R_NORMAL, R_TANGENT, R_POINT, R_WEIGHT, R_IMPULSE, RESULTANT_COLUMNS = 0, 3, 6, 9, 10, 13
+
+# places in device_out
+O_FORCE, O_DEFLECTION, O_ENERGY, O_POINT, O_WAY, OUT_COLUMNS = 0, 1, 2, 3, 6, 9
 
 # columns of event: time is added by the caller
 EV_KIND, EV_SUBJECT, EV_PLACE, EV_VALUE, EVENT_COLUMNS = 0, 1, 2, 5, 6
@@ -118,12 +121,19 @@ class Tables(NamedTuple):
     wheel_memory: Any  # (nw, EDGE_COLUMNS)
     mount_memory: Any  # (nt, SET_COLUMNS)
     axle_memory: Any  # (AXLE_MEMORY,)
-    clock: Any  # (1,) length of the step that is tried, s
+    clock: Any  # (2,) length of the step that is tried, time of the scenario at which forces are tried, s
     pose: Any  # (nb, POSE_COLUMNS)
     counts: Any  # (COUNTS,)
     work: Any  # (WORKS,)
     resultant: Any  # (nb, RESULTANT_COLUMNS)
     event: Any  # (ne, EVENT_COLUMNS)
+    # test stand; nd devices, none in a rollover: see rollover.devices
+    device_i: Any  # (nd, DEVICE_INTEGERS)
+    device_f: Any  # (nd, DEVICE_COLUMNS)
+    device_memory: Any  # (nd, DEVICE_MEMORY)
+    device_q: Any  # (2 ACCOUNTS, 6 nb) generalised forces now, then at the start of the step
+    device_x: Any  # (nb, 6) positions and angular velocities at the start of the step
+    device_out: Any  # (OUT_COLUMNS,) force, deflection, energy, point, way: what is recorded
 
 
 @register
@@ -178,10 +188,16 @@ def handle(t: Any) -> Any:
         t.wheel_memory,
         t.mount_memory,
         t.axle_memory,
-        t.clock,
         t.pose,
         t.counts,
         t.work,
         t.resultant,
         t.event,
+        t.clock,
+        t.device_i,
+        t.device_f,
+        t.device_memory,
+        t.device_q,
+        t.device_x,
+        t.device_out,
     )

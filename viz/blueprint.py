@@ -25,12 +25,13 @@ _FAR = 2.6  # times the vehicle's own size: a run that covers more shows the veh
 _Plots = tuple[tuple[str, tuple[str, ...]], ...]
 _TOP: _Plots = (
     ("ROPS force, kN", ("rops/force",)),
+    ("Test stand, kN", ("device/force",)),
     ("Ground force, kN", ("ground/force_normal", "ground/force_tangential")),
 )
 _LOADS: _Plots = (
     ("ROPS by axis, kN", ("rops/force_?",)),
     ("Wheels, kN", ("wheel/*/force_normal",)),
-    ("Sinkage, mm", ("ground/sinkage", "rops/deflection")),
+    ("Sinkage, mm", ("ground/sinkage", "rops/deflection", "device/deflection")),
     ("Impulse, N s", ("ground/impulse_normal", "rops/impulse")),
     ("Axle stop, N m s", ("axle/*/impulse",)),
     ("Contact area, cm\N{SUPERSCRIPT TWO}", ("ground/contact_area",)),
@@ -38,7 +39,7 @@ _LOADS: _Plots = (
 _MOTION: _Plots = (
     ("Roll, deg", ("chassis/roll",)),
     ("Striker acceleration, m/s\N{SUPERSCRIPT TWO}", ("striker/acceleration_z",)),
-    ("Energy, kJ", ("energy/*", "rops/energy")),
+    ("Energy, kJ", ("energy/*", "rops/energy", "device/energy")),
     ("Rates, deg/s", ("chassis/angular_velocity_?",)),
     ("Striker speed, m/s", ("striker/velocity_z",)),
     ("Striker position, m", ("striker/position_z",)),
@@ -57,7 +58,9 @@ def blueprint(run: Run, scales: str) -> rrb.Blueprint:
     `scales` says what lengths and colours in the scene mean.
     """
     # a plot of nothing but zeros says less than its absence, but for the load that is asked for
-    channels = [c for c, v in run.recording.channels.items() if c == "rops/force" or np.any(np.nan_to_num(v))]
+    found = run.recording.channels
+    asked = "device/force" if np.any(found.get("device/force", 0.0)) else "rops/force"
+    channels = [c for c, v in found.items() if c == asked or np.any(np.nan_to_num(v))]
     top = _views(channels, _TOP)
     left = rrb.Vertical(
         _scenes(run, scales),

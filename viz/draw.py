@@ -48,6 +48,9 @@ class Picture:
         )
 
 
+LABELLED = ("rops", "rops_upper", "chassis", "striker", "device", "weight")
+
+
 def picture(run: Run) -> Picture:
     """Choose the scales of a run's scene from what happened in it."""
     (x, y, _), radius = extent(run)
@@ -178,13 +181,13 @@ def _forces(out: Stream, run: Run, scale: float) -> None:
     for body, contact in run.contact.items():
         size = np.linalg.norm(contact.force, axis=1)
         there = size > 0.0
-        name = body.replace("_", " ").replace("rops", "ROPS")
+        name = {"device": "test stand"}.get(body, body.replace("_", " ").replace("rops", "ROPS"))
         arrows = rr.Arrows3D.columns(
             origins=contact.point[there],
             vectors=contact.force[there] / scale,
             labels=[f"{name} {newtons(f)}" for f in size[there]],
             # wheels carry their load all the time: labels on them would hide the others
-            show_labels=np.full(int(there.sum()), body in ("rops", "rops_upper", "chassis", "striker")),
+            show_labels=np.full(int(there.sum()), body in LABELLED),
         )
         # a time without force has a row without arrow, or the last one would stand for ever
         out.columns(force_path(scale, body), run.frame_time, arrows.partition(there.astype(np.int64)))

@@ -33,6 +33,8 @@ LEDGER = {
     "friction": 0xE78AC3FF,
     "collision": 0xFF7043FF,
     "axle": 0x8FCB6BFF,
+    "device": 0xFF8C26FF,
+    "lashing": 0x9FB4CCFF,
     "residual": 0xF5F5F5FF,
 }
 BODY = {  # a body's ground force, in the plots and as the arrow in the scene
@@ -41,6 +43,8 @@ BODY = {  # a body's ground force, in the plots and as the arrow in the scene
     "striker": SIMULATED,
     "chassis": 0xF2F2F2FF,
     "ground": SIMULATED,
+    "device": MEASURED,
+    "weight": 0xF2F2F2FF,
     **WHEEL,
 }
 PHASE = {
@@ -66,6 +70,7 @@ _SHOWN = {
 _BY_CHANNEL = {
     "ground/sinkage": ("mm", 1e3),
     "rops/deflection": ("mm", 1e3),
+    "device/deflection": ("mm", 1e3),
     "ground/contact_area": ("cm\N{SUPERSCRIPT TWO}", 1e4),
 }
 
@@ -139,6 +144,10 @@ def series(channel: str) -> Series:
 def _describe(channel: str) -> tuple[str, str, int]:
     """Group, name for people and colour of a known channel."""
     match channel.split("/"):
+        case ["device", what]:
+            group = {"force": "loads", "deflection": "sinkage", "energy": "energy"}[what]
+            name = "energy put in" if what == "energy" else what
+            return group, f"test stand, {name}", MEASURED
         case ["rops", "force"]:
             return "loads", "ROPS force", BODY["rops"]
         case ["rops", "force_x" | "force_y" | "force_z" as what]:

@@ -26,7 +26,14 @@ from viz.viewer import open_viewer
 __all__ = ["open_viewer", "run_id", "write_rrd"]
 
 # channels whose peaks are marked in their plots and told among the events; on all of them it would be noise
-_MARKED = ("rops/force", "ground/force_normal", "rops/deflection", "ground/sinkage")
+_MARKED = (
+    "rops/force",
+    "device/force",
+    "device/deflection",
+    "ground/force_normal",
+    "rops/deflection",
+    "ground/sinkage",
+)
 
 
 def write_rrd(run: Run, path: Path, *, peaks: Sequence[Peak] = ()) -> None:

@@ -18,6 +18,7 @@ from rollover.inertia import MassProperties
 from rollover.rops import ClearanceZone, Rops
 from rollover.run import Run
 from rollover.shapes import Box, Disc, Point, Shape, Tube, axes_along
+from rollover.stand import PendulumBlow, StaticTest
 from rollover.vehicle import Striker, Vehicle, Wheel, laden
 from viz.entities import escaped
 
@@ -30,6 +31,7 @@ RIM, RIM_MARK = 0xD8D8D0FF, 0x6F7378FF
 ZONE = 0x5FD3F5FF
 STEEL_DENSITY = 7850.0  # kg/m3, for the size of a block of which only the mass is known
 _AROUND = 48  # facets of a tyre
+_MEMBER = 0.04  # m from the loaded point, on a member's axis, to the beam's front
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,7 +100,7 @@ def parts(run: Run) -> tuple[Part, ...]:
     vehicle = run.scenario.vehicle
     if isinstance(vehicle, Striker):
         return _rig(run, vehicle)
-    return _vehicle(vehicle)
+    return _vehicle(vehicle) + _stand(run)
 
 
 def _vehicle(vehicle: Vehicle) -> tuple[Part, ...]:
@@ -128,6 +130,35 @@ def _vehicle(vehicle: Vehicle) -> tuple[Part, ...]:
         if not mass.outline:
             # it cannot touch anything: seen through, in the size that its inertia gives it
             found.append(dataclasses.replace(_equivalent(mass.body, f"{root}/mass"), colour=LOAD, see_through=True))
+    return tuple(found)
+
+
+def _stand(run: Run) -> tuple[Part, ...]:
+    """The test stand: a beam and the rod that pushes it, or a block on the lower part of its chains, and lashings."""
+    begin = run.scenario.initiation
+    if isinstance(begin, StaticTest):
+        # its x is the way that it pushes, its front stands at the loaded point; 150 mm high as the standards have it
+        path = body_path("beam")
+        size = (0.10, begin.beam_length, 0.15)
+        return (
+            Block(path=f"{path}/beam", centre=(-0.05 - _MEMBER, 0.0, 0.0), size=size, colour=STEEL),
+            Rod(path=f"{path}/rod", start=(-0.1, 0.0, 0.0), end=(-0.7, 0.0, 0.0), radius=0.04, colour=DARK_STEEL),
+        )
+    if not isinstance(begin, PendulumBlow):
+        return ()
+    path, along = body_path("pendulum"), begin.come_from in ("front", "rear")
+    half, top = 0.5 * begin.face, 0.5 * begin.face + 1.2
+    size = (begin.depth, begin.face, begin.face) if along else (begin.face, begin.depth, begin.face)
+    found: list[Part] = [Block(path=f"{path}/block", centre=(0.0, 0.0, 0.0), size=size, colour=STEEL)]
+    for name, side in (("one", 0.8 * half), ("other", -0.8 * half)):
+        x, y = (0.0, side) if along else (side, 0.0)
+        chain = Rod(path=f"{path}/chain_{name}", start=(x, y, half), end=(x, y, top), radius=0.015, colour=DARK_STEEL)
+        found.append(chain)
+    if begin.lashings and "chassis" in run.motion:
+        pose = run.motion["chassis"]
+        R, origin = rotation(pose.quaternion[0]), pose.origin[0]
+        strips = tuple(origin + np.array([x.point, x.anchor]) @ R.T for x in begin.lashings)
+        found.append(Wire(path="world/lashings", strips=strips, colour=DARK_STEEL, radius=0.012))
     return tuple(found)
 
 

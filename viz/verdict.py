@@ -84,11 +84,21 @@ def ranked(run: Run, peaks: Sequence[Peak]) -> tuple[Peak, ...]:
     """
     given = {p.channel for p in peaks}
     found = [*peaks, *(p for p in _of_channels(run) if not given or p.channel in {*_ALSO} - given)]
-    order = ("rops/force", "ground/force_normal", "rops/mount/", "rops/force_", "rops/", "ground/", "wheel/", "")
+    order = (
+        "device/force",
+        "rops/force",
+        "ground/force_normal",
+        "rops/mount/",
+        "rops/force_",
+        "rops/",
+        "ground/",
+        "wheel/",
+        "",
+    )
 
     def place(peak: Peak) -> tuple[int, str]:
         same = next((i for i, p in enumerate(order) if peak.channel == p), None)
-        begins = next(i for i, p in enumerate(order) if p not in order[:2] and peak.channel.startswith(p))
+        begins = next(i for i, p in enumerate(order) if p not in order[:3] and peak.channel.startswith(p))
         return (begins if same is None else same, peak.channel)
 
     return tuple(sorted(found, key=place))

@@ -95,7 +95,7 @@ class _Writer:
         properties = {key: self.slot(slot, suffix) for key, slot in slots(kind).items()}
         for f in fields(kind):
             default = f.default_factory() if f.default_factory is not MISSING else f.default
-            if default is not MISSING:
+            if f.init and default is not MISSING:
                 properties[f.name] = {**properties[f.name], "default": plain(default, slots(kind)[f.name])}
         definition: dict[str, Any] = {"type": "object", "additionalProperties": False, "properties": properties}
         if kind.__doc__:

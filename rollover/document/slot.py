@@ -104,16 +104,16 @@ class Slot:
 
 @functools.cache
 def slots(kind: type) -> dict[str, Slot]:
-    """What may stand under each key of a parameter class, `kind` first."""
+    """What may stand under each key of a parameter class, `kind` first; what follows from others is no key."""
     hints = typing.get_type_hints(kind, include_extras=True)
-    names = sorted((f.name for f in fields(kind)), key=lambda name: name != "kind")
+    names = sorted((f.name for f in fields(kind) if f.init), key=lambda name: name != "kind")
     return {name: slot_of(hints[name]) for name in names}
 
 
 @functools.cache
 def required(kind: type) -> tuple[str, ...]:
     """Keys without a default."""
-    return tuple(f.name for f in fields(kind) if f.default is MISSING and f.default_factory is MISSING)
+    return tuple(f.name for f in fields(kind) if f.init and f.default is MISSING and f.default_factory is MISSING)
 
 
 def slot_of(annotation: Any) -> Slot:

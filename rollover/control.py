@@ -1,0 +1,47 @@
+"""Who runs a test stand: asked after each step, it moves on what the devices do and keeps what the test found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from rollover.excitation import Blows, Harmonic
+from rollover.exciter import Hammer, Shaker
+from rollover.pendulum import PendulumControl
+from rollover.rig import Rig
+from rollover.run import Event
+from rollover.scenario import Scenario
+from rollover.stand import PendulumBlow, StaticTest, TiltTable
+from rollover.static_load import StaticControl
+from rollover.tables import Tables
+from rollover.tilting import TiltControl
+
+
+class Control(Protocol):
+    """One test on one stand."""
+
+    events: list[Event]
+
+    def after(self, now: float, dt: float, q: Any, qd: Any, t: Tables) -> bool:
+        """Move on after an accepted step, dt is 0 at the start; may write velocities; False ends the run."""
+        ...
+
+    def results(self) -> tuple[Mapping[str, Any], ...]:
+        """What was found: a row for each load, blow or tilt, each with kind, name and status."""
+        ...
+
+
+def control_of(scenario: Scenario, rig: Rig) -> Control | None:
+    """Who runs the scenario's test stand, or None where there is none."""
+    begin = scenario.initiation
+    if isinstance(begin, StaticTest):
+        return StaticControl(begin, rig)
+    if isinstance(begin, PendulumBlow):
+        return PendulumControl(begin, rig, scenario.gravity)
+    if isinstance(begin, TiltTable):
+        return TiltControl(begin, rig, scenario)
+    if isinstance(scenario.excitation, Harmonic):
+        return Shaker(scenario.excitation, rig)
+    if isinstance(scenario.excitation, Blows):
+        return Hammer(scenario.excitation, rig, scenario.gravity)
+    return None
