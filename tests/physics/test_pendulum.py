@@ -114,10 +114,9 @@ def test_lashings_hold_one_way() -> None:
 
 def test_preload_is_there_before_the_blow() -> None:
     """Two ropes straight down with 5 kN each press the rear tyres together by 10 kN."""
+    rope = _blow().lashings[0]
     ropes = tuple(
-        replace(
-            _blow().lashings[0], name=f"r{k}", point=(0.0, y, 0.6), anchor=(0.0, y, 0.0), preload=5e3, stiffness=1e5
-        )
+        replace(rope, name=f"r{k}", point=(0.0, y, 0.6), anchor=(0.0, y, 0.0), preload=5e3, stiffness=1e5)
         for k, y in enumerate((0.4, -0.4))
     )
     scenario = replace(
