@@ -32,7 +32,7 @@ import math
 import pkgutil
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +66,47 @@ class Domain:
 
 
 @parameters
+class Interval:
+    """What a calibration says about one number of a law."""
+
+    of: Annotated[str, "the number's name"]
+    low: Annotated[float | None, "of the interval of 95 percent; none: not bounded"] = None
+    high: Annotated[float | None, "of the interval of 95 percent; none: not bounded"] = None
+    origin: Annotated[
+        Literal["data", "kept", "neutral"],
+        "from the drops; kept as published on demand; or neutral, as the drops say nothing about it",
+    ] = "data"
+
+
+@parameters
+class Calibration:
+    """Where a law's numbers come from if not from its own source, and how far they were tested."""
+
+    source: Annotated[str, "in words"]
+    recordings: Annotated[tuple[str, ...], "name and SHA-256 of each"] = ()
+    speed_least: Annotated[float, Quantity("m/s", "normal impact speed", least=0)] = 0.0
+    speed_most: Annotated[float, Quantity("m/s", "normal impact speed", above=0)] = 100.0
+    momentum_most: Annotated[float, Quantity("N s", "mass in the law times impact speed", above=0)] = 1e6
+    area: Annotated[float | None, Quantity("m2", "footprint; none: any", above=0)] = None
+    sinkage_most: Annotated[float | None, Quantity("m", "deepest that was recorded", above=0)] = None
+    log_scatter: Annotated[float | None, Quantity("1", "standard deviation of ln F about the law", least=0)] = None
+    multiple_correlation: Annotated[float | None, Quantity("1", "of ln K'", least=0, most=1)] = None
+    intervals: tuple[Interval, ...] = ()
+
+    @property
+    def domain(self) -> Domain:
+        """The same as bounds; recorded drops are virgin soil hit at a right angle."""
+        return Domain(
+            speed_least=self.speed_least,
+            speed_most=self.speed_most,
+            momentum_most=self.momentum_most,
+            area=math.nan if self.area is None else self.area,
+            virgin_only=True,
+            obliquity_most=math.radians(10.0),
+        )
+
+
+@parameters
 class GroundLaw:
     """A loading curve F(z, v) on the reference area, and how the ground unloads."""
 
@@ -73,6 +114,8 @@ class GroundLaw:
         float,
         Quantity("1", "share of the deepest sinkage that springs back: K_u = K'(z_max)/recovery", above=0, below=1),
     ] = 0.02
+
+    calibration: Annotated[Calibration | None, "where the numbers come from, if not from the law's own source"] = None
 
     force: ClassVar[Any]
     begin: ClassVar[Any] = None
@@ -94,7 +137,7 @@ class GroundLaw:
     @property
     def domain(self) -> Domain:
         """Where the law's numbers come from."""
-        return Domain()
+        return Domain() if self.calibration is None else self.calibration.domain
 
 
 def laws() -> dict[str, type[GroundLaw]]:

@@ -6,6 +6,7 @@ import functools
 import math
 import re
 import typing
+from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from typing import Annotated, Any, TypeVar, dataclass_transform
 
@@ -108,6 +109,15 @@ def _metadata(annotation: Any) -> tuple[Any, ...]:
     return getattr(annotation, "__metadata__", ())
 
 
+def _flat(value: Any) -> Iterator[Any]:
+    """The numbers of a value, also of a list of points."""
+    if isinstance(value, tuple):
+        for item in value:
+            yield from _flat(item)
+    else:
+        yield value
+
+
 def _check(self: Any) -> None:
     kind: Any = type(self)
     for name in _labels(kind):
@@ -115,7 +125,7 @@ def _check(self: Any) -> None:
             raise ValueError(f"{name}: not a plain name, got {getattr(self, name)!r}; {Label.allowed} are allowed")
     for name, quantity in quantities(kind).items():
         value = getattr(self, name)
-        for number in value if isinstance(value, tuple) else (value,):
+        for number in _flat(value):
             if isinstance(number, bool) or not isinstance(number, (int, float)):
                 if number is not None:
                     raise ValueError(f"{name}: not a number, got {number!r}; a number in {quantity.unit} is allowed")

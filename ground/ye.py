@@ -62,6 +62,8 @@ class Ye2006(GroundLaw):
     @property
     def domain(self) -> Domain:
         """The drop tests behind the regression: speeds, momentum, face, virgin soil, normal impact."""
+        if self.calibration is not None:
+            return self.calibration.domain
         return Domain(
             speed_least=1.0,
             speed_most=3.5,

@@ -15,9 +15,9 @@ from ground.surface import normal
 from rollover import tables as c
 from rollover.inertia import MassProperties
 from rollover.scenario import Ground, Scenario
-from rollover.shapes import Disc, Shape, SurfacePoints, rectangle, sample
+from rollover.shapes import Disc, Shape, SurfacePoints, cone, rectangle, sample
 from rollover.tables import Tables
-from rollover.vehicle import Striker, Vehicle, Wheel, carried
+from rollover.vehicle import RigidBody, Striker, Vehicle, Wheel, carried
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class Body:
 POINTS_IN_ELEMENT = 0.8  # contact points are never further apart than this share of an element
 
 
-def bodies_of(vehicle: Vehicle | Striker, elements: Elements) -> tuple[Body, ...]:
+def bodies_of(vehicle: Vehicle | RigidBody | Striker, elements: Elements) -> tuple[Body, ...]:
     """Bodies with their contact points: striker; or chassis, front axle, ROPS as far as there are any.
 
     Points stand for areas, elements keep the ruts: an element without a point would be a gap under the body.
@@ -55,7 +55,10 @@ def bodies_of(vehicle: Vehicle | Striker, elements: Elements) -> tuple[Body, ...
     if isinstance(vehicle, Striker):
         height = 0.5 * (vehicle.face_length + vehicle.face_width)
         half = np.array([0.5 * vehicle.face_length, 0, 0]), np.array([0, 0.5 * vehicle.face_width, 0])
-        face = rectangle(np.zeros(3), half[0], -half[1], spacing)
+        if vehicle.nose == "cone":
+            face = cone(np.zeros(3), vehicle.nose_radius, vehicle.nose_height, spacing)
+        else:
+            face = rectangle(np.zeros(3), half[0], -half[1], spacing)
         m, a, b = vehicle.mass, vehicle.face_length, vehicle.face_width
         block = (m * (b * b + height**2) / 12, m * (a * a + height**2) / 12, m * (a * a + b * b) / 12)
         inertia = MassProperties(mass=m, centre_of_mass=(0.0, 0.0, 0.5 * height), inertia=block)
@@ -128,7 +131,7 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
             points.append((r, surface.normal, surface.area))
             owner += [b] * len(r)
             start += len(r)
-    wheels = vehicle.wheels if isinstance(vehicle, Vehicle) else ()
+    wheels = () if isinstance(vehicle, Striker) else vehicle.wheels
     wheel_f = np.zeros((len(wheels), c.WHEEL_COLUMNS))
     for w, wheel in enumerate(wheels):
         tyre = wheel.tyre
@@ -255,7 +258,7 @@ def _soil(ground: Ground) -> Array:
 
 
 def _mounts(
-    vehicle: Vehicle | Striker, bodies: tuple[Body, ...], row: dict[str, int]
+    vehicle: Vehicle | RigidBody | Striker, bodies: tuple[Body, ...], row: dict[str, int]
 ) -> tuple[Array, NDArray[np.int64]]:
     if isinstance(vehicle, Striker) or vehicle.rops is None:
         return np.zeros((0, c.MOUNT_COLUMNS)), np.zeros((0, 2), dtype=np.int64)
@@ -273,7 +276,7 @@ def _mounts(
 
 
 def _joints(
-    vehicle: Vehicle | Striker, bodies: tuple[Body, ...], row: dict[str, int]
+    vehicle: Vehicle | RigidBody | Striker, bodies: tuple[Body, ...], row: dict[str, int]
 ) -> tuple[NDArray[np.int64], Array, Array, NDArray[np.int64]]:
     axle_f, axle_i = np.zeros(0), np.zeros(2, dtype=np.int64)
     if isinstance(vehicle, Striker):

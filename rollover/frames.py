@@ -27,6 +27,12 @@ def from_angles(roll: float, pitch: float, yaw: float) -> Array:
     )
 
 
+def from_quaternion(wxyz: tuple[float, float, float, float]) -> Array:
+    """R_WV of a quaternion w, x, y, z (scalar first, body to world), (3, 3); its length does not matter."""
+    w, x, y, z = wxyz
+    return np.asarray(Rotation.from_quat([x, y, z, w]).as_matrix())
+
+
 def rotation_vector(R: Array) -> Array:
     """Rotation vector of a matrix, (3,), rad, shorter than pi."""
     axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])

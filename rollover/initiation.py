@@ -1,7 +1,8 @@
-"""How a scenario begins (data): dropped, tipped over its balance, standing, or on a test stand."""
+"""How a scenario begins (data): dropped, tipped over its balance, standing, thrown, or on a test stand."""
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 from ground.kinds import ByKind
@@ -43,4 +44,31 @@ class Standing:
     roll_rate: Annotated[float, Quantity("rad/s", "at release", least=-10, most=10)] = 0.0
 
 
-Initiation = Annotated[Drop | TipOver | Standing | StaticTest | PendulumBlow | TiltTable, ByKind()]
+@parameters
+class Throw:
+    """In flight: position, orientation and velocities at t = 0, as a camera saw them."""
+
+    kind: Literal["throw"] = "throw"
+    position: Annotated[tuple[float, float, float], Quantity("m", "of the centre of mass, world")]
+    velocity: Annotated[tuple[float, float, float], Quantity("m/s", "of the centre of mass, world")] = (0.0, 0.0, 0.0)
+    quaternion: Annotated[
+        tuple[float, float, float, float] | None,
+        Quantity("1", "w, x, y, z of the turn from body to world axes; instead of the angles", least=-1.01, most=1.01),
+    ] = None
+    roll_deg: Annotated[float, Quantity("deg", least=-180, most=180)] = 0.0
+    pitch_deg: Annotated[float, Quantity("deg", least=-90, most=90)] = 0.0
+    yaw_deg: Annotated[float, Quantity("deg", least=-360, most=360)] = 0.0
+    angular_velocity: Annotated[tuple[float, float, float], Quantity("rad/s", "body axes")] = (0.0, 0.0, 0.0)
+
+    def validate(self) -> None:
+        """Refuse two orientations, and a quaternion that is none; rounding is put right by its length."""
+        if self.quaternion is None:
+            return
+        size = math.hypot(*self.quaternion)
+        if abs(size - 1.0) > 0.01:
+            raise ValueError(f"quaternion: not of length 1, got {size:.4g}; 0.99 to 1.01 is allowed")
+        if (self.roll_deg, self.pitch_deg, self.yaw_deg) != (0.0, 0.0, 0.0):
+            raise ValueError("quaternion: got one beside roll_deg, pitch_deg or yaw_deg; one of both")
+
+
+Initiation = Annotated[Drop | TipOver | Standing | Throw | StaticTest | PendulumBlow | TiltTable, ByKind()]

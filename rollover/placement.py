@@ -13,8 +13,8 @@ from rollover.contact import Body
 from rollover.equilibrium import ROLL, Equilibrium, tread_point
 from rollover.faults import Fault, InputError
 from rollover.forces import generalised_forces
-from rollover.frames import from_angles, rotation_vector
-from rollover.initiation import Drop, Standing, TipOver
+from rollover.frames import from_angles, from_quaternion, rotation_vector
+from rollover.initiation import Drop, Standing, Throw, TipOver
 from rollover.scenario import Scenario
 from rollover.step import stand
 from rollover.tables import Tables, handle
@@ -37,6 +37,8 @@ def place(scenario: Scenario, bodies: tuple[Body, ...], t: Tables) -> Start:
     initiation = scenario.initiation
     if isinstance(initiation, Drop):
         return _dropped(initiation, scenario, bodies, t)
+    if isinstance(initiation, Throw):
+        return _thrown(initiation, scenario, bodies, t)
     assert isinstance(scenario.vehicle, Vehicle)
     if isinstance(initiation, TipOver):
         return _tipped(initiation, scenario, scenario.vehicle, bodies, t)
@@ -57,6 +59,24 @@ def _dropped(drop: Drop, scenario: Scenario, bodies: tuple[Body, ...], t: Tables
     qd = np.zeros(6 * len(bodies))
     qd[2::6] = -(drop.speed - scenario.gravity * drop.lead_time)
     return Start(q=q, qd=qd, time=-drop.lead_time)
+
+
+def _thrown(throw: Throw, scenario: Scenario, bodies: tuple[Body, ...], t: Tables) -> Start:
+    if throw.quaternion is not None:
+        R = from_quaternion(throw.quaternion)
+    else:
+        R = from_angles(math.radians(throw.roll_deg), math.radians(throw.pitch_deg), math.radians(throw.yaw_deg))
+    x, y, z = throw.position
+    if z <= float(height(scenario.ground.surface, np.array(x), np.array(y))):
+        raise InputError(
+            Fault(path="initiation.position", message=f"the centre of mass is in the ground, got z = {z:g} m; higher")
+        )
+    q, qd = np.zeros(6), np.zeros(6)
+    q[:3], q[3:] = throw.position, rotation_vector(R)
+    qd[:3], qd[3:] = throw.velocity, throw.angular_velocity
+    kernels = handle(t)
+    generalised_forces(kernels, q, qd, np.zeros(6))
+    return Start(q=q, qd=qd, time=0.0)
 
 
 def _deepest(bodies: tuple[Body, ...], t: Tables, R: Array, surface: Surface) -> float:

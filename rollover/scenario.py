@@ -17,11 +17,11 @@ from rollover import document
 from rollover.effects import effects
 from rollover.excitation import Excitation
 from rollover.filters import least_rate
-from rollover.initiation import Drop, Initiation, Standing, TipOver
+from rollover.initiation import Drop, Initiation, Standing, Throw, TipOver
 from rollover.stand import PendulumBlow, StaticTest, TiltTable
-from rollover.vehicle import Striker, Vehicle
+from rollover.vehicle import RigidBody, Striker, Vehicle
 
-AnyVehicle = Annotated[Vehicle | Striker, ByKind()]
+AnyVehicle = Annotated[Vehicle | Striker | RigidBody, ByKind()]
 AnyLaw = Annotated[GroundLaw, ByKind(laws)]  # whatever law stands in the folder `ground`
 
 
@@ -119,7 +119,7 @@ class Scenario:
         return document.replaced(self, changes, origin)
 
 
-def _check_start(vehicle: Vehicle | Striker, start: Initiation) -> None:
+def _check_start(vehicle: Vehicle | Striker | RigidBody, start: Initiation) -> None:
     if isinstance(vehicle, Striker):
         if not isinstance(start, Drop):
             raise ValueError(f"initiation.kind: a striker cannot begin so, got {start.kind!r}; 'drop' is allowed")
@@ -131,6 +131,10 @@ def _check_start(vehicle: Vehicle | Striker, start: Initiation) -> None:
         return
     if isinstance(start, (StaticTest, PendulumBlow)) and (vehicle.rops is None or not vehicle.rops.members):
         raise ValueError(f"initiation.kind: {start.kind!r} loads a ROPS, got a vehicle without; one with members")
+    if isinstance(start, Throw):
+        if not isinstance(vehicle, RigidBody):
+            raise ValueError(f"initiation.kind: only a rigid body is thrown, got {start.kind!r}; vehicle.kind: body")
+        return
     sides = [w.centre[1] for w in vehicle.wheels]
     left, right = sum(y > 0.0 for y in sides), sum(y < 0.0 for y in sides)
     if isinstance(start, TipOver):

@@ -57,7 +57,22 @@ class Disc:
     radius: Annotated[float, Quantity("m", above=0)]
 
 
-Shape = Annotated[Box | Tube | Disc, ByKind()]
+@parameters
+class Points:
+    """Single points, such as the corners of a body on hard ground; each stands for an area whichever way it faces."""
+
+    kind: Literal["points"] = "points"
+    name: Annotated[str, Label()]
+    at: Annotated[tuple[Point, ...], Quantity("m", "the points, vehicle axes")]
+    area: Annotated[float, Quantity("m2", "that each point stands for", above=0)]
+
+    def validate(self) -> None:
+        """Refuse an empty list."""
+        if not self.at:
+            raise ValueError("at: got no point; at least one")
+
+
+Shape = Annotated[Box | Tube | Disc | Points, ByKind()]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +99,33 @@ def sample(shape: Shape, spacing: float) -> tuple[SurfacePoints, ...]:
         return _sample_box(np.array(shape.low), np.array(shape.high), spacing)
     if isinstance(shape, Tube):
         return _sample_tube(np.array(shape.start), np.array(shape.end), 0.5 * shape.diameter, spacing)
+    if isinstance(shape, Points):
+        place = np.array(shape.at)
+        return (SurfacePoints(position=place, normal=np.zeros_like(place), area=np.full(len(place), shape.area)),)
     return (_sample_disc(np.array(shape.centre), np.array(shape.normal, dtype=float), shape.radius, spacing),)
+
+
+def cone(tip: NDArray[np.float64], radius: float, height: float, spacing: float) -> SurfacePoints:
+    """Points on a cone that stands on `tip`; their areas, projected along z, add up to that of its base."""
+    rings = max(2, math.ceil(math.hypot(radius, height) / spacing))
+    slope = math.hypot(radius, height)
+    position, normal, area = (
+        [tip[None]],
+        [np.array([[0.0, 0.0, -1.0]])],
+        [np.array([math.pi * (0.5 * radius / rings) ** 2])],
+    )
+    for i in range(1, rings + 1):
+        # ring i stands for the surface up to half a ring on either side; the last one only inwards
+        inner, outer = (i - 0.5) * radius / rings, min(i + 0.5, rings) * radius / rings
+        r = radius * i / rings
+        count = max(6, math.ceil(2.0 * math.pi * r / spacing))
+        angle = 2.0 * math.pi * (np.arange(count) + 0.5 * (i % 2)) / count
+        around = np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=1)
+        position.append(tip + r * around + np.array([0.0, 0.0, height * i / rings]))
+        normal.append((height * around - np.array([0.0, 0.0, radius])) / slope)
+        # projected along z, a ring's surface is smaller by radius/slope
+        area.append(np.full(count, math.pi * (outer**2 - inner**2) / count * slope / radius))
+    return SurfacePoints(position=np.concatenate(position), normal=np.concatenate(normal), area=np.concatenate(area))
 
 
 def rectangle(

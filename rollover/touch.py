@@ -99,7 +99,9 @@ def search(t: Any) -> int:
             if depth <= 0.0:
                 continue
             if not is_flat:
-                facing = -(d0 * t.point_n[i, 0] + d1 * t.point_n[i, 1] + d2 * t.point_n[i, 2])
+                nx, ny, nz = t.point_n[i, 0], t.point_n[i, 1], t.point_n[i, 2]
+                # a listed point has no normal: it stands for its area whichever way the body is turned
+                facing = -(d0 * nx + d1 * ny + d2 * nz) if nx != 0.0 or ny != 0.0 or nz != 0.0 else 1.0
                 if facing <= 1e-6:
                     continue
             x, y, z = place(row, a, b, c)

@@ -1,4 +1,4 @@
-"""What falls or rolls: a vehicle with wheels, front axle and ROPS, or the striker of the drop rig (data only).
+"""What falls or rolls: a vehicle with wheels, front axle and ROPS, a rigid body, or a striker on a guide (data only).
 
 Vehicle axes (ISO 8855): x forward, y left, z up; origin on level ground below the middle of the rear axle.
 Masses and inertias of a vehicle are those of the whole, as they are measured; what the axle and the ROPS weigh
@@ -8,7 +8,7 @@ is taken off to find the chassis. Attached masses (ballast, driver, implement) c
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from ground.quantity import Label, Quantity, parameters
 from rollover.inertia import MassProperties, combined, cuboid
@@ -142,22 +142,50 @@ class Vehicle:
 
 @parameters
 class Striker:
-    """The striker of the drop rig (Ye 2006, Fig. 5): a block on a vertical guide, flat face down."""
+    """The striker of the drop rig (Ye 2006, Fig. 5): a block on a vertical guide, flat face or a cone's tip down."""
 
     kind: Literal["striker"] = "striker"
     name: str = "striker"
     mass: Annotated[float, Quantity("kg", above=0)] = 132.0
     face_length: Annotated[float, Quantity("m", "along x", above=0)] = 0.140
     face_width: Annotated[float, Quantity("m", "along y", above=0)] = 0.045
+    nose: Annotated[Literal["flat", "cone"], "a cone replaces the face: its area grows with the depth"] = "flat"
+    nose_radius: Annotated[float, Quantity("m", "of the cone's base", above=0)] = 0.04375
+    nose_height: Annotated[float, Quantity("m", "of the cone", above=0)] = 0.0755
     contact_spacing: Annotated[float, Quantity("m", "of the contact points on the face", above=0)] = 0.0225
 
 
-def chassis_of(vehicle: Vehicle) -> MassProperties:
+@parameters
+class RigidBody:
+    """One free rigid body, such as a thrown block: mass properties and what of it can touch the ground."""
+
+    kind: Literal["body"] = "body"
+    name: str
+    whole: MassProperties
+    outline: Annotated[tuple[Shape, ...], "what can touch the ground; on hard ground the corners, as points"]
+    contact_spacing: Annotated[float, Quantity("m", "of the contact points on outlines", above=0)] = 0.03
+    provenance: tuple[Provenance, ...] = ()
+
+    # a body is a chassis with nothing on it
+    wheels: ClassVar[tuple[Wheel, ...]] = ()
+    front_axle: ClassVar[None] = None
+    rops: ClassVar[None] = None
+    attached: ClassVar[tuple[Attached, ...]] = ()
+
+    def validate(self) -> None:
+        """Refuse a body that nothing could stop."""
+        if not self.outline:
+            raise ValueError("outline: nothing can touch the ground, got no shape; at least one")
+
+
+def chassis_of(vehicle: Vehicle | RigidBody) -> MassProperties:
     """Mass properties of the chassis: the whole less front axle and ROPS, without attached masses.
 
     Raises ``ValueError`` if the parts weigh more than the whole or leave an inertia that no body can have.
     """
     whole = vehicle.whole
+    if isinstance(vehicle, RigidBody):
+        return whole
     parts = [] if vehicle.front_axle is None else [vehicle.front_axle.body]
     if vehicle.rops is not None:
         parts += [body for body, _ in vehicle.rops.parts.values()]
@@ -173,7 +201,7 @@ def chassis_of(vehicle: Vehicle) -> MassProperties:
         raise ValueError(f"whole.inertia: leaves the chassis, without front axle and ROPS, an impossible {e}") from None
 
 
-def carried(vehicle: Vehicle, carrier: Carrier) -> MassProperties:
+def carried(vehicle: Vehicle | RigidBody, carrier: Carrier) -> MassProperties:
     """Mass properties of a body of the vehicle with the masses that it carries."""
     if carrier == "chassis":
         own = chassis_of(vehicle)
@@ -185,7 +213,7 @@ def carried(vehicle: Vehicle, carrier: Carrier) -> MassProperties:
     return combined([own, *extra]) if extra else own
 
 
-def laden(vehicle: Vehicle) -> MassProperties:
+def laden(vehicle: Vehicle | RigidBody) -> MassProperties:
     """Mass properties of the vehicle with everything that is attached to it."""
     return combined([vehicle.whole, *(a.body for a in vehicle.attached)]) if vehicle.attached else vehicle.whole
 

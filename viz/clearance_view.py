@@ -9,7 +9,7 @@ from ground.surface import height
 from rollover.clearance import approaches
 from rollover.frames import from_quaternions
 from rollover.run import Run
-from rollover.shapes import Box, Shape, Tube
+from rollover.shapes import Box, Points, Shape, Tube
 from rollover.vehicle import Vehicle
 from viz import plots
 from viz.page import Figure
@@ -72,6 +72,8 @@ def _edges(shape: Shape) -> Array:
         return np.array([shape.start, shape.end])
     if isinstance(shape, Box):
         return _box_of(np.array([shape.low, shape.high]))
+    if isinstance(shape, Points):
+        return _box_of(np.array(shape.at))
     return np.array([shape.centre])
 
 

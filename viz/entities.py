@@ -17,7 +17,7 @@ FOLLOWED = "world/followed"  # goes with the vehicle without turning
 
 # 0xRRGGBBAA. The same thing has the same colour in every view: what answers the question is blue.
 SIMULATED, MEASURED, LIMIT = 0x5B9BFFFF, 0xFF8C26FF, 0xF0434EFF
-AXIS = {"x": 0xE78AC3FF, "y": 0x8FCB6BFF, "z": 0xB79CF5FF}
+AXIS = {"x": 0xE78AC3FF, "y": 0x8FCB6BFF, "z": 0xB79CF5FF, "w": 0xF2F2F2FF}  # w: of a quaternion
 WHEEL = {
     "front_left": 0x66D9C2FF,
     "front_right": 0xF4D35EFF,

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from rollover.inertia import MassProperties
 from rollover.rops import ClearanceZone, Rops
 from rollover.run import Run
-from rollover.shapes import Box, Disc, Point, Shape, Tube, axes_along
+from rollover.shapes import Box, Disc, Point, Points, Shape, Tube, axes_along
 from rollover.stand import PendulumBlow, StaticTest
-from rollover.vehicle import Striker, Vehicle, Wheel, laden
+from rollover.vehicle import RigidBody, Striker, Vehicle, Wheel, laden
 from viz.entities import escaped
 
 PAINT = (0x4C8C46FF, 0x417C3DFF, 0x569A4EFF, 0x386E36FF)  # the chassis, part by part
@@ -103,7 +103,7 @@ def parts(run: Run) -> tuple[Part, ...]:
     return _vehicle(vehicle) + _stand(run)
 
 
-def _vehicle(vehicle: Vehicle) -> tuple[Part, ...]:
+def _vehicle(vehicle: Vehicle | RigidBody) -> tuple[Part, ...]:
     chassis, axle = body_path("chassis"), body_path("front_axle")
     found: list[Part] = []
     for i, shape in enumerate(vehicle.outline):
@@ -201,11 +201,41 @@ def _solid(shape: Shape, path: str, colour: int) -> Part:
         return Block(path=path, centre=_point(0.5 * (low + high)), size=_point(high - low), colour=colour)
     if isinstance(shape, Tube):
         return Rod(path=path, start=shape.start, end=shape.end, radius=0.5 * shape.diameter, colour=colour)
+    if isinstance(shape, Points):
+        return _around(np.array(shape.at), path)
     assert isinstance(shape, Disc)
     # a side of a plate has no thickness; 5 mm inwards are enough to be seen
     outward = axes_along(np.array(shape.normal, dtype=float))[0]
     back = _point(np.array(shape.centre) - 0.005 * outward)
     return Rod(path=path, start=back, end=shape.centre, radius=shape.radius, colour=SIDE_WALL)
+
+
+def _around(points: NDArray[np.float64], path: str) -> Hull | Balls:
+    """The convex body with these corners, each flat side in a shade of its own; fewer or flat ones as balls."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        hull = ConvexHull(points)
+    except (QhullError, ValueError):
+        size = 0.02 * float(np.ptp(points, axis=0).max() or 1.0)
+        return Balls(path=path, centres=points, radii=np.full(len(points), size), colour=PAINT[0])
+    sides: dict[tuple[float, ...], int] = {}
+    vertices, normals, colours = [], [], []
+    for corners, plane in zip(hull.simplices, hull.equations, strict=True):
+        shade = PAINT[sides.setdefault(tuple((np.round(plane, 6) + 0.0).tolist()), len(sides)) % len(PAINT)]
+        a, b, c = points[corners]
+        order = (a, b, c) if np.cross(b - a, c - a) @ plane[:3] > 0.0 else (a, c, b)
+        for corner in order:
+            vertices.append(corner)
+            normals.append(plane[:3])
+            colours.append(shade)
+    return Hull(
+        path=path,
+        vertices=np.array(vertices),
+        normals=np.array(normals),
+        colours=np.array(colours, dtype=np.uint32),
+        triangles=np.arange(len(vertices)).reshape(-1, 3),
+    )
 
 
 def _equivalent(body: MassProperties, path: str) -> Block:
@@ -295,13 +325,42 @@ def _rig(run: Run, striker: Striker) -> tuple[Part, ...]:
     def bar(name: str, start: Point, end: Point) -> Rod:
         return Rod(path=f"world/guide/{name}", start=start, end=end, radius=0.01, colour=DARK_STEEL)
 
-    return (
+    point: Part = Block(
         # the ground's force acts inside its outline
-        Block(path=f"{path}/nose", centre=(0.0, 0.0, 0.5 * nose), size=(a, b, nose), colour=STEEL, see_through=True),
+        path=f"{path}/nose",
+        centre=(0.0, 0.0, 0.5 * nose),
+        size=(a, b, nose),
+        colour=STEEL,
+        see_through=True,
+    )
+    shaft: tuple[Part, ...] = ()
+    if striker.nose == "cone":
+        point = _cone(striker.nose_radius, striker.nose_height, f"{path}/nose")
+        start, end = (0.0, 0.0, striker.nose_height), (0.0, 0.0, nose)
+        shaft = (Rod(path=f"{path}/shaft", start=start, end=end, radius=striker.nose_radius, colour=STEEL),)
+    return (
+        point,
+        *shaft,
         Block(path=f"{path}/mass", centre=(0.0, 0.0, nose + 0.5 * side), size=(side, side, side), colour=FRAME),
         bar("front", (x + apart, y, 0.0), (x + apart, y, top)),
         bar("rear", (x - apart, y, 0.0), (x - apart, y, top)),
         bar("cross", (x + apart, y, top), (x - apart, y, top)),
+    )
+
+
+def _cone(radius: float, height: float, path: str) -> Hull:
+    """A cone that stands on its tip at the origin."""
+    angle = 2.0 * math.pi * np.arange(_AROUND + 1) / _AROUND
+    rim = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(angle.size, height)], axis=1)
+    outward = np.stack([height * np.cos(angle), height * np.sin(angle), np.full(angle.size, -radius)], axis=1)
+    outward /= math.hypot(radius, height)
+    vertices = np.stack([np.zeros_like(rim[1:]), rim[1:], rim[:-1]], axis=1).reshape(-1, 3)
+    return Hull(
+        path=path,
+        vertices=vertices,
+        normals=np.repeat(outward[1:], 3, axis=0),
+        colours=np.full(len(vertices), STEEL, dtype=np.uint32),
+        triangles=np.arange(len(vertices)).reshape(-1, 3),
     )
 
 

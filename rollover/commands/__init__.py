@@ -10,5 +10,6 @@ from rollover.commands import check
 from rollover.commands import importing
 from rollover.commands import schema
 from rollover.commands import regress
+from rollover.commands import identify
 
-__all__ = ["check", "importing", "listing", "regress", "run", "schema", "view"]
+__all__ = ["check", "identify", "importing", "listing", "regress", "run", "schema", "view"]

@@ -1,0 +1,137 @@
+"""`rollover identify`: a ground law from recorded drops."""
+
+from __future__ import annotations
+
+import json
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rollover.commands.door import AsJson, Force, Setting, answering, app, settings
+from rollover.faults import Fault, InputError
+
+if TYPE_CHECKING:
+    from rollover.recording import Recording
+
+SOIL, ANSWER = "soil.yaml", "identify.json"
+
+
+class Form(StrEnum):
+    """Which law is identified."""
+
+    ye = "ye-2006"
+    bearing = "bearing"
+
+
+class StrikerMass(StrEnum):
+    """Which mass stands in eq (5), as `ground.striker_mass` of a scenario."""
+
+    reference = "reference"
+    effective = "effective"
+
+
+@app.command("identify")
+@answering
+def identify_(
+    recordings: Annotated[list[str], typer.Argument(help="Recorded drops.", metavar="RECORDING...")],
+    scenario: Annotated[str, typer.Option(help="Whose striker fell, unless a recording says otherwise.")] = "drop_test",
+    set_: Setting = None,
+    form: Annotated[Form | None, typer.Option("--law", help="Law  [default: ye-2006; bearing for a cone]")] = None,
+    fraction: Annotated[
+        float | None, typer.Option(min=0.0, max=10.0, help="m_b1/m_s  [default: the scenario's co-moving mass]")
+    ] = None,
+    striker_mass: Annotated[StrikerMass, typer.Option(help="m_s in eq (5).")] = StrikerMass.reference,
+    buoyancy: Annotated[float, typer.Option(min=0.0, help="Of the striker in what it falls through, N.")] = 0.0,
+    terminal_speed: Annotated[
+        bool, typer.Option("--terminal-speed", help="It fell at terminal speed: take the drag from there.")
+    ] = False,
+    keep: Annotated[bool, typer.Option("--keep", help="Published values for what the drops cannot determine.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Results folder  [default: out/identify/NAME]")] = None,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Identify a ground law from drops: stiffness over depth, coefficients with intervals, a soil file."""
+    from rollover import console, document, identification
+    from rollover import scenario as scenarios
+    from rollover.vehicle import Striker
+
+    chosen = scenarios.load(document.find(scenario))
+    if set_:
+        chosen = chosen.replaced(settings(set_), origin="--set")
+    found = {Path(name).stem: _read(name) for name in recordings}
+    if len(found) < len(recordings):
+        raise InputError(Fault(message=f"two recordings share a name, got {', '.join(recordings)}; each name once"))
+    folder = out or Path("out", "identify", Path(recordings[0]).stem)
+    _claim(folder, force)
+    is_cone = isinstance(chosen.vehicle, Striker) and chosen.vehicle.nose == "cone"
+    wanted = form or (Form.bearing if is_cone else Form.ye)
+    drops, refused = identification.drops_of(
+        {name: recording for name, (recording, _) in found.items()},
+        chosen,
+        buoyancy=buoyancy,
+        terminal=terminal_speed,
+    )
+    sources = sorted({recording.source for recording, _ in found.values() if recording.source})
+    answer = identification.identified(
+        drops,
+        {name: digest for name, (_, digest) in found.items()},
+        form=wanted.value,
+        fraction=chosen.ground.co_moving_mass.share if fraction is None else fraction,
+        law_mass=striker_mass.value,
+        keep=keep,
+        source="; ".join(sources) or "recorded drops",
+    )
+    report = {**answer.answer, "refused": refused, "remarks": list(answer.remarks)}
+    _write(folder, document.dump(answer.law, identification.head(answer)), report)
+    for reason in refused:
+        console.say(f"left out: {reason}")
+    if as_json:
+        print(json.dumps(report, indent=2))
+        return
+    widths = [max(map(len, column)) for column in zip(*answer.table, strict=True)]
+    for row in answer.table:
+        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+    for remark in answer.remarks:
+        print(remark)
+    print(f"Soil: {folder / SOIL}")
+
+
+def _read(name: str) -> tuple[Recording, str]:
+    """A recording and the SHA-256 of its file; of a run's folder its channels."""
+    import hashlib
+
+    from rollover.recording import read_parquet
+
+    path = Path(name)
+    path = path / "channels.parquet" if path.is_dir() else path
+    recording = read_parquet(path)
+    return recording, hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _claim(folder: Path, force: bool) -> None:
+    if not folder.exists():
+        return
+    foreign = [p.name for p in folder.iterdir() if p.name not in (SOIL, ANSWER)] if folder.is_dir() else [folder.name]
+    if foreign:
+        raise InputError(
+            Fault(file=str(folder), message=f"holds files that are not results, got {foreign[0]!r}; another --out")
+        )
+    if any(folder.iterdir()) and not force:
+        raise InputError(
+            Fault(file=str(folder), message="holds an identification; --force replaces it, --out leaves it")
+        )
+
+
+def _write(folder: Path, soil: str, report: dict[str, object]) -> None:
+    """Both files whole, each in one stroke, once both texts are there."""
+    import os
+
+    texts = {SOIL: soil, ANSWER: json.dumps(report, indent=2, allow_nan=False) + "\n"}
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in texts.items():
+        part = folder / f".{name}.part"
+        part.write_text(text, encoding="utf-8")
+    for name in texts:
+        os.replace(folder / f".{name}.part", folder / name)
