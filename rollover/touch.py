@@ -194,6 +194,8 @@ def let_go(t: Any) -> None:
             drop_mass(t, slot)
             t.state[slot, MODE] = IDLE
             t.memory[slot, FORCE] = 0.0
+            if t.law[PLASTIC] == 0:
+                t.memory[slot, SINKAGE] = 0.0  # no rut stays
         else:
             t.active[kept] = slot
             kept += 1

@@ -17,7 +17,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from ground.bearing import Bearing
 from ground.compaction import Compaction
+from ground.hard import Hard
 from ground.law import BRANCH, HIDDEN, MASS, SPEED, GroundLaw, evaluate, laws, touched
 from ground.press import Press
 from ground.quantity import quantities
@@ -26,7 +28,11 @@ from ground.ye import Ye2006
 
 # an instance of every law, with no number at which a term of it vanishes
 EXAMPLES: dict[str, GroundLaw] = {
+    "bearing": Bearing(
+        surface_pressure=3e3, depth_pressure=2e4, depth_exponent=0.8, rate_per_decade=0.15, rate_reference=0.03
+    ),
     "compaction": Compaction(elastic_stiffness=9e5, plastic_stiffness=6e4, damping=800.0),
+    "hard": Hard(stiffness=8e4, restitution=0.4, slow_speed=0.5),
     "press": Press(stiffness=2e5, damping=900.0, side_damping=600.0, side_mass=12.0),
     "treated": Treated(
         speed_coefficient=2e4,
