@@ -101,12 +101,17 @@ def identify_(
 def _read(name: str) -> tuple[Recording, str]:
     """A recording and the SHA-256 of its file; of a run's folder its channels."""
     import hashlib
+    import importlib
 
     from rollover.recording import read_parquet
 
     path = Path(name)
     path = path / "channels.parquet" if path.is_dir() else path
-    recording = read_parquet(path)
+    try:
+        read = importlib.import_module("rollover.importers").read_recording  # any file format, where they are there
+    except ImportError:
+        read = read_parquet
+    recording: Recording = read(path)
     return recording, hashlib.sha256(path.read_bytes()).hexdigest()
 
 

@@ -157,13 +157,17 @@ def rms(parts: Sequence[Array]) -> float:
     return float(np.median([np.sqrt(np.mean(np.sum(part.reshape(-1, 3) ** 2, axis=1))) for part in parts]))
 
 
-def study(path: str, count: int) -> dict[str, Any]:
+STARTS = ((0.08, 0.3), (0.16, 0.125), (0.4, 0.05))  # mu, e
+
+
+def study(
+    path: str, count: int, starts: Sequence[tuple[float, float]] = STARTS, scenario: Scenario | None = None
+) -> dict[str, Any]:
     """Fit every second of `count` tosses spread over all, judge the others."""
-    scenario = load("cube_toss")
+    scenario = scenario or load("cube_toss")
     every = tosses(path)
     chosen = [every[k] for k in np.linspace(0, len(every) - 1, min(count, len(every))).astype(int)]
     training, held_out = chosen[::2], chosen[1::2]
-    starts: Sequence[tuple[float, float]] = ((0.08, 0.3), (0.16, 0.125), (0.4, 0.05))
     for window in WINDOWS:
         best = fit(scenario, training, window, starts)
         starts = [tuple(np.exp(best.x).tolist())]
