@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rollover.shapes import Box, Disc, Tube, sample
+from rollover.shapes import Box, Disc, Points, Tube, cone, sample
 
 
 @pytest.mark.parametrize("spacing", [0.5, 0.07, 0.02])
@@ -47,3 +47,23 @@ def test_impossible_shapes_are_refused() -> None:
         Box(name="b", low=(0, 0, 0), high=(1, 0, 1))
     with pytest.raises(ValueError, match="same as start"):
         Tube(name="t", start=(1, 1, 1), end=(1, 1, 1), diameter=0.1)
+
+
+def test_points_are_themselves_and_face_every_way() -> None:
+    (patch,) = sample(Points(name="corners", at=((0.1, 0.2, 0.3), (0.0, 0.0, 1.0)), area=0.02), 0.01)
+    assert patch.position.tolist() == [[0.1, 0.2, 0.3], [0.0, 0.0, 1.0]]
+    assert not patch.normal.any()
+    assert patch.area.tolist() == [0.02, 0.02]
+
+
+def test_a_cone_has_its_area_and_faces_outward() -> None:
+    r, h = 0.3, 0.4
+    patch = cone(np.array([1.0, 2.0, 3.0]), r, h, 0.01)
+    # seen along the axis: its base
+    assert float(-patch.normal[:, 2] @ patch.area) == pytest.approx(math.pi * r**2, rel=1e-9)
+    # mantle pi r sqrt(r^2 + h^2), the point at the tip stands flat
+    assert float(patch.area.sum()) == pytest.approx(math.pi * r * 0.5, rel=1e-3)
+    above = patch.position - [1.0, 2.0, 3.0]
+    assert np.hypot(above[:, 0], above[:, 1]) == pytest.approx(above[:, 2] * r / h, abs=1e-12)
+    assert np.linalg.norm(patch.normal, axis=1) == pytest.approx(1.0)
+    assert np.all(np.sum(patch.normal[1:] * above[1:], axis=1) == pytest.approx(0.0, abs=1e-12))

@@ -12,8 +12,8 @@ from rollover.inertia import MassProperties
 from rollover.initiation import TipOver
 from rollover.run import Run
 from rollover.scenario import load
-from rollover.shapes import Disc
-from rollover.vehicle import Attached, Striker, Vehicle
+from rollover.shapes import Disc, Point, Points
+from rollover.vehicle import Attached, RigidBody, Striker, Vehicle
 from tests.viz import example
 from viz.scene import Balls, Block, Hull, Rod, extent, parts, path_of_centre, rotation
 
@@ -24,7 +24,7 @@ def by_path(run: Run) -> dict[str, object]:
     return found
 
 
-def with_vehicle(run: Run, vehicle: Vehicle) -> Run:
+def with_vehicle(run: Run, vehicle: Vehicle | RigidBody | Striker) -> Run:
     return dataclasses.replace(run, scenario=dataclasses.replace(run.scenario, vehicle=vehicle))
 
 
@@ -192,3 +192,43 @@ def test_the_centre_that_is_followed_is_the_laden_one(overturn: Run) -> None:
     after = path_of_centre(with_vehicle(overturn, dataclasses.replace(vehicle, attached=(heavy,))))
     way = 0.5 * (np.array([5.0, 0.0, 2.0]) - np.array(vehicle.whole.centre_of_mass))
     assert np.linalg.norm(after - before, axis=1) == pytest.approx(np.linalg.norm(way), rel=1e-9)
+
+
+def body(run: Run, *at: Point) -> dict[str, object]:
+    """What is drawn of a body that touches with these points."""
+    whole = MassProperties(mass=1.0, centre_of_mass=(0.0, 0.0, 0.0), inertia=(1.0, 1.0, 1.0))
+    outline = (Points(name="corners", at=at, area=0.1),)
+    return by_path(with_vehicle(run, RigidBody(name="body", whole=whole, outline=outline)))
+
+
+def test_a_body_given_by_its_corners_is_drawn_whole_with_every_side_outward(overturn: Run) -> None:
+    corners = [(x, y, z) for x in (-1.0, 1.0) for y in (-0.5, 0.5) for z in (-0.25, 0.25)]
+    hull = body(overturn, *corners)["world/chassis/corners"]
+    assert isinstance(hull, Hull)
+    a, b, c = (hull.vertices[hull.triangles[:, k]] for k in range(3))
+    cross = np.cross(b - a, c - a)
+    assert float(np.linalg.norm(cross, axis=1).sum()) / 2.0 == pytest.approx(2.0 * (2.0 + 1.0 + 0.5), rel=1e-12)
+    # volume by the divergence theorem: positive only if the triangles turn outwards
+    assert float(np.sum(a * cross)) / 6.0 == pytest.approx(2.0 * 1.0 * 0.5, rel=1e-12)
+    assert np.sum(cross * hull.normals[hull.triangles[:, 0]], axis=1) == pytest.approx(np.linalg.norm(cross, axis=1))
+    # the two triangles of a side share a shade
+    assert all(len({int(s) for s in hull.colours[np.all(hull.normals == n, axis=1)]}) == 1 for n in hull.normals)
+
+
+def test_corners_that_span_no_body_are_balls(overturn: Run) -> None:
+    drawn = body(overturn, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (1.0, 1.0, 0.0))["world/chassis/corners"]
+    assert isinstance(drawn, Balls)
+    assert len(drawn.centres) == 4
+
+
+def test_a_cone_nose_stands_on_its_tip(drop: Run) -> None:
+    striker = Striker(nose="cone", nose_radius=0.1, nose_height=0.3)
+    found = by_path(with_vehicle(drop, striker))
+    nose, shaft = found["world/striker/nose"], found["world/striker/shaft"]
+    assert isinstance(nose, Hull)
+    assert isinstance(shaft, Rod)
+    assert nose.vertices.min(axis=0) == pytest.approx([-0.1, -0.1, 0.0])
+    assert nose.vertices.max(axis=0) == pytest.approx([0.1, 0.1, 0.3])
+    a, b, c = (nose.vertices[nose.triangles[:, k]] for k in range(3))
+    assert np.all(np.sum(np.cross(b - a, c - a) * nose.normals[::3], axis=1) > 0.0)
+    assert (shaft.start[2], shaft.radius) == (0.3, 0.1)
