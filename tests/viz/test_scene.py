@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rollover.inertia import MassProperties
-from rollover.initiation import TipOver
+from rollover.initiation import Throw, TipOver
 from rollover.run import Run
 from rollover.scenario import load
 from rollover.shapes import Disc, Point, Points
@@ -24,7 +24,7 @@ def by_path(run: Run) -> dict[str, object]:
     return found
 
 
-def with_vehicle(run: Run, vehicle: Vehicle | RigidBody | Striker) -> Run:
+def with_vehicle(run: Run, vehicle: Vehicle | Striker) -> Run:
     return dataclasses.replace(run, scenario=dataclasses.replace(run.scenario, vehicle=vehicle))
 
 
@@ -198,7 +198,9 @@ def body(run: Run, *at: Point) -> dict[str, object]:
     """What is drawn of a body that touches with these points."""
     whole = MassProperties(mass=1.0, centre_of_mass=(0.0, 0.0, 0.0), inertia=(1.0, 1.0, 1.0))
     outline = (Points(name="corners", at=at, area=0.1),)
-    return by_path(with_vehicle(run, RigidBody(name="body", whole=whole, outline=outline)))
+    vehicle = RigidBody(name="body", whole=whole, outline=outline)
+    scenario = dataclasses.replace(run.scenario, vehicle=vehicle, initiation=Throw(position=(0.0, 0.0, 1.0)))
+    return by_path(dataclasses.replace(run, scenario=scenario))
 
 
 def test_a_body_given_by_its_corners_is_drawn_whole_with_every_side_outward(overturn: Run) -> None:
