@@ -107,7 +107,8 @@ ONE_FAULT: dict[str, tuple[str | bytes, str]] = {
     ),
     "number for a mapping": (
         without("{kind: ye-2006}", "5"),
-        "bad.yaml:5: ground.law: not a mapping, got 5; a mapping (kind: bearing or compaction or hard or press or treated or ye-2006) "
+        "bad.yaml:5: ground.law: not a mapping, got 5; "
+        "a mapping (kind: bearing or compaction or hard or press or treated or ye-2006) "
         "or the name of a .yaml file is allowed",
     ),
     "too short": (
@@ -220,7 +221,10 @@ def test_a_fault_in_an_included_file_names_that_file() -> None:
         "soil.yaml:1: ground.law.kind: missing; one of bearing, compaction, hard, press, treated, ye-2006 is needed"
     )
     assert faults_of(text, soil="recovery: 0.1\n") == [missing]
-    wrong = "a mapping (kind: bearing or compaction or hard or press or treated or ye-2006) or the name of a .yaml file is needed"
+    wrong = (
+        "a mapping (kind: bearing or compaction or hard or press or treated or ye-2006) "
+        "or the name of a .yaml file is needed"
+    )
     assert faults_of(text, soil="- 3\n") == [f"soil.yaml:1: not a mapping, got [3]; {wrong}"]
 
 
@@ -556,7 +560,7 @@ def test_a_law_defined_later_is_accepted() -> None:
     Path("peat.yaml").write_text(TEXT.replace("ye-2006", "peat"))
     env = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[2])}
     done = subprocess.run([sys.executable, "-c", NEW_LAW], capture_output=True, text=True, check=True, env=env)
-    assert done.stdout.strip() == "Peat(recovery=0.02, kind='peat', stiffness=30000.0)"
+    assert done.stdout.strip() == "Peat(recovery=0.02, calibration=None, kind='peat', stiffness=30000.0)"
 
 
 # ---------------------------------------------------------------- parts that must fit together
