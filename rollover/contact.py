@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from ground.array import Elements
 from ground.kernel import COLUMNS, STATE_COLUMNS
 from ground.law import HIDDEN, REFERENCE_MASS, GroundLaw
+from ground.settings import settings
 from ground.surface import normal
 from rollover import tables as c
+from rollover.effects import acting
 from rollover.inertia import MassProperties
 from rollover.scenario import Ground, Scenario
 from rollover.shapes import Disc, Shape, SurfacePoints, rectangle, sample
@@ -142,6 +144,7 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
     nx, ny = ground.elements.count
     elements = ground.elements
     law: GroundLaw = ground.law
+    law_settings, numbers = settings(law, *acting(scenario.effects))
     number = start
     capacity = 2 * number + 64
     hidden = HIDDEN + law.hidden
@@ -162,17 +165,8 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         mount_i=mount_i,
         axle_f=axle_f,
         axle_i=axle_i,
-        law=np.array(
-            [
-                int(law.plastic),
-                int(law.unloads_at_rest_stiffness),
-                law.force.address,
-                law.advance.address if law.advance is not None else 0,
-                law.begin.address if law.begin is not None else 0,
-            ],
-            dtype=np.int64,
-        ),
-        p=law.p,
+        law=law_settings,
+        p=numbers,
         soil=_soil(ground),
         domain=law.domain.vector,
         plane=np.array([*n, 0.0]),

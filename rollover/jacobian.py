@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ground.compiled import call_force, compiled
-from ground.kernel import ADDRESS_FORCE, AREA, BODY, LINE_C, LINE_K, LINE_Z, NORMAL, OWNER_R, PLASTIC, SPREAD
+from ground.compiled import compiled
+from ground.kernel import AREA, BODY, LINE_C, LINE_K, LINE_Z, NORMAL, OWNER_R, PLASTIC, SPREAD, loading_force
 from ground.law import REFERENCE_AREA
 from rollover.forces import TYRE_RELAXATION, tyre_stiffness
 from rollover.tables import (
@@ -90,10 +90,10 @@ def stiffness(t: Any, f: float, fd: float, K: Any) -> None:
         if t.law[PLASTIC] != 0 and z < m[LINE_Z]:
             normal = area * (f * m[LINE_K] + fd * m[LINE_C])
         else:
-            s, force, z = t.s[i], t.law[ADDRESS_FORCE], max(z - m[SPREAD], 0.0)
-            here = call_force(force, (t.p.ctypes, s.ctypes, z, v))
-            deeper = call_force(force, (t.p.ctypes, s.ctypes, z + 1e-6, v))
-            faster = call_force(force, (t.p.ctypes, s.ctypes, z, v + 1e-6))
+            s, z = t.s[i], max(z - m[SPREAD], 0.0)
+            here = loading_force(t.law, t.p, s, z, v)
+            deeper = loading_force(t.law, t.p, s, z + 1e-6, v)
+            faster = loading_force(t.law, t.p, s, z, v + 1e-6)
             normal = area * (f * (deeper - here) + fd * (faster - here)) * 1e6
         stick = t.soil[MU] * trial[FN] / t.soil[STICK]
         b = t.state[i, BODY]
