@@ -274,6 +274,8 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
                 impulse += hit(law, p, s, row, state, f, y)
         else:
             outcome = commit(law, p, s, row, state, y[0], y[1], h, f[LAW_MASS] * f[FACE] / REFERENCE_AREA)
+            if turning:
+                y[0] -= 2.0 * SAME  # the way back begins on the line, with its dashpot
             if y[0] <= 0.0:
                 outcome |= RELEASED
             if row[MASS_B] > 0.0:
