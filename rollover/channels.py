@@ -38,6 +38,7 @@ _ENERGY = {
     "friction": "lost in sliding",
     "collision": "lost in the collision with the co-moving mass, eq (8)",
     "axle": "stored and lost in the front axle's stops",
+    "effects": "taken by effects on the bodies: guide, air, a striker that gives way",
     "residual": "what the ledger does not explain",
 }
 

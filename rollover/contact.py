@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,7 @@ from ground.law import HIDDEN, REFERENCE_MASS, GroundLaw
 from ground.settings import settings
 from ground.surface import normal
 from rollover import tables as c
+from rollover import terms
 from rollover.effects import acting
 from rollover.inertia import MassProperties
 from rollover.scenario import Ground, Scenario
@@ -48,8 +51,10 @@ class Body:
 POINTS_IN_ELEMENT = 0.8  # contact points are never further apart than this share of an element
 
 
-def bodies_of(vehicle: Vehicle | Striker, elements: Elements) -> tuple[Body, ...]:
-    """Bodies with their contact points: striker; or chassis, front axle, ROPS as far as there are any.
+def bodies_of(
+    vehicle: Vehicle | Striker, elements: Elements, effects: Mapping[str, Any] | None = None
+) -> tuple[Body, ...]:
+    """Bodies with their contact points: striker, perhaps in two; or chassis, front axle, ROPS as far as there are any.
 
     Points stand for areas, elements keep the ruts: an element without a point would be a gap under the body.
     """
@@ -60,8 +65,15 @@ def bodies_of(vehicle: Vehicle | Striker, elements: Elements) -> tuple[Body, ...
         face = rectangle(np.zeros(3), half[0], -half[1], spacing)
         m, a, b = vehicle.mass, vehicle.face_length, vehicle.face_width
         block = (m * (b * b + height**2) / 12, m * (a * a + height**2) / 12, m * (a * a + b * b) / 12)
-        inertia = MassProperties(mass=m, centre_of_mass=(0.0, 0.0, 0.5 * height), inertia=block)
-        return (Body(name="striker", inertia=inertia, surfaces=(("face", face),)),)
+
+        def part(name: str, share: float, surfaces: tuple[tuple[str, SurfacePoints], ...]) -> Body:
+            j = (share * block[0], share * block[1], share * block[2])
+            inertia = MassProperties(mass=share * m, centre_of_mass=(0.0, 0.0, 0.5 * height), inertia=j)
+            return Body(name=name, inertia=inertia, surfaces=surfaces)
+
+        nose = nose_share(effects)
+        whole = part("striker", nose, (("face", face),))
+        return (whole,) if nose == 1.0 else (whole, part("striker_body", 1.0 - nose, ()))
 
     def sampled(shapes: tuple[Shape, ...]) -> list[tuple[str, SurfacePoints]]:
         return [(shape.name, patch) for shape in shapes for patch in sample(shape, spacing)]
@@ -140,6 +152,7 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         ]
     mount_f, mount_i = _mounts(vehicle, bodies, row)
     joint_i, joint_f, axle_f, axle_i = _joints(vehicle, bodies, row)
+    term_i, term_f = _terms(scenario, bodies)
     n = normal(ground.surface)
     nx, ny = ground.elements.count
     elements = ground.elements
@@ -165,9 +178,11 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         mount_i=mount_i,
         axle_f=axle_f,
         axle_i=axle_i,
+        term_i=term_i,
+        term_f=term_f,
         law=law_settings,
         p=numbers,
-        soil=_soil(ground),
+        soil=_soil(ground, nose_share(scenario.effects)),
         domain=law.domain.vector,
         plane=np.array([*n, 0.0]),
         grid_f=np.array(
@@ -191,6 +206,7 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         wheel_memory=np.zeros((len(wheels), c.EDGE_COLUMNS)),
         mount_memory=np.zeros((len(mount_f), c.SET_COLUMNS)),
         axle_memory=np.zeros(c.AXLE_MEMORY),
+        term_memory=np.zeros((len(term_i), terms.TERM_MEMORY)),
         pose=np.zeros((nb, c.POSE_COLUMNS)),
         counts=np.zeros(c.COUNTS, dtype=np.int64),
         work=np.zeros(c.WORKS),
@@ -214,7 +230,34 @@ def grown(t: Tables) -> Tables:
     )
 
 
-def _soil(ground: Ground) -> Array:
+def nose_share(effects: Mapping[str, Any] | None) -> float:
+    """Share of a striker's mass in its nose: all of it, unless it gives way."""
+    gives = (effects or {}).get("structural-compliance")
+    return 1.0 if gives is None or gives.stiffness is None else float(gives.nose_share)
+
+
+def _terms(scenario: Scenario, bodies: tuple[Body, ...]) -> tuple[NDArray[np.int64], Array]:
+    """Rows for `rollover.terms`; forces on a striker in two parts go by their masses, so that it falls as one."""
+    effects = scenario.effects
+    rows: list[tuple[tuple[int, int, int], list[float]]] = []
+    falling = range(len(bodies)) if isinstance(scenario.vehicle, Striker) else range(1)
+    mass = sum(bodies[b].inertia.mass for b in falling)
+    for b in falling:
+        share = bodies[b].inertia.mass / mass
+        if "guide-friction" in effects and isinstance(scenario.vehicle, Striker):
+            rows.append(((terms.GUIDE_BRAKE, b, b), [share * effects["guide-friction"].force]))
+        if "air-drag" in effects:
+            rows.append(((terms.AIR_DRAG, b, b), [share * effects["air-drag"].factor]))
+    if isinstance(scenario.vehicle, Striker) and len(bodies) > 1:
+        gives = effects["structural-compliance"]
+        rows.append(((terms.BETWEEN, 0, 1), [gives.stiffness, gives.damping, 0.0]))
+    f = np.zeros((len(rows), terms.TERM_NUMBERS))
+    for i, (_, numbers) in enumerate(rows):
+        f[i, : len(numbers)] = numbers
+    return np.array([row for row, _ in rows], dtype=np.int64).reshape(-1, 3), f
+
+
+def _soil(ground: Ground, share: float) -> Array:
     rule = {"reference": c.RULE_REFERENCE, "effective": c.RULE_EFFECTIVE, "clamped": c.RULE_CLAMPED}
     friction = ground.friction
     return np.array(
@@ -222,7 +265,7 @@ def _soil(ground: Ground) -> Array:
             friction.coefficient,
             friction.stick_displacement,
             friction.stick_relaxation,
-            ground.co_moving_mass.share,
+            ground.co_moving_mass.share / share,  # of the whole striker, though its nose alone hits
             rule[ground.striker_mass],
             REFERENCE_MASS,
             ground.law.domain.momentum_most,
@@ -258,7 +301,8 @@ def _joints(
 ) -> tuple[NDArray[np.int64], Array, Array, NDArray[np.int64]]:
     axle_f, axle_i = np.zeros(0), np.zeros(2, dtype=np.int64)
     if isinstance(vehicle, Striker):
-        return np.array([[c.GUIDE, 0, -1]], dtype=np.int64), np.zeros((1, 6)), axle_f, axle_i
+        guides = [[c.GUIDE, b, -1] for b in range(len(bodies))]
+        return np.array(guides, dtype=np.int64), np.zeros((len(bodies), 6)), axle_f, axle_i
     if vehicle.front_axle is None:
         return np.zeros((0, 3), dtype=np.int64), np.zeros((0, 6)), axle_f, axle_i
     a, b = row["chassis"], row["front_axle"]

@@ -46,6 +46,7 @@ from ground.kernel import (
     rut_depth,
 )
 from ground.law import BRANCH, REFERENCE_AREA
+from rollover.terms import CREEP
 
 # numbers of a drop: kg, kg, N/m, N s/m (no spring: rigid), -, m2, kg, N s, m/s2, m/s, s, N, N s2/m2
 MASS, NOSE, SPRING, DASHPOT, FRACTION, FACE, LAW_MASS, MOMENTUM_MOST, GRAVITY, IMPACT_SPEED, STEP, GUIDE, AIR = range(13)
@@ -53,7 +54,6 @@ NUMBERS = 13
 # columns of what comes out
 OUT_FORCE, OUT_SINKAGE, OUT_X, OUT_V, OUT_A, OUT_IMPULSE, OUT_COLUMNS = 0, 1, 2, 3, 4, 5, 6
 
-CREEP = 0.005  # m/s: below it the friction of the guide is a dashpot, so that it has a value at rest
 RESOLVED = 0.25  # longest step times the frequency on the ground
 CLOSE = 1e-7  # m: how near a step ends to a jump of the force
 

@@ -39,6 +39,7 @@ from rollover.tables import (
     X,
     Z,
 )
+from rollover.terms import stiffen_terms
 from rollover.vectors import direction_row, place, to_body
 
 
@@ -115,6 +116,7 @@ def stiffness(t: Any, f: float, fd: float, K: Any) -> None:
             stick = c[W_KY] * (f + fd * TYRE_RELAXATION) if c[W_MU] > 0.0 else 0.0
             add_point(K, t.pose[b], b, g[E_POINT : E_POINT + 3], n, normal, stick)
     add_mounts(t, f, fd, K)
+    stiffen_terms(t, f, fd, K)
     if t.axle_f.size > 0 and t.axle_memory[M_TORQUE_NOW] != 0.0:
         c, b = t.axle_i[0], t.axle_i[1]
         add_pair(K, f * t.axle_f[A_K] + fd * t.axle_f[A_C], spin_row(t, c, c, 0), 6 * c, spin_row(t, c, b, 0), 6 * b)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time as clock
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -14,6 +15,7 @@ from ground.compiled import mark_warm
 from rollover import history, model
 from rollover import tables as c
 from rollover.contact import Body, bodies_of, grown, tables_of
+from rollover.effects import read
 from rollover.forces import generalised_forces
 from rollover.frames import matrices, quaternions
 from rollover.history import History, States
@@ -54,7 +56,8 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
     not exist, and lets a keyboard interrupt through.
     """
     began = clock.perf_counter()
-    bodies = bodies_of(scenario.vehicle, scenario.ground.elements)
+    given, scenario = scenario, scenario.applied()
+    bodies = bodies_of(scenario.vehicle, scenario.ground.elements, scenario.effects)
     t = tables_of(scenario, bodies)
     start = place(scenario, bodies, t)
     settings = scenario.simulation
@@ -130,7 +133,8 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
     except DivergedError as reason:
         sentence = str(reason)
     mark_warm()
-    return _result(scenario, bodies, live.tables, past, events, sentence, clock.perf_counter() - began)
+    done = _result(scenario, bodies, live.tables, past, events, sentence, clock.perf_counter() - began)
+    return done if given is scenario else replace(done, scenario=given)
 
 
 def _point(x: Any) -> tuple[float, float, float]:
@@ -181,6 +185,7 @@ def _result(
     status: Literal["done", "failed"] = "failed" if sentence else "done"
     flags = int(np.bitwise_or.reduce(s.flags))
     recording = Recording(title=scenario.title, time=time, channels=found, source="simulation")
+    recording = read(scenario.effects, recording)
     return Run(
         scenario=scenario,
         status=status,

@@ -105,6 +105,7 @@ from rollover.tables import (
     ZDOT,
     Z,
 )
+from rollover.terms import finish_terms
 from rollover.touch import drop_mass, note_event, touch
 from rollover.vectors import depth_acceleration, depth_row, place, velocity
 
@@ -123,6 +124,7 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
     finish_wheels(t)
     finish_mounts(t)
     finish_axle(t)
+    finish_terms(t, h)
     start_step(t)
     t.work[COLLISION] += touch(t, qd, h)
     settle(t)

@@ -57,7 +57,7 @@ RULE_REFERENCE, RULE_EFFECTIVE, RULE_CLAMPED = 0, 1, 2
 SLOTS, ACTIVE, EVENTS, OUTSIDE, FLAGS_NOW, COUNTS = 0, 1, 2, 3, 4, 5
 
 # places in work (J taken from the vehicle since the start)
-SOIL, TYRE, ROPS, FRICTION_WORK, COLLISION, AXLE, WORKS = 0, 1, 2, 3, 4, 5, 6
+SOIL, TYRE, ROPS, FRICTION_WORK, COLLISION, AXLE, EXTRA_WORK, WORKS = 0, 1, 2, 3, 4, 5, 6, 7
 
 # columns of trial: what the last evaluation found for each active element
 Z, ZDOT, FN, FT, MOVED, TRIAL_COLUMNS = 0, 1, 2, 3, 6, 9
@@ -100,6 +100,8 @@ class Tables(NamedTuple):
     mount_i: Any  # (2,) chassis and ROPS rows
     axle_f: Any  # (AXLE_COLUMNS,) or (0,)
     axle_i: Any  # (2,) chassis and axle rows
+    term_i: Any  # (ne, 3) kind, body, other body
+    term_f: Any  # (ne, terms.TERM_NUMBERS)
     # ground
     law: Any  # (5,) see ground.kernel
     p: Any
@@ -122,6 +124,7 @@ class Tables(NamedTuple):
     wheel_memory: Any  # (nw, EDGE_COLUMNS)
     mount_memory: Any  # (nt, SET_COLUMNS)
     axle_memory: Any  # (AXLE_MEMORY,)
+    term_memory: Any  # (ne, terms.TERM_MEMORY)
     pose: Any  # (nb, POSE_COLUMNS)
     counts: Any  # (COUNTS,)
     work: Any  # (WORKS,)
@@ -161,6 +164,8 @@ def handle(t: Any) -> Any:
         t.mount_i,
         t.axle_f,
         t.axle_i,
+        t.term_i,
+        t.term_f,
         t.law,
         t.p,
         t.soil,
@@ -181,6 +186,7 @@ def handle(t: Any) -> Any:
         t.wheel_memory,
         t.mount_memory,
         t.axle_memory,
+        t.term_memory,
         t.pose,
         t.counts,
         t.work,
