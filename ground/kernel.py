@@ -124,8 +124,8 @@ def normal_force(law: Any, p: Any, s: Any, row: Any, z: float, v: float) -> floa
 def lets_go(law: Any, p: Any, row: Any) -> float:
     """Sinkage at which an unloaded element lets go: its rut, less the reach of adhesion, m."""
     if p[law[EFFECTS] + ADHESION] > 0.0:
-        return max(rut_depth(row) - p[law[EFFECTS] + REACH], 0.0)
-    return rut_depth(row)  # type: ignore[no-any-return]
+        return max(rut_depth(row) - p[law[EFFECTS] + REACH], 0.0)  # type: ignore[no-any-return]
+    return rut_depth(row)
 
 
 @compiled

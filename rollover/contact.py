@@ -248,6 +248,8 @@ def _terms(scenario: Scenario, bodies: tuple[Body, ...]) -> tuple[NDArray[np.int
             rows.append(((terms.GUIDE_BRAKE, b, b), [share * effects["guide-friction"].force]))
         if "air-drag" in effects:
             rows.append(((terms.AIR_DRAG, b, b), [share * effects["air-drag"].factor]))
+    if "gyroscopic-rotor" in effects and not isinstance(scenario.vehicle, Striker):
+        rows.append(((terms.ROTOR, 0, 0), list(effects["gyroscopic-rotor"].vector)))
     if isinstance(scenario.vehicle, Striker) and len(bodies) > 1:
         gives = effects["structural-compliance"]
         rows.append(((terms.BETWEEN, 0, 1), [gives.stiffness, gives.damping, 0.0]))

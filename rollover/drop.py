@@ -6,6 +6,7 @@ thousand drops in the time of a hundred full runs. Where both can be asked they 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,15 +19,17 @@ from ground.law import HIDDEN, REFERENCE_AREA, REFERENCE_MASS
 from ground.settings import settings
 from ground.surface import normal
 from rollover import fall
+from rollover.contact import nose_share
 from rollover.document import exchanged
 from rollover.effects import acting, read
+from rollover.initiation import Drop
 from rollover.recording import Recording
 from rollover.scenario import Scenario
 from rollover.vehicle import Striker
 
 Array = NDArray[np.float64]
 LONGEST_STEP = 5e-4  # s, of the integration
-SHARE_OF_PERIOD = 0.2  # step times the frequency of a striker that gives way
+RESOLVED = 0.25  # longest step times the frequency of a striker that gives way
 
 COLUMNS = {
     "ground/force_normal": (fall.OUT_FORCE, 1.0),
@@ -65,29 +68,31 @@ class DropModel:
     def numbers(self) -> Array:
         """What `fall.drop` reads, (fall.NUMBERS,)."""
         s = self.scenario.applied()
-        vehicle, ground = s.vehicle, s.ground
+        vehicle, ground, start = s.vehicle, s.ground, s.initiation
         assert isinstance(vehicle, Striker)
+        assert isinstance(start, Drop)
+        f = np.zeros(fall.NUMBERS)
+        share = nose_share(s.effects)
         face = vehicle.face_length * vehicle.face_width
-        mass, share, spring, dashpot = vehicle.mass, 1.0, 0.0, 0.0
-        gives = s.effects.get("structural-compliance")
-        step = self.step
-        if gives is not None and gives.stiffness is not None:
-            share, spring, dashpot = gives.nose_share, gives.stiffness, gives.damping
-            lighter = mass * share * (1.0 - share)
-            step = min(step, SHARE_OF_PERIOD / max((spring / lighter) ** 0.5, 2.0 * dashpot / lighter))
-        nose = mass * share
-        law_mass, most = REFERENCE_MASS, np.inf
+        f[fall.MASS], f[fall.NOSE], f[fall.FACE] = vehicle.mass, vehicle.mass * share, face
+        f[fall.GRAVITY], f[fall.IMPACT_SPEED], f[fall.STEP] = s.gravity, start.speed, self.step
+        f[fall.FRACTION] = ground.co_moving_mass.share / share  # of the whole striker, though its nose alone hits
+        f[fall.LAW_MASS], f[fall.MOMENTUM_MOST] = REFERENCE_MASS, np.inf
         if ground.striker_mass != "reference":
-            law_mass = nose * REFERENCE_AREA / face
-            most = ground.law.domain.momentum_most if ground.striker_mass == "clamped" else np.inf
-        guide, air = s.effects.get("guide-friction"), s.effects.get("air-drag")
-        fraction = ground.co_moving_mass.share / share  # of the whole striker, however stiff it is
-        guided = 0.0 if guide is None else guide.force
-        drag = 0.0 if air is None else air.factor
-        return np.array(
-            [mass, nose, spring, dashpot, fraction, face, law_mass, most, s.gravity, s.initiation.speed]  # type: ignore[union-attr]
-            + [step, guided, drag]
-        )
+            f[fall.LAW_MASS] = f[fall.NOSE] * REFERENCE_AREA / face
+            f[fall.MOMENTUM_MOST] = ground.law.domain.momentum_most if ground.striker_mass == "clamped" else np.inf
+        if share < 1.0:
+            gives = s.effects["structural-compliance"]
+            f[fall.SPRING], f[fall.DASHPOT] = gives.stiffness, gives.damping
+            reduced = vehicle.mass * share * (1.0 - share)
+            f[fall.STEP] = min(
+                self.step, RESOLVED / max(math.sqrt(gives.stiffness / reduced), 2.0 * gives.damping / reduced)
+            )
+        if "guide-friction" in s.effects:
+            f[fall.GUIDE] = s.effects["guide-friction"].force
+        if "air-drag" in s.effects:
+            f[fall.AIR] = s.effects["air-drag"].factor
+        return f
 
     @cached_property
     def told(self) -> tuple[NDArray[np.int64], Array]:
@@ -97,10 +102,11 @@ class DropModel:
     @property
     def times(self) -> Array:
         """Rows of the full run: from the lead to the end, s."""
-        s = self.scenario
-        every = max(1, round(s.simulation.output_step / s.simulation.step)) * s.simulation.step
-        lead = s.initiation.lead_time  # type: ignore[union-attr]
-        return np.round(np.arange(round((s.simulation.duration + lead) / every) + 1) * every - lead, 9)
+        start, settings = self.scenario.initiation, self.scenario.simulation
+        assert isinstance(start, Drop)
+        every = max(1, round(settings.output_step / settings.step)) * settings.step
+        count = round((settings.duration + start.lead_time) / every) + 1
+        return np.asarray(np.round(np.arange(count) * every - start.lead_time, 9), dtype=np.float64)
 
     def rows(self, times: Array) -> Array:
         """Columns of `fall` at `times` (s, rising), (n, fall.OUT_COLUMNS), without what sensors make of them.

@@ -49,7 +49,9 @@ from ground.law import BRANCH, REFERENCE_AREA
 from rollover.terms import CREEP
 
 # numbers of a drop: kg, kg, N/m, N s/m (no spring: rigid), -, m2, kg, N s, m/s2, m/s, s, N, N s2/m2
-MASS, NOSE, SPRING, DASHPOT, FRACTION, FACE, LAW_MASS, MOMENTUM_MOST, GRAVITY, IMPACT_SPEED, STEP, GUIDE, AIR = range(13)
+MASS, NOSE, SPRING, DASHPOT, FRACTION, FACE, LAW_MASS, MOMENTUM_MOST, GRAVITY, IMPACT_SPEED, STEP, GUIDE, AIR = range(
+    13
+)
 NUMBERS = 13
 # columns of what comes out
 OUT_FORCE, OUT_SINKAGE, OUT_X, OUT_V, OUT_A, OUT_IMPULSE, OUT_COLUMNS = 0, 1, 2, 3, 4, 5, 6
@@ -71,7 +73,7 @@ def fall_back(g: float, mass: float, guide: float, air: float, v: float, time: f
     """Depth (m) and speed (m/s) `time` seconds before a body that falls freely has depth 0 and speed v."""
     if guide == 0.0 and air == 0.0:
         return -(v * time - 0.5 * g * time * time), v - g * time
-    x, count = 0.0, max(int(math.ceil(time / 1e-3)), 1)
+    x, count = 0.0, max(math.ceil(time / 1e-3), 1)
     h = -time / count
     for _ in range(count):
         k1 = free(g, mass, guide, air, v)
@@ -95,7 +97,7 @@ def accelerate(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, a
     a[0] = nose / (f[NOSE] + row[MASS_B])
     if f[SPRING] <= 0.0:
         a[1] = a[0]
-    return force  # type: ignore[no-any-return]
+    return force
 
 
 @compiled

@@ -158,7 +158,8 @@ def states(rows: Array, nb: int, nw: int, nt: int) -> States:
 def energies(s: States, t: Tables, bodies: tuple[Body, ...], gravity: float) -> dict[str, Array]:
     """The ledger over time, J, each (n,): what the bodies hold and what was taken from them; `residual` is the rest.
 
-    kinetic + potential + soil + tyre + rops + friction + collision + axle + effects - (their sum at the start) = -residual.
+    kinetic + potential + soil + tyre + rops + friction + collision + axle + effects less their sum at the start is
+    -residual.
     """
     n = len(s.axle)
     flat = s.qd.reshape(n, -1)

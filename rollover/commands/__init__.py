@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
+from rollover.commands import root
 from rollover.commands import run
 from rollover.commands import view
 from rollover.commands import listing
 from rollover.commands import check
 from rollover.commands import schema
 
-__all__ = ["check", "listing", "run", "schema", "view"]
+__all__ = ["check", "listing", "root", "run", "schema", "view"]

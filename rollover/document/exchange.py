@@ -20,6 +20,7 @@ def exchanged(thing: T, changes: Mapping[str, Any]) -> T:
     """
     below: dict[str, dict[str, Any]] = {}
     here: dict[str, Any] = {}
+    kind: Any = type(thing)
     for path, value in changes.items():
         step, _, rest = path.partition(".")
         if rest:
@@ -28,7 +29,7 @@ def exchanged(thing: T, changes: Mapping[str, Any]) -> T:
             here[step] = value
     for step, deeper in below.items():
         inner = here[step] if step in here else _part(thing, step)
-        slot = None if isinstance(thing, (tuple, Mapping)) else slots(type(thing))[step]
+        slot = None if isinstance(thing, (tuple, Mapping)) else slots(kind)[step]
         if slot and slot.by_key:
             fresh = {key.partition(".")[0] for key in deeper} - inner.keys()
             inner = {**inner, **{key: slot.by_key.table()[key]() for key in fresh}}
@@ -39,7 +40,6 @@ def exchanged(thing: T, changes: Mapping[str, Any]) -> T:
         return tuple(at.get(i, item) for i, item in enumerate(thing))  # type: ignore[return-value]
     if isinstance(thing, Mapping):
         return {**thing, **here}  # type: ignore[return-value]
-    kind: Any = type(thing)
     for step in here:
         if step not in slots(kind):
             raise KeyError(f"no such path: {step} in {kind.__name__}")
@@ -51,6 +51,7 @@ def _part(thing: Any, step: str) -> Any:
         return next((item for item in thing if getattr(item, "name", None) == step), None) or thing[int(step)]
     if isinstance(thing, Mapping):
         return thing[step]
-    if step not in slots(type(thing)):
-        raise KeyError(f"no such path: {step} in {type(thing).__name__}")
+    kind: Any = type(thing)
+    if step not in slots(kind):
+        raise KeyError(f"no such path: {step} in {kind.__name__}")
     return getattr(thing, step)

@@ -71,7 +71,8 @@ class Effect:
 
     def says(self) -> str:
         """The sentence, with the values in it."""
-        units = quantities(type(self))
+        kind: Any = type(self)
+        units = quantities(kind)
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         spoken = {
             name: f"{value:.3g} {units[name].unit if units[name].unit != '1' else ''}".strip()

@@ -123,8 +123,12 @@ class SoilAddedMassGrowth(Effect):
 class SoilElasticRebound(Effect):
     """F = F_max - K_u (z_max - z) with K_u = K'(z_max)/recovery and a light dashpot: ground that springs back."""
 
-    recovery: Annotated[float, Quantity("1", "share of z_max that springs back; none below the law's own", least=0, below=1)] = 0.1  # noqa: E501
-    damping_ratio: Annotated[float, Quantity("1", "dashpot of the way back over the critical one", least=0, most=2)] = 0.1  # noqa: E501
+    recovery: Annotated[
+        float, Quantity("1", "share of z_max that springs back; none below the law's own", least=0, below=1)
+    ] = 0.1
+    damping_ratio: Annotated[float, Quantity("1", "dashpot of the way back over the critical one", least=0, most=2)] = (
+        0.1
+    )
 
     id = "soil-elastic-rebound"
     family = "a way back that is not the plastic one"
@@ -242,5 +246,3 @@ class GroundFriction(Effect):
     def changes(self, scenario: Any) -> Mapping[str, Any]:
         """The scenario's coefficient of friction."""
         return {} if self.coefficient is None else {"ground.friction.coefficient": self.coefficient}
-
-

@@ -271,7 +271,9 @@ class SensorClipping(Effect):
     equation = "y = min(max(x, -limit), limit)"
     source = "definition"
     sentence = "{channel} ends at {limit}: its tops are flat."
-    rivals: ClassVar[Mapping[str, str]] = {"rops-plasticity": "a second channel that feels the force: it goes on rising"}
+    rivals: ClassVar[Mapping[str, str]] = {
+        "rops-plasticity": "a second channel that feels the force: it goes on rising"
+    }
     null: ClassVar[Mapping[str, float | None]] = {"limit": None}
     search: ClassVar[Mapping[str, Search]] = {"limit": Search(10.0, 1e6, "log")}
 
