@@ -43,9 +43,10 @@ def laws() -> list[Row]:
 
 def effects() -> list[Row]:
     """Effects by id."""
+    known: dict[str, Any] = dict(known_effects())
     return [
         {"id": name, "kind": effect.kind, "parameters": _numbers(effect), "is": _first_line(effect)}
-        for name, effect in known_effects().items()
+        for name, effect in known.items()
     ]
 
 

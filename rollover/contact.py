@@ -18,6 +18,7 @@ from ground.surface import normal
 from rollover import tables as c
 from rollover import terms
 from rollover.effects import acting
+from rollover.effects.vehicle import TankSlosh
 from rollover.inertia import MassProperties
 from rollover.scenario import Ground, Scenario
 from rollover.shapes import Disc, Shape, SurfacePoints, rectangle, sample
@@ -98,7 +99,48 @@ def bodies_of(
         found.append(Body(name="front_axle", inertia=vehicle.front_axle.body, surfaces=tuple(walls("front_axle"))))
     if vehicle.rops is not None:
         found.append(Body(name="rops", inertia=vehicle.rops.body, surfaces=tuple(sampled(vehicle.rops.members))))
+    for name in loose(effects):
+        load = loose_body(effects, name, found[0].inertia)
+        rest = without(found[0].inertia, load)
+        found[0] = Body(name="chassis", inertia=rest, surfaces=found[0].surfaces)
+        found.append(Body(name=name, inertia=load, surfaces=()))
     return tuple(found)
+
+
+def loose(effects: Mapping[str, Any] | None) -> tuple[str, ...]:
+    """Effects whose mass moves in the vehicle."""
+    return tuple(n for n in ("tank-slosh", "payload-shift") if effects and n in effects and effects[n].mass > 0.0)
+
+
+def loose_body(effects: Mapping[str, Any] | None, name: str, chassis: MassProperties) -> MassProperties:
+    """A mass that moves in the vehicle: a cube of water's density, at its place or the chassis' centre of mass."""
+    assert effects is not None
+    mass, place = effects[name].mass, effects[name].position
+    j = mass * (mass / 1000.0) ** (2.0 / 3.0) / 6.0
+    return MassProperties(mass=mass, centre_of_mass=place or chassis.centre_of_mass, inertia=(j, j, j))
+
+
+def without(whole: MassProperties, part: MassProperties) -> MassProperties:
+    """Mass properties of the rest. Raises ``ValueError`` if there is none that a body can have."""
+    if part.mass >= whole.mass:
+        raise ValueError(f"mass: more than the chassis has, got {part.mass:g} kg; less than {whole.mass:g} kg")
+    mass = whole.mass - part.mass
+    centre, taken = np.array(whole.centre_of_mass), np.array(part.centre_of_mass)
+    middle = (whole.mass * centre - part.mass * taken) / mass
+
+    def tensor(p: MassProperties) -> Array:
+        (xx, yy, zz), (xy, xz, yz) = p.inertia, p.products
+        r = np.array(p.centre_of_mass) - middle
+        J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        return np.asarray(J + p.mass * (r @ r * np.eye(3) - np.outer(r, r)))
+
+    J = tensor(whole) - tensor(part)
+    return MassProperties(
+        mass=mass,
+        centre_of_mass=(float(middle[0]), float(middle[1]), float(middle[2])),
+        inertia=(float(J[0, 0]), float(J[1, 1]), float(J[2, 2])),
+        products=(float(J[0, 1]), float(J[0, 2]), float(J[1, 2])),
+    )
 
 
 def side_walls(wheel: Wheel) -> tuple[Disc, Disc]:
@@ -250,6 +292,12 @@ def _terms(scenario: Scenario, bodies: tuple[Body, ...]) -> tuple[NDArray[np.int
             rows.append(((terms.AIR_DRAG, b, b), [share * effects["air-drag"].factor]))
     if "gyroscopic-rotor" in effects and not isinstance(scenario.vehicle, Striker):
         rows.append(((terms.ROTOR, 0, 0), list(effects["gyroscopic-rotor"].vector)))
+    if "drive-torque" in effects and not isinstance(scenario.vehicle, Striker):
+        rows.append(((terms.REACTION, 0, 0), [effects["drive-torque"].torque]))
+    if not isinstance(scenario.vehicle, Striker):
+        for b, body in enumerate(bodies):
+            if body.name in loose(effects):
+                rows.append(((terms.BED, 0, b), _bed(effects[body.name], body, bodies[0], scenario.gravity)))
     if isinstance(scenario.vehicle, Striker) and len(bodies) > 1:
         gives = effects["structural-compliance"]
         rows.append(((terms.BETWEEN, 0, 1), [gives.stiffness, gives.damping, 0.0]))
@@ -257,6 +305,19 @@ def _terms(scenario: Scenario, bodies: tuple[Body, ...]) -> tuple[NDArray[np.int
     for i, (_, numbers) in enumerate(rows):
         f[i, : len(numbers)] = numbers
     return np.array([row for row, _ in rows], dtype=np.int64).reshape(-1, 3), f
+
+
+BED_FREQUENCY = 300.0  # rad/s, of a load on its bed: it sags by a tenth of a millimetre
+
+
+def _bed(effect: Any, body: Body, chassis: Body, gravity: float) -> list[float]:
+    """Numbers of `terms.BED` for a mass that moves across the chassis."""
+    m, j, w = body.inertia.mass, body.inertia.inertia[0], BED_FREQUENCY
+    held = [*(body.centre - chassis.centre), m * w * w, 1.4 * m * w, j * w * w, 1.4 * j * w]
+    if isinstance(effect, TankSlosh):
+        slow = math.sqrt(gravity / effect.length)
+        return [*held, m * slow * slow, 2.0 * effect.damping * m * slow, 0.0, math.inf]
+    return [*held, 0.0, 0.0, effect.friction, effect.travel]
 
 
 def _soil(ground: Ground, share: float) -> Array:
@@ -293,6 +354,7 @@ def _mounts(
                 *mount.rotational_stiffness,
                 *mount.rotational_damping,
                 *(math.inf if f is None else f for f in mount.yield_force),
+                *mount.play,
             ]
         )
     return np.array(rows), np.array([a, b], dtype=np.int64)

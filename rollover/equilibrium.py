@@ -52,7 +52,7 @@ class Equilibrium:
         n = t.plane[:3]
         x = np.array([n[2], 0.0, -n[0]]) / math.hypot(n[0], n[2])
         self.along = np.array([x, _cross(n, x)])  # two directions in the surface
-        self.size = 13 if bodies[-1].name == "rops" else 7
+        self.size = 13 if any(b.name == "rops" for b in bodies) else 7
         self.scale = max(-float(self.weight.sum()), 1.0)
 
     def guess(self, roll: float = 0.0, axle: float = 0.0) -> Array:

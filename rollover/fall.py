@@ -171,6 +171,7 @@ def hit(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any) -> float
     row[MASS_B] = f[FRACTION] * f[NOSE] if y[1] > 0.0 else 0.0
     mass = min(f[LAW_MASS], f[MOMENTUM_MOST] / max(y[1], 1e-12))
     begin(law, p, s, row, state, mass, y[0])
+    y[0] = max(y[0], SAME)  # in the ground: what depends on the rate alone acts at once
     y[1] *= f[NOSE] / (f[NOSE] + row[MASS_B])
     if f[SPRING] <= 0.0:
         y[3] = y[1]

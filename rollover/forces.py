@@ -49,6 +49,7 @@ from rollover.tables import (
     T_CR,
     T_K,
     T_KR,
+    T_PLAY,
     T_ROPS,
     T_YIELD,
     VEL,
@@ -73,6 +74,7 @@ from rollover.vectors import (
     cross,
     depth_row,
     place,
+    relative_angle,
     set_rotation,
     spin,
     to_body,
@@ -215,17 +217,6 @@ def try_wheels(t: Any, Q: Any) -> None:
 
 
 @compiled
-def relative_angle(a: Any, b: Any, k: int) -> float:
-    """Component k of the rotation of body b against body a, in a's axes; exact to second order in the angle."""
-    i, j = (k + 1) % 3, (k + 2) % 3
-    ji, ij = 0.0, 0.0
-    for m in range(3):
-        ji += a[ROT + 3 * m + j] * b[ROT + 3 * m + i]
-        ij += a[ROT + 3 * m + i] * b[ROT + 3 * m + j]
-    return 0.5 * (ji - ij)
-
-
-@compiled
 def try_mounts(t: Any, Q: Any) -> None:
     """Loads through the mounts: on the ROPS, and their reaction on the chassis at the same point."""
     if t.mount_f.shape[0] == 0:
@@ -245,7 +236,8 @@ def try_mounts(t: Any, Q: Any) -> None:
         rate = to_body(chassis, v[0] - w[0], v[1] - w[1], v[2] - w[2])
         for k in range(3):
             delta = local[k] - f[T_CHASSIS + k]
-            spring = f[T_K + k] * (delta - g[S_SET + k])
+            free = min(max(delta - g[S_SET + k], -f[T_PLAY + k]), f[T_PLAY + k])
+            spring = f[T_K + k] * (delta - g[S_SET + k] - free)
             spring = min(max(spring, -f[T_YIELD + k]), f[T_YIELD + k])
             angle = relative_angle(chassis, rops, k)
             g[S_DELTA_NOW + k], g[S_ANGLE_NOW + k] = delta, angle

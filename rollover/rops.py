@@ -18,7 +18,7 @@ class Mount:
     """What joins the ROPS to the chassis: per axis an elastic, perfectly plastic spring with a dashpot.
 
     The frame is rigid in the model: the sway of its posts is part of the mounts' compliance. Force on each axis
-    (vehicle axes): clip(k (delta - delta_p), +-F_y), delta_p the permanent set; no yield force, no yielding.
+    (vehicle axes): clip(k (delta - delta_p -+ play), +-F_y), delta_p the permanent set; no yield force, no yielding.
     """
 
     name: Annotated[str, Label("in channels: rops/mount/NAME/force_x")]
@@ -32,6 +32,7 @@ class Mount:
         None,
         None,
     )
+    play: Annotated[Point, Quantity("m", "free way to either side along x, y, z", least=0)] = (0.0, 0.0, 0.0)
 
 
 @parameters

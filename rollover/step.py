@@ -95,6 +95,7 @@ from rollover.tables import (
     SOIL,
     STICK,
     T_K,
+    T_PLAY,
     T_YIELD,
     TURN,
     TYRE,
@@ -253,7 +254,7 @@ def finish_mounts(t: Any) -> None:
         for k in range(3):
             t.work[ROPS] -= 0.5 * (g[S_FORCE + k] + g[S_FORCE_NOW + k]) * (g[S_DELTA_NOW + k] - g[S_DELTA + k])
             t.work[ROPS] -= 0.5 * (g[S_TORQUE + k] + g[S_TORQUE_NOW + k]) * (g[S_ANGLE_NOW + k] - g[S_ANGLE + k])
-            most = f[T_YIELD + k] / f[T_K + k]
+            most = f[T_YIELD + k] / f[T_K + k] + f[T_PLAY + k]
             elastic = g[S_DELTA_NOW + k] - g[S_SET + k]
             if abs(elastic) > most:
                 if g[S_SET + k] == 0.0:

@@ -26,8 +26,8 @@ E_DEPTH_NOW, E_FORCE_NOW, E_DAMPING_NOW, E_ENERGY_NOW, E_FRICTION_NOW = 16, 17, 
 # carrier's axes and in the world
 E_MOVED, E_SLIP, E_POINT, E_WHERE, EDGE_COLUMNS = 23, 26, 29, 32, 35
 
-# columns of mount_f: point on the ROPS, point on the chassis, stiffness, damping, both again for rotation, yield
-T_ROPS, T_CHASSIS, T_K, T_C, T_KR, T_CR, T_YIELD, MOUNT_COLUMNS = 0, 3, 6, 9, 12, 15, 18, 21
+# columns of mount_f: point on the ROPS, point on the chassis, stiffness, damping, both again for rotation, yield, play
+T_ROPS, T_CHASSIS, T_K, T_C, T_KR, T_CR, T_YIELD, T_PLAY, MOUNT_COLUMNS = 0, 3, 6, 9, 12, 15, 18, 21, 24
 # columns of mount_memory: set, deflection, force, angle, torque at the start of the step; the same now
 S_SET, S_DELTA, S_FORCE, S_ANGLE, S_TORQUE, S_DELTA_NOW, S_FORCE_NOW, S_ANGLE_NOW, S_TORQUE_NOW, SET_COLUMNS = (
     0,

@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar
 
 from ground.quantity import Quantity, parameters
 from rollover.effects.effect import Effect, Search
+from rollover.shapes import Point
 from rollover.vehicle import Vehicle
 
 AIR_DENSITY = 1.204  # kg/m3 at 20 degrees and 1013 hPa
@@ -263,3 +264,101 @@ class GyroscopicRotor(Effect):
         """Refuse an axis that points nowhere."""
         if not any(self.axis):
             raise ValueError(f"axis: points nowhere, got {list(self.axis)}; any other direction")
+
+
+@parameters
+class MountPlay(Effect):
+    """Mounts of the ROPS with play: no force until the gap to either side is taken up."""
+
+    gap: Annotated[float, Quantity("m", "to either side along x, y, z", least=0)] = 0.008
+
+    id = "mount-play"
+    family = "a structure that gives way"
+    equation = "F = k (delta - clip(delta, +-gap))"
+    source = "5-15 mm in worn or silent-block mounts (M-)"
+    sentence = "The mounts of the ROPS move by {gap} before they bear."
+    rivals: ClassVar[Mapping[str, str]] = {
+        "sensor-clock-offset": "the force against the deflection: play has a dead zone",
+        "rops-elasticity": "the force as the deflection goes to zero",
+    }
+    acts = ("rollover",)
+    channels = ("rops/deflection", "rops/force")
+    null: ClassVar[Mapping[str, float | None]] = {"gap": 0.0}
+    search: ClassVar[Mapping[str, Search]] = {"gap": Search(5e-4, 0.05, "log")}
+
+    def changes(self, scenario: Any) -> Mapping[str, Any]:
+        """The play of every mount, beyond what it has."""
+        rops = scenario.vehicle.rops if isinstance(scenario.vehicle, Vehicle) else None
+        mounts = () if rops is None or self.gap == 0.0 else rops.mounts
+        return {f"vehicle.rops.mounts.{mount.name}.play": tuple(p + self.gap for p in mount.play) for mount in mounts}
+
+
+@parameters
+class TankSlosh(Effect):
+    """Part of a liquid as a mass on a spring across the vehicle: k = m g/length, as a pendulum of that length has."""
+
+    mass: Annotated[float, Quantity("kg", "that moves, part of the whole vehicle's", least=0)] = 100.0
+    length: Annotated[float, Quantity("m", "of the pendulum with the same frequency", above=0)] = 0.35
+    damping: Annotated[float, Quantity("1", "over critical", least=0, most=2)] = 0.02
+    position: Annotated[Point | None, Quantity("m", "vehicle axes; none: the chassis' centre of mass")] = None
+
+    id = "tank-slosh"
+    family = "a mass that moves in the vehicle"
+    equation = "m (u'' + a_y - g_y) + 2 damping m w u' + m w^2 u = 0, w^2 = g/length"
+    source = "tanks of 0.8-1.2 m: 0.75-0.95 Hz, length 0.28-0.44 m, half of the liquid (computed); damping 0.5-5 % (M)"
+    sentence = "{mass} of liquid slosh across the vehicle like a pendulum of {length}."
+    rivals: ClassVar[Mapping[str, str]] = {"payload-shift": "a tank filled to the brim, or another level"}
+    acts = ("rollover",)
+    channels = ("chassis/roll", "chassis/angular_velocity_x")
+    null: ClassVar[Mapping[str, float | None]] = {"mass": 0.0}
+    search: ClassVar[Mapping[str, Search]] = {
+        "mass": Search(10.0, 1500.0, "log"),
+        "length": Search(0.05, 3.0, "log"),
+        "damping": Search(0.0, 0.3),
+    }
+
+
+@parameters
+class PayloadShift(Effect):
+    """A load that slides across the vehicle with Coulomb friction until it meets a wall."""
+
+    mass: Annotated[float, Quantity("kg", "that slides, part of the whole vehicle's", least=0)] = 150.0
+    friction: Annotated[float, Quantity("1", "mu on its bed", least=0, most=2)] = 0.3
+    travel: Annotated[float, Quantity("m", "to the wall on either side", least=0)] = 0.2
+    position: Annotated[Point | None, Quantity("m", "vehicle axes; none: the chassis' centre of mass")] = None
+
+    id = "payload-shift"
+    family = "a mass that moves in the vehicle"
+    equation = "m (u'' + a_y - g_y) = -mu N sign(u'), |u| <= travel"
+    source = "mu 0.2-0.5, 5-30 % of the mass (M)"
+    sentence = "{mass} of load slide by {travel} to the side before they meet a wall."
+    rivals: ClassVar[Mapping[str, str]] = {
+        "tank-slosh": "the load lashed down",
+        "centre-of-mass": "the moment at which it moves: a wrong centre of mass is there from the start",
+    }
+    acts = ("rollover",)
+    channels = ("chassis/roll", "chassis/angular_velocity_x")
+    null: ClassVar[Mapping[str, float | None]] = {"mass": 0.0}
+    search: ClassVar[Mapping[str, Search]] = {
+        "mass": Search(10.0, 1500.0, "log"),
+        "friction": Search(0.0, 1.0),
+        "travel": Search(0.02, 1.0, "log"),
+    }
+
+
+@parameters
+class DriveTorque(Effect):
+    """M = -torque about the chassis' y: an engine that goes on driving wheels which the ground holds."""
+
+    torque: Annotated[float, Quantity("N m", "on the rear axle, forward")] = 1500.0
+
+    id = "drive-torque"
+    family = "a moment on the chassis"
+    equation = "M_y = -torque on the chassis; wheels that are held pass it on to the ground"
+    source = "rear upset; some kN m in a low gear (M-)"
+    sentence = "The engine goes on driving with {torque} and lifts the front."
+    rivals: ClassVar[Mapping[str, str]] = {"gyroscopic-rotor": "the clutch open with the engine running"}
+    acts = ("rollover",)
+    channels = ("chassis/pitch", "chassis/angular_velocity_y")
+    null: ClassVar[Mapping[str, float | None]] = {"torque": 0.0}
+    search: ClassVar[Mapping[str, Search]] = {"torque": Search(-2e4, 2e4)}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from ground.compiled import force_law
 from ground.quantity import Quantity, parameters
@@ -29,8 +29,8 @@ class SoilRoots(Effect):
     source = "made up for this page"
     sentence = "Roots hold with {stiffness} until they tear at {depth}."
     channels = ("ground/force_normal",)
-    null = {"stiffness": 0.0}
-    search = {"stiffness": Search(1e3, 1e6, "log"), "depth": Search(0.01, 0.3, "log")}
+    null: ClassVar = {"stiffness": 0.0}
+    search: ClassVar = {"stiffness": Search(1e3, 1e6, "log"), "depth": Search(0.01, 0.3, "log")}
 
     def force_terms(self) -> tuple[ForceTerm, ...]:
         """The compiled force with its numbers."""
