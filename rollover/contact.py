@@ -307,7 +307,7 @@ def _terms(scenario: Scenario, bodies: tuple[Body, ...]) -> tuple[NDArray[np.int
     return np.array([row for row, _ in rows], dtype=np.int64).reshape(-1, 3), f
 
 
-BED_FREQUENCY = 300.0  # rad/s, of a load on its bed: it sags by a tenth of a millimetre
+BED_FREQUENCY = 200.0  # rad/s, of a load on its bed: it sags by a quarter of a millimetre
 
 
 def _bed(effect: Any, body: Body, chassis: Body, gravity: float) -> list[float]:

@@ -21,6 +21,7 @@ HELD, POWER, HELD_NOW, POWER_NOW, TERM_MEMORY = 0, 1, 2, 3, 4  # columns of term
 B_PLACE, B_K, B_C, B_KR, B_CR, B_SPRING, B_DASHPOT, B_MU, B_TRAVEL = 0, 3, 4, 5, 6, 7, 8, 9, 10
 TERM_NUMBERS = 11
 WEIGHT = 10.0  # N/kg, what presses a load on its bed as far as Newton's matrix is concerned
+WALL = 0.005  # m, in a wall, over which its dashpot grows to its whole
 CREEP = 0.005  # m/s: below it the friction of the guide is a dashpot, so that it has a value at rest
 
 
@@ -87,7 +88,8 @@ def try_bed(t: Any, i: int, Q: Any) -> Any:
             power += f[B_C] * rate[k] * rate[k]
         else:
             beyond = d - min(max(d, -f[B_TRAVEL]), f[B_TRAVEL])
-            dashpot = f[B_DASHPOT] + (f[B_C] if beyond != 0.0 else 0.0)
+            # the wall's dashpot grows from nothing, so that a load meets it without a jump
+            dashpot = f[B_DASHPOT] + f[B_C] * min(abs(beyond) / WALL, 1.0)
             force[1] = -f[B_SPRING] * d - f[B_K] * beyond - dashpot * rate[1]
             held += 0.5 * f[B_SPRING] * d * d + 0.5 * f[B_K] * beyond * beyond
             power += dashpot * rate[1] * rate[1]

@@ -1,7 +1,7 @@
 """Effects of ground and striker against closed forms; each derivation stands in its test.
 
-The ground of these tests is linear, F = K z, so that the motion down has a closed form: with m the striker, m_b the soil
-that moves along and M = m + m_b, M z'' = m g - F(z, z') from z = 0 with v_0 = v_s m/M.
+The ground of these tests is linear, F = K z, so that the motion down has a closed form: with m the striker, m_b the
+soil that moves along and M = m + m_b, M z'' = m g - F(z, z') from z = 0 with v_0 = v_s m/M.
 """
 
 from __future__ import annotations
@@ -147,7 +147,7 @@ def test_damped_rebound_leaves_the_weight_on_its_line() -> None:
 
 
 def test_adhesion_pulls_at_lift_off_and_takes_its_work() -> None:
-    """Beyond the rut F = -min(K_u gap, P (1 - gap/reach)): a triangle of base reach and height P K_u/(K_u + P/reach)."""
+    """Beyond the rut F = -min(K_u gap, P (1 - gap/reach)): a triangle of base reach, height P K_u/(K_u + P/reach)."""
     K, R, reach, stress = 2e4, 0.3, 0.02, 60_000.0
     P = stress * REFERENCE_AREA
     rebound = {"effects.soil-elastic-rebound.recovery": R, "effects.soil-elastic-rebound.damping_ratio": 0.0}
@@ -207,7 +207,7 @@ def test_guide_friction_slows_the_free_fall() -> None:
 
 
 def test_air_brakes_towards_the_terminal_speed() -> None:
-    """m v' = m g - c v^2: v(t) = v_t tanh(artanh(v_s/v_t) + g t/v_t), x = v_t^2/g ln cosh of the same, less its start."""
+    """m v' = m g - c v^2: v(t) = v_t tanh(artanh(v_s/v_t) + g t/v_t), x = v_t^2/g ln cosh of it, less its start."""
     area, cd, rho = 3.0, 1.1, 1.204
     c = 0.5 * rho * cd * area
     v_t = math.sqrt(m * g / c)

@@ -20,10 +20,10 @@ from tests.physics.scenes import block, shipped
 g = 9.81
 
 
-def tilted(angle: float, duration: float) -> Scenario:
+def tilted(angle: float, duration: float, step: float = 1e-3) -> Scenario:
     """A block put down flat on a slope that rises towards y, with friction enough to stay where it is."""
     degrees = math.degrees(angle)
-    scenario = block(Drop(speed=0.01, roll_deg=degrees), mu=2.0, duration=duration, step=1e-3, spacing=0.1)
+    scenario = block(Drop(speed=0.01, roll_deg=degrees), mu=2.0, duration=duration, step=step, spacing=0.1)
     return scenario.replaced({"ground.surface": {"kind": "slope", "angle_deg": degrees}})
 
 
@@ -63,7 +63,7 @@ def test_a_load_slides_down_and_meets_its_wall() -> None:
     """u'' = -g (sin a - mu cos a) while it slides; it stays if mu > tan a, and ends at the wall."""
     angle, mu, travel = 0.3, 0.2, 0.15
     changes = {"mass": 60.0, "friction": mu, "travel": travel}
-    slides = run(tilted(angle, 0.8).replaced({f"effects.payload-shift.{k}": v for k, v in changes.items()}))
+    slides = run(tilted(angle, 0.8, 2e-4).replaced({f"effects.payload-shift.{k}": v for k, v in changes.items()}))
     t, u = across(slides, "payload-shift")
     exact = -0.5 * g * (math.sin(angle) - mu * math.cos(angle)) * t**2
     on = exact > -0.8 * travel
