@@ -14,7 +14,7 @@ from rollover.forces import generalised_forces, tyre_point
 from rollover.frames import from_angles, rotation_vector
 from rollover.jacobian import stiffness
 from rollover.step import stand
-from rollover.tables import E_DEPTH_NOW, E_FORCE_NOW, POSE_COLUMNS, ROT, W_CENTRE, W_HALF, W_KZ, Tables, handle
+from rollover.tables import E_DEPTH_NOW, E_FORCE_NOW, POSE_COLUMNS, ROT, T_PLAY, W_CENTRE, W_HALF, W_KZ, Tables, handle
 
 Array = NDArray[np.float64]
 ROLL, PITCH, AXLE, SLIDE, YAW, SHIFT, TILT = 1, 2, 3, 4, 6, 7, 10  # places in u; 0 is the height
@@ -146,6 +146,10 @@ class Equilibrium:
         if len(self.bodies) == 1 or self.bodies[1].name != "front_axle":
             free = [k for k in free if k != AXLE]
         u = guess.copy()
+        if self.size == 13 and not u[SHIFT : SHIFT + 3].any():
+            # a frame with play leans on its mounts: within the play nothing would push it there
+            down = -self._rotations(u)[0][2]
+            u[SHIFT : SHIFT + 3] = np.sign(down) * self.t.mount_f[:, T_PLAY : T_PLAY + 3].max(axis=0)
         self.residual(u)
         stand(self.handle)
         r = self.residual(u)[free]
