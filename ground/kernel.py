@@ -13,8 +13,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ground.compiled import call_advance, call_force, compiled
-from ground.law import BRANCH, REFERENCE_AREA
+from ground.compiled import call_advance, call_begin, call_force, compiled
+from ground.law import BRANCH, MASS, REFERENCE_AREA, SPEED
 
 # columns of memory (float)
 SINKAGE = 0  # deepest point's z at the last commit, m
@@ -33,7 +33,8 @@ FORCE = 20  # normal force at the start of the step, N
 FRICTION = 21  # 21, 22, 23: friction force at the start of the step, N
 TOUCH_SPEED = 24  # latched normal impact speed, m/s
 SPREAD = 25  # how far the mean of the covered area stands above its deepest point, m
-COLUMNS = 26
+GROWING = 26  # 1 while the co-moving mass may still grow with depth
+COLUMNS = 27
 
 # columns of state (int)
 CELL, BODY, MODE, FLAGS, HITS = 0, 1, 2, 3, 4
@@ -42,6 +43,20 @@ IDLE, LOADING, UNLOADING = 0, 1, 2
 
 # columns of the law's settings
 PLASTIC, REST_STIFFNESS, ADDRESS_FORCE, ADDRESS_ADVANCE, ADDRESS_BEGIN = 0, 1, 2, 3, 4
+EFFECTS = 5  # where the effects' numbers begin in p, behind those of the law
+TERMS = 6  # how many compiled force terms there are; their addresses follow
+
+# places of the effects' numbers, from law[EFFECTS] on; forces are per reference area
+DAMPING, DAMPING_EXPONENT = 0, 1  # d, N (s/m)^zeta, and zeta
+PER_DECADE, SLOW = 2, 3  # lambda, and the rate below which there is no hardening, m/s
+DRAG = 4  # 1/2 C rho A, N s2/m2
+GROWTH = 5  # dm_b1/dz, kg/m
+RECOVERY, REBOUND_DAMPING = 6, 7  # least share that springs back; dashpot of the unloading line over critical
+ADHESION, REACH = 8, 9  # pull-off force, N; gap over which it fades, m
+LAYER_DEPTH, LAYER_RATIO, CRUST_DEPTH, CRUST_RATIO = 10, 11, 12, 13
+STIFFNESS = 14  # factor on the law
+EFFECT_PLACES = 15  # numbers of the compiled terms follow, TERM_PLACES for each
+TERM_PLACES = 8
 
 SAME = 1e-10  # m: sinkages closer than this are one, so that rounding does not switch a loaded element to its line
 
@@ -50,8 +65,38 @@ BRANCHED, ARRESTED, RELEASED = 1, 2, 4
 
 
 @compiled
+def loading_force(law: Any, p: Any, s: Any, z: float, v: float) -> float:
+    """The law's loading curve with the effects that act on it, N per reference area; rates count on the way down.
+
+    F = r(z) F_law (1 + lambda log10(v/v_0)) + d v^zeta + 1/2 C rho A v^2 + terms, r the ratio of crust and layer.
+    """
+    e = law[EFFECTS]
+    f = p[e + STIFFNESS] * call_force(law[ADDRESS_FORCE], (p.ctypes, s.ctypes, z, v))
+    if z < p[e + CRUST_DEPTH]:
+        f *= p[e + CRUST_RATIO]
+    if z > p[e + LAYER_DEPTH]:
+        f *= p[e + LAYER_RATIO]
+    if v > 0.0:
+        if v > p[e + SLOW] and p[e + PER_DECADE] != 0.0:
+            f *= 1.0 + p[e + PER_DECADE] * math.log10(v / p[e + SLOW])
+        if p[e + DAMPING] != 0.0:
+            f += p[e + DAMPING] * v ** p[e + DAMPING_EXPONENT]
+        f += p[e + DRAG] * v * v
+    for k in range(law[TERMS]):
+        own = p[e + EFFECT_PLACES + TERM_PLACES * k :]
+        f += call_force(law[TERMS + 1 + k], (own.ctypes, s.ctypes, z, v))
+    return f  # type: ignore[no-any-return]
+
+
+@compiled
+def springs_back(law: Any, p: Any) -> float:
+    """Share of the deepest sinkage that springs back: the law's own, or that of the rebound effect if it is more."""
+    return max(p[0], p[law[EFFECTS] + RECOVERY])  # type: ignore[no-any-return]
+
+
+@compiled
 def normal_force(law: Any, p: Any, s: Any, row: Any, z: float, v: float) -> float:
-    """Spring force of one element at sinkage z and rate v, N: never a pull; memory is only read.
+    """Spring force of one element at sinkage z and rate v, N: a pull only from adhesion; memory is only read.
 
     z is that of the deepest point; the law is asked once, at the mean of the covered area (midpoint rule).
     Loading follows the law; below the deepest sinkage the line of stiffness K_u with its dashpot, capped by
@@ -60,10 +105,27 @@ def normal_force(law: Any, p: Any, s: Any, row: Any, z: float, v: float) -> floa
     if z <= 0.0:
         return 0.0
     if law[PLASTIC] == 0 or z >= row[LINE_Z] - SAME:
-        f = call_force(law[ADDRESS_FORCE], (p.ctypes, s.ctypes, max(z - row[SPREAD], 0.0), v))
+        f = max(loading_force(law, p, s, max(z - row[SPREAD], 0.0), v), 0.0)
+        if v > 0.0 and row[GROWING] != 0.0:
+            f += p[law[EFFECTS] + GROWTH] * v * v  # soil set moving takes its momentum, d(m_b1)/dt v
     else:
         f = min(row[LINE_F] - row[LINE_K] * (row[LINE_Z] - z) + row[LINE_C] * v, row[LINE_F])
-    return max(f, 0.0) * row[AREA] / REFERENCE_AREA  # type: ignore[no-any-return]
+        pull = p[law[EFFECTS] + ADHESION]
+        if pull > 0.0:
+            gap = rut_depth(row) - z
+            if gap > 0.0:
+                f = min(f, 0.0)
+                pull *= max(1.0 - gap / p[law[EFFECTS] + REACH], 0.0)
+        f = max(f, 0.0 - pull)
+    return f * row[AREA] / REFERENCE_AREA  # type: ignore[no-any-return]
+
+
+@compiled
+def lets_go(law: Any, p: Any, row: Any) -> float:
+    """Sinkage at which an unloaded element lets go: its rut, less the reach of adhesion, m."""
+    if p[law[EFFECTS] + ADHESION] > 0.0:
+        return max(rut_depth(row) - p[law[EFFECTS] + REACH], 0.0)  # type: ignore[no-any-return]
+    return rut_depth(row)
 
 
 @compiled
@@ -77,10 +139,10 @@ def rut_depth(row: Any) -> float:
 @compiled
 def set_line(law: Any, p: Any, s: Any, row: Any, z: float) -> None:
     """Start the unloading line at (z, F(z)) with K_u = K'(z)/recovery."""
-    f = call_force(law[ADDRESS_FORCE], (p.ctypes, s.ctypes, max(z - row[SPREAD], 0.0), 0.0))
+    f = loading_force(law, p, s, max(z - row[SPREAD], 0.0), 0.0)
     row[LINE_Z] = z
     row[LINE_F] = f
-    row[LINE_K] = f / (p[0] * z) if z > 0.0 else 0.0
+    row[LINE_K] = f / (springs_back(law, p) * z) if z > 0.0 else 0.0
 
 
 @compiled
@@ -99,10 +161,10 @@ def enter_from_the_side(law: Any, p: Any, s: Any, row: Any, z: float, force: flo
     must not be there at once. It climbs K_u to the loading curve as the member sinks further.
     """
     per_reference = force * REFERENCE_AREA / max(row[AREA], 1e-12)
-    f = call_force(law[ADDRESS_FORCE], (p.ctypes, s.ctypes, max(z - row[SPREAD], 0.0), 0.0))
+    f = loading_force(law, p, s, max(z - row[SPREAD], 0.0), 0.0)
     if f <= per_reference or z <= 0.0:
         return
-    row[LINE_K] = f / (p[0] * z)
+    row[LINE_K] = f / (springs_back(law, p) * z)
     row[LINE_Z] = z + (f - per_reference) / row[LINE_K]
     row[LINE_F] = f
     row[LINE_C] = 0.0
@@ -128,6 +190,8 @@ def commit(law: Any, p: Any, s: Any, row: Any, state: Any, z: float, v: float, h
         if state[MODE] == LOADING and before < s[BRANCH] <= z:
             outcome |= BRANCHED
         state[MODE] = LOADING
+        if row[GROWING] != 0.0:
+            row[MASS_B] += p[law[EFFECTS] + GROWTH] * row[AREA] / REFERENCE_AREA * (z - row[LINE_Z])
         set_line(law, p, s, row, z)
     if state[MODE] == LOADING and v <= 0.0:
         state[MODE] = UNLOADING
@@ -135,9 +199,33 @@ def commit(law: Any, p: Any, s: Any, row: Any, state: Any, z: float, v: float, h
         outcome |= ARRESTED
         if law[REST_STIFFNESS] != 0:
             set_rest_line(row, mass)
-    if z <= rut_depth(row) and v <= 0.0:
+    if z <= lets_go(law, p, row) and v <= 0.0:
         outcome |= RELEASED
     return outcome
+
+
+@compiled
+def begin(law: Any, p: Any, s: Any, row: Any, state: Any, mass: float, start: float) -> None:
+    """Start an element's memory for a touch at TOUCH_SPEED: latched terms, and where the unloading line starts.
+
+    `mass` (kg) is m_s of the law, `start` (m) the sinkage from which normal motion swept the element.
+    """
+    s[:] = 0.0
+    s[SPEED] = row[TOUCH_SPEED]
+    s[MASS] = mass
+    s[BRANCH] = math.inf
+    if law[ADDRESS_BEGIN] != 0:
+        call_begin(law[ADDRESS_BEGIN], (p.ctypes, s.ctypes))
+    state[MODE] = LOADING
+    if law[PLASTIC] != 0:
+        row[GROWING] = 1.0 if p[law[EFFECTS] + GROWTH] > 0.0 else 0.0
+        if row[LINE_Z] > 0.0 and law[REST_STIFFNESS] == 0:
+            # a second hit starts from the rut, on a reloading line that meets this hit's loading curve
+            set_line(law, p, s, row, row[LINE_Z])
+        if start > rut_depth(row) + 1e-6 and start > row[LINE_Z] * (1.0 - 1e-9):
+            enter_from_the_side(law, p, s, row, start, 0.0)
+        if row[SINKAGE] < row[LINE_Z]:
+            state[MODE] = UNLOADING
 
 
 @compiled

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from ground.law import laws as known_laws
+from ground.quantity import quantities
 from rollover import channels as table
 from rollover import document
 from rollover import scenario as scenarios
@@ -61,7 +63,23 @@ def laws() -> list[Row]:
 
 def effects() -> list[Row]:
     """Effects by id."""
-    return [{"id": name, "is": _first_line(effect)} for name, effect in known_effects().items()]
+    known: dict[str, Any] = dict(known_effects())
+    return [
+        {"id": name, "kind": effect.kind, "parameters": _numbers(effect), "is": _first_line(effect)}
+        for name, effect in known.items()
+    ]
+
+
+def _numbers(effect: Any) -> str:
+    """Parameters of an effect with their defaults: ``depth 0.25 m, stiffness_ratio 3``."""
+    units = quantities(effect)
+    typical = {f.name: getattr(effect(), f.name) for f in fields(effect)}
+    words = [
+        f"{name} {text(list(value) if isinstance(value, tuple) else value)}"
+        + (f" {units[name].unit}" if name in units and units[name].unit != "1" and value is not None else "")
+        for name, value in typical.items()
+    ]
+    return ", ".join(words)
 
 
 def channels() -> list[Row]:

@@ -40,6 +40,7 @@ _ENERGY = {
     "axle": "stored and lost in the front axle's stops",
     "device": "taken by the devices of a test stand, less what they put in",
     "lashing": "stored and lost in the lashings of a test stand",
+    "effects": "taken by effects on the bodies: guide, air, a striker that gives way",
     "residual": "what the ledger does not explain",
 }
 

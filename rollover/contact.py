@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +13,12 @@ from numpy.typing import NDArray
 from ground.array import Elements
 from ground.kernel import COLUMNS, STATE_COLUMNS
 from ground.law import HIDDEN, REFERENCE_MASS, GroundLaw
+from ground.settings import settings
 from ground.surface import normal
 from rollover import tables as c
+from rollover import terms
+from rollover.effects import acting
+from rollover.effects.vehicle import TankSlosh
 from rollover.inertia import MassProperties
 from rollover.scenario import Ground, Scenario
 from rollover.shapes import Disc, Shape, SurfacePoints, cone, rectangle, sample
@@ -46,8 +52,10 @@ class Body:
 POINTS_IN_ELEMENT = 0.8  # contact points are never further apart than this share of an element
 
 
-def bodies_of(vehicle: Vehicle | RigidBody | Striker, elements: Elements) -> tuple[Body, ...]:
-    """Bodies with their contact points: striker; or chassis, front axle, ROPS as far as there are any.
+def bodies_of(
+    vehicle: Vehicle | RigidBody | Striker, elements: Elements, effects: Mapping[str, Any] | None = None
+) -> tuple[Body, ...]:
+    """Bodies with their contact points: striker, perhaps in two; or chassis, front axle, ROPS as far as there are any.
 
     Points stand for areas, elements keep the ruts: an element without a point would be a gap under the body.
     """
@@ -61,8 +69,15 @@ def bodies_of(vehicle: Vehicle | RigidBody | Striker, elements: Elements) -> tup
             face = rectangle(np.zeros(3), half[0], -half[1], spacing)
         m, a, b = vehicle.mass, vehicle.face_length, vehicle.face_width
         block = (m * (b * b + height**2) / 12, m * (a * a + height**2) / 12, m * (a * a + b * b) / 12)
-        inertia = MassProperties(mass=m, centre_of_mass=(0.0, 0.0, 0.5 * height), inertia=block)
-        return (Body(name="striker", inertia=inertia, surfaces=(("face", face),)),)
+
+        def part(name: str, share: float, surfaces: tuple[tuple[str, SurfacePoints], ...]) -> Body:
+            j = (share * block[0], share * block[1], share * block[2])
+            inertia = MassProperties(mass=share * m, centre_of_mass=(0.0, 0.0, 0.5 * height), inertia=j)
+            return Body(name=name, inertia=inertia, surfaces=surfaces)
+
+        nose = nose_share(effects)
+        whole = part("striker", nose, (("face", face),))
+        return (whole,) if nose == 1.0 else (whole, part("striker_body", 1.0 - nose, ()))
 
     def sampled(shapes: tuple[Shape, ...]) -> list[tuple[str, SurfacePoints]]:
         return [(shape.name, patch) for shape in shapes for patch in sample(shape, spacing)]
@@ -96,7 +111,48 @@ def bodies_of(vehicle: Vehicle | RigidBody | Striker, elements: Elements) -> tup
                 inertia = carried(vehicle, "rops")
             extra = loads("rops") if name == "rops" else []
             found.append(Body(name=name, inertia=inertia, surfaces=tuple(sampled(members) + extra)))
+    for name in loose(effects):
+        load = loose_body(effects, name, found[0].inertia)
+        rest = without(found[0].inertia, load)
+        found[0] = Body(name="chassis", inertia=rest, surfaces=found[0].surfaces)
+        found.append(Body(name=name, inertia=load, surfaces=()))
     return tuple(found)
+
+
+def loose(effects: Mapping[str, Any] | None) -> tuple[str, ...]:
+    """Effects whose mass moves in the vehicle."""
+    return tuple(n for n in ("tank-slosh", "payload-shift") if effects and n in effects and effects[n].mass > 0.0)
+
+
+def loose_body(effects: Mapping[str, Any] | None, name: str, chassis: MassProperties) -> MassProperties:
+    """A mass that moves in the vehicle: a cube of water's density, at its place or the chassis' centre of mass."""
+    assert effects is not None
+    mass, place = effects[name].mass, effects[name].position
+    j = mass * (mass / 1000.0) ** (2.0 / 3.0) / 6.0
+    return MassProperties(mass=mass, centre_of_mass=place or chassis.centre_of_mass, inertia=(j, j, j))
+
+
+def without(whole: MassProperties, part: MassProperties) -> MassProperties:
+    """Mass properties of the rest. Raises ``ValueError`` if there is none that a body can have."""
+    if part.mass >= whole.mass:
+        raise ValueError(f"mass: more than the chassis has, got {part.mass:g} kg; less than {whole.mass:g} kg")
+    mass = whole.mass - part.mass
+    centre, taken = np.array(whole.centre_of_mass), np.array(part.centre_of_mass)
+    middle = (whole.mass * centre - part.mass * taken) / mass
+
+    def tensor(p: MassProperties) -> Array:
+        (xx, yy, zz), (xy, xz, yz) = p.inertia, p.products
+        r = np.array(p.centre_of_mass) - middle
+        J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        return np.asarray(J + p.mass * (r @ r * np.eye(3) - np.outer(r, r)))
+
+    J = tensor(whole) - tensor(part)
+    return MassProperties(
+        mass=mass,
+        centre_of_mass=(float(middle[0]), float(middle[1]), float(middle[2])),
+        inertia=(float(J[0, 0]), float(J[1, 1]), float(J[2, 2])),
+        products=(float(J[0, 1]), float(J[0, 2]), float(J[1, 2])),
+    )
 
 
 def side_walls(wheel: Wheel) -> tuple[Disc, Disc]:
@@ -152,10 +208,12 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         ]
     mount_f, mount_i = _mounts(vehicle, bodies, row)
     joint_i, joint_f, axle_f, axle_i = _joints(vehicle, bodies, row)
+    term_i, term_f = _terms(scenario, bodies)
     n = normal(ground.surface)
     nx, ny = ground.elements.count
     elements = ground.elements
     law: GroundLaw = ground.law
+    law_settings, numbers = settings(law, *acting(scenario.effects))
     number = start
     capacity = 2 * number + 64
     hidden = HIDDEN + law.hidden
@@ -176,18 +234,11 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         mount_i=mount_i,
         axle_f=axle_f,
         axle_i=axle_i,
-        law=np.array(
-            [
-                int(law.plastic),
-                int(law.unloads_at_rest_stiffness),
-                law.force.address,
-                law.advance.address if law.advance is not None else 0,
-                law.begin.address if law.begin is not None else 0,
-            ],
-            dtype=np.int64,
-        ),
-        p=law.p,
-        soil=_soil(ground),
+        term_i=term_i,
+        term_f=term_f,
+        law=law_settings,
+        p=numbers,
+        soil=_soil(ground, nose_share(scenario.effects)),
         domain=law.domain.vector,
         plane=np.array([*n, 0.0]),
         grid_f=np.array(
@@ -212,6 +263,7 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         mount_memory=np.zeros((len(mount_f), c.SET_COLUMNS)),
         axle_memory=np.zeros(c.AXLE_MEMORY),
         clock=np.zeros(2),
+        term_memory=np.zeros((len(term_i), terms.TERM_MEMORY)),
         pose=np.zeros((nb, c.POSE_COLUMNS)),
         counts=np.zeros(c.COUNTS, dtype=np.int64),
         work=np.zeros(c.WORKS),
@@ -241,7 +293,55 @@ def grown(t: Tables) -> Tables:
     )
 
 
-def _soil(ground: Ground) -> Array:
+def nose_share(effects: Mapping[str, Any] | None) -> float:
+    """Share of a striker's mass in its nose: all of it, unless it gives way."""
+    gives = (effects or {}).get("structural-compliance")
+    return 1.0 if gives is None or gives.stiffness is None else float(gives.nose_share)
+
+
+def _terms(scenario: Scenario, bodies: tuple[Body, ...]) -> tuple[NDArray[np.int64], Array]:
+    """Rows for `rollover.terms`; forces on a striker in two parts go by their masses, so that it falls as one."""
+    effects = scenario.effects
+    rows: list[tuple[tuple[int, int, int], list[float]]] = []
+    falling = range(len(bodies)) if isinstance(scenario.vehicle, Striker) else range(1)
+    mass = sum(bodies[b].inertia.mass for b in falling)
+    for b in falling:
+        share = bodies[b].inertia.mass / mass
+        if "guide-friction" in effects and isinstance(scenario.vehicle, Striker):
+            rows.append(((terms.GUIDE_BRAKE, b, b), [share * effects["guide-friction"].force]))
+        if "air-drag" in effects:
+            rows.append(((terms.AIR_DRAG, b, b), [share * effects["air-drag"].factor]))
+    if "gyroscopic-rotor" in effects and not isinstance(scenario.vehicle, Striker):
+        rows.append(((terms.ROTOR, 0, 0), list(effects["gyroscopic-rotor"].vector)))
+    if "drive-torque" in effects and not isinstance(scenario.vehicle, Striker):
+        rows.append(((terms.REACTION, 0, 0), [effects["drive-torque"].torque]))
+    if not isinstance(scenario.vehicle, Striker):
+        for b, body in enumerate(bodies):
+            if body.name in loose(effects):
+                rows.append(((terms.BED, 0, b), _bed(effects[body.name], body, bodies[0], scenario.gravity)))
+    if isinstance(scenario.vehicle, Striker) and len(bodies) > 1:
+        gives = effects["structural-compliance"]
+        rows.append(((terms.BETWEEN, 0, 1), [gives.stiffness, gives.damping, 0.0]))
+    f = np.zeros((len(rows), terms.TERM_NUMBERS))
+    for i, (_, numbers) in enumerate(rows):
+        f[i, : len(numbers)] = numbers
+    return np.array([row for row, _ in rows], dtype=np.int64).reshape(-1, 3), f
+
+
+BED_FREQUENCY = 200.0  # rad/s, of a load on its bed: it sags by a quarter of a millimetre
+
+
+def _bed(effect: Any, body: Body, chassis: Body, gravity: float) -> list[float]:
+    """Numbers of `terms.BED` for a mass that moves across the chassis."""
+    m, j, w = body.inertia.mass, body.inertia.inertia[0], BED_FREQUENCY
+    held = [*(body.centre - chassis.centre), m * w * w, 1.4 * m * w, j * w * w, 1.4 * j * w]
+    if isinstance(effect, TankSlosh):
+        slow = math.sqrt(gravity / effect.length)
+        return [*held, m * slow * slow, 2.0 * effect.damping * m * slow, 0.0, math.inf]
+    return [*held, 0.0, 0.0, effect.friction, effect.travel]
+
+
+def _soil(ground: Ground, share: float) -> Array:
     rule = {"reference": c.RULE_REFERENCE, "effective": c.RULE_EFFECTIVE, "clamped": c.RULE_CLAMPED}
     friction = ground.friction
     return np.array(
@@ -249,7 +349,7 @@ def _soil(ground: Ground) -> Array:
             friction.coefficient,
             friction.stick_displacement,
             friction.stick_relaxation,
-            ground.co_moving_mass.share,
+            ground.co_moving_mass.share / share,  # of the whole striker, though its nose alone hits
             rule[ground.striker_mass],
             REFERENCE_MASS,
             ground.law.domain.momentum_most,
@@ -280,7 +380,8 @@ def _joints(
 ) -> tuple[NDArray[np.int64], Array, Array, NDArray[np.int64]]:
     axle_f, axle_i = np.zeros(0), np.zeros(2, dtype=np.int64)
     if isinstance(vehicle, Striker):
-        return np.array([[c.GUIDE, 0, -1]], dtype=np.int64), np.zeros((1, 6)), axle_f, axle_i
+        guides = [[c.GUIDE, b, -1] for b in range(len(bodies))]
+        return np.array(guides, dtype=np.int64), np.zeros((len(bodies), 6)), axle_f, axle_i
     if vehicle.front_axle is None:
         return np.zeros((0, 3), dtype=np.int64), np.zeros((0, 6)), axle_f, axle_i
     a, b = row["chassis"], row["front_axle"]

@@ -61,6 +61,7 @@ from rollover.tables import (
     X,
     Z,
 )
+from rollover.terms import try_terms
 from rollover.vectors import (
     add_force,
     centripetal_depth,
@@ -263,6 +264,7 @@ def generalised_forces(t: Any, q: Any, qd: Any, Q: Any) -> None:
     try_mounts(t, Q)
     try_axle(t, Q)
     try_devices(t, Q)
+    try_terms(t, Q)
 
 
 @compiled

@@ -171,8 +171,8 @@ def states(rows: Array, nb: int, nw: int, nt: int) -> States:
 def energies(s: States, t: Tables, bodies: tuple[Body, ...], gravity: float) -> dict[str, Array]:
     """The ledger over time, J, each (n,): what the bodies hold and what was taken from them; `residual` is the rest.
 
-    kinetic + potential + soil + tyre + rops + friction + collision + axle - (their sum at the start) = -residual;
-    on a test stand also what its devices and lashings took, less than zero for what they put in.
+    kinetic + potential + soil + tyre + rops + friction + collision + axle + effects less their sum at the start is
+    -residual; on a test stand also what its devices and lashings took, less than zero for what they put in.
     """
     n = len(s.axle)
     flat = s.qd.reshape(n, -1)
@@ -188,6 +188,7 @@ def energies(s: States, t: Tables, bodies: tuple[Body, ...], gravity: float) -> 
         "friction": s.work[:, c.FRICTION_WORK],
         "collision": s.work[:, c.COLLISION],
         "axle": s.work[:, c.AXLE],
+        "effects": s.work[:, c.EXTRA_WORK],
     }
     if len(t.device_i):
         ledger["device"] = s.work[:, c.DEVICE]
@@ -212,10 +213,10 @@ def channels(scenario: Scenario, s: States, t: Tables, bodies: tuple[Body, ...])
         "ground/contact_area": s.footprint,
     }
     if isinstance(scenario.vehicle, Striker):
-        bottom = bodies[0].inertia.centre_of_mass[2]
-        found["striker/position_z"] = s.q[:, 0, 2] - bottom
-        found["striker/velocity_z"] = s.qd[:, 0, 2]
-        found["striker/acceleration_z"] = s.qdd[:, 0, 2]
+        body = len(bodies) - 1  # of one in two parts, the upper carries the instruments
+        found["striker/position_z"] = s.q[:, body, 2] - bodies[body].centre[2]
+        found["striker/velocity_z"] = s.qd[:, body, 2]
+        found["striker/acceleration_z"] = s.qdd[:, body, 2]
     else:
         found |= _chassis(s, row["chassis"])
     if "rops" in row:

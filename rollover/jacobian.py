@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ground.compiled import call_force, compiled
-from ground.kernel import ADDRESS_FORCE, AREA, BODY, LINE_C, LINE_K, LINE_Z, NORMAL, OWNER_R, PLASTIC, SPREAD
+from ground.compiled import compiled
+from ground.kernel import AREA, BODY, LINE_C, LINE_K, LINE_Z, NORMAL, OWNER_R, PLASTIC, SPREAD, loading_force
 from ground.law import REFERENCE_AREA
 from rollover.forces import TYRE_RELAXATION, tyre_stiffness
 from rollover.tables import (
@@ -43,6 +43,7 @@ from rollover.tables import (
     X,
     Z,
 )
+from rollover.terms import stiffen_terms
 from rollover.vectors import direction_row, place, to_body
 
 
@@ -94,10 +95,10 @@ def stiffness(t: Any, f: float, fd: float, K: Any) -> None:
         if t.law[PLASTIC] != 0 and z < m[LINE_Z]:
             normal = area * (f * m[LINE_K] + fd * m[LINE_C])
         else:
-            s, force, z = t.s[i], t.law[ADDRESS_FORCE], max(z - m[SPREAD], 0.0)
-            here = call_force(force, (t.p.ctypes, s.ctypes, z, v))
-            deeper = call_force(force, (t.p.ctypes, s.ctypes, z + 1e-6, v))
-            faster = call_force(force, (t.p.ctypes, s.ctypes, z, v + 1e-6))
+            s, z = t.s[i], max(z - m[SPREAD], 0.0)
+            here = loading_force(t.law, t.p, s, z, v)
+            deeper = loading_force(t.law, t.p, s, z + 1e-6, v)
+            faster = loading_force(t.law, t.p, s, z, v + 1e-6)
             normal = area * (f * (deeper - here) + fd * (faster - here)) * 1e6
         stick = t.soil[MU] * trial[FN] / t.soil[STICK]
         b = t.state[i, BODY]
@@ -120,6 +121,7 @@ def stiffness(t: Any, f: float, fd: float, K: Any) -> None:
             stick = c[W_KY] * (f + fd * TYRE_RELAXATION) if c[W_MU] > 0.0 else 0.0
             add_point(K, t.pose[b], b, g[E_POINT : E_POINT + 3], n, normal, stick)
     add_mounts(t, f, fd, K)
+    stiffen_terms(t, f, fd, K)
     if t.axle_f.size > 0 and t.axle_memory[M_TORQUE_NOW] != 0.0:
         c, b = t.axle_i[0], t.axle_i[1]
         add_pair(K, f * t.axle_f[A_K] + fd * t.axle_f[A_C], spin_row(t, c, c, 0), 6 * c, spin_row(t, c, b, 0), 6 * b)

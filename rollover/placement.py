@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ground.surface import Surface, height
 from rollover.contact import Body
 from rollover.equilibrium import ROLL, Equilibrium, tread_point
+from rollover.fall import fall_back
 from rollover.faults import Fault, InputError
 from rollover.forces import generalised_forces
 from rollover.frames import from_angles, from_quaternion, rotation_vector
@@ -18,7 +19,7 @@ from rollover.initiation import Drop, Standing, Throw, TipOver
 from rollover.scenario import Scenario
 from rollover.step import stand
 from rollover.tables import Tables, handle
-from rollover.vehicle import Vehicle
+from rollover.vehicle import Striker, Vehicle
 
 Array = NDArray[np.float64]
 
@@ -51,13 +52,14 @@ def _dropped(drop: Drop, scenario: Scenario, bodies: tuple[Body, ...], t: Tables
     q = _rigid(bodies, np.zeros(3), R)
     lowest = _deepest(bodies, t, R, scenario.ground.surface)
     # first contact at t = 0, a hair's breadth below the surface so that it is found there
-    rise = lowest + drop.speed * drop.lead_time - 0.5 * scenario.gravity * drop.lead_time**2 - 1e-9
+    rise, speed = _fallen(scenario, bodies, drop, lowest)
+    rise -= 1e-9
     q[2::6] += rise
     kernels = handle(t)
     generalised_forces(kernels, q, np.zeros_like(q), np.zeros_like(q))
     stand(kernels)
     qd = np.zeros(6 * len(bodies))
-    qd[2::6] = -(drop.speed - scenario.gravity * drop.lead_time)
+    qd[2::6] = -speed
     return Start(q=q, qd=qd, time=-drop.lead_time)
 
 
@@ -77,6 +79,19 @@ def _thrown(throw: Throw, scenario: Scenario, bodies: tuple[Body, ...], t: Table
     kernels = handle(t)
     generalised_forces(kernels, q, qd, np.zeros(6))
     return Start(q=q, qd=qd, time=0.0)
+
+
+def _fallen(scenario: Scenario, bodies: tuple[Body, ...], drop: Drop, lowest: float) -> tuple[float, float]:
+    """How far a drop begins above its place at first contact, and its downward speed there; `lowest` is added."""
+    guide, air = scenario.effects.get("guide-friction"), scenario.effects.get("air-drag")
+    brake = guide.force if guide is not None and isinstance(scenario.vehicle, Striker) else 0.0
+    drag = air.factor if air is not None else 0.0
+    if brake == 0.0 and drag == 0.0:
+        rise = lowest + drop.speed * drop.lead_time - 0.5 * scenario.gravity * drop.lead_time**2
+        return rise, drop.speed - scenario.gravity * drop.lead_time
+    mass = sum(b.inertia.mass for b in bodies)
+    depth, speed = fall_back(scenario.gravity, mass, brake, drag, drop.speed, drop.lead_time)
+    return lowest - float(depth), float(speed)
 
 
 def _deepest(bodies: tuple[Body, ...], t: Tables, R: Array, surface: Surface) -> float:

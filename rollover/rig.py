@@ -48,7 +48,7 @@ class Rig:
 
 def set_up(scenario: Scenario) -> Rig:
     """Bodies, tables and start of a run. Raises ``ValueError`` for a start that does not exist."""
-    bodies = bodies_of(scenario.vehicle, scenario.ground.elements)
+    bodies = bodies_of(scenario.vehicle, scenario.ground.elements, scenario.effects)
     t = tables_of(scenario, bodies)
     begin = scenario.initiation
     if isinstance(begin, StaticTest):

@@ -118,6 +118,15 @@ class Scenario:
         """
         return document.replaced(self, changes, origin)
 
+    def applied(self) -> Scenario:
+        """Return this scenario with the values that its effects replace; the effects stay, for their other terms."""
+        changed = self
+        for effect in self.effects.values():
+            changes = effect.changes(changed)
+            if changes:
+                changed = document.exchanged(changed, changes)
+        return changed
+
 
 def _check_start(vehicle: Vehicle | Striker | RigidBody, start: Initiation) -> None:
     if isinstance(vehicle, Striker):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time as clock
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -15,6 +16,7 @@ from rollover import history, model
 from rollover import tables as c
 from rollover.contact import Body, grown
 from rollover.control import Control, control_of
+from rollover.effects import read
 from rollover.forces import generalised_forces
 from rollover.frames import matrices, quaternions, rotation_vector
 from rollover.history import History, States
@@ -57,6 +59,7 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
     not exist, and lets a keyboard interrupt through.
     """
     began = clock.perf_counter()
+    given, scenario = scenario, scenario.applied()
     rig = set_up(scenario)
     bodies, t, start = rig.bodies, rig.tables, rig.start
     control = control_of(scenario, rig)
@@ -137,7 +140,8 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
     except DivergedError as reason:
         sentence = str(reason)
     mark_warm()
-    return _result(scenario, bodies, live.tables, past, events, control, sentence, clock.perf_counter() - began)
+    done = _result(scenario, bodies, live.tables, past, events, control, sentence, clock.perf_counter() - began)
+    return done if given is scenario else replace(done, scenario=given)
 
 
 def _point(x: Any) -> tuple[float, float, float]:
@@ -192,6 +196,7 @@ def _result(
     status: Literal["done", "failed"] = "failed" if sentence else "done"
     flags = int(np.bitwise_or.reduce(s.flags))
     recording = Recording(title=scenario.title, time=time, channels=found, source="simulation")
+    recording = read(scenario.effects, recording)
     return Run(
         scenario=scenario,
         status=status,

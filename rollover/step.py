@@ -12,10 +12,12 @@ import numpy as np
 
 from ground.compiled import compiled
 from ground.kernel import (
+    ADHESION,
     AREA,
     ARRESTED,
     BODY,
     BRANCHED,
+    EFFECTS,
     FLAGS,
     FORCE,
     FRICTION,
@@ -27,6 +29,7 @@ from ground.kernel import (
     NORMAL,
     OWNER_R,
     PLACE,
+    REBOUND_DAMPING,
     RELEASED,
     SHEAR,
     SINKAGE,
@@ -106,6 +109,7 @@ from rollover.tables import (
     ZDOT,
     Z,
 )
+from rollover.terms import finish_terms
 from rollover.touch import drop_mass, note_event, touch
 from rollover.vectors import depth_acceleration, depth_row, place, velocity
 
@@ -126,6 +130,7 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
     finish_mounts(t)
     finish_axle(t)
     finish_devices(t, h, DEVICE)
+    finish_terms(t, h)
     start_step(t)
     if strike(t, qd):
         read_poses(t.pose, q, qd)
@@ -150,7 +155,7 @@ def finish_elements(t: Any, h: float) -> None:
         contact = trial[FN]
         if m[MASS_B] > 0.0:
             contact += m[MASS_B] * depth_acceleration(t.pose[b], m[OWNER_R : OWNER_R + 3], m[NORMAL : NORMAL + 3])
-            if contact < 0.0:
+            if contact < -t.p[t.law[EFFECTS] + ADHESION] * m[AREA] / REFERENCE_AREA:
                 # the mass would have to be pulled along: it leaves, and stays in the soil
                 drop_mass(t, i)
                 contact = trial[FN]
@@ -167,7 +172,10 @@ def finish_elements(t: Any, h: float) -> None:
         m[FORCE] = trial[FN]
         for k in range(3):
             m[FRICTION + k] = trial[FT + k]
+        along = m[MASS_B]
         outcome = commit(t.law, t.p, t.s[i], m, state, trial[Z], trial[ZDOT], h, t.s[i, 1] * m[AREA] / REFERENCE_AREA)
+        # half of the work that sets more soil moving is that soil's kinetic energy
+        t.work[SOIL] -= 0.5 * (m[MASS_B] - along) * trial[ZDOT] * trial[ZDOT]
         commit_friction(t.soil[STICK], m[SHEAR : SHEAR + 3], trial[MOVED : MOVED + 3], m[NORMAL : NORMAL + 3])
         for k in range(3):
             m[PLACE + k] += trial[MOVED + k]
@@ -226,7 +234,8 @@ def settle(t: Any) -> None:
         for a in range(t.counts[ACTIVE]):
             i = t.active[a]
             if t.state[i, BODY] == body and t.state[i, MODE] == UNLOADING and t.memory[i, LINE_C] == 0.0:
-                t.memory[i, LINE_C] = 2.0 * t.memory[i, LINE_K] / omega
+                ratio = t.p[t.law[EFFECTS] + REBOUND_DAMPING]
+                t.memory[i, LINE_C] = 2.0 * ratio * t.memory[i, LINE_K] / omega
 
 
 @compiled

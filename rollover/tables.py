@@ -53,7 +53,7 @@ RULE_REFERENCE, RULE_EFFECTIVE, RULE_CLAMPED = 0, 1, 2
 SLOTS, ACTIVE, EVENTS, OUTSIDE, FLAGS_NOW, COUNTS = 0, 1, 2, 3, 4, 5
 
 # places in work (J taken from the vehicle since the start)
-SOIL, TYRE, ROPS, FRICTION_WORK, COLLISION, AXLE, DEVICE, LASHING, WORKS = 0, 1, 2, 3, 4, 5, 6, 7, 8
+SOIL, TYRE, ROPS, FRICTION_WORK, COLLISION, AXLE, DEVICE, LASHING, EXTRA_WORK, WORKS = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
 
 # columns of trial: what the last evaluation found for each active element
 Z, ZDOT, FN, FT, MOVED, TRIAL_COLUMNS = 0, 1, 2, 3, 6, 9
@@ -99,6 +99,8 @@ class Tables(NamedTuple):
     mount_i: Any  # (nt, 2) rows of body a and body b
     axle_f: Any  # (AXLE_COLUMNS,) or (0,)
     axle_i: Any  # (2,) chassis and axle rows
+    term_i: Any  # (ne, 3) kind, body, other body
+    term_f: Any  # (ne, terms.TERM_NUMBERS)
     # ground
     law: Any  # (5,) see ground.kernel
     p: Any
@@ -122,6 +124,7 @@ class Tables(NamedTuple):
     mount_memory: Any  # (nt, SET_COLUMNS)
     axle_memory: Any  # (AXLE_MEMORY,)
     clock: Any  # (2,) length of the step that is tried, time of the scenario at which forces are tried, s
+    term_memory: Any  # (ne, terms.TERM_MEMORY)
     pose: Any  # (nb, POSE_COLUMNS)
     counts: Any  # (COUNTS,)
     work: Any  # (WORKS,)
@@ -168,6 +171,8 @@ def handle(t: Any) -> Any:
         t.mount_i,
         t.axle_f,
         t.axle_i,
+        t.term_i,
+        t.term_f,
         t.law,
         t.p,
         t.soil,
@@ -189,6 +194,7 @@ def handle(t: Any) -> Any:
         t.mount_memory,
         t.axle_memory,
         t.clock,
+        t.term_memory,
         t.pose,
         t.counts,
         t.work,

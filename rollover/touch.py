@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from ground.compiled import call_begin, compiled
+from ground.compiled import compiled
 from ground.kernel import (
-    ADDRESS_BEGIN,
     AREA,
     BODY,
     CELL,
     FLAGS,
     FORCE,
+    GROWING,
     HITS,
     IDLE,
     LINE_Z,
@@ -32,11 +32,11 @@ from ground.kernel import (
     SPREAD,
     TOUCH_SPEED,
     UNLOADING,
+    begin,
     enter_from_the_side,
     rut_depth,
-    set_line,
 )
-from ground.law import BRANCH, MASS, REFERENCE_AREA, SPEED
+from ground.law import REFERENCE_AREA
 from rollover.impact import exchange, share_mass
 from rollover.tables import (
     ACTIVE,
@@ -164,6 +164,7 @@ def drop_mass(t: Any, slot: int) -> None:
         speed = m[NORMAL] * v[0] + m[NORMAL + 1] * v[1] + m[NORMAL + 2] * v[2]
         t.work[SOIL] += 0.5 * m[MASS_B] * speed * speed
         m[MASS_B] = 0.0
+    m[GROWING] = 0.0
 
 
 @compiled
@@ -281,34 +282,20 @@ def touch(t: Any, qd: Any, h: float) -> float:
     moving = False
     for k in range(hits):
         slot = t.active[fresh[k]]
-        begin(t, slot, share[k])
+        begin_contact(t, slot, share[k])
         moving = moving or t.memory[slot, MASS_B] > 0.0
     return exchange(t, fresh, hits, qd) if moving else 0.0
 
 
 @compiled
-def begin(t: Any, slot: int, share: float) -> None:
-    """Start an element's memory for this touch: the law's mass, latched terms, flags, where the line starts."""
-    m, state, s = t.memory[slot], t.state[slot], t.s[slot]
+def begin_contact(t: Any, slot: int, share: float) -> None:
+    """Start an element's memory for this touch with the law's mass; its flags, its event."""
+    m, state = t.memory[slot], t.state[slot]
     speed, start, angle = m[TOUCH_SPEED], t.found[slot, 1], t.found[slot, 2]
-    s[:] = 0.0
-    s[SPEED] = speed
     rule = t.soil[MASS_RULE]
     mass = t.soil[MASS_GIVEN] if rule == RULE_REFERENCE else share * REFERENCE_AREA / max(m[AREA], 1e-12)
     if rule == RULE_CLAMPED and speed > 0.0:
         mass = min(mass, t.soil[MOMENTUM_MOST] / speed)
-    s[MASS] = mass
-    s[BRANCH] = math.inf
-    if t.law[ADDRESS_BEGIN] != 0:
-        call_begin(t.law[ADDRESS_BEGIN], (t.p.ctypes, s.ctypes))
+    begin(t.law, t.p, t.s[slot], m, state, mass, start)
     state[FLAGS] = domain_flags(t, speed, mass, angle, state[HITS])
-    state[MODE] = LOADING
-    if t.law[PLASTIC] != 0:
-        if m[LINE_Z] > 0.0 and t.law[REST_STIFFNESS] == 0:
-            # a second hit starts from the rut, on a reloading line that meets this hit's loading curve
-            set_line(t.law, t.p, s, m, m[LINE_Z])
-        if start > rut_depth(m) + 1e-6 and start > m[LINE_Z] * (1.0 - 1e-9):
-            enter_from_the_side(t.law, t.p, s, m, start, 0.0)
-        if m[SINKAGE] < m[LINE_Z]:
-            state[MODE] = UNLOADING
     note_event(t, TOUCH, state[BODY], (m[PLACE], m[PLACE + 1], m[PLACE + 2]), speed)

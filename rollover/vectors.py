@@ -123,3 +123,14 @@ def direction_row(row: Any, r: Any, a: float, b: float, c: float, J: Any) -> Non
 def depth_row(row: Any, r: Any, n: Any, J: Any) -> None:
     """J (6,) with dz/dt = J [v, omega], z the depth of the point r along -n."""
     direction_row(row, r, -n[0], -n[1], -n[2], J)
+
+
+@compiled
+def relative_angle(a: Any, b: Any, k: int) -> float:
+    """Component k of the rotation of body b against body a, in a's axes; exact to second order in the angle."""
+    i, j = (k + 1) % 3, (k + 2) % 3
+    ji, ij = 0.0, 0.0
+    for m in range(3):
+        ji += a[ROT + 3 * m + j] * b[ROT + 3 * m + i]
+        ij += a[ROT + 3 * m + i] * b[ROT + 3 * m + j]
+    return 0.5 * (ji - ij)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from rollover.commands import root
 from rollover.commands import run
 from rollover.commands import view
 from rollover.commands import listing
@@ -12,4 +13,4 @@ from rollover.commands import schema
 from rollover.commands import regress
 from rollover.commands import identify
 
-__all__ = ["check", "identify", "importing", "listing", "regress", "run", "schema", "view"]
+__all__ = ["check", "identify", "importing", "listing", "regress", "root", "run", "schema", "view"]

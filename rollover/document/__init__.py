@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rollover.document.check import check
+from rollover.document.exchange import exchanged
 from rollover.document.include import expand, find, headings, shipped_folder
 from rollover.document.replace import parse_setting, replaced
 from rollover.document.resolved import Leaf, content_hash, dump, paths, to_mapping
@@ -25,6 +26,7 @@ __all__ = [
     "content_hash",
     "dump",
     "dump_mapping",
+    "exchanged",
     "find",
     "headings",
     "load",

@@ -1,10 +1,70 @@
-"""The table of effects: switchable terms of the simulation, each a class of parameters, by effect id."""
+"""The table of effects: switchable terms of the simulation, each a class of parameters, by effect id.
+
+An effect of one's own is one Python file with a class derived from `Effect`, named by ``--effects FILE`` or the
+environment variable ROLLOVER_EFFECTS (several files as in PATH); it then stands beside those of this folder.
+"""
 
 from __future__ import annotations
 
-EFFECTS: dict[str, type] = {}
+import hashlib
+import importlib.util
+import os
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ground.settings import ForceTerm
+from rollover.effects import ground, parameter, sensor, vehicle
+from rollover.effects.effect import EFFECTS, Effect, Search, nothing
+from rollover.faults import Fault, InputError
+from rollover.recording import Recording
+
+__all__ = ["EFFECTS", "Effect", "Search", "acting", "effects", "ground", "nothing", "parameter", "read", "sensor"]
+__all__ += ["vehicle"]
+
+VARIABLE = "ROLLOVER_EFFECTS"
 
 
 def effects() -> dict[str, type]:
-    """Every effect that exists, by its id."""
+    """Every effect that exists, by its id; those of one's own files last. Raises `InputError`."""
+    for name in filter(None, os.environ.get(VARIABLE, "").split(os.pathsep)):
+        _load(Path(name).resolve())
     return dict(EFFECTS)
+
+
+def _load(path: Path) -> None:
+    module = f"rollover_effects_{hashlib.sha256(str(path).encode()).hexdigest()[:12]}"
+    if module in sys.modules:
+        return
+    spec = importlib.util.spec_from_file_location(module, path)
+    if spec is None or spec.loader is None or not path.is_file():
+        raise InputError(Fault(file=str(path), message="no such file of effects; a Python file is needed"))
+    loaded = importlib.util.module_from_spec(spec)
+    sys.modules[module] = loaded
+    try:
+        spec.loader.exec_module(loaded)
+    except Exception as e:
+        del sys.modules[module]
+        raise InputError(Fault(file=str(path), message=f"cannot be used: {type(e).__name__}: {e}")) from e
+
+
+def acting(chosen: Mapping[str, Any]) -> tuple[dict[int, float], tuple[ForceTerm, ...]]:
+    """Numbers by place, and force terms, that a scenario's effects hand to the ground's kernel."""
+    places: dict[int, float] = {}
+    terms: tuple[ForceTerm, ...] = ()
+    for effect in chosen.values():
+        places |= effect.places()
+        terms += effect.force_terms()
+    return places, terms
+
+
+def read(chosen: Mapping[str, Any], recording: Recording) -> Recording:
+    """What a scenario's sensors make of a recording: y = clip(G (R h x)(t - t_0 - e t) + b).
+
+    Whatever the order in the file: the sensor's axis, its lag, its scale and gain, its clock, its bias, its range.
+    """
+    for name in sensor.ORDER:
+        if name in chosen:
+            recording = chosen[name].read(recording)
+    return recording

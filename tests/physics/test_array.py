@@ -83,21 +83,22 @@ def test_second_hit_starts_from_the_rut() -> None:
     """An element let go keeps its rut: hit again at the same speed it gives no force before the rut's depth."""
     from ground.kernel import LINE_C, LINE_Z, MODE, STATE_COLUMNS, commit, normal_force, rut_depth
     from ground.law import touched
+    from ground.settings import settings
     from ground.ye import Ye2006
 
     law, row, state = Ye2006(), np.zeros(COLUMNS), np.zeros(STATE_COLUMNS, dtype=np.int64)
     row[5] = 0.14 * 0.045
     state[MODE] = 1
-    s, p = touched(law, speed=2.0), law.p
-    settings = np.array([1, 0, law.force.address, 0, law.begin.address])
+    s = touched(law, speed=2.0)
+    told, p = settings(law)
     for z in np.linspace(0.001, 0.1, 100):
-        commit(settings, p, s, row, state, z, 1.0, 1e-3, 132.0)
-    commit(settings, p, s, row, state, 0.0999, -0.1, 1e-3, 132.0)
+        commit(told, p, s, row, state, z, 1.0, 1e-3, 132.0)
+    commit(told, p, s, row, state, 0.0999, -0.1, 1e-3, 132.0)
     assert row[LINE_Z] == pytest.approx(0.1)
     assert rut_depth(row) == pytest.approx(0.098)  # recovery 2 %
-    assert normal_force(settings, p, s, row, 0.0979, 0.0) == 0.0
-    halfway = normal_force(settings, p, s, row, 0.099, 0.0)
-    top = normal_force(settings, p, s, row, 0.1, 0.0)
+    assert normal_force(told, p, s, row, 0.0979, 0.0) == 0.0
+    halfway = normal_force(told, p, s, row, 0.099, 0.0)
+    top = normal_force(told, p, s, row, 0.1, 0.0)
     assert halfway == pytest.approx(0.5 * top, rel=1e-9)
     row[LINE_C] = 1e5
-    assert normal_force(settings, p, s, row, 0.099, -1.0) == 0.0  # never a pull, however fast it leaves
+    assert normal_force(told, p, s, row, 0.099, -1.0) == 0.0  # never a pull, however fast it leaves

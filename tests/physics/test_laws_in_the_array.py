@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from ground.kernel import AREA, COLUMNS, LOADING, MODE, STATE_COLUMNS, commit, normal_force
 from ground.law import REFERENCE_AREA, GroundLaw, touched
+from ground.settings import settings as kernel_settings
 from rollover.simulate import run
 from tests.ground.test_laws_contract import EXAMPLES
 from tests.physics.scenes import drop
@@ -22,9 +23,8 @@ class Element:
     def __init__(self, law: GroundLaw, speed: float) -> None:
         self.row, self.state = np.zeros(COLUMNS), np.zeros(STATE_COLUMNS, dtype=np.int64)
         self.row[AREA], self.state[MODE] = 2.0 * REFERENCE_AREA, LOADING
-        self.p, self.s = law.p, touched(law, speed=speed)
-        address = [f.address if f is not None else 0 for f in (law.force, law.advance, law.begin)]
-        self.law = np.array([int(law.plastic), int(law.unloads_at_rest_stiffness), *address], dtype=np.int64)
+        self.law, self.p = kernel_settings(law)
+        self.s = touched(law, speed=speed)
 
     def force(self, z: float, v: float) -> float:
         return float(normal_force(self.law, self.p, self.s, self.row, z, v))

@@ -208,7 +208,7 @@ def test_progress_in_lines_where_there_is_no_terminal(capsys: pytest.CaptureFixt
         ("vehicles", {"utility_tractor", "rops_rig"}),
         ("soils", {"natural_clay"}),
         ("laws", {"ye-2006", "treated"}),
-        ("effects", set()),
+        ("effects", {"soil-layer", "sensor-gain", "mass"}),
         ("channels", set(CHANNELS)),
     ],
 )

@@ -150,8 +150,8 @@ ONE_FAULT: dict[str, tuple[str | bytes, str]] = {
     ),
     "title": (without("title: Drop", "title: 5"), "bad.yaml:1: title: not text, got 5; text is allowed"),
     "effect": (
-        f"{TEXT}effects:\n  soil-adhesion: {{stress: 5}}\n",
-        "bad.yaml:12: effects.soil-adhesion: unknown effect, got 'soil-adhesion'; allowed: none",
+        f"{TEXT}effects:\n  soil-adhesio: {{stress: 5}}\n",
+        "bad.yaml:12: effects.soil-adhesio: unknown effect, got 'soil-adhesio'; did you mean 'soil-adhesion'?",
     ),
     "striker tips": (
         without("kind: drop\n  speed: 3.0", "kind: tip-over"),
@@ -462,8 +462,8 @@ def test_a_new_kind_starts_its_part_afresh() -> None:
             "replaced: simulation.output_step: not a multiple of step (0.0003 s), got 0.0002; such as 0.0003",
         ),
         (
-            {"effects.soil-adhesion.stress": 500.0},
-            "replaced: effects.soil-adhesion: unknown effect, got 'soil-adhesion'; allowed: none",
+            {"effects.soil-adhesio.stress": 500.0},
+            "replaced: effects.soil-adhesio: unknown effect, got 'soil-adhesio'; did you mean 'soil-adhesion'?",
         ),
         (
             {"vehicle": "vehicles/compact_tractr.yaml"},
@@ -510,8 +510,7 @@ def test_an_effect_of_the_table_is_read_replaced_and_written(monkeypatch: pytest
     Path("bare.yaml").write_text(TEXT)
     assert load("bare.yaml").replaced({"effects.soil-adhesion.stress": 500.0}) == scenario
     assert faults_of(f"{TEXT}effects: {{soil-adhesio: {{stress: 5}}}}\n") == [
-        "bad.yaml:11: effects.soil-adhesio: unknown effect, got 'soil-adhesio'; "
-        "did you mean 'soil-adhesion'? allowed: soil-adhesion"
+        "bad.yaml:11: effects.soil-adhesio: unknown effect, got 'soil-adhesio'; did you mean 'soil-adhesion'?"
     ]
     assert faults_of(f"{TEXT}effects: {{soil-adhesion: {{stress: -5}}}}\n") == [
         "bad.yaml:11: effects.soil-adhesion.stress: out of bounds, got -5; a number at least 0 Pa is allowed"
@@ -531,7 +530,7 @@ def test_effects_from_python_are_checked_too(monkeypatch: pytest.MonkeyPatch) ->
     both = {"soil-adhesion": Adhesion(stress=1.0), "soil-suction": Adhesion(stress=2.0)}
     assert content_hash(with_(both)) == content_hash(with_(dict(reversed(both.items()))))
     monkeypatch.delitem(EFFECTS, "soil-suction")
-    with pytest.raises(ValueError, match=r"^effects: unknown effect, got 'nope'; allowed: soil-adhesion$"):
+    with pytest.raises(ValueError, match=r"^effects: unknown effect, got 'nope'; allowed: .*soil-adhesion"):
         with_({"nope": Adhesion(stress=1.0)})
     with pytest.raises(ValueError, match=r"^effects: not parameters of soil-adhesion, got 5; Adhesion$"):
         with_({"soil-adhesion": 5})

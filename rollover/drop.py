@@ -1,0 +1,148 @@
+"""Drop tests in a millisecond: a striker on level ground, with the kernels and effects of the full run.
+
+`DropModel` is a scenario made ready; parameters are exchanged by path, so that fits and diagnoses can make ten
+thousand drops in the time of a hundred full runs. Where both can be asked they agree to the integration error.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ground.law import HIDDEN, REFERENCE_AREA, REFERENCE_MASS
+from ground.settings import settings
+from ground.surface import normal
+from rollover import fall
+from rollover.contact import nose_share
+from rollover.document import exchanged
+from rollover.effects import acting, read
+from rollover.initiation import Drop
+from rollover.recording import Recording
+from rollover.scenario import Scenario
+from rollover.vehicle import Striker
+
+Array = NDArray[np.float64]
+LONGEST_STEP = 5e-4  # s, of the integration
+RESOLVED = 0.25  # longest step times the frequency of a striker that gives way
+
+COLUMNS = {
+    "ground/force_normal": (fall.OUT_FORCE, 1.0),
+    "ground/impulse_normal": (fall.OUT_IMPULSE, 1.0),
+    "ground/sinkage": (fall.OUT_SINKAGE, 1.0),
+    "striker/position_z": (fall.OUT_X, -1.0),
+    "striker/velocity_z": (fall.OUT_V, -1.0),
+    "striker/acceleration_z": (fall.OUT_A, -1.0),
+}
+
+
+class DropFailedError(Exception):
+    """The integration left what can be."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DropModel:
+    """A drop test made ready to be run many times; `step` (s) is the longest step of the integration."""
+
+    scenario: Scenario
+    step: float = LONGEST_STEP
+
+    def __post_init__(self) -> None:
+        reason = unfit(self.scenario)
+        if reason:
+            raise ValueError(reason)
+
+    def with_(self, changes: Mapping[str, Any]) -> DropModel:
+        """The same drop with values exchanged by path; an effect is switched on by naming one of its parameters.
+
+        Raises ``ValueError`` for a value out of bounds, ``KeyError`` for a path that does not exist.
+        """
+        return DropModel(scenario=exchanged(self.scenario, changes), step=self.step)
+
+    @cached_property
+    def numbers(self) -> Array:
+        """What `fall.drop` reads, (fall.NUMBERS,)."""
+        s = self.scenario.applied()
+        vehicle, ground, start = s.vehicle, s.ground, s.initiation
+        assert isinstance(vehicle, Striker)
+        assert isinstance(start, Drop)
+        f = np.zeros(fall.NUMBERS)
+        share = nose_share(s.effects)
+        face = vehicle.face_length * vehicle.face_width
+        f[fall.MASS], f[fall.NOSE], f[fall.FACE] = vehicle.mass, vehicle.mass * share, face
+        f[fall.GRAVITY], f[fall.IMPACT_SPEED], f[fall.STEP] = s.gravity, start.speed, self.step
+        f[fall.FRACTION] = ground.co_moving_mass.share / share  # of the whole striker, though its nose alone hits
+        f[fall.LAW_MASS], f[fall.MOMENTUM_MOST] = REFERENCE_MASS, np.inf
+        if ground.striker_mass != "reference":
+            f[fall.LAW_MASS] = f[fall.NOSE] * REFERENCE_AREA / face
+            f[fall.MOMENTUM_MOST] = ground.law.domain.momentum_most if ground.striker_mass == "clamped" else np.inf
+        if share < 1.0:
+            gives = s.effects["structural-compliance"]
+            f[fall.SPRING], f[fall.DASHPOT] = gives.stiffness, gives.damping
+            reduced = vehicle.mass * share * (1.0 - share)
+            f[fall.STEP] = min(
+                self.step, RESOLVED / max(math.sqrt(gives.stiffness / reduced), 2.0 * gives.damping / reduced)
+            )
+        if "guide-friction" in s.effects:
+            f[fall.GUIDE] = s.effects["guide-friction"].force
+        if "air-drag" in s.effects:
+            f[fall.AIR] = s.effects["air-drag"].factor
+        return f
+
+    @cached_property
+    def told(self) -> tuple[NDArray[np.int64], Array]:
+        """Settings and numbers of the ground's kernel."""
+        return settings(self.scenario.applied().ground.law, *acting(self.scenario.effects))
+
+    @property
+    def times(self) -> Array:
+        """Rows of the full run: from the lead to the end, s."""
+        start, settings = self.scenario.initiation, self.scenario.simulation
+        assert isinstance(start, Drop)
+        every = max(1, round(settings.output_step / settings.step)) * settings.step
+        count = round((settings.duration + start.lead_time) / every) + 1
+        return np.asarray(np.round(np.arange(count) * every - start.lead_time, 9), dtype=np.float64)
+
+    def rows(self, times: Array) -> Array:
+        """Columns of `fall` at `times` (s, rising), (n, fall.OUT_COLUMNS), without what sensors make of them.
+
+        Raises `DropFailedError`.
+        """
+        law, p = self.told
+        out = np.empty((len(times), fall.OUT_COLUMNS))
+        kind = self.scenario.ground.law
+        if fall.drop(law, p, HIDDEN + kind.hidden, self.numbers, times, out) < 0:
+            raise DropFailedError("the drop diverged: a velocity beyond 10 km/s, or steps without end")
+        return out
+
+    def run(self, times: Array | None = None) -> Recording:
+        """Channels of the drop at `times` (s, rising; default: rows of the full run), as its sensors read them.
+
+        Raises `DropFailedError`.
+        """
+        at = self.times if times is None else np.ascontiguousarray(times, dtype=np.float64)
+        out = self.rows(at)
+        channels = {name: sign * out[:, column] for name, (column, sign) in COLUMNS.items()}
+        recording = Recording(title=self.scenario.title, time=at, channels=channels, source="simulation")
+        return read(self.scenario.effects, recording)
+
+
+def unfit(scenario: Scenario) -> str:
+    """Why a scenario is no drop test that can be run by itself, or nothing."""
+    if not isinstance(scenario.vehicle, Striker):
+        return f"vehicle.kind: not a drop test, got {scenario.vehicle.kind!r}; 'striker' is needed"
+    gradient = normal(scenario.ground.surface)
+    slope = scenario.effects.get("slope")
+    if gradient[2] < 1.0 or (slope is not None and slope.angle != 0.0):
+        return "ground.surface: not level, got an inclination; a drop test by itself needs level ground"
+    return ""
+
+
+def simulate_drop(scenario: Scenario, times: Array | None = None) -> Recording:
+    """Channels of a drop test without the full run. Raises ``ValueError`` if it is none, `DropFailedError`."""
+    return DropModel(scenario=scenario).run(times)

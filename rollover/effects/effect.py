@@ -1,0 +1,88 @@
+"""What an effect is: a term of the simulation that can be switched on, with its numbers and what is known of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any, ClassVar, Literal, NamedTuple
+
+from ground.quantity import parameters, quantities
+from ground.settings import ForceTerm
+from rollover.recording import Recording
+
+EFFECTS: dict[str, type] = {}
+
+Kind = Literal["physics", "parameter", "sensor"]
+
+
+class Search(NamedTuple):
+    """Where to look for a parameter: from `low` to `high`, in even steps of the value or of its logarithm."""
+
+    low: float
+    high: float
+    scale: Literal["log", "linear"] = "linear"
+
+
+@parameters
+class Effect:
+    """A term beyond the basic model; the numbers that a class declares default to a typical strength.
+
+    At `null` it changes nothing, by not one bit: a number, or None where the scenario's own value then holds.
+    A class gives one of: `places` and `force_terms` (the ground's loading curve), `changes` (values of the scenario),
+    `read` (what a sensor makes of a channel); terms on the bodies are read by `rollover.terms`.
+    """
+
+    id: ClassVar[str] = ""
+    kind: ClassVar[Kind] = "physics"
+    family: ClassVar[str] = ""  # what a report names before the member: "a resistance that grows with speed"
+    equation: ClassVar[str] = ""
+    source: ClassVar[str] = ""  # with its confidence: seen, or recalled with high, medium or low confidence
+    sentence: ClassVar[str] = ""  # for a test engineer; {parameter} stands for a value
+    rivals: ClassVar[Mapping[str, str]] = {}  # look-alike -> the test that tells them apart
+    acts: ClassVar[tuple[str, ...]] = ("drop", "rollover")
+    channels: ClassVar[tuple[str, ...]] = ()  # that feel it first
+    null: ClassVar[Mapping[str, float | None]] = {}
+    search: ClassVar[Mapping[str, Search]] = {}
+
+    def __init_subclass__(cls) -> None:
+        """Enter the table. Raises ``TypeError`` for a class without an id and for an id given twice."""
+        known = EFFECTS.get(cls.id)
+        if not cls.id:
+            raise TypeError(f"{cls.__module__}.{cls.__name__}: an effect needs an `id`")
+        if known is not None and (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
+            raise TypeError(f"{cls.__module__}.{cls.__name__}: effect {cls.id!r} is taken by {known.__module__}")
+        EFFECTS[cls.id] = cls
+
+    def places(self) -> Mapping[int, float]:
+        """Numbers for the ground's kernel, by their place (see `ground.kernel`)."""
+        return {}
+
+    def force_terms(self) -> tuple[ForceTerm, ...]:
+        """Compiled forces that are added to the ground's loading curve."""
+        return ()
+
+    def changes(self, scenario: Any) -> Mapping[str, Any]:
+        """Values of the scenario that the effect replaces, by path."""
+        return {}
+
+    def read(self, recording: Recording) -> Recording:
+        """What the sensors make of a recording."""
+        return recording
+
+    def says(self) -> str:
+        """The sentence, with the values in it."""
+        kind: Any = type(self)
+        units = quantities(kind)
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        spoken = {
+            name: f"{value:.3g} {units[name].unit if units[name].unit != '1' else ''}".strip()
+            if isinstance(value, float) and name in units
+            else value
+            for name, value in values.items()
+        }
+        return self.sentence.format(**spoken)
+
+
+def nothing(effect: type[Effect]) -> Effect:
+    """The effect at its null: switched on, and without effect."""
+    return effect(**effect.null)

@@ -1,0 +1,248 @@
+"""Effects of the ground: terms of an element's loading curve, of its way back, of the mass that moves along.
+
+Forces are those of the reference face (140 mm x 45 mm) and grow with the area of contact. `M` in a source: recalled,
+not seen, with high (+), medium or low (-) confidence; a number of that kind is where a search starts, not a truth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar
+
+from ground import kernel as k
+from ground.law import REFERENCE_AREA
+from ground.quantity import Quantity, parameters
+from rollover.effects.effect import Effect, Search
+
+FORCE = ("ground/force_normal", "striker/acceleration_z")
+SPEED = "a resistance of the ground that grows with speed"
+DEPTH = "a resistance of the ground that changes with depth"
+
+
+@parameters
+class SoilViscousDamping(Effect):
+    """F += d v^zeta while the ground is pushed deeper: viscous and radiation damping."""
+
+    damping: Annotated[float, Quantity("N (s/m)^zeta", "d on the reference face", least=0)] = 1500.0
+    exponent: Annotated[float, Quantity("1", "zeta", above=0, most=3)] = 1.0
+
+    id = "soil-viscous-damping"
+    family = SPEED
+    equation = "F += d v^zeta, v > 0, on the loading curve"
+    source = "Ye 2006 eq (1); half-space c = 3.4 r0^2 sqrt(rho G)/(1 - nu) gives 1.1-3.0 kN s/m for G 5-40 MPa (M)"
+    sentence = "The ground resists in proportion to the speed: {damping} on the face, with exponent {exponent}."
+    rivals: ClassVar[Mapping[str, str]] = {
+        "soil-inertial-drag": "drops over a range of speeds of 4 to 1 or more: v against v^2",
+        "soil-rate-hardening": "a slow press test: damping vanishes with v, hardening scales with the force",
+        "soil-stiffness": "the force as v goes to zero at the deepest point: damping leaves it alone",
+    }
+    channels = FORCE
+    null: ClassVar[Mapping[str, float | None]] = {"damping": 0.0}
+    search: ClassVar[Mapping[str, Search]] = {"damping": Search(30.0, 1e4, "log"), "exponent": Search(0.5, 2.0)}
+
+    def places(self) -> Mapping[int, float]:
+        """D and zeta."""
+        return {k.DAMPING: self.damping, k.DAMPING_EXPONENT: self.exponent}
+
+
+@parameters
+class SoilRateHardening(Effect):
+    """F *= 1 + lambda log10(v/v_0) for v > v_0: strength that grows with the logarithm of the rate."""
+
+    per_decade: Annotated[float, Quantity("1", "lambda, gain of strength per decade of rate", least=-0.5, most=1)] = 0.1
+    reference_speed: Annotated[float, Quantity("m/s", "v_0, below it the strength is that of the law", above=0)] = 0.01
+
+    id = "soil-rate-hardening"
+    family = SPEED
+    equation = "F *= 1 + lambda log10(max(v, v_0)/v_0)"
+    source = "s_u = s_u0 (1 + lambda log10(rate/rate_0)), lambda 0.05-0.20 (M+); eq (5) of Ye 2006 softens instead"
+    sentence = "The ground is {per_decade} stronger for each tenfold speed."
+    rivals: ClassVar[Mapping[str, str]] = {
+        "soil-viscous-damping": "a slow press test and drops at small speed",
+        "soil-stiffness": "two speeds a decade apart",
+    }
+    channels = FORCE
+    null: ClassVar[Mapping[str, float | None]] = {"per_decade": 0.0}
+    search: ClassVar[Mapping[str, Search]] = {"per_decade": Search(0.01, 0.5, "log")}
+
+    def places(self) -> Mapping[int, float]:
+        """Lambda and v_0."""
+        return {k.PER_DECADE: self.per_decade, k.SLOW: self.reference_speed}
+
+
+@parameters
+class SoilInertialDrag(Effect):
+    """F += 1/2 C rho A v^2 while the ground is pushed deeper: soil thrown aside (Poncelet)."""
+
+    coefficient: Annotated[float, Quantity("1", "C", least=0)] = 2.0
+    density: Annotated[float, Quantity("kg/m3", "rho of the soil", above=0)] = 1800.0
+
+    id = "soil-inertial-drag"
+    family = SPEED
+    equation = "F += 1/2 C rho A v^2, v > 0, on the loading curve"
+    source = "Poncelet; C 1-4.4 (M), 70-300 N at 3.5 m/s on the reference face"
+    sentence = "Soil that is thrown aside resists with the square of the speed, C = {coefficient}."
+    rivals: ClassVar[Mapping[str, str]] = {
+        "soil-viscous-damping": "drops over a range of speeds of 4 to 1 or more: v^2 against v",
+        "soil-added-mass-growth": "the acceleration of the rebound: a mass that moves along stays, drag does not",
+    }
+    channels = FORCE
+    null: ClassVar[Mapping[str, float | None]] = {"coefficient": 0.0}
+    search: ClassVar[Mapping[str, Search]] = {"coefficient": Search(0.2, 50.0, "log")}
+
+    def places(self) -> Mapping[int, float]:
+        """1/2 C rho A of the reference face."""
+        return {k.DRAG: 0.5 * self.coefficient * self.density * REFERENCE_AREA}
+
+
+@parameters
+class SoilAddedMassGrowth(Effect):
+    """m_b1 += rate dz as the element goes deeper, with the force dm_b1/dt v that sets it moving."""
+
+    rate: Annotated[float, Quantity("kg/m", "of the co-moving mass with depth, on the reference face", least=0)] = 20.0
+
+    id = "soil-added-mass-growth"
+    family = SPEED
+    equation = "m_b1(z) = m_b1(0) + rate z; F_s += rate v^2 (momentum (m + m_b1) v)"
+    source = "m_b1 = rho A (beta z + alpha sqrt A), rho 1700-2000 kg/m3, rho A = 11 kg/m on the reference face (M)"
+    sentence = "The soil that moves along grows by {rate} of depth."
+    rivals: ClassVar[Mapping[str, str]] = {
+        "co-moving-mass": "the impulse of the first contact at a high sampling rate",
+        "soil-inertial-drag": "the acceleration near the deepest point: a mass acts there, drag does not",
+    }
+    channels = FORCE
+    null: ClassVar[Mapping[str, float | None]] = {"rate": 0.0}
+    search: ClassVar[Mapping[str, Search]] = {"rate": Search(1.0, 300.0, "log")}
+
+    def places(self) -> Mapping[int, float]:
+        """dm_b1/dz."""
+        return {k.GROWTH: self.rate}
+
+
+@parameters
+class SoilElasticRebound(Effect):
+    """F = F_max - K_u (z_max - z) with K_u = K'(z_max)/recovery and a light dashpot: ground that springs back."""
+
+    recovery: Annotated[
+        float, Quantity("1", "share of z_max that springs back; none below the law's own", least=0, below=1)
+    ] = 0.1
+    damping_ratio: Annotated[float, Quantity("1", "dashpot of the way back over the critical one", least=0, most=2)] = (
+        0.1
+    )
+
+    id = "soil-elastic-rebound"
+    family = "a way back that is not the plastic one"
+    equation = "K_u = K'(z_max)/max(recovery, that of the law); c_u = 2 damping_ratio sqrt(K_u (m_s + m_b1))"
+    source = "rebound of 2-10 % of z_max in clay (M); the damping ratio is a guess (M-)"
+    sentence = "The ground springs back by {recovery} of the deepest sinkage."
+    rivals: ClassVar[Mapping[str, str]] = {"soil-adhesion": "the sign of the force at lift-off"}
+    channels = ("ground/sinkage", "striker/velocity_z", "ground/force_normal")
+    null: ClassVar[Mapping[str, float | None]] = {"recovery": 0.0, "damping_ratio": 1.0}
+    search: ClassVar[Mapping[str, Search]] = {"recovery": Search(0.02, 0.6, "log"), "damping_ratio": Search(0.0, 1.0)}
+
+    def places(self) -> Mapping[int, float]:
+        """The least share that springs back, and the dashpot over the critical one."""
+        return {k.RECOVERY: self.recovery, k.REBOUND_DAMPING: self.damping_ratio}
+
+
+@parameters
+class SoilAdhesion(Effect):
+    """F >= -c_a A (1 - gap/reach) on the way out: ground that holds the face until a gap has opened."""
+
+    stress: Annotated[float, Quantity("Pa", "c_a, pull-off stress", least=0)] = 5000.0
+    reach: Annotated[float, Quantity("m", "gap at which nothing is held any more", above=0)] = 0.005
+
+    id = "soil-adhesion"
+    family = "a pull at lift-off"
+    equation = "F = max(line, -c_a A max(1 - gap/reach, 0)); gap = rut - z"
+    source = "c_a 1-10 kPa in the field, suction up to 80-100 kPa (M); the reach is a guess (M-)"
+    sentence = "The ground holds on to the face with {stress} when it is pulled out."
+    rivals: ClassVar[Mapping[str, str]] = {
+        "sensor-bias": "the level before contact: a bias stands there too",
+        "soil-elastic-rebound": "a pull-out: lift the striker and watch the sign of the force",
+    }
+    channels = ("ground/force_normal",)
+    null: ClassVar[Mapping[str, float | None]] = {"stress": 0.0}
+    search: ClassVar[Mapping[str, Search]] = {"stress": Search(500.0, 1e5, "log"), "reach": Search(5e-4, 0.05, "log")}
+
+    def places(self) -> Mapping[int, float]:
+        """The pull of the reference face, and its reach."""
+        return {k.ADHESION: self.stress * REFERENCE_AREA, k.REACH: self.reach}
+
+
+@parameters
+class SoilLayer(Effect):
+    """K' *= ratio below a depth: a hardpan or plough sole, or a soft layer."""
+
+    depth: Annotated[float, Quantity("m", "of the layer's top; sinkage", above=0)] = 0.25
+    stiffness_ratio: Annotated[float, Quantity("1", "of K' below to K' above", above=0)] = 3.0
+
+    id = "soil-layer"
+    family = DEPTH
+    equation = "F = ratio K'(z) z for z > depth"
+    source = "hardpan at 0.2-0.35 m, cone index ratio 2-4 (M)"
+    sentence = "Below {depth} the ground is {stiffness_ratio} times as stiff."
+    rivals: ClassVar[Mapping[str, str]] = {
+        "soil-viscous-damping": "two speeds: a layer keeps its depth, damping does not",
+        "soil-crust": "a drop that ends above the step in depth",
+    }
+    channels = FORCE
+    null: ClassVar[Mapping[str, float | None]] = {"stiffness_ratio": 1.0}
+    search: ClassVar[Mapping[str, Search]] = {
+        "depth": Search(0.005, 0.6, "log"),
+        "stiffness_ratio": Search(0.2, 8.0, "log"),
+    }
+
+    def places(self) -> Mapping[int, float]:
+        """Depth and ratio."""
+        return {k.LAYER_DEPTH: self.depth, k.LAYER_RATIO: self.stiffness_ratio}
+
+
+@parameters
+class SoilCrust(Effect):
+    """K' *= ratio above a depth: a dry crust, or a soft or wet top."""
+
+    thickness: Annotated[float, Quantity("m", "of the crust; sinkage", above=0)] = 0.04
+    stiffness_ratio: Annotated[float, Quantity("1", "of K' in the crust to K' below", above=0)] = 2.0
+
+    id = "soil-crust"
+    family = DEPTH
+    equation = "F = ratio K'(z) z for z < thickness"
+    source = "20-80 mm (M)"
+    sentence = "The upper {thickness} of the ground are {stiffness_ratio} times as stiff as what lies below."
+    rivals: ClassVar[Mapping[str, str]] = {
+        "soil-layer": "a drop that goes deeper than the step in depth",
+        "co-moving-mass": "the impulse of the first contact: a crust has none",
+    }
+    channels = FORCE
+    null: ClassVar[Mapping[str, float | None]] = {"stiffness_ratio": 1.0}
+    search: ClassVar[Mapping[str, Search]] = {
+        "thickness": Search(0.005, 0.2, "log"),
+        "stiffness_ratio": Search(0.2, 8.0, "log"),
+    }
+
+    def places(self) -> Mapping[int, float]:
+        """Depth and ratio."""
+        return {k.CRUST_DEPTH: self.thickness, k.CRUST_RATIO: self.stiffness_ratio}
+
+
+@parameters
+class GroundFriction(Effect):
+    """|F_t| <= mu F_n: sliding resistance of the ground's elements, in place of the scenario's coefficient."""
+
+    coefficient: Annotated[float | None, Quantity("1", "mu", least=0, most=2)] = 0.4
+
+    id = "ground-friction"
+    family = "a force along the surface"
+    equation = "|F_t| <= mu F_n"
+    source = "mu 0.13-0.85 in the literature on rollover and skid tests (M)"
+    sentence = "Structure and ground rub on each other with mu = {coefficient}."
+    rivals: ClassVar[Mapping[str, str]] = {"slope": "the lateral acceleration before contact: friction has none there"}
+    acts = ("rollover",)
+    channels = ("ground/force_tangential", "chassis/yaw", "chassis/angular_velocity_x")
+    null: ClassVar[Mapping[str, float | None]] = {"coefficient": None}
+    search: ClassVar[Mapping[str, Search]] = {"coefficient": Search(0.05, 1.2)}
+
+    def changes(self, scenario: Any) -> Mapping[str, Any]:
+        """The scenario's coefficient of friction."""
+        return {} if self.coefficient is None else {"ground.friction.coefficient": self.coefficient}

@@ -1,0 +1,304 @@
+"""Effects of sensors: what is read instead of what is, y = clip(G (R h x)(t - t_0 - e t) + b), one channel each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Annotated, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ground.quantity import Quantity, parameters
+from rollover.channels import is_known
+from rollover.effects.effect import Effect, Kind, Search
+from rollover.recording import Recording
+
+Array = NDArray[np.float64]
+READ = "one channel and no other: a missing force acts on all that feel it"
+
+
+def _checked(channel: str) -> None:
+    if not is_known(channel) or channel == "time":
+        raise ValueError(f"channel: unknown channel, got {channel!r}; see `rollover list channels`")
+
+
+def _with(recording: Recording, channel: str, values: Array) -> Recording:
+    return replace(recording, channels={**recording.channels, channel: values})
+
+
+@parameters
+class SensorMisalignment(Effect):
+    """y = cos(angle) x + sin(angle) x_across: a sensor whose axis is turned towards the next one."""
+
+    channel: Annotated[str, "that is misread"] = "striker/acceleration_z"
+    angle: Annotated[float, Quantity("rad", "between the sensor's axis and its channel", least=-1.6, most=1.6)] = 0.05
+
+    id = "sensor-misalignment"
+    kind: ClassVar[Kind] = "sensor"
+    family = "a sensor that points elsewhere"
+    equation = "y = cos(angle) x + sin(angle) x_across; across: y for x, z for y, x for z, tangential for normal"
+    source = "mounting, 1-5 deg (M)"
+    sentence = "The sensor of {channel} is turned by {angle}."
+    rivals: ClassVar[Mapping[str, str]] = {
+        "sensor-gain": "a motion across the channel: a gain reads nothing of it",
+        "slope": "turn the vehicle: a misaligned sensor turns with it",
+    }
+    null: ClassVar[Mapping[str, float | None]] = {"angle": 0.0}
+    search: ClassVar[Mapping[str, Search]] = {"angle": Search(-0.3, 0.3)}
+
+    def validate(self) -> None:
+        """Refuse a channel that does not exist."""
+        _checked(self.channel)
+
+    def read(self, recording: Recording) -> Recording:
+        """Mix in the channel across, where there is one."""
+        if self.angle == 0.0 or self.channel not in recording.channels:
+            return recording
+        stem, axis = self.channel[:-1], self.channel[-1:]
+        across = stem + {"x": "y", "y": "z", "z": "x"}.get(axis, "") if stem.endswith("_") else ""
+        if self.channel.endswith("force_normal"):
+            across = self.channel.replace("force_normal", "force_tangential")
+        read = math.cos(self.angle) * recording[self.channel]
+        if across in recording.channels:
+            read = read + math.sin(self.angle) * recording[across]
+        return _with(recording, self.channel, read)
+
+
+@parameters
+class SensorLag(Effect):
+    """tau dy/dt = x - y: a slow sensor or a filter of first order that nobody wrote down."""
+
+    channel: Annotated[str, "that is misread"] = "ground/force_normal"
+    time: Annotated[float, Quantity("s", "tau", least=0)] = 0.002
+
+    id = "sensor-lag"
+    kind: ClassVar[Kind] = "sensor"
+    family = "a channel that comes late"
+    equation = "tau dy/dt = x - y"
+    source = "CFC 60 cuts at 100 Hz, about 2 ms (M+)"
+    sentence = "{channel} lags by {time}: its edges are round."
+    rivals: ClassVar[Mapping[str, str]] = {
+        "sensor-clock-offset": "a sharp edge: a lag rounds it, a clock only moves it",
+    }
+    null: ClassVar[Mapping[str, float | None]] = {"time": 0.0}
+    search: ClassVar[Mapping[str, Search]] = {"time": Search(1e-4, 0.05, "log")}
+
+    def validate(self) -> None:
+        """Refuse a channel that does not exist."""
+        _checked(self.channel)
+
+    def read(self, recording: Recording) -> Recording:
+        """Solve the lag exactly for a signal that is straight between its samples; it begins settled."""
+        if self.time == 0.0 or self.channel not in recording.channels:
+            return recording
+        x, h = recording[self.channel], np.diff(recording.time)
+        ratio = h / self.time
+        fade = np.exp(-ratio)
+        rest = -np.expm1(-ratio) / ratio  # mean of the fading over the step
+        gain_old, gain_new = rest - fade, 1.0 - rest
+        y = x.copy()
+        for i in range(len(h)):
+            y[i + 1] = fade[i] * y[i] + gain_old[i] * x[i] + gain_new[i] * x[i + 1]
+        return _with(recording, self.channel, y)
+
+
+@parameters
+class SensorScale(Effect):
+    """y = scale x: a position or length channel with a wrong scale."""
+
+    channel: Annotated[str, "that is misread; a position or a length"] = "ground/sinkage"
+    scale: Annotated[float, Quantity("1", "what is read over what is", above=0, most=10)] = 1.02
+
+    id = "sensor-scale"
+    kind: ClassVar[Kind] = "sensor"
+    family = "a channel read at a wrong scale"
+    equation = "y = scale x"
+    source = "1-2 % for displacement sensors (M)"
+    sentence = "{channel} reads {scale} times what is."
+    rivals: ClassVar[Mapping[str, str]] = {
+        "co-moving-mass": "the double integral of the acceleration against the displacement",
+        "impact-speed": "the double integral of the acceleration against the displacement",
+    }
+    null: ClassVar[Mapping[str, float | None]] = {"scale": 1.0}
+    search: ClassVar[Mapping[str, Search]] = {"scale": Search(0.8, 1.25, "log")}
+
+    def validate(self) -> None:
+        """Refuse a channel that does not exist."""
+        _checked(self.channel)
+
+    def read(self, recording: Recording) -> Recording:
+        """Scale the channel."""
+        if self.channel not in recording.channels:
+            return recording
+        return _with(recording, self.channel, self.scale * recording[self.channel])
+
+
+@parameters
+class SensorGain(Effect):
+    """y = gain x: an amplifier that is not what its calibration says."""
+
+    channel: Annotated[str, "that is misread"] = "ground/force_normal"
+    gain: Annotated[float, Quantity("1", "what is read over what is", least=-10, most=10)] = 1.03
+
+    id = "sensor-gain"
+    kind: ClassVar[Kind] = "sensor"
+    family = "a channel read at a wrong scale"
+    equation = "y = gain x"
+    source = "1-5 % (M)"
+    sentence = "{channel} reads {gain} times what is."
+    rivals: ClassVar[Mapping[str, str]] = {
+        "sensor-bias": "the level before contact, where a gain reads nothing",
+        "mass": "the level at rest against a weighed mass",
+    }
+    null: ClassVar[Mapping[str, float | None]] = {"gain": 1.0}
+    search: ClassVar[Mapping[str, Search]] = {"gain": Search(0.7, 1.4, "log")}
+
+    def validate(self) -> None:
+        """Refuse a channel that does not exist."""
+        _checked(self.channel)
+
+    def read(self, recording: Recording) -> Recording:
+        """Scale the channel."""
+        if self.channel not in recording.channels:
+            return recording
+        return _with(recording, self.channel, self.gain * recording[self.channel])
+
+
+@parameters
+class SensorClockOffset(Effect):
+    """y(t) = x(t - offset): a channel whose clock started at another time."""
+
+    channel: Annotated[str, "that is misread"] = "ground/force_normal"
+    offset: Annotated[float, Quantity("s", "by which it comes late", least=-1, most=1)] = 0.002
+
+    id = "sensor-clock-offset"
+    kind: ClassVar[Kind] = "sensor"
+    family = "a channel that comes late"
+    equation = "y(t) = x(t - offset)"
+    source = "recorders that were started by hand or by a trigger of their own (M)"
+    sentence = "{channel} comes {offset} late."
+    rivals: ClassVar[Mapping[str, str]] = {
+        "sensor-lag": "a sharp edge: a lag rounds it, a clock only moves it",
+        "sensor-clock-drift": "two events far apart in time",
+    }
+    null: ClassVar[Mapping[str, float | None]] = {"offset": 0.0}
+    search: ClassVar[Mapping[str, Search]] = {"offset": Search(-0.05, 0.05)}
+
+    def validate(self) -> None:
+        """Refuse a channel that does not exist."""
+        _checked(self.channel)
+
+    def read(self, recording: Recording) -> Recording:
+        """Shift the channel; beyond its ends it stays what it was there."""
+        if self.offset == 0.0 or self.channel not in recording.channels:
+            return recording
+        late = np.interp(recording.time - self.offset, recording.time, recording[self.channel])
+        return _with(recording, self.channel, late)
+
+
+@parameters
+class SensorClockDrift(Effect):
+    """y(t) = x(t - drift t): a channel whose clock runs at another rate."""
+
+    channel: Annotated[str, "that is misread"] = "ground/force_normal"
+    drift: Annotated[float, Quantity("1", "seconds late per second", least=-0.5, most=0.5)] = 1e-3
+
+    id = "sensor-clock-drift"
+    kind: ClassVar[Kind] = "sensor"
+    family = "a channel that comes late"
+    equation = "y(t) = x((1 - drift) t)"
+    source = "20-100 ppm for quartz (M+); more where two recorders were joined"
+    sentence = "The clock of {channel} falls behind by {drift} of the time."
+    rivals: ClassVar[Mapping[str, str]] = {"sensor-clock-offset": "two events far apart in time"}
+    null: ClassVar[Mapping[str, float | None]] = {"drift": 0.0}
+    search: ClassVar[Mapping[str, Search]] = {"drift": Search(-0.05, 0.05)}
+
+    def validate(self) -> None:
+        """Refuse a channel that does not exist."""
+        _checked(self.channel)
+
+    def read(self, recording: Recording) -> Recording:
+        """Stretch the channel; beyond its ends it stays what it was there."""
+        if self.drift == 0.0 or self.channel not in recording.channels:
+            return recording
+        late = np.interp((1.0 - self.drift) * recording.time, recording.time, recording[self.channel])
+        return _with(recording, self.channel, late)
+
+
+@parameters
+class SensorBias(Effect):
+    """y = x + bias: a zero that was not set, or that moved."""
+
+    channel: Annotated[str, "that is misread"] = "ground/force_normal"
+    bias: Annotated[float, Quantity("SI unit of the channel", "what is read of nothing")] = 50.0
+
+    id = "sensor-bias"
+    kind: ClassVar[Kind] = "sensor"
+    family = "a channel read with an offset"
+    equation = "y = x + bias"
+    source = "definition"
+    sentence = "{channel} reads {bias} too much throughout."
+    rivals: ClassVar[Mapping[str, str]] = {
+        "sensor-gain": "the level before contact, where a gain reads nothing",
+        "soil-adhesion": "the level before contact, where nothing holds",
+    }
+    null: ClassVar[Mapping[str, float | None]] = {"bias": 0.0}
+    search: ClassVar[Mapping[str, Search]] = {"bias": Search(-500.0, 500.0)}
+
+    def validate(self) -> None:
+        """Refuse a channel that does not exist."""
+        _checked(self.channel)
+
+    def read(self, recording: Recording) -> Recording:
+        """Shift the channel's values."""
+        if self.bias == 0.0 or self.channel not in recording.channels:
+            return recording
+        return _with(recording, self.channel, recording[self.channel] + self.bias)
+
+
+@parameters
+class SensorClipping(Effect):
+    """y = min(max(x, -limit), limit): an amplifier or converter at the end of its range."""
+
+    channel: Annotated[str, "that is misread"] = "ground/force_normal"
+    limit: Annotated[float | None, Quantity("SI unit of the channel", "end of the range to both sides", above=0)] = 3e3
+
+    id = "sensor-clipping"
+    kind: ClassVar[Kind] = "sensor"
+    family = "a channel cut off at its range"
+    equation = "y = min(max(x, -limit), limit)"
+    source = "definition"
+    sentence = "{channel} ends at {limit}: its tops are flat."
+    rivals: ClassVar[Mapping[str, str]] = {
+        "rops-plasticity": "a second channel that feels the force: it goes on rising"
+    }
+    null: ClassVar[Mapping[str, float | None]] = {"limit": None}
+    search: ClassVar[Mapping[str, Search]] = {"limit": Search(10.0, 1e6, "log")}
+
+    def validate(self) -> None:
+        """Refuse a channel that does not exist."""
+        _checked(self.channel)
+
+    def read(self, recording: Recording) -> Recording:
+        """Cut the channel off."""
+        if self.limit is None or self.channel not in recording.channels:
+            return recording
+        return _with(recording, self.channel, np.clip(recording[self.channel], -self.limit, self.limit))
+
+
+# in which what is read comes about, whatever the order in a file
+ORDER = tuple(
+    kind.id
+    for kind in (
+        SensorMisalignment,
+        SensorLag,
+        SensorScale,
+        SensorGain,
+        SensorClockOffset,
+        SensorClockDrift,
+        SensorBias,
+        SensorClipping,
+    )
+)

@@ -1,0 +1,292 @@
+"""Compiled: a striker that falls on level ground, integrated by itself with the kernels of the full run.
+
+Depth x is positive down. A rigid striker has one coordinate; one that gives way has two, nose and body. Within a step
+the classical Runge-Kutta formula is used; steps end where the force has a kink or a jump, where the motion turns, and
+where the contact begins or ends, so that no step lies across one of these.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ground.compiled import compiled
+from ground.kernel import (
+    ADHESION,
+    AREA,
+    COLUMNS,
+    CRUST_DEPTH,
+    CRUST_RATIO,
+    EFFECTS,
+    GROWING,
+    IDLE,
+    LAYER_DEPTH,
+    LAYER_RATIO,
+    LINE_C,
+    LINE_K,
+    LINE_Z,
+    LOADING,
+    MASS_B,
+    MODE,
+    PLASTIC,
+    REBOUND_DAMPING,
+    RELEASED,
+    SAME,
+    SINKAGE,
+    STATE_COLUMNS,
+    TOUCH_SPEED,
+    UNLOADING,
+    begin,
+    commit,
+    lets_go,
+    loading_force,
+    normal_force,
+    rut_depth,
+)
+from ground.law import BRANCH, REFERENCE_AREA
+from rollover.terms import CREEP
+
+# numbers of a drop: kg, kg, N/m, N s/m (no spring: rigid), -, m2, kg, N s, m/s2, m/s, s, N, N s2/m2
+MASS, NOSE, SPRING, DASHPOT, FRACTION, FACE, LAW_MASS, MOMENTUM_MOST, GRAVITY, IMPACT_SPEED, STEP, GUIDE, AIR = range(
+    13
+)
+NUMBERS = 13
+# columns of what comes out
+OUT_FORCE, OUT_SINKAGE, OUT_X, OUT_V, OUT_A, OUT_IMPULSE, OUT_COLUMNS = 0, 1, 2, 3, 4, 5, 6
+
+RESOLVED = 0.25  # longest step times the frequency on the ground
+CLOSE = 1e-7  # m: how near a step ends to a jump of the force
+
+
+@compiled
+def free(g: float, mass: float, guide: float, air: float, v: float) -> float:
+    """Downward acceleration of a body that falls with v on a guide through air, m/s2."""
+    if guide == 0.0 and air == 0.0:
+        return g
+    return g - (guide * min(max(v / CREEP, -1.0), 1.0) + air * v * abs(v)) / mass
+
+
+@compiled
+def fall_back(g: float, mass: float, guide: float, air: float, v: float, time: float) -> Any:
+    """Depth (m) and speed (m/s) `time` seconds before a body that falls freely has depth 0 and speed v."""
+    if guide == 0.0 and air == 0.0:
+        return -(v * time - 0.5 * g * time * time), v - g * time
+    x, count = 0.0, max(math.ceil(time / 1e-3), 1)
+    h = -time / count
+    for _ in range(count):
+        k1 = free(g, mass, guide, air, v)
+        k2 = free(g, mass, guide, air, v + 0.5 * h * k1)
+        k3 = free(g, mass, guide, air, v + 0.5 * h * k2)
+        k4 = free(g, mass, guide, air, v + h * k3)
+        x += h * (v + h * (k1 + k2 + k3) / 6.0)
+        v += h * (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0
+    return x, v
+
+
+@compiled
+def accelerate(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, a: Any) -> float:
+    """Accelerations of nose and body into a (2,); returns the ground's spring force, N. y: x, v of both."""
+    force = normal_force(law, p, s, row, y[0], y[1]) if state[MODE] != IDLE else 0.0
+    nose = f[NOSE] * free(f[GRAVITY], f[MASS], f[GUIDE], f[AIR], y[1]) - force
+    if f[SPRING] > 0.0:
+        between = f[SPRING] * (y[2] - y[0]) + f[DASHPOT] * (y[3] - y[1])
+        nose += between
+        a[1] = free(f[GRAVITY], f[MASS], f[GUIDE], f[AIR], y[3]) - between / (f[MASS] - f[NOSE])
+    a[0] = nose / (f[NOSE] + row[MASS_B])
+    if f[SPRING] <= 0.0:
+        a[1] = a[0]
+    return force
+
+
+@compiled
+def advance(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, h: float, a: Any, end: Any) -> None:
+    """One step of the classical Runge-Kutta formula from y to `end`; a (4, 2) holds the stages' accelerations."""
+    for stage in range(4):
+        if stage == 0:
+            for k in range(4):
+                end[k] = y[k]
+        else:
+            part = h if stage == 3 else 0.5 * h
+            for k in range(2):
+                # velocity of the stage before this one: its own start plus what it had gained
+                before = 0.0 if stage == 1 else (0.5 * h) * a[stage - 2, k]
+                end[2 * k] = y[2 * k] + part * (y[2 * k + 1] + before)
+                end[2 * k + 1] = y[2 * k + 1] + part * a[stage - 1, k]
+        accelerate(law, p, s, row, state, f, end, a[stage])
+    for k in range(2):
+        end[2 * k] = y[2 * k] + h * (y[2 * k + 1] + h * (a[0, k] + a[1, k] + a[2, k]) / 6.0)
+        end[2 * k + 1] = y[2 * k + 1] + h * (a[0, k] + 2.0 * a[1, k] + 2.0 * a[2, k] + a[3, k]) / 6.0
+
+
+@compiled
+def between_ends(theta: float, h: float, u0: float, d0: float, u1: float, d1: float) -> float:
+    """Cubic through values u and rates d at both ends of a step."""
+    w = 1.0 - theta
+    return (
+        w * w * (1.0 + 2.0 * theta) * u0
+        + theta * theta * (3.0 - 2.0 * theta) * u1
+        + h * theta * w * (w * d0 - theta * d1)
+    )
+
+
+@compiled
+def crossing(level: float, h: float, u0: float, d0: float, u1: float, d1: float) -> float:
+    """Share of the step at which the cubic passes `level`, which lies between its ends."""
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if (between_ends(middle, h, u0, d0, u1, d1) - level) * (u0 - level) > 0.0:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+@compiled
+def levels(law: Any, p: Any, s: Any, row: Any, state: Any, out: Any) -> int:
+    """Depths at which the force may have a kink or a jump, or the contact begin or end, into out (5,)."""
+    if state[MODE] == IDLE:
+        out[0] = rut_depth(row)
+        return 1
+    e = law[EFFECTS]
+    out[0] = lets_go(law, p, row) if law[PLASTIC] != 0 else 0.0
+    out[1] = row[LINE_Z]
+    out[2] = s[BRANCH]
+    count = 3
+    if p[e + LAYER_RATIO] != 1.0:
+        out[count] = p[e + LAYER_DEPTH]
+        count += 1
+    if p[e + CRUST_RATIO] != 1.0:
+        out[count] = p[e + CRUST_DEPTH]
+        count += 1
+    return count
+
+
+@compiled
+def hit(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any) -> float:
+    """Begin a contact: latch the speed, share momentum with the co-moving mass; returns the impulse, N s."""
+    row[TOUCH_SPEED], row[SINKAGE] = y[1], y[0]
+    row[MASS_B] = f[FRACTION] * f[NOSE] if y[1] > 0.0 else 0.0
+    mass = min(f[LAW_MASS], f[MOMENTUM_MOST] / max(y[1], 1e-12))
+    begin(law, p, s, row, state, mass, y[0])
+    y[0] = max(y[0], SAME)  # in the ground: what depends on the rate alone acts at once
+    y[1] *= f[NOSE] / (f[NOSE] + row[MASS_B])
+    if f[SPRING] <= 0.0:
+        y[3] = y[1]
+    return row[MASS_B] * y[1]  # type: ignore[no-any-return]
+
+
+@compiled
+def settle_one(law: Any, p: Any, row: Any, state: Any, nose: float) -> None:
+    """Give an arrested element its dashpot, 2 K_u/omega of what stands on it (see `rollover.step.settle`)."""
+    if state[MODE] == UNLOADING and row[LINE_C] == 0.0 and row[LINE_K] > 0.0:
+        omega = math.sqrt(row[LINE_K] * row[AREA] / REFERENCE_AREA / (nose + row[MASS_B]))
+        row[LINE_C] = 2.0 * p[law[EFFECTS] + REBOUND_DAMPING] * row[LINE_K] / omega
+
+
+@compiled
+def steepness(law: Any, p: Any, s: Any, row: Any, state: Any) -> float:
+    """Stiffness of the ground as it is met now, N/m: of the line, or the secant of the loading curve."""
+    if state[MODE] == IDLE:
+        return 0.0
+    if state[MODE] == UNLOADING:
+        return row[LINE_K] * row[AREA] / REFERENCE_AREA  # type: ignore[no-any-return]
+    z = max(row[SINKAGE], 1e-6)
+    return loading_force(law, p, s, z, 0.0) / z * row[AREA] / REFERENCE_AREA  # type: ignore[no-any-return]
+
+
+@compiled
+def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
+    """Fall on the ground at t = 0 with IMPACT_SPEED; rows (OUT_COLUMNS) at `times` (s, rising) into `out`.
+
+    `memory` is the length of an element's memory. x, v and a are those of the body, which carries the instruments.
+    Returns the number of steps, or -1 if the state left what can be.
+    """
+    row, state, s = np.zeros(COLUMNS), np.zeros(STATE_COLUMNS, np.int64), np.zeros(memory)
+    y, end, a, now, stops = np.zeros(4), np.zeros(4), np.zeros((4, 2)), np.zeros(2), np.zeros(5)
+    at = np.zeros(4)
+    i, n = 0, times.size
+    g, m, guide, air = f[GRAVITY], f[MASS], f[GUIDE], f[AIR]
+    while i < n and times[i] < 0.0:
+        x, v = fall_back(g, m, guide, air, f[IMPACT_SPEED], -times[i])
+        out[i, OUT_FORCE], out[i, OUT_SINKAGE], out[i, OUT_IMPULSE] = 0.0, 0.0, 0.0
+        out[i, OUT_X], out[i, OUT_V], out[i, OUT_A] = x, v, free(g, m, guide, air, v)
+        i += 1
+    row[AREA] = f[FACE]
+    y[1], y[3] = f[IMPACT_SPEED], f[IMPACT_SPEED]
+    impulse = hit(law, p, s, row, state, f, y)
+    pull = p[law[EFFECTS] + ADHESION] * f[FACE] / REFERENCE_AREA
+    t, steps = 0.0, 0
+    most = 10_000 + 200 * int(max(times[n - 1], 0.0) / f[STEP]) if n > 0 else 0
+    while i < n:
+        steps += 1
+        h = min(f[STEP], RESOLVED * math.sqrt((f[NOSE] + row[MASS_B]) / max(steepness(law, p, s, row, state), 1e-9)))
+        advance(law, p, s, row, state, f, y, h, a, end)
+        if steps > most or not (abs(end[1]) < 1e4 and abs(end[3]) < 1e4):
+            return -1
+        share, jump = 1.0, 0.0
+        for k in range(levels(law, p, s, row, state, stops)):
+            level = stops[k]
+            way = 1.0 if end[0] > y[0] else -1.0
+            near = level - way * CLOSE if k > 2 else level
+            if abs(y[0] - level) > 2.0 * CLOSE and (y[0] - near) * (end[0] - near) < 0.0:
+                theta = crossing(near, h, y[0], y[1], end[0], end[1])
+                if theta < share:
+                    share, jump = theta, way * 2.0 * CLOSE if k > 2 else 0.0
+        turning = state[MODE] == LOADING and y[1] > 0.0 and end[1] < 0.0
+        if turning:
+            accelerate(law, p, s, row, state, f, end, now)
+            theta = crossing(0.0, h, y[1], a[0, 0], end[1], now[0])
+            turning = theta <= share
+            if turning:
+                share, jump = theta, 0.0
+        if share < 1.0:
+            h = max(share, 1e-9) * h
+            advance(law, p, s, row, state, f, y, h, a, end)
+        if turning:
+            end[1] = 0.0
+            if f[SPRING] <= 0.0:
+                end[3] = 0.0
+        if times[i] <= t + h:
+            accelerate(law, p, s, row, state, f, end, now)
+            first0, first1, last0, last1 = a[0, 0], a[0, 1], now[0], now[1]
+            while i < n and times[i] <= t + h:
+                theta = max((times[i] - t) / h, 0.0)
+                at[0] = between_ends(theta, h, y[0], y[1], end[0], end[1])
+                at[1] = between_ends(theta, h, y[1], first0, end[1], last0)
+                at[2] = between_ends(theta, h, y[2], y[3], end[2], end[3])
+                at[3] = between_ends(theta, h, y[3], first1, end[3], last1)
+                force = accelerate(law, p, s, row, state, f, at, now)
+                touching = state[MODE] != IDLE
+                # (1) without the collision: F_s = F + m_b1 a
+                out[i, OUT_FORCE] = force + row[MASS_B] * now[0] if touching else 0.0
+                out[i, OUT_SINKAGE] = at[0] if touching else 0.0
+                out[i, OUT_X], out[i, OUT_V], out[i, OUT_A] = at[2], at[3], now[1]
+                out[i, OUT_IMPULSE] = impulse
+                i += 1
+        t += h
+        for k in range(4):
+            y[k] = end[k]
+        y[0] += jump
+        if f[SPRING] <= 0.0:
+            y[2] = y[0]
+        if state[MODE] == IDLE:
+            if y[0] >= rut_depth(row) - SAME and y[1] > 0.0:
+                impulse += hit(law, p, s, row, state, f, y)
+        else:
+            outcome = commit(law, p, s, row, state, y[0], y[1], h, f[LAW_MASS] * f[FACE] / REFERENCE_AREA)
+            if turning:
+                y[0] -= 2.0 * SAME  # the way back begins on the line, with its dashpot
+            if y[0] <= 0.0:
+                outcome |= RELEASED
+            if row[MASS_B] > 0.0:
+                force = accelerate(law, p, s, row, state, f, y, now)
+                if force + row[MASS_B] * now[0] < -pull:
+                    row[MASS_B], row[GROWING] = 0.0, 0.0  # it would have to be pulled along: it stays in the soil
+            if outcome & RELEASED:
+                state[MODE] = IDLE
+                row[MASS_B], row[GROWING] = 0.0, 0.0
+        settle_one(law, p, row, state, f[NOSE])
+    return steps

@@ -1,0 +1,178 @@
+"""Compiled: forces on the bodies beyond ground, tyres and mounts, and the work that they take.
+
+A row of `term_i` says kind and bodies, the same row of `term_f` its numbers. What a term holds as energy and the power
+that it takes are kept for the start of the step and for now; the ledger books the difference and the mean.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ground.compiled import compiled
+from rollover.tables import EXTRA_WORK, OMEGA, ROT, VEL, X
+from rollover.vectors import add_force, direction_row, relative_angle, spin, to_body, to_world, velocity
+
+GUIDE_BRAKE, AIR_DRAG, BETWEEN, ROTOR, REACTION, BED = 0, 1, 2, 3, 4, 5  # kinds
+HELD, POWER, HELD_NOW, POWER_NOW, TERM_MEMORY = 0, 1, 2, 3, 4  # columns of term_memory
+# numbers of a bed: place on the chassis (3), stiffness and damping across it, both about it, spring, dashpot and
+# coefficient of friction along y, travel to either side
+B_PLACE, B_K, B_C, B_KR, B_CR, B_SPRING, B_DASHPOT, B_MU, B_TRAVEL = 0, 3, 4, 5, 6, 7, 8, 9, 10
+TERM_NUMBERS = 11
+WEIGHT = 10.0  # N/kg, what presses a load on its bed as far as Newton's matrix is concerned
+WALL = 0.005  # m, in a wall, over which its dashpot grows to its whole
+CREEP = 0.005  # m/s: below it the friction of the guide is a dashpot, so that it has a value at rest
+
+
+@compiled
+def try_terms(t: Any, Q: Any) -> None:
+    """Forces of all terms at the poses that were read last."""
+    for i in range(t.term_i.shape[0]):
+        kind, b, other = t.term_i[i]
+        f, g, row = t.term_f[i], t.term_memory[i], t.pose[b]
+        held, power = 0.0, 0.0
+        if kind == GUIDE_BRAKE:
+            v = row[VEL + 2]
+            force = -f[0] * min(max(v / CREEP, -1.0), 1.0)
+            Q[6 * b + 2] += force
+            power = -force * v
+        elif kind == AIR_DRAG:
+            speed = np.sqrt(row[VEL] ** 2 + row[VEL + 1] ** 2 + row[VEL + 2] ** 2)
+            for k in range(3):
+                Q[6 * b + k] -= f[0] * speed * row[VEL + k]
+            power = f[0] * speed**3
+        elif kind == BETWEEN:
+            # nose b below, body `other` above on the same guide
+            shut = f[2] - (t.pose[other, X + 2] - row[X + 2])
+            rate = row[VEL + 2] - t.pose[other, VEL + 2]
+            force = f[0] * shut + f[1] * rate
+            Q[6 * b + 2] -= force
+            Q[6 * other + 2] += force
+            held, power = 0.5 * f[0] * shut * shut, f[1] * rate * rate
+        elif kind == ROTOR:
+            # the rotor's angular momentum turns with the body: -omega x H, which does no work
+            for k in range(3):
+                m, n = (k + 1) % 3, (k + 2) % 3
+                Q[6 * b + 3 + k] -= row[OMEGA + m] * f[n] - row[OMEGA + n] * f[m]
+        elif kind == REACTION:
+            Q[6 * b + 4] -= f[0]
+            power = f[0] * row[OMEGA + 1]
+        elif kind == BED:
+            held, power = try_bed(t, i, Q)
+        g[HELD_NOW], g[POWER_NOW] = held, power
+
+
+@compiled
+def try_bed(t: Any, i: int, Q: Any) -> Any:
+    """Forces between chassis and a mass that moves along its y on a bed; returns energy held and power taken.
+
+    Across the bed stiff springs hold the mass. Along y: spring, dashpot, friction mu N clip(v/v_c, +-1), and beyond the
+    travel a stop as stiff as the bed.
+    """
+    c, b, f = t.term_i[i, 1], t.term_i[i, 2], t.term_f[i]
+    chassis, load = t.pose[c], t.pose[b]
+    local, force, torque = np.empty(3), np.zeros(3), np.zeros(3)
+    local[0], local[1], local[2] = to_body(
+        chassis, load[X] - chassis[X], load[X + 1] - chassis[X + 1], load[X + 2] - chassis[X + 2]
+    )
+    v, w = velocity(load, 0.0, 0.0, 0.0), velocity(chassis, local[0], local[1], local[2])
+    rate = to_body(chassis, v[0] - w[0], v[1] - w[1], v[2] - w[2])
+    turn = to_body(chassis, *spin(load))
+    held, power = 0.0, 0.0
+    for k in range(3):
+        d = local[k] - f[B_PLACE + k]
+        if k != 1:
+            force[k] = -f[B_K] * d - f[B_C] * rate[k]
+            held += 0.5 * f[B_K] * d * d
+            power += f[B_C] * rate[k] * rate[k]
+        else:
+            beyond = d - min(max(d, -f[B_TRAVEL]), f[B_TRAVEL])
+            # the wall's dashpot grows from nothing, so that a load meets it without a jump
+            dashpot = f[B_DASHPOT] + f[B_C] * min(abs(beyond) / WALL, 1.0)
+            force[1] = -f[B_SPRING] * d - f[B_K] * beyond - dashpot * rate[1]
+            held += 0.5 * f[B_SPRING] * d * d + 0.5 * f[B_K] * beyond * beyond
+            power += dashpot * rate[1] * rate[1]
+        angle, slip = relative_angle(chassis, load, k), turn[k] - chassis[OMEGA + k]
+        torque[k] = -f[B_KR] * angle - f[B_CR] * slip
+        held += 0.5 * f[B_KR] * angle * angle
+        power += f[B_CR] * slip * slip
+    normal = np.sqrt(force[0] * force[0] + force[2] * force[2])
+    rub = f[B_MU] * normal * min(max(rate[1] / CREEP, -1.0), 1.0)
+    force[1] -= rub
+    power += rub * rate[1]
+    x, y, z = to_world(chassis, force[0], force[1], force[2])
+    add_force(load, b, np.zeros(3), x, y, z, Q)
+    add_force(chassis, c, local, -x, -y, -z, Q)
+    x, y, z = to_world(chassis, torque[0], torque[1], torque[2])
+    on_load = to_body(load, x, y, z)
+    for k in range(3):
+        Q[6 * b + 3 + k] += on_load[k]
+        Q[6 * c + 3 + k] -= torque[k]
+    return held, power
+
+
+@compiled
+def finish_terms(t: Any, h: float) -> None:
+    """Book what the terms took in a step, and start the next one."""
+    for i in range(t.term_i.shape[0]):
+        g = t.term_memory[i]
+        t.work[EXTRA_WORK] += g[HELD_NOW] - g[HELD] + 0.5 * h * (g[POWER] + g[POWER_NOW])
+        g[HELD], g[POWER] = g[HELD_NOW], g[POWER_NOW]
+
+
+@compiled
+def stiffen_terms(t: Any, f: float, fd: float, K: Any) -> None:
+    """What the stiff ones of them add to Newton's matrix."""
+    for i in range(t.term_i.shape[0]):
+        kind, b, other = t.term_i[i]
+        a = 6 * b + 2
+        if kind == GUIDE_BRAKE and abs(t.pose[b, VEL + 2]) < CREEP:
+            K[a, a] += fd * t.term_f[i, 0] / CREEP
+        elif kind == BETWEEN:
+            both, c = f * t.term_f[i, 0] + fd * t.term_f[i, 1], 6 * other + 2
+            K[a, a] += both
+            K[c, c] += both
+            K[a, c] -= both
+            K[c, a] -= both
+        elif kind == BED:
+            stiffen_bed(t, i, f, fd, K)
+
+
+@compiled
+def stiffen_bed(t: Any, i: int, f: float, fd: float, K: Any) -> None:
+    """Springs of a bed, along and about the chassis' axes."""
+    c, b, n = t.term_i[i, 1], t.term_i[i, 2], t.term_f[i]
+    chassis, load = t.pose[c], t.pose[b]
+    local, zero, J = np.empty(3), np.zeros(3), np.zeros((2, 6))
+    local[0], local[1], local[2] = to_body(
+        chassis, load[X] - chassis[X], load[X + 1] - chassis[X + 1], load[X + 2] - chassis[X + 2]
+    )
+    for k in range(3):
+        x, y, z = chassis[ROT + k], chassis[ROT + 3 + k], chassis[ROT + 6 + k]
+        along = f * n[B_K] + fd * n[B_C]
+        if k == 1:
+            along = f * n[B_SPRING] + fd * n[B_DASHPOT]
+            if abs(local[1] - n[B_PLACE + 1]) > n[B_TRAVEL]:
+                along += f * n[B_K] + fd * n[B_C]
+            v, w = velocity(load, 0.0, 0.0, 0.0), velocity(chassis, local[0], local[1], local[2])
+            if abs(x * (v[0] - w[0]) + y * (v[1] - w[1]) + z * (v[2] - w[2])) < CREEP:
+                along += fd * n[B_MU] * WEIGHT * t.mass[6 * b, 6 * b] / CREEP
+        direction_row(load, zero, x, y, z, J[0])
+        direction_row(chassis, local, x, y, z, J[1])
+        add_both(K, along, J, 6 * b, 6 * c)
+        J[:, :] = 0.0
+        J[0, 3], J[0, 4], J[0, 5] = to_body(load, x, y, z)
+        J[1, 3 + k] = 1.0
+        add_both(K, f * n[B_KR] + fd * n[B_CR], J, 6 * b, 6 * c)
+
+
+@compiled
+def add_both(K: Any, factor: float, J: Any, at: int, bt: int) -> None:
+    """K += factor (a - b)(a - b)' with the rows a and b of J at two bodies."""
+    for j in range(6):
+        for k in range(6):
+            K[at + j, at + k] += factor * J[0, j] * J[0, k]
+            K[bt + j, bt + k] += factor * J[1, j] * J[1, k]
+            K[at + j, bt + k] -= factor * J[0, j] * J[1, k]
+            K[bt + j, at + k] -= factor * J[1, j] * J[0, k]

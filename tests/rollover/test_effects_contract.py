@@ -1,0 +1,269 @@
+"""What every effect promises, asked of every effect there is, and of one that stands outside the package."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import string
+import subprocess
+import sys
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ground.quantity import quantities
+from rollover.channels import is_known
+from rollover.drop import DropModel, simulate_drop
+from rollover.effects import Effect, effects, nothing
+from rollover.faults import InputError
+from rollover.recording import Recording
+from rollover.scenario import Scenario
+from rollover.simulate import run
+from tests.physics.scenes import shipped
+
+# ids and parameters that users and recordings rely on
+PROMISED: dict[str, set[str]] = {
+    "soil-viscous-damping": {"damping", "exponent"},
+    "soil-rate-hardening": {"per_decade"},
+    "soil-inertial-drag": {"coefficient"},
+    "soil-added-mass-growth": {"rate"},
+    "soil-elastic-rebound": {"recovery"},
+    "soil-adhesion": {"stress"},
+    "soil-layer": {"depth", "stiffness_ratio"},
+    "soil-crust": {"thickness", "stiffness_ratio"},
+    "ground-friction": {"coefficient"},
+    "rops-elasticity": {"stiffness"},
+    "rops-plasticity": {"yield_force"},
+    "structural-compliance": {"stiffness", "damping"},
+    "mount-play": {"gap"},
+    "tyre-damping": {"damping"},
+    "tyre-lateral-stiffness": {"stiffness"},
+    "axle-stop": {"angle", "stiffness"},
+    "tank-slosh": {"mass", "length", "damping"},
+    "payload-shift": {"mass", "friction", "travel"},
+    "gyroscopic-rotor": {"angular_momentum"},
+    "drive-torque": {"torque"},
+    "guide-friction": {"force"},
+    "air-drag": {"area"},
+    "mass": set(),
+    "centre-of-mass": {"height", "lateral"},
+    "inertia": set(),
+    "slope": set(),
+    "impact-speed": set(),
+    "soil-stiffness": {"scale"},
+    "co-moving-mass": {"fraction"},
+    **{
+        f"sensor-{fault}": {"channel"}
+        for fault in ("scale", "bias", "gain", "clipping", "lag", "clock-offset", "clock-drift", "misalignment")
+    },
+}
+OWN = Path(__file__).with_name("own_effect.py")
+TABLE: dict[str, Any] = effects()
+each = pytest.mark.parametrize("effect", TABLE.values(), ids=TABLE.keys())
+
+
+def dropped() -> Scenario:
+    """A short drop with a lead."""
+    return shipped("drop_test").replaced(
+        {"simulation.step": 1e-3, "simulation.output_step": 1e-3, "simulation.duration": 0.3, "loads.cfc": 60}
+    )
+
+
+def rolled() -> Scenario:
+    """The first stretch of a side overturn with everything on it."""
+    return shipped("side_overturn").replaced(
+        {"simulation.step": 1e-3, "simulation.output_step": 1e-3, "simulation.duration": 0.05}
+    )
+
+
+def with_effect(scenario: Scenario, effect: Effect) -> Scenario:
+    parameters = {f.name: getattr(effect, f.name) for f in fields(effect)}
+    return scenario.replaced({f"effects.{effect.id}": parameters})
+
+
+def same(a: Recording, b: Recording) -> bool:
+    return set(a.channels) == set(b.channels) and all(a[k].tobytes() == b[k].tobytes() for k in a.channels)
+
+
+BASES: dict[str, Recording] = {}
+
+
+def base(scenario: Scenario) -> Recording:
+    if scenario.title not in BASES:
+        BASES[scenario.title] = run(scenario).recording
+    return BASES[scenario.title]
+
+
+def test_every_promised_effect_is_there_with_its_parameters() -> None:
+    for name, parameters in PROMISED.items():
+        assert name in TABLE, name
+        assert parameters <= {f.name for f in fields(TABLE[name])}, name
+    assert {name for name, e in TABLE.items() if e.kind == "sensor"} == {n for n in PROMISED if n.startswith("sensor")}
+
+
+@each
+def test_an_effect_at_its_null_changes_no_bit_of_a_drop(effect: type[Effect]) -> None:
+    scenario = dropped()
+    null = with_effect(scenario, nothing(effect))
+    assert effect.id in null.effects
+    assert same(run(null).recording, base(scenario))
+    assert same(simulate_drop(null), simulate_drop(scenario))
+
+
+@each
+def test_an_effect_at_its_null_changes_no_bit_of_a_rollover(effect: type[Effect]) -> None:
+    if effect.kind == "sensor" or "rollover" not in effect.acts:
+        pytest.skip("acts on drops or on channels alone")
+    scenario = rolled()
+    assert same(run(with_effect(scenario, nothing(effect))).recording, base(scenario))
+
+
+@each
+def test_an_effect_at_its_default_changes_what_it_says_it_acts_on(effect: type[Effect]) -> None:
+    scenario = dropped() if "drop" in effect.acts else rolled()
+    changed = run(with_effect(scenario, effect()))
+    assert changed.status == "done", changed.sentence
+    if effect.id in ("soil-adhesion", "soil-elastic-rebound", "rops-plasticity", "rops-elasticity", "axle-stop"):
+        assert changed.scenario.effects  # act later than this short stretch: see their own tests
+    elif effect.id not in ("ground-friction", "mount-play"):
+        assert not same(changed.recording, base(scenario))
+
+
+@each
+def test_an_effect_tells_what_it_is(effect: type[Effect]) -> None:
+    assert effect.kind in ("physics", "parameter", "sensor")
+    assert (effect.__doc__ or "").strip()
+    assert not (effect.__doc__ or "").startswith(f"{effect.__name__}(")
+    for text in (effect.family, effect.equation, effect.source, effect.sentence):
+        assert len(text) > 5, text
+    assert set(effect.acts) <= {"drop", "rollover"}
+    assert effect.acts
+    assert all(is_known(channel) for channel in effect.channels), effect.channels
+    assert effect.channels or effect.kind == "sensor"
+    names = {f.name for f in fields(effect)}
+    assert {name for _, name, _, _ in string.Formatter().parse(effect.sentence) if name} <= names
+    assert effect().says().endswith(".")
+    assert effect.rivals, "no look-alike with a test that tells them apart"
+    for rival, test in effect.rivals.items():
+        assert rival in TABLE, rival
+        assert rival != effect.id
+        assert len(test) > 10
+
+
+@each
+def test_the_numbers_of_an_effect_have_units_bounds_and_ranges_to_search(effect: type[Effect]) -> None:
+    kind: Any = effect
+    declared = quantities(kind)
+    assert effect.null
+    assert set(effect.null) <= set(declared)
+    assert set(effect.search) >= {n for n in effect.null if n != "damping_ratio"} - {"stiffness_ratio"}
+    for name, (low, high, scale) in effect.search.items():
+        assert declared[name].unit, name
+        assert declared[name].meaning, name
+        assert declared[name].admits(low), (name, low)
+        assert declared[name].admits(high), (name, high)
+        assert low < high
+        assert scale in ("log", "linear")
+        assert scale == "linear" or low > 0.0
+        for value in (low, math.sqrt(low * high) if scale == "log" else 0.5 * (low + high), high):
+            effect(**{name: value})
+        with pytest.raises(ValueError, match=f"{name}: out of bounds"):
+            effect(**{name: math.nan})
+    assert effect() != nothing(effect)
+
+
+@each
+def test_naming_one_parameter_switches_an_effect_on(effect: type[Effect]) -> None:
+    for name in effect.search:
+        value = float(effect.search[name].high)
+        changed = dropped().replaced({f"effects.{effect.id}.{name}": value})
+        assert changed.effects == {effect.id: effect(**{name: value})}
+        if "slope" not in effect.id:
+            assert DropModel(scenario=dropped()).with_({f"effects.{effect.id}.{name}": value}).scenario == changed
+
+
+def test_a_wrong_effect_is_one_line_with_the_nearest() -> None:
+    for change, line in {
+        "effects.soil-layr.depth": "effects.soil-layr: unknown effect, got 'soil-layr'; did you mean 'soil-layer'",
+        "effects.soil-layer.dept": "effects.soil-layer.dept: unknown key, got 'dept'; did you mean 'depth'",
+    }.items():
+        with pytest.raises(InputError) as caught:
+            dropped().replaced({change: 0.1}, origin="--set")
+        assert str(caught.value).startswith(f"--set: {line}"), str(caught.value)
+    with pytest.raises(InputError, match=r"effects.soil-layer.depth: out of bounds, got -1"):
+        dropped().replaced({"effects.soil-layer.depth": -1})
+    with pytest.raises(InputError, match=r"effects.sensor-gain.channel: unknown channel, got 'ground/forc'"):
+        dropped().replaced({"effects.sensor-gain.channel": "ground/forc"})
+
+
+def outside(*arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:
+    """A process of its own: an effect once defined stays in the table of its process."""
+    root = Path(__file__).parents[2]
+    path = os.pathsep.join([str(root), os.environ.get("PYTHONPATH", "")])
+    env = {**os.environ, "PYTHONPATH": path, **variables}
+    return subprocess.run([sys.executable, *arguments], capture_output=True, text=True, env=env, cwd=root, check=False)
+
+
+def test_an_effect_of_ones_own_is_one_short_file_and_keeps_every_promise() -> None:
+    assert len(OWN.read_text(encoding="utf-8").splitlines()) <= 40
+    program = (
+        "import numpy as np\n"
+        "from tests.rollover import test_effects_contract as contract\n"
+        "roots = contract.TABLE['soil-roots']\n"
+        "contract.test_an_effect_at_its_null_changes_no_bit_of_a_drop(roots)\n"
+        "contract.test_the_numbers_of_an_effect_have_units_bounds_and_ranges_to_search(roots)\n"
+        "contract.test_naming_one_parameter_switches_an_effect_on(roots)\n"
+        "from rollover.drop import DropModel\n"
+        "model = DropModel(scenario=contract.dropped())\n"
+        "t = np.array([0.008])\n"
+        "own = model.with_({'effects.soil-roots.stiffness': 3e4, 'effects.soil-roots.depth': 0.3})\n"
+        "soft = model.with_({'ground.law.stiffness_scale': 1.0})\n"
+        "a, b = own.run(t), soft.run(t)\n"
+        "K = lambda r: (r['ground/force_normal'] + 13.2 * r['striker/acceleration_z']) / r['ground/sinkage']\n"
+        "print(round(float((K(a) - K(b))[0])))\n"
+    )
+    done = outside("-c", program, ROLLOVER_EFFECTS=str(OWN))
+    assert done.stdout.strip() == "30000", done.stderr
+
+
+def test_the_command_line_takes_a_file_of_effects(tmp_path: Path) -> None:
+    listed = outside("-m", "tests.rollover.command", "--effects", str(OWN), "list", "effects", "--json")
+    assert "soil-roots" in {row["id"] for row in json.loads(listed.stdout)}, listed.stderr
+    missing = outside("-m", "tests.rollover.command", "--effects", str(tmp_path / "no.py"), "list", "effects")
+    assert missing.returncode == 2
+    assert "no such file of effects" in missing.stderr
+    broken = tmp_path / "broken.py"
+    broken.write_text("1/0\n")
+    answer = outside("-m", "tests.rollover.command", "--effects", str(broken), "list", "effects")
+    assert answer.returncode == 2
+    assert "cannot be used: ZeroDivisionError" in answer.stderr
+
+
+def test_an_id_given_twice_is_an_error() -> None:
+    program = (
+        "from rollover.effects import Effect\n"
+        "try:\n"
+        "    type('Again', (Effect,), {'id': 'soil-layer'})\n"
+        "except TypeError as error: print(error)\n"
+        "try:\n"
+        "    type('Nameless', (Effect,), {'id': ''})\n"
+        "except TypeError as error: print(error)\n"
+    )
+    twice, nameless = outside("-c", program).stdout.splitlines()
+    assert "'soil-layer' is taken by rollover.effects.ground" in twice
+    assert "needs an `id`" in nameless
+
+
+def test_the_listing_shows_what_each_effect_is() -> None:
+    from rollover import catalogue
+
+    rows = {row["id"]: row for row in catalogue.effects()}
+    assert set(rows) == set(TABLE)
+    layer = rows["soil-layer"]
+    assert layer["kind"] == "physics"
+    assert layer["parameters"] == "depth 0.25 m, stiffness_ratio 3"
+    assert np.all([len(row["is"]) > 10 for row in rows.values()])
