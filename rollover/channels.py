@@ -38,6 +38,7 @@ _ENERGY = {
     "friction": "lost in sliding",
     "collision": "lost in the collision with the co-moving mass, eq (8)",
     "axle": "stored and lost in the front axle's stops",
+    "drive": "taken by the brakes, less what the engine gave",
     "residual": "what the ledger does not explain",
 }
 
@@ -67,6 +68,7 @@ CHANNELS: dict[str, Channel] = {
         Channel(name="rops/deflection", unit="m", meaning="of the loaded upper corner against the chassis"),
         Channel(name="rops/energy", unit="J", meaning="absorbed by the ROPS"),
         Channel(name="wheel/NAME/force_normal", unit="N", meaning="ground on the tyre"),
+        Channel(name="wheel/NAME/spin", unit="rad/s", meaning="of a wheel that turns by itself, forward"),
         Channel(name="axle/front/angle", unit="rad", meaning="of the front axle about its pivot"),
         *[Channel(name=f"energy/{name}", unit="J", meaning=meaning) for name, meaning in _ENERGY.items()],
     ]

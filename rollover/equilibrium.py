@@ -13,7 +13,7 @@ from rollover.contact import Body
 from rollover.forces import generalised_forces, tyre_point
 from rollover.frames import from_angles, rotation_vector
 from rollover.jacobian import stiffness
-from rollover.step import stand
+from rollover.step import renew_normals, stand
 from rollover.tables import E_DEPTH_NOW, E_FORCE_NOW, POSE_COLUMNS, ROT, W_CENTRE, W_HALF, W_KZ, Tables, handle
 
 Array = NDArray[np.float64]
@@ -39,11 +39,12 @@ class Equilibrium:
 
     Height is along the surface's normal, slide along it; roll, pitch and yaw turn about the vehicle's origin. The
     residuals are the virtual work of all forces for each coordinate, over the weight. The tyres' stick springs hold
-    the vehicle where the search began, so that on a slope it leans on them.
+    the vehicle where the search began, so that on a slope it leans on them. They begin at `base`, a point of the
+    plane `t.plane`, which for an uneven surface is that of the ground under the wheels.
     """
 
-    def __init__(self, bodies: tuple[Body, ...], t: Tables, heading: float, gravity: float) -> None:
-        self.bodies, self.t, self.heading = bodies, t, heading
+    def __init__(self, bodies: tuple[Body, ...], t: Tables, heading: float, gravity: float, base: Array) -> None:
+        self.bodies, self.t, self.heading, self.base = bodies, t, heading, base
         self.handle = handle(t)
         self.weight = np.zeros(6 * len(bodies))
         self.weight[2::6] = [-gravity * b.inertia.mass for b in bodies]
@@ -79,7 +80,7 @@ class Equilibrium:
         return u
 
     def _origin(self, u: Array) -> Array:
-        return np.asarray(u[0] * self.t.plane[:3] + u[SLIDE : SLIDE + 2] @ self.along)
+        return np.asarray(u[0] * self.t.plane[:3] + u[SLIDE : SLIDE + 2] @ self.along + self.base)
 
     def _rotations(self, u: Array) -> list[Array]:
         R = from_angles(u[ROLL], u[PITCH], self.heading + u[YAW])
@@ -138,6 +139,9 @@ class Equilibrium:
         q = self.coordinates(u)
         Q = np.zeros_like(q)
         generalised_forces(self.handle, q, np.zeros_like(q), Q)
+        if len(self.t.relief):
+            renew_normals(self.handle)
+            generalised_forces(self.handle, q, np.zeros_like(q), Q)
         return np.asarray(self.tangents(u, q) @ (Q + self.weight) / self.scale)
 
     def solve(self, guess: Array, fixed: tuple[int, ...] = ()) -> Array | None:
@@ -242,6 +246,12 @@ class Equilibrium:
             a = b if y * b[1] < 0.0 else (a[0], 0.5 * a[1])
             b = (x, y)
         return True
+
+    def forward(self, u: Array, speed: float) -> Array:
+        """Velocities (6 nb,) of a vehicle that moves along its heading and the ground at `speed` (m/s)."""
+        n, ahead = self.t.plane[:3], from_angles(0.0, 0.0, self.heading + u[YAW])[:, 0]
+        ahead = ahead - (ahead @ n) * n
+        return np.tile([*(speed * ahead / np.linalg.norm(ahead)), 0.0, 0.0, 0.0], len(self.bodies))
 
     def rates(self, u: Array, rate: float) -> Array:
         """Velocities (6 nb,) while the vehicle rolls at `rate` about its most loaded tyre's contact."""

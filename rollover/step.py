@@ -28,6 +28,7 @@ from ground.kernel import (
     OWNER_R,
     PLACE,
     RELEASED,
+    ROW,
     SHEAR,
     SINKAGE,
     UNLOADING,
@@ -36,7 +37,7 @@ from ground.kernel import (
 )
 from ground.law import REFERENCE_AREA
 from rollover.dense import dot, times
-from rollover.forces import generalised_forces, read_poses
+from rollover.forces import along_axle, generalised_forces, read_poses
 from rollover.impact import mobility
 from rollover.tables import (
     A_SWING,
@@ -59,6 +60,8 @@ from rollover.tables import (
     E_FRICTION,
     E_FRICTION_NOW,
     E_MOVED,
+    E_NORMAL,
+    E_NORMAL_NOW,
     E_PLACE,
     E_POINT,
     E_SHEAR,
@@ -95,6 +98,7 @@ from rollover.tables import (
     T_YIELD,
     TURN,
     TYRE,
+    W_AXIS,
     W_KY,
     W_MU,
     WHEEL_OFF,
@@ -102,8 +106,9 @@ from rollover.tables import (
     ZDOT,
     Z,
 )
+from rollover.spin import finish_spins, keep_spins
 from rollover.touch import drop_mass, note_event, touch
-from rollover.vectors import depth_acceleration, depth_row, place, velocity
+from rollover.vectors import depth_acceleration, depth_row, place, to_world, velocity
 
 
 @compiled
@@ -120,8 +125,11 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
     finish_wheels(t)
     finish_mounts(t)
     finish_axle(t)
+    finish_spins(t)
     start_step(t)
-    t.work[COLLISION] += touch(t, qd, h)
+    before = qd.copy()
+    t.work[COLLISION] += touch(t, qd[: t.mass.shape[0]], h)
+    keep_spins(t, before, qd)
     settle(t)
     read_poses(t.pose, q, qd)  # the impact changed the velocities
 
@@ -129,11 +137,11 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
 @compiled
 def finish_elements(t: Any, h: float) -> None:
     """Work, contact forces and commit of the elements in contact."""
-    flags, footprint = 0, 0.0
+    flags, footprint, row = 0, 0.0, 0
     for a in range(t.counts[ACTIVE]):
         i = t.active[a]
         m, state, trial = t.memory[i], t.state[i], t.trial[i]
-        b = state[BODY]
+        b, row = state[BODY], state[ROW]
         t.work[SOIL] += 0.5 * (m[FORCE] + trial[FN]) * (trial[Z] - m[SINKAGE])
         for k in range(3):
             t.work[FRICTION_WORK] -= 0.5 * (m[FRICTION + k] + trial[FT + k]) * trial[MOVED + k]
@@ -158,8 +166,10 @@ def finish_elements(t: Any, h: float) -> None:
         m[FORCE] = trial[FN]
         for k in range(3):
             m[FRICTION + k] = trial[FT + k]
-        outcome = commit(t.law, t.p, t.s[i], m, state, trial[Z], trial[ZDOT], h, t.s[i, 1] * m[AREA] / REFERENCE_AREA)
-        commit_friction(t.soil[STICK], m[SHEAR : SHEAR + 3], trial[MOVED : MOVED + 3], m[NORMAL : NORMAL + 3])
+        outcome = commit(
+            t.law[row], t.p[row], t.s[i], m, state, trial[Z], trial[ZDOT], h, t.s[i, 1] * m[AREA] / REFERENCE_AREA
+        )
+        commit_friction(t.soil[row, STICK], m[SHEAR : SHEAR + 3], trial[MOVED : MOVED + 3], m[NORMAL : NORMAL + 3])
         for k in range(3):
             m[PLACE + k] += trial[MOVED + k]
         if outcome & BRANCHED:
@@ -168,7 +178,7 @@ def finish_elements(t: Any, h: float) -> None:
             note_event(t, TURN, b, x, trial[Z])
         if outcome & RELEASED:
             state[MODE] = IDLE
-    if footprint > 0.0 and abs(footprint - t.domain[3]) > 0.01 * t.domain[3]:
+    if footprint > 0.0 and abs(footprint - t.domain[row, 3]) > 0.01 * t.domain[row, 3]:
         flags |= OUT_OF_AREA
     t.counts[FLAGS_NOW] = flags
 
@@ -276,10 +286,26 @@ def stand(t: Any) -> None:
 @compiled
 def keep_strain(t: Any) -> None:
     """Take what the stick springs have been strained by since `stand` as their strain at the start of a run."""
+    e = np.empty(3)
     for w in range(t.wheel_i.size):
-        g = t.wheel_memory[w]
+        g, c = t.wheel_memory[w], t.wheel_f[w]
         grip(t, w)
         hold(g)
+        if t.spin_i[w] >= 0:
+            # nothing has turned the wheel yet: it holds along its axle only
+            n, shear = g[E_NORMAL_NOW : E_NORMAL_NOW + 3], g[E_SHEAR : E_SHEAR + 3]
+            e[0], e[1], e[2] = to_world(t.pose[t.wheel_i[w]], c[W_AXIS], c[W_AXIS + 1], c[W_AXIS + 2])
+            lean = n[0] * e[0] + n[1] * e[1] + n[2] * e[2]
+            shear[0], shear[1], shear[2] = along_axle(e, n, lean, shear)
+
+
+@compiled
+def renew_normals(t: Any) -> None:
+    """Take the ground's normals under the tyres as found now for those of the next evaluation."""
+    for w in range(t.wheel_i.size):
+        g = t.wheel_memory[w]
+        for k in range(3):
+            g[E_NORMAL + k] = g[E_NORMAL_NOW + k]
 
 
 @compiled
@@ -288,7 +314,7 @@ def grip(t: Any, w: int) -> None:
     g = t.wheel_memory[w]
     if g[E_FORCE_NOW] > 0.0:
         stick = max(t.wheel_f[w, W_MU] * g[E_FORCE_NOW] / t.wheel_f[w, W_KY], 1e-9)
-        commit_friction(stick, g[E_SHEAR : E_SHEAR + 3], g[E_SLIP : E_SLIP + 3], t.plane[:3])
+        commit_friction(stick, g[E_SHEAR : E_SHEAR + 3], g[E_SLIP : E_SLIP + 3], g[E_NORMAL_NOW : E_NORMAL_NOW + 3])
     else:
         for k in range(3):
             g[E_SHEAR + k] = 0.0
@@ -314,6 +340,7 @@ def start_step(t: Any) -> None:
         g[E_ENERGY] = g[E_ENERGY_NOW]
         for k in range(3):
             g[E_FRICTION + k] = g[E_FRICTION_NOW + k]
+            g[E_NORMAL + k] = g[E_NORMAL_NOW + k]
     for i in range(t.mount_f.shape[0]):
         g = t.mount_memory[i]
         for k in range(3):
