@@ -270,6 +270,7 @@ def _turning(scenario: Scenario, wheel_f: Array, first: int) -> tuple[NDArray[np
             wheel.inertia,
             start.brake.torque if start.brake and vehicle.on_axle(wheel, start.brake.axle) else 0.0,
             float(start.drive is not None and vehicle.on_axle(wheel, start.drive.axle)),
+            float(start.brake is not None and start.brake.against == "ground"),
         ]
         wheel_f[w, c.W_ROLLS] = 0.0
         if vehicle.on_axle(wheel, "front"):

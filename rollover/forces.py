@@ -69,7 +69,7 @@ from rollover.tables import (
     X,
     Z,
 )
-from rollover.tread import C_CAMBER, C_COSINE, C_DEPTH, C_FORCE, C_MOMENT, C_NORMAL, CUTS, closing_rate, cut, press
+from rollover.tread import C_CAMBER, C_COSINE, C_DEPTH, C_FORCE, C_NORMAL, CUTS, closing_rate, cut, press
 from rollover.vectors import (
     add_force,
     centripetal_depth,
@@ -204,7 +204,7 @@ def try_wheels(t: Any, Q: Any) -> None:
         v = velocity(row, r[0], r[1], r[2])
         rate, camber = -(n[0] * v[0] + n[1] * v[1] + n[2] * v[2]), lean
         if uneven:
-            rate = closing_rate(row, c, found)
+            rate = closing_rate(row, c, e, g[E_NORMAL : E_NORMAL + 3], found)
             camber = found[C_CAMBER]
         v = velocity(row, hold[0], hold[1], hold[2])
         if spinning:
@@ -216,7 +216,7 @@ def try_wheels(t: Any, Q: Any) -> None:
         force = spring + damping
         moment = -slope * lean * depth * depth
         if uneven:
-            moment = press(t, w, force, stiffness, slope, found, Q)
+            moment = press(t, w, force, slope, found, Q)
             force *= math.sqrt(found[C_FORCE] ** 2 + found[C_FORCE + 1] ** 2 + found[C_FORCE + 2] ** 2)
         g[E_FORCE_NOW], g[E_DAMPING_NOW], g[E_ENERGY_NOW] = force, damping, 0.5 * spring * depth
         stick = max(c[W_MU] * force / c[W_KY], 1e-9)

@@ -64,6 +64,9 @@ class Brake:
 
     torque: Annotated[float, Quantity("N m", "limit, of each wheel", above=0)]
     axle: Annotated[Literal["rear", "front", "all"], "whose wheels it holds"] = "all"
+    against: Annotated[
+        Literal["vehicle", "ground"], "what it holds them to: the ground, where they are dug in, frozen in or chained"
+    ] = "vehicle"
 
 
 @parameters

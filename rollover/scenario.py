@@ -150,7 +150,8 @@ def _check_start(vehicle: Vehicle | Striker, start: Drop | TipOver | Standing | 
     elif isinstance(start, (Standing, Driving)):
         if len(sides) < 3 or not left or not right:
             raise ValueError(
-                f"initiation.kind: {start.kind!r} needs at least 3 wheels on both sides, got {left} left and {right} right"
+                f"initiation.kind: {start.kind!r} needs at least 3 wheels on both sides, "
+                f"got {left} left and {right} right"
             )
         still = [w.name for w in vehicle.wheels if w.inertia is None]
         if isinstance(start, Driving) and still:

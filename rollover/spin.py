@@ -20,10 +20,15 @@ from rollover.tables import (
     D_TORQUE,
     DRIVE,
     OMEGA,
+    P_ABSOLUTE,
+    P_ABSOLUTE_NOW,
     P_ANGLE,
     P_ANGLE_NOW,
     P_BRAKE,
     P_DRIVEN,
+    P_HELD,
+    P_HOLD,
+    P_HOLD_NOW,
     P_INERTIA,
     P_RATE_NOW,
     P_STRAIN,
@@ -67,18 +72,25 @@ def try_spins(t: Any, Q: Any) -> None:
         if at < 0 or at >= Q.shape[0]:
             continue
         s, f = t.spin_memory[w], t.spin_f[w]
-        torque = 0.0
+        torque, held = 0.0, 0.0
         if f[P_DRIVEN] > 0.0:
             torque = share - t.drive[D_STIFFNESS] * (s[P_ANGLE_NOW] - angle)
             torque -= t.drive[D_DAMPING] * (s[P_RATE_NOW] - rate)
-        if f[P_BRAKE] > 0.0:
-            strain = s[P_STRAIN] + s[P_ANGLE_NOW] - s[P_ANGLE] + BRAKE_RELAXATION * s[P_RATE_NOW]
-            torque -= min(max(BRAKE_STIFFNESS * strain, -f[P_BRAKE]), f[P_BRAKE])
-        s[P_TORQUE_NOW] = torque
-        Q[at] += torque
         b = t.wheel_i[w]
         e, omega = t.wheel_f[w, W_AXIS : W_AXIS + 3], t.pose[b, OMEGA : OMEGA + 3]
-        momentum = f[P_INERTIA] * (s[P_RATE_NOW] + e[0] * omega[0] + e[1] * omega[1] + e[2] * omega[2])
+        absolute = s[P_RATE_NOW] + e[0] * omega[0] + e[1] * omega[1] + e[2] * omega[2]
+        if f[P_HELD] > 0.0:
+            # the ground holds the wheel, whatever its carrier does: a torque on spin + omega . e
+            held = -BRAKE_STIFFNESS * (s[P_STRAIN] + BRAKE_RELAXATION * absolute)
+            held = min(max(held, -f[P_BRAKE]), f[P_BRAKE])
+            for k in range(3):
+                Q[6 * b + 3 + k] += held * e[k]
+        elif f[P_BRAKE] > 0.0:
+            strain = s[P_STRAIN] + s[P_ANGLE_NOW] - s[P_ANGLE] + BRAKE_RELAXATION * s[P_RATE_NOW]
+            torque -= min(max(BRAKE_STIFFNESS * strain, -f[P_BRAKE]), f[P_BRAKE])
+        s[P_TORQUE_NOW], s[P_HOLD_NOW], s[P_ABSOLUTE_NOW] = torque, held, absolute
+        Q[at] += torque + held
+        momentum = f[P_INERTIA] * absolute
         x, y, z = cross(omega[0], omega[1], omega[2], momentum * e[0], momentum * e[1], momentum * e[2])
         Q[6 * b + 3] -= x
         Q[6 * b + 4] -= y
@@ -86,7 +98,7 @@ def try_spins(t: Any, Q: Any) -> None:
 
 
 @compiled
-def finish_spins(t: Any) -> None:
+def finish_spins(t: Any, h: float) -> None:
     """Work of drive and brakes; the brakes' slip."""
     for w in range(t.spin_i.size):
         if t.spin_i[w] < 0:
@@ -94,7 +106,11 @@ def finish_spins(t: Any) -> None:
         s, most = t.spin_memory[w], t.spin_f[w, P_BRAKE] / BRAKE_STIFFNESS
         turned = s[P_ANGLE_NOW] - s[P_ANGLE]
         t.work[DRIVE] -= 0.5 * (s[P_TORQUE] + s[P_TORQUE_NOW]) * turned
+        if t.spin_f[w, P_HELD] > 0.0:
+            turned = 0.5 * h * (s[P_ABSOLUTE] + s[P_ABSOLUTE_NOW])
+            t.work[DRIVE] -= 0.5 * (s[P_HOLD] + s[P_HOLD_NOW]) * turned
         s[P_STRAIN] = min(max(s[P_STRAIN] + turned, -most), most)
+        s[P_HOLD], s[P_ABSOLUTE] = s[P_HOLD_NOW], s[P_ABSOLUTE_NOW]
         s[P_ANGLE], s[P_TORQUE] = s[P_ANGLE_NOW], s[P_TORQUE_NOW]
 
 

@@ -39,6 +39,7 @@ from ground.law import REFERENCE_AREA
 from rollover.dense import dot, times
 from rollover.forces import along_axle, generalised_forces, read_poses
 from rollover.impact import mobility
+from rollover.spin import finish_spins, keep_spins
 from rollover.tables import (
     A_SWING,
     ACC,
@@ -106,7 +107,6 @@ from rollover.tables import (
     ZDOT,
     Z,
 )
-from rollover.spin import finish_spins, keep_spins
 from rollover.touch import drop_mass, note_event, touch
 from rollover.vectors import depth_acceleration, depth_row, place, to_world, velocity
 
@@ -125,7 +125,7 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
     finish_wheels(t)
     finish_mounts(t)
     finish_axle(t)
-    finish_spins(t)
+    finish_spins(t, h)
     start_step(t)
     before = qd.copy()
     t.work[COLLISION] += touch(t, qd[: t.mass.shape[0]], h)

@@ -28,10 +28,13 @@ E_MOVED, E_SLIP, E_POINT, E_WHERE = 23, 26, 29, 32
 # normal of the ground under the tread at the start of the step and now
 E_NORMAL, E_NORMAL_NOW, EDGE_COLUMNS = 35, 38, 41
 
-# columns of spin_f: inertia about the axle, limit of the brake's torque, whether the drive turns this wheel
-P_INERTIA, P_BRAKE, P_DRIVEN, SPIN_COLUMNS = 0, 1, 2, 3
+# columns of spin_f: inertia about the axle, limit of the brake's torque, whether the drive turns this wheel,
+# whether the brake holds it against the ground instead of its carrier
+P_INERTIA, P_BRAKE, P_DRIVEN, P_HELD, SPIN_COLUMNS = 0, 1, 2, 3, 4
 # columns of spin_memory: angle, torque and strain of the brake at the start of the step; angle, rate and torque now
-P_ANGLE, P_TORQUE, P_STRAIN, P_ANGLE_NOW, P_RATE_NOW, P_TORQUE_NOW, SPIN_MEMORY = 0, 1, 2, 3, 4, 5, 6
+P_ANGLE, P_TORQUE, P_STRAIN, P_ANGLE_NOW, P_RATE_NOW, P_TORQUE_NOW = 0, 1, 2, 3, 4, 5
+# torque of the ground that holds it and its rate spin + omega . e, at the start of the step and now
+P_HOLD, P_ABSOLUTE, P_HOLD_NOW, P_ABSOLUTE_NOW, SPIN_MEMORY = 6, 7, 8, 9, 10
 # places in drive: torque that the engine may give now, rate at which it gives none any more, stiffness and damping
 # of a locked axle
 D_TORQUE, D_RATE, D_STIFFNESS, D_DAMPING, DRIVES = 0, 1, 2, 3, 4

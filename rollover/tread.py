@@ -32,8 +32,8 @@ from rollover.vectors import add_force, cross, place, spin, to_body, to_world, v
 NODES = 33
 FAR = 0.2  # share of the radius: ground further below the tread is not looked at closely
 
-# places in what `cut` finds: depth along the normal before the camber, cos of the camber (its sine is at the end); force direction and moment
-# about the wheel's centre for a unit force on that depth; normal of the ground
+# places in what `cut` finds: depth d in the disc's plane, cos of the camber (its sine is at the end); force and moment
+# about the wheel's centre for a unit of force on the depth d cos; normal of the ground
 C_DEPTH, C_COSINE, C_FORCE, C_MOMENT, C_NORMAL, C_CAMBER, CUTS = 0, 1, 2, 5, 8, 11, 12
 
 
@@ -161,18 +161,20 @@ def cut(t: Any, row: Any, wheel: Any, before: Any, found: Any) -> None:
 
 
 @compiled
-def closing_rate(row: Any, c: Any, found: Any) -> float:
-    """Rate of the depth on uneven ground, m/s, from the wheel's motion and the depth's gradient."""
+def closing_rate(row: Any, c: Any, e: Any, n: Any, found: Any) -> float:
+    """Rate of the depth on uneven ground, m/s; e is the axle, n the normal that the camber is measured against."""
     v = velocity(row, c[W_CENTRE], c[W_CENTRE + 1], c[W_CENTRE + 2])
     o = spin(row)
     rate = 0.0
     for k in range(3):
         rate -= found[C_FORCE + k] * v[k] + found[C_MOMENT + k] * o[k]
-    return rate
+    x, y, z = cross(o[0], o[1], o[2], e[0], e[1], e[2])
+    leaning = n[0] * x + n[1] * y + n[2] * z
+    return rate - found[C_DEPTH] * found[C_CAMBER] / found[C_COSINE] * leaning
 
 
 @compiled
-def press(t: Any, w: int, force: float, stiffness: float, slope: float, found: Any, Q: Any) -> float:
+def press(t: Any, w: int, force: float, slope: float, found: Any, Q: Any) -> float:
     """Normal force of uneven ground on a tyre, into Q; returns the moment that its camber adds.
 
     U = k d^2/2 (1 - lean^2) with d the cut's own depth: what the second factor takes away is a moment too.
@@ -187,4 +189,4 @@ def press(t: Any, w: int, force: float, stiffness: float, slope: float, found: A
     Q[6 * b + 4] += y
     Q[6 * b + 5] += z
     d, lean = found[C_DEPTH], found[C_CAMBER]
-    return lean * d * d * (stiffness - slope * (1.0 - lean * lean))
+    return lean * d * (force / found[C_COSINE] - slope * d * (1.0 - lean * lean))
