@@ -140,7 +140,7 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
             float(wheel.rolls),
         ]
     spin_i, spin_f, drive = _turning(scenario, wheel_f, 6 * nb)
-    for w in np.flatnonzero(spin_i >= 0):
+    for w in np.flatnonzero(spin_i >= 0).tolist():
         # a turning wheel's inertia about its axle is not its carrier's
         at = 6 * row[wheels[w].carrier] + 3
         axle = wheel_f[w, c.W_AXIS : c.W_AXIS + 3]

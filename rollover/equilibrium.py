@@ -13,7 +13,7 @@ from rollover.contact import Body
 from rollover.forces import generalised_forces, tyre_point
 from rollover.frames import from_angles, rotation_vector
 from rollover.jacobian import stiffness
-from rollover.step import renew_normals, stand
+from rollover.step import stand
 from rollover.tables import E_DEPTH_NOW, E_FORCE_NOW, POSE_COLUMNS, ROT, W_CENTRE, W_HALF, W_KZ, Tables, handle
 
 Array = NDArray[np.float64]
@@ -139,9 +139,6 @@ class Equilibrium:
         q = self.coordinates(u)
         Q = np.zeros_like(q)
         generalised_forces(self.handle, q, np.zeros_like(q), Q)
-        if len(self.t.relief):
-            renew_normals(self.handle)
-            generalised_forces(self.handle, q, np.zeros_like(q), Q)
         return np.asarray(self.tangents(u, q) @ (Q + self.weight) / self.scale)
 
     def solve(self, guess: Array, fixed: tuple[int, ...] = ()) -> Array | None:
@@ -247,11 +244,12 @@ class Equilibrium:
             b = (x, y)
         return True
 
-    def forward(self, u: Array, speed: float) -> Array:
-        """Velocities (6 nb,) of a vehicle that moves along its heading and the ground at `speed` (m/s)."""
+    def forward(self, u: Array, speed: float, sideways: float) -> Array:
+        """Velocities (6 nb,) of a vehicle that moves along the ground, along its heading and to its left (m/s)."""
         n, ahead = self.t.plane[:3], from_angles(0.0, 0.0, self.heading + u[YAW])[:, 0]
         ahead = ahead - (ahead @ n) * n
-        return np.tile([*(speed * ahead / np.linalg.norm(ahead)), 0.0, 0.0, 0.0], len(self.bodies))
+        ahead /= np.linalg.norm(ahead)
+        return np.tile([*(speed * ahead + sideways * _cross(n, ahead)), 0.0, 0.0, 0.0], len(self.bodies))
 
     def rates(self, u: Array, rate: float) -> Array:
         """Velocities (6 nb,) while the vehicle rolls at `rate` about its most loaded tyre's contact."""

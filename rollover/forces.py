@@ -25,7 +25,6 @@ from rollover.tables import (
     E_FORCE_NOW,
     E_FRICTION_NOW,
     E_MOVED,
-    E_NORMAL,
     E_NORMAL_NOW,
     E_PLACE,
     E_POINT,
@@ -69,7 +68,7 @@ from rollover.tables import (
     X,
     Z,
 )
-from rollover.tread import C_CAMBER, C_COSINE, C_DEPTH, C_FORCE, C_NORMAL, CUTS, closing_rate, cut, press
+from rollover.tread import C_AROUND, C_CAMBER, C_COSINE, C_DEPTH, C_FORCE, C_NORMAL, CUTS, closing_rate, cut, press
 from rollover.vectors import (
     add_force,
     centripetal_depth,
@@ -176,7 +175,7 @@ def try_wheels(t: Any, Q: Any) -> None:
         row, c, g = t.pose[b], t.wheel_f[w], t.wheel_memory[w]
         n, offset = g[E_NORMAL_NOW : E_NORMAL_NOW + 3], t.plane[3]
         if uneven:
-            cut(t, row, c, g[E_NORMAL : E_NORMAL + 3], found)
+            cut(t, row, c, found)
             n[:] = found[C_NORMAL : C_NORMAL + 3]
         else:
             n[:] = t.plane[:3]
@@ -204,7 +203,7 @@ def try_wheels(t: Any, Q: Any) -> None:
         v = velocity(row, r[0], r[1], r[2])
         rate, camber = -(n[0] * v[0] + n[1] * v[1] + n[2] * v[2]), lean
         if uneven:
-            rate = closing_rate(row, c, e, g[E_NORMAL : E_NORMAL + 3], found)
+            rate = closing_rate(row, c, e, found)
             camber = found[C_CAMBER]
         v = velocity(row, hold[0], hold[1], hold[2])
         if spinning:
@@ -235,7 +234,7 @@ def try_wheels(t: Any, Q: Any) -> None:
         add_force(row, b, hold, f[0], f[1], f[2], Q)  # friction holds the tread where it took hold of it
         # the stiffness falls with camber: the moment that goes with it keeps the spring conservative
         if uneven:
-            n = g[E_NORMAL : E_NORMAL + 3]
+            n = found[C_AROUND : C_AROUND + 3]
         ex, ey, ez = cross(e[0], e[1], e[2], n[0], n[1], n[2])
         ex, ey, ez = to_body(row, moment * ex, moment * ey, moment * ez)
         Q[6 * b + 3] += ex

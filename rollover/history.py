@@ -163,7 +163,7 @@ def states(rows: Array, t: Tables) -> States:
 def energies(s: States, t: Tables, bodies: tuple[Body, ...], gravity: float) -> dict[str, Array]:
     """The ledger over time, J, each (n,): what the bodies hold and what was taken from them; `residual` is the rest.
 
-    kinetic + potential + soil + tyre + rops + friction + collision + axle + drive, less their sum at the start, = -residual.
+    All of them, kinetic and potential to drive, less their sum at the start, are -residual.
     """
     n = len(s.axle)
     flat = s.qd.reshape(n, -1)

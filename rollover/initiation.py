@@ -53,6 +53,7 @@ class Drive:
     axle: Annotated[Literal["rear", "front", "all"], "whose wheels it drives"] = "rear"
     differential: Annotated[Literal["open", "locked"], "open: equal torques; locked: equal rates"] = "open"
     rise_time: Annotated[float, Quantity("s", "from zero to all of it", least=0)] = 0.1
+    until: Annotated[float | None, Quantity("s", "time at which the clutch is let go", above=0)] = None
     limit_rate: Annotated[
         float | None, Quantity("rad/s", "of the wheels, at which the engine gives nothing more", above=0)
     ] = None
@@ -75,6 +76,7 @@ class Driving:
 
     kind: Literal["driving"] = "driving"
     speed: Annotated[float, Quantity("m/s", "forward, along the ground", least=-20, most=20)]
+    sideways: Annotated[float, Quantity("m/s", "sliding, to the left", least=-20, most=20)] = 0.0
     position: Annotated[tuple[float, float], Quantity("m", "of the vehicle's origin, world x and y")] = (0.0, 0.0)
     heading_deg: Annotated[float, Quantity("deg", "of the vehicle about z", least=-360, most=360)] = 0.0
     steer_deg: Annotated[float, Quantity("deg", "of the front wheels, to the left", least=-60, most=60)] = 0.0

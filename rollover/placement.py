@@ -81,7 +81,7 @@ def _element_heights(t: Tables, x: Array) -> Array:
     found, plane = np.empty(len(x)), np.empty(4)
     spacing = t.grid_f[2:]
     for k, corner in enumerate(t.grid_f[:2] + np.floor((x[:, :2] - t.grid_f[:2]) / spacing) * spacing):
-        element_plane(t.relief, t.nodes, *corner, *spacing, plane)
+        element_plane(t.relief, t.nodes, corner[0], corner[1], spacing[0], spacing[1], plane)
         found[k] = (plane[3] - plane[:2] @ x[k, :2]) / plane[2]
     return found
 
@@ -137,7 +137,7 @@ def _driving(driving: Driving, scenario: Scenario, bodies: tuple[Body, ...], t: 
     turning = t.spin_i >= 0
     rates = driving.speed / t.wheel_f[turning, W_RADIUS]
     q = np.concatenate([statics.coordinates(u), np.zeros(len(rates))])
-    return Start(q=q, qd=np.concatenate([statics.forward(u, driving.speed), rates]), time=0.0)
+    return Start(q=q, qd=np.concatenate([statics.forward(u, driving.speed, driving.sideways), rates]), time=0.0)
 
 
 def _tipped(tip: TipOver, scenario: Scenario, vehicle: Vehicle, bodies: tuple[Body, ...], t: Tables) -> Start:

@@ -138,6 +138,9 @@ def _throttle(scenario: Scenario, t: Tables, now: float) -> None:
     """What the engine may give in the next step."""
     start = scenario.initiation
     if isinstance(start, Driving) and start.drive is not None:
+        if start.drive.until is not None and now >= start.drive.until:
+            t.drive[c.D_TORQUE] = 0.0
+            return
         rising = now / start.drive.rise_time if start.drive.rise_time > 0.0 else 1.0
         t.drive[c.D_TORQUE] = start.drive.torque * min(max(rising, 0.0), 1.0)
 

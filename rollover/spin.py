@@ -19,6 +19,7 @@ from rollover.tables import (
     D_STIFFNESS,
     D_TORQUE,
     DRIVE,
+    E_FORCE,
     OMEGA,
     P_ABSOLUTE,
     P_ABSOLUTE_NOW,
@@ -79,13 +80,13 @@ def try_spins(t: Any, Q: Any) -> None:
         b = t.wheel_i[w]
         e, omega = t.wheel_f[w, W_AXIS : W_AXIS + 3], t.pose[b, OMEGA : OMEGA + 3]
         absolute = s[P_RATE_NOW] + e[0] * omega[0] + e[1] * omega[1] + e[2] * omega[2]
-        if f[P_HELD] > 0.0:
+        if f[P_HELD] > 0.0 and t.wheel_memory[w, E_FORCE] > 0.0:
             # the ground holds the wheel, whatever its carrier does: a torque on spin + omega . e
             held = -BRAKE_STIFFNESS * (s[P_STRAIN] + BRAKE_RELAXATION * absolute)
             held = min(max(held, -f[P_BRAKE]), f[P_BRAKE])
             for k in range(3):
                 Q[6 * b + 3 + k] += held * e[k]
-        elif f[P_BRAKE] > 0.0:
+        elif f[P_BRAKE] > 0.0 and f[P_HELD] == 0.0:
             strain = s[P_STRAIN] + s[P_ANGLE_NOW] - s[P_ANGLE] + BRAKE_RELAXATION * s[P_RATE_NOW]
             torque -= min(max(BRAKE_STIFFNESS * strain, -f[P_BRAKE]), f[P_BRAKE])
         s[P_TORQUE_NOW], s[P_HOLD_NOW], s[P_ABSOLUTE_NOW] = torque, held, absolute

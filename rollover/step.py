@@ -300,15 +300,6 @@ def keep_strain(t: Any) -> None:
 
 
 @compiled
-def renew_normals(t: Any) -> None:
-    """Take the ground's normals under the tyres as found now for those of the next evaluation."""
-    for w in range(t.wheel_i.size):
-        g = t.wheel_memory[w]
-        for k in range(3):
-            g[E_NORMAL + k] = g[E_NORMAL_NOW + k]
-
-
-@compiled
 def grip(t: Any, w: int) -> None:
     """Add what a tyre's anchor has moved to its stick spring, as far as friction holds; off the ground it is free."""
     g = t.wheel_memory[w]

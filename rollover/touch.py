@@ -96,7 +96,7 @@ def search(t: Any) -> int:
         f = t.found[t.touched[c]]
         for k in range(3, 7):
             f[k] /= f[1]
-    return count
+    return count  # type: ignore[no-any-return]
 
 
 @compiled
@@ -170,7 +170,7 @@ def on_relief(t: Any) -> Any:
         wide = abs(row[ROT]) * a + abs(row[ROT + 1]) * b + abs(row[ROT + 2]) * c
         long = abs(row[ROT + 3]) * a + abs(row[ROT + 4]) * b + abs(row[ROT + 5]) * c
         tall = abs(row[ROT + 6]) * a + abs(row[ROT + 7]) * b + abs(row[ROT + 8]) * c
-        # a plane through an element's corners is nowhere higher than twice the element further on
+        # what lies under the box, and the elements that it looks into
         reach = math.hypot(wide, long) + t.grid_f[2] + t.grid_f[3]
         top = highest(t.relief, t.nodes, x, y, reach)
         if z - tall > top:
@@ -188,6 +188,9 @@ def on_relief(t: Any) -> Any:
                 continue
             cell = ix * t.grid_i[1] + iy
             slot = t.slot_of[cell]
+            ground, _, _ = height_and_gradient(t.relief, t.nodes, x, y)
+            if z > ground + 2.0 * (t.grid_f[2] + t.grid_f[3]):
+                continue  # higher than a plane of 75 degrees stands over the surface within its element
             if slot < 0:
                 plane_of(t, cell, plane)
             else:

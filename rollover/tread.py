@@ -4,11 +4,12 @@ The area of the disc below the ground takes the place of depth: the tyre is pres
 plane that cuts off as much (equivalent-plane model after Sui and Hirshey 2001, recalled). The gradient of that area
 is the chord from where the ground enters the disc to where it leaves it, whatever lies between: a wheel climbs a step
 from the moment that its edge meets the tread, and its force leans back. Being the gradient of k d^2/2, it gives back
-what it took. On a plane it is the plane's own law, to rounding.
+what it took.
 
-Limits: one disc, at the tread's lowest generator, so that nothing is enveloped across the tread; the profile is
-sampled at `NODES` places over the diameter; no rim, no separate stiffness for a tread that wraps around an edge.
-The camber's part in the stiffness is that of the last step's ground.
+The disc is the deepest of `SLICES` across the crowned tread, the maximum rounded by `SOFT`, which is also how far the
+depth may differ from the plane's own law there. Limits: the profile is sampled at `NODES` places over the diameter; no
+rim, no separate stiffness for a tread that wraps around an edge; the camber in the stiffness is that against the ground
+around the wheel.
 """
 
 from __future__ import annotations
@@ -29,12 +30,16 @@ from rollover.tables import (
 )
 from rollover.vectors import add_force, cross, place, spin, to_body, to_world, velocity
 
-NODES = 33
+NODES = 25
+SLICES = 5
+SOFT = 0.001  # m: slices whose depths differ by less share the force
 FAR = 0.2  # share of the radius: ground further below the tread is not looked at closely
 
 # places in what `cut` finds: depth d in the disc's plane, cos of the camber (its sine is at the end); force and moment
 # about the wheel's centre for a unit of force on the depth d cos; normal of the ground
-C_DEPTH, C_COSINE, C_FORCE, C_MOMENT, C_NORMAL, C_CAMBER, CUTS = 0, 1, 2, 5, 8, 11, 12
+C_DEPTH, C_COSINE, C_FORCE, C_MOMENT, C_NORMAL, C_CAMBER = 0, 1, 2, 5, 8, 11
+# change of the camber's sine as the hub moves along x and y; normal that the camber is measured against
+C_BY_X, C_BY_Y, C_AROUND, CUTS = 12, 13, 14, 17
 
 
 @compiled
@@ -83,32 +88,39 @@ def depth_of(R: float, area: float) -> Any:
 
 
 @compiled
-def cut(t: Any, row: Any, wheel: Any, before: Any, found: Any) -> None:
-    """What the ground cuts off a tyre, into `found` (CUTS,); `before` (3,) is the ground's normal of the last step."""
-    e = to_world(row, wheel[W_AXIS], wheel[W_AXIS + 1], wheel[W_AXIS + 2])
-    hub = place(row, wheel[W_CENTRE], wheel[W_CENTRE + 1], wheel[W_CENTRE + 2])
-    lean = before[0] * e[0] + before[1] * e[1] + before[2] * e[2]
-    cosine = math.sqrt(max(1.0 - lean * lean, 1e-12))
-    half, crown = wheel[W_HALF], max(wheel[W_CROWN], 1e-6)
-    y = min(max(-half * half * lean / (2.0 * crown * cosine), -half), half)
-    R = wheel[W_RADIUS] - crown * (y / half) ** 2
-    found[:] = 0.0
-    found[C_COSINE], found[C_CAMBER] = cosine, lean
+def lean_on(t: Any, hub: Any, e: Any, reach: float, found: Any) -> None:
+    """Sine of the camber against the ground around the wheel, and how it changes as the hub moves along x and y.
+
+    The ground's slope is that of chords of the wheel's diameter through the hub, so that it does not jump at an edge.
+    """
+    x, y = hub[0], hub[1]
+    a, ax, ay = height_and_gradient(t.relief, t.nodes, x + reach, y)
+    b, bx, by = height_and_gradient(t.relief, t.nodes, x - reach, y)
+    c, cx, cy = height_and_gradient(t.relief, t.nodes, x, y + reach)
+    d, dx, dy = height_and_gradient(t.relief, t.nodes, x, y - reach)
+    gx, gy = 0.5 * (a - b) / reach, 0.5 * (c - d) / reach
+    size = math.sqrt(1.0 + gx * gx + gy * gy)
+    n = (-gx / size, -gy / size, 1.0 / size)
+    lean = n[0] * e[0] + n[1] * e[1] + n[2] * e[2]
+    by_gx, by_gy = -e[0] / size - lean * gx / (size * size), -e[1] / size - lean * gy / (size * size)
+    found[C_CAMBER], found[C_COSINE] = lean, math.sqrt(max(1.0 - lean * lean, 1e-12))
+    found[C_BY_X] = 0.5 * (by_gx * (ax - bx) + by_gy * (cx - dx)) / reach
+    found[C_BY_Y] = 0.5 * (by_gx * (ay - by) + by_gy * (cy - dy)) / reach
     for k in range(3):
-        found[C_NORMAL + k] = before[k]
-    upright = math.sqrt(max(1.0 - e[2] * e[2], 0.0))
-    x0, y0, z0 = hub[0] + y * e[0], hub[1] + y * e[1], hub[2] + y * e[2]
-    if upright < 0.05:
-        found[C_DEPTH] = -R
-        return
-    gap = highest(t.relief, t.nodes, x0, y0, R) - (z0 - R * upright)
-    if gap < -FAR * R:
-        found[C_DEPTH] = gap
-        return
+        found[C_AROUND + k] = n[k]
+
+
+@compiled
+def slice_through(t: Any, hub: Any, centre: Any, e: Any, R: float, at: Any, weight: Any, one: Any) -> None:
+    """Depth of one disc across the axle e, its gradient and its moment about the hub, into `one` (7,).
+
+    Where the ground does not reach the disc, the (negative) depth of what comes nearest to it.
+    """
+    upright = math.sqrt(1.0 - e[2] * e[2])
     # forward, level; and up within the disc's plane
     fx, fy = e[1] / upright, -e[0] / upright
     wx, wy, wz = fy * e[2], -fx * e[2], upright
-    at = np.empty((NODES, 8))  # s, height in the plane, place (3), gradient (2) over q, 1/q
+    x0, y0, z0 = centre
     nearest, best = -1e30, 0
     for i in range(NODES):
         s = R * (2.0 * i / (NODES - 1) - 1.0)
@@ -125,52 +137,88 @@ def cut(t: Any, row: Any, wheel: Any, before: Any, found: Any) -> None:
         p[0], p[1], p[7] = s, r, 1.0 / q
         p[2], p[3], p[4] = x0 + s * fx + r * wx, y0 + s * fy + r * wy, z0 + r * wz
         p[5], p[6] = gx / q, gy / q
+        weight[i] = 0.0
         if r + arc > nearest:
             nearest, best = r + arc, i
     area = 0.0
-    weight = np.zeros(NODES)
     for i in range(NODES - 1):
         more, left, right = stretch(R, at[i, 0], at[i + 1, 0], at[i, 1], at[i + 1, 1])
         area += more
         weight[i] += left
         weight[i + 1] += right
-    gx, gy, up = at[best, 5], at[best, 6], at[best, 7]
+    one[:] = 0.0
+    one[0], factor = min(nearest, 0.0), 1.0
     if area > 1e-14:
-        gx, gy, up = 0.0, 0.0, 0.0
-        for i in range(NODES):
-            if weight[i] > 0.0:
-                p = at[i]
-                a, b, c = -weight[i] * p[5], -weight[i] * p[6], weight[i] * p[7]
-                gx, gy, up = gx - a, gy - b, up + c
-                u, v, w = cross(p[2] - hub[0], p[3] - hub[1], p[4] - hub[2], a, b, c)
-                found[C_MOMENT] += u
-                found[C_MOMENT + 1] += v
-                found[C_MOMENT + 2] += w
-        depth, chord = depth_of(R, area)
-        factor = cosine / chord
-        found[C_DEPTH], found[C_FORCE], found[C_FORCE + 1] = depth, -factor * gx, -factor * gy
-        found[C_FORCE + 2] = factor * up
-        # turning about the axle moves no ground through the disc
-        about = e[0] * found[C_MOMENT] + e[1] * found[C_MOMENT + 1] + e[2] * found[C_MOMENT + 2]
-        for k in range(3):
-            found[C_MOMENT + k] = factor * (found[C_MOMENT + k] - about * e[k])
+        one[0], chord = depth_of(R, area)
+        factor = 1.0 / chord
     else:
-        found[C_DEPTH] = min(nearest, 0.0)
-    size = math.sqrt(gx * gx + gy * gy + up * up)
-    found[C_NORMAL], found[C_NORMAL + 1], found[C_NORMAL + 2] = -gx / size, -gy / size, up / size
+        weight[:] = 0.0
+        weight[best] = 1.0
+    for i in range(NODES):
+        if weight[i] > 0.0:
+            p, by = at[i], factor * weight[i]
+            a, b, c = -by * p[5], -by * p[6], by * p[7]
+            u, v, w = cross(p[2] - hub[0], p[3] - hub[1], p[4] - hub[2], a, b, c)
+            one[1], one[2], one[3] = one[1] + a, one[2] + b, one[3] + c
+            one[4], one[5], one[6] = one[4] + u, one[5] + v, one[6] + w
+    # the wheel's own turning moves no sample; yet these stay level, so that they turn about the axle as the wheel leans
+    about = e[0] * one[4] + e[1] * one[5] + e[2] * one[6]
+    lift = about * e[2] / upright
+    one[4] += lift * wx - about * e[0]
+    one[5] += lift * wy - about * e[1]
+    one[6] += lift * wz - about * e[2]
 
 
 @compiled
-def closing_rate(row: Any, c: Any, e: Any, n: Any, found: Any) -> float:
-    """Rate of the depth on uneven ground, m/s; e is the axle, n the normal that the camber is measured against."""
+def cut(t: Any, row: Any, wheel: Any, found: Any) -> None:
+    """What the ground cuts off a tyre, into `found` (CUTS,): the deepest of its slices, softly."""
+    e = to_world(row, wheel[W_AXIS], wheel[W_AXIS + 1], wheel[W_AXIS + 2])
+    hub = place(row, wheel[W_CENTRE], wheel[W_CENTRE + 1], wheel[W_CENTRE + 2])
+    found[:] = 0.0
+    lean_on(t, hub, e, wheel[W_RADIUS], found)
+    for k in range(3):
+        found[C_NORMAL + k] = found[C_AROUND + k]
+    upright = math.sqrt(max(1.0 - e[2] * e[2], 0.0))
+    low = hub[2] - wheel[W_RADIUS] * upright - wheel[W_HALF] * abs(e[2])
+    gap = highest(t.relief, t.nodes, hub[0], hub[1], wheel[W_RADIUS] + wheel[W_HALF]) - low
+    if gap < -FAR * wheel[W_RADIUS] or upright < 0.05:
+        found[C_DEPTH] = min(gap, -FAR * wheel[W_RADIUS])
+        return
+    at, weight, slices = np.empty((NODES, 8)), np.empty(NODES), np.empty((SLICES, 7))
+    deepest = -1e30
+    for j in range(SLICES):
+        share = 2.0 * j / (SLICES - 1) - 1.0
+        y = share * wheel[W_HALF]
+        R = wheel[W_RADIUS] - max(wheel[W_CROWN], 1e-6) * share * share
+        centre = (hub[0] + y * e[0], hub[1] + y * e[1], hub[2] + y * e[2])
+        slice_through(t, hub, centre, e, R, at, weight, slices[j])
+        deepest = max(deepest, slices[j, 0])
+    total = 0.0
+    for j in range(SLICES):
+        total += math.exp((slices[j, 0] - deepest) / SOFT)
+    found[C_DEPTH] = deepest + SOFT * math.log(total)
+    for j in range(SLICES):
+        part = found[C_COSINE] * math.exp((slices[j, 0] - deepest) / SOFT) / total
+        for k in range(3):
+            found[C_FORCE + k] += part * slices[j, 1 + k]
+            found[C_MOMENT + k] += part * slices[j, 4 + k]
+    size = math.sqrt(found[C_FORCE] ** 2 + found[C_FORCE + 1] ** 2 + found[C_FORCE + 2] ** 2)
+    for k in range(3):
+        found[C_NORMAL + k] = found[C_FORCE + k] / size
+
+
+@compiled
+def closing_rate(row: Any, c: Any, e: Any, found: Any) -> float:
+    """Rate of the depth on uneven ground, m/s; e is the axle."""
     v = velocity(row, c[W_CENTRE], c[W_CENTRE + 1], c[W_CENTRE + 2])
     o = spin(row)
     rate = 0.0
     for k in range(3):
         rate -= found[C_FORCE + k] * v[k] + found[C_MOMENT + k] * o[k]
     x, y, z = cross(o[0], o[1], o[2], e[0], e[1], e[2])
-    leaning = n[0] * x + n[1] * y + n[2] * z
-    return rate - found[C_DEPTH] * found[C_CAMBER] / found[C_COSINE] * leaning
+    leaning = found[C_AROUND] * x + found[C_AROUND + 1] * y + found[C_AROUND + 2] * z
+    leaning += found[C_BY_X] * v[0] + found[C_BY_Y] * v[1]
+    return rate - found[C_DEPTH] * found[C_CAMBER] / found[C_COSINE] * leaning  # type: ignore[no-any-return]
 
 
 @compiled
@@ -182,11 +230,14 @@ def press(t: Any, w: int, force: float, slope: float, found: Any, Q: Any) -> flo
     b = t.wheel_i[w]
     row = t.pose[b]
     x, y, z = force * found[C_FORCE], force * found[C_FORCE + 1], force * found[C_FORCE + 2]
+    d, lean = found[C_DEPTH], found[C_CAMBER]
+    moment = lean * d * (force / found[C_COSINE] - slope * d * (1.0 - lean * lean))
+    # the camber changes with the place as well as with the axle's direction
+    x, y = x + moment * found[C_BY_X], y + moment * found[C_BY_Y]
     add_force(row, b, t.wheel_f[w, W_CENTRE : W_CENTRE + 3], x, y, z, Q)
     x, y, z = force * found[C_MOMENT], force * found[C_MOMENT + 1], force * found[C_MOMENT + 2]
     x, y, z = to_body(row, x, y, z)
     Q[6 * b + 3] += x
     Q[6 * b + 4] += y
     Q[6 * b + 5] += z
-    d, lean = found[C_DEPTH], found[C_CAMBER]
-    return lean * d * (force / found[C_COSINE] - slope * d * (1.0 - lean * lean))
+    return moment  # type: ignore[no-any-return]
