@@ -40,7 +40,7 @@ from rollover.tables import (
 )
 from rollover.vectors import cross, to_body
 
-BRAKE_STIFFNESS = 2e5  # N m/rad: a brake holds like a spring until its limit
+BRAKE_STIFFNESS = 2e6  # N m/rad: a brake holds like a spring until its limit
 BRAKE_RELAXATION = 0.002  # s, dashpot over that spring
 DROOP = 0.1  # share of the rate limit over which a governor takes the torque back
 
