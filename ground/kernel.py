@@ -37,8 +37,9 @@ GROWING = 26  # 1 while the co-moving mass may still grow with depth
 COLUMNS = 27
 
 # columns of state (int)
-CELL, BODY, MODE, FLAGS, HITS = 0, 1, 2, 3, 4
-STATE_COLUMNS = 5
+# which element, body above it, mode, domain flags, touches so far, row of its law and friction
+CELL, BODY, MODE, FLAGS, HITS, ROW = 0, 1, 2, 3, 4, 5
+STATE_COLUMNS = 6
 IDLE, LOADING, UNLOADING = 0, 1, 2
 
 # columns of the law's settings

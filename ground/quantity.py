@@ -65,6 +65,18 @@ class Quantity:
 
 
 @dataclass(frozen=True)
+class Grid:
+    """Rows of numbers, which a file may also name as a .csv or .npy file; read by the scenario loader."""
+
+    unit: str
+    meaning: str = ""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> dict[str, Any]:
+        """Ask for nothing more than numbers."""
+        return handler(source)  # type: ignore[no-any-return]
+
+
+@dataclass(frozen=True)
 class Label:
     """A name that paths and channels are built from: letters, digits, ``_`` and ``-``, a letter first."""
 

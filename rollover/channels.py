@@ -41,6 +41,7 @@ _ENERGY = {
     "device": "taken by the devices of a test stand, less what they put in",
     "lashing": "stored and lost in the lashings of a test stand",
     "effects": "taken by effects on the bodies: guide, air, a striker that gives way",
+    "drive": "taken by the brakes, less what the engine gave",
     "residual": "what the ledger does not explain",
 }
 
@@ -80,6 +81,7 @@ CHANNELS: dict[str, Channel] = {
         Channel(name="device/force", unit="N", meaning="of the test stand's beam, block or exciter on what it loads"),
         Channel(name="device/deflection", unit="m", meaning="of the loaded point along the load, since it began"),
         Channel(name="device/energy", unit="J", meaning="put in by the device since the load began"),
+        Channel(name="wheel/NAME/spin", unit="rad/s", meaning="of a wheel that turns by itself, forward"),
         Channel(name="axle/front/angle", unit="rad", meaning="of the front axle about its pivot"),
         Channel(name="axle/front/impulse", unit="N m s", meaning="of the axle on its stops, accumulated"),
         *[Channel(name=f"energy/{name}", unit="J", meaning=meaning) for name, meaning in _ENERGY.items()],

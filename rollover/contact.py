@@ -14,14 +14,17 @@ from ground.array import Elements
 from ground.kernel import COLUMNS, STATE_COLUMNS
 from ground.law import HIDDEN, REFERENCE_MASS, GroundLaw
 from ground.settings import settings
-from ground.surface import normal
+from ground.surface import is_flat, normal
+from ground.surface import tables as surface_tables
 from rollover import tables as c
 from rollover import terms
 from rollover.effects import acting
 from rollover.effects.vehicle import TankSlosh
 from rollover.inertia import MassProperties
-from rollover.scenario import Ground, Scenario
+from rollover.initiation import Driving
+from rollover.scenario import Ground, Patch, Scenario
 from rollover.shapes import Disc, Shape, SurfacePoints, cone, rectangle, sample
+from rollover.spin import spin_mass
 from rollover.tables import Tables
 from rollover.vehicle import RigidBody, Striker, Vehicle, Wheel, carried
 
@@ -206,17 +209,29 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
             math.inf if tyre.bottoming is None else tyre.bottoming * tyre.radius,
             tyre.bottoming_stiffness,
         ]
+    spin_i, spin_f, drive = _turning(scenario, wheel_f, 6 * nb)
+    for w in np.flatnonzero(spin_i >= 0).tolist():
+        # a turning wheel's inertia about its axle is not its carrier's
+        at = 6 * row[wheels[w].carrier] + 3
+        axle = wheel_f[w, c.W_AXIS : c.W_AXIS + 3]
+        mass[at : at + 3, at : at + 3] -= spin_f[w, c.P_INERTIA] * np.outer(axle, axle)
+    wheel_i = np.array([row[w.carrier] for w in wheels], dtype=np.int64)
     mount_f, mount_i = _mounts(vehicle, bodies, row)
     joint_i, joint_f, axle_f, axle_i = _joints(vehicle, bodies, row)
     term_i, term_f = _terms(scenario, bodies)
-    n = normal(ground.surface)
+    n = normal(ground.surface) if is_flat(ground.surface) else np.array([0.0, 0.0, 1.0])
+    relief, nodes = surface_tables(ground.surface)
     nx, ny = ground.elements.count
     elements = ground.elements
-    law: GroundLaw = ground.law
-    law_settings, numbers = settings(law, *acting(scenario.effects))
+    rows: list[tuple[GroundLaw, Ground | Patch]] = [(ground.law, ground), *((p.law, p) for p in ground.patches)]
     number = start
     capacity = 2 * number + 64
-    hidden = HIDDEN + law.hidden
+    hidden = HIDDEN + max(law.hidden for law, _ in rows)
+    told = [settings(law, *acting(scenario.effects)) for law, _ in rows]
+    integers = np.array([whole for whole, _ in told], dtype=np.int64)
+    numbers = np.zeros((len(rows), max(len(p) for _, p in told)))
+    for k, (_, p) in enumerate(told):
+        numbers[k, : len(p)] = p
     return Tables(
         mass=mass,
         inverse=np.linalg.inv(mass),
@@ -229,18 +244,25 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         member_f=np.array(members_f).reshape(-1, 9),
         member_i=np.array(members_i, dtype=np.int64).reshape(-1, 3),
         wheel_f=wheel_f,
-        wheel_i=np.array([row[w.carrier] for w in wheels], dtype=np.int64),
+        wheel_i=wheel_i,
+        spin_i=spin_i,
+        spin_f=spin_f,
+        spin_mass=spin_mass(6 * nb + int((spin_i >= 0).sum()), spin_i, spin_f, wheel_f, wheel_i),
+        drive=drive,
         mount_f=mount_f,
         mount_i=mount_i,
         axle_f=axle_f,
         axle_i=axle_i,
         term_i=term_i,
         term_f=term_f,
-        law=law_settings,
+        law=integers,
         p=numbers,
-        soil=_soil(ground, nose_share(scenario.effects)),
-        domain=law.domain.vector,
+        soil=np.array([_soil(ground, law, place, nose_share(scenario.effects)) for law, place in rows]),
+        domain=np.array([law.domain.vector for law, _ in rows]),
+        patch_f=np.array([[p.low[0], p.high[0], p.low[1], p.high[1]] for p in ground.patches]).reshape(-1, 4),
         plane=np.array([*n, 0.0]),
+        relief=relief,
+        nodes=nodes,
         grid_f=np.array(
             [
                 elements.centre[0] - 0.5 * nx * elements.spacing[0],
@@ -259,7 +281,8 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         touched=np.zeros(number + 1, dtype=np.int64),
         candidate_i=np.zeros((number + 1, 2), dtype=np.int64),
         candidate_f=np.zeros((number + 1, 2)),
-        wheel_memory=np.zeros((len(wheels), c.EDGE_COLUMNS)),
+        wheel_memory=_upright(len(wheels)),
+        spin_memory=np.zeros((len(wheels), c.SPIN_MEMORY)),
         mount_memory=np.zeros((len(mount_f), c.SET_COLUMNS)),
         axle_memory=np.zeros(c.AXLE_MEMORY),
         clock=np.zeros(2),
@@ -341,20 +364,55 @@ def _bed(effect: Any, body: Body, chassis: Body, gravity: float) -> list[float]:
     return [*held, 0.0, 0.0, effect.friction, effect.travel]
 
 
-def _soil(ground: Ground, share: float) -> Array:
-    rule = {"reference": c.RULE_REFERENCE, "effective": c.RULE_EFFECTIVE, "clamped": c.RULE_CLAMPED}
-    friction = ground.friction
-    return np.array(
-        [
-            friction.coefficient,
-            friction.stick_displacement,
-            friction.stick_relaxation,
-            ground.co_moving_mass.share / share,  # of the whole striker, though its nose alone hits
-            rule[ground.striker_mass],
-            REFERENCE_MASS,
-            ground.law.domain.momentum_most,
+def _upright(wheels: int) -> Array:
+    """Empty memory of tyres over level ground."""
+    memory = np.zeros((wheels, c.EDGE_COLUMNS))
+    memory[:, c.E_NORMAL + 2] = memory[:, c.E_NORMAL_NOW + 2] = 1.0
+    return memory
+
+
+LOCK_STIFFNESS, LOCK_DAMPING = 1e5, 200.0  # N m/rad and N m s/rad of the shafts between the wheels of a locked axle
+
+
+def _turning(scenario: Scenario, wheel_f: Array, first: int) -> tuple[NDArray[np.int64], Array, Array]:
+    """Coordinates and numbers of wheels that turn, and of their drive; steers the front wheels. None unless driving."""
+    start, vehicle = scenario.initiation, scenario.vehicle
+    spin_i, spin_f = np.full(len(wheel_f), -1, dtype=np.int64), np.zeros((len(wheel_f), c.SPIN_COLUMNS))
+    drive = np.array([0.0, 1e9, 0.0, 0.0])
+    if not isinstance(start, Driving) or not isinstance(vehicle, Vehicle):
+        return spin_i, spin_f, drive
+    steer = math.radians(start.steer_deg)
+    for w, wheel in enumerate(vehicle.wheels):
+        assert wheel.inertia is not None  # the scenario has seen to it
+        spin_i[w] = first + w
+        spin_f[w] = [
+            wheel.inertia,
+            start.brake.torque if start.brake and vehicle.on_axle(wheel, start.brake.axle) else 0.0,
+            float(start.drive is not None and vehicle.on_axle(wheel, start.drive.axle)),
+            float(start.brake is not None and start.brake.against == "ground"),
         ]
-    )
+        wheel_f[w, c.W_ROLLS] = 0.0
+        if vehicle.on_axle(wheel, "front"):
+            wheel_f[w, c.W_AXIS : c.W_AXIS + 3] = [-math.sin(steer), math.cos(steer), 0.0]
+    if start.drive is not None:
+        drive[c.D_RATE] = start.drive.limit_rate or 1e9
+        if start.drive.differential == "locked":
+            drive[c.D_STIFFNESS], drive[c.D_DAMPING] = LOCK_STIFFNESS, LOCK_DAMPING
+    return spin_i, spin_f, drive
+
+
+def _soil(ground: Ground, law: GroundLaw, place: Ground | Patch, share: float) -> list[float]:
+    rule = {"reference": c.RULE_REFERENCE, "effective": c.RULE_EFFECTIVE, "clamped": c.RULE_CLAMPED}
+    friction = place.friction or ground.friction
+    return [
+        friction.coefficient,
+        friction.stick_displacement,
+        friction.stick_relaxation,
+        ground.co_moving_mass.share / share,  # of the whole striker, though its nose alone hits
+        rule[ground.striker_mass],
+        REFERENCE_MASS,
+        law.domain.momentum_most,
+    ]
 
 
 def _mounts(

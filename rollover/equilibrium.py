@@ -55,11 +55,12 @@ class Equilibrium:
 
     Height is along the surface's normal, slide along it; roll, pitch and yaw turn about the vehicle's origin. The
     residuals are the virtual work of all forces for each coordinate, over the weight. The tyres' stick springs hold
-    the vehicle where the search began, so that on a slope it leans on them.
+    the vehicle where the search began, so that on a slope it leans on them. They begin at `base`, a point of the
+    plane `t.plane`, which for an uneven surface is that of the ground under the wheels.
     """
 
-    def __init__(self, bodies: tuple[Body, ...], t: Tables, heading: float, gravity: float) -> None:
-        self.bodies, self.t, self.heading = bodies, t, heading
+    def __init__(self, bodies: tuple[Body, ...], t: Tables, heading: float, gravity: float, base: Array) -> None:
+        self.bodies, self.t, self.heading, self.base = bodies, t, heading, base
         self.handle = handle(t)
         self.weight = np.zeros(6 * len(bodies))
         self.weight[2::6] = [-gravity * b.inertia.mass for b in bodies]
@@ -100,7 +101,7 @@ class Equilibrium:
         return u
 
     def _origin(self, u: Array) -> Array:
-        return np.asarray(u[0] * self.t.plane[:3] + u[SLIDE : SLIDE + 2] @ self.along)
+        return np.asarray(u[0] * self.t.plane[:3] + u[SLIDE : SLIDE + 2] @ self.along + self.base)
 
     def _rotations(self, u: Array) -> list[Array]:
         R = from_angles(u[ROLL], u[PITCH], self.heading + u[YAW])
@@ -299,6 +300,13 @@ class Equilibrium:
             a = b if y * b[1] < 0.0 else (a[0], 0.5 * a[1])
             b = (x, y)
         return True
+
+    def forward(self, u: Array, speed: float, sideways: float) -> Array:
+        """Velocities (6 nb,) of a vehicle that moves along the ground, along its heading and to its left (m/s)."""
+        n, ahead = self.t.plane[:3], from_angles(0.0, 0.0, self.heading + u[YAW])[:, 0]
+        ahead = ahead - (ahead @ n) * n
+        ahead /= np.linalg.norm(ahead)
+        return np.tile([*(speed * ahead + sideways * _cross(n, ahead)), 0.0, 0.0, 0.0], len(self.bodies))
 
     def rates(self, u: Array, rate: float) -> Array:
         """Velocities (6 nb,) while the vehicle rolls at `rate` about its most loaded tyre's contact."""

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from ground.compiled import compiled
-from ground.kernel import BODY, MASS_B, NORMAL, OFFSET, OWNER_R, PLACE, SHEAR, SPREAD, friction_force, normal_force
+from ground.kernel import BODY, MASS_B, NORMAL, OFFSET, OWNER_R, PLACE, ROW, SHEAR, SPREAD, friction_force, normal_force
 from rollover.connectors import try_mounts
 from rollover.devices import try_devices
+from rollover.spin import read_spins, tread_motion, try_spins, turn_by_friction
 from rollover.tables import (
     A_C,
     A_IMPACT,
@@ -27,6 +28,7 @@ from rollover.tables import (
     E_FORCE_NOW,
     E_FRICTION_NOW,
     E_MOVED,
+    E_NORMAL_NOW,
     E_PLACE,
     E_POINT,
     E_SHEAR,
@@ -62,6 +64,7 @@ from rollover.tables import (
     Z,
 )
 from rollover.terms import try_terms
+from rollover.tread import C_AROUND, C_CAMBER, C_COSINE, C_DEPTH, C_FORCE, C_NORMAL, CUTS, closing_rate, cut, press
 from rollover.vectors import (
     add_force,
     centripetal_depth,
@@ -93,18 +96,18 @@ def read_poses(pose: Any, q: Any, qd: Any) -> None:
 @compiled
 def try_elements(t: Any, Q: Any) -> None:
     """Forces of the elements in contact, with what was found for each in `trial`."""
-    mu, stick, relaxation = t.soil[MU], t.soil[STICK], t.soil[RELAXATION]
     for a in range(t.counts[ACTIVE]):
         i = t.active[a]
         m, trial = t.memory[i], t.trial[i]
         b = t.state[i, BODY]
-        row = t.pose[b]
+        row, law = t.pose[b], t.state[i, ROW]
+        mu, stick, relaxation = t.soil[law, MU], t.soil[law, STICK], t.soil[law, RELAXATION]
         r, n = m[OWNER_R : OWNER_R + 3], m[NORMAL : NORMAL + 3]
         x, y, z = place(row, r[0], r[1], r[2])
         v = velocity(row, r[0], r[1], r[2])
         depth = m[OFFSET] - (n[0] * x + n[1] * y + n[2] * z) + m[SPREAD]
         rate = -(n[0] * v[0] + n[1] * v[1] + n[2] * v[2])
-        force = normal_force(t.law, t.p, t.s[i], m, depth, rate)
+        force = normal_force(t.law[law], t.p[law], t.s[i], m, depth, rate)
         trial[Z], trial[ZDOT], trial[FN] = depth, rate, force
         trial[MOVED], trial[MOVED + 1], trial[MOVED + 2] = x - m[PLACE], y - m[PLACE + 1], z - m[PLACE + 2]
         f = friction_force(mu, stick, relaxation, force, m[SHEAR : SHEAR + 3], trial[MOVED : MOVED + 3], v, n)
@@ -169,11 +172,17 @@ def along_axle(e: Any, n: Any, lean: float, v: Any) -> Any:
 @compiled
 def try_wheels(t: Any, Q: Any) -> None:
     """Tyre forces on the undisturbed surface: energy k(camber) depth^2/2, a dashpot, friction on a stick spring."""
-    e, x = np.empty(3), np.empty(3)
-    n, offset = t.plane[:3], t.plane[3]
+    e, x, tread, found = np.empty(3), np.empty(3), np.empty(3), np.zeros(CUTS)
+    uneven = t.relief.shape[0] > 0
     for w in range(t.wheel_i.size):
         b = t.wheel_i[w]
         row, c, g = t.pose[b], t.wheel_f[w], t.wheel_memory[w]
+        n, offset = g[E_NORMAL_NOW : E_NORMAL_NOW + 3], t.plane[3]
+        if uneven:
+            cut(t, row, c, found)
+            n[:] = found[C_NORMAL : C_NORMAL + 3]
+        else:
+            n[:] = t.plane[:3]
         lean = tyre_point(row, c, n, e, x)
         r = g[E_POINT : E_POINT + 3]
         r[0], r[1], r[2] = to_body(row, x[0], x[1], x[2])
@@ -182,39 +191,59 @@ def try_wheels(t: Any, Q: Any) -> None:
             g[E_WHERE + k] = row[X + k] + x[k]
             depth -= n[k] * g[E_WHERE + k]
             g[E_FRICTION_NOW + k] = 0.0
-        held = place(row, g[E_ANCHOR], g[E_ANCHOR + 1], g[E_ANCHOR + 2])
+        hold = g[E_ANCHOR : E_ANCHOR + 3]
+        turning, spinning = (0.0, 0.0, 0.0), t.spin_i[w] >= 0 and t.spin_i[w] < Q.shape[0]
+        if spinning:
+            hold = tread
+            turning = tread_motion(t, w, g[E_ANCHOR : E_ANCHOR + 3], tread)
+        held = place(row, hold[0], hold[1], hold[2])
         for k in range(3):
             g[E_MOVED + k] = held[k] - g[E_PLACE + k]
+        if uneven:
+            depth = found[C_DEPTH] * found[C_COSINE]
         g[E_DEPTH_NOW], g[E_FORCE_NOW], g[E_DAMPING_NOW], g[E_ENERGY_NOW] = depth, 0.0, 0.0, 0.0
         if depth <= 0.0:
             continue
         v = velocity(row, r[0], r[1], r[2])
-        rate = -(n[0] * v[0] + n[1] * v[1] + n[2] * v[2])
-        hold = g[E_ANCHOR : E_ANCHOR + 3]
+        rate, camber = -(n[0] * v[0] + n[1] * v[1] + n[2] * v[2]), lean
+        if uneven:
+            rate = closing_rate(row, c, e, found)
+            camber = found[C_CAMBER]
         v = velocity(row, hold[0], hold[1], hold[2])
-        stiffness, slope = tyre_stiffness(c, lean)
+        if spinning:
+            vx, vy, vz = to_world(row, turning[0], turning[1], turning[2])
+            v = v[0] + vx, v[1] + vy, v[2] + vz
+        stiffness, slope = tyre_stiffness(c, camber)
         spring, energy, beyond = stiffness * depth, 0.5 * stiffness * depth * depth, max(depth - c[W_BOTTOM], 0.0)
-        fade, fall = lying(lean)
+        fade, fall = lying(camber)
         if beyond > 0.0:
             # the rim bottoms: a second spring in parallel, with an energy of its own
             spring += fade * c[W_KB] * beyond
             energy += 0.5 * fade * c[W_KB] * beyond * beyond
         damping = max(c[W_C] * stiffness / c[W_KZ] * rate, -spring)  # never a pull
         force = spring + damping
+        moment = -slope * lean * depth * depth - fall * c[W_KB] * lean * beyond * beyond
+        if uneven:
+            moment = press(t, w, force, slope + fall * c[W_KB] * (beyond / depth) ** 2, found, Q)
+            force *= math.sqrt(found[C_FORCE] ** 2 + found[C_FORCE + 1] ** 2 + found[C_FORCE + 2] ** 2)
         g[E_FORCE_NOW], g[E_DAMPING_NOW], g[E_ENERGY_NOW] = force, damping, energy
         stick = max(c[W_MU] * force / c[W_KY], 1e-9)
         slip = (g[E_MOVED], g[E_MOVED + 1], g[E_MOVED + 2])
         shear = (g[E_SHEAR], g[E_SHEAR + 1], g[E_SHEAR + 2])
-        if c[W_ROLLS] > 0.0:
+        if c[W_ROLLS] > 0.0 and not spinning:
             # a wheel that turns freely holds only along its axle; what goes the other way is rolling
             v, slip, shear = along_axle(e, n, lean, v), along_axle(e, n, lean, slip), along_axle(e, n, lean, shear)
         g[E_SLIP], g[E_SLIP + 1], g[E_SLIP + 2] = slip
         f = friction_force(c[W_MU], stick, TYRE_RELAXATION, force, shear, slip, v, n)
         g[E_FRICTION_NOW], g[E_FRICTION_NOW + 1], g[E_FRICTION_NOW + 2] = f
-        add_force(row, b, r, force * n[0], force * n[1], force * n[2], Q)
+        if not uneven:
+            add_force(row, b, r, force * n[0], force * n[1], force * n[2], Q)
+        if spinning:
+            turn_by_friction(t, w, hold, f, Q)
         add_force(row, b, hold, f[0], f[1], f[2], Q)  # friction holds the tread where it took hold of it
         # the stiffness falls with camber: the moment that goes with it keeps the spring conservative
-        moment = -slope * lean * depth * depth - fall * c[W_KB] * lean * beyond * beyond
+        if uneven:
+            n = found[C_AROUND : C_AROUND + 3]
         ex, ey, ez = cross(e[0], e[1], e[2], n[0], n[1], n[2])
         ex, ey, ez = to_body(row, moment * ex, moment * ey, moment * ez)
         Q[6 * b + 3] += ex
@@ -255,12 +284,14 @@ def try_axle(t: Any, Q: Any) -> None:
 
 @compiled
 def generalised_forces(t: Any, q: Any, qd: Any, Q: Any) -> None:
-    """All of the above at the state (q, qd), into Q (6 nb,)."""
+    """All of the above at the state (q, qd), into Q (n,); wheels do not turn where q is that of the bodies alone."""
     for k in range(Q.shape[0]):
         Q[k] = 0.0
     read_poses(t.pose, q, qd)
+    read_spins(t, q, qd)
     try_elements(t, Q)
     try_wheels(t, Q)
+    try_spins(t, Q)
     try_mounts(t, Q)
     try_axle(t, Q)
     try_devices(t, Q)
@@ -269,10 +300,8 @@ def generalised_forces(t: Any, q: Any, qd: Any, Q: Any) -> None:
 
 @compiled
 def added_mass(t: Any, q: Any, M: Any) -> None:
-    """Sum of m_b1 J J' over the elements in contact, into M (6 nb, 6 nb)."""
-    for j in range(M.shape[0]):
-        for k in range(M.shape[1]):
-            M[j, k] = 0.0
+    """Sum of m_b1 J J' over the elements in contact and what turning wheels add, into M (n, n)."""
+    M[:, :] = t.spin_mass
     J = np.empty(6)
     for b in range(t.pose.shape[0]):
         set_rotation(t.pose[b], q[6 * b + 3], q[6 * b + 4], q[6 * b + 5])

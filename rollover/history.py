@@ -20,6 +20,7 @@ from rollover.tables import (
     ACTIVE,
     E_FORCE,
     E_FRICTION,
+    E_NORMAL,
     E_WHERE,
     FLAGS_NOW,
     M_ANGLE,
@@ -54,7 +55,8 @@ def write_row(t: Any, q: Any, qd: Any, qdd: Any, row: Any) -> None:
         for j in range(3):
             row[k + 1 + j] = g[E_FRICTION + j]
             row[k + 4 + j] = g[E_WHERE + j]
-        k += 7
+            row[k + 7 + j] = g[E_NORMAL + j]
+        k += 10
     for i in range(t.mount_f.shape[0]):
         for j in range(6):
             row[k + j] = t.mount_memory[i, S_FORCE_NOW + j]
@@ -81,9 +83,9 @@ def write_row(t: Any, q: Any, qd: Any, qdd: Any, row: Any) -> None:
 
 def row_length(t: Tables) -> int:
     """Columns that `write_row` fills."""
-    n = len(t.mass)
+    n = len(t.spin_mass)
     out = OUT_COLUMNS if len(t.device_i) else 0
-    parts = len(t.pose) * RESULTANT_COLUMNS + 7 * len(t.wheel_i) + 12 * len(t.mount_f)
+    parts = len(t.pose) * RESULTANT_COLUMNS + 10 * len(t.wheel_i) + 12 * len(t.mount_f)
     return int(3 * n + parts + 2 + WORKS + 1 + 3 + out)
 
 
@@ -128,7 +130,8 @@ class States:
     qd: Array
     qdd: Array
     resultant: Array  # (n, nb, RESULTANT_COLUMNS)
-    wheels: Array  # (n, nw, 7): normal force, friction (3), place (3)
+    spin: Array  # (n, ns) rates of turning wheels
+    wheels: Array  # (n, nw, 10): normal force, friction (3), place (3), normal of the ground (3)
     mounts: Array  # (n, nt, 12): force and moment on body b, deflection and turn, all in body a's axes
     axle: Array  # (n, 2): angle, impulse of the stop
     work: Array  # (n, WORKS)
@@ -139,9 +142,9 @@ class States:
     device: Array  # (n, OUT_COLUMNS), or (n, 0) without a test stand
 
 
-def states(rows: Array, nb: int, nw: int, nt: int) -> States:
+def states(rows: Array, t: Tables) -> States:
     """Cut the rows into what they mean."""
-    n = len(rows)
+    n, nb, ns = len(rows), len(t.pose), len(t.spin_mass) - len(t.mass)
     at = 0
 
     def take(*shape: int) -> Array:
@@ -151,13 +154,15 @@ def states(rows: Array, nb: int, nw: int, nt: int) -> States:
         at += width
         return part
 
+    q, _, qd, spin, qdd, _ = (take(*shape) for _ in range(3) for shape in ((nb, 6), (ns,)))
     return States(
-        q=take(nb, 6),
-        qd=take(nb, 6),
-        qdd=take(nb, 6),
+        q=q,
+        qd=qd,
+        qdd=qdd,
+        spin=spin,
         resultant=take(nb, RESULTANT_COLUMNS),
-        wheels=take(nw, 7),
-        mounts=take(nt, 12),
+        wheels=take(len(t.wheel_i), 10),
+        mounts=take(len(t.mount_f), 12),
         axle=take(2),
         work=take(WORKS),
         soil_kinetic=take(),
@@ -171,12 +176,16 @@ def states(rows: Array, nb: int, nw: int, nt: int) -> States:
 def energies(s: States, t: Tables, bodies: tuple[Body, ...], gravity: float) -> dict[str, Array]:
     """The ledger over time, J, each (n,): what the bodies hold and what was taken from them; `residual` is the rest.
 
-    kinetic + potential + soil + tyre + rops + friction + collision + axle + effects less their sum at the start is
-    -residual; on a test stand also what its devices and lashings took, less than zero for what they put in.
+    All of them, kinetic and potential to drive, less their sum at the start, are -residual; on a test stand also what
+    its devices and lashings took, less than zero for what they put in.
     """
     n = len(s.axle)
     flat = s.qd.reshape(n, -1)
     kinetic = 0.5 * np.einsum("ni,ij,nj->n", flat, t.mass, flat) + s.soil_kinetic
+    if s.spin.shape[1]:
+        # I (spin + omega . e)^2/2 of the wheels that turn; t.mass is without them
+        whole = np.concatenate([flat, s.spin], axis=1)
+        kinetic += 0.5 * np.einsum("ni,ij,nj->n", whole, t.spin_mass, whole)
     masses = np.array([body.inertia.mass for body in bodies])
     potential = gravity * s.q[:, :, 2] @ masses
     ledger = {
@@ -189,6 +198,7 @@ def energies(s: States, t: Tables, bodies: tuple[Body, ...], gravity: float) -> 
         "collision": s.work[:, c.COLLISION],
         "axle": s.work[:, c.AXLE],
         "effects": s.work[:, c.EXTRA_WORK],
+        "drive": s.work[:, c.DRIVE],
     }
     if len(t.device_i):
         ledger["device"] = s.work[:, c.DEVICE]
@@ -201,14 +211,14 @@ def energies(s: States, t: Tables, bodies: tuple[Body, ...], gravity: float) -> 
 def channels(scenario: Scenario, s: States, t: Tables, bodies: tuple[Body, ...]) -> dict[str, Array]:
     """All channels of a run by their names, SI, each (n,)."""
     row = {body.name: b for b, body in enumerate(bodies)}
-    n = t.plane[:3]
+    n, uneven = t.plane[:3], len(t.relief) > 0
     normal = s.resultant[:, :, c.R_NORMAL : c.R_NORMAL + 3].sum(axis=1)
     tangent = s.resultant[:, :, c.R_TANGENT : c.R_TANGENT + 3].sum(axis=1)
     impulse = s.resultant[:, :, c.R_IMPULSE : c.R_IMPULSE + 3].sum(axis=1)
     found: dict[str, Array] = {
-        "ground/force_normal": normal @ n,
+        "ground/force_normal": s.resultant[:, :, c.R_WEIGHT].sum(axis=1) if uneven else normal @ n,
         "ground/force_tangential": np.linalg.norm(tangent, axis=1),
-        "ground/impulse_normal": impulse @ n,
+        "ground/impulse_normal": np.linalg.norm(impulse, axis=1) if uneven else impulse @ n,
         "ground/sinkage": s.sinkage,
         "ground/contact_area": s.footprint,
     }
@@ -225,6 +235,8 @@ def channels(scenario: Scenario, s: States, t: Tables, bodies: tuple[Body, ...])
     if not isinstance(vehicle, Striker):
         for w, wheel in enumerate(vehicle.wheels):
             found[f"wheel/{wheel.name}/force_normal"] = s.wheels[:, w, 0]
+            if t.spin_i[w] >= 0:
+                found[f"wheel/{wheel.name}/spin"] = s.spin[:, t.spin_i[w] - len(t.mass)]
         if vehicle.front_axle is not None:
             found["axle/front/angle"] = s.axle[:, 0]
             if vehicle.front_axle.stop == "impact":

@@ -168,7 +168,7 @@ def share_mass(t: Any, new: Any, total: int, share: Any) -> None:
                 AJ[a, m] += A[m, at + k] * J[a, k]
         W[a] = max(dot(J[a], AJ[a, at : at + 6]), 1e-30)
         add_outer(P, t.memory[i, MASS_B], J[a], at)
-    fraction = t.soil[FRACTION]
+    fraction = t.soil[0, FRACTION]
     for k in range(total):
         a = new[k]
         i = t.active[a]

@@ -1,4 +1,4 @@
-"""How a scenario begins (data): dropped, tipped over its balance, standing, thrown, or on a test stand."""
+"""How a scenario begins (data): dropped, tipped over, standing, driving, thrown, or on a test stand."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ class Drop:
     roll_deg: Annotated[float, Quantity("deg", "at first contact", least=-180, most=180)] = 0.0
     pitch_deg: Annotated[float, Quantity("deg", "at first contact", least=-90, most=90)] = 0.0
     yaw_deg: Annotated[float, Quantity("deg", "at first contact", least=-360, most=360)] = 0.0
+    position: Annotated[tuple[float, float], Quantity("m", "of the vehicle's origin, world x and y")] = (0.0, 0.0)
 
 
 @parameters
@@ -33,6 +34,7 @@ class TipOver:
     excess_deg: Annotated[float, Quantity("deg", "roll beyond the balance", least=0, most=30)] = 1.0
     roll_rate: Annotated[float, Quantity("rad/s", "at release, towards the side", least=0, most=10)] = 0.0
     heading_deg: Annotated[float, Quantity("deg", "of the vehicle about z", least=-360, most=360)] = 0.0
+    position: Annotated[tuple[float, float], Quantity("m", "of the vehicle's origin, world x and y")] = (0.0, 0.0)
 
 
 @parameters
@@ -42,6 +44,7 @@ class Standing:
     kind: Literal["standing"] = "standing"
     heading_deg: Annotated[float, Quantity("deg", "of the vehicle about z", least=-360, most=360)] = 0.0
     roll_rate: Annotated[float, Quantity("rad/s", "at release", least=-10, most=10)] = 0.0
+    position: Annotated[tuple[float, float], Quantity("m", "of the vehicle's origin, world x and y")] = (0.0, 0.0)
 
 
 @parameters
@@ -71,4 +74,43 @@ class Throw:
             raise ValueError("quaternion: got one beside roll_deg, pitch_deg or yaw_deg; one of both")
 
 
-Initiation = Annotated[Drop | TipOver | Standing | Throw | StaticTest | PendulumBlow | TiltTable, ByKind()]
+@parameters
+class Drive:
+    """What turns the wheels of an axle: a torque that rises from zero and is taken back at the engine's limit."""
+
+    torque: Annotated[float, Quantity("N m", "on the axle's wheels together, forward", least=-1e6, most=1e6)]
+    axle: Annotated[Literal["rear", "front", "all"], "whose wheels it drives"] = "rear"
+    differential: Annotated[Literal["open", "locked"], "open: equal torques; locked: equal rates"] = "open"
+    rise_time: Annotated[float, Quantity("s", "from zero to all of it", least=0)] = 0.1
+    until: Annotated[float | None, Quantity("s", "time at which the clutch is let go", above=0)] = None
+    limit_rate: Annotated[
+        float | None, Quantity("rad/s", "of the wheels, at which the engine gives nothing more", above=0)
+    ] = None
+
+
+@parameters
+class Brake:
+    """Holds wheels up to a limit; a large one locks them."""
+
+    torque: Annotated[float, Quantity("N m", "limit, of each wheel", above=0)]
+    axle: Annotated[Literal["rear", "front", "all"], "whose wheels it holds"] = "all"
+    against: Annotated[
+        Literal["vehicle", "ground"], "what it holds them to: the ground, where they are dug in, frozen in or chained"
+    ] = "vehicle"
+
+
+@parameters
+class Driving:
+    """Put down in static equilibrium where it stands, then sent forward along the ground with its wheels rolling."""
+
+    kind: Literal["driving"] = "driving"
+    speed: Annotated[float, Quantity("m/s", "forward, along the ground", least=-20, most=20)]
+    sideways: Annotated[float, Quantity("m/s", "sliding, to the left", least=-20, most=20)] = 0.0
+    position: Annotated[tuple[float, float], Quantity("m", "of the vehicle's origin, world x and y")] = (0.0, 0.0)
+    heading_deg: Annotated[float, Quantity("deg", "of the vehicle about z", least=-360, most=360)] = 0.0
+    steer_deg: Annotated[float, Quantity("deg", "of the front wheels, to the left", least=-60, most=60)] = 0.0
+    drive: Drive | None = None
+    brake: Brake | None = None
+
+
+Initiation = Annotated[Drop | TipOver | Standing | Driving | Throw | StaticTest | PendulumBlow | TiltTable, ByKind()]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ground.compiled import compiled
-from ground.kernel import AREA, BODY, LINE_C, LINE_K, LINE_Z, NORMAL, OWNER_R, PLASTIC, SPREAD, loading_force
+from ground.kernel import AREA, BODY, LINE_C, LINE_K, LINE_Z, NORMAL, OWNER_R, PLASTIC, ROW, SPREAD, loading_force
 from ground.law import REFERENCE_AREA
 from rollover.forces import TYRE_RELAXATION, tyre_stiffness
 from rollover.tables import (
@@ -20,6 +20,7 @@ from rollover.tables import (
     ACTIVE,
     E_DEPTH_NOW,
     E_FORCE_NOW,
+    E_NORMAL_NOW,
     E_POINT,
     FN,
     M_TORQUE_NOW,
@@ -84,23 +85,27 @@ def stiffness(t: Any, f: float, fd: float, K: Any) -> None:
     for i in range(K.shape[0]):
         for k in range(K.shape[1]):
             K[i, k] = 0.0
-    n = t.plane[:3]
     for a in range(t.counts[ACTIVE]):
         i = t.active[a]
         m, trial = t.memory[i], t.trial[i]
         z, v = trial[Z], trial[ZDOT]
         if trial[FN] <= 0.0:
             continue
-        area = m[AREA] / REFERENCE_AREA
-        if t.law[PLASTIC] != 0 and z < m[LINE_Z]:
+        area, law, p, soil = (
+            m[AREA] / REFERENCE_AREA,
+            t.law[t.state[i, ROW]],
+            t.p[t.state[i, ROW]],
+            t.soil[t.state[i, ROW]],
+        )
+        if law[PLASTIC] != 0 and z < m[LINE_Z]:
             normal = area * (f * m[LINE_K] + fd * m[LINE_C])
         else:
             s, z = t.s[i], max(z - m[SPREAD], 0.0)
-            here = loading_force(t.law, t.p, s, z, v)
-            deeper = loading_force(t.law, t.p, s, z + 1e-6, v)
-            faster = loading_force(t.law, t.p, s, z, v + 1e-6)
+            here = loading_force(law, p, s, z, v)
+            deeper = loading_force(law, p, s, z + 1e-6, v)
+            faster = loading_force(law, p, s, z, v + 1e-6)
             normal = area * (f * (deeper - here) + fd * (faster - here)) * 1e6
-        stick = t.soil[MU] * trial[FN] / t.soil[STICK]
+        stick = soil[MU] * trial[FN] / soil[STICK]
         b = t.state[i, BODY]
         add_point(
             K,
@@ -109,7 +114,7 @@ def stiffness(t: Any, f: float, fd: float, K: Any) -> None:
             m[OWNER_R : OWNER_R + 3],
             m[NORMAL : NORMAL + 3],
             normal,
-            stick * (f + fd * t.soil[RELAXATION]),
+            stick * (f + fd * soil[RELAXATION]),
         )
     for w in range(t.wheel_i.size):
         g, c = t.wheel_memory[w], t.wheel_f[w]
@@ -119,7 +124,7 @@ def stiffness(t: Any, f: float, fd: float, K: Any) -> None:
             bottom = c[W_KB] if g[E_DEPTH_NOW] > c[W_BOTTOM] else 0.0
             normal = f * (k + bottom) + fd * c[W_C] * k / c[W_KZ]
             stick = c[W_KY] * (f + fd * TYRE_RELAXATION) if c[W_MU] > 0.0 else 0.0
-            add_point(K, t.pose[b], b, g[E_POINT : E_POINT + 3], n, normal, stick)
+            add_point(K, t.pose[b], b, g[E_POINT : E_POINT + 3], g[E_NORMAL_NOW : E_NORMAL_NOW + 3], normal, stick)
     add_mounts(t, f, fd, K)
     stiffen_terms(t, f, fd, K)
     if t.axle_f.size > 0 and t.axle_memory[M_TORQUE_NOW] != 0.0:

@@ -30,6 +30,7 @@ from exudyn.itemInterface import (
     LoadMassProportional,
     MarkerBodyMass,
     MarkerBodyRigid,
+    NodeGenericODE2,
     NodeRigidBodyRotVecLG,
     ObjectGenericODE2,
     ObjectGround,
@@ -79,7 +80,7 @@ def solve(
                 initialVelocities=start.qd[6 * b : 6 * b + 6].tolist(),
             )
         )
-        J = body.tensor
+        J = live.tables.mass[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6]  # without wheels that turn
         inertia = [J[0, 0], J[1, 1], J[2, 2], J[1, 2], J[0, 2], J[0, 1]]
         handle = mbs.AddObject(ObjectRigidBody(mass=body.inertia.mass, inertia=inertia, nodeNumber=node))
         marker = mbs.AddMarker(MarkerBodyMass(bodyNumber=handle))
@@ -89,8 +90,21 @@ def solve(
     _add_joints(mbs, live.tables, handles, start)
     _add_stand(mbs, handles, start, held, hinges)
 
-    n = 6 * len(bodies)
-    Q, M, K = np.zeros(n), np.zeros((n, n)), np.zeros((n, n))
+    n = len(live.tables.spin_mass)
+    if turning := n - 6 * len(bodies):
+        spins = start.qd[-turning:].tolist()
+        angles = [0.0] * turning
+        nodes.append(
+            mbs.AddNode(
+                NodeGenericODE2(
+                    numberOfODE2Coordinates=turning,
+                    referenceCoordinates=angles,
+                    initialCoordinates=angles,
+                    initialCoordinates_t=spins,
+                )
+            )
+        )
+    Q, M, K = np.zeros(n), live.tables.spin_mass.copy(), np.zeros((n, n))
     added = exu.MatrixContainer()
     added.SetWithDenseMatrix(M, useDenseMatrix=True)
     newton = exu.MatrixContainer()

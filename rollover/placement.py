@@ -8,17 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ground.surface import Surface, height
+from ground.relief import element_plane
+from ground.surface import Surface, height, is_flat
 from rollover.contact import Body
 from rollover.equilibrium import ROLL, Equilibrium, tread_point
 from rollover.fall import fall_back
 from rollover.faults import Fault, InputError
 from rollover.forces import generalised_forces
 from rollover.frames import from_angles, from_quaternion, rotation_vector
-from rollover.initiation import Drop, Standing, Throw, TipOver
+from rollover.initiation import Driving, Drop, Standing, Throw, TipOver
 from rollover.scenario import Scenario
 from rollover.step import stand
-from rollover.tables import Tables, handle
+from rollover.tables import W_RADIUS, Tables, handle
 from rollover.vehicle import Striker, Vehicle
 
 Array = NDArray[np.float64]
@@ -41,6 +42,8 @@ def place(scenario: Scenario, bodies: tuple[Body, ...], t: Tables) -> Start:
     if isinstance(initiation, Throw):
         return _thrown(initiation, scenario, bodies, t)
     assert isinstance(scenario.vehicle, Vehicle)
+    if isinstance(initiation, Driving):
+        return _driving(initiation, scenario, bodies, t)
     if isinstance(initiation, TipOver):
         return _tipped(initiation, scenario, scenario.vehicle, bodies, t)
     assert isinstance(initiation, Standing)  # test stands put the vehicle down themselves
@@ -49,8 +52,9 @@ def place(scenario: Scenario, bodies: tuple[Body, ...], t: Tables) -> Start:
 
 def _dropped(drop: Drop, scenario: Scenario, bodies: tuple[Body, ...], t: Tables) -> Start:
     R = from_angles(math.radians(drop.roll_deg), math.radians(drop.pitch_deg), math.radians(drop.yaw_deg))
-    q = _rigid(bodies, np.zeros(3), R)
-    lowest = _deepest(bodies, t, R, scenario.ground.surface)
+    at = np.array([*drop.position, 0.0])
+    q = _rigid(bodies, at, R)
+    lowest = _deepest(bodies, t, R, scenario.ground.surface, at)
     # first contact at t = 0, a hair's breadth below the surface so that it is found there
     rise, speed = _fallen(scenario, bodies, drop, lowest)
     rise -= 1e-9
@@ -94,17 +98,46 @@ def _fallen(scenario: Scenario, bodies: tuple[Body, ...], drop: Drop, lowest: fl
     return lowest - float(depth), float(speed)
 
 
-def _deepest(bodies: tuple[Body, ...], t: Tables, R: Array, surface: Surface) -> float:
+def _deepest(bodies: tuple[Body, ...], t: Tables, R: Array, surface: Surface, at: Array) -> float:
     """How far the lowest contact point or tread edge lies below the surface, along z, with the origin at z = 0."""
     depth = -math.inf
     for body in bodies:
         for _, points in body.surfaces:
-            x = points.position @ R.T
-            depth = max(depth, float(np.max(height(surface, x[:, 0], x[:, 1]) - x[:, 2])))
+            x = points.position @ R.T + at
+            ground = height(surface, x[:, 0], x[:, 1]) if is_flat(surface) else _element_heights(t, x)
+            depth = max(depth, float(np.max(ground - x[:, 2])))
     for w in range(len(t.wheel_i)):
-        x = tread_point(t, bodies, w, R)
+        x = tread_point(t, bodies, w, R) + at
         depth = max(depth, float(height(surface, x[0], x[1]) - x[2]))
     return depth
+
+
+def _element_heights(t: Tables, x: Array) -> Array:
+    """Heights of the elements' planes below or above points (n, 3), (n,)."""
+    found, plane = np.empty(len(x)), np.empty(4)
+    spacing = t.grid_f[2:]
+    for k, corner in enumerate(t.grid_f[:2] + np.floor((x[:, :2] - t.grid_f[:2]) / spacing) * spacing):
+        element_plane(t.relief, t.nodes, corner[0], corner[1], spacing[0], spacing[1], plane)
+        found[k] = (plane[3] - plane[:2] @ x[k, :2]) / plane[2]
+    return found
+
+
+def _base(
+    scenario: Scenario, bodies: tuple[Body, ...], t: Tables, position: tuple[float, float], heading: float
+) -> Array:
+    """Where the vehicle's origin is put down, (3,); on uneven ground `t.plane` becomes that under its wheels."""
+    surface, at = scenario.ground.surface, np.array(position)
+    if is_flat(surface):
+        return np.array([*at, float(height(surface, at[0], at[1]))])
+    turn = from_angles(0.0, 0.0, heading)[:2, :2]
+    hubs = np.array([bodies[int(b)].centre[:2] for b in t.wheel_i]).reshape(-1, 2) + t.wheel_f[:, :2]
+    under = hubs @ turn.T + at
+    z = height(surface, under[:, 0], under[:, 1])
+    fit = np.linalg.lstsq(np.column_stack([under - at, np.ones(len(under))]), z, rcond=None)[0]
+    n = np.array([-fit[0], -fit[1], 1.0]) / math.sqrt(1.0 + fit[0] ** 2 + fit[1] ** 2)
+    base = np.array([*at, fit[2]])
+    t.plane[:] = [*n, n @ base]
+    return base
 
 
 def _rigid(bodies: tuple[Body, ...], origin: Array, R: Array) -> Array:
@@ -113,7 +146,16 @@ def _rigid(bodies: tuple[Body, ...], origin: Array, R: Array) -> Array:
 
 
 def _standing(standing: Standing, scenario: Scenario, bodies: tuple[Body, ...], t: Tables) -> Start:
-    statics = Equilibrium(bodies, t, math.radians(standing.heading_deg), scenario.gravity)
+    statics, u = _stood(standing, scenario, bodies, t)
+    return Start(q=statics.coordinates(u), qd=statics.rates(u, standing.roll_rate), time=0.0)
+
+
+def _stood(
+    start: Standing | Driving, scenario: Scenario, bodies: tuple[Body, ...], t: Tables
+) -> tuple[Equilibrium, Array]:
+    heading = math.radians(start.heading_deg)
+    base = _base(scenario, bodies, t, start.position, heading)
+    statics = Equilibrium(bodies, t, heading, scenario.gravity, base)
     u = statics.solve(statics.guess()) if len(t.wheel_i) else None
     if u is None:
         raise InputError(
@@ -122,8 +164,16 @@ def _standing(standing: Standing, scenario: Scenario, bodies: tuple[Body, ...], 
                 message="the vehicle does not stand on this surface, got no static equilibrium; 'drop' or 'tip-over'",
             )
         )
-    u = statics.seated(u)
-    return Start(q=statics.coordinates(u), qd=statics.rates(u, standing.roll_rate), time=0.0)
+    return statics, statics.seated(u)
+
+
+def _driving(driving: Driving, scenario: Scenario, bodies: tuple[Body, ...], t: Tables) -> Start:
+    """At its static equilibrium, all of it moving forward, each wheel turning as its tread rolls."""
+    statics, u = _stood(driving, scenario, bodies, t)
+    turning = t.spin_i >= 0
+    rates = driving.speed / t.wheel_f[turning, W_RADIUS]
+    q = np.concatenate([statics.coordinates(u), np.zeros(len(rates))])
+    return Start(q=q, qd=np.concatenate([statics.forward(u, driving.speed, driving.sideways), rates]), time=0.0)
 
 
 def _tipped(tip: TipOver, scenario: Scenario, vehicle: Vehicle, bodies: tuple[Body, ...], t: Tables) -> Start:
@@ -134,7 +184,8 @@ def _tipped(tip: TipOver, scenario: Scenario, vehicle: Vehicle, bodies: tuple[Bo
             )
         )
     sign = -1.0 if tip.side == "left" else 1.0  # roll > 0 lowers the right side
-    statics = Equilibrium(bodies, t, math.radians(tip.heading_deg), scenario.gravity)
+    base = _base(scenario, bodies, t, tip.position, math.radians(tip.heading_deg))
+    statics = Equilibrium(bodies, t, math.radians(tip.heading_deg), scenario.gravity, base)
     swing = vehicle.front_axle.swing if vehicle.front_axle is not None else 0.0
     u = statics.balance(sign, swing)
     if u is not None and tip.excess_deg > 0.0:

@@ -102,7 +102,7 @@ def _on_table(scenario: Scenario, tilt: TiltTable, bodies: tuple[Body, ...], t: 
     """Standing on the table at its first angle; tilted bit by bit, for beyond it stands a balance on two wheels."""
     first, f = t.device_f[0, d.D_START], t.device_f[0]
     f[d.D_START] = 0.0
-    statics = Equilibrium(bodies, t, math.radians(tilt.heading_deg), scenario.gravity)
+    statics = Equilibrium(bodies, t, math.radians(tilt.heading_deg), scenario.gravity, np.zeros(3))
     u = statics.solve(statics.guess())
     for angle in np.linspace(0.0, first, 1 + math.ceil(first / TILT_STEP))[1:]:
         f[d.D_START] = angle

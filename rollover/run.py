@@ -87,7 +87,7 @@ class Run:
     domain_flags: tuple[str, ...]  # over the whole run
     ledger: Mapping[
         str, float
-    ]  # J at the end: kinetic, potential, soil, tyre, rops, friction, collision, axle, residual
+    ]  # J at the end: kinetic, potential, soil, tyre, rops, friction, collision, axle, drive, residual
     released: float  # J, energy the run had to give; the residual is judged against it
     wall_time: float
     stop_time: float

@@ -17,12 +17,27 @@ from rollover import document
 from rollover.effects import effects
 from rollover.excitation import Excitation
 from rollover.filters import least_rate
-from rollover.initiation import Drop, Initiation, Standing, Throw, TipOver
+from rollover.initiation import Driving, Drop, Initiation, Standing, Throw, TipOver
 from rollover.stand import PendulumBlow, StaticTest, TiltTable
 from rollover.vehicle import RigidBody, Striker, Vehicle
 
 AnyVehicle = Annotated[Vehicle | Striker | RigidBody, ByKind()]
 AnyLaw = Annotated[GroundLaw, ByKind(laws)]  # whatever law stands in the folder `ground`
+
+
+@parameters
+class Patch:
+    """A rectangle of the array with a soil of its own: what has its centre inside, edges with low x and y included."""
+
+    low: Annotated[tuple[float, float], Quantity("m", "corner with the smallest x and y")]
+    high: Annotated[tuple[float, float], Quantity("m", "corner with the largest x and y")]
+    law: AnyLaw
+    friction: Annotated[Coulomb | None, "null: that of the ground around it"] = None
+
+    def validate(self) -> None:
+        """Refuse a rectangle turned inside out."""
+        if self.low[0] >= self.high[0] or self.low[1] >= self.high[1]:
+            raise ValueError(f"high: must lie beyond low on both axes, got {list(self.high)} against {list(self.low)}")
 
 
 @parameters
@@ -39,6 +54,7 @@ class Ground:
         "m_s in the law: the drop test's 132 kg per reference area, the element's share of the effective mass, "
         "or the latter with m v clamped to the calibrated momentum",
     ] = "reference"
+    patches: Annotated[tuple[Patch, ...], "parts with another soil; the last one counts where they overlap"] = ()
 
 
 @parameters
@@ -153,11 +169,21 @@ def _check_start(vehicle: Vehicle | Striker | RigidBody, start: Initiation) -> N
                 f"initiation.side: nothing to tip over, got {count} wheels on the {start.side} "
                 f"and {left + right - count} on the other side; at least 2 and 1 are needed"
             )
-    elif isinstance(start, (Standing, PendulumBlow, TiltTable)):
+    elif isinstance(start, (Standing, Driving, PendulumBlow, TiltTable)):
         if len(sides) < 3 or not left or not right:
             raise ValueError(
                 f"initiation.kind: {start.kind!r} needs at least 3 wheels on both sides, "
                 f"got {left} left and {right} right"
+            )
+        still = [w.name for w in vehicle.wheels if w.inertia is None]
+        if isinstance(start, Driving) and still:
+            raise ValueError(f"initiation.kind: 'driving' needs vehicle.wheels.*.inertia, got none for {still}")
+        axle = vehicle.front_axle
+        turning = sum(w.inertia or 0.0 for w in vehicle.wheels if w.carrier == "front_axle")
+        if isinstance(start, Driving) and axle is not None and turning >= axle.body.inertia[1]:
+            raise ValueError(
+                f"initiation.kind: the front wheels turn with more inertia than their axle has, got {turning:g} kg m2; "
+                f"less than {axle.body.inertia[1]:g} kg m2 is allowed"
             )
     elif isinstance(start, Drop) and not (vehicle.outline or vehicle.wheels or (vehicle.rops and vehicle.rops.members)):
         raise ValueError("vehicle.outline: nothing can touch the ground, got no outline, wheels or ROPS members")

@@ -20,7 +20,7 @@ from rollover.effects import read
 from rollover.forces import generalised_forces
 from rollover.frames import matrices, quaternions, rotation_vector
 from rollover.history import History, States
-from rollover.initiation import Standing
+from rollover.initiation import Driving, Standing
 from rollover.recording import Recording
 from rollover.rig import set_up
 from rollover.run import ContactForce, Event, GroundTrack, Motion, Run
@@ -71,14 +71,14 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
     rows = np.zeros((steps // every + 2, history.row_length(t)))
     past = History(scenario=scenario, bodies=bodies, time=np.zeros(len(rows)), rows=rows)
     live = model.Live(tables=t, handle=handle(t))
-    Q = np.zeros(6 * len(bodies))
+    Q = np.zeros(len(t.spin_mass))
     generalised_forces(live.handle, start.q, start.qd, Q)
     keep_strain(live.handle)
     generalised_forces(live.handle, start.q, start.qd, Q)
     start_step(live.handle)
     events: list[Event] = []
     seen: set[tuple[int, int]] = set()
-    touched = isinstance(scenario.initiation, Standing)  # what balances before it falls is not at rest
+    touched = isinstance(scenario.initiation, (Standing, Driving))  # what balances before it falls is not at rest
     landed = {(c.TOUCH, b) for b in range(len(bodies))}
     state = {"rows": 0, "last": 0.0, "quiet": 0.0, "next": began + 0.25}
 
@@ -89,6 +89,7 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
         state["last"] = time
         t.clock[1] = now
         end_of_step(live.handle, q, qd, qdd, dt, Q)
+        _throttle(scenario, t, now)
         if t.counts[c.EVENTS] > 0:
             _collect(t, now, bodies, scenario, events, seen)
         speed = float(np.abs(qd).max())
@@ -108,7 +109,7 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
             if k % track_every == 0:
                 past.add_track(now, live.tables)
             state["rows"] = k + 1
-        settled = speed < REST_SPEED and (touched or not seen.isdisjoint(landed))
+        settled = float(np.abs(qd[: len(t.mass)]).max()) < REST_SPEED and (touched or not seen.isdisjoint(landed))
         state["quiet"] = state["quiet"] + dt if settled else 0.0
         if progress is not None and k % 20 == 0 and clock.perf_counter() >= state["next"]:
             progress(now, clock.perf_counter() - began)
@@ -142,6 +143,17 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
     mark_warm()
     done = _result(scenario, bodies, live.tables, past, events, control, sentence, clock.perf_counter() - began)
     return done if given is scenario else replace(done, scenario=given)
+
+
+def _throttle(scenario: Scenario, t: Tables, now: float) -> None:
+    """What the engine may give in the next step."""
+    start = scenario.initiation
+    if isinstance(start, Driving) and start.drive is not None:
+        if start.drive.until is not None and now >= start.drive.until:
+            t.drive[c.D_TORQUE] = 0.0
+            return
+        rising = now / start.drive.rise_time if start.drive.rise_time > 0.0 else 1.0
+        t.drive[c.D_TORQUE] = start.drive.torque * min(max(rising, 0.0), 1.0)
 
 
 def _point(x: Any) -> tuple[float, float, float]:
@@ -188,7 +200,7 @@ def _result(
 ) -> Run:
     count = max(past.count, 1)
     time = past.time[:count].copy()
-    s = history.states(past.rows[:count], len(bodies), len(t.wheel_i), len(t.mount_f))
+    s = history.states(past.rows[:count], t)
     found = history.channels(scenario, s, t, bodies)
     wanted = np.arange(time[0], time[-1] + 1e-9, 1.0 / FRAME_RATE)
     frames = np.unique(np.minimum(np.searchsorted(time, wanted - 1e-9), count - 1))
@@ -225,10 +237,10 @@ def flag_names(flags: int) -> tuple[str, ...]:
 
 
 def _released(found: dict[str, Array]) -> float:
-    """Energy that the run had to give, J: kinetic at the start, the deepest fall, and what a device put in."""
+    """Energy that the run had to give, J: kinetic at the start, the deepest fall, what a device or an engine put in."""
     start = found["energy/kinetic"][0] + found["energy/collision"][0]
     put_in = -found["energy/device"].min() if "energy/device" in found else 0.0
-    return float(start - found["energy/potential"].min() + put_in)
+    return float(start - found["energy/potential"].min() - found["energy/drive"].min() + put_in)
 
 
 def _phases(scenario: Scenario, time: Array, events: list[Event], force: Array) -> tuple[tuple[float, str], ...]:
@@ -293,6 +305,6 @@ def _contact(
     if isinstance(scenario.vehicle, Striker):
         return found
     for w, wheel in enumerate(scenario.vehicle.wheels):
-        force = s.wheels[frames, w, :1] * t.plane[:3] + s.wheels[frames, w, 1:4]
+        force = s.wheels[frames, w, :1] * s.wheels[frames, w, 7:10] + s.wheels[frames, w, 1:4]
         found[wheel.name] = ContactForce(point=s.wheels[frames, w, 4:7], force=force)
     return found

@@ -31,6 +31,7 @@ from ground.kernel import (
     PLACE,
     REBOUND_DAMPING,
     RELEASED,
+    ROW,
     SHEAR,
     SINKAGE,
     UNLOADING,
@@ -40,8 +41,9 @@ from ground.kernel import (
 from ground.law import REFERENCE_AREA
 from rollover.dense import dot, times
 from rollover.devices import finish_devices, keep_poses
-from rollover.forces import generalised_forces, read_poses
+from rollover.forces import along_axle, generalised_forces, read_poses
 from rollover.impact import mobility, strike_stop
+from rollover.spin import finish_spins, keep_spins
 from rollover.tables import (
     A_IMPACT,
     A_SWING,
@@ -66,6 +68,8 @@ from rollover.tables import (
     E_FRICTION,
     E_FRICTION_NOW,
     E_MOVED,
+    E_NORMAL,
+    E_NORMAL_NOW,
     E_PLACE,
     E_POINT,
     E_SHEAR,
@@ -102,6 +106,7 @@ from rollover.tables import (
     STICK,
     TURN,
     TYRE,
+    W_AXIS,
     W_KY,
     W_MU,
     WHEEL_OFF,
@@ -111,7 +116,7 @@ from rollover.tables import (
 )
 from rollover.terms import finish_terms
 from rollover.touch import drop_mass, note_event, touch
-from rollover.vectors import depth_acceleration, depth_row, place, velocity
+from rollover.vectors import depth_acceleration, depth_row, place, to_world, velocity
 
 
 @compiled
@@ -131,10 +136,14 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
     finish_axle(t)
     finish_devices(t, h, DEVICE)
     finish_terms(t, h)
+    finish_spins(t, h)
     start_step(t)
-    if strike(t, qd):
+    before = qd.copy()
+    bodies = qd[: t.mass.shape[0]]
+    if strike(t, bodies):
         read_poses(t.pose, q, qd)
-    t.work[COLLISION] += touch(t, qd, h)
+    t.work[COLLISION] += touch(t, bodies, h)
+    keep_spins(t, before, qd)
     settle(t)
     read_poses(t.pose, q, qd)  # the impact changed the velocities
     keep_poses(t)
@@ -143,11 +152,11 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
 @compiled
 def finish_elements(t: Any, h: float) -> None:
     """Work, contact forces and commit of the elements in contact."""
-    flags, footprint = 0, 0.0
+    flags, footprint, row = 0, 0.0, 0
     for a in range(t.counts[ACTIVE]):
         i = t.active[a]
         m, state, trial = t.memory[i], t.state[i], t.trial[i]
-        b = state[BODY]
+        b, row = state[BODY], state[ROW]
         t.work[SOIL] += 0.5 * (m[FORCE] + trial[FN]) * (trial[Z] - m[SINKAGE])
         for k in range(3):
             t.work[FRICTION_WORK] -= 0.5 * (m[FRICTION + k] + trial[FT + k]) * trial[MOVED + k]
@@ -155,7 +164,7 @@ def finish_elements(t: Any, h: float) -> None:
         contact = trial[FN]
         if m[MASS_B] > 0.0:
             contact += m[MASS_B] * depth_acceleration(t.pose[b], m[OWNER_R : OWNER_R + 3], m[NORMAL : NORMAL + 3])
-            if contact < -t.p[t.law[EFFECTS] + ADHESION] * m[AREA] / REFERENCE_AREA:
+            if contact < -t.p[row, t.law[row, EFFECTS] + ADHESION] * m[AREA] / REFERENCE_AREA:
                 # the mass would have to be pulled along: it leaves, and stays in the soil
                 drop_mass(t, i)
                 contact = trial[FN]
@@ -173,10 +182,12 @@ def finish_elements(t: Any, h: float) -> None:
         for k in range(3):
             m[FRICTION + k] = trial[FT + k]
         along = m[MASS_B]
-        outcome = commit(t.law, t.p, t.s[i], m, state, trial[Z], trial[ZDOT], h, t.s[i, 1] * m[AREA] / REFERENCE_AREA)
+        outcome = commit(
+            t.law[row], t.p[row], t.s[i], m, state, trial[Z], trial[ZDOT], h, t.s[i, 1] * m[AREA] / REFERENCE_AREA
+        )
         # half of the work that sets more soil moving is that soil's kinetic energy
         t.work[SOIL] -= 0.5 * (m[MASS_B] - along) * trial[ZDOT] * trial[ZDOT]
-        commit_friction(t.soil[STICK], m[SHEAR : SHEAR + 3], trial[MOVED : MOVED + 3], m[NORMAL : NORMAL + 3])
+        commit_friction(t.soil[row, STICK], m[SHEAR : SHEAR + 3], trial[MOVED : MOVED + 3], m[NORMAL : NORMAL + 3])
         for k in range(3):
             m[PLACE + k] += trial[MOVED + k]
         if outcome & BRANCHED:
@@ -185,7 +196,7 @@ def finish_elements(t: Any, h: float) -> None:
             note_event(t, TURN, b, x, trial[Z])
         if outcome & RELEASED:
             state[MODE] = IDLE
-    if footprint > 0.0 and abs(footprint - t.domain[3]) > 0.01 * t.domain[3]:
+    if footprint > 0.0 and abs(footprint - t.domain[row, 3]) > 0.01 * t.domain[row, 3]:
         flags |= OUT_OF_AREA
     t.counts[FLAGS_NOW] = flags
 
@@ -234,7 +245,8 @@ def settle(t: Any) -> None:
         for a in range(t.counts[ACTIVE]):
             i = t.active[a]
             if t.state[i, BODY] == body and t.state[i, MODE] == UNLOADING and t.memory[i, LINE_C] == 0.0:
-                ratio = t.p[t.law[EFFECTS] + REBOUND_DAMPING]
+                row = t.state[i, ROW]
+                ratio = t.p[row, t.law[row, EFFECTS] + REBOUND_DAMPING]
                 t.memory[i, LINE_C] = 2.0 * ratio * t.memory[i, LINE_K] / omega
 
 
@@ -311,10 +323,17 @@ def stand(t: Any) -> None:
 @compiled
 def keep_strain(t: Any) -> None:
     """Take what the stick springs have been strained by since `stand` as their strain at the start of a run."""
+    e = np.empty(3)
     for w in range(t.wheel_i.size):
-        g = t.wheel_memory[w]
+        g, c = t.wheel_memory[w], t.wheel_f[w]
         grip(t, w)
         hold(g)
+        if t.spin_i[w] >= 0:
+            # nothing has turned the wheel yet: it holds along its axle only
+            n, shear = g[E_NORMAL_NOW : E_NORMAL_NOW + 3], g[E_SHEAR : E_SHEAR + 3]
+            e[0], e[1], e[2] = to_world(t.pose[t.wheel_i[w]], c[W_AXIS], c[W_AXIS + 1], c[W_AXIS + 2])
+            lean = n[0] * e[0] + n[1] * e[1] + n[2] * e[2]
+            shear[0], shear[1], shear[2] = along_axle(e, n, lean, shear)
 
 
 @compiled
@@ -323,7 +342,7 @@ def grip(t: Any, w: int) -> None:
     g = t.wheel_memory[w]
     if g[E_FORCE_NOW] > 0.0:
         stick = max(t.wheel_f[w, W_MU] * g[E_FORCE_NOW] / t.wheel_f[w, W_KY], 1e-9)
-        commit_friction(stick, g[E_SHEAR : E_SHEAR + 3], g[E_SLIP : E_SLIP + 3], t.plane[:3])
+        commit_friction(stick, g[E_SHEAR : E_SHEAR + 3], g[E_SLIP : E_SLIP + 3], g[E_NORMAL_NOW : E_NORMAL_NOW + 3])
     else:
         for k in range(3):
             g[E_SHEAR + k] = 0.0
@@ -349,6 +368,7 @@ def start_step(t: Any) -> None:
         g[E_ENERGY] = g[E_ENERGY_NOW]
         for k in range(3):
             g[E_FRICTION + k] = g[E_FRICTION_NOW + k]
+            g[E_NORMAL + k] = g[E_NORMAL_NOW + k]
     for i in range(t.mount_f.shape[0]):
         g = t.mount_memory[i]
         for k in range(6):

@@ -25,7 +25,20 @@ E_ANCHOR, E_PLACE, E_SHEAR, E_DEPTH, E_FORCE, E_DAMPING, E_ENERGY, E_FRICTION = 
 E_DEPTH_NOW, E_FORCE_NOW, E_DAMPING_NOW, E_ENERGY_NOW, E_FRICTION_NOW = 16, 17, 18, 19, 20
 # way of the anchor since the start of the step and what of it strains the spring; the tread's lowest point in the
 # carrier's axes and in the world
-E_MOVED, E_SLIP, E_POINT, E_WHERE, EDGE_COLUMNS = 23, 26, 29, 32, 35
+E_MOVED, E_SLIP, E_POINT, E_WHERE = 23, 26, 29, 32
+# normal of the ground under the tread at the start of the step and now
+E_NORMAL, E_NORMAL_NOW, EDGE_COLUMNS = 35, 38, 41
+
+# columns of spin_f: inertia about the axle, limit of the brake's torque, whether the drive turns this wheel,
+# whether the brake holds it against the ground instead of its carrier
+P_INERTIA, P_BRAKE, P_DRIVEN, P_HELD, SPIN_COLUMNS = 0, 1, 2, 3, 4
+# columns of spin_memory: angle, torque and strain of the brake at the start of the step; angle, rate and torque now
+P_ANGLE, P_TORQUE, P_STRAIN, P_ANGLE_NOW, P_RATE_NOW, P_TORQUE_NOW = 0, 1, 2, 3, 4, 5
+# torque of the ground that holds it and its rate spin + omega . e, at the start of the step and now
+P_HOLD, P_ABSOLUTE, P_HOLD_NOW, P_ABSOLUTE_NOW, SPIN_MEMORY = 6, 7, 8, 9, 10
+# places in drive: torque that the engine may give now, rate at which it gives none any more, stiffness and damping
+# of a locked axle
+D_TORQUE, D_RATE, D_STIFFNESS, D_DAMPING, DRIVES = 0, 1, 2, 3, 4
 
 # columns of mount_f, mounts of the ROPS and its hinges alike: point on body b, on body a; then for the six axes (along
 # x, y, z of body a, about them) stiffness, damping, yield, hardening, play, rate D of the rate factor as a speed (0: no
@@ -53,7 +66,8 @@ RULE_REFERENCE, RULE_EFFECTIVE, RULE_CLAMPED = 0, 1, 2
 SLOTS, ACTIVE, EVENTS, OUTSIDE, FLAGS_NOW, COUNTS = 0, 1, 2, 3, 4, 5
 
 # places in work (J taken from the vehicle since the start)
-SOIL, TYRE, ROPS, FRICTION_WORK, COLLISION, AXLE, DEVICE, LASHING, EXTRA_WORK, WORKS = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
+SOIL, TYRE, ROPS, FRICTION_WORK, COLLISION, AXLE, DEVICE, LASHING = 0, 1, 2, 3, 4, 5, 6, 7
+EXTRA_WORK, DRIVE, WORKS = 8, 9, 10
 
 # columns of trial: what the last evaluation found for each active element
 Z, ZDOT, FN, FT, MOVED, TRIAL_COLUMNS = 0, 1, 2, 3, 6, 9
@@ -80,7 +94,7 @@ FLAG_NAMES = {
 
 
 class Tables(NamedTuple):
-    """See the column names above; sizes: nb bodies, np points, nm members, nw wheels, nt mounts, ns slots."""
+    """See the column names above; sizes: nb bodies, np points, nm members, nw wheels, nt mounts, ns slots, nr laws."""
 
     # vehicle
     mass: Any  # (6 nb, 6 nb) constant mass matrix
@@ -95,6 +109,10 @@ class Tables(NamedTuple):
     member_i: Any  # (nm, 3) body, first point, end
     wheel_f: Any  # (nw, WHEEL_COLUMNS)
     wheel_i: Any  # (nw,) carrier
+    spin_i: Any  # (nw,) coordinate of the wheel's angle, or -1: it does not turn by itself
+    spin_f: Any  # (nw, SPIN_COLUMNS)
+    spin_mass: Any  # (n, n) what turning wheels add to the mass matrix; n = 6 nb + turning wheels
+    drive: Any  # (DRIVES,)
     mount_f: Any  # (nt, MOUNT_COLUMNS)
     mount_i: Any  # (nt, 2) rows of body a and body b
     axle_f: Any  # (AXLE_COLUMNS,) or (0,)
@@ -102,11 +120,14 @@ class Tables(NamedTuple):
     term_i: Any  # (ne, 3) kind, body, other body
     term_f: Any  # (ne, terms.TERM_NUMBERS)
     # ground
-    law: Any  # (5,) see ground.kernel
-    p: Any
-    soil: Any  # (SOIL_COLUMNS,)
-    domain: Any  # (6,)
-    plane: Any  # (4,) normal and offset
+    law: Any  # (nr, 5) see ground.kernel; the first row is the ground's, the others are those of its patches
+    p: Any  # (nr, most parameters)
+    soil: Any  # (nr, SOIL_COLUMNS)
+    domain: Any  # (nr, 6)
+    patch_f: Any  # (nr - 1, 4) smallest and largest x, smallest and largest y
+    plane: Any  # (4,) normal and offset of a flat surface; of an uneven one near the start
+    relief: Any  # (parts, PART_COLUMNS) of an uneven surface, see ground.relief
+    nodes: Any  # heights of its maps
     grid_f: Any  # (4,) x0, y0, dx, dy
     grid_i: Any  # (2,) nx, ny
     # memory
@@ -121,6 +142,7 @@ class Tables(NamedTuple):
     candidate_i: Any  # (np, 2) slot and point
     candidate_f: Any  # (np, 2) projected area, depth
     wheel_memory: Any  # (nw, EDGE_COLUMNS)
+    spin_memory: Any  # (nw, SPIN_MEMORY)
     mount_memory: Any  # (nt, SET_COLUMNS)
     axle_memory: Any  # (AXLE_MEMORY,)
     clock: Any  # (2,) length of the step that is tried, time of the scenario at which forces are tried, s
@@ -167,6 +189,10 @@ def handle(t: Any) -> Any:
         t.member_i,
         t.wheel_f,
         t.wheel_i,
+        t.spin_i,
+        t.spin_f,
+        t.spin_mass,
+        t.drive,
         t.mount_f,
         t.mount_i,
         t.axle_f,
@@ -177,7 +203,10 @@ def handle(t: Any) -> Any:
         t.p,
         t.soil,
         t.domain,
+        t.patch_f,
         t.plane,
+        t.relief,
+        t.nodes,
         t.grid_f,
         t.grid_i,
         t.slot_of,
@@ -191,6 +220,7 @@ def handle(t: Any) -> Any:
         t.candidate_i,
         t.candidate_f,
         t.wheel_memory,
+        t.spin_memory,
         t.mount_memory,
         t.axle_memory,
         t.clock,

@@ -22,11 +22,11 @@ from ground.kernel import (
     MASS_B,
     MODE,
     NORMAL,
-    OFFSET,
     OWNER_R,
     PLACE,
     PLASTIC,
     REST_STIFFNESS,
+    ROW,
     SHEAR,
     SINKAGE,
     SPREAD,
@@ -37,6 +37,7 @@ from ground.kernel import (
     rut_depth,
 )
 from ground.law import REFERENCE_AREA
+from ground.relief import element_plane, height_and_gradient, highest
 from rollover.impact import exchange, share_mass
 from rollover.tables import (
     ACTIVE,
@@ -49,6 +50,7 @@ from rollover.tables import (
     OUT_OF_MOMENTUM,
     OUT_OF_SPEED,
     OUTSIDE,
+    ROT,
     RULE_CLAMPED,
     RULE_REFERENCE,
     SLOTS,
@@ -77,6 +79,29 @@ def search(t: Any) -> int:
     `found` then holds for each: the deepest point and its sinkage; projected area, mean sinkage and centroid of the
     points of the same body.
     """
+    if t.relief.shape[0] > 0:
+        candidates, count = on_relief(t)
+    else:
+        candidates, count = on_plane(t)
+    for c in range(candidates):
+        slot, i = t.candidate_i[c, 0], t.candidate_i[c, 1]
+        f = t.found[slot]
+        if t.point_body[i] == t.point_body[int(f[2])]:
+            area = t.candidate_f[c, 0]
+            f[1] += area
+            f[3] += area * t.candidate_f[c, 1]
+            for k in range(3):
+                f[4 + k] += area * t.point_r[i, k]
+    for c in range(count):
+        f = t.found[t.touched[c]]
+        for k in range(3, 7):
+            f[k] /= f[1]
+    return count  # type: ignore[no-any-return]
+
+
+@compiled
+def on_plane(t: Any) -> Any:
+    """Points below a flat surface, as candidates; returns how many, and of how many elements."""
     n, offset = t.plane[:3], t.plane[3]
     candidates, count = 0, 0
     for member in range(t.member_i.shape[0]):
@@ -114,30 +139,101 @@ def search(t: Any) -> int:
             # an element at rest keeps its rut: it is touched only beyond it
             if t.state[slot, MODE] == IDLE and depth <= rut_depth(t.memory[slot]):
                 continue
-            t.candidate_i[candidates, 0], t.candidate_i[candidates, 1] = slot, i
-            t.candidate_f[candidates, 0], t.candidate_f[candidates, 1] = facing * t.point_a[i], depth
+            count += note_candidate(t, candidates, count, slot, i, facing, depth)
             candidates += 1
-            if t.found[slot, 0] <= 0.0:
-                t.touched[count] = slot
-                count += 1
-                for k in range(1, 7):
-                    t.found[slot, k] = 0.0
-            if depth > t.found[slot, 0]:
-                t.found[slot, 0], t.found[slot, 2] = depth, i
-    for c in range(candidates):
-        slot, i = t.candidate_i[c, 0], t.candidate_i[c, 1]
-        f = t.found[slot]
-        if t.point_body[i] == t.point_body[int(f[2])]:
-            area = t.candidate_f[c, 0]
-            f[1] += area
-            f[3] += area * t.candidate_f[c, 1]
-            for k in range(3):
-                f[4 + k] += area * t.point_r[i, k]
-    for c in range(count):
-        f = t.found[t.touched[c]]
-        for k in range(3, 7):
-            f[k] /= f[1]
-    return count
+    return candidates, count
+
+
+@compiled
+def note_candidate(t: Any, candidates: int, count: int, slot: int, i: int, facing: float, depth: float) -> int:
+    """Keep a point that is deep enough; returns 1 where it is the first of its element."""
+    t.candidate_i[candidates, 0], t.candidate_i[candidates, 1] = slot, i
+    t.candidate_f[candidates, 0], t.candidate_f[candidates, 1] = facing * t.point_a[i], depth
+    first = 0
+    if t.found[slot, 0] <= 0.0:
+        t.touched[count] = slot
+        first = 1
+        for k in range(1, 7):
+            t.found[slot, k] = 0.0
+    if depth > t.found[slot, 0]:
+        t.found[slot, 0], t.found[slot, 2] = depth, i
+    return first
+
+
+@compiled
+def on_relief(t: Any) -> Any:
+    """Points below the planes of their elements on an uneven surface; returns as `on_plane` does."""
+    candidates, count = 0, 0
+    plane = np.empty(4)
+    for member in range(t.member_i.shape[0]):
+        row, m = t.pose[t.member_i[member, 0]], t.member_f[member]
+        x, y, z = place(row, m[0], m[1], m[2])
+        a, b, c = m[3], m[4], m[5]
+        wide = abs(row[ROT]) * a + abs(row[ROT + 1]) * b + abs(row[ROT + 2]) * c
+        long = abs(row[ROT + 3]) * a + abs(row[ROT + 4]) * b + abs(row[ROT + 5]) * c
+        tall = abs(row[ROT + 6]) * a + abs(row[ROT + 7]) * b + abs(row[ROT + 8]) * c
+        # what lies under the box, and the elements that it looks into
+        reach = math.hypot(wide, long) + t.grid_f[2] + t.grid_f[3]
+        top = highest(t.relief, t.nodes, x, y, reach)
+        if z - tall > top:
+            continue
+        for i in range(t.member_i[member, 1], t.member_i[member, 2]):
+            x, y, z = place(row, t.point_r[i, 0], t.point_r[i, 1], t.point_r[i, 2])
+            if z > top:
+                continue
+            ix = math.floor((x - t.grid_f[0]) / t.grid_f[2])
+            iy = math.floor((y - t.grid_f[1]) / t.grid_f[3])
+            if ix < 0 or iy < 0 or ix >= t.grid_i[0] or iy >= t.grid_i[1]:
+                ground, _, _ = height_and_gradient(t.relief, t.nodes, x, y)
+                if z < ground:
+                    t.counts[OUTSIDE] += 1
+                continue
+            cell = ix * t.grid_i[1] + iy
+            slot = t.slot_of[cell]
+            ground, _, _ = height_and_gradient(t.relief, t.nodes, x, y)
+            if z > ground + 2.0 * (t.grid_f[2] + t.grid_f[3]):
+                continue  # higher than a plane of 75 degrees stands over the surface within its element
+            if slot < 0:
+                plane_of(t, cell, plane)
+            else:
+                plane[:] = t.memory[slot, NORMAL : NORMAL + 4]
+            depth = plane[3] - (plane[0] * x + plane[1] * y + plane[2] * z)
+            if depth <= 0.0:
+                continue
+            d0, d1, d2 = to_body(row, plane[0], plane[1], plane[2])
+            facing = -(d0 * t.point_n[i, 0] + d1 * t.point_n[i, 1] + d2 * t.point_n[i, 2])
+            if facing <= 1e-6:
+                continue
+            slot = slot_at(t, cell)
+            if t.state[slot, MODE] == IDLE and depth <= rut_depth(t.memory[slot]):
+                continue
+            count += note_candidate(t, candidates, count, slot, i, facing, depth)
+            candidates += 1
+    return candidates, count
+
+
+@compiled
+def plane_of(t: Any, cell: int, plane: Any) -> None:
+    """Normal and offset of an untouched element into `plane` (4,)."""
+    if t.relief.shape[0] == 0:
+        plane[:] = t.plane
+        return
+    ix, iy = cell // t.grid_i[1], cell % t.grid_i[1]
+    dx, dy = t.grid_f[2], t.grid_f[3]
+    element_plane(t.relief, t.nodes, t.grid_f[0] + ix * dx, t.grid_f[1] + iy * dy, dx, dy, plane)
+
+
+@compiled
+def law_of(t: Any, cell: int) -> int:
+    """Row of an element's law and friction: that of the last patch over its centre, or 0."""
+    x = t.grid_f[0] + (cell // t.grid_i[1] + 0.5) * t.grid_f[2]
+    y = t.grid_f[1] + (cell % t.grid_i[1] + 0.5) * t.grid_f[3]
+    found = 0
+    for k in range(t.patch_f.shape[0]):
+        f = t.patch_f[k]
+        if f[0] <= x < f[1] and f[2] <= y < f[3]:
+            found = k + 1
+    return found
 
 
 @compiled
@@ -151,6 +247,8 @@ def slot_at(t: Any, cell: int) -> int:
         t.memory[slot, :] = 0.0
         t.state[slot, :] = 0
         t.state[slot, CELL] = cell
+        t.state[slot, ROW] = law_of(t, cell)
+        plane_of(t, cell, t.memory[slot, NORMAL : NORMAL + 4])
         t.found[slot, 0] = 0.0
     return slot  # type: ignore[no-any-return]
 
@@ -195,7 +293,7 @@ def let_go(t: Any) -> None:
             drop_mass(t, slot)
             t.state[slot, MODE] = IDLE
             t.memory[slot, FORCE] = 0.0
-            if t.law[PLASTIC] == 0:
+            if t.law[t.state[slot, ROW], PLASTIC] == 0:
                 t.memory[slot, SINKAGE] = 0.0  # no rut stays
         else:
             t.active[kept] = slot
@@ -204,17 +302,17 @@ def let_go(t: Any) -> None:
 
 
 @compiled
-def domain_flags(t: Any, speed: float, mass: float, obliquity: float, hits: int) -> int:
+def domain_flags(domain: Any, speed: float, mass: float, obliquity: float, hits: int) -> int:
     """Bits of `tables.FLAG_NAMES` for one touch; the contact area is judged for the whole footprint elsewhere."""
     flags = 0
     # a touch is latched within a step: what lies on the bound lies within
-    if speed < t.domain[0] * (1.0 - 1e-3) or speed > t.domain[1] * (1.0 + 1e-3):
+    if speed < domain[0] * (1.0 - 1e-3) or speed > domain[1] * (1.0 + 1e-3):
         flags |= OUT_OF_SPEED
-    if mass * speed > t.domain[2] * (1.0 + 1e-3):
+    if mass * speed > domain[2] * (1.0 + 1e-3):
         flags |= OUT_OF_MOMENTUM
-    if t.domain[4] > 0.0 and hits > 1:
+    if domain[4] > 0.0 and hits > 1:
         flags |= NOT_VIRGIN
-    if obliquity > t.domain[5]:
+    if obliquity > domain[5]:
         flags |= OBLIQUE
     return flags
 
@@ -231,11 +329,12 @@ def touch(t: Any, qd: Any, h: float) -> float:
     for c in range(count):
         slot = t.touched[c]
         m, state = t.memory[slot], t.state[slot]
+        law, p, n = t.law[state[ROW]], t.p[state[ROW]], t.memory[slot, NORMAL : NORMAL + 3]
         b = t.point_body[int(t.found[slot, 2])]
         z = t.found[slot, 0]
         r = t.found[slot, 4:7]
         x, v = place(t.pose[b], r[0], r[1], r[2]), velocity(t.pose[b], r[0], r[1], r[2])
-        speed = -(t.plane[0] * v[0] + t.plane[1] * v[1] + t.plane[2] * v[2])
+        speed = -(n[0] * v[0] + n[1] * v[1] + n[2] * v[2])
         known = state[MODE] != IDLE
         # what normal motion swept in one step; beyond it the element was entered from the side
         swept = max(1.05 * speed * h, 0.0) + 1e-6
@@ -246,8 +345,8 @@ def touch(t: Any, qd: Any, h: float) -> float:
         m[SPREAD] = z - t.found[slot, 3]
         if known:
             change_owner(t, slot, b, r, speed)
-            if jump > swept and t.law[PLASTIC] != 0 and t.law[REST_STIFFNESS] == 0:
-                enter_from_the_side(t.law, t.p, t.s[slot], m, z, before * m[AREA] / max(was, 1e-12))
+            if jump > swept and law[PLASTIC] != 0 and law[REST_STIFFNESS] == 0:
+                enter_from_the_side(law, p, t.s[slot], m, z, before * m[AREA] / max(was, 1e-12))
                 state[MODE] = LOADING if z >= m[LINE_Z] else UNLOADING
         for k in range(3):
             m[PLACE + k] = x[k]
@@ -255,12 +354,10 @@ def touch(t: Any, qd: Any, h: float) -> float:
         if not known:
             for k in range(3):
                 m[OWNER_R + k] = r[k]
-                m[NORMAL + k] = t.plane[k]
                 m[SHEAR + k] = 0.0
-            m[OFFSET] = t.plane[3]
             state[BODY] = b
             state[HITS] += 1
-            acceleration = depth_acceleration(t.pose[b], r, t.plane[:3])
+            acceleration = depth_acceleration(t.pose[b], r, n)
             start = max(z - swept, rut_depth(m))
             # v_s at the surface, not up to a step later: K_b1 grows with its 18.7th power
             latched = math.sqrt(max(speed * abs(speed) - 2.0 * acceleration * min(z - start, swept), 0.0))
@@ -291,11 +388,13 @@ def touch(t: Any, qd: Any, h: float) -> float:
 def begin_contact(t: Any, slot: int, share: float) -> None:
     """Start an element's memory for this touch with the law's mass; its flags, its event."""
     m, state = t.memory[slot], t.state[slot]
+    row = state[ROW]
+    soil = t.soil[row]
     speed, start, angle = m[TOUCH_SPEED], t.found[slot, 1], t.found[slot, 2]
-    rule = t.soil[MASS_RULE]
-    mass = t.soil[MASS_GIVEN] if rule == RULE_REFERENCE else share * REFERENCE_AREA / max(m[AREA], 1e-12)
+    rule = soil[MASS_RULE]
+    mass = soil[MASS_GIVEN] if rule == RULE_REFERENCE else share * REFERENCE_AREA / max(m[AREA], 1e-12)
     if rule == RULE_CLAMPED and speed > 0.0:
-        mass = min(mass, t.soil[MOMENTUM_MOST] / speed)
-    begin(t.law, t.p, t.s[slot], m, state, mass, start)
-    state[FLAGS] = domain_flags(t, speed, mass, angle, state[HITS])
+        mass = min(mass, soil[MOMENTUM_MOST] / speed)
+    begin(t.law[row], t.p[row], t.s[slot], m, state, mass, start)
+    state[FLAGS] = domain_flags(t.domain[row], speed, mass, angle, state[HITS])
     note_event(t, TOUCH, state[BODY], (m[PLACE], m[PLACE + 1], m[PLACE + 2]), speed)

@@ -48,7 +48,12 @@ class Wheel:
     centre: Annotated[Point, Quantity("m", "wheel centre, vehicle axes")]
     tyre: Tyre
     carrier: Literal["chassis", "front_axle"] = "chassis"
-    rolls: Annotated[bool, "turns freely, as undriven and unbraked wheels do; else it is locked"] = False
+    rolls: Annotated[
+        bool, "turns freely and without inertia, else it is locked; 'driving' turns every wheel by its own inertia"
+    ] = False
+    inertia: Annotated[
+        float | None, Quantity("kg m2", "of all that turns with it, about its axle; part of its carrier's", above=0)
+    ] = None
 
 
 @parameters
@@ -138,6 +143,12 @@ class Vehicle:
         if len(set(masses)) != len(masses):
             raise ValueError(f"attached: two masses share a name, got {masses}; each name once")
         chassis_of(self)
+
+    def on_axle(self, wheel: Wheel, axle: str) -> bool:
+        """Whether a wheel belongs to the "front", the "rear" or "all" of the axles."""
+        xs = [w.centre[0] for w in self.wheels]
+        is_front = wheel.carrier == "front_axle" or wheel.centre[0] > 0.5 * (min(xs) + max(xs)) + 1e-9
+        return axle == "all" or is_front == (axle == "front")
 
 
 @parameters

@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ground.array import Elements
-from ground.surface import Surface, height, normal
+from ground.surface import Surface, height, is_flat, normal, normals
 from rollover.run import GroundTrack
 
 SOIL = 0x6B5638FF
@@ -37,8 +38,8 @@ _RAMP = np.array([(0x6B, 0x56, 0x38), (0x8A, 0x5A, 0x2C), (0xD9, 0x5F, 0x1E), (0
 class Patch:
     """A part of the mesh that sinks: vertices `base` (b, 3) and `triangles`; world axes, m.
 
-    Each vertex sinks along `down` by what stands in its `column` (b,) of the track, -1: not at all. Where `is_side`
-    (b,) it belongs to the side of the block of soil and keeps its colour.
+    Each vertex sinks along `down`, (3,) or on uneven ground (b, 3), by what stands in its `column` (b,) of the track,
+    -1: not at all. Where `is_side` (b,) it belongs to the side of the block of soil and keeps its colour.
     """
 
     name: str
@@ -174,7 +175,7 @@ def terrain(
         triangles=np.concatenate([_squares(moving.size), _walls(moving, nx, ny), len(base) + _squares(len(side) // 4)]),
         column=np.concatenate([column, np.stack([*upper, *np.full((2, len(rim)), -1)], axis=1).ravel()]),
         is_side=np.repeat([False, True], [len(base), len(side)]),
-        down=-normal(surface),
+        down=_down(surface, elements, moving, len(side)),
     )
     parts = (fixed, around, fixed_side)
     return Terrain(
@@ -193,6 +194,18 @@ def terrain(
     )
 
 
+def _down(surface: Surface, elements: Elements, moving: NDArray[np.int64], sides: int) -> NDArray[np.float64]:
+    """Where vertices sink to: one direction for a flat surface, or that of each vertex's own element."""
+    if is_flat(surface):
+        return -normal(surface)
+    (x0, y0), (dx, dy), ny = corner(elements), elements.spacing, elements.count[1]
+    x: NDArray[np.float64] = x0 + (moving // ny + 0.5) * np.float64(dx)
+    y: NDArray[np.float64] = y0 + (moving % ny + 0.5) * np.float64(dy)
+    n = normals(surface, x, y)
+    # the sides of the block hang straight down: those few vertices sink with the world
+    return -np.concatenate([np.repeat(n, 4, axis=0), np.tile([0.0, 0.0, 1.0], (sides, 1))])
+
+
 def _patches(elements: Elements, whole: Patch) -> tuple[Patch, ...]:
     """Cut a mesh into tiles: at any instant few elements move, and a mesh can only be written as a whole."""
     middle = whole.base[whole.triangles].mean(axis=1)[:, :2] - corner(elements)
@@ -209,6 +222,7 @@ def _patches(elements: Elements, whole: Patch) -> tuple[Patch, ...]:
                 triangles=triangles.reshape(-1, 3),
                 column=whole.column[vertices],
                 is_side=whole.is_side[vertices],
+                down=whole.down[vertices] if whole.down.ndim > 1 else whole.down,
             )
         )
     return tuple(found)
@@ -234,9 +248,31 @@ def _around(surface: Surface, elements: Elements, outer: Rectangle) -> tuple[NDA
         if hx - lx > 1e-9 and hy - ly > 1e-9:
             edges += [(4 * len(found) + k, 4 * len(found) + (k + 1) % 4) for k in outside]
             found.append([(lx, ly), (hx, ly), (hx, hy), (lx, hy)])
+    if not is_flat(surface):
+        found, edges = _tiles(found, outer)
     flat = np.array(found, dtype=float).reshape(-1, 2)
     corners = np.column_stack([flat, height(surface, flat[:, 0], flat[:, 1])])
     return corners, np.array(edges, dtype=np.int64).reshape(-1, 2)
+
+
+def _tiles(
+    rectangles: list[list[tuple[float, float]]], outer: Rectangle
+) -> tuple[list[list[tuple[float, float]]], list[tuple[int, int]]]:
+    """Rectangles cut into tiles that can follow uneven ground, and which of their edges are the picture's own."""
+    a, b, c, d = outer
+    step = max(b - a, d - c) / 60.0
+    found: list[list[tuple[float, float]]] = []
+    edges: list[tuple[int, int]] = []
+    for (lx, ly), _, (hx, hy), _ in rectangles:
+        xs = np.linspace(lx, hx, max(2, math.ceil((hx - lx) / step) + 1)).tolist()
+        ys = np.linspace(ly, hy, max(2, math.ceil((hy - ly) / step) + 1)).tolist()
+        for x0, x1 in pairwise(xs):
+            for y0, y1 in pairwise(ys):
+                at = 4 * len(found)
+                rim = ((y0 == c, 0), (x1 == b, 1), (y1 == d, 2), (x0 == a, 3))
+                edges += [(at + k, at + (k + 1) % 4) for on, k in rim if on]
+                found.append([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+    return found, edges
 
 
 def _is_open(elements: Elements, edges: NDArray[np.float64], outer: Rectangle) -> NDArray[np.bool_]:
@@ -345,10 +381,13 @@ def _fixed(
 def _grid(surface: Surface, outer: Rectangle, step: float) -> NDArray[np.float64]:
     """Lines at whole multiples of `step`, lifted a little so that they do not flicker within the surface."""
     x0, x1, y0, y1 = outer
-    lift = 0.004 * step * normal(surface)
+    lift = 0.004 * step * (normal(surface) if is_flat(surface) else np.array([0.0, 0.0, 1.0]))
     lines = []
+    pieces = 1 if is_flat(surface) else 100
     for low, high, across, axis in ((x0, x1, (y0, y1), 0), (y0, y1, (x0, x1), 1)):
         for at in np.arange(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1) * step:
-            ends = np.array([(at, c) if axis == 0 else (c, at) for c in across])
-            lines.append(np.column_stack([ends, height(surface, ends[:, 0], ends[:, 1])]) + lift)
+            along = np.linspace(*across, pieces + 1)
+            way = np.array([(at, c) if axis == 0 else (c, at) for c in along])
+            drawn = np.column_stack([way, height(surface, way[:, 0], way[:, 1])]) + lift
+            lines += [drawn[k : k + 2] for k in range(pieces)]
     return np.array(lines).reshape(-1, 2, 3)

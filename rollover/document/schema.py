@@ -50,6 +50,8 @@ class _Writer:
         return choices[0] if len(choices) == 1 else {"anyOf": choices}
 
     def _bare(self, slot: Slot, suffix: str) -> dict[str, Any]:
+        if slot.grid:
+            return {"anyOf": [self._list(slot), {"type": "string", "pattern": "\\.(csv|npy)$"}]}
         if slot.is_list:
             return self._list(slot)
         if slot.by_key:

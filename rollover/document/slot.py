@@ -10,7 +10,7 @@ from dataclasses import MISSING, dataclass, fields, is_dataclass
 from typing import Annotated, Any, Literal
 
 from ground.kinds import ByKey, ByKind
-from ground.quantity import Label, Quantity
+from ground.quantity import Grid, Label, Quantity
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,11 +24,12 @@ class Slot:
     optional: bool = False
     by_kind: ByKind | None = None
     by_key: ByKey | None = None
+    grid: Grid | None = None
 
     @property
     def unit(self) -> str:
         """Unit of the number or numbers here, or nothing."""
-        return self.quantity.unit if self.quantity else ""
+        return self.quantity.unit if self.quantity else self.grid.unit if self.grid else ""
 
     @property
     def kinds(self) -> Mapping[str, type]:
@@ -82,6 +83,8 @@ class Slot:
         return f"{words}, or null" if self.optional else words
 
     def _allowed(self, kind: object) -> str:
+        if self.grid:
+            return f"rows of numbers in {self.unit}, or the name of a .csv or .npy file,"
         if self.is_list:
             first = self.element(0)
             inside = first.allowed() if first else ""
@@ -124,14 +127,16 @@ def slot_of(annotation: Any) -> Slot:
         by_kind = next((m for m in metadata if isinstance(m, ByKind)), None)
         inner = Slot(type=bare) if by_kind else slot_of(bare)
         quantity = next((m for m in metadata if isinstance(m, Quantity)), inner.quantity)
+        grid = next((m for m in metadata if isinstance(m, Grid)), None)
         label = next((m for m in metadata if isinstance(m, Label)), None)
         text = next((m for m in metadata if isinstance(m, str)), "")
         return Slot(
             **{
                 **vars(inner),
                 "quantity": quantity,
-                "meaning": text or (label.meaning if label else quantity.meaning if quantity else inner.meaning),
+                "meaning": text or next((m.meaning for m in (grid, label, quantity, inner) if m), ""),
                 "label": label is not None or inner.label,
+                "grid": grid or inner.grid,
                 "by_kind": by_kind or inner.by_kind,
                 "by_key": next((m for m in metadata if isinstance(m, ByKey)), inner.by_key),
             }
