@@ -104,11 +104,12 @@ class Rating:
 
 
 def rate(
-    time: Array, measured: Array, simulated: Array, *, noise: float | None = None, iso: bool = True
+    time: Array, measured: Array, simulated: Array, *, noise: float | None = None, least_rate: float = 0.0
 ) -> Rating | NotRateable:
     """Rate a simulated signal against a measured one at the same stamps.
 
-    `time`, `measured`, `simulated` (n,), s and SI; NaN where either is missing. `noise` 1 sigma of the measured.
+    `time`, `measured`, `simulated` (n,), s and SI; NaN where either is missing. `noise` 1 sigma of the measured;
+    `least_rate` Hz as in `iso18571`.
     """
     known = np.isfinite(measured) & np.isfinite(simulated)
     n = int(known.sum())
@@ -119,7 +120,7 @@ def rate(
     span = float(np.ptp(m))
     weight = _weights(time, known)
     return Rating(
-        iso18571=iso18571(time, measured, simulated) if iso else NotRateable(reason="not asked for"),
+        iso18571=iso18571(time, measured, simulated, least_rate=least_rate),
         sprague_geers=sprague_geers(weight, m, s),
         samples=n,
         rms=rms,
@@ -161,10 +162,11 @@ def sprague_geers(weight: Array, measured: Array, simulated: Array) -> SpragueGe
     return SpragueGeers(magnitude=magnitude, phase=phase, combined=float(np.hypot(magnitude, phase)))
 
 
-def iso18571(time: Array, measured: Array, simulated: Array) -> Iso18571 | NotRateable:
+def iso18571(time: Array, measured: Array, simulated: Array, *, least_rate: float = 0.0) -> Iso18571 | NotRateable:
     """Rate by ISO/TS 18571 over the longest stretch without a gap, on a uniform grid of 10 kHz (or less: `rate`).
 
-    `time` (n,) s; `measured` is the reference. Both must have been through the same filter.
+    `time` (n,) s; `measured` is the reference. Both must have been through the same filter; `least_rate` Hz is what
+    it admits: a stretch so long that it would have to be rated below is not rated.
     """
     first, last = _longest(np.isfinite(measured) & np.isfinite(simulated), time)
     count = last - first
@@ -181,6 +183,12 @@ def iso18571(time: Array, measured: Array, simulated: Array) -> Iso18571 | NotRa
             reason=f"sampled too slowly: {count} samples in {end - start:.3g} s ({own:.3g} Hz); {FEWEST} are needed"
         )
     n = min(round((end - start) * RATE) + 1, MOST_SAMPLES)
+    if (n - 1) / (end - start) < least_rate:
+        longest = (MOST_SAMPLES - 1) / least_rate
+        return NotRateable(
+            reason=f"too long: {end - start:.4g} s; at the {least_rate:g} Hz that its filter class needs, "
+            f"{longest:.3g} s can be rated at once"
+        )
     grid = np.linspace(start, end, n)
     m, s = (np.interp(grid, time[first:last], values[first:last]) for values in (measured, simulated))
     if _constant(m):

@@ -92,11 +92,11 @@ def test_sprague_geers_of_a_larger_and_of_a_shifted_sine() -> None:
     """s = 1.2 m gives M = 0.2, P = 0; a sine shifted by 0.1 pi over whole periods gives M = 0, P = 0.1."""
     t = np.linspace(0.0, 1.0, 5001)
     m = np.sin(10.0 * np.pi * t)
-    larger = rate(t, m, 1.2 * m, iso=False)
+    larger = rate(t, m, 1.2 * m)
     assert isinstance(larger, Rating)
     assert larger.sprague_geers.magnitude == pytest.approx(0.2)  # type: ignore[union-attr]
     assert larger.sprague_geers.phase == pytest.approx(0.0, abs=1e-6)  # type: ignore[union-attr]
-    shifted = rate(t, m, np.sin(10.0 * np.pi * t - 0.1 * np.pi), iso=False)
+    shifted = rate(t, m, np.sin(10.0 * np.pi * t - 0.1 * np.pi))
     assert isinstance(shifted, Rating)
     assert shifted.sprague_geers.magnitude == pytest.approx(0.0, abs=1e-6)  # type: ignore[union-attr]
     assert shifted.sprague_geers.combined == pytest.approx(0.1, abs=1e-6)  # type: ignore[union-attr]
@@ -107,7 +107,7 @@ def test_residual_peak_and_integral_of_a_half_sine() -> None:
     A, T = 3500.0, 0.2
     t = np.linspace(0.0, T, 2001)
     m = A * np.sin(np.pi * t / T)
-    found = rate(t, m, 0.9 * m, noise=35.0, iso=False)
+    found = rate(t, m, 0.9 * m, noise=35.0)
     assert isinstance(found, Rating)
     assert found.peak.measured == pytest.approx(A)
     assert found.peak.relative_error == pytest.approx(-0.1)
@@ -124,7 +124,7 @@ def test_a_gap_is_not_bridged() -> None:
     t = np.linspace(0.0, 1.0, 1001)
     m = 2.0 + 0.0 * t
     m[300:701] = np.nan
-    found = rate(t, m, m, iso=False)
+    found = rate(t, m, m)
     assert isinstance(found, Rating)
     assert found.integral_measured == pytest.approx(2.0 * (0.299 + 0.299), rel=1e-9)
     wave = np.sin(20.0 * t)
@@ -158,11 +158,19 @@ def test_nothing_in_common_is_not_rateable_at_all() -> None:
     found = rate(TIME, np.full(N, np.nan), SINE)
     assert isinstance(found, NotRateable)
     assert "no overlap" in found.reason
-    silent = rate(TIME, 0.0 * SINE, SINE, iso=False)
+    silent = rate(TIME, 0.0 * SINE, SINE)
     assert isinstance(silent, Rating)
     assert isinstance(silent.sprague_geers, NotRateable)
     assert silent.nrmse is None
     assert silent.peak.relative_error is None
+
+
+def test_a_stretch_too_long_for_its_filter_class_is_not_rated() -> None:
+    """CFC 60 needs 600 Hz; 10 000 samples of that are 16.7 s."""
+    t = np.arange(20_001) * 1e-3
+    found = iso18571(t, np.sin(t), np.sin(t), least_rate=600.0)
+    assert isinstance(found, NotRateable)
+    assert "16.7 s" in found.reason
 
 
 def test_a_long_stretch_is_rated_at_a_lower_rate_that_is_stated() -> None:
