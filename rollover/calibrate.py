@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover import alignment, simulate
+from rollover import alignment, drop, simulate
 from rollover.determined import Determination, determine
+from rollover.document import exchanged
+from rollover.execute import map_cases
 from rollover.objective import Case, Noise, Objective, Parameter, Simulate, case, check_free
 from rollover.rating import Iso18571, Rating, rate
 from rollover.recording import Recording
@@ -102,7 +104,7 @@ class Calibration:
 
 def simulator(scenario: Scenario) -> Simulate:
     """The quickest simulation of a scenario's kind: the one place that chooses it."""
-    return _simulated
+    return drop.simulate_drop if not drop.unfit(scenario) else _simulated
 
 
 def _simulated(scenario: Scenario) -> Recording:
@@ -121,12 +123,12 @@ def calibrate(
     channels: Sequence[str] | None = None,
     starts: int = STARTS,
     seed: int = 0,
-    map_: Callable[[Callable[[Any], Any], Sequence[Any]], Sequence[Any]] | None = None,
+    workers: int = 0,
 ) -> Calibration:
     """Fit parameters to recordings, all at once, each under its own conditions.
 
     `noise(recording, channel)` gives 1 sigma where a recording states none. `clock_sigma` s is the width of the
-    prior of each recording's clock offset, 0 for exact clocks. `map_` works off the starts, in order (default: here).
+    prior of each recording's clock offset, 0 for exact clocks. `workers` child processes follow the starts, 0 none.
     Raises `InputError` for a fitted parameter that a recording states as its condition, ``ValueError`` for a
     recording of which nothing can be compared.
     """
@@ -144,7 +146,7 @@ def calibrate(
         clock_sigma=clock_sigma,
     )
     given = np.array([p.place(p.start) for p in parameters])
-    u, agreeing = _from_starts(plain, given, starts, seed, map_)
+    u, agreeing = _from_starts(plain, given, starts, seed, workers)
     weighted = plain.correlated(u)
     weighted, outliers = _without_outliers(weighted, u)
     u, _ = follow((weighted, u, "linear"))
@@ -182,7 +184,7 @@ def robust_cost(objective: Objective, u: Array) -> float:
 
 
 def _from_starts(
-    objective: Objective, given: Array, starts: int, seed: int, map_: Callable[..., Sequence[Any]] | None
+    objective: Objective, given: Array, starts: int, seed: int, workers: int
 ) -> tuple[Array, tuple[int, int]]:
     """Best of several starts: the given one and the most promising of a Latin hypercube."""
     tried = [given]
@@ -192,8 +194,12 @@ def _from_starts(
         spread = qmc.LatinHypercube(d=len(given), seed=seed).random(starts)
         ranked = sorted(spread, key=lambda u: robust_cost(objective, np.asarray(u)))
         tried += [np.asarray(u) for u in ranked[: FOLLOWED - 1]]
-    tasks = [(objective, start, "soft_l1") for start in tried]
-    ends = list(map_(follow, tasks)) if map_ is not None else [follow(task) for task in tasks]  # type: ignore[arg-type]
+    tasks: list[tuple[Objective, Array, Literal["linear", "soft_l1"]]] = [(objective, u, "soft_l1") for u in tried]
+    outcomes = list(map_cases(follow, tasks, workers=workers))
+    ends = [o.value for o in outcomes if o.value is not None]
+    if not ends:
+        failure = outcomes[0].failure
+        raise ValueError(f"no start led anywhere, got {failure.sentence if failure else 'nothing'}; other bounds")
     best = min(ends, key=lambda end: end[1])
     same = sum(bool(np.max(np.abs(end[0] - best[0])) < SAME) for end in ends)
     return best[0], (same, len(ends))
@@ -221,7 +227,7 @@ def score(cases: Sequence[Case], objective: Objective, u: Array) -> Score:
         parts, late = own.parts(k, u)
         squares += sum(float(p @ p) for p in parts[:-1])
         samples += sum(p.size for p in parts[:-1])
-        simulated = own.simulate(each.scenario.replaced(own.values(u)))
+        simulated = own.simulate(exchanged(each.scenario, own.values(u)))
         for signal, sigma in zip(each.signals, each.sigmas, strict=True):
             found = rate(signal.time, signal.values, alignment.simulated_at(signal, simulated, late=late), noise=sigma)
             if isinstance(found, Rating):

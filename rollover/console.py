@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rollover.baseline import Answer
+    from rollover.calibrate import Calibration
     from rollover.loads import PeakLoad
+    from rollover.misfit import Misfit
     from rollover.run import Run
 
 QUIET = 2.0  # s of wall time: a run that is shorter shows no progress
@@ -172,3 +174,66 @@ def regression(answers: Sequence[Answer], folder: str) -> None:
     if not bad and not updated:
         verdict = f"all {len(answers)} scenarios are as they were"
     out.print(f"{verdict[0].upper()}{verdict[1:]}. Everything: {folder}", style="bold")
+
+
+def comparison(found: Sequence[Misfit], folder: str) -> None:
+    """How well each recording is followed, a line for each channel."""
+    from rollover.rating import Iso18571, NotRateable
+
+    out = Console(highlight=False, markup=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
+    for each in found:
+        out.print(each.recording, style="bold")
+        table = Table(box=None, pad_edge=False)
+        for heading in ("channel", "CFC", "ISO 18571", "", "rms/range %", "rms/noise", "peak %", "peak later ms"):
+            table.add_column(heading, justify="left" if heading in ("channel", "") else "right")
+        for c in each.channels:
+            first = (c.channel, str(c.cfc or "-"))
+            if isinstance(c.rating, NotRateable):
+                table.add_row(*first, "-", c.rating.reason)
+                continue
+            iso, peak = c.rating.iso18571, c.rating.peak
+            rated = isinstance(iso, Iso18571)
+            table.add_row(
+                *first,
+                f"{iso.overall:.3f}" if isinstance(iso, Iso18571) else "-",
+                iso.grade if isinstance(iso, Iso18571) else "not rated",
+                "-" if c.rating.nrmse is None else f"{100.0 * c.rating.nrmse:.3g}",
+                "-" if c.rating.over_noise is None else f"{c.rating.over_noise:.3g}",
+                "-" if peak.relative_error is None else f"{100.0 * peak.relative_error:+.3g}",
+                f"{1e3 * peak.time_error:+.3g}",
+                style="" if rated else "yellow",
+            )
+        out.print(table)
+        if each.clock is not None:
+            late, sigma, gain = 1e3 * each.clock.offset, 1e3 * each.clock.sigma, 100.0 * each.clock.gain
+            out.print(f"Clock {late:+.3g} +- {sigma:.2g} ms late; setting it (not done) would remove {gain:.0f} %.")
+        for channel, why in each.skipped.items():
+            out.print(f"{channel}: left out, {why}", style="yellow")
+        for note in each.notes:
+            out.print(note, style="yellow")
+    out.print(f"Results: {folder}")
+
+
+def calibration(found: Calibration, folder: str) -> None:
+    """Fitted values with their intervals, and what they gain."""
+    out = Console(highlight=False, markup=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
+    table = Table(box=None, pad_edge=False)
+    for heading in ("parameter", "unit", "was", "is", "95 % from", "to", "", ""):
+        table.add_column(heading, justify="right" if heading in ("was", "is", "95 % from", "to") else "left")
+    for e in found.estimates:
+        verdict = "determined" if e.determined else f"not determined: {e.why}"
+        values = (f"{v:.5g}" for v in (e.start, e.value, e.low, e.high))
+        table.add_row(e.path, e.unit, *values, e.method, verdict, style="" if e.determined else "yellow")
+    out.print(table)
+    for which, scores in (("fitted", found.training), ("held out", found.held_out)):
+        if scores is None:
+            continue
+        before, after = scores.before, scores.after
+        rated = ""
+        if before.iso18571 is not None and after.iso18571 is not None:
+            rated = f", ISO 18571 {before.iso18571:.3f} -> {after.iso18571:.3f}"
+        names = ", ".join(scores.recordings)
+        out.print(f"{which}: residual over noise {before.over_noise:.3g} -> {after.over_noise:.3g}{rated} ({names})")
+    for warning in found.warnings:
+        out.print(warning, style="yellow")
+    out.print(f"Results: {folder}")

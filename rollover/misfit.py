@@ -7,7 +7,8 @@ and what that would gain, and leaves it there.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from rollover import alignment
 from rollover.alignment import Signal
 from rollover.filters import least_rate
-from rollover.rating import NotRateable, Rating, rate
+from rollover.rating import NotRateable, Peak, Rating, rate
 from rollover.recording import Recording
 from rollover.run import Run
 from rollover.vehicle import Striker
@@ -206,6 +207,17 @@ def sigma_of(
     return noise(recording, channel) if noise is not None else None
 
 
+def differences_noise(recording: Recording, channel: str) -> float | None:
+    """1 sigma of white noise from third differences, which slow signals leave small; None from fewer than 16 samples.
+
+    The median keeps edges out: sigma = 1.4826 median|d3|/sqrt(20), 20 the sum of the squares of 1, 3, 3, 1.
+    """
+    values = recording[channel][np.isfinite(recording[channel])]
+    if values.size < 16:
+        return None
+    return 1.4826 * float(np.median(np.abs(np.diff(values, 3)))) / np.sqrt(20.0) or None
+
+
 def clock(signals: Sequence[tuple[Signal, float]], simulated: Recording, total: float) -> Clock | None:
     """Offset of the recording's clock at which its channels agree best with the simulation; scanned, then refined."""
     if not signals or total <= 0.0:
@@ -336,3 +348,18 @@ def _absorbed(recording: Recording, start: float, end: float) -> float | None:
         return None
     f, z = force[known], sinkage[known]
     return float(np.sum(0.5 * (f[1:] + f[:-1]) * np.diff(z)))
+
+
+def summary(found: Any) -> Any:
+    """What a comparison or a rating says, as bare values for a file; without the arrays."""
+    if isinstance(found, NotRateable):
+        return {"not_rateable": found.reason}
+    if is_dataclass(found):
+        values = {f.name: getattr(found, f.name) for f in fields(found)}
+        about = {name: summary(value) for name, value in values.items() if not isinstance(value, np.ndarray)}
+        return {**about, "time_error": found.time_error} if isinstance(found, Peak) else about
+    if isinstance(found, (tuple, list)):
+        return [summary(item) for item in found]
+    if isinstance(found, Mapping):
+        return {key: summary(item) for key, item in found.items()}
+    return found

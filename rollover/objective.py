@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rollover import alignment
 from rollover.alignment import Signal
-from rollover.document import paths
+from rollover.document import exchanged, paths
 from rollover.faults import Fault, InputError
 from rollover.misfit import sigma_of
 from rollover.recording import Recording
@@ -182,7 +182,7 @@ class Objective:
     def parts(self, k: int, u: Array) -> tuple[list[Array], float]:
         """Residuals over noise of case `k`, channel by channel and then the clock's prior; its clock offset, s."""
         case = self.cases[k]
-        simulated = self.simulate(case.scenario.replaced(self.values(u), origin="--fit"))
+        simulated = self.simulate(exchanged(case.scenario, self.values(u)))
         smooth = [alignment.smooth(signal, simulated) for signal in case.signals]
         worth = self.correlation[k] if self.correlation else (1.0,) * len(case.signals)
         scales = [sigma * math.sqrt(tau) for sigma, tau in zip(case.sigmas, worth, strict=True)]

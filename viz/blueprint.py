@@ -52,10 +52,10 @@ _MOUNTS = ("rops/mount/*/force_?", "rops/hinge/*/force_?")
 _MOMENTS = ("rops/mount/*/moment_?", "rops/hinge/*/moment_?", "rops/hinge/*/angle_?")
 
 
-def blueprint(run: Run, scales: str) -> rrb.Blueprint:
+def blueprint(run: Run, scales: str, views: Sequence[rrb.TimeSeriesView] = ()) -> rrb.Blueprint:
     """Layout for one run: what answers "how high were the loads, and when" is in front in every place.
 
-    `scales` says what lengths and colours in the scene mean.
+    `scales` says what lengths and colours in the scene mean; `views` come in front of the motion.
     """
     # a plot of nothing but zeros says less than its absence, but for the load that is asked for
     found = run.recording.channels
@@ -70,7 +70,7 @@ def blueprint(run: Run, scales: str) -> rrb.Blueprint:
     rows = [
         top[:1],
         _mounts(channels) + top[1:] + _views(channels, _LOADS) + _moments(channels),
-        _views(channels, _MOTION) + _others(channels),
+        [*views, *_views(channels, _MOTION), *_others(channels)],
         [
             rrb.TextDocumentView(origin="/report/verdict", contents=["+ /report/verdict"], name="How high, and when"),
             rrb.TextLogView(

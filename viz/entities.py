@@ -94,6 +94,16 @@ class Series:
         return f"{self.path}/simulated"
 
     @property
+    def measured(self) -> str:
+        """Path of the measured values, in the same plot."""
+        return f"{self.path}/measured"
+
+    @property
+    def residual(self) -> str:
+        """Path of measured less simulated over the noise."""
+        return f"residual/{self.path.rpartition('/')[2]}"
+
+    @property
     def peak(self) -> str:
         """Path of the marker at the raw peak."""
         return f"{self.path}/peak"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -36,10 +36,18 @@ _MARKED = (
 )
 
 
-def write_rrd(run: Run, path: Path, *, peaks: Sequence[Peak] = ()) -> None:
+def write_rrd(
+    run: Run,
+    path: Path,
+    *,
+    peaks: Sequence[Peak] = (),
+    beside: Callable[[Stream], None] | None = None,
+    views: Sequence[Any] = (),
+) -> None:
     """Write a run as a recording for the viewer, whole or not at all; a failed run is shown as far as it came.
 
-    `peaks` are the peak loads of the report; without them, raw peaks are read off the channels.
+    `peaks` are the peak loads of the report; without them, raw peaks are read off the channels. `beside` writes what
+    stands beside the simulated values, `views` show what has no place in a run's layout.
     """
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     name = run_id(run)
@@ -49,7 +57,7 @@ def write_rrd(run: Run, path: Path, *, peaks: Sequence[Peak] = ()) -> None:
     try:
         with catch_and_log_exceptions("recording", strict=True), _closed(rec):
             with_ = picture(run)
-            rec.save(part, default_blueprint=blueprint(run, ", ".join(with_.scales)))
+            rec.save(part, default_blueprint=blueprint(run, ", ".join(with_.scales), views))
             out, found = Stream(rec), ranked(run, peaks)
             standing(out, run, with_)
             _looks(out, run, found)
@@ -64,6 +72,8 @@ def write_rrd(run: Run, path: Path, *, peaks: Sequence[Peak] = ()) -> None:
                 peak_place(out, run, found[0], with_.size)
             _phases(out, run)
             _events(out, run, found)
+            if beside is not None:
+                beside(out)
         os.replace(part, path)
     finally:
         part.unlink(missing_ok=True)

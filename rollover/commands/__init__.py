@@ -12,5 +12,21 @@ from rollover.commands import importing
 from rollover.commands import schema
 from rollover.commands import regress
 from rollover.commands import identify
+from rollover.commands import compare
+from rollover.commands import calibrate
+from rollover.commands import synthesize
 
-__all__ = ["check", "identify", "importing", "listing", "regress", "root", "run", "schema", "view"]
+__all__ = [
+    "calibrate",
+    "check",
+    "compare",
+    "identify",
+    "importing",
+    "listing",
+    "regress",
+    "root",
+    "run",
+    "schema",
+    "synthesize",
+    "view",
+]

@@ -1,0 +1,167 @@
+"""`rollover compare`: measured against simulated."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rollover.commands.door import COMPILING, FAILED, AsJson, Force, Setting, answering, app, settings
+from rollover.faults import Fault, InputError
+
+if TYPE_CHECKING:
+    from rollover.misfit import Misfit
+    from rollover.recording import Recording
+    from rollover.run import Run
+    from rollover.scenario import Scenario
+
+FORMAT = "rollover-compare/1"
+JSON, PAGE, PICTURE = "compare.json", "report.html", "compare.rrd"
+
+
+@app.command()
+@answering
+def compare(
+    scenario: Annotated[str, typer.Argument(help="A scenario file, or the name of a shipped one.")],
+    recordings: Annotated[
+        list[str], typer.Argument(help="Recordings, each with its conditions.", metavar="RECORDING...")
+    ],
+    set_: Setting = None,
+    cfc: Annotated[
+        int | None,
+        typer.Option(
+            help="Filter class for both sides, refused where one is too slow  [default: loads.cfc if possible]"
+        ),
+    ] = None,
+    profile: Annotated[Path | None, typer.Option(help="What the columns of a foreign file are.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Results folder  [default: out/compare/NAME]")] = None,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Compare recordings with runs under their conditions: rated, by channel and phase, nothing shifted in time."""
+    from rollover import console, document, store
+    from rollover import scenario as scenarios
+
+    path = document.find(scenario)
+    chosen = scenarios.load(path)
+    if set_:
+        chosen = chosen.replaced(settings(set_), origin="--set")
+    measured = read(recordings, profile)
+    folder = out or Path("out", "compare", path.stem)
+    pictures = _pictures(list(measured))
+    about = {"scenario_hash": document.content_hash(chosen), "recordings": list(measured)}
+    store.claim_account(folder, FORMAT, about, [JSON, PAGE, *pictures.values()], force=force)
+    _say_compiling()
+    runs = {name: _run(chosen, name, recording) for name, recording in measured.items()}
+    found = [_misfit(runs[name], recording, name, cfc) for name, recording in measured.items()]
+    answer = _answer(about, runs, found)
+    command = " ".join(map(shlex.quote, ["rollover", "compare", scenario, *recordings]))
+    with store.whole(folder) as part:
+        store.write_json(part / JSON, answer)
+        from viz.comparison_page import page
+
+        text = page(
+            found,
+            title=chosen.title,
+            command=command,
+            scenario_hash=about["scenario_hash"],
+            versions=store.versions(),
+        )
+        (part / PAGE).write_text(text, encoding="utf-8")
+        draw = _picture()
+        for each in found if draw is not None else ():
+            assert draw is not None
+            draw(runs[each.recording], each, part / pictures[each.recording])
+    if as_json:
+        print(json.dumps(store.plain(answer), indent=2))
+    else:
+        console.comparison(found, str(folder))
+    failed = [name for name, run in runs.items() if run.status == "failed"]
+    for name in failed:
+        console.say(f"{name}: the simulation failed: {runs[name].sentence}")
+    if failed:
+        raise typer.Exit(FAILED)
+
+
+def read(paths: list[str], profile: Path | None) -> dict[str, Recording]:
+    """Recordings by their file's stem. Raises `InputError` for all faults at once, and for one name twice."""
+    from rollover.importers import read_recording
+
+    found: dict[str, Recording] = {}
+    faults: list[Fault] = []
+    for text in paths:
+        name = Path(text).stem
+        if name in found:
+            faults.append(Fault(file=text, message=f"a second recording by this name, got {name!r}; each its own"))
+            continue
+        try:
+            found[name] = read_recording(text, profile=profile)
+        except InputError as e:
+            faults += e.faults
+    if faults:
+        raise InputError(*faults)
+    return found
+
+
+def _say_compiling() -> None:
+    from ground.compiled import is_warm
+    from rollover import console
+
+    if not is_warm():
+        console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
+
+
+def _run(scenario: Scenario, name: str, recording: Recording) -> Run:
+    from rollover import console, simulate
+
+    under = scenario.replaced(recording.conditions, origin=f"{name}: conditions")
+    lead = getattr(under.initiation, "lead_time", 0.0)
+    with console.progress(f"simulating {name}", -lead, under.simulation.duration) as show:
+        return simulate.run(under, progress=show)
+
+
+def _misfit(run: Run, recording: Recording, name: str, cfc: int | None) -> Misfit:
+    from rollover.misfit import differences_noise, misfit
+
+    wanted = run.scenario.loads.cfc if cfc is None else cfc
+    try:
+        return misfit(run, recording, name=name, cfc=wanted, at_least=cfc is not None, noise=differences_noise)
+    except ValueError as e:
+        raise InputError(Fault(file=name, message=str(e))) from None
+
+
+def _answer(about: Mapping[str, Any], runs: Mapping[str, Run], found: list[Misfit]) -> dict[str, Any]:
+    from rollover import store
+    from rollover.misfit import summary
+
+    return {
+        "format": FORMAT,
+        **about,
+        "versions": store.versions(),
+        "comparisons": [
+            {**summary(each), "status": runs[each.recording].status, "sentence": runs[each.recording].sentence}
+            for each in found
+        ],
+    }
+
+
+def _pictures(names: list[str]) -> dict[str, str]:
+    """A picture for each recording; a single one has the plain name."""
+    return {name: PICTURE if len(names) == 1 else f"compare-{name}.rrd" for name in names}
+
+
+def _picture() -> Callable[[Run, Misfit, Path], None] | None:
+    from rollover import console
+
+    try:
+        from viz.comparison import write_comparison
+    except ImportError as e:
+        if (e.name or "").partition(".")[0] != "rerun":
+            raise
+        console.say(f"No rerun wheel for this platform: {PICTURE} was not written.")
+        return None
+    return write_comparison

@@ -1,0 +1,102 @@
+"""`rollover synthesize`: recordings of a scenario as instruments would have made them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rollover.commands.door import FAILED, AsJson, Force, Setting, answering, app, settings
+from rollover.faults import Fault, InputError
+
+DROP = ("ground/force_normal", "ground/sinkage", "striker/acceleration_z")
+ROLL = ("chassis/roll", "chassis/angular_velocity_x", "chassis/acceleration_y", "chassis/acceleration_z", "rops/force")
+
+
+@app.command()
+@answering
+def synthesize(
+    scenario: Annotated[str, typer.Argument(help="A scenario file, or the name of a shipped one.")],
+    out: Annotated[Path, typer.Option(help="Folder of the recording.")] = Path("out/synthesize"),
+    name: Annotated[str | None, typer.Option(help="Name of the recording  [default: the scenario's]")] = None,
+    set_: Setting = None,
+    hidden: Annotated[
+        list[str] | None,
+        typer.Option("--hide", metavar="PATH=VALUE", help="Like --set, but not stated among the conditions."),
+    ] = None,
+    channel: Annotated[
+        list[str] | None,
+        typer.Option("--channel", help="A recorded channel; may be repeated  [default: the usual ones]"),
+    ] = None,
+    noise: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--noise",
+            metavar="SHARE or CHANNEL=SIGMA",
+            help="White noise, 1 sigma: a share of each channel's range, or SI for one  [default: 0.005]",
+        ),
+    ] = None,
+    rate: Annotated[float, typer.Option(help="Sampling rate, Hz.", min=1.0, max=1e6)] = 1000.0,
+    cfc: Annotated[int | None, typer.Option(help="Filter class that the instruments apply.")] = None,
+    late: Annotated[float, typer.Option(help="How late the instruments' clock is, s.")] = 0.0,
+    seed: Annotated[int, typer.Option(help="Of the noise.")] = 0,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Simulate a scenario and write what instruments with noise would have recorded of it."""
+    from rollover import console, document, simulate
+    from rollover import scenario as scenarios
+    from rollover.importers import write_recording
+    from rollover.synthesis import synthetic
+    from rollover.vehicle import Striker
+
+    path = document.find(scenario)
+    stated, unstated = settings(set_ or []), settings(hidden or [])
+    chosen = scenarios.load(path).replaced(stated, origin="--set").replaced(unstated, origin="--hide")
+    target = out / f"{name or path.stem}.csv"
+    share, sigmas = _noise(noise or [])
+    done = simulate.run(chosen)
+    if done.status == "failed":
+        console.say(f"{path}: the simulation failed: {done.sentence}")
+        raise typer.Exit(FAILED)
+    usual = DROP if isinstance(chosen.vehicle, Striker) else ROLL
+    try:
+        made = synthetic(
+            done.recording,
+            channels=tuple(channel) if channel else tuple(c for c in usual if c in done.recording.channels),
+            rate=rate,
+            share=share,
+            sigmas=sigmas,
+            cfc=cfc,
+            late=late,
+            seed=seed,
+            conditions={leaf.path: leaf.value for leaf in document.paths(chosen) if leaf.path in stated},
+        )
+    except ValueError as e:
+        raise InputError(Fault(file="rollover synthesize", message=str(e))) from None
+    write_recording(made, target, force=force)
+    if as_json:
+        print(json.dumps({"recording": str(target), "samples": made.time.size, "noise": dict(made.noise)}, indent=2))
+    else:
+        print(f"{made.time.size} samples of {len(made.channels)} channels: {target}")
+
+
+def _noise(given: list[str]) -> tuple[float, dict[str, float]]:
+    """Share of the range for all, and 1 sigma for some channels. Raises `InputError`."""
+    share, sigmas = 0.005, {}
+    for text in given:
+        channel, equals, number = text.rpartition("=")
+        try:
+            value = float(number)
+        except ValueError:
+            value = -1.0
+        if not 0.0 <= value < float("inf"):
+            message = f"not a noise, got {text!r}; SHARE or CHANNEL=SIGMA, at least 0"
+            raise InputError(Fault(file="--noise", message=message))
+        if equals:
+            sigmas[channel] = value
+        else:
+            share = value
+    return share, sigmas

@@ -1,0 +1,146 @@
+"""The page of a comparison: how well each recording is followed, channel by channel and phase by phase."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from rollover.misfit import ChannelMisfit, Misfit
+from rollover.rating import Iso18571, NotRateable, Rating, SpragueGeers
+from viz import plots
+from viz.comparison import sentences
+from viz.entities import series
+from viz.page import Block, Cell, Details, Figure, Footer, Headline, Note, Section, State, Table, render
+from viz.plots import Curve
+
+STATES: Mapping[str, State] = {"excellent": "pass", "good": "pass", "fair": "warn", "poor": "fail"}
+COLUMNS = ["channel", "CFC", "ISO/TS 18571", "grade", "Z", "E_P", "E_M", "E_S", "M, %", "P, %"]
+COLUMNS += ["RMS / range, %", "RMS / noise", "peak, %", "peak later, ms"]
+
+
+def page(
+    found: Sequence[Misfit],
+    *,
+    title: str,
+    command: str,
+    scenario_hash: str = "",
+    versions: Mapping[str, str] | None = None,
+) -> str:
+    """HTML of one comparison for each recording."""
+    blocks: list[Block] = [
+        Note(
+            text="Each recording is compared at its own stamps with a run under its own conditions, both through the "
+            "same filter class. Nothing was shifted in time. ISO/TS 18571 and peaks are over the event, from first "
+            "contact to rest."
+        )
+    ]
+    for each in found:
+        blocks.append(Section(title=each.recording, blocks=_recording(each)))
+    return render(
+        title=title,
+        subtitle="Measured against simulated",
+        headline=headline(found),
+        blocks=blocks,
+        footer=Footer(command=command, scenario_hash=scenario_hash, versions=versions),
+    )
+
+
+def headline(found: Sequence[Misfit]) -> Headline:
+    """The span of the ratings and of the residuals."""
+    ratings = [c.rating for m in found for c in m.channels]
+    isos = sorted(
+        (r.iso18571 for r in ratings if isinstance(r, Rating) and isinstance(r.iso18571, Iso18571)),
+        key=lambda iso: iso.overall,
+    )
+    noisy = sorted(r.over_noise for r in ratings if isinstance(r, Rating) and r.over_noise is not None)
+    recordings = f"{len(found)} recording{'s' if len(found) != 1 else ''}, {len(ratings)} channels"
+    detail = f"Residuals are {noisy[0]:.3g} to {noisy[-1]:.3g} times the noise." if noisy else ""
+    if not isos:
+        return Headline(sentence=f"{recordings}: none could be rated.", detail=detail, state="warn")
+    low, high = isos[0], isos[-1]
+    return Headline(
+        sentence=f"{recordings}: ISO/TS 18571 {low.overall:.2f} ({low.grade}) to {high.overall:.2f} ({high.grade}).",
+        detail=detail,
+        state=STATES[low.grade],
+    )
+
+
+def _recording(found: Misfit) -> list[Block]:
+    table = Table(
+        columns=COLUMNS,
+        rows=[_row(c.channel, c.cfc, c.rating) for c in found.channels],
+        numeric=(2, *range(4, len(COLUMNS))),
+        caption="Z corridor, E_P phase, E_M magnitude, E_S slope of ISO/TS 18571; M, P Sprague-Geers.",
+    )
+    blocks: list[Block] = [Note(text=found.title), table]
+    why = [
+        Note(text=f"{c.channel}: not rated by ISO/TS 18571: {reason}")
+        for c in found.channels
+        if (reason := _reason(c.rating))
+    ]
+    blocks += why + [Note(text=f"{line[:1].upper()}{line[1:]}.") for line in sentences(found)]
+    blocks += [_figure(c, found) for c in found.channels]
+    rows: list[list[str | Cell]] = [
+        [
+            c.channel,
+            cell.phase,
+            f"{cell.start:.4f}",
+            f"{cell.end:.4f}",
+            str(cell.samples),
+            f"{100.0 * cell.share:.1f}",
+            _number(cell.rating.over_noise) if isinstance(cell.rating, Rating) else "",
+            _number(cell.rating.iso18571.overall)
+            if isinstance(cell.rating, Rating) and isinstance(cell.rating.iso18571, Iso18571)
+            else "",
+        ]
+        for c in found.channels
+        for cell in c.cells
+    ]
+    columns = ["channel", "phase", "from, s", "to, s", "samples", "share, %", "RMS / noise", "ISO/TS 18571"]
+    phases = Table(
+        columns=columns,
+        rows=rows,
+        numeric=range(2, len(columns)),
+        caption="Share: of the recording's squared residual over noise.",
+    )
+    return [*blocks, Details(summary="By phase", blocks=[phases])]
+
+
+def _row(channel: str, cfc: int | None, rating: Rating | NotRateable) -> list[str | Cell]:
+    first: list[str | Cell] = [channel, "none" if cfc is None else str(cfc)]
+    if isinstance(rating, NotRateable):
+        return [*first, Cell(rating.reason, "muted"), *[""] * (len(COLUMNS) - 3)]
+    iso, sg, peak = rating.iso18571, rating.sprague_geers, rating.peak
+    scores: list[str | Cell] = [Cell("not rated", "muted"), "", "", "", "", ""]
+    if isinstance(iso, Iso18571):
+        parts = (iso.corridor, iso.phase, iso.magnitude, iso.slope)
+        scores = [f"{iso.overall:.3f}", Cell(iso.grade, STATES[iso.grade]), *(f"{p:.3f}" for p in parts)]
+    geers = [f"{100.0 * v:.3g}" for v in (sg.magnitude, sg.phase)] if isinstance(sg, SpragueGeers) else ["", ""]
+    return [
+        *first,
+        *scores,
+        *geers,
+        _number(rating.nrmse, 100.0),
+        _number(rating.over_noise),
+        "" if peak.relative_error is None else f"{100.0 * peak.relative_error:+.3g}",
+        f"{1e3 * peak.time_error:+.3g}",
+    ]
+
+
+def _reason(rating: Rating | NotRateable) -> str:
+    if isinstance(rating, NotRateable):
+        return rating.reason
+    return rating.iso18571.reason if isinstance(rating.iso18571, NotRateable) else ""
+
+
+def _figure(c: ChannelMisfit, found: Misfit) -> Figure:
+    s = series(c.channel)
+    measured = Curve(name="measured", x=c.time, y=c.measured * s.factor)
+    simulated = Curve(name="simulated", x=c.time, y=c.simulated * s.factor)
+    label = f"{s.name}, {s.unit}" if s.unit else c.channel
+    how = "unfiltered" if c.cfc is None else f"both CFC {c.cfc}"
+    svg = plots.overlay(measured, simulated, label=label, phases=found.phases)
+    return Figure(svg=svg, caption=f"{c.channel}, {how}, {c.rate:.5g} Hz; below, measured less simulated.")
+
+
+def _number(value: float | None, factor: float = 1.0) -> str:
+    return "" if value is None else f"{value * factor:.3g}"
