@@ -102,6 +102,17 @@ def at_stamps(signal: Signal, time: Array, values: Array, *, late: float = 0.0) 
     return np.interp(signal.time - late, time, values)
 
 
+def doubt(values: Array) -> Array:
+    """How far interpolation between rows of a simulation may be off, (m,): the largest second difference nearby.
+
+    Nothing where it is smooth, the whole jump where it jumps, as an acceleration does when the ground is touched:
+    when between two rows it does so is not known.
+    """
+    bend = np.zeros(values.size + 2)
+    bend[2:-2] = np.abs(np.diff(values, 2))
+    return np.asarray(np.maximum(np.maximum(bend[:-2], bend[1:-1]), bend[2:]))
+
+
 def classes(recorded: int | None, wanted: int | None) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Filter classes still to be applied to the measured and to the simulated side.
 

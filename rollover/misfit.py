@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 
 CLOCK_WINDOW = 0.02  # s, to either side, in which the clock's offset is looked for
 CONTACT_SHARE, CONTACT_SIGMAS, CONTACT_ROWS = 0.02, 5.0, 3  # of the peak, of the noise, in a row: contact
+OUTSIDE = 0.01  # of a recording's samples: more beyond the simulation are worth a note
 LEAD = 0.01  # s before first contact that are rated with what follows
 CONTACT_CHANNELS = ("ground/force_normal", "rops/force", "striker/acceleration_z")
 
@@ -143,8 +144,8 @@ def misfit(
         values = alignment.simulated_at(signal, simulated)
         found.append(_channel(signal, values, after, phases, first))
         signals.append((signal, after if after else _scale(signal.values)))
-    before = recording.time < start
-    if np.any(before) or recording.time[-1] > end:
+    outside = np.count_nonzero((recording.time < start) | (recording.time > end))
+    if outside > OUTSIDE * recording.time.size:
         notes.append(
             f"the simulation covers {start:g} to {end:g} s of the recording's "
             f"{recording.time[0]:g} to {recording.time[-1]:g} s; the rest was not compared"

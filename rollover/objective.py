@@ -158,6 +158,7 @@ def case(
 class Objective:
     """Residuals over noise as a function of `u` (p,).
 
+    The noise of a sample is the channel's and, beside a jump of the simulation, what interpolation leaves in doubt.
     Each case's clock offset has a Gaussian prior of `clock_sigma` s and is profiled out: at every `u` it stands at
     its best. `correlation` gives, for each case and channel, how many samples are worth one (>= 1); `weights` (n,)
     hold down outliers, None for all alike.
@@ -185,13 +186,15 @@ class Objective:
         simulated = self.simulate(exchanged(case.scenario, self.values(u)))
         smooth = [alignment.smooth(signal, simulated) for signal in case.signals]
         worth = self.correlation[k] if self.correlation else (1.0,) * len(case.signals)
-        scales = [sigma * math.sqrt(tau) for sigma, tau in zip(case.sigmas, worth, strict=True)]
+        doubts = [alignment.doubt(v) for v in smooth]
 
         def at(late: float) -> list[Array]:
-            found = [
-                (s.values - alignment.at_stamps(s, simulated.time, v, late=late)) / scale
-                for s, v, scale in zip(case.signals, smooth, scales, strict=True)
-            ]
+            found = []
+            for s, v, d, sigma, tau in zip(case.signals, smooth, doubts, case.sigmas, worth, strict=True):
+                # a sample beside a jump says as little as the time of the jump is known
+                size = np.hypot(sigma, alignment.at_stamps(s, simulated.time, d, late=late))
+                away = s.values - alignment.at_stamps(s, simulated.time, v, late=late)
+                found.append(away / (size * math.sqrt(tau)))
             return [*found, np.array([late / self.clock_sigma if self.clock_sigma > 0.0 else 0.0])]
 
         if self.clock_sigma <= 0.0:
@@ -263,12 +266,14 @@ def _profiled(at: Callable[[float], list[Array]], sigma: float) -> tuple[list[Ar
         slope = [(b - a) / (2.0 * h) for a, b in zip(at(late - h), at(late + h), strict=True)]
         bend = sum(float(s @ s) for s in slope)
         move = -sum(float(s @ r) for s, r in zip(slope, now, strict=True)) / bend
-        to = min(max(late + move, -5.0 * sigma), 5.0 * sigma)
-        new = at(to)
-        if not (less := _squared(new)) < cost:
-            break
-        done = cost - less < 1e-9 * cost
-        late, now, cost = to, new, less
+        done = True
+        for share in (1.0, 0.5, 0.25, 0.1):
+            to = min(max(late + share * move, -5.0 * sigma), 5.0 * sigma)
+            new = at(to)
+            if (less := _squared(new)) < cost:
+                done = cost - less < 1e-9 * cost
+                late, now, cost = to, new, less
+                break
         if done:
             break
     return now, late

@@ -62,7 +62,7 @@ def calibrate(
     measured = read(recordings, profile)
     held = _held_out(list(measured), hold_out or [])
     folder = out or Path("out", "calibrate", path.stem)
-    about = {
+    about: dict[str, Any] = {
         "scenario_hash": document.content_hash(chosen),
         "recordings": list(measured),
         "fitted": fit,

@@ -53,7 +53,7 @@ def compare(
     measured = read(recordings, profile)
     folder = out or Path("out", "compare", path.stem)
     pictures = _pictures(list(measured))
-    about = {"scenario_hash": document.content_hash(chosen), "recordings": list(measured)}
+    about: dict[str, Any] = {"scenario_hash": document.content_hash(chosen), "recordings": list(measured)}
     store.claim_account(folder, FORMAT, about, [JSON, PAGE, *pictures.values()], force=force)
     _say_compiling()
     runs = {name: _run(chosen, name, recording) for name, recording in measured.items()}
