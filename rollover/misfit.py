@@ -7,7 +7,7 @@ and what that would gain, and leaves it there.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from rollover.vehicle import Striker
 Array = NDArray[np.float64]
 
 CLOCK_WINDOW = 0.02  # s, to either side, in which the clock's offset is looked for
+CLOCK_SAMPLES = 50_000  # of each channel, by which it is found
 CONTACT_SHARE, CONTACT_SIGMAS, CONTACT_ROWS = 0.02, 5.0, 3  # of the peak, of the noise, in a row: contact
 OUTSIDE = 0.01  # of a recording's samples: more beyond the simulation are worth a note
 LEAD = 0.01  # s before first contact that are rated with what follows
@@ -141,6 +142,8 @@ def misfit(
         notes += [note] if note else []
         sigma = sigma_of(recording, channel, noise)
         after = None if sigma is None else sigma * signal.quieter
+        if signals and np.array_equal(signals[-1][0].time, signal.time):  # one clock: its stamps are kept once
+            signal = replace(signal, time=signals[-1][0].time, stretch=signals[-1][0].stretch)
         values = alignment.simulated_at(signal, simulated)
         found.append(_channel(signal, values, after, phases, first))
         signals.append((signal, after if after else _scale(signal.values)))
@@ -158,7 +161,7 @@ def misfit(
         phases=phases,
         contact_measured=seen,
         contact_simulated=first,
-        clock=clock(signals, simulated, total),
+        clock=clock(signals, simulated),
         energy_measured=_absorbed(recording, start, end),
         energy_simulated=_absorbed(simulated, float(recording.time[0]), float(recording.time[-1])),
         skipped=skipped,
@@ -219,10 +222,11 @@ def differences_noise(recording: Recording, channel: str) -> float | None:
     return 1.4826 * float(np.median(np.abs(np.diff(values, 3)))) / np.sqrt(20.0) or None
 
 
-def clock(signals: Sequence[tuple[Signal, float]], simulated: Recording, total: float) -> Clock | None:
+def clock(signals: Sequence[tuple[Signal, float]], simulated: Recording) -> Clock | None:
     """Offset of the recording's clock at which its channels agree best with the simulation; scanned, then refined."""
-    if not signals or total <= 0.0:
+    if not signals:
         return None
+    signals = [(_thinned(signal), sigma) for signal, sigma in signals]
     smooth = [alignment.smooth(signal, simulated) for signal, _ in signals]
 
     def squared(late: float) -> float:
@@ -231,6 +235,7 @@ def clock(signals: Sequence[tuple[Signal, float]], simulated: Recording, total: 
             for (s, sigma), v in zip(signals, smooth, strict=True)
         )
 
+    now = squared(0.0)
     width, step = CLOCK_WINDOW, CLOCK_WINDOW / 20.0
     centre = 0.0
     while step > 1e-7:
@@ -246,9 +251,17 @@ def clock(signals: Sequence[tuple[Signal, float]], simulated: Recording, total: 
     return Clock(
         offset=centre,
         sigma=min(sigma, CLOCK_WINDOW),
-        gain=1.0 - least / total,
+        gain=1.0 - least / now if now > 0.0 else 0.0,
         at_limit=abs(centre) > CLOCK_WINDOW * 0.999,
     )
+
+
+def _thinned(signal: Signal) -> Signal:
+    """At most `CLOCK_SAMPLES` of a signal's samples, evenly taken; filtered as before."""
+    every = -(-signal.time.size // CLOCK_SAMPLES)
+    if every == 1:
+        return signal
+    return replace(signal, time=signal.time[::every], values=signal.values[::every], stretch=signal.stretch[::every])
 
 
 class _TooSlowError(ValueError):
