@@ -16,14 +16,18 @@ from numpy.typing import NDArray
 from rollover import alignment
 from rollover.alignment import Signal
 from rollover.filters import least_rate
+from rollover.measured import at_sensors
+from rollover.noise import LENGTH, noise_floor
 from rollover.rating import NotRateable, Peak, Rating, rate
 from rollover.recording import Recording
 from rollover.run import Run
-from rollover.vehicle import Striker
+from rollover.scenario import Scenario
+from rollover.vehicle import Striker, Vehicle, chassis_of
 
 Array = NDArray[np.float64]
 
 CLOCK_WINDOW = 0.02  # s, to either side, in which the clock's offset is looked for
+NOISE_SAMPLES = 100_000  # the first of a channel, by which its noise is estimated
 CLOCK_SAMPLES = 50_000  # of each channel, by which it is found
 CONTACT_SHARE, CONTACT_SIGMAS, CONTACT_ROWS = 0.02, 5.0, 3  # of the peak, of the noise, in a row: contact
 OUTSIDE = 0.01  # of a recording's samples: more beyond the simulation are worth a note
@@ -116,7 +120,7 @@ def misfit(
     a note says so, or, with `at_least`, ``ValueError`` is raised. `noise(recording, channel)` gives 1 sigma of the
     recorded samples where the recording states none.
     """
-    simulated = run.recording
+    simulated = as_measured(run.scenario, run.recording, recording)
     start, end = float(simulated.time[0]), float(simulated.time[-1])
     phases = phases_of(run)
     first = next((at for at, phase in phases if phase in ("loading", "impact")), None)
@@ -211,15 +215,22 @@ def sigma_of(
     return noise(recording, channel) if noise is not None else None
 
 
-def differences_noise(recording: Recording, channel: str) -> float | None:
-    """1 sigma of white noise from third differences, which slow signals leave small; None from fewer than 16 samples.
+def estimated_noise(recording: Recording, channel: str) -> float | None:
+    """1 sigma from the quiet stretches of the recording itself; None from too few samples or without any noise."""
+    values = recording[channel][np.isfinite(recording[channel])][:NOISE_SAMPLES]
+    return (noise_floor(values).sigma or None) if values.size >= LENGTH else None
 
-    The median keeps edges out: sigma = 1.4826 median|d3|/sqrt(20), 20 the sum of the squares of 1, 3, 3, 1.
-    """
-    values = recording[channel][np.isfinite(recording[channel])]
-    if values.size < 16:
-        return None
-    return 1.4826 * float(np.median(np.abs(np.diff(values, 3)))) / np.sqrt(20.0) or None
+
+def as_measured(scenario: Scenario, simulated: Recording, recording: Recording) -> Recording:
+    """A simulation at the places and in the axes of a recording's instruments; as it is where none are stated."""
+    if not recording.sensors:
+        return simulated
+    vehicle = scenario.vehicle
+    centre, pivot = (0.0, 0.0, 0.0), None
+    if isinstance(vehicle, Vehicle):
+        centre = chassis_of(vehicle).centre_of_mass
+        pivot = vehicle.front_axle.pivot if vehicle.front_axle is not None else None
+    return at_sensors(simulated, recording, centre_of_mass=centre, pivot=pivot, gravity=scenario.gravity)
 
 
 def clock(signals: Sequence[tuple[Signal, float]], simulated: Recording) -> Clock | None:

@@ -14,7 +14,7 @@ from rollover import alignment
 from rollover.alignment import Signal
 from rollover.document import exchanged, paths
 from rollover.faults import Fault, InputError
-from rollover.misfit import sigma_of
+from rollover.misfit import as_measured, sigma_of
 from rollover.recording import Recording
 from rollover.scenario import Scenario
 
@@ -122,7 +122,7 @@ def case(
     stays white. Raises `InputError` for a condition that the scenario lacks, ``ValueError`` if nothing is left.
     """
     under = scenario.replaced(recording.conditions, origin=f"{name}: conditions")
-    simulated = simulate(under)
+    simulated = as_measured(under, simulate(under), recording)
     start, end = float(simulated.time[0]), float(simulated.time[-1])
     rows = 1.0 / float(np.median(np.diff(simulated.time)))
     signals, sigmas, skipped = [], [], {}
@@ -183,7 +183,8 @@ class Objective:
     def parts(self, k: int, u: Array) -> tuple[list[Array], float]:
         """Residuals over noise of case `k`, channel by channel and then the clock's prior; its clock offset, s."""
         case = self.cases[k]
-        simulated = self.simulate(exchanged(case.scenario, self.values(u)))
+        under = exchanged(case.scenario, self.values(u))
+        simulated = as_measured(under, self.simulate(under), case.recording)
         smooth = [alignment.smooth(signal, simulated) for signal in case.signals]
         worth = self.correlation[k] if self.correlation else (1.0,) * len(case.signals)
         doubts = [alignment.doubt(v) for v in smooth]

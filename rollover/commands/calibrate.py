@@ -49,7 +49,7 @@ def calibrate(
     from rollover import scenario as scenarios
     from rollover.calibrate import calibrate as fitted
     from rollover.commands.compare import read
-    from rollover.misfit import differences_noise
+    from rollover.misfit import estimated_noise
     from rollover.objective import parameter
 
     path = document.find(scenario)
@@ -75,7 +75,7 @@ def calibrate(
             {name: r for name, r in measured.items() if name not in held},
             parameters,
             held_out={name: r for name, r in measured.items() if name in held},
-            noise=differences_noise,
+            noise=estimated_noise,
             clock_sigma=clock_sigma,
             channels=channel,
             starts=starts,

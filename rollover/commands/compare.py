@@ -125,11 +125,11 @@ def _run(scenario: Scenario, name: str, recording: Recording) -> Run:
 
 
 def _misfit(run: Run, recording: Recording, name: str, cfc: int | None) -> Misfit:
-    from rollover.misfit import differences_noise, misfit
+    from rollover.misfit import estimated_noise, misfit
 
     wanted = run.scenario.loads.cfc if cfc is None else cfc
     try:
-        return misfit(run, recording, name=name, cfc=wanted, at_least=cfc is not None, noise=differences_noise)
+        return misfit(run, recording, name=name, cfc=wanted, at_least=cfc is not None, noise=estimated_noise)
     except ValueError as e:
         raise InputError(Fault(file=name, message=str(e))) from None
 

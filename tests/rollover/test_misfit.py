@@ -9,9 +9,9 @@ import pytest
 
 from rollover import alignment
 from rollover.filters import filtered
-from rollover.misfit import Misfit, contact, misfit
+from rollover.misfit import Misfit, contact, estimated_noise, misfit
 from rollover.rating import Rating
-from rollover.recording import Recording
+from rollover.recording import Recording, Sensor
 from rollover.run import Event, Run
 from tests.rollover.example import run_of
 from tests.rollover.twin import NOISE, drop, recorded, scene
@@ -197,3 +197,21 @@ def test_the_ground_takes_the_same_work_on_both_sides() -> None:
     made = Recording(title="spring", time=t, channels={FORCE: 1000.0 * t, "ground/sinkage": t})
     found = misfit(run(), made)
     assert found.energy_measured == pytest.approx(5.0, rel=1e-3)
+
+
+def test_a_turned_instrument_is_compared_with_what_it_would_read() -> None:
+    """Upside down on the striker, and at rest +1 g where it counts what holds it up: -(a + g)."""
+    base = run()
+    down = Sensor(body="striker", orientation_deg=(180.0, 0.0, 0.0), gravity="proper")
+    name = "striker/acceleration_z"
+    reading = -(base.recording[name] + 9.81)
+    made = Recording(title="turned", time=base.recording.time, channels={name: reading}, sensors={name: down})
+    found = misfit(base, made).channels[0]
+    assert np.max(np.abs(found.residual)) < 1e-9
+    assert np.max(np.abs(misfit(base, replace(made, sensors={})).channels[0].residual)) > 10.0
+
+
+def test_noise_is_found_in_the_recording_itself() -> None:
+    made = replace(recorded(scene(), {}, np.random.default_rng(6), every=1), noise={})
+    for channel, sigma in NOISE.items():
+        assert estimated_noise(made, channel) == pytest.approx(sigma, rel=0.15)
