@@ -117,7 +117,13 @@ def test_the_same_class_on_both_sides() -> None:
 
 @pytest.mark.parametrize(
     ("recorded_class", "wanted", "expected"),
-    [(None, None, ((), ())), (None, 60, ((60,), (60,))), (180, None, ((), (180,))), (180, 60, ((60,), (180, 60)))],
+    [
+        (None, None, ((), ())),
+        (None, 60, ((60,), (60,))),
+        (180, None, ((), (180,))),
+        (180, 60, ((60,), (180, 60))),
+        (60, 180, ((), (60,))),
+    ],
 )
 def test_classes(recorded_class: int | None, wanted: int | None, expected: tuple[tuple[int, ...], ...]) -> None:
     assert alignment.classes(recorded_class, wanted) == expected
