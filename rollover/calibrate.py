@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -26,6 +27,7 @@ OUTLIER = 4.5  # sigmas, of the fitted residual in its own scatter
 NEAR = 1e-3  # of the range: at a bound
 SAME = 0.02  # of the range: two starts that ended at one place
 TURNS = 40
+SOFTENINGS = (30.0, 5.0, 1.0)  # of the noise, one after another, from a start that may be far away
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,21 +162,29 @@ def follow(task: tuple[Objective, Array, Literal["linear", "soft_l1"]]) -> tuple
     """Least squares from one start: where it ends, (p,), and its cost. `soft_l1` counts large residuals by size."""
     from scipy.optimize import least_squares
 
-    objective, start, loss = task
-    found = least_squares(
-        objective.residuals,
-        np.clip(start, 1e-6, 1.0 - 1e-6),
-        jac=objective.jacobian,
-        bounds=(0.0, 1.0),
-        loss=loss,
-        f_scale=CAP,
-        x_scale=1.0,
-        xtol=1e-6,
-        ftol=1e-7,
-        gtol=1e-12,
-        max_nfev=TURNS,
-    )
-    return np.asarray(found.x), float(found.cost)
+    objective, u, loss = task
+    cost = np.inf
+    for softening in SOFTENINGS if loss == "soft_l1" else (1.0,):
+        # a clock that is free from far away would lead into a valley of its own
+        clock = objective.clock_sigma if softening == 1.0 else 0.0
+        soft = replace(objective, softening=softening, clock_sigma=clock)
+        # at the end differences to both sides: those to one side lead beside the minimum
+        slopes = soft.jacobian if loss == "soft_l1" else partial(soft.jacobian, central=True)
+        found = least_squares(
+            soft.residuals,
+            np.clip(u, 1e-6, 1.0 - 1e-6),
+            jac=slopes,
+            bounds=(0.0, 1.0),
+            loss=loss,
+            f_scale=CAP,
+            x_scale=1.0,
+            xtol=1e-6,
+            ftol=1e-7 if softening == 1.0 else 1e-4,
+            gtol=1e-12,
+            max_nfev=TURNS,
+        )
+        u, cost = np.asarray(found.x), float(found.cost)
+    return u, cost
 
 
 def robust_cost(objective: Objective, u: Array) -> float:
@@ -192,7 +202,8 @@ def _from_starts(
         from scipy.stats import qmc
 
         spread = qmc.LatinHypercube(d=len(given), seed=seed).random(starts)
-        ranked = sorted(spread, key=lambda u: robust_cost(objective, np.asarray(u)))
+        soft = replace(objective, softening=SOFTENINGS[0], clock_sigma=0.0)
+        ranked = sorted(spread, key=lambda u: robust_cost(soft, np.asarray(u)))
         tried += [np.asarray(u) for u in ranked[: FOLLOWED - 1]]
     tasks: list[tuple[Objective, Array, Literal["linear", "soft_l1"]]] = [(objective, u, "soft_l1") for u in tried]
     outcomes = list(map_cases(follow, tasks, workers=workers))

@@ -161,13 +161,15 @@ class Objective:
     The noise of a sample is the channel's and, beside a jump of the simulation, what interpolation leaves in doubt.
     Each case's clock offset has a Gaussian prior of `clock_sigma` s and is profiled out: at every `u` it stands at
     its best. `correlation` gives, for each case and channel, how many samples are worth one (>= 1); `weights` (n,)
-    hold down outliers, None for all alike.
+    hold down outliers, None for all alike. `softening` multiplies every sigma but that of the clocks, so that a start
+    far away is first led by what is large.
     """
 
     cases: tuple[Case, ...]
     parameters: tuple[Parameter, ...]
     simulate: Simulate
     clock_sigma: float = CLOCK_SIGMA
+    softening: float = 1.0
     correlation: tuple[tuple[float, ...], ...] = ()
     weights: Array | None = None
 
@@ -195,7 +197,7 @@ class Objective:
                 # a sample beside a jump says as little as the time of the jump is known
                 size = np.hypot(sigma, alignment.at_stamps(s, simulated.time, d, late=late))
                 away = s.values - alignment.at_stamps(s, simulated.time, v, late=late)
-                found.append(away / (size * math.sqrt(tau)))
+                found.append(away / (size * math.sqrt(tau) * self.softening))
             return [*found, np.array([late / self.clock_sigma if self.clock_sigma > 0.0 else 0.0])]
 
         if self.clock_sigma <= 0.0:
