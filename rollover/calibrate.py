@@ -10,8 +10,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover import alignment, simulate
+from rollover import alignment, drop, simulate
 from rollover.determined import Determination, determine
+from rollover.document import exchanged
 from rollover.execute import map_cases
 from rollover.misfit import as_measured
 from rollover.objective import Case, Noise, Objective, Parameter, Simulate, case, check_free
@@ -106,7 +107,7 @@ class Calibration:
 
 def simulator(scenario: Scenario) -> Simulate:
     """The quickest simulation of a scenario's kind: the one place that chooses it."""
-    return _simulated
+    return drop.simulate_drop if not drop.unfit(scenario) else _simulated
 
 
 def _simulated(scenario: Scenario) -> Recording:
@@ -238,7 +239,7 @@ def score(cases: Sequence[Case], objective: Objective, u: Array) -> Score:
         parts, late = own.parts(k, u)
         squares += sum(float(p @ p) for p in parts[:-1])
         samples += sum(p.size for p in parts[:-1])
-        under = each.scenario.replaced(own.values(u))
+        under = exchanged(each.scenario, own.values(u))
         simulated = as_measured(under, own.simulate(under), each.recording)
         for signal, sigma in zip(each.signals, each.sigmas, strict=True):
             found = rate(signal.time, signal.values, alignment.simulated_at(signal, simulated, late=late), noise=sigma)

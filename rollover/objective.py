@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rollover import alignment
 from rollover.alignment import Signal
-from rollover.document import paths
+from rollover.document import exchanged, paths
 from rollover.faults import Fault, InputError
 from rollover.misfit import as_measured, sigma_of
 from rollover.recording import Recording
@@ -185,7 +185,7 @@ class Objective:
     def parts(self, k: int, u: Array) -> tuple[list[Array], float]:
         """Residuals over noise of case `k`, channel by channel and then the clock's prior; its clock offset, s."""
         case = self.cases[k]
-        under = case.scenario.replaced(self.values(u), origin="--fit")
+        under = exchanged(case.scenario, self.values(u))
         simulated = as_measured(under, self.simulate(under), case.recording)
         smooth = [alignment.smooth(signal, simulated) for signal in case.signals]
         worth = self.correlation[k] if self.correlation else (1.0,) * len(case.signals)
