@@ -183,8 +183,12 @@ def _describe(channel: str) -> tuple[str, str, int]:
             return "sinkage", "contact area", LEDGER["soil"]
         case ["ground", "sinkage"]:
             return "sinkage", "deepest sinkage", LEDGER["soil"]
-        case ["wheel", name, _]:
-            return "wheels", f"wheel {name.replace('_', ' ')}", WHEEL.get(name, _any(name))
+        case ["wheel", name, what]:
+            spin = ", spin" if what == "spin" else ""
+            return "wheels", f"wheel {name.replace('_', ' ')}{spin}", WHEEL.get(name, _any(name))
+        case ["sensor", name, what]:
+            group, quantity, shade = "motion", *_motion("sensor", what)
+            return group, f"{name.replace('_', ' ')}: {quantity}", shade
         case ["energy", name]:
             return "energy", name, LEDGER.get(name, _any(name))
         case ["axle", name, what]:
