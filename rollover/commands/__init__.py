@@ -15,6 +15,7 @@ from rollover.commands import identify
 from rollover.commands import compare
 from rollover.commands import calibrate
 from rollover.commands import synthesize
+from rollover.commands import prove
 
 __all__ = [
     "calibrate",
@@ -23,6 +24,7 @@ __all__ = [
     "identify",
     "importing",
     "listing",
+    "prove",
     "regress",
     "root",
     "run",

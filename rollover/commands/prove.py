@@ -1,0 +1,102 @@
+"""`rollover prove`: the blind proof of the diagnosis."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rollover.commands.door import FAILED, AsJson, Force, answering, app
+from rollover.faults import Fault, InputError
+
+if TYPE_CHECKING:
+    from rollover.proof.seal import Seal
+
+JSON, SEAL, TRUTH, DIAGNOSES = "prove.json", "seal.json", "truth.json", "diagnoses.jsonl"
+ACCOUNT = (JSON, SEAL, TRUTH, DIAGNOSES)
+
+
+@app.command()
+@answering
+def prove(
+    cases: Annotated[int, typer.Option(help="How many concealed drop test campaigns.", min=1)] = 50,
+    seed: Annotated[int, typer.Option(help="Another seed, other cases; the same seed, the same ones.", min=0)] = 1,
+    out: Annotated[Path, typer.Option(help="Folder of the full account.")] = Path("out/prove"),
+    workers: Annotated[int | None, typer.Option(help="Cases at once  [default: number of cores]", min=0)] = None,
+    effects: Annotated[
+        list[str] | None, typer.Option(metavar="ID", help="Only cases about this effect; may be repeated.")
+    ] = None,
+    kinds: Annotated[
+        list[str] | None,
+        typer.Option(metavar="KIND", help="Only null, decoy, negligible, single, pair, outside, scatter, other-form."),
+    ] = None,
+    time_limit: Annotated[float, typer.Option(help="Wall time for each diagnosis, s.", min=1.0)] = 600.0,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Make concealed cases by an independent solver, seal the truth, diagnose them, open the seal and score."""
+    from rollover import console, store
+    from rollover.proof import examine
+
+    about = {"cases": cases, "seed": seed, "kinds": kinds or [], "effects": effects or []}
+    store.claim_account(out, examine.FORMAT, about, ACCOUNT, force=force)
+
+    def tell(seal: Seal) -> None:
+        console.say(f"Sealed: the truth of {seal.cases} cases has the hash {seal.digest}; the diagnosis starts now.")
+
+    with console.counting("cases") as show:
+        try:
+            proof = examine.prove(
+                cases,
+                seed,
+                kinds=about["kinds"],  # type: ignore[arg-type]
+                effects=about["effects"],  # type: ignore[arg-type]
+                workers=workers,
+                time_limit=time_limit,
+                diagnosis=examine.DIAGNOSIS,
+                on_seal=tell,
+                show=show,
+            )
+        except ValueError as e:
+            raise InputError(Fault(file="rollover prove", message=str(e))) from None
+    account = store.plain({**proof.account, "versions": store.versions()})
+    with store.whole(out) as part:
+        store.write_json(part / JSON, account)
+        store.write_json(part / SEAL, proof.seal.public())
+        truth = {"salt": proof.seal.salt, "truths": proof.truths}
+        (part / TRUTH).write_text(json.dumps({"format": "rollover-truths/1", **truth}, indent=1), encoding="utf-8")
+        lines = (json.dumps(store.plain({"case": name, **found})) for name, found in proof.diagnoses.items())
+        (part / DIAGNOSES).write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+    if as_json:
+        print(json.dumps(account, indent=2))
+    else:
+        print("\n".join([*sentences(account["summary"]), f"Written to {out}"]))
+    if not proof.diagnoses:
+        console.say(f"Every diagnosis failed; the first: {account['rows'][0]['failure']}")
+        raise typer.Exit(FAILED)
+
+
+def sentences(summary: dict[str, Any]) -> list[str]:
+    """The account in a few lines."""
+    said = {
+        "False alarms where nothing was": summary["false_alarms"],
+        "One effect: detected": summary["detected"],
+        "  of those, named first": summary["named_first"],
+        "  in the set offered": summary["in_set"],
+        "  alone and right": summary["alone_and_right"],
+        "Two effects: both named": summary["two_effects"]["both"],
+        "Unlisted: called unexplained": summary["outside"]["unexplained"],
+        "  called by a listed name that is not even near": summary["outside"]["wrong"],
+        "Intervals that hold the true value": summary["coverage"],
+    }
+    lines = [f"{what:<50} {_share(found)}" for what, found in said.items() if found["of"]]
+    if summary["failed"]:
+        lines.append(f"{'Diagnoses that failed':<50} {len(summary['failed'])}")
+    return lines
+
+
+def _share(found: dict[str, Any]) -> str:
+    low, high = 100.0 * found["low"], 100.0 * found["high"]
+    return f"{found['hits']:4d} of {found['of']:4d}   ({low:.0f} to {high:.0f} % at 95 %)"

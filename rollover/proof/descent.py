@@ -1,0 +1,313 @@
+"""The drop solved on its own: momenta instead of velocities, an eighth-order integrator between events.
+
+State: x and P of the nose with the soil that moves along, x and v of the body, the force of a Maxwell branch.
+
+    dP/dt = sum of forces on nose and soil,   v = P/(m + m_b1(x)),   F_s = F + d(m_b1 v)/dt        (1) without impulse
+
+A stage ends at an event (the deepest point, a change of branch, a step in depth, lift-off, a new touch) and the next
+starts there, so that no step lies across a kink.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rollover.proof.rig import RAMP, Curve, Rig, branches, loading_curve
+
+Array = NDArray[np.float64]
+CHANNELS = (
+    "ground/force_normal",
+    "ground/sinkage",
+    "striker/position_z",
+    "striker/velocity_z",
+    "striker/acceleration_z",
+)
+FREE, LOADING, LINE = "free", "loading", "line"
+RTOL, ATOL = 1e-9, 1e-11
+MOST_STAGES = 4000
+NUDGE = 1e-11  # m: past an event, so that it does not answer again
+
+
+class DescentError(RuntimeError):
+    """The drop came to no end."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line:
+    """The way back: F = min(force - stiffness (z - depth) ..., force) with a dashpot; it ends in the rut."""
+
+    depth: float
+    force: float
+    stiffness: float
+    dashpot: float = 0.0
+
+    @property
+    def rut(self) -> float:
+        """Depth at which nothing presses any more, m."""
+        return max(self.depth - self.force / self.stiffness, 0.0) if self.stiffness > 0.0 else 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stage:
+    """From `start` to `end` (s) under one set of equations; `soil` is m_b1 at `origin`, kg, and grows by `growth`."""
+
+    rig: Rig
+    mode: str
+    start: float
+    end: float
+    soil: float
+    growth: float
+    origin: float
+    curve: Curve | None
+    line: Line | None
+    state: Callable[[ArrayLike], Array]
+
+    def moving(self, x: float) -> float:
+        """m_b1 at depth x, kg."""
+        return self.soil + self.growth * max(x - self.origin, 0.0)
+
+    def ground(self, t: float, x: float, v: float, memory: float) -> float:
+        """What the soil's spring presses with, N."""
+        rig = self.rig
+        if self.mode == FREE:
+            return 0.0
+        if self.mode == LOADING:
+            assert self.curve is not None
+            force = self.curve(t, x, v)
+        else:
+            line = self.line
+            assert line is not None
+            force = min(line.force - line.stiffness * (line.depth - x) + line.dashpot * v, line.force)
+            gap = line.rut - x
+            least = 0.0
+            if rig.pull > 0.0:
+                if gap > 0.0:
+                    force = min(force, 0.0)
+                least = -rig.pull * max(0.0, 1.0 - max(gap, 0.0) / rig.reach)
+            force = max(force, least)
+        return max(force + memory, 0.0) if memory else force
+
+    def rates(self, t: float, y: Array) -> list[float]:
+        """Derivative of the state."""
+        return self.motion(t, *y.tolist())[0]
+
+    def motion(self, t: float, x: float, p: float, xb: float, vb: float, memory: float) -> tuple[list[float], Any]:
+        """Derivative of the state, and what instruments see: v, a of nose and body, N on the soil without impulse."""
+        rig = self.rig
+        total = rig.nose + self.moving(x)
+        v = p / total
+        force = self.ground(t, x, v, memory)
+        share = rig.nose / rig.mass
+        outer = rig.nose * rig.gravity - share * _resistance(rig, v)
+        if rig.push is not None:
+            outer += rig.push(t, x, v)
+        ab = 0.0
+        if rig.spring > 0.0:
+            between = rig.spring * (xb - x) + rig.dashpot * (vb - v)
+            outer += between
+            ab = rig.gravity - _resistance(rig, vb) / rig.mass - between / (rig.mass - rig.nose)
+        thrown = self.growth * v * v if self.mode == LOADING and v > 0.0 else 0.0
+        a = (outer - force - thrown) / total
+        if rig.side_load:
+            # friction side_load m |a| against the motion, solved for a
+            turned = rig.side_load * rig.nose * _sign(v) * math.copysign(1.0, a)
+            a *= total / (total + turned)
+        if rig.spring <= 0.0:
+            ab, vb = a, v
+        fading = 0.0
+        if rig.relaxing:
+            fading = rig.relaxing * v - memory / rig.relaxation if self.mode != FREE else -memory / rig.relaxation
+        seen = (v, a, xb if rig.spring > 0.0 else x, vb, ab, force + thrown + self.moving(x) * a)
+        return [v, total * a + thrown, vb, ab, fading], seen
+
+
+@dataclass(frozen=True, kw_only=True)
+class Descent:
+    """A drop from `start` to `end` (s), first contact at 0."""
+
+    rig: Rig
+    stages: tuple[Stage, ...]
+    impulse: float  # N s, of all exchanges of momentum with the soil
+    lost: float  # J, in them
+
+    def channels(self, times: ArrayLike) -> dict[str, Array]:
+        """Values of `CHANNELS` at times (n,), s, in any order, (n,) each; z up for the striker. No impulse in them."""
+        t = np.asarray(times, dtype=np.float64)
+        out = np.empty((len(CHANNELS), t.size))
+        which = np.searchsorted([s.end for s in self.stages[:-1]], t, side="right")
+        for k, stage in enumerate(self.stages):
+            here = np.flatnonzero(which == k)
+            if here.size == 0:
+                continue
+            states = np.reshape(stage.state(t[here]), (5, here.size)).T.tolist()
+            rows = [(y[0], *stage.motion(at, *y)[1]) for at, y in zip(t[here].tolist(), states, strict=True)]
+            x, _, _, xb, vb, ab, cell = np.array(rows).T
+            touching = stage.mode != FREE
+            out[0, here] = cell if touching else 0.0
+            out[1, here] = x if touching else 0.0
+            out[2, here], out[3, here], out[4, here] = -xb, -vb, -ab
+        return dict(zip(CHANNELS, out, strict=True))
+
+    def deepest(self) -> tuple[float, float]:
+        """Time (s) and depth (m) of the deepest point of the nose."""
+        ends = [(float(s.state(s.end)[0]), s.end) for s in self.stages if s.mode == LOADING]
+        depth, at = max(ends)
+        return at, depth
+
+    def phases(self) -> list[tuple[float, str]]:
+        """Start (s) and name of each phase: free-fall, loading, unloading, rest."""
+        at = self.deepest()[0]
+        return [(self.stages[0].start, "free-fall"), (0.0, "loading"), (at, "unloading")]
+
+
+def _sign(v: float) -> float:
+    return min(max(v / RAMP, -1.0), 1.0)
+
+
+def _resistance(rig: Rig, v: float) -> float:
+    return rig.guide * _sign(v) + rig.air * v * abs(v)
+
+
+def descend(rig: Rig, start: float, end: float) -> Descent:
+    """Solve one drop from `start` (s, not after first contact) to `end`. Raises `DescentError`."""
+    start = min(start, -1e-6)
+    stages = [_approach(rig, start)]
+    t, x, v = 0.0, 0.0, rig.speed
+    xb, vb, memory = 0.0, rig.speed, 0.0
+    line: Line | None = None
+    growing = rig.growth > 0.0
+    impulse = lost = 0.0
+    mode, soil, origin = FREE, 0.0, 0.0
+    curve: Curve | None = None
+    touching = True
+    while t < end:
+        if len(stages) > MOST_STAGES:
+            raise DescentError(f"no end after {MOST_STAGES} stages, at {t:.6g} s")
+        if touching:  # restitution 0: nose and soil go on together
+            curve, soil, growing = loading_curve(rig, v), rig.fraction * rig.mass, rig.growth > 0.0
+            shared = v * rig.nose / (rig.nose + soil)
+            impulse += rig.nose * (v - shared)
+            lost += 0.5 * v * shared * soil  # (8) with k_s = 0
+            v, touching = shared, False
+            vb = v if rig.spring <= 0.0 else vb
+            origin, mode = x, LOADING
+            if line is not None:
+                line = _line(rig, curve, t, line.depth, line.dashpot)
+                mode, x = LINE, max(x, line.rut)
+        growth = rig.growth if growing and mode == LOADING else 0.0
+        stage, happened = _stage(rig, mode, t, end, (x, v, xb, vb, memory), soil, growth, origin, curve, line)
+        stages.append(stage)
+        y = stage.state(stage.end).tolist()
+        t, x, xb, vb, memory = stage.end, y[0], y[2], y[3], y[4]
+        v = y[1] / (rig.nose + stage.moving(x))
+        soil, origin = stage.moving(x), max(x, origin)
+        if happened == "deepest":
+            assert curve is not None
+            line = _line(rig, curve, t, x, 0.0)
+            critical = 2.0 * math.sqrt(line.stiffness * (rig.nose + soil))
+            line = _line(rig, curve, t, x, rig.unloading_ratio * critical)
+            mode, x, v = LINE, x - NUDGE, 0.0
+        elif happened == "deeper":
+            mode, x, origin = LOADING, x + NUDGE, x
+        elif happened == "step":
+            x += NUDGE
+        elif happened == "lift-off":
+            mode, soil, growing = FREE, 0.0, False
+            x -= NUDGE
+        elif happened == "soil stays":
+            soil, growing = 0.0, False
+        elif happened == "touch":
+            touching = True
+        if rig.spring <= 0.0:
+            xb, vb = x, v
+    return Descent(rig=rig, stages=tuple(stages), impulse=impulse, lost=lost)
+
+
+def _line(rig: Rig, curve: Curve, t: float, depth: float, dashpot: float) -> Line:
+    force = curve(t, depth, 0.0)
+    return Line(depth=depth, force=force, stiffness=force / (rig.recovery * depth), dashpot=dashpot)
+
+
+def _approach(rig: Rig, start: float) -> Stage:
+    """Free fall, solved backwards from the first contact."""
+    from scipy.integrate import solve_ivp
+
+    common: dict[str, Any] = {
+        "rig": rig, "mode": FREE, "start": start, "end": 0.0, "soil": 0.0, "growth": 0.0, "origin": 0.0,
+        "curve": None, "line": None,
+    }  # fmt: skip
+    bare = Stage(**common, state=lambda t: np.zeros(5))
+    first = [0.0, rig.nose * rig.speed, 0.0, rig.speed, 0.0]
+    solved = solve_ivp(bare.rates, (0.0, start), first, method="DOP853", rtol=RTOL, atol=ATOL, dense_output=True)
+    return Stage(**common, state=solved.sol)
+
+
+def _stage(
+    rig: Rig,
+    mode: str,
+    t: float,
+    end: float,
+    at: tuple[float, float, float, float, float],
+    soil: float,
+    growth: float,
+    origin: float,
+    curve: Curve | None,
+    line: Line | None,
+) -> tuple[Stage, str]:
+    """Integrate to the next event and say which it was."""
+    from scipy.integrate import solve_ivp
+
+    common: dict[str, Any] = {
+        "rig": rig, "mode": mode, "start": t, "soil": soil, "growth": growth, "origin": origin, "curve": curve,
+        "line": line,
+    }  # fmt: skip
+    bare = Stage(**common, end=end, state=lambda t: np.zeros(5))
+    x, v, xb, vb, memory = at
+    state = [x, v * (rig.nose + bare.moving(x)), xb, vb, memory]
+    names: list[str] = []
+    events: list[Any] = []
+
+    def watch(name: str, value: Callable[[float, Array], float], direction: float) -> None:
+        value.terminal, value.direction = True, direction  # type: ignore[attr-defined]
+        names.append(name)
+        events.append(value)
+
+    if mode == LOADING:
+        watch("deepest", lambda t, y: y[1], -1.0)
+        for depth in (branches(rig.speed)[2], *rig.steps()):
+            if depth > x:
+                watch("step", lambda t, y, depth=depth: y[0] - depth, 1.0)  # type: ignore[misc]
+    elif mode == LINE:
+        assert line is not None
+        leaves = max(line.rut - (rig.reach if rig.pull > 0.0 else 0.0), 0.0)
+        watch("deeper", lambda t, y: y[0] - line.depth, 1.0)
+        watch("lift-off", lambda t, y: y[0] - leaves, -1.0)
+    else:
+        depth = line.rut if line is not None else 0.0
+        watch("touch", lambda t, y: y[0] - depth, 1.0)
+    if mode != FREE and soil > 0.0 and rig.spring > 0.0:
+
+        def held(t: float, y: Array) -> float:
+            return float(bare.motion(t, *np.asarray(y).tolist())[1][5]) + rig.pull
+
+        if held(t, np.array(state)) < 0.0:  # the soil cannot be pulled along: it stays
+            common["soil"], common["growth"] = 0.0, 0.0
+            bare = Stage(**common, end=end, state=bare.state)
+            state[1] = v * rig.nose
+        else:
+            watch("soil stays", held, -1.0)
+    solved = solve_ivp(
+        bare.rates, (t, end), state, method="DOP853", rtol=RTOL, atol=ATOL, dense_output=True, events=events,
+        max_step=0.02,
+    )  # fmt: skip
+    if solved.status < 0:
+        raise DescentError(f"at {t:.6g} s: {solved.message}")
+    stage = Stage(**common, end=float(solved.t[-1]), state=solved.sol)
+    happened = next((n for n, found in zip(names, solved.t_events, strict=True) if found.size), "end")
+    return stage, happened

@@ -1,0 +1,373 @@
+"""Concealed cases: drop tests with a known truth, made without the simulator that a diagnosis fits to them.
+
+for case in cases(20, seed=1):
+    write_case(case, folder / case.name)      # scenario and recordings, nothing else
+    case.truth                                # to be sealed
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.proof import campaign, library, outside
+from rollover.proof.campaign import ACCELERATION, DEPTH, FORCE, PLACE, SPEED, Campaign, Shot
+from rollover.proof.descent import CHANNELS, Descent, descend
+from rollover.proof.instruments import PAD, Fault, Instruments, channel_filter
+from rollover.proof.library import Change, Setting
+from rollover.proof.rig import Rig
+from rollover.proof.strength import strength
+from rollover.recording import Clock, Recording
+
+Array = NDArray[np.float64]
+
+# kind -> share of the cases
+KINDS: dict[str, float] = {
+    "null": 0.20,
+    "decoy": 0.06,
+    "negligible": 0.06,
+    "single": 0.44,
+    "pair": 0.12,
+    "outside": 0.12,
+}
+MORE_KINDS = ("scatter", "other-form")  # asked for by name only
+REBOUND = {"recovery": 0.1, "damping_ratio": 0.1}  # what the scenario knows where the ground is said to spring back
+TYPICAL = {FORCE: 3500.0, DEPTH: 0.35, PLACE: 0.5, SPEED: 3.5, ACCELERATION: 25.0}
+_PLAN = 2**32 - 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Order:
+    """Which case to make: everything else follows from it."""
+
+    index: int
+    seed: int
+    kind: str
+    ids: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Says nothing of what is in it."""
+        return f"case-{self.index + 1:04d}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """Scenario text and recordings for the diagnosis, and the truth (bare JSON values) that stays here."""
+
+    name: str
+    scenario: str
+    recordings: tuple[Recording, ...]
+    truth: Mapping[str, Any]
+
+
+def plan(count: int, seed: int, kinds: Sequence[str] = (), effects: Sequence[str] = ()) -> list[Order]:
+    """Orders of a proof: shares of `KINDS` (or even ones of `kinds`), each effect as often as any other, shuffled.
+
+    `effects` keeps only cases about these; ids of `library.EFFECTS` and `outside.OUTSIDE`. Raises ``ValueError``.
+    """
+    known = (*KINDS, *MORE_KINDS)
+    for kind in kinds:
+        if kind not in known:
+            raise ValueError(f"kinds: no such kind, got {kind!r}; {', '.join(known)} are allowed")
+    for id in effects:
+        if id not in library.EFFECTS and id not in outside.OUTSIDE:
+            raise ValueError(f"effects: no such effect, got {id!r}; {', '.join([*library.EFFECTS, *outside.OUTSIDE])}")
+    random = np.random.default_rng([seed, _PLAN])
+    shares = dict.fromkeys(kinds, 1.0) if kinds else dict(KINDS)
+    if effects and not kinds:
+        shares = {"single": 1.0} if any(e in library.EFFECTS for e in effects) else {}
+        shares |= {"outside": 1.0} if any(e in outside.OUTSIDE for e in effects) else {}
+    scale = count / sum(shares.values())
+    ends = np.round(np.cumsum([share * scale for share in shares.values()])).astype(int)
+    many = np.diff(ends, prepend=0)
+    of_kind = [kind for kind, n in zip(shares, many, strict=True) for _ in range(n)]
+    of_kind = [of_kind[i] for i in random.permutation(len(of_kind))]
+    listed = [e for e in library.EFFECTS if e in effects or not effects]
+    named = [e for e in listed if effects or e not in library.NEGLIGIBLE]
+    turns = {
+        "single": _turns(random, named),
+        "other-form": _turns(random, named),
+        "outside": _turns(random, [e for e in outside.OUTSIDE if e in effects or not effects] or list(outside.OUTSIDE)),
+    }
+    orders = []
+    for i, kind in enumerate(of_kind):
+        ids: tuple[str, ...] = ()
+        if kind in turns:
+            ids = (next(turns[kind]),)
+        elif kind == "pair":
+            ids = _two(random, listed)
+        elif kind == "negligible":
+            ids = (str(random.choice(["air-drag", "soil-adhesion", "soil-inertial-drag", "guide-friction"])),)
+        orders.append(Order(index=i, seed=seed, kind=kind, ids=ids))
+    return orders
+
+
+def _turns(random: np.random.Generator, ids: list[str]) -> Iterator[str]:
+    while True:
+        yield from (ids[i] for i in random.permutation(len(ids)))
+
+
+def _two(random: np.random.Generator, listed: list[str]) -> tuple[str, ...]:
+    able = [e for e in library.EFFECTS if e not in (*library.NEGLIGIBLE, "soil-adhesion")]
+    while True:
+        first = str(random.choice([e for e in able if e in listed] or able))
+        ids = (first, str(random.choice([e for e in able if e != first])))
+        if frozenset(ids) not in library.NEVER_TOGETHER:
+            return ids
+
+
+def cases(count: int, seed: int, kinds: Sequence[str] = (), effects: Sequence[str] = ()) -> Iterator[Case]:
+    """Make the cases of a `plan`, one after another."""
+    return map(make, plan(count, seed, kinds, effects))
+
+
+def make(order: Order) -> Case:
+    """Make one case: the same for the same order, to the last bit."""
+    random = np.random.default_rng([order.seed, order.index])
+    needs = tuple(c for id in order.ids for c in _needs(random, id))
+    held = campaign.draw(random, needs, hard=order.kind == "decoy")
+    rebounds = order.kind != "negligible" and (order.ids == ("soil-adhesion",) or random.random() < 0.04)
+    rebounds = rebounds and "soil-elastic-rebound" not in order.ids
+    held = replace(held, rebounds=rebounds)
+    if order.kind == "scatter":
+        spread = campaign.log_uniform(random, 0.01, 0.06)
+        held = replace(
+            held, shots=tuple(replace(s, scatter=float(np.exp(random.normal(0, spread)))) for s in held.shots)
+        )
+    plain = [descend(_rig(held, shot, ()), *_span(shot)) for shot in held.shots]
+    setting = _setting(held, plain, order.kind == "other-form")
+    changes = tuple(_drawn(random, order, id, setting) for id in order.ids)
+    made = _measured(held, changes, plain if not changes else None)
+    nothing = _measured(held, (), plain)
+    noise = {c: held.noise(c, _spread(made, c)) for c in held.channels}
+    recordings = tuple(
+        _recorded(i, held, shot, reading, changes, {c: noise[c] for c in held.channels}, random)
+        for i, (shot, reading) in enumerate(zip(held.shots, made, strict=True))
+    )
+    sigma = {c: n.sigma for c, n in noise.items()}
+    worth = [{c: noise[c].independence(1.0 / shot.rate) for c in held.channels} for shot in held.shots]
+    times = [reading.times for reading in made]
+
+    def against(other: list[Reading]) -> dict[str, Any]:
+        return strength(times, [m.values for m in made], [o.values for o in other], sigma, worth)
+
+    each = []
+    for k in range(len(changes)):
+        rest = changes[:k] + changes[k + 1 :]
+        each.append(against(_measured(held, rest) if rest else nothing))
+    truth = _truth(order, held, changes, each, against(nothing) if changes else None, sigma, recordings)
+    return Case(name=order.name, scenario=_scenario(held), recordings=recordings, truth=truth)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """One drop as its instruments show it without noise; stamps in the recorder's time."""
+
+    times: Array
+    values: dict[str, Array]
+
+
+def _needs(random: np.random.Generator, id: str) -> tuple[str, ...]:
+    if id in library.NEEDS:
+        return library.NEEDS[id]
+    return (str(random.choice([FORCE, DEPTH, ACCELERATION])),) if id.startswith(("sensor-", "outside:")) else ()
+
+
+def _span(shot: Shot) -> tuple[float, float]:
+    return shot.start - 3.0 * PAD, shot.end + 3.0 * PAD
+
+
+def _rig(held: Campaign, shot: Shot, changes: Sequence[Change]) -> Rig:
+    rig = Rig(speed=shot.speed, stiffness=shot.scatter)
+    if held.rebounds:
+        rig = replace(rig, recovery=REBOUND["recovery"], unloading_ratio=REBOUND["damping_ratio"])
+    for change in changes:
+        rig = replace(rig, **change.rig)
+        rig = replace(rig, **{name: getattr(rig, name) * factor for name, factor in change.factors.items()})
+        if change.speed_power:
+            rig = replace(rig, stiffness=rig.stiffness * (shot.speed / 2.0) ** change.speed_power)
+    return rig
+
+
+def _instruments(changes: Sequence[Change]) -> Instruments:
+    faults: dict[str, Fault] = {}
+    for change in changes:
+        if change.fault:
+            faults[change.channel] = replace(faults.get(change.channel, Fault()), **change.fault)
+    return Instruments(faults=faults)
+
+
+def _measured(held: Campaign, changes: Sequence[Change], solved: Sequence[Descent] | None = None) -> list[Reading]:
+    """Every drop without noise, but behind its filters and with what range and resolution do to it."""
+    instruments = _instruments(changes)
+    found = []
+    for i, shot in enumerate(held.shots):
+        drop = solved[i] if solved is not None else descend(_rig(held, shot, changes), *_span(shot))
+        stamps = _stamps(shot, i)
+        values = {}
+        for channel in held.channels:
+            if channel in held.cfc:
+                step, pad = 1.0 / shot.rate, int(PAD * shot.rate)
+                wide = stamps[0] - shot.late + step * np.arange(-pad, stamps.size + pad)
+                values[channel] = channel_filter(instruments.read(drop, wide, channel), step, held.cfc[channel])[
+                    pad : pad + stamps.size
+                ]
+            else:
+                values[channel] = instruments.read(drop, stamps - shot.late, channel)
+            silent = np.random.default_rng(i)  # where contacts are loose
+            values[channel] = instruments.limited(values[channel], stamps, channel, silent)
+            for name, start, end in shot.gaps:
+                if name == channel:
+                    values[channel] = np.where((stamps >= start) & (stamps < end), np.nan, values[channel])
+        found.append(Reading(times=stamps, values=values))
+    return found
+
+
+def _stamps(shot: Shot, index: int) -> Array:
+    """Time stamps of a recording, s, in the recorder's time."""
+    count = int((shot.end - shot.start) * shot.rate) + 1
+    t = shot.start + shot.late + np.arange(count) / shot.rate
+    if shot.uneven:
+        stray = np.random.default_rng([index, count, int(1e6 * shot.speed)])
+        t = t + stray.uniform(-shot.uneven, shot.uneven, count) / shot.rate
+    return np.asarray(np.round(t, 9))
+
+
+def _spread(made: Sequence[Reading], channel: str) -> float:
+    """Range of a channel over all recordings."""
+    low = min(float(np.nanmin(m.values[channel])) for m in made)
+    return max(float(np.nanmax(m.values[channel])) for m in made) - low
+
+
+def _setting(held: Campaign, plain: Sequence[Descent], other_forms: bool) -> Setting:
+    made = _measured(held, (), plain)
+    return Setting(
+        depths=tuple(d.deepest()[1] for d in plain),
+        spans={c: _spread(made, c) for c in held.channels},
+        peaks={c: max(float(np.nanmax(np.abs(m.values[c]))) for m in made) for c in held.channels},
+        channels=held.channels,
+        other_forms=other_forms,
+    )
+
+
+def _drawn(random: np.random.Generator, order: Order, id: str, setting: Setting) -> Change:
+    change = {**library.EFFECTS, **outside.OUTSIDE}[id](random, setting)
+    if order.kind == "negligible" and id == "soil-inertial-drag":
+        return replace(change, told={"coefficient": 0.002}, rig={"drag": 0.5 * 0.002 * 1800.0 * 0.0063})
+    if order.kind == "negligible" and id == "guide-friction":
+        return replace(change, told={"force": 0.05}, rig={"guide": 0.05})
+    return change
+
+
+def _recorded(
+    index: int,
+    held: Campaign,
+    shot: Shot,
+    reading: Reading,
+    changes: Sequence[Change],
+    noise: Mapping[str, Any],
+    random: np.random.Generator,
+) -> Recording:
+    """The reading with its noise, as a file would hold it."""
+    instruments = _instruments(changes)
+    channels = {}
+    for channel in CHANNELS:
+        if channel not in held.channels:
+            continue
+        drawn = noise[channel].drawn(reading.times.size, 1.0 / shot.rate, random)
+        silent = np.random.default_rng(index)
+        channels[channel] = instruments.limited(reading.values[channel] + drawn, reading.times, channel, silent)
+    return Recording(
+        title=f"Drop {index + 1}",
+        time=reading.times,
+        channels=channels,
+        source="drop rig, 132 kg striker on natural clay",
+        conditions={"initiation.speed": shot.speed},
+        noise={c: float(f"{n.sigma:.3g}") for c, n in noise.items()} if held.states_noise else {},
+        cfc={c: cfc for c, cfc in held.cfc.items() if c in channels},
+        clock=Clock(zero="known" if shot.zero_known else "unknown"),
+    )
+
+
+def _scenario(held: Campaign) -> str:
+    """The scenario that a diagnosis starts from."""
+    knows = ", ".join(f"{name}: {value}" for name, value in REBOUND.items())
+    effects = f"effects:\n  soil-elastic-rebound: {{{knows}}}\n" if held.rebounds else ""
+    return (
+        "# Drop tests of a striker of 132 kg on natural clay; the speed of each is in its recording.\n"
+        "format: rollover-scenario/1\n"
+        "title: Drop tests, 132 kg striker on natural clay\n"
+        "vehicle: {kind: striker, mass: 132.0, face_length: 0.140, face_width: 0.045}\n"
+        "ground:\n"
+        "  elements: {length: 0.140, width: 0.045, spacing: [0.140, 0.045]}\n"
+        "  law: soils/natural_clay.yaml\n"
+        "  friction: {coefficient: 0.0}\n"
+        "  co_moving_mass: {fraction: 0.10}\n"
+        "initiation: {kind: drop, speed: 3.0, lead_time: 0.1}\n"
+        f"{effects}"
+        "simulation: {duration: 0.8, step: 0.0002, output_step: 0.0002}\n"
+    )
+
+
+def _truth(
+    order: Order,
+    held: Campaign,
+    changes: Sequence[Change],
+    each: Sequence[Mapping[str, Any]],
+    whole: Mapping[str, Any] | None,
+    sigma: Mapping[str, float],
+    recordings: Sequence[Recording],
+) -> dict[str, Any]:
+    verdicts = {"physics": "missing-physics", "parameter": "parameter", "sensor": "sensor", "outside": "unexplained"}
+    verdict = "no-mismatch"
+    if changes and order.kind != "negligible":
+        strongest = max(range(len(changes)), key=lambda k: float(each[k]["signal_to_noise"]))
+        verdict = verdicts[changes[strongest].kind]
+    return {
+        "format": "rollover-truth/1",
+        "case": order.name,
+        "kind": order.kind,
+        "seed": order.seed,
+        "index": order.index,
+        "verdict": verdict,
+        "effects": [
+            {
+                "id": change.id,
+                "kind": change.kind,
+                "parameters": {name: float(value) for name, value in change.told.items()},
+                "channel": change.channel,
+                "depends_on": change.depends_on,
+                "near": list(change.near),
+                "over_noise": float(told["over_noise"]),
+                "signal_to_noise": float(told["signal_to_noise"]),
+                "channels": told["channels"],
+                "where": told["where"],
+            }
+            for change, told in zip(changes, each, strict=True)
+        ],
+        "over_noise": float(whole["over_noise"]) if whole is not None else 0.0,
+        "signal_to_noise": float(whole["signal_to_noise"]) if whole is not None else 0.0,
+        "where": whole["where"] if whole is not None else [],
+        "noise": {c: float(value) for c, value in sigma.items()},
+        "noise_share": {c: float(value) for c, value in held.noise_share.items()},
+        "colour": dict(held.colour),
+        "cfc": dict(held.cfc),
+        "states_noise": held.states_noise,
+        "rebounds": held.rebounds,
+        "recordings": [
+            {
+                "title": r.title,
+                "speed": s.speed,
+                "rate": s.rate,
+                "late": s.late,
+                "scatter": s.scatter,
+                "samples": r.time.size,
+            }
+            for r, s in zip(recordings, held.shots, strict=True)
+        ],
+    }

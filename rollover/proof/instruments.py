@@ -1,0 +1,137 @@
+"""What the instruments make of a drop: y = clip(G (h x)((1 - e) t - t_0) + b), and noise with a colour.
+
+Clocks are read off the solution itself, not shifted samples; the lag is solved on a grid much finer than its time.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.proof.descent import Descent
+
+Array = NDArray[np.float64]
+PAD = 0.06  # s before and behind a record that a filter sees, so that the record has no filter's edge in it
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fault:
+    """What is wrong with one channel; the defaults: nothing. The second part is in no table of effects."""
+
+    lag: float = 0.0  # s
+    gain: float = 1.0
+    offset: float = 0.0  # s late
+    drift: float = 0.0  # s late per s
+    bias: float = 0.0
+    limit: float = math.inf
+    warming: float = 0.0  # gain 1 + warming/(1 + exp(-(t - middle)/width))
+    middle: float = 0.0
+    width: float = 1.0
+    hum: float = 0.0  # amplitude
+    frequency: float = 50.0
+    phase: float = 0.0
+    quantum: float = 0.0
+    curved: float = 0.0  # y = x (1 + curved |x|)
+    dropouts: float = 0.0  # per second, of `lasting` s, in which the channel reads nothing
+    lasting: float = 0.003
+
+
+@dataclass(frozen=True, kw_only=True)
+class Noise:
+    """Gaussian, `sigma` in the channel's unit; x_t = colour x_(t-1) + e_t, or behind a filter class."""
+
+    sigma: float
+    colour: float = 0.0
+    cfc: int = 0
+
+    def drawn(self, count: int, step: float, random: np.random.Generator) -> Array:
+        """`count` values, (count,)."""
+        from scipy.signal import lfilter
+
+        lead = 400
+        white = random.standard_normal(count + 2 * lead)
+        if self.cfc:
+            # an estimate of the level from a thousand times as many samples would be no better: the filter's own
+            shaped = channel_filter(white, step, self.cfc) / math.sqrt(_power(step, self.cfc))
+        elif self.colour:
+            shaped = lfilter([math.sqrt(1.0 - self.colour**2)], [1.0, -self.colour], white)
+        else:
+            shaped = white
+        return np.asarray(self.sigma * shaped[lead : lead + count])
+
+    def independence(self, step: float) -> float:
+        """Samples that count as one."""
+        if self.cfc:
+            return max(1.0, 1.0 / _power(step, self.cfc))
+        return (1.0 + self.colour) / (1.0 - self.colour)
+
+
+def channel_filter(values: Array, step: float, cfc: int) -> Array:
+    """CFC of SAE J211 (w_d = 2 pi 2.0775 CFC), forward and backward; evenly spaced values (n,), every `step` s."""
+    from scipy.signal import butter, sosfiltfilt
+
+    sos = butter(2, 2.0775 * cfc, fs=1.0 / step, output="sos")
+    return np.asarray(sosfiltfilt(sos, values, padlen=min(values.size - 1, 300)))
+
+
+def _power(step: float, cfc: int) -> float:
+    """Variance that a filter class leaves of white noise of variance 1."""
+    spike = np.zeros(8001)
+    spike[4000] = 1.0
+    return float(np.sum(channel_filter(spike, step, cfc) ** 2))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Instruments:
+    """Faults by channel."""
+
+    faults: dict[str, Fault] = field(default_factory=dict)
+
+    def read(self, descent: Descent, times: Array, channel: str) -> Array:
+        """What a channel's sensor gives at times (n,) of a drop, without noise and range."""
+        fault = self.faults.get(channel, Fault())
+        at = (1.0 - fault.drift) * times - fault.offset
+        if fault.lag > 0.0:
+            grid = np.arange(at.min() - PAD, at.max() + 1e-4, min(1e-4, fault.lag / 4.0))
+            # the steepest edge is the first contact: a point on either side of it
+            grid = np.union1d(grid, [-1e-9, 1e-9])
+            x = _lagged(descent.channels(np.clip(grid, descent.stages[0].start, None))[channel], grid, fault.lag)
+            values = np.interp(at, grid, x)
+        else:
+            values = descent.channels(at)[channel]
+        warmth = fault.warming / (1.0 + np.exp(-(times - fault.middle) / fault.width)) if fault.warming else 0.0
+        values = values * fault.gain * (1.0 + warmth) * (1.0 + fault.curved * np.abs(values)) + fault.bias
+        if fault.hum:
+            values = values + fault.hum * np.sin(2.0 * math.pi * fault.frequency * times + fault.phase)
+        return np.asarray(values)
+
+    def limited(self, values: Array, times: Array, channel: str, random: np.random.Generator) -> Array:
+        """Range, resolution and loose contacts of a channel, which come behind the noise."""
+        fault = self.faults.get(channel, Fault())
+        if fault.quantum:
+            values = fault.quantum * np.round(values / fault.quantum)
+        if fault.dropouts:
+            count = random.poisson(fault.dropouts * (times[-1] - times[0]))
+            for start in random.uniform(times[0], times[-1], count):
+                values = np.where((times >= start) & (times < start + fault.lasting), 0.0, values)
+        return np.clip(values, -fault.limit, fault.limit) if math.isfinite(fault.limit) else values
+
+
+def _lagged(x: Array, t: Array, tau: float) -> Array:
+    """Solve tau dy/dt = x - y for x that is straight between its samples; settled at the start."""
+    h = np.diff(t)
+    fade = np.exp(-h / tau)
+    slope = np.diff(x) / h
+    y = np.empty_like(x)
+    y[0] = x[0] - tau * slope[0]
+    value = float(y[0])
+    for i, (f, old, new, s) in enumerate(
+        zip(fade.tolist(), x[:-1].tolist(), x[1:].tolist(), slope.tolist(), strict=True)
+    ):
+        # the particular solution is x - tau s
+        value = new - tau * s + (value - old + tau * s) * f
+        y[i + 1] = value
+    return y

@@ -1,0 +1,217 @@
+"""Effects with names, at a random strength: what each changes of the rig, the instruments or the scenario's numbers.
+
+Strengths reach from the barely visible to the strong and are even in their logarithm. `other_forms` lets each differ
+from the law that a diagnosis fits where physics leaves it open: soft edges of layers, exponents that are not round.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from rollover.proof.campaign import ACCELERATION, DEPTH, FORCE, PLACE, SPEED, log_uniform
+from rollover.proof.rig import FACE
+
+Random = np.random.Generator
+MOST_CHANNELS = (FORCE, DEPTH, ACCELERATION, SPEED, PLACE)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setting:
+    """What a draw may lean on: how deep each drop goes without the effect (m), the range of each channel."""
+
+    depths: tuple[float, ...]
+    spans: Mapping[str, float]
+    peaks: Mapping[str, float]
+    channels: tuple[str, ...]
+    other_forms: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Change:
+    """An effect at a strength: `told` are its parameters by the names of the contract."""
+
+    id: str
+    kind: str  # physics, parameter, sensor, outside
+    told: Mapping[str, float]
+    rig: Mapping[str, Any] = field(default_factory=dict)
+    factors: Mapping[str, float] = field(default_factory=dict)  # numbers of the rig that are multiplied
+    channel: str = ""
+    fault: Mapping[str, float] = field(default_factory=dict)
+    speed_power: float = 0.0  # the ground's stiffness grows with this power of the speed (outside)
+    depends_on: str = ""
+    near: tuple[str, ...] = ()  # listed effects that an unlisted one resembles
+
+
+Draw = Callable[[Random, Setting], Change]
+
+
+def _either(random: Random, low: float, high: float) -> float:
+    """A factor above or below 1, by `low` to `high` of its logarithm."""
+    return math.exp(log_uniform(random, low, high) * random.choice((-1.0, 1.0)))
+
+
+def _physics(id: str, told: Mapping[str, float], depends_on: str, **rig: Any) -> Change:
+    return Change(id=id, kind="physics", told=told, rig=rig, depends_on=depends_on)
+
+
+def _viscous(random: Random, s: Setting) -> Change:
+    exponent = 1.0 if random.random() < 0.6 and not s.other_forms else float(random.uniform(0.85, 1.2))
+    d = log_uniform(random, 40.0, 3000.0)
+    told = {"damping": d, "exponent": exponent}
+    return _physics("soil-viscous-damping", told, "speed", damping=d, exponent=exponent)
+
+
+def _rate(random: Random, s: Setting) -> Change:
+    gain = log_uniform(random, 0.01, 0.2)
+    slow = log_uniform(random, 0.007, 0.014) if s.other_forms else 0.01
+    return _physics("soil-rate-hardening", {"per_decade": gain}, "speed", per_decade=gain, slow=slow)
+
+
+def _drag(random: Random, s: Setting) -> Change:
+    c = log_uniform(random, 0.5, 40.0)
+    power = float(random.uniform(1.9, 2.1)) if s.other_forms else 2.0
+    told = {"coefficient": c}
+    return _physics("soil-inertial-drag", told, "speed", drag=0.5 * c * 1800.0 * FACE, drag_exponent=power)
+
+
+def _growth(random: Random, s: Setting) -> Change:
+    rate = log_uniform(random, 1.5, 100.0)
+    return _physics("soil-added-mass-growth", {"rate": rate}, "speed", growth=rate)
+
+
+def _rebound(random: Random, s: Setting) -> Change:
+    recovery, ratio = log_uniform(random, 0.025, 0.3), float(random.uniform(0.05, 0.9))
+    told = {"recovery": recovery, "damping_ratio": ratio}
+    return _physics("soil-elastic-rebound", told, "depth", recovery=recovery, unloading_ratio=ratio)
+
+
+def _adhesion(random: Random, s: Setting) -> Change:
+    stress, reach = log_uniform(random, 2.5e4, 1.2e5), log_uniform(random, 0.003, 0.015)
+    return _physics("soil-adhesion", {"stress": stress, "reach": reach}, "depth", pull=stress * FACE, reach=reach)
+
+
+def _layer(random: Random, s: Setting) -> Change:
+    reached = sorted(s.depths)[-2]
+    depth, ratio = float(random.uniform(0.15, 0.8)) * reached, _either(random, 0.03, 1.2)
+    width = float(random.uniform(0.001, 0.004)) if s.other_forms else 0.0
+    told = {"depth": depth, "stiffness_ratio": ratio}
+    return _physics("soil-layer", told, "depth", layer_depth=depth, layer_ratio=ratio, layer_width=width)
+
+
+def _crust(random: Random, s: Setting) -> Change:
+    depth, ratio = float(random.uniform(0.012, 0.08)), _either(random, 0.05, 1.2)
+    width = float(random.uniform(0.001, 0.003)) if s.other_forms else 0.0
+    told = {"thickness": depth, "stiffness_ratio": ratio}
+    return _physics("soil-crust", told, "depth", crust_depth=depth, crust_ratio=ratio, crust_width=width)
+
+
+def _compliance(random: Random, s: Setting) -> Change:
+    k, c = log_uniform(random, 1e5, 5e6), log_uniform(random, 60.0, 2000.0)
+    share = float(random.uniform(0.07, 0.14)) if s.other_forms else 0.1
+    told = {"stiffness": k, "damping": c}
+    return _physics("structural-compliance", told, "acceleration", spring=k, dashpot=c, nose_share=share)
+
+
+def _guide(random: Random, s: Setting) -> Change:
+    force = log_uniform(random, 5.0, 300.0)
+    return _physics("guide-friction", {"force": force}, "speed", guide=force)
+
+
+def _air(random: Random, s: Setting) -> Change:
+    area = log_uniform(random, 0.01, 0.12)
+    return _physics("air-drag", {"area": area}, "speed", air=0.5 * 1.204 * area)
+
+
+def _mass(random: Random, s: Setting) -> Change:
+    added = log_uniform(random, 0.5, 20.0) * float(random.choice((-1.0, 1.0)))
+    return Change(id="mass", kind="parameter", told={"added": added}, rig={"mass": 132.0 + added})
+
+
+def _speed(random: Random, s: Setting) -> Change:
+    scale = _either(random, 0.003, 0.08)
+    return Change(id="impact-speed", kind="parameter", told={"scale": scale}, factors={"speed": scale})
+
+
+def _stiffness(random: Random, s: Setting) -> Change:
+    scale = _either(random, 0.005, 0.35)
+    return Change(id="soil-stiffness", kind="parameter", told={"scale": scale}, factors={"stiffness": scale})
+
+
+def _soil_mass(random: Random, s: Setting) -> Change:
+    fraction = 0.10 * _either(random, 0.05, 1.2)
+    return Change(id="co-moving-mass", kind="parameter", told={"fraction": fraction}, rig={"fraction": fraction})
+
+
+def _sensor(id: str, channels: tuple[str, ...], draw: Callable[[Random, Setting, str], tuple[Any, ...]]) -> Draw:
+    def made(random: Random, s: Setting) -> Change:
+        channel = str(random.choice([c for c in s.channels if c in channels]))
+        told, fault = draw(random, s, channel)
+        return Change(id=id, kind="sensor", told=told, channel=channel, fault=fault)
+
+    return made
+
+
+def _signed(random: Random, low: float, high: float) -> float:
+    return log_uniform(random, low, high) * float(random.choice((-1.0, 1.0)))
+
+
+def _pair(name: str, field_name: str, value: float) -> tuple[dict[str, float], dict[str, float]]:
+    return {name: value}, {field_name: value}
+
+
+# gains act on amplifiers, scales on lengths: the same law, another instrument
+EFFECTS: dict[str, Draw] = {
+    "soil-viscous-damping": _viscous,
+    "soil-rate-hardening": _rate,
+    "soil-inertial-drag": _drag,
+    "soil-added-mass-growth": _growth,
+    "soil-elastic-rebound": _rebound,
+    "soil-adhesion": _adhesion,
+    "soil-layer": _layer,
+    "soil-crust": _crust,
+    "structural-compliance": _compliance,
+    "guide-friction": _guide,
+    "air-drag": _air,
+    "mass": _mass,
+    "impact-speed": _speed,
+    "soil-stiffness": _stiffness,
+    "co-moving-mass": _soil_mass,
+    "sensor-scale": _sensor(
+        "sensor-scale", (DEPTH, PLACE), lambda r, s, c: _pair("scale", "gain", _either(r, 0.004, 0.1))
+    ),
+    "sensor-gain": _sensor(
+        "sensor-gain", (FORCE, ACCELERATION, SPEED), lambda r, s, c: _pair("gain", "gain", _either(r, 0.004, 0.1))
+    ),
+    "sensor-bias": _sensor(
+        "sensor-bias", MOST_CHANNELS, lambda r, s, c: _pair("bias", "bias", s.spans[c] * _signed(r, 0.001, 0.06))
+    ),
+    "sensor-clipping": _sensor(
+        "sensor-clipping",
+        (FORCE, ACCELERATION, DEPTH),
+        lambda r, s, c: _pair("limit", "limit", s.peaks[c] * float(r.uniform(0.5, 0.97))),
+    ),
+    "sensor-lag": _sensor(
+        "sensor-lag", MOST_CHANNELS, lambda r, s, c: _pair("time", "lag", log_uniform(r, 4e-4, 1.2e-2))
+    ),
+    "sensor-clock-offset": _sensor(
+        "sensor-clock-offset", MOST_CHANNELS, lambda r, s, c: _pair("offset", "offset", _signed(r, 4e-4, 1.2e-2))
+    ),
+    "sensor-clock-drift": _sensor(
+        "sensor-clock-drift", MOST_CHANNELS, lambda r, s, c: _pair("drift", "drift", _signed(r, 2e-3, 5e-2))
+    ),
+}
+NEGLIGIBLE = ("air-drag",)
+NEEDS: dict[str, tuple[str, ...]] = {"sensor-scale": (DEPTH,)}
+# the other one hides it, or says the same of the same channel
+NEVER_TOGETHER = (
+    frozenset({"sensor-scale", "sensor-gain"}),
+    frozenset({"sensor-lag", "sensor-clock-offset"}),
+    frozenset({"sensor-clock-offset", "sensor-clock-drift"}),
+    frozenset({"sensor-lag", "sensor-clock-drift"}),
+    frozenset({"soil-viscous-damping", "soil-inertial-drag"}),
+)

@@ -1,0 +1,111 @@
+"""The rig as it really was: every number of a drop that is known to the generator alone, and the soil's answer to it.
+
+The soil's curve is written from the paper (Ye 2006, eqs 3-5) and from the definitions of the effects; nothing of the
+simulator is used. x, z are positive down, SI.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+CLAY_MASS = 132.0  # kg in (5): the law belongs to the face, whatever strikes it
+FACE = 0.140 * 0.045  # m2
+RAMP = 0.005  # m/s over which the friction of the guide changes its sign
+
+Push = Callable[[float, float, float], float]  # (t, x, v) -> N, downward
+Resist = Callable[[float, float, float, float], float]  # (t, z, v, F) -> F
+Curve = Callable[[float, float, float], float]  # (t, z, v) -> N
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rig:
+    """One drop; the defaults are the paper's. Where a step in depth has a `width` (m) it is a smooth one."""
+
+    speed: float = 3.0  # m/s at the first contact
+    mass: float = 132.0
+    gravity: float = 9.81
+    fraction: float = 0.10  # m_b1 over the mass of the whole striker
+    stiffness: float = 1.0
+    damping: float = 0.0  # N (s/m)^exponent
+    exponent: float = 1.0
+    per_decade: float = 0.0
+    slow: float = 0.01  # m/s
+    drag: float = 0.0  # N (s/m)^drag_exponent
+    drag_exponent: float = 2.0
+    growth: float = 0.0  # kg/m
+    recovery: float = 0.02  # K_u = K'(z_max)/recovery
+    unloading_ratio: float = 1.0  # dashpot of the way back over the critical one
+    pull: float = 0.0  # N on the face
+    reach: float = 0.005  # m
+    layer_depth: float = math.inf
+    layer_ratio: float = 1.0
+    layer_width: float = 0.0
+    crust_depth: float = 0.0
+    crust_ratio: float = 1.0
+    crust_width: float = 0.0
+    nose_share: float = 0.1
+    spring: float = 0.0  # N/m between nose and body; 0: one rigid block
+    dashpot: float = 0.0
+    guide: float = 0.0  # N
+    air: float = 0.0  # 1/2 rho C_d A, N s2/m2
+    side_load: float = 0.0  # friction of the guide over the force that accelerates the striker
+    relaxing: float = 0.0  # N/m, spring of a Maxwell branch of the soil
+    relaxation: float = 1.0  # s, its time
+    push: Push | None = None
+    resist: Resist | None = None
+
+    @property
+    def nose(self) -> float:
+        """Mass that meets the ground first, kg."""
+        return self.mass * self.nose_share if self.spring > 0.0 else self.mass
+
+    def steps(self) -> tuple[float, ...]:
+        """Depths at which the curve jumps, m."""
+        found = []
+        if self.layer_ratio != 1.0 and self.layer_width == 0.0:
+            found.append(self.layer_depth)
+        if self.crust_ratio != 1.0 and self.crust_width == 0.0:
+            found.append(self.crust_depth)
+        return tuple(found)
+
+
+def branches(touch_speed: float) -> tuple[float, float, float]:
+    """K_b1 (N/m), the factor of z^0.264 in K_b2 z, and the depth (m) where both are equal."""
+    first = 75_000.0 + 4.9e-6 * touch_speed**18.71  # (4)
+    # (5): 1e3 * 1300 * (1e3 z)^-0.736 * 0.89^(m_s v_s/100) * z
+    factor = 1.3e6 * 1e3**-0.736 * 0.89 ** (CLAY_MASS * touch_speed / 100.0)
+    return first, factor, (factor / first) ** (1.0 / 0.736)
+
+
+def _below(z: float, depth: float, width: float) -> float:
+    """0 above a depth and 1 below it, m."""
+    if width > 0.0:
+        return 0.5 * (1.0 + math.tanh((z - depth) / width))
+    return 1.0 if z > depth else 0.0
+
+
+def loading_curve(rig: Rig, touch_speed: float) -> Curve:
+    """F(t, z, v) of the ground while it is pushed deeper, after a touch with `touch_speed`; never a pull."""
+    first, factor, change = branches(touch_speed)
+
+    def curve(t: float, z: float, v: float) -> float:
+        z = max(z, 0.0)
+        force = rig.stiffness * (first * z if z <= change else factor * z**0.264)  # (3): F = K' z
+        if rig.crust_ratio != 1.0:
+            force *= rig.crust_ratio + (1.0 - rig.crust_ratio) * _below(z, rig.crust_depth, rig.crust_width)
+        if rig.layer_ratio != 1.0:
+            force *= 1.0 + (rig.layer_ratio - 1.0) * _below(z, rig.layer_depth, rig.layer_width)
+        if v > 0.0:
+            if rig.per_decade != 0.0 and v > rig.slow:
+                force *= 1.0 + rig.per_decade * math.log10(v / rig.slow)
+            if rig.damping != 0.0:
+                force += rig.damping * v**rig.exponent
+            if rig.drag != 0.0:
+                force += rig.drag * v**rig.drag_exponent
+        if rig.resist is not None:
+            force = rig.resist(t, z, v, force)
+        return max(force, 0.0)
+
+    return curve
