@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -235,9 +235,10 @@ def _line(rig: Rig, curve: Curve, t: float, depth: float, dashpot: float) -> Lin
 
 
 def _approach(rig: Rig, start: float) -> Stage:
-    """Free fall, solved backwards from the first contact."""
+    """Free fall, solved backwards from the first contact, as one block: a dashpot run backwards explodes."""
     from scipy.integrate import solve_ivp
 
+    rig = replace(rig, spring=0.0)
     common: dict[str, Any] = {
         "rig": rig, "mode": FREE, "start": start, "end": 0.0, "soil": 0.0, "growth": 0.0, "origin": 0.0,
         "curve": None, "line": None,

@@ -37,6 +37,7 @@ KINDS: dict[str, float] = {
 MORE_KINDS = ("scatter", "other-form")  # asked for by name only
 REBOUND = {"recovery": 0.1, "damping_ratio": 0.1}  # what the scenario knows where the ground is said to spring back
 TYPICAL = {FORCE: 3500.0, DEPTH: 0.35, PLACE: 0.5, SPEED: 3.5, ACCELERATION: 25.0}
+NULLS_SAY_NOTHING = (*KINDS, *MORE_KINDS, "truth", "concealed", "proof", "effect", "outside", "clean")
 _PLAN = 2**32 - 1
 
 

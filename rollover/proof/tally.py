@@ -56,7 +56,7 @@ def tally(rows: Sequence[Row]) -> dict[str, Any]:
         "failed": [r["case"] for r in rows if r["failed"]],
         "false_alarms": counted(nulls, "false_alarm"),
         "false_alarms_by_kind": {k: counted([r for r in nulls if r["kind"] == k], "false_alarm") for k in NULLS},
-        "p_values": uniformity([r["p_value"] for r in nulls if r["p_value"] is not None]),
+        "p_values": uniformity([r["p_value"] for r in nulls if r["p_value"] is not None and r["kind"] != "negligible"]),
         "detected": counted(singles, "detected"),
         "named_first": counted(singles, "first"),
         "in_set": counted(singles, "in_set"),

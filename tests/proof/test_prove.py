@@ -1,0 +1,79 @@
+"""The whole way: made, sealed, diagnosed in other processes, opened, scored, written."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from rollover.commands.door import app
+from rollover.proof import examine
+from rollover.proof.examine import prove
+from rollover.proof.seal import opened
+
+BY_HAND = "tests.proof.diagnoses:"
+QUICK = ["--cases", "2", "--kinds", "null", "--kinds", "single", "--effects", "mass", "--workers", "0"]
+
+
+def test_the_hash_comes_before_the_first_diagnosis() -> None:
+    order: list[str] = []
+    proof = prove(
+        2,
+        4,
+        kinds=["null"],
+        workers=0,
+        diagnosis=BY_HAND + "says_nothing",
+        on_seal=lambda seal: order.append(seal.digest),
+        show=lambda done, of: order.append(f"{done}/{of}"),
+    )
+    assert order == [proof.seal.digest, "1/2", "2/2"]
+    assert proof.account["summary"]["false_alarms"]["hits"] == 0
+    assert proof.account["summary"]["p_values"]["of"] == 2
+    assert len(proof.diagnoses) == 2
+
+
+def test_in_processes_of_their_own() -> None:
+    kinds, found = ["null", "single"], BY_HAND + "always_damping"
+    proof = prove(2, 8, kinds=kinds, effects=["soil-viscous-damping"], workers=1, diagnosis=found)
+    summary = proof.account["summary"]
+    assert (summary["false_alarms"]["hits"], summary["named_first"]["hits"]) == (1, 1)
+    assert [row["case"] for row in proof.account["rows"]] == ["case-0001", "case-0002"]
+
+
+def test_a_diagnosis_that_changes_its_recordings_is_no_proof() -> None:
+    with pytest.raises(RuntimeError, match="case-0001: its recordings were changed"):
+        prove(1, 4, kinds=["null"], workers=0, diagnosis=BY_HAND + "spoils")
+
+
+def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(examine, "DIAGNOSIS", BY_HAND + "says_nothing")
+    out = tmp_path / "proof"
+    answer = CliRunner().invoke(app, ["prove", *QUICK, "--out", str(out), "--json"])
+    assert answer.exit_code == 0, answer.output
+    account = json.loads(answer.stdout)
+    assert account["seal"]["digest"] in answer.stderr
+    assert account == json.loads((out / "prove.json").read_text())
+    assert sorted(p.name for p in out.iterdir()) == ["diagnoses.jsonl", "prove.json", "seal.json", "truth.json"]
+    assert len(opened(account["seal"]["digest"], out / "truth.json")) == 2
+    assert len((out / "diagnoses.jsonl").read_text().splitlines()) == 2
+    other = CliRunner().invoke(app, ["prove", *QUICK, "--seed", "2", "--out", str(out)])
+    assert other.exit_code == 2
+    assert "--force" in other.stderr
+
+
+def test_diagnoses_that_fail_are_listed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(examine, "DIAGNOSIS", BY_HAND + "fails")
+    answer = CliRunner().invoke(app, ["prove", *QUICK, "--out", str(tmp_path / "proof")])
+    assert answer.exit_code == 3
+    assert "RuntimeError: no idea" in answer.stderr
+    account = json.loads((tmp_path / "proof" / "prove.json").read_text())
+    assert account["summary"]["failed"] == ["case-0001", "case-0002"]
+
+
+def test_an_effect_that_does_not_exist(tmp_path: Path) -> None:
+    answer = CliRunner().invoke(app, ["prove", "--effects", "soil-lair", "--out", str(tmp_path / "proof")])
+    assert answer.exit_code == 2
+    assert "no such effect, got 'soil-lair'" in answer.stderr
+    assert not (tmp_path / "proof").exists()

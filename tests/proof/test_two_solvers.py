@@ -1,0 +1,44 @@
+"""The generator and the simulator, two ways to the same drop: they must agree where they mean the same."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rollover import scenario
+from rollover.drop import DropModel
+from rollover.proof.descent import descend
+from rollover.proof.rig import FACE, Rig
+
+T = np.linspace(-0.05, 0.6, 651)
+SAME: dict[str, tuple[dict[str, float], dict[str, Any]]] = {
+    "nothing": ({}, {}),
+    "soil-viscous-damping": ({"damping": 900.0, "exponent": 1.2}, {"damping": 900.0, "exponent": 1.2}),
+    "soil-rate-hardening": ({"per_decade": 0.1}, {"per_decade": 0.1}),
+    "soil-inertial-drag": ({"coefficient": 8.0}, {"drag": 0.5 * 8.0 * 1800.0 * FACE}),
+    "soil-added-mass-growth": ({"rate": 30.0}, {"growth": 30.0}),
+    "soil-elastic-rebound": ({"recovery": 0.1, "damping_ratio": 0.1}, {"recovery": 0.1, "unloading_ratio": 0.1}),
+    "soil-layer": ({"depth": 0.1, "stiffness_ratio": 2.0}, {"layer_depth": 0.1, "layer_ratio": 2.0}),
+    "soil-crust": ({"thickness": 0.03, "stiffness_ratio": 2.0}, {"crust_depth": 0.03, "crust_ratio": 2.0}),
+    "structural-compliance": ({"stiffness": 5e5, "damping": 300.0}, {"spring": 5e5, "dashpot": 300.0}),
+    "guide-friction": ({"force": 100.0}, {"guide": 100.0}),
+    "air-drag": ({"area": 0.5}, {"air": 0.5 * 1.204 * 0.5}),
+    "mass": ({"added": 10.0}, {"mass": 142.0}),
+    "impact-speed": ({"scale": 1.05}, {"speed": 3.15}),
+    "soil-stiffness": ({"scale": 1.2}, {"stiffness": 1.2}),
+    "co-moving-mass": ({"fraction": 0.2}, {"fraction": 0.2}),
+}
+
+
+@pytest.mark.parametrize("name", SAME)
+def test_two_solvers_one_drop(name: str) -> None:
+    theirs, ours = SAME[name]
+    model = DropModel(scenario=scenario.load("drop_test"))
+    run = model.with_({f"effects.{name}.{key}": value for key, value in theirs.items()}).run(T)
+    made = descend(Rig(**ours), -0.06, 0.62).channels(T)
+    for channel, values in made.items():
+        apart = np.abs(values - run[channel]) / np.ptp(values)
+        apart[np.argmin(np.abs(T))] = 0.0  # whether t = 0 itself is before or behind the contact
+        assert np.quantile(apart, 0.99) < 1e-3, f"{channel}: {np.quantile(apart, 0.99):.2e} of its range"
