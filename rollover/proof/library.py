@@ -61,50 +61,50 @@ def _physics(id: str, told: Mapping[str, float], depends_on: str, **rig: Any) ->
 
 def _viscous(random: Random, s: Setting) -> Change:
     exponent = 1.0 if random.random() < 0.6 and not s.other_forms else float(random.uniform(0.85, 1.2))
-    d = log_uniform(random, 40.0, 3000.0)
+    d = log_uniform(random, 6.0, 3000.0)
     told = {"damping": d, "exponent": exponent}
     return _physics("soil-viscous-damping", told, "speed", damping=d, exponent=exponent)
 
 
 def _rate(random: Random, s: Setting) -> Change:
-    gain = log_uniform(random, 0.01, 0.2)
+    gain = log_uniform(random, 0.002, 0.2)
     slow = log_uniform(random, 0.007, 0.014) if s.other_forms else 0.01
     return _physics("soil-rate-hardening", {"per_decade": gain}, "speed", per_decade=gain, slow=slow)
 
 
 def _drag(random: Random, s: Setting) -> Change:
-    c = log_uniform(random, 0.5, 40.0)
+    c = log_uniform(random, 0.08, 40.0)
     power = float(random.uniform(1.9, 2.1)) if s.other_forms else 2.0
     told = {"coefficient": c}
     return _physics("soil-inertial-drag", told, "speed", drag=0.5 * c * 1800.0 * FACE, drag_exponent=power)
 
 
 def _growth(random: Random, s: Setting) -> Change:
-    rate = log_uniform(random, 1.5, 100.0)
+    rate = log_uniform(random, 0.3, 100.0)
     return _physics("soil-added-mass-growth", {"rate": rate}, "speed", growth=rate)
 
 
 def _rebound(random: Random, s: Setting) -> Change:
-    recovery, ratio = log_uniform(random, 0.025, 0.3), float(random.uniform(0.05, 0.9))
+    recovery, ratio = log_uniform(random, 0.021, 0.3), float(random.uniform(0.05, 0.9))
     told = {"recovery": recovery, "damping_ratio": ratio}
     return _physics("soil-elastic-rebound", told, "depth", recovery=recovery, unloading_ratio=ratio)
 
 
 def _adhesion(random: Random, s: Setting) -> Change:
-    stress, reach = log_uniform(random, 2.5e4, 1.2e5), log_uniform(random, 0.003, 0.015)
+    stress, reach = log_uniform(random, 3e3, 1.2e5), log_uniform(random, 0.003, 0.015)
     return _physics("soil-adhesion", {"stress": stress, "reach": reach}, "depth", pull=stress * FACE, reach=reach)
 
 
 def _layer(random: Random, s: Setting) -> Change:
     reached = sorted(s.depths)[-2]
-    depth, ratio = float(random.uniform(0.15, 0.8)) * reached, _either(random, 0.03, 1.2)
+    depth, ratio = float(random.uniform(0.15, 0.8)) * reached, _either(random, 0.006, 1.2)
     width = float(random.uniform(0.001, 0.004)) if s.other_forms else 0.0
     told = {"depth": depth, "stiffness_ratio": ratio}
     return _physics("soil-layer", told, "depth", layer_depth=depth, layer_ratio=ratio, layer_width=width)
 
 
 def _crust(random: Random, s: Setting) -> Change:
-    depth, ratio = float(random.uniform(0.012, 0.08)), _either(random, 0.05, 1.2)
+    depth, ratio = float(random.uniform(0.012, 0.08)), _either(random, 0.012, 1.2)
     width = float(random.uniform(0.001, 0.003)) if s.other_forms else 0.0
     told = {"thickness": depth, "stiffness_ratio": ratio}
     return _physics("soil-crust", told, "depth", crust_depth=depth, crust_ratio=ratio, crust_width=width)
@@ -118,7 +118,7 @@ def _compliance(random: Random, s: Setting) -> Change:
 
 
 def _guide(random: Random, s: Setting) -> Change:
-    force = log_uniform(random, 5.0, 300.0)
+    force = log_uniform(random, 1.0, 300.0)
     return _physics("guide-friction", {"force": force}, "speed", guide=force)
 
 
@@ -128,22 +128,22 @@ def _air(random: Random, s: Setting) -> Change:
 
 
 def _mass(random: Random, s: Setting) -> Change:
-    added = log_uniform(random, 0.5, 20.0) * float(random.choice((-1.0, 1.0)))
+    added = log_uniform(random, 0.1, 20.0) * float(random.choice((-1.0, 1.0)))
     return Change(id="mass", kind="parameter", told={"added": added}, rig={"mass": 132.0 + added})
 
 
 def _speed(random: Random, s: Setting) -> Change:
-    scale = _either(random, 0.003, 0.08)
+    scale = _either(random, 0.0008, 0.08)
     return Change(id="impact-speed", kind="parameter", told={"scale": scale}, factors={"speed": scale})
 
 
 def _stiffness(random: Random, s: Setting) -> Change:
-    scale = _either(random, 0.005, 0.35)
+    scale = _either(random, 0.001, 0.35)
     return Change(id="soil-stiffness", kind="parameter", told={"scale": scale}, factors={"stiffness": scale})
 
 
 def _soil_mass(random: Random, s: Setting) -> Change:
-    fraction = 0.10 * _either(random, 0.05, 1.2)
+    fraction = 0.10 * _either(random, 0.012, 1.2)
     return Change(id="co-moving-mass", kind="parameter", told={"fraction": fraction}, rig={"fraction": fraction})
 
 
@@ -182,13 +182,13 @@ EFFECTS: dict[str, Draw] = {
     "soil-stiffness": _stiffness,
     "co-moving-mass": _soil_mass,
     "sensor-scale": _sensor(
-        "sensor-scale", (DEPTH, PLACE), lambda r, s, c: _pair("scale", "gain", _either(r, 0.004, 0.1))
+        "sensor-scale", (DEPTH, PLACE), lambda r, s, c: _pair("scale", "gain", _either(r, 0.0015, 0.1))
     ),
     "sensor-gain": _sensor(
-        "sensor-gain", (FORCE, ACCELERATION, SPEED), lambda r, s, c: _pair("gain", "gain", _either(r, 0.004, 0.1))
+        "sensor-gain", (FORCE, ACCELERATION, SPEED), lambda r, s, c: _pair("gain", "gain", _either(r, 0.0015, 0.1))
     ),
     "sensor-bias": _sensor(
-        "sensor-bias", MOST_CHANNELS, lambda r, s, c: _pair("bias", "bias", s.spans[c] * _signed(r, 0.001, 0.06))
+        "sensor-bias", MOST_CHANNELS, lambda r, s, c: _pair("bias", "bias", s.spans[c] * _signed(r, 0.0003, 0.06))
     ),
     "sensor-clipping": _sensor(
         "sensor-clipping",
@@ -196,10 +196,10 @@ EFFECTS: dict[str, Draw] = {
         lambda r, s, c: _pair("limit", "limit", s.peaks[c] * float(r.uniform(0.5, 0.97))),
     ),
     "sensor-lag": _sensor(
-        "sensor-lag", MOST_CHANNELS, lambda r, s, c: _pair("time", "lag", log_uniform(r, 4e-4, 1.2e-2))
+        "sensor-lag", MOST_CHANNELS, lambda r, s, c: _pair("time", "lag", log_uniform(r, 3e-4, 1.2e-2))
     ),
     "sensor-clock-offset": _sensor(
-        "sensor-clock-offset", MOST_CHANNELS, lambda r, s, c: _pair("offset", "offset", _signed(r, 4e-4, 1.2e-2))
+        "sensor-clock-offset", MOST_CHANNELS, lambda r, s, c: _pair("offset", "offset", _signed(r, 1e-4, 1.2e-2))
     ),
     "sensor-clock-drift": _sensor(
         "sensor-clock-drift", MOST_CHANNELS, lambda r, s, c: _pair("drift", "drift", _signed(r, 2e-3, 5e-2))

@@ -12,7 +12,8 @@ def says_nothing(folder: Path, out: Path, workers: int = 1) -> dict[str, Any]:
     assert "scenario.yaml" in names
     assert "r1.parquet" in names
     assert not any("truth" in name for name in names)
-    return {"format": "rollover-diagnosis/1", "verdict": "no-mismatch", "effects": [], "significance": {"p_value": 0.5}}
+    answer = {"format": "rollover-diagnosis/1", "verdict": "no-mismatch", "effects": [], "folder": folder.name}
+    return {**answer, "significance": {"p_value": 0.5}}
 
 
 def always_damping(folder: Path, out: Path, workers: int = 1) -> dict[str, Any]:

@@ -114,6 +114,7 @@ def test_rate_hardening_scales_with_the_force() -> None:
         assert hard(0.0, z, 1.0) / bare(0.0, z, 1.0) == pytest.approx(1.2)
         assert hard(0.0, z, 0.1) / bare(0.0, z, 0.1) == pytest.approx(1.1)
         assert hard(0.0, z, 0.009) == bare(0.0, z, 0.009)
+        assert hard(0.0, z, 0.015) / bare(0.0, z, 0.015) == pytest.approx(1.0 + 0.1 * math.log10(1.5))
 
 
 def test_growing_mass_leaves_the_first_impulse_alone() -> None:
@@ -195,10 +196,17 @@ def test_side_load_takes_a_share_of_what_accelerates() -> None:
     """In the fall m a = m g - r m a; braked, m a = m g - F + r m |a|: sign by sign."""
     got = fall(side_load=0.1).channels(TIMES)
     np.testing.assert_allclose(got[ACCELERATION][BEFORE], -9.81 / 1.1, rtol=1e-12)
+    lifted = fall(side_load=0.1, recovery=0.3, unloading_ratio=0.05)
+    rising = next(s for s in lifted.stages[1:] if s.mode == FREE)
+    up = lifted.channels(np.array([rising.start + 1e-6]))
+    assert up[SPEED][0] > 0.1
+    assert up[ACCELERATION][0] == pytest.approx(-9.81 / 0.9)
 
 
 def test_soil_that_relaxes_forgets(nothing: dict[str, Any]) -> None:
-    got = fall(relaxing=1e4, relaxation=0.03).channels(TIMES)
+    drop = fall(relaxing=1e4, relaxation=0.03)
+    got = drop.channels(TIMES)
+    assert abs(drop.stages[-1].state(0.6)[4]) < 1e-3
     assert got[FORCE][130] > 1.1 * nothing[FORCE][130]
     assert got[FORCE][-1] == pytest.approx(132.0 * 9.81, rel=1e-3)
 

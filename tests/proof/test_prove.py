@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
 
 from rollover.commands.door import app
+from rollover.execute import map_cases
 from rollover.proof import examine
 from rollover.proof.examine import prove
 from rollover.proof.seal import opened
@@ -32,6 +34,17 @@ def test_the_hash_comes_before_the_first_diagnosis() -> None:
     assert proof.account["summary"]["false_alarms"]["hits"] == 0
     assert proof.account["summary"]["p_values"]["of"] == 2
     assert len(proof.diagnoses) == 2
+
+
+def test_answers_go_to_their_own_cases(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Cases are done in any order."""
+
+    def backwards(*args: Any, **kwargs: Any) -> Any:
+        return reversed(list(map_cases(*args, **kwargs)))
+
+    monkeypatch.setattr(examine, "map_cases", backwards)
+    proof = prove(2, 4, kinds=["null"], workers=0, diagnosis=BY_HAND + "says_nothing")
+    assert {name: found["folder"] for name, found in proof.diagnoses.items()} == {n: n for n in proof.diagnoses}
 
 
 def test_in_processes_of_their_own() -> None:

@@ -53,8 +53,9 @@ def test_named_first_alone_and_right() -> None:
     (parameter,) = row["parameters"]
     assert parameter["error"] == pytest.approx(0.02)
     assert parameter["covers"] is True
-    value["low"] = 1001.0
-    assert score(truth(effect()), found)["parameters"][0]["covers"] is False
+    for ends in ({"low": 1001.0}, {"low": 900.0, "high": 999.0}):
+        value |= ends
+        assert score(truth(effect()), found)["parameters"][0]["covers"] is False
 
 
 @pytest.mark.parametrize(
@@ -138,6 +139,7 @@ def test_p_values_of_nulls() -> None:
 
 def test_the_sums() -> None:
     rows = [
+        score(truth(effect("mass"), effect("soil-crust"), kind="pair"), said("mass", "soil-crust")),
         score(truth(effect()), said("soil-viscous-damping")),
         score(truth(effect()), said("mass", verdict="parameter")),
         score(truth(effect("soil-layer")), said(verdict="no-mismatch")),
@@ -164,4 +166,4 @@ def test_the_sums() -> None:
     lines = table(found, "by_effect")
     assert {line["effect"]: line["detected"] for line in lines} == {"soil-viscous-damping": 1.0, "soil-layer": 0.0}
     assert len(found["misses"]) == 3
-    assert counted(rows, "first")["of"] == 2
+    assert counted(rows, "first")["of"] == 3  # the pair too
