@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from rollover.baseline import Answer
     from rollover.calibrate import Calibration
+    from rollover.criteria import Criterion
     from rollover.loads import PeakLoad
     from rollover.misfit import Misfit
     from rollover.run import Run
@@ -92,8 +93,12 @@ def readable(value: float | None, unit: str) -> str:
     return f"{value * _READABLE.get(unit, (unit, 1.0))[1]:.4g}"
 
 
-def report(run: Run, peaks: Sequence[PeakLoad], answer: Mapping[str, Any], folder: str) -> None:
+def report(
+    run: Run, peaks: Sequence[PeakLoad], rows: Sequence[Criterion], answer: Mapping[str, Any], folder: str
+) -> None:
     """The answer of a run on standard output."""
+    from rollover.loads import unconverged
+
     out = Console(highlight=False, markup=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
     out.print(run.scenario.title, style="bold")
     if run.status == "done":
@@ -101,8 +106,15 @@ def report(run: Run, peaks: Sequence[PeakLoad], answer: Mapping[str, Any], folde
         out.print(f"{run.stop_time:g} s simulated in {run.wall_time:.2g} s ({speed:.2g} x real time)")
     else:
         out.print(f"FAILED: {run.sentence}", style="bold red")
+    if run.tests:
+        _stand(out, run)
     if peaks:
         out.print(_table(peaks))
+    if rows:
+        out.print()
+        out.print(_criteria(rows))
+    if unsure := unconverged(peaks):
+        out.print(f"{unsure[0].upper()}{unsure[1:]}.", style="bold yellow")
     if run.domain_flags:
         marked = " Loads marked * were taken there: an extrapolation, not a measured range." if peaks else ""
         flags = ", ".join(run.domain_flags)
@@ -111,6 +123,33 @@ def report(run: Run, peaks: Sequence[PeakLoad], answer: Mapping[str, Any], folde
     if half is not None and half["status"] != "done":
         out.print(f"At half the step the run failed: {half['sentence']}", style="yellow")
     out.print(f"Results: {folder}")
+
+
+def _stand(out: Console, run: Run) -> None:
+    from rollover.findings import findings
+
+    found = findings(run.tests)
+    assert found is not None
+    table = Table(box=None, pad_edge=False)
+    for k, heading in enumerate(found.headings):
+        table.add_column(heading, justify="left" if k < found.words else "right")
+    for row in found.rows:
+        table.add_row(*row)
+    out.print(table)
+    out.print(f"{found.sentence}.", style="bold")
+    out.print()
+
+
+def _criteria(rows: Sequence[Criterion]) -> Table:
+    table = Table(box=None, pad_edge=False)
+    styles = {"met": "green", "not met": "bold red", "compared": ""}
+    for heading in ("standard", "requirement", "asked", "simulated", "margin", "half step", "verdict"):
+        table.add_column(heading, justify="right" if heading in ("simulated", "margin", "half step") else "left")
+    for row in rows:
+        r, (asked, simulated, margin) = row.requirement, row.in_words
+        words = (r.standard, r.name, asked, simulated, margin, row.half_step_in_words or "-", row.verdict)
+        table.add_row(*words, style=styles[row.verdict])
+    return table
 
 
 def _table(peaks: Sequence[PeakLoad]) -> Table:

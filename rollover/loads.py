@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -106,3 +107,22 @@ def _peak(run: Run, channel: str, parts: tuple[str, ...], impulse: str | None) -
         domain_flags=flag_names(flags),
         half_step_change=None,
     )
+
+
+CONVERGED = 0.02  # relative change of a filtered peak at half the step that passes for converged
+
+
+def leading(peaks: Sequence[PeakLoad]) -> PeakLoad | None:
+    """The load that is asked for first: of a test stand's device, on the ROPS, of the ground; one that there was."""
+    order = ("device/force", "rops/force", "ground/force_normal")
+    first = [p for name in order for p in peaks if p.channel == name and p.raw != 0.0]
+    return next(iter([*first, *(p for p in peaks if p.raw != 0.0)]), None)
+
+
+def unconverged(peaks: Sequence[PeakLoad]) -> str:
+    """A sentence if the leading load moves by more than `CONVERGED` at half the step, otherwise nothing."""
+    peak = leading(peaks)
+    if peak is None or peak.half_step_change is None or peak.half_step_change <= CONVERGED:
+        return ""
+    change = 100.0 * peak.half_step_change
+    return f"not converged: half the step changes {peak.channel} (CFC {peak.cfc}) by {change:.2g} %, more than 2 %"

@@ -20,7 +20,7 @@ from rollover.effects import read
 from rollover.forces import generalised_forces
 from rollover.frames import matrices, quaternions, rotation_vector
 from rollover.history import History, States
-from rollover.initiation import Driving, Standing
+from rollover.initiation import Driving, Drop, Standing
 from rollover.recording import Recording
 from rollover.rig import set_up
 from rollover.run import ContactForce, Event, GroundTrack, Motion, Run
@@ -244,7 +244,7 @@ def _released(found: dict[str, Array]) -> float:
 
 
 def _phases(scenario: Scenario, time: Array, events: list[Event], force: Array) -> tuple[tuple[float, str], ...]:
-    """Start and name of each phase: approach or support, tipping, impact, rest."""
+    """Start and name of each phase: approach or support, tipping, impact, rest; driven once an exciter is at work."""
     first = min((e.time for e in events if e.kind == "first-touch"), default=math.inf)
     rest = min((e.time for e in events if e.kind == "rest"), default=math.inf)
     wheels = isinstance(scenario.vehicle, Vehicle) and scenario.vehicle.wheels
@@ -255,9 +255,13 @@ def _phases(scenario: Scenario, time: Array, events: list[Event], force: Array) 
     tipping = min((e.time for e in events if e.kind == "lift-off"), default=math.inf)
     if wheels and scenario.initiation.kind == "tip-over":
         tipping = float(time[0])
-    marks = [(float(time[0]), "support" if wheels else "approach")]
+    dropped = isinstance(scenario.initiation, Drop)
+    marks = [(float(time[0]), "support" if wheels and not dropped else "approach")]
     marks += [(at, name) for at, name in ((tipping, "tipping"), (first, "impact"), (rest, "rest")) if math.isfinite(at)]
-    return tuple(m for k, m in enumerate(marks) if k + 1 == len(marks) or marks[k + 1][0] > m[0])
+    found = [m for k, m in enumerate(marks) if k + 1 == len(marks) or marks[k + 1][0] > m[0]]
+    if scenario.excitation is not None and (start := scenario.excitation.start) <= time[-1]:
+        found = [*(m for m in found if m[0] < start), (start, "driven")]  # between two blows nothing rests
+    return tuple(found)
 
 
 def _motion(s: States, bodies: tuple[Body, ...], frames: NDArray[np.int64]) -> dict[str, Motion]:

@@ -33,8 +33,12 @@ __all__ = [
 
 STATIC = "French order of 6 July 1981, annex I (static tests of the EEC and OECD)"
 DYNAMIC = "French order of 6 July 1981, annex II (dynamic tests of the EEC and OECD)"
+NINE, TEN = "EU 1322/2014 annex IX, not seen", "EU 1322/2014 annex X, not seen"
 NARROW = "excerpts of the EEC directives on narrow-track tractors"
 OSHA_TEXT = "29 CFR 1926.1002 and 1928.52, SAE J1194"
+SIDES: tuple[str, ...] = ("left", "right")
+ABOVE: tuple[str, ...] = ("above",)
+ENDS: tuple[str, ...] = ("front", "rear")
 FOOT_POUND, POUND = 1.3558179483314004, 0.45359237  # J, kg
 
 
@@ -67,14 +71,22 @@ def code_4(tractor: Tractor) -> tuple[Requirement, ...]:
     behind = tractor.rear_share >= 0.5
     first, second = ("rear", "front") if behind else ("front", "rear")
     found = [
-        _energy(standard, f"longitudinal load, {first}", "1.4 M", 1.4 * M, "energy, first longitudinal load"),
+        _energy(
+            standard,
+            f"longitudinal load, {first}",
+            "1.4 M",
+            1.4 * M,
+            "energy, first longitudinal load",
+            come_from=(first,),
+        ),
         _force(standard, f"crush, {first}", "20 M", 20.0 * M, "crush, held 5 s after the deflection stops"),
-        _energy(standard, "side load", "1.75 M", 1.75 * M, "energy, load from the side"),
+        _energy(standard, "side load", "1.75 M", 1.75 * M, "energy, load from the side", come_from=SIDES),
         _force(standard, f"crush, {second}", "20 M", 20.0 * M, "crush, held 5 s after the deflection stops"),
     ]
     if tractor.folding:
         name = f"second longitudinal load, {second}"
-        found.append(_energy(standard, name, "0.35 M", 0.35 * M, "tilting or folding frames: other corner"))
+        clause = "tilting or folding frames: other corner"
+        found.append(_energy(standard, name, "0.35 M", 0.35 * M, clause, come_from=(second,)))
     return tuple(found)
 
 
@@ -86,18 +98,18 @@ def code_3(tractor: Tractor) -> tuple[Requirement, ...]:
     standard, M = "OECD Code 3 / ISO 3463", tractor.mass
     found = []
     if tractor.rear_share > 0.5:
+        clause = "rear impact, chains at 20 deg"
         if tractor.wheelbase is not None:
             H, formula = 2.165e-8 * M * (1e3 * tractor.wheelbase) ** 2, "2.165e-8 M L^2 mm, L in mm"
-            found.append(_height(standard, "rear impact, by wheelbase", formula, H, "rear impact, chains at 20 deg"))
+            found.append(_height(standard, "rear impact, by wheelbase", formula, H, clause, ("rear",)))
         if tractor.pitch_inertia is not None:
             H, formula = 5.73e-2 * tractor.pitch_inertia, "5.73e-2 I mm, I about the rear axle"
-            found.append(
-                _height(standard, "rear impact, by pitch inertia", formula, H, "rear impact, chains at 20 deg")
-            )
+            found.append(_height(standard, "rear impact, by pitch inertia", formula, H, clause, ("rear",)))
+    front, side = "25 + 0.07 M, from 2000 kg 125 + 0.02 M", "25 + 0.20 M, from 2000 kg 125 + 0.15 M"
     found += [
         _crush(standard, "rear crush", M),
-        _height(standard, "front impact", "25 + 0.07 M, from 2000 kg 125 + 0.02 M", front_height(M), "front impact"),
-        _height(standard, "side impact", "25 + 0.20 M, from 2000 kg 125 + 0.15 M", side_height(M), "side impact"),
+        _height(standard, "front impact", front, front_height(M), "front impact", ("front",)),
+        _height(standard, "side impact", side, side_height(M), "side impact", SIDES),
         _crush(standard, "front crush", M),
         Requirement(
             standard=standard,
@@ -110,6 +122,7 @@ def code_3(tractor: Tractor) -> tuple[Requirement, ...]:
             bound="most",
             source=DYNAMIC,
             confidence="seen",
+            come_from=SIDES,
         ),
     ]
     return tuple(found)
@@ -134,25 +147,25 @@ def code_6(tractor: Tractor) -> tuple[Requirement, ...]:
     widths = tractor.width is not None and tractor.rops_width is not None
     factor = (tractor.rops_width + tractor.width) / (2.0 * tractor.width) if widths else 1.0  # type: ignore[operator]
     side = "1.75 M (B6 + B)/(2 B)" if widths else "1.75 M (B6 + B)/(2 B), widths not given: factor 1"
+    first, second = "first longitudinal load", "second longitudinal load"
     return (
         _narrow_angle(standard),
-        _energy(standard, "longitudinal load", "500 + 0.5 M", 500.0 + 0.5 * M, "first longitudinal load", "recalled"),
+        _energy(standard, "longitudinal load", "500 + 0.5 M", 500.0 + 0.5 * M, first, "recalled", NINE, ENDS),
         _force(standard, "crush, front", "20 M", 20.0 * M, "crush", NARROW),
-        _energy(standard, "side load", side, 1.75 * M * factor, "load from the side", "recalled"),
+        _energy(standard, "side load", side, 1.75 * M * factor, "load from the side", "recalled", NINE, SIDES),
         _force(standard, "crush, rear", "20 M", 20.0 * M, "crush", NARROW),
-        _energy(standard, "second longitudinal load", "0.35 M", 0.35 * M, "second longitudinal load", "recalled"),
+        _energy(standard, second, "0.35 M", 0.35 * M, second, "recalled", NINE, ENDS),
     )
 
 
 def code_7(tractor: Tractor) -> tuple[Requirement, ...]:
     """OECD Code 7, ISO 12003-2, annex X: narrow-track tractors with the structure behind; static loads."""
     standard, M = "OECD Code 7 / ISO 12003-2", tractor.mass
+    first, ahead = "first longitudinal load", "side, 200 mm ahead of the seat reference point"
     return (
-        _energy(standard, "longitudinal load", "500 + 0.5 M", 500.0 + 0.5 * M, "first longitudinal load", "recalled"),
+        _energy(standard, "longitudinal load", "500 + 0.5 M", 500.0 + 0.5 * M, first, "recalled", TEN, ENDS),
         _force(standard, "crush, rear", "20 M", 20.0 * M, "crush", NARROW),
-        _energy(
-            standard, "side load", "1.75 M", 1.75 * M, "side, 200 mm ahead of the seat reference point", "recalled"
-        ),
+        _energy(standard, "side load", "1.75 M", 1.75 * M, ahead, "recalled", NARROW, SIDES),
         _force(standard, "crush, front", "20 M", 20.0 * M, "crush", NARROW),
     )
 
@@ -163,8 +176,8 @@ def osha(tractor: Tractor) -> tuple[Requirement, ...]:
     high: Confidence = "recalled-high"
     weight, side, rear = 2.0 * tractor.mass * 9.80665, (723.0 + 0.4 * W) * FOOT_POUND, 0.47 * W * FOOT_POUND
     return (
-        _energy(standard, "side load", "723 + 0.4 W ft lbf", side, "static, side", high, OSHA_TEXT),
-        _energy(standard, "rear load", "0.47 W ft lbf", rear, "static, rear", high, OSHA_TEXT),
+        _energy(standard, "side load", "723 + 0.4 W ft lbf", side, "static, side", high, OSHA_TEXT, SIDES),
+        _energy(standard, "rear load", "0.47 W ft lbf", rear, "static, rear", high, OSHA_TEXT, ("rear",)),
         _force(standard, "crush", "2 W", weight, "1926.1003, crush", "29 CFR 1926.1003"),
     )  # fmt: skip
 
@@ -210,27 +223,31 @@ def _energy(
     clause: str,
     confidence: Confidence = "seen",
     source: str = STATIC,
+    come_from: tuple[str, ...] = (),
 ) -> Requirement:
-    return _requirement(standard, name, formula, value, clause, "energy", "J", confidence, source)
+    return _requirement(standard, name, formula, value, clause, "energy", "J", confidence, source, come_from)
 
 
 def _force(standard: str, name: str, formula: str, value: float, clause: str, source: str = STATIC) -> Requirement:
-    return _requirement(standard, name, formula, value, clause, "force", "N", "seen", source)
+    return _requirement(standard, name, formula, value, clause, "force", "N", "seen", source, ABOVE)
 
 
 def _crush(standard: str, name: str, mass: float) -> Requirement:
-    return _requirement(standard, name, "twice the weight", 2.0 * mass * 9.81, "crush", "force", "N", "seen", DYNAMIC)
+    return _force(standard, name, "twice the weight", 2.0 * mass * 9.81, "crush", DYNAMIC)
 
 
-def _height(standard: str, name: str, formula: str, millimetres: float, clause: str) -> Requirement:
-    return _requirement(standard, name, formula, 1e-3 * millimetres, clause, "height", "m", "seen", DYNAMIC)
+def _height(
+    standard: str, name: str, formula: str, millimetres: float, clause: str, come_from: tuple[str, ...]
+) -> Requirement:
+    value = 1e-3 * millimetres
+    return _requirement(standard, name, formula, value, clause, "height", "m", "seen", DYNAMIC, come_from)
 
 
 def _narrow_angle(standard: str) -> Requirement:
     source = "EU 1322/2014 annex IX, preparation seen, angle recalled"
     return _requirement(
         standard, "lateral stability", "unstable equilibrium on a tilting plane", math.radians(38.0),
-        "lateral stability, pivot free", "angle", "rad", "recalled-high", source,
+        "lateral stability, pivot free", "angle", "rad", "recalled-high", source, SIDES,
     )  # fmt: skip
 
 
@@ -244,6 +261,7 @@ def _requirement(
     unit: str,
     confidence: Confidence,
     source: str,
+    come_from: tuple[str, ...],
 ) -> Requirement:
     return Requirement(
         standard=standard,
@@ -256,4 +274,5 @@ def _requirement(
         bound="least",
         source=source,
         confidence=confidence,
+        come_from=come_from,
     )

@@ -120,6 +120,7 @@ def write(
     run: Run,
     peaks: Sequence[PeakLoad],
     *,
+    criteria: Sequence[Mapping[str, Any]] = (),
     half_step: Run | None = None,
     picture: Callable[[Path], None] | None = None,
     page: Callable[[Mapping[str, Any]], str] | None = None,
@@ -127,9 +128,9 @@ def write(
 ) -> dict[str, Any]:
     """Write a run's folder and return what its run.json says.
 
-    Everything goes to a temporary folder beside it, which takes its place at the very end; `picture` writes the
-    .rrd there, `page` gives the text of the report from what run.json says. Whatever happens before that, an
-    interrupt too, leaves nothing behind.
+    `criteria` are what the run was held against, as bare values. Everything goes to a temporary folder beside it,
+    which takes its place at the very end; `picture` writes the .rrd there, `page` gives the text of the report from
+    what run.json says. Whatever happens before that, an interrupt too, leaves nothing behind.
     """
     scenario_hash = content_hash(run.scenario)
     target = claim(folder, scenario_hash, force=force)
@@ -141,7 +142,7 @@ def write(
         if picture is not None:
             picture(part / PICTURE)
         names = sorted([*(p.name for p in part.iterdir()), RUN, *([PAGE] if page is not None else [])])
-        answer = _answer(run, scenario_hash, peaks, half_step, names)
+        answer = _answer(run, scenario_hash, peaks, criteria, half_step, names)
         write_json(part / RUN, answer)
         if page is not None:
             (part / PAGE).write_text(page(answer), encoding="utf-8")
@@ -163,7 +164,12 @@ def read_run_json(folder: Path) -> dict[str, Any]:
 
 
 def _answer(
-    run: Run, scenario_hash: str, peaks: Sequence[PeakLoad], half_step: Run | None, files: list[str]
+    run: Run,
+    scenario_hash: str,
+    peaks: Sequence[PeakLoad],
+    criteria: Sequence[Mapping[str, Any]],
+    half_step: Run | None,
+    files: list[str],
 ) -> dict[str, Any]:
     answer: dict[str, Any] = plain(
         {
@@ -181,6 +187,7 @@ def _answer(
             "energy_released": run.released,
             "tests": run.tests,
             "peak_loads": [asdict(peak) for peak in peaks],
+            "criteria": criteria,
             "half_step": None
             if half_step is None
             else {

@@ -53,6 +53,7 @@ PHASE = {
     "tipping": 0xC2A23CFF,
     "impact": 0xC24A44FF,
     "rest": 0x3F8A4BFF,
+    "driven": 0x9A6A2FFF,
     "failed": 0xF0434EFF,
 }
 FILTERED = 0xFFFFFFFF

@@ -8,16 +8,18 @@ from typing import Any
 import numpy as np
 
 from rollover.criteria import Criterion
-from rollover.loads import PeakLoad, load_channels, magnitude
+from rollover.findings import findings
+from rollover.loads import CONVERGED, PeakLoad, leading, load_channels, magnitude
 from rollover.run import Run
+from rollover.stand import TiltTable
 from viz import plots
 from viz.clearance_view import clearance_figure
 from viz.entities import series
 from viz.page import Block, Cell, Details, Figure, Footer, Headline, Note, Pairs, Section, State, Table, render
 from viz.plots import Curve, Level
-from viz.verdict import filtered, in_words, joules, known, ranked, raw, title_of
+from viz.stand_view import stand_section
+from viz.verdict import filtered, in_words, joules, known, raw, title_of
 
-CONVERGED = 0.02  # relative change at half the step that passes for converged
 ONE_PER_TABLE = 60  # events that are listed
 
 
@@ -30,7 +32,8 @@ def page(
     command: str = "rollover run scenario.yaml",
 ) -> str:
     """HTML of a run's report. `answer` is its run.json, `rows` what it was held against."""
-    blocks: list[Block] = [*_warnings(run, answer), *_peaks(peaks), *_standards(rows), *_domain(run, peaks)]
+    blocks: list[Block] = [*_warnings(run, answer), *stand_section(run, rows), *_standards(run, rows)]
+    blocks += [*_peaks(peaks), *_domain(run, peaks)]
     blocks += [*_histories(run, peaks), *_structure(run, rows), *_ledger(run), *_course(run, answer)]
     return render(
         title=run.scenario.title,
@@ -48,11 +51,12 @@ def headline(run: Run, peaks: Sequence[PeakLoad], rows: Sequence[Criterion] = ()
             f"{run.sentence}. What follows holds until then; a peak of it would pass for the peak, so there is none."
         )
         return Headline(sentence=f"The run failed at {run.stop_time:.3f} s", detail=detail, state="fail")
-    if not peaks:
-        return Headline(sentence="No load was recorded", state="warn")
-    first = next(p for p in ranked(run, peaks) if p.channel in {q.channel for q in peaks})
-    peak = next(p for p in peaks if p.channel == first.channel)
+    peak, found = leading(peaks), findings(run.tests)
+    if peak is None:
+        return Headline(sentence=found.sentence if found else "No load was recorded", state="warn")
     sentence = f"{title_of(peak)}: at most {raw(peak)} (raw), {filtered(peak) or 'none'} (CFC {peak.cfc})"
+    if isinstance(run.scenario.initiation, TiltTable) and found is not None:
+        sentence = found.sentence  # what turns there is the weight: no load answers the question
     parts = ["outside the ground law's calibrated domain" if peak.domain_flags else "inside the calibrated domain"]
     unsure = bool(peak.domain_flags)
     change = peak.half_step_change
@@ -108,34 +112,31 @@ def _peaks(peaks: Sequence[PeakLoad]) -> list[Block]:
     return [Section(title="Peak loads", blocks=[table])]
 
 
-def _standards(rows: Sequence[Criterion]) -> list[Block]:
+def _standards(run: Run, rows: Sequence[Criterion]) -> list[Block]:
     if not rows:
         return []
     states: Mapping[str, Any] = {"met": "pass", "not met": "fail", "compared": "muted"}
+    halved = any(row.at_half_step is not None for row in rows)
     cells: list[list[str | Cell]] = []
     for row in rows:
         r = row.requirement
-        unit = series_unit(r.unit)
-        margin = f"{1e3 * row.margin:+.0f} mm" if r.quantity == "distance" else f"{100.0 * row.margin:+.0f} %"
-        cells.append(
-            [
-                f"{r.standard}: {r.name}",
-                f"{'at least' if r.bound == 'least' else 'at most'} {number(r.value, unit[1])} {unit[0]}",
-                f"{number(row.simulated, unit[1])} {unit[0]}",
-                margin,
-                Cell(row.verdict, states[row.verdict]),
-                r.clause,
-                f"{r.formula}; {r.source}; {r.confidence.replace('-', ', ')}",
-            ]
+        half = [row.half_step_in_words] if halved else []
+        sure = f"{r.formula}; {r.source}; {r.confidence.replace('-', ', ')}"
+        verdict = Cell(row.verdict, states[row.verdict])
+        cells.append([f"{r.standard}: {r.name}", *row.in_words, *half, verdict, r.clause, sure])
+    columns = ["requirement", "asked", "simulated", "margin or ratio", *(["half step"] if halved else [])]
+    numeric = range(1, len(columns))
+    columns += ["verdict", "clause", "formula, source, how sure"]
+    table = Table(columns=columns, rows=cells, numeric=numeric)
+    blocks: list[Block] = [table]
+    if any(row.verdict == "compared" for row in rows):
+        text = (
+            "A standard's test energies and forces belong to its test, not to an overturn: beside this run they are a "
+            "measure (compared, simulated over asked), not a verdict."
         )
-    columns = ["requirement", "asked", "simulated", "margin", "verdict", "clause", "formula, source, how sure"]
-    table = Table(columns=columns, rows=cells, numeric=(1, 2, 3))
-    notes = [Note(text=f"{row.requirement.name}: {row.note}") for row in rows if row.note]
-    text = (
-        "A standard's test energies and forces belong to its test, not to an overturn: beside this run they are a "
-        "measure (compared), not a verdict."
-    )
-    return [Section(title="Against standards", blocks=[table, Note(text=text), Details(summary="Notes", blocks=notes)])]
+        blocks.append(Note(text=text))
+    notes = [Note(text=f"{title(row.requirement.name)}: {row.note}.") for row in rows if row.note]
+    return [Section(title="Against standards", blocks=[*blocks, Details(summary="Notes", blocks=notes)])]
 
 
 def _domain(run: Run, peaks: Sequence[PeakLoad]) -> list[Block]:
@@ -159,6 +160,8 @@ def _histories(run: Run, peaks: Sequence[PeakLoad]) -> list[Block]:
     mounts: list[Curve] = []
     for channel, parts, _ in load_channels(run.recording):
         s = series(channel)
+        if run.tests and not np.any(magnitude(run.recording, parts, None)):
+            continue  # on a test stand the ground need not touch a ROPS, nor a device push
         smooth = Curve(name=f"CFC {cfc}", x=time, y=s.factor * magnitude(run.recording, parts, cfc))
         if channel.startswith(("wheel/", "rops/mount/")):
             group = wheels if channel.startswith("wheel/") else mounts
@@ -194,7 +197,7 @@ def _raw(run: Run, parts: tuple[str, ...], factor: float) -> Curve:
 def _structure(run: Run, rows: Sequence[Criterion]) -> list[Block]:
     """Force and energy of the structure over its deflection, with the energies that are asked for; the zone."""
     blocks: list[Block] = []
-    if "rops/deflection" in run.recording.channels:
+    if "rops/deflection" in run.recording.channels and np.any(run.recording["rops/force"] > 0.0):
         deflection = 1e3 * np.abs(run.recording["rops/deflection"])
         force = Curve(name="raw", x=deflection, y=1e-3 * run.recording["rops/force"])
         energy = Curve(name="absorbed", x=deflection, y=1e-3 * run.recording["rops/energy"])

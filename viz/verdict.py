@@ -10,7 +10,9 @@ from typing import Protocol
 import numpy as np
 
 from ground.law import Domain
+from rollover.findings import findings
 from rollover.run import Run
+from rollover.stand import TiltTable
 from viz.entities import series, shown
 
 
@@ -84,6 +86,8 @@ def ranked(run: Run, peaks: Sequence[Peak]) -> tuple[Peak, ...]:
     """
     given = {p.channel for p in peaks}
     found = [*peaks, *(p for p in _of_channels(run) if not given or p.channel in {*_ALSO} - given)]
+    if run.tests:  # on a test stand the ground need not touch a ROPS, nor a device push
+        found = [p for p in found if p.raw]
     order = (
         "device/force",
         "rops/force",
@@ -187,8 +191,12 @@ def _headline(run: Run, found: Sequence[Peak]) -> list[str]:
         lines += ["What follows holds until then.", ""]
     if not found:
         return [*lines, "# No load was recorded", "", f"{run.scenario.title}.", ""]
-    first = found[0]
+    first, stand = found[0], findings(run.tests)
+    if stand is not None and isinstance(run.scenario.initiation, TiltTable):
+        return [*lines, f"# {stand.sentence}", ""]  # what turns there is the weight: no load answers the question
     lines += [f"# {title_of(first)}: {raw(first)}", ""]
+    if stand is not None:
+        lines += [f"{stand.sentence}.", ""]
     worth = []
     if known(first.filtered):
         worth.append(f"CFC {first.cfc}: **{filtered(first)}**")

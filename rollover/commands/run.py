@@ -5,14 +5,26 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rollover.commands.door import COMPILING, FAILED, AsJson, Force, Setting, answering, app, settings
+from rollover.commands.door import (
+    COMPILING,
+    FAILED,
+    THE_ANSWER_IS_NO,
+    AsJson,
+    Force,
+    Setting,
+    answering,
+    app,
+    settings,
+)
 
 if TYPE_CHECKING:
+    from rollover.criteria import Criterion
     from rollover.loads import PeakLoad
     from rollover.run import Run
     from rollover.scenario import Scenario
@@ -32,6 +44,9 @@ def run(
         int,
         typer.Option(help="Starts that nobody could tell apart, for mean and scatter of each load.", min=1, max=100),
     ] = 1,
+    require: Annotated[
+        bool, typer.Option("--require", help="Exit with 1 if a criterion of loads.standards is not met.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Simulate one scenario: results, peak loads and a recording to look at."""
@@ -55,23 +70,50 @@ def run(
     peaks = loads.peak_loads(done, again if again and again.status == "done" else None) if done.status == "done" else ()
     if peaks and ensemble > 1:
         peaks = _with_scatter(peaks, chosen, ensemble)
+    rows = _criteria(done, again)
     command = " ".join(["rollover", "run", scenario, *(f"--set {shlex.quote(s)}" for s in set_ or [])])
     answer = store.write(
         folder,
         done,
         peaks,
+        criteria=[asdict(row) for row in rows],
         half_step=again,
         picture=_picture(done, peaks),
-        page=lambda answer: _page(done, peaks, answer, command),
+        page=lambda answer: _page(done, peaks, answer, rows, command),
         force=force,
     )
     if as_json:
         print(json.dumps(answer, indent=2))
     else:
-        console.report(done, peaks, answer, str(folder))
+        console.report(done, peaks, rows, answer, str(folder))
     if done.status == "failed":
         console.say(f"{path}: the simulation failed: {done.sentence}")
         raise typer.Exit(FAILED)
+    if require:
+        _require(rows, str(path))
+
+
+def _criteria(done: Run, again: Run | None) -> tuple[Criterion, ...]:
+    from rollover.criteria import criteria, with_half_step
+
+    rows = criteria(done)
+    return with_half_step(rows, criteria(again)) if rows and again and again.status == "done" else rows
+
+
+def _require(rows: Sequence[Criterion], path: str) -> None:
+    """Say which verdicts are not met. Raises `typer.Exit`."""
+    from rollover import console
+
+    missed = [row for row in rows if row.verdict == "not met"]
+    for row in missed:
+        asked, simulated, _ = row.in_words
+        name = f"{row.requirement.standard}: {row.requirement.name}"
+        console.say(f"{path}: not met: {name}, got {simulated}; asked: {asked}. {row.note}")
+    if missed:
+        raise typer.Exit(THE_ANSWER_IS_NO)
+    count = sum(row.verdict == "met" for row in rows)
+    answer = f"all {count} verdicts are met" if count else "nothing to judge, no verdict was given"
+    console.say(f"{path}: {answer}.")
 
 
 def _simulated(scenario: Scenario, half_step: bool) -> tuple[Run, Run | None]:
@@ -99,11 +141,12 @@ def _with_scatter(peaks: Sequence[PeakLoad], scenario: Scenario, starts: int) ->
         return tuple(peaks)
 
 
-def _page(done: Run, peaks: Sequence[PeakLoad], answer: Mapping[str, Any], command: str) -> str:
-    from rollover.criteria import criteria
+def _page(
+    done: Run, peaks: Sequence[PeakLoad], answer: Mapping[str, Any], rows: Sequence[Criterion], command: str
+) -> str:
     from viz import report
 
-    return report.page(done, peaks, answer, rows=criteria(done), command=command)
+    return report.page(done, peaks, answer, rows=rows, command=command)
 
 
 def _picture(done: Run, peaks: Sequence[PeakLoad]) -> Callable[[Path], None] | None:

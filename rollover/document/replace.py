@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from rollover.document.check import check
-from rollover.document.include import expand
+from rollover.document.include import ENDINGS, expand
 from rollover.document.resolved import paths, to_mapping
 from rollover.document.slot import Slot, slot_of
 from rollover.document.tree import Node, Place, parse, planted
@@ -28,8 +28,8 @@ def replaced(thing: T, changes: Mapping[str, Any], origin: str = "replaced") -> 
     """
     place = Place(file=origin, line=None, folder=Path.cwd())
     tree = to_mapping(thing)
-    fresh: set[int] = set()
-    # a whole part before what is below it, and a kind before what belongs to it
+    fresh: dict[int, Any] = {}  # by id, and kept: an id may be given again to what comes later
+    # a whole part before what is below it, and a kind before what belongs to it, whatever the order of a mapping
     for path in sorted(changes, key=lambda p: (p.count("."), not p.endswith("kind"))):
         _put(thing, tree, path, changes[path], place, fresh)
     slot = slot_of(type(thing))
@@ -45,38 +45,72 @@ def parse_setting(text: str, origin: str = "--set") -> tuple[str, Node]:
     return path.strip(), parse(value, Place(file=origin, line=None, folder=Path.cwd()))
 
 
-def _put(thing: Any, tree: dict[str, Any], path: str, value: Any, place: Place, fresh: set[int]) -> None:
+def _put(thing: Any, tree: dict[str, Any], path: str, value: Any, place: Place, fresh: dict[int, Any]) -> None:
     *above, last = path.split(".")
     part: Any = tree
     slot: Slot | None = slot_of(type(thing))
-    for step in above:
+    for depth, step in enumerate(above, 1):
         if slot and slot.by_key and isinstance(part, dict):
-            fresh.add(id(part.setdefault(step, {})))  # an effect is switched on by naming one of its parameters
-        kind = part.get("kind") if isinstance(part, dict) else None
+            _freshen(part.setdefault(step, {}), fresh)  # an effect is switched on by naming one of its parameters
+        kind = _plain(part.get("kind")) if isinstance(part, dict) else None
         index = _index(part, step) if isinstance(part, list) else None
         slot = slot and (slot.child(step, kind) if index is None else slot.element(index))
+        key: Any = step if index is None else index
+        if (brought := _brought(part, key, slot, place, ".".join(above[:depth]))) is not None:
+            part[key] = brought
+            _freshen(brought, fresh)
         part = part.get(step) if isinstance(part, dict) else None if index is None else part[index]
         if not isinstance(part, (dict, list)):
             raise _unknown(thing, path, place)
     bare = _bare(value, path, place)
-    key: Any = _index(part, last) if isinstance(part, list) else last
+    key = _index(part, last) if isinstance(part, list) else last
     if isinstance(part, list):
         if key is None:
             raise _unknown(thing, path, place)
     elif last == "kind" and "kind" in part:
-        if part["kind"] != (bare.plain if isinstance(bare, Node) else bare):
+        if _plain(part["kind"]) != _plain(bare):
             part.clear()
-            fresh.add(id(part))
+            fresh[id(part)] = part
     elif last not in part and id(part) not in fresh and not (slot and slot.by_key):
         raise _unknown(thing, path, place)
     part[key] = bare
-    if isinstance(bare, dict):
-        fresh.add(id(bare))
+    _freshen(bare, fresh)
+
+
+def _brought(part: Any, key: Any, slot: Slot | None, place: Place, path: str) -> Any:
+    """What a file that another change put here holds, opened to be reached into; None where there is no such file."""
+    found = part.get(key) if isinstance(part, dict) else part[key] if isinstance(key, int) else None
+    if isinstance(found, str) and found.endswith(ENDINGS):
+        found = planted(found, place)
+    if not isinstance(found, Node) or slot is None or not slot.kinds:
+        return None
+    return _opened(expand(found, slot, (), path))
+
+
+def _opened(node: Node) -> Any:
+    """A tree whose mappings and lists can be changed; its leaves keep their places."""
+    if isinstance(node.value, Mapping):
+        return {key: _opened(child) for key, child in node.value.items()}
+    if isinstance(node.value, tuple):
+        return [_opened(child) for child in node.value]
+    return node
+
+
+def _plain(value: Any) -> Any:
+    return value.plain if isinstance(value, Node) else value
+
+
+def _freshen(value: Any, fresh: dict[int, Any]) -> None:
+    """Keys that it lacks may be set anywhere in what was just put in: it is checked as a whole in the end."""
+    if isinstance(value, (dict, list)):
+        fresh[id(value)] = value
+        for child in value.values() if isinstance(value, dict) else value:
+            _freshen(child, fresh)
 
 
 def _index(elements: list[Any], step: str) -> int | None:
     for i, element in enumerate(elements):
-        if isinstance(element, dict) and element.get("name") == step:
+        if isinstance(element, dict) and _plain(element.get("name")) == step:
             return i
     return int(step) if step.isdecimal() and int(step) < len(elements) else None
 

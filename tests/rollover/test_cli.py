@@ -10,6 +10,7 @@ import sys
 import time
 import types
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,8 @@ import viz
 from rollover import document, simulate, store
 from rollover.channels import CHANNELS
 from rollover.cli import app
+from rollover.criterion import Criterion, compared, judged
+from rollover.requirement import Requirement
 from rollover.scenario import Scenario, load
 from tests.rollover.example import TEXT, Peak, run_of
 
@@ -42,6 +45,8 @@ class Bench:
         self.sentence = ""
         self.finer_sentence = ""
         self.halves: list[bool] = []
+        self.rows: list[tuple[Criterion, ...]] = [()]
+        self.unconverged = ""
 
     def run(self, scenario: Scenario, *, progress: Callable[[float, float], None] | None = None) -> Any:
         self.asked.append(scenario)
@@ -62,16 +67,33 @@ def bench(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Bench:
     monkeypatch.setattr("ground.compiled.is_warm", lambda: True)
     loads, log = types.ModuleType("rollover.loads"), types.ModuleType("viz.log")
     loads.peak_loads = bench.peak_loads  # type: ignore[attr-defined]
+    loads.unconverged = lambda peaks: bench.unconverged  # type: ignore[attr-defined]
     log.write_rrd = lambda run, path, peaks: path.write_bytes(b"rrd")  # type: ignore[attr-defined]
     report = types.ModuleType("viz.report")
     report.page = lambda run, peaks, answer, rows, command: f"<p>{command}</p>"  # type: ignore[attr-defined]
     for module in (loads, log, report):
         monkeypatch.setitem(sys.modules, module.__name__, module)
     monkeypatch.setattr("rollover.loads", loads, raising=False)
-    monkeypatch.setattr("rollover.criteria.criteria", lambda run: ())
+    monkeypatch.setattr(
+        "rollover.criteria.criteria", lambda run: bench.rows.pop(0) if len(bench.rows) > 1 else bench.rows[0]
+    )
     monkeypatch.setattr(viz, "log", log, raising=False)
     monkeypatch.setattr(viz, "report", report, raising=False)
     return bench
+
+
+ASKED = Requirement(
+    standard="OECD Code 4 / ISO 5700",
+    name="side load",
+    formula="1.75 M",
+    clause="energy, load from the side",
+    quantity="energy",
+    unit="J",
+    value=5250.0,
+    bound="least",
+    source="the code",
+    confidence="seen",
+)
 
 
 # ---------------------------------------------------------------- run
@@ -88,6 +110,51 @@ def test_run_writes_results_and_prints_peaks(bench: Bench) -> None:
     assert "3.552" in done.stdout  # kN
     assert "calibrated domain: speed." in done.stdout
     assert f"Results: {folder}" in done.stdout
+
+
+def test_run_prints_and_keeps_what_it_is_held_against(bench: Bench) -> None:
+    bench.rows = [(judged(ASKED, 5512.5, "load 'side' reached"),), (judged(ASKED, 5501.475, ""),)]
+    done = rollover("run", "drop_test", "--require")
+    assert done.exit_code == 0, done.stderr
+    [line] = [line for line in done.stdout.splitlines() if "side load" in line]
+    for word in ("OECD Code 4", "at least 5.25 kJ", "5.513 kJ", "+5.0 %", "0.2 %", "met"):
+        assert word in line
+    assert "all 1 verdicts are met" in done.stderr
+    [row] = store.read_run_json(Path("out/run/drop_test"))["criteria"]
+    wanted = {"clause": "energy, load from the side", "source": "the code", "confidence": "seen", "value": 5250.0}
+    assert {key: row["requirement"][key] for key in wanted} == wanted
+    assert (row["simulated"], row["verdict"], row["note"]) == (5512.5, "met", "load 'side' reached")
+    assert row["margin"] == pytest.approx(0.05)
+    assert row["at_half_step"] == 5501.475
+
+
+def test_require_says_no_by_name(bench: Bench) -> None:
+    bench.rows = [(judged(ASKED, 4200.0, "given up"), compared(replace(ASKED, name="rear load"), 1.0, ""))]
+    assert rollover("run", "drop_test").exit_code == 0, "only where it is required"
+    done = rollover("run", "drop_test", "--require")
+    assert done.exit_code == 1
+    said = "not met: OECD Code 4 / ISO 5700: side load, got 4.2 kJ; asked: at least 5.25 kJ. given up\n"
+    assert done.stderr.endswith(said)
+    assert done.stderr.count("not met") == 1
+    assert store.read_run_json(Path("out/run/drop_test"))["criteria"][0]["verdict"] == "not met"
+    as_json = rollover("run", "drop_test", "--require", "--json")
+    assert as_json.exit_code == 1
+    assert json.loads(as_json.stdout)["criteria"][1]["verdict"] == "compared"
+    bench.sentence = "it blew up"
+    bench.asked.clear()
+    assert rollover("run", "drop_test", "--require").exit_code == 3, "a failed run is no answer"
+
+
+def test_require_where_nothing_is_judged_is_said(bench: Bench) -> None:
+    bench.rows = [(compared(ASKED, 1.0, ""),)]
+    done = rollover("run", "drop_test", "--require")
+    assert done.exit_code == 0
+    assert "nothing to judge" in done.stderr
+
+
+def test_a_run_that_is_not_converged_is_said(bench: Bench) -> None:
+    bench.unconverged = "not converged: half the step changes rops/force"
+    assert "Not converged: half the step changes rops/force." in rollover("run", "drop_test").stdout
 
 
 def test_run_as_json_prints_nothing_else(bench: Bench) -> None:

@@ -33,7 +33,30 @@ def test_energy_and_force_beside_the_static_test() -> None:
     assert rows["side load"].margin == pytest.approx(8000.0 / 5250.0 - 1.0)
     assert rows["crush, rear"].margin == pytest.approx(-0.75)
     assert rows["side load"].verdict == rows["crush, rear"].verdict == "compared"
-    assert rops_share(replace(run, released=16e3)) == pytest.approx(0.5)
+
+
+def test_share_of_the_rops_counts_from_its_landing() -> None:
+    """1 kJ was in the frame when it touched, 9 kJ at most: 8 of the 20 kJ that were kinetic then; not of the start."""
+    run = overturn()
+    n = run.recording.time.size
+    late = np.arange(n) >= n // 2
+    channels = {
+        "rops/force": 1e3 * late,
+        "rops/energy": np.where(late, 9e3, 0.0) - 8e3 * (np.arange(n) == n // 2),
+        "energy/kinetic": np.where(late, 20e3, 30e3),
+    }
+    run = replace(run, recording=replace(run.recording, channels={**run.recording.channels, **channels}))
+    assert rops_share(run) == pytest.approx(0.4)
+    [row] = [c for c in criteria(run) if c.requirement.name == "share of the ROPS"]
+    assert (row.verdict, row.simulated) == ("compared", pytest.approx(0.4))
+    assert row.margin == pytest.approx(0.4 / 0.43 - 1.0)
+    assert "16 % on natural clay, 25 % on ground" in row.note
+    channels["rops/force"] = np.zeros(n)
+    never = replace(run, recording=replace(run.recording, channels={**run.recording.channels, **channels}))
+    assert rops_share(never) is None
+    assert "share of the ROPS" not in {c.requirement.name for c in criteria(never)}
+    dropped = replace(run, scenario=shipped("tractor_drop_corner"))
+    assert "share of the ROPS" not in {c.requirement.name for c in criteria(dropped)}, "published of overturns"
 
 
 def test_zone_is_a_verdict() -> None:
@@ -58,7 +81,7 @@ def test_elastic_deflection_counts_against_what_was_left() -> None:
     n = run.recording.time.size
     way = np.zeros(n)
     way[n // 2] = 0.30
-    way[-1] = 0.10
+    way[run.recording.time >= run.recording.time[-1] - 0.25] = 0.10
     scenario = run.scenario.replaced({"loads.standards": ["code-3"]})
     recording = replace(run.recording, channels={**run.recording.channels, "rops/deflection": way})
     rows = {c.requirement.name: c for c in criteria(replace(run, scenario=scenario, recording=recording))}

@@ -603,3 +603,42 @@ def test_the_dump_is_plain_yaml_1_2() -> None:
     scenario = load("side_overturn")
     assert YAML(typ="safe", pure=True).load(dump(scenario)) == to_mapping(scenario)
     assert "inertia: [1300.0, 3000.0, 3300.0]\n" in dump(scenario)
+
+
+def test_a_change_reaches_into_what_another_one_brought() -> None:
+    """A file, and a file or a value below it: whatever the order, the whole comes before its parts."""
+    scenario = load("side_overturn")
+    whole = {"vehicle": "vehicles/compact_tractor.yaml"}
+    below = {"vehicle.rops": "vehicles/rops/two_post_rear_450.yaml", "vehicle.wheels.rear_left.tyre.friction": 0.3}
+    below["vehicle.rops.mounts.left.yield_force"] = [1.0, 2.0, 3.0]
+    found = scenario.replaced({**whole, **below})
+    assert found == scenario.replaced({**below, **whole})
+    assert found == scenario.replaced(whole).replaced(below)
+    assert isinstance(found.vehicle, Vehicle)
+    assert found.vehicle.rops is not None
+    assert found.vehicle.rops.mounts[0].yield_force == (1.0, 2.0, 3.0)
+    assert found.vehicle.wheels[2].tyre.friction == 0.3
+    assert found.vehicle.name == "Compact tractor 2 t, two-post rear ROPS"
+
+
+def test_a_key_that_the_brought_file_lacks_may_be_set_and_is_checked() -> None:
+    scenario = load("side_overturn")
+    law = {"ground.law": "soils/natural_clay_soft.yaml"}
+    assert scenario.replaced({**law, "ground.law.recovery": 0.02}).ground.law == Ye2006(
+        stiffness_scale=0.762, recovery=0.02
+    )
+    with pytest.raises(InputError, match=r"ground\.law\.recovry: unknown key"):
+        scenario.replaced({**law, "ground.law.recovry": 0.02})
+    with pytest.raises(InputError, match=r"vehicle: no such file, got 'vehicles/tractr\.yaml'"):
+        scenario.replaced({"vehicle": "vehicles/tractr.yaml", "vehicle.rops": None})
+    with pytest.raises(InputError, match=r"ground\.surface\.x\.y: no such path"):
+        scenario.replaced({"ground.surface": {"kind": "plane"}, "ground.surface.x.y": 1.0})
+
+
+def test_kind_and_value_of_what_the_command_line_brought() -> None:
+    """A mapping as text: its kind and what is below it can be set as well."""
+    scenario = load("side_overturn")
+    text = dict([document.parse_setting("ground.surface={kind: slope, angle_deg: 5}")])
+    assert scenario.replaced({**text, "ground.surface.angle_deg": 7.0}).ground.surface == Slope(angle_deg=7.0)
+    same = scenario.replaced({**text, "ground.surface.kind": "slope"})
+    assert same.ground.surface == Slope(angle_deg=5.0)

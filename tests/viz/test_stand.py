@@ -7,16 +7,25 @@ import functools
 import numpy as np
 import pytest
 
+from rollover.criteria import criteria
+from rollover.loads import peak_loads
 from rollover.run import Run
 from rollover.scenario import load
 from rollover.simulate import run
+from tests.viz.html import Parts
+from tests.viz.test_report import ANSWER
 from viz.log import write_rrd
+from viz.page import Figure
+from viz.report import headline, page
 from viz.scene import Block, extent, parts, rotation
+from viz.stand_view import stand_section
+from viz.verdict import verdict
 
 
 @functools.cache
 def made(name: str) -> Run:
-    return run(load(name).replaced({"simulation.duration": 0.5}))
+    duration = {"driven_pile": 1.7, "pendulum": 1.4}.get(name, 0.5)
+    return run(load(name).replaced({"simulation.duration": duration}))
 
 
 def test_beam_stands_at_the_rops_and_faces_it() -> None:
@@ -47,7 +56,53 @@ def test_weight_turns_on_a_tilt_table() -> None:
     assert np.degrees(np.arctan2(weight[1], -weight[2])) == pytest.approx(20.5, abs=0.02)
 
 
-@pytest.mark.parametrize("name", ["static_rops_test", "pendulum", "tilt_table", "vibrating_plate", "driven_pile"])
+STANDS = {
+    "static_rops_test": ("Test stand, force: at most 9.23 kN at 0.500 s", "0 of 1 loads that began"),
+    "pendulum": ("Test stand, force: at most 57.0 kN at 1.01", "The block struck at 3.35 m/s with 11.27 kJ"),
+    "tilt_table": ("Stood up to 20.50 deg", "Stood up to 20.50 deg"),
+    "vibrating_plate": ("Test stand, force: at most 12.0 kN at 0.2", "21 turns at 70 Hz with 11.99 kN"),
+    "driven_pile": ("Ground force: at most ", "3 blows drive it "),
+}
+
+
+@pytest.mark.parametrize("name", STANDS)
+def test_a_stand_is_told_by_what_it_found(name: str) -> None:
+    """On the page and in the picture: its own load first, its sentence and table, nothing of loads that never were."""
+    result, (first, sentence) = made(name), STANDS[name]
+    peaks, rows = peak_loads(result), criteria(result)
+    head = headline(result, peaks, rows)
+    assert head.sentence.startswith(first)
+    text = page(result, peaks, ANSWER, rows=rows)
+    said = Parts(text).said
+    assert sentence in said
+    assert "Test stand" in said
+    assert "ROPS force" not in said
+    assert "Histories" in said
+    picture = verdict(result, peaks)
+    assert picture.startswith("# " + first.replace("at most ", ""))
+    assert sentence in picture
+    assert "none" not in picture
+    for row in rows:
+        assert f"{row.requirement.standard}: {row.requirement.name}" in said
+
+
+def test_energy_of_a_static_test_stands_beside_what_is_asked() -> None:
+    result = made("static_rops_test")
+    figures = [b for b in stand_section(result, criteria(result))[0].blocks if isinstance(b, Figure)]
+    assert len(figures) == 2
+    assert "OECD Code 4 / ISO 5700: longitudinal load, rear" in figures[1].svg
+    assert "rear" in figures[0].svg
+    assert "dashed" in figures[1].caption
+
+
+def test_what_drives_a_striker_is_a_phase() -> None:
+    assert made("driven_pile").phases[-1] == (0.8, "driven")
+    assert made("vibrating_plate").phases[-1] == (0.2, "driven")
+    assert "rest" in {name for _, name in made("driven_pile").phases[:-1]}, "before the first blow it rests"
+    assert made("tilt_table").phases == ((0.0, "support"),)
+
+
+@pytest.mark.parametrize("name", STANDS)
 def test_recordings_are_written(name: str, tmp_path) -> None:  # type: ignore[no-untyped-def]
     write_rrd(made(name), tmp_path / "a.rrd")
     assert (tmp_path / "a.rrd").stat().st_size > 10_000
