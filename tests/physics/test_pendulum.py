@@ -102,6 +102,13 @@ def test_energy_of_the_block_goes_where_the_report_says() -> None:
     assert found["block_energy_after"] < 0.6 * found["block_energy"]
 
 
+def test_the_block_is_caught_after_its_blow() -> None:
+    """It swings back after a pendulum's period of 3.8 s and does not strike twice: 0.1 s apart ends the test."""
+    found = side().tests[0]
+    assert found["status"] == "done"
+    assert found["contact_ended_at"] < side().stop_time - 0.2
+
+
 def test_lashings_hold_one_way() -> None:
     """Ropes pull and never push: without them and the strut the tractor is shoved further."""
     held = side().recording["chassis/position_y"]

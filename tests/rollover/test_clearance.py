@@ -116,3 +116,19 @@ def hull_slope(vehicle: Vehicle) -> float:
     top, front = np.array([-0.10, 2.50]), np.array([2.70, 1.45])  # crossbar's top (x, z), bonnet
     e = (front - top) / np.hypot(*(front - top))
     return float(e[0])
+
+
+def test_the_upper_part_of_a_folding_structure_counts() -> None:
+    """Its upper part alone, moved 0.6 m ahead and 0.5 m down, stands beside the operator; the lower one stays away."""
+    run, late = moved(0.0)
+    scenario = run.scenario.replaced({"vehicle": "vehicles/compact_tractor_folding.yaml"})
+    rest = run.pose["chassis"]
+    ahead = Motion(origin=rest.origin + np.outer(late, [0.6, 0.0, -0.5]), quaternion=rest.quaternion)
+    still = replace(run, scenario=scenario, pose={"chassis": rest, "rops": rest, "rops_upper": rest})
+    assert approaches(still)[0].least > 0.0
+    folded = approaches(replace(still, pose={**still.pose, "rops_upper": ahead}))[0]
+    assert folded.least < 0.0
+    assert isinstance(scenario.vehicle, Vehicle)
+    assert scenario.vehicle.rops is not None
+    assert folded.nearest in {member.name for member in scenario.vehicle.rops.parts["rops_upper"][1]}
+    assert folded.first_intrusion == run.recording.time[np.argmax(late)]
