@@ -61,7 +61,7 @@ def _load(run: Run, load: StaticLoad, entry: Mapping[str, Any], requirement: Req
     if "deflection" in entry:
         note += f" at {1e3 * entry['deflection']:.0f} mm and {1e-3 * entry['force']:.1f} kN"
     if "permanent_set" in entry:
-        note += f", {1e3 * entry['permanent_set']:.0f} mm left"
+        note += f", {round(1e3 * entry['permanent_set']) + 0:d} mm left"
     if requirement.quantity == "force" and done:
         assert isinstance(run.scenario.initiation, StaticTest)
         note += f"; held {run.scenario.initiation.hold:g} s after the deflection stopped, the test holds {HELD:g} s"
