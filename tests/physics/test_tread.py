@@ -10,7 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from ground.surface import Bank, Heightmap, Kerb, Ramp, Slope, Sum, Surface
-from rollover.contact import bodies_of, tables_of
+from rollover.bodies import bodies_of
+from rollover.contact import tables_of
 from rollover.forces import read_poses, try_wheels
 from rollover.frames import from_angles, matrices, rotation_vector
 from rollover.tables import E_DAMPING_NOW, E_DEPTH_NOW, E_ENERGY_NOW, E_FORCE_NOW, handle

@@ -12,6 +12,7 @@ from scipy.integrate import quad
 from rollover.run import Run
 from rollover.scenario import Scenario
 from rollover.simulate import run
+from tests.physics.regime import climbing, direction
 from tests.physics.scenes import shipped
 
 G = 9.81
@@ -160,3 +161,11 @@ def test_rear_overturn_against_the_rigid_tractor() -> None:
 def test_scenarios_overturn_and_their_ledger_closes(name: str, roll: float) -> None:
     result = done(run(shipped(name)))
     assert np.degrees(np.abs(result.recording["chassis/roll"]).max()) > roll
+
+
+def test_a_slope_across_turns_a_rear_overturn_to_the_side() -> None:
+    """Straight backward on level ground; nearly so, but to the side that lies lower, where it climbs obliquely."""
+    level, slight, steep = (direction(climbing(angle)) for angle in (0.0, 10.0, 30.0))
+    assert level is not None and slight is not None and steep is not None
+    assert level < 0.1
+    assert 0.3 < slight < 0.5 * steep < 22.0
