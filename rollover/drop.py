@@ -19,7 +19,7 @@ from ground.law import HIDDEN, REFERENCE_AREA, REFERENCE_MASS
 from ground.settings import settings
 from ground.surface import normal
 from rollover import fall
-from rollover.contact import nose_share
+from rollover.bodies import nose_share
 from rollover.document import exchanged
 from rollover.effects import acting, read
 from rollover.initiation import Drop

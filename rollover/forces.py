@@ -64,7 +64,7 @@ from rollover.tables import (
     Z,
 )
 from rollover.terms import try_terms
-from rollover.tread import C_AROUND, C_CAMBER, C_COSINE, C_DEPTH, C_FORCE, C_NORMAL, CUTS, closing_rate, cut, press
+from rollover.tread import C_DEPTH, C_LEAN, C_NORMAL, CUTS, closing_rate, cut, press, pressing
 from rollover.vectors import (
     add_force,
     centripetal_depth,
@@ -200,7 +200,7 @@ def try_wheels(t: Any, Q: Any) -> None:
         for k in range(3):
             g[E_MOVED + k] = held[k] - g[E_PLACE + k]
         if uneven:
-            depth = found[C_DEPTH] * found[C_COSINE]
+            depth = found[C_DEPTH]
         g[E_DEPTH_NOW], g[E_FORCE_NOW], g[E_DAMPING_NOW], g[E_ENERGY_NOW] = depth, 0.0, 0.0, 0.0
         if depth <= 0.0:
             continue
@@ -208,7 +208,7 @@ def try_wheels(t: Any, Q: Any) -> None:
         rate, camber = -(n[0] * v[0] + n[1] * v[1] + n[2] * v[2]), lean
         if uneven:
             rate = closing_rate(row, c, e, found)
-            camber = found[C_CAMBER]
+            camber = found[C_LEAN]
         v = velocity(row, hold[0], hold[1], hold[2])
         if spinning:
             vx, vy, vz = to_world(row, turning[0], turning[1], turning[2])
@@ -222,10 +222,11 @@ def try_wheels(t: Any, Q: Any) -> None:
             energy += 0.5 * fade * c[W_KB] * beyond * beyond
         damping = max(c[W_C] * stiffness / c[W_KZ] * rate, -spring)  # never a pull
         force = spring + damping
-        moment = -slope * lean * depth * depth - fall * c[W_KB] * lean * beyond * beyond
+        # the stiffness falls with camber: -dU/d(lean), the moment that keeps the spring conservative
+        moment = -slope * camber * depth * depth - fall * c[W_KB] * camber * beyond * beyond
         if uneven:
-            moment = press(t, w, force, slope + fall * c[W_KB] * (beyond / depth) ** 2, found, Q)
-            force *= math.sqrt(found[C_FORCE] ** 2 + found[C_FORCE + 1] ** 2 + found[C_FORCE + 2] ** 2)
+            press(t, w, e, force, moment, found, Q)
+            force *= pressing(found)
         g[E_FORCE_NOW], g[E_DAMPING_NOW], g[E_ENERGY_NOW] = force, damping, energy
         stick = max(c[W_MU] * force / c[W_KY], 1e-9)
         slip = (g[E_MOVED], g[E_MOVED + 1], g[E_MOVED + 2])
@@ -241,14 +242,12 @@ def try_wheels(t: Any, Q: Any) -> None:
         if spinning:
             turn_by_friction(t, w, hold, f, Q)
         add_force(row, b, hold, f[0], f[1], f[2], Q)  # friction holds the tread where it took hold of it
-        # the stiffness falls with camber: the moment that goes with it keeps the spring conservative
-        if uneven:
-            n = found[C_AROUND : C_AROUND + 3]
-        ex, ey, ez = cross(e[0], e[1], e[2], n[0], n[1], n[2])
-        ex, ey, ez = to_body(row, moment * ex, moment * ey, moment * ez)
-        Q[6 * b + 3] += ex
-        Q[6 * b + 4] += ey
-        Q[6 * b + 5] += ez
+        if not uneven:
+            ex, ey, ez = cross(e[0], e[1], e[2], n[0], n[1], n[2])
+            ex, ey, ez = to_body(row, moment * ex, moment * ey, moment * ez)
+            Q[6 * b + 3] += ex
+            Q[6 * b + 4] += ey
+            Q[6 * b + 5] += ez
 
 
 @compiled

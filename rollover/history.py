@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ground.compiled import compiled
 from ground.kernel import AREA, CELL, LINE_Z, SINKAGE
 from rollover import tables as c
-from rollover.contact import Body
+from rollover.bodies import Body
 from rollover.frames import angles, matrices, quaternions
 from rollover.rops import Rops
 from rollover.scenario import Scenario

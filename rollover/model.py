@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from rollover.contact import Body
+from rollover.bodies import Body
 from rollover.forces import added_mass, generalised_forces
 from rollover.frames import matrices
 from rollover.jacobian import stiffness

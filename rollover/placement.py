@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ground.relief import element_plane
 from ground.surface import Surface, height, is_flat
-from rollover.contact import Body
+from rollover.bodies import Body
 from rollover.equilibrium import ROLL, Equilibrium, tread_point
 from rollover.fall import fall_back
 from rollover.faults import Fault, InputError

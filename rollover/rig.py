@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover import devices as d
-from rollover.contact import Body, bodies_of, tables_of
+from rollover.bodies import Body, bodies_of
+from rollover.contact import tables_of
 from rollover.equilibrium import Equilibrium
 from rollover.faults import Fault, InputError
 from rollover.frames import matrices

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from ground.compiled import mark_warm
 from rollover import history, model
 from rollover import tables as c
-from rollover.contact import Body, grown
+from rollover.bodies import Body
+from rollover.contact import grown
 from rollover.control import Control, control_of
 from rollover.effects import read
 from rollover.forces import generalised_forces

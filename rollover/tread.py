@@ -6,6 +6,14 @@ is the chord from where the ground enters the disc to where it leaves it, whatev
 from the moment that its edge meets the tread, and its force leans back. Being the gradient of k d^2/2, it gives back
 what it took.
 
+How far the ground stands in the disc is told by how high it stands over the tread, brought into the disc's plane with
+the slope around the wheel:
+
+    L = (h(x, y) - z) / (sqrt(1 + |g|^2) cos(camber)),   g that slope, (x, y, z) on the tread,
+
+which is exact on a plane, and for an upright disc at a step. Nothing has to be searched for, so that a disc that lies
+against a steep face has one depth and no other; there the side wall bears, on the elements.
+
 The disc is the deepest of `SLICES` across the crowned tread, the maximum rounded by `SOFT`, which is also how far the
 depth may differ from the plane's own law there. Limits: the profile is sampled at `NODES` places over the diameter; no
 rim, no separate stiffness for a tread that wraps around an edge; the camber in the stiffness is that against the ground
@@ -30,16 +38,18 @@ from rollover.tables import (
 )
 from rollover.vectors import add_force, cross, place, spin, to_body, to_world, velocity
 
-NODES = 25
+NODES = 49
 SLICES = 5
 SOFT = 0.001  # m: slices whose depths differ by less share the force
 FAR = 0.2  # share of the radius: ground further below the tread is not looked at closely
 
-# places in what `cut` finds: depth d in the disc's plane, cos of the camber (its sine is at the end); force and moment
-# about the wheel's centre for a unit of force on the depth d cos; normal of the ground
-C_DEPTH, C_COSINE, C_FORCE, C_MOMENT, C_NORMAL, C_CAMBER = 0, 1, 2, 5, 8, 11
-# change of the camber's sine as the hub moves along x and y; normal that the camber is measured against
-C_BY_X, C_BY_Y, C_AROUND, CUTS = 12, 13, 14, 17
+# places in what `cut` finds: depth, across the ground around the wheel, and its change with the hub's place and with
+# the axle's direction; sine of the camber and its change with the hub's x and y; normal of the ground around the wheel,
+# which is also the camber's change with the axle's direction; normal of the ground that the tyre presses on
+C_DEPTH, C_BY_HUB, C_BY_AXLE, C_LEAN, C_LEAN_X, C_LEAN_Y, C_AROUND, C_NORMAL, CUTS = 0, 1, 4, 7, 8, 9, 10, 13, 16
+# places in what `slice_through` finds: depth in the disc's plane; its change with the ground's height as sums over the
+# tread of the direction (h_x, h_y, -1), of that times the place forward, times the place up, and of the height itself
+S_DEPTH, S_PLACE, S_FORWARD, S_UP, S_HEIGHT, SLICED = 0, 1, 4, 7, 10, 11
 
 
 @compiled
@@ -88,58 +98,41 @@ def depth_of(R: float, area: float) -> Any:
 
 
 @compiled
-def lean_on(t: Any, hub: Any, e: Any, reach: float, found: Any) -> None:
-    """Sine of the camber against the ground around the wheel, and how it changes as the hub moves along x and y.
+def slope_around(t: Any, hub: Any, reach: float, g: Any) -> None:
+    """The ground's slope around the wheel (2,) and its change with the hub's x, then y, into `g` (6,).
 
-    The ground's slope is that of chords of the wheel's diameter through the hub, so that it does not jump at an edge.
+    That of chords of the wheel's diameter through the hub, so that it does not jump at an edge.
     """
     x, y = hub[0], hub[1]
     a, ax, ay = height_and_gradient(t.relief, t.nodes, x + reach, y)
     b, bx, by = height_and_gradient(t.relief, t.nodes, x - reach, y)
     c, cx, cy = height_and_gradient(t.relief, t.nodes, x, y + reach)
     d, dx, dy = height_and_gradient(t.relief, t.nodes, x, y - reach)
-    gx, gy = 0.5 * (a - b) / reach, 0.5 * (c - d) / reach
-    size = math.sqrt(1.0 + gx * gx + gy * gy)
-    n = (-gx / size, -gy / size, 1.0 / size)
-    lean = n[0] * e[0] + n[1] * e[1] + n[2] * e[2]
-    by_gx, by_gy = -e[0] / size - lean * gx / (size * size), -e[1] / size - lean * gy / (size * size)
-    found[C_CAMBER], found[C_COSINE] = lean, math.sqrt(max(1.0 - lean * lean, 1e-12))
-    found[C_BY_X] = 0.5 * (by_gx * (ax - bx) + by_gy * (cx - dx)) / reach
-    found[C_BY_Y] = 0.5 * (by_gx * (ay - by) + by_gy * (cy - dy)) / reach
-    for k in range(3):
-        found[C_AROUND + k] = n[k]
+    g[0], g[1] = 0.5 * (a - b) / reach, 0.5 * (c - d) / reach
+    g[2], g[3] = 0.5 * (ax - bx) / reach, 0.5 * (cx - dx) / reach
+    g[4], g[5] = 0.5 * (ay - by) / reach, 0.5 * (cy - dy) / reach
 
 
 @compiled
-def slice_through(t: Any, hub: Any, centre: Any, e: Any, R: float, at: Any, weight: Any, one: Any) -> None:
-    """Depth of one disc across the axle e, its gradient and its moment about the hub, into `one` (7,).
+def slice_through(
+    t: Any, centre: Any, forward: Any, up: Any, R: float, flat: float, at: Any, weight: Any, one: Any
+) -> None:
+    """Depth of one disc and what changes it, into `one` (SLICED,); `flat` turns heights into lengths up the disc.
 
-    Where the ground does not reach the disc, the (negative) depth of what comes nearest to it.
+    The disc's plane is spanned by `forward` and `up`. Where the ground does not reach the disc, the (negative)
+    depth of what comes nearest to it.
     """
-    upright = math.sqrt(1.0 - e[2] * e[2])
-    # forward, level; and up within the disc's plane
-    fx, fy = e[1] / upright, -e[0] / upright
-    wx, wy, wz = fy * e[2], -fx * e[2], upright
-    x0, y0, z0 = centre
     nearest, best = -1e30, 0
     for i in range(NODES):
         s = R * (2.0 * i / (NODES - 1) - 1.0)
         arc = math.sqrt(max(R * R - s * s, 0.0))
-        r, gx, gy, q = -arc, 0.0, 0.0, 1.0
-        for _ in range(8):
-            px, py, pz = x0 + s * fx + r * wx, y0 + s * fy + r * wy, z0 + r * wz
-            z, gx, gy = height_and_gradient(t.relief, t.nodes, px, py)
-            q = max(wz - gx * wx - gy * wy, 0.1)
-            r += (z - pz) / q
-            if abs(e[2]) < 1e-9 or abs(z - pz) < 1e-11 or r < -arc - FAR * R:
-                break
         p = at[i]
-        p[0], p[1], p[7] = s, r, 1.0 / q
-        p[2], p[3], p[4] = x0 + s * fx + r * wx, y0 + s * fy + r * wy, z0 + r * wz
-        p[5], p[6] = gx / q, gy / q
-        weight[i] = 0.0
-        if r + arc > nearest:
-            nearest, best = r + arc, i
+        x, y = centre[0] + s * forward[0] - arc * up[0], centre[1] + s * forward[1] - arc * up[1]
+        z, p[2], p[3] = height_and_gradient(t.relief, t.nodes, x, y)
+        p[4] = z - centre[2] - s * forward[2] + arc * up[2]
+        p[0], p[1], weight[i] = s, p[4] * flat - arc, 0.0
+        if p[4] > nearest:
+            nearest, best = p[4], i
     area = 0.0
     for i in range(NODES - 1):
         more, left, right = stretch(R, at[i, 0], at[i + 1, 0], at[i, 1], at[i + 1, 1])
@@ -147,64 +140,103 @@ def slice_through(t: Any, hub: Any, centre: Any, e: Any, R: float, at: Any, weig
         weight[i] += left
         weight[i + 1] += right
     one[:] = 0.0
-    one[0], factor = min(nearest, 0.0), 1.0
+    one[S_DEPTH], factor = min(nearest, 0.0) * flat, flat
     if area > 1e-14:
-        one[0], chord = depth_of(R, area)
-        factor = 1.0 / chord
+        one[S_DEPTH], chord = depth_of(R, area)
+        factor = flat / chord
     else:
         weight[:] = 0.0
         weight[best] = 1.0
     for i in range(NODES):
         if weight[i] > 0.0:
             p, by = at[i], factor * weight[i]
-            a, b, c = -by * p[5], -by * p[6], by * p[7]
-            u, v, w = cross(p[2] - hub[0], p[3] - hub[1], p[4] - hub[2], a, b, c)
-            one[1], one[2], one[3] = one[1] + a, one[2] + b, one[3] + c
-            one[4], one[5], one[6] = one[4] + u, one[5] + v, one[6] + w
-    # the wheel's own turning moves no sample; yet these stay level, so that they turn about the axle as the wheel leans
-    about = e[0] * one[4] + e[1] * one[5] + e[2] * one[6]
-    lift = about * e[2] / upright
-    one[4] += lift * wx - about * e[0]
-    one[5] += lift * wy - about * e[1]
-    one[6] += lift * wz - about * e[2]
+            arc = math.sqrt(max(R * R - p[0] * p[0], 0.0))
+            for k in range(3):
+                way = -by if k == 2 else by * p[2 + k]
+                one[S_PLACE + k] += way
+                one[S_FORWARD + k] += p[0] * way
+                one[S_UP + k] -= arc * way
+            one[S_HEIGHT] += by * p[4]
 
 
 @compiled
 def cut(t: Any, row: Any, wheel: Any, found: Any) -> None:
     """What the ground cuts off a tyre, into `found` (CUTS,): the deepest of its slices, softly."""
-    e = to_world(row, wheel[W_AXIS], wheel[W_AXIS + 1], wheel[W_AXIS + 2])
     hub = place(row, wheel[W_CENTRE], wheel[W_CENTRE + 1], wheel[W_CENTRE + 2])
+    e, n, forward, up = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    e[0], e[1], e[2] = to_world(row, wheel[W_AXIS], wheel[W_AXIS + 1], wheel[W_AXIS + 2])
+    g = np.empty(6)
+    slope_around(t, hub, wheel[W_RADIUS], g)
+    size = math.sqrt(1.0 + g[0] * g[0] + g[1] * g[1])
+    n[0], n[1], n[2] = -g[0] / size, -g[1] / size, 1.0 / size
+    lean = n[0] * e[0] + n[1] * e[1] + n[2] * e[2]
+    cosine = math.sqrt(max(1.0 - lean * lean, 1e-12))
     found[:] = 0.0
-    lean_on(t, hub, e, wheel[W_RADIUS], found)
-    for k in range(3):
-        found[C_NORMAL + k] = found[C_AROUND + k]
-    upright = math.sqrt(max(1.0 - e[2] * e[2], 0.0))
-    low = hub[2] - wheel[W_RADIUS] * upright - wheel[W_HALF] * abs(e[2])
+    found[C_LEAN] = lean
+    lean_by_g = -e[0] / size - lean * g[0] / (size * size), -e[1] / size - lean * g[1] / (size * size)
+    found[C_LEAN_X] = lean_by_g[0] * g[2] + lean_by_g[1] * g[3]
+    found[C_LEAN_Y] = lean_by_g[0] * g[4] + lean_by_g[1] * g[5]
+    found[C_AROUND : C_AROUND + 3] = n
+    found[C_NORMAL : C_NORMAL + 3] = n
+    low = hub[2] - wheel[W_RADIUS] * math.sqrt(max(1.0 - e[2] * e[2], 0.0)) - wheel[W_HALF] * abs(e[2])
     gap = highest(t.relief, t.nodes, hub[0], hub[1], wheel[W_RADIUS] + wheel[W_HALF]) - low
-    if gap < -FAR * wheel[W_RADIUS] or upright < 0.05:
-        found[C_DEPTH] = min(gap, -FAR * wheel[W_RADIUS])
+    if gap < -FAR * wheel[W_RADIUS]:
+        found[C_DEPTH] = gap
         return
-    at, weight, slices = np.empty((NODES, 8)), np.empty(NODES), np.empty((SLICES, 7))
+    forward[0], forward[1], forward[2] = cross(e[0], e[1], e[2], n[0], n[1], n[2])
+    for k in range(3):
+        forward[k] /= cosine
+        up[k] = (n[k] - lean * e[k]) / cosine
+    at, weight, slices = np.empty((NODES, 5)), np.empty(NODES), np.empty((SLICES, SLICED))
     deepest = -1e30
     for j in range(SLICES):
         share = 2.0 * j / (SLICES - 1) - 1.0
         y = share * wheel[W_HALF]
         R = wheel[W_RADIUS] - max(wheel[W_CROWN], 1e-6) * share * share
         centre = (hub[0] + y * e[0], hub[1] + y * e[1], hub[2] + y * e[2])
-        slice_through(t, hub, centre, e, R, at, weight, slices[j])
-        deepest = max(deepest, slices[j, 0])
+        slice_through(t, centre, forward, up, R, 1.0 / (size * cosine), at, weight, slices[j])
+        deepest = max(deepest, slices[j, S_DEPTH])
     total = 0.0
     for j in range(SLICES):
-        total += math.exp((slices[j, 0] - deepest) / SOFT)
-    found[C_DEPTH] = deepest + SOFT * math.log(total)
+        total += math.exp((slices[j, S_DEPTH] - deepest) / SOFT)
+    depth = deepest + SOFT * math.log(total)
+    found[C_DEPTH] = depth * cosine
+    # d(depth cos) by chains: places P = hub + y e + s forward - arc up; heights by 1/(size cos)
+    whole, by_e = np.zeros(SLICED), np.zeros(3)
     for j in range(SLICES):
-        part = found[C_COSINE] * math.exp((slices[j, 0] - deepest) / SOFT) / total
+        part = cosine * math.exp((slices[j, S_DEPTH] - deepest) / SOFT) / total
+        y = (2.0 * j / (SLICES - 1) - 1.0) * wheel[W_HALF]
+        for k in range(SLICED):
+            whole[k] += part * slices[j, k]
         for k in range(3):
-            found[C_FORCE + k] += part * slices[j, 1 + k]
-            found[C_MOMENT + k] += part * slices[j, 4 + k]
-    size = math.sqrt(found[C_FORCE] ** 2 + found[C_FORCE + 1] ** 2 + found[C_FORCE + 2] ** 2)
+            by_e[k] += part * y * slices[j, S_PLACE + k]
+    a, b = whole[S_FORWARD : S_FORWARD + 3], whole[S_UP : S_UP + 3]
+    by_lean, by_cosine = 0.0, depth - whole[S_HEIGHT] / cosine
     for k in range(3):
-        found[C_NORMAL + k] = found[C_FORCE + k] / size
+        by_lean -= b[k] * e[k] / cosine
+        by_cosine -= (a[k] * forward[k] + b[k] * up[k]) / cosine
+    by_lean -= by_cosine * lean / cosine
+    from_a, into_n = cross(n[0], n[1], n[2], a[0], a[1], a[2]), cross(a[0], a[1], a[2], e[0], e[1], e[2])
+    along, by_n = 0.0, np.empty(3)
+    for k in range(3):
+        found[C_BY_AXLE + k] = by_e[k] + (from_a[k] - lean * b[k]) / cosine + by_lean * n[k]
+        by_n[k] = (into_n[k] + b[k]) / cosine + by_lean * e[k]
+        along += by_n[k] * n[k]
+    by_size = -whole[S_HEIGHT] / size
+    by_gx = (by_size - along / size) * g[0] / size - by_n[0] / size
+    by_gy = (by_size - along / size) * g[1] / size - by_n[1] / size
+    found[C_BY_HUB] = whole[S_PLACE] + by_gx * g[2] + by_gy * g[3]
+    found[C_BY_HUB + 1] = whole[S_PLACE + 1] + by_gx * g[4] + by_gy * g[5]
+    found[C_BY_HUB + 2] = whole[S_PLACE + 2]
+    strength = pressing(found)
+    for k in range(3):
+        found[C_NORMAL + k] = -found[C_BY_HUB + k] / strength
+
+
+@compiled
+def pressing(found: Any) -> float:
+    """Force on the hub for a unit of force on the depth."""
+    return math.sqrt(found[C_BY_HUB] ** 2 + found[C_BY_HUB + 1] ** 2 + found[C_BY_HUB + 2] ** 2)
 
 
 @compiled
@@ -212,32 +244,26 @@ def closing_rate(row: Any, c: Any, e: Any, found: Any) -> float:
     """Rate of the depth on uneven ground, m/s; e is the axle."""
     v = velocity(row, c[W_CENTRE], c[W_CENTRE + 1], c[W_CENTRE + 2])
     o = spin(row)
+    turning = cross(o[0], o[1], o[2], e[0], e[1], e[2])
     rate = 0.0
     for k in range(3):
-        rate -= found[C_FORCE + k] * v[k] + found[C_MOMENT + k] * o[k]
-    x, y, z = cross(o[0], o[1], o[2], e[0], e[1], e[2])
-    leaning = found[C_AROUND] * x + found[C_AROUND + 1] * y + found[C_AROUND + 2] * z
-    leaning += found[C_BY_X] * v[0] + found[C_BY_Y] * v[1]
-    return rate - found[C_DEPTH] * found[C_CAMBER] / found[C_COSINE] * leaning  # type: ignore[no-any-return]
+        rate += found[C_BY_HUB + k] * v[k] + found[C_BY_AXLE + k] * turning[k]
+    return rate
 
 
 @compiled
-def press(t: Any, w: int, force: float, slope: float, found: Any, Q: Any) -> float:
-    """Normal force of uneven ground on a tyre, into Q; returns the moment that its camber adds.
-
-    U = k d^2/2 (1 - lean^2) with d the cut's own depth: what the second factor takes away is a moment too.
-    """
+def press(t: Any, w: int, e: Any, force: float, moment: float, found: Any, Q: Any) -> None:
+    """Force and moment of uneven ground on a tyre, into Q: those of -dU = -force d(depth) + moment d(lean)."""
     b = t.wheel_i[w]
     row = t.pose[b]
-    x, y, z = force * found[C_FORCE], force * found[C_FORCE + 1], force * found[C_FORCE + 2]
-    d, lean = found[C_DEPTH], found[C_CAMBER]
-    moment = lean * d * (force / found[C_COSINE] - slope * d * (1.0 - lean * lean))
-    # the camber changes with the place as well as with the axle's direction
-    x, y = x + moment * found[C_BY_X], y + moment * found[C_BY_Y]
-    add_force(row, b, t.wheel_f[w, W_CENTRE : W_CENTRE + 3], x, y, z, Q)
-    x, y, z = force * found[C_MOMENT], force * found[C_MOMENT + 1], force * found[C_MOMENT + 2]
+    x = -force * found[C_BY_HUB] + moment * found[C_LEAN_X]
+    y = -force * found[C_BY_HUB + 1] + moment * found[C_LEAN_Y]
+    add_force(row, b, t.wheel_f[w, W_CENTRE : W_CENTRE + 3], x, y, -force * found[C_BY_HUB + 2], Q)
+    a = np.empty(3)
+    for k in range(3):
+        a[k] = -force * found[C_BY_AXLE + k] + moment * found[C_AROUND + k]
+    x, y, z = cross(e[0], e[1], e[2], a[0], a[1], a[2])
     x, y, z = to_body(row, x, y, z)
     Q[6 * b + 3] += x
     Q[6 * b + 4] += y
     Q[6 * b + 5] += z
-    return moment  # type: ignore[no-any-return]

@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.contact import Body
+from rollover.bodies import Body
 from rollover.frames import matrices
 from rollover.placement import Start
 from rollover.scenario import Scenario

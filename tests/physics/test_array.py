@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from ground.kernel import COLUMNS
-from rollover.contact import bodies_of, tables_of
+from rollover.bodies import bodies_of
+from rollover.contact import tables_of
 from rollover.initiation import Drop
 from rollover.loads import peak_loads
 from rollover.run import Run

@@ -7,8 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
+from rollover.bodies import bodies_of
 from rollover.clearance import protected_margin
-from rollover.contact import bodies_of, tables_of
+from rollover.contact import tables_of
 from rollover.criteria import LIGHT_SHARES, rops_share
 from rollover.forces import generalised_forces
 from rollover.frames import from_angles, rotation_vector

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rollover.contact import bodies_of, tables_of
+from rollover.bodies import bodies_of
+from rollover.contact import tables_of
 from rollover.forces import generalised_forces
 from rollover.frames import from_angles, rotation_vector
 from rollover.impact import constraints

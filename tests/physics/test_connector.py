@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from scipy.optimize import fsolve
 
 from rollover import document
+from rollover.bodies import bodies_of
 from rollover.connector import Connector, RateFactor
 from rollover.connectors import try_axis
-from rollover.contact import bodies_of, tables_of
+from rollover.contact import tables_of
 from rollover.forces import generalised_forces
 from rollover.frames import from_angles, rotation_vector
 from rollover.rops import Rops

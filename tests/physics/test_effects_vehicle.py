@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.contact import bodies_of, tables_of
+from rollover.bodies import bodies_of
+from rollover.contact import tables_of
 from rollover.forces import generalised_forces
 from rollover.initiation import Drop
 from rollover.run import Run

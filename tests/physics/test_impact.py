@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from ground.kernel import BODY, MASS_B, NORMAL, OWNER_R
-from rollover.contact import bodies_of, tables_of
+from rollover.bodies import bodies_of
+from rollover.contact import tables_of
 from rollover.forces import generalised_forces
 from rollover.frames import from_angles, rotation_vector
 from rollover.initiation import Drop

@@ -12,7 +12,8 @@ from ground.array import CoMovingMass, Elements
 from ground.friction import Coulomb
 from ground.surface import Slope
 from ground.ye import Ye2006
-from rollover.contact import bodies_of, tables_of
+from rollover.bodies import bodies_of
+from rollover.contact import tables_of
 from rollover.equilibrium import tread_point
 from rollover.forces import generalised_forces
 from rollover.frames import from_angles, matrices, rotation_vector

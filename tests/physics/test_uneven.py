@@ -112,9 +112,10 @@ def test_two_soils_side_by_side_are_each_its_own() -> None:
 
 
 def test_a_patch_that_lies_over_two_elements() -> None:
-    from rollover.contact import bodies_of, tables_of
+    from rollover.bodies import bodies_of
+    from rollover.contact import tables_of
+    from rollover.search import law_of
     from rollover.tables import handle
-    from rollover.touch import law_of
 
     patch = {"low": [0.0, 0.0], "high": [0.2, 0.1], "law": Ye2006(stiffness_scale=3.0)}
     scenario = block(Drop(speed=1.0)).replaced(

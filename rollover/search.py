@@ -1,0 +1,206 @@
+"""Compiled: which elements lie under the vehicle's points; an element's memory is made at its first touch."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ground.compiled import compiled
+from ground.kernel import (
+    CELL,
+    IDLE,
+    MODE,
+    NORMAL,
+    ROW,
+    rut_depth,
+)
+from ground.relief import element_plane, height_and_gradient, highest
+from rollover.tables import (
+    OUTSIDE,
+    ROT,
+    SLOTS,
+)
+from rollover.vectors import place, to_body
+
+
+@compiled
+def search(t: Any) -> int:
+    """Find what lies under the vehicle's points; returns the number of elements, their slots in `touched`.
+
+    `found` then holds for each: the deepest point and its sinkage; projected area, mean sinkage and centroid of the
+    points of the same body.
+    """
+    if t.relief.shape[0] > 0:
+        candidates, count = on_relief(t)
+    else:
+        candidates, count = on_plane(t)
+    for c in range(candidates):
+        slot, i = t.candidate_i[c, 0], t.candidate_i[c, 1]
+        f = t.found[slot]
+        if t.point_body[i] == t.point_body[int(f[2])]:
+            area = t.candidate_f[c, 0]
+            f[1] += area
+            f[3] += area * t.candidate_f[c, 1]
+            for k in range(3):
+                f[4 + k] += area * t.point_r[i, k]
+    for c in range(count):
+        f = t.found[t.touched[c]]
+        for k in range(3, 7):
+            f[k] /= f[1]
+    return count  # type: ignore[no-any-return]
+
+
+@compiled
+def on_plane(t: Any) -> Any:
+    """Points below a flat surface, as candidates; returns how many, and of how many elements."""
+    n, offset = t.plane[:3], t.plane[3]
+    candidates, count = 0, 0
+    for member in range(t.member_i.shape[0]):
+        row = t.pose[t.member_i[member, 0]]
+        m = t.member_f[member]
+        down = to_body(row, n[0], n[1], n[2])
+        if down[0] * m[6] + down[1] * m[7] + down[2] * m[8] > -1e-6 and m[6] * m[6] + m[7] * m[7] + m[8] * m[8] > 0.0:
+            continue  # a flat patch that does not face the ground
+        x, y, z = place(row, m[0], m[1], m[2])
+        reach = abs(down[0]) * m[3] + abs(down[1]) * m[4] + abs(down[2]) * m[5]
+        if n[0] * x + n[1] * y + n[2] * z - offset > reach:
+            continue
+        base = offset - n[0] * row[0] - n[1] * row[1] - n[2] * row[2]
+        facing = -(down[0] * m[6] + down[1] * m[7] + down[2] * m[8])
+        is_flat = m[6] * m[6] + m[7] * m[7] + m[8] * m[8] > 0.0
+        d0, d1, d2 = down
+        for i in range(t.member_i[member, 1], t.member_i[member, 2]):
+            a, b, c = t.point_r[i, 0], t.point_r[i, 1], t.point_r[i, 2]
+            depth = base - (d0 * a + d1 * b + d2 * c)
+            if depth <= 0.0:
+                continue
+            if not is_flat:
+                nx, ny, nz = t.point_n[i, 0], t.point_n[i, 1], t.point_n[i, 2]
+                # a listed point has no normal: it stands for its area whichever way the body is turned
+                facing = -(d0 * nx + d1 * ny + d2 * nz) if nx != 0.0 or ny != 0.0 or nz != 0.0 else 1.0
+                if facing <= 1e-6:
+                    continue
+            x, y, z = place(row, a, b, c)
+            ix = math.floor((x - t.grid_f[0]) / t.grid_f[2])
+            iy = math.floor((y - t.grid_f[1]) / t.grid_f[3])
+            if ix < 0 or iy < 0 or ix >= t.grid_i[0] or iy >= t.grid_i[1]:
+                t.counts[OUTSIDE] += 1
+                continue
+            slot = slot_at(t, ix * t.grid_i[1] + iy)
+            # an element at rest keeps its rut: it is touched only beyond it
+            if t.state[slot, MODE] == IDLE and depth <= rut_depth(t.memory[slot]):
+                continue
+            count += note_candidate(t, candidates, count, slot, i, facing, depth)
+            candidates += 1
+    return candidates, count
+
+
+@compiled
+def note_candidate(t: Any, candidates: int, count: int, slot: int, i: int, facing: float, depth: float) -> int:
+    """Keep a point that is deep enough; returns 1 where it is the first of its element."""
+    t.candidate_i[candidates, 0], t.candidate_i[candidates, 1] = slot, i
+    t.candidate_f[candidates, 0], t.candidate_f[candidates, 1] = facing * t.point_a[i], depth
+    first = 0
+    if t.found[slot, 0] <= 0.0:
+        t.touched[count] = slot
+        first = 1
+        for k in range(1, 7):
+            t.found[slot, k] = 0.0
+    if depth > t.found[slot, 0]:
+        t.found[slot, 0], t.found[slot, 2] = depth, i
+    return first
+
+
+@compiled
+def on_relief(t: Any) -> Any:
+    """Points below the planes of their elements on an uneven surface; returns as `on_plane` does."""
+    candidates, count = 0, 0
+    plane = np.empty(4)
+    for member in range(t.member_i.shape[0]):
+        row, m = t.pose[t.member_i[member, 0]], t.member_f[member]
+        x, y, z = place(row, m[0], m[1], m[2])
+        a, b, c = m[3], m[4], m[5]
+        wide = abs(row[ROT]) * a + abs(row[ROT + 1]) * b + abs(row[ROT + 2]) * c
+        long = abs(row[ROT + 3]) * a + abs(row[ROT + 4]) * b + abs(row[ROT + 5]) * c
+        tall = abs(row[ROT + 6]) * a + abs(row[ROT + 7]) * b + abs(row[ROT + 8]) * c
+        # what lies under the box, and the elements that it looks into
+        reach = math.hypot(wide, long) + t.grid_f[2] + t.grid_f[3]
+        top = highest(t.relief, t.nodes, x, y, reach)
+        if z - tall > top:
+            continue
+        for i in range(t.member_i[member, 1], t.member_i[member, 2]):
+            x, y, z = place(row, t.point_r[i, 0], t.point_r[i, 1], t.point_r[i, 2])
+            if z > top:
+                continue
+            ix = math.floor((x - t.grid_f[0]) / t.grid_f[2])
+            iy = math.floor((y - t.grid_f[1]) / t.grid_f[3])
+            if ix < 0 or iy < 0 or ix >= t.grid_i[0] or iy >= t.grid_i[1]:
+                ground, _, _ = height_and_gradient(t.relief, t.nodes, x, y)
+                if z < ground:
+                    t.counts[OUTSIDE] += 1
+                continue
+            cell = ix * t.grid_i[1] + iy
+            slot = t.slot_of[cell]
+            ground, _, _ = height_and_gradient(t.relief, t.nodes, x, y)
+            if z > ground + 2.0 * (t.grid_f[2] + t.grid_f[3]):
+                continue  # higher than a plane of 75 degrees stands over the surface within its element
+            if slot < 0:
+                plane_of(t, cell, plane)
+            else:
+                plane[:] = t.memory[slot, NORMAL : NORMAL + 4]
+            depth = plane[3] - (plane[0] * x + plane[1] * y + plane[2] * z)
+            if depth <= 0.0:
+                continue
+            d0, d1, d2 = to_body(row, plane[0], plane[1], plane[2])
+            facing = -(d0 * t.point_n[i, 0] + d1 * t.point_n[i, 1] + d2 * t.point_n[i, 2])
+            if facing <= 1e-6:
+                continue
+            slot = slot_at(t, cell)
+            if t.state[slot, MODE] == IDLE and depth <= rut_depth(t.memory[slot]):
+                continue
+            count += note_candidate(t, candidates, count, slot, i, facing, depth)
+            candidates += 1
+    return candidates, count
+
+
+@compiled
+def plane_of(t: Any, cell: int, plane: Any) -> None:
+    """Normal and offset of an untouched element into `plane` (4,)."""
+    if t.relief.shape[0] == 0:
+        plane[:] = t.plane
+        return
+    ix, iy = cell // t.grid_i[1], cell % t.grid_i[1]
+    dx, dy = t.grid_f[2], t.grid_f[3]
+    element_plane(t.relief, t.nodes, t.grid_f[0] + ix * dx, t.grid_f[1] + iy * dy, dx, dy, plane)
+
+
+@compiled
+def law_of(t: Any, cell: int) -> int:
+    """Row of an element's law and friction: that of the last patch over its centre, or 0."""
+    x = t.grid_f[0] + (cell // t.grid_i[1] + 0.5) * t.grid_f[2]
+    y = t.grid_f[1] + (cell % t.grid_i[1] + 0.5) * t.grid_f[3]
+    found = 0
+    for k in range(t.patch_f.shape[0]):
+        f = t.patch_f[k]
+        if f[0] <= x < f[1] and f[2] <= y < f[3]:
+            found = k + 1
+    return found
+
+
+@compiled
+def slot_at(t: Any, cell: int) -> int:
+    """Memory row of an element; made at its first touch, so that untouched elements cost nothing."""
+    slot = t.slot_of[cell]
+    if slot < 0:
+        slot = t.counts[SLOTS]
+        t.slot_of[cell] = slot
+        t.counts[SLOTS] = slot + 1
+        t.memory[slot, :] = 0.0
+        t.state[slot, :] = 0
+        t.state[slot, CELL] = cell
+        t.state[slot, ROW] = law_of(t, cell)
+        plane_of(t, cell, t.memory[slot, NORMAL : NORMAL + 4])
+        t.found[slot, 0] = 0.0
+    return slot  # type: ignore[no-any-return]
