@@ -56,7 +56,8 @@ RECOVERY, REBOUND_DAMPING = 6, 7  # least share that springs back; dashpot of th
 ADHESION, REACH = 8, 9  # pull-off force, N; gap over which it fades, m
 LAYER_DEPTH, LAYER_RATIO, CRUST_DEPTH, CRUST_RATIO = 10, 11, 12, 13
 STIFFNESS = 14  # factor on the law
-EFFECT_PLACES = 15  # numbers of the compiled terms follow, TERM_PLACES for each
+GROWTH_END = 15  # sinkage at which the co-moving mass has grown to its whole, m
+EFFECT_PLACES = 16  # numbers of the compiled terms follow, TERM_PLACES for each
 TERM_PLACES = 8
 
 SAME = 1e-10  # m: sinkages closer than this are one, so that rounding does not switch a loaded element to its line
@@ -107,7 +108,7 @@ def normal_force(law: Any, p: Any, s: Any, row: Any, z: float, v: float) -> floa
         return 0.0
     if law[PLASTIC] == 0 or z >= row[LINE_Z] - SAME:
         f = max(loading_force(law, p, s, max(z - row[SPREAD], 0.0), v), 0.0)
-        if v > 0.0 and row[GROWING] != 0.0:
+        if v > 0.0 and row[GROWING] != 0.0 and row[LINE_Z] - SAME <= z < p[law[EFFECTS] + GROWTH_END]:
             f += p[law[EFFECTS] + GROWTH] * v * v  # soil set moving takes its momentum, d(m_b1)/dt v
     else:
         f = min(row[LINE_F] - row[LINE_K] * (row[LINE_Z] - z) + row[LINE_C] * v, row[LINE_F])
@@ -183,6 +184,11 @@ def commit(law: Any, p: Any, s: Any, row: Any, state: Any, z: float, v: float, h
     if law[ADDRESS_ADVANCE] != 0:
         # the mean rate makes a law's own states second order in the step
         call_advance(law[ADDRESS_ADVANCE], (p.ctypes, s.ctypes, max(z - row[SPREAD], 0.0), (z - before) / h, h))
+    if row[GROWING] != 0.0 and z > row[LINE_Z]:
+        swept = max(min(z, p[law[EFFECTS] + GROWTH_END]) - row[LINE_Z], 0.0)
+        row[MASS_B] += p[law[EFFECTS] + GROWTH] * row[AREA] / REFERENCE_AREA * swept
+        if law[PLASTIC] == 0:
+            row[LINE_Z] = z  # how far it has grown; no line starts there
     if law[PLASTIC] == 0:
         if z <= 0.0:
             outcome |= RELEASED
@@ -191,8 +197,6 @@ def commit(law: Any, p: Any, s: Any, row: Any, state: Any, z: float, v: float, h
         if state[MODE] == LOADING and before < s[BRANCH] <= z:
             outcome |= BRANCHED
         state[MODE] = LOADING
-        if row[GROWING] != 0.0:
-            row[MASS_B] += p[law[EFFECTS] + GROWTH] * row[AREA] / REFERENCE_AREA * (z - row[LINE_Z])
         set_line(law, p, s, row, z)
     if state[MODE] == LOADING and v <= 0.0:
         state[MODE] = UNLOADING
@@ -218,8 +222,8 @@ def begin(law: Any, p: Any, s: Any, row: Any, state: Any, mass: float, start: fl
     if law[ADDRESS_BEGIN] != 0:
         call_begin(law[ADDRESS_BEGIN], (p.ctypes, s.ctypes))
     state[MODE] = LOADING
+    row[GROWING] = 1.0 if p[law[EFFECTS] + GROWTH] > 0.0 else 0.0
     if law[PLASTIC] != 0:
-        row[GROWING] = 1.0 if p[law[EFFECTS] + GROWTH] > 0.0 else 0.0
         if row[LINE_Z] > 0.0 and law[REST_STIFFNESS] == 0:
             # a second hit starts from the rut, on a reloading line that meets this hit's loading curve
             set_line(law, p, s, row, row[LINE_Z])

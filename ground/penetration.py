@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -158,12 +159,24 @@ def chosen(found: dict[str, Fitted]) -> Fitted:
     return min(offered, key=lambda f: f.error)
 
 
+def fit_form(form: Form, drops: Sequence[Drop]) -> tuple[Array, Array]:
+    """One form's numbers, in its own units, from two drops or more, and how much deeper each was found to be, m."""
+    value, contact, *_ = _fit(form, [loading(drop, 0.0) for drop in drops])
+    return value, contact
+
+
+def numbers_of(form: Form, value: Array) -> dict[str, Any]:
+    """A form's numbers by the fields of the law `bearing`, SI."""
+    unit = np.array([1e3 if name.endswith("pressure") else 1.0 for name in form.names])
+    return dict(zip(form.names, (unit * value).tolist(), strict=True))
+
+
 def law(fitted: Fitted, drops: Sequence[Drop], *, source: str, recordings: Sequence[str]) -> Bearing:
     """The law of `ground.bearing` with a fitted form's numbers. Raises ``ValueError`` for another form."""
     if fitted.form.pressure is not _bearing:
         raise ValueError(f"{fitted.form.name}: not a form of the law 'bearing'; {', '.join(_bearing_forms())}")
     unit = np.array([1e3 if name.endswith("pressure") else 1.0 for name in fitted.form.names])
-    value = dict(zip(fitted.form.names, (unit * fitted.value).tolist(), strict=True))
+    value = numbers_of(fitted.form, fitted.value)
     speeds = [drop.speed for drop in drops]
     loads = [loading(drop, 0.0) for drop in drops]
     bounds = zip(fitted.form.names, (unit * fitted.low).tolist(), (unit * fitted.high).tolist(), strict=True)
@@ -269,4 +282,16 @@ def _bearing_forms() -> list[str]:
     return [name for name, form in FORMS.items() if form.pressure is _bearing]
 
 
-__all__ = ["CONTACT_ERROR", "FORMS", "REFERENCE_AREA", "Fitted", "Form", "chosen", "fit_forms", "law", "predicted"]
+__all__ = [
+    "CONTACT_ERROR",
+    "FORMS",
+    "REFERENCE_AREA",
+    "Fitted",
+    "Form",
+    "chosen",
+    "fit_form",
+    "fit_forms",
+    "law",
+    "numbers_of",
+    "predicted",
+]

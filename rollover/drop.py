@@ -22,13 +22,14 @@ from rollover import fall
 from rollover.bodies import nose_share
 from rollover.document import exchanged
 from rollover.effects import acting, read
-from rollover.initiation import Drop
+from rollover.initiation import Drop, Release
 from rollover.recording import Recording
 from rollover.scenario import Scenario
 from rollover.vehicle import Striker
 
 Array = NDArray[np.float64]
 LONGEST_STEP = 5e-4  # s, of the integration
+ENTRY = 0.02  # longest step over the time in which a cone goes in
 RESOLVED = 0.25  # longest step times the frequency of a striker that gives way
 
 COLUMNS = {
@@ -70,12 +71,18 @@ class DropModel:
         s = self.scenario.applied()
         vehicle, ground, start = s.vehicle, s.ground, s.initiation
         assert isinstance(vehicle, Striker)
-        assert isinstance(start, Drop)
+        assert isinstance(start, (Drop, Release))
         f = np.zeros(fall.NUMBERS)
         share = nose_share(s.effects)
-        face = vehicle.face_length * vehicle.face_width
+        is_cone = vehicle.nose == "cone"
+        face = math.pi * vehicle.nose_radius**2 if is_cone else vehicle.face_length * vehicle.face_width
         f[fall.MASS], f[fall.NOSE], f[fall.FACE] = vehicle.mass, vehicle.mass * share, face
-        f[fall.GRAVITY], f[fall.IMPACT_SPEED], f[fall.STEP] = s.gravity, start.speed, self.step
+        f[fall.GRAVITY], f[fall.SPEED], f[fall.STEP] = s.gravity, start.speed, self.step
+        if is_cone:
+            f[fall.CONE] = vehicle.nose_height
+            f[fall.STEP] = min(self.step, ENTRY * vehicle.nose_height / max(landing_speed(start, s.gravity), 1e-3))
+        if isinstance(start, Release):
+            f[fall.HEIGHT] = start.height
         f[fall.FRACTION] = ground.co_moving_mass.share / share  # of the whole striker, though its nose alone hits
         f[fall.LAW_MASS], f[fall.MOMENTUM_MOST] = REFERENCE_MASS, np.inf
         if ground.striker_mass != "reference":
@@ -86,7 +93,7 @@ class DropModel:
             f[fall.SPRING], f[fall.DASHPOT] = gives.stiffness, gives.damping
             reduced = vehicle.mass * share * (1.0 - share)
             f[fall.STEP] = min(
-                self.step, RESOLVED / max(math.sqrt(gives.stiffness / reduced), 2.0 * gives.damping / reduced)
+                f[fall.STEP], RESOLVED / max(math.sqrt(gives.stiffness / reduced), 2.0 * gives.damping / reduced)
             )
         if "guide-friction" in s.effects:
             f[fall.GUIDE] = s.effects["guide-friction"].force
@@ -97,16 +104,17 @@ class DropModel:
     @cached_property
     def told(self) -> tuple[NDArray[np.int64], Array]:
         """Settings and numbers of the ground's kernel."""
-        return settings(self.scenario.applied().ground.law, *acting(self.scenario.effects))
+        s = self.scenario.applied()
+        return settings(s.ground.law, *acting(s.effects))
 
     @property
     def times(self) -> Array:
         """Rows of the full run: from the lead to the end, s."""
         start, settings = self.scenario.initiation, self.scenario.simulation
-        assert isinstance(start, Drop)
+        lead = start.lead_time if isinstance(start, Drop) else 0.0
         every = max(1, round(settings.output_step / settings.step)) * settings.step
-        count = round((settings.duration + start.lead_time) / every) + 1
-        return np.asarray(np.round(np.arange(count) * every - start.lead_time, 9), dtype=np.float64)
+        count = round((settings.duration + lead) / every) + 1
+        return np.asarray(np.round(np.arange(count) * every - lead, 9), dtype=np.float64)
 
     def rows(self, times: Array) -> Array:
         """Columns of `fall` at `times` (s, rising), (n, fall.OUT_COLUMNS), without what sensors make of them.
@@ -130,6 +138,11 @@ class DropModel:
         channels = {name: sign * out[:, column] for name, (column, sign) in COLUMNS.items()}
         recording = Recording(title=self.scenario.title, time=at, channels=channels, source="simulation")
         return read(self.scenario.effects, recording)
+
+
+def landing_speed(start: Drop | Release, gravity: float) -> float:
+    """Speed at first contact if nothing but gravity acts before, m/s."""
+    return start.speed if isinstance(start, Drop) else math.sqrt(start.speed**2 + 2.0 * gravity * start.height)
 
 
 def unfit(scenario: Scenario) -> str:

@@ -21,6 +21,8 @@ from ground.kernel import (
     CRUST_RATIO,
     EFFECTS,
     GROWING,
+    GROWTH,
+    GROWTH_END,
     IDLE,
     LAYER_DEPTH,
     LAYER_RATIO,
@@ -35,6 +37,7 @@ from ground.kernel import (
     RELEASED,
     SAME,
     SINKAGE,
+    SPREAD,
     STATE_COLUMNS,
     TOUCH_SPEED,
     UNLOADING,
@@ -48,11 +51,10 @@ from ground.kernel import (
 from ground.law import BRANCH, REFERENCE_AREA
 from rollover.terms import CREEP
 
-# numbers of a drop: kg, kg, N/m, N s/m (no spring: rigid), -, m2, kg, N s, m/s2, m/s, s, N, N s2/m2
-MASS, NOSE, SPRING, DASHPOT, FRACTION, FACE, LAW_MASS, MOMENTUM_MOST, GRAVITY, IMPACT_SPEED, STEP, GUIDE, AIR = range(
-    13
-)
-NUMBERS = 13
+# numbers of a drop: kg, kg, N/m, N s/m (no spring: rigid), -, m2, kg, N s, m/s2, m/s, s, N, N s2/m2,
+# m (height of a cone whose base is the face, 0: flat), m (above the ground at t = 0 with the speed, 0: first contact)
+MASS, NOSE, SPRING, DASHPOT, FRACTION, FACE, LAW_MASS, MOMENTUM_MOST, GRAVITY, SPEED, STEP, GUIDE, AIR = range(13)
+CONE, HEIGHT, NUMBERS = 13, 14, 15
 # columns of what comes out
 OUT_FORCE, OUT_SINKAGE, OUT_X, OUT_V, OUT_A, OUT_IMPULSE, OUT_COLUMNS = 0, 1, 2, 3, 4, 5, 6
 
@@ -86,15 +88,45 @@ def fall_back(g: float, mass: float, guide: float, air: float, v: float, time: f
 
 
 @compiled
+def cover(f: Any, row: Any, z: float) -> None:
+    """Covered area of a cone at sinkage z, pi (R z/h)^2 up to its base, and the mean of it above the tip, 2/3 z."""
+    if f[CONE] > 0.0:
+        wet = min(max(z, 0.0), f[CONE])
+        row[AREA], row[SPREAD] = f[FACE] * (wet / f[CONE]) ** 2, 2.0 / 3.0 * wet
+
+
+@compiled
+def swept(f: Any, z: float) -> float:
+    """Volume that the nose has swept at sinkage z, m3: the integral of the covered area."""
+    if f[CONE] > 0.0:
+        wet = min(z, f[CONE])
+        return f[FACE] * (wet**3 / (3.0 * f[CONE] ** 2) + z - wet)  # type: ignore[no-any-return]
+    return f[FACE] * z  # type: ignore[no-any-return]
+
+
+@compiled
+def along(law: Any, p: Any, row: Any, f: Any, z: float) -> float:
+    """Co-moving mass at sinkage z: what there was at the last commit and what has grown since, kg."""
+    end = p[law[EFFECTS] + GROWTH_END]
+    if row[GROWING] == 0.0 or z <= row[LINE_Z] or row[LINE_Z] >= end:
+        return row[MASS_B]  # type: ignore[no-any-return]
+    grown = swept(f, min(z, end)) - swept(f, row[LINE_Z])
+    return row[MASS_B] + p[law[EFFECTS] + GROWTH] / REFERENCE_AREA * grown  # type: ignore[no-any-return]
+
+
+@compiled
 def accelerate(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, a: Any) -> float:
     """Accelerations of nose and body into a (2,); returns the ground's spring force, N. y: x, v of both."""
-    force = normal_force(law, p, s, row, y[0], y[1]) if state[MODE] != IDLE else 0.0
+    force, soil = 0.0, row[MASS_B]
+    if state[MODE] != IDLE:
+        cover(f, row, y[0])
+        force, soil = normal_force(law, p, s, row, y[0], y[1]), along(law, p, row, f, y[0])
     nose = f[NOSE] * free(f[GRAVITY], f[MASS], f[GUIDE], f[AIR], y[1]) - force
     if f[SPRING] > 0.0:
         between = f[SPRING] * (y[2] - y[0]) + f[DASHPOT] * (y[3] - y[1])
         nose += between
         a[1] = free(f[GRAVITY], f[MASS], f[GUIDE], f[AIR], y[3]) - between / (f[MASS] - f[NOSE])
-    a[0] = nose / (f[NOSE] + row[MASS_B])
+    a[0] = nose / (f[NOSE] + soil)
     if f[SPRING] <= 0.0:
         a[1] = a[0]
     return force
@@ -145,8 +177,8 @@ def crossing(level: float, h: float, u0: float, d0: float, u1: float, d1: float)
 
 
 @compiled
-def levels(law: Any, p: Any, s: Any, row: Any, state: Any, out: Any) -> int:
-    """Depths at which the force may have a kink or a jump, or the contact begin or end, into out (5,)."""
+def levels(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, out: Any) -> int:
+    """Depths at which the force may have a kink or a jump, or the contact begin or end, into out (7,)."""
     if state[MODE] == IDLE:
         out[0] = rut_depth(row)
         return 1
@@ -160,6 +192,12 @@ def levels(law: Any, p: Any, s: Any, row: Any, state: Any, out: Any) -> int:
         count += 1
     if p[e + CRUST_RATIO] != 1.0:
         out[count] = p[e + CRUST_DEPTH]
+        count += 1
+    if row[GROWING] != 0.0 and p[e + GROWTH_END] < math.inf:
+        out[count] = p[e + GROWTH_END]
+        count += 1
+    if f[CONE] > 0.0:
+        out[count] = f[CONE]
         count += 1
     return count
 
@@ -199,24 +237,28 @@ def steepness(law: Any, p: Any, s: Any, row: Any, state: Any) -> float:
 
 @compiled
 def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
-    """Fall on the ground at t = 0 with IMPACT_SPEED; rows (OUT_COLUMNS) at `times` (s, rising) into `out`.
+    """Fall on the ground at t = 0 with SPEED, or from HEIGHT at t = 0 with it.
 
+    Rows (OUT_COLUMNS) at `times` (s, rising) go into `out`.
     `memory` is the length of an element's memory. x, v and a are those of the body, which carries the instruments.
     Returns the number of steps, or -1 if the state left what can be.
     """
     row, state, s = np.zeros(COLUMNS), np.zeros(STATE_COLUMNS, np.int64), np.zeros(memory)
-    y, end, a, now, stops = np.zeros(4), np.zeros(4), np.zeros((4, 2)), np.zeros(2), np.zeros(5)
+    y, end, a, now, stops = np.zeros(4), np.zeros(4), np.zeros((4, 2)), np.zeros(2), np.zeros(7)
     at = np.zeros(4)
     i, n = 0, times.size
     g, m, guide, air = f[GRAVITY], f[MASS], f[GUIDE], f[AIR]
     while i < n and times[i] < 0.0:
-        x, v = fall_back(g, m, guide, air, f[IMPACT_SPEED], -times[i])
+        x, v = fall_back(g, m, guide, air, f[SPEED], -times[i])
         out[i, OUT_FORCE], out[i, OUT_SINKAGE], out[i, OUT_IMPULSE] = 0.0, 0.0, 0.0
-        out[i, OUT_X], out[i, OUT_V], out[i, OUT_A] = x, v, free(g, m, guide, air, v)
+        out[i, OUT_X], out[i, OUT_V], out[i, OUT_A] = x - f[HEIGHT], v, free(g, m, guide, air, v)
         i += 1
     row[AREA] = f[FACE]
-    y[1], y[3] = f[IMPACT_SPEED], f[IMPACT_SPEED]
-    impulse = hit(law, p, s, row, state, f, y)
+    y[1], y[3], impulse = f[SPEED], f[SPEED], 0.0
+    if f[HEIGHT] > 0.0:
+        y[0], y[2], state[MODE] = -f[HEIGHT], -f[HEIGHT], IDLE
+    else:
+        impulse = hit(law, p, s, row, state, f, y)
     pull = p[law[EFFECTS] + ADHESION] * f[FACE] / REFERENCE_AREA
     t, steps = 0.0, 0
     most = 10_000 + 200 * int(max(times[n - 1], 0.0) / f[STEP]) if n > 0 else 0
@@ -227,7 +269,7 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
         if steps > most or not (abs(end[1]) < 1e4 and abs(end[3]) < 1e4):
             return -1
         share, jump = 1.0, 0.0
-        for k in range(levels(law, p, s, row, state, stops)):
+        for k in range(levels(law, p, s, row, state, f, stops)):
             level = stops[k]
             way = 1.0 if end[0] > y[0] else -1.0
             near = level - way * CLOSE if k > 2 else level
@@ -261,7 +303,7 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
                 force = accelerate(law, p, s, row, state, f, at, now)
                 touching = state[MODE] != IDLE
                 # (1) without the collision: F_s = F + m_b1 a
-                out[i, OUT_FORCE] = force + row[MASS_B] * now[0] if touching else 0.0
+                out[i, OUT_FORCE] = force + along(law, p, row, f, at[0]) * now[0] if touching else 0.0
                 out[i, OUT_SINKAGE] = at[0] if touching else 0.0
                 out[i, OUT_X], out[i, OUT_V], out[i, OUT_A] = at[2], at[3], now[1]
                 out[i, OUT_IMPULSE] = impulse
@@ -276,7 +318,10 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
             if y[0] >= rut_depth(row) - SAME and y[1] > 0.0:
                 impulse += hit(law, p, s, row, state, f, y)
         else:
+            cover(f, row, y[0])
+            soil = along(law, p, row, f, y[0])
             outcome = commit(law, p, s, row, state, y[0], y[1], h, f[LAW_MASS] * f[FACE] / REFERENCE_AREA)
+            row[MASS_B] = soil  # of a cone whose area grew within the step
             if turning:
                 y[0] -= 2.0 * SAME  # the way back begins on the line, with its dashpot
             if y[0] <= 0.0:
@@ -288,5 +333,7 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
             if outcome & RELEASED:
                 state[MODE] = IDLE
                 row[MASS_B], row[GROWING] = 0.0, 0.0
+                if law[PLASTIC] == 0:
+                    row[LINE_Z] = 0.0  # no rut stays
         settle_one(law, p, row, state, f[NOSE])
     return steps

@@ -1,4 +1,4 @@
-"""How a scenario begins (data): dropped, tipped over, standing, driving, thrown, or on a test stand."""
+"""How a scenario begins (data): dropped, released, tipped over, standing, driving, thrown, or on a test stand."""
 
 from __future__ import annotations
 
@@ -21,6 +21,15 @@ class Drop:
     pitch_deg: Annotated[float, Quantity("deg", "at first contact", least=-90, most=90)] = 0.0
     yaw_deg: Annotated[float, Quantity("deg", "at first contact", least=-360, most=360)] = 0.0
     position: Annotated[tuple[float, float], Quantity("m", "of the vehicle's origin, world x and y")] = (0.0, 0.0)
+
+
+@parameters
+class Release:
+    """Let go at a height at t = 0, at rest or with a vertical speed; when it lands follows from the fall."""
+
+    kind: Literal["release"] = "release"
+    height: Annotated[float, Quantity("m", "of the lowest point above the ground, along z", above=0, most=1000)]
+    speed: Annotated[float, Quantity("m/s", "downward, at release", least=-50, most=50)] = 0.0
 
 
 @parameters
@@ -113,4 +122,6 @@ class Driving:
     brake: Brake | None = None
 
 
-Initiation = Annotated[Drop | TipOver | Standing | Driving | Throw | StaticTest | PendulumBlow | TiltTable, ByKind()]
+Initiation = Annotated[
+    Drop | Release | TipOver | Standing | Driving | Throw | StaticTest | PendulumBlow | TiltTable, ByKind()
+]

@@ -16,7 +16,7 @@ from rollover.fall import fall_back
 from rollover.faults import Fault, InputError
 from rollover.forces import generalised_forces
 from rollover.frames import from_angles, from_quaternion, rotation_vector
-from rollover.initiation import Driving, Drop, Standing, Throw, TipOver
+from rollover.initiation import Driving, Drop, Release, Standing, Throw, TipOver
 from rollover.scenario import Scenario
 from rollover.step import stand
 from rollover.tables import W_RADIUS, Tables, handle
@@ -39,6 +39,8 @@ def place(scenario: Scenario, bodies: tuple[Body, ...], t: Tables) -> Start:
     initiation = scenario.initiation
     if isinstance(initiation, Drop):
         return _dropped(initiation, scenario, bodies, t)
+    if isinstance(initiation, Release):
+        return _released(initiation, scenario, bodies, t)
     if isinstance(initiation, Throw):
         return _thrown(initiation, scenario, bodies, t)
     assert isinstance(scenario.vehicle, Vehicle)
@@ -65,6 +67,17 @@ def _dropped(drop: Drop, scenario: Scenario, bodies: tuple[Body, ...], t: Tables
     qd = np.zeros(6 * len(bodies))
     qd[2::6] = -speed
     return Start(q=q, qd=qd, time=-drop.lead_time)
+
+
+def _released(release: Release, scenario: Scenario, bodies: tuple[Body, ...], t: Tables) -> Start:
+    origin, upright = np.zeros(3), np.eye(3)
+    q, qd = _rigid(bodies, origin, upright), np.zeros(6 * len(bodies))
+    q[2::6] += _deepest(bodies, t, upright, scenario.ground.surface, origin) + release.height
+    qd[2::6] = -release.speed
+    kernels = handle(t)
+    generalised_forces(kernels, q, qd, np.zeros_like(q))
+    stand(kernels)
+    return Start(q=q, qd=qd, time=0.0)
 
 
 def _thrown(throw: Throw, scenario: Scenario, bodies: tuple[Body, ...], t: Tables) -> Start:

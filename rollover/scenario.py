@@ -17,7 +17,7 @@ from rollover import document
 from rollover.effects import effects
 from rollover.excitation import Excitation
 from rollover.filters import least_rate
-from rollover.initiation import Driving, Drop, Initiation, Standing, Throw, TipOver
+from rollover.initiation import Driving, Drop, Initiation, Release, Standing, Throw, TipOver
 from rollover.stand import PendulumBlow, StaticTest, TiltTable
 from rollover.vehicle import RigidBody, Striker, Vehicle
 
@@ -146,8 +146,12 @@ class Scenario:
 
 def _check_start(vehicle: Vehicle | Striker | RigidBody, start: Initiation) -> None:
     if isinstance(vehicle, Striker):
+        if isinstance(start, Release):
+            return
         if not isinstance(start, Drop):
-            raise ValueError(f"initiation.kind: a striker cannot begin so, got {start.kind!r}; 'drop' is allowed")
+            raise ValueError(
+                f"initiation.kind: a striker cannot begin so, got {start.kind!r}; 'drop' or 'release' is allowed"
+            )
         for name in ("roll_deg", "pitch_deg", "yaw_deg"):
             if getattr(start, name) != 0.0:
                 raise ValueError(
@@ -185,7 +189,9 @@ def _check_start(vehicle: Vehicle | Striker | RigidBody, start: Initiation) -> N
                 f"initiation.kind: the front wheels turn with more inertia than their axle has, got {turning:g} kg m2; "
                 f"less than {axle.body.inertia[1]:g} kg m2 is allowed"
             )
-    elif isinstance(start, Drop) and not (vehicle.outline or vehicle.wheels or (vehicle.rops and vehicle.rops.members)):
+    elif isinstance(start, (Drop, Release)) and not (
+        vehicle.outline or vehicle.wheels or (vehicle.rops and vehicle.rops.members)
+    ):
         raise ValueError("vehicle.outline: nothing can touch the ground, got no outline, wheels or ROPS members")
 
 

@@ -109,7 +109,7 @@ def let_go(t: Any) -> None:
             t.state[slot, MODE] = IDLE
             t.memory[slot, FORCE] = 0.0
             if t.law[t.state[slot, ROW], PLASTIC] == 0:
-                t.memory[slot, SINKAGE] = 0.0  # no rut stays
+                t.memory[slot, SINKAGE] = t.memory[slot, LINE_Z] = 0.0  # no rut stays
         else:
             t.active[kept] = slot
             kept += 1

@@ -146,8 +146,8 @@ def _seen_from(run: Run) -> NDArray[np.float64]:
 
 def _heading(scenario: Scenario) -> float:
     start = scenario.initiation
-    if start.kind == "throw":
-        return 0.0  # a body that tumbles heads nowhere
+    if start.kind in ("throw", "release"):
+        return 0.0  # a body that tumbles heads nowhere; one that is let go looks along x
     return start.yaw_deg if start.kind == "drop" else start.heading_deg
 
 

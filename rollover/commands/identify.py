@@ -101,18 +101,12 @@ def identify_(
 def _read(name: str) -> tuple[Recording, str]:
     """A recording and the SHA-256 of its file; of a run's folder its channels."""
     import hashlib
-    import importlib
 
-    from rollover.recording import read_parquet
+    from rollover.importers import read_recording
 
     path = Path(name)
     path = path / "channels.parquet" if path.is_dir() else path
-    try:
-        read = importlib.import_module("rollover.importers").read_recording  # any file format, where they are there
-    except ImportError:
-        read = read_parquet
-    recording: Recording = read(path)
-    return recording, hashlib.sha256(path.read_bytes()).hexdigest()
+    return read_recording(path), hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _claim(folder: Path, force: bool) -> None:

@@ -13,6 +13,7 @@ from ground import kernel as k
 from ground.law import REFERENCE_AREA
 from ground.quantity import Quantity, parameters
 from rollover.effects.effect import Effect, Search
+from rollover.vehicle import Striker
 
 FORCE = ("ground/force_normal", "striker/acceleration_z")
 SPEED = "a resistance of the ground that grows with speed"
@@ -97,15 +98,25 @@ class SoilInertialDrag(Effect):
 
 @parameters
 class SoilAddedMassGrowth(Effect):
-    """m_b1 += rate dz as the element goes deeper, with the force dm_b1/dt v that sets it moving."""
+    """m_b1 += rate dz A/A_ref as the element goes deeper, with the force dm_b1/dt v that sets it moving.
+
+    On a face it grows with the depth. On a cone, whose area A grows too, it follows the cube of the wetted radius,
+    m_b1 = rate/A_ref pi/3 r^3/tan(half angle), until the cone is in: the accompanying mass of a body entering water.
+    """
 
     rate: Annotated[float, Quantity("kg/m", "of the co-moving mass with depth, on the reference face", least=0)] = 20.0
+    reach: Annotated[
+        float | None, Quantity("m", "sinkage up to which it grows; none: a cone's height, no end on a face", above=0)
+    ] = None
 
     id = "soil-added-mass-growth"
     family = SPEED
-    equation = "m_b1(z) = m_b1(0) + rate z; F_s += rate v^2 (momentum (m + m_b1) v)"
-    source = "m_b1 = rho A (beta z + alpha sqrt A), rho 1700-2000 kg/m3, rho A = 11 kg/m on the reference face (M)"
-    sentence = "The soil that moves along grows by {rate} of depth."
+    equation = "m_b1(z) = m_b1(0) + rate/A_ref integral of A dz; F_s += rate A/A_ref v^2 (momentum (m + m_b1) v)"
+    source = (
+        "m_b1 = rho A (beta z + alpha sqrt A), rho 1700-2000 kg/m3, rho A = 11 kg/m on the reference face (M); "
+        "k rho r^3 of a cone, von Karman 1929, Wagner 1932 (M+)"
+    )
+    sentence = "The soil or fluid that moves along grows by {rate} of depth."
     rivals: ClassVar[Mapping[str, str]] = {
         "co-moving-mass": "the impulse of the first contact at a high sampling rate",
         "soil-inertial-drag": "the acceleration near the deepest point: a mass acts there, drag does not",
@@ -116,7 +127,14 @@ class SoilAddedMassGrowth(Effect):
 
     def places(self) -> Mapping[int, float]:
         """dm_b1/dz."""
-        return {k.GROWTH: self.rate}
+        return {k.GROWTH: self.rate} | ({} if self.reach is None else {k.GROWTH_END: self.reach})
+
+    def changes(self, scenario: Any) -> Mapping[str, Any]:
+        """The reach that a cone's height gives."""
+        striker = scenario.vehicle
+        if self.reach is not None or not isinstance(striker, Striker) or striker.nose != "cone":
+            return {}
+        return {f"effects.{self.id}.reach": striker.nose_height}
 
 
 @parameters

@@ -17,6 +17,7 @@ G, GRAVITY = 9.80665, 9.81  # unit g; free fall in the laboratory, m/s2
 BODY, SHAFT, SPRING, INSERT = 0.5228, 0.0343, 0.0040, 0.0025  # kg
 CONE = {80: 0.0257, 60: 0.0300}  # kg, by half angle
 CLIPS = 41.7  # g
+RADIUS = 0.026  # m, of the cone's base
 _KEY = re.compile(r"S([FR])(60|80)(\d{3})(\d)")
 
 
@@ -47,11 +48,18 @@ def _drop(name: str, match: re.Match[str], rows: np.ndarray) -> Recording:
             "sensor/body/acceleration_x": rows[:, 2] * G,
             "sensor/body/acceleration_y": rows[:, 3] * G,
         },
-        conditions={"initiation.speed": math.sqrt(2.0 * GRAVITY * height), "vehicle.mass": mass},
+        conditions={
+            "initiation.speed": math.sqrt(2.0 * GRAVITY * height),
+            "vehicle.mass": mass,
+            "vehicle.nose": "cone",
+            "vehicle.nose_radius": RADIUS,
+            "vehicle.nose_height": RADIUS / math.tan(math.radians(angle)),
+        },
         sensors={f"sensor/body/acceleration_{axis}": lateral for axis in "xy"},
         notes=(
             f"the accelerometer sits in the body of {BODY} kg and clips at {CLIPS} g; use 0 to 50 ms",
             f"half cone angle {angle} deg, cone radius 26 mm, between nose and body {between}",
+            f"nose, with what lies between: {1.0 - BODY / mass:.4f} of the mass",
             "speed at impact worked out from the height of the drop, without air",
         ),
     )

@@ -5,20 +5,25 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatch
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rollover.faults import Fault, InputError
 from rollover.frames import angles
 from rollover.importers.importer import Collection, check_claim, reading
 from rollover.recording import Recording
 
-RATE = 148.0  # Hz
+Array = NDArray[np.float64]
+RATE, GRAVITY = 148.0, 9.81  # Hz, m/s2
+CLEAR, LEAST_FLIGHT = 0.002, 5  # m under the lowest corner; rows before it touches
 MASS, INERTIA, EDGE = 0.37, 8.1e-4, 0.1048  # kg, kg m2 about each axis, m
 COLUMNS = ("x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz")
 _NOTES = (
     f"a cube of {MASS} kg, edge {EDGE} m, inertia {INERTIA} kg m2 about each axis; the table is at z = 0",
-    "velocities are filtered differences of the tracked poses, not measured by themselves",
+    "velocities are filtered differences of the tracked poses, not measured by themselves; the start in the"
+    " conditions is that of a flight fitted to the poses before the first contact",
 )
 
 
@@ -51,11 +56,39 @@ def _toss(name: str, rows: np.ndarray) -> Recording:
     channels |= {f"chassis/angular_velocity_{axis}": rows[:, 10 + k].copy() for k, axis in enumerate("xyz")}
     return Recording(
         title=f"Cube {name}",
+        conditions=_start(rows[:, :3], Rotation.from_quat(scalar_first[:, [1, 2, 3, 0]]), rows[0, 7:]),
         source=CUBE_TOSSES.source,
         time=np.arange(len(rows)) / RATE,
         channels=channels,
         notes=_NOTES,
     )
+
+
+def _start(centre: Array, turn: Any, rates: Array) -> dict[str, Any]:
+    """Where and how fast the cube is at its first row: a flight without forces but gravity, fitted to the rows of it.
+
+    Of a cube the turn is constant too. With fewer than five rows before it touches the recorded rates stand.
+    """
+    corners = 0.5 * EDGE * np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1)
+    lowest = centre[:, 2] + (turn.as_matrix()[:, 2] @ corners).min(axis=1)
+    flight = int(np.argmax(lowest < CLEAR)) if np.any(lowest < CLEAR) else len(centre)
+    place, velocity, spin, first = centre[0], rates[:3], rates[3:], turn[0]
+    if flight >= LEAST_FLIGHT:
+        t = np.arange(flight) / RATE
+        A = np.stack([np.ones_like(t), t], axis=1)
+        fallen = centre[:flight] + 0.5 * GRAVITY * t[:, None] ** 2 * [0.0, 0.0, 1.0]
+        place, velocity = np.linalg.lstsq(A, fallen, rcond=None)[0]
+        turned, along = np.linalg.lstsq(A, (turn[:flight] * turn[0].inv()).as_rotvec(), rcond=None)[0]
+        first = type(turn).from_rotvec(turned) * turn[0]
+        spin = first.inv().apply(along)
+    x, y, z, w = first.as_quat()
+    return {
+        "initiation.position": place.tolist(),
+        "initiation.velocity": velocity.tolist(),
+        "initiation.quaternion": [float(w), float(x), float(y), float(z)],
+        "initiation.angular_velocity": spin.tolist(),
+        "vehicle.whole.mass": MASS,
+    }
 
 
 def _without_jumps(q: np.ndarray) -> np.ndarray:

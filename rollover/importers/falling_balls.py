@@ -29,8 +29,12 @@ def _read(path: Path, select: Sequence[str]) -> Iterator[tuple[str, Recording]]:
         name = f"{re.sub(r'[^a-z0-9]+', '-', ball.lower())}-{drop}"
         if not any(fnmatch(name, pattern) for pattern in select):
             continue
-        conditions: dict[str, Any] = {}
-        notes: tuple[str, ...] = ("height from video at 15 Hz; the speed is a filtered difference of it",)
+        height = values["h_m"][rows]
+        conditions: dict[str, Any] = {"initiation.kind": "release", "initiation.height": float(height[0])}
+        notes: tuple[str, ...] = (
+            "height from video at 15 Hz; the speed is a filtered difference of it",
+            "let go at about the first row, from about its height: neither was measured by itself",
+        )
         mass, circumference = known.get(_key(ball), (None, None))
         if mass is not None and circumference is not None:
             conditions["vehicle.mass"] = mass
@@ -43,7 +47,7 @@ def _read(path: Path, select: Sequence[str]) -> Iterator[tuple[str, Recording]]:
                 title=f"{ball}, drop {drop}",
                 source=FALLING_BALLS.source,
                 time=values["t_s"][rows],
-                channels={"striker/position_z": values["h_m"][rows], "striker/velocity_z": values["v_mps"][rows]},
+                channels={"striker/position_z": height, "striker/velocity_z": values["v_mps"][rows]},
                 conditions=conditions,
                 clock=Clock(zero="unknown"),
                 notes=notes,

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import gzip
+import math
 import zlib
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatch
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ground.drops import Drop, UnusableDrop, found_contact
 from rollover.faults import Fault, InputError
 from rollover.importers.importer import Collection
 from rollover.recording import Clock, Recording, Sensor
 
 G = 9.80665  # m/s2
 MASS = 7.71  # kg
+RADIUS, HEIGHT = 0.04375, 0.0755  # m, of the cone
 BEFORE = 3.0  # s of each file before the impact
 RANGES = {"a2g": 2.0, "a18g": 18.0, "a50g": 50.0, "a200g": 200.0, "a250g": 250.0}
 COLUMNS = ("t_s", "a2g", "a18g", "a50g", "a200g", "tx", "ty", "a250g", "pore_kPa")
@@ -56,23 +60,37 @@ def _drop(name: str, columns: dict[str, NDArray[np.float64]]) -> Recording:
     chosen = finest(columns)
     others = ", ".join(f"{n} {off:+.3f} g, gain {gain:.3f}" for n, (off, gain) in disagreement(columns, chosen).items())
     time = columns["t_s"] - columns["t_s"][0] - BEFORE
+    # upright it reads +1 g at rest: what holds it up; coordinate acceleration is that less gravity
+    acceleration = (columns[chosen] - 1.0) * G
+    conditions: dict[str, Any] = {
+        "vehicle.mass": MASS,
+        "vehicle.nose": "cone",
+        "vehicle.nose_radius": RADIUS,
+        "vehicle.nose_height": HEIGHT,
+    }
+    try:
+        found = found_contact(Drop(name=name, time=time, mass=MASS, speed=math.nan, acceleration=-acceleration))
+        time, landing = found.time, f"speed at first contact {found.speed:.3f} m/s, integrated back from rest"
+        conditions["initiation.speed"] = found.speed
+    except UnusableDrop as reason:
+        landing = f"no clean drop, its clock and speed at first contact are not known: {reason}"
     lateral = Sensor(body="striker", gravity="proper")
     return Recording(
         title=f"Penetrometer {name}",
         source=SOIL_PENETROMETER.source,
         time=time,
         channels={
-            # upright it reads +1 g at rest: what holds it up; coordinate acceleration is that less gravity
-            "striker/acceleration_z": (columns[chosen] - 1.0) * G,
+            "striker/acceleration_z": acceleration,
             "sensor/body/acceleration_x": columns["tx"] * G,
             "sensor/body/acceleration_y": columns["ty"] * G,
         },
-        conditions={"vehicle.mass": MASS},
+        conditions=conditions,
         clock=Clock(zero="unknown"),
         sensors={f"sensor/body/acceleration_{axis}": lateral for axis in "xy"},
         notes=(
             f"axial acceleration from {chosen}, the finest range that is not clipped; against it: {others}",
             "2 kHz assumed from the number of rows; the instrument's tilt is taken as 0",
+            landing,
             "cone tip of 43.75 mm radius and 75.5 mm height, volume 2.473 l",
         ),
     )

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ground.bearing import Bearing
 from ground.compaction import Compaction
+from ground.fluid import FluidEntry
 from ground.hard import Hard
 from ground.law import BRANCH, HIDDEN, MASS, SPEED, GroundLaw, evaluate, laws, touched
 from ground.press import Press
@@ -32,6 +33,7 @@ EXAMPLES: dict[str, GroundLaw] = {
         surface_pressure=3e3, depth_pressure=2e4, depth_exponent=0.8, rate_per_decade=0.15, rate_reference=0.03
     ),
     "compaction": Compaction(elastic_stiffness=9e5, plastic_stiffness=6e4, damping=800.0),
+    "fluid-entry": FluidEntry(density=1000.0, drag_coefficient=0.8),
     "hard": Hard(stiffness=8e4, restitution=0.4, slow_speed=0.5),
     "press": Press(stiffness=2e5, damping=900.0, side_damping=600.0, side_mass=12.0),
     "treated": Treated(

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from ground.bearing import Bearing
 from ground.penetration import chosen
-from tests.real import cube_tosses, penetrometer
+from rollover.cli import app
+from rollover.scenario import load
+from tests.real import cone_drops, cube_tosses, falling_balls, penetrometer
 
 DATA = os.environ.get("ROLLOVER_DATA", "")
 
@@ -43,3 +48,69 @@ def test_the_sea_bed_resists_with_depth_and_rate_and_handling_is_left_out() -> N
     assert best.depth_error < 0.16
     assert best.residual < 0.75 * forms["ye-2006"].residual
     assert [round(d.depth[0], 1) for d in best.held_out] == [0.5, 0.5, 0.5]
+
+
+def test_a_law_from_two_drops_predicts_the_third_in_the_simulator_as_far_as_one_sea_bed_is_another() -> None:
+    for run in penetrometer.held_out(folder("soil_penetrometer")):
+        # measured: errors of 10, 27 and 21 % of the range, depths within 15 %
+        assert run.error < 0.30, run
+        assert run.depth[1] == pytest.approx(run.depth[0], rel=0.18), run
+
+
+@pytest.mark.parametrize("angle", [60, 80])
+def test_the_water_that_a_rigid_cone_takes_along_shows_at_every_height_left_out(angle: int) -> None:
+    found = cone_drops.rigid(folder("cone_drops"), angle, repeats=1)
+    without, with_mass = found["without"]["error"], found["with"]["error"]
+    for height in set(without) & set(cone_drops.HELD_OUT):
+        # measured: 8.6 to 12.0 % of the range without, 2.7 to 4.8 % with
+        assert with_mass[height] < 0.065, height
+        assert with_mass[height] < 0.6 * without[height], height
+    # 4/3 rho r^3 of a disc by Lamb
+    assert 0.6 < found["k"] < 1.6
+
+
+def test_the_spring_of_the_sprung_cones_is_found() -> None:
+    path = folder("cone_drops")
+    water = cone_drops.rigid(path, 60, repeats=1)["with"]["numbers"]
+    found = cone_drops.sprung(path, 60, water, repeats=1)
+    for height in set(found["rigid"]["error"]) & set(cone_drops.HELD_OUT):
+        assert found["stated"]["error"][height] < 0.6 * found["rigid"]["error"][height], height
+        assert found["fitted"]["error"][height] < 0.4 * found["rigid"]["error"][height], height
+    # 7.8 N/mm by the authors
+    assert found["fitted"]["numbers"][cone_drops.STIFFNESS] == pytest.approx(7800.0, rel=0.2)
+
+
+def test_air_brakes_light_balls_and_dense_ones_next_to_nothing() -> None:
+    chosen_balls = ("whiffle-ball-1-*", "yellow-whiffle-ball-*", "volleyball-*", "baseball-*", "golf-ball-*")
+    found = falling_balls.study(folder("falling_balls"), chosen_balls)
+    for ball in ("whiffle-ball-1", "yellow-whiffle-ball", "volleyball"):
+        for without, held_out in zip(found[ball]["without"], found[ball]["held_out"], strict=True):
+            assert held_out < 0.35 * without, ball
+    for ball in ("whiffle-ball-1", "yellow-whiffle-ball"):
+        assert 0.4 < found[ball]["drag_coefficient"] < 0.75
+    for ball in ("baseball", "golf-ball"):
+        assert max(found[ball]["without"]) < 0.3, ball  # m after 35 m of fall: nothing to be found
+        assert min(found[ball]["held_out"]) > 0.8 * min(found[ball]["without"]), ball
+
+
+def test_the_command_makes_a_soil_of_the_imported_drops_that_the_scenario_takes(tmp_path: Path) -> None:
+    source = str(folder("soil_penetrometer"))
+    call = CliRunner().invoke
+    imported, soil = tmp_path / "drops", tmp_path / "soil"
+    made = call(app, ["import", source, "--as", "soil-penetrometer", "--out", str(imported)])
+    assert made.exit_code == 0, made.output
+    files = sorted(str(path) for path in imported.glob("*.csv"))
+    assert len(files) == 4
+    checked = call(app, ["check", "--scenario", "penetrometer_drop", *files])
+    assert checked.exit_code == 0, checked.output
+    options = ["--set", "gravity=9.81", "--buoyancy", "24.87", "--terminal-speed", "--out", str(soil), "--json"]
+    done = call(app, ["identify", *files, "--scenario", "penetrometer_drop", *options])
+    assert done.exit_code == 0, done.output
+    answer = json.loads(done.stdout)
+    assert answer["chosen"] == "bearing-rate"
+    assert [reason.split(":")[0] for reason in answer["refused"]] == ["bLog0D39"]
+    law = load("penetrometer_drop").replaced({"ground.law": str(soil / "soil.yaml")}).ground.law
+    assert isinstance(law, Bearing)
+    assert law.calibration is not None
+    assert 0.1 < law.calibration.log_scatter < 0.3
+    assert len(law.calibration.recordings) == 3
