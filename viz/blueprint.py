@@ -146,7 +146,7 @@ def _seen_from(run: Run) -> NDArray[np.float64]:
 
 def _heading(scenario: Scenario) -> float:
     start = scenario.initiation
-    if start.kind in ("throw", "release"):
+    if start.kind == "throw" or start.kind == "release":
         return 0.0  # a body that tumbles heads nowhere; one that is let go looks along x
     return start.yaw_deg if start.kind == "drop" else start.heading_deg
 

@@ -102,15 +102,12 @@ def test_growing_added_mass_keeps_the_momentum() -> None:
     t = np.linspace(0.0, 0.3, 100)
     z, v, a, _ = motion(model, t)
     p = np.sqrt((M * v0) ** 2 + 2 * m * g * (M * z + 0.5 * r * z**2))
-    assert v == pytest.approx(p / (M + r * z), rel=3e-4)
+    # ground of 1 mN/m takes 1e-6 m/s from 145 kg meanwhile
+    assert v == pytest.approx(p / (M + r * z), abs=1e-6)
     assert v[-1] < 0.85 * (v0 + m / M * g * t[-1])  # against no growth
     # and what the load cell reads is all that brakes the striker: m_b a + dm_b/dt v
     force = model.run(t)["ground/force_normal"]
     assert force == pytest.approx(m * (g - a), rel=1e-12)
-    finer = DropModel(scenario=model.scenario, step=1e-4)
-    closer = motion(finer, t)[1]
-    exact = p / (M + r * z)
-    assert np.abs(closer - exact).max() < 0.4 * np.abs(v - exact).max()  # first order in the step
 
 
 def test_rebound_gives_its_energy_back() -> None:
