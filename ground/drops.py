@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ground.law import REFERENCE_AREA
+from ground.reference import REFERENCE_AREA
 
 Array = NDArray[np.float64]
 LEAST_ROWS = 20  # between touch and the deepest point

@@ -38,12 +38,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ground.quantity import Quantity, parameters
+from ground.reference import REFERENCE_AREA as REFERENCE_AREA
+from ground.reference import REFERENCE_MASS as REFERENCE_MASS
 
 # places in an element's memory s
 SPEED, MASS, BRANCH, HIDDEN = 0, 1, 2, 3
-
-REFERENCE_AREA = 0.140 * 0.045  # m2, face of the drop-test striker, Ye 2006 Fig. 5
-REFERENCE_MASS = 132.0  # kg, the same striker
 
 
 @dataclass(frozen=True, kw_only=True)
