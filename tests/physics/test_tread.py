@@ -14,7 +14,7 @@ from rollover.bodies import bodies_of
 from rollover.contact import tables_of
 from rollover.forces import read_poses, try_wheels
 from rollover.frames import from_angles, matrices, rotation_vector
-from rollover.tables import E_DAMPING_NOW, E_DEPTH_NOW, E_ENERGY_NOW, E_FORCE_NOW, handle
+from rollover.tables import E_DAMPING_NOW, E_DEPTH_NOW, E_ENERGY_NOW, E_FORCE_NOW, W_BOTTOM, W_C, W_KZ, handle
 from tests.physics.scenes import shipped
 
 Array = NDArray[np.float64]
@@ -105,15 +105,23 @@ def test_the_force_is_the_gradient_of_the_energy(surface: Surface) -> None:
 
 @pytest.mark.parametrize("surface", SURFACES, ids=lambda s: s.kind)
 def test_the_dashpot_takes_what_it_is_booked_for(surface: Surface) -> None:
-    """P = sum of dashpot force times the depth's rate (by differences): (Q(v) - Q(0)) . v."""
+    """P = sum of dashpot force times the depth's rate (by differences) = (Q(0) - Q(v)) . v; the force is c k/k_z rate.
+
+    k = 2 U/d^2 where the rim is not reached; no tyre pulls.
+    """
     tyres, rng, compared = Tyres(surface), np.random.default_rng(6), 0
     for place, R in poses(tyres, surface, 7, 40):
         rates = rng.normal(size=6)
         still, moving = tyres.at(place, R), tyres.at(place, R, rates)
         ahead, behind = (tyres.at(*moved(place, R, s * 1e-6 * rates))[0][:, DEPTH] for s in (1.0, -1.0))
-        power = float(moving[0][:, DAMPING] @ ((ahead - behind) / 2e-6))
+        rate = (ahead - behind) / 2e-6
+        power = float(moving[0][:, DAMPING] @ rate)
         assert float((still[1] - moving[1]) @ rates) == pytest.approx(power, rel=1e-4, abs=1e-2)
-        compared += abs(power) > 1.0
+        for w, c in enumerate(tyres.tables.wheel_f):
+            energy, depth, _, damping = moving[0][w]
+            if 0.0 < depth < c[W_BOTTOM] and damping > -1.99 * energy / depth:
+                assert damping == pytest.approx(c[W_C] * 2.0 * energy / depth**2 / c[W_KZ] * rate[w], rel=1e-4, abs=0.1)
+                compared += 1
     assert compared > 30
 
 
