@@ -150,6 +150,36 @@ def overlay(measured: Curve, simulated: Curve, *, label: str, phases: Sequence[t
     return svg.text
 
 
+def before_after(
+    measured: Curve,
+    before: Curve,
+    after: Curve | None,
+    *,
+    label: str,
+    noise: float,
+    phases: Sequence[tuple[float, str]] = (),
+) -> str:
+    """Measured, simulated before and after at the same stamps; below, measured less each over `noise` (2 sigma drawn).
+
+    The residual's axis is linear up to five times the noise and logarithmic beyond: both misfits can be read.
+    """
+    with _canvas(WIDTH, 4.3) as (figure, svg):
+        above, below = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [3, 1.8]})
+        simulated = [_roled(before, "limit"), *([] if after is None else [_roled(after, "first")])]
+        _draw(above, [_roled(measured, "second"), *simulated])
+        _finish(above, "", label, margins=(0.0, 0.08))
+        _shade(above, phases)
+        for curve in simulated:
+            rest = Curve(name=curve.name, x=curve.x, y=(measured.y - curve.y) / noise, role=curve.role)
+            _draw(below, [rest])
+        below.axhspan(-2.0, 2.0, color=COLOURS["muted"], alpha=0.18, lw=0)
+        below.axhline(0.0, color=COLOURS["ink"], lw=0.6)
+        below.set_yscale("symlog", linthresh=5.0)
+        _finish(below, "time, s", "residual / noise", margins=(0.0, 0.1), legend=False)
+        _shade(below, [(start, "") for start, _ in phases])
+    return svg.text
+
+
 def bars(values: Mapping[str, float], *, label: str, roles: Mapping[str, Role] | None = None) -> str:
     """One horizontal bar for each name, negative ones to the left, each with its number: the energy ledger."""
     names, numbers = list(values), [v if math.isfinite(v) else 0.0 for v in values.values()]

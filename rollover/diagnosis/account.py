@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +22,15 @@ FILES = (JSON, SCENARIO, PAGE, PICTURE)
 NOT_RECORDINGS = (".yaml", ".yml", ".json", ".md", ".txt")
 
 
-def account(found: Diagnosis) -> dict[str, Any]:
-    """What diagnosis.json says, bare JSON values."""
+def account(
+    found: Diagnosis, about: Mapping[str, Any] | None = None, prechecks: Sequence[Mapping[str, Any]] = ()
+) -> dict[str, Any]:
+    """What diagnosis.json says, bare JSON values; `about` names what was asked, `prechecks` what sensors gave away."""
     depends = dict.fromkeys(("depends_on",), found.depends_on)
     answer: dict[str, Any] = plain(
         {
             "format": FORMAT,
+            **(about or {}),
             "verdict": found.verdict,
             "sentence": found.sentence,
             "remaining": {
@@ -35,7 +39,7 @@ def account(found: Diagnosis) -> dict[str, Any]:
                 "where": [asdict(p) for p in found.remaining_where],
                 **(depends if found.remaining_significant and not found.effects else {"depends_on": None}),
             },
-            "smallest_detectable": dict(found.smallest_detectable),
+            "smallest_detectable": {k: v for k, v in found.smallest_detectable.items() if isfinite(v)},
             "significance": {"p_value": found.p_value, "noise": dict(found.noise)},
             "where": [_place(p) for p in found.where],
             "depends_on": found.depends_on,
@@ -49,6 +53,7 @@ def account(found: Diagnosis) -> dict[str, Any]:
             "candidates": [asdict(c) for c in found.candidates],
             "simulations": found.simulations,
             "seconds": found.seconds,
+            "prechecks": list(prechecks),
             "notes": list(found.notes),
             "versions": versions(),
         }
@@ -64,7 +69,7 @@ def _effect(effect: Named) -> dict[str, Any]:
     return {
         "id": effect.id,
         "kind": effect.kind,
-        "channel": effect.channel,
+        **({} if effect.channel is None else {"channel": effect.channel}),
         "statement": effect.statement,
         "parameters": {name: asdict(i) for name, i in effect.parameters.items()},
         "p_value": effect.p_value,
