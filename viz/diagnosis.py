@@ -29,7 +29,8 @@ PHASES = {
     "unloading": 0x7A5FA3FF,
     "rest": 0x3F8A4BFF,
 }
-_SOURCES = (("measured", MEASURED, 1.5), ("before", LIMIT, 1.5), ("after", SIMULATED, 2.0))
+# the viewer draws what was measured last, thin, so that the curve that follows it is seen below
+_SOURCES = (("measured", MEASURED, 1.0), ("before", LIMIT, 1.5), ("after", SIMULATED, 4.0))
 
 
 def write_diagnosis(found: Diagnosis, told: Sequence[Told], path: Path, title: str) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from rollover.diagnosis import Diagnosis
 from rollover.diagnosis.series import Told, Track
 from rollover.diagnosis.verdict import Place, Score
-from rollover.effects import EFFECTS
+from rollover.effects import effects
 from rollover.prechecks import Finding
 from viz import plots
 from viz.diagnosis_words import STATES, answer, label_of, named
@@ -230,11 +230,11 @@ def _detectable(found: Diagnosis) -> list[Block]:
     """Where nothing was found: what these recordings would have shown."""
     if found.effects or not found.smallest_detectable:
         return []
+    kinds = effects()
     rows: list[Row] = []
     for key, value in found.smallest_detectable.items():
         id, _, channel = key.partition(":")
-        kind = EFFECTS.get(id)
-        first = next(iter(kind.search), "") if kind is not None else ""
+        first = next(iter(getattr(kinds.get(id), "search", {})), "")
         rows.append([named(id, channel or None), first, _g(value)])
     table = Table(
         columns=["effect", "parameter", "smallest that shows"],

@@ -48,8 +48,9 @@ def diagnose(
 
     from rollover import console, document, store
     from rollover import scenario as scenarios
-    from rollover.diagnosis import account as accounts
+    from rollover.diagnosis import account, diagnosed_text
     from rollover.diagnosis import diagnose as diagnosed
+    from rollover.diagnosis.account import FILES, FORMAT, JSON, PAGE, PICTURE, SCENARIO
     from rollover.diagnosis.series import series
 
     del workers  # a drop is two milliseconds: sending it to another process takes longer
@@ -66,18 +67,18 @@ def diagnose(
         "recordings": list(measured),
         "hold_out": held,
     }
-    store.claim_account(folder, accounts.FORMAT, about, accounts.FILES, force=force)
+    store.claim_account(folder, FORMAT, about, FILES, force=force)
     console.say("asking the sensors first")
     findings = _prechecks(chosen, measured)
     found = diagnosed(chosen, list(measured.items()), hold_out=held, say=console.say)
     sensors = tuple(f"{name}: {f.channel}: {f.sentence}" for name, f in findings)
     found = replace(found, notes=(*sensors, *found.notes))
     told = series(chosen, list(measured.items()), found)
-    answer = accounts.account(found, about, [{"recording": name, **_plain(f)} for name, f in findings])
+    answer = account(found, about, [{"recording": name, **_plain(f)} for name, f in findings])
     words = ["rollover", "diagnose", scenario, *recordings, *_options(hold_out, set_)]
     with store.whole(folder) as part:
-        store.write_json(part / accounts.JSON, answer)
-        (part / accounts.SCENARIO).write_text(accounts.diagnosed_text(chosen, found), encoding="utf-8")
+        store.write_json(part / JSON, answer)
+        (part / SCENARIO).write_text(diagnosed_text(chosen, found), encoding="utf-8")
         from viz.diagnosis_page import page
 
         text = page(
@@ -89,10 +90,10 @@ def diagnose(
             scenario_hash=about["scenario_hash"],
             versions=store.versions(),
         )
-        (part / accounts.PAGE).write_text(text, encoding="utf-8")
+        (part / PAGE).write_text(text, encoding="utf-8")
         draw = _picture()
         if draw is not None:
-            draw(found, told, part / accounts.PICTURE, chosen.title)
+            draw(found, told, part / PICTURE, chosen.title)
     if as_json:
         print(json.dumps(answer, indent=2))
     else:
