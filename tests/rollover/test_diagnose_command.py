@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +15,14 @@ from typer.testing import CliRunner, Result
 from rollover.cli import app
 from rollover.diagnosis import Diagnosis, account
 from rollover.diagnosis.evidence import evidence_of
+from rollover.diagnosis.series import series
 from rollover.diagnosis.simulator import simulator_of
 from rollover.document import find
 from rollover.drop import DropModel
 from rollover.importers import read_recording, write_recording
 from rollover.recording import Recording
 from rollover.scenario import load
-from tests.rollover.diagnosed import sensor_at_fault
+from tests.rollover.diagnosed import nothing_found, sensor_at_fault
 
 SPEEDS = (1.0, 2.0, 3.0)
 DAMPING = 900.0
@@ -35,16 +37,16 @@ def rollover(*words: object) -> Result:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Drops on a ground with viscous damping, which the scenario lacks; one load cell sticks for a while."""
+    """Drops on a ground with viscous damping, which the scenario lacks; one recording has a gap."""
     out = tmp_path_factory.mktemp("recordings")
     random = np.random.default_rng(5)
     for speed in SPEEDS:
         changes = {"initiation.speed": speed, "effects.soil-viscous-damping.damping": DAMPING}
-        t = np.arange(-0.02, 0.35, 1.0 / 300.0)
+        t = np.arange(-0.02, 0.45, 1.0 / 300.0)
         run = DropModel(scenario=load(find("drop_test"))).with_(changes).run(t)
         channels = {name: run[name] + random.normal(0.0, sigma, t.size) for name, sigma in SIGMA.items()}
         if speed == 3.0:
-            channels["ground/sinkage"][100:] = np.nan  # lost near the end
+            channels["ground/sinkage"][70:90] = np.nan
         made = Recording(title=f"{speed} m/s", time=t, channels=channels, conditions={"initiation.speed": speed})
         write_recording(made, out / f"v{speed:g}.csv")
     (out / "README.md").write_text("not a recording\n")
@@ -75,6 +77,9 @@ def test_it_names_what_was_left_out_and_writes_all_four(done: tuple[Path, Result
     assert answer["fit"]["training"]["recordings"] == ["v1", "v3"]
     assert answer["fit"]["held_out"]["recordings"] == ["v2"]
     assert "looking at" in result.stderr
+    (gap,) = [f for f in answer["prechecks"] if f["check"] == "gap"]
+    assert (gap["recording"], gap["channel"]) == ("v3", "ground/sinkage")
+    assert f"v3: ground/sinkage: {gap['sentence']}" in answer["notes"]
     assert_contract(answer)
 
 
@@ -156,6 +161,27 @@ def test_the_diagnosed_scenario_runs_and_follows_the_recordings(
     assert full["ground/force_normal"][after] == pytest.approx(drop["ground/force_normal"][after], rel=0.02)
     without = DropModel(scenario=load(find("drop_test"))).run(full.time)
     assert np.max(drop["ground/force_normal"]) > 1.5 * np.max(without["ground/force_normal"])
+
+
+def test_series_are_what_the_diagnosed_scenario_predicts(folder: Path) -> None:
+    effect = replace(
+        sensor_at_fault().effects[0], id="soil-viscous-damping", settings={"damping": DAMPING}, channel=None
+    )
+    found = replace(sensor_at_fault(), effects=(effect,), training=("v1",), held_out=("v2",))
+    recordings = [(name, read_recording(folder / f"{name}.csv")) for name in ("v1", "v2")]
+    shown = series(load(find("drop_test")), recordings, found)
+    assert [(one.recording, one.held_out) for one in shown] == [("v1", False), ("v2", True)]
+    for one, (_, recording) in zip(shown, recordings, strict=True):
+        assert abs(one.shift) < 5e-4
+        assert [name for _, name in one.phases][:3] == ["free-fall", "first-contact", "loading"]
+        sinkage = next(t for t in one.tracks if t.channel == "ground/sinkage")
+        assert sinkage.measured == pytest.approx(recording["ground/sinkage"])
+        assert sinkage.after is not None
+        off = {"before": sinkage.before, "after": sinkage.after}
+        rms = {when: float(np.sqrt(np.mean((sinkage.measured - v) ** 2))) for when, v in off.items()}
+        assert rms["after"] == pytest.approx(SIGMA["ground/sinkage"], rel=0.25)
+        assert rms["before"] > 10.0 * rms["after"]
+    assert all(t.after is None for t in series(load(find("drop_test")), recordings[:1], nothing_found())[0].tracks)
 
 
 def test_the_page_says_it_all(done: tuple[Path, Result], folder: Path) -> None:
