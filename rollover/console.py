@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from rollover.baseline import Answer
     from rollover.calibrate import Calibration
     from rollover.criteria import Criterion
+    from rollover.diagnosis import Diagnosis
     from rollover.loads import PeakLoad
     from rollover.misfit import Misfit
     from rollover.run import Run
@@ -275,4 +276,35 @@ def calibration(found: Calibration, folder: str) -> None:
         out.print(f"{which}: residual over noise {before.over_noise:.3g} -> {after.over_noise:.3g}{rated} ({names})")
     for warning in found.warnings:
         out.print(warning, style="yellow")
+    out.print(f"Results: {folder}")
+
+
+def diagnosis(found: Diagnosis, folder: str) -> None:
+    """The verdict in a sentence, what was found with intervals, and what it gains."""
+    out = Console(highlight=False, markup=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
+    out.print(f"{found.verdict}: {found.sentence}", style="bold")
+    if found.effects:
+        table = Table(box=None, pad_edge=False)
+        for heading in ("effect", "channel", "parameter", "value", "95 % from", "to", "unit"):
+            table.add_column(heading, justify="right" if heading in ("value", "95 % from", "to") else "left")
+        for e in found.effects:
+            for name, i in e.parameters.items():
+                values = (f"{v:.5g}" for v in (i.value, i.low, i.high))
+                bound = " (at the end of its range)" if i.at_bound else ""
+                table.add_row(e.id, e.channel or "", name, *values, f"{i.unit}{bound}")
+        out.print(table)
+    for which, names in (("training", found.training), ("held_out", found.held_out)):
+        if which not in found.before or which not in found.after:
+            continue
+        a, b = found.before[which], found.after[which]
+        rated = ""
+        if a.iso18571 is not None and b.iso18571 is not None:
+            rated = f", ISO 18571 {a.iso18571:.3f} -> {b.iso18571:.3f}"
+        title = "fitted" if which == "training" else "held out"
+        out.print(f"{title}: misfit over noise {a.nrmse:.3g} -> {b.nrmse:.3g}{rated} ({', '.join(names)})")
+    for e in found.effects:
+        if e.indistinguishable_from:
+            out.print(f"{e.id} or {', '.join(e.indistinguishable_from)}: measure next: {e.discriminating_test}")
+    for note in found.notes:
+        out.print(note, style="yellow")
     out.print(f"Results: {folder}")

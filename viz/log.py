@@ -55,7 +55,7 @@ def write_rrd(
     # plots would be used for this one
     rec = rr.RecordingStream(f"rollover {name}", recording_id=name)
     try:
-        with catch_and_log_exceptions("recording", strict=True), _closed(rec):
+        with catch_and_log_exceptions("recording", strict=True), closed(rec):
             with_ = picture(run)
             rec.save(part, default_blueprint=blueprint(run, ", ".join(with_.scales), views))
             out, found = Stream(rec), ranked(run, peaks)
@@ -80,7 +80,7 @@ def write_rrd(
 
 
 @contextlib.contextmanager
-def _closed(rec: rr.RecordingStream) -> Iterator[None]:
+def closed(rec: rr.RecordingStream) -> Iterator[None]:
     """Flush and write the footer whatever happens; what is logged later would be lost without a word."""
     try:
         yield

@@ -36,6 +36,7 @@ CYCLE: tuple[Role, ...] = ("first", "second", "third", "fourth", "muted")
 MOST_POINTS = 1600  # of a curve, a few for each pixel across
 LETTERS = 14  # of a legend to an inch
 WIDTH, HEIGHT = 7.2, 2.7  # inch
+LINEAR = 10.0  # times the noise up to which the axis of a diagnosis' residual is linear
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,6 +147,43 @@ def overlay(measured: Curve, simulated: Curve, *, label: str, phases: Sequence[t
         _draw(below, [Curve(name="residual", x=measured.x, y=measured.y - model, role="muted")])
         below.axhline(0.0, color=COLOURS["ink"], lw=0.6)
         _finish(below, "time, s", "residual", margins=(0.0, 0.1))
+        _shade(below, [(start, "") for start, _ in phases])
+    return svg.text
+
+
+def before_after(
+    measured: Curve,
+    before: Curve,
+    after: Curve | None,
+    *,
+    label: str,
+    noise: float,
+    phases: Sequence[tuple[float, str]] = (),
+) -> str:
+    """Measured, simulated before and after at the same stamps; below, measured less each over `noise` (2 sigma drawn).
+
+    The residual's axis is linear up to ten times the noise and logarithmic beyond: both misfits can be read.
+    """
+    with _canvas(WIDTH, 4.3) as (figure, svg):
+        above, below = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [3, 1.8]})
+        simulated = [_roled(before, "limit"), *([] if after is None else [_roled(after, "first")])]
+        x, y = thinned(measured.x, measured.y)  # wide and pale: what covers it can still be told from it
+        above.plot(x, y, color=COLOURS["second"], lw=3.2, alpha=0.55, label=measured.name)
+        _draw(above, simulated)
+        _finish(above, "", label, margins=(0.0, 0.08))
+        _shade(above, phases)
+        for curve in simulated:
+            rest = Curve(name=curve.name, x=curve.x, y=(measured.y - curve.y) / noise, role=curve.role)
+            _draw(below, [rest])
+        below.axhspan(-2.0, 2.0, color=COLOURS["muted"], alpha=0.18, lw=0)
+        below.axhline(0.0, color=COLOURS["ink"], lw=0.6)
+        below.set_yscale("symlog", linthresh=LINEAR)
+        low, high = below.get_ylim()
+        marks = [s * 10.0**k for s in (-1.0, 1.0) for k in range(1, 7)]
+        near = [m for m in (0.0, *marks) if low <= m <= high]
+        below.set_yticks(near, [f"{m:g}" for m in near], minor=False)
+        below.set_yticks([], minor=True)
+        _finish(below, "time, s", "residual / noise", margins=(0.0, 0.1), legend=False)
         _shade(below, [(start, "") for start, _ in phases])
     return svg.text
 

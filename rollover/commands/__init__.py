@@ -15,12 +15,14 @@ from rollover.commands import identify
 from rollover.commands import compare
 from rollover.commands import calibrate
 from rollover.commands import synthesize
+from rollover.commands import diagnose
 from rollover.commands import prove
 
 __all__ = [
     "calibrate",
     "check",
     "compare",
+    "diagnose",
     "identify",
     "importing",
     "listing",

@@ -1,0 +1,208 @@
+"""`rollover diagnose`: what physics a scenario left out, from recordings."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rollover.commands.door import AsJson, Force, Setting, answering, app, settings
+from rollover.faults import Fault, InputError
+
+if TYPE_CHECKING:
+    from rollover.prechecks import Finding
+    from rollover.recording import Recording
+    from rollover.scenario import Scenario
+
+
+@app.command()
+@answering
+def diagnose(
+    scenario: Annotated[str, typer.Argument(help="A scenario file, or the name of a shipped one.")],
+    recordings: Annotated[
+        list[str], typer.Argument(help="Recordings with their conditions, or folders of them.", metavar="RECORDING...")
+    ],
+    hold_out: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--hold-out",
+            metavar="NAME",
+            help="A recording to judge by; may be repeated  [default: each condition in turn]",
+        ),
+    ] = None,
+    set_: Setting = None,
+    out: Annotated[Path | None, typer.Option(help="Results folder  [default: out/diagnose/NAME]")] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(help="Processes for scenarios that need full runs; a drop test needs one.", min=0),
+    ] = None,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Say what separates a scenario from recordings: which physics, value or sensor, where, and how sure that is."""
+    from dataclasses import replace
+
+    from rollover import console, document, store
+    from rollover import scenario as scenarios
+    from rollover.diagnosis import account, diagnosed_text
+    from rollover.diagnosis import diagnose as diagnosed
+    from rollover.diagnosis.account import FILES, FORMAT, JSON, PAGE, PICTURE, SCENARIO
+    from rollover.diagnosis.series import series
+
+    del workers  # a drop is two milliseconds: sending it to another process takes longer
+    path = document.find(scenario)
+    chosen = scenarios.load(path)
+    if set_:
+        chosen = chosen.replaced(settings(set_), origin="--set")
+    measured = read(recordings)
+    _check(path, chosen, measured)
+    held = _held_out(list(measured), hold_out or [])
+    folder = out or Path("out", "diagnose", path.stem)
+    about: dict[str, Any] = {
+        "scenario_hash": document.content_hash(chosen),
+        "recordings": list(measured),
+        "hold_out": held,
+    }
+    store.claim_account(folder, FORMAT, about, FILES, force=force)
+    console.say("asking the sensors first")
+    findings = _prechecks(chosen, measured)
+    found = diagnosed(chosen, list(measured.items()), hold_out=held, say=console.say)
+    sensors = tuple(f"{name}: {f.channel}: {f.sentence}" for name, f in findings)
+    found = replace(found, notes=(*sensors, *found.notes))
+    told = series(chosen, list(measured.items()), found)
+    answer = account(found, about, [{"recording": name, **_plain(f)} for name, f in findings])
+    words = ["rollover", "diagnose", scenario, *recordings, *_options(hold_out, set_)]
+    with store.whole(folder) as part:
+        store.write_json(part / JSON, answer)
+        (part / SCENARIO).write_text(diagnosed_text(chosen, found), encoding="utf-8")
+        from viz.diagnosis_page import page
+
+        text = page(
+            found,
+            told,
+            title=chosen.title,
+            prechecks=findings,
+            command=" ".join(map(shlex.quote, words)),
+            scenario_hash=about["scenario_hash"],
+            versions=store.versions(),
+        )
+        (part / PAGE).write_text(text, encoding="utf-8")
+        draw = _picture()
+        if draw is not None:
+            draw(found, told, part / PICTURE, chosen.title)
+    if as_json:
+        print(json.dumps(answer, indent=2))
+    else:
+        console.diagnosis(found, str(folder))
+
+
+def read(paths: Sequence[str]) -> dict[str, Recording]:
+    """Recordings by their file's stem, those in folders too. Raises `InputError` for all faults at once."""
+    from rollover.importers import read_recording
+
+    found: dict[str, Recording] = {}
+    faults: list[Fault] = []
+    for text in paths:
+        try:
+            files = _files(Path(text))
+        except InputError as e:
+            faults += e.faults
+            continue
+        for file in files:
+            if file.stem in found:
+                message = f"a second recording by this name, got {file.stem!r}; each its own"
+                faults.append(Fault(file=str(file), message=message))
+                continue
+            try:
+                found[file.stem] = read_recording(file)
+            except InputError as e:
+                faults += e.faults
+    if faults:
+        raise InputError(*faults)
+    return found
+
+
+def _files(path: Path) -> list[Path]:
+    """A recording's own path, or those of all in a folder that is none itself."""
+    from rollover.diagnosis.account import NOT_RECORDINGS
+    from rollover.importers import importers
+
+    if not path.is_dir() or (path / "channels.parquet").is_file() or any(i.sniff(path) for i in importers().values()):
+        return [path]
+    files = [p for p in sorted(path.iterdir()) if p.is_file() and p.suffix not in NOT_RECORDINGS]
+    if not files:
+        raise InputError(Fault(file=str(path), message="no recordings in this folder; tables such as NAME.csv are"))
+    return files
+
+
+def _check(path: Path, scenario: Scenario, measured: Mapping[str, Recording]) -> None:
+    """Refuse what is no drop test, and conditions that the scenario does not know. Raises `InputError`."""
+    from rollover.diagnosis.simulator import set_up
+    from rollover.drop import unfit
+
+    reason = unfit(scenario)
+    if reason:
+        raise InputError(Fault(file=str(path), message=reason))
+    faults = []
+    for name, recording in measured.items():
+        reason = unfit(set_up(scenario, recording))
+        if reason:
+            faults.append(Fault(file=name, message=f"conditions: {reason}"))
+    if faults:
+        raise InputError(*faults)
+
+
+def _held_out(names: list[str], given: list[str]) -> list[str]:
+    from rollover.faults import hint
+
+    for name in given:
+        if name not in names:
+            raise InputError(Fault(file="--hold-out", message=f"no such recording, got {name!r}; {hint(name, names)}"))
+    if set(names) <= set(given):
+        raise InputError(Fault(file="--hold-out", message=f"nothing left to fit, got all of {', '.join(names)}"))
+    return sorted(set(given))
+
+
+def _prechecks(scenario: Scenario, measured: Mapping[str, Recording]) -> list[tuple[str, Finding]]:
+    """What the recordings alone give away about their sensors, before any model is asked."""
+    from rollover.diagnosis.simulator import set_up
+    from rollover.prechecks import prechecks
+
+    found = []
+    for name, recording in measured.items():
+        own = set_up(scenario, recording)
+        mass = getattr(own.vehicle, "mass", None)
+        found += [(name, f) for f in prechecks(recording, mass=mass, gravity=own.gravity)]
+    return found
+
+
+def _plain(finding: Finding) -> dict[str, Any]:
+    from dataclasses import asdict
+
+    from rollover import store
+
+    bare: dict[str, Any] = store.plain(asdict(finding))
+    return bare
+
+
+def _options(hold_out: list[str] | None, set_: list[str] | None) -> list[str]:
+    given = (("--hold-out", hold_out or []), ("--set", set_ or []))
+    return [part for name, texts in given for text in texts for part in (name, text)]
+
+
+def _picture() -> Callable[..., None] | None:
+    from rollover import console
+    from rollover.diagnosis.account import PICTURE
+
+    try:
+        from viz.diagnosis import write_diagnosis
+    except ImportError as e:
+        if (e.name or "").partition(".")[0] != "rerun":
+            raise
+        console.say(f"No rerun wheel for this platform: {PICTURE} was not written.")
+        return None
+    return write_diagnosis

@@ -1,0 +1,108 @@
+"""A diagnosis as its files: diagnosis.json, and the scenario with what was found switched on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from rollover.diagnosis.diagnose import diagnose
+from rollover.diagnosis.verdict import Diagnosis, Named, Place, Score
+from rollover.document import dump
+from rollover.importers import read_recording
+from rollover.recording import Recording
+from rollover.scenario import Scenario, load
+from rollover.store import plain, versions
+
+FORMAT = "rollover-diagnosis/1"
+JSON, SCENARIO, PAGE, PICTURE = "diagnosis.json", "scenario-diagnosed.yaml", "report.html", "diagnosis.rrd"
+FILES = (JSON, SCENARIO, PAGE, PICTURE)
+NOT_RECORDINGS = (".yaml", ".yml", ".json", ".md", ".txt")
+
+
+def account(
+    found: Diagnosis, about: Mapping[str, Any] | None = None, prechecks: Sequence[Mapping[str, Any]] = ()
+) -> dict[str, Any]:
+    """What diagnosis.json says, bare JSON values; `about` names what was asked, `prechecks` what sensors gave away."""
+    depends = dict.fromkeys(("depends_on",), found.depends_on)
+    answer: dict[str, Any] = plain(
+        {
+            "format": FORMAT,
+            **(about or {}),
+            "verdict": found.verdict,
+            "sentence": found.sentence,
+            "remaining": {
+                "significant": found.remaining_significant,
+                "p_value": found.remaining_p_value,
+                "where": [asdict(p) for p in found.remaining_where],
+                **(depends if found.remaining_significant and not found.effects else {"depends_on": None}),
+            },
+            "smallest_detectable": {k: v for k, v in found.smallest_detectable.items() if isfinite(v)},
+            "significance": {"p_value": found.p_value, "noise": dict(found.noise)},
+            "where": [_place(p) for p in found.where],
+            "depends_on": found.depends_on,
+            "dependencies": [{"on": name, "share": share} for name, share in found.dependencies],
+            "effects": [_effect(e) for e in found.effects],
+            "fit": {
+                "training": _fit(found, "training", found.training),
+                "held_out": _fit(found, "held_out", found.held_out),
+                "recordings": [{"name": n, "before": a, "after": b} for n, a, b in found.per_recording],
+            },
+            "candidates": [asdict(c) for c in found.candidates],
+            "simulations": found.simulations,
+            "seconds": found.seconds,
+            "prechecks": list(prechecks),
+            "notes": list(found.notes),
+            "versions": versions(),
+        }
+    )
+    return answer
+
+
+def _place(place: Place) -> dict[str, Any]:
+    return asdict(place)
+
+
+def _effect(effect: Named) -> dict[str, Any]:
+    return {
+        "id": effect.id,
+        "kind": effect.kind,
+        **({} if effect.channel is None else {"channel": effect.channel}),
+        "statement": effect.statement,
+        "parameters": {name: asdict(i) for name, i in effect.parameters.items()},
+        "p_value": effect.p_value,
+        "indistinguishable_from": list(effect.indistinguishable_from),
+        "discriminating_test": effect.discriminating_test,
+    }
+
+
+def _fit(found: Diagnosis, which: str, names: tuple[str, ...]) -> dict[str, Any]:
+    def score(scores: Mapping[str, Score]) -> dict[str, Any]:
+        return asdict(scores[which]) if which in scores else {}
+
+    return {"recordings": list(names), "before": score(found.before), "after": score(found.after)}
+
+
+def diagnosed_scenario(scenario: Scenario, found: Diagnosis) -> Scenario:
+    """The scenario with the found effects switched on and fitted."""
+    changes = {f"effects.{e.id}": dict(e.settings) for e in found.effects}
+    return scenario.replaced(changes, origin="diagnosis") if changes else scenario
+
+
+def diagnosed_text(scenario: Scenario, found: Diagnosis) -> str:
+    """scenario-diagnosed.yaml: `rollover run` accepts it."""
+    return dump(diagnosed_scenario(scenario, found), f"{scenario.title}\nDiagnosed: {found.sentence}")
+
+
+def recordings_in(folder: Path) -> list[tuple[str, Recording]]:
+    """Name and recording of each table in a folder, by name. Raises `InputError`."""
+    paths = [p for p in sorted(folder.iterdir()) if p.is_file() and p.suffix not in NOT_RECORDINGS]
+    return [(p.stem, read_recording(p)) for p in paths]
+
+
+def diagnose_folder(folder: Path, out: Path | None = None, workers: int = 1) -> dict[str, Any]:
+    """Diagnose a folder that holds scenario.yaml and its recordings; returns what diagnosis.json says."""
+    del out, workers
+    return account(diagnose(load(folder / "scenario.yaml"), recordings_in(folder)))

@@ -1,0 +1,121 @@
+"""Who competes: every effect of the table that can act on these recordings, sensor effects once for each channel."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.channels import describe
+from rollover.diagnosis.evidence import Evidence
+from rollover.effects import EFFECTS, Search, effects
+
+Array = NDArray[np.float64]
+
+# shape parameters that stay at their default: few recordings tell them apart from the strength
+SHAPES = {
+    "soil-viscous-damping": ("exponent",),
+    "soil-elastic-rebound": ("damping_ratio",),
+    "soil-adhesion": ("reach",),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """An effect with the parameters that are fitted, where to look for them, and the channel of a sensor effect."""
+
+    id: str
+    kind: str
+    family: str
+    search: Mapping[str, Search]
+    channel: str | None = None
+
+    @property
+    def key(self) -> str:
+        """Id, with the channel of a sensor effect."""
+        return self.id if self.channel is None else f"{self.id}:{self.channel}"
+
+    def changes(self, x: Sequence[float]) -> dict[str, Any]:
+        """Values to exchange in the scenario for coordinates x, each from 0 (low) to 1 (high)."""
+        found: dict[str, Any] = {} if self.channel is None else {f"effects.{self.id}.channel": self.channel}
+        for value, (name, search) in zip(x, self.search.items(), strict=True):
+            found[f"effects.{self.id}.{name}"] = physical(value, search)
+        return found
+
+    def values(self, x: Sequence[float]) -> dict[str, float]:
+        """Parameters by name for coordinates x."""
+        return {name: physical(v, s) for v, (name, s) in zip(x, self.search.items(), strict=True)}
+
+    def starts(self) -> list[tuple[float, ...]]:
+        """Coordinates to look at first."""
+        many = 5 if len(self.search) == 1 else 4
+        axes = []
+        for s in self.search.values():
+            inside = [(k + 0.5) / many for k in range(many)]
+            if s.scale == "linear" and s.low < 0.0 < s.high:
+                middle = -s.low / (s.high - s.low)
+                inside = [middle + f * (1.0 - middle) for f in (0.05, 0.4)] + [middle - f * middle for f in (0.05, 0.4)]
+            elif s.scale == "log" and s.low < 1.0 < s.high and s.high / s.low < 20.0:
+                middle = math.log(1.0 / s.low) / math.log(s.high / s.low)
+                inside = [middle + f * (1.0 - middle) for f in (0.1, 0.5)] + [middle - f * middle for f in (0.1, 0.5)]
+            axes.append(inside)
+        return list(itertools.product(*axes))
+
+
+def physical(x: float, search: Search) -> float:
+    """Value of a parameter for its coordinate."""
+    if search.scale == "log":
+        return float(search.low * (search.high / search.low) ** x)
+    return float(search.low + x * (search.high - search.low))
+
+
+def coordinate(value: float, search: Search) -> float:
+    """Coordinate of a value."""
+    if search.scale == "log":
+        return math.log(value / search.low) / math.log(search.high / search.low)
+    return (value - search.low) / (search.high - search.low)
+
+
+def candidates_of(evidence: Sequence[Evidence], switched_on: Iterable[str], acts: str) -> list[Candidate]:
+    """All candidates for these recordings; effects that the scenario has switched on already do not compete."""
+    effects()
+    spans: dict[str, float] = {}
+    for e in evidence:
+        for s in e.signals:
+            spans[s.channel] = max(spans.get(s.channel, 0.0), s.span)
+    found = []
+    for name, kind in EFFECTS.items():
+        if name in switched_on or acts not in kind.acts:
+            continue
+        if kind.kind == "sensor":
+            found += [c for channel in spans if (c := _sensor(name, kind, channel, spans))]
+            continue
+        search = {p: s for p, s in kind.search.items() if p not in SHAPES.get(name, ())}
+        found.append(Candidate(id=name, kind=kind.kind, family=kind.family, search=search))
+    return found
+
+
+def _sensor(name: str, kind: Any, channel: str, spans: Mapping[str, float]) -> Candidate | None:
+    search = dict(kind.search)
+    span = spans[channel]
+    length = describe(channel).unit in ("m", "rad")
+    if (name == "sensor-scale") != length and name in ("sensor-scale", "sensor-gain"):
+        return None  # a scale is that of a position or a length, a gain that of all else
+    if name == "sensor-misalignment" and not _across(channel, spans):
+        return None
+    if name == "sensor-bias":
+        search = {"bias": Search(-0.5 * span, 0.5 * span)}
+    if name == "sensor-clipping":
+        search = {"limit": Search(0.1 * span, 1.05 * span)}
+    return Candidate(id=name, kind="sensor", family=kind.family, search=search, channel=channel)
+
+
+def _across(channel: str, spans: Mapping[str, float]) -> bool:
+    stem, axis = channel[:-1], channel[-1:]
+    turned = stem + {"x": "y", "y": "z", "z": "x"}.get(axis, "?") if stem.endswith("_") else ""
+    return turned in spans or channel.replace("force_normal", "force_tangential") in (set(spans) - {channel})

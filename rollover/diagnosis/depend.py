@@ -1,0 +1,147 @@
+"""What the mismatch depends on: the residual force on the striker, regressed on one quantity after another.
+
+Inverse dynamics of a drop: from the measured depth z (or acceleration, twice integrated) and the load cell (or
+m (a + g)), the force that the law leaves unexplained is
+
+    dF = F_s - K'(z; v_s) z - m_b1 z''                                                                     (D2)
+
+while the ground is pushed deeper. A quantity that dF is a function of predicts it in recordings that were not
+fitted: the share of variance it predicts there, leaving one condition out, is its score.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ground.law import evaluate
+from rollover.diagnosis.evidence import Evidence
+from rollover.recording import Recording
+from rollover.scenario import Scenario
+
+Array = NDArray[np.float64]
+KNOTS = 7
+TIME, DEPTH, SPEED, ACCELERATION = "time", "ground/sinkage", "striker/velocity_z", "striker/acceleration_z"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResidualForce:
+    """One recording's residual force dF (n,) N while loading, with what it may depend on, by name, (n,) each."""
+
+    recording: str
+    condition: str
+    force: Array
+    of: dict[str, Array]
+
+
+def residual_forces(scenarios: Sequence[Scenario], evidence: Sequence[Evidence]) -> list[ResidualForce]:
+    """(D2) for each recording that has what it takes; `scenarios` with their conditions put in."""
+    found = []
+    for scenario, e in zip(scenarios, evidence, strict=True):
+        one = _of(scenario, e)
+        if one is not None:
+            found.append(one)
+    return found
+
+
+def _of(scenario: Scenario, e: Evidence) -> ResidualForce | None:
+    r = e.recording
+    start = scenario.initiation
+    mass, law = getattr(scenario.vehicle, "mass", None), scenario.ground.law
+    if mass is None or not hasattr(start, "speed"):
+        return None
+    state = _motion(r, float(start.speed), scenario.gravity)
+    if state is None:
+        return None
+    time, z, v, a = state
+    area = scenario.vehicle.face_length * scenario.vehicle.face_width / (0.140 * 0.045)  # type: ignore[union-attr]
+    measured = r.channels.get("ground/force_normal")
+    force = mass * (scenario.gravity - a) if measured is None else np.interp(time, *r.samples("ground/force_normal"))
+    soil = scenario.ground.co_moving_mass.share * mass
+    going_in = (v > 0.15 * float(start.speed)) & (z > 0.002) & (time > 0.003)
+    if going_in.sum() < 12:
+        return None
+    rows = np.flatnonzero(going_in)
+    rows = rows[np.unique(np.linspace(0, rows.size - 1, min(rows.size, 120)).round().astype(int))]
+    speed = float(start.speed)
+    spring = np.array([evaluate(law, float(z[k]), float(v[k]), speed=speed) * area for k in rows])
+    dF = force[rows] - spring - soil * a[rows]
+    of = {TIME: time[rows], DEPTH: z[rows], SPEED: v[rows], ACCELERATION: -a[rows]}
+    return ResidualForce(recording=e.name, condition=e.condition or e.name, force=dF, of=of)
+
+
+def _motion(r: Recording, speed: float, gravity: float) -> tuple[Array, Array, Array, Array] | None:
+    """Time, depth, its rate and second derivative (positive down) while loading, smoothed; None without either."""
+    if "striker/acceleration_z" in r.channels:
+        time, up = r.samples("striker/acceleration_z")
+        if time.size < 20:
+            return None
+        a = -_smoothed(up, time)
+        v = _from_contact(time, a, speed)
+        if "ground/sinkage" in r.channels:
+            z = np.interp(time, *_cleaned(r, "ground/sinkage"))
+        else:
+            z = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(time))])
+            z = z - np.interp(0.0, time, z)
+        return time, z, v, a
+    name = "ground/sinkage" if "ground/sinkage" in r.channels else None
+    if name is None:
+        return None
+    time, z = r.samples(name)
+    if time.size < 20:
+        return None
+    z = _smoothed(z, time)
+    v = np.gradient(z, time)
+    return time, z, v, np.gradient(_smoothed(v, time), time)
+
+
+def _cleaned(r: Recording, name: str) -> tuple[Array, Array]:
+    time, values = r.samples(name)
+    return time, _smoothed(values, time)
+
+
+def _smoothed(values: Array, time: Array, width: float = 0.004) -> Array:
+    """Savitzky-Golay of second order over some milliseconds."""
+    from scipy.signal import savgol_filter
+
+    n = max(5, 2 * round(0.5 * width / float(np.median(np.diff(time)))) + 1)
+    return np.asarray(savgol_filter(values, n, 2)) if values.size > n else values
+
+
+def _from_contact(time: Array, a: Array, speed: float) -> Array:
+    """Velocity downward from the acceleration; just before the contact it is the impact speed."""
+    v = np.concatenate([[0.0], np.cumsum(0.5 * (a[1:] + a[:-1]) * np.diff(time))])
+    return np.asarray(v - np.interp(0.0, time, v) + speed / 1.1)
+
+
+def dependency(forces: Sequence[ResidualForce]) -> list[tuple[str, float]]:
+    """Quantities with the share of the residual force that they predict in conditions left out, best first."""
+    if not forces:
+        return []
+    conditions = sorted({f.condition for f in forces})
+    scores = []
+    for name in (TIME, DEPTH, SPEED, ACCELERATION):
+        wrong, all_ = 0.0, 0.0
+        for left in conditions:
+            train = [f for f in forces if f.condition != left] or list(forces)
+            test = [f for f in forces if f.condition == left]
+            x = np.concatenate([f.of[name] for f in train])
+            y = np.concatenate([f.force for f in train])
+            knots = np.unique(np.quantile(x, np.linspace(0.0, 1.0, KNOTS)))
+            weights = np.linalg.lstsq(_hats(x, knots), y, rcond=1e-8)[0]
+            for f in test:
+                # beyond what was seen nothing is predicted
+                seen = (f.of[name] >= knots[0]) & (f.of[name] <= knots[-1])
+                miss = f.force[seen] - _hats(f.of[name][seen], knots) @ weights
+                wrong += float(miss @ miss) / max(int(seen.sum()), 1) * f.force.size
+                all_ += float(f.force @ f.force)
+        scores.append((name, 1.0 - wrong / max(all_, 1e-300)))
+    return sorted(scores, key=lambda pair: -pair[1])
+
+
+def _hats(x: Array, knots: Array) -> Array:
+    """Piecewise linear basis (n, k)."""
+    return np.stack([np.interp(x, knots, row) for row in np.eye(knots.size)], axis=1)

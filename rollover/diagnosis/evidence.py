@@ -1,0 +1,193 @@
+"""What one recording is worth: its channels over their noise, whitened, and the phases of the test it went through."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.simulator import Simulator
+from rollover.filters import least_rate
+from rollover.noise import LENGTH, noise_floor
+from rollover.recording import Recording
+
+Array = NDArray[np.float64]
+
+MODEL_ERROR = 5e-4  # of a channel's range: what integrators differ by is no mismatch
+ALONE = 0.02  # s, prior of the time shift of a recording whose clock has no zero
+MOST_ROWS = 700  # of a recording that are looked at
+SHIFT = 1e-3  # s, prior of the time shift of a recording whose zero is known
+
+
+@dataclass(frozen=True, kw_only=True)
+class Signal:
+    """One channel of a recording: where it has values, its noise (SI), colour, and range."""
+
+    channel: str
+    rows: NDArray[np.int64]
+    values: Array
+    sigma: float
+    noise: float
+    ar: tuple[float, ...]
+    span: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evidence:
+    """One recording made ready: signals, their simulator, and the prior of its time shift (s)."""
+
+    name: str
+    recording: Recording
+    simulator: Simulator
+    signals: tuple[Signal, ...]
+    shift_prior: float
+    condition: str
+
+    @property
+    def count(self) -> int:
+        """Number of samples of all signals."""
+        return sum(s.rows.size for s in self.signals)
+
+    def stacked(self, predicted: Mapping[str, Array]) -> Array:
+        """Predicted channels at the samples, in units of the noise and whitened, one signal after another."""
+        return np.concatenate([self._whitened(s, predicted[s.channel][s.rows]) for s in self.signals])
+
+    def measured(self) -> Array:
+        """The same of the measurement."""
+        return np.concatenate([self._whitened(s, s.values) for s in self.signals])
+
+    def spans(self) -> list[tuple[Signal, slice]]:
+        """Each signal with its place in the stack."""
+        found, at = [], 0
+        for s in self.signals:
+            found.append((s, slice(at, at + s.rows.size)))
+            at += s.rows.size
+        return found
+
+    @staticmethod
+    def _whitened(signal: Signal, values: Array) -> Array:
+        x = values / signal.sigma
+        if not signal.ar:
+            return x
+        y = x.copy()
+        for k, a in enumerate(signal.ar, start=1):
+            y[k:] -= a * x[:-k]
+        y[: len(signal.ar)] = 0.0  # no past to whiten with
+        return y * _gain(signal.ar)
+
+
+def _gain(ar: tuple[float, ...]) -> float:
+    """1/sd of the innovations of an autoregression of variance 1."""
+    from scipy.signal import lfilter
+
+    impulse = np.zeros(4000)
+    impulse[0] = 1.0
+    return float(np.sqrt(np.sum(lfilter([1.0], [1.0, *(-a for a in ar)], impulse) ** 2)))
+
+
+def binned(recording: Recording) -> Recording:
+    """The recording at no more than `MOST_ROWS` rows: means of neighbouring samples, none across a gap.
+
+    What is averaged keeps its information while noise falls with the root of the number; a rate that a filter class
+    needs is kept.
+    """
+    n = recording.time.size
+    step = float(np.median(np.diff(recording.time))) if n > 1 else 1.0
+    most = int(n // MOST_ROWS)
+    for cfc in recording.cfc.values():
+        most = min(most, int(1.0 / (step * 1.05 * least_rate(cfc))))
+    if most < 2:
+        return recording
+    parts = np.arange(0, n - most + 1, most)
+    time = np.add.reduceat(recording.time[: parts[-1] + most], parts) / most
+    spread = recording.time[parts + most - 1] - recording.time[parts]
+    whole = spread < 1.5 * (most - 1) * step
+    channels = {}
+    for channel, values in recording.channels.items():
+        mean = np.add.reduceat(values[: parts[-1] + most], parts) / most  # NaN where any is
+        channels[channel] = mean[whole]
+    noise = {channel: sigma / np.sqrt(most) for channel, sigma in recording.noise.items()}
+    return replace(recording, time=time[whole], channels=channels, noise=noise)
+
+
+def evidence_of(name: str, recording: Recording, simulator: Simulator) -> Evidence | None:
+    """Make a recording ready; None if it shares no channel with the simulation.
+
+    Noise is estimated from each channel itself; where it is too short for that, the noise that the recording states.
+    """
+    predicted = simulator.predict({}, 0.0)
+    if predicted is None:
+        return None
+    signals = []
+    leaps = _near_leaps(recording, predicted)
+    for channel, values in recording.channels.items():
+        rows = np.flatnonzero(np.isfinite(values) & ~leaps)
+        if channel not in predicted or rows.size < 8 or not np.all(np.isfinite(predicted[channel][rows])):
+            continue
+        y = values[rows]
+        span = float(max(np.ptp(predicted[channel][rows]), np.ptp(y)))
+        if span <= 0.0:
+            continue
+        noise, ar = _noise(y - predicted[channel][rows], y, recording.noise.get(channel))
+        sigma = float(np.hypot(noise, MODEL_ERROR * span))
+        if noise < sigma * 0.7:
+            ar = ()  # the model's error is not coloured as the noise is
+        signals.append(Signal(channel=channel, rows=rows, values=y, sigma=sigma, noise=noise, ar=ar, span=span))
+    if not signals:
+        return None
+    loose = recording.clock.zero == "unknown"
+    step = float(np.median(np.diff(recording.time))) if recording.time.size > 1 else 0.0
+    return Evidence(
+        name=name,
+        recording=recording,
+        simulator=simulator,
+        signals=tuple(signals),
+        shift_prior=ALONE if loose else SHIFT + 0.5 * step,
+        condition=condition_of(recording.conditions),
+    )
+
+
+def _near_leaps(recording: Recording, predicted: Mapping[str, Array]) -> NDArray[np.bool_]:
+    """Samples so near the first contact that the clock decides on which side of the leap of force they lie, (n,)."""
+    near = np.zeros(recording.time.size, dtype=bool)
+    sinkage = predicted.get("ground/sinkage")
+    if sinkage is None or not (sinkage > 0.0).any() or recording.time.size < 3:
+        return near
+    first = int(np.argmax(sinkage > 0.0))
+    near[max(first - 1, 0) : first + 1] = True
+    return near
+
+
+def _noise(residual: Array, values: Array, stated: float | None) -> tuple[float, tuple[float, ...]]:
+    """Noise (1 sigma) and its colour; the smaller of what the channel and its misfit show, as both add to it."""
+    if values.size < LENGTH:
+        return (stated if stated is not None else _by_differences(residual)), ()
+    best = min((noise_floor(residual), noise_floor(values)), key=lambda floor: floor.sigma)
+    return best.sigma, best.ar
+
+
+def _by_differences(values: Array) -> float:
+    """Noise of a short series from its second differences: sd = 1.4826 median|d2|/sqrt(6)."""
+    if values.size < 5:
+        return 0.0
+    d = np.diff(values, 2)
+    return float(1.4826 * np.median(np.abs(d - np.median(d))) / np.sqrt(6.0))
+
+
+def condition_of(conditions: Mapping[str, Any]) -> str:
+    """Name of the condition that a recording was run under: recordings alike share it."""
+    return ", ".join(
+        f"{path}={value:g}" if isinstance(value, float) else f"{path}={value}"
+        for path, value in sorted(conditions.items())
+    )
+
+
+def groups_of(evidence: Sequence[Evidence]) -> list[list[int]]:
+    """Places of the recordings that share a condition, one list for each condition."""
+    found: dict[str, list[int]] = {}
+    for k, e in enumerate(evidence):
+        found.setdefault(e.condition or e.name, []).append(k)
+    return list(found.values())

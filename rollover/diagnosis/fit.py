@@ -1,0 +1,256 @@
+"""Least squares of effects over several recordings, the time shift of each profiled out.
+
+For recording r with whitened residual w, J = dy/dx of the effects' coordinates and s = dy/dtau of its time shift,
+
+    minimise sum_r |w_r - J_r dx - s_r dtau_r|^2 + ((tau_r + dtau_r)/sd)^2                                    (D1)
+
+tau_r is eliminated, which leaves for each recording a small A_r, b_r, c_r: enough to refit without any recording and
+to predict that one, so that holding out costs no simulation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.evidence import Evidence
+
+Array = NDArray[np.float64]
+NUDGES = (2e-2, 5e-3, 1e-3)  # of a coordinate, for differences: wide first, as thresholds show only over samples
+GENTLE = 1e-4  # prior of a coordinate (1/variance): keeps what nothing determines where it is
+
+
+@dataclass(frozen=True, kw_only=True)
+class Block:
+    """One recording at the fitted point: residual (n,), Jacobian (n, p), slope of the shift (n,), shift, its prior."""
+
+    residual: Array
+    J: Array
+    slope: Array
+    shift: float
+    prior: float
+
+    @property
+    def weight(self) -> float:
+        """s's + 1/sd^2."""
+        return float(self.slope @ self.slope) + self.prior**-2
+
+    def normal(self) -> tuple[Array, Array, float]:
+        """A (p, p), b (p,), c: |..|^2 of (D1) with tau eliminated is c - 2 b'dx + dx'A dx."""
+        g = float(self.slope @ self.residual) - self.shift * self.prior**-2
+        h = self.J.T @ self.slope
+        A = self.J.T @ self.J - np.outer(h, h) / self.weight
+        b = self.J.T @ self.residual - h * g / self.weight
+        c = float(self.residual @ self.residual) + (self.shift / self.prior) ** 2 - g * g / self.weight
+        return A, b, c
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fitted:
+    """Effects fitted to recordings: coordinates, blocks there, and what is left, sum of squares over the noise."""
+
+    candidates: tuple[Candidate, ...]
+    x: tuple[float, ...]
+    blocks: tuple[Block, ...]
+
+    @property
+    def left(self) -> float:
+        """Sum over the recordings of (D1) at its minimum."""
+        return sum(b.normal()[2] for b in self.blocks)
+
+    @property
+    def label(self) -> str:
+        """Keys of the effects."""
+        return " + ".join(c.key for c in self.candidates) or "as it is"
+
+
+class Judge:
+    """Evidence with a memory of what was simulated: the same values are never simulated twice."""
+
+    def __init__(self, evidence: Sequence[Evidence]) -> None:
+        self.evidence = tuple(evidence)
+        self.measured = [e.measured() for e in self.evidence]
+        self.shifts = [0.0] * len(self.evidence)
+        self.simulations = 0
+        self._known: dict[tuple[object, ...], Array | None] = {}
+
+    def predicted(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
+        """Stacked prediction of recording r; None where the simulation fails or a value is out of bounds."""
+        key = (r, tuple(c.key for c in candidates), tuple(np.round(x, 12)), round(shift, 9))
+        if key not in self._known:
+            self._known[key] = self._simulated(r, candidates, x, shift)
+        return self._known[key]
+
+    def _simulated(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
+        self.simulations += 1
+        try:
+            found = self.evidence[r].simulator.predict(self.changes(candidates, x), shift)
+        except ValueError:
+            return None
+        if found is None:
+            return None
+        y = self.evidence[r].stacked(found)
+        return y if np.all(np.isfinite(y)) else None
+
+    @staticmethod
+    def changes(candidates: Sequence[Candidate], x: Sequence[float]) -> dict[str, object]:
+        """Values to exchange in the scenario."""
+        found: dict[str, object] = {}
+        at = 0
+        for c in candidates:
+            found |= c.changes(x[at : at + len(c.search)])
+            at += len(c.search)
+        return found
+
+    def aligned(self) -> None:
+        """Begin with the time shift at which each recording meets the scenario best, within three of its prior."""
+        for r, e in enumerate(self.evidence):
+            shifts = np.linspace(-3.0, 3.0, 25) * e.shift_prior
+            left = []
+            for s in shifts:
+                y = self.predicted(r, (), (), float(s))
+                left.append(
+                    np.inf if y is None else float(np.sum((self.measured[r] - y) ** 2)) + (s / e.shift_prior) ** 2
+                )
+            self.shifts[r] = float(shifts[int(np.argmin(left))])
+
+    def block(
+        self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float, nudge: float
+    ) -> Block | None:
+        """Recording r linearised at x by differences over `nudge`; no Jacobian for 0."""
+        y = self.predicted(r, candidates, x, shift)
+        if y is None:
+            return None
+        e = self.evidence[r]
+        J = np.zeros((y.size, len(x)))
+        for k in range(len(x) if nudge else 0):
+            step = nudge if x[k] < 0.5 else -nudge
+            moved = self.predicted(r, candidates, [*x[:k], x[k] + step, *x[k + 1 :]], shift)
+            if moved is None:
+                return None
+            J[:, k] = (moved - y) / step
+        return Block(residual=self.measured[r] - y, J=J, slope=self._slope(r, y), shift=shift, prior=e.shift_prior)
+
+    def _slope(self, r: int, y: Array) -> Array:
+        """dy/dtau = -dy/dt of each signal, by differences along the stamps."""
+        e = self.evidence[r]
+        slope = np.zeros_like(y)
+        for signal, part in e.spans():
+            slope[part] = -np.gradient(y[part], e.recording.time[signal.rows])
+        return slope
+
+    def fit(
+        self,
+        candidates: Sequence[Candidate],
+        start: Sequence[float],
+        *,
+        rounds: int = 14,
+        only: Sequence[int] | None = None,
+        shifts: Sequence[float] | None = None,
+        width: int = 0,
+    ) -> Fitted | None:
+        """Levenberg-Marquardt on (D1) from a start within the unit box; None if nothing can be simulated there."""
+        use = list(range(len(self.evidence))) if only is None else list(only)
+        x = [float(v) for v in start]
+        shifts = [self.shifts[r] for r in use] if shifts is None else list(shifts)
+        found = [self.block(r, candidates, x, s, NUDGES[width]) for r, s in zip(use, shifts, strict=True)]
+        if any(b is None for b in found):
+            return None
+        blocks: list[Block] = [b for b in found if b is not None]
+        best, damping = self._total(blocks), 1e-3
+        for _ in range(rounds):
+            A, b = np.zeros((len(x), len(x))), np.zeros(len(x))
+            for block in blocks:
+                Ar, br, _ = block.normal()
+                A, b = A + Ar, b + br
+            improved = False
+            for _ in range(5):
+                dx = _bounded(A, b, np.array(x), damping)
+                trial = [float(v) for v in np.clip(np.array(x) + dx, 0.0, 1.0)]
+                moved = np.array(trial) - np.array(x)
+                steps = [_shift(block, moved) for block in blocks]
+                after = [
+                    self.block(r, candidates, trial, block.shift + d, 0.0)
+                    for r, block, d in zip(use, blocks, steps, strict=True)
+                ]
+                if all(a is not None for a in after):
+                    total = self._total([a for a in after if a is not None])
+                    if total < best:
+                        improved = True
+                        break
+                damping = max(10.0 * damping, 1e-3)
+            gain = best - total if improved else 0.0
+            if improved:
+                x, best, damping, shifts = trial, total, 0.1 * damping, [a.shift for a in after if a is not None]
+            if gain < 1e-3 * max(1.0, 1e-2 * best):
+                width, damping = width + 1, 1e-3
+            last = width == len(NUDGES) or not x
+            again = [
+                self.block(r, candidates, x, s, NUDGES[width if width < len(NUDGES) else 1])
+                for r, s in zip(use, shifts, strict=True)
+            ]
+            if any(b is None for b in again):
+                return None
+            blocks = [b for b in again if b is not None]
+            if last:
+                break
+        return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=tuple(blocks))
+
+    def polish(self, fitted: Fitted, size: float = 0.02, most: int = 70) -> Fitted:
+        """Follow a crooked valley by a simplex: where a threshold is crossed, differences mislead; never worse."""
+        from scipy.optimize import minimize
+
+        shifts = [b.shift for b in fitted.blocks]
+
+        def left(x: Array) -> float:
+            inside = [float(v) for v in np.clip(x, 0.0, 1.0)]
+            out = float(np.sum(np.abs(x - np.array(inside))))
+            blocks = [self.block(r, fitted.candidates, inside, s, 0.0) for r, s in enumerate(shifts)]
+            if any(b is None for b in blocks):
+                return 1e300
+            return sum(b.normal()[2] for b in blocks if b is not None) * (1.0 + out)
+
+        start = np.array(fitted.x)
+        simplex = np.vstack(
+            [start, *(start + size * (1.0 if v < 0.9 else -1.0) * np.eye(start.size)[k] for k, v in enumerate(start))]
+        )
+        found = minimize(
+            left, start, method="Nelder-Mead", options={"initial_simplex": simplex, "maxfev": most, "xatol": 1e-4}
+        )
+        again = self.fit(fitted.candidates, np.clip(found.x, 0.0, 1.0), rounds=3, shifts=shifts, width=2)
+        return again if again is not None and again.left < fitted.left else fitted
+
+    @staticmethod
+    def _total(blocks: Sequence[Block]) -> float:
+        return sum(float(b.residual @ b.residual) + (b.shift / b.prior) ** 2 for b in blocks)
+
+
+def _shift(block: Block, dx: Array) -> float:
+    """Change of the time shift that goes with dx."""
+    g = float(block.slope @ (block.residual - block.J @ dx)) - block.shift * block.prior**-2
+    return g / block.weight
+
+
+def _bounded(A: Array, b: Array, x: Array, damping: float) -> Array:
+    """Step that solves (A + damping diag A) dx = b, coordinates that would leave the unit box held at its border."""
+    p = x.size
+    free = np.ones(p, dtype=bool)
+    dx = np.zeros(p)
+    for _ in range(p + 1):
+        if not free.any():
+            break
+        M = A[np.ix_(free, free)].copy()
+        M[np.diag_indices_from(M)] *= 1.0 + damping
+        M[np.diag_indices_from(M)] += GENTLE
+        target = b[free] - A[np.ix_(free, ~free)] @ dx[~free]
+        dx[free] = np.linalg.solve(M, target)
+        out = free & ((x + dx < 0.0) | (x + dx > 1.0))
+        if not out.any():
+            break
+        dx[out] = np.clip(x[out] + dx[out], 0.0, 1.0) - x[out]
+        free &= ~out
+    return dx

@@ -1,0 +1,97 @@
+"""Judging on recordings that were not fitted: leave one condition out, by the linear models at the fitted point.
+
+With sum_s A_s dx = sum_s b_s over the training recordings s, recording r is left with c_r - 2 b_r'dx + dx'A_r dx: only
+its own time shift is fitted to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.fit import GENTLE, Fitted
+
+Array = NDArray[np.float64]
+NOISE_ALONE = 1.5  # misfit over the noise up to which the noise's own statistics decide
+
+
+@dataclass(frozen=True, kw_only=True)
+class Held:
+    """Held-out misfit: `left` (k,) sum of squares over the noise of each recording, `count` (k,) its samples."""
+
+    left: Array
+    count: Array
+
+    @property
+    def nrmse(self) -> Array:
+        """Root mean square over the noise, (k,): 1 is the noise itself."""
+        return np.asarray(np.sqrt(self.left / self.count))
+
+    @property
+    def total(self) -> float:
+        """Root mean square over the noise of all together."""
+        return float(np.sqrt(self.left.sum() / self.count.sum()))
+
+
+def held_out(fitted: Fitted, groups: Sequence[Sequence[int]]) -> Held:
+    """Predict each group of recordings by a fit to all the others; a single group is predicted by itself."""
+    normals = [b.normal() for b in fitted.blocks]
+    p = len(fitted.x)
+    left = np.zeros(len(normals))
+    for group in groups:
+        rest = [r for r in range(len(normals)) if r not in group] or list(group)
+        dx = _step(
+            sum((normals[r][0] for r in rest), np.zeros((p, p))), sum((normals[r][1] for r in rest), np.zeros(p))
+        )
+        dx = np.clip(np.array(fitted.x) + dx, -0.25, 1.25) - np.array(fitted.x)
+        for r in group:
+            A, b, c = normals[r]
+            left[r] = max(c - 2.0 * float(b @ dx) + float(dx @ A @ dx), 0.0)
+    return Held(left=left, count=np.array([b.residual.size for b in fitted.blocks], dtype=float))
+
+
+def _step(A: Array, b: Array) -> Array:
+    if not b.size:
+        return b
+    return np.asarray(np.linalg.solve(A + GENTLE * np.eye(b.size), b))
+
+
+def split(fitted: Fitted, training: Sequence[int], held: Sequence[int]) -> Held:
+    """Fit the training recordings only and predict the held ones; each recording's place keeps its own value."""
+    normals = [b.normal() for b in fitted.blocks]
+    p = len(fitted.x)
+    A = sum((normals[r][0] for r in training), np.zeros((p, p)))
+    dx = _step(A, sum((normals[r][1] for r in training), np.zeros(p)))
+    left = np.array([max(c - 2.0 * float(b @ dx) + float(dx @ A_r @ dx), 0.0) for A_r, b, c in normals])
+    del held
+    return Held(left=left, count=np.array([b.residual.size for b in fitted.blocks], dtype=float))
+
+
+def worse(rival: Fitted, best: Fitted, groups: Sequence[Sequence[int]]) -> tuple[float, float]:
+    """How much worse a rival predicts held-out recordings, as two scores; both above 2 exclude it.
+
+    First: the excess of its squares over that of the best, in standard errors of the noise: for predictions that differ
+    by D (in noise units) the excess has sd 2 |D| phi, phi the best's own misfit per sample (at least 1). Second: the
+    mean over conditions of ln(E_rival/E_best) in its paired standard errors.
+    """
+    a, b = held_out(rival, groups), held_out(best, groups)
+    phi = max(1.0, float(np.sqrt(b.left.sum() / b.count.sum())))
+    apart = np.zeros(len(best.blocks))
+    for r, (x, y) in enumerate(zip(rival.blocks, best.blocks, strict=True)):
+        d = x.residual - y.residual
+        apart[r] = float(d @ d) - float(y.slope @ d) ** 2 / y.weight
+    distance = float(apart.sum())
+    excess = float(a.left.sum() - b.left.sum())
+    if excess <= 0.0:
+        return 0.0, 0.0
+    first = excess / (2.0 * np.sqrt(max(distance, 1e-12)) * phi)
+    # conditions under which the two say the same decide nothing
+    telling = [list(g) for g in groups if apart[list(g)].sum() > 9.0 * phi**2]
+    logs = np.array([0.5 * np.log(a.left[g].sum() / b.left[g].sum()) for g in telling])
+    if phi < NOISE_ALONE or logs.size < 2:
+        return float(first), float(first)
+    error = float(np.std(logs, ddof=1) / np.sqrt(logs.size))
+    return float(first), float(np.mean(logs) / max(error, 1e-12))

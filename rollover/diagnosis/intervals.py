@@ -1,0 +1,60 @@
+"""95 % intervals of fitted parameters: the curvature of the misfit, and what a small error of the model would do."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ground.quantity import quantities
+from rollover.diagnosis.candidates import physical
+from rollover.diagnosis.evidence import MODEL_ERROR
+from rollover.diagnosis.fit import GENTLE, Fitted, Judge
+from rollover.diagnosis.verdict import Interval
+from rollover.effects import EFFECTS
+
+Array = NDArray[np.float64]
+TWO_SIDED = 1.96
+
+
+def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
+    """For each effect, its parameters with 95 % intervals.
+
+    cov = phi A^-1, phi the misfit left per sample (at least 1); beside it, in quadrature, what a gain error of the
+    model of `MODEL_ERROR` in any one channel would do, A^-1 J'(error): integrators differ, noise or not.
+    """
+    p = len(fitted.x)
+    A = sum((b.normal()[0] for b in fitted.blocks), np.zeros((p, p))) + GENTLE * np.eye(p)
+    inverse = np.linalg.inv(A)
+    count = sum(b.residual.size for b in fitted.blocks)
+    phi = max(1.0, fitted.left / count)
+    sd = np.sqrt(np.maximum(phi * np.diag(inverse), 0.0))
+    moved = np.zeros(p)
+    channels = {s.channel for e in judge.evidence for s in e.signals}
+    for channel in channels:
+        pull = np.zeros(p)
+        for r, block in enumerate(fitted.blocks):
+            for signal, part in judge.evidence[r].spans():
+                if signal.channel == channel:
+                    y = (judge.measured[r] - block.residual)[part]
+                    pull += block.J[part].T @ (MODEL_ERROR * y)
+        moved += (inverse @ pull) ** 2
+    sd = np.sqrt(sd**2 + moved)
+    found, at = [], 0
+    for c in fitted.candidates:
+        kind: Any = EFFECTS[c.id]
+        units = quantities(kind)
+        values: dict[str, Interval] = {}
+        for name, search in c.search.items():
+            x = fitted.x[at]
+            values[name] = Interval(
+                value=physical(x, search),
+                low=physical(x - TWO_SIDED * sd[at], search),
+                high=physical(x + TWO_SIDED * sd[at], search),
+                unit=units[name].unit if name in units else "",
+                at_bound=not 1e-6 < x < 1.0 - 1e-6,
+            )
+            at += 1
+        found.append(values)
+    return found

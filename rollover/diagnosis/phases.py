@@ -1,0 +1,50 @@
+"""Phases of a drop as they were measured: free fall, first contact, loading, peak, unloading, rest."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.evidence import Evidence
+
+Array = NDArray[np.float64]
+FIRST_CONTACT = 0.005  # s, after the impact
+AROUND_PEAK = 0.10  # of the time to the deepest point, either side
+SETTLING = 0.06  # s after the deepest point until what is left is rest
+
+
+def drop_phases(evidence: Evidence) -> tuple[tuple[float, str], ...]:
+    """(start s, name) of each phase of a drop: by the measured sinkage where there is any, else by the simulated."""
+    recording = evidence.recording
+    predicted = evidence.simulator.predict({}, 0.0) or {}
+    depth = recording.channels.get("ground/sinkage")
+    if depth is None and "striker/position_z" in recording.channels:
+        depth = -recording.channels["striker/position_z"]
+    if depth is None:
+        depth = predicted.get("ground/sinkage")
+    if depth is None:
+        depth = _integrated(recording.time, predicted)
+    known = np.isfinite(depth)
+    time, z = recording.time[known], depth[known]
+    start = float(recording.time[0])
+    if time.size < 5:
+        return ((start, "approach"),)
+    smooth = np.convolve(z, np.ones(3) / 3.0, mode="valid")
+    deepest = float(time[1 + int(np.argmax(smooth))])
+    marks = [
+        (start, "free-fall"),
+        (0.0, "first-contact"),
+        (FIRST_CONTACT, "loading"),
+        ((1.0 - AROUND_PEAK) * deepest, "peak"),
+        ((1.0 + AROUND_PEAK) * deepest, "unloading"),
+        (deepest + SETTLING, "rest"),
+    ]
+    marks = [m for k, m in enumerate(marks) if k == 0 or m[0] > marks[k - 1][0]]
+    return tuple(m for k, m in enumerate(marks) if k + 1 == len(marks) or marks[k + 1][0] > start)
+
+
+def _integrated(time: Array, predicted: dict[str, Array]) -> Array:
+    speed = predicted.get("striker/velocity_z")
+    if speed is None:
+        return np.full(time.size, np.nan)
+    return np.concatenate([[0.0], np.cumsum(-0.5 * (speed[1:] + speed[:-1]) * np.diff(time))])

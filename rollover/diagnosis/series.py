@@ -1,0 +1,130 @@
+"""What a diagnosis rests on, over time: measured, simulated before, and simulated with what was found.
+
+The scenario before and the diagnosed one are simulated anew at every stamp of a recording: the latter is what
+`rollover run` makes of scenario-diagnosed.yaml. Both at one time shift, that of the better explanation: a shift of its
+own would hide part of what the scenario misses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.account import diagnosed_scenario
+from rollover.diagnosis.evidence import Evidence, binned, evidence_of
+from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.phases import drop_phases
+from rollover.diagnosis.simulator import simulator_of
+from rollover.diagnosis.verdict import Diagnosis
+from rollover.recording import Recording
+from rollover.scenario import Scenario
+
+Array = NDArray[np.float64]
+WIDEST = 3.0  # times its prior that a time shift may be
+
+
+@dataclass(frozen=True, kw_only=True)
+class Track:
+    """One channel over time, SI: `time`, `measured`, `before` (n,), `after` (n,) or None; gaps are left out.
+
+    `noise` is 1 sigma of what the misfit is held against: the measured noise, and what integrators differ by.
+    """
+
+    channel: str
+    time: Array
+    measured: Array
+    before: Array
+    after: Array | None
+    noise: float
+
+    @property
+    def rms_before(self) -> float:
+        """Root mean square of measured less simulated, over the noise."""
+        return self._rms(self.before)
+
+    @property
+    def rms_after(self) -> float | None:
+        """The same with what was found; None if nothing was."""
+        return None if self.after is None else self._rms(self.after)
+
+    def _rms(self, simulated: Array) -> float:
+        return float(np.sqrt(np.mean((self.measured - simulated) ** 2))) / self.noise
+
+
+@dataclass(frozen=True, kw_only=True)
+class Told:
+    """One recording: its tracks, its phases (start s, name), and the time shift (s) at which it is shown."""
+
+    recording: str
+    title: str
+    held_out: bool
+    phases: tuple[tuple[float, str], ...]
+    shift: float
+    tracks: tuple[Track, ...]
+
+
+def series(scenario: Scenario, recordings: Sequence[tuple[str, Recording]], found: Diagnosis) -> tuple[Told, ...]:
+    """Each recording beside its simulations, in the order given; those that could not be simulated are left out."""
+    diagnosed = diagnosed_scenario(scenario, found)
+    judged = found.held_out if set(found.held_out) != set(found.training) else ()
+    told = []
+    for name, recording in recordings:
+        one = _told(name, recording, scenario, diagnosed if found.effects else None, name in judged)
+        if one is not None:
+            told.append(one)
+    return tuple(told)
+
+
+def _told(
+    name: str, recording: Recording, scenario: Scenario, diagnosed: Scenario | None, held_out: bool
+) -> Told | None:
+    simulator = simulator_of(scenario, recording)
+    evidence = evidence_of(name, thinner := binned(recording), simulator_of(scenario, thinner))
+    if evidence is None:
+        return None
+    best = evidence if diagnosed is None else evidence_of(name, thinner, simulator_of(diagnosed, thinner))
+    at = _shift(best or evidence)
+    before = simulator.predict({}, at)
+    if before is None:
+        return None
+    after = None if diagnosed is None else simulator_of(diagnosed, recording).predict({}, at)
+    tracks = []
+    for signal in evidence.signals:
+        channel = signal.channel
+        there = np.isfinite(recording.channels[channel])
+        tracks.append(
+            Track(
+                channel=channel,
+                time=recording.time[there],
+                measured=recording.channels[channel][there],
+                before=before[channel][there],
+                after=None if after is None else after[channel][there],
+                noise=signal.sigma * float(np.sqrt(_rows_in_one(recording, thinner))),
+            )
+        )
+    return Told(
+        recording=name,
+        title=recording.title,
+        held_out=held_out,
+        phases=drop_phases(evidence),
+        shift=at,
+        tracks=tuple(tracks),
+    )
+
+
+def _rows_in_one(recording: Recording, thinner: Recording) -> float:
+    """How many samples were averaged into one: single samples are that much noisier."""
+    return max(1.0, float(np.median(np.diff(thinner.time)) / np.median(np.diff(recording.time))))
+
+
+def _shift(evidence: Evidence) -> float:
+    """Time shift at which a simulation meets its recording best, within `WIDEST` of its prior, s."""
+    judge = Judge([evidence])
+    judge.aligned()
+    fitted = judge.fit((), ())
+    best = judge.shifts[0] if fitted is None else fitted.blocks[0].shift
+    most = WIDEST * evidence.shift_prior
+    return float(np.clip(best, -most, most))

@@ -1,0 +1,109 @@
+"""The page and the recording of a diagnosis, from made-up ones."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rollover.prechecks import Finding
+from tests.rollover.diagnosed import FORCE, nothing_found, sensor_at_fault, told
+from tests.viz.html import Parts
+from viz.diagnosis_page import page, ranked
+from viz.diagnosis_words import answer, markdown
+
+FLAT = Finding(
+    check="clipping", channel=FORCE, start=0.1, end=0.12, value=3e3, unit="N", error=None, sentence="a flat top"
+)
+
+
+def test_the_page_of_a_finding() -> None:
+    text = page(sensor_at_fault(), told(), title="Drop", prechecks=[("one", FLAT)], command="rollover diagnose x")
+    parts = Parts(text)
+    assert parts.fetched() == []
+    said = parts.said
+    assert "A sensor is at fault: sensor-gain of ground/force_normal." in said
+    row = next(r for r in parts.rows if r[:2] == ["sensor-gain of ground/force_normal", "sensor"])
+    assert row[2:7] == ["gain", "1.08", "1.07", "1.09", "-"]
+    assert "at the end of its range" in row[7]
+    assert "predicts the held-out recordings no better than soil-stiffness: it may be any of these" in said
+    assert "Measure next: weigh the striker at rest." in said
+    assert "Structure remains in the misfit (probability 1e-06)." in said
+    assert ["one", FORCE, "loading", "0.0050", "0.1000", "70.0", "speed"] in parts.rows
+    assert ["speed", "90"] in parts.rows
+    assert ["time", "0"] in parts.rows  # worse than nothing is nothing
+    assert ["fitted", "one", "before", "9", "0.800", "8"] in parts.rows
+    assert ["held out", "two", "after", "1.25", "", ""] in parts.rows
+    assert ["one", "fitted", "9", "1.2"] in parts.rows
+    assert ["two", "held out", "9.1", "1.3"] in parts.rows
+    assert "Without a gain: 1 more" in said
+    assert "a flat top" in said
+    assert "<one>: a note." in said
+    assert "What these recordings would have shown" not in said
+    assert text.count("<svg") == 2
+
+
+def test_the_page_where_nothing_was_found() -> None:
+    parts = Parts(page(nothing_found(), told(with_after=False), title="Drop", command="rollover diagnose x"))
+    assert "Simulation and recordings agree within the noise." in parts.said
+    assert ["soil-viscous-damping", "damping", "120"] in parts.rows
+    assert "Nothing was found in 2 recordings" in parts.said
+    assert "What was found" not in parts.said
+    assert "Where they differ" not in parts.said
+
+
+def test_each_verdict_has_its_sentence() -> None:
+    said = {
+        answer(replace(nothing_found(), verdict=v))
+        for v in ("no-mismatch", "parameter", "sensor", "missing-physics", "unexplained", "cannot-tell")
+    }
+    assert len(said) == 6
+
+
+def test_the_recording_with_the_largest_share_comes_first() -> None:
+    found = sensor_at_fault()
+    assert [one.recording for one, _ in ranked(found, told())] == ["one", "two"]
+    moved = replace(found, where=(replace(found.where[0], recording="two"),))
+    assert [one.recording for one, _ in ranked(moved, told())] == ["two", "one"]
+
+
+def test_residuals_are_over_the_noise() -> None:
+    track = told()[0].tracks[0]
+    assert track.rms_after == pytest.approx(np.sqrt(0.5), rel=0.05)  # a sine of one sigma
+    assert track.rms_before > 1.0
+    assert told(with_after=False)[0].tracks[0].rms_after is None
+
+
+@pytest.mark.parametrize("with_after", [True, False])
+def test_the_recording_for_the_viewer(with_after: bool, tmp_path: Path) -> None:
+    pytest.importorskip("rerun", reason="no rerun wheel for this platform", exc_type=ImportError)
+    from viz.diagnosis import write_diagnosis
+    from viz.verify import check_rrd, read_column, read_entities
+
+    path = tmp_path / "diagnosis.rrd"
+    found = sensor_at_fault() if with_after else nothing_found()
+    write_diagnosis(found, told(with_after=with_after), path, "Drop")
+    assert check_rrd(path) == []
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+    entities = set(read_entities(path))
+    here = "/two/values/ground_force_normal_kN"
+    assert {f"{here}/measured", f"{here}/before", "/answer", "/one/phase"} <= entities
+    assert (f"{here}/after" in entities) == with_after
+    at, values = read_column(path, f"{here}/measured", "Scalars:scalars")
+    track = told()[1].tracks[0]
+    assert len(at) == track.time.size + 1  # a gap, marked
+    read = np.array([v[0] for v in values])
+    assert np.isnan(read).sum() == 1
+    assert read[~np.isnan(read)] == pytest.approx(1e-3 * track.measured)
+    left = read_column(path, "/two/residual/ground_force_normal_kN/before", "Scalars:scalars")[1]
+    residual = np.array([v[0] for v in left])
+    assert np.nanmax(residual) == pytest.approx(np.max(track.measured - track.before) / 40.0)
+
+
+def test_the_words_name_the_rival_and_the_next_test() -> None:
+    words = markdown(sensor_at_fault())
+    assert words.startswith("# A sensor is at fault: sensor-gain of ground/force_normal.")
+    assert "Not told apart from soil-stiffness." in words
+    assert "Measure next: weigh the striker at rest." in words
