@@ -9,9 +9,13 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from rollover.bodies import bodies_of
+from rollover.contact import tables_of
 from rollover.run import Run
 from rollover.scenario import Scenario
 from rollover.simulate import run
+from rollover.spin import keep_spins
+from rollover.tables import W_AXIS, handle
 from tests.physics.regime import climbing, direction
 from tests.physics.scenes import shipped
 
@@ -168,3 +172,18 @@ def test_a_slope_across_turns_a_rear_overturn_to_the_side() -> None:
     level, slight, steep = (direction(climbing(angle)) or 0.0 for angle in (0.0, 10.0, 30.0))
     assert level < 0.1
     assert 0.3 < slight < 0.5 * steep < 22.0
+
+
+def test_a_blow_on_its_carrier_does_not_turn_a_wheel() -> None:
+    """spin + omega . e stays, e the axle: no torque passes a bearing at once."""
+    scenario = driving({"initiation.steer_deg": 10.0})
+    bodies = bodies_of(scenario.vehicle, scenario.ground.elements)
+    t = tables_of(scenario, bodies)
+    rng, n = np.random.default_rng(4), 6 * len(bodies)
+    before, after = rng.normal(size=(2, n + 4))
+    after[n:] = before[n:]
+    keep_spins(handle(t), before, after)
+    for w, b in enumerate(t.wheel_i.tolist()):
+        turned = (after - before)[6 * b + 3 : 6 * b + 6]
+        assert abs(turned[1]) > 0.01
+        assert after[n + w] - before[n + w] == pytest.approx(-float(turned @ t.wheel_f[w, W_AXIS : W_AXIS + 3]))
