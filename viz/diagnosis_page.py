@@ -165,7 +165,9 @@ def _followed(found: Diagnosis, told: Sequence[Told]) -> list[Block]:
     if not rows:
         return []
     each = set(found.training) == set(found.held_out)
-    how = "Held out: each condition in turn, predicted from the others." if each else "Held out: never fitted."
+    how = "Held out: the misfit is predicted from a fit to the others; rating and peak are of the fit to all."
+    if each and len({t.condition or t.recording for t in told}) < 2:
+        how = "All recordings share one condition: nothing could be held out, and all numbers are of the fit."
     heads = ["", "recordings", "", "misfit / noise", "ISO/TS 18571", "peak force error, %"]
     blocks: list[Block] = [Table(columns=heads, rows=rows, numeric=(3, 4, 5), caption=how)]
     held = {t.recording: t.held_out for t in told}

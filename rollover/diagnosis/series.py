@@ -64,6 +64,7 @@ class Told:
     phases: tuple[tuple[float, str], ...]
     shift: float
     tracks: tuple[Track, ...]
+    condition: str = ""
 
 
 def series(scenario: Scenario, recordings: Sequence[tuple[str, Recording]], found: Diagnosis) -> tuple[Told, ...]:
@@ -112,6 +113,7 @@ def _told(
         phases=drop_phases(evidence),
         shift=at,
         tracks=tuple(tracks),
+        condition=evidence.condition,
     )
 
 

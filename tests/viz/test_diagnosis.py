@@ -54,6 +54,14 @@ def test_the_page_where_nothing_was_found() -> None:
     assert "Where they differ" not in parts.said
 
 
+def test_one_condition_is_not_called_held_out() -> None:
+    found = replace(sensor_at_fault(), training=("one", "two"), held_out=("one", "two"))
+    alike = tuple(replace(t, condition="initiation.speed=3") for t in told())
+    for shown, single in ((told(), False), (alike, True)):
+        text = page(found, shown, title="Drop", command="rollover diagnose x")
+        assert ("nothing could be held out" in text) == single
+
+
 def test_each_verdict_has_its_sentence() -> None:
     said = {
         answer(replace(nothing_found(), verdict=v))
