@@ -25,9 +25,9 @@ def freed(vectors: Array, block: Block) -> Array:
     return np.asarray(vectors - shrink * np.outer(s, s @ vectors))
 
 
-def null_of_the_best(directions: Sequence[Sequence[Array]], draws: int = DRAWS, seed: int = 0) -> Array:
+def null_of_the_best(directions: Sequence[Array], draws: int = DRAWS, seed: int = 0) -> Array:
     """Largest gain on noise (draws,), sorted; `directions` are, for each recording, arrays (n_r, m)."""
-    m = directions[0].shape[1] if directions else 0  # type: ignore[attr-defined]
+    m = directions[0].shape[1] if len(directions) else 0
     if m == 0:
         return np.zeros(draws)
     G = sum((np.asarray(d).T @ np.asarray(d) for d in directions), np.zeros((m, m)))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,7 +43,8 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
     sd = np.sqrt(sd**2 + moved)
     found, at = [], 0
     for c in fitted.candidates:
-        units = quantities(EFFECTS[c.id])
+        kind: Any = EFFECTS[c.id]
+        units = quantities(kind)
         values: dict[str, Interval] = {}
         for name, search in c.search.items():
             x = fitted.x[at]

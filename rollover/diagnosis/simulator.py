@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rollover.drop import DropFailedError, DropModel, unfit
 from rollover.effects import read
+from rollover.faults import Fault, InputError
 from rollover.filters import filtered
 from rollover.recording import Recording
 from rollover.scenario import Scenario
@@ -73,13 +74,12 @@ def behind_filters(channels: Mapping[str, Array], recording: Recording) -> dict[
 def simulator_of(scenario: Scenario, recording: Recording) -> Simulator:
     """The quickest simulator that a scenario admits; the recording's conditions are put in by path.
 
-    Raises `InputError` for a condition that the scenario does not know.
+    Raises `InputError` for a condition that the scenario does not know, and for a scenario that is no drop test.
     """
     own = set_up(scenario, recording)
-    if unfit(own):
-        from rollover.diagnosis.overturn import RunSimulator
-
-        return RunSimulator(own, recording)
+    reason = unfit(own)
+    if reason:
+        raise InputError(Fault(message=f"{scenario.title}: {reason}; only drop tests can be diagnosed"))
     return DropSimulator(own, recording)
 
 

@@ -26,7 +26,7 @@ __all__ += ["vehicle"]
 VARIABLE = "ROLLOVER_EFFECTS"
 
 
-def effects() -> dict[str, type]:
+def effects() -> dict[str, type[Effect]]:
     """Every effect that exists, by its id; those of one's own files last. Raises `InputError`."""
     for name in filter(None, os.environ.get(VARIABLE, "").split(os.pathsep)):
         _load(Path(name).resolve())

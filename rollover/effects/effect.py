@@ -10,7 +10,7 @@ from ground.quantity import parameters, quantities
 from ground.settings import ForceTerm
 from rollover.recording import Recording
 
-EFFECTS: dict[str, type] = {}
+EFFECTS: dict[str, type[Effect]] = {}
 
 Kind = Literal["physics", "parameter", "sensor"]
 
