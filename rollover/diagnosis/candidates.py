@@ -24,6 +24,9 @@ SHAPES = {
     "soil-adhesion": ("reach",),
 }
 
+ONE = (6,)
+SEVERAL = (12, 6, 3)  # places on the axes of an effect's parameters
+
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate:
@@ -52,15 +55,14 @@ class Candidate:
         return {name: physical(v, s) for v, (name, s) in zip(x, self.search.items(), strict=True)}
 
     def starts(self) -> list[tuple[float, ...]]:
-        """Coordinates to look at first."""
-        many = 5 if len(self.search) == 1 else 4
+        """Coordinates to look at first; the first of two parameters, a depth or a frequency, in the finer steps."""
         axes = []
-        for s in self.search.values():
+        for s, many in zip(self.search.values(), ONE if len(self.search) == 1 else SEVERAL, strict=False):
             inside = [(k + 0.5) / many for k in range(many)]
-            if s.scale == "linear" and s.low < 0.0 < s.high:
+            if len(self.search) == 1 and s.scale == "linear" and s.low < 0.0 < s.high:
                 middle = -s.low / (s.high - s.low)
                 inside = [middle + f * (1.0 - middle) for f in (0.05, 0.4)] + [middle - f * middle for f in (0.05, 0.4)]
-            elif s.scale == "log" and s.low < 1.0 < s.high and s.high / s.low < 20.0:
+            elif len(self.search) == 1 and s.scale == "log" and s.low < 1.0 < s.high and s.high / s.low < 20.0:
                 middle = math.log(1.0 / s.low) / math.log(s.high / s.low)
                 inside = [middle + f * (1.0 - middle) for f in (0.1, 0.5)] + [middle - f * middle for f in (0.1, 0.5)]
             axes.append(inside)

@@ -153,6 +153,8 @@ def _selected(
             break
         taken.append(found)
         current = found.fitted
+        if held_out(current, groups).total < NOISE_ITSELF:
+            break
         left = mismatch_of(judge.evidence, current.blocks, phases)
         if left.p_value > SURE or not _matters(judge, current, left):
             break
@@ -269,7 +271,9 @@ def _considered(judge: Judge, base: Fitted, steps: Steps, groups: Sequence[Seque
             found.append(
                 Considered(
                     id=s.candidate.id, channel=s.candidate.channel, held_out_gain=0.0,
-                    reason="moves the simulation in directions in which the misfit has little",
+                    reason=f"leaves {s.nrmse:.2f} times the noise after a first fit to few recordings"
+                    if s.nrmse
+                    else "moves the simulation in directions in which the misfit has little",
                 )
             )  # fmt: skip
     return tuple(sorted(found, key=lambda c: -c.held_out_gain))

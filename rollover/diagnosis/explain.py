@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,13 @@ PROMISING = 14  # candidates fitted in full at each step
 NEGLIGIBLE = 0.004  # of a channel's range: an effect that moves nothing by more is not named
 MOST = 3  # effects in one explanation
 VISIBLE = 5.0  # standard errors of the noise at which an effect shows
+FEW = 3  # recordings that candidates are looked at on
+SHORT = 5  # rounds of a first fit
+LEADERS, MOST_LEADERS = 5, 12  # first fits that are followed up, at least and at most
+WITHIN = 6.0  # times what the best leaves, up to which a first fit is followed up
+FAR = 3.0  # misfit over the noise from which on time shifts fitted to it are not believed
+ELSEWHERE = 0.2  # of a coordinate: starts so far apart are two
+NOISE_LEFT = 1.01  # misfit over the noise that needs no further search
 CROOKED = 100.0  # times what the best leaves, up to which a fit of two parameters is polished
 APART = 2.0  # standard errors beyond which a rival is excluded
 
@@ -28,13 +35,17 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Screened:
-    """A candidate looked at: the best start, what is left there, and the largest gain of any of its directions."""
+    """A candidate looked at on a few recordings: the best starts, what is left there, the gain of its best direction.
+
+    `size` is the strength that would show; `nrmse` what a first fit leaves over the noise, 0 where there was none.
+    """
 
     candidate: Candidate
-    start: tuple[float, ...]
+    starts: tuple[tuple[float, ...], ...]
     left: float
     potential: float
     size: float
+    nrmse: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,41 +59,74 @@ class Step:
     detectable: tuple[tuple[str, float], ...] = field(default=(), repr=False)
 
 
-def screen(judge: Judge, base: Fitted, candidates: Sequence[Candidate]) -> tuple[list[Screened], list[Array]]:
-    """Look at each candidate in a few places beside the base; returns them and all directions for the null."""
+def spread(base: Fitted, groups: Sequence[Sequence[int]]) -> list[int]:
+    """Few recordings that stand for all: of the conditions that are met worst, best, and in the middle."""
+    left = [b.normal()[2] / b.residual.size for b in base.blocks]
+    members = [max(g, key=lambda r: left[r]) for g in groups if g]
+    members.sort(key=lambda r: left[r])
+    if len(members) <= FEW:
+        return sorted(set(members)) if len(groups) > 1 else list(range(len(base.blocks)))[:FEW]
+    return sorted({members[0], members[len(members) // 2], members[-1]})
+
+
+def begun(judge: Judge, base: Fitted) -> list[float]:
+    """Time shifts (s) to begin with: where the base is far off its shifts are bent by what is missing."""
+    count = sum(b.residual.size for b in base.blocks)
+    if base.left < FAR**2 * count:
+        return [b.shift for b in base.blocks]
+    return [
+        b.shift if e.recording.clock.zero == "unknown" else 0.0
+        for b, e in zip(base.blocks, judge.evidence, strict=True)
+    ]
+
+
+def screen(
+    judge: Judge, base: Fitted, candidates: Sequence[Candidate], few: Sequence[int]
+) -> tuple[list[Screened], list[Array]]:
+    """Look at each candidate in some places beside the base; returns them and all directions for the null."""
     found = []
-    directions: list[list[Array]] = [[] for _ in base.blocks]
+    directions: list[list[Array]] = [[] for _ in few]
+    shifts = begun(judge, base)
+    beside = [judge.block(r, base.candidates, base.x, shifts[r], 0.0) for r in few]
+    if any(b is None for b in beside):
+        return [], []
+    blocks = [b for b in beside if b is not None]
     for c in candidates:
-        best: tuple[float, tuple[float, ...]] | None = None
+        met: list[tuple[float, tuple[float, ...]]] = []
         potential, smallest = 0.0, np.inf
         for start in c.starts():
             left, along, size = 0.0, 0.0, 0.0
             kept = []
-            for r, block in enumerate(base.blocks):
-                y = judge.predicted(r, (*base.candidates, c), (*base.x, *start), block.shift)
-                if y is None:
+            for r, block in zip(few, blocks, strict=True):
+                there = judge.block(r, (*base.candidates, c), (*base.x, *start), shifts[r], 0.0)
+                if there is None:
                     break
-                # residual + d is what is left; d = prediction of the base less the candidate's
-                d = block.residual - (judge.measured[r] - y)
-                free = freed(np.column_stack([d, block.residual]), block)
+                left += there.normal()[2]
+                free = freed(np.column_stack([block.residual - there.residual, block.residual]), block)
                 kept.append(free[:, :1])
-                gained = free[:, 1] - free[:, 0]
-                left += float(gained @ gained)
                 along += float(free[:, 0] @ free[:, 1])
                 size += float(free[:, 0] @ free[:, 0])
-            if len(kept) < len(base.blocks):
+            if len(kept) < len(blocks):
                 continue
             if size > 1e-12:
                 potential = max(potential, along * along / size)
-                if c.search:
-                    smallest = min(smallest, _visible(c, start, size))
-                for r, d in enumerate(kept):
-                    directions[r].append(d)
-            if best is None or left < best[0]:
-                best = (left, start)
-        if best is not None:
-            found.append(Screened(candidate=c, start=best[1], left=best[0], potential=potential, size=smallest))
+                smallest = min(smallest, _visible(c, start, size * len(base.blocks) / len(few)))
+                for k, d in enumerate(kept):
+                    directions[k].append(d)
+            met.append((left, start))
+        if met:
+            met.sort()
+            found.append(Screened(candidate=c, starts=_apart(met), left=met[0][0], potential=potential, size=smallest))
     return found, [np.concatenate(d, axis=1) if d else np.zeros((0, 0)) for d in directions]
+
+
+def _apart(met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float, ...], ...]:
+    """The best start, and of two parameters the best one that is not beside it."""
+    best = met[0][1]
+    if len(best) < 2:
+        return (best,)
+    other = [s for _, s in met if max(abs(a - b) for a, b in zip(s, best, strict=True)) > ELSEWHERE]
+    return (best, *other[:1])
 
 
 def _visible(candidate: Candidate, start: Sequence[float], size: float) -> float:
@@ -100,24 +144,25 @@ def step(
 ) -> Step:
     """Fit the promising candidates beside the base and rank them by what they predict of held-out conditions."""
     say(f"looking at {len(candidates)} candidates beside {base.label}")
-    screened, directions = screen(judge, base, candidates)
+    few = spread(base, groups)
+    screened, directions = screen(judge, base, candidates, few)
     null = null_of_the_best(directions)
     count = sum(b.residual.size for b in base.blocks)
-    by_potential = sorted(screened, key=lambda s: -s.potential)[:PROMISING]
-    by_start = sorted(screened, key=lambda s: s.left)[: PROMISING // 2]
-    chosen = {s.candidate.key: s for s in (*by_potential, *by_start)}
+    screened, begun_with = _first_fits(judge, base, screened, few, say)
     fits = []
-    for s in chosen.values():
-        say(f"fitting {s.candidate.key}")
-        fitted = judge.fit((*base.candidates, s.candidate), (*base.x, *s.start))
+    for first in begun_with:
+        say(f"fitting {first.candidates[-1].key}")
+        fitted = judge.fit(first.candidates, first.x, shifts=_all_shifts(judge, base, first, few), width=1)
         if fitted is not None:
             fits.append(fitted)
     if not fits:
         return Step(fitted=base, p_value=1.0, rivals=(), screened=tuple(screened))
     fits.sort(key=lambda f: f.left)
     # where a threshold makes the way crooked, the nearer ones are followed to the end
-    near = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < CROOKED * fits[0].left][:5]
-    fits = [judge.polish(f) if f in near else f for f in fits]
+    if fits[0].left > NOISE_LEFT**2 * count:
+        near = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < CROOKED * fits[0].left][:2]
+        fits = [judge.polish(f) if f in near else f for f in fits]
+    fits = _one_each(fits)
     fits.sort(key=lambda f: held_out(f, groups).left.sum())
     best = fits[0]
     gain = base.left - min(f.left for f in fits)
@@ -130,6 +175,48 @@ def step(
         screened=tuple(screened),
         detectable=detectable,
     )
+
+
+def _first_fits(
+    judge: Judge, base: Fitted, screened: Sequence[Screened], few: Sequence[int], say: Progress
+) -> tuple[list[Screened], list[Fitted]]:
+    """Short fits to few recordings: the ones worth a full fit, best first, and what each leaves."""
+    by_potential = sorted(screened, key=lambda s: -s.potential)[:PROMISING]
+    by_start = sorted(screened, key=lambda s: s.left)[: PROMISING // 2]
+    chosen = {s.candidate.key: s for s in (*by_start, *by_potential)}
+    shifts = begun(judge, base)
+    fits: list[Fitted] = []
+    told: dict[str, float] = {}
+    say(f"first fits of {len(chosen)} candidates to {len(few)} recordings")
+    for key, s in chosen.items():
+        for start in s.starts:
+            one = judge.fit(
+                (*base.candidates, s.candidate), (*base.x, *start),
+                rounds=SHORT, only=few, shifts=[shifts[r] for r in few],
+            )  # fmt: skip
+            if one is not None:
+                fits.append(one)
+                size = sum(b.residual.size for b in one.blocks)
+                told[key] = min(told.get(key, np.inf), float(np.sqrt(one.left / size)))
+    fits.sort(key=lambda f: f.left)
+    worth = [f for k, f in enumerate(fits) if k < LEADERS or f.left < WITHIN * fits[0].left][:MOST_LEADERS]
+    return [replace(s, nrmse=told.get(s.candidate.key, 0.0)) for s in screened], worth
+
+
+def _all_shifts(judge: Judge, base: Fitted, first: Fitted, few: Sequence[int]) -> list[float]:
+    """Time shifts of all recordings: as fitted where they are, elsewhere as begun with."""
+    shifts = begun(judge, base)
+    for r, block in zip(few, first.blocks, strict=True):
+        shifts[r] = block.shift
+    return shifts
+
+
+def _one_each(fits: Sequence[Fitted]) -> list[Fitted]:
+    """The best fit of each candidate."""
+    best: dict[str, Fitted] = {}
+    for f in sorted(fits, key=lambda f: f.left):
+        best.setdefault(f.candidates[-1].key, f)
+    return list(best.values())
 
 
 def moves(judge: Judge, base: Fitted, fitted: Fitted) -> float:

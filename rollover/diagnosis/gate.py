@@ -27,7 +27,7 @@ def freed(vectors: Array, block: Block) -> Array:
 
 def null_of_the_best(directions: Sequence[Array], draws: int = DRAWS, seed: int = 0) -> Array:
     """Largest gain on noise (draws,), sorted; `directions` are, for each recording, arrays (n_r, m)."""
-    m = directions[0].shape[1] if directions else 0
+    m = directions[0].shape[1] if len(directions) else 0
     if m == 0:
         return np.zeros(draws)
     G = sum((np.asarray(d).T @ np.asarray(d) for d in directions), np.zeros((m, m)))

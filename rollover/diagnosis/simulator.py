@@ -74,12 +74,12 @@ def behind_filters(channels: Mapping[str, Array], recording: Recording) -> dict[
 def simulator_of(scenario: Scenario, recording: Recording) -> Simulator:
     """The quickest simulator that a scenario admits; the recording's conditions are put in by path.
 
-    Raises `InputError` for a condition that the scenario does not know.
+    Raises `InputError` for a condition that the scenario does not know, and for a scenario that is no drop test.
     """
     own = set_up(scenario, recording)
     reason = unfit(own)
     if reason:
-        raise InputError(Fault(file=recording.title, message=f"only drop tests are diagnosed so far: {reason}"))
+        raise InputError(Fault(message=f"{scenario.title}: {reason}; only drop tests can be diagnosed"))
     return DropSimulator(own, recording)
 
 
