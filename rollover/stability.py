@@ -41,7 +41,7 @@ from rollover.vehicle import Attached, Vehicle
 Array = NDArray[np.float64]
 COARSE, FINE = math.radians(3.0), math.radians(0.01)  # of the slope: between rests, and of what happens between two
 STEEPEST = math.radians(80.0)
-GONE = 0.6  # rad against the slope, beyond the axle's swing: further over, it lies rather than stands
+GONE = 0.35  # rad against the slope, beyond the axle's swing: further over, it lies rather than stands
 GRIP = 1e9  # friction coefficient of a wheel that a stop holds: as long as it carries anything
 UNLOADED = 0.002  # share of its load on level ground with which a wheel carries, and holds, nothing
 REST = 1e-5  # residual forces and moments over the weight
@@ -92,10 +92,10 @@ def stability_angles(
     Raises `InputError` for what has no wheels to stand on, or does not stand on level ground.
     """
     vehicle = scenario.vehicle
-    if not isinstance(vehicle, Vehicle) or len(vehicle.wheels) < 3:
-        raise InputError(
-            Fault(path="vehicle", message=f"needs wheels to stand on, got {vehicle.name!r}; at least three wheels")
-        )
+    sides = [w.centre[1] for w in vehicle.wheels] if isinstance(vehicle, Vehicle) else []
+    if not isinstance(vehicle, Vehicle) or len(sides) < 3 or not min(sides) < 0.0 < max(sides):
+        message = f"needs wheels to stand on, got {vehicle.name!r}; at least three wheels, on both sides"
+        raise InputError(Fault(path="vehicle", message=message))
     still = _still(scenario, vehicle)
     bodies = bodies_of(still.vehicle, still.ground.elements)
     t = tables_of(still, bodies)
@@ -140,7 +140,7 @@ class _Tilt:
         self.pace = np.where(np.isin(self.free, (SLIDE, SLIDE + 1)), 0.01, 1.0)  # the plane is the same everywhere
         self.holds = t.wheel_f[:, W_ROLLS] == 0.0
         self.by_chassis = t.wheel_i == 0
-        self.lower: Array = np.eye(len(self.free))
+        self.lower = np.eye(len(self.free))
         self.memory = t.wheel_memory.copy()
         self.loads = np.full(len(t.wheel_i), self.weight.sum() / len(t.wheel_i))  # N, until they are known
 
@@ -155,7 +155,7 @@ class _Tilt:
         K = np.zeros((statics.weight.size, statics.weight.size))
         stiffness(statics.handle, 1.0, 0.0, K)
         T = statics.tangents(u, statics.coordinates(u))[self.free]
-        self.lower = np.linalg.cholesky(T @ K @ T.T / statics.scale + 1e-3 * np.eye(len(self.free)))
+        self.lower[:] = np.linalg.cholesky(T @ K @ T.T / statics.scale + 1e-3 * np.eye(len(self.free)))
         self.memory = t.wheel_memory.copy()
         stance = self._rest(0.0, u)
         if stance.gone:

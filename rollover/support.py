@@ -58,7 +58,8 @@ def turning_slope(points: Sequence[Array], centre: Array, heading: float, throug
     """tan b = (r x e) . z/(r x e) . d, the least over the edges e of the support: the slope (rad) to turn over one.
 
     `points` (3,) support the body, `centre` is its centre of mass, vehicle axes; r points to it from the edge. The
-    body turns when the weight sin b d - cos b z, d downhill, has no moment about the edge any more. pi/2 if never. Of all edges, or of those `through` one of the points.
+    body turns when the weight sin b d - cos b z, d downhill, has no moment about the edge any more. pi/2 if never. Of
+    all edges, or of those `through` one of the points.
     """
     d = np.array([-math.cos(heading), math.sin(heading), 0.0])
     least = 0.5 * math.pi

@@ -99,10 +99,9 @@ def _scenario(name: str) -> Scenario:
     if kind not in document.slot_of(scenarios.AnyVehicle).kinds:
         return scenarios.load(path)
     vehicle = document.load(path, scenarios.AnyVehicle)
-    if not isinstance(vehicle, Vehicle):
-        raise InputError(
-            Fault(file=str(path), path="kind", message=f"has no wheels to stand on, got {kind!r}; 'vehicle'")
-        )
+    if not isinstance(vehicle, Vehicle) or len(vehicle.wheels) < 3:
+        message = f"has no wheels to stand on, got {vehicle.name!r}; a vehicle with at least three"
+        raise InputError(Fault(file=str(path), path="wheels", message=message))
     return scenarios.Scenario(
         title=vehicle.name,
         vehicle=vehicle,
