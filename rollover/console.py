@@ -308,3 +308,36 @@ def diagnosis(found: Diagnosis, folder: str) -> None:
     for note in found.notes:
         out.print(note, style="yellow")
     out.print(f"Results: {folder}")
+
+
+def stability(answer: Mapping[str, Any], folder: str) -> None:
+    """Static stability angles, a line for each heading, with the closed forms for stiff tyres beside."""
+    out = Console(highlight=False, markup=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
+    out.print(answer["vehicle"], style="bold")
+    table = Table(box=None, pad_edge=False)
+    for heading in ("heading", "lift-off", "pivot ends", "on stop", "overturns", "stiff: pivot", "stiff: stop"):
+        table.add_column(heading, justify="right")
+    table.add_column("first off")
+    for row in answer["headings"]:
+        stiff = row["closed_form"]["outer_edge"]
+        angles = [row[f"{key}_deg"] for key in ("lift_off", "phase_one", "stop", "overturn")]
+        angles += [stiff["free_pivot_deg"], stiff["rigid_deg"]]
+        off = ", ".join(row["first_off"])
+        table.add_row(f"{row['heading_deg']:g}", *("-" if a is None else f"{a:.2f}" for a in angles), off)
+    out.print(table)
+    out.print(
+        "Slopes in degrees; heading 0 uphill, 90 left side downhill. Stiff: closed form at the tyres' outer edges."
+    )
+    for part in answer["losses"]:
+        share, was, now = 100.0 * part["share"], part["without_deg"], part["with_deg"]
+        out.print(f"{part['part']}: takes {share:.1f} % across the slope, {was:.2f} -> {now:.2f} deg")
+    if answer["effects_left_out"]:
+        out.print(f"Effects were left out: {', '.join(answer['effects_left_out'])}.", style="yellow")
+    least, limit = answer["least"], answer["code_6"]
+    verdict = "below" if least["balance_deg"] < limit["limit_deg"] else "not below"
+    out.print(
+        f"Least {least['balance_deg']:.2f} deg at heading {least['heading_deg']:g}: {verdict} the "
+        f"{limit['limit_deg']:g} deg asked of narrow tractors ({limit['confidence']}).",
+        style="bold",
+    )
+    out.print(f"Results: {folder}")

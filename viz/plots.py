@@ -242,7 +242,7 @@ def scatter(
 
 def polar(curves: Sequence[Curve], *, label: str) -> str:
     """Values over a heading: `x` in rad, 0 ahead (up), growing to the left as yaw does, `y` outwards."""
-    with _canvas(4.2, 3.8) as (figure, svg):
+    with _canvas(4.6, 4.4) as (figure, svg):
         axes = figure.add_subplot(projection="polar")
         axes.set_theta_zero_location("N")
         for curve in curves:
@@ -252,7 +252,7 @@ def polar(curves: Sequence[Curve], *, label: str) -> str:
         axes.spines["polar"].set_color(COLOURS["grid"])
         axes.set_title(label, fontsize=9, color=COLOURS["ink"])
         if len(curves) > 1:
-            axes.legend(frameon=False, fontsize=8, loc="lower left", bbox_to_anchor=(-0.2, -0.12))
+            figure.legend(frameon=False, fontsize=8, loc="outside lower center", ncols=2)
     return svg.text
 
 

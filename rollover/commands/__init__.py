@@ -17,6 +17,7 @@ from rollover.commands import calibrate
 from rollover.commands import synthesize
 from rollover.commands import diagnose
 from rollover.commands import prove
+from rollover.commands import stability
 
 __all__ = [
     "calibrate",
@@ -31,6 +32,7 @@ __all__ = [
     "root",
     "run",
     "schema",
+    "stability",
     "synthesize",
     "view",
 ]
