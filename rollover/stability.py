@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ground.surface import Plane
-from rollover.contact import bodies_of, tables_of
+from rollover.bodies import bodies_of
+from rollover.contact import tables_of
 from rollover.equilibrium import AXLE, PITCH, ROLL, SLIDE, Equilibrium
 from rollover.faults import Fault, InputError
 from rollover.forces import generalised_forces
