@@ -53,7 +53,7 @@ def _of(scenario: Scenario, e: Evidence) -> ResidualForce | None:
     mass, law = getattr(scenario.vehicle, "mass", None), scenario.ground.law
     if mass is None or not hasattr(start, "speed"):
         return None
-    state = _motion(r, float(start.speed), scenario.gravity)
+    state = _motion(r, float(start.speed) / (1.0 + scenario.ground.co_moving_mass.share))
     if state is None:
         return None
     time, z, v, a = state
@@ -73,8 +73,11 @@ def _of(scenario: Scenario, e: Evidence) -> ResidualForce | None:
     return ResidualForce(recording=e.name, condition=e.condition or e.name, force=dF, of=of)
 
 
-def _motion(r: Recording, speed: float, gravity: float) -> tuple[Array, Array, Array, Array] | None:
-    """Time, depth, its rate and second derivative (positive down) while loading, smoothed; None without either."""
+def _motion(r: Recording, speed: float) -> tuple[Array, Array, Array, Array] | None:
+    """Time, depth, its rate and second derivative (positive down) while loading, smoothed; None without either.
+
+    `speed` is that just after the impact, m/s.
+    """
     if "striker/acceleration_z" in r.channels:
         time, up = r.samples("striker/acceleration_z")
         if time.size < 20:
@@ -112,9 +115,9 @@ def _smoothed(values: Array, time: Array, width: float = 0.004) -> Array:
 
 
 def _from_contact(time: Array, a: Array, speed: float) -> Array:
-    """Velocity downward from the acceleration; just before the contact it is the impact speed."""
+    """Velocity downward from the acceleration; just after the impact it is `speed`."""
     v = np.concatenate([[0.0], np.cumsum(0.5 * (a[1:] + a[:-1]) * np.diff(time))])
-    return np.asarray(v - np.interp(0.0, time, v) + speed / 1.1)
+    return np.asarray(v - np.interp(0.0, time, v) + speed)
 
 
 def dependency(forces: Sequence[ResidualForce]) -> list[tuple[str, float]]:

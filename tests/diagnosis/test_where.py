@@ -1,0 +1,106 @@
+"""Candidates, phases, and what a residual force depends on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis.candidates import candidates_of, coordinate, physical
+from rollover.diagnosis.depend import ACCELERATION, DEPTH, SPEED, TIME, ResidualForce, dependency, residual_forces
+from rollover.diagnosis.evidence import evidence_of
+from rollover.diagnosis.phases import drop_phases
+from rollover.diagnosis.simulator import set_up, simulator_of
+from rollover.effects import EFFECTS, Search
+from rollover.faults import InputError
+from tests.diagnosis import drops
+from tests.diagnosis.drops import recorded, scenario
+from tests.physics.scenes import shipped
+
+
+@pytest.mark.parametrize("search", [Search(0.2, 8.0, "log"), Search(-0.3, 0.5)])
+def test_coordinates_go_from_low_to_high_and_back(search: Search) -> None:
+    assert physical(0.0, search) == pytest.approx(search.low)
+    assert physical(1.0, search) == pytest.approx(search.high)
+    assert coordinate(physical(0.37, search), search) == pytest.approx(0.37)
+
+
+def test_sensor_effects_compete_for_each_channel_and_only_where_they_can_be() -> None:
+    own = scenario()
+    name, recording = recorded({}, speeds=(2.0,))[0]
+    e = evidence_of(name, recording, simulator_of(own, recording))
+    assert e is not None
+    keys = {c.key for c in candidates_of([e], ("soil-crust",), "drop")}
+    assert {"sensor-scale:ground/sinkage", "sensor-gain:ground/force_normal", "soil-layer"} <= keys
+    assert not keys & {"sensor-gain:ground/sinkage", "sensor-scale:ground/force_normal", "soil-crust", "rops-plasticity"}
+
+
+def test_every_start_of_every_candidate_is_inside_its_range() -> None:
+    own = scenario()
+    name, recording = recorded({}, speeds=(2.0,))[0]
+    e = evidence_of(name, recording, simulator_of(own, recording))
+    assert e is not None
+    for c in candidates_of([e], (), "drop"):
+        assert len(c.starts()) >= 4, c.key
+        for start in c.starts():
+            for v, (parameter, search) in zip(c.values(start).values(), c.search.items(), strict=True):
+                assert search.low < v < search.high, (c.key, parameter)
+
+
+def test_phases_are_in_order_and_the_peak_is_the_deepest_point() -> None:
+    own = scenario()
+    name, recording = recorded({}, speeds=(2.0,), noise=1e-4, rate=2000.0)[0]
+    e = evidence_of(name, recording, simulator_of(own, recording))
+    assert e is not None
+    phases = drop_phases(e)
+    assert [n for _, n in phases] == ["free-fall", "first-contact", "loading", "peak", "unloading", "rest"]
+    assert [t for t, _ in phases] == sorted(t for t, _ in phases)
+    z, t = recording.channels[drops.DEPTH], recording.time
+    begin, end = (next(at for at, n in phases if n == wanted) for wanted in ("peak", "unloading"))
+    assert begin < t[np.argmax(z)] < end
+
+
+LAWS: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]] = {
+    TIME: lambda t, z, v: 300.0 * np.sin(60.0 * t),
+    DEPTH: lambda t, z, v: np.where(z > 0.05, 400.0, 0.0),
+    SPEED: lambda t, z, v: 120.0 * v,
+}
+
+
+@pytest.mark.parametrize("wanted", LAWS)
+def test_a_residual_force_is_put_down_to_what_it_was_made_from(wanted: str) -> None:
+    forces = []
+    for k, speed in enumerate((1.5, 2.5, 3.5)):
+        t = np.linspace(0.0, 0.05, 80)
+        # decelerations that differ in their course, so that depth, speed and time are not functions of one another
+        a = -speed * (10.0 + 4.0 * k) * (1.0 + 0.3 * np.sin(40.0 * t * (k + 1)))
+        v = speed + np.cumsum(a) * (t[1] - t[0])
+        z = np.cumsum(v) * (t[1] - t[0])
+        of = {TIME: t, DEPTH: z, SPEED: v, ACCELERATION: a}
+        forces.append(ResidualForce(recording=str(k), condition=str(k), force=LAWS[wanted](t, z, v), of=of))
+    scores = dependency(forces)
+    assert scores[0][0] == wanted
+    assert scores[0][1] > 0.8
+    assert scores[0][1] > scores[1][1] + 0.03
+
+
+def test_viscous_damping_shows_as_a_force_that_depends_on_speed() -> None:
+    own = scenario()
+    changes = {"effects.soil-viscous-damping.damping": 800.0}
+    made = recorded(changes, channels=(drops.FORCE, drops.DEPTH, drops.ACCELERATION), rate=2000.0, noise=1e-3)
+    found = [evidence_of(name, r, simulator_of(own, r)) for name, r in made]
+    forces = residual_forces([set_up(own, r) for _, r in made], [e for e in found if e is not None])
+    assert len(forces) == 3
+    for f in forces:
+        fast = f.of[SPEED] > 0.5 * f.of[SPEED].max()
+        assert np.median(f.force[fast] / f.of[SPEED][fast]) == pytest.approx(800.0, rel=0.1)
+    assert dependency(forces)[0][0] == SPEED
+
+
+def test_what_is_no_drop_test_is_refused_in_one_line() -> None:
+    _, recording = recorded({}, speeds=(2.0,))[0]
+    name = next(p.stem for p in sorted((drops.shipped.__globals__["SHIPPED"]).glob("*.yaml")) if "tractor" in p.stem)
+    with pytest.raises(InputError, match="only drop tests can be diagnosed"):
+        simulator_of(shipped(name), recording.__class__(title="r", time=recording.time, channels=recording.channels))
+    assert EFFECTS
