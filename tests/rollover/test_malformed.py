@@ -264,13 +264,15 @@ for line in sys.stdin:
     folder, name, profile = line.rstrip("\\n").split("\\t")
     import os
     os.chdir(folder)
-    begin = time.process_time()
-    try:
-        read_recording(name, profile=profile or None)
-        said = ["read"]
-    except InputError as e:
-        said = str(e).splitlines()
-    spent = time.process_time() - begin
+    spent = float("inf")
+    for _ in range(2):  # the first reading also imports
+        begin = time.process_time()
+        try:
+            read_recording(name, profile=profile or None)
+            said = ["read"]
+        except InputError as e:
+            said = str(e).splitlines()
+        spent = min(spent, time.process_time() - begin)
     print(len(said), spent, largest(), said[0], sep="\\t", flush=True)
 """
 
