@@ -28,7 +28,7 @@ from rollover.scenario import Scenario
 
 Array = NDArray[np.float64]
 
-SURE = 0.01  # p-value below which there is a mismatch
+SURE = 1e-3  # p-value below which there is a mismatch
 EXPLAINED = 1.2  # held-out misfit over the noise that counts as explained
 NOISE_ITSELF = 1.05  # held-out misfit that no further effect can better
 PARTLY = 0.05  # of the excess over the noise that an explanation may leave and still be named
@@ -210,8 +210,8 @@ def _matters(judge: Judge, base: Fitted, before: Mismatch) -> bool:
     for r, block in enumerate(base.blocks):
         for signal, _ in judge.evidence[r].spans():
             cells = [c for c in before.cells if c.recording == r and c.channel == signal.channel]
-            power = sum(max(c.structured - c.waves, 0.0) for c in cells) / max(sum(c.rows.size for c in cells), 1)
-            most = max(most, float(np.sqrt(power)) * signal.sigma / signal.span)
+            power = sum(c.structured - c.waves for c in cells) / max(sum(c.rows.size for c in cells), 1)
+            most = max(most, float(np.sqrt(max(power, 0.0))) * signal.sigma / signal.span)
         del block
     return most > NEGLIGIBLE
 
