@@ -20,6 +20,7 @@ MODEL_ERROR = 5e-4  # of a channel's range: what integrators differ by is no mis
 ALONE = 0.02  # s, prior of the time shift of a recording whose clock has no zero
 MOST_ROWS = 700  # of a recording that are looked at
 CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is believed
+LONGEST = 0.98  # of the memory from one sample to the next
 MANY = 10  # quiet windows from which on a memory of two samples is told
 CORNER = 2.0775  # corner frequency over the filter class, forward and backward, Hz
 SHIFT = 1e-3  # s, prior of the time shift of a recording whose zero is known
@@ -194,6 +195,26 @@ def _by_differences(values: Array) -> float:
         return 0.0
     d = np.diff(values, 2)
     return float(1.4826 * np.median(np.abs(d - np.median(d))) / np.sqrt(6.0))
+
+
+def recoloured(e: Evidence, predicted: Mapping[str, Array]) -> Evidence:
+    """The evidence with the noise's memory from all of a misfit that is nearly noise, where it is longer than thought.
+
+    Quiet stretches are too short to show slow noise. What of the misfit is none adds to the memory: it is then judged
+    too mildly, never too sharply.
+    """
+    signals = []
+    for s in e.signals:
+        left = s.values - predicted[s.channel][s.rows]
+        left = left - left.mean()
+        power = float(left @ left)
+        memory = float(left[1:] @ left[:-1]) / power if power > 0.0 else 0.0
+        known = s.ar[0] / (1.0 - s.ar[1]) if len(s.ar) > 1 else sum(s.ar)
+        if memory > known + 1.0 / np.sqrt(left.size) and memory < LONGEST:
+            noise = max(s.noise, float(np.std(left)))
+            s = replace(s, ar=(memory,), noise=noise, sigma=max(s.sigma, noise))
+        signals.append(s)
+    return replace(e, signals=tuple(signals))
 
 
 def condition_of(conditions: Mapping[str, Any]) -> str:

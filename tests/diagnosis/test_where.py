@@ -33,7 +33,12 @@ def test_sensor_effects_compete_for_each_channel_and_only_where_they_can_be() ->
     assert e is not None
     keys = {c.key for c in candidates_of([e], ("soil-crust",), "drop")}
     assert {"sensor-scale:ground/sinkage", "sensor-gain:ground/force_normal", "soil-layer"} <= keys
-    assert not keys & {"sensor-gain:ground/sinkage", "sensor-scale:ground/force_normal", "soil-crust", "rops-plasticity"}
+    assert not keys & {
+        "sensor-gain:ground/sinkage",
+        "sensor-scale:ground/force_normal",
+        "soil-crust",
+        "rops-plasticity",
+    }
 
 
 def test_every_start_of_every_candidate_is_inside_its_range() -> None:
