@@ -59,9 +59,10 @@ class NoiseFloor:
         return np.asarray(noise * (self.sigma * _gain(self.ar)))
 
 
-def noise_floor(values: Array) -> NoiseFloor:
+def noise_floor(values: Array, order: int | None = None) -> NoiseFloor:
     """Noise floor of a channel from evenly spaced samples (n,), whatever else it shows; n at least 48.
 
+    `order` is that of the autoregression, at most 8; by default a criterion chooses it, which needs many windows.
     Exactly repeated or smooth values give sigma 0. Raises ``ValueError`` for fewer samples.
     """
     values = np.asarray(values, dtype=np.float64)
@@ -92,7 +93,7 @@ def noise_floor(values: Array) -> NoiseFloor:
         independence = 1.0
     return NoiseFloor(
         sigma=float(np.sqrt(gamma[0])),
-        ar=_autoregression(values, stride, gamma),
+        ar=_autoregression(values, stride, gamma, order),
         independence=independence,
         windows=windows,
     )
@@ -143,8 +144,8 @@ def _autocovariance(values: Array, stride: int) -> tuple[Array, int]:
     return np.linalg.solve(_system(), c), len(r)
 
 
-def _autoregression(values: Array, stride: int, at_stride: Array) -> tuple[float, ...]:
-    """Coefficients of the autoregression (Yule-Walker) whose order the Bayesian criterion chooses."""
+def _autoregression(values: Array, stride: int, at_stride: Array, wanted: int | None) -> tuple[float, ...]:
+    """Coefficients of the autoregression (Yule-Walker) of an order wanted, or that the Bayesian criterion chooses."""
     r = _windows(values, LENGTH * stride, 1)[:, 0, :]
     n, length = r.size, r.shape[1]
     if stride == 1:
@@ -158,13 +159,13 @@ def _autoregression(values: Array, stride: int, at_stride: Array) -> tuple[float
     ridge = gamma.copy()
     ridge[0] *= 1.0 + 1e-8
     best: tuple[float, tuple[float, ...]] = (0.0, ())
-    for order in range(1, top + 1):
+    for order in range(1, top + 1) if wanted is None else (wanted,):
         a = solve_toeplitz(ridge[:order], gamma[1 : order + 1])
         if np.max(np.abs(np.roots([1.0, *(-a)]))) > 0.9995:
             continue  # not stationary: the estimate of gamma need not be that of any process
         left = 1.0 - float(a @ gamma[1 : order + 1]) / gamma[0]
         score = n * np.log(max(left, 1e-12)) + 2.0 * order * np.log(n)
-        if score < best[0]:
+        if score < best[0] or wanted is not None:
             best = (score, tuple(float(v) for v in a))
     return best[1]
 

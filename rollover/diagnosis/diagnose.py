@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rollover.diagnosis.candidates import Candidate, candidates_of
 from rollover.diagnosis.depend import dependency, residual_forces
 from rollover.diagnosis.detect import Mismatch, mismatch_of
-from rollover.diagnosis.evidence import Evidence, binned, evidence_of, groups_of
+from rollover.diagnosis.evidence import Evidence, binned, evidence_of, groups_of, recoloured
 from rollover.diagnosis.explain import CHANCE, MOST, NEGLIGIBLE, Step, confusion, moves, step
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import null_of_the_best
@@ -28,8 +28,9 @@ from rollover.scenario import Scenario
 
 Array = NDArray[np.float64]
 
-SURE = 0.01  # p-value below which there is a mismatch
+SURE = 1e-3  # p-value below which there is a mismatch
 EXPLAINED = 1.2  # held-out misfit over the noise that counts as explained
+NEARLY_NOISE = 1.3  # misfit over the noise up to which its own memory is believed
 NOISE_ITSELF = 1.05  # held-out misfit that no further effect can better
 PARTLY = 0.05  # of the excess over the noise that an explanation may leave and still be named
 FEWEST = 24  # samples in all, below which nothing is said
@@ -63,6 +64,9 @@ def diagnose(
     judge = Judge(found)
     judge.aligned()
     base = judge.fit((), ())
+    if base is not None and base.left < NEARLY_NOISE**2 * sum(e.count for e in found):
+        judge, base = _recoloured(judge, base)
+        found = list(judge.evidence)
     if base is None:
         return _nothing(found, names, [*notes, "the scenario itself could not be simulated"], began)
     phases = [drop_phases(e) for e in found]
@@ -119,6 +123,17 @@ def _evidence(scenario: Scenario, recordings: Sequence[tuple[str, Recording]]) -
         else:
             found.append(one)
     return found, notes
+
+
+def _recoloured(judge: Judge, base: Fitted) -> tuple[Judge, Fitted | None]:
+    """The same recordings with the colour of the noise from the whole misfit."""
+    found = []
+    for e, block in zip(judge.evidence, base.blocks, strict=True):
+        predicted = e.simulator.predict({}, block.shift)
+        found.append(e if predicted is None else recoloured(e, predicted))
+    again = Judge(found)
+    again.shifts = [b.shift for b in base.blocks]
+    return again, again.fit((), ())
 
 
 class Steps:
@@ -210,8 +225,8 @@ def _matters(judge: Judge, base: Fitted, before: Mismatch) -> bool:
     for r, block in enumerate(base.blocks):
         for signal, _ in judge.evidence[r].spans():
             cells = [c for c in before.cells if c.recording == r and c.channel == signal.channel]
-            power = sum(max(c.structured - c.waves, 0.0) for c in cells) / max(sum(c.rows.size for c in cells), 1)
-            most = max(most, float(np.sqrt(power)) * signal.sigma / signal.span)
+            power = sum(c.structured - c.waves for c in cells) / max(sum(c.rows.size for c in cells), 1)
+            most = max(most, float(np.sqrt(max(power, 0.0))) * signal.sigma / signal.span)
         del block
     return most > NEGLIGIBLE
 

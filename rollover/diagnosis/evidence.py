@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.simulator import Simulator
 from rollover.filters import least_rate
-from rollover.noise import LENGTH, noise_floor
+from rollover.noise import LENGTH, NoiseFloor, noise_floor
 from rollover.recording import Recording
 
 Array = NDArray[np.float64]
@@ -19,6 +19,10 @@ Array = NDArray[np.float64]
 MODEL_ERROR = 5e-4  # of a channel's range: what integrators differ by is no mismatch
 ALONE = 0.02  # s, prior of the time shift of a recording whose clock has no zero
 MOST_ROWS = 700  # of a recording that are looked at
+CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is believed
+LONGEST = 0.98  # of the memory from one sample to the next
+MANY = 10  # quiet windows from which on a memory of two samples is told
+CORNER = 2.0775  # corner frequency over the filter class, forward and backward, Hz
 SHIFT = 1e-3  # s, prior of the time shift of a recording whose zero is known
 
 
@@ -124,7 +128,7 @@ def evidence_of(name: str, recording: Recording, simulator: Simulator) -> Eviden
     signals = []
     leaps = _near_leaps(recording, predicted)
     for channel, values in recording.channels.items():
-        rows = np.flatnonzero(np.isfinite(values) & ~leaps)
+        rows = np.flatnonzero(np.isfinite(values) & ~leaps)[:: _oversampling(recording, channel)]
         if channel not in predicted or rows.size < 8 or not np.all(np.isfinite(predicted[channel][rows])):
             continue
         y = values[rows]
@@ -150,6 +154,14 @@ def evidence_of(name: str, recording: Recording, simulator: Simulator) -> Eviden
     )
 
 
+def _oversampling(recording: Recording, channel: str) -> int:
+    """Of how many samples behind a channel filter one is new: those of twice its corner frequency tell all."""
+    if channel not in recording.cfc or recording.time.size < 2:
+        return 1
+    rate = 1.0 / float(np.median(np.diff(recording.time)))
+    return max(1, int(rate / (2.0 * CORNER * recording.cfc[channel])))
+
+
 def _near_leaps(recording: Recording, predicted: Mapping[str, Array]) -> NDArray[np.bool_]:
     """Samples so near the first contact that the clock decides on which side of the leap of force they lie, (n,)."""
     near = np.zeros(recording.time.size, dtype=bool)
@@ -162,11 +174,19 @@ def _near_leaps(recording: Recording, predicted: Mapping[str, Array]) -> NDArray
 
 
 def _noise(residual: Array, values: Array, stated: float | None) -> tuple[float, tuple[float, ...]]:
-    """Noise (1 sigma) and its colour; the smaller of what the channel and its misfit show, as both add to it."""
+    """Noise (1 sigma) and its colour, from the misfit; from the channel itself where that shows clearly less."""
     if values.size < LENGTH:
         return (stated if stated is not None else _by_differences(residual)), ()
-    best = min((noise_floor(residual), noise_floor(values)), key=lambda floor: floor.sigma)
+    best, other = (_floor(v) for v in (residual, values))
+    if other.sigma < CLEARLY * best.sigma:
+        best = other
     return best.sigma, best.ar
+
+
+def _floor(values: Array) -> NoiseFloor:
+    """Noise floor with as short a memory as the samples can tell: longer ones are made of chance."""
+    one = noise_floor(values, order=1)
+    return noise_floor(values, order=2) if one.windows >= MANY else one
 
 
 def _by_differences(values: Array) -> float:
@@ -175,6 +195,26 @@ def _by_differences(values: Array) -> float:
         return 0.0
     d = np.diff(values, 2)
     return float(1.4826 * np.median(np.abs(d - np.median(d))) / np.sqrt(6.0))
+
+
+def recoloured(e: Evidence, predicted: Mapping[str, Array]) -> Evidence:
+    """The evidence with the noise's memory from all of a misfit that is nearly noise, where it is longer than thought.
+
+    Quiet stretches are too short to show slow noise. What of the misfit is none adds to the memory: it is then judged
+    too mildly, never too sharply.
+    """
+    signals = []
+    for s in e.signals:
+        left = s.values - predicted[s.channel][s.rows]
+        left = left - left.mean()
+        power = float(left @ left)
+        memory = float(left[1:] @ left[:-1]) / power if power > 0.0 else 0.0
+        known = s.ar[0] / (1.0 - s.ar[1]) if len(s.ar) > 1 else sum(s.ar)
+        if memory > known + 1.0 / np.sqrt(left.size) and memory < LONGEST:
+            noise = max(s.noise, float(np.std(left)))
+            s = replace(s, ar=(memory,), noise=noise, sigma=max(s.sigma, noise))
+        signals.append(s)
+    return replace(e, signals=tuple(signals))
 
 
 def condition_of(conditions: Mapping[str, Any]) -> str:

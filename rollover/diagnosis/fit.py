@@ -21,6 +21,7 @@ from rollover.diagnosis.evidence import Evidence
 
 Array = NDArray[np.float64]
 NUDGES = (2e-2, 5e-3, 1e-3)  # of a coordinate, for differences: wide first, as thresholds show only over samples
+PLACES = 241  # time shifts that are tried
 GENTLE = 1e-4  # prior of a coordinate (1/variance): keeps what nothing determines where it is
 
 
@@ -107,16 +108,33 @@ class Judge:
         return found
 
     def aligned(self) -> None:
-        """Begin with the time shift at which each recording meets the scenario best, within three of its prior."""
+        """Begin with the time shift at which each recording meets the scenario best, within three of its prior.
+
+        One run moved along the stamps tells where to look; the best places are then simulated.
+        """
         for r, e in enumerate(self.evidence):
-            shifts = np.linspace(-3.0, 3.0, 25) * e.shift_prior
-            left = []
+            shifts = np.linspace(-3.0, 3.0, PLACES) * e.shift_prior
+            y = self.predicted(r, (), (), 0.0)
+            if y is None:
+                continue
+            rough = []
             for s in shifts:
-                y = self.predicted(r, (), (), float(s))
-                left.append(
-                    np.inf if y is None else float(np.sum((self.measured[r] - y) ** 2)) + (s / e.shift_prior) ** 2
-                )
-            self.shifts[r] = float(shifts[int(np.argmin(left))])
+                moved = y.copy()
+                for signal, part in e.spans():
+                    time = e.recording.time[signal.rows]
+                    moved[part] = np.interp(time - s, time, y[part])
+                rough.append(float(np.sum((self.measured[r] - moved) ** 2)) + (s / e.shift_prior) ** 2)
+            best = float(shifts[int(np.argmin(rough))])
+            near = best + np.linspace(-2.0, 2.0, 5) * float(shifts[1] - shifts[0])
+            left = [self._left(r, float(s)) for s in near]
+            self.shifts[r] = float(near[int(np.argmin(left))])
+
+    def _left(self, r: int, shift: float) -> float:
+        """What the scenario as it is leaves of recording r at a time shift."""
+        y = self.predicted(r, (), (), shift)
+        if y is None:
+            return np.inf
+        return float(np.sum((self.measured[r] - y) ** 2)) + (shift / self.evidence[r].shift_prior) ** 2
 
     def block(
         self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float, nudge: float
@@ -188,7 +206,7 @@ class Judge:
                 x, best, damping, shifts = trial, total, 0.1 * damping, [a.shift for a in after if a is not None]
             if gain < 1e-3 * max(1.0, 1e-2 * best):
                 width, damping = width + 1, 1e-3
-            last = width == len(NUDGES) or not x
+            last = width >= len(NUDGES)
             again = [
                 self.block(r, candidates, x, s, NUDGES[width if width < len(NUDGES) else 1])
                 for r, s in zip(use, shifts, strict=True)
