@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 import numpy as np
@@ -52,10 +53,20 @@ _MOUNTS = ("rops/mount/*/force_?", "rops/hinge/*/force_?")
 _MOMENTS = ("rops/mount/*/moment_?", "rops/hinge/*/moment_?", "rops/hinge/*/angle_?")
 
 
-def blueprint(run: Run, scales: str, views: Sequence[rrb.TimeSeriesView] = ()) -> rrb.Blueprint:
+@dataclass(frozen=True, kw_only=True)
+class Beside:
+    """What a layout shows besides a run: a document that answers first, plots before the motion, its own phases."""
+
+    answer: str
+    title: str
+    views: Sequence[rrb.TimeSeriesView] = ()
+    phase: str = ""
+
+
+def blueprint(run: Run, scales: str, beside: Beside | None = None) -> rrb.Blueprint:
     """Layout for one run: what answers "how high were the loads, and when" is in front in every place.
 
-    `scales` says what lengths and colours in the scene mean; `views` come in front of the motion.
+    `scales` says what lengths and colours in the scene mean.
     """
     # a plot of nothing but zeros says less than its absence, but for the load that is asked for
     found = run.recording.channels
@@ -65,17 +76,18 @@ def blueprint(run: Run, scales: str, views: Sequence[rrb.TimeSeriesView] = ()) -
     loads = _views(channels, LOADS)
     if not top:  # on a tilt table the wheels tell
         top, loads = loads[:1], loads[1:]
-    left = rrb.Vertical(
-        _scenes(run, scales),
-        rrb.StateTimelineView(origin="/phase", contents=["+ /phase"], name="Phase"),
-        row_shares=[7, 1],
-    )
+    phases = [_phase("phase", "Phase")]
+    words = [rrb.TextDocumentView(origin="/report/verdict", contents=["+ /report/verdict"], name="How high, and when")]
+    if beside is not None:
+        words.insert(0, rrb.TextDocumentView(origin=beside.answer, contents=[f"+ {beside.answer}"], name=beside.title))
+        phases += [_phase(beside.phase, "Phase, measured")] if beside.phase else []
+    left = rrb.Vertical(_scenes(run, scales), *phases, row_shares=[7, *[1] * len(phases)])
     rows = [
         top[:1],
         _mounts(channels) + top[1:] + loads + _moments(channels),
-        [*views, *_views(channels, MOTION), *_others(channels)],
+        [*(beside.views if beside else ()), *_views(channels, MOTION), *_others(channels)],
         [
-            rrb.TextDocumentView(origin="/report/verdict", contents=["+ /report/verdict"], name="How high, and when"),
+            *words,
             rrb.TextLogView(
                 origin="/events",
                 contents=["+ /events"],
@@ -97,6 +109,10 @@ def blueprint(run: Run, scales: str, views: Sequence[rrb.TimeSeriesView] = ()) -
         auto_layout=False,
         auto_views=False,
     )
+
+
+def _phase(path: str, name: str) -> rrb.StateTimelineView:
+    return rrb.StateTimelineView(origin=f"/{path}", contents=[f"+ /{path}"], name=name)
 
 
 def _scenes(run: Run, scales: str) -> rrb.Spatial3DView | rrb.Tabs:

@@ -92,4 +92,4 @@ def test_the_viewer_draws_it_without_complaint(two: tuple[Pair, Path]) -> None:
     image = pixels(shot)
     for shade in (BASELINE, CANDIDATE):  # both curves in the plot, and the difference below
         rgb = [(shade >> k) & 255 for k in (24, 16, 8)]
-        assert (np.abs(image - rgb).max(axis=2) < 12).sum() > 200
+        assert (np.abs(image - rgb).max(axis=2) < 12).sum() > 100
