@@ -70,7 +70,9 @@ def _page(path: Path, html: Path, force: bool) -> None:
     from viz.web_page import write_page
 
     if html.is_dir() or html.suffix.lower() not in (".html", ".htm"):
-        raise InputError(Fault(file="--html", message=f"not the name of a page, got {str(html)!r}; NAME.html is needed"))
+        raise InputError(
+            Fault(file="--html", message=f"not the name of a page, got {str(html)!r}; NAME.html is needed")
+        )
     if html.exists() and not force:
         raise InputError(Fault(file=str(html), message="exists; --force replaces it"))
     if (html.parent / RUN).exists() and html.name != VIEWER:
