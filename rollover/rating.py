@@ -21,6 +21,7 @@ FEWEST = 20  # stamps of its own that a stretch needs: below, interpolation woul
 
 # ISO/TS 18571: half widths of the corridors, largest shift, window of the warp, what scores zero, weights
 INNER, OUTER, POWER = 0.05, 0.50, 2
+ROUNDING = 1e-12  # of a correlation: what machines may differ by decides nothing
 MOST_SHIFT = 0.20
 WARP_WINDOW, MAGNITUDE_LIMIT = 0.10, 0.50
 SLOPE_LIMIT, SLOPE_SPAN = 2.0, 9
@@ -246,7 +247,7 @@ def best_shift(measured: Array, simulated: Array) -> int:
         if _constant(pair[0]) or _constant(pair[1]):
             continue
         now = float(np.corrcoef(*pair)[0, 1])
-        if now > most:
+        if now > most + ROUNDING:
             best, most = k, now
     return best
 
