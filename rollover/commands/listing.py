@@ -16,6 +16,7 @@ class Listed(StrEnum):
     """What `list` can list."""
 
     scenarios = "scenarios"
+    studies = "studies"
     vehicles = "vehicles"
     soils = "soils"
     laws = "laws"

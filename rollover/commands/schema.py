@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -17,6 +18,7 @@ class Part(StrEnum):
     scenario = "scenario"
     vehicle = "vehicle"
     soil = "soil"
+    study = "study"
 
 
 @app.command()
@@ -25,7 +27,14 @@ def schema(
     part: Annotated[Part, typer.Argument(help="Whose schema.")] = Part.scenario,
     as_json: AsJson = True,
 ) -> None:
-    """Print the JSON Schema of a scenario file, for editors; it is JSON with or without --json."""
+    """Print the JSON Schema of a scenario or study file, for editors; it is JSON with or without --json."""
     from rollover import scenario as scenarios
+    from rollover import study
 
-    print(json.dumps(scenarios.schema(part.value), indent=2))
+    schemas: dict[Part, Callable[[], Any]] = {
+        Part.scenario: scenarios.schema,
+        Part.vehicle: lambda: scenarios.schema("vehicle"),
+        Part.soil: lambda: scenarios.schema("soil"),
+        Part.study: study.schema,
+    }
+    print(json.dumps(schemas[part](), indent=2))
