@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from typing import Literal
 
 import numpy as np
 import rerun.blueprint as rrb
@@ -19,16 +21,17 @@ from viz.scene import extent, path_of_centre
 BACKGROUND = 0x2B313CFF
 _FIELD_OF_VIEW = math.radians(55.0)  # the viewer's own, vertical
 
+_STILL, _UPRIGHT = math.radians(2.0), math.radians(75.0)  # of roll and pitch
 _FAR = 2.6  # times the vehicle's own size: a run that covers more shows the vehicle too small
 
 # title, patterns of channels; a plot of which no channel was recorded is left out
 _Plots = tuple[tuple[str, tuple[str, ...]], ...]
-_TOP: _Plots = (
+TOP: _Plots = (
     ("ROPS force, kN", ("rops/force",)),
     ("Test stand, kN", ("device/force",)),
     ("Ground force, kN", ("ground/force_normal", "ground/force_tangential")),
 )
-_LOADS: _Plots = (
+LOADS: _Plots = (
     ("ROPS by axis, kN", ("rops/force_?",)),
     ("Wheels, kN", ("wheel/*/force_normal",)),
     ("Sinkage, mm", ("ground/sinkage", "rops/deflection", "device/deflection")),
@@ -36,7 +39,7 @@ _LOADS: _Plots = (
     ("Axle stop, N m s", ("axle/*/impulse",)),
     ("Contact area, cm\N{SUPERSCRIPT TWO}", ("ground/contact_area",)),
 )
-_MOTION: _Plots = (
+MOTION: _Plots = (
     ("Roll, deg", ("chassis/roll",)),
     ("Striker acceleration, m/s\N{SUPERSCRIPT TWO}", ("striker/acceleration_z",)),
     ("Energy, kJ", ("energy/*", "rops/energy", "device/energy")),
@@ -52,30 +55,45 @@ _MOUNTS = ("rops/mount/*/force_?", "rops/hinge/*/force_?")
 _MOMENTS = ("rops/mount/*/moment_?", "rops/hinge/*/moment_?", "rops/hinge/*/angle_?")
 
 
-def blueprint(run: Run, scales: str, views: Sequence[rrb.TimeSeriesView] = ()) -> rrb.Blueprint:
+@dataclass(frozen=True, kw_only=True)
+class Beside:
+    """What a layout shows besides a run: a document that answers first, plots before the motion, its own phases."""
+
+    answer: str
+    title: str
+    views: Sequence[rrb.TimeSeriesView] = ()
+    phase: str = ""
+
+
+def blueprint(run: Run, scales: str, beside: Beside | None = None) -> rrb.Blueprint:
     """Layout for one run: what answers "how high were the loads, and when" is in front in every place.
 
-    `scales` says what lengths and colours in the scene mean; `views` come in front of the motion.
+    `scales` says what lengths and colours in the scene mean.
     """
     # a plot of nothing but zeros says less than its absence, but for the load that is asked for
     found = run.recording.channels
     asked = "" if run.tests else "rops/force"
     channels = [c for c, v in found.items() if c == asked or np.any(np.nan_to_num(v))]
-    top = _views(channels, _TOP)
-    loads = _views(channels, _LOADS)
+    top = _views(run, channels, TOP)
+    loads = _views(run, channels, LOADS)
     if not top:  # on a tilt table the wheels tell
         top, loads = loads[:1], loads[1:]
-    left = rrb.Vertical(
-        _scenes(run, scales),
-        rrb.StateTimelineView(origin="/phase", contents=["+ /phase"], name="Phase"),
-        row_shares=[7, 1],
-    )
+    phases = [_phase("phase", "Phase")]
+    words = [rrb.TextDocumentView(origin="/report/verdict", contents=["+ /report/verdict"], name="How high, and when")]
+    if beside is not None:
+        words.insert(0, rrb.TextDocumentView(origin=beside.answer, contents=[f"+ {beside.answer}"], name=beside.title))
+        phases += [_phase(beside.phase, "Phase, measured")] if beside.phase else []
+    left = rrb.Vertical(_scenes(run, scales), *phases, row_shares=[7, *[1] * len(phases)])
     rows = [
         top[:1],
-        _mounts(channels) + top[1:] + loads + _moments(channels),
-        [*views, *_views(channels, _MOTION), *_others(channels)],
+        _mounts(run, channels) + top[1:] + loads + _moments(run, channels),
         [
-            rrb.TextDocumentView(origin="/report/verdict", contents=["+ /report/verdict"], name="How high, and when"),
+            *(beside.views if beside else ()),
+            *_views(run, channels, lively(run, channels, MOTION)),
+            *_others(run, channels),
+        ],
+        [
+            *words,
             rrb.TextLogView(
                 origin="/events",
                 contents=["+ /events"],
@@ -97,6 +115,10 @@ def blueprint(run: Run, scales: str, views: Sequence[rrb.TimeSeriesView] = ()) -
         auto_layout=False,
         auto_views=False,
     )
+
+
+def _phase(path: str, name: str) -> rrb.StateTimelineView:
+    return rrb.StateTimelineView(origin=f"/{path}", contents=[f"+ /{path}"], name=name)
 
 
 def _scenes(run: Run, scales: str) -> rrb.Spatial3DView | rrb.Tabs:
@@ -159,16 +181,33 @@ def _side(run: Run) -> float:
     return -1.0 if float(roll[int(np.nanargmax(np.abs(roll)))]) > 0.0 else 1.0
 
 
-def _views(channels: Sequence[str], plots: _Plots) -> list[rrb.TimeSeriesView]:
-    found = []
-    for title, patterns in plots:
-        matching = [c for p in patterns for c in channels if fnmatchcase(c, p)]
-        if matching:
-            found.append(plot(title, matching))
-    return found
+def matching(channels: Sequence[str], plots: _Plots) -> list[tuple[str, list[str]]]:
+    """Title and channels of every plot that has any."""
+    found = [(title, [c for p in patterns for c in channels if fnmatchcase(c, p)]) for title, patterns in plots]
+    return [(title, fitting) for title, fitting in found if fitting]
 
 
-def plot(title: str, channels: Iterable[str]) -> rrb.TimeSeriesView:
+def lively(run: Run, channels: Sequence[str], plots: _Plots) -> _Plots:
+    """The same plots, those in front first that show something."""
+    dull = {title for title, fitting in matching(channels, plots) if all(_dull(run, c) for c in fitting)}
+    return tuple(sorted(plots, key=lambda p: p[0] in dull))
+
+
+def _dull(run: Run, channel: str) -> bool:
+    """Whether a curve says nothing: it stands still, or it is a roll that jumps where the vehicle stands upright."""
+    values = run.recording[channel][1:]
+    spread = float(np.ptp(values[np.isfinite(values)])) if np.isfinite(values).any() else 0.0
+    if channel == "chassis/roll":
+        pitch = run.recording.channels.get("chassis/pitch", np.zeros(1))
+        return spread < _STILL or float(np.nanmax(np.abs(pitch))) > _UPRIGHT
+    return spread <= 1e-3 * float(np.nanmax(np.abs(values), initial=0.0))
+
+
+def _views(run: Run, channels: Sequence[str], plots: _Plots) -> list[rrb.TimeSeriesView]:
+    return [plot(run, title, fitting) for title, fitting in matching(channels, plots)]
+
+
+def plot(run: Run, title: str, channels: Sequence[str]) -> rrb.TimeSeriesView:
     """Plot of some channels, with whatever is recorded beside the simulated values: measured, limit, peak."""
     paths = [series(c).path for c in channels]
     return rrb.TimeSeriesView(
@@ -176,37 +215,45 @@ def plot(title: str, channels: Iterable[str]) -> rrb.TimeSeriesView:
         contents=[f"+ /{path}/**" for path in paths],
         name=title,
         axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
-        plot_legend=rrb.PlotLegend("RightTop"),
+        plot_legend=rrb.PlotLegend(free_corner(run, channels)),
     )
 
 
-def _mounts(channels: Sequence[str]) -> list[rrb.Container]:
+def free_corner(run: Run, channels: Sequence[str]) -> Literal["LeftTop", "RightTop"]:
+    """The upper corner in which the curves leave more room for a legend."""
+    third = max(1, run.recording.time.size // 3)
+    values = np.nan_to_num(np.array([run.recording[c] * series(c).factor for c in channels]))
+    left, right = values[:, :third].max(), values[:, -third:].max()
+    return "LeftTop" if left < right else "RightTop"
+
+
+def _mounts(run: Run, channels: Sequence[str]) -> list[rrb.Container]:
     """One tab with a plot for each mount and hinge; the axes have the same colours in each."""
-    return _joints(channels, _MOUNTS, "Mounts, kN")
+    return _joints(run, channels, _MOUNTS, "Mounts, kN")
 
 
-def _moments(channels: Sequence[str]) -> list[rrb.Container]:
+def _moments(run: Run, channels: Sequence[str]) -> list[rrb.Container]:
     """One tab with the moments through mounts and hinges, and how far these turn."""
-    return _joints(channels, _MOMENTS, "Moments, kN m")
+    return _joints(run, channels, _MOMENTS, "Moments, kN m")
 
 
-def _joints(channels: Sequence[str], patterns: tuple[str, ...], title: str) -> list[rrb.Container]:
+def _joints(run: Run, channels: Sequence[str], patterns: tuple[str, ...], title: str) -> list[rrb.Container]:
     found: dict[str, list[str]] = {}
     for channel in channels:
         if any(fnmatchcase(channel, pattern) for pattern in patterns):
             _, what, name, part = channel.split("/")
             load = "" if part.startswith("force") else f" {part[:-2]}"
             found.setdefault(f"{what.capitalize()} {name}{load}, {series(channel).unit}", []).append(channel)
-    plots = [plot(name, of_joint) for name, of_joint in found.items()]
+    plots = [plot(run, name, of_joint) for name, of_joint in found.items()]
     return [rrb.Grid(*plots, grid_columns=min(2, len(plots)), name=title)] if plots else []
 
 
-def _others(channels: Sequence[str]) -> list[rrb.TimeSeriesView]:
+def _others(run: Run, channels: Sequence[str]) -> list[rrb.TimeSeriesView]:
     """What no plot above shows; nothing recorded is out of reach."""
-    patterns = [p for plots in (_TOP, _LOADS, _MOTION) for _, found in plots for p in found]
+    patterns = [p for plots in (TOP, LOADS, MOTION) for _, found in plots for p in found]
     patterns += [*_MOUNTS, *_MOMENTS]
     rest: dict[str, list[str]] = {}
     for channel in channels:
         if not any(fnmatchcase(channel, p) for p in patterns):
             rest.setdefault(series(channel).unit, []).append(channel)
-    return [plot(f"Other, {unit}" if unit else "Other, SI", found) for unit, found in rest.items()]
+    return [plot(run, f"Other, {unit}" if unit else "Other, SI", found) for unit, found in rest.items()]

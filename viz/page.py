@@ -103,10 +103,11 @@ class Details:
 
 @dataclass(frozen=True, kw_only=True)
 class Footer:
-    """What the page rests on and how to get it again."""
+    """What the page rests on and how to get it again; `hash_of` says what the hash is one of."""
 
     command: str
     scenario_hash: str = ""
+    hash_of: str = "Scenario"
     versions: Mapping[str, str] | None = None
 
 

@@ -14,8 +14,8 @@ from rollover.faults import Fault, InputError
 if TYPE_CHECKING:
     from rollover.proof.seal import Seal
 
-JSON, SEAL, TRUTH, DIAGNOSES = "prove.json", "seal.json", "truth.json", "diagnoses.jsonl"
-ACCOUNT = (JSON, SEAL, TRUTH, DIAGNOSES)
+JSON, SEAL, TRUTH, DIAGNOSES, PAGE = "prove.json", "seal.json", "truth.json", "diagnoses.jsonl", "report.html"
+ACCOUNT = (JSON, SEAL, TRUTH, DIAGNOSES, PAGE)
 
 
 @app.command()
@@ -69,6 +69,10 @@ def prove(
         (part / TRUTH).write_text(json.dumps({"format": "rollover-truths/1", **truth}, indent=1), encoding="utf-8")
         lines = (json.dumps(store.plain({"case": name, **found})) for name, found in proof.diagnoses.items())
         (part / DIAGNOSES).write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+        from viz.proof_page import page
+
+        text = page(account, command=_command(cases, seed, about), versions=account["versions"])
+        (part / PAGE).write_text(text, encoding="utf-8")
     if as_json:
         print(json.dumps(account, indent=2))
     else:
@@ -76,6 +80,12 @@ def prove(
     if not proof.diagnoses:
         console.say(f"Every diagnosis failed; the first: {account['rows'][0]['failure']}")
         raise typer.Exit(FAILED)
+
+
+def _command(cases: int, seed: int, about: dict[str, Any]) -> str:
+    words = ["rollover", "prove", "--cases", str(cases), "--seed", str(seed)]
+    words += [word for name in ("effects", "kinds") for value in about[name] for word in (f"--{name}", value)]
+    return " ".join(words)
 
 
 def sentences(summary: dict[str, Any]) -> list[str]:

@@ -5,6 +5,7 @@ Needs a Vulkan driver; without a graphics card Debian's mesa-vulkan-drivers (lav
 
 from __future__ import annotations
 
+import io
 import os
 import socket
 import subprocess
@@ -15,8 +16,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from viz.viewer import viewer_binary
 
+KEPT = Path(__file__).resolve().parents[2] / "out" / "pictures"  # for people to look at after the tests
 DRIVERS = Path("/usr/share/vulkan/icd.d")
 _HARMLESS = ("Software rasterizer", "loss of performance", "not found for screenshot")
 
@@ -24,6 +29,21 @@ _HARMLESS = ("Software rasterizer", "loss of performance", "not found for screen
 def has_software_driver() -> bool:
     """Whether pictures can be made on a machine without a graphics card."""
     return DRIVERS.is_dir() and any("lvp" in p.name for p in DRIVERS.iterdir())
+
+
+def kept(name: str, picture: bytes) -> Path:
+    """Keep a picture for people to look at."""
+    KEPT.mkdir(parents=True, exist_ok=True)
+    path = KEPT / name
+    path.write_bytes(picture)
+    return path
+
+
+def pixels(picture: bytes) -> NDArray[np.int64]:
+    """Red, green, blue of a PNG, 0 to 255, (rows, columns, 3)."""
+    from PIL import Image
+
+    return np.asarray(Image.open(io.BytesIO(picture)).convert("RGB"), dtype=np.int64)
 
 
 @contextmanager

@@ -1,0 +1,137 @@
+"""What a diagnosis says of what it found: effects by name, places, candidates passed over, one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.detect import Mismatch
+from rollover.diagnosis.evidence import Evidence
+from rollover.diagnosis.explain import confusion
+from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.holdout import Held, held_out
+from rollover.diagnosis.intervals import intervals
+from rollover.diagnosis.selection import Explanation, strongest
+from rollover.diagnosis.verdict import Considered, Named, Place, Verdict
+from rollover.effects import EFFECTS
+
+
+def named(judge: Judge, found: Explanation, groups: Sequence[Sequence[int]]) -> tuple[Named, ...]:
+    """Effects of an explanation with their intervals and look-alikes, the strongest first."""
+    fitted = found.fitted
+    settings = {c.key: s for c, s in zip(fitted.candidates, intervals(judge, fitted), strict=True)}
+    by_key = {s.fitted.candidates[-1].key: s for s in found.parts}
+    effects = []
+    for c in fitted.candidates:
+        kind = EFFECTS[c.id]
+        parameters = settings[c.key]
+        values: dict[str, Any] = {name: i.value for name, i in parameters.items()}
+        if c.channel is not None:
+            values["channel"] = c.channel
+        rivals = [f.candidates[-1] for f in confusion(by_key[c.key], groups) if f.candidates[-1].key != c.key]
+        tests = [kind.rivals[r.id] for r in rivals if r.id in kind.rivals]
+        effects.append(
+            Named(
+                id=c.id,
+                kind=c.kind,
+                statement=kind(**values).says(),
+                parameters=parameters,
+                settings=values,
+                channel=c.channel,
+                p_value=by_key[c.key].p_value,
+                indistinguishable_from=tuple(dict.fromkeys(r.id for r in rivals if r.id != c.id)),
+                discriminating_test=tests[0] if tests else next(iter(kind.rivals.values()), ""),
+            )
+        )
+    first = strongest(judge, found.base, fitted)
+    return tuple(sorted(effects, key=lambda n: (n.id, n.channel) != (first.id, first.channel)))
+
+
+def considered(
+    found: Explanation, candidates: Sequence[Candidate], groups: Sequence[Sequence[int]]
+) -> tuple[Considered, ...]:
+    """Every candidate with its gain on held-out conditions beside the base, and why it was not chosen."""
+    first = found.first
+    chosen = {c.key for c in found.fitted.candidates}
+    lines: dict[str, Considered] = {}
+    if first is not None:
+        start, best = held_out(first.base, groups).total, held_out(first.fitted, groups).total
+        for f in first.rivals:
+            c = f.candidates[-1]
+            end = held_out(f, groups).total
+            if c.key in chosen:
+                reason = "chosen"
+            elif end >= 0.999 * start:
+                reason = "predicts held-out recordings no better than the scenario as it is"
+            else:
+                reason = f"leaves {end:.2f} times the noise on held-out recordings, the best {best:.2f}"
+            lines[c.key] = Considered(
+                id=c.id, channel=c.channel, held_out_gain=float(np.log(start / end)), reason=reason
+            )
+        for s in first.screened:
+            if s.candidate.key not in lines and s.nrmse:
+                c = s.candidate
+                reason = f"leaves {s.nrmse:.2f} times the noise after a first fit to few recordings"
+                lines[c.key] = Considered(id=c.id, channel=c.channel, held_out_gain=0.0, reason=reason)
+    for c in candidates:
+        if c.key not in lines:
+            reason = (
+                "chosen beside another one"
+                if c.key in chosen
+                else "moves the simulation in directions in which the misfit has little"
+            )
+            lines[c.key] = Considered(id=c.id, channel=c.channel, held_out_gain=0.0, reason=reason)
+    return tuple(sorted(lines.values(), key=lambda c: -c.held_out_gain))
+
+
+def places(mismatch: Mismatch, evidence: Sequence[Evidence], depends: str | None) -> tuple[Place, ...]:
+    """Where the misfit is more than noise, largest share first."""
+    return tuple(
+        Place(
+            recording=evidence[c.recording].name,
+            channel=c.channel,
+            phase=c.phase,
+            start=c.start,
+            end=c.end,
+            share=share,
+            depends_on=depends,
+        )
+        for c, share in mismatch.shares()[:12]
+        if share > 0.01
+    )  # fmt: skip
+
+
+def noise(evidence: Sequence[Evidence]) -> dict[str, float]:
+    """Noise (1 sigma, SI) of each channel, the median of the recordings."""
+    found: dict[str, list[float]] = {}
+    for e in evidence:
+        for s in e.signals:
+            found.setdefault(s.channel, []).append(s.noise)
+    return {name: float(np.median(values)) for name, values in found.items()}
+
+
+def sentence(
+    verdict: Verdict,
+    effects: Sequence[Named],
+    before: Mismatch,
+    first: Held,
+    last: Held,
+    evidence: Sequence[Evidence],
+) -> str:
+    """The verdict in one sentence or two."""
+    if verdict == "no-mismatch":
+        return f"Simulation and {len(evidence)} recordings agree within the noise (p = {before.p_value:.2g})."
+    if verdict == "cannot-tell":
+        return "These recordings are too weak to show even typical effects: nothing can be said."
+    if verdict == "unexplained":
+        return (
+            f"Simulation and recordings differ ({first.total:.1f} times the noise), and no candidate explains it on "
+            "recordings that were held out."
+        )
+    said = " ".join(e.statement for e in effects)
+    rivals = sorted({r for e in effects for r in e.indistinguishable_from})
+    also = f" Not told apart by these recordings: {', '.join(rivals)}." if rivals else ""
+    return f"{said} With it the held-out misfit falls from {first.total:.1f} to {last.total:.2f} times the noise.{also}"
