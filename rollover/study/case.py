@@ -89,7 +89,7 @@ def stated_versions() -> str:
 def own_effects(files: str) -> str:
     """Hash of the files of one's own effects: what they say decides a result as a version does."""
     digest = hashlib.sha256()
-    for name in filter(None, files.split(os.pathsep)):
+    for name in dict.fromkeys(filter(None, files.split(os.pathsep))):  # one that is given twice is one
         digest.update(Path(name).read_bytes() if Path(name).is_file() else b"")
     return digest.hexdigest() if files else ""
 
