@@ -60,10 +60,10 @@ class Result:
     provenance: Mapping[str, Any]
 
 
-def case_of(scenario: Scenario, *, simulator: Simulator, clearance: bool) -> Case:
-    """The case of a scenario."""
+def case_of(key: str, scenario: Scenario, *, simulator: Simulator, clearance: bool) -> Case:
+    """The case of a scenario, whose `key` is that of `key_of`."""
     return Case(
-        key=key_of(scenario, simulator=simulator, clearance=clearance),
+        key=key,
         scenario=pickle.dumps(scenario),
         simulator=simulator,
         clearance=clearance,
