@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rollover.commands.door import FAILED, AsJson, Force, answering, app
+from rollover.commands.door import FAILED, AsJson, Force, answering, app, manual
 from rollover.faults import Fault, InputError
 
 if TYPE_CHECKING:
@@ -18,13 +18,19 @@ JSON, SEAL, TRUTH, DIAGNOSES, PAGE = "prove.json", "seal.json", "truth.json", "d
 ACCOUNT = (JSON, SEAL, TRUTH, DIAGNOSES, PAGE)
 
 
-@app.command()
+@app.command(
+    epilog=manual(
+        "prove --cases 50 --seed 1",
+        writes="prove.json, report.html, seal.json, truth.json, diagnoses.jsonl.",
+        status="3 every diagnosis failed",
+    )
+)
 @answering
 def prove(
     cases: Annotated[int, typer.Option(help="How many concealed drop test campaigns.", min=1)] = 50,
     seed: Annotated[int, typer.Option(help="Another seed, other cases; the same seed, the same ones.", min=0)] = 1,
     out: Annotated[Path, typer.Option(help="Folder of the full account.")] = Path("out/prove"),
-    workers: Annotated[int | None, typer.Option(help="Cases at once  [default: number of cores]", min=0)] = None,
+    workers: Annotated[int | None, typer.Option(help="Cases at once", show_default="number of cores", min=0)] = None,
     effects: Annotated[
         list[str] | None, typer.Option(metavar="ID", help="Only cases about this effect; may be repeated.")
     ] = None,

@@ -9,24 +9,31 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rollover.commands.door import COMPILING, FAILED, THE_ANSWER_IS_NO, AsJson, Force, answering, app
+from rollover.commands.door import BROKE, COMPILING, FAILED, NO, THE_ANSWER_IS_NO, AsJson, Force, answering, app, manual
 from rollover.faults import Fault, InputError
 
 if TYPE_CHECKING:
     from rollover.baseline import Answer
 
 
-@app.command()
+@app.command(
+    epilog=manual(
+        "regress",
+        "regress side_overturn --update --reason 'stiffer rear tyres'",
+        writes="regress.json, regress.csv, report.html; with --update the baselines beside the scenarios.",
+        status=f"{NO}: a load has changed; {BROKE}",
+    )
+)
 @answering
 def regress(
     scenarios: Annotated[
         list[str] | None,
-        typer.Argument(help="Scenarios or folders of them  [default: all shipped]", metavar="[SCENARIO]..."),
+        typer.Argument(help="Scenarios or folders of them", show_default="all shipped", metavar="[SCENARIO]..."),
     ] = None,
     update: Annotated[bool, typer.Option("--update", help="Write the baselines anew; needs --reason.")] = False,
     reason: Annotated[str, typer.Option(help="Why the loads may be others from now on; kept in the baseline.")] = "",
     out: Annotated[Path, typer.Option(help="Folder of the full account.")] = Path("out/regress"),
-    workers: Annotated[int | None, typer.Option(help="Runs at once  [default: number of cores]", min=0)] = None,
+    workers: Annotated[int | None, typer.Option(help="Runs at once", show_default="number of cores", min=0)] = None,
     time_limit: Annotated[float, typer.Option(help="Wall time for each run, s.", min=1.0)] = 600.0,
     force: Force = False,
     as_json: AsJson = False,
