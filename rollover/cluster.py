@@ -10,8 +10,11 @@ import multiprocessing
 import pickle
 import threading
 import time
+import uuid
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, suppress
+from multiprocessing.util import Finalize
 from typing import Any, TypeVar
 
 from rollover.execute import AHEAD, Failure, Outcome, answer_of, child_pool, packed
@@ -53,24 +56,28 @@ def _handed_out(
 ) -> Iterator[Outcome[C, V]]:
     from distributed import as_completed
 
+    token = uuid.uuid4().hex  # tells this study's children from those of others on the same workers
     todo = iter(enumerate(cases))
     open_: dict[str, tuple[int, C]] = {}
     over = as_completed(loop=client.loop)
-    while True:
-        room = AHEAD * max(1, sum(client.nthreads().values())) - len(open_)
-        for index, case in _first(todo, room):
-            task = client.submit(
-                _in_child, function, case, time_limit, memory_limit, warm_up, pure=False, retries=0, key=f"case-{index}"
-            )
-            open_[task.key] = (index, case)
-            over.add(task)
-        if not open_:
-            return
-        for task in [next(over), *_ready(over)]:
-            index, case = open_.pop(task.key)
-            value, failure, wall = _brought(task)
-            task.release()
-            yield Outcome(index=index, case=case, value=value, failure=failure, wall_time=wall)
+    try:
+        while True:
+            room = AHEAD * max(1, sum(client.nthreads().values())) - len(open_)
+            for index, case in _first(todo, room):
+                args = (token, function, case, time_limit, memory_limit, warm_up)
+                task = client.submit(_in_child, *args, pure=False, retries=0, key=f"case-{token}-{index}")
+                open_[task.key] = (index, case)
+                over.add(task)
+            if not open_:
+                return
+            for task in [next(over), *_ready(over)]:
+                index, case = open_.pop(task.key)
+                value, failure, wall = _brought(task)
+                task.release()
+                yield Outcome(index=index, case=case, value=value, failure=failure, wall_time=wall)
+    finally:
+        with suppress(Exception):  # a worker that is lost has let go already
+            client.run(_let_go, token)
 
 
 def _first(todo: Iterator[tuple[int, C]], most: int) -> Iterator[tuple[int, C]]:
@@ -95,10 +102,12 @@ def _brought(task: Any) -> tuple[Any, Failure | None, float]:
     return None, Failure(kind="crash" if lost else "error", sentence=sentence, detail=str(reason)), 0.0
 
 
-_own = threading.local()  # the pool of one child that each thread of a worker keeps
+_own = threading.local()  # the pool of one child that each thread of a worker keeps, and whose it is
+_pools: dict[str, list[Any]] = {}
 
 
 def _in_child(
+    token: str,
     function: Callable[[C], V],
     case: C,
     time_limit: float | None,
@@ -106,22 +115,37 @@ def _in_child(
     warm_up: Callable[[], None] | None,
 ) -> bytes:
     """On a worker: one case in this thread's child process, its answer as `execute.packed` gives it."""
-    from concurrent.futures.process import BrokenProcessPool
-
     for last in (False, True):
-        pool = getattr(_own, "pool", None)
-        if pool is None or not pool.active:
-            # a nanny's worker is daemonic, and those may have no children; ours end as soon as it closes its pipe
-            multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
-            pool = _own.pool = child_pool(1, warm_up)
-        task = pool.schedule(packed, args=(function, case, memory_limit), timeout=time_limit)
+        pool = _pool(token, warm_up)
         try:
+            task = pool.schedule(packed, args=(function, case, memory_limit), timeout=time_limit)
             return pickle.dumps(answer_of(task, time_limit))
-        except BrokenProcessPool:
+        except (BrokenProcessPool, RuntimeError):  # its child was ended between two cases
             _own.pool = None
             if last:
                 raise
     raise AssertionError  # the second round returns or raises
+
+
+def _pool(token: str, warm_up: Callable[[], None] | None) -> Any:
+    pool = getattr(_own, "pool", None)
+    if pool is not None and pool.active and _own.token == token:
+        return pool
+    if pool is not None:
+        pool.stop()  # of a study that is over: this thread works for another one now
+    # a nanny's worker is daemonic, and those may have no children; ours are stopped when it ends
+    multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
+    _own.pool, _own.token = child_pool(1, warm_up), token
+    _pools.setdefault(token, []).append(_own.pool)
+    Finalize(None, _own.pool.stop, exitpriority=100)
+    return _own.pool
+
+
+def _let_go(token: str) -> None:
+    """On a worker: end the children of a study."""
+    for pool in _pools.pop(token, []):
+        pool.stop()
+        pool.join()
 
 
 @contextmanager

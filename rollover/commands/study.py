@@ -129,7 +129,7 @@ def _head(name: str, chosen: Study, status: str) -> dict[str, Any]:
 
 def _note(p: Progress) -> str:
     failed = f"{p.failed} failed, " if p.failed else ""
-    return f"{failed}{60.0 * p.rate:.3g} a minute, {_span(p.left)} left"
+    return f"{failed}{60.0 * p.rate:.3g} a minute, {_span(p.left)} left" if p.rate > 0.0 else failed.rstrip(", ")
 
 
 def _span(seconds: float) -> str:

@@ -23,10 +23,10 @@ from rollover.loads import leading as leading_load
 from rollover.loads import load_channels, magnitude, peak_loads
 from rollover.recording import Recording
 from rollover.run import Run
-from rollover.scenario import Scenario
+from rollover.scenario import Scenario, load
 from rollover.store import versions
 
-ALSO = ("rops/deflection", "rops/energy", "ground/sinkage")
+ALSO = ("rops/deflection", "rops/energy", "ground/sinkage", "chassis/roll")
 CLEARANCE = ("clearance/structure", "clearance/ground")
 Simulator = Literal["full", "drop"]
 
@@ -94,11 +94,14 @@ def own_effects(files: str) -> str:
     return digest.hexdigest() if files else ""
 
 
-def warm_up() -> None:
-    """Load what a case needs, so that the first one is not charged for it."""
-    from rollover import simulate  # noqa: F401
-
+def warm_up(simulator: Simulator = "full") -> None:
+    """Load what a case needs, kernels too, by a drop of its own, so that the first case is not charged for it."""
     effects()
+    drop = load("drop_test")
+    if simulator == "drop":
+        _dropped(drop)
+    else:
+        _simulated(drop.replaced({"simulation.duration": 0.005}), clearance=False)
 
 
 class WrongVersionsError(Exception):

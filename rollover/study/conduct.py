@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,7 +17,18 @@ from rollover.execute import Failure, Outcome, map_cases
 from rollover.faults import InputError
 from rollover.scenario import Scenario
 from rollover.study import shelf
-from rollover.study.case import CLEARANCE, Case, Result, case_of, key_of, own_effects, stated_versions, warm_up, work
+from rollover.study.case import (
+    CLEARANCE,
+    Case,
+    Result,
+    Simulator,
+    case_of,
+    key_of,
+    own_effects,
+    stated_versions,
+    warm_up,
+    work,
+)
 from rollover.study.design import Points, points
 from rollover.study.shelf import Row
 from rollover.study.study import Study, base_values, changes
@@ -155,7 +168,7 @@ def _worked_off(
             asked.append(key)
             yield case
 
-    outcomes = _outcomes(cases(), way)
+    outcomes = _outcomes(cases(), way, builder.study.simulator)
     try:
         for outcome in outcomes:
             key = asked[outcome.index]
@@ -166,8 +179,12 @@ def _worked_off(
     return rows, len(todo)
 
 
-def _outcomes(cases: Iterator[Case], way: Way) -> Iterator[Outcome[Case, Result]]:
-    limits: dict[str, Any] = {"time_limit": way.time_limit, "memory_limit": way.memory_limit, "warm_up": warm_up}
+def _outcomes(cases: Iterator[Case], way: Way, simulator: Simulator) -> Iterator[Outcome[Case, Result]]:
+    limits: dict[str, Any] = {
+        "time_limit": way.time_limit,
+        "memory_limit": way.memory_limit,
+        "warm_up": partial(warm_up, simulator),
+    }
     if way.scheduler:
         from rollover.cluster import map_on_cluster
 
@@ -185,14 +202,17 @@ class _Tally:
     def __init__(self, *, of: int, kept: int, show: Show | None) -> None:
         self.of, self.kept, self.show = of, kept, show
         self.done = self.failed = 0
-        self.began = time.monotonic()
+        self.began = 0.0
 
     def count(self, row: Row) -> None:
+        """The first case has waited for its worker to start: the clock runs from its end."""
         self.done += 1
         self.failed += row.status == "failed"
+        if self.done == 1:
+            self.began = time.monotonic()
         if self.show is not None:
-            rate = self.done / max(time.monotonic() - self.began, 1e-9)
-            left = (self.of - self.done) / rate
+            rate = (self.done - 1) / max(time.monotonic() - self.began, 1e-9)
+            left = (self.of - self.done) / rate if rate > 0.0 else math.inf
             self.show(Progress(done=self.done, failed=self.failed, of=self.of, kept=self.kept, rate=rate, left=left))
 
 

@@ -122,8 +122,9 @@ def _read(path: Path, names: list[str]) -> dict[str, NDArray[Any]]:
         raise InputError(Fault(file=str(path), message="empty, got a table without rows"))
     _bounded(count)
     for name, column in found.items():
-        if column.dtype != object and not np.isfinite(column).all():
-            row = int(np.argmin(np.isfinite(column)))
+        filled = np.array([bool(w.strip()) for w in column]) if column.dtype == object else np.isfinite(column)
+        if not filled.all():
+            row = int(np.argmin(filled))
             raise InputError(
                 Fault(file=str(path), message=f"column {name}: no number in row {row + 1}; every cell filled")
             )
@@ -140,7 +141,8 @@ def _wordy(words: list[str]) -> bool:
             return False
         return True
 
-    return bool(words) and not any(number(w) for w in words if w.strip())
+    written = [w for w in words if w.strip()]
+    return bool(written) and not any(number(w) for w in written)
 
 
 def _present(path: Path, names: list[str], there: list[str]) -> None:
