@@ -1,5 +1,7 @@
 """Pictures of a recording without a window, to be looked at: ``python -m tests.viz.picture RRD OUT TIME ...``.
 
+Each goes to OUT_TIME.png, 1200 pixels wide in 256 colours, small enough for a page.
+
 Needs a Vulkan driver; without a graphics card Debian's mesa-vulkan-drivers (lavapipe) will do.
 """
 
@@ -37,6 +39,17 @@ def kept(name: str, picture: bytes) -> Path:
     path = KEPT / name
     path.write_bytes(picture)
     return path
+
+
+def small(picture: bytes, width: int = 1200) -> bytes:
+    """The same PNG in fewer pixels and 256 colours."""
+    from PIL import Image
+
+    image = Image.open(io.BytesIO(picture)).convert("RGB")
+    image = image.resize((width, round(image.height * width / image.width)), Image.Resampling.LANCZOS)
+    out = io.BytesIO()
+    image.quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(out, "PNG", optimize=True)
+    return out.getvalue()
 
 
 def pixels(picture: bytes) -> NDArray[np.int64]:
@@ -107,5 +120,5 @@ def pictures(path: Path, times: Sequence[float]) -> tuple[list[bytes], list[str]
 if __name__ == "__main__":
     shots, said = pictures(Path(sys.argv[1]), [float(t) for t in sys.argv[3:]])
     for t, png in zip(sys.argv[3:], shots, strict=True):
-        Path(f"{sys.argv[2]}_{t}.png").write_bytes(png)
+        Path(f"{sys.argv[2]}_{t}.png").write_bytes(small(png))
     print("\n".join(said) or "nothing to complain about")
