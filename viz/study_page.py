@@ -31,7 +31,7 @@ def page(study: Study, done: Conducted, account: Mapping[str, Any], *, command: 
     for output in account["outputs"][:MOST_FIGURES]:
         blocks.append(_output(study, done, account, output))
     if rest := account["outputs"][MOST_FIGURES:]:
-        blocks.append(Section(title="Further outputs", blocks=[_quantiles(o) for o in rest]))
+        blocks.append(Section(title="Further outputs", blocks=[_quantiles(o, drawn=account["drawn"]) for o in rest]))
     if account["reliability"]:
         blocks.append(_reliability(account["reliability"]))
     if account["worst"] is not None:
@@ -71,7 +71,7 @@ def _output(study: Study, done: Conducted, account: Mapping[str, Any], output: M
     y = values_of(chosen, done.rows) * factor
     label = f"{output['name']}, {unit}" if unit != "1" else output["name"]
     levels = [] if output["limit"] is None else [Level(name="limit", value=output["limit"] * factor)]
-    blocks: list[Block] = [_quantiles(output)]
+    blocks: list[Block] = [_quantiles(output, drawn=account["drawn"])]
     if np.isfinite(y).any():
         blocks.append(_distribution(y, label, levels, drawn=account["drawn"]))
         if output["ends"]:
@@ -81,13 +81,13 @@ def _output(study: Study, done: Conducted, account: Mapping[str, Any], output: M
     return Section(title=output["name"], blocks=blocks)
 
 
-def _quantiles(output: Mapping[str, Any]) -> Table:
+def _quantiles(output: Mapping[str, Any], *, drawn: bool) -> Table:
     unit, factor = series_unit(output["unit"])
     rows: list[list[str | Cell]] = [["mean", _number(output["mean"], factor), "", ""]]
     rows.append(["standard deviation", _number(output["deviation"], factor), "", ""])
     rows.append(["least", _number(output["least"], factor), "", ""])
     for q in output["quantiles"]:
-        bounds = [_number(q[key], factor, "not bounded") for key in ("low", "high")]
+        bounds = [_number(q[key], factor, "not bounded" if drawn else "") for key in ("low", "high")]
         rows.append([f"{100.0 * q['q']:g} %", _number(q["value"], factor), *bounds])
     rows.append(["largest", _number(output["largest"], factor), "", ""])
     if (e := output["exceedance"]) is not None:
@@ -96,12 +96,13 @@ def _quantiles(output: Mapping[str, Any]) -> Table:
         if e["failed"]:
             every = f"the same, {e['failed']} failed cases on either side"
             rows.append([every, "", _percent(e["low_of_all"]), _percent(e["high_of_all"])])
+    how = "Intervals by order statistics and Clopper-Pearson." if drawn else "No draws: no intervals, and no odds."
     missing = f"; {output['missing']} have no such measure" if output["missing"] else ""
     return Table(
         columns=(f"{output['name']}, {unit}", "", "interval from", "to"),
         rows=rows,
         numeric=(1, 2, 3),
-        caption=f"{output['cases']} cases{missing}. Intervals by order statistics and Clopper-Pearson.",
+        caption=f"{output['cases']} cases{missing}. {how}",
     )
 
 

@@ -219,11 +219,12 @@ def sentences(account: dict[str, Any]) -> list[str]:
         lines.append(f"{each['name']}, {unit}")
         for q in each["quantiles"]:
             low, value, high = (readable(q[key], each["unit"]) for key in ("low", "value", "high"))
-            lines.append(f"  {100.0 * q['q']:5.4g} %  {value:>9}   ({low} to {high})")
+            bounds = f"   ({low} to {high})" if account["drawn"] else ""
+            lines.append(f"  {100.0 * q['q']:5.4g} %  {value:>9}{bounds}")
         if (e := each["exceedance"]) is not None:
-            bounds = f"({100.0 * e['low_of_all']:.3g} to {100.0 * e['high_of_all']:.3g} %)"
+            span = f"({100.0 * e['low_of_all']:.3g} to {100.0 * e['high_of_all']:.3g} %)"
             limit = readable(e["limit"], each["unit"])
-            lines.append(f"  {e['beyond']} {limit}: {100.0 * e['probability']:.3g} %  {bounds}")
+            lines.append(f"  {e['beyond']} {limit}: {100.0 * e['probability']:.3g} %  {span}")
         for s in each["sobol"]:
             total = f"total {s['total']:.2f} +- {s['total_half_width']:.2f}"
             lines.append(f"  {s['axis']}: first {s['first']:.2f} +- {s['first_half_width']:.2f}, {total}")

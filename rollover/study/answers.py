@@ -75,25 +75,27 @@ def _output(study: Study, output: Output, done: Conducted, chosen: slice, drawn:
         "deviation": float(good.std(ddof=1)) if len(good) > 1 else None,
         "least": float(good.min()) if len(good) else None,
         "largest": float(good.max()) if len(good) else None,
-        "quantiles": [quantile(good, q, study.confidence) for q in study.quantiles] if len(good) else [],
+        "quantiles": [quantile(good, q, study.confidence, drawn=drawn) for q in study.quantiles] if len(good) else [],
         "exceedance": exceedance(good, output, failed, study.confidence) if drawn and len(good) else None,
         "worst": _worst(output, y, done),
         "ends": _ends(study, done, y),
-        "rank_correlation": _ranks(study, done, y),
+        "rank_correlation": _ranks(study, done, y) if drawn else [],
         "sobol": _named(study, _sobol(study, y)),
         "morris": _named(study, _morris(study, done, y)),
     }
     return found
 
 
-def quantile(values: Array, q: float, confidence: float) -> dict[str, Any]:
+def quantile(values: Array, q: float, confidence: float, *, drawn: bool = True) -> dict[str, Any]:
     """Quantile with its interval by order statistics, which holds for any distribution.
 
     P(x_(l) <= x_q < x_(u)) = sum_{k=l}^{u-1} C(n,k) q^k (1-q)^(n-k) >= confidence; an end that n values do not bound is
-    None. `values` (n,) are independent draws.
+    None. `values` (n,) are independent draws; if they are not `drawn` there is no interval.
     """
     from scipy.stats import binom
 
+    if not drawn:
+        return {"q": q, "value": float(np.quantile(values, q)), "low": None, "high": None}
     n, x = len(values), np.sort(values)
     tail = 0.5 * (1.0 - confidence)
     low, high = int(binom.ppf(tail, n, q)), int(binom.ppf(1.0 - tail, n, q)) + 1

@@ -6,6 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from rollover import study as studies
+from rollover.study import Study
+from rollover.study.conduct import Conducted
+from rollover.study.design import points
+from rollover.study.shelf import Row
+
 ROOT = Path(__file__).resolve().parents[2]
 EFFECTS = ROOT / "tests" / "rollover" / "faulty_effect.py"
 
@@ -56,3 +62,27 @@ def faulty(folder: Path, faults: dict[int, int], cases: int = 60, wait: float = 
     path = folder / "faulty.yaml"
     path.write_text(FAULTY, encoding="utf-8")
     return path
+
+
+def made_up(folder: Path, cases: int) -> tuple[Study, Conducted]:
+    """A study with rows made up by hand: force = 1000 speed^2 soil, every 20th case failed, no simulation."""
+    study = studies.load(drops(folder, ("count: 20", f"count: {cases}")))
+    found = points(study)
+    force = 1e3 * found.columns["speed"] ** 2 * found.columns["soil"]
+    rows = []
+    for k in range(cases):
+        failed = k % 20 == 7
+        measures = {} if failed else {"ground/force_normal": float(force[k]), "ground/sinkage": float(1e-4 * force[k])}
+        rows.append(
+            Row(
+                key=f"{k:040x}",
+                status="failed" if failed else "done",
+                failure="crash" if failed else "",
+                sentence="its process ended with exit code -6" if failed else "",
+                measures=measures,
+                domain_flags=() if failed else ("impact-speed", "momentum")[: 1 + k % 2],
+                peak_flags=() if failed else ("impact-speed",)[: k % 2],
+                provenance={"wall_time": 0.5},
+            )
+        )
+    return study, Conducted(points=found, keys=[row.key for row in rows], rows=rows, ran=cases)

@@ -114,6 +114,7 @@ def test_killed_three_times_it_ends_with_the_same_table(sixty: tuple[Path, Path]
     account = finished(begun(study, out, "--json"))
     assert account["ran"] == 60 - len(seen)
     assert {name: files(out)[name] for name in seen} == seen
+    assert read_table(out / shelf.TABLE) == read_table(reference / shelf.TABLE)
     assert (out / shelf.TABLE).read_bytes() == (reference / shelf.TABLE).read_bytes()
     assert account["cases"] == {"all": 60, "done": 56, "failed": 4}
     assert conduct(studies.load(study), out, Way(workers=0)).ran == 0

@@ -59,6 +59,7 @@
         const cell = document.createElement("td");
         if (numeric[j]) cell.className = "number";
         cell.textContent = values[k] === null ? "" : values[k];
+        if (cell.textContent.length > 30) cell.title = cell.textContent;
         line.append(cell);
       });
       lines.append(line);
