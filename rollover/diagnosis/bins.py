@@ -18,7 +18,7 @@ from rollover.scenario import Scenario
 Array = NDArray[np.float64]
 
 MOST_ROWS = 500  # of a recording that are looked at
-LIKE_ALL = 2  # stamps within a mean at which it is simulated, away from the first contact
+FEW = 4  # stamps in a mean that are all simulated; of more, two away from the first contact
 KNOWN, UNKNOWN = 4e-3, 30e-3  # s, by which a clock's zero may be off
 
 
@@ -42,11 +42,12 @@ def simulated(scenario: Scenario, recording: Recording) -> tuple[Recording, Simu
     if inside is None:
         return recording, simulator_of(scenario, recording)
     many = inside.shape[1]
-    few = np.round((np.arange(LIKE_ALL) + 0.5) * many / LIKE_ALL - 0.5).astype(int)
+    first = round(0.25 * many - 0.5)
+    few = np.array([first, many - 1 - first])  # mean and about the spread of all of them
     # a filter needs all stamps, and so does the kink of the force at the first contact
     near = UNKNOWN if recording.clock.zero == "unknown" else KNOWN
     whole = np.abs(thin.time) < near + many * float(np.median(np.diff(recording.time)))
-    if recording.cfc or many <= LIKE_ALL or not isinstance(scenario.initiation, Drop):
+    if recording.cfc or many <= FEW or not isinstance(scenario.initiation, Drop):
         whole[:] = True
     rows = [part if all_ else part[few] for part, all_ in zip(inside, whole, strict=True)]
     counts = np.array([r.size for r in rows])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rollover.channels import describe
 from rollover.diagnosis.evidence import Evidence
-from rollover.effects import EFFECTS, Search, effects
+from rollover.effects import EFFECTS, Search, effects, nth
 
 Array = NDArray[np.float64]
 
@@ -46,11 +46,15 @@ class Candidate:
         """Id, with the channel of a sensor effect."""
         return self.id if self.channel is None else f"{self.id}:{self.channel}"
 
-    def changes(self, x: Sequence[float]) -> dict[str, Any]:
-        """Values to exchange in the scenario for coordinates x, each from 0 (low) to 1 (high)."""
-        found: dict[str, Any] = {} if self.channel is None else {f"effects.{self.id}.channel": self.channel}
+    def changes(self, x: Sequence[float], number: int = 1) -> dict[str, Any]:
+        """Values to exchange in the scenario for coordinates x, each from 0 (low) to 1 (high).
+
+        `number` counts effects of this id, each on its own channel.
+        """
+        key = nth(self.id, number)
+        found: dict[str, Any] = {} if self.channel is None else {f"effects.{key}.channel": self.channel}
         for value, (name, search) in zip(x, self.search.items(), strict=True):
-            found[f"effects.{self.id}.{name}"] = physical(value, search)
+            found[f"effects.{key}.{name}"] = physical(value, search)
         return found
 
     def values(self, x: Sequence[float]) -> dict[str, float]:

@@ -142,9 +142,9 @@ class Judge:
     def changes(candidates: Sequence[Candidate], x: Sequence[float]) -> dict[str, object]:
         """Values to exchange in the scenario."""
         found: dict[str, object] = {}
-        at = 0
-        for c in candidates:
-            found |= c.changes(x[at : at + len(c.search)])
+        at, ids = 0, [c.id for c in candidates]
+        for k, c in enumerate(candidates):
+            found |= c.changes(x[at : at + len(c.search)], 1 + ids[:k].count(c.id))
             at += len(c.search)
         return found
 
