@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rollover.channels import describe
 from rollover.diagnosis.evidence import Evidence
-from rollover.effects import EFFECTS, Search, effects
+from rollover.effects import EFFECTS, Search, effects, nth
 
 Array = NDArray[np.float64]
 
@@ -24,6 +24,7 @@ SHAPES = {
     "soil-adhesion": ("reach",),
 }
 
+PLACES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of a shape, at which a fit of it begins
 BESIDE = 0.01  # of a coordinate: how far from its zero an effect is looked at
 THRESHOLDS = 10  # places at which something that has no zero is looked at
 ONE = (5,)
@@ -46,11 +47,15 @@ class Candidate:
         """Id, with the channel of a sensor effect."""
         return self.id if self.channel is None else f"{self.id}:{self.channel}"
 
-    def changes(self, x: Sequence[float]) -> dict[str, Any]:
-        """Values to exchange in the scenario for coordinates x, each from 0 (low) to 1 (high)."""
-        found: dict[str, Any] = {} if self.channel is None else {f"effects.{self.id}.channel": self.channel}
+    def changes(self, x: Sequence[float], number: int = 1) -> dict[str, Any]:
+        """Values to exchange in the scenario for coordinates x, each from 0 (low) to 1 (high).
+
+        `number` counts effects of this id, each on its own channel.
+        """
+        key = nth(self.id, number)
+        found: dict[str, Any] = {} if self.channel is None else {f"effects.{key}.channel": self.channel}
         for value, (name, search) in zip(x, self.search.items(), strict=True):
-            found[f"effects.{self.id}.{name}"] = physical(value, search)
+            found[f"effects.{key}.{name}"] = physical(value, search)
         return found
 
     def values(self, x: Sequence[float]) -> dict[str, float]:
@@ -71,11 +76,13 @@ class Candidate:
             axes.append(inside)
         return list(itertools.product(*axes))
 
-    def with_shapes(self, x: Sequence[float]) -> tuple[Candidate, tuple[float, ...]]:
-        """The same effect with its shape fitted too, begun at the shape's default; and its coordinates."""
+    def with_shapes(self, x: Sequence[float]) -> list[tuple[Candidate, tuple[float, ...]]]:
+        """The same effect with its shape fitted too, and coordinates to begin at: the shape's default, and others."""
         kind: Any = EFFECTS[self.id]()
-        begin = tuple(min(max(coordinate(getattr(kind, n), s), 0.02), 0.98) for n, s in self.shapes.items())
-        return replace(self, search={**self.search, **self.shapes}, shapes={}), (*x, *begin)
+        whole = replace(self, search={**self.search, **self.shapes}, shapes={})
+        default = [min(max(coordinate(getattr(kind, n), s), 0.02), 0.98) for n, s in self.shapes.items()]
+        places = [tuple(default), *itertools.product(*[PLACES] * len(default))]
+        return [(whole, (*x, *place)) for place in places]
 
     def probes(self) -> list[tuple[float, ...]]:
         """Coordinates that span the directions in which the effect begins: small where it has a zero, else spread."""

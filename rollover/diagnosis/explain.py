@@ -180,15 +180,30 @@ def _shaped(judge: Judge, fits: Sequence[Fitted]) -> list[Fitted]:
     for f in fits:
         last = f.candidates[-1]
         if last.shapes and f.left < SHAPED * best:
-            at = len(f.x) - len(last.search)
-            shaped, x = last.with_shapes(f.x[at:])
-            again = judge.fit((*f.candidates[:-1], shaped), (*f.x[:at], *x), shifts=[b.shift for b in f.blocks])
-            if again is not None and again.left < f.left - WORTH * max(
-                1.0, best / sum(b.residual.size for b in f.blocks)
-            ):
+            again = _with_shape(judge, f)
+            size = sum(b.residual.size for b in f.blocks)
+            if again is not None and again.left < f.left - WORTH * max(1.0, best / size):
                 f = again
         found.append(f)
     return sorted(found, key=lambda f: f.left)
+
+
+def _with_shape(judge: Judge, f: Fitted) -> Fitted | None:
+    """The fit with the shape of its last effect fitted too, from the best of some places."""
+    last, shifts = f.candidates[-1], [b.shift for b in f.blocks]
+    at = len(f.x) - len(last.search)
+    begun_at: list[tuple[float, Candidate, tuple[float, ...]]] = []
+    for shaped, x in last.with_shapes(f.x[at:]):
+        blocks = [judge.block(r, (*f.candidates[:-1], shaped), (*f.x[:at], *x), s, 0.0) for r, s in enumerate(shifts)]
+        if all(b is not None for b in blocks):
+            begun_at.append((sum(b.normal()[2] for b in blocks if b is not None), shaped, x))
+    if not begun_at:
+        return None
+    _, shaped, x = min(begun_at, key=lambda one: one[0])
+    again = judge.fit((*f.candidates[:-1], shaped), (*f.x[:at], *x), shifts=shifts)
+    if again is not None and again.left > NOISE_LEFT**2 * sum(b.residual.size for b in again.blocks):
+        again = judge.polish(again)
+    return again
 
 
 def _first_fits(

@@ -22,6 +22,8 @@ from rollover.diagnosis.evidence import Evidence
 Array = NDArray[np.float64]
 NUDGES = (2e-2, 5e-3, 1e-3)  # of a coordinate, for differences: wide first, as thresholds show only over samples
 PLACES = 241  # time shifts that are tried
+WIDEST = 4.0  # times its prior that a time shift may be
+NONE = np.zeros(0, dtype=np.int64)
 GENTLE = 1e-4  # prior of a coordinate (1/variance): keeps what nothing determines where it is
 
 
@@ -142,9 +144,9 @@ class Judge:
     def changes(candidates: Sequence[Candidate], x: Sequence[float]) -> dict[str, object]:
         """Values to exchange in the scenario."""
         found: dict[str, object] = {}
-        at = 0
-        for c in candidates:
-            found |= c.changes(x[at : at + len(c.search)])
+        at, ids = 0, [c.id for c in candidates]
+        for k, c in enumerate(candidates):
+            found |= c.changes(x[at : at + len(c.search)], 1 + ids[:k].count(c.id))
             at += len(c.search)
         return found
 
@@ -184,27 +186,21 @@ class Judge:
         y = self.predicted(r, candidates, x, shift)
         if y is None:
             return None
-        e = self.evidence[r]
+        e, raw = self.evidence[r], self.raw(r, candidates, x, shift)
+        assert raw is not None
+        leaps = self._leaps.get(_key(r, candidates, x, shift), NONE)
         J = np.zeros((y.size, len(x)))
         for k in range(len(x) if nudge else 0):
             step = nudge if x[k] < 0.5 else -nudge
-            moved = self.predicted(r, candidates, [*x[:k], x[k] + step, *x[k + 1 :]], shift)
+            there = [*x[:k], x[k] + step, *x[k + 1 :]]
+            moved = self.raw(r, candidates, there, shift)
             if moved is None:
                 return None
-            J[:, k] = (moved - y) / step
-        return Block(
-            residual=self.measured[r] - y,
-            J=J,
-            slope=self._slope(r, candidates, x, shift),
-            shift=shift,
-            prior=e.shift_prior,
-        )
-
-    def _slope(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array:
-        raw = self.raw(r, candidates, x, shift)
-        assert raw is not None
-        leaps = self._leaps.get(_key(r, candidates, x, shift), np.zeros(0, dtype=np.int64))
-        return self.evidence[r].slope(raw, leaps)
+            d = (moved - raw) / step
+            for at in (*leaps, *self._leaps.get(_key(r, candidates, there, shift), NONE)):
+                d[at : at + 3] = 0.0  # a leap that moves past a sample is no slope
+            J[:, k] = e.whitened(d)
+        return Block(residual=self.measured[r] - y, J=J, slope=e.slope(raw, leaps), shift=shift, prior=e.shift_prior)
 
     def fit(
         self,
@@ -298,9 +294,10 @@ def _key(r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: flo
 
 
 def shift_of(block: Block, dx: Array) -> float:
-    """Change of the time shift that goes with dx."""
+    """Change of the time shift that goes with dx; it stays within `WIDEST` of its prior."""
     g = float(block.slope @ (block.residual - block.J @ dx)) - block.shift * block.prior**-2
-    return g / block.weight
+    most = WIDEST * block.prior
+    return min(max(block.shift + g / block.weight, -most), most) - block.shift
 
 
 def _bounded(A: Array, b: Array, x: Array, damping: float) -> Array:
