@@ -6,16 +6,17 @@ import time as clock
 from collections.abc import Callable, Mapping, Sequence
 
 from rollover.diagnosis.candidates import candidates_of
+from rollover.diagnosis.chaos import weighted
 from rollover.diagnosis.depend import dependency, residual_forces
 from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.evidence import Evidence, binned, evidence_of, groups_of, recoloured
 from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.holdout import Held, held_out
-from rollover.diagnosis.phases import drop_phases
+from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.scores import scored
 from rollover.diagnosis.selection import EXPLAINED, decided, selected
-from rollover.diagnosis.simulator import DropSimulator, set_up, simulator_of
+from rollover.diagnosis.simulator import DropSimulator, RunSimulator, set_up, simulator_of
 from rollover.diagnosis.statements import considered, named, noise, places, sentence
 from rollover.diagnosis.verdict import Diagnosis
 from rollover.effects import EFFECTS
@@ -59,10 +60,10 @@ def diagnose(
         found = list(judge.evidence)
     if base is None:
         return _nothing(found, names, [*notes, "the scenario itself could not be simulated"], began)
-    phases = [drop_phases(e) for e in found]
+    phases = [phases_of(e) for e in found]
     before = mismatch_of(found, base.blocks, phases)
     acts = "drop" if all(isinstance(e.simulator, DropSimulator) for e in found) else "rollover"
-    candidates = candidates_of(found, scenario.effects, acts)
+    candidates = candidates_of(found, scenario.effects, acts, scenario)
     steps, current = selected(judge, base, candidates, groups, phases, say)
     steps, current, verdict = decided(judge, base, before, steps, groups)
     after = mismatch_of(found, current.blocks, phases)
@@ -111,7 +112,7 @@ def _evidence(scenario: Scenario, recordings: Sequence[tuple[str, Recording]]) -
         if one is None:
             notes.append(f"{name}: shares no usable channel with the simulation and was left aside")
         else:
-            found.append(one)
+            found.append(weighted(one, one.simulator.strays()) if isinstance(one.simulator, RunSimulator) else one)
     return found, notes
 
 

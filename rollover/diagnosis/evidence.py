@@ -37,6 +37,7 @@ class Signal:
     noise: float
     ar: tuple[float, ...]
     span: float
+    weight: Array | None = None  # (n,), below 1 where the model itself is not sure
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,6 +75,12 @@ class Evidence:
     @staticmethod
     def _whitened(signal: Signal, values: Array) -> Array:
         x = values / signal.sigma
+        if signal.weight is not None:
+            return Evidence._coloured(signal, x) * signal.weight
+        return Evidence._coloured(signal, x)
+
+    @staticmethod
+    def _coloured(signal: Signal, x: Array) -> Array:
         if not signal.ar:
             return x
         y = x.copy()
@@ -210,7 +217,7 @@ def recoloured(e: Evidence, predicted: Mapping[str, Array]) -> Evidence:
         power = float(left @ left)
         memory = float(left[1:] @ left[:-1]) / power if power > 0.0 else 0.0
         known = s.ar[0] / (1.0 - s.ar[1]) if len(s.ar) > 1 else sum(s.ar)
-        if memory > known + 1.0 / np.sqrt(left.size) and memory < LONGEST:
+        if s.weight is None and memory > known + 1.0 / np.sqrt(left.size) and memory < LONGEST:
             noise = max(s.noise, float(np.std(left)))
             s = replace(s, ar=(memory,), noise=noise, sigma=max(s.sigma, noise))
         signals.append(s)

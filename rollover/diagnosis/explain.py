@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import freed, null_of_the_best, p_value
 from rollover.diagnosis.holdout import held_out, worse
@@ -16,13 +17,9 @@ from rollover.effects import EFFECTS
 
 Array = NDArray[np.float64]
 CHANCE = 0.01  # p-value of the best of all candidates that admits one
-PROMISING = 14  # candidates fitted in full at each step
 NEGLIGIBLE = 0.004  # of a channel's range: an effect that moves nothing by more is not named
 MOST = 3  # effects in one explanation
 VISIBLE = 5.0  # standard errors of the noise at which an effect shows
-FEW = 3  # recordings that candidates are looked at on
-SHORT = 5  # rounds of a first fit
-LEADERS, MOST_LEADERS = 5, 12  # first fits that are followed up, at least and at most
 WITHIN = 6.0  # times what the best leaves, up to which a first fit is followed up
 FAR = 3.0  # misfit over the noise from which on time shifts fitted to it are not believed
 ELSEWHERE = 0.2  # of a coordinate: starts so far apart are two
@@ -59,14 +56,14 @@ class Step:
     detectable: tuple[tuple[str, float], ...] = field(default=(), repr=False)
 
 
-def spread(base: Fitted, groups: Sequence[Sequence[int]]) -> list[int]:
+def spread(base: Fitted, groups: Sequence[Sequence[int]], few: int = DROPS.few) -> list[int]:
     """Few recordings that stand for all: of the conditions that are met worst, best, and in the middle."""
     left = [b.normal()[2] / b.residual.size for b in base.blocks]
     members = [max(g, key=lambda r: left[r]) for g in groups if g]
     members.sort(key=lambda r: left[r])
-    if len(members) <= FEW:
-        return sorted(set(members)) if len(groups) > 1 else list(range(len(base.blocks)))[:FEW]
-    return sorted({members[0], members[len(members) // 2], members[-1]})
+    if len(members) <= few:
+        return sorted(set(members)) if len(groups) > 1 else list(range(len(base.blocks)))[:few]
+    return sorted({members[round(k * (len(members) - 1) / (few - 1))] for k in range(few)})
 
 
 def begun(judge: Judge, base: Fitted) -> list[float]:
@@ -144,10 +141,12 @@ def step(
 ) -> Step:
     """Fit the promising candidates beside the base and rank them by what they predict of held-out conditions."""
     say(f"looking at {len(candidates)} candidates beside {base.label}")
-    few = spread(base, groups)
+    few = spread(base, groups, judge.effort.few)
     screened, directions = screen(judge, base, candidates, few)
     null = null_of_the_best(directions)
     count = sum(b.residual.size for b in base.blocks)
+    if judge.effort.thrifty and (p := p_value(max((s.potential for s in screened), default=0.0), null)) > CHANCE:
+        return Step(fitted=base, p_value=p, rivals=(), screened=tuple(screened), detectable=_detectable(screened))
     screened, begun_with = _first_fits(judge, base, screened, few, say)
     fits = []
     for first in begun_with:
@@ -160,29 +159,33 @@ def step(
     fits.sort(key=lambda f: f.left)
     # where a threshold makes the way crooked, the nearer ones are followed to the end
     if fits[0].left > NOISE_LEFT**2 * count:
-        near = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < CROOKED * fits[0].left][:2]
+        near = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < CROOKED * fits[0].left]
+        near = near[: judge.effort.polishes]
         fits = [judge.polish(f) if f in near else f for f in fits]
     fits = _one_each(fits)
     fits.sort(key=lambda f: held_out(f, groups).left.sum())
     best = fits[0]
     gain = base.left - min(f.left for f in fits)
     phi = max(1.0, min(f.left for f in fits) / count)  # what even the best leaves is no chance of the noise's size
-    detectable = tuple((s.candidate.key, s.size) for s in screened if np.isfinite(s.size))
     return Step(
         fitted=best,
         p_value=p_value(gain / phi, null),
         rivals=tuple(fits),
         screened=tuple(screened),
-        detectable=detectable,
+        detectable=_detectable(screened),
     )
+
+
+def _detectable(screened: Sequence[Screened]) -> tuple[tuple[str, float], ...]:
+    return tuple((s.candidate.key, s.size) for s in screened if np.isfinite(s.size))
 
 
 def _first_fits(
     judge: Judge, base: Fitted, screened: Sequence[Screened], few: Sequence[int], say: Progress
 ) -> tuple[list[Screened], list[Fitted]]:
     """Short fits to few recordings: the ones worth a full fit, best first, and what each leaves."""
-    by_potential = sorted(screened, key=lambda s: -s.potential)[:PROMISING]
-    by_start = sorted(screened, key=lambda s: s.left)[: PROMISING // 2]
+    by_potential = sorted(screened, key=lambda s: -s.potential)[: judge.effort.promising]
+    by_start = sorted(screened, key=lambda s: s.left)[: judge.effort.promising // 2]
     chosen = {s.candidate.key: s for s in (*by_start, *by_potential)}
     shifts = begun(judge, base)
     fits: list[Fitted] = []
@@ -192,14 +195,15 @@ def _first_fits(
         for start in s.starts:
             one = judge.fit(
                 (*base.candidates, s.candidate), (*base.x, *start),
-                rounds=SHORT, only=few, shifts=[shifts[r] for r in few],
+                rounds=judge.effort.short, only=few, shifts=[shifts[r] for r in few],
             )  # fmt: skip
             if one is not None:
                 fits.append(one)
                 size = sum(b.residual.size for b in one.blocks)
                 told[key] = min(told.get(key, np.inf), float(np.sqrt(one.left / size)))
     fits.sort(key=lambda f: f.left)
-    worth = [f for k, f in enumerate(fits) if k < LEADERS or f.left < WITHIN * fits[0].left][:MOST_LEADERS]
+    worth = [f for k, f in enumerate(fits) if k < judge.effort.leaders or f.left < WITHIN * fits[0].left]
+    worth = worth[: judge.effort.most_leaders]
     return [replace(s, nrmse=told.get(s.candidate.key, 0.0)) for s in screened], worth
 
 

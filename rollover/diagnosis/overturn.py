@@ -20,7 +20,9 @@ from rollover.effects import read
 from rollover.filters import filtered, least_rate
 from rollover.misfit import as_measured
 from rollover.recording import Recording
+from rollover.run import Run
 from rollover.scenario import Scenario
+from rollover.vehicle import Striker
 
 Array = NDArray[np.float64]
 SENSORS = "sensor-"
@@ -28,6 +30,10 @@ KEPT = 400  # runs of one recording: a third of a megabyte each
 BEYOND = 0.06  # s by which a run goes on past the last stamp, so that it covers a time shift
 SLOWEST = 20.0  # times the first run's wall time, and
 LEAST_TIME = 5.0  # s: a run that takes longer has lost its way in ever shorter steps
+ELSEWHERE = ((0.34, 0.28), (-0.41, 0.17))  # of an element, by which neighbours lie elsewhere on the grid
+SHORTER = (2, 5)  # times shorter steps of neighbours
+BLOW = 2.0  # weights
+AFTER = 0.03  # s, shortest sliding that is a phase
 MOTION = ("chassis/", "striker/", "axle/front/angle")  # what an instrument's place is worked out from
 
 
@@ -43,6 +49,7 @@ class RunSimulator:
         self.scenario = _covering(scenario, recording)
         self.runs = 0
         self.seconds = 0.0
+        self.phases: tuple[tuple[float, str], ...] = ()  # of the scenario as it is, once it has run
         self._limit = np.inf
         self._known: dict[tuple[Any, ...], tuple[Scenario, Recording] | None] = {}
 
@@ -71,6 +78,28 @@ class RunSimulator:
             found[name] = np.where(outside, np.nan, np.interp(at, run.time, values))
         return found
 
+    def strays(self) -> list[dict[str, Array]]:
+        """What neighbours differ by from the run as it is, channels (n,) at the stamps; those that fail are left out.
+
+        Neighbours lie elsewhere on the ground's grid, or take shorter steps: nobody could say which of them is right.
+        """
+        base = self.predict({}, 0.0)
+        if base is None:
+            return []
+        elements, step = self.scenario.ground.elements, self.scenario.simulation.step
+        places = [
+            tuple(c + f * w for c, f, w in zip(elements.centre, fraction, elements.spacing, strict=True))
+            for fraction in ELSEWHERE
+        ]
+        changes: list[dict[str, Any]] = [{"ground.elements.centre": place} for place in places]
+        changes += [{"simulation.step": step / parts} for parts in SHORTER]
+        found = []
+        for change in changes:
+            there = self.predict(change, 0.0)
+            if there is not None:
+                found.append({name: there[name] - base[name] for name in base})
+        return found
+
     def _run(self, chosen: Scenario, changes: Mapping[str, Any]) -> tuple[Scenario, Recording] | None:
         """The run before instruments, with the scenario as its effects made it; None if it failed."""
         moving = {path: value for path, value in changes.items() if not path.startswith(f"effects.{SENSORS}")}
@@ -79,10 +108,10 @@ class RunSimulator:
             if len(self._known) >= KEPT:
                 self._known.pop(next(iter(self._known)))
             physical = {name: e for name, e in chosen.effects.items() if not name.startswith(SENSORS)}
-            self._known[key] = self._made(replace(chosen, effects=physical))
+            self._known[key] = self._made(replace(chosen, effects=physical), is_base=not key)
         return self._known[key]
 
-    def _made(self, scenario: Scenario) -> tuple[Scenario, Recording] | None:
+    def _made(self, scenario: Scenario, *, is_base: bool) -> tuple[Scenario, Recording] | None:
         self.runs += 1
         try:
             run = simulate.run(scenario, progress=self._watch)
@@ -94,6 +123,8 @@ class RunSimulator:
             self._limit = max(SLOWEST * run.wall_time, LEAST_TIME)
         if run.status == "failed":
             return None
+        if is_base:
+            self.phases = phases_of(run)
         stems = {name[:-1] for name in self.recording.channels}  # the axes across, for a sensor that is turned
         kept = {n: v for n, v in run.recording.channels.items() if n[:-1] in stems or n.startswith(MOTION)}
         return scenario.applied(), replace(run.recording, channels=kept)
@@ -101,6 +132,27 @@ class RunSimulator:
     def _watch(self, _simulated: float, wall: float) -> None:
         if wall > self._limit:
             raise _TooSlowError
+
+
+def phases_of(run: Run) -> tuple[tuple[float, str], ...]:
+    """(start s, name) of support, tipping, impact, sliding, rest: sliding is what comes after the last blow.
+
+    A blow is a force of the ground beyond `BLOW` times the weight; support ends with the first wheel that lifts off,
+    tipping with the first part that hits the ground and is no wheel.
+    """
+    marks = list(run.phases)
+    start = next((at for at, name in marks if name == "impact"), None)
+    if start is None:
+        return tuple(marks)
+    vehicle = run.scenario.vehicle
+    mass = vehicle.mass if isinstance(vehicle, Striker) else vehicle.whole.mass
+    time, force = run.recording.time, run.recording["ground/force_normal"]
+    blows = time[(force > BLOW * mass * run.scenario.gravity) & (time >= start)]
+    end = next((at for at, name in marks if name == "rest"), float(time[-1]))
+    sliding = float(blows[-1]) if blows.size else start
+    if start < sliding < end - AFTER:
+        marks.append((sliding, "sliding"))
+    return tuple(sorted(marks))
 
 
 def _covering(scenario: Scenario, recording: Recording) -> Scenario:
