@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -25,12 +25,13 @@ SHAPES = {
     "soil-adhesion": ("reach",),
     "tank-slosh": ("damping",),
     "payload-shift": ("friction",),
-    "axle-stop": ("stiffness",),
 }
 
+BESIDE = 0.01  # of a coordinate: how far from its zero an effect is looked at
+THRESHOLDS = 14  # places at which something that has no zero is looked at
 ONE = (6,)
 SEVERAL = (12, 6, 3)  # places on the axes of an effect's parameters
-BESIDE = 0.08  # of a coordinate: a step off what changes nothing, where each place costs a full run
+WIDE = 0.08  # of a coordinate: a step off what changes nothing, where each place costs a full run
 SPREAD, SPREAD_FIRST = (0.25, 0.5, 0.75), (0.3, 0.6)  # places where nothing is known to change nothing
 
 
@@ -44,6 +45,7 @@ class Candidate:
     search: Mapping[str, Search]
     channel: str | None = None
     neutral: tuple[float | None, ...] | None = None  # coordinates that change nothing; given where a place costs a run
+    shapes: Mapping[str, Search] = field(default_factory=dict)  # fitted only where what is left asks for them
 
     @property
     def key(self) -> str:
@@ -84,10 +86,33 @@ class Candidate:
         if len(known) == len(neutral):
             at = [float(n) for n in neutral if n is not None]
             signs = (1.0, -1.0) if len(at) == 1 else (1.0,)
-            steps = [(k, sign * BESIDE) for k in known for sign in signs]
+            steps = [(k, sign * WIDE) for k in known for sign in signs]
             return [tuple(a + (d if a + d < 1.0 else -d) * (j == k) for j, a in enumerate(at)) for k, d in steps]
         places = SPREAD if len(neutral) == 1 else SPREAD_FIRST
-        axes = [[min(n + 2.0 * BESIDE, 0.9)] if n is not None else list(places) for n in neutral]
+        axes = [[min(n + 2.0 * WIDE, 0.9)] if n is not None else list(places) for n in neutral]
+        return list(itertools.product(*axes))
+
+    def with_shapes(self, x: Sequence[float]) -> tuple[Candidate, tuple[float, ...]]:
+        """The same effect with its shape fitted too, begun at the shape's default; and its coordinates."""
+        kind: Any = EFFECTS[self.id]()
+        begin = tuple(min(max(coordinate(getattr(kind, n), s), 0.02), 0.98) for n, s in self.shapes.items())
+        return replace(self, search={**self.search, **self.shapes}, shapes={}), (*x, *begin)
+
+    def probes(self) -> list[tuple[float, ...]]:
+        """Coordinates that span the directions in which the effect begins: small where it has a zero, else spread."""
+        if self.neutral is not None:
+            return self._beside(self.neutral)
+        axes: list[list[float]] = []
+        for name, s in self.search.items():
+            null = EFFECTS[self.id].null.get(name)
+            at = coordinate(null, s) if isinstance(null, (int, float)) and (s.scale != "log" or null > 0.0) else None
+            if at is not None and 0.0 < at < 1.0:
+                axes.append([at + BESIDE])
+            elif null is not None:
+                axes.append([0.1, 0.35, 0.6, 0.85])
+            else:
+                many = THRESHOLDS if not axes else 2
+                axes.append([(k + 0.5) / many for k in range(many)])
         return list(itertools.product(*axes))
 
 
@@ -122,8 +147,11 @@ def candidates_of(
             found += [c for channel in spans if (c := _sensor(name, kind, channel, spans))]
             continue
         search = {p: s for p, s in kind.search.items() if p not in SHAPES.get(name, ())}
+        shapes = {p: s for p, s in kind.search.items() if p in SHAPES.get(name, ())}
         neutral = None if acts == "drop" else tuple(_neutral(kind, p, s, scenario) for p, s in search.items())
-        found.append(Candidate(id=name, kind=kind.kind, family=kind.family, search=search, neutral=neutral))
+        found.append(
+            Candidate(id=name, kind=kind.kind, family=kind.family, search=search, shapes=shapes, neutral=neutral)
+        )
     return found
 
 

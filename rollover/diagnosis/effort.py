@@ -10,6 +10,7 @@ class Effort:
     """Limits of a search; the defaults are those for drops."""
 
     few: int = 3  # recordings that candidates are looked at on
+    scored: int | None = None  # candidates looked at closer; none: as many as for drops, and all of two parameters
     promising: int = 14  # candidates that get a first fit at each step
     short: int = 5  # rounds of a first fit
     leaders: int = 5  # first fits that are followed up, at least
@@ -17,11 +18,20 @@ class Effort:
     rounds: int = 14  # of a whole fit
     nudges: tuple[float, ...] = (2e-2, 5e-3, 1e-3)  # of a coordinate, for differences: wide first
     polishes: int = 2  # fits that are followed along a crooked valley
-    thrifty: bool = False  # nothing is fitted where no direction that was looked at is more than chance
+    thrifty: bool = False  # looks at few recordings, fits no shapes, and stops where nothing but noise is left
 
 
 DROPS = Effort()
 # below a wide step, a run with many contacts shows chance and no slope
 RUNS = Effort(
-    few=2, promising=4, short=2, leaders=2, most_leaders=3, rounds=5, nudges=(3e-2,), polishes=0, thrifty=True
+    few=2,
+    scored=12,
+    promising=4,
+    short=2,
+    leaders=2,
+    most_leaders=3,
+    rounds=5,
+    nudges=(3e-2,),
+    polishes=0,
+    thrifty=True,
 )

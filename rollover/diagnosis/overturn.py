@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover import simulate
+from rollover.diagnosis.effort import RUNS
 from rollover.document import exchanged
 from rollover.effects import read
 from rollover.filters import filtered, least_rate
@@ -44,12 +45,14 @@ class _TooSlowError(Exception):
 class RunSimulator:
     """Any scenario by full runs; `runs` counts those that were made, `seconds` is their wall time."""
 
+    effort = RUNS
+
     def __init__(self, scenario: Scenario, recording: Recording) -> None:
         self.recording = recording
         self.scenario = _covering(scenario, recording)
         self.runs = 0
         self.seconds = 0.0
-        self.phases: tuple[tuple[float, str], ...] = ()  # of the scenario as it is, once it has run
+        self._phases: tuple[tuple[float, str], ...] = ()
         self._limit = np.inf
         self._known: dict[tuple[Any, ...], tuple[Scenario, Recording] | None] = {}
 
@@ -78,6 +81,11 @@ class RunSimulator:
             found[name] = np.where(outside, np.nan, np.interp(at, run.time, values))
         return found
 
+    def marks(self) -> tuple[tuple[float, str], ...]:
+        """Phases of the run as it is; empty if it fails."""
+        self.predict({}, 0.0)
+        return self._phases
+
     def strays(self) -> list[dict[str, Array]]:
         """What neighbours differ by from the run as it is, channels (n,) at the stamps; those that fail are left out.
 
@@ -99,6 +107,10 @@ class RunSimulator:
             if there is not None:
                 found.append({name: there[name] - base[name] for name in base})
         return found
+
+    def contact(self, _shift: float) -> float:
+        """No one leap: elements of a surface touch one after another."""
+        return np.inf
 
     def _run(self, chosen: Scenario, changes: Mapping[str, Any]) -> tuple[Scenario, Recording] | None:
         """The run before instruments, with the scenario as its effects made it; None if it failed."""
@@ -124,7 +136,7 @@ class RunSimulator:
         if run.status == "failed":
             return None
         if is_base:
-            self.phases = phases_of(run)
+            self._phases = phases_of(run)
         stems = {name[:-1] for name in self.recording.channels}  # the axes across, for a sensor that is turned
         kept = {n: v for n, v in run.recording.channels.items() if n[:-1] in stems or n.startswith(MOTION)}
         return scenario.applied(), replace(run.recording, channels=kept)

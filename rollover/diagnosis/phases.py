@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.evidence import Evidence
-from rollover.diagnosis.overturn import RunSimulator
 
 Array = NDArray[np.float64]
 FIRST_CONTACT = 0.005  # s, after the impact
@@ -16,11 +15,11 @@ SETTLING = 0.06  # s after the deepest point until what is left is rest
 
 def phases_of(evidence: Evidence) -> tuple[tuple[float, str], ...]:
     """(start s, name) of each phase that a recording went through."""
-    simulator = evidence.simulator
-    if not isinstance(simulator, RunSimulator):
+    run = evidence.simulator.marks()
+    if not run:
         return drop_phases(evidence)
     first, last = float(evidence.recording.time[0]), float(evidence.recording.time[-1])
-    marks = [m for m in simulator.phases if m[0] < last]
+    marks = [m for m in run if m[0] < last]
     marks = [m for k, m in enumerate(marks) if k + 1 == len(marks) or marks[k + 1][0] > first]
     return tuple((max(at, first) if k else first, name) for k, (at, name) in enumerate(marks)) or ((first, "approach"),)
 
