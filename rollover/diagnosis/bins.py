@@ -41,6 +41,10 @@ class Averaged:
         """See `Simulator`."""
         return self.inner.marks()
 
+    def state(self, shift: float) -> Mapping[str, Array]:
+        """See `Simulator`."""
+        return {c: v.reshape(-1, self.many).mean(axis=1) for c, v in self.inner.state(shift).items()}
+
     @property
     def effort(self) -> Effort:
         """See `Simulator`."""

@@ -27,12 +27,12 @@ UNTOUCHED = 0.99  # weights all above need no mention
 
 
 def weighted(e: Evidence, strays: Sequence[Mapping[str, Array]]) -> Evidence:
-    """The evidence with each sample's weight (D3); `strays` are the neighbours' deviations at the recording's stamps."""
+    """The evidence with each sample's weight (D3); `strays` are the neighbours' deviations at its stamps."""
     if not strays:
         return e
-    return replace(
-        e, signals=tuple(_weighted(e, s, np.stack([d[s.channel][s.rows] for d in strays])) for s in e.signals)
-    )
+    signals = tuple(_weighted(e, s, np.stack([d[s.channel][s.rows] for d in strays])) for s in e.signals)
+    stacked = [e.raw(d) for d in strays]
+    return replace(e, signals=signals, strays=tuple(d for d in stacked if np.all(np.isfinite(d))))
 
 
 def _weighted(e: Evidence, s: Signal, strays: Array) -> Signal:

@@ -9,6 +9,7 @@ from rollover.diagnosis import colour
 from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import candidates_of
 from rollover.diagnosis.chaos import weighted
+from rollover.diagnosis.chassis import degrees_of
 from rollover.diagnosis.depend import dependency, residual_forces
 from rollover.diagnosis.evidence import Evidence, evidence_of, groups_of
 from rollover.diagnosis.fit import Judge
@@ -18,7 +19,7 @@ from rollover.diagnosis.scores import judged
 from rollover.diagnosis.selection import SURE, decided, explained, matters
 from rollover.diagnosis.simulator import set_up
 from rollover.diagnosis.statements import considered, named, noise, places, sentence
-from rollover.diagnosis.verdict import Diagnosis
+from rollover.diagnosis.verdict import Degree, Diagnosis
 from rollover.drop import unfit
 from rollover.effects import EFFECTS
 from rollover.recording import Recording
@@ -69,7 +70,11 @@ def diagnose(
     before, after = explanation.before, explanation.after if explanation.parts else explanation.before
     set_ups = [set_up(scenario, e.recording) for e in found]
     say("what the mismatch depends on")
-    dependencies = dependency(residual_forces(set_ups, found)) if acts == "drop" else []
+    degrees: tuple[Degree, ...] = ()
+    forces = residual_forces(set_ups, found) if acts == "drop" else []
+    if acts != "drop":
+        degrees, forces = degrees_of(set_ups, found, [b.shift for b in explanation.base.blocks])
+    dependencies = dependency(forces)
     detectable = dict(explanation.detectable)
     if verdict == "no-mismatch" and _is_weak(detectable):
         verdict = "cannot-tell"
@@ -91,6 +96,7 @@ def diagnose(
         remaining_where=places(after, found, None) if verdict == "unexplained" or (effects and remains) else (),
         depends_on=depends if is_mismatch else None,
         dependencies=tuple(dependencies),
+        degrees=degrees if is_mismatch else (),
         smallest_detectable=detectable,
         training=training,
         held_out=tuple(e.name for e in kept) or training,

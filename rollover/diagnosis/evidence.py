@@ -47,6 +47,7 @@ class Evidence:
     signals: tuple[Signal, ...]
     shift_prior: float
     condition: str
+    strays: tuple[Array, ...] = ()  # stacked, SI: what runs that nobody could tell apart differ by
     model_error: float = MODEL_ERROR  # of a channel's range
 
     @property

@@ -20,6 +20,7 @@ SCORED = 18  # candidates looked at closer, by their score
 WITHIN = 6.0  # times what the best leaves, up to which a first fit is followed up
 FAR = 3.0  # misfit over the noise from which on time shifts fitted to it are not believed
 ELSEWHERE = 0.2  # of a coordinate: starts so far apart are two
+RIVALS = 0.4  # of the best's gain: a first fit that gains less is no rival, where fits cost much
 NOISE_LEFT = 1.01  # misfit over the noise that needs no further search
 CROOKED = 100.0  # times what the best leaves, up to which a fit of two parameters is polished
 SHAPED = 4.0  # times what the best leaves, up to which an effect's shape is fitted too
@@ -214,6 +215,9 @@ def _first_fits(
                 told[key] = min(told.get(key, np.inf), float(np.sqrt(one.left / size)))
     fits.sort(key=lambda f: f.left)
     worth = [f for k, f in enumerate(fits) if k < judge.effort.leaders or f.left < WITHIN * fits[0].left]
+    if judge.effort.thrifty and fits:
+        as_it_is = sum(base.blocks[r].normal()[2] for r in few)
+        worth = [f for f in worth if as_it_is - f.left >= RIVALS * (as_it_is - fits[0].left)]
     worth = worth[: judge.effort.most_leaders]
     return [replace(s, nrmse=told.get(s.candidate.key, 0.0)) for s in screened], worth
 

@@ -79,7 +79,7 @@ def gate(judge: Judge, base: Fitted, candidates: Sequence[Candidate], only: Sequ
 
 
 def _direction(judge: Judge, base: Fitted, c: Candidate, x: Sequence[float], use: Sequence[int]) -> Array | None:
-    """What the candidate at x moves in the recordings `use`, freed of their time shifts; None where it cannot be simulated."""
+    """What the candidate at x moves in the recordings `use`, without their time shifts; None if it fails."""
     found = []
     for r in use:
         block = base.blocks[r]

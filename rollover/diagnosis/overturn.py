@@ -28,14 +28,14 @@ from rollover.vehicle import Striker
 Array = NDArray[np.float64]
 SENSORS = "sensor-"
 KEPT = 400  # runs of one recording: a third of a megabyte each
-BEYOND = 0.06  # s by which a run goes on past the last stamp, so that it covers a time shift
+BEYOND, FAR_BEYOND = 0.01, 0.06  # s by which a run goes on past the last stamp: time shifts, known zero or not
 SLOWEST = 20.0  # times the first run's wall time, and
 LEAST_TIME = 5.0  # s: a run that takes longer has lost its way in ever shorter steps
 ELSEWHERE = ((0.34, 0.28), (-0.41, 0.17))  # of an element, by which neighbours lie elsewhere on the grid
-SHORTER = (2, 5)  # times shorter steps of neighbours
+SHORTER = (2, 4)  # times shorter steps of neighbours
 BLOW = 2.0  # weights
 AFTER = 0.03  # s, shortest sliding that is a phase
-MOTION = ("chassis/", "striker/", "axle/front/angle")  # what an instrument's place is worked out from
+MOTION = ("chassis/", "striker/", "axle/front/angle", "ground/sinkage")  # what an instrument's place is worked out from
 
 
 class _TooSlowError(Exception):
@@ -70,7 +70,7 @@ class RunSimulator:
         run = read(chosen.effects, as_measured(applied, run, self.recording))
         step = float(np.median(np.diff(run.time)))
         at = self.recording.time - shift
-        outside = (at < run.time[0] - BEYOND) | (at > run.time[-1] + BEYOND)
+        outside = (at < run.time[0] - FAR_BEYOND) | (at > run.time[-1] + FAR_BEYOND)
         found = {}
         for name in self.recording.channels:
             if name not in run.channels:
@@ -85,6 +85,14 @@ class RunSimulator:
         """Phases of the run as it is; empty if it fails."""
         self.predict({}, 0.0)
         return self._phases
+
+    def state(self, shift: float) -> Mapping[str, Array]:
+        """Motion of the run as it is, (n,) at the stamps less `shift`; empty if it fails."""
+        known = self._run(self.scenario, {})
+        if known is None:
+            return {}
+        run, at = known[1], self.recording.time - shift
+        return {name: np.interp(at, run.time, values) for name, values in run.channels.items()}
 
     def strays(self) -> list[dict[str, Array]]:
         """What neighbours differ by from the run as it is, channels (n,) at the stamps; those that fail are left out.
@@ -173,7 +181,7 @@ def _covering(scenario: Scenario, recording: Recording) -> Scenario:
     It does not stop at rest: what rests stays in the rows that later stamps are compared with.
     """
     settings = scenario.simulation
-    end = float(recording.time[-1]) + BEYOND
+    end = float(recording.time[-1]) + (FAR_BEYOND if recording.clock.zero == "unknown" else BEYOND)
     rows = max(1, int(np.ceil(end / settings.output_step)))
     duration = round(min(rows * settings.output_step, 120.0), 9)
     return replace(scenario, simulation=replace(settings, duration=duration, stop_at_rest=False))

@@ -41,6 +41,9 @@ class Simulator(Protocol):
     def marks(self) -> tuple[tuple[float, str], ...]:
         """(start s, name) of the phases of the scenario as it is; empty if the recording itself tells."""
 
+    def state(self, shift: float) -> Mapping[str, Array]:
+        """Motion of the scenario as it is, recorded or not, (n,) each; empty where the recording itself tells."""
+
     @property
     def effort(self) -> Effort:
         """How much may be simulated."""
@@ -77,6 +80,11 @@ class DropSimulator:
     def marks(self) -> tuple[tuple[float, str], ...]:
         """See `Simulator`."""
         return ()
+
+    def state(self, shift: float) -> Mapping[str, Array]:
+        """See `Simulator`."""
+        del shift
+        return {}
 
     def _edges(self, physical: Mapping[str, Any], shift: float, read_by: Mapping[str, Any]) -> dict[str, Array]:
         """Channels behind a lag or with a clock of their own: what these make of a leap lies between the stamps."""

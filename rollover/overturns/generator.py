@@ -35,11 +35,12 @@ CHANNELS = (
 )
 CLASS = 60
 RATE = 1000.0  # Hz
-LENGTH = 0.7  # s of a recording: tipping, the blow on the tyres' side walls, and the ROPS
+LENGTH = 0.6  # s of a recording: tipping, the blow on the tyres' side walls, and the ROPS
 LEAD = 0.06  # s more of the run behind the record, that the filter sees
 STEP, SPECTRAL_RADIUS = 2.5e-4, 0.85
 SPACING, POINTS = (0.035, 0.035), 0.016  # m, of elements and of contact points
 SHIFTED = 0.02  # m, by which the grid lies elsewhere, at most
+NOTHING = {"over_noise": 0.0, "signal_to_noise": 0.0, "where": [], "channels": {}}
 _PLAN = 2**31 - 1
 
 
@@ -140,8 +141,8 @@ def _shot(random: np.random.Generator, k: int) -> Shot:
     across = -90.0 if side == "left" else 90.0
     return Shot(
         side=side,
-        excess=round(float(random.uniform(3.0, 7.0)), 2),
-        rate=round(float(random.uniform(0.9, 1.7)), 3),
+        excess=round(float(random.uniform(4.0, 8.0)), 2),
+        rate=round(float(random.uniform(1.2, 2.0)), 3),
         inclination=round(float(random.uniform(1.0, 14.0)), 1),
         direction=round(across + float(random.uniform(-35.0, 35.0)), 0),
         late=float(random.normal(0.0, 3e-4)),
@@ -227,7 +228,7 @@ def _truth(
     verdict = "no-mismatch"
     if changes and order.kind != "negligible":
         verdict = {"physics": "missing-physics"}.get(changes[0].kind, changes[0].kind)
-    whole = found if changes else {"over_noise": 0.0, "signal_to_noise": 0.0, "where": [], "channels": {}}
+    whole: Mapping[str, Any] = found if changes else NOTHING
     return {
         "format": "rollover-truth/1",
         "rig": "overturn",
