@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.chaos import FEW
 from rollover.diagnosis.fit import Block, Fitted, Judge
 from rollover.effects import EFFECTS
 
@@ -68,7 +69,7 @@ def gate(judge: Judge, base: Fitted, candidates: Sequence[Candidate], only: Sequ
     if not columns:
         return Gate(score=0.0, scores={}, null=np.zeros(DRAWS), detectable={})
     D = np.stack(columns, axis=1)
-    scores = (D.T @ (misfit - own @ (own.T @ misfit))) ** 2
+    scores = (D.T @ (misfit - own @ (own.T @ misfit))) ** 2 / (1.0 + _trust(judge, blocks, use, D))
     detectable: dict[str, float] = {}
     for name, value in zip(names, values, strict=True):
         detectable[name] = min(value, detectable.get(name, np.inf))
@@ -76,6 +77,19 @@ def gate(judge: Judge, base: Fitted, candidates: Sequence[Candidate], only: Sequ
     for name, score in zip(names, scores, strict=True):
         own_best[name] = max(float(score), own_best.get(name, 0.0))
     return Gate(score=float(scores.max()), scores=own_best, null=null_of_the_best([D]), detectable=detectable)
+
+
+def _trust(judge: Judge, blocks: Sequence[Block], use: Sequence[int], D: Array) -> Array:
+    """Variance along each direction (n, m) of what runs that nobody could tell apart differ by, (m,), noise units."""
+    many = min((len(judge.evidence[r].strays) for r in use), default=0)
+    found = np.zeros(D.shape[1])
+    for k in range(many):
+        strays = [
+            freed(judge.evidence[r].whitened(judge.evidence[r].strays[k])[:, None], block)[:, 0]
+            for r, block in zip(use, blocks, strict=True)
+        ]
+        found += (D.T @ np.concatenate(strays)) ** 2
+    return np.asarray(FEW * found / max(many, 1))
 
 
 def _direction(judge: Judge, base: Fitted, c: Candidate, x: Sequence[float], use: Sequence[int]) -> Array | None:
