@@ -11,6 +11,7 @@ from typing import Any
 from rollover.diagnosis.diagnose import diagnose
 from rollover.diagnosis.verdict import Diagnosis, Named, Place, Score
 from rollover.document import dump
+from rollover.effects import nth
 from rollover.importers import read_recording
 from rollover.recording import Recording
 from rollover.scenario import Scenario, load
@@ -88,7 +89,8 @@ def _fit(found: Diagnosis, which: str, names: tuple[str, ...]) -> dict[str, Any]
 
 def diagnosed_scenario(scenario: Scenario, found: Diagnosis) -> Scenario:
     """The scenario with the found effects switched on and fitted."""
-    changes = {f"effects.{e.id}": dict(e.settings) for e in found.effects}
+    ids = [e.id for e in found.effects]
+    changes = {f"effects.{nth(e.id, 1 + ids[:k].count(e.id))}": dict(e.settings) for k, e in enumerate(found.effects)}
     return scenario.replaced(changes, origin="diagnosis") if changes else scenario
 
 

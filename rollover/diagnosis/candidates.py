@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rollover.channels import describe
 from rollover.diagnosis.evidence import Evidence
 from rollover.document import value_at
-from rollover.effects import EFFECTS, Search, effects
+from rollover.effects import EFFECTS, Search, effects, nth
 
 Array = NDArray[np.float64]
 
@@ -28,9 +28,9 @@ SHAPES = {
 }
 
 BESIDE = 0.01  # of a coordinate: how far from its zero an effect is looked at
-THRESHOLDS = 14  # places at which something that has no zero is looked at
-ONE = (6,)
-SEVERAL = (12, 6, 3)  # places on the axes of an effect's parameters
+THRESHOLDS = 10  # places at which something that has no zero is looked at
+ONE = (5,)
+SEVERAL = (8, 4, 3)  # places on the axes of an effect's parameters
 WIDE = 0.08  # of a coordinate: a step off what changes nothing, where each place costs a full run
 SPREAD, SPREAD_FIRST = (0.25, 0.5, 0.75), (0.3, 0.6)  # places where nothing is known to change nothing
 
@@ -52,11 +52,15 @@ class Candidate:
         """Id, with the channel of a sensor effect."""
         return self.id if self.channel is None else f"{self.id}:{self.channel}"
 
-    def changes(self, x: Sequence[float]) -> dict[str, Any]:
-        """Values to exchange in the scenario for coordinates x, each from 0 (low) to 1 (high)."""
-        found: dict[str, Any] = {} if self.channel is None else {f"effects.{self.id}.channel": self.channel}
+    def changes(self, x: Sequence[float], number: int = 1) -> dict[str, Any]:
+        """Values to exchange in the scenario for coordinates x, each from 0 (low) to 1 (high).
+
+        `number` counts effects of this id, each on its own channel.
+        """
+        key = nth(self.id, number)
+        found: dict[str, Any] = {} if self.channel is None else {f"effects.{key}.channel": self.channel}
         for value, (name, search) in zip(x, self.search.items(), strict=True):
-            found[f"effects.{self.id}.{name}"] = physical(value, search)
+            found[f"effects.{key}.{name}"] = physical(value, search)
         return found
 
     def values(self, x: Sequence[float]) -> dict[str, float]:
@@ -109,9 +113,9 @@ class Candidate:
             if at is not None and 0.0 < at < 1.0:
                 axes.append([at + BESIDE])
             elif null is not None:
-                axes.append([0.1, 0.35, 0.6, 0.85])
+                axes.append([0.1, 0.6])
             else:
-                many = THRESHOLDS if not axes else 2
+                many = (THRESHOLDS if len(self.search) > 1 else 4) if not axes else 1
                 axes.append([(k + 0.5) / many for k in range(many)])
         return list(itertools.product(*axes))
 

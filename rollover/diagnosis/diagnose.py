@@ -113,11 +113,7 @@ def diagnose(
 
 
 def _weighed(every: Sequence[Evidence]) -> list[Evidence]:
-    """The recordings without what lies beside their leaps, the noise of those alike from their quiet stretches."""
-    judge = Judge(every)
-    judge.aligned()
-    again = [evidence_of(e.name, e.recording, e.simulator, s) for e, s in zip(every, judge.shifts, strict=True)]
-    every = [new or old for new, old in zip(again, every, strict=True)]
+    """The recordings with the noise of those alike taken together, from their quiet stretches."""
     judge = Judge(every)
     judge.aligned()
     base = judge.fit((), (), rounds=2)

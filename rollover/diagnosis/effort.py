@@ -13,8 +13,8 @@ class Effort:
     scored: int | None = None  # candidates looked at closer; none: as many as for drops, and all of two parameters
     promising: int = 14  # candidates that get a first fit at each step
     short: int = 5  # rounds of a first fit
-    leaders: int = 5  # first fits that are followed up, at least
-    most_leaders: int = 12  # and at most
+    leaders: int = 4  # first fits that are followed up, at least
+    most_leaders: int = 9  # and at most
     rounds: int = 14  # of a whole fit
     nudges: tuple[float, ...] = (2e-2, 5e-3, 1e-3)  # of a coordinate, for differences: wide first
     polishes: int = 2  # fits that are followed along a crooked valley

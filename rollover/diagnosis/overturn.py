@@ -130,10 +130,6 @@ class RunSimulator:
                 found.append({name: there[name] - base[name] for name in base})
         return found
 
-    def contact(self, _shift: float) -> float:
-        """No one leap: elements of a surface touch one after another."""
-        return np.inf
-
     def _run(self, chosen: Scenario, changes: Mapping[str, Any]) -> tuple[Scenario, Recording] | None:
         """The run before instruments, with the scenario as its effects made it; None if it failed."""
         key = _key(changes)
