@@ -47,7 +47,8 @@ def whole(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evid
     for members in alike(evidence):
         sigma, ar = autoregression([residuals[r][part] for r, _, _, part in members])
         for r, k, s, _ in members:
-            found[r][k] = with_noise(s, sigma, ar, evidence[r].model_error)
+            if s.weight is None:  # else what is left is the model's error as well
+                found[r][k] = with_noise(s, sigma, ar, evidence[r].model_error)
     return [replace(e, signals=tuple(s)) for e, s in zip(evidence, found, strict=True)]
 
 

@@ -35,6 +35,7 @@ class Signal:
     noise: float
     ar: tuple[float, ...]
     span: float
+    weight: Array | None = None  # (n,), below 1 where the model itself is not sure
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +48,7 @@ class Evidence:
     signals: tuple[Signal, ...]
     shift_prior: float
     condition: str
+    strays: tuple[Array, ...] = ()  # stacked, SI: what runs that nobody could tell apart differ by
     model_error: float = MODEL_ERROR  # of a channel's range
     averaged: int = 1  # samples in one
 
@@ -113,6 +115,12 @@ class Evidence:
     @staticmethod
     def _whitened(signal: Signal, values: Array) -> Array:
         x = values / signal.sigma
+        if signal.weight is not None:
+            return Evidence._coloured(signal, x) * signal.weight
+        return Evidence._coloured(signal, x)
+
+    @staticmethod
+    def _coloured(signal: Signal, x: Array) -> Array:
         if not signal.ar:
             return x
         y = x.copy()

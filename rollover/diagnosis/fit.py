@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
 
 Array = NDArray[np.float64]
-NUDGES = (2e-2, 5e-3, 1e-3)  # of a coordinate, for differences: wide first, as thresholds show only over samples
 PLACES = 241  # time shifts that are tried
 WIDEST = 4.0  # times its prior that a time shift may be
 NONE = np.zeros(0, dtype=np.int64)
@@ -81,6 +81,7 @@ class Judge:
 
     def __init__(self, evidence: Sequence[Evidence]) -> None:
         self.evidence = tuple(evidence)
+        self.effort = max((e.simulator.effort for e in self.evidence), key=lambda e: e.thrifty, default=DROPS)
         self.measured = [e.measured() for e in self.evidence]
         self.shifts = [0.0] * len(self.evidence)
         self.simulations = 0
@@ -96,7 +97,8 @@ class Judge:
 
     def again(self, fitted: Fitted) -> Fitted:
         """A fit where it stands, linearised anew under the noise as it is held now."""
-        blocks = [self.block(r, fitted.candidates, fitted.x, b.shift, NUDGES[1]) for r, b in enumerate(fitted.blocks)]
+        nudge = self.effort.nudges[:2][-1]
+        blocks = [self.block(r, fitted.candidates, fitted.x, b.shift, nudge) for r, b in enumerate(fitted.blocks)]
         kept = [new if new is not None else old for new, old in zip(blocks, fitted.blocks, strict=True)]
         return Fitted(candidates=fitted.candidates, x=fitted.x, blocks=tuple(kept))
 
@@ -207,16 +209,18 @@ class Judge:
         candidates: Sequence[Candidate],
         start: Sequence[float],
         *,
-        rounds: int = 14,
+        rounds: int | None = None,
         only: Sequence[int] | None = None,
         shifts: Sequence[float] | None = None,
         width: int = 0,
     ) -> Fitted | None:
         """Levenberg-Marquardt on (D1) from a start within the unit box; None if nothing can be simulated there."""
         use = list(range(len(self.evidence))) if only is None else list(only)
+        nudges = self.effort.nudges
+        rounds, width = self.effort.rounds if rounds is None else rounds, min(width, len(nudges) - 1)
         x = [float(v) for v in start]
         shifts = [self.shifts[r] for r in use] if shifts is None else list(shifts)
-        found = [self.block(r, candidates, x, s, NUDGES[width]) for r, s in zip(use, shifts, strict=True)]
+        found = [self.block(r, candidates, x, s, nudges[width]) for r, s in zip(use, shifts, strict=True)]
         if any(b is None for b in found):
             return None
         blocks: list[Block] = [b for b in found if b is not None]
@@ -247,9 +251,11 @@ class Judge:
                 x, best, damping, shifts = trial, total, 0.1 * damping, [a.shift for a in after if a is not None]
             if gain < 1e-3 * max(1.0, 1e-2 * best):
                 width, damping = width + 1, 1e-3
-            last = width >= len(NUDGES)
+            last = width >= len(nudges)
+            if last and not improved and len(nudges) == 1:
+                break
             again = [
-                self.block(r, candidates, x, s, NUDGES[width if width < len(NUDGES) else 1])
+                self.block(r, candidates, x, s, nudges[width if width < len(nudges) else min(1, len(nudges) - 1)])
                 for r, s in zip(use, shifts, strict=True)
             ]
             if any(b is None for b in again):

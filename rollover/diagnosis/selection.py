@@ -10,7 +10,7 @@ import numpy as np
 from rollover.diagnosis import colour
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.detect import Mismatch, mismatch_of
-from rollover.diagnosis.explain import NEARLY_NOISE, Step, moves, step
+from rollover.diagnosis.explain import NEARLY_NOISE, Step, moves, spread, step
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate, gate
 from rollover.diagnosis.holdout import held_out
@@ -62,7 +62,8 @@ def explained(
         base = judge.again(base)
     before = mismatch_of(judge.evidence, base.blocks, phases)
     say(f"looking at {len(candidates)} candidates, which of them could matter")
-    looked = first_look = gate(judge, base, candidates)
+    few = spread(base, groups, judge.effort.few) if judge.effort.thrifty else None
+    looked = first_look = gate(judge, base, candidates, few)
     current, left, taken = base, before, []
     first: Step | None = None
     for _ in range(MOST):
@@ -75,7 +76,9 @@ def explained(
         taken.append(found)
         current = found.fitted
         left = mismatch_of(judge.evidence, current.blocks, phases)
-        looked = gate(judge, current, free(current, candidates))
+        if judge.effort.thrifty and (left.p_value > SURE or not matters(judge, current, left)):
+            break
+        looked = gate(judge, current, free(current, candidates), few)
     parts = _needed(judge, taken, candidates, groups, say) if len(taken) > 1 else [s.again(judge) for s in taken]
     base = judge.again(base)
     current = parts[-1].fitted if parts else base
