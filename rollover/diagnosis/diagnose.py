@@ -14,6 +14,7 @@ from rollover.diagnosis.depend import dependency, residual_forces
 from rollover.diagnosis.evidence import Evidence, evidence_of, groups_of
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import yardstick
+from rollover.diagnosis.overturn import RunSimulator
 from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.scores import judged
 from rollover.diagnosis.selection import SURE, decided, explained, matters
@@ -84,6 +85,7 @@ def diagnose(
     is_mismatch = verdict not in ("no-mismatch", "cannot-tell")
     remains = after.p_value < SURE and matters(judge, explanation.fitted, after)
     training = tuple(e.name for e in found)
+    notes += _cost(found)
     return Diagnosis(
         verdict=verdict,
         sentence=sentence(verdict, effects, before, h_before.held, h_after.held, found),
@@ -129,6 +131,13 @@ def _evidence(scenario: Scenario, recordings: Sequence[tuple[str, Recording]]) -
         else:
             found.append(one)
     return found, notes
+
+
+def _cost(found: Sequence[Evidence]) -> list[str]:
+    """What full runs took, where there were any."""
+    made = [e.simulator for e in found if isinstance(e.simulator, RunSimulator)]
+    runs, seconds = sum(s.runs for s in made), sum(s.seconds for s in made)
+    return [f"{runs} full runs of {1e3 * seconds / runs:.0f} ms on the average"] if runs else []
 
 
 def _is_weak(detectable: Mapping[str, float]) -> bool:
