@@ -32,6 +32,7 @@ THRESHOLDS = 10  # places at which something that has no zero is looked at
 ONE = (5,)
 SEVERAL = (8, 4, 3)  # places on the axes of an effect's parameters
 WIDE = 0.08  # of a coordinate: a step off what changes nothing, where each place costs a full run
+LIMITS = (0.12, 0.3)  # more places of what may be a limit
 SPREAD, SPREAD_FIRST = (0.25, 0.5, 0.75), (0.3, 0.6)  # places where nothing is known to change nothing
 
 
@@ -91,7 +92,10 @@ class Candidate:
             at = [float(n) for n in neutral if n is not None]
             signs = (1.0, -1.0) if len(at) == 1 else (1.0,)
             steps = [(k, sign * WIDE) for k in known for sign in signs]
-            return [tuple(a + (d if a + d < 1.0 else -d) * (j == k) for j, a in enumerate(at)) for k, d in steps]
+            beside = [tuple(a + (d if a + d < 1.0 else -d) * (j == k) for j, a in enumerate(at)) for k, d in steps]
+            # what the scenario has may be far above what ever acts: a yield force, a stop
+            is_limit = len(at) == 1 and None in EFFECTS[self.id].null.values()
+            return [*beside, *((x,) for x in LIMITS if is_limit)]
         places = SPREAD if len(neutral) == 1 else SPREAD_FIRST
         axes = [[min(n + 2.0 * WIDE, 0.9)] if n is not None else list(places) for n in neutral]
         return list(itertools.product(*axes))
