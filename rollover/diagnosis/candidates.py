@@ -25,6 +25,7 @@ SHAPES = {
 }
 
 PLACES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of a shape, at which a fit of it begins
+FAINT = 20.0  # times weaker than an effect usually is, and still looked for
 BESIDE = 0.01  # of a coordinate: how far from its zero an effect is looked at
 THRESHOLDS = 10  # places at which something that has no zero is looked at
 ONE = (5,)
@@ -76,13 +77,16 @@ class Candidate:
             axes.append(inside)
         return list(itertools.product(*axes))
 
-    def with_shapes(self, x: Sequence[float]) -> list[tuple[Candidate, tuple[float, ...]]]:
-        """The same effect with its shape fitted too, and coordinates to begin at: the shape's default, and others."""
+    def whole(self) -> Candidate:
+        """The same effect with its shape fitted too."""
+        return replace(self, search={**self.search, **self.shapes}, shapes={})
+
+    def with_shapes(self, x: Sequence[float]) -> list[tuple[float, ...]]:
+        """Coordinates of `whole` at which its fit may begin: the shape's default, and others."""
         kind: Any = EFFECTS[self.id]()
-        whole = replace(self, search={**self.search, **self.shapes}, shapes={})
         default = [min(max(coordinate(getattr(kind, n), s), 0.02), 0.98) for n, s in self.shapes.items()]
         places = [tuple(default), *itertools.product(*[PLACES] * len(default))]
-        return [(whole, (*x, *place)) for place in places]
+        return [(*x, *place) for place in places]
 
     def probes(self) -> list[tuple[float, ...]]:
         """Coordinates that span the directions in which the effect begins: small where it has a zero, else spread."""
@@ -128,10 +132,15 @@ def candidates_of(evidence: Sequence[Evidence], switched_on: Iterable[str], acts
         if kind.kind == "sensor":
             found += [c for channel in spans if (c := _sensor(name, kind, channel, spans))]
             continue
-        search = {p: s for p, s in kind.search.items() if p not in SHAPES.get(name, ())}
+        search = {p: _widened(s, kind.null.get(p)) for p, s in kind.search.items() if p not in SHAPES.get(name, ())}
         shapes = {p: s for p, s in kind.search.items() if p in SHAPES.get(name, ())}
         found.append(Candidate(id=name, kind=kind.kind, family=kind.family, search=search, shapes=shapes))
     return found
+
+
+def _widened(search: Search, null: float | None) -> Search:
+    """The range with strengths that only a low noise shows."""
+    return search._replace(low=search.low / FAINT) if search.scale == "log" and null == 0.0 else search
 
 
 def _sensor(name: str, kind: Any, channel: str, spans: Mapping[str, float]) -> Candidate | None:
