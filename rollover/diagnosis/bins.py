@@ -57,11 +57,14 @@ class Averaged:
         return self.inner.effort
 
 
-def simulated(scenario: Scenario, recording: Recording) -> tuple[Recording, Simulator]:
-    """The recording at no more than `MOST_ROWS` rows, and what simulates it. Raises `InputError`."""
+def simulated(scenario: Scenario, recording: Recording) -> tuple[Recording, Simulator, int]:
+    """The recording at no more than `MOST_ROWS` rows, what simulates it, and how many samples are in a row.
+
+    Raises `InputError`.
+    """
     thin, inside = _thinned(recording)
     if inside is None:
-        return recording, simulator_of(scenario, recording)
+        return recording, simulator_of(scenario, recording), 1
     many = inside.shape[1]
     first = round(0.25 * many - 0.5)
     few = np.array([first, many - 1 - first])  # mean and about the spread of all of them
@@ -74,9 +77,8 @@ def simulated(scenario: Scenario, recording: Recording) -> tuple[Recording, Simu
     counts = np.array([r.size for r in rows])
     at = np.concatenate(rows)
     part = replace(recording, time=recording.time[at], channels={c: v[at] for c, v in recording.channels.items()})
-    return thin, Averaged(
-        inner=simulator_of(scenario, part), starts=np.concatenate([[0], np.cumsum(counts)[:-1]]), counts=counts
-    )
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    return thin, Averaged(inner=simulator_of(scenario, part), starts=starts, counts=counts), many
 
 
 def binned(recording: Recording) -> Recording:

@@ -57,6 +57,14 @@ class RunSimulator:
         self._known: dict[tuple[Any, ...], tuple[Scenario, Recording] | None] = {}
         self._behind: dict[tuple[Any, ...], tuple[Recording, dict[str, Array]]] = {}
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What is sent to another process: not the runs."""
+        return {**self.__dict__, "_known": {}}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the runs: another process makes its own."""
+        return {**self.__dict__, "_known": {}, "_behind": {}}
+
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """Channels (n,) at the recording's stamps less `shift` (s); None if the run fails.
 
