@@ -58,10 +58,6 @@ class RunSimulator:
         self._behind: dict[tuple[Any, ...], tuple[Recording, dict[str, Array]]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is sent to another process: not the runs."""
-        return {**self.__dict__, "_known": {}}
-
-    def __getstate__(self) -> dict[str, Any]:
         """Without the runs: another process makes its own."""
         return {**self.__dict__, "_known": {}, "_behind": {}}
 
