@@ -8,6 +8,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.diagnose import diagnose
 from rollover.diagnosis.verdict import Diagnosis, Named, Place, Score
 from rollover.document import dump
@@ -107,5 +108,5 @@ def recordings_in(folder: Path) -> list[tuple[str, Recording]]:
 
 def diagnose_folder(folder: Path, out: Path | None = None, workers: int = 1) -> dict[str, Any]:
     """Diagnose a folder that holds scenario.yaml and its recordings; returns what diagnosis.json says."""
-    del out, workers
-    return account(diagnose(load(folder / "scenario.yaml"), recordings_in(folder)))
+    del out
+    return account(diagnose(load(folder / "scenario.yaml"), recordings_in(folder), crew=Crew(workers)))

@@ -28,11 +28,13 @@ SHAPES = {
 }
 
 PLACES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of a shape, at which a fit of it begins
+FAINT = 20.0  # times weaker than an effect usually is, and still looked for
 BESIDE = 0.01  # of a coordinate: how far from its zero an effect is looked at
 THRESHOLDS = 10  # places at which something that has no zero is looked at
 ONE = (5,)
 SEVERAL = (8, 4, 3)  # places on the axes of an effect's parameters
 WIDE = 0.08  # of a coordinate: a step off what changes nothing, where each place costs a full run
+LIMITS = (0.12, 0.3)  # more places of what may be a limit
 SPREAD, SPREAD_FIRST = (0.25, 0.5, 0.75), (0.3, 0.6)  # places where nothing is known to change nothing
 
 
@@ -92,18 +94,24 @@ class Candidate:
             at = [float(n) for n in neutral if n is not None]
             signs = (1.0, -1.0) if len(at) == 1 else (1.0,)
             steps = [(k, sign * WIDE) for k in known for sign in signs]
-            return [tuple(a + (d if a + d < 1.0 else -d) * (j == k) for j, a in enumerate(at)) for k, d in steps]
+            beside = [tuple(a + (d if a + d < 1.0 else -d) * (j == k) for j, a in enumerate(at)) for k, d in steps]
+            # what the scenario has may be far above what ever acts: a yield force, a stop
+            is_limit = len(at) == 1 and None in EFFECTS[self.id].null.values()
+            return [*beside, *((x,) for x in LIMITS if is_limit)]
         places = SPREAD if len(neutral) == 1 else SPREAD_FIRST
         axes = [[min(n + 2.0 * WIDE, 0.9)] if n is not None else list(places) for n in neutral]
         return list(itertools.product(*axes))
 
-    def with_shapes(self, x: Sequence[float]) -> list[tuple[Candidate, tuple[float, ...]]]:
-        """The same effect with its shape fitted too, and coordinates to begin at: the shape's default, and others."""
+    def whole(self) -> Candidate:
+        """The same effect with its shape fitted too."""
+        return replace(self, search={**self.search, **self.shapes}, shapes={})
+
+    def with_shapes(self, x: Sequence[float]) -> list[tuple[float, ...]]:
+        """Coordinates of `whole` at which its fit may begin: the shape's default, and others."""
         kind: Any = EFFECTS[self.id]()
-        whole = replace(self, search={**self.search, **self.shapes}, shapes={})
         default = [min(max(coordinate(getattr(kind, n), s), 0.02), 0.98) for n, s in self.shapes.items()]
         places = [tuple(default), *itertools.product(*[PLACES] * len(default))]
-        return [(whole, (*x, *place)) for place in places]
+        return [(*x, *place) for place in places]
 
     def probes(self) -> list[tuple[float, ...]]:
         """Coordinates that span the directions in which the effect begins: small where it has a zero, else spread."""
@@ -153,7 +161,7 @@ def candidates_of(
         if kind.kind == "sensor":
             found += [c for channel in spans if (c := _sensor(name, kind, channel, spans))]
             continue
-        search = {p: s for p, s in kind.search.items() if p not in SHAPES.get(name, ())}
+        search = {p: _widened(s, kind.null.get(p)) for p, s in kind.search.items() if p not in SHAPES.get(name, ())}
         shapes = {p: s for p, s in kind.search.items() if p in SHAPES.get(name, ())}
         neutral = None if acts == "drop" else tuple(_neutral(kind, p, s, scenario) for p, s in search.items())
         found.append(
@@ -195,6 +203,11 @@ def _apart(value: Any, other: Any) -> list[float]:
     if isinstance(value, (int, float)) and isinstance(other, (int, float)):
         return [float(value - other)] if value != other else []
     return []
+
+
+def _widened(search: Search, null: float | None) -> Search:
+    """The range with strengths that only a low noise shows."""
+    return search._replace(low=search.low / FAINT) if search.scale == "log" and null == 0.0 else search
 
 
 def _sensor(name: str, kind: Any, channel: str, spans: Mapping[str, float]) -> Candidate | None:

@@ -10,10 +10,12 @@ from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import candidates_of
 from rollover.diagnosis.chaos import weighted
 from rollover.diagnosis.chassis import degrees_of
+from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.depend import dependency, residual_forces
 from rollover.diagnosis.evidence import Evidence, evidence_of, groups_of
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import yardstick
+from rollover.diagnosis.overturn import RunSimulator
 from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.scores import judged
 from rollover.diagnosis.selection import SURE, decided, explained, matters
@@ -35,12 +37,13 @@ def diagnose(
     *,
     hold_out: Sequence[str] = (),
     say: Callable[[str], None] = lambda _: None,
+    crew: Crew | None = None,
 ) -> Diagnosis:
     """Compare a scenario with recordings and say what separates them.
 
     `recordings` are (name, recording); `hold_out` names those that are never fitted, otherwise each condition is left
-    out in turn. Raises `InputError` for a condition that the scenario does not know, ``ValueError`` for a name in
-    `hold_out` that is none.
+    out in turn. `crew` works off the fits, in children if it has any; the answer is the same. Raises `InputError` for
+    a condition that the scenario does not know, ``ValueError`` for a name in `hold_out` that is none.
     """
     began = clock.perf_counter()
     names = [name for name, _ in recordings]
@@ -64,7 +67,7 @@ def diagnose(
     phases = [phases_of(e) for e in found]
     acts = "rollover" if any(unfit(set_up(scenario, e.recording)) for e in found) else "drop"
     candidates = candidates_of(found, scenario.effects, acts, scenario)
-    explanation = explained(judge, base, candidates, groups, phases, say)
+    explanation = explained(judge, base, candidates, groups, phases, say, crew or Crew())
     explanation, verdict = decided(judge, explanation, groups)
     found = list(judge.evidence)
     before, after = explanation.before, explanation.after if explanation.parts else explanation.before
@@ -84,6 +87,7 @@ def diagnose(
     is_mismatch = verdict not in ("no-mismatch", "cannot-tell")
     remains = after.p_value < SURE and matters(judge, explanation.fitted, after)
     training = tuple(e.name for e in found)
+    notes += _cost(found)
     return Diagnosis(
         verdict=verdict,
         sentence=sentence(verdict, effects, before, h_before.held, h_after.held, found),
@@ -129,6 +133,13 @@ def _evidence(scenario: Scenario, recordings: Sequence[tuple[str, Recording]]) -
         else:
             found.append(one)
     return found, notes
+
+
+def _cost(found: Sequence[Evidence]) -> list[str]:
+    """What full runs took, where there were any."""
+    made = [e.simulator for e in found if isinstance(e.simulator, RunSimulator)]
+    runs, seconds = sum(s.runs for s in made), sum(s.seconds for s in made)
+    return [f"{runs} full runs of {1e3 * seconds / runs:.0f} ms on the average"] if runs else []
 
 
 def _is_weak(detectable: Mapping[str, float]) -> bool:

@@ -20,6 +20,11 @@ class Effort:
     polishes: int = 2  # fits that are followed along a crooked valley
     thrifty: bool = False  # looks at few recordings, fits no shapes, and stops where nothing but noise is left
 
+    @property
+    def fine(self) -> float:
+        """Of a coordinate, for differences where a fit has ended."""
+        return self.nudges[:2][-1]
+
 
 DROPS = Effort()
 # below a wide step, a run with many contacts shows chance and no slope

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis import colour
 from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.crew import Crew, Job
 from rollover.diagnosis.effort import DROPS
-from rollover.diagnosis.fit import Fitted, Judge
+from rollover.diagnosis.fit import NOISE_LEFT, Fitted, Judge
 from rollover.diagnosis.gate import Gate, freed
 from rollover.diagnosis.holdout import held_out, worse
 
@@ -21,7 +23,6 @@ WITHIN = 6.0  # times what the best leaves, up to which a first fit is followed 
 FAR = 3.0  # misfit over the noise from which on time shifts fitted to it are not believed
 ELSEWHERE = 0.2  # of a coordinate: starts so far apart are two
 RIVALS = 0.4  # of the best's gain: a first fit that gains less is no rival, where fits cost much
-NOISE_LEFT = 1.04  # misfit over the noise that needs no further search
 CROOKED = 100.0  # times what the best leaves, up to which a fit of two parameters is polished
 SHAPED = 4.0  # times what the best leaves, up to which an effect's shape is fitted too
 WORTH = 12.0  # gain that pays for a shape
@@ -132,6 +133,7 @@ def step(
     groups: Sequence[Sequence[int]],
     say: Progress,
     looked: Gate,
+    crew: Crew,
 ) -> Step | None:
     """Fit the promising candidates beside the base and rank them by what they predict of held-out conditions.
 
@@ -142,13 +144,12 @@ def step(
     few = spread(base, groups, judge.effort.few)
     screened = screen(judge, base, _promising(candidates, looked, judge.effort.scored), few)
     count = sum(b.residual.size for b in base.blocks)
-    screened, begun_with = _first_fits(judge, base, screened, few, say)
-    fits = []
-    for first in begun_with:
-        say(f"fitting {first.candidates[-1].key}")
-        fitted = judge.fit(first.candidates, first.x, shifts=_all_shifts(judge, base, first, few), width=1)
-        if fitted is not None:
-            fits.append(fitted)
+    screened, begun_with = _first_fits(judge, base, screened, few, say, crew)
+    jobs = [
+        Job(candidates=f.candidates, start=f.x, shifts=tuple(_all_shifts(judge, base, f, few)), width=1)
+        for f in begun_with
+    ]
+    fits = [f for f in crew.fits(judge, jobs, say) if f is not None]
     if not fits:
         return None
     fits.sort(key=lambda f: f.left)
@@ -156,8 +157,9 @@ def step(
     if fits[0].left > NOISE_LEFT**2 * count:
         near = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < CROOKED * fits[0].left]
         near = near[: judge.effort.polishes]
-        fits = [judge.polish(f) if f in near else f for f in fits]
-    fits = _one_each(fits) if judge.effort.thrifty else _shaped(judge, _one_each(fits))
+        polished = crew.fits(judge, [_from(f, "polish") for f in near], say)
+        fits = [f for f in fits if f not in near] + [new or old for new, old in zip(polished, near, strict=True)]
+    fits = _one_each(fits) if judge.effort.thrifty else _shaped(judge, _one_each(fits), crew, say)
     if fits[0].left < NEARLY_NOISE**2 * count:
         judge.weigh(colour.whole(judge.evidence, judge.residuals(fits[0])))
         base, fits = judge.again(base), [judge.again(f) for f in fits]
@@ -174,60 +176,45 @@ def _promising(candidates: Sequence[Candidate], looked: Gate, scored: int | None
     return [c for k, c in enumerate(ranked) if k < SCORED or len(c.search) > 1]
 
 
-def _shaped(judge: Judge, fits: Sequence[Fitted]) -> list[Fitted]:
+def _from(f: Fitted, how: Literal["polish", "shape"]) -> Job:
+    return Job(how=how, candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks))
+
+
+def _shaped(judge: Judge, fits: Sequence[Fitted], crew: Crew, say: Progress) -> list[Fitted]:
     """The fits with shapes fitted too where that pays, best first."""
-    found = []
     best = min(f.left for f in fits)
-    for f in fits:
-        last = f.candidates[-1]
-        if last.shapes and f.left < SHAPED * best:
-            again = _with_shape(judge, f)
-            size = sum(b.residual.size for b in f.blocks)
-            if again is not None and again.left < f.left - WORTH * max(1.0, best / size):
-                f = again
-        found.append(f)
+    size = sum(b.residual.size for b in fits[0].blocks)
+    able = [f for f in fits if f.candidates[-1].shapes and f.left < SHAPED * best]
+    found = list(fits)
+    for old, new in zip(able, crew.fits(judge, [_from(f, "shape") for f in able], say), strict=True):
+        if new is not None and new.left < old.left - WORTH * max(1.0, best / size):
+            found[found.index(old)] = new
     return sorted(found, key=lambda f: f.left)
 
 
-def _with_shape(judge: Judge, f: Fitted) -> Fitted | None:
-    """The fit with the shape of its last effect fitted too, from the best of some places."""
-    last, shifts = f.candidates[-1], [b.shift for b in f.blocks]
-    at = len(f.x) - len(last.search)
-    begun_at: list[tuple[float, Candidate, tuple[float, ...]]] = []
-    for shaped, x in last.with_shapes(f.x[at:]):
-        blocks = [judge.block(r, (*f.candidates[:-1], shaped), (*f.x[:at], *x), s, 0.0) for r, s in enumerate(shifts)]
-        if all(b is not None for b in blocks):
-            begun_at.append((sum(b.normal()[2] for b in blocks if b is not None), shaped, x))
-    if not begun_at:
-        return None
-    _, shaped, x = min(begun_at, key=lambda one: one[0])
-    again = judge.fit((*f.candidates[:-1], shaped), (*f.x[:at], *x), shifts=shifts)
-    if again is not None and again.left > NOISE_LEFT**2 * sum(b.residual.size for b in again.blocks):
-        again = judge.polish(again)
-    return again
-
-
 def _first_fits(
-    judge: Judge, base: Fitted, screened: Sequence[Screened], few: Sequence[int], say: Progress
+    judge: Judge, base: Fitted, screened: Sequence[Screened], few: Sequence[int], say: Progress, crew: Crew
 ) -> tuple[list[Screened], list[Fitted]]:
     """Short fits to few recordings: the ones worth a full fit, best first, and what each leaves."""
     by_potential = sorted(screened, key=lambda s: -s.potential)[: judge.effort.promising]
     by_start = sorted(screened, key=lambda s: s.left)[: judge.effort.promising // 2]
     chosen = {s.candidate.key: s for s in (*by_start, *by_potential)}
     shifts = begun(judge, base)
-    fits: list[Fitted] = []
     told: dict[str, float] = {}
     say(f"first fits of {len(chosen)} candidates to {len(few)} recordings")
-    for key, s in chosen.items():
-        for start in s.starts:
-            one = judge.fit(
-                (*base.candidates, s.candidate), (*base.x, *start),
-                rounds=judge.effort.short, only=few, shifts=[shifts[r] for r in few],
-            )  # fmt: skip
-            if one is not None:
-                fits.append(one)
-                size = sum(b.residual.size for b in one.blocks)
-                told[key] = min(told.get(key, np.inf), float(np.sqrt(one.left / size)))
+    at = tuple(shifts[r] for r in few)
+    jobs = [
+        Job(
+            candidates=(*base.candidates, s.candidate), start=(*base.x, *start), shifts=at, only=tuple(few),
+            rounds=judge.effort.short,
+        )
+        for s in chosen.values()
+        for start in s.starts
+    ]  # fmt: skip
+    fits = [f for f in crew.fits(judge, jobs, say) if f is not None]
+    for one in fits:
+        key, size = one.candidates[-1].key, sum(b.residual.size for b in one.blocks)
+        told[key] = min(told.get(key, np.inf), float(np.sqrt(one.left / size)))
     fits.sort(key=lambda f: f.left)
     worth = [f for k, f in enumerate(fits) if k < judge.effort.leaders or f.left < WITHIN * fits[0].left]
     if judge.effort.thrifty and fits:

@@ -10,6 +10,7 @@ to predict that one, so that holding out costs no simulation.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -23,6 +24,7 @@ from rollover.diagnosis.evidence import Evidence
 Array = NDArray[np.float64]
 PLACES = 241  # time shifts that are tried
 WIDEST = 4.0  # times its prior that a time shift may be
+NOISE_LEFT = 1.04  # misfit over the noise that needs no further search
 NONE = np.zeros(0, dtype=np.int64)
 GENTLE = 1e-4  # prior of a coordinate (1/variance): keeps what nothing determines where it is
 
@@ -89,6 +91,23 @@ class Judge:
         self._leaps: dict[tuple[object, ...], NDArray[np.int64]] = {}
         self._known: dict[tuple[object, ...], Array | None] = {}
 
+    def bare(self) -> Judge:
+        """The same without what was simulated, to be sent to another process."""
+        other = Judge(self.evidence)
+        other.shifts = list(self.shifts)
+        return other
+
+    def fingerprint(self) -> str:
+        """Hash of the recordings as they are held: their samples and their noise."""
+        total = hashlib.sha256()
+        for e in self.evidence:
+            total.update(repr((e.name, e.shift_prior)).encode())
+            for s in e.signals:
+                total.update(repr((s.channel, s.sigma, s.ar)).encode() + s.values.tobytes() + s.rows.tobytes())
+                if s.weight is not None:
+                    total.update(s.weight.tobytes())
+        return total.hexdigest()
+
     def weigh(self, evidence: Sequence[Evidence]) -> None:
         """Take the same recordings with another noise: nothing is simulated again, fits must be made anew."""
         self.evidence = tuple(evidence)
@@ -97,8 +116,8 @@ class Judge:
 
     def again(self, fitted: Fitted) -> Fitted:
         """A fit where it stands, linearised anew under the noise as it is held now."""
-        nudge = self.effort.nudges[:2][-1]
-        blocks = [self.block(r, fitted.candidates, fitted.x, b.shift, nudge) for r, b in enumerate(fitted.blocks)]
+        fine = self.effort.fine
+        blocks = [self.block(r, fitted.candidates, fitted.x, b.shift, fine) for r, b in enumerate(fitted.blocks)]
         kept = [new if new is not None else old for new, old in zip(blocks, fitted.blocks, strict=True)]
         return Fitted(candidates=fitted.candidates, x=fitted.x, blocks=tuple(kept))
 
@@ -255,7 +274,7 @@ class Judge:
             if last and not improved and len(nudges) == 1:
                 break
             again = [
-                self.block(r, candidates, x, s, nudges[width if width < len(nudges) else min(1, len(nudges) - 1)])
+                self.block(r, candidates, x, s, nudges[width] if width < len(nudges) else self.effort.fine)
                 for r, s in zip(use, shifts, strict=True)
             ]
             if any(b is None for b in again):
@@ -263,6 +282,10 @@ class Judge:
             blocks = [b for b in again if b is not None]
             if last:
                 break
+        if width < len(nudges) and nudges[width] != self.effort.fine:
+            ended = [self.block(r, candidates, x, s, self.effort.fine) for r, s in zip(use, shifts, strict=True)]
+            if all(b is not None for b in ended):
+                blocks = [b for b in ended if b is not None]
         return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=tuple(blocks))
 
     def polish(self, fitted: Fitted, size: float = 0.02, most: int = 70) -> Fitted:
@@ -288,6 +311,23 @@ class Judge:
         )
         again = self.fit(fitted.candidates, np.clip(found.x, 0.0, 1.0), rounds=3, shifts=shifts, width=2)
         return again if again is not None and again.left < fitted.left else fitted
+
+    def shaped(self, f: Fitted) -> Fitted | None:
+        """The fit with the shape of its last effect fitted too, from the best of some places."""
+        last, shifts = f.candidates[-1], [b.shift for b in f.blocks]
+        candidates, at = (*f.candidates[:-1], last.whole()), len(f.x) - len(last.search)
+        begun: list[tuple[float, tuple[float, ...]]] = []
+        for start in last.with_shapes(f.x[at:]):
+            x = (*f.x[:at], *start)
+            blocks = [self.block(r, candidates, x, s, 0.0) for r, s in enumerate(shifts)]
+            if all(b is not None for b in blocks):
+                begun.append((sum(b.normal()[2] for b in blocks if b is not None), x))
+        if not begun:
+            return None
+        again = self.fit(candidates, min(begun)[1], shifts=shifts)
+        if again is not None and again.left > NOISE_LEFT**2 * sum(b.residual.size for b in again.blocks):
+            again = self.polish(again)
+        return again
 
     @staticmethod
     def _total(blocks: Sequence[Block]) -> float:

@@ -30,7 +30,7 @@ SENSORS = "sensor-"
 KEPT = 300  # runs of one recording: a third of a megabyte each
 BEYOND, FAR_BEYOND = 0.01, 0.06  # s by which a run goes on past the last stamp: time shifts, known zero or not
 SLOWEST = 20.0  # times the first run's wall time, and
-LEAST_TIME = 5.0  # s: a run that takes longer has lost its way in ever shorter steps
+LEAST_TIME = 2.0  # s: a run that takes longer has lost its way in ever shorter steps
 ELSEWHERE = ((0.34, 0.28), (-0.41, 0.17))  # of an element, by which neighbours lie elsewhere on the grid
 SHORTER = (3,)  # times shorter steps of neighbours
 BLOW = 2.0  # weights
@@ -56,6 +56,10 @@ class RunSimulator:
         self._limit = np.inf
         self._known: dict[tuple[Any, ...], tuple[Scenario, Recording] | None] = {}
         self._behind: dict[tuple[Any, ...], tuple[Recording, dict[str, Array]]] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the runs: another process makes its own."""
+        return {**self.__dict__, "_known": {}, "_behind": {}}
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """Channels (n,) at the recording's stamps less `shift` (s); None if the run fails.

@@ -58,6 +58,10 @@ class DropSimulator:
         self.recording = recording
         self._raw: dict[tuple[Any, ...], Recording] = {}
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What is sent to another process: not the runs."""
+        return {"model": DropModel(scenario=self.model.scenario), "recording": self.recording, "_raw": {}}
+
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """See `Simulator`; ``ValueError`` for a value out of bounds passes."""
         physical = {path: value for path, value in changes.items() if not path.startswith(SENSORS)}
