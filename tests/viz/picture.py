@@ -92,6 +92,16 @@ def _patiently(attempt: Any, seconds: float = 30.0) -> Any:
             time.sleep(0.2)
 
 
+def complaints_of(viewer: Any) -> list[str]:
+    """What views report and the viewer logged, but for what every software renderer says."""
+    complaints = [f"{view.name}: {r.summary}" for view in viewer.get_state().views for r in view.reports]
+    return complaints + [
+        f"{entry.level}: {entry.message}"
+        for entry in viewer.get_logs()
+        if entry.level in ("WARN", "ERROR") and not any(h in entry.message for h in _HARMLESS)
+    ]
+
+
 def pictures(path: Path, times: Sequence[float]) -> tuple[list[bytes], list[str]]:
     """A PNG for each instant, and what the viewer complained about."""
     with headless_viewer() as viewer:
@@ -107,14 +117,7 @@ def pictures(path: Path, times: Sequence[float]) -> tuple[list[bytes], list[str]
             while (shot := viewer.take_screenshot(max_size=1600)) != before and time.monotonic() < deadline + 30.0:
                 before = shot
             found.append(shot)
-        state = viewer.get_state()
-        complaints = [f"{view.name}: {r.summary}" for view in state.views for r in view.reports]
-        complaints += [
-            f"{entry.level}: {entry.message}"
-            for entry in viewer.get_logs()
-            if entry.level in ("WARN", "ERROR") and not any(h in entry.message for h in _HARMLESS)
-        ]
-        return found, complaints
+        return found, complaints_of(viewer)
 
 
 if __name__ == "__main__":
