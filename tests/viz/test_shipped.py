@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-import time
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,8 @@ import pytest
 from rollover import loads, simulate
 from rollover.document import shipped_folder
 from rollover.scenario import load
-from tests.viz.picture import complaints_of, has_software_driver, headless_viewer, kept, pixels
+from tests.viz.picture import complaints_of, has_software_driver, headless_viewer, kept, pixels, settled
+from tests.viz.picture import load as show
 from viz.viewer import viewer_binary
 
 log = pytest.importorskip("viz.log", reason="no rerun wheel for this platform", exc_type=ImportError)
@@ -56,16 +56,9 @@ def test_no_view_of_any_scenario_complains(recordings: dict[str, Path]) -> None:
 
 def shown(viewer: Any, name: str, path: Path) -> list[str]:
     """What the viewer complains about once the recording is drawn."""
-    viewer.open([str(path)])
-    deadline = time.monotonic() + 30.0
-    while not (state := viewer.get_state()).recordings or not state.recordings[0].timelines:
-        assert time.monotonic() < deadline, f"{name} was not loaded"
-        time.sleep(0.05)
+    show(viewer, path)
     viewer.set_time("sim_time", duration=KEPT.get(name, 0.0), play_state="paused")
-    size = 1600 if name in KEPT else 300
-    before = b""
-    while (shot := viewer.take_screenshot(max_size=size)) != before and time.monotonic() < deadline:
-        before = shot
+    shot = settled(lambda: viewer.take_screenshot(max_size=1600 if name in KEPT else 300))
     assert pixels(shot).std() > 5.0, f"{name}: nothing is drawn"
     if name in KEPT:
         kept(f"{name}.png", shot)
