@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -60,11 +62,11 @@ def regress(
                 answers = failed = e.answers
         else:
             answers = regression.compared(choice, workers=workers, time_limit=time_limit, show=show)
-    account = _account(selection, answers)
+    account = _account(selection, answers, _hash(choice.files))
     with store.whole(out) as part:
         store.write_json(part / JSON, account)
         store.write_csv(part / CSV, _rows(answers))
-        (part / PAGE).write_text(_page(answers, selection), encoding="utf-8")
+        (part / PAGE).write_text(_page(answers, selection, account["scenario_hash"]), encoding="utf-8")
     if as_json:
         print(json.dumps(account, indent=2))
     else:
@@ -81,7 +83,22 @@ JSON, CSV, PAGE = "regress.json", "regress.csv", "report.html"
 ACCOUNT = (JSON, CSV, PAGE)
 
 
-def _account(selection: list[str], answers: list[Answer]) -> dict[str, Any]:
+def _hash(files: Sequence[Path]) -> str:
+    """One hash over all scenarios; of a file that cannot be read its bytes."""
+    from rollover import document
+    from rollover import scenario as scenarios
+
+    digest = hashlib.sha256()
+    for file in sorted(files, key=lambda f: f.stem):
+        try:
+            own = document.content_hash(scenarios.load(file))
+        except InputError:
+            own = hashlib.sha256(file.read_bytes()).hexdigest()
+        digest.update(f"{file.stem} {own}\n".encode())
+    return digest.hexdigest()
+
+
+def _account(selection: list[str], answers: list[Answer], scenario_hash: str) -> dict[str, Any]:
     from rollover import store
 
     found: dict[str, Any] = store.plain(
@@ -89,6 +106,7 @@ def _account(selection: list[str], answers: list[Answer]) -> dict[str, Any]:
             "format": FORMAT,
             "ok": all(a.ok for a in answers),
             "scenarios": selection,
+            "scenario_hash": scenario_hash,
             "versions": store.versions(),
             "answers": [asdict(a) for a in answers],
         }
@@ -100,7 +118,7 @@ def _rows(answers: list[Answer]) -> list[dict[str, Any]]:
     return [{"scenario": a.scenario, "verdict": a.verdict, **asdict(d)} for a in answers for d in a.differences]
 
 
-def _page(answers: list[Answer], selection: list[str]) -> str:
+def _page(answers: list[Answer], selection: list[str], scenario_hash: str) -> str:
     from viz.regression import page
 
-    return page(answers, command=" ".join(["rollover regress", *selection]))
+    return page(answers, command=" ".join(["rollover regress", *selection]), scenario_hash=scenario_hash)
