@@ -13,6 +13,7 @@ second, fourth, ... sample: taking every s-th sample leaves its variance as it i
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,20 +57,21 @@ class NoiseFloor:
         noise = random.standard_normal((draws, count + lead))
         if self.ar:
             noise = lfilter([1.0], [1.0, *(-a for a in self.ar)], noise, axis=1)[:, lead:]
-        return np.asarray(noise * (self.sigma * _gain(self.ar)))
+        return np.asarray(noise * (self.sigma / grown(self.ar)))
 
 
-def noise_floor(values: Array, order: int | None = None) -> NoiseFloor:
+def noise_floor(values: Array, order: int | None = None, strides: Sequence[int] = STRIDES) -> NoiseFloor:
     """Noise floor of a channel from evenly spaced samples (n,), whatever else it shows; n at least 48.
 
     `order` is that of the autoregression, at most 8; by default a criterion chooses it, which needs many windows.
+    `strides` are those looked at: (1,) for noise that is known not to outlast a window.
     Exactly repeated or smooth values give sigma 0. Raises ``ValueError`` for fewer samples.
     """
     values = np.asarray(values, dtype=np.float64)
     if values.size < LENGTH:
         raise ValueError(f"values: too few for a noise floor, got {values.size}; at least {LENGTH} are needed")
     best: tuple[int, Array, int] | None = None
-    for stride in STRIDES:
+    for stride in strides:
         if values.size < LENGTH * stride or (stride > 1 and values.size < 4 * LENGTH * stride):
             break
         gamma, windows = _autocovariance(values, stride)
@@ -170,13 +172,13 @@ def _autoregression(values: Array, stride: int, at_stride: Array, wanted: int | 
     return best[1]
 
 
-@functools.lru_cache(maxsize=64)
-def _gain(ar: tuple[float, ...]) -> float:
-    """What white noise is multiplied by so that its autoregression has variance 1."""
+@functools.lru_cache(maxsize=256)
+def grown(ar: tuple[float, ...]) -> float:
+    """Standard deviation of an autoregression over that of what drives it."""
     if not ar:
         return 1.0
     from scipy.signal import lfilter
 
     impulse = np.zeros(20_000)
     impulse[0] = 1.0
-    return float(1.0 / np.sqrt(np.sum(lfilter([1.0], [1.0, *(-a for a in ar)], impulse) ** 2)))
+    return float(np.sqrt(np.sum(lfilter([1.0], [1.0, *(-a for a in ar)], impulse) ** 2)))

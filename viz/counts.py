@@ -90,7 +90,7 @@ def confusion(
 
 def _open(width: float, height: float, label: str) -> str:
     size = f'viewBox="0 0 {width:.0f} {height:.0f}" style="max-width:{width:.0f}px" font-size="12"'
-    return f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="{escape(label)}" {size}>'
+    return f'<svg role="img" aria-label="{escape(label)}" {size}>'
 
 
 def _text(x: float, y: float, text: str, anchor: str, role: str, more: str = "") -> str:

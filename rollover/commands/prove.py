@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rollover.commands.door import FAILED, AsJson, Force, answering, app
+from rollover.commands.door import FAILED, AsJson, Force, answering, app, manual
 from rollover.faults import Fault, InputError
 
 if TYPE_CHECKING:
@@ -18,13 +18,20 @@ JSON, SEAL, TRUTH, DIAGNOSES, PAGE = "prove.json", "seal.json", "truth.json", "d
 ACCOUNT = (JSON, SEAL, TRUTH, DIAGNOSES, PAGE)
 
 
-@app.command()
+@app.command(
+    epilog=manual(
+        "prove --cases 50 --seed 1",
+        writes="prove.json, report.html, seal.json, truth.json, diagnoses.jsonl.",
+        status="3 every diagnosis failed",
+    )
+)
 @answering
 def prove(
-    cases: Annotated[int, typer.Option(help="How many concealed drop test campaigns.", min=1)] = 50,
+    cases: Annotated[int, typer.Option(help="How many concealed campaigns of tests.", min=1)] = 50,
     seed: Annotated[int, typer.Option(help="Another seed, other cases; the same seed, the same ones.", min=0)] = 1,
     out: Annotated[Path, typer.Option(help="Folder of the full account.")] = Path("out/prove"),
-    workers: Annotated[int | None, typer.Option(help="Cases at once  [default: number of cores]", min=0)] = None,
+    workers: Annotated[int | None, typer.Option(help="Cases at once", show_default="number of cores", min=0)] = None,
+    rig: Annotated[str, typer.Option(help="What is tested: drop, or overturn (minutes a case).")] = "drop",
     effects: Annotated[
         list[str] | None, typer.Option(metavar="ID", help="Only cases about this effect; may be repeated.")
     ] = None,
@@ -36,11 +43,12 @@ def prove(
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
-    """Make concealed cases by an independent solver, seal the truth, diagnose them, open the seal and score."""
+    """Make concealed cases (drops by an independent solver), seal the truth, diagnose them, open the seal and score."""
     from rollover import console, store
     from rollover.proof import examine
 
     about = {"cases": cases, "seed": seed, "kinds": kinds or [], "effects": effects or []}
+    about |= {"rig": rig} if rig != "drop" else {}
     store.claim_account(out, examine.FORMAT, about, ACCOUNT, force=force)
 
     def tell(seal: Seal) -> None:
@@ -51,6 +59,7 @@ def prove(
             proof = examine.prove(
                 cases,
                 seed,
+                rig=rig,
                 kinds=about["kinds"],  # type: ignore[arg-type]
                 effects=about["effects"],  # type: ignore[arg-type]
                 workers=workers,

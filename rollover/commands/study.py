@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rollover.commands.door import COMPILING, FAILED, AsJson, Force, answering, app
+from rollover.commands.door import COMPILING, FAILED, AsJson, Force, answering, app, manual
 
 if TYPE_CHECKING:
     from rollover.study.conduct import Builder, Conducted, Progress, Way
@@ -24,13 +24,19 @@ class Retry(StrEnum):
     failed = "failed"
 
 
-@app.command()
+@app.command(
+    epilog=manual(
+        "study my_study.yaml --workers 4",
+        writes="study.json, cases and their table with a row for each, failed ones too, report.html, the worst case as "
+        "a scenario. Run again, it resumes.",
+    )
+)
 @answering
 def study(
     name: Annotated[str, typer.Argument(help="A study file, or the name of a shipped one.", metavar="STUDY")],
-    out: Annotated[Path | None, typer.Option(help="Results folder  [default: out/study/NAME]")] = None,
+    out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/study/NAME")] = None,
     workers: Annotated[
-        int | None, typer.Option(help="Cases at once; 0 for this process  [default: number of cores]", min=0)
+        int | None, typer.Option(help="Cases at once; 0 for this process", show_default="number of cores", min=0)
     ] = None,
     scheduler: Annotated[
         str, typer.Option(metavar="ADDRESS", help="Of a dask scheduler: tcp://HOST:PORT, local or slurm.")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.simulator import Simulator
-from rollover.noise import LENGTH, NoiseFloor, noise_floor
+from rollover.noise import LENGTH, NoiseFloor, grown, noise_floor
 from rollover.recording import Recording
 
 Array = NDArray[np.float64]
@@ -20,6 +20,7 @@ ALONE = 0.02  # s, prior of the time shift of a recording whose clock has no zer
 CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is believed
 MANY = 10  # quiet windows from which on a memory of two samples is told
 CORNER = 2.0775  # corner frequency over the filter class, forward and backward, Hz
+LEAP = 4.0  # times the steps beside it
 SHIFT = 1e-3  # s, prior of the time shift of a recording whose zero is known
 
 
@@ -34,6 +35,7 @@ class Signal:
     noise: float
     ar: tuple[float, ...]
     span: float
+    weight: Array | None = None  # (n,), below 1 where the model itself is not sure
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +48,9 @@ class Evidence:
     signals: tuple[Signal, ...]
     shift_prior: float
     condition: str
+    strays: tuple[Array, ...] = ()  # stacked, SI: what runs that nobody could tell apart differ by
     model_error: float = MODEL_ERROR  # of a channel's range
+    averaged: int = 1  # samples in one
 
     @property
     def count(self) -> int:
@@ -69,6 +73,37 @@ class Evidence:
         """The same of the measurement."""
         return np.concatenate([self._whitened(s, s.values) for s in self.signals])
 
+    def leaps(self, raw: Array) -> NDArray[np.int64]:
+        """First of each three samples (stacked) across which a prediction leaps."""
+        found = []
+        for s, part in self.spans():
+            x = raw[part]
+            if x.size < 5:
+                continue
+            step = np.abs(np.diff(x))
+            beside = np.maximum(np.append(step[2:], 0.0), np.append(0.0, step[:-2])[: x.size - 2])
+            leap = np.abs(x[2:] - x[:-2])
+            found.append(part.start + np.flatnonzero((leap > LEAP * beside) & (leap > 3.0 * s.sigma)))
+        return np.concatenate(found) if found else np.zeros(0, dtype=np.int64)
+
+    def forgiven(self, raw: Array, leaps: NDArray[np.int64]) -> Array:
+        """Predicted samples (stacked, SI) on either side of a leap, moved towards the measured ones within it.
+
+        On which side of a leap a sample lies is decided by clocks, not by physics.
+        """
+        y, measured = raw.copy(), np.concatenate([s.values for s in self.signals])
+        for k in leaps:
+            near = raw[k : k + 3]
+            y[k : k + 3] = np.clip(measured[k : k + 3], near.min(), near.max())
+        return y
+
+    def slope(self, raw: Array, leaps: NDArray[np.int64]) -> Array:
+        """dy/dtau = -dy/dt of each signal by differences along the stamps, whitened; none across a leap."""
+        found = np.concatenate([-np.gradient(raw[part], self.recording.time[s.rows]) for s, part in self.spans()])
+        for k in leaps:
+            found[k : k + 3] = 0.0
+        return self.whitened(found)
+
     def spans(self) -> list[tuple[Signal, slice]]:
         """Each signal with its place in the stack."""
         found, at = [], 0
@@ -80,37 +115,32 @@ class Evidence:
     @staticmethod
     def _whitened(signal: Signal, values: Array) -> Array:
         x = values / signal.sigma
+        if signal.weight is not None:
+            return Evidence._coloured(signal, x) * signal.weight
+        return Evidence._coloured(signal, x)
+
+    @staticmethod
+    def _coloured(signal: Signal, x: Array) -> Array:
         if not signal.ar:
             return x
         y = x.copy()
         for k, a in enumerate(signal.ar, start=1):
             y[k:] -= a * x[:-k]
         y[: len(signal.ar)] = 0.0  # no past to whiten with
-        return y * _gain(signal.ar)
+        return y * grown(signal.ar)
 
 
-def _gain(ar: tuple[float, ...]) -> float:
-    """1/sd of the innovations of an autoregression of variance 1."""
-    from scipy.signal import lfilter
-
-    impulse = np.zeros(4000)
-    impulse[0] = 1.0
-    return float(np.sqrt(np.sum(lfilter([1.0], [1.0, *(-a for a in ar)], impulse) ** 2)))
-
-
-def evidence_of(name: str, recording: Recording, simulator: Simulator, shift: float = 0.0) -> Evidence | None:
+def evidence_of(name: str, recording: Recording, simulator: Simulator, averaged: int = 1) -> Evidence | None:
     """Make a recording ready; None if it shares no channel with the simulation.
 
-    `shift` (s) is how late its clock is thought to be: samples beside the leap of the first contact are left out.
     Noise is estimated from each channel itself; where it is too short for that, the noise that the recording states.
     """
-    predicted = simulator.predict({}, shift)
+    predicted = simulator.predict({}, 0.0)
     if predicted is None:
         return None
     signals = []
-    leaps = _near_leaps(recording, simulator, shift)
     for channel, values in recording.channels.items():
-        rows = np.flatnonzero(np.isfinite(values) & ~leaps)[:: _oversampling(recording, channel)]
+        rows = np.flatnonzero(np.isfinite(values))[:: _oversampling(recording, channel)]
         if channel not in predicted or rows.size < 8 or not np.all(np.isfinite(predicted[channel][rows])):
             continue
         y = values[rows]
@@ -133,6 +163,7 @@ def evidence_of(name: str, recording: Recording, simulator: Simulator, shift: fl
         signals=tuple(signals),
         shift_prior=ALONE if loose else SHIFT + 0.5 * step,
         condition=condition_of(recording.conditions),
+        averaged=averaged,
     )
 
 
@@ -142,14 +173,6 @@ def _oversampling(recording: Recording, channel: str) -> int:
         return 1
     rate = 1.0 / float(np.median(np.diff(recording.time)))
     return max(1, int(rate / (2.0 * CORNER * recording.cfc[channel])))
-
-
-def _near_leaps(recording: Recording, simulator: Simulator, shift: float) -> NDArray[np.bool_]:
-    """Samples so near the first contact that the clock decides on which side of the leap of force they lie, (n,)."""
-    if recording.time.size < 3:
-        return np.zeros(recording.time.size, dtype=bool)
-    step = float(np.median(np.diff(recording.time)))
-    return np.asarray(np.abs(recording.time - simulator.contact(shift)) < step)
 
 
 def _noise(residual: Array, values: Array, stated: float | None) -> tuple[float, tuple[float, ...]]:
@@ -164,8 +187,8 @@ def _noise(residual: Array, values: Array, stated: float | None) -> tuple[float,
 
 def _floor(values: Array) -> NoiseFloor:
     """Noise floor with as short a memory as the samples can tell: longer ones are made of chance."""
-    one = noise_floor(values, order=1)
-    return noise_floor(values, order=2) if one.windows >= MANY else one
+    one = noise_floor(values, order=1, strides=(1,))
+    return noise_floor(values, order=2, strides=(1,)) if one.windows >= MANY else one
 
 
 def _by_differences(values: Array) -> float:
