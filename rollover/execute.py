@@ -23,7 +23,7 @@ C = TypeVar("C")
 V = TypeVar("V")
 
 AHEAD = 2  # cases handed out per worker: none idles, and an interrupt has little to throw away
-TASKS = 256  # cases after which a worker is replaced, so that what a case leaks does not grow for ever
+TASKS = 1000  # cases after which a worker is replaced, so that what a case leaks does not grow for ever
 BROKEN = 3  # pools in a row that may break before a case has gone through
 KILLED = -9  # exit code of a process that was ended from outside, as the operating system does when memory runs out
 # one thread for each child: cores are shared out among cases, and a sum does not depend on how many there are

@@ -27,10 +27,11 @@ ACCOUNT = (JSON, SEAL, TRUTH, DIAGNOSES, PAGE)
 )
 @answering
 def prove(
-    cases: Annotated[int, typer.Option(help="How many concealed drop test campaigns.", min=1)] = 50,
+    cases: Annotated[int, typer.Option(help="How many concealed campaigns of tests.", min=1)] = 50,
     seed: Annotated[int, typer.Option(help="Another seed, other cases; the same seed, the same ones.", min=0)] = 1,
     out: Annotated[Path, typer.Option(help="Folder of the full account.")] = Path("out/prove"),
     workers: Annotated[int | None, typer.Option(help="Cases at once", show_default="number of cores", min=0)] = None,
+    rig: Annotated[str, typer.Option(help="What is tested: drop, or overturn (minutes a case).")] = "drop",
     effects: Annotated[
         list[str] | None, typer.Option(metavar="ID", help="Only cases about this effect; may be repeated.")
     ] = None,
@@ -42,11 +43,12 @@ def prove(
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
-    """Make concealed cases by an independent solver, seal the truth, diagnose them, open the seal and score."""
+    """Make concealed cases (drops by an independent solver), seal the truth, diagnose them, open the seal and score."""
     from rollover import console, store
     from rollover.proof import examine
 
     about = {"cases": cases, "seed": seed, "kinds": kinds or [], "effects": effects or []}
+    about |= {"rig": rig} if rig != "drop" else {}
     store.claim_account(out, examine.FORMAT, about, ACCOUNT, force=force)
 
     def tell(seal: Seal) -> None:
@@ -57,6 +59,7 @@ def prove(
             proof = examine.prove(
                 cases,
                 seed,
+                rig=rig,
                 kinds=about["kinds"],  # type: ignore[arg-type]
                 effects=about["effects"],  # type: ignore[arg-type]
                 workers=workers,

@@ -8,16 +8,20 @@ from collections.abc import Callable, Mapping, Sequence
 from rollover.diagnosis import colour
 from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import candidates_of
+from rollover.diagnosis.chaos import weighted
+from rollover.diagnosis.chassis import degrees_of
+from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.depend import dependency, residual_forces
 from rollover.diagnosis.evidence import Evidence, evidence_of, groups_of
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import yardstick
-from rollover.diagnosis.phases import drop_phases
+from rollover.diagnosis.overturn import RunSimulator
+from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.scores import judged
 from rollover.diagnosis.selection import SURE, decided, explained, matters
 from rollover.diagnosis.simulator import set_up
 from rollover.diagnosis.statements import considered, named, noise, places, sentence
-from rollover.diagnosis.verdict import Diagnosis
+from rollover.diagnosis.verdict import Degree, Diagnosis
 from rollover.drop import unfit
 from rollover.effects import EFFECTS
 from rollover.recording import Recording
@@ -33,12 +37,13 @@ def diagnose(
     *,
     hold_out: Sequence[str] = (),
     say: Callable[[str], None] = lambda _: None,
+    crew: Crew | None = None,
 ) -> Diagnosis:
     """Compare a scenario with recordings and say what separates them.
 
     `recordings` are (name, recording); `hold_out` names those that are never fitted, otherwise each condition is left
-    out in turn. Raises `InputError` for a condition that the scenario does not know, ``ValueError`` for a name in
-    `hold_out` that is none.
+    out in turn. `crew` works off the fits, in children if it has any; the answer is the same. Raises `InputError` for
+    a condition that the scenario does not know, ``ValueError`` for a name in `hold_out` that is none.
     """
     began = clock.perf_counter()
     names = [name for name, _ in recordings]
@@ -46,7 +51,7 @@ def diagnose(
     if unknown:
         raise ValueError(f"hold_out: no such recording, got {unknown[0]!r}; {', '.join(names)}")
     every, notes = _evidence(scenario, recordings)
-    every = _weighed(every)
+    every = [weighted(e, e.simulator.strays()) for e in _weighed(every)]
     found = [e for e in every if e.name not in hold_out]
     kept = [e for e in every if e.name in hold_out]
     if sum(e.count for e in found) < FEWEST:
@@ -59,16 +64,20 @@ def diagnose(
     base = judge.fit((), ())
     if base is None:
         return _nothing(every, names, [*notes, "the scenario itself could not be simulated"], began)
-    phases = [drop_phases(e) for e in found]
+    phases = [phases_of(e) for e in found]
     acts = "rollover" if any(unfit(set_up(scenario, e.recording)) for e in found) else "drop"
-    candidates = candidates_of(found, scenario.effects, acts)
-    explanation = explained(judge, base, candidates, groups, phases, say)
+    candidates = candidates_of(found, scenario.effects, acts, scenario)
+    explanation = explained(judge, base, candidates, groups, phases, say, crew or Crew())
     explanation, verdict = decided(judge, explanation, groups)
     found = list(judge.evidence)
     before, after = explanation.before, explanation.after if explanation.parts else explanation.before
     set_ups = [set_up(scenario, e.recording) for e in found]
     say("what the mismatch depends on")
-    dependencies = dependency(residual_forces(set_ups, found)) if acts == "drop" else []
+    degrees: tuple[Degree, ...] = ()
+    forces = residual_forces(set_ups, found) if acts == "drop" else []
+    if acts != "drop":
+        degrees, forces = degrees_of(set_ups, found, [b.shift for b in explanation.base.blocks])
+    dependencies = dependency(forces)
     detectable = dict(explanation.detectable)
     if verdict == "no-mismatch" and _is_weak(detectable):
         verdict = "cannot-tell"
@@ -78,6 +87,7 @@ def diagnose(
     is_mismatch = verdict not in ("no-mismatch", "cannot-tell")
     remains = after.p_value < SURE and matters(judge, explanation.fitted, after)
     training = tuple(e.name for e in found)
+    notes += _cost(found)
     return Diagnosis(
         verdict=verdict,
         sentence=sentence(verdict, effects, before, h_before.held, h_after.held, found),
@@ -90,6 +100,7 @@ def diagnose(
         remaining_where=places(after, found, None) if verdict == "unexplained" or (effects and remains) else (),
         depends_on=depends if is_mismatch else None,
         dependencies=tuple(dependencies),
+        degrees=degrees if is_mismatch else (),
         smallest_detectable=detectable,
         training=training,
         held_out=tuple(e.name for e in kept) or training,
@@ -122,6 +133,13 @@ def _evidence(scenario: Scenario, recordings: Sequence[tuple[str, Recording]]) -
         else:
             found.append(one)
     return found, notes
+
+
+def _cost(found: Sequence[Evidence]) -> list[str]:
+    """What full runs took, where there were any."""
+    made = [e.simulator for e in found if isinstance(e.simulator, RunSimulator)]
+    runs, seconds = sum(s.runs for s in made), sum(s.seconds for s in made)
+    return [f"{runs} full runs of {1e3 * seconds / runs:.0f} ms on the average"] if runs else []
 
 
 def _is_weak(detectable: Mapping[str, float]) -> bool:

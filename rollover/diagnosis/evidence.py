@@ -35,7 +35,7 @@ class Signal:
     noise: float
     ar: tuple[float, ...]
     span: float
-    level: float = 0.0  # of the noise as this recording alone shows it
+    weight: Array | None = None  # (n,), below 1 where the model itself is not sure
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +48,9 @@ class Evidence:
     signals: tuple[Signal, ...]
     shift_prior: float
     condition: str
+    strays: tuple[Array, ...] = ()  # stacked, SI: what runs that nobody could tell apart differ by
     model_error: float = MODEL_ERROR  # of a channel's range
+    averaged: int = 1  # samples in one
 
     @property
     def count(self) -> int:
@@ -113,6 +115,12 @@ class Evidence:
     @staticmethod
     def _whitened(signal: Signal, values: Array) -> Array:
         x = values / signal.sigma
+        if signal.weight is not None:
+            return Evidence._coloured(signal, x) * signal.weight
+        return Evidence._coloured(signal, x)
+
+    @staticmethod
+    def _coloured(signal: Signal, x: Array) -> Array:
         if not signal.ar:
             return x
         y = x.copy()
@@ -122,7 +130,7 @@ class Evidence:
         return y * grown(signal.ar)
 
 
-def evidence_of(name: str, recording: Recording, simulator: Simulator) -> Evidence | None:
+def evidence_of(name: str, recording: Recording, simulator: Simulator, averaged: int = 1) -> Evidence | None:
     """Make a recording ready; None if it shares no channel with the simulation.
 
     Noise is estimated from each channel itself; where it is too short for that, the noise that the recording states.
@@ -143,9 +151,7 @@ def evidence_of(name: str, recording: Recording, simulator: Simulator) -> Eviden
         sigma = float(np.hypot(noise, MODEL_ERROR * span))
         if noise < sigma * 0.7:
             ar = ()  # the model's error is not coloured as the noise is
-        signals.append(
-            Signal(channel=channel, rows=rows, values=y, sigma=sigma, noise=noise, ar=ar, span=span, level=noise)
-        )
+        signals.append(Signal(channel=channel, rows=rows, values=y, sigma=sigma, noise=noise, ar=ar, span=span))
     if not signals:
         return None
     loose = recording.clock.zero == "unknown"
@@ -157,6 +163,7 @@ def evidence_of(name: str, recording: Recording, simulator: Simulator) -> Eviden
         signals=tuple(signals),
         shift_prior=ALONE if loose else SHIFT + 0.5 * step,
         condition=condition_of(recording.conditions),
+        averaged=averaged,
     )
 
 
@@ -180,8 +187,8 @@ def _noise(residual: Array, values: Array, stated: float | None) -> tuple[float,
 
 def _floor(values: Array) -> NoiseFloor:
     """Noise floor with as short a memory as the samples can tell: longer ones are made of chance."""
-    one = noise_floor(values, order=1)
-    return noise_floor(values, order=2) if one.windows >= MANY else one
+    one = noise_floor(values, order=1, strides=(1,))
+    return noise_floor(values, order=2, strides=(1,)) if one.windows >= MANY else one
 
 
 def _by_differences(values: Array) -> float:

@@ -4,26 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis import colour
 from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.fit import Fitted, Judge
+from rollover.diagnosis.crew import Crew, Job
+from rollover.diagnosis.effort import DROPS
+from rollover.diagnosis.fit import NOISE_LEFT, Fitted, Judge
 from rollover.diagnosis.gate import Gate, freed
 from rollover.diagnosis.holdout import held_out, worse
 
 Array = NDArray[np.float64]
 SCORED = 18  # candidates looked at closer, by their score
-PROMISING = 14  # candidates fitted in full at each step
-FEW = 3  # recordings that candidates are looked at on
-SHORT = 5  # rounds of a first fit
-LEADERS, MOST_LEADERS = 4, 9  # first fits that are followed up, at least and at most
 WITHIN = 6.0  # times what the best leaves, up to which a first fit is followed up
 FAR = 3.0  # misfit over the noise from which on time shifts fitted to it are not believed
 ELSEWHERE = 0.2  # of a coordinate: starts so far apart are two
-NOISE_LEFT = 1.04  # misfit over the noise that needs no further search
+RIVALS = 0.4  # of the best's gain: a first fit that gains less is no rival, where fits cost much
 CROOKED = 100.0  # times what the best leaves, up to which a fit of two parameters is polished
 SHAPED = 4.0  # times what the best leaves, up to which an effect's shape is fitted too
 WORTH = 12.0  # gain that pays for a shape
@@ -64,14 +63,14 @@ class Step:
         return replace(self, base=judge.again(self.base), fitted=best or judge.again(self.fitted), rivals=rivals)
 
 
-def spread(base: Fitted, groups: Sequence[Sequence[int]]) -> list[int]:
+def spread(base: Fitted, groups: Sequence[Sequence[int]], few: int = DROPS.few) -> list[int]:
     """Few recordings that stand for all: of the conditions that are met worst, best, and in the middle."""
     left = [b.normal()[2] / b.residual.size for b in base.blocks]
     members = [max(g, key=lambda r: left[r]) for g in groups if g]
     members.sort(key=lambda r: left[r])
-    if len(members) <= FEW:
-        return sorted(set(members)) if len(groups) > 1 else list(range(len(base.blocks)))[:FEW]
-    return sorted({members[0], members[len(members) // 2], members[-1]})
+    if len(members) <= few:
+        return sorted(set(members)) if len(groups) > 1 else list(range(len(base.blocks)))[:few]
+    return sorted({members[round(k * (len(members) - 1) / (few - 1))] for k in range(few)})
 
 
 def begun(judge: Judge, base: Fitted) -> list[float]:
@@ -134,6 +133,7 @@ def step(
     groups: Sequence[Sequence[int]],
     say: Progress,
     looked: Gate,
+    crew: Crew,
 ) -> Step | None:
     """Fit the promising candidates beside the base and rank them by what they predict of held-out conditions.
 
@@ -141,24 +141,25 @@ def step(
     what it leaves; the step is then under that noise. None if nothing could be fitted.
     """
     say(f"looking at {len(candidates)} candidates beside {base.label}")
-    few = spread(base, groups)
-    screened = screen(judge, base, _promising(candidates, looked), few)
+    few = spread(base, groups, judge.effort.few)
+    screened = screen(judge, base, _promising(candidates, looked, judge.effort.scored), few)
     count = sum(b.residual.size for b in base.blocks)
-    screened, begun_with = _first_fits(judge, base, screened, few, say)
-    fits = []
-    for first in begun_with:
-        say(f"fitting {first.candidates[-1].key}")
-        fitted = judge.fit(first.candidates, first.x, shifts=_all_shifts(judge, base, first, few), width=1)
-        if fitted is not None:
-            fits.append(fitted)
+    screened, begun_with = _first_fits(judge, base, screened, few, say, crew)
+    jobs = [
+        Job(candidates=f.candidates, start=f.x, shifts=tuple(_all_shifts(judge, base, f, few)), width=1)
+        for f in begun_with
+    ]
+    fits = [f for f in crew.fits(judge, jobs, say) if f is not None]
     if not fits:
         return None
     fits.sort(key=lambda f: f.left)
     # where a threshold makes the way crooked, the nearer ones are followed to the end
     if fits[0].left > NOISE_LEFT**2 * count:
-        near = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < CROOKED * fits[0].left][:2]
-        fits = [judge.polish(f) if f in near else f for f in fits]
-    fits = _shaped(judge, _one_each(fits))
+        near = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < CROOKED * fits[0].left]
+        near = near[: judge.effort.polishes]
+        polished = crew.fits(judge, [_from(f, "polish") for f in near], say)
+        fits = [f for f in fits if f not in near] + [new or old for new, old in zip(polished, near, strict=True)]
+    fits = _one_each(fits) if judge.effort.thrifty else _shaped(judge, _one_each(fits), crew, say)
     if fits[0].left < NEARLY_NOISE**2 * count:
         judge.weigh(colour.whole(judge.evidence, judge.residuals(fits[0])))
         base, fits = judge.again(base), [judge.again(f) for f in fits]
@@ -167,53 +168,59 @@ def step(
     return Step(base=base, fitted=fits[0], p_value=looked.p_value(phi), rivals=tuple(fits), screened=tuple(screened))
 
 
-def _promising(candidates: Sequence[Candidate], looked: Gate) -> list[Candidate]:
+def _promising(candidates: Sequence[Candidate], looked: Gate, scored: int | None) -> list[Candidate]:
     """Those that scored best, and of two parameters all: beside their thresholds a score tells little."""
     ranked = sorted(candidates, key=lambda c: -looked.scores.get(c.key, 0.0))
+    if scored is not None:
+        return ranked[:scored]
     return [c for k, c in enumerate(ranked) if k < SCORED or len(c.search) > 1]
 
 
-def _shaped(judge: Judge, fits: Sequence[Fitted]) -> list[Fitted]:
+def _from(f: Fitted, how: Literal["polish", "shape"]) -> Job:
+    return Job(how=how, candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks))
+
+
+def _shaped(judge: Judge, fits: Sequence[Fitted], crew: Crew, say: Progress) -> list[Fitted]:
     """The fits with shapes fitted too where that pays, best first."""
-    found = []
     best = min(f.left for f in fits)
-    for f in fits:
-        last = f.candidates[-1]
-        if last.shapes and f.left < SHAPED * best:
-            at = len(f.x) - len(last.search)
-            shaped, x = last.with_shapes(f.x[at:])
-            again = judge.fit((*f.candidates[:-1], shaped), (*f.x[:at], *x), shifts=[b.shift for b in f.blocks])
-            if again is not None and again.left < f.left - WORTH * max(
-                1.0, best / sum(b.residual.size for b in f.blocks)
-            ):
-                f = again
-        found.append(f)
+    size = sum(b.residual.size for b in fits[0].blocks)
+    able = [f for f in fits if f.candidates[-1].shapes and f.left < SHAPED * best]
+    found = list(fits)
+    for old, new in zip(able, crew.fits(judge, [_from(f, "shape") for f in able], say), strict=True):
+        if new is not None and new.left < old.left - WORTH * max(1.0, best / size):
+            found[found.index(old)] = new
     return sorted(found, key=lambda f: f.left)
 
 
 def _first_fits(
-    judge: Judge, base: Fitted, screened: Sequence[Screened], few: Sequence[int], say: Progress
+    judge: Judge, base: Fitted, screened: Sequence[Screened], few: Sequence[int], say: Progress, crew: Crew
 ) -> tuple[list[Screened], list[Fitted]]:
     """Short fits to few recordings: the ones worth a full fit, best first, and what each leaves."""
-    by_potential = sorted(screened, key=lambda s: -s.potential)[:PROMISING]
-    by_start = sorted(screened, key=lambda s: s.left)[: PROMISING // 2]
+    by_potential = sorted(screened, key=lambda s: -s.potential)[: judge.effort.promising]
+    by_start = sorted(screened, key=lambda s: s.left)[: judge.effort.promising // 2]
     chosen = {s.candidate.key: s for s in (*by_start, *by_potential)}
     shifts = begun(judge, base)
-    fits: list[Fitted] = []
     told: dict[str, float] = {}
     say(f"first fits of {len(chosen)} candidates to {len(few)} recordings")
-    for key, s in chosen.items():
-        for start in s.starts:
-            one = judge.fit(
-                (*base.candidates, s.candidate), (*base.x, *start),
-                rounds=SHORT, only=few, shifts=[shifts[r] for r in few],
-            )  # fmt: skip
-            if one is not None:
-                fits.append(one)
-                size = sum(b.residual.size for b in one.blocks)
-                told[key] = min(told.get(key, np.inf), float(np.sqrt(one.left / size)))
+    at = tuple(shifts[r] for r in few)
+    jobs = [
+        Job(
+            candidates=(*base.candidates, s.candidate), start=(*base.x, *start), shifts=at, only=tuple(few),
+            rounds=judge.effort.short,
+        )
+        for s in chosen.values()
+        for start in s.starts
+    ]  # fmt: skip
+    fits = [f for f in crew.fits(judge, jobs, say) if f is not None]
+    for one in fits:
+        key, size = one.candidates[-1].key, sum(b.residual.size for b in one.blocks)
+        told[key] = min(told.get(key, np.inf), float(np.sqrt(one.left / size)))
     fits.sort(key=lambda f: f.left)
-    worth = [f for k, f in enumerate(fits) if k < LEADERS or f.left < WITHIN * fits[0].left][:MOST_LEADERS]
+    worth = [f for k, f in enumerate(fits) if k < judge.effort.leaders or f.left < WITHIN * fits[0].left]
+    if judge.effort.thrifty and fits:
+        as_it_is = sum(base.blocks[r].normal()[2] for r in few)
+        worth = [f for f in worth if as_it_is - f.left >= RIVALS * (as_it_is - fits[0].left)]
+    worth = worth[: judge.effort.most_leaders]
     return [replace(s, nrmse=told.get(s.candidate.key, 0.0)) for s in screened], worth
 
 

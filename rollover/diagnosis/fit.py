@@ -10,6 +10,7 @@ to predict that one, so that holding out costs no simulation.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,11 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
 
 Array = NDArray[np.float64]
-NUDGES = (2e-2, 5e-3, 1e-3)  # of a coordinate, for differences: wide first, as thresholds show only over samples
 PLACES = 241  # time shifts that are tried
+WIDEST = 4.0  # times its prior that a time shift may be
+NOISE_LEFT = 1.04  # misfit over the noise that needs no further search
+NONE = np.zeros(0, dtype=np.int64)
 GENTLE = 1e-4  # prior of a coordinate (1/variance): keeps what nothing determines where it is
 
 
@@ -79,12 +83,30 @@ class Judge:
 
     def __init__(self, evidence: Sequence[Evidence]) -> None:
         self.evidence = tuple(evidence)
+        self.effort = max((e.simulator.effort for e in self.evidence), key=lambda e: e.thrifty, default=DROPS)
         self.measured = [e.measured() for e in self.evidence]
         self.shifts = [0.0] * len(self.evidence)
         self.simulations = 0
         self._raw: dict[tuple[object, ...], Array | None] = {}
         self._leaps: dict[tuple[object, ...], NDArray[np.int64]] = {}
         self._known: dict[tuple[object, ...], Array | None] = {}
+
+    def bare(self) -> Judge:
+        """The same without what was simulated, to be sent to another process."""
+        other = Judge(self.evidence)
+        other.shifts = list(self.shifts)
+        return other
+
+    def fingerprint(self) -> str:
+        """Hash of the recordings as they are held: their samples and their noise."""
+        total = hashlib.sha256()
+        for e in self.evidence:
+            total.update(repr((e.name, e.shift_prior)).encode())
+            for s in e.signals:
+                total.update(repr((s.channel, s.sigma, s.ar)).encode() + s.values.tobytes() + s.rows.tobytes())
+                if s.weight is not None:
+                    total.update(s.weight.tobytes())
+        return total.hexdigest()
 
     def weigh(self, evidence: Sequence[Evidence]) -> None:
         """Take the same recordings with another noise: nothing is simulated again, fits must be made anew."""
@@ -94,7 +116,8 @@ class Judge:
 
     def again(self, fitted: Fitted) -> Fitted:
         """A fit where it stands, linearised anew under the noise as it is held now."""
-        blocks = [self.block(r, fitted.candidates, fitted.x, b.shift, NUDGES[1]) for r, b in enumerate(fitted.blocks)]
+        fine = self.effort.fine
+        blocks = [self.block(r, fitted.candidates, fitted.x, b.shift, fine) for r, b in enumerate(fitted.blocks)]
         kept = [new if new is not None else old for new, old in zip(blocks, fitted.blocks, strict=True)]
         return Fitted(candidates=fitted.candidates, x=fitted.x, blocks=tuple(kept))
 
@@ -142,9 +165,9 @@ class Judge:
     def changes(candidates: Sequence[Candidate], x: Sequence[float]) -> dict[str, object]:
         """Values to exchange in the scenario."""
         found: dict[str, object] = {}
-        at = 0
-        for c in candidates:
-            found |= c.changes(x[at : at + len(c.search)])
+        at, ids = 0, [c.id for c in candidates]
+        for k, c in enumerate(candidates):
+            found |= c.changes(x[at : at + len(c.search)], 1 + ids[:k].count(c.id))
             at += len(c.search)
         return found
 
@@ -184,43 +207,39 @@ class Judge:
         y = self.predicted(r, candidates, x, shift)
         if y is None:
             return None
-        e = self.evidence[r]
+        e, raw = self.evidence[r], self.raw(r, candidates, x, shift)
+        assert raw is not None
+        leaps = self._leaps.get(_key(r, candidates, x, shift), NONE)
         J = np.zeros((y.size, len(x)))
         for k in range(len(x) if nudge else 0):
             step = nudge if x[k] < 0.5 else -nudge
-            moved = self.predicted(r, candidates, [*x[:k], x[k] + step, *x[k + 1 :]], shift)
+            there = [*x[:k], x[k] + step, *x[k + 1 :]]
+            moved = self.raw(r, candidates, there, shift)
             if moved is None:
                 return None
-            J[:, k] = (moved - y) / step
-        return Block(
-            residual=self.measured[r] - y,
-            J=J,
-            slope=self._slope(r, candidates, x, shift),
-            shift=shift,
-            prior=e.shift_prior,
-        )
-
-    def _slope(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array:
-        raw = self.raw(r, candidates, x, shift)
-        assert raw is not None
-        leaps = self._leaps.get(_key(r, candidates, x, shift), np.zeros(0, dtype=np.int64))
-        return self.evidence[r].slope(raw, leaps)
+            d = (moved - raw) / step
+            for at in (*leaps, *self._leaps.get(_key(r, candidates, there, shift), NONE)):
+                d[at : at + 3] = 0.0  # a leap that moves past a sample is no slope
+            J[:, k] = e.whitened(d)
+        return Block(residual=self.measured[r] - y, J=J, slope=e.slope(raw, leaps), shift=shift, prior=e.shift_prior)
 
     def fit(
         self,
         candidates: Sequence[Candidate],
         start: Sequence[float],
         *,
-        rounds: int = 14,
+        rounds: int | None = None,
         only: Sequence[int] | None = None,
         shifts: Sequence[float] | None = None,
         width: int = 0,
     ) -> Fitted | None:
         """Levenberg-Marquardt on (D1) from a start within the unit box; None if nothing can be simulated there."""
         use = list(range(len(self.evidence))) if only is None else list(only)
+        nudges = self.effort.nudges
+        rounds, width = self.effort.rounds if rounds is None else rounds, min(width, len(nudges) - 1)
         x = [float(v) for v in start]
         shifts = [self.shifts[r] for r in use] if shifts is None else list(shifts)
-        found = [self.block(r, candidates, x, s, NUDGES[width]) for r, s in zip(use, shifts, strict=True)]
+        found = [self.block(r, candidates, x, s, nudges[width]) for r, s in zip(use, shifts, strict=True)]
         if any(b is None for b in found):
             return None
         blocks: list[Block] = [b for b in found if b is not None]
@@ -251,9 +270,11 @@ class Judge:
                 x, best, damping, shifts = trial, total, 0.1 * damping, [a.shift for a in after if a is not None]
             if gain < 1e-3 * max(1.0, 1e-2 * best):
                 width, damping = width + 1, 1e-3
-            last = width >= len(NUDGES)
+            last = width >= len(nudges)
+            if last and not improved and len(nudges) == 1:
+                break
             again = [
-                self.block(r, candidates, x, s, NUDGES[width if width < len(NUDGES) else 1])
+                self.block(r, candidates, x, s, nudges[width] if width < len(nudges) else self.effort.fine)
                 for r, s in zip(use, shifts, strict=True)
             ]
             if any(b is None for b in again):
@@ -261,6 +282,10 @@ class Judge:
             blocks = [b for b in again if b is not None]
             if last:
                 break
+        if width < len(nudges) and nudges[width] != self.effort.fine:
+            ended = [self.block(r, candidates, x, s, self.effort.fine) for r, s in zip(use, shifts, strict=True)]
+            if all(b is not None for b in ended):
+                blocks = [b for b in ended if b is not None]
         return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=tuple(blocks))
 
     def polish(self, fitted: Fitted, size: float = 0.02, most: int = 70) -> Fitted:
@@ -287,6 +312,23 @@ class Judge:
         again = self.fit(fitted.candidates, np.clip(found.x, 0.0, 1.0), rounds=3, shifts=shifts, width=2)
         return again if again is not None and again.left < fitted.left else fitted
 
+    def shaped(self, f: Fitted) -> Fitted | None:
+        """The fit with the shape of its last effect fitted too, from the best of some places."""
+        last, shifts = f.candidates[-1], [b.shift for b in f.blocks]
+        candidates, at = (*f.candidates[:-1], last.whole()), len(f.x) - len(last.search)
+        begun: list[tuple[float, tuple[float, ...]]] = []
+        for start in last.with_shapes(f.x[at:]):
+            x = (*f.x[:at], *start)
+            blocks = [self.block(r, candidates, x, s, 0.0) for r, s in enumerate(shifts)]
+            if all(b is not None for b in blocks):
+                begun.append((sum(b.normal()[2] for b in blocks if b is not None), x))
+        if not begun:
+            return None
+        again = self.fit(candidates, min(begun)[1], shifts=shifts)
+        if again is not None and again.left > NOISE_LEFT**2 * sum(b.residual.size for b in again.blocks):
+            again = self.polish(again)
+        return again
+
     @staticmethod
     def _total(blocks: Sequence[Block]) -> float:
         return sum(b.total for b in blocks)
@@ -298,9 +340,10 @@ def _key(r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: flo
 
 
 def shift_of(block: Block, dx: Array) -> float:
-    """Change of the time shift that goes with dx."""
+    """Change of the time shift that goes with dx; it stays within `WIDEST` of its prior."""
     g = float(block.slope @ (block.residual - block.J @ dx)) - block.shift * block.prior**-2
-    return g / block.weight
+    most = WIDEST * block.prior
+    return min(max(block.shift + g / block.weight, -most), most) - block.shift
 
 
 def _bounded(A: Array, b: Array, x: Array, damping: float) -> Array:

@@ -60,10 +60,10 @@ class Result:
     provenance: Mapping[str, Any]
 
 
-def case_of(scenario: Scenario, *, simulator: Simulator, clearance: bool) -> Case:
-    """The case of a scenario."""
+def case_of(key: str, scenario: Scenario, *, simulator: Simulator, clearance: bool) -> Case:
+    """The case of a scenario, whose `key` is that of `key_of`."""
     return Case(
-        key=key_of(scenario, simulator=simulator, clearance=clearance),
+        key=key,
         scenario=pickle.dumps(scenario),
         simulator=simulator,
         clearance=clearance,
@@ -89,7 +89,7 @@ def stated_versions() -> str:
 def own_effects(files: str) -> str:
     """Hash of the files of one's own effects: what they say decides a result as a version does."""
     digest = hashlib.sha256()
-    for name in filter(None, files.split(os.pathsep)):
+    for name in dict.fromkeys(filter(None, files.split(os.pathsep))):  # one that is given twice is one
         digest.update(Path(name).read_bytes() if Path(name).is_file() else b"")
     return digest.hexdigest() if files else ""
 

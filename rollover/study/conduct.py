@@ -102,9 +102,9 @@ class Builder:
             return "bad-" + hashlib.sha256(f"{e}{json.dumps(values, sort_keys=True)}".encode()).hexdigest()[:36]
         return key_of(scenario, simulator=self.study.simulator, clearance=self.clearance)
 
-    def case(self, values: Mapping[str, Any]) -> Case:
-        """Case of a point. Raises ``ValueError``."""
-        return case_of(self.scenario(values), simulator=self.study.simulator, clearance=self.clearance)
+    def case(self, key: str, values: Mapping[str, Any]) -> Case:
+        """Case of a point and its key. Raises ``ValueError``."""
+        return case_of(key, self.scenario(values), simulator=self.study.simulator, clearance=self.clearance)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,7 +159,7 @@ def _worked_off(
     def cases() -> Iterator[Case]:
         for key, k in todo.items():
             try:
-                case = builder.case(found.row(k))
+                case = builder.case(key, found.row(k))
             except (ValueError, InputError) as e:
                 failure = Failure(kind="error", sentence=f"no such scenario: {e}")
                 rows[key] = _keep(folder, key, None, failure, 0.0)

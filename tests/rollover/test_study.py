@@ -200,7 +200,7 @@ def test_a_case_is_the_run_of_its_scenario() -> None:
     scenario = builder.scenario(values)
     slow = text.scenario.replaced({"initiation.speed": 2.0, "ground.law.stiffness_scale": 1.3})
     assert document.content_hash(scenario) == document.content_hash(slow)
-    result = work(builder.case(values))
+    result = work(builder.case(builder.key(values), values))
     run = simulate.run(slow)
     for peak in peak_loads(run):
         assert result.measures[peak.channel] == peak.filtered
