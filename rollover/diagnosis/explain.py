@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 SCORED = 18  # candidates looked at closer, by their score
 PROMISING = 14  # candidates fitted in full at each step
 FEW = 3  # recordings that candidates are looked at on
-SHORT = 5  # rounds of a first fit
+SHORT = 6  # rounds of a first fit
 LEADERS, MOST_LEADERS = 4, 9  # first fits that are followed up, at least and at most
 WITHIN = 6.0  # times what the best leaves, up to which a first fit is followed up
 FAR = 3.0  # misfit over the noise from which on time shifts fitted to it are not believed
@@ -202,10 +202,11 @@ def _first_fits(
     told: dict[str, float] = {}
     say(f"first fits of {len(chosen)} candidates to {len(few)} recordings")
     at = tuple(shifts[r] for r in few)
+    pinned = base.left > FAR**2 * sum(b.residual.size for b in base.blocks)
     jobs = [
         Job(
             candidates=(*base.candidates, s.candidate), start=(*base.x, *start), shifts=at, only=tuple(few),
-            rounds=SHORT,
+            rounds=SHORT, pinned=pinned,
         )
         for s in chosen.values()
         for start in s.starts
