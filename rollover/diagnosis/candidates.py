@@ -35,7 +35,7 @@ ONE = (5,)
 SEVERAL = (8, 4, 3)  # places on the axes of an effect's parameters
 WIDE = 0.08  # of a coordinate: a step off what changes nothing, where each place costs a full run
 LIMITS = (0.12, 0.3)  # more places of what may be a limit
-SPREAD, SPREAD_FIRST = (0.25, 0.5, 0.75), (0.3, 0.6)  # places where nothing is known to change nothing
+SPREAD = (0.12, 0.3, 0.6)  # places of a depth, a length: where nothing is known to change nothing
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,8 +98,15 @@ class Candidate:
             # what the scenario has may be far above what ever acts: a yield force, a stop
             is_limit = len(at) == 1 and None in EFFECTS[self.id].null.values()
             return [*beside, *((x,) for x in LIMITS if is_limit)]
-        places = SPREAD if len(neutral) == 1 else SPREAD_FIRST
-        axes = [[min(n + 2.0 * WIDE, 0.9)] if n is not None else list(places) for n in neutral]
+        axes = []
+        for n, (name, search) in zip(neutral, self.search.items(), strict=True):
+            if n is not None:
+                axes.append([min(n + 2.0 * WIDE, 0.9)])
+            elif EFFECTS[self.id].null.get(name) == 0.0:  # a strength: what is usual shows the direction
+                usual = coordinate(getattr(EFFECTS[self.id](), name), search)
+                axes.append([min(max(usual, WIDE), 1.0 - WIDE)])
+            else:
+                axes.append(list(SPREAD))
         return list(itertools.product(*axes))
 
     def whole(self) -> Candidate:

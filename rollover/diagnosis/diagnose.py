@@ -87,7 +87,7 @@ def diagnose(
     is_mismatch = verdict not in ("no-mismatch", "cannot-tell")
     remains = after.p_value < SURE and matters(judge, explanation.fitted, after)
     training = tuple(e.name for e in found)
-    notes += _cost(found)
+    notes += [*(_felt(degrees[0]) for _ in degrees[:1] if is_mismatch), *_cost(found)]
     return Diagnosis(
         verdict=verdict,
         sentence=sentence(verdict, effects, before, h_before.held, h_after.held, found),
@@ -133,6 +133,12 @@ def _evidence(scenario: Scenario, recordings: Sequence[tuple[str, Recording]]) -
         else:
             found.append(one)
     return found, notes
+
+
+def _felt(d: Degree) -> str:
+    """The degree of freedom that misses most, in a sentence."""
+    what = "force" if d.unit == "N" else "moment"
+    return f"on the {d.body}, {d.share:.0%} of the misfit is a {what} {d.axis}, {d.rms:.3g} {d.unit} root mean square"
 
 
 def _cost(found: Sequence[Evidence]) -> list[str]:

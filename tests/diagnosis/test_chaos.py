@@ -32,10 +32,12 @@ def evidence(values: np.ndarray) -> Evidence:
 
 
 def p_value(e: Evidence, off: np.ndarray) -> float:
-    """Of "nothing but noise" for a misfit (n,) against a prediction of zero."""
+    """Of "nothing but noise" in all, or in any phase, for a misfit (n,) against a prediction of zero."""
     residual = e.whitened(off)
     block = Block(residual=residual, J=np.zeros((off.size, 0)), slope=np.zeros(off.size), shift=0.0, prior=1e-3)
-    return mismatch_of([e], [block], [((0.0, "impact"),)]).p_value
+    phases = [((0.0, "tipping"), (0.5 * N * STEP, "impact"))]
+    found = mismatch_of([e], [block], phases)
+    return min(found.p_value, *found.adjusted)
 
 
 def test_a_sample_counts_by_its_noise_and_its_scatter() -> None:
@@ -78,7 +80,7 @@ def test_what_neighbours_differ_by_is_no_mismatch_and_more_than_that_is_one() ->
     plain = evidence(np.zeros(N))
     sure = weighted(plain, strays)
     assert p_value(plain, off) < 1e-6
-    assert p_value(sure, off) > 0.05
+    assert p_value(sure, off) > 0.02
     early = np.where(t < 0.4, 0.3 * np.sin(2.0 * np.pi * 3.0 * t), 0.0)  # where no neighbour strays
     assert p_value(sure, off + early) < 1e-3
     assert p_value(sure, off + 10.0 * wave) < 1e-3
