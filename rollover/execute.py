@@ -9,6 +9,8 @@ import multiprocessing
 import os
 import pickle
 import sys
+import threading
+import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -24,6 +26,7 @@ V = TypeVar("V")
 
 AHEAD = 2  # cases handed out per worker: none idles, and an interrupt has little to throw away
 TASKS = 1000  # cases after which a worker is replaced, so that what a case leaks does not grow for ever
+LOOK = 2.0  # s between two looks of a child for its parent
 BROKEN = 3  # pools in a row that may break before a case has gone through
 KILLED = -9  # exit code of a process that was ended from outside, as the operating system does when memory runs out
 # one thread for each child: cores are shared out among cases, and a sum does not depend on how many there are
@@ -98,9 +101,17 @@ def child_pool(workers: int, warm_up: Callable[[], None] | None = None) -> Any:
 def _begin_child(warm_up: Callable[[], None] | None) -> None:
     for name in THREADS:
         os.environ.setdefault(name, "1")
+    threading.Thread(target=_leave_with, args=(os.getppid(),), daemon=True).start()
     if warm_up is not None:
         with suppress(Exception):  # the first case will say what is wrong
             warm_up()
+
+
+def _leave_with(parent: int) -> None:
+    """End this process once its parent is gone: a case that hangs would go on for ever."""
+    while os.getppid() == parent:
+        time.sleep(LOOK)
+    os._exit(1)
 
 
 def _in_children(

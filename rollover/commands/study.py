@@ -99,6 +99,8 @@ def begin(target: Path, name: str, chosen: Study) -> None:
     from rollover.study import shelf
 
     target.mkdir(parents=True, exist_ok=True)
+    for part in target.glob(".*.part"):  # of a process that was killed
+        part.unlink()
     head = f"{chosen.title}\nEvery value of the study beside this file."
     shelf.put_text(target / shelf.STUDY, document.dump(chosen, head))
     if not (target / shelf.ACCOUNT).exists() or _name_of(target / shelf.ACCOUNT) != name:
@@ -217,6 +219,8 @@ def sentences(account: dict[str, Any]) -> list[str]:
     for each in account["outputs"]:
         unit = series_unit(each["unit"])[0]
         lines.append(f"{each['name']}, {unit}")
+        if not each["cases"]:
+            lines.append("  no case has it")
         for q in each["quantiles"]:
             low, value, high = (readable(q[key], each["unit"]) for key in ("low", "value", "high"))
             bounds = f"   ({low} to {high})" if account["drawn"] else ""

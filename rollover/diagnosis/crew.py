@@ -34,11 +34,12 @@ class Job:
     only: tuple[int, ...] | None = None
     rounds: int | None = None  # as many as a whole fit may take
     width: int = 0
+    pinned: bool = False
 
     def key(self, about: str) -> str:
         """Hash of what is fitted and from where, with `about` for all else that it depends on."""
         names = [(c.key, sorted(c.search.items())) for c in self.candidates]
-        told = repr((about, self.how, names, self.start, self.shifts, self.only, self.rounds, self.width))
+        told = repr((about, self.how, names, self.start, self.shifts, self.only, self.rounds, self.width, self.pinned))
         return hashlib.sha256(told.encode()).hexdigest()
 
     @property
@@ -109,7 +110,13 @@ def work(judge: Judge, job: Job) -> Fitted | None:
     """Work off one job."""
     if job.how == "fit":
         return judge.fit(
-            job.candidates, job.start, rounds=job.rounds, only=job.only, shifts=job.shifts, width=job.width
+            job.candidates,
+            job.start,
+            rounds=job.rounds,
+            only=job.only,
+            shifts=job.shifts,
+            width=job.width,
+            pinned=job.pinned,
         )
     begun = _at(judge, job.candidates, job)
     if begun is None:

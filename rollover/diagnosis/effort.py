@@ -12,7 +12,7 @@ class Effort:
     few: int = 3  # recordings that candidates are looked at on
     scored: int | None = None  # candidates looked at closer; none: as many as for drops, and all of two parameters
     promising: int = 14  # candidates that get a first fit at each step
-    short: int = 5  # rounds of a first fit
+    short: int = 6  # rounds of a first fit
     leaders: int = 4  # first fits that are followed up, at least
     most_leaders: int = 9  # and at most
     rounds: int = 14  # of a whole fit

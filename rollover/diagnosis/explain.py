@@ -203,10 +203,11 @@ def _first_fits(
     told: dict[str, float] = {}
     say(f"first fits of {len(chosen)} candidates to {len(few)} recordings")
     at = tuple(shifts[r] for r in few)
+    pinned = base.left > FAR**2 * sum(b.residual.size for b in base.blocks)
     jobs = [
         Job(
             candidates=(*base.candidates, s.candidate), start=(*base.x, *start), shifts=at, only=tuple(few),
-            rounds=judge.effort.short,
+            rounds=judge.effort.short, pinned=pinned,
         )
         for s in chosen.values()
         for start in s.starts

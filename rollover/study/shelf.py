@@ -107,7 +107,7 @@ def claim(folder: Path, name: str, *, force: bool) -> Path:
     names = [p.name for p in target.iterdir() if not p.name.endswith(".part")]
     if foreign := sorted(set(names) - set(FILES)):
         raise _refused(folder, f"holds files that are no study's, got {foreign[0]!r}; another --out is needed")
-    if not names or force:
+    if force or not set(names) - {LOCK, STUDY}:  # nothing yet, or killed before anything was there
         return target
     try:
         found = json.loads((target / ACCOUNT).read_text(encoding="utf-8"))

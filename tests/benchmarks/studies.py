@@ -25,7 +25,7 @@ from rollover import study as studies
 from rollover.recording import as_numbers, read_table
 from rollover.study import shelf
 from rollover.study.answers import answers
-from rollover.study.case import _simulated, warm_up
+from rollover.study.case import _peak_memory, _simulated, warm_up
 from rollover.study.conduct import Builder, Conducted, Way, conduct
 from rollover.study.design import points
 from rollover.study.plan import Random
@@ -75,6 +75,7 @@ class Conduct:
     case_cpu: float  # s, of all cases together, as they told
     case_wall: float
     memory: float  # bytes, the largest child
+    parent: float
     table: bytes
 
     def says(self, alone: float) -> str:
@@ -86,8 +87,7 @@ class Conduct:
             f"({100.0 * overhead * n / self.case_cpu:.1f} %), of it {1e3 * c.own / n:.1f} ms in the parent",
             f"parallel efficiency {100.0 * self.case_wall / (self.workers * c.wall):.0f} % (workers busy), "
             f"{100.0 * n * alone / (self.workers * c.wall):.0f} % (against one case after another, alone)",
-            f"memory: {self.memory / 1e6:.0f} MB for a child, "
-            f"{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3:.0f} MB for the parent",
+            f"memory: {self.memory / 1e6:.0f} MB for a child, {self.parent / 1e6:.0f} MB for the parent",
         )
         return "\n  ".join(lines)
 
@@ -108,6 +108,7 @@ def overturns(cases: int, workers: int, scheduler: str, folder: Path) -> Conduct
         case_cpu=float(as_numbers(told["cpu_time"]).sum()),
         case_wall=float(as_numbers(told["wall_time"]).sum()),
         memory=float(max(told["peak_memory"])),
+        parent=_peak_memory(),
         table=(folder / shelf.TABLE).read_bytes(),
     )
 

@@ -5,12 +5,16 @@ from __future__ import annotations
 import os
 import signal
 import threading
+from pathlib import Path
 from typing import Any
 
 
 def odd(case: Any) -> Any:
     """What a case asks for, of the child that works it off or of the worker above it."""
     match case:
+        case Path():
+            case.write_text(str(os.getpid()))
+            threading.Event().wait()
         case "raise":
             raise ValueError("not today")
         case "die":

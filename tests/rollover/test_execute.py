@@ -5,9 +5,12 @@ from __future__ import annotations
 import itertools
 import os
 import signal
+import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -61,6 +64,35 @@ def test_memory_beyond_the_limit_is_a_failure_and_the_child_goes_on() -> None:
     assert found[0].value[1] == found[2].value[1], "the same child"
     free = next(iter(map_cases(odd, ["eat"], workers=1, memory_limit=3e9)))
     assert free.value == 2_000_000_000
+
+
+ORPHAN = """
+import sys
+from pathlib import Path
+from rollover.execute import map_cases
+from tests.rollover.odd import odd
+if __name__ == "__main__":
+    list(map_cases(odd, [Path(sys.argv[1])], workers=1))
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs /proc")
+def test_a_case_that_hangs_ends_with_its_parent(tmp_path: Path) -> None:
+    script, told = tmp_path / "orphan.py", tmp_path / "pid"
+    script.write_text(ORPHAN)
+    root = Path(__file__).resolve().parents[2]
+    parent = subprocess.Popen([sys.executable, str(script), str(told)], env={**os.environ, "PYTHONPATH": str(root)})
+    while not told.exists() or not told.read_text():
+        assert parent.poll() is None
+        time.sleep(0.05)
+    child = Path("/proc", told.read_text())
+    assert child.exists()
+    parent.kill()
+    parent.wait()
+    until = time.monotonic() + 60.0
+    while child.exists() and time.monotonic() < until:
+        time.sleep(0.1)
+    assert not child.exists()
 
 
 def warm() -> None:

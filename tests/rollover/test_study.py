@@ -100,7 +100,8 @@ def test_soil_scatter_follows_from_the_multiple_correlation() -> None:
     assert 0.25 < axis.log_deviation < 0.29
     drawn = np.log(axis.at((np.arange(20000) + 0.5) / 20000))
     assert float(drawn.std()) == pytest.approx(axis.log_deviation, rel=2e-3)
-    assert SoilScatter(name="soil", correlation=0.99).log_deviation < 0.4 * axis.log_deviation
+    tighter = SoilScatter(name="soil", correlation=0.99).log_deviation
+    assert s**2 / (s**2 + tighter**2) == pytest.approx(0.99**2, rel=1e-12)
 
 
 def test_distributions_against_their_moments() -> None:
@@ -117,14 +118,16 @@ def test_distributions_against_their_moments() -> None:
     assert log.at(u).mean() == pytest.approx(2.0 * math.exp(0.045), rel=1e-4)
 
 
-@pytest.mark.parametrize(("of", "asked"), [("normals", 0.7), ("ranks", 0.7)])
+@pytest.mark.parametrize(("of", "asked"), [("normals", 0.55), ("ranks", 0.55)])
 def test_a_correlation_is_kept_and_the_distributions_too(tmp_path: Path, of: str, asked: float) -> None:
     copula = f"correlation: {{axes: [soil, speed], matrix: [[1.0, {asked}], [{asked}, 1.0]], of: {of}}}\nplan"
-    study = studies.load(drops(tmp_path, ("count: 20", "count: 4000"), ("plan", copula)))
+    even = ("{kind: lhs, count: 20, seed: 3}", "{kind: sobol, count: 8192}")
+    study = studies.load(drops(tmp_path, even, ("plan", copula)))
     found = points(study).columns
     ranks = spearmanr(found["speed"], found["soil"]).statistic
     wanted = asked if of == "ranks" else 6.0 / math.pi * math.asin(asked / 2.0)
-    assert abs(ranks - wanted) < 0.02  # sd of a rank correlation of 4000 draws: 0.01
+    # a balanced sequence is far nearer than the 0.008 of 8192 draws; 2 sin(pi/6 0.55) differs from 0.55 by 0.018
+    assert abs(ranks - wanted) < 0.004
     assert np.quantile(found["speed"], [0.1, 0.5, 0.9]) == pytest.approx([1.25, 2.25, 3.25], abs=0.05)
 
 

@@ -23,19 +23,9 @@ SCENARIOS = sorted(path.stem for path in shipped_folder().glob("*.yaml"))
 KEPT = {"side_overturn": 2.4, "drop_test": 0.2, "static_rops_test": 4.0, "rear_overturn": 1.13}  # name -> s
 
 
-@pytest.fixture(scope="module")
-def recordings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Each scenario run once, at its own length and step."""
-    folder, found = tmp_path_factory.mktemp("shipped"), {}
-    for name in SCENARIOS:
-        run = simulate.run(load(name))
-        assert run.status == "done", (name, run.sentence)
-        found[name] = folder / f"{name}.rrd"
-        log.write_rrd(run, found[name], peaks=loads.peak_loads(run))
-    return found
-
-
-def test_recordings_are_whole_and_hold_what_their_layouts_name(recordings: dict[str, Path]) -> None:
+def test_every_recording_is_whole_and_no_view_complains(tmp_path: Path) -> None:
+    """One test: the runs are shared, and workers share nothing."""
+    recordings = {name: recorded(name, tmp_path) for name in SCENARIOS}
     assert len(recordings) > 15
     found = {name: check_rrd(path) for name, path in recordings.items()}
     assert {name: problems for name, problems in found.items() if problems} == {}
@@ -43,15 +33,22 @@ def test_recordings_are_whole_and_hold_what_their_layouts_name(recordings: dict[
         [viewer_binary(), "rrd", "verify", *recordings.values()], capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stdout + done.stderr
-
-
-@pytest.mark.skipif(not has_software_driver(), reason="no software Vulkan driver (mesa-vulkan-drivers)")
-def test_no_view_of_any_scenario_complains(recordings: dict[str, Path]) -> None:
+    if not has_software_driver():
+        pytest.skip("recordings are whole; no software Vulkan driver (mesa-vulkan-drivers) to draw them with")
     complaints: dict[str, list[str]] = {}
     for name, path in recordings.items():
         with headless_viewer() as viewer:
             complaints[name] = shown(viewer, name, path)
     assert {name: said for name, said in complaints.items() if said} == {}
+
+
+def recorded(name: str, folder: Path) -> Path:
+    """A scenario run once, at its own length and step."""
+    run = simulate.run(load(name))
+    assert run.status == "done", (name, run.sentence)
+    path = folder / f"{name}.rrd"
+    log.write_rrd(run, path, peaks=loads.peak_loads(run))
+    return path
 
 
 def shown(viewer: Any, name: str, path: Path) -> list[str]:
