@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis import colour
-from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.candidates import BESIDE, Candidate
 from rollover.diagnosis.crew import Crew, Job
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.fit import NOISE_LEFT, Fitted, Judge
@@ -113,8 +113,16 @@ def screen(judge: Judge, base: Fitted, candidates: Sequence[Candidate], few: Seq
             met.append((left, start))
         if met:
             met.sort()
-            found.append(Screened(candidate=c, starts=_apart(met), left=met[0][0], potential=potential))
+            found.append(Screened(candidate=c, starts=_begun_at(c, met), left=met[0][0], potential=potential))
     return found
+
+
+def _begun_at(c: Candidate, met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float, ...], ...]:
+    """Where fits begin: the best starts; of few and far ones the best, and beside what changes nothing."""
+    neutral = [] if c.neutral is None else [n + BESIDE for n in c.neutral if n is not None]
+    if c.neutral is None or len(neutral) < len(c.neutral):
+        return _apart(met)
+    return (tuple(neutral), met[0][1])
 
 
 def _apart(met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float, ...], ...]:
@@ -219,6 +227,7 @@ def _first_fits(
     fits.sort(key=lambda f: f.left)
     worth = [f for k, f in enumerate(fits) if k < judge.effort.leaders or f.left < WITHIN * fits[0].left]
     if judge.effort.thrifty and fits:
+        worth = _one_each(worth)
         as_it_is = sum(base.blocks[r].normal()[2] for r in few)
         worth = [f for f in worth if as_it_is - f.left >= RIVALS * (as_it_is - fits[0].left)]
     worth = worth[: judge.effort.most_leaders]
