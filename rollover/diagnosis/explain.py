@@ -74,9 +74,12 @@ def spread(base: Fitted, groups: Sequence[Sequence[int]], few: int = DROPS.few) 
 
 
 def begun(judge: Judge, base: Fitted) -> list[float]:
-    """Time shifts (s) to begin with: where the base is far off its shifts are bent by what is missing."""
+    """Time shifts (s) to begin with: where the base is far off its shifts are bent by what is missing.
+
+    Where samples are weighed by what neighbours scatter by, how far off it is cannot be told from what is left.
+    """
     count = sum(b.residual.size for b in base.blocks)
-    if base.left < FAR**2 * count:
+    if base.left < FAR**2 * count and not judge.effort.thrifty:
         return [b.shift for b in base.blocks]
     return [
         b.shift if e.recording.clock.zero == "unknown" else 0.0
@@ -211,7 +214,7 @@ def _first_fits(
     told: dict[str, float] = {}
     say(f"first fits of {len(chosen)} candidates to {len(few)} recordings")
     at = tuple(shifts[r] for r in few)
-    pinned = base.left > FAR**2 * sum(b.residual.size for b in base.blocks)
+    pinned = judge.effort.thrifty or base.left > FAR**2 * sum(b.residual.size for b in base.blocks)
     jobs = [
         Job(
             candidates=(*base.candidates, s.candidate), start=(*base.x, *start), shifts=at, only=tuple(few),
