@@ -11,11 +11,12 @@ from rollover.diagnosis.candidates import candidates_of
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.depend import dependency, residual_forces
 from rollover.diagnosis.evidence import Evidence, evidence_of, groups_of
+from rollover.diagnosis.explain import SURE
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import yardstick
 from rollover.diagnosis.phases import drop_phases
 from rollover.diagnosis.scores import judged
-from rollover.diagnosis.selection import SURE, decided, explained, matters
+from rollover.diagnosis.selection import decided, explained, matters
 from rollover.diagnosis.simulator import set_up
 from rollover.diagnosis.statements import considered, named, noise, places, sentence
 from rollover.diagnosis.verdict import Diagnosis
@@ -48,9 +49,8 @@ def diagnose(
     if unknown:
         raise ValueError(f"hold_out: no such recording, got {unknown[0]!r}; {', '.join(names)}")
     every, notes = _evidence(scenario, recordings)
-    every = _weighed(every)
-    found = [e for e in every if e.name not in hold_out]
-    kept = [e for e in every if e.name in hold_out]
+    found = _weighed([e for e in every if e.name not in hold_out])
+    kept = [e for e in _weighed(every) if e.name in hold_out] if hold_out else []
     if sum(e.count for e in found) < FEWEST:
         return _nothing(every, names, notes, began)
     groups = groups_of(found)

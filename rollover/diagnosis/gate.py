@@ -80,10 +80,10 @@ def _direction(judge: Judge, base: Fitted, c: Candidate, x: Sequence[float]) -> 
     """What the candidate at x moves, all recordings, freed of their time shifts; None where it cannot be simulated."""
     found = []
     for r, block in enumerate(base.blocks):
-        y = judge.predicted(r, (*base.candidates, c), (*base.x, *x), block.shift)
-        if y is None:
+        d = judge.moved(r, (base.candidates, base.x), ((*base.candidates, c), (*base.x, *x)), block.shift)
+        if d is None:
             return None
-        found.append(freed((y - (judge.measured[r] - block.residual))[:, None], block)[:, 0])
+        found.append(freed(d[:, None], block)[:, 0])
     return np.concatenate(found)
 
 
