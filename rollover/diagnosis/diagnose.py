@@ -13,12 +13,13 @@ from rollover.diagnosis.chassis import degrees_of
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.depend import dependency, residual_forces
 from rollover.diagnosis.evidence import Evidence, evidence_of, groups_of
+from rollover.diagnosis.explain import SURE
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import yardstick
 from rollover.diagnosis.overturn import RunSimulator
 from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.scores import judged
-from rollover.diagnosis.selection import SURE, decided, explained, matters
+from rollover.diagnosis.selection import decided, explained, matters
 from rollover.diagnosis.simulator import set_up
 from rollover.diagnosis.statements import considered, named, noise, places, sentence
 from rollover.diagnosis.verdict import Degree, Diagnosis
@@ -51,9 +52,8 @@ def diagnose(
     if unknown:
         raise ValueError(f"hold_out: no such recording, got {unknown[0]!r}; {', '.join(names)}")
     every, notes = _evidence(scenario, recordings)
-    every = [weighted(e, e.simulator.strays()) for e in _weighed(every)]
-    found = [e for e in every if e.name not in hold_out]
-    kept = [e for e in every if e.name in hold_out]
+    found = _trusted([e for e in every if e.name not in hold_out])
+    kept = [e for e in _trusted(every) if e.name in hold_out] if hold_out else []
     if sum(e.count for e in found) < FEWEST:
         return _nothing(every, names, notes, began)
     groups = groups_of(found)
@@ -122,6 +122,11 @@ def _weighed(every: Sequence[Evidence]) -> list[Evidence]:
     judge.aligned()
     base = judge.fit((), (), rounds=2)
     return list(every) if base is None else colour.quiet(every, judge.residuals(base))
+
+
+def _trusted(every: Sequence[Evidence]) -> list[Evidence]:
+    """The recordings weighed, what the simulation itself is not sure of less."""
+    return [weighted(e, e.simulator.strays()) for e in _weighed(every)]
 
 
 def _evidence(scenario: Scenario, recordings: Sequence[tuple[str, Recording]]) -> tuple[list[Evidence], list[str]]:

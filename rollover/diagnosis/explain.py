@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rollover.diagnosis import colour
 from rollover.diagnosis.candidates import BESIDE, Candidate
 from rollover.diagnosis.crew import Crew, Job
+from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.fit import NOISE_LEFT, Fitted, Judge
 from rollover.diagnosis.gate import Gate, freed
@@ -29,7 +30,11 @@ WORTH = 12.0  # gain that pays for a shape
 APART = 2.0  # standard errors beyond which a rival is excluded
 NEARLY_NOISE = 1.3  # misfit over the noise up to which its own colour is believed
 
+LIKE_NOISE = 2.2  # misfit over the noise up to which it may be noise that was underrated
+SURE = 1e-3  # p-value below which there is a mismatch
+
 Progress = Callable[[str], None]
+Phases = Sequence[Sequence[tuple[float, str]]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,6 +147,7 @@ def step(
     base: Fitted,
     candidates: Sequence[Candidate],
     groups: Sequence[Sequence[int]],
+    phases: Phases,
     say: Progress,
     looked: Gate,
     crew: Crew,
@@ -171,12 +177,26 @@ def step(
         polished = crew.fits(judge, [_from(f, "polish") for f in near], say)
         fits = [f for f in fits if f not in near] + [new or old for new, old in zip(polished, near, strict=True)]
     fits = _one_each(fits) if judge.effort.thrifty else _shaped(judge, _one_each(fits), crew, say)
-    if fits[0].left < NEARLY_NOISE**2 * count:
-        judge.weigh(colour.whole(judge.evidence, judge.residuals(fits[0])))
+    if weighed(judge, fits[0], phases):
         base, fits = judge.again(base), [judge.again(f) for f in fits]
     fits.sort(key=lambda f: held_out(f, groups).left.sum())
     phi = max(1.0, min(f.left for f in fits) / count)  # what even the best leaves is no chance of the noise's size
     return Step(base=base, fitted=fits[0], p_value=looked.p_value(phi), rivals=tuple(fits), screened=tuple(screened))
+
+
+def weighed(judge: Judge, fitted: Fitted, phases: Phases) -> bool:
+    """Weigh the recordings by all that a fit leaves, if that is noise: as little as seen, or more without structure."""
+    left, count = fitted.left, sum(b.residual.size for b in fitted.blocks)
+    if left > LIKE_NOISE**2 * count:
+        return False
+    before = judge.evidence
+    judge.weigh(colour.whole(before, judge.residuals(fitted)))
+    if left < NEARLY_NOISE**2 * count:
+        return True
+    if mismatch_of(judge.evidence, judge.again(fitted).blocks, phases).p_value > SURE:
+        return True
+    judge.weigh(before)
+    return False
 
 
 def _promising(candidates: Sequence[Candidate], looked: Gate, scored: int | None) -> list[Candidate]:
