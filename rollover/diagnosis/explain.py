@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis import colour
-from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.candidates import BESIDE, Candidate
 from rollover.diagnosis.crew import Crew, Job
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.fit import NOISE_LEFT, Fitted, Judge
@@ -74,9 +74,12 @@ def spread(base: Fitted, groups: Sequence[Sequence[int]], few: int = DROPS.few) 
 
 
 def begun(judge: Judge, base: Fitted) -> list[float]:
-    """Time shifts (s) to begin with: where the base is far off its shifts are bent by what is missing."""
+    """Time shifts (s) to begin with: where the base is far off its shifts are bent by what is missing.
+
+    Where samples are weighed by what neighbours scatter by, how far off it is cannot be told from what is left.
+    """
     count = sum(b.residual.size for b in base.blocks)
-    if base.left < FAR**2 * count:
+    if base.left < FAR**2 * count and not judge.effort.thrifty:
         return [b.shift for b in base.blocks]
     return [
         b.shift if e.recording.clock.zero == "unknown" else 0.0
@@ -113,8 +116,16 @@ def screen(judge: Judge, base: Fitted, candidates: Sequence[Candidate], few: Seq
             met.append((left, start))
         if met:
             met.sort()
-            found.append(Screened(candidate=c, starts=_apart(met), left=met[0][0], potential=potential))
+            found.append(Screened(candidate=c, starts=_begun_at(c, met), left=met[0][0], potential=potential))
     return found
+
+
+def _begun_at(c: Candidate, met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float, ...], ...]:
+    """Where fits begin: the best starts; of few and far ones the best, and beside what changes nothing."""
+    neutral = [] if c.neutral is None else [n + BESIDE for n in c.neutral if n is not None]
+    if c.neutral is None or len(neutral) < len(c.neutral):
+        return _apart(met)
+    return (tuple(neutral), met[0][1])
 
 
 def _apart(met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float, ...], ...]:
@@ -203,7 +214,7 @@ def _first_fits(
     told: dict[str, float] = {}
     say(f"first fits of {len(chosen)} candidates to {len(few)} recordings")
     at = tuple(shifts[r] for r in few)
-    pinned = base.left > FAR**2 * sum(b.residual.size for b in base.blocks)
+    pinned = judge.effort.thrifty or base.left > FAR**2 * sum(b.residual.size for b in base.blocks)
     jobs = [
         Job(
             candidates=(*base.candidates, s.candidate), start=(*base.x, *start), shifts=at, only=tuple(few),
@@ -219,6 +230,7 @@ def _first_fits(
     fits.sort(key=lambda f: f.left)
     worth = [f for k, f in enumerate(fits) if k < judge.effort.leaders or f.left < WITHIN * fits[0].left]
     if judge.effort.thrifty and fits:
+        worth = _one_each(worth)
         as_it_is = sum(base.blocks[r].normal()[2] for r in few)
         worth = [f for f in worth if as_it_is - f.left >= RIVALS * (as_it_is - fits[0].left)]
     worth = worth[: judge.effort.most_leaders]
