@@ -21,7 +21,6 @@ Array = NDArray[np.float64]
 # shape parameters that stay at their default: few recordings tell them apart from the strength
 SHAPES = {
     "soil-viscous-damping": ("exponent",),
-    "soil-elastic-rebound": ("damping_ratio",),
     "soil-adhesion": ("reach",),
     "tank-slosh": ("damping",),
     "payload-shift": ("friction",),

@@ -54,14 +54,6 @@ def test_one_effect_is_named_with_its_value(id: str, seed: int, verdict: str, tm
     assert not found.remaining_significant
 
 
-def test_both_of_two_effects_are_named(tmp_path: Any) -> None:
-    order = Order(index=0, seed=432, kind="pair", ids=("soil-stiffness", "sensor-gain"))
-    _, found, row = diagnosed(order, tmp_path)
-    assert row["both_in_sets"]
-    assert len(found.effects) == 2
-    assert found.after["held_out"].nrmse < 1.2
-
-
 def test_what_no_table_holds_is_not_given_a_name(tmp_path: Any) -> None:
     order = Order(index=0, seed=440, kind="outside", ids=("outside:bands",))
     _, found, row = diagnosed(order, tmp_path)
