@@ -11,9 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ground.law import REFERENCE_AREA, REFERENCE_MASS
 from rollover.channels import describe
 from rollover.diagnosis.evidence import Evidence
 from rollover.effects import EFFECTS, Search, effects
+from rollover.scenario import Scenario
+from rollover.vehicle import Striker
 
 Array = NDArray[np.float64]
 
@@ -83,8 +86,25 @@ def coordinate(value: float, search: Search) -> float:
     return (value - search.low) / (search.high - search.low)
 
 
-def candidates_of(evidence: Sequence[Evidence], switched_on: Iterable[str], acts: str) -> list[Candidate]:
-    """All candidates for these recordings; effects that the scenario has switched on already do not compete."""
+def size_of(scenario: Scenario) -> tuple[float, float]:
+    """Mass and face over those of the reference striker, at most 1: what falls may be smaller than the ranges are for.
+
+    A vehicle has no face: 1.
+    """
+    vehicle = scenario.vehicle
+    if not isinstance(vehicle, Striker):
+        return min(vehicle.whole.mass / REFERENCE_MASS, 1.0), 1.0
+    face = math.pi * vehicle.nose_radius**2 if vehicle.nose == "cone" else vehicle.face_length * vehicle.face_width
+    return min(vehicle.mass / REFERENCE_MASS, 1.0), min(face / REFERENCE_AREA, 1.0)
+
+
+def candidates_of(
+    evidence: Sequence[Evidence], switched_on: Iterable[str], acts: str, size: tuple[float, float] = (1.0, 1.0)
+) -> list[Candidate]:
+    """All candidates for these recordings; effects that the scenario has switched on already do not compete.
+
+    `size` is that of what falls, see `size_of`.
+    """
     effects()
     spans: dict[str, float] = {}
     for e in evidence:
@@ -97,9 +117,17 @@ def candidates_of(evidence: Sequence[Evidence], switched_on: Iterable[str], acts
         if kind.kind == "sensor":
             found += [c for channel in spans if (c := _sensor(name, kind, channel, spans))]
             continue
-        search = {p: s for p, s in kind.search.items() if p not in SHAPES.get(name, ())}
+        search = {p: _sized(s, kind.grows.get(p), size) for p, s in kind.search.items() if p not in SHAPES.get(name, ())}
         found.append(Candidate(id=name, kind=kind.kind, family=kind.family, search=search))
     return found
+
+
+def _sized(search: Search, powers: tuple[float, float] | None, size: tuple[float, float]) -> Search:
+    """The range for what falls; a range at the reference stays itself to the last bit."""
+    if powers is None or size == (1.0, 1.0):
+        return search
+    factor = size[0] ** powers[0] * size[1] ** powers[1]
+    return Search(factor * search.low, factor * search.high, search.scale)
 
 
 def _sensor(name: str, kind: Any, channel: str, spans: Mapping[str, float]) -> Candidate | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 
-from rollover.diagnosis.candidates import candidates_of
+from rollover.diagnosis.candidates import candidates_of, size_of
 from rollover.diagnosis.depend import dependency, residual_forces
 from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.evidence import Evidence, binned, evidence_of, groups_of, recoloured
@@ -62,7 +62,8 @@ def diagnose(
     phases = [drop_phases(e) for e in found]
     before = mismatch_of(found, base.blocks, phases)
     acts = "drop" if all(isinstance(e.simulator, DropSimulator) for e in found) else "rollover"
-    candidates = candidates_of(found, scenario.effects, acts)
+    size = size_of(set_up(scenario, found[0].recording))
+    candidates = candidates_of(found, scenario.effects, acts, size)
     steps, current = selected(judge, base, candidates, groups, phases, say)
     steps, current, verdict = decided(judge, base, before, steps, groups)
     after = mismatch_of(found, current.blocks, phases)

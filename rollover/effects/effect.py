@@ -43,6 +43,8 @@ class Effect:
     channels: ClassVar[tuple[str, ...]] = ()  # that feel it first
     null: ClassVar[Mapping[str, float | None]] = {}
     search: ClassVar[Mapping[str, Search]] = {}
+    # parameter -> powers of mass and of face with which its range grows, from a striker of 132 kg on the reference face
+    grows: ClassVar[Mapping[str, tuple[float, float]]] = {}
 
     def __init_subclass__(cls) -> None:
         """Enter the table. Raises ``TypeError`` for a class without an id and for an id given twice."""
