@@ -1,0 +1,63 @@
+"""What a recording's conditions leave uncertain, profiled out of the comparison.
+
+With N (n, q) what one standard deviation of each uncertain condition does to the whitened samples, a misfit has the
+covariance 1 + N N' in place of 1. With N = U S V',
+
+    w -> (1 + N N')^-1/2 w = w - U (1 - (1 + S^2)^-1/2) U'w                                                    (D3)
+
+has the covariance 1 again: what an error of the conditions would do counts little, all else as before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.document import leaf
+from rollover.recording import Doubt
+from rollover.scenario import Scenario
+
+Array = NDArray[np.float64]
+LEAST = 1e-9  # of the largest: directions below are rounding
+
+
+@dataclass(frozen=True, kw_only=True)
+class Eased:
+    """(D3): directions U (n, q) of unit length, and the share of each that is taken out (q,)."""
+
+    directions: Array
+    shares: Array
+
+    def __call__(self, values: Array) -> Array:
+        """Whitened misfit or its derivatives, (n,) or (n, m), freed of what the conditions leave uncertain."""
+        inside = self.shares[:, None] * (self.directions.T @ values.reshape(values.shape[0], -1))
+        return np.asarray(values - (self.directions @ inside).reshape(values.shape))
+
+
+def eased(columns: Array) -> Eased:
+    """From N (n, q), columns of what 1 sigma of each condition does."""
+    U, S, _ = np.linalg.svd(columns, full_matrices=False)
+    kept = S > LEAST * max(float(S.max(initial=0.0)), 1e-300)
+    return Eased(directions=U[:, kept], shares=1.0 - 1.0 / np.sqrt(1.0 + S[kept] ** 2))
+
+
+def doubts(scenario: Scenario, uncertainty: Mapping[str, Doubt]) -> list[dict[str, Any]]:
+    """Values to exchange for an error of one standard deviation, one mapping for each uncertain number.
+
+    Raises `InputError` for a path that the scenario does not have, or that is no number or list of as many.
+    """
+    found = []
+    for path, sigma in uncertainty.items():
+        value = leaf(scenario, path)
+        if isinstance(sigma, tuple):
+            for k, one in enumerate(sigma):
+                moved = list(value)
+                moved[k] += one
+                found.append({path: moved})
+        else:
+            found.append({path: value + sigma})
+    return found
