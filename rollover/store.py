@@ -36,6 +36,7 @@ RUN, SCENARIO, CHANNELS, EVENTS, PICTURE, PAGE = (
     "report.html",
 )
 FILES = (RUN, SCENARIO, CHANNELS, EVENTS, PICTURE, PAGE)
+VIEWER = "viewer.html"  # the only other file that may stand there; a new run's folder begins without it
 
 
 def versions() -> dict[str, str]:
@@ -54,7 +55,7 @@ def claim(folder: Path, scenario_hash: str, *, force: bool = False) -> Path:
     Results of the same scenario and versions may be written again; others only with `force`. A folder that holds
     anything but results is never touched.
     """
-    target, names = _own_files(folder, FILES, RUN)
+    target, names = _own_files(folder, (*FILES, VIEWER), RUN)
     if not names or force:
         return target
     found = read_run_json(target)

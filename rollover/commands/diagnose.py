@@ -59,7 +59,7 @@ def diagnose(
     if set_:
         chosen = chosen.replaced(settings(set_), origin="--set")
     measured = read(recordings)
-    _check(path, chosen, measured)
+    _check(chosen, measured)
     held = _held_out(list(measured), hold_out or [])
     folder = out or Path("out", "diagnose", path.stem)
     about: dict[str, Any] = {
@@ -139,19 +139,16 @@ def _files(path: Path) -> list[Path]:
     return files
 
 
-def _check(path: Path, scenario: Scenario, measured: Mapping[str, Recording]) -> None:
-    """Refuse what is no drop test, and conditions that the scenario does not know. Raises `InputError`."""
+def _check(scenario: Scenario, measured: Mapping[str, Recording]) -> None:
+    """Refuse conditions that the scenario does not know, all at once. Raises `InputError`."""
     from rollover.diagnosis.simulator import set_up
-    from rollover.drop import unfit
 
-    reason = unfit(scenario)
-    if reason:
-        raise InputError(Fault(file=str(path), message=reason))
-    faults = []
-    for name, recording in measured.items():
-        reason = unfit(set_up(scenario, recording))
-        if reason:
-            faults.append(Fault(file=name, message=f"conditions: {reason}"))
+    faults: list[Fault] = []
+    for recording in measured.values():
+        try:
+            set_up(scenario, recording)
+        except InputError as e:
+            faults += e.faults
     if faults:
         raise InputError(*faults)
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from rollover.commands.door import answering, app
+from rollover.commands.door import Force, answering, app
 from rollover.faults import Fault, InputError
 
 
@@ -15,18 +16,82 @@ from rollover.faults import Fault, InputError
 @answering
 def view(
     results: Annotated[Path, typer.Argument(help="A results folder or an .rrd file.", metavar="DIR_OR_RRD")],
+    html: Annotated[
+        Path | None, typer.Option(help="Write one HTML file with viewer and recording in it, and open nothing.")
+    ] = None,
+    force: Force = False,
 ) -> None:
-    """Open the recorded visualisation in the native viewer."""
-    from rollover.store import PICTURE
+    """Open the recorded visualisation in the native viewer, or put it into one HTML file.
 
-    path = results / PICTURE if results.is_dir() else results
-    if not path.is_file():
-        raise InputError(Fault(file=str(results), message=f"no {PICTURE} there; `rollover run` writes one"))
-    from viz.viewer import open_viewer
-
+    The HTML file holds the viewer and the recording, about 20 MB: it opens in a browser by a double click, without a
+    network and without this program, and asks nobody for anything.
+    """
+    path = _recording(results)
     try:
+        if html is not None:
+            _page(path, html, force)
+            return
+        from viz.viewer import open_viewer
+
         status = open_viewer(path)
     except FileNotFoundError as e:
         raise InputError(Fault(message=str(e))) from None
     if status != 0:
         raise InputError(Fault(file=str(path), message=f"the viewer could not show it, it ended with status {status}"))
+
+
+def _recording(results: Path) -> Path:
+    """The .rrd of a results folder, or the file itself. Raises `InputError`."""
+    from rollover.faults import nearest
+    from rollover.store import PICTURE
+
+    if results.is_dir():
+        found = [results / PICTURE] if (results / PICTURE).is_file() else sorted(results.glob("*.rrd"))
+        if not found:
+            raise InputError(Fault(file=str(results), message=f"no {PICTURE} there; `rollover run` writes one"))
+        if len(found) > 1:
+            names = ", ".join(p.name for p in found)
+            raise InputError(Fault(file=str(results), message=f"several recordings, got {names}; name one of them"))
+        return found[0]
+    if not results.is_file():
+        beside = [p.name for p in results.parent.glob("*")] if results.parent.is_dir() else []
+        meant = [str(results.with_name(name)) for name in nearest(results.name, beside)]
+        cure = f"did you mean {meant[0]!r}?" if meant else "`rollover run` writes a folder with one"
+        raise InputError(Fault(file=str(results), message=f"no such recording; {cure}"))
+    if results.suffix != ".rrd":
+        raise InputError(Fault(file=str(results), message="not a recording for the viewer; an .rrd file is needed"))
+    return results
+
+
+def _page(path: Path, html: Path, force: bool) -> None:
+    """Write the page beside the native viewer. Raises `InputError`."""
+    from rollover import console
+    from rollover.store import RUN, VIEWER
+    from viz.web_page import write_page
+
+    if html.is_dir() or html.suffix.lower() not in (".html", ".htm"):
+        raise InputError(
+            Fault(file="--html", message=f"not the name of a page, got {str(html)!r}; NAME.html is needed")
+        )
+    if html.exists() and not force:
+        raise InputError(Fault(file=str(html), message="exists; --force replaces it"))
+    if (html.parent / RUN).exists() and html.name != VIEWER:
+        raise InputError(Fault(file=str(html), message=f"a page in a results folder is {VIEWER}, got {html.name!r}"))
+    title, footer = _about(path)
+    try:
+        write_page(path, html, title=title, footer=footer)
+    except OSError as e:
+        raise InputError(Fault(file=str(html), message=str(e))) from None
+    console.say(f"Written: {html}, {html.stat().st_size / 1e6:.0f} MB. A double click opens it.")
+
+
+def _about(path: Path) -> tuple[str, str]:
+    """Title of a recording and what it rests on, as far as the folder says."""
+    from rollover.store import RUN, versions
+
+    try:
+        found = json.loads((path.parent / RUN).read_text(encoding="utf-8"))
+        own, scenario, title = found["versions"]["rollover"], found["scenario_hash"], found["title"]
+    except (OSError, ValueError, KeyError, TypeError):  # no run's folder
+        return path.stem, f"rollover {versions()['rollover']}."
+    return str(title), f"rollover {own}, scenario {scenario}."

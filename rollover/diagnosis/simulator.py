@@ -8,9 +8,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.overturn import RunSimulator
 from rollover.drop import DropFailedError, DropModel, unfit
 from rollover.effects import read
-from rollover.faults import Fault, InputError
 from rollover.filters import filtered
 from rollover.recording import Recording
 from rollover.scenario import Scenario
@@ -74,13 +74,10 @@ def behind_filters(channels: Mapping[str, Array], recording: Recording) -> dict[
 def simulator_of(scenario: Scenario, recording: Recording) -> Simulator:
     """The quickest simulator that a scenario admits; the recording's conditions are put in by path.
 
-    Raises `InputError` for a condition that the scenario does not know, and for a scenario that is no drop test.
+    Raises `InputError` for a condition that the scenario does not know.
     """
     own = set_up(scenario, recording)
-    reason = unfit(own)
-    if reason:
-        raise InputError(Fault(message=f"{scenario.title}: {reason}; only drop tests can be diagnosed"))
-    return DropSimulator(own, recording)
+    return RunSimulator(own, recording) if unfit(own) else DropSimulator(own, recording)
 
 
 def set_up(scenario: Scenario, recording: Recording) -> Scenario:
@@ -88,4 +85,4 @@ def set_up(scenario: Scenario, recording: Recording) -> Scenario:
     return scenario.replaced(dict(recording.conditions), origin=recording.title) if recording.conditions else scenario
 
 
-__all__ = ["DropSimulator", "Simulator", "behind_filters", "set_up", "simulator_of"]
+__all__ = ["DropSimulator", "RunSimulator", "Simulator", "behind_filters", "set_up", "simulator_of"]

@@ -12,11 +12,9 @@ from rollover.diagnosis.depend import ACCELERATION, DEPTH, SPEED, TIME, Residual
 from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.phases import drop_phases
 from rollover.diagnosis.simulator import set_up, simulator_of
-from rollover.effects import EFFECTS, Search
-from rollover.faults import InputError
+from rollover.effects import Search
 from tests.diagnosis import drops
 from tests.diagnosis.drops import recorded, scenario
-from tests.physics.scenes import shipped
 
 
 @pytest.mark.parametrize("search", [Search(0.2, 8.0, "log"), Search(-0.3, 0.5)])
@@ -101,11 +99,3 @@ def test_viscous_damping_shows_as_a_force_that_depends_on_speed() -> None:
         fast = f.of[SPEED] > 0.5 * f.of[SPEED].max()
         assert np.median(f.force[fast] / f.of[SPEED][fast]) == pytest.approx(800.0, rel=0.1)
     assert dependency(forces)[0][0] == SPEED
-
-
-def test_what_is_no_drop_test_is_refused_in_one_line() -> None:
-    _, recording = recorded({}, speeds=(2.0,))[0]
-    name = next(p.stem for p in sorted((drops.shipped.__globals__["SHIPPED"]).glob("*.yaml")) if "tractor" in p.stem)
-    with pytest.raises(InputError, match="only drop tests can be diagnosed"):
-        simulator_of(shipped(name), recording.__class__(title="r", time=recording.time, channels=recording.channels))
-    assert EFFECTS

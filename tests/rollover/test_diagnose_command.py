@@ -221,7 +221,7 @@ def test_results_of_other_recordings_are_not_overwritten(done: tuple[Path, Resul
         (["drop_test", "{empty}"], "no recordings in this folder"),
         (["drop_test", "{folder}/none.csv"], "no such file"),
         (["drop_test", "{folder}", "{folder}/v1.csv"], "a second recording by this name, got 'v1'"),
-        (["side_overturn", "{folder}"], "vehicle.kind: not a drop test, got 'vehicle'; 'striker' is needed"),
+        (["side_overturn", "{folder}/v1.csv"], "initiation.speed: no such path"),
         (["drop_test", "{folder}", "--set", "initiation.sped=2"], "initiation.sped"),
     ],
 )

@@ -17,6 +17,7 @@ from typing import Any
 
 from viz.viewer import viewer_binary
 
+KEPT = Path(__file__).resolve().parents[2] / "out" / "pictures"  # for people to look at after the tests
 DRIVERS = Path("/usr/share/vulkan/icd.d")
 _HARMLESS = ("Software rasterizer", "loss of performance", "not found for screenshot")
 
@@ -24,6 +25,14 @@ _HARMLESS = ("Software rasterizer", "loss of performance", "not found for screen
 def has_software_driver() -> bool:
     """Whether pictures can be made on a machine without a graphics card."""
     return DRIVERS.is_dir() and any("lvp" in p.name for p in DRIVERS.iterdir())
+
+
+def kept(name: str, picture: bytes) -> Path:
+    """Keep a picture for people to look at."""
+    KEPT.mkdir(parents=True, exist_ok=True)
+    path = KEPT / name
+    path.write_bytes(picture)
+    return path
 
 
 @contextmanager

@@ -1,0 +1,142 @@
+"""Full runs under a diagnosis: what is run, what is only read off, instruments, and runs that come to nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rollover import simulate
+from rollover.diagnosis import overturn
+from rollover.diagnosis.overturn import RunSimulator
+from rollover.diagnosis.simulator import DropSimulator, simulator_of
+from rollover.filters import filtered
+from rollover.measured import at_sensor
+from rollover.recording import Recording, Sensor
+from rollover.scenario import Scenario
+from tests.physics.scenes import shipped
+
+ROLL, Z = "chassis/angular_velocity_x", "chassis/position_z"
+UP = "sensor/corner/acceleration_z"
+FRICTION = "effects.ground-friction.coefficient"
+
+
+def toss() -> Scenario:
+    return shipped("cube_toss")
+
+
+def recording(*channels: str, until: float = 0.3, start: float = 0.0, **more: Any) -> Recording:
+    time = np.arange(start, until, 0.0071)
+    return Recording(title="toss", time=time, channels={c: np.zeros(time.size) for c in channels}, **more)
+
+
+def run(changes: Mapping[str, Any] | None = None) -> Recording:
+    own = toss().replaced({"simulation.duration": 0.5, **(changes or {})})
+    return simulate.run(own).recording
+
+
+def test_a_prediction_is_the_run_at_the_stamps_less_the_shift() -> None:
+    made = recording(ROLL, Z)
+    simulator = simulator_of(toss(), made)
+    assert isinstance(simulator, RunSimulator)
+    found = simulator.predict({FRICTION: 0.4}, 0.003)
+    expected = run({FRICTION: 0.4})
+    assert found is not None
+    for name in (ROLL, Z):
+        np.testing.assert_array_equal(found[name], np.interp(made.time - 0.003, expected.time, expected[name]))
+    plain = simulator.predict({}, 0.003)
+    assert plain is not None
+    assert np.ptp(found[ROLL] - plain[ROLL]) > 0.1
+
+
+def test_the_run_is_no_longer_than_the_recording_needs() -> None:
+    simulator = RunSimulator(toss(), recording(Z, until=0.3))
+    last = float(recording(Z, until=0.3).time[-1])
+    assert last + 0.03 < simulator.scenario.simulation.duration < last + 0.1
+    assert RunSimulator(toss(), recording(Z, until=3.0)).scenario.simulation.duration > 2.99
+
+
+def test_shifts_and_sensors_cost_no_run() -> None:
+    simulator = RunSimulator(toss(), recording(Z, ROLL))
+    first = simulator.predict({}, 0.0)
+    simulator.predict({}, 0.002)
+    gain = {"effects.sensor-gain.channel": ROLL, "effects.sensor-gain.gain": 1.1}
+    read = simulator.predict(gain, 0.0)
+    assert simulator.runs == 1
+    assert first is not None
+    assert read is not None
+    np.testing.assert_allclose(read[ROLL], 1.1 * first[ROLL], rtol=1e-12)
+    np.testing.assert_array_equal(read[Z], first[Z])
+    both = simulator.predict({**gain, FRICTION: 0.4}, 0.0)
+    again = simulator.predict({FRICTION: 0.4}, 0.0)
+    assert simulator.runs == 2
+    assert both is not None
+    assert again is not None
+    np.testing.assert_allclose(both[ROLL], 1.1 * again[ROLL], rtol=1e-12)
+
+
+def test_a_sensor_that_the_scenario_knows_of_is_read_once() -> None:
+    gain = {"effects.sensor-gain.channel": ROLL, "effects.sensor-gain.gain": 1.1}
+    plain = RunSimulator(toss(), recording(ROLL)).predict({}, 0.0)
+    known = RunSimulator(toss().replaced(gain), recording(ROLL)).predict({"effects.sensor-bias.channel": ROLL}, 0.0)
+    assert plain is not None
+    assert known is not None
+    np.testing.assert_allclose(known[ROLL], 1.1 * plain[ROLL] + 50.0, rtol=1e-12)
+
+
+def test_instruments_are_read_where_the_recording_puts_them() -> None:
+    sensor = Sensor(body="chassis", position=(0.05, 0.0, 0.02), orientation_deg=(0.0, 30.0, 0.0), gravity="proper")
+    made = recording(UP, sensors={UP: sensor})
+    found = RunSimulator(toss(), made).predict({}, 0.0)
+    whole = run()
+    there = at_sensor(whole, UP, sensor, centre_of_mass=(0.0, 0.0, 0.0), gravity=9.81)
+    assert found is not None
+    early = made.time < 0.28  # ends of the run differ, and its last difference with them
+    np.testing.assert_allclose(found[UP][early], np.interp(made.time, whole.time, there)[early], rtol=1e-9)
+
+
+def test_channels_go_through_the_filter_class_that_was_applied() -> None:
+    made = recording("chassis/acceleration_z", cfc={"chassis/acceleration_z": 60})
+    found = RunSimulator(toss(), made).predict({}, 0.0)
+    whole = run()
+    expected = np.interp(made.time, whole.time, filtered(whole["chassis/acceleration_z"], 0.0005, 60))
+    assert found is not None
+    early = made.time < 0.25
+    np.testing.assert_allclose(found["chassis/acceleration_z"][early], expected[early], rtol=1e-6, atol=1e-6)
+
+
+def test_what_the_run_has_no_rows_of_is_not_predicted() -> None:
+    made = recording(Z, start=-0.2)
+    found = RunSimulator(toss(), made).predict({}, 0.0)
+    assert found is not None
+    assert np.all(np.isnan(found[Z][made.time < -0.07]))
+    assert np.all(np.isfinite(found[Z][made.time >= 0.0]))
+
+
+def test_a_run_that_fails_predicts_nothing() -> None:
+    lost = RunSimulator(toss().replaced({"initiation.velocity": [60.0, 0.0, 0.0]}), recording(Z))
+    assert lost.predict({}, 0.0) is None
+    assert lost.predict({}, 0.001) is None
+    assert lost.runs == 1
+
+
+def test_a_run_that_loses_its_way_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    simulator = RunSimulator(toss(), recording(Z, until=4.0))
+    monkeypatch.setattr(overturn, "LEAST_TIME", 0.0)
+    monkeypatch.setattr(overturn, "SLOWEST", 0.0)
+    assert simulator.predict({}, 0.0) is not None
+
+    def endless(_: Scenario, *, progress: Any) -> Any:
+        while True:
+            progress(0.0, 1.0)
+
+    monkeypatch.setattr(simulate, "run", endless)
+    assert simulator.predict({FRICTION: 0.4}, 0.0) is None
+
+
+def test_drops_keep_their_own_integrator() -> None:
+    time = np.arange(0.0, 0.1, 0.001)
+    made = Recording(title="r", time=time, channels={"ground/sinkage": np.zeros(time.size)})
+    assert isinstance(simulator_of(shipped("drop_test"), made), DropSimulator)

@@ -1,0 +1,129 @@
+"""One HTML file with a recording and the viewer itself, for a reader who has only a browser.
+
+The viewer's script and its WebAssembly are asked from the installed viewer, which serves them for its own web page;
+they stand in the file as they came, so that viewer and recording are of one version. A content security policy in the
+page forbids every connection: nothing is loaded from elsewhere and nobody is told.
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import functools
+import gzip
+import html
+import http.client
+import json
+import os
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from viz.viewer import viewer_binary
+
+TEMPLATE = Path(__file__).parent / "templates" / "viewer.html"
+SCRIPT, PROGRAM = "/re_viewer.js", "/re_viewer_bg.wasm"
+PATIENCE = 30.0  # s, until the viewer serves its page
+
+
+@dataclass(frozen=True, kw_only=True)
+class Viewer:
+    """What a browser needs of the viewer: its script, and its program packed by gzip."""
+
+    script: str
+    program: bytes
+
+
+def write_page(recording: Path, path: Path, *, title: str, footer: str = "") -> None:
+    """Write the page of a recording, whole or not at all; `footer` says where the recording is from.
+
+    Raises ``FileNotFoundError`` where there is no recording or the installed SDK brings no viewer, and ``OSError``
+    for a viewer that does not serve its web page.
+    """
+    if not recording.is_file():
+        raise FileNotFoundError(f"{recording}: no such recording")
+    text = page(recording.read_bytes(), installed(), title=title, footer=footer)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        part.write_text(text, encoding="utf-8")
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def page(recording: bytes, viewer: Viewer, *, title: str, footer: str = "") -> str:
+    """HTML text with everything in it."""
+    parts = {
+        "title": html.escape(title),
+        "footer": html.escape(footer),
+        "name": _in_script(json.dumps(title)),
+        "script": _in_script(viewer.script),
+        "program": base64.b64encode(viewer.program).decode("ascii"),
+        "recording": base64.b64encode(gzip.compress(recording, 6, mtime=0)).decode("ascii"),
+    }
+    pieces = TEMPLATE.read_text(encoding="utf-8").split("@@")  # every second one is a part's name
+    return "".join(parts[piece] if k % 2 else piece for k, piece in enumerate(pieces))
+
+
+def _in_script(text: str) -> str:
+    """Text as it may stand in a script element, which ends at the first ``</script`` wherever that stands."""
+    return text.replace("</script", "<\\/script").replace("<!--", "<\\!--")
+
+
+@functools.cache
+def installed() -> Viewer:
+    """The installed viewer. Raises ``FileNotFoundError``, or ``OSError`` if it does not serve its page."""
+    with _serving(viewer_binary()) as port:
+        script, program = _fetched(port, SCRIPT).decode("utf-8"), _fetched(port, PROGRAM)
+    if not program.startswith(b"\0asm") or "WebHandle" not in script:
+        raise OSError("viewer: what it serves is not its web viewer; another version of rerun-sdk may help")
+    return Viewer(script=script, program=gzip.compress(program, 6, mtime=0))
+
+
+@contextlib.contextmanager
+def _serving(binary: Path) -> Iterator[int]:
+    """Port of this machine at which the viewer serves its page, for as long as that is needed."""
+    port, other = _free_ports()
+    command = [str(binary), "--serve-web", "--bind", "127.0.0.1", "--web-viewer-port", str(port), "--port", str(other)]
+    nowhere = subprocess.DEVNULL
+    quiet = {"RUST_LOG": "error", **os.environ}
+    subprocess.run([binary, "analytics", "disable"], check=False, stdout=nowhere, stderr=nowhere, env=quiet)
+    child = subprocess.Popen(command, stdout=nowhere, stderr=nowhere, env=quiet)
+    try:
+        deadline = time.monotonic() + PATIENCE
+        while not _answers(port):
+            if child.poll() is not None or time.monotonic() > deadline:
+                raise OSError("viewer: it did not serve its web page on this machine")
+            time.sleep(0.05)
+        yield port
+    finally:
+        child.kill()
+        child.wait()
+
+
+def _free_ports() -> tuple[int, int]:
+    with socket.socket() as one, socket.socket() as other:
+        one.bind(("127.0.0.1", 0))
+        other.bind(("127.0.0.1", 0))
+        return one.getsockname()[1], other.getsockname()[1]
+
+
+def _answers(port: int) -> bool:
+    with socket.socket() as s:
+        return s.connect_ex(("127.0.0.1", port)) == 0
+
+
+def _fetched(port: int, path: str) -> bytes:
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE)
+    try:
+        connection.request("GET", path)
+        answer = connection.getresponse()
+        if answer.status != 200:
+            raise OSError(f"viewer: {path} was answered by {answer.status}")
+        return answer.read()
+    finally:
+        connection.close()
