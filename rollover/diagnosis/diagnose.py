@@ -8,11 +8,12 @@ from collections.abc import Callable, Mapping, Sequence
 from rollover.diagnosis.candidates import candidates_of, size_of
 from rollover.diagnosis.depend import dependency, residual_forces
 from rollover.diagnosis.detect import Mismatch, mismatch_of
-from rollover.diagnosis.evidence import Evidence, binned, evidence_of, groups_of, recoloured
+from rollover.diagnosis.evidence import Evidence, binned, doubted, evidence_of, left_out, recoloured
 from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.holdout import Held, held_out
 from rollover.diagnosis.phases import drop_phases
+from rollover.diagnosis.repeats import with_scatter
 from rollover.diagnosis.scores import scored
 from rollover.diagnosis.selection import EXPLAINED, decided, selected
 from rollover.diagnosis.simulator import DropSimulator, set_up, simulator_of
@@ -47,7 +48,7 @@ def diagnose(
     found, notes = _evidence(scenario, recordings)
     if sum(e.count for e in found) < FEWEST:
         return _nothing(found, names, notes, began)
-    groups = groups_of(found)
+    groups = left_out(found)
     if hold_out:
         held = [k for k, e in enumerate(found) if e.name in hold_out]
         groups = [held] if held else groups
@@ -113,6 +114,7 @@ def _evidence(scenario: Scenario, recordings: Sequence[tuple[str, Recording]]) -
             notes.append(f"{name}: shares no usable channel with the simulation and was left aside")
         else:
             found.append(one)
+    found = [doubted(e, set_up(scenario, e.recording)) for e in with_scatter(found)]
     return found, notes
 
 

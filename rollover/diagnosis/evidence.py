@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.nuisance import NOTHING, Eased, doubts, eased
 from rollover.diagnosis.simulator import Simulator
 from rollover.filters import least_rate
 from rollover.noise import LENGTH, NoiseFloor, noise_floor
 from rollover.recording import Recording
+from rollover.scenario import Scenario
 
 Array = NDArray[np.float64]
 
@@ -49,6 +51,7 @@ class Evidence:
     signals: tuple[Signal, ...]
     shift_prior: float
     condition: str
+    eased: Eased = NOTHING
 
     @property
     def count(self) -> int:
@@ -81,6 +84,17 @@ class Evidence:
             y[k:] -= a * x[:-k]
         y[: len(signal.ar)] = 0.0  # no past to whiten with
         return y * _gain(signal.ar)
+
+
+def doubted(e: Evidence, scenario: Scenario) -> Evidence:
+    """The evidence with what its conditions leave uncertain profiled out; `scenario` is under them."""
+    base = e.simulator.predict({}, 0.0)
+    columns = []
+    for changes in doubts(scenario, e.recording.uncertainty, e.name):
+        moved = e.simulator.predict(changes, 0.0)
+        if base is not None and moved is not None:
+            columns.append(e.stacked(moved) - e.stacked(base))
+    return replace(e, eased=eased(np.stack(columns, axis=1))) if columns else e
 
 
 def _gain(ar: tuple[float, ...]) -> float:
@@ -144,12 +158,13 @@ def evidence_of(name: str, recording: Recording, simulator: Simulator) -> Eviden
         return None
     loose = recording.clock.zero == "unknown"
     step = float(np.median(np.diff(recording.time))) if recording.time.size > 1 else 0.0
+    prior = ALONE if loose else SHIFT + 0.5 * step
     return Evidence(
         name=name,
         recording=recording,
         simulator=simulator,
         signals=tuple(signals),
-        shift_prior=ALONE if loose else SHIFT + 0.5 * step,
+        shift_prior=recording.clock.within or prior,
         condition=condition_of(recording.conditions),
     )
 
@@ -223,6 +238,12 @@ def condition_of(conditions: Mapping[str, Any]) -> str:
         f"{path}={value:g}" if isinstance(value, float) else f"{path}={value}"
         for path, value in sorted(conditions.items())
     )
+
+
+def left_out(evidence: Sequence[Evidence]) -> list[list[int]]:
+    """What is left out in turn: one condition after another, or one recording after another if all share one."""
+    groups = groups_of(evidence)
+    return groups if len(groups) > 1 else [[k] for k in range(len(evidence))]
 
 
 def groups_of(evidence: Sequence[Evidence]) -> list[list[int]]:

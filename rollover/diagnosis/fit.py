@@ -123,7 +123,7 @@ class Judge:
                 for signal, part in e.spans():
                     time = e.recording.time[signal.rows]
                     moved[part] = np.interp(time - s, time, y[part])
-                rough.append(float(np.sum((self.measured[r] - moved) ** 2)) + (s / e.shift_prior) ** 2)
+                rough.append(float(np.sum(e.eased(self.measured[r] - moved) ** 2)) + (s / e.shift_prior) ** 2)
             best = float(shifts[int(np.argmin(rough))])
             near = best + np.linspace(-2.0, 2.0, 5) * float(shifts[1] - shifts[0])
             left = [self._left(r, float(s)) for s in near]
@@ -134,7 +134,8 @@ class Judge:
         y = self.predicted(r, (), (), shift)
         if y is None:
             return np.inf
-        return float(np.sum((self.measured[r] - y) ** 2)) + (shift / self.evidence[r].shift_prior) ** 2
+        e = self.evidence[r]
+        return float(np.sum(e.eased(self.measured[r] - y) ** 2)) + (shift / e.shift_prior) ** 2
 
     def block(
         self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float, nudge: float
@@ -151,7 +152,13 @@ class Judge:
             if moved is None:
                 return None
             J[:, k] = (moved - y) / step
-        return Block(residual=self.measured[r] - y, J=J, slope=self._slope(r, y), shift=shift, prior=e.shift_prior)
+        return Block(
+            residual=e.eased(self.measured[r] - y),
+            J=e.eased(J),
+            slope=e.eased(self._slope(r, y)),
+            shift=shift,
+            prior=e.shift_prior,
+        )
 
     def _slope(self, r: int, y: Array) -> Array:
         """dy/dtau = -dy/dt of each signal, by differences along the stamps."""

@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.document import leaf
+from rollover.document import paths
+from rollover.faults import Fault, InputError, hint
 from rollover.recording import Doubt
 from rollover.scenario import Scenario
 
@@ -34,8 +35,13 @@ class Eased:
 
     def __call__(self, values: Array) -> Array:
         """Whitened misfit or its derivatives, (n,) or (n, m), freed of what the conditions leave uncertain."""
+        if self.shares.size == 0:
+            return values
         inside = self.shares[:, None] * (self.directions.T @ values.reshape(values.shape[0], -1))
         return np.asarray(values - (self.directions @ inside).reshape(values.shape))
+
+
+NOTHING = Eased(directions=np.zeros((0, 0)), shares=np.zeros(0))
 
 
 def eased(columns: Array) -> Eased:
@@ -45,19 +51,23 @@ def eased(columns: Array) -> Eased:
     return Eased(directions=U[:, kept], shares=1.0 - 1.0 / np.sqrt(1.0 + S[kept] ** 2))
 
 
-def doubts(scenario: Scenario, uncertainty: Mapping[str, Doubt]) -> list[dict[str, Any]]:
+def doubts(scenario: Scenario, uncertainty: Mapping[str, Doubt], origin: str = "") -> list[dict[str, Any]]:
     """Values to exchange for an error of one standard deviation, one mapping for each uncertain number.
 
     Raises `InputError` for a path that the scenario does not have, or that is no number or list of as many.
     """
-    found = []
+    if not uncertainty:
+        return []
+    known = {leaf.path: leaf.value for leaf in paths(scenario)}
+    found: list[dict[str, Any]] = []
     for path, sigma in uncertainty.items():
-        value = leaf(scenario, path)
-        if isinstance(sigma, tuple):
-            for k, one in enumerate(sigma):
-                moved = list(value)
-                moved[k] += one
-                found.append({path: moved})
-        else:
-            found.append({path: value + sigma})
+        value = known.get(path)
+        each = sigma if isinstance(sigma, tuple) else (sigma,)
+        many = value if isinstance(value, list) else [value]
+        if len(many) != len(each) or not all(isinstance(v, (int, float)) for v in many):
+            message = f"uncertainty: not a number of the scenario, or not as many, got {value!r}; {hint(path, known)}"
+            raise InputError(Fault(file=origin, path=path, message=message))
+        for k, one in enumerate(each):
+            moved = [v + one * (j == k) for j, v in enumerate(many)]
+            found.append({path: tuple(moved) if isinstance(value, list) else moved[0]})
     return found
