@@ -112,7 +112,7 @@ def candidates_of(
             spans[s.channel] = max(spans.get(s.channel, 0.0), s.span)
     found = []
     for name, kind in EFFECTS.items():
-        if name in switched_on or acts not in kind.acts:
+        if name in switched_on or acts not in kind.acts or not kind.competes:
             continue
         if kind.kind == "sensor":
             found += [c for channel in spans if (c := _sensor(name, kind, channel, spans))]
