@@ -163,11 +163,13 @@ def sprague_geers(weight: Array, measured: Array, simulated: Array) -> SpragueGe
     return SpragueGeers(magnitude=magnitude, phase=phase, combined=float(np.hypot(magnitude, phase)))
 
 
-def iso18571(time: Array, measured: Array, simulated: Array, *, least_rate: float = 0.0) -> Iso18571 | NotRateable:
+def iso18571(
+    time: Array, measured: Array, simulated: Array, *, least_rate: float = 0.0, most: int = MOST_SAMPLES
+) -> Iso18571 | NotRateable:
     """Rate by ISO/TS 18571 over the longest stretch without a gap, on a uniform grid of 10 kHz (or less: `rate`).
 
     `time` (n,) s; `measured` is the reference. Both must have been through the same filter; `least_rate` Hz is what
-    it admits: a stretch so long that it would have to be rated below is not rated.
+    it admits: a stretch so long that it would have to be rated below is not rated. `most` is the most samples.
     """
     first, last = _longest(np.isfinite(measured) & np.isfinite(simulated), time)
     count = last - first
@@ -183,9 +185,9 @@ def iso18571(time: Array, measured: Array, simulated: Array, *, least_rate: floa
         return NotRateable(
             reason=f"sampled too slowly: {count} samples in {end - start:.3g} s ({own:.3g} Hz); {FEWEST} are needed"
         )
-    n = min(round((end - start) * RATE) + 1, MOST_SAMPLES)
+    n = min(round((end - start) * RATE) + 1, most)
     if (n - 1) / (end - start) < least_rate:
-        longest = (MOST_SAMPLES - 1) / least_rate
+        longest = (most - 1) / least_rate
         return NotRateable(
             reason=f"too long: {end - start:.4g} s; at the {least_rate:g} Hz that its filter class needs, "
             f"{longest:.3g} s can be rated at once"

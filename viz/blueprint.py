@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 import numpy as np
@@ -23,12 +24,12 @@ _FAR = 2.6  # times the vehicle's own size: a run that covers more shows the veh
 
 # title, patterns of channels; a plot of which no channel was recorded is left out
 _Plots = tuple[tuple[str, tuple[str, ...]], ...]
-_TOP: _Plots = (
+TOP: _Plots = (
     ("ROPS force, kN", ("rops/force",)),
     ("Test stand, kN", ("device/force",)),
     ("Ground force, kN", ("ground/force_normal", "ground/force_tangential")),
 )
-_LOADS: _Plots = (
+LOADS: _Plots = (
     ("ROPS by axis, kN", ("rops/force_?",)),
     ("Wheels, kN", ("wheel/*/force_normal",)),
     ("Sinkage, mm", ("ground/sinkage", "rops/deflection", "device/deflection")),
@@ -36,7 +37,7 @@ _LOADS: _Plots = (
     ("Axle stop, N m s", ("axle/*/impulse",)),
     ("Contact area, cm\N{SUPERSCRIPT TWO}", ("ground/contact_area",)),
 )
-_MOTION: _Plots = (
+MOTION: _Plots = (
     ("Roll, deg", ("chassis/roll",)),
     ("Striker acceleration, m/s\N{SUPERSCRIPT TWO}", ("striker/acceleration_z",)),
     ("Energy, kJ", ("energy/*", "rops/energy", "device/energy")),
@@ -52,30 +53,41 @@ _MOUNTS = ("rops/mount/*/force_?", "rops/hinge/*/force_?")
 _MOMENTS = ("rops/mount/*/moment_?", "rops/hinge/*/moment_?", "rops/hinge/*/angle_?")
 
 
-def blueprint(run: Run, scales: str, views: Sequence[rrb.TimeSeriesView] = ()) -> rrb.Blueprint:
+@dataclass(frozen=True, kw_only=True)
+class Beside:
+    """What a layout shows besides a run: a document that answers first, plots before the motion, its own phases."""
+
+    answer: str
+    title: str
+    views: Sequence[rrb.TimeSeriesView] = ()
+    phase: str = ""
+
+
+def blueprint(run: Run, scales: str, beside: Beside | None = None) -> rrb.Blueprint:
     """Layout for one run: what answers "how high were the loads, and when" is in front in every place.
 
-    `scales` says what lengths and colours in the scene mean; `views` come in front of the motion.
+    `scales` says what lengths and colours in the scene mean.
     """
     # a plot of nothing but zeros says less than its absence, but for the load that is asked for
     found = run.recording.channels
     asked = "" if run.tests else "rops/force"
     channels = [c for c, v in found.items() if c == asked or np.any(np.nan_to_num(v))]
-    top = _views(channels, _TOP)
-    loads = _views(channels, _LOADS)
+    top = _views(channels, TOP)
+    loads = _views(channels, LOADS)
     if not top:  # on a tilt table the wheels tell
         top, loads = loads[:1], loads[1:]
-    left = rrb.Vertical(
-        _scenes(run, scales),
-        rrb.StateTimelineView(origin="/phase", contents=["+ /phase"], name="Phase"),
-        row_shares=[7, 1],
-    )
+    phases = [_phase("phase", "Phase")]
+    words = [rrb.TextDocumentView(origin="/report/verdict", contents=["+ /report/verdict"], name="How high, and when")]
+    if beside is not None:
+        words.insert(0, rrb.TextDocumentView(origin=beside.answer, contents=[f"+ {beside.answer}"], name=beside.title))
+        phases += [_phase(beside.phase, "Phase, measured")] if beside.phase else []
+    left = rrb.Vertical(_scenes(run, scales), *phases, row_shares=[7, *[1] * len(phases)])
     rows = [
         top[:1],
         _mounts(channels) + top[1:] + loads + _moments(channels),
-        [*views, *_views(channels, _MOTION), *_others(channels)],
+        [*(beside.views if beside else ()), *_views(channels, MOTION), *_others(channels)],
         [
-            rrb.TextDocumentView(origin="/report/verdict", contents=["+ /report/verdict"], name="How high, and when"),
+            *words,
             rrb.TextLogView(
                 origin="/events",
                 contents=["+ /events"],
@@ -97,6 +109,10 @@ def blueprint(run: Run, scales: str, views: Sequence[rrb.TimeSeriesView] = ()) -
         auto_layout=False,
         auto_views=False,
     )
+
+
+def _phase(path: str, name: str) -> rrb.StateTimelineView:
+    return rrb.StateTimelineView(origin=f"/{path}", contents=[f"+ /{path}"], name=name)
 
 
 def _scenes(run: Run, scales: str) -> rrb.Spatial3DView | rrb.Tabs:
@@ -159,13 +175,14 @@ def _side(run: Run) -> float:
     return -1.0 if float(roll[int(np.nanargmax(np.abs(roll)))]) > 0.0 else 1.0
 
 
+def matching(channels: Sequence[str], plots: _Plots) -> list[tuple[str, list[str]]]:
+    """Title and channels of every plot that has any."""
+    found = [(title, [c for p in patterns for c in channels if fnmatchcase(c, p)]) for title, patterns in plots]
+    return [(title, fitting) for title, fitting in found if fitting]
+
+
 def _views(channels: Sequence[str], plots: _Plots) -> list[rrb.TimeSeriesView]:
-    found = []
-    for title, patterns in plots:
-        matching = [c for p in patterns for c in channels if fnmatchcase(c, p)]
-        if matching:
-            found.append(plot(title, matching))
-    return found
+    return [plot(title, fitting) for title, fitting in matching(channels, plots)]
 
 
 def plot(title: str, channels: Iterable[str]) -> rrb.TimeSeriesView:
@@ -203,7 +220,7 @@ def _joints(channels: Sequence[str], patterns: tuple[str, ...], title: str) -> l
 
 def _others(channels: Sequence[str]) -> list[rrb.TimeSeriesView]:
     """What no plot above shows; nothing recorded is out of reach."""
-    patterns = [p for plots in (_TOP, _LOADS, _MOTION) for _, found in plots for p in found]
+    patterns = [p for plots in (TOP, LOADS, MOTION) for _, found in plots for p in found]
     patterns += [*_MOUNTS, *_MOMENTS]
     rest: dict[str, list[str]] = {}
     for channel in channels:

@@ -9,8 +9,10 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from rollover.misfit import ChannelMisfit, Misfit
+from rollover.rating import Iso18571, Rating
 from rollover.run import Run
-from viz.entities import MEASURED, PHASE, series
+from viz.blueprint import Beside
+from viz.entities import CYCLE, MEASURED, PHASE, series
 from viz.log import write_rrd
 from viz.stream import Stream, colour
 
@@ -18,7 +20,9 @@ from viz.stream import Stream, colour
 def write_comparison(run: Run, found: Misfit, path: Path) -> None:
     """Write a run with a recording over it, whole or not at all; the recording keeps its own stamps."""
     views = [] if not found.channels else [_residuals(found)]
-    write_rrd(run, path, beside=lambda out: _beside(out, found), views=views)
+    phase = "phase_measured" if found.phases else ""
+    shown = Beside(answer="/report/comparison", title="Measured against simulated", views=views, phase=phase)
+    write_rrd(run, path, beside=lambda out: _beside(out, found), shown=shown)
 
 
 def _residuals(found: Misfit) -> rrb.TimeSeriesView:
@@ -34,12 +38,13 @@ def _residuals(found: Misfit) -> rrb.TimeSeriesView:
 
 def _beside(out: Stream, found: Misfit) -> None:
     min_max = rr.components.AggregationPolicy.MinMax
-    for c in found.channels:
-        s = series(c.channel)
+    for k, c in enumerate(found.channels):
+        s, own = series(c.channel), CYCLE[k % len(CYCLE)]  # two channels in one plot are told apart
         measured = rr.SeriesLines(
             names=[f"{s.legend}, measured"], colors=colour(MEASURED), widths=[1.5], aggregation_policy=min_max
         )
-        residual = rr.SeriesLines(names=[s.name], colors=colour(s.colour), widths=[1.0], aggregation_policy=min_max)
+        residual = rr.SeriesLines(names=[s.name], colors=colour(own), widths=[1.0], aggregation_policy=min_max)
+        out.static(s.simulated, rr.SeriesLines.from_fields(names=[f"{s.legend}, simulated"]))
         out.static(s.measured, measured)
         out.static(s.residual, residual)
         _columns(out, s.measured, c, c.measured * s.factor)
@@ -51,8 +56,7 @@ def _beside(out: Stream, found: Misfit) -> None:
     out.columns(
         "phase_measured", np.array([at for at, _ in marks]), rr.StateChange.columns(state=[name for _, name in marks])
     )
-    words = f"# {found.title}\n\n" + "\n".join(f"- {line}" for line in sentences(found))
-    out.static("report/comparison", rr.TextDocument(words, media_type=rr.MediaType.MARKDOWN))
+    out.static("report/comparison", rr.TextDocument(markdown(found), media_type=rr.MediaType.MARKDOWN))
 
 
 def _columns(out: Stream, path: str, c: ChannelMisfit, values: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
@@ -63,12 +67,44 @@ def _columns(out: Stream, path: str, c: ChannelMisfit, values: np.ndarray[tuple[
     out.columns(path, time, rr.Scalars.columns(scalars=np.insert(values, breaks, np.nan)))
 
 
+def markdown(found: Misfit) -> str:
+    """The worst rating as the answer, a line for each channel, and what else is to be known."""
+    rated = [(iso, c) for c in found.channels if (iso := _iso(c)) is not None]
+    worst = min(rated, key=lambda pair: pair[0].overall, default=None)
+    head = "none of the channels could be rated"
+    if worst is not None:
+        iso, c = worst
+        head = f"ISO/TS 18571 {iso.overall:.2f} ({iso.grade}) at worst, {series(c.channel).name}"
+    lines = [f"# {head[0].upper()}{head[1:]}", "", found.title, ""]
+    lines += ["| channel | CFC | ISO/TS 18571 | RMS / noise | peak | peak later |", "|---|---|---|---|---|---|"]
+    for c in found.channels:
+        lines.append(f"| {series(c.channel).name} | {c.cfc or 'none'} | {' | '.join(_cells(c))} |")
+    return "\n".join([*lines, "", *(f"- {line}" for line in sentences(found))])
+
+
+def _iso(c: ChannelMisfit) -> Iso18571 | None:
+    iso = c.rating.iso18571 if isinstance(c.rating, Rating) else None
+    return iso if isinstance(iso, Iso18571) else None
+
+
+def _cells(c: ChannelMisfit) -> list[str]:
+    if not isinstance(c.rating, Rating):
+        return [c.rating.reason, "", "", ""]
+    iso, peak = _iso(c), c.rating.peak
+    return [
+        "not rated" if iso is None else f"{iso.overall:.3f} {iso.grade}",
+        "" if c.rating.over_noise is None else f"{c.rating.over_noise:.3g}",
+        "" if peak.relative_error is None else f"{100.0 * peak.relative_error:+.3g} %",
+        f"{1e3 * peak.time_error:+.3g} ms",
+    ]
+
+
 def sentences(found: Misfit) -> list[str]:
     """What is to be known about a comparison besides its numbers."""
     lines = []
     if found.contact_measured is not None and found.contact_simulated is not None:
         lines.append(
-            f"first contact: measured {found.contact_measured:.4f} s, simulated {found.contact_simulated:.4f} s"
+            f"first contact: measured {_instant(found.contact_measured)}, simulated {_instant(found.contact_simulated)}"
         )
     if found.clock is not None:
         c = found.clock
@@ -85,3 +121,7 @@ def sentences(found: Misfit) -> list[str]:
         )
     lines += [f"{channel}: left out, {why}" for channel, why in found.skipped.items()]
     return [*lines, *found.notes]
+
+
+def _instant(time: float) -> str:
+    return f"{round(time, 4) + 0.0:.4f} s"  # + 0.0: a tiny negative time is not -0.0000

@@ -57,7 +57,7 @@ PHASE = {
     "failed": 0xF0434EFF,
 }
 FILTERED = 0xFFFFFFFF
-_CYCLE = (0x66D9C2FF, 0xF4D35EFF, 0xE78AC3FF, 0x8FCB6BFF, 0xB79CF5FF, 0xFF7043FF, 0x9FB4CCFF)
+CYCLE = (0x66D9C2FF, 0xF4D35EFF, 0xE78AC3FF, 0x8FCB6BFF, 0xB79CF5FF, 0xFF7043FF, 0x9FB4CCFF)
 
 # SI unit -> (unit for people, factor); what is not here is shown in SI
 _SHOWN = {
@@ -173,7 +173,7 @@ def _describe(channel: str) -> tuple[str, str, int]:
         case ["rops", "deflection"]:
             return "sinkage", "ROPS deflection", LEDGER["rops"]
         case ["rops", "energy"]:
-            return "energy", "absorbed by the ROPS", _CYCLE[0]
+            return "energy", "absorbed by the ROPS", CYCLE[0]
         case ["ground", "force_normal"]:
             return "loads", "ground force", BODY["ground"]
         case ["ground", "force_tangential"]:
@@ -193,7 +193,7 @@ def _describe(channel: str) -> tuple[str, str, int]:
         case ["energy", name]:
             return "energy", name, LEDGER.get(name, _any(name))
         case ["axle", name, what]:
-            return "motion", f"{name} axle {what}", _CYCLE[1 if what == "angle" else 2]
+            return "motion", f"{name} axle {what}", CYCLE[1 if what == "angle" else 2]
         case ["chassis" | "striker" as body, what]:
             return "motion", *_motion(body, what)
     return "other", channel, _any(channel)
@@ -210,4 +210,4 @@ def _motion(body: str, what: str) -> tuple[str, int]:
 
 def _any(name: str) -> int:
     """A colour that stays with a name from run to run; Python's own hash does not."""
-    return _CYCLE[sum(ord(c) * (i + 1) for i, c in enumerate(name)) % len(_CYCLE)]
+    return CYCLE[sum(ord(c) * (i + 1) for i, c in enumerate(name)) % len(CYCLE)]

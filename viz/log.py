@@ -16,7 +16,7 @@ from rerun.error_utils import catch_and_log_exceptions
 
 from rollover.document import content_hash, dump
 from rollover.run import Run
-from viz.blueprint import blueprint
+from viz.blueprint import Beside, blueprint
 from viz.draw import WARNINGS, moving, peak_place, picture, sentence, standing
 from viz.entities import FILTERED, LIMIT, PHASE, series
 from viz.stream import Stream, colour
@@ -42,12 +42,12 @@ def write_rrd(
     *,
     peaks: Sequence[Peak] = (),
     beside: Callable[[Stream], None] | None = None,
-    views: Sequence[Any] = (),
+    shown: Beside | None = None,
 ) -> None:
     """Write a run as a recording for the viewer, whole or not at all; a failed run is shown as far as it came.
 
     `peaks` are the peak loads of the report; without them, raw peaks are read off the channels. `beside` writes what
-    stands beside the simulated values, `views` show what has no place in a run's layout.
+    stands beside the simulated values, `shown` says how the layout shows it.
     """
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     name = run_id(run)
@@ -57,7 +57,7 @@ def write_rrd(
     try:
         with catch_and_log_exceptions("recording", strict=True), closed(rec):
             with_ = picture(run)
-            rec.save(part, default_blueprint=blueprint(run, ", ".join(with_.scales), views))
+            rec.save(part, default_blueprint=blueprint(run, ", ".join(with_.scales), shown))
             out, found = Stream(rec), ranked(run, peaks)
             standing(out, run, with_)
             _looks(out, run, found)

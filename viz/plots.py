@@ -135,8 +135,13 @@ def xy(
     return svg.text
 
 
-def overlay(measured: Curve, simulated: Curve, *, label: str, phases: Sequence[tuple[float, str]] = ()) -> str:
-    """Measured and simulated over time, below them the residual: measured less simulated at the measured stamps."""
+def overlay(
+    measured: Curve, simulated: Curve, *, label: str, phases: Sequence[tuple[float, str]] = (), turned: bool = False
+) -> str:
+    """Two curves over time, below them the residual: measured less simulated, `turned` the other way round.
+
+    It is taken at the stamps of the first.
+    """
     with _canvas(WIDTH, 3.9) as (figure, svg):
         above, below = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [3, 1.3]})
         _draw(above, [_roled(measured, "second"), _roled(simulated, "first")])
@@ -144,9 +149,10 @@ def overlay(measured: Curve, simulated: Curve, *, label: str, phases: Sequence[t
         _shade(above, phases)
         good = np.isfinite(simulated.x) & np.isfinite(simulated.y)
         model = np.interp(measured.x, simulated.x[good], simulated.y[good], left=np.nan, right=np.nan)
-        _draw(below, [Curve(name="residual", x=measured.x, y=measured.y - model, role="muted")])
+        rest = model - measured.y if turned else measured.y - model
+        _draw(below, [Curve(name="difference" if turned else "residual", x=measured.x, y=rest, role="muted")])
         below.axhline(0.0, color=COLOURS["ink"], lw=0.6)
-        _finish(below, "time, s", "residual", margins=(0.0, 0.1))
+        _finish(below, "time, s", "difference" if turned else "residual", margins=(0.0, 0.1))
         _shade(below, [(start, "") for start, _ in phases])
     return svg.text
 

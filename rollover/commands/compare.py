@@ -15,20 +15,29 @@ from rollover.faults import Fault, InputError
 
 if TYPE_CHECKING:
     from rollover.misfit import Misfit
+    from rollover.pair import Pair
     from rollover.recording import Recording
     from rollover.run import Run
     from rollover.scenario import Scenario
 
-FORMAT = "rollover-compare/1"
+FORMAT, PAIR = "rollover-compare/1", "rollover-compare-runs/1"
 JSON, PAGE, PICTURE = "compare.json", "report.html", "compare.rrd"
 
 
 @app.command()
 @answering
 def compare(
-    scenario: Annotated[str, typer.Argument(help="A scenario file, or the name of a shipped one.")],
+    scenario: Annotated[
+        str,
+        typer.Argument(
+            help="A scenario file, the name of a shipped one, or a run's results.", metavar="SCENARIO_OR_DIR"
+        ),
+    ],
     recordings: Annotated[
-        list[str], typer.Argument(help="Recordings, each with its conditions.", metavar="RECORDING...")
+        list[str],
+        typer.Argument(
+            help="Recordings, each with its conditions; beside results another run's.", metavar="RECORDING..."
+        ),
     ],
     set_: Setting = None,
     cfc: Annotated[
@@ -45,7 +54,12 @@ def compare(
     """Compare recordings with runs under their conditions: rated, by channel and phase, nothing shifted in time."""
     from rollover import console, document, store
     from rollover import scenario as scenarios
+    from rollover.pair import is_result
 
+    if is_result(scenario):
+        refused = {"--set": set_, "--cfc": cfc, "--profile": profile}
+        _two_runs(scenario, recordings, [name for name, given in refused.items() if given], out, force, as_json)
+        return
     path = document.find(scenario)
     chosen = scenarios.load(path)
     if set_:
@@ -85,6 +99,55 @@ def compare(
         console.say(f"{name}: the simulation failed: {runs[name].sentence}")
     if failed:
         raise typer.Exit(FAILED)
+
+
+def _two_runs(
+    baseline: str, others: list[str], refused: list[str], out: Path | None, force: bool, as_json: bool
+) -> None:
+    """A baseline's results against a candidate's. Raises `InputError`."""
+    from rollover import console, store
+    from rollover.pair import is_result, pair, summary
+    from rollover.pair import read as result
+    from viz.pair_page import page
+    from viz.pair_words import answer as in_words
+    from viz.pair_words import markdown
+
+    if refused:
+        raise InputError(Fault(file=refused[0], message="two runs are compared as they are; leave it out"))
+    if len(others) != 1 or not is_result(others[0]):
+        got = " ".join(others)
+        message = f"the results of a run, got {got!r} beside them; the results of one other run are needed"
+        raise InputError(Fault(file=baseline, message=message))
+    found = pair(result(Path(baseline)), result(Path(others[0])))
+    folder = out or Path("out", "compare", Path(others[0]).resolve().name)
+    about = {side: getattr(found, side).answer["scenario_hash"] for side in ("baseline", "candidate")}
+    store.claim_account(folder, PAIR, {"hashes": about}, [JSON, PAGE, PICTURE], force=force)
+    answer = {"format": PAIR, "hashes": about, **summary(found), "answer": in_words(found)}
+    command = " ".join(map(shlex.quote, ["rollover", "compare", baseline, *others]))
+    with store.whole(folder) as part:
+        store.write_json(part / JSON, answer)
+        (part / PAGE).write_text(page(found, command=command, versions=store.versions()), encoding="utf-8")
+        _draw_pair(found, part / PICTURE)
+    if as_json:
+        print(json.dumps(store.plain(answer), indent=2))
+    else:
+        print(markdown(found))
+        console.say(f"Results: {folder}")
+
+
+def _draw_pair(found: Pair, path: Path) -> None:
+    from rollover import console
+
+    try:
+        from viz.pair import write_pair
+
+        write_pair(found, path)
+    except FileNotFoundError as e:
+        console.say(f"{e}; {path.name} was not written")
+    except ImportError as e:
+        if (e.name or "").partition(".")[0] != "rerun":
+            raise
+        console.say(f"No rerun wheel for this platform: {path.name} was not written.")
 
 
 def read(paths: list[str], profile: Path | None) -> dict[str, Recording]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,8 @@ SHAPES = {
     "soil-adhesion": ("reach",),
 }
 
+BESIDE = 0.01  # of a coordinate: how far from its zero an effect is looked at
+THRESHOLDS = 14  # places at which something that has no zero is looked at
 ONE = (6,)
 SEVERAL = (12, 6, 3)  # places on the axes of an effect's parameters
 
@@ -40,6 +42,7 @@ class Candidate:
     family: str
     search: Mapping[str, Search]
     channel: str | None = None
+    shapes: Mapping[str, Search] = field(default_factory=dict)  # fitted only where what is left asks for them
 
     @property
     def key(self) -> str:
@@ -69,6 +72,27 @@ class Candidate:
                 middle = math.log(1.0 / s.low) / math.log(s.high / s.low)
                 inside = [middle + f * (1.0 - middle) for f in (0.1, 0.5)] + [middle - f * middle for f in (0.1, 0.5)]
             axes.append(inside)
+        return list(itertools.product(*axes))
+
+    def with_shapes(self, x: Sequence[float]) -> tuple[Candidate, tuple[float, ...]]:
+        """The same effect with its shape fitted too, begun at the shape's default; and its coordinates."""
+        kind: Any = EFFECTS[self.id]()
+        begin = tuple(min(max(coordinate(getattr(kind, n), s), 0.02), 0.98) for n, s in self.shapes.items())
+        return replace(self, search={**self.search, **self.shapes}, shapes={}), (*x, *begin)
+
+    def probes(self) -> list[tuple[float, ...]]:
+        """Coordinates that span the directions in which the effect begins: small where it has a zero, else spread."""
+        axes: list[list[float]] = []
+        for name, s in self.search.items():
+            null = EFFECTS[self.id].null.get(name)
+            at = coordinate(null, s) if isinstance(null, (int, float)) and (s.scale != "log" or null > 0.0) else None
+            if at is not None and 0.0 < at < 1.0:
+                axes.append([at + BESIDE])
+            elif null is not None:
+                axes.append([0.1, 0.35, 0.6, 0.85])
+            else:
+                many = THRESHOLDS if not axes else 2
+                axes.append([(k + 0.5) / many for k in range(many)])
         return list(itertools.product(*axes))
 
 
@@ -117,8 +141,10 @@ def candidates_of(
         if kind.kind == "sensor":
             found += [c for channel in spans if (c := _sensor(name, kind, channel, spans))]
             continue
-        search = {p: _sized(s, kind.grows.get(p), size) for p, s in kind.search.items() if p not in SHAPES.get(name, ())}
-        found.append(Candidate(id=name, kind=kind.kind, family=kind.family, search=search))
+        sized = {p: _sized(s, kind.grows.get(p), size) for p, s in kind.search.items()}
+        search = {p: s for p, s in sized.items() if p not in SHAPES.get(name, ())}
+        shapes = {p: s for p, s in sized.items() if p in SHAPES.get(name, ())}
+        found.append(Candidate(id=name, kind=kind.kind, family=kind.family, search=search, shapes=shapes))
     return found
 
 

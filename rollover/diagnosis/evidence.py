@@ -4,25 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.nuisance import NOTHING, Eased, doubts, eased
+from rollover.diagnosis.nuisance import Eased, doubts, eased
 from rollover.diagnosis.simulator import Simulator
-from rollover.filters import least_rate
 from rollover.noise import LENGTH, NoiseFloor, noise_floor
 from rollover.recording import Recording
 from rollover.scenario import Scenario
 
 Array = NDArray[np.float64]
 
-MODEL_ERROR = 5e-4  # of a channel's range: what integrators differ by is no mismatch
+MODEL_ERROR = 2e-4  # of a channel's range: what integrators differ by is no mismatch
 ALONE = 0.02  # s, prior of the time shift of a recording whose clock has no zero
-MOST_ROWS = 700  # of a recording that are looked at
 CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is believed
-LONGEST = 0.98  # of the memory from one sample to the next
 MANY = 10  # quiet windows from which on a memory of two samples is told
 CORNER = 2.0775  # corner frequency over the filter class, forward and backward, Hz
 SHIFT = 1e-3  # s, prior of the time shift of a recording whose zero is known
@@ -39,6 +37,7 @@ class Signal:
     noise: float
     ar: tuple[float, ...]
     span: float
+    scatter: float = 0.0  # between runs of one condition, SI
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +50,15 @@ class Evidence:
     signals: tuple[Signal, ...]
     shift_prior: float
     condition: str
-    eased: Eased = NOTHING
+    model_error: float = MODEL_ERROR  # of a channel's range
+    doubts: Array | None = None  # what 1 sigma of each uncertain condition does to the stack, SI, (n, q)
+
+    @cached_property
+    def eased(self) -> Eased:
+        """What takes the uncertain conditions out of a whitened misfit."""
+        if self.doubts is None:
+            return eased(np.zeros((self.count, 0)))
+        return eased(np.stack([self.whitened(column) for column in self.doubts.T], axis=1))
 
     @property
     def count(self) -> int:
@@ -60,7 +67,15 @@ class Evidence:
 
     def stacked(self, predicted: Mapping[str, Array]) -> Array:
         """Predicted channels at the samples, in units of the noise and whitened, one signal after another."""
-        return np.concatenate([self._whitened(s, predicted[s.channel][s.rows]) for s in self.signals])
+        return self.whitened(self.raw(predicted))
+
+    def raw(self, predicted: Mapping[str, Array]) -> Array:
+        """Predicted channels at the samples, one signal after another, SI."""
+        return np.concatenate([predicted[s.channel][s.rows] for s in self.signals])
+
+    def whitened(self, raw: Array) -> Array:
+        """Stacked samples in units of the noise and whitened."""
+        return np.concatenate([self._whitened(s, raw[part]) for s, part in self.spans()])
 
     def measured(self) -> Array:
         """The same of the measurement."""
@@ -87,14 +102,12 @@ class Evidence:
 
 
 def doubted(e: Evidence, scenario: Scenario) -> Evidence:
-    """The evidence with what its conditions leave uncertain profiled out; `scenario` is under them."""
+    """The evidence with what its conditions leave uncertain; `scenario` is under them. Raises `InputError`."""
+    changes = doubts(scenario, e.recording.uncertainty, e.name)
     base = e.simulator.predict({}, 0.0)
-    columns = []
-    for changes in doubts(scenario, e.recording.uncertainty, e.name):
-        moved = e.simulator.predict(changes, 0.0)
-        if base is not None and moved is not None:
-            columns.append(e.stacked(moved) - e.stacked(base))
-    return replace(e, eased=eased(np.stack(columns, axis=1))) if columns else e
+    moved = [e.simulator.predict(one, 0.0) for one in changes]
+    columns = [e.raw(m) - e.raw(base) for m in moved if m is not None and base is not None]
+    return replace(e, doubts=np.stack(columns, axis=1)) if columns else e
 
 
 def _gain(ar: tuple[float, ...]) -> float:
@@ -106,41 +119,17 @@ def _gain(ar: tuple[float, ...]) -> float:
     return float(np.sqrt(np.sum(lfilter([1.0], [1.0, *(-a for a in ar)], impulse) ** 2)))
 
 
-def binned(recording: Recording) -> Recording:
-    """The recording at no more than `MOST_ROWS` rows: means of neighbouring samples, none across a gap.
-
-    What is averaged keeps its information while noise falls with the root of the number; a rate that a filter class
-    needs is kept.
-    """
-    n = recording.time.size
-    step = float(np.median(np.diff(recording.time))) if n > 1 else 1.0
-    most = int(n // MOST_ROWS)
-    for cfc in recording.cfc.values():
-        most = min(most, int(1.0 / (step * 1.05 * least_rate(cfc))))
-    if most < 2:
-        return recording
-    parts = np.arange(0, n - most + 1, most)
-    time = np.add.reduceat(recording.time[: parts[-1] + most], parts) / most
-    spread = recording.time[parts + most - 1] - recording.time[parts]
-    whole = spread < 1.5 * (most - 1) * step
-    channels = {}
-    for channel, values in recording.channels.items():
-        mean = np.add.reduceat(values[: parts[-1] + most], parts) / most  # NaN where any is
-        channels[channel] = mean[whole]
-    noise = {channel: sigma / np.sqrt(most) for channel, sigma in recording.noise.items()}
-    return replace(recording, time=time[whole], channels=channels, noise=noise)
-
-
-def evidence_of(name: str, recording: Recording, simulator: Simulator) -> Evidence | None:
+def evidence_of(name: str, recording: Recording, simulator: Simulator, shift: float = 0.0) -> Evidence | None:
     """Make a recording ready; None if it shares no channel with the simulation.
 
+    `shift` (s) is how late its clock is thought to be: samples beside the leap of the first contact are left out.
     Noise is estimated from each channel itself; where it is too short for that, the noise that the recording states.
     """
-    predicted = simulator.predict({}, 0.0)
+    predicted = simulator.predict({}, shift)
     if predicted is None:
         return None
     signals = []
-    leaps = _near_leaps(recording, predicted)
+    leaps = _near_leaps(recording, simulator, shift)
     for channel, values in recording.channels.items():
         rows = np.flatnonzero(np.isfinite(values) & ~leaps)[:: _oversampling(recording, channel)]
         if channel not in predicted or rows.size < 8 or not np.all(np.isfinite(predicted[channel][rows])):
@@ -158,13 +147,12 @@ def evidence_of(name: str, recording: Recording, simulator: Simulator) -> Eviden
         return None
     loose = recording.clock.zero == "unknown"
     step = float(np.median(np.diff(recording.time))) if recording.time.size > 1 else 0.0
-    prior = ALONE if loose else SHIFT + 0.5 * step
     return Evidence(
         name=name,
         recording=recording,
         simulator=simulator,
         signals=tuple(signals),
-        shift_prior=recording.clock.within or prior,
+        shift_prior=recording.clock.within or (ALONE if loose else SHIFT + 0.5 * step),
         condition=condition_of(recording.conditions),
     )
 
@@ -177,15 +165,12 @@ def _oversampling(recording: Recording, channel: str) -> int:
     return max(1, int(rate / (2.0 * CORNER * recording.cfc[channel])))
 
 
-def _near_leaps(recording: Recording, predicted: Mapping[str, Array]) -> NDArray[np.bool_]:
+def _near_leaps(recording: Recording, simulator: Simulator, shift: float) -> NDArray[np.bool_]:
     """Samples so near the first contact that the clock decides on which side of the leap of force they lie, (n,)."""
-    near = np.zeros(recording.time.size, dtype=bool)
-    sinkage = predicted.get("ground/sinkage")
-    if sinkage is None or not (sinkage > 0.0).any() or recording.time.size < 3:
-        return near
-    first = int(np.argmax(sinkage > 0.0))
-    near[max(first - 1, 0) : first + 1] = True
-    return near
+    if recording.time.size < 3:
+        return np.zeros(recording.time.size, dtype=bool)
+    step = float(np.median(np.diff(recording.time)))
+    return np.asarray(np.abs(recording.time - simulator.contact(shift)) < step)
 
 
 def _noise(residual: Array, values: Array, stated: float | None) -> tuple[float, tuple[float, ...]]:
@@ -210,26 +195,6 @@ def _by_differences(values: Array) -> float:
         return 0.0
     d = np.diff(values, 2)
     return float(1.4826 * np.median(np.abs(d - np.median(d))) / np.sqrt(6.0))
-
-
-def recoloured(e: Evidence, predicted: Mapping[str, Array]) -> Evidence:
-    """The evidence with the noise's memory from all of a misfit that is nearly noise, where it is longer than thought.
-
-    Quiet stretches are too short to show slow noise. What of the misfit is none adds to the memory: it is then judged
-    too mildly, never too sharply.
-    """
-    signals = []
-    for s in e.signals:
-        left = s.values - predicted[s.channel][s.rows]
-        left = left - left.mean()
-        power = float(left @ left)
-        memory = float(left[1:] @ left[:-1]) / power if power > 0.0 else 0.0
-        known = s.ar[0] / (1.0 - s.ar[1]) if len(s.ar) > 1 else sum(s.ar)
-        if memory > known + 1.0 / np.sqrt(left.size) and memory < LONGEST:
-            noise = max(s.noise, float(np.std(left)))
-            s = replace(s, ar=(memory,), noise=noise, sigma=max(s.sigma, noise))
-        signals.append(s)
-    return replace(e, signals=tuple(signals))
 
 
 def condition_of(conditions: Mapping[str, Any]) -> str:

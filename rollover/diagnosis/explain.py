@@ -1,25 +1,22 @@
-"""Forward selection: which effect, then which second and third, each admitted only if it beats the best of chance."""
+"""One step of the selection: which effect, beside those held already, best predicts what was not fitted."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis import colour
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.gate import freed, null_of_the_best, p_value
+from rollover.diagnosis.gate import Gate, freed
 from rollover.diagnosis.holdout import held_out, worse
-from rollover.effects import EFFECTS
 
 Array = NDArray[np.float64]
-CHANCE = 0.01  # p-value of the best of all candidates that admits one
+SCORED = 18  # candidates looked at closer, by their score
 PROMISING = 14  # candidates fitted in full at each step
-NEGLIGIBLE = 0.004  # of a channel's range: an effect that moves nothing by more is not named
-MOST = 3  # effects in one explanation
-VISIBLE = 5.0  # standard errors of the noise at which an effect shows
 FEW = 3  # recordings that candidates are looked at on
 SHORT = 5  # rounds of a first fit
 LEADERS, MOST_LEADERS = 5, 12  # first fits that are followed up, at least and at most
@@ -28,7 +25,10 @@ FAR = 3.0  # misfit over the noise from which on time shifts fitted to it are no
 ELSEWHERE = 0.2  # of a coordinate: starts so far apart are two
 NOISE_LEFT = 1.01  # misfit over the noise that needs no further search
 CROOKED = 100.0  # times what the best leaves, up to which a fit of two parameters is polished
+SHAPED = 4.0  # times what the best leaves, up to which an effect's shape is fitted too
+WORTH = 12.0  # gain that pays for a shape
 APART = 2.0  # standard errors beyond which a rival is excluded
+NEARLY_NOISE = 1.3  # misfit over the noise up to which its own colour is believed
 
 Progress = Callable[[str], None]
 
@@ -37,26 +37,31 @@ Progress = Callable[[str], None]
 class Screened:
     """A candidate looked at on a few recordings: the best starts, what is left there, the gain of its best direction.
 
-    `size` is the strength that would show; `nrmse` what a first fit leaves over the noise, 0 where there was none.
+    `nrmse` is what a first fit leaves over the noise, 0 where there was none.
     """
 
     candidate: Candidate
     starts: tuple[tuple[float, ...], ...]
     left: float
     potential: float
-    size: float
     nrmse: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Step:
-    """One step of the selection: what was added, the p-value of its gain, and all that competed, best first."""
+    """One effect added to a base: the best, its p-value (of the best of all by chance), and all that competed."""
 
+    base: Fitted
     fitted: Fitted
     p_value: float
-    rivals: tuple[Fitted, ...]
-    screened: tuple[Screened, ...]
-    detectable: tuple[tuple[str, float], ...] = field(default=(), repr=False)
+    rivals: tuple[Fitted, ...] = ()
+    screened: tuple[Screened, ...] = ()
+
+    def again(self, judge: Judge) -> Step:
+        """The same under the noise as it is held now."""
+        rivals = tuple(judge.again(f) for f in self.rivals)
+        best = next((new for new, old in zip(rivals, self.rivals, strict=True) if old is self.fitted), None)
+        return replace(self, base=judge.again(self.base), fitted=best or judge.again(self.fitted), rivals=rivals)
 
 
 def spread(base: Fitted, groups: Sequence[Sequence[int]]) -> list[int]:
@@ -80,44 +85,37 @@ def begun(judge: Judge, base: Fitted) -> list[float]:
     ]
 
 
-def screen(
-    judge: Judge, base: Fitted, candidates: Sequence[Candidate], few: Sequence[int]
-) -> tuple[list[Screened], list[Array]]:
-    """Look at each candidate in some places beside the base; returns them and all directions for the null."""
-    found = []
-    directions: list[list[Array]] = [[] for _ in few]
+def screen(judge: Judge, base: Fitted, candidates: Sequence[Candidate], few: Sequence[int]) -> list[Screened]:
+    """Look at each candidate in some places beside the base, on a few recordings."""
+    found: list[Screened] = []
     shifts = begun(judge, base)
     beside = [judge.block(r, base.candidates, base.x, shifts[r], 0.0) for r in few]
-    if any(b is None for b in beside):
-        return [], []
     blocks = [b for b in beside if b is not None]
+    if len(blocks) < len(few):
+        return found
     for c in candidates:
         met: list[tuple[float, tuple[float, ...]]] = []
-        potential, smallest = 0.0, np.inf
+        potential = 0.0
         for start in c.starts():
-            left, along, size = 0.0, 0.0, 0.0
-            kept = []
+            left, along, size, count = 0.0, 0.0, 0.0, 0
             for r, block in zip(few, blocks, strict=True):
                 there = judge.block(r, (*base.candidates, c), (*base.x, *start), shifts[r], 0.0)
                 if there is None:
                     break
+                count += 1
                 left += there.normal()[2]
                 free = freed(np.column_stack([block.residual - there.residual, block.residual]), block)
-                kept.append(free[:, :1])
                 along += float(free[:, 0] @ free[:, 1])
                 size += float(free[:, 0] @ free[:, 0])
-            if len(kept) < len(blocks):
+            if count < len(blocks):
                 continue
             if size > 1e-12:
                 potential = max(potential, along * along / size)
-                smallest = min(smallest, _visible(c, start, size * len(base.blocks) / len(few)))
-                for k, d in enumerate(kept):
-                    directions[k].append(d)
             met.append((left, start))
         if met:
             met.sort()
-            found.append(Screened(candidate=c, starts=_apart(met), left=met[0][0], potential=potential, size=smallest))
-    return found, [np.concatenate(d, axis=1) if d else np.zeros((0, 0)) for d in directions]
+            found.append(Screened(candidate=c, starts=_apart(met), left=met[0][0], potential=potential))
+    return found
 
 
 def _apart(met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float, ...], ...]:
@@ -129,24 +127,22 @@ def _apart(met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float,
     return (best, *other[:1])
 
 
-def _visible(candidate: Candidate, start: Sequence[float], size: float) -> float:
-    """Strength (first parameter) whose trace would be 5 times the noise's, by that at a start: |d| grows with it."""
-    name, search = next(iter(candidate.search.items()))
-    value = candidate.values(start)[name]
-    null = EFFECTS[candidate.id].null.get(name)
-    base = float(null) if isinstance(null, (int, float)) else 0.0
-    del search
-    return base + (value - base) * VISIBLE / float(np.sqrt(max(size, 1e-12)))
-
-
 def step(
-    judge: Judge, base: Fitted, candidates: Sequence[Candidate], groups: Sequence[Sequence[int]], say: Progress
-) -> Step:
-    """Fit the promising candidates beside the base and rank them by what they predict of held-out conditions."""
+    judge: Judge,
+    base: Fitted,
+    candidates: Sequence[Candidate],
+    groups: Sequence[Sequence[int]],
+    say: Progress,
+    looked: Gate,
+) -> Step | None:
+    """Fit the promising candidates beside the base and rank them by what they predict of held-out conditions.
+
+    `looked` is what all of them scored beside the base. Where the best leaves nearly noise, that noise is weighed by
+    what it leaves; the step is then under that noise. None if nothing could be fitted.
+    """
     say(f"looking at {len(candidates)} candidates beside {base.label}")
     few = spread(base, groups)
-    screened, directions = screen(judge, base, candidates, few)
-    null = null_of_the_best(directions)
+    screened = screen(judge, base, _promising(candidates, looked), few)
     count = sum(b.residual.size for b in base.blocks)
     screened, begun_with = _first_fits(judge, base, screened, few, say)
     fits = []
@@ -156,25 +152,43 @@ def step(
         if fitted is not None:
             fits.append(fitted)
     if not fits:
-        return Step(fitted=base, p_value=1.0, rivals=(), screened=tuple(screened))
+        return None
     fits.sort(key=lambda f: f.left)
     # where a threshold makes the way crooked, the nearer ones are followed to the end
     if fits[0].left > NOISE_LEFT**2 * count:
         near = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < CROOKED * fits[0].left][:2]
         fits = [judge.polish(f) if f in near else f for f in fits]
-    fits = _one_each(fits)
+    fits = _shaped(judge, _one_each(fits))
+    if fits[0].left < NEARLY_NOISE**2 * count:
+        judge.weigh(colour.whole(judge.evidence, judge.residuals(fits[0])))
+        base, fits = judge.again(base), [judge.again(f) for f in fits]
     fits.sort(key=lambda f: held_out(f, groups).left.sum())
-    best = fits[0]
-    gain = base.left - min(f.left for f in fits)
     phi = max(1.0, min(f.left for f in fits) / count)  # what even the best leaves is no chance of the noise's size
-    detectable = tuple((s.candidate.key, s.size) for s in screened if np.isfinite(s.size))
-    return Step(
-        fitted=best,
-        p_value=p_value(gain / phi, null),
-        rivals=tuple(fits),
-        screened=tuple(screened),
-        detectable=detectable,
-    )
+    return Step(base=base, fitted=fits[0], p_value=looked.p_value(phi), rivals=tuple(fits), screened=tuple(screened))
+
+
+def _promising(candidates: Sequence[Candidate], looked: Gate) -> list[Candidate]:
+    """Those that scored best, and of two parameters all: beside their thresholds a score tells little."""
+    ranked = sorted(candidates, key=lambda c: -looked.scores.get(c.key, 0.0))
+    return [c for k, c in enumerate(ranked) if k < SCORED or len(c.search) > 1]
+
+
+def _shaped(judge: Judge, fits: Sequence[Fitted]) -> list[Fitted]:
+    """The fits with shapes fitted too where that pays, best first."""
+    found = []
+    best = min(f.left for f in fits)
+    for f in fits:
+        last = f.candidates[-1]
+        if last.shapes and f.left < SHAPED * best:
+            at = len(f.x) - len(last.search)
+            shaped, x = last.with_shapes(f.x[at:])
+            again = judge.fit((*f.candidates[:-1], shaped), (*f.x[:at], *x), shifts=[b.shift for b in f.blocks])
+            if again is not None and again.left < f.left - WORTH * max(
+                1.0, best / sum(b.residual.size for b in f.blocks)
+            ):
+                f = again
+        found.append(f)
+    return sorted(found, key=lambda f: f.left)
 
 
 def _first_fits(
@@ -229,9 +243,9 @@ def moves(judge: Judge, base: Fitted, fitted: Fitted) -> float:
     return most
 
 
-def confusion(base: Fitted, step_: Step, groups: Sequence[Sequence[int]]) -> list[Fitted]:
+def confusion(step_: Step, groups: Sequence[Sequence[int]]) -> list[Fitted]:
     """Rivals that predict held-out recordings as well as the best does, the best first."""
-    best = step_.fitted
+    best, base = step_.fitted, step_.base
     found = [best]
     for rival in step_.rivals:
         explains = base.left - rival.left > 0.5 * (base.left - best.left)

@@ -40,6 +40,11 @@ class Block:
         """s's + 1/sd^2."""
         return float(self.slope @ self.slope) + self.prior**-2
 
+    @property
+    def total(self) -> float:
+        """(D1) where it stands."""
+        return float(self.residual @ self.residual) + (self.shift / self.prior) ** 2
+
     def normal(self) -> tuple[Array, Array, float]:
         """A (p, p), b (p,), c: |..|^2 of (D1) with tau eliminated is c - 2 b'dx + dx'A dx."""
         g = float(self.slope @ self.residual) - self.shift * self.prior**-2
@@ -77,14 +82,44 @@ class Judge:
         self.measured = [e.measured() for e in self.evidence]
         self.shifts = [0.0] * len(self.evidence)
         self.simulations = 0
+        self._raw: dict[tuple[object, ...], Array | None] = {}
         self._known: dict[tuple[object, ...], Array | None] = {}
+
+    def weigh(self, evidence: Sequence[Evidence]) -> None:
+        """Take the same recordings with another noise: nothing is simulated again, fits must be made anew."""
+        self.evidence = tuple(evidence)
+        self.measured = [e.measured() for e in self.evidence]
+        self._known = {}
+
+    def again(self, fitted: Fitted) -> Fitted:
+        """A fit where it stands, linearised anew under the noise as it is held now."""
+        blocks = [self.block(r, fitted.candidates, fitted.x, b.shift, NUDGES[1]) for r, b in enumerate(fitted.blocks)]
+        kept = [new if new is not None else old for new, old in zip(blocks, fitted.blocks, strict=True)]
+        return Fitted(candidates=fitted.candidates, x=fitted.x, blocks=tuple(kept))
+
+    def residuals(self, fitted: Fitted) -> list[Array]:
+        """Measured less predicted, stacked, SI, of each recording."""
+        found = []
+        for r, (e, block) in enumerate(zip(self.evidence, fitted.blocks, strict=True)):
+            raw = self.raw(r, fitted.candidates, fitted.x, block.shift)
+            measured = np.concatenate([s.values for s in e.signals])
+            found.append(measured - raw if raw is not None else np.zeros_like(measured))
+        return found
 
     def predicted(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
         """Stacked prediction of recording r; None where the simulation fails or a value is out of bounds."""
-        key = (r, tuple(c.key for c in candidates), tuple(np.round(x, 12)), round(shift, 9))
+        key = _key(r, candidates, x, shift)
         if key not in self._known:
-            self._known[key] = self._simulated(r, candidates, x, shift)
+            raw = self.raw(r, candidates, x, shift)
+            self._known[key] = None if raw is None else self.evidence[r].whitened(raw)
         return self._known[key]
+
+    def raw(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
+        """The same in SI, before the noise comes in."""
+        key = _key(r, candidates, x, shift)
+        if key not in self._raw:
+            self._raw[key] = self._simulated(r, candidates, x, shift)
+        return self._raw[key]
 
     def _simulated(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
         self.simulations += 1
@@ -94,7 +129,7 @@ class Judge:
             return None
         if found is None:
             return None
-        y = self.evidence[r].stacked(found)
+        y = self.evidence[r].raw(found)
         return y if np.all(np.isfinite(y)) else None
 
     @staticmethod
@@ -197,7 +232,7 @@ class Judge:
                 dx = _bounded(A, b, np.array(x), damping)
                 trial = [float(v) for v in np.clip(np.array(x) + dx, 0.0, 1.0)]
                 moved = np.array(trial) - np.array(x)
-                steps = [_shift(block, moved) for block in blocks]
+                steps = [shift_of(block, moved) for block in blocks]
                 after = [
                     self.block(r, candidates, trial, block.shift + d, 0.0)
                     for r, block, d in zip(use, blocks, steps, strict=True)
@@ -251,10 +286,15 @@ class Judge:
 
     @staticmethod
     def _total(blocks: Sequence[Block]) -> float:
-        return sum(float(b.residual @ b.residual) + (b.shift / b.prior) ** 2 for b in blocks)
+        return sum(b.total for b in blocks)
 
 
-def _shift(block: Block, dx: Array) -> float:
+def _key(r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> tuple[object, ...]:
+    names = tuple((c.key, len(c.search)) for c in candidates)
+    return (r, names, tuple(np.round(np.asarray(x, dtype=float), 12)), round(shift, 9))
+
+
+def shift_of(block: Block, dx: Array) -> float:
     """Change of the time shift that goes with dx."""
     g = float(block.slope @ (block.residual - block.J @ dx)) - block.shift * block.prior**-2
     return g / block.weight

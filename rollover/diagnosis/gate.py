@@ -1,21 +1,28 @@
-"""When a gain is more than chance: the null distribution of the best of all candidates.
+"""When a gain is more than chance: the score of the best of all candidates against its null distribution.
 
-Each candidate looked at in a few places gives directions d in the space of the whitened samples, freed of what the
-time shifts explain. On noise alone the gain of a direction is z^2, z = d'n/|d|, and the best of all is max z^2: drawn
-from N(0, G), G the matrix of the directions' cosines, without a single simulation.
+Each candidate looked at in a few places beside what is held already gives directions d in the space of the whitened
+samples, freed of what the time shifts and the effects already held explain. On noise alone the gain of a direction is
+z^2, z = d'n/|d|, and the best of all is max z^2: drawn from N(0, G), G the matrix of the directions' cosines, without a
+single simulation. What is compared with it is the same maximum for the misfit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.fit import Block
+from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.fit import Block, Fitted, Judge
+from rollover.effects import EFFECTS
 
 Array = NDArray[np.float64]
 DRAWS = 4000
+SHOWS = 1e-3  # noise units: a direction that moves the whole by less is arithmetic's
+VISIBLE = 5.0  # standard errors of the noise at which an effect shows
+JITTER = 1e-9
 
 
 def freed(vectors: Array, block: Block) -> Array:
@@ -25,6 +32,79 @@ def freed(vectors: Array, block: Block) -> Array:
     return np.asarray(vectors - shrink * np.outer(s, s @ vectors))
 
 
+@dataclass(frozen=True, kw_only=True)
+class Gate:
+    """The best score of all candidates, each one's own by key, the null (draws,), and the strength that would show."""
+
+    score: float
+    scores: Mapping[str, float]
+    null: Array
+    detectable: Mapping[str, float]
+
+    def p_value(self, phi: float = 1.0) -> float:
+        """p-value of the best score; `phi` is what is left per sample where not even an explanation leaves noise."""
+        return p_value(self.score / max(phi, 1.0), self.null)
+
+
+def gate(judge: Judge, base: Fitted, candidates: Sequence[Candidate]) -> Gate:
+    """Look at every candidate beside the base, in all recordings."""
+    misfit = np.concatenate([freed((b.residual + b.shift * b.slope)[:, None], b)[:, 0] for b in base.blocks])
+    held = np.concatenate([freed(b.J, b) for b in base.blocks]) if base.x else np.zeros((misfit.size, 0))
+    own, _ = np.linalg.qr(held)
+    columns, names, values = [], [], []
+    for c in candidates:
+        for x in c.probes():
+            d = _direction(judge, base, c, x)
+            if d is None:
+                continue
+            d = d - own @ (own.T @ d)
+            size = float(np.sqrt(d @ d))
+            if size > SHOWS:
+                columns.append(d / size)
+                names.append(c.key)
+                values.append(_visible(c, x, size))
+    if not columns:
+        return Gate(score=0.0, scores={}, null=np.zeros(DRAWS), detectable={})
+    D = np.stack(columns, axis=1)
+    scores = (D.T @ (misfit - own @ (own.T @ misfit))) ** 2
+    detectable: dict[str, float] = {}
+    for name, value in zip(names, values, strict=True):
+        detectable[name] = min(value, detectable.get(name, np.inf))
+    own_best: dict[str, float] = {}
+    for name, score in zip(names, scores, strict=True):
+        own_best[name] = max(float(score), own_best.get(name, 0.0))
+    return Gate(score=float(scores.max()), scores=own_best, null=null_of_the_best([D]), detectable=detectable)
+
+
+def _direction(judge: Judge, base: Fitted, c: Candidate, x: Sequence[float]) -> Array | None:
+    """What the candidate at x moves, all recordings, freed of their time shifts; None where it cannot be simulated."""
+    found = []
+    for r, block in enumerate(base.blocks):
+        y = judge.predicted(r, (*base.candidates, c), (*base.x, *x), block.shift)
+        if y is None:
+            return None
+        found.append(freed((y - (judge.measured[r] - block.residual))[:, None], block)[:, 0])
+    return np.concatenate(found)
+
+
+def yardstick(id: str, names: Collection[str]) -> tuple[str, float]:
+    """The parameter that says how strong an effect is, of those fitted, and its value at no effect.
+
+    The first that has a number for its null; otherwise the first of all, and 0.
+    """
+    for name, null in EFFECTS[id].null.items():
+        if name in names and isinstance(null, (int, float)):
+            return name, float(null)
+    return next(iter(names)), 0.0
+
+
+def _visible(c: Candidate, x: Sequence[float], size: float) -> float:
+    """How far from its null an effect's parameter must be for a trace `VISIBLE` times the noise's, by that at x."""
+    values = c.values(x)
+    name, null = yardstick(c.id, values)
+    return abs(values[name] - null) * VISIBLE / size
+
+
 def null_of_the_best(directions: Sequence[Array], draws: int = DRAWS, seed: int = 0) -> Array:
     """Largest gain on noise (draws,), sorted; `directions` are, for each recording, arrays (n_r, m)."""
     m = directions[0].shape[1] if len(directions) else 0
@@ -32,9 +112,7 @@ def null_of_the_best(directions: Sequence[Array], draws: int = DRAWS, seed: int 
         return np.zeros(draws)
     G = sum((np.asarray(d).T @ np.asarray(d) for d in directions), np.zeros((m, m)))
     size = np.sqrt(np.maximum(np.diag(G), 1e-300))
-    C = G / np.outer(size, size)
-    values, vectors = np.linalg.eigh(C)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    root = np.linalg.cholesky(G / np.outer(size, size) + JITTER * m * np.eye(m))
     z = np.random.default_rng(seed).standard_normal((draws, m)) @ root.T
     return np.asarray(np.sort(np.max(z * z, axis=1)))
 

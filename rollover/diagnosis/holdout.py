@@ -37,10 +37,10 @@ class Held:
 
 
 def held_out(fitted: Fitted, groups: Sequence[Sequence[int]]) -> Held:
-    """Predict each group of recordings by a fit to all the others; a single group is predicted by itself."""
+    """Predict each group of recordings by a fit to all the others; one group alone, or what is in none, by its own."""
     normals = [b.normal() for b in fitted.blocks]
     p = len(fitted.x)
-    left = np.zeros(len(normals))
+    left = np.array([max(c, 0.0) for _, _, c in normals])
     for group in groups:
         rest = [r for r in range(len(normals)) if r not in group] or list(group)
         dx = _step(
@@ -57,17 +57,6 @@ def _step(A: Array, b: Array) -> Array:
     if not b.size:
         return b
     return np.asarray(np.linalg.solve(A + GENTLE * np.eye(b.size), b))
-
-
-def split(fitted: Fitted, training: Sequence[int], held: Sequence[int]) -> Held:
-    """Fit the training recordings only and predict the held ones; each recording's place keeps its own value."""
-    normals = [b.normal() for b in fitted.blocks]
-    p = len(fitted.x)
-    A = sum((normals[r][0] for r in training), np.zeros((p, p)))
-    dx = _step(A, sum((normals[r][1] for r in training), np.zeros(p)))
-    left = np.array([max(c - 2.0 * float(b @ dx) + float(dx @ A_r @ dx), 0.0) for A_r, b, c in normals])
-    del held
-    return Held(left=left, count=np.array([b.residual.size for b in fitted.blocks], dtype=float))
 
 
 def worse(rival: Fitted, best: Fitted, groups: Sequence[Sequence[int]]) -> tuple[float, float]:

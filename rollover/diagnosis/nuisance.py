@@ -41,11 +41,10 @@ class Eased:
         return np.asarray(values - (self.directions @ inside).reshape(values.shape))
 
 
-NOTHING = Eased(directions=np.zeros((0, 0)), shares=np.zeros(0))
-
-
 def eased(columns: Array) -> Eased:
     """From N (n, q), columns of what 1 sigma of each condition does."""
+    if columns.shape[1] == 0:
+        return Eased(directions=columns, shares=np.zeros(0))
     U, S, _ = np.linalg.svd(columns, full_matrices=False)
     kept = S > LEAST * max(float(S.max(initial=0.0)), 1e-300)
     return Eased(directions=U[:, kept], shares=1.0 - 1.0 / np.sqrt(1.0 + S[kept] ** 2))

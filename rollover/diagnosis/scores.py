@@ -2,48 +2,91 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.holdout import Held
+from rollover.diagnosis.evidence import Evidence
+from rollover.diagnosis.fit import Fitted, Judge, shift_of
+from rollover.diagnosis.holdout import Held, held_out
 from rollover.diagnosis.verdict import Score
 from rollover.rating import Iso18571, iso18571
 
+SAMPLES = 1500  # that a rating is worked out on
 FORCES = ("ground/force_normal", "rops/force", "striker/acceleration_z", "chassis/acceleration_z")
 
 
-def scored(judge: Judge, fitted: Fitted, held: Held, hold_out: Sequence[str]) -> dict[str, Score]:
-    """Scores of the training recordings (as fitted) and of the held-out ones (as predicted)."""
+@dataclass(frozen=True, kw_only=True)
+class Judged:
+    """How well an explanation meets recordings: scores by "training" and "held_out", what is held out, and of each."""
+
+    scores: Mapping[str, Score]
+    held: Held
+    by_recording: tuple[tuple[str, float], ...]
+
+
+def judged(judge: Judge, fitted: Fitted, kept: Sequence[Evidence], groups: Sequence[Sequence[int]]) -> Judged:
+    """Judge an explanation by recordings that were kept from it, or without such by leaving conditions out in turn."""
     every = range(len(judge.evidence))
-    kept = [r for r in every if judge.evidence[r].name in hold_out] or list(every)
-    train = [r for r in every if judge.evidence[r].name not in hold_out]
-    left = sum(fitted.blocks[r].normal()[2] for r in train)
-    count = sum(fitted.blocks[r].residual.size for r in train)
-    return {
-        "training": _score(judge, fitted, train, float(np.sqrt(left / max(count, 1)))),
-        "held_out": _score(judge, fitted, kept, float(np.sqrt(held.left[kept].sum() / held.count[kept].sum()))),
-    }
+    left = sum(b.normal()[2] for b in fitted.blocks)
+    train = _score(
+        [_rated(judge, fitted, r) for r in every], float(np.sqrt(left / sum(b.residual.size for b in fitted.blocks)))
+    )
+    held = held_out(fitted, groups)
+    rows = [(e.name, float(v)) for e, v in zip(judge.evidence, held.nrmse, strict=True)]
+    if not kept:
+        scores = {"training": train, "held_out": replace(train, nrmse=held.total)}
+        return Judged(scores=scores, held=held, by_recording=tuple(rows))
+    other = Judge(kept)
+    other.aligned()
+    apart = predicted(other, fitted)
+    if apart is None:
+        return Judged(scores={"training": train}, held=held, by_recording=tuple(rows))
+    held = held_out(apart, [])
+    rows += [(e.name, float(v)) for e, v in zip(kept, held.nrmse, strict=True)]
+    score = _score([_rated(other, apart, r) for r in range(len(kept))], held.total)
+    return Judged(scores={"training": train, "held_out": score}, held=held, by_recording=tuple(rows))
 
 
-def _score(judge: Judge, fitted: Fitted, rows: Sequence[int], nrmse: float) -> Score:
+def predicted(judge: Judge, fitted: Fitted, rounds: int = 5) -> Fitted | None:
+    """An explanation carried over to other recordings: only their own time shifts are fitted."""
+    blocks = []
+    for r in range(len(judge.evidence)):
+        at, best = judge.shifts[r], None
+        for _ in range(rounds):
+            block = judge.block(r, fitted.candidates, fitted.x, at, 0.0)
+            if block is None:
+                return None
+            if best is None or block.total < best.total:
+                best = block
+            at = best.shift + (0.5 if best is not block else 1.0) * shift_of(best, np.zeros(len(fitted.x)))
+        assert best is not None
+        blocks.append(best)
+    return Fitted(candidates=fitted.candidates, x=fitted.x, blocks=tuple(blocks))
+
+
+def _rated(judge: Judge, fitted: Fitted, r: int) -> tuple[list[float], list[float]]:
+    """ISO ratings of one recording's channels, and the error of its peak force, where they can be had."""
+    e, block = judge.evidence[r], fitted.blocks[r]
+    predicted = e.simulator.predict(judge.changes(fitted.candidates, fitted.x), block.shift)
+    if predicted is None:
+        return [], []
     ratings, peaks = [], []
-    for r in rows:
-        e, block = judge.evidence[r], fitted.blocks[r]
-        changes = judge.changes(fitted.candidates, fitted.x)
-        predicted = e.simulator.predict(changes, block.shift)
-        if predicted is None:
-            continue
-        for signal in e.signals:
-            time, y = e.recording.time[signal.rows], predicted[signal.channel][signal.rows]
-            rating = iso18571(time, signal.values, y)
-            if isinstance(rating, Iso18571):
-                ratings.append(rating.overall)
-        force = next((s for name in FORCES for s in e.signals if s.channel == name), None)
-        if force is not None:
-            measured, simulated = _peak(force.values), _peak(predicted[force.channel][force.rows])
-            peaks.append(abs(simulated - measured) / max(measured, 1e-12))
+    for signal in e.signals:
+        time, y = e.recording.time[signal.rows], predicted[signal.channel][signal.rows]
+        rating = iso18571(time, signal.values, y, most=SAMPLES)
+        if isinstance(rating, Iso18571):
+            ratings.append(rating.overall)
+    force = next((s for name in FORCES for s in e.signals if s.channel == name), None)
+    if force is not None:
+        measured, simulated = _peak(force.values), _peak(predicted[force.channel][force.rows])
+        peaks.append(abs(simulated - measured) / max(measured, 1e-12))
+    return ratings, peaks
+
+
+def _score(rated: Sequence[tuple[list[float], list[float]]], nrmse: float) -> Score:
+    ratings, peaks = [v for one, _ in rated for v in one], [v for _, one in rated for v in one]
     return Score(
         nrmse=nrmse,
         iso18571=float(np.mean(ratings)) if ratings else None,

@@ -1,102 +1,181 @@
-"""From the scenario as it is to an explanation: effects added one by one, and the verdict that they bear."""
+"""From the scenario as it is to an explanation: effects added one by one, tried without, and the verdict they bear."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rollover.diagnosis import colour
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.detect import Mismatch, mismatch_of
-from rollover.diagnosis.explain import CHANCE, MOST, NEGLIGIBLE, Step, moves, step
+from rollover.diagnosis.explain import NEARLY_NOISE, Step, moves, step
 from rollover.diagnosis.fit import Fitted, Judge
+from rollover.diagnosis.gate import Gate, gate
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.verdict import Verdict
 
+CHANCE = 0.005  # p-value of the best of all candidates that admits one
 SURE = 1e-3  # p-value below which there is a mismatch
-EXPLAINED = 1.2  # held-out misfit over the noise that counts as explained
-NOISE_ITSELF = 1.05  # held-out misfit that no further effect can better
-PARTLY = 0.05  # of the excess over the noise that an explanation may leave and still be named
+MOST = 3  # effects in one explanation
+NEGLIGIBLE = 0.001  # of a channel's range: what moves nothing by more is not worth a name
+PARTLY = 0.02  # of the excess over the noise that one effect may leave and still be named
+NEEDED = 25.0  # gain, over what is left per sample, that an effect must bring beside all the others
+
+Phases = Sequence[Sequence[tuple[float, str]]]
+Groups = Sequence[Sequence[int]]
+Progress = Callable[[str], None]
 
 
-class Steps:
-    """The steps of a selection, and what was looked at in its first."""
+@dataclass(frozen=True, kw_only=True)
+class Explanation:
+    """What was selected: the base, the fit (the base itself if nothing), a step for each of its effects.
 
-    def __init__(self, taken: Sequence[Step], tried: Sequence[Step]) -> None:
-        self.taken, self.tried = list(taken), list(tried)
+    Each step's base is the fit without that effect, so that its rivals competed beside all the others. `first` is the
+    first step, taken or not; `looked` what all candidates scored beside the base; `detectable` the strength at which
+    each would have shown, beside the explanation for those that are not in it.
+    """
+
+    base: Fitted
+    fitted: Fitted
+    parts: tuple[Step, ...]
+    looked: Gate
+    detectable: Mapping[str, float]
+    before: Mismatch
+    after: Mismatch
+    first: Step | None = None
 
     @property
-    def looked(self) -> Step | None:
-        """The first step, taken or not."""
-        return self.tried[0] if self.tried else None
+    def p_value(self) -> float:
+        """Of "nothing but noise": the smaller of the omnibus test's and of the best candidate's, for two tests."""
+        return float(1.0 - (1.0 - min(self.before.p_value, self.looked.p_value())) ** 2)
 
 
-def selected(
-    judge: Judge,
-    base: Fitted,
-    candidates: Sequence[Candidate],
-    groups: Sequence[Sequence[int]],
-    phases: Sequence[Sequence[tuple[float, str]]],
-    say: Callable[[str], None],
-) -> tuple[Steps, Fitted]:
-    """Forward selection: up to three effects, each beyond chance, until nothing but noise is left."""
-    taken: list[Step] = []
-    tried: list[Step] = []
-    current = base
+def explained(
+    judge: Judge, base: Fitted, candidates: Sequence[Candidate], groups: Groups, phases: Phases, say: Progress
+) -> Explanation:
+    """Forward selection of up to three effects, each beyond chance, then each tried without and against its rivals."""
+    count = sum(b.residual.size for b in base.blocks)
+    if base.left < NEARLY_NOISE**2 * count:
+        judge.weigh(colour.whole(judge.evidence, judge.residuals(base)))
+        base = judge.again(base)
+    before = mismatch_of(judge.evidence, base.blocks, phases)
+    say(f"looking at {len(candidates)} candidates, which of them could matter")
+    looked = first_look = gate(judge, base, candidates)
+    current, left, taken = base, before, []
+    first: Step | None = None
     for _ in range(MOST):
-        used = {c.key for c in current.candidates} | {c.id for c in current.candidates if c.channel is None}
-        found = step(judge, current, [c for c in candidates if c.key not in used and c.id not in used], groups, say)
-        tried.append(found)
-        if found.p_value > CHANCE or moves(judge, current, found.fitted) < NEGLIGIBLE:
+        if looked.p_value() > CHANCE and (left.p_value > SURE or not matters(judge, current, left)):
+            break
+        found = step(judge, current, free(current, candidates), groups, say, looked)
+        first = first or found
+        if found is None or found.p_value > CHANCE or moves(judge, found.base, found.fitted) < NEGLIGIBLE:
             break
         taken.append(found)
         current = found.fitted
-        if held_out(current, groups).total < NOISE_ITSELF:
-            break
         left = mismatch_of(judge.evidence, current.blocks, phases)
-        if left.p_value > SURE or not matters(judge, current, left):
+        looked = gate(judge, current, free(current, candidates))
+    parts = _needed(judge, taken, candidates, groups, say) if len(taken) > 1 else [s.again(judge) for s in taken]
+    base = judge.again(base)
+    current = parts[-1].fitted if parts else base
+    return Explanation(
+        base=base,
+        fitted=current,
+        parts=tuple(parts),
+        looked=first_look,
+        detectable={**first_look.detectable, **looked.detectable},
+        before=before,
+        after=mismatch_of(judge.evidence, current.blocks, phases),
+        first=first.again(judge) if first is not None else None,
+    )
+
+
+def free(current: Fitted, candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Candidates that an explanation does not hold yet."""
+    used = {c.key for c in current.candidates}
+    return [c for c in candidates if c.key not in used]
+
+
+def without(judge: Judge, fitted: Fitted, k: int, rounds: int = 8) -> Fitted | None:
+    """The explanation fitted again without its k-th effect."""
+    rest, x, at = [], [], 0
+    for j, c in enumerate(fitted.candidates):
+        if j != k:
+            rest.append(c)
+            x += list(fitted.x[at : at + len(c.search)])
+        at += len(c.search)
+    return judge.fit(rest, x, rounds=rounds, shifts=[b.shift for b in fitted.blocks])
+
+
+def _needed(
+    judge: Judge, taken: Sequence[Step], candidates: Sequence[Candidate], groups: Groups, say: Progress
+) -> list[Step]:
+    """Steps of the effects that are needed: each dropped if that costs no more than chance, or given to a better one.
+
+    Returned in such an order that the last one's fit is the whole explanation; every step's fit is.
+    """
+    current = judge.again(taken[-1].fitted)
+    while len(current.candidates) > 1:
+        losses = []
+        for k in range(len(current.candidates)):
+            rest = without(judge, current, k)
+            losses.append((rest.left - current.left if rest is not None else np.inf, k, rest))
+        loss, _, rest = min(losses, key=lambda one: one[0])
+        phi = max(1.0, current.left / sum(b.residual.size for b in current.blocks))
+        if rest is None or loss / phi > NEEDED:
             break
-    return Steps(taken, tried), current
+        current = rest
+    kept, last = len(current.candidates), taken[-1]
+    parts: list[Step] = []
+    for turn in range(kept):
+        whole = turn == kept - 1 and current.candidates[0].key == last.fitted.candidates[-1].key
+        if whole and {c.key for c in current.candidates} == {c.key for c in last.fitted.candidates}:
+            parts.append(last)  # found beside just these others
+            break
+        # the first of all is taken out and looked for anew beside the rest: it comes back last, or a better one does
+        rest = without(judge, current, 0)
+        if rest is None:
+            break
+        others = free(rest, candidates)
+        found = step(judge, rest, others, groups, say, gate(judge, rest, others))
+        if found is None:
+            break
+        parts.append(found)
+        current = found.fitted
+    return [s.again(judge) for s in parts] if len(parts) == kept else [s.again(judge) for s in taken]
 
 
-def decided(
-    judge: Judge, base: Fitted, before: Mismatch, steps: Steps, groups: Sequence[Sequence[int]]
-) -> tuple[Steps, Fitted, Verdict]:
-    """The verdict; what does not explain is not named, and of several effects only those that are needed."""
-    start = held_out(base, groups).total
-    for count in range(len(steps.taken), 0, -1):
-        fitted = steps.taken[count - 1].fitted
-        end = held_out(fitted, groups).total
-        if end < EXPLAINED or end**2 - 1.0 < PARTLY * (start**2 - 1.0):
-            # the fewest that explain as well
-            for fewer in range(1, count):
-                earlier = held_out(steps.taken[fewer - 1].fitted, groups).total
-                if earlier < max(1.02 * end, NOISE_ITSELF):
-                    count, fitted = fewer, steps.taken[fewer - 1].fitted
-                    break
-            kind = strongest(judge, base, fitted).kind
-            verdict: Verdict = (
-                "missing-physics" if kind == "physics" else "parameter" if kind == "parameter" else "sensor"
-            )
-            return Steps(steps.taken[:count], steps.tried), fitted, verdict
-    significant = before.p_value < SURE and matters(judge, base, before)
-    return Steps([], steps.tried), base, "unexplained" if significant or steps.taken else "no-mismatch"
+def decided(judge: Judge, found: Explanation, groups: Groups) -> tuple[Explanation, Verdict]:
+    """The verdict; what does not explain is not named.
+
+    Several effects are named only if together they leave nothing but noise; one alone also where it takes nearly all.
+    """
+    if found.parts and (found.after.p_value > SURE or not matters(judge, found.fitted, found.after)):
+        return found, _kind(strongest(judge, found.base, found.fitted))
+    start = held_out(found.base, groups).total
+    if found.first is not None and found.parts:
+        one = found.first
+        end = held_out(one.fitted, groups).total
+        if end**2 - 1.0 < PARTLY * (start**2 - 1.0):
+            return replace(found, parts=(one,), fitted=one.fitted), _kind(one.fitted.candidates[-1])
+    significant = found.before.p_value < SURE and matters(judge, found.base, found.before)
+    verdict: Verdict = "unexplained" if significant or found.parts else "no-mismatch"
+    return replace(found, parts=(), fitted=found.base), verdict
+
+
+def _kind(c: Candidate) -> Verdict:
+    return "missing-physics" if c.kind == "physics" else "parameter" if c.kind == "parameter" else "sensor"
 
 
 def strongest(judge: Judge, base: Fitted, fitted: Fitted) -> Candidate:
     """The effect without which most would be left."""
     best, loss = fitted.candidates[0], -np.inf
     for k, c in enumerate(fitted.candidates):
-        rest = tuple(o for j, o in enumerate(fitted.candidates) if j != k)
-        if not rest:
+        if len(fitted.candidates) == 1:
             return c
-        x, at = [], 0
-        for o in fitted.candidates:
-            if o is not c:
-                x += list(fitted.x[at : at + len(o.search)])
-            at += len(o.search)
-        without = judge.fit(rest, x, rounds=4)
-        left = without.left if without is not None else base.left
+        rest = without(judge, fitted, k, rounds=4)
+        left = rest.left if rest is not None else base.left
         if left > loss:
             best, loss = c, left
     return best
@@ -105,10 +184,9 @@ def strongest(judge: Judge, base: Fitted, fitted: Fitted) -> Candidate:
 def matters(judge: Judge, base: Fitted, before: Mismatch) -> bool:
     """Whether the structure of the misfit is worth a word: beyond a share of a channel's range."""
     most = 0.0
-    for r, block in enumerate(base.blocks):
-        for signal, _ in judge.evidence[r].spans():
+    for r, e in enumerate(judge.evidence[: len(base.blocks)]):
+        for signal, _ in e.spans():
             cells = [c for c in before.cells if c.recording == r and c.channel == signal.channel]
             power = sum(c.structured - c.waves for c in cells) / max(sum(c.rows.size for c in cells), 1)
             most = max(most, float(np.sqrt(max(power, 0.0))) * signal.sigma / signal.span)
-        del block
     return most > NEGLIGIBLE

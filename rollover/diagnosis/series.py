@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.account import diagnosed_scenario
-from rollover.diagnosis.evidence import Evidence, binned, evidence_of
+from rollover.diagnosis.bins import simulated
+from rollover.diagnosis.evidence import Evidence, evidence_of
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.phases import drop_phases
 from rollover.diagnosis.simulator import simulator_of
@@ -83,10 +84,11 @@ def _told(
     name: str, recording: Recording, scenario: Scenario, diagnosed: Scenario | None, held_out: bool
 ) -> Told | None:
     simulator = simulator_of(scenario, recording)
-    evidence = evidence_of(name, thinner := binned(recording), simulator_of(scenario, thinner))
+    evidence = evidence_of(name, *simulated(scenario, recording))
     if evidence is None:
         return None
-    best = evidence if diagnosed is None else evidence_of(name, thinner, simulator_of(diagnosed, thinner))
+    thinner = evidence.recording
+    best = evidence if diagnosed is None else evidence_of(name, *simulated(diagnosed, recording))
     at = _shift(best or evidence)
     before = simulator.predict({}, at)
     if before is None:

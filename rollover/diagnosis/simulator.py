@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -12,11 +14,14 @@ from rollover.diagnosis.overturn import RunSimulator
 from rollover.drop import DropFailedError, DropModel, unfit
 from rollover.effects import read
 from rollover.filters import filtered
+from rollover.initiation import Drop
 from rollover.recording import Recording
 from rollover.scenario import Scenario
 
 Array = NDArray[np.float64]
 SENSORS = "effects.sensor-"
+EDGES = ("sensor-lag", "sensor-clock-offset", "sensor-clock-drift")
+BESIDE = 1e-9  # s: on either side of the first contact
 KEPT = 64  # runs of one recording
 
 
@@ -25,6 +30,9 @@ class Simulator(Protocol):
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """Channels (n,) at the recording's stamps less `shift` (s); None if the simulation fails."""
+
+    def contact(self, _shift: float) -> float:
+        """Time (s) on a clock that is so late at which forces leap; inf if they do not."""
 
 
 class DropSimulator:
@@ -38,23 +46,60 @@ class DropSimulator:
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """See `Simulator`; ``ValueError`` for a value out of bounds passes."""
         physical = {path: value for path, value in changes.items() if not path.startswith(SENSORS)}
+        stamps = self.recording.time
         try:
-            run = self._run(physical, shift)
+            run = self._run(physical, stamps - shift, (shift,))
+            if len(physical) < len(changes):
+                read_by = self.model.with_({p: v for p, v in changes.items() if p not in physical}).scenario.effects
+                run = replace(run, time=stamps, channels={**run.channels, **self._edges(physical, shift, read_by)})
+                run = read({n: e for n, e in read_by.items() if n not in EDGES}, run)
         except DropFailedError:
             return None
-        if len(physical) < len(changes):
-            read_by = self.model.with_({p: v for p, v in changes.items() if p not in physical})
-            run = read(read_by.scenario.effects, run)
         return behind_filters(run.channels, self.recording)
 
-    def _run(self, physical: Mapping[str, Any], shift: float) -> Recording:
+    def _edges(self, physical: Mapping[str, Any], shift: float, read_by: Mapping[str, Any]) -> dict[str, Array]:
+        """Channels behind a lag or with a clock of their own: what these make of a leap lies between the stamps."""
+        stamps = self.recording.time
+        lag, offset, drift = (read_by.get(name) for name in EDGES)
+        found = {}
+        for channel in {effect.channel for effect in (lag, offset, drift) if effect is not None}:
+            own = stamps
+            if offset is not None and offset.channel == channel:
+                own = own - offset.offset
+            if drift is not None and drift.channel == channel:
+                own = (1.0 - drift.drift) * own
+            own, key = own - shift, (shift, channel, offset, drift)
+            if lag is None or lag.channel != channel:
+                found[channel] = self._run(physical, own, key)[channel]
+                continue
+            beside = self._contact + np.array([-BESIDE, BESIDE])
+            fine = np.concatenate([own, 0.5 * (own[1:] + own[:-1]), beside[(beside > own[0]) & (beside < own[-1])]])
+            dense, where = np.unique(fine, return_inverse=True)
+            raw = replace(self._run(physical, dense, (*key, "dense")), time=dense)
+            found[channel] = lag.read(raw)[channel][where[: own.size]]
+        return {name: values for name, values in found.items() if name in self.recording.channels}
+
+    def contact(self, _shift: float) -> float:
+        """Time (s) of the first contact on a recording's clock that is so late; forces leap there."""
+        return _shift + self._contact
+
+    @cached_property
+    def _contact(self) -> float:
+        start = self.model.scenario.initiation
+        if isinstance(start, Drop):
+            return 0.0
+        times = np.arange(0.0, self.model.scenario.simulation.duration, 1e-4)
+        below = self.model.run(times)["ground/sinkage"] > 0.0
+        return float(times[np.argmax(below)]) if below.any() else np.inf
+
+    def _run(self, physical: Mapping[str, Any], times: Array, key: tuple[Any, ...]) -> Recording:
         """The drop before instruments: what sensors alone change needs no second run."""
-        key = (*sorted(physical.items()), shift)
+        key = (*sorted(physical.items()), *key)
         if key not in self._raw:
             if len(self._raw) >= KEPT:
                 self._raw.pop(next(iter(self._raw)))
             model = self.model.with_(physical) if physical else self.model
-            self._raw[key] = model.run(self.recording.time - shift)
+            self._raw[key] = model.run(times)
         return self._raw[key]
 
 

@@ -7,32 +7,33 @@ from typing import Any
 
 import numpy as np
 
+from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.detect import Mismatch
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.explain import confusion
-from rollover.diagnosis.fit import Fitted, Judge
+from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.holdout import Held, held_out
 from rollover.diagnosis.intervals import intervals
-from rollover.diagnosis.selection import Steps, strongest
+from rollover.diagnosis.selection import Explanation, strongest
 from rollover.diagnosis.verdict import Considered, Named, Place, Verdict
 from rollover.effects import EFFECTS
 
 
-def named(judge: Judge, base: Fitted, steps: Steps, groups: Sequence[Sequence[int]]) -> tuple[Named, ...]:
+def named(judge: Judge, found: Explanation, groups: Sequence[Sequence[int]]) -> tuple[Named, ...]:
     """Effects of an explanation with their intervals and look-alikes, the strongest first."""
-    fitted = steps.taken[-1].fitted
-    settings = intervals(judge, fitted)
-    found = []
-    for k, c in enumerate(fitted.candidates):
+    fitted = found.fitted
+    settings = {c.key: s for c, s in zip(fitted.candidates, intervals(judge, fitted), strict=True)}
+    by_key = {s.fitted.candidates[-1].key: s for s in found.parts}
+    effects = []
+    for c in fitted.candidates:
         kind = EFFECTS[c.id]
-        parameters = settings[k]
+        parameters = settings[c.key]
         values: dict[str, Any] = {name: i.value for name, i in parameters.items()}
         if c.channel is not None:
             values["channel"] = c.channel
-        before = steps.taken[k - 1].fitted if k else base
-        rivals = [f.candidates[-1] for f in confusion(before, steps.taken[k], groups) if f.candidates[-1].key != c.key]
+        rivals = [f.candidates[-1] for f in confusion(by_key[c.key], groups) if f.candidates[-1].key != c.key]
         tests = [kind.rivals[r.id] for r in rivals if r.id in kind.rivals]
-        found.append(
+        effects.append(
             Named(
                 id=c.id,
                 kind=c.kind,
@@ -40,46 +41,50 @@ def named(judge: Judge, base: Fitted, steps: Steps, groups: Sequence[Sequence[in
                 parameters=parameters,
                 settings=values,
                 channel=c.channel,
-                p_value=steps.taken[k].p_value,
+                p_value=by_key[c.key].p_value,
                 indistinguishable_from=tuple(dict.fromkeys(r.id for r in rivals if r.id != c.id)),
                 discriminating_test=tests[0] if tests else next(iter(kind.rivals.values()), ""),
             )
         )
-    first = strongest(judge, base, fitted)
-    return tuple(sorted(found, key=lambda n: (n.id, n.channel) != (first.id, first.channel)))
+    first = strongest(judge, found.base, fitted)
+    return tuple(sorted(effects, key=lambda n: (n.id, n.channel) != (first.id, first.channel)))
 
 
-def considered(judge: Judge, base: Fitted, steps: Steps, groups: Sequence[Sequence[int]]) -> tuple[Considered, ...]:
+def considered(
+    found: Explanation, candidates: Sequence[Candidate], groups: Sequence[Sequence[int]]
+) -> tuple[Considered, ...]:
     """Every candidate with its gain on held-out conditions beside the base, and why it was not chosen."""
-    first = steps.looked
-    if first is None:
-        return ()
-    start = held_out(base, groups).total
-    chosen = {c.key for c in steps.taken[-1].fitted.candidates} if steps.taken else set()
-    best = held_out(first.fitted, groups).total
-    found, seen = [], set()
-    for f in first.rivals:
-        c = f.candidates[-1]
-        end = held_out(f, groups).total
-        seen.add(c.key)
-        if c.key in chosen:
-            reason = "chosen"
-        elif end >= 0.999 * start:
-            reason = "predicts held-out recordings no better than the scenario as it is"
-        else:
-            reason = f"leaves {end:.2f} times the noise on held-out recordings, the best {best:.2f}"
-        found.append(Considered(id=c.id, channel=c.channel, held_out_gain=float(np.log(start / end)), reason=reason))
-    for s in first.screened:
-        if s.candidate.key not in seen:
-            found.append(
-                Considered(
-                    id=s.candidate.id, channel=s.candidate.channel, held_out_gain=0.0,
-                    reason=f"leaves {s.nrmse:.2f} times the noise after a first fit to few recordings"
-                    if s.nrmse
-                    else "moves the simulation in directions in which the misfit has little",
-                )
-            )  # fmt: skip
-    return tuple(sorted(found, key=lambda c: -c.held_out_gain))
+    first = found.first
+    chosen = {c.key for c in found.fitted.candidates}
+    lines: dict[str, Considered] = {}
+    if first is not None:
+        start, best = held_out(first.base, groups).total, held_out(first.fitted, groups).total
+        for f in first.rivals:
+            c = f.candidates[-1]
+            end = held_out(f, groups).total
+            if c.key in chosen:
+                reason = "chosen"
+            elif end >= 0.999 * start:
+                reason = "predicts held-out recordings no better than the scenario as it is"
+            else:
+                reason = f"leaves {end:.2f} times the noise on held-out recordings, the best {best:.2f}"
+            lines[c.key] = Considered(
+                id=c.id, channel=c.channel, held_out_gain=float(np.log(start / end)), reason=reason
+            )
+        for s in first.screened:
+            if s.candidate.key not in lines and s.nrmse:
+                c = s.candidate
+                reason = f"leaves {s.nrmse:.2f} times the noise after a first fit to few recordings"
+                lines[c.key] = Considered(id=c.id, channel=c.channel, held_out_gain=0.0, reason=reason)
+    for c in candidates:
+        if c.key not in lines:
+            reason = (
+                "chosen beside another one"
+                if c.key in chosen
+                else "moves the simulation in directions in which the misfit has little"
+            )
+            lines[c.key] = Considered(id=c.id, channel=c.channel, held_out_gain=0.0, reason=reason)
+    return tuple(sorted(lines.values(), key=lambda c: -c.held_out_gain))
 
 
 def places(mismatch: Mismatch, evidence: Sequence[Evidence], depends: str | None) -> tuple[Place, ...]:

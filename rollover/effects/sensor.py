@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ground.compiled import compiled
 from ground.quantity import Quantity, parameters
 from rollover.channels import is_known
 from rollover.effects.effect import Effect, Kind, Search
@@ -26,6 +27,12 @@ def _checked(channel: str) -> None:
 
 def _with(recording: Recording, channel: str, values: Array) -> Recording:
     return replace(recording, channels={**recording.channels, channel: values})
+
+
+@compiled
+def _follow(fade: Any, drive: Any, y: Any) -> None:
+    for i in range(fade.size):
+        y[i + 1] = fade[i] * y[i] + drive[i]
 
 
 @parameters
@@ -99,8 +106,7 @@ class SensorLag(Effect):
         rest = -np.expm1(-ratio) / ratio  # mean of the fading over the step
         gain_old, gain_new = rest - fade, 1.0 - rest
         y = x.copy()
-        for i in range(len(h)):
-            y[i + 1] = fade[i] * y[i] + gain_old[i] * x[i] + gain_new[i] * x[i + 1]
+        _follow(fade, gain_old * x[:-1] + gain_new * x[1:], y)
         return _with(recording, self.channel, y)
 
 

@@ -11,9 +11,10 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import kstest
 
+from rollover.diagnosis.bins import binned
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.detect import mismatch_of
-from rollover.diagnosis.evidence import Evidence, binned
+from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.fit import GENTLE, Block, Fitted
 from rollover.diagnosis.gate import freed, null_of_the_best, p_value
 from rollover.diagnosis.holdout import held_out

@@ -65,6 +65,7 @@ def test_compare_writes_its_folder(folder: Path, tmp_path: Path) -> None:
     assert force["rating"]["peak"]["relative_error"] < -0.1
     assert [cell["phase"] for cell in force["cells"]][:3] == ["approach", "loading", "unloading"]
     assert sorted(p.name for p in (tmp_path / "c").iterdir()) == ["compare.json", "compare.rrd", "report.html"]
+    answers_first_in_the_viewer(tmp_path / "c" / "compare.rrd")
     page = (tmp_path / "c" / "report.html").read_text()
     assert "ISO/TS 18571" in page
     assert page.count("<svg") == 3
@@ -73,6 +74,24 @@ def test_compare_writes_its_folder(folder: Path, tmp_path: Path) -> None:
     assert again.exit_code == 0
     other = rollover("compare", "drop_test", folder / "d3.0.csv", "--out", tmp_path / "c", "--set", "gravity=9.8")
     assert other.exit_code == 2
+
+
+def answers_first_in_the_viewer(path: Path) -> None:
+    """The layout names what was logged; the rating and the recording's own phases stand in it."""
+    from viz.verify import blueprint_queries, check_rrd, read_column
+
+    assert check_rrd(path) == []
+    rules = dict(blueprint_queries(path))
+    assert rules["Measured against simulated"] == "/report/comparison"
+    assert rules["Phase, measured"] == "/phase_measured"
+    _, (words,) = read_column(path, "/report/comparison", "TextDocument:text")
+    assert words[0].startswith("# ISO/TS 18571 0.")
+    assert "| ground force | 60 | 0." in words[0]
+    colours = [
+        read_column(path, f"/residual/{s}", "SeriesLines:colors")[1]
+        for s in ("ground_force_normal_kN", "ground_sinkage_mm")
+    ]
+    assert colours[0] != colours[1]
 
 
 def test_compare_refuses_and_writes_nothing(folder: Path, tmp_path: Path) -> None:

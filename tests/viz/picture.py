@@ -5,6 +5,7 @@ Needs a Vulkan driver; without a graphics card Debian's mesa-vulkan-drivers (lav
 
 from __future__ import annotations
 
+import io
 import os
 import socket
 import subprocess
@@ -14,6 +15,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from viz.viewer import viewer_binary
 
@@ -33,6 +37,13 @@ def kept(name: str, picture: bytes) -> Path:
     path = KEPT / name
     path.write_bytes(picture)
     return path
+
+
+def pixels(picture: bytes) -> NDArray[np.int64]:
+    """Red, green, blue of a PNG, 0 to 255, (rows, columns, 3)."""
+    from PIL import Image
+
+    return np.asarray(Image.open(io.BytesIO(picture)).convert("RGB"), dtype=np.int64)
 
 
 @contextmanager

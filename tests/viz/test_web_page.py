@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import base64
 import gzip
-import io
 import re
 import time
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pytest
 
 from tests.viz.browser import has_browser, opened
-from tests.viz.picture import kept
+from tests.viz.picture import kept, pixels
 from viz import web_page
 from viz.web_page import Viewer, page, write_page
 
@@ -108,9 +105,3 @@ def drawn(picture: bytes) -> bool:
     paint = (green > red + 20) & (green > blue + 20)
     curve = (blue > 200) & (red < 130) & (green < 190)
     return bool(soil.sum() > 5000 and paint.sum() > 500 and curve.sum() > 50)
-
-
-def pixels(picture: bytes) -> Any:
-    from PIL import Image
-
-    return np.asarray(Image.open(io.BytesIO(picture)).convert("RGB"), dtype=int)

@@ -1,0 +1,115 @@
+"""Level and colour of the noise of each channel, from all recordings of one recorder together.
+
+Recordings at the same rate, behind the same filter class, share a channel's noise; each alone is too short to tell a
+long memory. First from the quiet stretches; where an explanation leaves little more than that, from all it leaves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.evidence import Evidence, Signal
+from rollover.noise import LENGTH, noise_floor
+
+Array = NDArray[np.float64]
+ALIKE = 0.05  # of the logarithm of the rate: recordings so close were taken alike
+MANY = 10  # quiet windows from which on a criterion chooses the memory
+CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is believed
+OWN = 1.5  # times the common noise, either way: beyond, a recording has its own
+LONGEST = 4  # samples of memory
+NOT_COLOURED = 0.7  # of the whole error that is noise: below, the model's own error prevails, which is no process
+STEADY = 0.995  # largest root of a memory
+
+
+def quiet(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evidence]:
+    """The evidence with its noise from the quiet stretches of the misfits (SI, stacked), recordings alike together."""
+    found = [list(e.signals) for e in evidence]
+    for members in alike(evidence):
+        parts = [(residuals[r][part], s) for r, k, s, part in members]
+        misfits, own = [p for p, _ in parts], [s.values for _, s in parts]
+        if sum(p.size // LENGTH for p in misfits) < 1:
+            continue  # too short: what each says by itself stands
+        best, other = _floor(misfits), _floor(own)
+        if other[0] < CLEARLY * best[0]:
+            best = other
+        for r, k, s, _ in members:
+            alone = s.noise
+            if len(members) > 1 and s.values.size >= LENGTH and not 1.0 / OWN < alone / max(best[0], 1e-300) < OWN:
+                continue
+            found[r][k] = replace(s, noise=best[0], ar=best[1])
+    found = [[with_noise(s, s.noise, s.ar, e.model_error) for s in f] for e, f in zip(evidence, found, strict=True)]
+    return [replace(e, signals=tuple(s)) for e, s in zip(evidence, found, strict=True)]
+
+
+def whole(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evidence]:
+    """The evidence with its noise from all of the misfits: an autoregression by least squares, recordings together."""
+    found = [list(e.signals) for e in evidence]
+    for members in alike(evidence):
+        sigma, ar = autoregression([residuals[r][part] for r, _, _, part in members])
+        for r, k, s, _ in members:
+            found[r][k] = with_noise(s, sigma, ar, evidence[r].model_error)
+    return [replace(e, signals=tuple(s)) for e, s in zip(evidence, found, strict=True)]
+
+
+def alike(evidence: Sequence[Evidence]) -> list[list[tuple[int, int, Signal, slice]]]:
+    """Signals (recording, place, signal, its part of the stack) that share a recorder."""
+    groups: list[tuple[tuple[str, int | None], float, list[tuple[int, int, Signal, slice]]]] = []
+    for r, e in enumerate(evidence):
+        for k, (s, part) in enumerate(e.spans()):
+            what = (s.channel, e.recording.cfc.get(s.channel))
+            rate = -float(np.log(np.median(np.diff(e.recording.time[s.rows]))))
+            for other, at, members in groups:
+                if other == what and abs(at - rate) < ALIKE:
+                    members.append((r, k, s, part))
+                    break
+            else:
+                groups.append((what, rate, [(r, k, s, part)]))
+    return [members for _, _, members in groups]
+
+
+def autoregression(series: Sequence[Array], most: int = LONGEST) -> tuple[float, tuple[float, ...]]:
+    """Standard deviation and coefficients of one autoregression behind several series; its order by BIC."""
+    most = min(most, max(0, min(v.size for v in series) // 8))
+    X = np.concatenate([np.stack([v[most - k : v.size - k] for k in range(most + 1)], axis=1) for v in series])
+    n = X.shape[0]
+    best: tuple[float, float, tuple[float, ...]] | None = None
+    for order in range(most + 1):
+        past = X[:, 1 : order + 1]
+        a = np.linalg.lstsq(past, X[:, 0], rcond=None)[0] if order else np.zeros(0)
+        if order and np.max(np.abs(np.roots([1.0, *(-a)]))) > STEADY:
+            continue
+        power = float(np.mean((X[:, 0] - past @ a) ** 2)) * n / max(n - order, 1)
+        score = n * np.log(max(power, 1e-300)) + order * np.log(n)
+        if best is None or score < best[0]:
+            best = (score, power, tuple(float(v) for v in a))
+    assert best is not None
+    return float(np.sqrt(best[1])) * grown(best[2]), best[2]
+
+
+def grown(ar: tuple[float, ...]) -> float:
+    """Standard deviation of an autoregression over that of its innovations."""
+    from scipy.signal import lfilter
+
+    if not ar:
+        return 1.0
+    impulse = np.zeros(4000)
+    impulse[0] = 1.0
+    return float(np.sqrt(np.sum(lfilter([1.0], [1.0, *(-a for a in ar)], impulse) ** 2)))
+
+
+def with_noise(s: Signal, noise: float, ar: tuple[float, ...], model_error: float) -> Signal:
+    """The signal held against another noise."""
+    sigma = float(np.hypot(np.hypot(noise, model_error * s.span), s.scatter))
+    return replace(s, noise=noise, sigma=sigma, ar=ar if noise >= NOT_COLOURED * sigma else ())
+
+
+def _floor(values: Sequence[Array]) -> tuple[float, tuple[float, ...]]:
+    """Level and memory of the quiet windows of several series, none of which lies across two."""
+    joined = np.concatenate([v[: v.size // LENGTH * LENGTH] for v in values])
+    one = noise_floor(joined, order=1)
+    best = noise_floor(joined, order=2) if one.windows >= MANY else one
+    return best.sigma, best.ar
