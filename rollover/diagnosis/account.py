@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rollover.diagnosis.diagnose import diagnose
-from rollover.diagnosis.verdict import Diagnosis, Named, Place, Score
+from rollover.diagnosis.verdict import Diagnosis, Law, Named, Place, Score
 from rollover.document import dump
 from rollover.importers import read_recording
 from rollover.recording import Recording
@@ -50,6 +50,7 @@ def account(
                 "held_out": _fit(found, "held_out", found.held_out),
                 "recordings": [{"name": n, "before": a, "after": b} for n, a, b in found.per_recording],
             },
+            **({} if found.empirical is None else {"empirical": _law(found.empirical)}),
             "candidates": [asdict(c) for c in found.candidates],
             "simulations": found.simulations,
             "seconds": found.seconds,
@@ -78,6 +79,19 @@ def _effect(effect: Named) -> dict[str, Any]:
     }
 
 
+def _law(law: Law) -> dict[str, Any]:
+    return {
+        "law": law.law,
+        "terms": [
+            {"term": t.term, "depends_on": t.depends_on, "coefficient": asdict(t.force)} for t in law.terms
+        ],
+        "held_out_gain": law.held_out_gain,
+        "standard_error": law.standard_error,
+        "held_out": {"before": {"nrmse": law.before}, "after": {"nrmse": law.after}},
+        "settings": dict(law.settings),
+    }
+
+
 def _fit(found: Diagnosis, which: str, names: tuple[str, ...]) -> dict[str, Any]:
     def score(scores: Mapping[str, Score]) -> dict[str, Any]:
         return asdict(scores[which]) if which in scores else {}
@@ -86,8 +100,10 @@ def _fit(found: Diagnosis, which: str, names: tuple[str, ...]) -> dict[str, Any]
 
 
 def diagnosed_scenario(scenario: Scenario, found: Diagnosis) -> Scenario:
-    """The scenario with the found effects switched on and fitted."""
+    """The scenario with the found effects, or the law found by regression, switched on and fitted."""
     changes = {f"effects.{e.id}": dict(e.settings) for e in found.effects}
+    if found.empirical is not None:
+        changes["effects.empirical"] = dict(found.empirical.settings)
     return scenario.replaced(changes, origin="diagnosis") if changes else scenario
 
 

@@ -43,15 +43,18 @@ class Candidate:
     search: Mapping[str, Search]
     channel: str | None = None
     shapes: Mapping[str, Search] = field(default_factory=dict)  # fitted only where what is left asks for them
+    fixed: Mapping[str, Any] = field(default_factory=dict)  # parameters that are not fitted
 
     @property
     def key(self) -> str:
-        """Id, with the channel of a sensor effect."""
-        return self.id if self.channel is None else f"{self.id}:{self.channel}"
+        """Id, with the channel of a sensor effect and what is not fitted."""
+        told = [str(v) for v in self.fixed.values()]
+        return ":".join([self.id, *([] if self.channel is None else [self.channel]), *told])
 
     def changes(self, x: Sequence[float]) -> dict[str, Any]:
         """Values to exchange in the scenario for coordinates x, each from 0 (low) to 1 (high)."""
         found: dict[str, Any] = {} if self.channel is None else {f"effects.{self.id}.channel": self.channel}
+        found |= {f"effects.{self.id}.{name}": value for name, value in self.fixed.items()}
         for value, (name, search) in zip(x, self.search.items(), strict=True):
             found[f"effects.{self.id}.{name}"] = physical(value, search)
         return found

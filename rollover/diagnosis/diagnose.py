@@ -12,6 +12,7 @@ from rollover.diagnosis import colour
 from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import candidates_of, size_of
 from rollover.diagnosis.depend import dependency, residual_forces
+from rollover.diagnosis.empirical import offered, proposed
 from rollover.diagnosis.evidence import Evidence, doubted, evidence_of, left_out
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import yardstick
@@ -75,6 +76,10 @@ def diagnose(
     set_ups = [set_up(scenario, e.recording) for e in found]
     say("what the mismatch depends on")
     dependencies = dependency(residual_forces(set_ups, found)) if acts == "drop" else []
+    law = None
+    if verdict == "unexplained" and acts == "drop":
+        say("a law for what no candidate explains")
+        law = proposed(judge, explanation.base, set_ups, found, groups)
     detectable = dict(explanation.detectable)
     if verdict == "no-mismatch" and _is_weak(detectable):
         verdict = "cannot-tell"
@@ -86,7 +91,7 @@ def diagnose(
     training = tuple(e.name for e in found)
     return Diagnosis(
         verdict=verdict,
-        sentence=sentence(verdict, effects, before, h_before.held, h_after.held, found),
+        sentence=sentence(verdict, effects, before, h_before.held, h_after.held, found) + offered(law),
         p_value=explanation.p_value,
         noise=noise(found),
         where=places(before, found, depends) if is_mismatch else (),
@@ -108,6 +113,7 @@ def diagnose(
         simulations=judge.simulations,
         seconds=clock.perf_counter() - began,
         notes=tuple(notes),
+        empirical=law,
     )
 
 
