@@ -60,6 +60,7 @@ OUT_FORCE, OUT_SINKAGE, OUT_X, OUT_V, OUT_A, OUT_IMPULSE, OUT_COLUMNS = 0, 1, 2,
 
 RESOLVED = 0.25  # longest step times the frequency on the ground
 FALLING = 5e-4  # s, step of a fall before the first contact
+HALVINGS = 20  # of a step, to the moment at which the soil stays behind
 CLOSE = 1e-7  # m: how near a step ends to a jump of the force
 
 
@@ -237,6 +238,12 @@ def steepness(law: Any, p: Any, s: Any, row: Any, state: Any) -> float:
 
 
 @compiled
+def held(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, now: Any) -> float:
+    """What presses the soil that moves along against the striker, N: below nothing it would have to be pulled."""
+    return accelerate(law, p, s, row, state, f, y, now) + row[MASS_B] * now[0]  # type: ignore[no-any-return]
+
+
+@compiled
 def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
     """Fall on the ground at t = 0 with SPEED, or from HEIGHT at t = 0 with it.
 
@@ -291,6 +298,19 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
         if share < 1.0:
             h = max(share, 1e-9) * h
             advance(law, p, s, row, state, f, y, h, a, end)
+        if row[MASS_B] > 0.0 and f[SPRING] > 0.0 and held(law, p, s, row, state, f, end, now) < -pull:
+            low, high = 0.0, h  # the step ends where the soil stays behind
+            for _ in range(HALVINGS):
+                middle = 0.5 * (low + high)
+                advance(law, p, s, row, state, f, y, middle, a, end)
+                if held(law, p, s, row, state, f, end, now) < -pull:
+                    high = middle
+                else:
+                    low = middle
+            if high < h:
+                turning, jump = False, 0.0
+            h = high
+            advance(law, p, s, row, state, f, y, h, a, end)
         if turning:
             end[1] = 0.0
             if f[SPRING] <= 0.0:
@@ -331,10 +351,8 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
                 y[0] -= 2.0 * SAME  # the way back begins on the line, with its dashpot
             if y[0] <= 0.0:
                 outcome |= RELEASED
-            if row[MASS_B] > 0.0:
-                force = accelerate(law, p, s, row, state, f, y, now)
-                if force + row[MASS_B] * now[0] < -pull:
-                    row[MASS_B], row[GROWING] = 0.0, 0.0  # it would have to be pulled along: it stays in the soil
+            if row[MASS_B] > 0.0 and held(law, p, s, row, state, f, y, now) < -pull:
+                row[MASS_B], row[GROWING] = 0.0, 0.0  # it would have to be pulled along: it stays in the soil
             if outcome & RELEASED:
                 state[MODE] = IDLE
                 row[MASS_B], row[GROWING] = 0.0, 0.0

@@ -56,7 +56,7 @@ class NoiseFloor:
         noise = random.standard_normal((draws, count + lead))
         if self.ar:
             noise = lfilter([1.0], [1.0, *(-a for a in self.ar)], noise, axis=1)[:, lead:]
-        return np.asarray(noise * (self.sigma * _gain(self.ar)))
+        return np.asarray(noise * (self.sigma / grown(self.ar)))
 
 
 def noise_floor(values: Array, order: int | None = None) -> NoiseFloor:
@@ -170,13 +170,13 @@ def _autoregression(values: Array, stride: int, at_stride: Array, wanted: int | 
     return best[1]
 
 
-@functools.lru_cache(maxsize=64)
-def _gain(ar: tuple[float, ...]) -> float:
-    """What white noise is multiplied by so that its autoregression has variance 1."""
+@functools.lru_cache(maxsize=256)
+def grown(ar: tuple[float, ...]) -> float:
+    """Standard deviation of an autoregression over that of what drives it."""
     if not ar:
         return 1.0
     from scipy.signal import lfilter
 
     impulse = np.zeros(20_000)
     impulse[0] = 1.0
-    return float(1.0 / np.sqrt(np.sum(lfilter([1.0], [1.0, *(-a for a in ar)], impulse) ** 2)))
+    return float(np.sqrt(np.sum(lfilter([1.0], [1.0, *(-a for a in ar)], impulse) ** 2)))

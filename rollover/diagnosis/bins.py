@@ -11,30 +11,29 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.simulator import Simulator, simulator_of
 from rollover.filters import least_rate
+from rollover.initiation import Drop
 from rollover.recording import Recording
 from rollover.scenario import Scenario
 
 Array = NDArray[np.float64]
 
-MOST_ROWS = 700  # of a recording that are looked at
-LIKE_ALL = 3  # stamps within a mean at which it is simulated
+MOST_ROWS = 500  # of a recording that are looked at
+LIKE_ALL = 2  # stamps within a mean at which it is simulated, away from the first contact
+KNOWN, UNKNOWN = 4e-3, 30e-3  # s, by which a clock's zero may be off
 
 
 @dataclass(frozen=True, kw_only=True)
 class Averaged:
-    """A simulator at `many` stamps for each mean; predicts the means."""
+    """A simulator at several stamps for each mean, `starts` (bins,) where those of each begin; predicts the means."""
 
     inner: Simulator
-    many: int
+    starts: NDArray[np.int64]
+    counts: NDArray[np.int64]
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """See `Simulator`."""
         found = self.inner.predict(changes, shift)
-        return None if found is None else {c: v.reshape(-1, self.many).mean(axis=1) for c, v in found.items()}
-
-    def contact(self, _shift: float) -> float:
-        """See `Simulator`."""
-        return self.inner.contact(_shift)
+        return None if found is None else {c: np.add.reduceat(v, self.starts) / self.counts for c, v in found.items()}
 
 
 def simulated(scenario: Scenario, recording: Recording) -> tuple[Recording, Simulator]:
@@ -43,12 +42,19 @@ def simulated(scenario: Scenario, recording: Recording) -> tuple[Recording, Simu
     if inside is None:
         return recording, simulator_of(scenario, recording)
     many = inside.shape[1]
-    rows = np.arange(many)
-    if many > LIKE_ALL and not recording.cfc:  # a filter needs all of them
-        rows = np.unique(np.round((np.arange(LIKE_ALL) + 0.5) * many / LIKE_ALL - 0.5).astype(int))
-    at = inside[:, rows].reshape(-1)
+    few = np.round((np.arange(LIKE_ALL) + 0.5) * many / LIKE_ALL - 0.5).astype(int)
+    # a filter needs all stamps, and so does the kink of the force at the first contact
+    near = UNKNOWN if recording.clock.zero == "unknown" else KNOWN
+    whole = np.abs(thin.time) < near + many * float(np.median(np.diff(recording.time)))
+    if recording.cfc or many <= LIKE_ALL or not isinstance(scenario.initiation, Drop):
+        whole[:] = True
+    rows = [part if all_ else part[few] for part, all_ in zip(inside, whole, strict=True)]
+    counts = np.array([r.size for r in rows])
+    at = np.concatenate(rows)
     part = replace(recording, time=recording.time[at], channels={c: v[at] for c, v in recording.channels.items()})
-    return thin, Averaged(inner=simulator_of(scenario, part), many=rows.size)
+    return thin, Averaged(
+        inner=simulator_of(scenario, part), starts=np.concatenate([[0], np.cumsum(counts)[:-1]]), counts=counts
+    )
 
 
 def binned(recording: Recording) -> Recording:

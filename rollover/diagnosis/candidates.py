@@ -28,9 +28,9 @@ SHAPES = {
 }
 
 BESIDE = 0.01  # of a coordinate: how far from its zero an effect is looked at
-THRESHOLDS = 14  # places at which something that has no zero is looked at
-ONE = (6,)
-SEVERAL = (12, 6, 3)  # places on the axes of an effect's parameters
+THRESHOLDS = 10  # places at which something that has no zero is looked at
+ONE = (5,)
+SEVERAL = (8, 4, 3)  # places on the axes of an effect's parameters
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,9 +92,9 @@ class Candidate:
             if at is not None and 0.0 < at < 1.0:
                 axes.append([at + BESIDE])
             elif null is not None:
-                axes.append([0.1, 0.35, 0.6, 0.85])
+                axes.append([0.1, 0.6])
             else:
-                many = THRESHOLDS if not axes else 2
+                many = (THRESHOLDS if len(self.search) > 1 else 4) if not axes else 1
                 axes.append([(k + 0.5) / many for k in range(many)])
         return list(itertools.product(*axes))
 

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.evidence import MODEL_ERROR, Evidence, Signal
-from rollover.noise import LENGTH, noise_floor
+from rollover.noise import LENGTH, grown, noise_floor
 
 Array = NDArray[np.float64]
 ALIKE = 0.05  # of the logarithm of the rate: recordings so close were taken alike
 MANY = 10  # quiet windows from which on a criterion chooses the memory
 CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is believed
-OWN = 1.5  # times the common noise, either way: beyond, a recording has its own
+AS_LOUD = 0.25  # of the logarithm of the noise
 LONGEST = 4  # samples of memory
 NOT_COLOURED = 0.7  # of the whole error that is noise: below, the model's own error prevails, which is no process
 STEADY = 0.995  # largest root of a memory
@@ -37,9 +37,6 @@ def quiet(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evid
         if other[0] < CLEARLY * best[0]:
             best = other
         for r, k, s, _ in members:
-            alone = s.noise
-            if len(members) > 1 and s.values.size >= LENGTH and not 1.0 / OWN < alone / max(best[0], 1e-300) < OWN:
-                continue
             found[r][k] = replace(s, noise=best[0], ar=best[1])
     found = [[with_noise(s, s.noise, s.ar, e.model_error) for s in f] for e, f in zip(evidence, found, strict=True)]
     return [replace(e, signals=tuple(s)) for e, s in zip(evidence, found, strict=True)]
@@ -65,19 +62,23 @@ def _is_rough(e: Evidence, s: Signal) -> bool:
 
 
 def alike(evidence: Sequence[Evidence]) -> list[list[tuple[int, int, Signal, slice]]]:
-    """Signals (recording, place, signal, its part of the stack) that share a recorder."""
-    groups: list[tuple[tuple[str, int | None], float, list[tuple[int, int, Signal, slice]]]] = []
+    """Signals (recording, place, signal, its part of the stack) of one channel that share a recorder.
+
+    The same rate, the same filter class, and of themselves about the same noise.
+    """
+    groups: list[tuple[tuple[str, int | None], float, float, list[tuple[int, int, Signal, slice]]]] = []
     for r, e in enumerate(evidence):
         for k, (s, part) in enumerate(e.spans()):
             what = (s.channel, e.recording.cfc.get(s.channel))
             rate = -float(np.log(np.median(np.diff(e.recording.time[s.rows]))))
-            for other, at, members in groups:
-                if other == what and abs(at - rate) < ALIKE:
+            level = float(np.log(max(s.level, 1e-300)))
+            for other, at, size, members in groups:
+                if other == what and abs(at - rate) < ALIKE and abs(size - level) < AS_LOUD:
                     members.append((r, k, s, part))
                     break
             else:
-                groups.append((what, rate, [(r, k, s, part)]))
-    return [members for _, _, members in groups]
+                groups.append((what, rate, level, [(r, k, s, part)]))
+    return [members for _, _, _, members in groups]
 
 
 def autoregression(series: Sequence[Array], most: int = LONGEST) -> tuple[float, tuple[float, ...]]:
@@ -97,17 +98,6 @@ def autoregression(series: Sequence[Array], most: int = LONGEST) -> tuple[float,
             best = (score, power, tuple(float(v) for v in a))
     assert best is not None
     return float(np.sqrt(best[1])) * grown(best[2]), best[2]
-
-
-def grown(ar: tuple[float, ...]) -> float:
-    """Standard deviation of an autoregression over that of its innovations."""
-    from scipy.signal import lfilter
-
-    if not ar:
-        return 1.0
-    impulse = np.zeros(4000)
-    impulse[0] = 1.0
-    return float(np.sqrt(np.sum(lfilter([1.0], [1.0, *(-a for a in ar)], impulse) ** 2)))
 
 
 def with_noise(s: Signal, noise: float, ar: tuple[float, ...], model_error: float) -> Signal:

@@ -118,11 +118,7 @@ def diagnose(
 
 
 def _weighed(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:
-    """The recordings without what lies beside their leaps, the noise of those alike from their quiet stretches."""
-    judge = Judge(every)
-    judge.aligned()
-    again = [evidence_of(e.name, e.recording, e.simulator, s) for e, s in zip(every, judge.shifts, strict=True)]
-    every = [replace(new or old, model_error=old.model_error) for new, old in zip(again, every, strict=True)]
+    """The recordings with the noise of those alike taken together, from their quiet stretches."""
     every = [doubted(e, set_up(scenario, e.recording)) for e in with_scatter(every)]
     judge = Judge(every)
     judge.aligned()

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.nuisance import Eased, doubts, eased
 from rollover.diagnosis.simulator import Simulator
-from rollover.noise import LENGTH, NoiseFloor, noise_floor
+from rollover.noise import LENGTH, NoiseFloor, grown, noise_floor
 from rollover.recording import Recording
 from rollover.scenario import Scenario
 
@@ -23,6 +23,7 @@ ALONE = 0.02  # s, prior of the time shift of a recording whose clock has no zer
 CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is believed
 MANY = 10  # quiet windows from which on a memory of two samples is told
 CORNER = 2.0775  # corner frequency over the filter class, forward and backward, Hz
+LEAP = 4.0  # times the steps beside it
 SHIFT = 1e-3  # s, prior of the time shift of a recording whose zero is known
 
 
@@ -38,6 +39,7 @@ class Signal:
     ar: tuple[float, ...]
     span: float
     scatter: float = 0.0  # between runs of one condition, SI
+    level: float = 0.0  # of the noise as this recording alone shows it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,6 +83,37 @@ class Evidence:
         """The same of the measurement."""
         return np.concatenate([self._whitened(s, s.values) for s in self.signals])
 
+    def leaps(self, raw: Array) -> NDArray[np.int64]:
+        """First of each three samples (stacked) across which a prediction leaps."""
+        found = []
+        for s, part in self.spans():
+            x = raw[part]
+            if x.size < 5:
+                continue
+            step = np.abs(np.diff(x))
+            beside = np.maximum(np.append(step[2:], 0.0), np.append(0.0, step[:-2])[: x.size - 2])
+            leap = np.abs(x[2:] - x[:-2])
+            found.append(part.start + np.flatnonzero((leap > LEAP * beside) & (leap > 3.0 * s.sigma)))
+        return np.concatenate(found) if found else np.zeros(0, dtype=np.int64)
+
+    def forgiven(self, raw: Array, leaps: NDArray[np.int64]) -> Array:
+        """Predicted samples (stacked, SI) on either side of a leap, moved towards the measured ones within it.
+
+        On which side of a leap a sample lies is decided by clocks, not by physics.
+        """
+        y, measured = raw.copy(), np.concatenate([s.values for s in self.signals])
+        for k in leaps:
+            near = raw[k : k + 3]
+            y[k : k + 3] = np.clip(measured[k : k + 3], near.min(), near.max())
+        return y
+
+    def slope(self, raw: Array, leaps: NDArray[np.int64]) -> Array:
+        """dy/dtau = -dy/dt of each signal by differences along the stamps, whitened; none across a leap."""
+        found = np.concatenate([-np.gradient(raw[part], self.recording.time[s.rows]) for s, part in self.spans()])
+        for k in leaps:
+            found[k : k + 3] = 0.0
+        return self.whitened(found)
+
     def spans(self) -> list[tuple[Signal, slice]]:
         """Each signal with its place in the stack."""
         found, at = [], 0
@@ -98,7 +131,7 @@ class Evidence:
         for k, a in enumerate(signal.ar, start=1):
             y[k:] -= a * x[:-k]
         y[: len(signal.ar)] = 0.0  # no past to whiten with
-        return y * _gain(signal.ar)
+        return y * grown(signal.ar)
 
 
 def doubted(e: Evidence, scenario: Scenario) -> Evidence:
@@ -110,28 +143,17 @@ def doubted(e: Evidence, scenario: Scenario) -> Evidence:
     return replace(e, doubts=np.stack(columns, axis=1)) if columns else e
 
 
-def _gain(ar: tuple[float, ...]) -> float:
-    """1/sd of the innovations of an autoregression of variance 1."""
-    from scipy.signal import lfilter
-
-    impulse = np.zeros(4000)
-    impulse[0] = 1.0
-    return float(np.sqrt(np.sum(lfilter([1.0], [1.0, *(-a for a in ar)], impulse) ** 2)))
-
-
-def evidence_of(name: str, recording: Recording, simulator: Simulator, shift: float = 0.0) -> Evidence | None:
+def evidence_of(name: str, recording: Recording, simulator: Simulator) -> Evidence | None:
     """Make a recording ready; None if it shares no channel with the simulation.
 
-    `shift` (s) is how late its clock is thought to be: samples beside the leap of the first contact are left out.
     Noise is estimated from each channel itself; where it is too short for that, the noise that the recording states.
     """
-    predicted = simulator.predict({}, shift)
+    predicted = simulator.predict({}, 0.0)
     if predicted is None:
         return None
     signals = []
-    leaps = _near_leaps(recording, simulator, shift)
     for channel, values in recording.channels.items():
-        rows = np.flatnonzero(np.isfinite(values) & ~leaps)[:: _oversampling(recording, channel)]
+        rows = np.flatnonzero(np.isfinite(values))[:: _oversampling(recording, channel)]
         if channel not in predicted or rows.size < 8 or not np.all(np.isfinite(predicted[channel][rows])):
             continue
         y = values[rows]
@@ -142,7 +164,9 @@ def evidence_of(name: str, recording: Recording, simulator: Simulator, shift: fl
         sigma = float(np.hypot(noise, MODEL_ERROR * span))
         if noise < sigma * 0.7:
             ar = ()  # the model's error is not coloured as the noise is
-        signals.append(Signal(channel=channel, rows=rows, values=y, sigma=sigma, noise=noise, ar=ar, span=span))
+        signals.append(
+            Signal(channel=channel, rows=rows, values=y, sigma=sigma, noise=noise, ar=ar, span=span, level=noise)
+        )
     if not signals:
         return None
     loose = recording.clock.zero == "unknown"
@@ -163,14 +187,6 @@ def _oversampling(recording: Recording, channel: str) -> int:
         return 1
     rate = 1.0 / float(np.median(np.diff(recording.time)))
     return max(1, int(rate / (2.0 * CORNER * recording.cfc[channel])))
-
-
-def _near_leaps(recording: Recording, simulator: Simulator, shift: float) -> NDArray[np.bool_]:
-    """Samples so near the first contact that the clock decides on which side of the leap of force they lie, (n,)."""
-    if recording.time.size < 3:
-        return np.zeros(recording.time.size, dtype=bool)
-    step = float(np.median(np.diff(recording.time)))
-    return np.asarray(np.abs(recording.time - simulator.contact(shift)) < step)
 
 
 def _noise(residual: Array, values: Array, stated: float | None) -> tuple[float, tuple[float, ...]]:

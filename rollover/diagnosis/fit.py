@@ -83,6 +83,7 @@ class Judge:
         self.shifts = [0.0] * len(self.evidence)
         self.simulations = 0
         self._raw: dict[tuple[object, ...], Array | None] = {}
+        self._leaps: dict[tuple[object, ...], NDArray[np.int64]] = {}
         self._known: dict[tuple[object, ...], Array | None] = {}
 
     def weigh(self, evidence: Sequence[Evidence]) -> None:
@@ -130,7 +131,12 @@ class Judge:
         if found is None:
             return None
         y = self.evidence[r].raw(found)
-        return y if np.all(np.isfinite(y)) else None
+        if not np.all(np.isfinite(y)):
+            return None
+        leaps = self.evidence[r].leaps(y)
+        if leaps.size:
+            self._leaps[_key(r, candidates, x, shift)] = leaps
+        return self.evidence[r].forgiven(y, leaps)
 
     @staticmethod
     def changes(candidates: Sequence[Candidate], x: Sequence[float]) -> dict[str, object]:
@@ -190,18 +196,16 @@ class Judge:
         return Block(
             residual=e.eased(self.measured[r] - y),
             J=e.eased(J),
-            slope=e.eased(self._slope(r, y)),
+            slope=e.eased(self._slope(r, candidates, x, shift)),
             shift=shift,
             prior=e.shift_prior,
         )
 
-    def _slope(self, r: int, y: Array) -> Array:
-        """dy/dtau = -dy/dt of each signal, by differences along the stamps."""
-        e = self.evidence[r]
-        slope = np.zeros_like(y)
-        for signal, part in e.spans():
-            slope[part] = -np.gradient(y[part], e.recording.time[signal.rows])
-        return slope
+    def _slope(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array:
+        raw = self.raw(r, candidates, x, shift)
+        assert raw is not None
+        leaps = self._leaps.get(_key(r, candidates, x, shift), np.zeros(0, dtype=np.int64))
+        return self.evidence[r].slope(raw, leaps)
 
     def fit(
         self,

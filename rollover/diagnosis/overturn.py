@@ -71,10 +71,6 @@ class RunSimulator:
             found[name] = np.where(outside, np.nan, np.interp(at, run.time, values))
         return found
 
-    def contact(self, _shift: float) -> float:
-        """No one leap: elements of a surface touch one after another."""
-        return np.inf
-
     def _run(self, chosen: Scenario, changes: Mapping[str, Any]) -> tuple[Scenario, Recording] | None:
         """The run before instruments, with the scenario as its effects made it; None if it failed."""
         moving = {path: value for path, value in changes.items() if not path.startswith(f"effects.{SENSORS}")}

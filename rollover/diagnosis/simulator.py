@@ -21,6 +21,8 @@ from rollover.scenario import Scenario
 Array = NDArray[np.float64]
 SENSORS = "effects.sensor-"
 EDGES = ("sensor-lag", "sensor-clock-offset", "sensor-clock-drift")
+KINKED = ("soil-layer", "soil-crust", "structural-compliance", "guide-friction")
+SMOOTH = 1e-3  # s: longest step that keeps all others within 1e-4 of the range
 BESIDE = 1e-9  # s: on either side of the first contact
 KEPT = 64  # runs of one recording
 
@@ -30,9 +32,6 @@ class Simulator(Protocol):
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """Channels (n,) at the recording's stamps less `shift` (s); None if the simulation fails."""
-
-    def contact(self, _shift: float) -> float:
-        """Time (s) on a clock that is so late at which forces leap; inf if they do not."""
 
 
 class DropSimulator:
@@ -79,10 +78,6 @@ class DropSimulator:
             found[channel] = lag.read(raw)[channel][where[: own.size]]
         return {name: values for name, values in found.items() if name in self.recording.channels}
 
-    def contact(self, _shift: float) -> float:
-        """Time (s) of the first contact on a recording's clock that is so late; forces leap there."""
-        return _shift + self._contact
-
     @cached_property
     def _contact(self) -> float:
         start = self.model.scenario.initiation
@@ -99,7 +94,8 @@ class DropSimulator:
             if len(self._raw) >= KEPT:
                 self._raw.pop(next(iter(self._raw)))
             model = self.model.with_(physical) if physical else self.model
-            self._raw[key] = model.run(times)
+            fine = any(name in model.scenario.effects for name in KINKED)
+            self._raw[key] = (model if fine else replace(model, step=SMOOTH)).run(times)
         return self._raw[key]
 
 
