@@ -84,7 +84,7 @@ def _shape(number: Any, x: float, u: float, w: float) -> float:
         y = x if a > 0.0 else u
         if max(a, b) > 1.5:
             return math.exp(-(((y - at) / WIDTH) ** 2))
-        return max(y - at, 0.0)
+        return max(y - at, 0.0)  # type: ignore[no-any-return]
     return x**a * max(u, 0.0) ** b * max(w, 0.0) ** c  # type: ignore[no-any-return]
 
 

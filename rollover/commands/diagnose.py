@@ -34,6 +34,12 @@ def diagnose(
             help="A recording to judge by; may be repeated  [default: each condition in turn]",
         ),
     ] = None,
+    tolerance: Annotated[
+        float,
+        typer.Option(
+            help="Share of a channel's range by which a scenario that lacks nothing may miss it.", min=0, max=0.5
+        ),
+    ] = 0.0,
     set_: Setting = None,
     out: Annotated[Path | None, typer.Option(help="Results folder  [default: out/diagnose/NAME]")] = None,
     workers: Annotated[
@@ -66,16 +72,17 @@ def diagnose(
         "scenario_hash": document.content_hash(chosen),
         "recordings": list(measured),
         "hold_out": held,
+        "tolerance": tolerance,
     }
     store.claim_account(folder, FORMAT, about, FILES, force=force)
     console.say("asking the sensors first")
     findings = _prechecks(chosen, measured)
-    found = diagnosed(chosen, list(measured.items()), hold_out=held, say=console.say)
+    found = diagnosed(chosen, list(measured.items()), hold_out=held, tolerance=tolerance, say=console.say)
     sensors = tuple(f"{name}: {f.channel}: {f.sentence}" for name, f in findings)
     found = replace(found, notes=(*sensors, *found.notes))
     told = series(chosen, list(measured.items()), found)
     answer = account(found, about, [{"recording": name, **_plain(f)} for name, f in findings])
-    words = ["rollover", "diagnose", scenario, *recordings, *_options(hold_out, set_)]
+    words = ["rollover", "diagnose", scenario, *recordings, *_options(hold_out, set_, tolerance)]
     with store.whole(folder) as part:
         store.write_json(part / JSON, answer)
         (part / SCENARIO).write_text(diagnosed_text(chosen, found), encoding="utf-8")
@@ -186,8 +193,9 @@ def _plain(finding: Finding) -> dict[str, Any]:
     return bare
 
 
-def _options(hold_out: list[str] | None, set_: list[str] | None) -> list[str]:
-    given = (("--hold-out", hold_out or []), ("--set", set_ or []))
+def _options(hold_out: list[str] | None, set_: list[str] | None, tolerance: float) -> list[str]:
+    stated = [f"{tolerance:g}"] if tolerance else []
+    given = (("--hold-out", hold_out or []), ("--set", set_ or []), ("--tolerance", stated))
     return [part for name, texts in given for text in texts for part in (name, text)]
 
 

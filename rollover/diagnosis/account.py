@@ -82,9 +82,7 @@ def _effect(effect: Named) -> dict[str, Any]:
 def _law(law: Law) -> dict[str, Any]:
     return {
         "law": law.law,
-        "terms": [
-            {"term": t.term, "depends_on": t.depends_on, "coefficient": asdict(t.force)} for t in law.terms
-        ],
+        "terms": [{"term": t.term, "depends_on": t.depends_on, "coefficient": asdict(t.force)} for t in law.terms],
         "held_out_gain": law.held_out_gain,
         "standard_error": law.standard_error,
         "held_out": {"before": {"nrmse": law.before}, "after": {"nrmse": law.after}},

@@ -43,15 +43,17 @@ def diagnose(
     """Compare a scenario with recordings and say what separates them.
 
     `recordings` are (name, recording); `hold_out` names those that are never fitted, otherwise each condition is left
-    out in turn. `tolerance` is the share of a channel's range by which the scenario is not expected to follow it even with
-    nothing left out: what is smaller counts as noise. Raises `InputError` for a condition that the scenario does not know, ``ValueError`` for a name in
-    `hold_out` that is none.
+    out in turn. `tolerance` is the share of a channel's range by which a scenario that lacks nothing may still miss it:
+    what is smaller counts as noise. Raises `InputError` for a condition that the scenario does not know, ``ValueError``
+    for a name in `hold_out` that is none, and for a tolerance outside 0 to 1.
     """
     began = clock.perf_counter()
     names = [name for name, _ in recordings]
     unknown = [name for name in hold_out if name not in names]
     if unknown:
         raise ValueError(f"hold_out: no such recording, got {unknown[0]!r}; {', '.join(names)}")
+    if not 0.0 <= tolerance < 1.0:
+        raise ValueError(f"tolerance: not a share of a range, got {tolerance:g}; at least 0 and below 1")
     every, notes = _evidence(scenario, recordings)
     every = _weighed(scenario, [replace(e, model_error=float(np.hypot(e.model_error, tolerance))) for e in every])
     found = [e for e in every if e.name not in hold_out]

@@ -51,7 +51,11 @@ class Subset:
 
 
 def proposed(
-    judge: Judge, base: Fitted, scenarios: Sequence[Scenario], evidence: Sequence[Evidence], groups: Sequence[Sequence[int]]
+    judge: Judge,
+    base: Fitted,
+    scenarios: Sequence[Scenario],
+    evidence: Sequence[Evidence],
+    groups: Sequence[Sequence[int]],
 ) -> Law | None:
     """The law that predicts held-out conditions best, if any does; `scenarios` under the conditions of `evidence`."""
     found = balances(scenarios, evidence)
@@ -114,11 +118,10 @@ def _of_size(size: int, G: Array, h: Array, power: Array) -> list[Subset]:
         own, right = G[c][rows, columns], h[c][sets]
         left[:, c] = power[c] - 2.0 * np.sum(right * solved, axis=1) + np.einsum("si,sij,sj->s", solved, own, solved)
     forces = _solved(G.sum(axis=0), h.sum(axis=0), sets)
-    subsets = [
+    return [
         Subset(terms=tuple(int(t) for t in sets[k]), forces=forces[k], left=left[k])
         for k in np.argsort(np.mean(np.log(np.maximum(left, 1e-300)), axis=1))[:TRIED]
     ]
-    return subsets
 
 
 def _solved(G: Array, h: Array, sets: NDArray[np.int64]) -> Array:
@@ -149,7 +152,9 @@ def _law(judge: Judge, fitted: Fitted, gain: float, error: float, before: float,
     settings: dict[str, Any] = dict(candidate.fixed) | {name: i.value for name, i in parameters.items()}
     effect = Empirical(**settings)
     terms = tuple(
-        LawTerm(term=getattr(effect, part), depends_on=TERMS[getattr(effect, part)].on, force=parameters[f"{part}_force"])
+        LawTerm(
+            term=getattr(effect, part), depends_on=TERMS[getattr(effect, part)].on, force=parameters[f"{part}_force"]
+        )
         for part in PARTS
         if f"{part}_force" in parameters
     )

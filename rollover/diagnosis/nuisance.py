@@ -46,7 +46,7 @@ def eased(columns: Array) -> Eased:
     if columns.shape[1] == 0:
         return Eased(directions=columns, shares=np.zeros(0))
     U, S, _ = np.linalg.svd(columns, full_matrices=False)
-    kept = S > LEAST * max(float(S.max(initial=0.0)), 1e-300)
+    kept = LEAST * max(float(S.max(initial=0.0)), 1e-300) < S
     return Eased(directions=U[:, kept], shares=1.0 - 1.0 / np.sqrt(1.0 + S[kept] ** 2))
 
 

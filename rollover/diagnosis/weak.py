@@ -26,14 +26,16 @@ from rollover.vehicle import Striker
 
 Array = NDArray[np.float64]
 WINDOWS = 18  # for each recording
-OVERLAP = 2.0  # half width over the distance of two windows
+OVERLAP = 2  # marks from a window's centre to its ends
+EARLY = 1.5  # power of the spacing: what happens at the contact is over soon
+LEAST_HALF = 3.0  # of a half width, in steps
 FEWEST_ROWS = 40  # while the ground is pushed deeper
 MOST_ROWS = 240
 
 
 @dataclass(frozen=True, kw_only=True)
 class Balance:
-    """One recording: means of the residual force (k,) N and of depth (m), rate and touch speed at rows (n,), weights."""
+    """One recording: means of the residual force, (k,) N; depth (m), rate and touch speed (m/s) at rows (n,)."""
 
     condition: str
     force: Array
@@ -95,12 +97,13 @@ def _balance(scenario: Scenario, e: Evidence) -> Balance | None:
 
 
 def _tests(t: Array) -> tuple[Array, Array]:
-    """phi and phi'' of the windows at times t, (k, n) each: cos^4 of half a turn."""
-    centres, step = np.linspace(t[0], t[-1], WINDOWS + 2, retstep=True)
-    half = OVERLAP * float(step)
-    centres = centres[(centres - half >= t[0] - 1e-12) & (centres + half <= t[-1] + 1e-12)]
-    s = np.clip((t[None] - centres[:, None]) / half, -1.0, 1.0)
-    c = np.cos(0.5 * np.pi * s)
+    """phi and phi'' of the windows at times t, (k, n) each: cos^4 of half a turn, short after the contact."""
+    marks = t[0] + (t[-1] - t[0]) * np.linspace(0.0, 1.0, WINDOWS + 2 * OVERLAP) ** EARLY
+    centres = marks[OVERLAP:-OVERLAP]
+    half = np.minimum(marks[2 * OVERLAP :] - centres, centres - marks[: -2 * OVERLAP])
+    wide = half > LEAST_HALF * float(np.median(np.diff(t)))
+    centres, half = centres[wide, None], half[wide, None]
+    c = np.cos(0.5 * np.pi * np.clip((t[None] - centres) / half, -1.0, 1.0))
     rate = 0.5 * np.pi / half
     scale = 4.0 / (3.0 * half)  # integral of cos^4 over the window: 3/4 half
     phi = scale * c**4

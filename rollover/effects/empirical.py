@@ -60,7 +60,8 @@ class Empirical(Effect):
     @property
     def law(self) -> str:
         """The law in one line."""
-        return f"F = {' '.join(f'{force:+.4g} N * {name}' for name, force in self.parts) or '0'}, z over {self.depth:.4g} m, v over {self.speed:.4g} m/s"
+        terms = " ".join(f"{force:+.4g} N * {name}" for name, force in self.parts) or "0"
+        return f"F = {terms}, z over {self.depth:.4g} m, v over {self.speed:.4g} m/s"
 
     def force_terms(self) -> tuple[ForceTerm, ...]:
         """The compiled sum; nothing where no term acts."""

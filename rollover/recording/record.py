@@ -67,9 +67,9 @@ class Recording:
     """Channels (see `channels.CHANNELS`), SI, one value each per time stamp; gaps are NaN.
 
     `time` (n,) strictly increasing, s; `channels` name -> (n,); `noise` name -> 1 sigma; `cfc` name -> class
-    of the filter already applied; `conditions` scenario path -> value this was run with; `uncertainty` scenario path -> 1 sigma; `sensors` name -> where it
-    was measured; `notes` what the reader of the file has to say. A channel with its own, slower clock stands in the
-    common table with gaps between its samples; `samples` gives it back alone.
+    of the filter already applied; `conditions` scenario path -> value this was run with, `uncertainty` the same
+    path -> 1 sigma; `sensors` name -> where it was measured; `notes` what the reader of the file has to say. A channel
+    with its own, slower clock stands in the common table with gaps between its samples; `samples` gives it back alone.
     """
 
     title: str
