@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.evidence import MODEL_ERROR, Evidence, Signal
+from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.noise import LENGTH, grown, noise_floor
 
 Array = NDArray[np.float64]
@@ -46,19 +46,13 @@ def whole(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evid
     """The evidence with its noise from all of the misfits: an autoregression by least squares, recordings together."""
     found = [list(e.signals) for e in evidence]
     for members in alike(evidence):
-        members = [m for m in members if not _is_rough(evidence[m[0]], m[2])]
+        members = [m for m in members if not evidence[m[0]].is_rough(m[2])]
         if not members:
             continue
         sigma, ar = autoregression([residuals[r][part] for r, _, _, part in members])
         for r, k, s, _ in members:
             found[r][k] = with_noise(s, sigma, ar, evidence[r].model_error)
     return [replace(e, signals=tuple(s)) for e, s in zip(evidence, found, strict=True)]
-
-
-def _is_rough(e: Evidence, s: Signal) -> bool:
-    """Whether a scatter between runs, or a tolerance that was asked for, says more of the error than noise does."""
-    known = s.scatter > 0.0 or e.model_error > MODEL_ERROR
-    return known and float(np.hypot(s.scatter, e.model_error * s.span)) > s.noise
 
 
 def alike(evidence: Sequence[Evidence]) -> list[list[tuple[int, int, Signal, slice]]]:

@@ -17,7 +17,7 @@ from rollover.diagnosis.evidence import Evidence, doubted, evidence_of, left_out
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import yardstick
 from rollover.diagnosis.phases import drop_phases
-from rollover.diagnosis.repeats import with_scatter
+from rollover.diagnosis.repeats import differing, with_scatter
 from rollover.diagnosis.scores import judged
 from rollover.diagnosis.selection import SURE, decided, explained, matters
 from rollover.diagnosis.simulator import set_up
@@ -61,6 +61,7 @@ def diagnose(
     if sum(e.count for e in found) < FEWEST:
         return _nothing(every, names, notes, began)
     groups = left_out(found)
+    notes += differing(every)
     if len(groups) == 1 and not kept:
         notes.append("one condition only: what stands as held out is predicted by the fit to it")
     judge = Judge(found)

@@ -62,6 +62,14 @@ class Evidence:
             return eased(np.zeros((self.count, 0)))
         return eased(np.stack([self.whitened(column) for column in self.doubts.T], axis=1))
 
+    def is_rough(self, s: Signal) -> bool:
+        """Whether a scatter between runs, or a tolerance that was asked for, says more of the error than noise does.
+
+        Such an error is one for the whole signal, not one for each sample: within its size it is nothing.
+        """
+        known = s.scatter > 0.0 or self.model_error > MODEL_ERROR
+        return known and float(np.hypot(s.scatter, self.model_error * s.span)) > s.noise
+
     @property
     def count(self) -> int:
         """Number of samples of all signals."""

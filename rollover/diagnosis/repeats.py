@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 PLACES = 121  # time shifts that are tried
 WIDTH = 3.0  # times its prior that a time shift may be
 SHOWS = 1.2  # times the noise, from which on there is scatter
+WORTH_SAYING = 0.02  # of the range
 LEAST = 16  # samples in common, below which nothing is said
 
 
@@ -52,6 +53,20 @@ def with_scatter(found: Sequence[Evidence]) -> list[Evidence]:
         )
         for r, e in enumerate(found)
     ]
+
+
+def differing(found: Sequence[Evidence]) -> list[str]:
+    """What is to be said of repeats that differ by more than noise, one line for each condition and channel."""
+    lines = []
+    for group in groups_of(found):
+        for s in found[group[0]].signals if len(group) > 1 else ():
+            most = max(
+                (t.scatter / t.span for r in group for t in found[r].signals if t.channel == s.channel), default=0.0
+            )
+            if most > WORTH_SAYING:
+                names = ", ".join(found[r].name for r in group)
+                lines.append(f"{names}: one condition, yet {s.channel} differ by {100.0 * most:.1f} % of the range")
+    return lines
 
 
 def _difference(a: Evidence, b: Evidence, channel: str) -> float | None:

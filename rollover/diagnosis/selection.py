@@ -66,6 +66,8 @@ def explained(
     current, left, taken = base, before, []
     first: Step | None = None
     for _ in range(MOST):
+        if is_tolerated(judge, current):
+            break
         if looked.p_value() > CHANCE and (left.p_value > SURE or not matters(judge, current, left)):
             break
         found = step(judge, current, free(current, candidates), groups, say, looked)
@@ -181,12 +183,19 @@ def strongest(judge: Judge, base: Fitted, fitted: Fitted) -> Candidate:
     return best
 
 
+def is_tolerated(judge: Judge, fitted: Fitted) -> bool:
+    """Whether all that is left lies within a scatter between runs or a tolerance that was asked for."""
+    rough = all(e.is_rough(s) for e in judge.evidence for s in e.signals)
+    return rough and fitted.left < sum(b.residual.size for b in fitted.blocks)
+
+
 def matters(judge: Judge, base: Fitted, before: Mismatch) -> bool:
     """Whether the structure of the misfit is worth a word: beyond a share of a channel's range."""
     most = 0.0
     for r, e in enumerate(judge.evidence[: len(base.blocks)]):
         for signal, _ in e.spans():
             cells = [c for c in before.cells if c.recording == r and c.channel == signal.channel]
-            power = sum(c.structured - c.waves for c in cells) / max(sum(c.rows.size for c in cells), 1)
+            chance = sum(c.rows.size if e.is_rough(signal) else c.waves for c in cells)
+            power = (sum(c.structured for c in cells) - chance) / max(sum(c.rows.size for c in cells), 1)
             most = max(most, float(np.sqrt(max(power, 0.0))) * signal.sigma / signal.span)
     return most > NEGLIGIBLE

@@ -117,6 +117,10 @@ def cones(series: str, repeats: str = "12") -> Callable[[Path, Mapping[str, Any]
         if series.startswith("SF"):
             water = earlier["value"]["rate"]
             scenario = scenario.replaced({"effects.soil-added-mass-growth.rate": water})
+            found = [
+                (n, replace(r, uncertainty={**r.uncertainty, "effects.soil-added-mass-growth.rate": 0.5 * water}))
+                for n, r in found
+            ]
         return scenario, found
 
     return made
