@@ -17,7 +17,7 @@ from rollover.diagnosis.evidence import Evidence, doubted, evidence_of, left_out
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import yardstick
 from rollover.diagnosis.phases import drop_phases
-from rollover.diagnosis.repeats import differing, with_scatter
+from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing, with_scatter
 from rollover.diagnosis.scores import judged
 from rollover.diagnosis.selection import SURE, decided, explained, matters
 from rollover.diagnosis.simulator import set_up
@@ -84,7 +84,8 @@ def diagnose(
         say("a law for what no candidate explains")
         law = proposed(judge, explanation.base, set_ups, found, groups)
     detectable = dict(explanation.detectable)
-    if verdict == "no-mismatch" and _is_weak(detectable):
+    contrary = differing(every, CONTRADICTING)
+    if verdict == "no-mismatch" and (contrary or _is_weak(detectable)):
         verdict = "cannot-tell"
     h_before, h_after = (judged(judge, f, kept, groups) for f in (explanation.base, explanation.fitted))
     effects = named(judge, explanation, groups) if verdict in ("parameter", "sensor", "missing-physics") else ()
@@ -94,7 +95,7 @@ def diagnose(
     training = tuple(e.name for e in found)
     return Diagnosis(
         verdict=verdict,
-        sentence=sentence(verdict, effects, before, h_before.held, h_after.held, found) + offered(law),
+        sentence=sentence(verdict, effects, before, h_before.held, h_after.held, found) + offered(law) + against_itself(verdict, contrary),
         p_value=explanation.p_value,
         noise=noise(found),
         where=places(before, found, depends) if is_mismatch else (),

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 PLACES = 121  # time shifts that are tried
 WIDTH = 3.0  # times its prior that a time shift may be
 SHOWS = 1.2  # times the noise, from which on there is scatter
-WORTH_SAYING = 0.02  # of the range
+WORTH_SAYING, CONTRADICTING = 0.02, 0.1  # of the range
 LEAST = 16  # samples in common, below which nothing is said
 
 
@@ -36,13 +36,15 @@ def with_scatter(found: Sequence[Evidence]) -> list[Evidence]:
                         apart.setdefault((r, s.channel), []).append(power)
     own: dict[tuple[int, str], float] = {}
     shares: dict[str, list[float]] = {}
-    for r, e in enumerate(found):
-        for s in e.signals:
-            if (r, s.channel) in apart:
-                power = float(np.mean(apart[r, s.channel]))
-                seen = power > (SHOWS * s.noise) ** 2
-                own[r, s.channel] = float(np.sqrt(power - s.noise**2)) if seen else 0.0
-                shares.setdefault(s.channel, []).append(own[r, s.channel] / s.span)
+    for group in groups_of(found):
+        # the least noise of those alike: the others' may hold what they differ by
+        noise: dict[str, float] = {}
+        for s in (s for r in group for s in found[r].signals):
+            noise[s.channel] = min(s.noise, noise.get(s.channel, np.inf))
+        for r, s in ((r, s) for r in group for s in found[r].signals if (r, s.channel) in apart):
+            power, floor = float(np.mean(apart[r, s.channel])), noise[s.channel] ** 2
+            own[r, s.channel] = float(np.sqrt(power - floor)) if power > SHOWS**2 * floor else 0.0
+            shares.setdefault(s.channel, []).append(own[r, s.channel] / s.span)
     usual = {channel: float(np.median(values)) for channel, values in shares.items()}
     return [
         replace(
@@ -55,18 +57,25 @@ def with_scatter(found: Sequence[Evidence]) -> list[Evidence]:
     ]
 
 
-def differing(found: Sequence[Evidence]) -> list[str]:
-    """What is to be said of repeats that differ by more than noise, one line for each condition and channel."""
+def differing(found: Sequence[Evidence], share: float = WORTH_SAYING) -> list[str]:
+    """Repeats that differ by more than noise and more than a share of the range, a line for each condition, channel."""
     lines = []
     for group in groups_of(found):
         for s in found[group[0]].signals if len(group) > 1 else ():
             most = max(
                 (t.scatter / t.span for r in group for t in found[r].signals if t.channel == s.channel), default=0.0
             )
-            if most > WORTH_SAYING:
+            if most > share:
                 names = ", ".join(found[r].name for r in group)
                 lines.append(f"{names}: one condition, yet {s.channel} differ by {100.0 * most:.1f} % of the range")
     return lines
+
+
+def against_itself(verdict: str, contrary: Sequence[str]) -> str:
+    """What a sentence goes on with where recordings contradict each other."""
+    if verdict != "cannot-tell" or not contrary:
+        return ""
+    return f" They contradict each other: {contrary[0]}."
 
 
 def _difference(a: Evidence, b: Evidence, channel: str) -> float | None:

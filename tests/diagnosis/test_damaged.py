@@ -84,7 +84,7 @@ def test_damaged_recordings_of_what_the_scenario_says_give_no_name(damaged: Call
         assert found.verdict in ("no-mismatch", "cannot-tell"), (found.verdict, found.sentence)
         assert not found.effects
     assert all(e.kind == "sensor" for e in found.effects)
-    if damaged in (short, before_contact, flat):
+    if damaged in (before_contact, flat):
         assert found.verdict in ("cannot-tell", "unexplained", "sensor"), found.sentence
     assert account(found)["verdict"] == found.verdict
     assert found.sentence
@@ -102,6 +102,5 @@ def test_recordings_that_contradict_each_other_are_not_explained() -> None:
     other = recorded({"effects.soil-stiffness.scale": 2.0}, 24, speeds=SPEEDS)
     found = diagnose(scenario(), [*made, *((f"{n} again", r) for n, r in other)])
     assert not found.effects, found.sentence
-    assert found.verdict in ("unexplained", "cannot-tell", "no-mismatch")
-    # what repeats differ by is said
-    assert any("differ" in note for note in found.notes), found.notes
+    assert found.verdict == "cannot-tell"
+    assert "They contradict each other: v1.5, v1.5 again: one condition" in found.sentence
