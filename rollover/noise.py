@@ -13,6 +13,7 @@ second, fourth, ... sample: taking every s-th sample leaves its variance as it i
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,17 +60,18 @@ class NoiseFloor:
         return np.asarray(noise * (self.sigma / grown(self.ar)))
 
 
-def noise_floor(values: Array, order: int | None = None) -> NoiseFloor:
+def noise_floor(values: Array, order: int | None = None, strides: Sequence[int] = STRIDES) -> NoiseFloor:
     """Noise floor of a channel from evenly spaced samples (n,), whatever else it shows; n at least 48.
 
     `order` is that of the autoregression, at most 8; by default a criterion chooses it, which needs many windows.
+    `strides` are those looked at: (1,) for noise that is known not to outlast a window.
     Exactly repeated or smooth values give sigma 0. Raises ``ValueError`` for fewer samples.
     """
     values = np.asarray(values, dtype=np.float64)
     if values.size < LENGTH:
         raise ValueError(f"values: too few for a noise floor, got {values.size}; at least {LENGTH} are needed")
     best: tuple[int, Array, int] | None = None
-    for stride in STRIDES:
+    for stride in strides:
         if values.size < LENGTH * stride or (stride > 1 and values.size < 4 * LENGTH * stride):
             break
         gamma, windows = _autocovariance(values, stride)

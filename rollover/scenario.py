@@ -14,7 +14,7 @@ from ground.law import GroundLaw, laws
 from ground.quantity import Quantity, parameters
 from ground.surface import Plane, Surface
 from rollover import document
-from rollover.effects import effects
+from rollover.effects import entries
 from rollover.excitation import Excitation
 from rollover.filters import least_rate
 from rollover.initiation import Driving, Drop, Initiation, Release, Standing, Throw, TipOver
@@ -104,16 +104,16 @@ class Scenario:
     loads: Loads = Loads()
     gravity: Annotated[float, Quantity("m/s2", "acceleration of free fall, along -z", least=0, most=30)] = 9.81
     effects: Annotated[
-        Mapping[str, Any], ByKey("effect", effects), "terms beyond the basic model, by effect id, with their parameters"
+        Mapping[str, Any], ByKey("effect", entries), "terms beyond the basic model, by effect id, with their parameters"
     ] = field(default_factory=dict, hash=False)
 
     def validate(self) -> None:
         """Refuse parts that do not fit together."""
         for name, parameters_ in self.effects.items():
-            if name not in effects():
-                raise ValueError(f"effects: unknown effect, got {name!r}; allowed: {', '.join(effects()) or 'none'}")
-            if not isinstance(parameters_, effects()[name]):
-                raise ValueError(f"effects: not parameters of {name}, got {parameters_!r}; {effects()[name].__name__}")
+            if name not in entries():
+                raise ValueError(f"effects: unknown effect, got {name!r}; allowed: {', '.join(entries()) or 'none'}")
+            if not isinstance(parameters_, entries()[name]):
+                raise ValueError(f"effects: not parameters of {name}, got {parameters_!r}; {entries()[name].__name__}")
         rate = 1.0 / self.simulation.output_step
         if rate < least_rate(self.loads.cfc) * (1.0 - 1e-9):
             raise ValueError(

@@ -44,7 +44,7 @@ def diagnose(
     out: Annotated[Path | None, typer.Option(help="Results folder  [default: out/diagnose/NAME]")] = None,
     workers: Annotated[
         int | None,
-        typer.Option(help="Processes for scenarios that need full runs; a drop test needs one.", min=0),
+        typer.Option(help="Processes that fit at once; the answer is the same  [default: 1]", min=0),
     ] = None,
     force: Force = False,
     as_json: AsJson = False,
@@ -57,9 +57,9 @@ def diagnose(
     from rollover.diagnosis import account, diagnosed_text
     from rollover.diagnosis import diagnose as diagnosed
     from rollover.diagnosis.account import FILES, FORMAT, JSON, PAGE, PICTURE, SCENARIO
+    from rollover.diagnosis.crew import Crew
     from rollover.diagnosis.series import series
 
-    del workers  # a drop is two milliseconds: sending it to another process takes longer
     path = document.find(scenario)
     chosen = scenarios.load(path)
     if set_:
@@ -77,7 +77,10 @@ def diagnose(
     store.claim_account(folder, FORMAT, about, FILES, force=force)
     console.say("asking the sensors first")
     findings = _prechecks(chosen, measured)
-    found = diagnosed(chosen, list(measured.items()), hold_out=held, tolerance=tolerance, say=console.say)
+    # beside the results folder, which is written whole or not at all: what an interrupted diagnosis had fitted
+    notebook = folder.parent / f".{folder.name}.fits"
+    crew = Crew(workers or 1, notebook, json.dumps([about, store.versions()], sort_keys=True))
+    found = diagnosed(chosen, list(measured.items()), hold_out=held, tolerance=tolerance, say=console.say, crew=crew)
     sensors = tuple(f"{name}: {f.channel}: {f.sentence}" for name, f in findings)
     found = replace(found, notes=(*sensors, *found.notes))
     told = series(chosen, list(measured.items()), found)
@@ -101,6 +104,7 @@ def diagnose(
         draw = _picture()
         if draw is not None:
             draw(found, told, part / PICTURE, chosen.title)
+    crew.close()
     if as_json:
         print(json.dumps(answer, indent=2))
     else:

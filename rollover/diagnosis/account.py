@@ -8,9 +8,11 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.diagnose import diagnose
 from rollover.diagnosis.verdict import Diagnosis, Law, Named, Place, Score
 from rollover.document import dump
+from rollover.effects import nth
 from rollover.importers import read_recording
 from rollover.recording import Recording
 from rollover.scenario import Scenario, load
@@ -99,7 +101,8 @@ def _fit(found: Diagnosis, which: str, names: tuple[str, ...]) -> dict[str, Any]
 
 def diagnosed_scenario(scenario: Scenario, found: Diagnosis) -> Scenario:
     """The scenario with the found effects, or the law found by regression, switched on and fitted."""
-    changes = {f"effects.{e.id}": dict(e.settings) for e in found.effects}
+    ids = [e.id for e in found.effects]
+    changes = {f"effects.{nth(e.id, 1 + ids[:k].count(e.id))}": dict(e.settings) for k, e in enumerate(found.effects)}
     if found.empirical is not None:
         changes["effects.empirical"] = dict(found.empirical.settings)
     return scenario.replaced(changes, origin="diagnosis") if changes else scenario
@@ -118,5 +121,5 @@ def recordings_in(folder: Path) -> list[tuple[str, Recording]]:
 
 def diagnose_folder(folder: Path, out: Path | None = None, workers: int = 1) -> dict[str, Any]:
     """Diagnose a folder that holds scenario.yaml and its recordings; returns what diagnosis.json says."""
-    del out, workers
-    return account(diagnose(load(folder / "scenario.yaml"), recordings_in(folder)))
+    del out
+    return account(diagnose(load(folder / "scenario.yaml"), recordings_in(folder), crew=Crew(workers)))

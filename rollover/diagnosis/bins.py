@@ -18,7 +18,7 @@ from rollover.scenario import Scenario
 Array = NDArray[np.float64]
 
 MOST_ROWS = 500  # of a recording that are looked at
-LIKE_ALL = 2  # stamps within a mean at which it is simulated, away from the first contact
+FEW = 4  # stamps in a mean that are all simulated; of more, two away from the first contact
 KNOWN, UNKNOWN = 4e-3, 30e-3  # s, by which a clock's zero may be off
 
 
@@ -36,25 +36,28 @@ class Averaged:
         return None if found is None else {c: np.add.reduceat(v, self.starts) / self.counts for c, v in found.items()}
 
 
-def simulated(scenario: Scenario, recording: Recording) -> tuple[Recording, Simulator]:
-    """The recording at no more than `MOST_ROWS` rows, and what simulates it. Raises `InputError`."""
+def simulated(scenario: Scenario, recording: Recording) -> tuple[Recording, Simulator, int]:
+    """The recording at no more than `MOST_ROWS` rows, what simulates it, and how many samples are in a row.
+
+    Raises `InputError`.
+    """
     thin, inside = _thinned(recording)
     if inside is None:
-        return recording, simulator_of(scenario, recording)
+        return recording, simulator_of(scenario, recording), 1
     many = inside.shape[1]
-    few = np.round((np.arange(LIKE_ALL) + 0.5) * many / LIKE_ALL - 0.5).astype(int)
+    first = round(0.25 * many - 0.5)
+    few = np.array([first, many - 1 - first])  # mean and about the spread of all of them
     # a filter needs all stamps, and so does the kink of the force at the first contact
     near = UNKNOWN if recording.clock.zero == "unknown" else KNOWN
     whole = np.abs(thin.time) < near + many * float(np.median(np.diff(recording.time)))
-    if recording.cfc or many <= LIKE_ALL or not isinstance(scenario.initiation, Drop):
+    if recording.cfc or many <= FEW or not isinstance(scenario.initiation, Drop):
         whole[:] = True
     rows = [part if all_ else part[few] for part, all_ in zip(inside, whole, strict=True)]
     counts = np.array([r.size for r in rows])
     at = np.concatenate(rows)
     part = replace(recording, time=recording.time[at], channels={c: v[at] for c, v in recording.channels.items()})
-    return thin, Averaged(
-        inner=simulator_of(scenario, part), starts=np.concatenate([[0], np.cumsum(counts)[:-1]]), counts=counts
-    )
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    return thin, Averaged(inner=simulator_of(scenario, part), starts=starts, counts=counts), many
 
 
 def binned(recording: Recording) -> Recording:

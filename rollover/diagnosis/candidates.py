@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ground.law import REFERENCE_AREA, REFERENCE_MASS
 from rollover.channels import describe
 from rollover.diagnosis.evidence import Evidence
-from rollover.effects import EFFECTS, Search, effects
+from rollover.effects import EFFECTS, Search, effects, nth
 from rollover.scenario import Scenario
 from rollover.vehicle import Striker
 
@@ -27,6 +27,8 @@ SHAPES = {
     "soil-adhesion": ("reach",),
 }
 
+PLACES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of a shape, at which a fit of it begins
+FAINT = 20.0  # times weaker than an effect usually is, and still looked for
 BESIDE = 0.01  # of a coordinate: how far from its zero an effect is looked at
 THRESHOLDS = 10  # places at which something that has no zero is looked at
 ONE = (5,)
@@ -51,12 +53,16 @@ class Candidate:
         told = [str(v) for v in self.fixed.values()]
         return ":".join([self.id, *([] if self.channel is None else [self.channel]), *told])
 
-    def changes(self, x: Sequence[float]) -> dict[str, Any]:
-        """Values to exchange in the scenario for coordinates x, each from 0 (low) to 1 (high)."""
-        found: dict[str, Any] = {} if self.channel is None else {f"effects.{self.id}.channel": self.channel}
-        found |= {f"effects.{self.id}.{name}": value for name, value in self.fixed.items()}
+    def changes(self, x: Sequence[float], number: int = 1) -> dict[str, Any]:
+        """Values to exchange in the scenario for coordinates x, each from 0 (low) to 1 (high).
+
+        `number` counts effects of this id, each on its own channel.
+        """
+        key = nth(self.id, number)
+        found: dict[str, Any] = {} if self.channel is None else {f"effects.{key}.channel": self.channel}
+        found |= {f"effects.{key}.{name}": value for name, value in self.fixed.items()}
         for value, (name, search) in zip(x, self.search.items(), strict=True):
-            found[f"effects.{self.id}.{name}"] = physical(value, search)
+            found[f"effects.{key}.{name}"] = physical(value, search)
         return found
 
     def values(self, x: Sequence[float]) -> dict[str, float]:
@@ -77,11 +83,16 @@ class Candidate:
             axes.append(inside)
         return list(itertools.product(*axes))
 
-    def with_shapes(self, x: Sequence[float]) -> tuple[Candidate, tuple[float, ...]]:
-        """The same effect with its shape fitted too, begun at the shape's default; and its coordinates."""
+    def whole(self) -> Candidate:
+        """The same effect with its shape fitted too."""
+        return replace(self, search={**self.search, **self.shapes}, shapes={})
+
+    def with_shapes(self, x: Sequence[float]) -> list[tuple[float, ...]]:
+        """Coordinates of `whole` at which its fit may begin: the shape's default, and others."""
         kind: Any = EFFECTS[self.id]()
-        begin = tuple(min(max(coordinate(getattr(kind, n), s), 0.02), 0.98) for n, s in self.shapes.items())
-        return replace(self, search={**self.search, **self.shapes}, shapes={}), (*x, *begin)
+        default = [min(max(coordinate(getattr(kind, n), s), 0.02), 0.98) for n, s in self.shapes.items()]
+        places = [tuple(default), *itertools.product(*[PLACES] * len(default))]
+        return [(*x, *place) for place in places]
 
     def probes(self) -> list[tuple[float, ...]]:
         """Coordinates that span the directions in which the effect begins: small where it has a zero, else spread."""
@@ -145,7 +156,7 @@ def candidates_of(
             found += [c for channel in spans if (c := _sensor(name, kind, channel, spans))]
             continue
         sized = {p: _sized(s, kind.grows.get(p), size) for p, s in kind.search.items()}
-        search = {p: s for p, s in sized.items() if p not in SHAPES.get(name, ())}
+        search = {p: _widened(s, kind.null.get(p)) for p, s in sized.items() if p not in SHAPES.get(name, ())}
         shapes = {p: s for p, s in sized.items() if p in SHAPES.get(name, ())}
         found.append(Candidate(id=name, kind=kind.kind, family=kind.family, search=search, shapes=shapes))
     return found
@@ -157,6 +168,11 @@ def _sized(search: Search, powers: tuple[float, float] | None, size: tuple[float
         return search
     factor = size[0] ** powers[0] * size[1] ** powers[1]
     return Search(factor * search.low, factor * search.high, search.scale)
+
+
+def _widened(search: Search, null: float | None) -> Search:
+    """The range with strengths that only a low noise shows."""
+    return search._replace(low=search.low / FAINT) if search.scale == "log" and null == 0.0 else search
 
 
 def _sensor(name: str, kind: Any, channel: str, spans: Mapping[str, float]) -> Candidate | None:

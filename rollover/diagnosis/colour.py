@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.evidence import Evidence, Signal
-from rollover.noise import LENGTH, grown, noise_floor
+from rollover.noise import LENGTH, NoiseFloor, grown, noise_floor
 
 Array = NDArray[np.float64]
 ALIKE = 0.05  # of the logarithm of the rate: recordings so close were taken alike
 MANY = 10  # quiet windows from which on a criterion chooses the memory
 CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is believed
-AS_LOUD = 0.25  # of the logarithm of the noise
+OWN = 1.5  # times the common noise: beyond, a recording has its own
+SURELY = 4  # quiet windows from which on that is believed
 LONGEST = 4  # samples of memory
 NOT_COLOURED = 0.7  # of the whole error that is noise: below, the model's own error prevails, which is no process
 STEADY = 0.995  # largest root of a memory
@@ -29,15 +30,14 @@ def quiet(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evid
     """The evidence with its noise from the quiet stretches of the misfits (SI, stacked), recordings alike together."""
     found = [list(e.signals) for e in evidence]
     for members in alike(evidence):
-        parts = [(residuals[r][part], s) for r, k, s, part in members]
-        misfits, own = [p for p, _ in parts], [s.values for _, s in parts]
-        if sum(p.size // LENGTH for p in misfits) < 1:
+        common = _quieter([residuals[r][part] for r, _, _, part in members], [s.values for _, _, s, _ in members])
+        if common is None:
             continue  # too short: what each says by itself stands
-        best, other = _floor(misfits), _floor(own)
-        if other[0] < CLEARLY * best[0]:
-            best = other
-        for r, k, s, _ in members:
-            found[r][k] = replace(s, noise=best[0], ar=best[1])
+        for r, k, s, part in members:
+            own = _quieter([residuals[r][part]], [s.values])
+            loud = own is not None and own.windows >= SURELY and own.sigma > OWN * common.sigma
+            best = own if own is not None and loud else common
+            found[r][k] = replace(s, noise=best.sigma, ar=best.ar)
     found = [[with_noise(s, s.noise, s.ar, e.model_error) for s in f] for e, f in zip(evidence, found, strict=True)]
     return [replace(e, signals=tuple(s)) for e, s in zip(evidence, found, strict=True)]
 
@@ -58,21 +58,20 @@ def whole(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evid
 def alike(evidence: Sequence[Evidence]) -> list[list[tuple[int, int, Signal, slice]]]:
     """Signals (recording, place, signal, its part of the stack) of one channel that share a recorder.
 
-    The same rate, the same filter class, and of themselves about the same noise.
+    The same rate, as many samples averaged, the same filter class.
     """
-    groups: list[tuple[tuple[str, int | None], float, float, list[tuple[int, int, Signal, slice]]]] = []
+    groups: list[tuple[tuple[str, int | None, int], float, list[tuple[int, int, Signal, slice]]]] = []
     for r, e in enumerate(evidence):
         for k, (s, part) in enumerate(e.spans()):
-            what = (s.channel, e.recording.cfc.get(s.channel))
+            what = (s.channel, e.recording.cfc.get(s.channel), e.averaged)
             rate = -float(np.log(np.median(np.diff(e.recording.time[s.rows]))))
-            level = float(np.log(max(s.level, 1e-300)))
-            for other, at, size, members in groups:
-                if other == what and abs(at - rate) < ALIKE and abs(size - level) < AS_LOUD:
+            for other, at, members in groups:
+                if other == what and abs(at - rate) < ALIKE:
                     members.append((r, k, s, part))
                     break
             else:
-                groups.append((what, rate, level, [(r, k, s, part)]))
-    return [members for _, _, _, members in groups]
+                groups.append((what, rate, [(r, k, s, part)]))
+    return [members for _, _, members in groups]
 
 
 def autoregression(series: Sequence[Array], most: int = LONGEST) -> tuple[float, tuple[float, ...]]:
@@ -100,9 +99,16 @@ def with_noise(s: Signal, noise: float, ar: tuple[float, ...], model_error: floa
     return replace(s, noise=noise, sigma=sigma, ar=ar if noise >= NOT_COLOURED * sigma else ())
 
 
-def _floor(values: Sequence[Array]) -> tuple[float, tuple[float, ...]]:
-    """Level and memory of the quiet windows of several series, none of which lies across two."""
-    joined = np.concatenate([v[: v.size // LENGTH * LENGTH] for v in values])
-    one = noise_floor(joined, order=1)
-    best = noise_floor(joined, order=2) if one.windows >= MANY else one
-    return best.sigma, best.ar
+def _quieter(misfits: Sequence[Array], own: Sequence[Array]) -> NoiseFloor | None:
+    """Noise of misfits, or of the channels themselves where that shows clearly less; None of too little."""
+    if sum(v.size // LENGTH for v in misfits) < 1:
+        return None
+    best, other = _floor(misfits), _floor(own)
+    return other if other.sigma < CLEARLY * best.sigma else best
+
+
+def _floor(values: Sequence[Array]) -> NoiseFloor:
+    """Level and memory of the quiet windows of several series, none across two, counted from their ends."""
+    joined = np.concatenate([v[v.size % LENGTH :] for v in values if v.size >= LENGTH])
+    one = noise_floor(joined, order=1, strides=(1,))
+    return noise_floor(joined, order=2, strides=(1,)) if one.windows >= MANY else one

@@ -11,6 +11,7 @@ import numpy as np
 from rollover.diagnosis import colour
 from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import candidates_of, size_of
+from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.depend import dependency, residual_forces
 from rollover.diagnosis.empirical import offered, proposed
 from rollover.diagnosis.evidence import Evidence, doubted, evidence_of, left_out
@@ -39,13 +40,15 @@ def diagnose(
     hold_out: Sequence[str] = (),
     tolerance: float = 0.0,
     say: Callable[[str], None] = lambda _: None,
+    crew: Crew | None = None,
 ) -> Diagnosis:
     """Compare a scenario with recordings and say what separates them.
 
     `recordings` are (name, recording); `hold_out` names those that are never fitted, otherwise each condition is left
     out in turn. `tolerance` is the share of a channel's range by which a scenario that lacks nothing may still miss it:
-    what is smaller counts as noise. Raises `InputError` for a condition that the scenario does not know, ``ValueError``
-    for a name in `hold_out` that is none, and for a tolerance outside 0 to 1.
+    what is smaller counts as noise. `crew` works off the fits, in children if it has any; the answer is the same.
+    Raises `InputError` for a condition that the scenario does not know, ``ValueError`` for a name in `hold_out` that is
+    none, and for a tolerance outside 0 to 1.
     """
     began = clock.perf_counter()
     names = [name for name, _ in recordings]
@@ -72,7 +75,7 @@ def diagnose(
     phases = [drop_phases(e) for e in found]
     acts = "rollover" if any(unfit(set_up(scenario, e.recording)) for e in found) else "drop"
     candidates = candidates_of(found, scenario.effects, acts, size_of(set_up(scenario, found[0].recording)))
-    explanation = explained(judge, base, candidates, groups, phases, say)
+    explanation = explained(judge, base, candidates, groups, phases, say, crew or Crew())
     explanation, verdict = decided(judge, explanation, groups)
     found = list(judge.evidence)
     before, after = explanation.before, explanation.after if explanation.parts else explanation.before
@@ -95,7 +98,9 @@ def diagnose(
     training = tuple(e.name for e in found)
     return Diagnosis(
         verdict=verdict,
-        sentence=sentence(verdict, effects, before, h_before.held, h_after.held, found) + offered(law) + against_itself(verdict, contrary),
+        sentence=sentence(verdict, effects, before, h_before.held, h_after.held, found)
+        + offered(law)
+        + against_itself(verdict, contrary),
         p_value=explanation.p_value,
         noise=noise(found),
         where=places(before, found, depends) if is_mismatch else (),

@@ -39,7 +39,6 @@ class Signal:
     ar: tuple[float, ...]
     span: float
     scatter: float = 0.0  # between runs of one condition, SI
-    level: float = 0.0  # of the noise as this recording alone shows it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +52,7 @@ class Evidence:
     shift_prior: float
     condition: str
     model_error: float = MODEL_ERROR  # of a channel's range
+    averaged: int = 1  # samples in one
     doubts: Array | None = None  # what 1 sigma of each uncertain condition does to the stack, SI, (n, q)
 
     @cached_property
@@ -151,7 +151,7 @@ def doubted(e: Evidence, scenario: Scenario) -> Evidence:
     return replace(e, doubts=np.stack(columns, axis=1)) if columns else e
 
 
-def evidence_of(name: str, recording: Recording, simulator: Simulator) -> Evidence | None:
+def evidence_of(name: str, recording: Recording, simulator: Simulator, averaged: int = 1) -> Evidence | None:
     """Make a recording ready; None if it shares no channel with the simulation.
 
     Noise is estimated from each channel itself; where it is too short for that, the noise that the recording states.
@@ -172,9 +172,7 @@ def evidence_of(name: str, recording: Recording, simulator: Simulator) -> Eviden
         sigma = float(np.hypot(noise, MODEL_ERROR * span))
         if noise < sigma * 0.7:
             ar = ()  # the model's error is not coloured as the noise is
-        signals.append(
-            Signal(channel=channel, rows=rows, values=y, sigma=sigma, noise=noise, ar=ar, span=span, level=noise)
-        )
+        signals.append(Signal(channel=channel, rows=rows, values=y, sigma=sigma, noise=noise, ar=ar, span=span))
     if not signals:
         return None
     loose = recording.clock.zero == "unknown"
@@ -186,6 +184,7 @@ def evidence_of(name: str, recording: Recording, simulator: Simulator) -> Eviden
         signals=tuple(signals),
         shift_prior=recording.clock.within or (ALONE if loose else SHIFT + 0.5 * step),
         condition=condition_of(recording.conditions),
+        averaged=averaged,
     )
 
 
@@ -209,8 +208,8 @@ def _noise(residual: Array, values: Array, stated: float | None) -> tuple[float,
 
 def _floor(values: Array) -> NoiseFloor:
     """Noise floor with as short a memory as the samples can tell: longer ones are made of chance."""
-    one = noise_floor(values, order=1)
-    return noise_floor(values, order=2) if one.windows >= MANY else one
+    one = noise_floor(values, order=1, strides=(1,))
+    return noise_floor(values, order=2, strides=(1,)) if one.windows >= MANY else one
 
 
 def _by_differences(values: Array) -> float:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis import colour
 from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.fit import Fitted, Judge
+from rollover.diagnosis.crew import Crew, Job
+from rollover.diagnosis.fit import NOISE_LEFT, Fitted, Judge
 from rollover.diagnosis.gate import Gate, freed
 from rollover.diagnosis.holdout import held_out, worse
 
@@ -23,7 +25,6 @@ LEADERS, MOST_LEADERS = 4, 9  # first fits that are followed up, at least and at
 WITHIN = 6.0  # times what the best leaves, up to which a first fit is followed up
 FAR = 3.0  # misfit over the noise from which on time shifts fitted to it are not believed
 ELSEWHERE = 0.2  # of a coordinate: starts so far apart are two
-NOISE_LEFT = 1.04  # misfit over the noise that needs no further search
 CROOKED = 100.0  # times what the best leaves, up to which a fit of two parameters is polished
 SHAPED = 4.0  # times what the best leaves, up to which an effect's shape is fitted too
 WORTH = 12.0  # gain that pays for a shape
@@ -134,6 +135,7 @@ def step(
     groups: Sequence[Sequence[int]],
     say: Progress,
     looked: Gate,
+    crew: Crew,
 ) -> Step | None:
     """Fit the promising candidates beside the base and rank them by what they predict of held-out conditions.
 
@@ -144,21 +146,21 @@ def step(
     few = spread(base, groups)
     screened = screen(judge, base, _promising(candidates, looked), few)
     count = sum(b.residual.size for b in base.blocks)
-    screened, begun_with = _first_fits(judge, base, screened, few, say)
-    fits = []
-    for first in begun_with:
-        say(f"fitting {first.candidates[-1].key}")
-        fitted = judge.fit(first.candidates, first.x, shifts=_all_shifts(judge, base, first, few), width=1)
-        if fitted is not None:
-            fits.append(fitted)
+    screened, begun_with = _first_fits(judge, base, screened, few, say, crew)
+    jobs = [
+        Job(candidates=f.candidates, start=f.x, shifts=tuple(_all_shifts(judge, base, f, few)), width=1)
+        for f in begun_with
+    ]
+    fits = [f for f in crew.fits(judge, jobs, say) if f is not None]
     if not fits:
         return None
     fits.sort(key=lambda f: f.left)
     # where a threshold makes the way crooked, the nearer ones are followed to the end
     if fits[0].left > NOISE_LEFT**2 * count:
         near = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < CROOKED * fits[0].left][:2]
-        fits = [judge.polish(f) if f in near else f for f in fits]
-    fits = _shaped(judge, _one_each(fits))
+        polished = crew.fits(judge, [_from(f, "polish") for f in near], say)
+        fits = [f for f in fits if f not in near] + [new or old for new, old in zip(polished, near, strict=True)]
+    fits = _shaped(judge, _one_each(fits), crew, say)
     if fits[0].left < NEARLY_NOISE**2 * count:
         judge.weigh(colour.whole(judge.evidence, judge.residuals(fits[0])))
         base, fits = judge.again(base), [judge.again(f) for f in fits]
@@ -173,45 +175,45 @@ def _promising(candidates: Sequence[Candidate], looked: Gate) -> list[Candidate]
     return [c for k, c in enumerate(ranked) if k < SCORED or len(c.search) > 1]
 
 
-def _shaped(judge: Judge, fits: Sequence[Fitted]) -> list[Fitted]:
+def _from(f: Fitted, how: Literal["polish", "shape"]) -> Job:
+    return Job(how=how, candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks))
+
+
+def _shaped(judge: Judge, fits: Sequence[Fitted], crew: Crew, say: Progress) -> list[Fitted]:
     """The fits with shapes fitted too where that pays, best first."""
-    found = []
     best = min(f.left for f in fits)
-    for f in fits:
-        last = f.candidates[-1]
-        if last.shapes and f.left < SHAPED * best:
-            at = len(f.x) - len(last.search)
-            shaped, x = last.with_shapes(f.x[at:])
-            again = judge.fit((*f.candidates[:-1], shaped), (*f.x[:at], *x), shifts=[b.shift for b in f.blocks])
-            if again is not None and again.left < f.left - WORTH * max(
-                1.0, best / sum(b.residual.size for b in f.blocks)
-            ):
-                f = again
-        found.append(f)
+    size = sum(b.residual.size for b in fits[0].blocks)
+    able = [f for f in fits if f.candidates[-1].shapes and f.left < SHAPED * best]
+    found = list(fits)
+    for old, new in zip(able, crew.fits(judge, [_from(f, "shape") for f in able], say), strict=True):
+        if new is not None and new.left < old.left - WORTH * max(1.0, best / size):
+            found[found.index(old)] = new
     return sorted(found, key=lambda f: f.left)
 
 
 def _first_fits(
-    judge: Judge, base: Fitted, screened: Sequence[Screened], few: Sequence[int], say: Progress
+    judge: Judge, base: Fitted, screened: Sequence[Screened], few: Sequence[int], say: Progress, crew: Crew
 ) -> tuple[list[Screened], list[Fitted]]:
     """Short fits to few recordings: the ones worth a full fit, best first, and what each leaves."""
     by_potential = sorted(screened, key=lambda s: -s.potential)[:PROMISING]
     by_start = sorted(screened, key=lambda s: s.left)[: PROMISING // 2]
     chosen = {s.candidate.key: s for s in (*by_start, *by_potential)}
     shifts = begun(judge, base)
-    fits: list[Fitted] = []
     told: dict[str, float] = {}
     say(f"first fits of {len(chosen)} candidates to {len(few)} recordings")
-    for key, s in chosen.items():
-        for start in s.starts:
-            one = judge.fit(
-                (*base.candidates, s.candidate), (*base.x, *start),
-                rounds=SHORT, only=few, shifts=[shifts[r] for r in few],
-            )  # fmt: skip
-            if one is not None:
-                fits.append(one)
-                size = sum(b.residual.size for b in one.blocks)
-                told[key] = min(told.get(key, np.inf), float(np.sqrt(one.left / size)))
+    at = tuple(shifts[r] for r in few)
+    jobs = [
+        Job(
+            candidates=(*base.candidates, s.candidate), start=(*base.x, *start), shifts=at, only=tuple(few),
+            rounds=SHORT,
+        )
+        for s in chosen.values()
+        for start in s.starts
+    ]  # fmt: skip
+    fits = [f for f in crew.fits(judge, jobs, say) if f is not None]
+    for one in fits:
+        key, size = one.candidates[-1].key, sum(b.residual.size for b in one.blocks)
+        told[key] = min(told.get(key, np.inf), float(np.sqrt(one.left / size)))
     fits.sort(key=lambda f: f.left)
     worth = [f for k, f in enumerate(fits) if k < LEADERS or f.left < WITHIN * fits[0].left][:MOST_LEADERS]
     return [replace(s, nrmse=told.get(s.candidate.key, 0.0)) for s in screened], worth

@@ -10,6 +10,7 @@ to predict that one, so that holding out costs no simulation.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,6 +23,9 @@ from rollover.diagnosis.evidence import Evidence
 Array = NDArray[np.float64]
 NUDGES = (2e-2, 5e-3, 1e-3)  # of a coordinate, for differences: wide first, as thresholds show only over samples
 PLACES = 241  # time shifts that are tried
+WIDEST = 4.0  # times its prior that a time shift may be
+NOISE_LEFT = 1.04  # misfit over the noise that needs no further search
+NONE = np.zeros(0, dtype=np.int64)
 GENTLE = 1e-4  # prior of a coordinate (1/variance): keeps what nothing determines where it is
 
 
@@ -86,6 +90,21 @@ class Judge:
         self._leaps: dict[tuple[object, ...], NDArray[np.int64]] = {}
         self._known: dict[tuple[object, ...], Array | None] = {}
 
+    def bare(self) -> Judge:
+        """The same without what was simulated, to be sent to another process."""
+        other = Judge(self.evidence)
+        other.shifts = list(self.shifts)
+        return other
+
+    def fingerprint(self) -> str:
+        """Hash of the recordings as they are held: their samples and their noise."""
+        total = hashlib.sha256()
+        for e in self.evidence:
+            total.update(repr((e.name, e.shift_prior)).encode())
+            for s in e.signals:
+                total.update(repr((s.channel, s.sigma, s.ar)).encode() + s.values.tobytes() + s.rows.tobytes())
+        return total.hexdigest()
+
     def weigh(self, evidence: Sequence[Evidence]) -> None:
         """Take the same recordings with another noise: nothing is simulated again, fits must be made anew."""
         self.evidence = tuple(evidence)
@@ -142,9 +161,9 @@ class Judge:
     def changes(candidates: Sequence[Candidate], x: Sequence[float]) -> dict[str, object]:
         """Values to exchange in the scenario."""
         found: dict[str, object] = {}
-        at = 0
-        for c in candidates:
-            found |= c.changes(x[at : at + len(c.search)])
+        at, ids = 0, [c.id for c in candidates]
+        for k, c in enumerate(candidates):
+            found |= c.changes(x[at : at + len(c.search)], 1 + ids[:k].count(c.id))
             at += len(c.search)
         return found
 
@@ -185,27 +204,27 @@ class Judge:
         y = self.predicted(r, candidates, x, shift)
         if y is None:
             return None
-        e = self.evidence[r]
+        e, raw = self.evidence[r], self.raw(r, candidates, x, shift)
+        assert raw is not None
+        leaps = self._leaps.get(_key(r, candidates, x, shift), NONE)
         J = np.zeros((y.size, len(x)))
         for k in range(len(x) if nudge else 0):
             step = nudge if x[k] < 0.5 else -nudge
-            moved = self.predicted(r, candidates, [*x[:k], x[k] + step, *x[k + 1 :]], shift)
+            there = [*x[:k], x[k] + step, *x[k + 1 :]]
+            moved = self.raw(r, candidates, there, shift)
             if moved is None:
                 return None
-            J[:, k] = (moved - y) / step
+            d = (moved - raw) / step
+            for at in (*leaps, *self._leaps.get(_key(r, candidates, there, shift), NONE)):
+                d[at : at + 3] = 0.0  # a leap that moves past a sample is no slope
+            J[:, k] = e.whitened(d)
         return Block(
             residual=e.eased(self.measured[r] - y),
             J=e.eased(J),
-            slope=e.eased(self._slope(r, candidates, x, shift)),
+            slope=e.eased(e.slope(raw, leaps)),
             shift=shift,
             prior=e.shift_prior,
         )
-
-    def _slope(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array:
-        raw = self.raw(r, candidates, x, shift)
-        assert raw is not None
-        leaps = self._leaps.get(_key(r, candidates, x, shift), np.zeros(0, dtype=np.int64))
-        return self.evidence[r].slope(raw, leaps)
 
     def fit(
         self,
@@ -262,6 +281,10 @@ class Judge:
             blocks = [b for b in again if b is not None]
             if last:
                 break
+        if width < len(NUDGES) and width != 1:
+            ended = [self.block(r, candidates, x, s, NUDGES[1]) for r, s in zip(use, shifts, strict=True)]
+            if all(b is not None for b in ended):
+                blocks = [b for b in ended if b is not None]
         return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=tuple(blocks))
 
     def polish(self, fitted: Fitted, size: float = 0.02, most: int = 70) -> Fitted:
@@ -288,6 +311,23 @@ class Judge:
         again = self.fit(fitted.candidates, np.clip(found.x, 0.0, 1.0), rounds=3, shifts=shifts, width=2)
         return again if again is not None and again.left < fitted.left else fitted
 
+    def shaped(self, f: Fitted) -> Fitted | None:
+        """The fit with the shape of its last effect fitted too, from the best of some places."""
+        last, shifts = f.candidates[-1], [b.shift for b in f.blocks]
+        candidates, at = (*f.candidates[:-1], last.whole()), len(f.x) - len(last.search)
+        begun: list[tuple[float, tuple[float, ...]]] = []
+        for start in last.with_shapes(f.x[at:]):
+            x = (*f.x[:at], *start)
+            blocks = [self.block(r, candidates, x, s, 0.0) for r, s in enumerate(shifts)]
+            if all(b is not None for b in blocks):
+                begun.append((sum(b.normal()[2] for b in blocks if b is not None), x))
+        if not begun:
+            return None
+        again = self.fit(candidates, min(begun)[1], shifts=shifts)
+        if again is not None and again.left > NOISE_LEFT**2 * sum(b.residual.size for b in again.blocks):
+            again = self.polish(again)
+        return again
+
     @staticmethod
     def _total(blocks: Sequence[Block]) -> float:
         return sum(b.total for b in blocks)
@@ -299,9 +339,10 @@ def _key(r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: flo
 
 
 def shift_of(block: Block, dx: Array) -> float:
-    """Change of the time shift that goes with dx."""
+    """Change of the time shift that goes with dx; it stays within `WIDEST` of its prior."""
     g = float(block.slope @ (block.residual - block.J @ dx)) - block.shift * block.prior**-2
-    return g / block.weight
+    most = WIDEST * block.prior
+    return min(max(block.shift + g / block.weight, -most), most) - block.shift
 
 
 def _bounded(A: Array, b: Array, x: Array, damping: float) -> Array:

@@ -46,6 +46,10 @@ class RunSimulator:
         self._limit = np.inf
         self._known: dict[tuple[Any, ...], tuple[Scenario, Recording] | None] = {}
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What is sent to another process: not the runs."""
+        return {**self.__dict__, "_known": {}}
+
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """Channels (n,) at the recording's stamps less `shift` (s); None if the run fails.
 

@@ -41,7 +41,8 @@ def with_scatter(found: Sequence[Evidence]) -> list[Evidence]:
         noise: dict[str, float] = {}
         for s in (s for r in group for s in found[r].signals):
             noise[s.channel] = min(s.noise, noise.get(s.channel, np.inf))
-        for r, s in ((r, s) for r in group for s in found[r].signals if (r, s.channel) in apart):
+        here = [(r, s) for r in group for s in found[r].signals if (r, s.channel) in apart]
+        for r, s in here:
             power, floor = float(np.mean(apart[r, s.channel])), noise[s.channel] ** 2
             own[r, s.channel] = float(np.sqrt(power - floor)) if power > SHOWS**2 * floor else 0.0
             shares.setdefault(s.channel, []).append(own[r, s.channel] / s.span)

@@ -9,6 +9,7 @@ import numpy as np
 
 from rollover.diagnosis import colour
 from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.explain import NEARLY_NOISE, Step, moves, step
 from rollover.diagnosis.fit import Fitted, Judge
@@ -21,6 +22,7 @@ SURE = 1e-3  # p-value below which there is a mismatch
 MOST = 3  # effects in one explanation
 NEGLIGIBLE = 0.001  # of a channel's range: what moves nothing by more is not worth a name
 PARTLY = 0.02  # of the excess over the noise that one effect may leave and still be named
+HOPELESS = 2.0  # misfit over the noise that two effects leave and a third is not looked for
 NEEDED = 25.0  # gain, over what is left per sample, that an effect must bring beside all the others
 
 Phases = Sequence[Sequence[tuple[float, str]]]
@@ -53,7 +55,13 @@ class Explanation:
 
 
 def explained(
-    judge: Judge, base: Fitted, candidates: Sequence[Candidate], groups: Groups, phases: Phases, say: Progress
+    judge: Judge,
+    base: Fitted,
+    candidates: Sequence[Candidate],
+    groups: Groups,
+    phases: Phases,
+    say: Progress,
+    crew: Crew,
 ) -> Explanation:
     """Forward selection of up to three effects, each beyond chance, then each tried without and against its rivals."""
     count = sum(b.residual.size for b in base.blocks)
@@ -70,15 +78,20 @@ def explained(
             break
         if looked.p_value() > CHANCE and (left.p_value > SURE or not matters(judge, current, left)):
             break
-        found = step(judge, current, free(current, candidates), groups, say, looked)
+        found = step(judge, current, free(current, candidates), groups, say, looked, crew)
         first = first or found
         if found is None or found.p_value > CHANCE or moves(judge, found.base, found.fitted) < NEGLIGIBLE:
             break
         taken.append(found)
         current = found.fitted
         left = mismatch_of(judge.evidence, current.blocks, phases)
+        if len(taken) > 1 and current.left > HOPELESS**2 * count:
+            break
         looked = gate(judge, current, free(current, candidates))
-    parts = _needed(judge, taken, candidates, groups, say) if len(taken) > 1 else [s.again(judge) for s in taken]
+    is_whole = left.p_value > SURE or not matters(judge, current, left)
+    parts = [s.again(judge) for s in taken]
+    if is_whole and len(taken) > 1:
+        parts = _needed(judge, taken, candidates, groups, say, crew)
     base = judge.again(base)
     current = parts[-1].fitted if parts else base
     return Explanation(
@@ -111,7 +124,7 @@ def without(judge: Judge, fitted: Fitted, k: int, rounds: int = 8) -> Fitted | N
 
 
 def _needed(
-    judge: Judge, taken: Sequence[Step], candidates: Sequence[Candidate], groups: Groups, say: Progress
+    judge: Judge, taken: Sequence[Step], candidates: Sequence[Candidate], groups: Groups, say: Progress, crew: Crew
 ) -> list[Step]:
     """Steps of the effects that are needed: each dropped if that costs no more than chance, or given to a better one.
 
@@ -140,7 +153,7 @@ def _needed(
         if rest is None:
             break
         others = free(rest, candidates)
-        found = step(judge, rest, others, groups, say, gate(judge, rest, others))
+        found = step(judge, rest, others, groups, say, gate(judge, rest, others), crew)
         if found is None:
             break
         parts.append(found)

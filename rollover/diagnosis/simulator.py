@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.overturn import RunSimulator
 from rollover.drop import DropFailedError, DropModel, unfit
-from rollover.effects import read
+from rollover.effects import every, read
 from rollover.filters import filtered
 from rollover.initiation import Drop
 from rollover.recording import Recording
@@ -42,6 +42,10 @@ class DropSimulator:
         self.recording = recording
         self._raw: dict[tuple[Any, ...], Recording] = {}
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What is sent to another process: not the runs."""
+        return {"model": DropModel(scenario=self.model.scenario), "recording": self.recording, "_raw": {}}
+
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """See `Simulator`; ``ValueError`` for a value out of bounds passes."""
         physical = {path: value for path, value in changes.items() if not path.startswith(SENSORS)}
@@ -51,7 +55,7 @@ class DropSimulator:
             if len(physical) < len(changes):
                 read_by = self.model.with_({p: v for p, v in changes.items() if p not in physical}).scenario.effects
                 run = replace(run, time=stamps, channels={**run.channels, **self._edges(physical, shift, read_by)})
-                run = read({n: e for n, e in read_by.items() if n not in EDGES}, run)
+                run = read({n: e for n, e in read_by.items() if e.id not in EDGES}, run)
         except DropFailedError:
             return None
         return behind_filters(run.channels, self.recording)
@@ -59,16 +63,16 @@ class DropSimulator:
     def _edges(self, physical: Mapping[str, Any], shift: float, read_by: Mapping[str, Any]) -> dict[str, Array]:
         """Channels behind a lag or with a clock of their own: what these make of a leap lies between the stamps."""
         stamps = self.recording.time
-        lag, offset, drift = (read_by.get(name) for name in EDGES)
+        lags, offsets, drifts = ({e.channel: e for e in every(read_by, name)} for name in EDGES)
         found = {}
-        for channel in {effect.channel for effect in (lag, offset, drift) if effect is not None}:
-            own = stamps
-            if offset is not None and offset.channel == channel:
-                own = own - offset.offset
-            if drift is not None and drift.channel == channel:
-                own = (1.0 - drift.drift) * own
-            own, key = own - shift, (shift, channel, offset, drift)
-            if lag is None or lag.channel != channel:
+        for channel in {*lags, *offsets, *drifts} & set(self.recording.channels):
+            own, lag = stamps, lags.get(channel)
+            if channel in offsets:
+                own = own - offsets[channel].offset
+            if channel in drifts:
+                own = (1.0 - drifts[channel].drift) * own
+            own, key = own - shift, (shift, channel, offsets.get(channel), drifts.get(channel))
+            if lag is None:
                 found[channel] = self._run(physical, own, key)[channel]
                 continue
             beside = self._contact + np.array([-BESIDE, BESIDE])
@@ -76,7 +80,7 @@ class DropSimulator:
             dense, where = np.unique(fine, return_inverse=True)
             raw = replace(self._run(physical, dense, (*key, "dense")), time=dense)
             found[channel] = lag.read(raw)[channel][where[: own.size]]
-        return {name: values for name, values in found.items() if name in self.recording.channels}
+        return found
 
     @cached_property
     def _contact(self) -> float:

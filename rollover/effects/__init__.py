@@ -21,9 +21,10 @@ from rollover.faults import Fault, InputError
 from rollover.recording import Recording
 
 __all__ = ["EFFECTS", "Effect", "Search", "acting", "effects", "ground", "nothing", "parameter", "read", "sensor"]
-__all__ += ["empirical", "vehicle"]
+__all__ += ["empirical", "entries", "every", "nth", "vehicle"]
 
 VARIABLE = "ROLLOVER_EFFECTS"
+MOST = 3  # sensor effects of one id in a scenario, each on its own channel
 
 
 def effects() -> dict[str, type[Effect]]:
@@ -59,12 +60,32 @@ def acting(chosen: Mapping[str, Any]) -> tuple[dict[int, float], tuple[ForceTerm
     return places, terms
 
 
+def entries() -> dict[str, type[Effect]]:
+    """What may stand under `effects` of a scenario: each effect once, one of a sensor also as ID-2 and ID-3.
+
+    A sensor effect is one channel's; with its number the same one acts on a second and a third channel.
+    """
+    found = effects()
+    more = {nth(id, n): kind for id, kind in found.items() if kind.kind == "sensor" for n in range(2, MOST + 1)}
+    return found | more
+
+
+def nth(id: str, n: int) -> str:
+    """Key under which the n-th (1, 2, ...) effect of one id stands."""
+    return id if n == 1 else f"{id}-{n}"
+
+
+def every(chosen: Mapping[str, Any], id: str) -> list[Any]:
+    """All effects of one id that a scenario has switched on."""
+    return [chosen[key] for key in (nth(id, n) for n in range(1, MOST + 1)) if key in chosen]
+
+
 def read(chosen: Mapping[str, Any], recording: Recording) -> Recording:
     """What a scenario's sensors make of a recording: y = clip(G (R h x)(t - t_0 - e t) + b).
 
     Whatever the order in the file: the sensor's axis, its lag, its scale and gain, its clock, its bias, its range.
     """
     for name in sensor.ORDER:
-        if name in chosen:
-            recording = chosen[name].read(recording)
+        for one in every(chosen, name):
+            recording = one.read(recording)
     return recording

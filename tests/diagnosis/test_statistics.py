@@ -150,6 +150,6 @@ def test_binning_keeps_means_and_averages_across_no_gap() -> None:
     assert found.time.size < 1002
     assert np.allclose(found.channels[FORCE], 3.0 + 2.0 * found.time)
     assert not np.any((found.time > 0.1001) & (found.time < 0.1999))
-    assert found.noise[FORCE] == pytest.approx(2.0 / np.sqrt(2.0))
+    assert found.noise[FORCE] == pytest.approx(2.0 / np.sqrt(4.0))
     name, short = recorded({}, speeds=(2.0,))[0]
     assert binned(short) is short, name

@@ -1,0 +1,152 @@
+"""Fits as jobs: worked off here or in child processes, and kept in a file until the diagnosis is done.
+
+A job depends on nothing but the recordings, their noise and its own start, so that the answer is the same for any
+number of workers, and a diagnosis that was interrupted takes up what it had fitted.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.fit import NUDGES, Block, Fitted, Judge
+from rollover.execute import map_cases
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """A fit to be made: `only` some recordings, from time `shifts` (s) of these; see `Judge.fit`.
+
+    "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too.
+    """
+
+    how: Literal["fit", "polish", "shape"] = "fit"
+    candidates: tuple[Candidate, ...]
+    start: tuple[float, ...]
+    shifts: tuple[float, ...]
+    only: tuple[int, ...] | None = None
+    rounds: int = 14
+    width: int = 0
+
+    def key(self, about: str) -> str:
+        """Hash of what is fitted and from where, with `about` for all else that it depends on."""
+        names = [(c.key, sorted(c.search.items())) for c in self.candidates]
+        told = repr((about, self.how, names, self.start, self.shifts, self.only, self.rounds, self.width))
+        return hashlib.sha256(told.encode()).hexdigest()
+
+    @property
+    def recordings(self) -> tuple[int, ...]:
+        """Places of the recordings."""
+        return tuple(range(len(self.shifts))) if self.only is None else self.only
+
+
+class Crew:
+    """Works off jobs: in this process, or in `workers` children where more than one is asked for.
+
+    `notebook` is a file that holds what is done, by key; `close` removes it.
+    """
+
+    def __init__(self, workers: int = 1, notebook: Path | None = None, about: str = "") -> None:
+        self.workers, self.notebook, self.about = workers, notebook, about
+        self._done: dict[str, dict[str, Any] | None] = {}
+        if notebook is not None and notebook.exists():
+            for line in notebook.read_text(encoding="utf-8").splitlines():
+                try:
+                    row = json.loads(line)
+                    self._done[row["key"]] = row["fit"]
+                except (ValueError, KeyError, TypeError):
+                    continue  # the line at which it was interrupted
+
+    def close(self) -> None:
+        """All is done: nothing needs to be taken up again."""
+        if self.notebook is not None:
+            self.notebook.unlink(missing_ok=True)
+
+    def fits(self, judge: Judge, jobs: Sequence[Job], say: Progress = lambda _: None) -> list[Fitted | None]:
+        """Fits in the order of the jobs; None where nothing could be simulated."""
+        about = f"{self.about} {judge.fingerprint()}"
+        found: list[Fitted | None] = [None] * len(jobs)
+        keys = [job.key(about) for job in jobs]
+        todo = [k for k, key in enumerate(keys) if key not in self._done]
+        for k, key in enumerate(keys):
+            if key in self._done:
+                found[k] = _rebuilt(judge, jobs[k], self._done[key])
+        if self.workers > 1 and len(todo) > 1:
+            bare = judge.bare()
+            outcomes = map_cases(_worked, [(bare, jobs[k]) for k in todo], workers=self.workers)
+            for count, outcome in enumerate(outcomes, start=1):
+                k = todo[outcome.index]
+                if outcome.failure is not None:
+                    raise RuntimeError(f"a fit of {jobs[k].candidates[-1].key}: {outcome.failure.sentence}")
+                found[k], made = outcome.value if outcome.value is not None else (None, 0)
+                judge.simulations += made
+                self._note(keys[k], found[k])
+                say(f"fitted {jobs[k].candidates[-1].key}, {count} of {len(todo)}")
+            return found
+        for count, k in enumerate(todo, start=1):
+            found[k] = work(judge, jobs[k])
+            self._note(keys[k], found[k])
+            say(f"fitted {jobs[k].candidates[-1].key}, {count} of {len(todo)}")
+        return found
+
+    def _note(self, key: str, fitted: Fitted | None) -> None:
+        row = None if fitted is None else {"x": list(fitted.x), "shifts": [b.shift for b in fitted.blocks]}
+        self._done[key] = row
+        if self.notebook is not None:
+            self.notebook.parent.mkdir(parents=True, exist_ok=True)
+            with self.notebook.open("a", encoding="utf-8") as file:
+                file.write(json.dumps({"key": key, "fit": row}) + "\n")
+
+
+def work(judge: Judge, job: Job) -> Fitted | None:
+    """Work off one job."""
+    if job.how == "fit":
+        return judge.fit(
+            job.candidates, job.start, rounds=job.rounds, only=job.only, shifts=job.shifts, width=job.width
+        )
+    begun = _at(judge, job.candidates, job)
+    if begun is None:
+        return None
+    return judge.polish(begun) if job.how == "polish" else judge.shaped(begun)
+
+
+def _worked(case: tuple[Judge, Job]) -> tuple[Fitted | None, int]:
+    judge, job = case
+    found = work(judge, job)
+    return found, judge.simulations
+
+
+def _at(judge: Judge, candidates: Sequence[Candidate], job: Job) -> Fitted | None:
+    return _linearised(judge, candidates, job.start, job.recordings, job.shifts)
+
+
+def _rebuilt(judge: Judge, job: Job, row: dict[str, Any] | None) -> Fitted | None:
+    if row is None:
+        return None
+    candidates = list(job.candidates)
+    if len(row["x"]) > len(job.start):
+        candidates[-1] = candidates[-1].whole()
+    return _linearised(judge, candidates, row["x"], job.recordings, row["shifts"])
+
+
+def _linearised(
+    judge: Judge,
+    candidates: Sequence[Candidate],
+    x: Sequence[float],
+    recordings: Sequence[int],
+    shifts: Sequence[float],
+) -> Fitted | None:
+    blocks: list[Block] = []
+    for r, shift in zip(recordings, shifts, strict=True):
+        block = judge.block(r, candidates, x, shift, NUDGES[1])
+        if block is None:
+            return None
+        blocks.append(block)
+    return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=tuple(blocks))
