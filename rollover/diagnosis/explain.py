@@ -166,6 +166,7 @@ def step(
         base, fits = judge.again(base), [judge.again(f) for f in fits]
     fits.sort(key=lambda f: held_out(f, groups).left.sum())
     phi = max(1.0, min(f.left for f in fits) / count)  # what even the best leaves is no chance of the noise's size
+    phi *= judge.per_error
     return Step(base=base, fitted=fits[0], p_value=looked.p_value(phi), rivals=tuple(fits), screened=tuple(screened))
 
 

@@ -117,6 +117,14 @@ class Judge:
         kept = [new if new is not None else old for new, old in zip(blocks, fitted.blocks, strict=True)]
         return Fitted(candidates=fitted.candidates, x=fitted.x, blocks=tuple(kept))
 
+    @property
+    def per_error(self) -> float:
+        """Samples that share one error: those of a signal where a scatter or a tolerance prevails, else 1."""
+        signals = [s for e in self.evidence for s in e.signals]
+        if not all(e.is_rough(s) for e in self.evidence for s in e.signals):
+            return 1.0
+        return sum(s.rows.size for s in signals) / len(signals)
+
     def residuals(self, fitted: Fitted) -> list[Array]:
         """Measured less predicted, stacked, SI, of each recording."""
         found = []

@@ -28,7 +28,7 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
     A = sum((b.normal()[0] for b in fitted.blocks), np.zeros((p, p))) + GENTLE * np.eye(p)
     inverse = np.linalg.inv(A)
     count = sum(b.residual.size for b in fitted.blocks)
-    phi = max(1.0, fitted.left / count)
+    phi = max(1.0, fitted.left / count) * judge.per_error
     sd = np.sqrt(np.maximum(phi * np.diag(inverse), 0.0))
     moved = np.zeros(p)
     channels = {s.channel for e in judge.evidence for s in e.signals}

@@ -175,6 +175,7 @@ def decided(judge: Judge, found: Explanation, groups: Groups) -> tuple[Explanati
         if end**2 - 1.0 < PARTLY * (start**2 - 1.0):
             return replace(found, parts=(one,), fitted=one.fitted), _kind(one.fitted.candidates[-1])
     significant = found.before.p_value < SURE and matters(judge, found.base, found.before)
+    significant = significant and not is_tolerated(judge, found.base)
     verdict: Verdict = "unexplained" if significant or found.parts else "no-mismatch"
     return replace(found, parts=(), fitted=found.base), verdict
 
@@ -197,9 +198,13 @@ def strongest(judge: Judge, base: Fitted, fitted: Fitted) -> Candidate:
 
 
 def is_tolerated(judge: Judge, fitted: Fitted) -> bool:
-    """Whether all that is left lies within a scatter between runs or a tolerance that was asked for."""
-    rough = all(e.is_rough(s) for e in judge.evidence for s in e.signals)
-    return rough and fitted.left < sum(b.residual.size for b in fitted.blocks)
+    """Whether what is left is no more than a scatter between runs, or a tolerance that was asked for, leaves by chance.
+
+    One error of unit size for each of k signals: a mean square of 1 with a standard deviation of sqrt(2/k).
+    """
+    rough = [e.is_rough(s) for e in judge.evidence for s in e.signals]
+    most = 1.0 + 2.0 * np.sqrt(2.0 / len(rough))
+    return all(rough) and bool(fitted.left < most * sum(b.residual.size for b in fitted.blocks))
 
 
 def matters(judge: Judge, base: Fitted, before: Mismatch) -> bool:
