@@ -14,6 +14,7 @@ from rollover import channels as table
 from rollover import document
 from rollover import scenario as scenarios
 from rollover.effects import effects as known_effects
+from rollover.faults import InputError
 from rollover.rops import Rops
 from rollover.vehicle import Vehicle, pitch_inertia
 
@@ -105,6 +106,7 @@ def paths(name: str) -> list[Row]:
 
 TABLES: dict[str, Callable[[], list[Row]]] = {
     "scenarios": lambda: files(""),
+    "studies": lambda: files("studies"),
     "vehicles": vehicles,
     "soils": lambda: files("soils"),
     "laws": laws,
@@ -115,8 +117,8 @@ TABLES: dict[str, Callable[[], list[Row]]] = {
 
 
 def check(name: str) -> str:
-    """Validate a scenario, vehicle, ROPS, soil or baseline file and say which of these it is. Raises `InputError`."""
-    path = document.find(name)
+    """Validate a scenario, study, vehicle, ROPS, soil or baseline file and say which it is. Raises `InputError`."""
+    path = _found(name)
     keys = document.headings(path)
     kind = keys["kind"].plain if "kind" in keys else None
     if str(keys["format"].plain if "format" in keys else "").startswith("rollover-baseline/"):
@@ -124,6 +126,12 @@ def check(name: str) -> str:
 
         baseline.read(path)
         return "baseline"
+    if str(keys["format"].plain if "format" in keys else "").startswith("rollover-study/") or "axes" in keys:
+        from rollover import study
+        from rollover.study.design import points
+
+        points(study.load(path))  # reads the plan's table as well
+        return "study"
     for what, annotation, meant in (
         ("soil", scenarios.AnyLaw, kind in known_laws()),
         ("vehicle", scenarios.AnyVehicle, kind in document.slot_of(scenarios.AnyVehicle).kinds),
@@ -134,6 +142,17 @@ def check(name: str) -> str:
             return what
     scenarios.load(path)
     return "scenario"
+
+
+def _found(name: str) -> Path:
+    """A file, or a shipped scenario or study of that name. Raises `InputError` that speaks of scenarios."""
+    try:
+        return document.find(name)
+    except InputError:
+        study = document.shipped_folder() / "studies" / f"{name}.yaml"
+        if study.is_file():
+            return study
+        raise
 
 
 def text(value: Any) -> str:

@@ -61,23 +61,24 @@ def progress(what: str, start: float, end: float) -> Iterator[Callable[[float, f
 
 
 @contextmanager
-def counting(what: str) -> Iterator[Callable[[int, int], None]]:
-    """Give a callback that shows how many of all are done: a bar on a terminal, otherwise a line now and then."""
+def counting(what: str) -> Iterator[Callable[..., None]]:
+    """Give a callback (done, of, note) that shows how many are done: a bar on a terminal, otherwise a line at times."""
     if sys.stderr.isatty():
-        from rich.progress import MofNCompleteColumn, Progress
+        from rich.progress import MofNCompleteColumn, Progress, TextColumn
 
-        with Progress(*Progress.get_default_columns()[:2], MofNCompleteColumn(), console=Console(stderr=True)) as bar:
-            task = bar.add_task(what, total=None)
-            yield lambda done, of: bar.update(task, completed=done, total=of)
+        columns = (*Progress.get_default_columns()[:2], MofNCompleteColumn(), TextColumn("{task.fields[note]}"))
+        with Progress(*columns, console=Console(stderr=True)) as bar:
+            task = bar.add_task(what, total=None, note="")
+            yield lambda done, of, note="": bar.update(task, completed=done, total=of, note=note)
         return
     began = last = clock.monotonic()
 
-    def line(done: int, of: int) -> None:
+    def line(done: int, of: int, note: str = "") -> None:
         nonlocal last
         now = clock.monotonic()
         if now - began > QUIET and now - last >= EVERY:
             last = now
-            say(f"{done} of {of} {what}")
+            say(f"{done} of {of} {what}{note and ', '}{note}")
 
     yield line
 

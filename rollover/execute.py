@@ -8,9 +8,15 @@ from __future__ import annotations
 import multiprocessing
 import os
 import pickle
+import sys
+import threading
+import time
 import traceback
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any, Generic, Literal, TypeVar
@@ -19,14 +25,19 @@ C = TypeVar("C")
 V = TypeVar("V")
 
 AHEAD = 2  # cases handed out per worker: none idles, and an interrupt has little to throw away
-TASKS = 256  # cases after which a worker is replaced, so that what a case leaks does not grow for ever
+TASKS = 1000  # cases after which a worker is replaced, so that what a case leaks does not grow for ever
+LOOK = 2.0  # s between two looks of a child for its parent
+BROKEN = 3  # pools in a row that may break before a case has gone through
+KILLED = -9  # exit code of a process that was ended from outside, as the operating system does when memory runs out
+# one thread for each child: cores are shared out among cases, and a sum does not depend on how many there are
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Failure:
-    """Why a case gave no value: an exception, the end of its process, or its time limit; `detail` for a log file."""
+    """Why a case gave no value: an exception, the end of its process, time or memory; `detail` for a log file."""
 
-    kind: Literal["error", "crash", "time-limit"]
+    kind: Literal["error", "crash", "time-limit", "memory-limit"]
     sentence: str
     detail: str = ""
 
@@ -55,57 +66,115 @@ def map_cases(
     *,
     workers: int | None = None,
     time_limit: float | None = None,
+    memory_limit: float | None = None,
+    warm_up: Callable[[], None] | None = None,
 ) -> Iterator[Outcome[C, V]]:
     """Outcome of ``function(case)`` for each case, as they become ready; `Outcome.index` restores the order.
 
     `function` is a top-level function, `case` and value can be pickled. `cases` is read as needed, so it may be
     long. `workers` is the number of child processes (default: `cores`), 0 works in this very process, where a crash
-    is a crash and no time limit holds. `time_limit` is in s of wall time for each case. Closing the iterator,
-    an interrupt too, ends the children.
+    is a crash and no limit holds. For each case, `time_limit` is in s of wall time, `memory_limit` in bytes that it may
+    take beyond what its process has (address space; not on Windows). A child calls `warm_up` once, outside all limits.
+    Closing the iterator, an interrupt too, ends the children.
     """
     workers = cores() if workers is None else workers
     if workers < 0 or (time_limit is not None and time_limit <= 0.0):
         raise ValueError(f"workers, time_limit: got {workers!r}, {time_limit!r}; at least 0, and more than 0 s")
+    if memory_limit is not None and memory_limit <= 0.0:
+        raise ValueError(f"memory_limit: got {memory_limit!r}; more than 0 bytes")
     if workers == 0:
         return (_done(i, case, _guarded(function, case)) for i, case in enumerate(cases))
-    return _in_children(function, cases, workers, time_limit)
+    return _in_children(function, cases, workers, time_limit, memory_limit, warm_up)
 
 
-def _in_children(
-    function: Callable[[C], V], cases: Iterable[C], workers: int, time_limit: float | None
-) -> Iterator[Outcome[C, V]]:
+def child_pool(workers: int, warm_up: Callable[[], None] | None = None) -> Any:
+    """A pool of child processes that takes tasks by ``schedule(packed, ...)``."""
     from pebble import ProcessPool
 
     # a fork would copy the locks of threads that it does not copy
-    pool = ProcessPool(max_workers=workers, max_tasks=TASKS, context=multiprocessing.get_context("spawn"))
-    todo, open_ = iter(enumerate(cases)), {}
-    try:
-        while True:
-            for index, case in todo:
-                open_[pool.schedule(_packed, args=(function, case), timeout=time_limit)] = (index, case)
-                if len(open_) >= AHEAD * workers:
-                    break
-            if not open_:
-                return
-            for future in wait(open_, return_when=FIRST_COMPLETED).done:
-                index, case = open_.pop(future)
-                yield _done(index, case, _answer(future, time_limit))
-    finally:
-        pool.stop()
-        pool.join()
+    context = multiprocessing.get_context("spawn")
+    return ProcessPool(
+        max_workers=workers, max_tasks=TASKS, context=context, initializer=_begin_child, initargs=(warm_up,)
+    )
+
+
+def _begin_child(warm_up: Callable[[], None] | None) -> None:
+    for name in THREADS:
+        os.environ.setdefault(name, "1")
+    threading.Thread(target=_leave_with, args=(os.getppid(),), daemon=True).start()
+    if warm_up is not None:
+        with suppress(Exception):  # the first case will say what is wrong
+            warm_up()
+
+
+def _leave_with(parent: int) -> None:
+    """End this process once its parent is gone: a case that hangs would go on for ever."""
+    while os.getppid() == parent:
+        time.sleep(LOOK)
+    os._exit(1)
+
+
+def _in_children(
+    function: Callable[[C], V],
+    cases: Iterable[C],
+    workers: int,
+    time_limit: float | None,
+    memory_limit: float | None,
+    warm_up: Callable[[], None] | None,
+) -> Iterator[Outcome[C, V]]:
+    todo, again = iter(enumerate(cases)), deque[tuple[int, C]]()
+    broken = 0
+    while True:
+        pool = child_pool(workers, warm_up)
+        open_: dict[Any, tuple[int, C]] = {}
+        try:
+            while True:
+                while len(open_) < AHEAD * workers:
+                    following = again.popleft() if again else next(todo, None)
+                    if following is None:
+                        break
+                    args = (function, following[1], memory_limit)
+                    try:
+                        task = pool.schedule(packed, args=args, timeout=time_limit)
+                    except RuntimeError as e:  # the pool has gone
+                        again.append(following)
+                        raise BrokenProcessPool(str(e)) from e
+                    open_[task] = following
+                if not open_:
+                    return
+                for future in wait(open_, return_when=FIRST_COMPLETED).done:
+                    answer = answer_of(future, time_limit)
+                    index, case = open_.pop(future)
+                    broken = 0
+                    yield _done(index, case, answer)
+        except BrokenProcessPool:
+            # a child that was ended between two cases breaks its whole pool: what was open is begun anew
+            broken += 1
+            if broken >= BROKEN:
+                raise
+            again.extend(open_.values())
+        finally:
+            pool.stop()
+            pool.join()
 
 
 def _guarded(function: Callable[[C], V], case: C) -> tuple[V | None, Failure | None, float]:
     began = perf_counter()
     try:
         return function(case), None, perf_counter() - began
+    except MemoryError:
+        sentence = "needed more memory than it may have"
+        failure = Failure(kind="memory-limit", sentence=sentence, detail=traceback.format_exc())
     except Exception as e:
         sentence = f"{type(e).__name__}: {e}" if str(e) else type(e).__name__
-        return None, Failure(kind="error", sentence=sentence, detail=traceback.format_exc()), perf_counter() - began
+        failure = Failure(kind="error", sentence=sentence, detail=traceback.format_exc())
+    return None, failure, perf_counter() - began
 
 
-def _packed(function: Callable[[C], V], case: C) -> bytes:
-    answer = _guarded(function, case)
+def packed(function: Callable[[C], V], case: C, memory_limit: float | None = None) -> bytes:
+    """What a child sends back of one case, as bytes for `answer_of`; never raises."""
+    with _limited(memory_limit):
+        answer = _guarded(function, case)
     try:
         return pickle.dumps(answer)
     except Exception as e:  # which exception a value raises that cannot be pickled is its own affair
@@ -113,7 +182,36 @@ def _packed(function: Callable[[C], V], case: C) -> bytes:
         return pickle.dumps((None, failure, answer[2]))
 
 
-def _answer(future: Any, time_limit: float | None) -> tuple[Any, Failure | None, float]:
+@contextmanager
+def _limited(memory_limit: float | None) -> Iterator[None]:
+    """Bound the address space of this process while a case is worked off; what cannot be had is a `MemoryError`."""
+    if memory_limit is None or sys.platform == "win32":
+        yield
+        return
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    most = _address_space() + int(memory_limit)
+    if hard != resource.RLIM_INFINITY:
+        most = min(most, hard)
+    resource.setrlimit(resource.RLIMIT_AS, (most, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+
+def _address_space() -> int:
+    """Bytes of address space that this process has; where that is not told, what such a process usually has."""
+    try:
+        with open("/proc/self/statm", encoding="ascii") as file:
+            return int(file.read().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+    except OSError:
+        return 1 << 30
+
+
+def answer_of(future: Any, time_limit: float | None) -> tuple[Any, Failure | None, float]:
+    """Value, failure and wall time (s) of a task that is over. Raises ``BrokenProcessPool`` where its pool is gone."""
     from pebble import ProcessExpired
 
     try:
@@ -122,7 +220,10 @@ def _answer(future: Any, time_limit: float | None) -> tuple[Any, Failure | None,
     except TimeoutError:
         return None, Failure(kind="time-limit", sentence=f"took longer than {time_limit:g} s"), float(time_limit or 0.0)
     except ProcessExpired as e:
-        return None, Failure(kind="crash", sentence=f"its process ended with exit code {e.exitcode}"), 0.0
+        hint = ", as when the machine runs out of memory" if e.exitcode == KILLED else ""
+        return None, Failure(kind="crash", sentence=f"its process ended with exit code {e.exitcode}{hint}"), 0.0
+    except BrokenProcessPool:
+        raise
     except Exception as e:  # a case that cannot be pickled, a module that the child cannot import
         return None, Failure(kind="error", sentence=f"{type(e).__name__}: {e}"), 0.0
 

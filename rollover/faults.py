@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +37,27 @@ def nearest(word: str, known: Iterable[str], most: int = 1) -> list[str]:
     """Which of the `known` words may have been meant, the likeliest first."""
     by_lower = {k.lower(): k for k in known}
     return [by_lower[m] for m in difflib.get_close_matches(word.lower(), by_lower, n=most, cutoff=0.6)]
+
+
+def absent(path: str | Path) -> str:
+    """That a path leads nowhere, and where it may have been meant to: the first part that is not there, put right."""
+    path = Path(path)
+    message = "no such file"
+    for depth, part in enumerate(path.parts):
+        folder = Path(*path.parts[:depth]) if depth else Path()
+        if (folder / part).exists():
+            continue
+        try:
+            beside = sorted(p.name for p in folder.iterdir())
+        except OSError:  # not a folder, or not for us
+            return message
+        rest = path.parts[depth + 1 :]
+        there = [Path(folder, name, *rest) for name in nearest(part, beside, most=3)]
+        meant = next((str(p) for p in there if p.exists()), None)
+        if meant is not None:
+            return f"{message}; did you mean {meant!r}?"
+        return f"{message}; the folder {str(folder)!r} is there, {part!r} in it is not" if rest else message
+    return message
 
 
 def hint(word: str, known: Iterable[str], most_listed: int = 16) -> str:

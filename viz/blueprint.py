@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from typing import Literal
 
 import numpy as np
 import rerun.blueprint as rrb
@@ -20,6 +21,7 @@ from viz.scene import extent, path_of_centre
 BACKGROUND = 0x2B313CFF
 _FIELD_OF_VIEW = math.radians(55.0)  # the viewer's own, vertical
 
+_STILL, _UPRIGHT = math.radians(2.0), math.radians(75.0)  # of roll and pitch
 _FAR = 2.6  # times the vehicle's own size: a run that covers more shows the vehicle too small
 
 # title, patterns of channels; a plot of which no channel was recorded is left out
@@ -72,8 +74,8 @@ def blueprint(run: Run, scales: str, beside: Beside | None = None) -> rrb.Bluepr
     found = run.recording.channels
     asked = "" if run.tests else "rops/force"
     channels = [c for c, v in found.items() if c == asked or np.any(np.nan_to_num(v))]
-    top = _views(channels, TOP)
-    loads = _views(channels, LOADS)
+    top = _views(run, channels, TOP)
+    loads = _views(run, channels, LOADS)
     if not top:  # on a tilt table the wheels tell
         top, loads = loads[:1], loads[1:]
     phases = [_phase("phase", "Phase")]
@@ -84,8 +86,12 @@ def blueprint(run: Run, scales: str, beside: Beside | None = None) -> rrb.Bluepr
     left = rrb.Vertical(_scenes(run, scales), *phases, row_shares=[7, *[1] * len(phases)])
     rows = [
         top[:1],
-        _mounts(channels) + top[1:] + loads + _moments(channels),
-        [*(beside.views if beside else ()), *_views(channels, MOTION), *_others(channels)],
+        _mounts(run, channels) + top[1:] + loads + _moments(run, channels),
+        [
+            *(beside.views if beside else ()),
+            *_views(run, channels, lively(run, channels, MOTION)),
+            *_others(run, channels),
+        ],
         [
             *words,
             rrb.TextLogView(
@@ -181,11 +187,27 @@ def matching(channels: Sequence[str], plots: _Plots) -> list[tuple[str, list[str
     return [(title, fitting) for title, fitting in found if fitting]
 
 
-def _views(channels: Sequence[str], plots: _Plots) -> list[rrb.TimeSeriesView]:
-    return [plot(title, fitting) for title, fitting in matching(channels, plots)]
+def lively(run: Run, channels: Sequence[str], plots: _Plots) -> _Plots:
+    """The same plots, those in front first that show something."""
+    dull = {title for title, fitting in matching(channels, plots) if all(_dull(run, c) for c in fitting)}
+    return tuple(sorted(plots, key=lambda p: p[0] in dull))
 
 
-def plot(title: str, channels: Iterable[str]) -> rrb.TimeSeriesView:
+def _dull(run: Run, channel: str) -> bool:
+    """Whether a curve says nothing: it stands still, or it is a roll that jumps where the vehicle stands upright."""
+    values = run.recording[channel][1:]
+    spread = float(np.ptp(values[np.isfinite(values)])) if np.isfinite(values).any() else 0.0
+    if channel == "chassis/roll":
+        pitch = run.recording.channels.get("chassis/pitch", np.zeros(1))
+        return spread < _STILL or float(np.nanmax(np.abs(pitch))) > _UPRIGHT
+    return spread <= 1e-3 * float(np.nanmax(np.abs(values), initial=0.0))
+
+
+def _views(run: Run, channels: Sequence[str], plots: _Plots) -> list[rrb.TimeSeriesView]:
+    return [plot(run, title, fitting) for title, fitting in matching(channels, plots)]
+
+
+def plot(run: Run, title: str, channels: Sequence[str]) -> rrb.TimeSeriesView:
     """Plot of some channels, with whatever is recorded beside the simulated values: measured, limit, peak."""
     paths = [series(c).path for c in channels]
     return rrb.TimeSeriesView(
@@ -193,32 +215,40 @@ def plot(title: str, channels: Iterable[str]) -> rrb.TimeSeriesView:
         contents=[f"+ /{path}/**" for path in paths],
         name=title,
         axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
-        plot_legend=rrb.PlotLegend("RightTop"),
+        plot_legend=rrb.PlotLegend(free_corner(run, channels)),
     )
 
 
-def _mounts(channels: Sequence[str]) -> list[rrb.Container]:
+def free_corner(run: Run, channels: Sequence[str]) -> Literal["LeftTop", "RightTop"]:
+    """The upper corner in which the curves leave more room for a legend."""
+    third = max(1, run.recording.time.size // 3)
+    values = np.nan_to_num(np.array([run.recording[c] * series(c).factor for c in channels]))
+    left, right = values[:, :third].max(), values[:, -third:].max()
+    return "LeftTop" if left < right else "RightTop"
+
+
+def _mounts(run: Run, channels: Sequence[str]) -> list[rrb.Container]:
     """One tab with a plot for each mount and hinge; the axes have the same colours in each."""
-    return _joints(channels, _MOUNTS, "Mounts, kN")
+    return _joints(run, channels, _MOUNTS, "Mounts, kN")
 
 
-def _moments(channels: Sequence[str]) -> list[rrb.Container]:
+def _moments(run: Run, channels: Sequence[str]) -> list[rrb.Container]:
     """One tab with the moments through mounts and hinges, and how far these turn."""
-    return _joints(channels, _MOMENTS, "Moments, kN m")
+    return _joints(run, channels, _MOMENTS, "Moments, kN m")
 
 
-def _joints(channels: Sequence[str], patterns: tuple[str, ...], title: str) -> list[rrb.Container]:
+def _joints(run: Run, channels: Sequence[str], patterns: tuple[str, ...], title: str) -> list[rrb.Container]:
     found: dict[str, list[str]] = {}
     for channel in channels:
         if any(fnmatchcase(channel, pattern) for pattern in patterns):
             _, what, name, part = channel.split("/")
             load = "" if part.startswith("force") else f" {part[:-2]}"
             found.setdefault(f"{what.capitalize()} {name}{load}, {series(channel).unit}", []).append(channel)
-    plots = [plot(name, of_joint) for name, of_joint in found.items()]
+    plots = [plot(run, name, of_joint) for name, of_joint in found.items()]
     return [rrb.Grid(*plots, grid_columns=min(2, len(plots)), name=title)] if plots else []
 
 
-def _others(channels: Sequence[str]) -> list[rrb.TimeSeriesView]:
+def _others(run: Run, channels: Sequence[str]) -> list[rrb.TimeSeriesView]:
     """What no plot above shows; nothing recorded is out of reach."""
     patterns = [p for plots in (TOP, LOADS, MOTION) for _, found in plots for p in found]
     patterns += [*_MOUNTS, *_MOMENTS]
@@ -226,4 +256,4 @@ def _others(channels: Sequence[str]) -> list[rrb.TimeSeriesView]:
     for channel in channels:
         if not any(fnmatchcase(channel, p) for p in patterns):
             rest.setdefault(series(channel).unit, []).append(channel)
-    return [plot(f"Other, {unit}" if unit else "Other, SI", found) for unit, found in rest.items()]
+    return [plot(run, f"Other, {unit}" if unit else "Other, SI", found) for unit, found in rest.items()]

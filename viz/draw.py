@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from rollover.run import Event, Run
 from rollover.vehicle import Striker
+from viz.edges import EDGE, edges
 from viz.entities import BODY, FILTERED, FOLLOWED, LIMIT, SIMULATED, force_path
-from viz.scene import Balls, Block, Hull, Part, Rod, Wire, body_path, extent, parts, path_of_centre
+from viz.scene import extent, parts, path_of_centre
+from viz.solids import Balls, Block, Hull, Part, Rod, Wire, body_path
 from viz.stream import Stream, colour, stamps
 from viz.terrain import GRID, Terrain, corner, cut_open, frames, nice, terrain, thinned
 from viz.verdict import Peak, newtons, raw
@@ -29,14 +31,15 @@ _LABEL_TIME, _LABEL_SHARE = 0.3, 0.1  # s that an event's label stands, and the 
 class Picture:
     """What a run's scene is drawn with.
 
-    Mesh of the ground, m of sinkage from which the soil is brightest, N for 1 m of arrow, and a length by which
-    arrows and marks are sized, m.
+    Mesh of the ground, m of sinkage from which the soil is brightest, N for 1 m of arrow, a length by which arrows
+    and marks are sized, m, and lines where the ground breaks, (k, 3) each.
     """
 
     ground: Terrain
     soil: float
     force: float
     size: float
+    edges: Sequence[NDArray[np.float64]] = ()
 
     @property
     def scales(self) -> tuple[str, ...]:
@@ -82,6 +85,7 @@ def picture(run: Run) -> Picture:
         soil=soil,
         force=nice(per_metre) if per_metre > 0.0 else 1e3,
         size=float(np.clip(radius, 0.3, 3.0)),
+        edges=edges(run.scenario.ground.surface, outer),
     )
 
 
@@ -99,6 +103,9 @@ def standing(out: Stream, run: Run, with_: Picture) -> None:
     if len(ground.grid):
         lines = rr.LineStrips3D(ground.grid, colors=colour(GRID), radii=[rr.Radius.ui_points(0.8)])
         out.static("world/ground/grid", lines)
+    if with_.edges:
+        lines = rr.LineStrips3D(with_.edges, colors=colour(EDGE), radii=[rr.Radius.ui_points(1.5)])
+        out.static("world/ground/edges", lines)
     for patch in ground.patches:
         out.static(f"{_TOUCHED}/{patch.name}", rr.Mesh3D.from_fields(triangle_indices=patch.triangles))
     for part in parts(run):
@@ -202,14 +209,22 @@ def peak_place(out: Stream, run: Run, peak: Peak, size: float) -> None:
         return
     nearest = loaded[int(np.argmin(np.abs(run.frame_time[loaded] - peak.raw_time)))]
     contact = run.contact[max(sizes, key=lambda name: float(sizes[name][nearest]))]
+    # the mark stays; its label would stand in the way of those of the forces that act there later
+    time = np.array([peak.raw_time, peak.raw_time + _stands(run)])
+    time = time[: 2 if time[1] < run.stop_time else 1]
     point = rr.Points3D.columns(
-        positions=contact.point[[nearest]],
-        radii=[0.025 * size],
-        colors=colour(LIMIT),
-        labels=[f"peak {raw(peak)}"],
-        show_labels=[True],
+        positions=contact.point[[nearest] * len(time)],
+        radii=np.full(len(time), 0.025 * size),
+        colors=colour(*[LIMIT] * len(time)),
+        labels=[f"peak {raw(peak)}"] * len(time),
+        show_labels=[True, False][: len(time)],
     )
-    out.columns("world/peak", np.array([peak.raw_time]), point)
+    out.columns("world/peak", time, point)
+
+
+def _stands(run: Run) -> float:
+    """How long a label stands, s."""
+    return min(_LABEL_TIME, _LABEL_SHARE * float(np.ptp(run.recording.time)))
 
 
 def sentence(event: Event) -> str:
@@ -236,7 +251,7 @@ def _marks(out: Stream, run: Run, size: float) -> None:
         radii=np.full(int(counts.sum()), radius),
     )
     out.columns("world/events/marks", time, marks.partition(counts))
-    stands = min(_LABEL_TIME, _LABEL_SHARE * float(np.ptp(run.recording.time)))
+    stands = _stands(run)
     rows: list[tuple[float, Sequence[Event]]] = [(g[0].time, g) for g in groups]
     # an empty row when a label's time is over; not after the end, which would make the time line longer than the run
     ends = zip(time.tolist(), [*time[1:].tolist(), run.stop_time], strict=True)

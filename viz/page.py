@@ -1,5 +1,7 @@
 """Report pages: one look for all of them, one file each, readable without a network, without JavaScript and on paper.
 
+Only a table of many cases brings a script, inside the page; without it the first rows are there all the same.
+
 A page is a headline, blocks and a footer; a block is one of the dataclasses here. Text is escaped, figures are the
 ``<svg>`` of `viz.plots`. The same content gives the same bytes.
 """
@@ -7,6 +9,7 @@ A page is a headline, blocks and a footer; a block is one of the dataclasses her
 from __future__ import annotations
 
 import functools
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -100,14 +103,64 @@ class Details:
 
 @dataclass(frozen=True, kw_only=True)
 class Footer:
-    """What the page rests on and how to get it again."""
+    """What the page rests on and how to get it again; `hash_of` says what the hash is one of."""
 
     command: str
     scenario_hash: str = ""
+    hash_of: str = "Scenario"
     versions: Mapping[str, str] | None = None
 
 
-Block = Pairs | Table | Figure | Note | Section | Details
+@dataclass(frozen=True, kw_only=True)
+class Cases:
+    """A table of many rows, a screenful at a time, that the reader sorts and filters; `columns` are of one length.
+
+    A column is its heading and its values, numbers (None: nothing there) or words.
+    """
+
+    kind: ClassVar[str] = "cases"
+    columns: Sequence[tuple[str, Sequence[Any]]]
+    caption: str = ""
+    shown: int = 50
+
+    def __post_init__(self) -> None:
+        if len({len(values) for _, values in self.columns}) != 1:
+            raise ValueError("columns: of different lengths; all of one")
+
+    @property
+    def count(self) -> int:
+        """Number of rows."""
+        return len(self.columns[0][1])
+
+    @property
+    def names(self) -> list[tuple[str, bool]]:
+        """Headings, and whether numbers stand below."""
+        return [(name, not any(isinstance(v, str) for v in values)) for name, values in self.columns]
+
+    @property
+    def first(self) -> list[list[str]]:
+        """Text of the rows that are there without a script."""
+        return [[_cell(values[k]) for _, values in self.columns] for k in range(min(self.shown, self.count))]
+
+    @property
+    def data(self) -> str:
+        """All values as JSON that can stand inside a script element; numbers with six digits."""
+        columns = [[_short(v) for v in values] for _, values in self.columns]
+        return json.dumps(columns, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+
+
+def _cell(value: Any) -> str:
+    return "" if value is None else value if isinstance(value, str) else f"{value:.6g}"
+
+
+def _short(value: Any) -> Any:
+    if value is None or isinstance(value, (str, int)):
+        return value
+    short = float(f"{value:.6g}")
+    return int(short) if short.is_integer() and abs(short) < 1e15 else short
+
+
+Block = Pairs | Table | Figure | Note | Section | Details | Cases
 
 
 def render(

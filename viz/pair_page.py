@@ -25,7 +25,7 @@ def page(found: Pair, *, command: str, versions: Mapping[str, str]) -> str:
         subtitle="Two runs: baseline and candidate",
         headline=Headline(sentence=answer(found), detail=detail(found), state=_state(found)),
         blocks=blocks,
-        footer=Footer(command=command, scenario_hash=_hashes(found), versions=versions),
+        footer=Footer(command=command, scenario_hash=_hashes(found), hash_of="Scenarios", versions=versions),
     )
 
 

@@ -12,8 +12,8 @@ from viz.report import number, series_unit
 COLUMNS = ("load", "filter", "unit", "was", "is", "change", "allowed", "at, s", "was at, s", "")
 
 
-def page(answers: Sequence[Answer], *, command: str) -> str:
-    """HTML of the full account."""
+def page(answers: Sequence[Answer], *, command: str, scenario_hash: str = "") -> str:
+    """HTML of the full account; `scenario_hash` is one over all scenarios that were asked for."""
     bad = [a for a in answers if not a.ok]
     updated = [a for a in answers if a.verdict == "updated"]
     if bad:
@@ -52,7 +52,7 @@ def page(answers: Sequence[Answer], *, command: str) -> str:
     ]
     if every:
         blocks.append(Section(title="Every load", blocks=every))
-    footer = Footer(command=command, versions=versions())
+    footer = Footer(command=command, scenario_hash=scenario_hash, hash_of="Scenarios", versions=versions())
     return render(title="Peak loads against their baselines", headline=head, blocks=blocks, footer=footer)
 
 

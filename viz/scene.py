@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections import Counter
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,85 +20,23 @@ from rollover.shapes import Box, Disc, Point, Points, Shape, Tube, axes_along
 from rollover.stand import PendulumBlow, StaticTest
 from rollover.vehicle import RigidBody, Striker, Vehicle, Wheel, laden
 from viz.entities import escaped
+from viz.rig import rig
+from viz.solids import AROUND, DARK_STEEL, FRAME, STEEL, Balls, Block, Hull, Part, Rod, Wire, body_path
 
 PAINT = (0x4C8C46FF, 0x417C3DFF, 0x569A4EFF, 0x386E36FF)  # the chassis, part by part
-FRAME, UPPER = 0xF2C81EFF, 0xF29A2EFF
+UPPER = 0xF29A2EFF
 LOAD = 0x3F6FB5FF  # what is attached
-STEEL, DARK_STEEL = 0x8E98A3FF, 0x5C6670FF
 TREAD, LUG, SIDE_WALL = 0x2B2E33FF, 0x3B3F46FF, 0x34383EFF
 RIM, RIM_MARK = 0xD8D8D0FF, 0x6F7378FF
 ZONE = 0x5FD3F5FF
-STEEL_DENSITY = 7850.0  # kg/m3, for the size of a block of which only the mass is known
-_AROUND = 48  # facets of a tyre
 _MEMBER = 0.04  # m from the loaded point, on a member's axis, to the beam's front
-
-
-@dataclass(frozen=True, kw_only=True)
-class Block:
-    """A solid cuboid along the axes of its entity."""
-
-    path: str
-    centre: Point
-    size: Point
-    colour: int
-    see_through: bool = False
-
-
-@dataclass(frozen=True, kw_only=True)
-class Rod:
-    """A solid round bar with flat ends at `start` and `end`."""
-
-    path: str
-    start: Point
-    end: Point
-    radius: float
-    colour: int
-
-
-@dataclass(frozen=True, kw_only=True)
-class Balls:
-    """Solid balls."""
-
-    path: str
-    centres: NDArray[np.float64]
-    radii: NDArray[np.float64]
-    colour: int
-
-
-@dataclass(frozen=True, kw_only=True)
-class Hull:
-    """A mesh: vertices (n, 3) with normals (n, 3) and colours (n,), triangles (m, 3)."""
-
-    path: str
-    vertices: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    colours: NDArray[np.uint32]
-    triangles: NDArray[np.int64]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Wire:
-    """Lines, each (k, 3)."""
-
-    path: str
-    strips: tuple[NDArray[np.float64], ...]
-    colour: int
-    radius: float
-
-
-Part = Block | Rod | Balls | Hull | Wire
-
-
-def body_path(body: str) -> str:
-    """Entity of a body: carries its pose, its parts are children."""
-    return f"world/{escaped(body)}"
 
 
 def parts(run: Run) -> tuple[Part, ...]:
     """Everything that is drawn besides ground, forces and events."""
     vehicle = run.scenario.vehicle
     if isinstance(vehicle, Striker):
-        return _rig(run, vehicle)
+        return rig(run, vehicle)
     return _vehicle(vehicle) + _stand(run)
 
 
@@ -282,16 +219,16 @@ def _tyre(centre: NDArray[np.float64], radius: float, half: float, rim: float, p
     section += [(-y, r) for y, r in reversed(section)]
     paint = [(RIM, RIM), (RIM, RIM), (SIDE_WALL, SIDE_WALL), (LUG, TREAD)]
     paint += [(LUG, TREAD), *reversed(paint)]
-    angle = 2.0 * math.pi * np.arange(_AROUND + 1) / _AROUND
+    angle = 2.0 * math.pi * np.arange(AROUND + 1) / AROUND
     vertices, normals, colours = [], [], []
     for (y0, r0), (y1, r1), shades in zip(section[:-1], section[1:], paint, strict=True):
         along = np.array([y1 - y0, r1 - r0])
         ny, nr = np.array([-along[1], along[0]]) / np.linalg.norm(along)
-        for k in range(_AROUND):
+        for k in range(AROUND):
             even, odd = shades
             shade = even if k % 2 == 0 else odd
             if r0 == 0.0 or r1 == 0.0:
-                shade = RIM_MARK if k // (_AROUND // 8) % 2 else RIM
+                shade = RIM_MARK if k // (AROUND // 8) % 2 else RIM
             for r, y, a in ((r0, y0, angle[k]), (r1, y1, angle[k]), (r1, y1, angle[k + 1]), (r0, y0, angle[k + 1])):
                 vertices.append((r * math.cos(a), y, r * math.sin(a)))
                 normals.append((nr * math.cos(a), ny, nr * math.sin(a)))
@@ -303,64 +240,6 @@ def _tyre(centre: NDArray[np.float64], radius: float, half: float, rim: float, p
         normals=np.array(normals),
         colours=np.array(colours, dtype=np.uint32),
         triangles=(first + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3),
-    )
-
-
-def _rig(run: Run, striker: Striker) -> tuple[Part, ...]:
-    """The striker and its guide; the striker's origin lies in the middle of its face.
-
-    Above the face a nose long enough to be seen from the deepest rut, above it a steel cube with the mass, beside
-    it two upright bars from the ground to above the cube's highest place, and a crossbar.
-    """
-    a, b = striker.face_length, striker.face_width
-    side = (striker.mass / STEEL_DENSITY) ** (1.0 / 3.0)
-    path = body_path("striker")
-    origin = run.motion["striker"].origin if "striker" in run.motion else np.zeros((0, 3))
-    x, y, _ = origin[0] if len(origin) else np.zeros(3)
-    highest, lowest = float(origin[:, 2].max(initial=0.0)), float(origin[:, 2].min(initial=0.0))
-    nose = 0.8 * side - lowest
-    top = highest + nose + 1.15 * side
-    apart = 0.5 * side + 0.025
-
-    def bar(name: str, start: Point, end: Point) -> Rod:
-        return Rod(path=f"world/guide/{name}", start=start, end=end, radius=0.01, colour=DARK_STEEL)
-
-    point: Part = Block(
-        # the ground's force acts inside its outline
-        path=f"{path}/nose",
-        centre=(0.0, 0.0, 0.5 * nose),
-        size=(a, b, nose),
-        colour=STEEL,
-        see_through=True,
-    )
-    shaft: tuple[Part, ...] = ()
-    if striker.nose == "cone":
-        point = _cone(striker.nose_radius, striker.nose_height, f"{path}/nose")
-        start, end = (0.0, 0.0, striker.nose_height), (0.0, 0.0, nose)
-        shaft = (Rod(path=f"{path}/shaft", start=start, end=end, radius=striker.nose_radius, colour=STEEL),)
-    return (
-        point,
-        *shaft,
-        Block(path=f"{path}/mass", centre=(0.0, 0.0, nose + 0.5 * side), size=(side, side, side), colour=FRAME),
-        bar("front", (x + apart, y, 0.0), (x + apart, y, top)),
-        bar("rear", (x - apart, y, 0.0), (x - apart, y, top)),
-        bar("cross", (x + apart, y, top), (x - apart, y, top)),
-    )
-
-
-def _cone(radius: float, height: float, path: str) -> Hull:
-    """A cone that stands on its tip at the origin."""
-    angle = 2.0 * math.pi * np.arange(_AROUND + 1) / _AROUND
-    rim = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(angle.size, height)], axis=1)
-    outward = np.stack([height * np.cos(angle), height * np.sin(angle), np.full(angle.size, -radius)], axis=1)
-    outward /= math.hypot(radius, height)
-    vertices = np.stack([np.zeros_like(rim[1:]), rim[1:], rim[:-1]], axis=1).reshape(-1, 3)
-    return Hull(
-        path=path,
-        vertices=vertices,
-        normals=np.repeat(outward[1:], 3, axis=0),
-        colours=np.full(len(vertices), STEEL, dtype=np.uint32),
-        triangles=np.arange(len(vertices)).reshape(-1, 3),
     )
 
 
@@ -391,8 +270,13 @@ def extent(run: Run, *, at: int | None = None) -> tuple[NDArray[np.float64], flo
 
 
 def path_of_centre(run: Run) -> NDArray[np.float64]:
-    """Where the vehicle's centre of mass was at the frame times, as if it were rigid, (n, 3); world, m."""
+    """Where the vehicle's centre of mass was at the frame times, as if it were rigid, (n, 3); world, m.
+
+    That of a striker's face if it is let go high up; of one in a guide nothing, for it stays in the picture.
+    """
     vehicle = run.scenario.vehicle
+    if isinstance(vehicle, Striker) and run.scenario.initiation.kind == "release" and "striker" in run.motion:
+        return run.motion["striker"].origin
     if isinstance(vehicle, Striker) or "chassis" not in run.motion:
         return np.zeros((0, 3))
     motion, centre = run.motion["chassis"], np.array(laden(vehicle).centre_of_mass)

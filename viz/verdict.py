@@ -76,6 +76,7 @@ class RawPeak:
     half_step_change: float | None = None
 
 
+SMALL = 100.0  # N, below which a force is told in N and not in kN
 _ALSO = ("rops/deflection", "ground/sinkage")
 
 
@@ -124,12 +125,13 @@ def amount(value: float, unit: str, factor: float = 1.0) -> str:
     """A number for people, three figures and the unit: ``amount(63210.0, "kN", 1e-3) == "63.2 kN"``."""
     number = value * factor
     digits = max(0, 2 - math.floor(math.log10(abs(number)))) if number and math.isfinite(number) else 0
-    return f"{number:.{min(digits, 3)}f} {unit}".rstrip()
+    text = f"{number:.{min(digits, 3)}f}" if digits < 5 else f"{number:.2g}"
+    return f"{text} {unit}".rstrip()
 
 
 def newtons(value: float) -> str:
-    """A force, from N."""
-    return amount(value, *shown("N"))
+    """A force, from N; a small one in N."""
+    return amount(value, "N") if abs(value) < SMALL else amount(value, *shown("N"))
 
 
 def joules(value: float) -> str:
@@ -140,6 +142,8 @@ def joules(value: float) -> str:
 def high(peak: Peak, value: float) -> str:
     """A value of a load in the unit in which its channel is plotted."""
     s = series(peak.channel)
+    if s.unit == "kN":
+        return newtons(value)
     return amount(value, s.unit, s.factor) if s.unit else amount(value, *shown(peak.unit))
 
 
@@ -195,10 +199,13 @@ def _headline(run: Run, found: Sequence[Peak]) -> list[str]:
     if stand is not None and isinstance(run.scenario.initiation, TiltTable):
         return [*lines, f"# {stand.sentence}", ""]  # what turns there is the weight: no load answers the question
     lines += [f"# {title_of(first)}: {raw(first)}", ""]
+    if not first.raw and "striker/position_z" in run.recording.channels:  # it never landed: how far it fell answers
+        z, v = run.recording["striker/position_z"], run.recording["striker/velocity_z"]
+        lines += [f"It fell from {z[0]:.4g} m to {z[-1]:.4g} m and ends at {v[-1]:.4g} m/s.", ""]
     if stand is not None:
         lines += [f"{stand.sentence}.", ""]
     worth = []
-    if known(first.filtered):
+    if filtered(first):
         worth.append(f"CFC {first.cfc}: **{filtered(first)}**")
     count = len({*run.domain_flags, *(flag for p in found for flag in p.domain_flags)})
     if count:

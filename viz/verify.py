@@ -84,7 +84,7 @@ def check_rrd(path: Path) -> list[str]:
     except Exception as e:
         # the reader raises whatever its decoder does; the sentence is what matters here
         return [f"{path.name}: cannot be read as a whole recording: {e}"]
-    return [*_layout(path, _entities(chunks)), *_times(chunks), *_aggregation(chunks)]
+    return [*_layout(path, _entities(chunks)), *_times(chunks), *_aggregation(chunks), *_overridden(path)]
 
 
 def _layout(path: Path, entities: dict[str, set[str]]) -> Iterator[str]:
@@ -117,3 +117,14 @@ def _aggregation(chunks: list[tuple[str, Any, Any]]) -> Iterator[str]:
     for entity, components in _entities(chunks).items():
         if "Scalars:scalars" in components and "SeriesPoints:markers" not in components and entity not in safe:
             yield f"{entity}: drawn without MinMax, a short peak would be drawn lower than it was"
+
+
+def _overridden(path: Path) -> Iterator[str]:
+    """A view of the layout may say how it draws a series, whatever the series itself says."""
+    component, most = "SeriesLines:aggregation_policy", [rr.components.AggregationPolicy.MinMax.value]
+    reader = RrdReader(path)
+    for store in reader.blueprints():
+        for chunk in reader.stream(store=store).to_chunks():
+            batch = chunk.to_record_batch()
+            if component in batch.schema.names and any(v != most for v in batch[component].to_pylist() if v):
+                yield f"{path.name}: the layout draws {chunk.entity_path} without MinMax"

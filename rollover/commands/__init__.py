@@ -18,6 +18,7 @@ from rollover.commands import synthesize
 from rollover.commands import diagnose
 from rollover.commands import prove
 from rollover.commands import stability
+from rollover.commands import study
 
 __all__ = [
     "calibrate",
@@ -33,6 +34,7 @@ __all__ = [
     "run",
     "schema",
     "stability",
+    "study",
     "synthesize",
     "view",
 ]

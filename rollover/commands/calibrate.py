@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rollover.commands.door import AsJson, Force, Setting, answering, app, settings
+from rollover.commands.door import BROKE, AsJson, Force, Setting, answering, app, manual, settings
 from rollover.faults import Fault, InputError
 
 if TYPE_CHECKING:
@@ -20,7 +20,13 @@ FORMAT = "rollover-calibrate/1"
 JSON, OVERRIDE, SCENARIO, PAGE = "calibrate.json", "override.yaml", "scenario-calibrated.yaml", "report.html"
 
 
-@app.command()
+@app.command(
+    epilog=manual(
+        "calibrate drop_test rec/d2.csv rec/d3.csv --fit vehicle.mass --fit ground.law.stiffness_scale=0.3:3",
+        writes="calibrate.json, override.yaml, scenario-calibrated.yaml (it runs), report.html.",
+        status=BROKE,
+    )
+)
 @answering
 def calibrate(
     scenario: Annotated[str, typer.Argument(help="A scenario file, or the name of a shipped one.")],
@@ -39,7 +45,7 @@ def calibrate(
     starts: Annotated[int, typer.Option(help="Random starts that are looked at.", min=0)] = 8,
     seed: Annotated[int, typer.Option(help="Of the random starts.")] = 0,
     profile: Annotated[Path | None, typer.Option(help="What the columns of a foreign file are.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Results folder  [default: out/calibrate/NAME]")] = None,
+    out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/calibrate/NAME")] = None,
     workers: Annotated[int, typer.Option(help="Starts followed at once; 0 for this process.", min=0)] = 0,
     force: Force = False,
     as_json: AsJson = False,

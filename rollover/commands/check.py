@@ -8,11 +8,13 @@ from typing import Annotated, Any
 
 import typer
 
-from rollover.commands.door import AsJson, answering, app
+from rollover.commands.door import AsJson, answering, app, manual
 from rollover.faults import Fault, InputError
 
 
-@app.command()
+@app.command(
+    epilog=manual("check my_scenario.yaml rec/d3.csv", writes="nothing; what each file is goes to standard output.")
+)
 @answering
 def check(
     files: Annotated[list[str], typer.Argument(help="Scenarios, vehicles, soils or recordings.", metavar="FILE...")],

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rollover.commands.door import COMPILING, FAILED, AsJson, Force, Setting, answering, app, settings
-from rollover.faults import Fault, InputError
+from rollover.commands.door import BROKE, COMPILING, FAILED, AsJson, Force, Setting, answering, app, manual, settings
+from rollover.faults import Fault, InputError, absent
 
 if TYPE_CHECKING:
     from rollover.misfit import Misfit
@@ -24,7 +24,14 @@ FORMAT, PAIR = "rollover-compare/1", "rollover-compare-runs/1"
 JSON, PAGE, PICTURE = "compare.json", "report.html", "compare.rrd"
 
 
-@app.command()
+@app.command(
+    epilog=manual(
+        "compare drop_test rec/d3.csv",
+        "compare out/run/side_overturn out/vineyard",
+        writes="compare.json, report.html, compare.rrd (one for each recording; two runs in one).",
+        status=BROKE,
+    )
+)
 @answering
 def compare(
     scenario: Annotated[
@@ -43,11 +50,11 @@ def compare(
     cfc: Annotated[
         int | None,
         typer.Option(
-            help="Filter class for both sides, refused where one is too slow  [default: loads.cfc if possible]"
+            help="Filter class for both sides, refused where one is too slow", show_default="loads.cfc if possible"
         ),
     ] = None,
     profile: Annotated[Path | None, typer.Option(help="What the columns of a foreign file are.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Results folder  [default: out/compare/NAME]")] = None,
+    out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/compare/NAME")] = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
@@ -114,6 +121,8 @@ def _two_runs(
 
     if refused:
         raise InputError(Fault(file=refused[0], message="two runs are compared as they are; leave it out"))
+    if len(others) == 1 and not Path(others[0]).exists():
+        raise InputError(Fault(file=others[0], message=absent(others[0])))
     if len(others) != 1 or not is_result(others[0]):
         got = " ".join(others)
         message = f"the results of a run, got {got!r} beside them; the results of one other run are needed"

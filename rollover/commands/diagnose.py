@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rollover.commands.door import AsJson, Force, Setting, answering, app, settings
+from rollover.commands.door import AsJson, Force, Setting, answering, app, manual, settings
 from rollover.faults import Fault, InputError
 
 if TYPE_CHECKING:
@@ -19,7 +19,12 @@ if TYPE_CHECKING:
     from rollover.scenario import Scenario
 
 
-@app.command()
+@app.command(
+    epilog=manual(
+        "diagnose drop_test rec --out out/diagnosis",
+        writes="diagnosis.json, scenario-diagnosed.yaml (it runs), report.html, diagnosis.rrd.",
+    )
+)
 @answering
 def diagnose(
     scenario: Annotated[str, typer.Argument(help="A scenario file, or the name of a shipped one.")],
@@ -31,7 +36,8 @@ def diagnose(
         typer.Option(
             "--hold-out",
             metavar="NAME",
-            help="A recording to judge by; may be repeated  [default: each condition in turn]",
+            help="A recording to judge by; may be repeated",
+            show_default="each condition in turn",
         ),
     ] = None,
     tolerance: Annotated[
@@ -41,7 +47,7 @@ def diagnose(
         ),
     ] = 0.0,
     set_: Setting = None,
-    out: Annotated[Path | None, typer.Option(help="Results folder  [default: out/diagnose/NAME]")] = None,
+    out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/diagnose/NAME")] = None,
     workers: Annotated[
         int | None,
         typer.Option(help="Processes that fit at once; the answer is the same  [default: 1]", min=0),

@@ -20,8 +20,24 @@ COMPILING = 25  # s, roughly, on two cores
 
 C = TypeVar("C", bound=Callable[..., None])
 
+DONE, NO, WRONG = "0 done", "1 the answer is no", "2 the input is wrong: a line for each fault, nothing written"
+BROKE = "3 a simulation failed: time, cause, last good state"
+
+
+def manual(*examples: str, writes: str, status: str = "") -> str:
+    """Lines below a command's options: how it is called, what it writes, and what its exit status says.
+
+    `status` names what 1 and 3 mean where the command can end with them, parted by semicolons.
+    """
+    lines = [f"Example:  rollover {example}" for example in examples]
+    words = "; ".join(sorted([DONE, WRONG, *filter(None, status.split("; "))]))
+    return "\n\n".join([*lines, f"Writes:  {writes}", f"Exit status:  {words}."])
+
+
 app = typer.Typer(
     help="Vehicle rollover load studies: what the ground does to a ROPS.",
+    epilog=manual("run side_overturn", "run --help", writes="each command into its own folder, whole or not at all.")
+    + f" Some commands also end with {NO}, or with {BROKE}.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},

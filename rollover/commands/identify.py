@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rollover.commands.door import AsJson, Force, Setting, answering, app, settings
+from rollover.commands.door import AsJson, Force, Setting, answering, app, manual, settings
 from rollover.faults import Fault, InputError
 
 if TYPE_CHECKING:
@@ -32,15 +32,21 @@ class StrikerMass(StrEnum):
     effective = "effective"
 
 
-@app.command("identify")
+@app.command(
+    "identify",
+    epilog=manual(
+        "identify rec/d2.csv rec/d3.csv --out out/soil",
+        writes="identify.json, a soil file that a scenario can name, report.html.",
+    ),
+)
 @answering
 def identify_(
     recordings: Annotated[list[str], typer.Argument(help="Recorded drops.", metavar="RECORDING...")],
     scenario: Annotated[str, typer.Option(help="Whose striker fell, unless a recording says otherwise.")] = "drop_test",
     set_: Setting = None,
-    form: Annotated[Form | None, typer.Option("--law", help="Law  [default: ye-2006; bearing for a cone]")] = None,
+    form: Annotated[Form | None, typer.Option("--law", help="Law", show_default="ye-2006; bearing for a cone")] = None,
     fraction: Annotated[
-        float | None, typer.Option(min=0.0, max=10.0, help="m_b1/m_s  [default: the scenario's co-moving mass]")
+        float | None, typer.Option(min=0.0, max=10.0, help="m_b1/m_s", show_default="the scenario's co-moving mass")
     ] = None,
     striker_mass: Annotated[StrikerMass, typer.Option(help="m_s in eq (5).")] = StrikerMass.reference,
     buoyancy: Annotated[float, typer.Option(min=0.0, help="Of the striker in what it falls through, N.")] = 0.0,
@@ -48,7 +54,7 @@ def identify_(
         bool, typer.Option("--terminal-speed", help="It fell at terminal speed: take the drag from there.")
     ] = False,
     keep: Annotated[bool, typer.Option("--keep", help="Published values for what the drops cannot determine.")] = False,
-    out: Annotated[Path | None, typer.Option(help="Results folder  [default: out/identify/NAME]")] = None,
+    out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/identify/NAME")] = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:

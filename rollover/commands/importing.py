@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rollover.commands.door import AsJson, Force, answering, app
+from rollover.commands.door import AsJson, Force, answering, app, manual
 from rollover.faults import Fault, InputError, hint
 
 if TYPE_CHECKING:
@@ -17,7 +17,14 @@ if TYPE_CHECKING:
     from rollover.recording import Recording
 
 
-@app.command("import")
+@app.command(
+    "import",
+    epilog=manual(
+        "import test.mme --out rec",
+        "import tosses --as cube-tosses --select 'toss00*'",
+        writes="NAME.csv (or .parquet, .mme.zip) with its sidecar NAME.yaml for each recording.",
+    ),
+)
 @answering
 def import_(
     source: Annotated[Path, typer.Argument(help="A file or folder.")],
@@ -26,7 +33,7 @@ def import_(
     select: Annotated[
         list[str] | None, typer.Option(help="Of a set of recordings, those whose names fit; may be repeated.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder  [default: out/import/NAME]")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder", show_default="out/import/NAME")] = None,
     to: Annotated[str, typer.Option(help="csv, parquet or mme.zip.")] = "csv",
     force: Force = False,
     as_json: AsJson = False,

@@ -3,50 +3,43 @@
 from __future__ import annotations
 
 import json
-from enum import StrEnum
 from typing import Annotated
 
 import typer
 
-from rollover.commands.door import AsJson, answering, app
-from rollover.faults import Fault, InputError
+from rollover.commands.door import AsJson, answering, app, manual
+from rollover.faults import Fault, InputError, hint
+
+LISTED = ("scenarios", "studies", "vehicles", "soils", "laws", "effects", "channels", "importers", "paths")
 
 
-class Listed(StrEnum):
-    """What `list` can list."""
-
-    scenarios = "scenarios"
-    vehicles = "vehicles"
-    soils = "soils"
-    laws = "laws"
-    effects = "effects"
-    channels = "channels"
-    importers = "importers"
-    paths = "paths"
-
-
-@app.command("list")
+@app.command(
+    "list",
+    epilog=manual("list scenarios", "list paths side_overturn", writes="nothing; the table goes to standard output."),
+)
 @answering
 def list_(
-    what: Annotated[Listed, typer.Argument(help="What to list.")],
+    what: Annotated[str, typer.Argument(help=f"What to list: {', '.join(LISTED)}.", metavar="WHAT")],
     scenario: Annotated[str | None, typer.Argument(help="Whose paths.")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Say what exists, one line each."""
     from rollover import catalogue
 
-    if what is Listed.paths and scenario is None:
+    if what not in LISTED:
+        raise InputError(Fault(file="rollover list", message=f"no such thing, got {what!r}; {hint(what, LISTED)}"))
+    if what == "paths" and scenario is None:
         raise InputError(Fault(file="rollover list paths", message="whose paths, got no scenario; name one"))
-    if what is not Listed.paths and scenario is not None:
-        raise InputError(Fault(file=f"rollover list {what.value}", message=f"one argument too many, got {scenario!r}"))
-    rows = catalogue.paths(scenario) if scenario is not None else catalogue.TABLES[what.value]()
+    if what != "paths" and scenario is not None:
+        raise InputError(Fault(file=f"rollover list {what}", message=f"one argument too many, got {scenario!r}"))
+    rows = catalogue.paths(scenario) if scenario is not None else catalogue.TABLES[what]()
     if as_json:
         print(json.dumps(rows, indent=2))
         return
     if not rows:
         from rollover import console
 
-        console.say(f"There are no {what.value} in this version.")
+        console.say(f"There are no {what} in this version.")
         return
     cells = [[catalogue.text(value) for value in row.values()] for row in rows]
     widths = [min(48, max(map(len, column))) for column in zip(*cells, strict=True)]

@@ -8,23 +8,30 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rollover.commands.door import FAILED, AsJson, Force, answering, app
+from rollover.commands.door import FAILED, AsJson, Force, answering, app, manual
 from rollover.faults import Fault, InputError
 
 if TYPE_CHECKING:
     from rollover.proof.seal import Seal
 
-JSON, SEAL, TRUTH, DIAGNOSES = "prove.json", "seal.json", "truth.json", "diagnoses.jsonl"
-ACCOUNT = (JSON, SEAL, TRUTH, DIAGNOSES)
+JSON, SEAL, TRUTH, DIAGNOSES, PAGE = "prove.json", "seal.json", "truth.json", "diagnoses.jsonl", "report.html"
+ACCOUNT = (JSON, SEAL, TRUTH, DIAGNOSES, PAGE)
 
 
-@app.command()
+@app.command(
+    epilog=manual(
+        "prove --cases 50 --seed 1",
+        writes="prove.json, report.html, seal.json, truth.json, diagnoses.jsonl.",
+        status="3 every diagnosis failed",
+    )
+)
 @answering
 def prove(
-    cases: Annotated[int, typer.Option(help="How many concealed drop test campaigns.", min=1)] = 50,
+    cases: Annotated[int, typer.Option(help="How many concealed campaigns of tests.", min=1)] = 50,
     seed: Annotated[int, typer.Option(help="Another seed, other cases; the same seed, the same ones.", min=0)] = 1,
     out: Annotated[Path, typer.Option(help="Folder of the full account.")] = Path("out/prove"),
-    workers: Annotated[int | None, typer.Option(help="Cases at once  [default: number of cores]", min=0)] = None,
+    workers: Annotated[int | None, typer.Option(help="Cases at once", show_default="number of cores", min=0)] = None,
+    rig: Annotated[str, typer.Option(help="What is tested: drop, or overturn (minutes a case).")] = "drop",
     effects: Annotated[
         list[str] | None, typer.Option(metavar="ID", help="Only cases about this effect; may be repeated.")
     ] = None,
@@ -36,11 +43,12 @@ def prove(
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
-    """Make concealed cases by an independent solver, seal the truth, diagnose them, open the seal and score."""
+    """Make concealed cases (drops by an independent solver), seal the truth, diagnose them, open the seal and score."""
     from rollover import console, store
     from rollover.proof import examine
 
     about = {"cases": cases, "seed": seed, "kinds": kinds or [], "effects": effects or []}
+    about |= {"rig": rig} if rig != "drop" else {}
     store.claim_account(out, examine.FORMAT, about, ACCOUNT, force=force)
 
     def tell(seal: Seal) -> None:
@@ -51,6 +59,7 @@ def prove(
             proof = examine.prove(
                 cases,
                 seed,
+                rig=rig,
                 kinds=about["kinds"],  # type: ignore[arg-type]
                 effects=about["effects"],  # type: ignore[arg-type]
                 workers=workers,
@@ -69,6 +78,10 @@ def prove(
         (part / TRUTH).write_text(json.dumps({"format": "rollover-truths/1", **truth}, indent=1), encoding="utf-8")
         lines = (json.dumps(store.plain({"case": name, **found})) for name, found in proof.diagnoses.items())
         (part / DIAGNOSES).write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+        from viz.proof_page import page
+
+        text = page(account, command=_command(cases, seed, about), versions=account["versions"])
+        (part / PAGE).write_text(text, encoding="utf-8")
     if as_json:
         print(json.dumps(account, indent=2))
     else:
@@ -76,6 +89,12 @@ def prove(
     if not proof.diagnoses:
         console.say(f"Every diagnosis failed; the first: {account['rows'][0]['failure']}")
         raise typer.Exit(FAILED)
+
+
+def _command(cases: int, seed: int, about: dict[str, Any]) -> str:
+    words = ["rollover", "prove", "--cases", str(cases), "--seed", str(seed)]
+    words += [word for name in ("effects", "kinds") for value in about[name] for word in (f"--{name}", value)]
+    return " ".join(words)
 
 
 def sentences(summary: dict[str, Any]) -> list[str]:

@@ -2,31 +2,40 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rollover.commands.door import COMPILING, FAILED, THE_ANSWER_IS_NO, AsJson, Force, answering, app
+from rollover.commands.door import BROKE, COMPILING, FAILED, NO, THE_ANSWER_IS_NO, AsJson, Force, answering, app, manual
 from rollover.faults import Fault, InputError
 
 if TYPE_CHECKING:
     from rollover.baseline import Answer
 
 
-@app.command()
+@app.command(
+    epilog=manual(
+        "regress",
+        "regress side_overturn --update --reason 'stiffer rear tyres'",
+        writes="regress.json, regress.csv, report.html; with --update the baselines beside the scenarios.",
+        status=f"{NO}: a load has changed; {BROKE}",
+    )
+)
 @answering
 def regress(
     scenarios: Annotated[
         list[str] | None,
-        typer.Argument(help="Scenarios or folders of them  [default: all shipped]", metavar="[SCENARIO]..."),
+        typer.Argument(help="Scenarios or folders of them", show_default="all shipped", metavar="[SCENARIO]..."),
     ] = None,
     update: Annotated[bool, typer.Option("--update", help="Write the baselines anew; needs --reason.")] = False,
     reason: Annotated[str, typer.Option(help="Why the loads may be others from now on; kept in the baseline.")] = "",
     out: Annotated[Path, typer.Option(help="Folder of the full account.")] = Path("out/regress"),
-    workers: Annotated[int | None, typer.Option(help="Runs at once  [default: number of cores]", min=0)] = None,
+    workers: Annotated[int | None, typer.Option(help="Runs at once", show_default="number of cores", min=0)] = None,
     time_limit: Annotated[float, typer.Option(help="Wall time for each run, s.", min=1.0)] = 600.0,
     force: Force = False,
     as_json: AsJson = False,
@@ -53,11 +62,11 @@ def regress(
                 answers = failed = e.answers
         else:
             answers = regression.compared(choice, workers=workers, time_limit=time_limit, show=show)
-    account = _account(selection, answers)
+    account = _account(selection, answers, _hash(choice.files))
     with store.whole(out) as part:
         store.write_json(part / JSON, account)
         store.write_csv(part / CSV, _rows(answers))
-        (part / PAGE).write_text(_page(answers, selection), encoding="utf-8")
+        (part / PAGE).write_text(_page(answers, selection, account["scenario_hash"]), encoding="utf-8")
     if as_json:
         print(json.dumps(account, indent=2))
     else:
@@ -74,7 +83,22 @@ JSON, CSV, PAGE = "regress.json", "regress.csv", "report.html"
 ACCOUNT = (JSON, CSV, PAGE)
 
 
-def _account(selection: list[str], answers: list[Answer]) -> dict[str, Any]:
+def _hash(files: Sequence[Path]) -> str:
+    """One hash over all scenarios; of a file that cannot be read its bytes."""
+    from rollover import document
+    from rollover import scenario as scenarios
+
+    digest = hashlib.sha256()
+    for file in sorted(files, key=lambda f: f.stem):
+        try:
+            own = document.content_hash(scenarios.load(file))
+        except InputError:
+            own = hashlib.sha256(file.read_bytes()).hexdigest()
+        digest.update(f"{file.stem} {own}\n".encode())
+    return digest.hexdigest()
+
+
+def _account(selection: list[str], answers: list[Answer], scenario_hash: str) -> dict[str, Any]:
     from rollover import store
 
     found: dict[str, Any] = store.plain(
@@ -82,6 +106,7 @@ def _account(selection: list[str], answers: list[Answer]) -> dict[str, Any]:
             "format": FORMAT,
             "ok": all(a.ok for a in answers),
             "scenarios": selection,
+            "scenario_hash": scenario_hash,
             "versions": store.versions(),
             "answers": [asdict(a) for a in answers],
         }
@@ -93,7 +118,7 @@ def _rows(answers: list[Answer]) -> list[dict[str, Any]]:
     return [{"scenario": a.scenario, "verdict": a.verdict, **asdict(d)} for a in answers for d in a.differences]
 
 
-def _page(answers: list[Answer], selection: list[str]) -> str:
+def _page(answers: list[Answer], selection: list[str], scenario_hash: str) -> str:
     from viz.regression import page
 
-    return page(answers, command=" ".join(["rollover regress", *selection]))
+    return page(answers, command=" ".join(["rollover regress", *selection]), scenario_hash=scenario_hash)

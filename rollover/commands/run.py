@@ -12,14 +12,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rollover.commands.door import (
+    BROKE,
     COMPILING,
     FAILED,
+    NO,
     THE_ANSWER_IS_NO,
     AsJson,
     Force,
     Setting,
     answering,
     app,
+    manual,
     settings,
 )
 
@@ -30,12 +33,20 @@ if TYPE_CHECKING:
     from rollover.scenario import Scenario
 
 
-@app.command()
+@app.command(
+    epilog=manual(
+        "run side_overturn --set vehicle=vehicles/vineyard_tractor.yaml --out out/vineyard",
+        "run drop_test --set initiation.speed=3.5 --json",
+        writes="run.json (status, versions, hash, peak loads, criteria), scenario.yaml, channels.parquet, events.json, "
+        "report.html, recording.rrd.",
+        status=f"{NO}: a criterion is not met under --require; {BROKE}",
+    )
+)
 @answering
 def run(
     scenario: Annotated[str, typer.Argument(help="A scenario file, or the name of a shipped one.")],
     set_: Setting = None,
-    out: Annotated[Path | None, typer.Option(help="Results folder  [default: out/run/NAME]")] = None,
+    out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/run/NAME")] = None,
     force: Force = False,
     half_step: Annotated[
         bool, typer.Option("--half-step/--no-half-step", help="Run again at half the step to see what it changes.")

@@ -3,29 +3,26 @@
 from __future__ import annotations
 
 import json
-from enum import StrEnum
 from typing import Annotated
 
 import typer
 
-from rollover.commands.door import AsJson, answering, app
+from rollover.commands.door import AsJson, answering, app, manual
+from rollover.faults import Fault, InputError, hint
+
+PARTS = ("scenario", "vehicle", "soil", "study")
 
 
-class Part(StrEnum):
-    """What `schema` can describe."""
-
-    scenario = "scenario"
-    vehicle = "vehicle"
-    soil = "soil"
-
-
-@app.command()
+@app.command(epilog=manual("schema > scenario.schema.json", writes="nothing; the schema goes to standard output."))
 @answering
 def schema(
-    part: Annotated[Part, typer.Argument(help="Whose schema.")] = Part.scenario,
+    part: Annotated[str, typer.Argument(help=f"Whose schema: {', '.join(PARTS)}.", metavar="[PART]")] = "scenario",
     as_json: AsJson = True,
 ) -> None:
-    """Print the JSON Schema of a scenario file, for editors; it is JSON with or without --json."""
+    """Print the JSON Schema of a scenario or study file, for editors; it is JSON with or without --json."""
+    if part not in PARTS:
+        raise InputError(Fault(file="rollover schema", message=f"no such part, got {part!r}; {hint(part, PARTS)}"))
     from rollover import scenario as scenarios
+    from rollover import study
 
-    print(json.dumps(scenarios.schema(part.value), indent=2))
+    print(json.dumps(study.schema() if part == "study" else scenarios.schema(part), indent=2))  # type: ignore[arg-type]

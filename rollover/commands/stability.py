@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rollover.commands.door import COMPILING, FAILED, AsJson, Force, Setting, answering, app, settings
+from rollover.commands.door import BROKE, COMPILING, FAILED, AsJson, Force, Setting, answering, app, manual, settings
 from rollover.faults import Fault, InputError
 
 if TYPE_CHECKING:
@@ -26,7 +26,10 @@ CODE_6 = {
 }
 
 
-@app.command("stability")
+@app.command(
+    "stability",
+    epilog=manual("stability utility_tractor", writes="stability.json, report.html.", status=BROKE),
+)
 @answering
 def stability_(
     name: Annotated[
@@ -35,7 +38,7 @@ def stability_(
     ],
     headings: Annotated[int, typer.Option(help="How many, evenly spaced.", min=1, max=360)] = 24,
     set_: Setting = None,
-    out: Annotated[Path | None, typer.Option(help="Results folder  [default: out/stability/NAME]")] = None,
+    out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/stability/NAME")] = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:

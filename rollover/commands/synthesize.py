@@ -8,19 +8,25 @@ from typing import Annotated
 
 import typer
 
-from rollover.commands.door import FAILED, AsJson, Force, Setting, answering, app, settings
+from rollover.commands.door import BROKE, FAILED, AsJson, Force, Setting, answering, app, manual, settings
 from rollover.faults import Fault, InputError
 
 DROP = ("ground/force_normal", "ground/sinkage", "striker/acceleration_z")
 ROLL = ("chassis/roll", "chassis/angular_velocity_x", "chassis/acceleration_y", "chassis/acceleration_z", "rops/force")
 
 
-@app.command()
+@app.command(
+    epilog=manual(
+        "synthesize drop_test --set initiation.speed=3 --hide vehicle.mass=140 --out rec --name d3",
+        writes="NAME.csv with its sidecar NAME.yaml, which states what a test engineer would know, not what is hidden.",
+        status=BROKE,
+    )
+)
 @answering
 def synthesize(
     scenario: Annotated[str, typer.Argument(help="A scenario file, or the name of a shipped one.")],
     out: Annotated[Path, typer.Option(help="Folder of the recording.")] = Path("out/synthesize"),
-    name: Annotated[str | None, typer.Option(help="Name of the recording  [default: the scenario's]")] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the recording", show_default="the scenario's")] = None,
     set_: Setting = None,
     hidden: Annotated[
         list[str] | None,
@@ -28,14 +34,15 @@ def synthesize(
     ] = None,
     channel: Annotated[
         list[str] | None,
-        typer.Option("--channel", help="A recorded channel; may be repeated  [default: the usual ones]"),
+        typer.Option("--channel", help="A recorded channel; may be repeated", show_default="the usual ones"),
     ] = None,
     noise: Annotated[
         list[str] | None,
         typer.Option(
             "--noise",
             metavar="SHARE or CHANNEL=SIGMA",
-            help="White noise, 1 sigma: a share of each channel's range, or SI for one  [default: 0.005]",
+            help="White noise, 1 sigma: a share of each channel's range, or SI for one",
+            show_default="0.005",
         ),
     ] = None,
     rate: Annotated[float, typer.Option(help="Sampling rate, Hz.", min=1.0, max=1e6)] = 1000.0,

@@ -8,11 +8,15 @@ from typing import Annotated
 
 import typer
 
-from rollover.commands.door import Force, answering, app
-from rollover.faults import Fault, InputError
+from rollover.commands.door import Force, answering, app, manual
+from rollover.faults import Fault, InputError, absent
 
 
-@app.command()
+@app.command(
+    epilog=manual(
+        "view out/demo", "view out/demo --html side_overturn.html", writes="nothing, or with --html the one page."
+    )
+)
 @answering
 def view(
     results: Annotated[Path, typer.Argument(help="A results folder or an .rrd file.", metavar="DIR_OR_RRD")],
@@ -42,7 +46,6 @@ def view(
 
 def _recording(results: Path) -> Path:
     """The .rrd of a results folder, or the file itself. Raises `InputError`."""
-    from rollover.faults import nearest
     from rollover.store import PICTURE
 
     if results.is_dir():
@@ -54,10 +57,8 @@ def _recording(results: Path) -> Path:
             raise InputError(Fault(file=str(results), message=f"several recordings, got {names}; name one of them"))
         return found[0]
     if not results.is_file():
-        beside = [p.name for p in results.parent.glob("*")] if results.parent.is_dir() else []
-        meant = [str(results.with_name(name)) for name in nearest(results.name, beside)]
-        cure = f"did you mean {meant[0]!r}?" if meant else "`rollover run` writes a folder with one"
-        raise InputError(Fault(file=str(results), message=f"no such recording; {cure}"))
+        message, _, cure = absent(results).partition("; ")
+        raise InputError(Fault(file=str(results), message=f"{message}; {cure or '`rollover run` writes results'}"))
     if results.suffix != ".rrd":
         raise InputError(Fault(file=str(results), message="not a recording for the viewer; an .rrd file is needed"))
     return results

@@ -46,6 +46,7 @@ def account(
             "where": [_place(p) for p in found.where],
             "depends_on": found.depends_on,
             "dependencies": [{"on": name, "share": share} for name, share in found.dependencies],
+            "degrees_of_freedom": [asdict(d) for d in found.degrees],
             "effects": [_effect(e) for e in found.effects],
             "fit": {
                 "training": _fit(found, "training", found.training),

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.effort import Effort
 from rollover.diagnosis.simulator import Simulator, simulator_of
 from rollover.filters import least_rate
 from rollover.initiation import Drop
@@ -33,7 +34,27 @@ class Averaged:
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """See `Simulator`."""
         found = self.inner.predict(changes, shift)
-        return None if found is None else {c: np.add.reduceat(v, self.starts) / self.counts for c, v in found.items()}
+        return None if found is None else self._means(found)
+
+    def _means(self, found: Mapping[str, Array]) -> dict[str, Array]:
+        return {c: np.add.reduceat(v, self.starts) / self.counts for c, v in found.items()}
+
+    def strays(self) -> list[dict[str, Array]]:
+        """See `Simulator`."""
+        return [self._means(d) for d in self.inner.strays()]
+
+    def marks(self) -> tuple[tuple[float, str], ...]:
+        """See `Simulator`."""
+        return self.inner.marks()
+
+    def state(self, shift: float) -> Mapping[str, Array]:
+        """See `Simulator`."""
+        return self._means(self.inner.state(shift))
+
+    @property
+    def effort(self) -> Effort:
+        """See `Simulator`."""
+        return self.inner.effort
 
 
 def simulated(scenario: Scenario, recording: Recording) -> tuple[Recording, Simulator, int]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ground.law import REFERENCE_AREA, REFERENCE_MASS
 from rollover.channels import describe
 from rollover.diagnosis.evidence import Evidence
+from rollover.document import value_at
 from rollover.effects import EFFECTS, Search, effects, nth
 from rollover.scenario import Scenario
 from rollover.vehicle import Striker
@@ -25,6 +26,8 @@ SHAPES = {
     "soil-viscous-damping": ("exponent",),
     "soil-elastic-rebound": ("damping_ratio",),
     "soil-adhesion": ("reach",),
+    "tank-slosh": ("damping",),
+    "payload-shift": ("friction",),
 }
 
 PLACES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of a shape, at which a fit of it begins
@@ -33,6 +36,9 @@ BESIDE = 0.01  # of a coordinate: how far from its zero an effect is looked at
 THRESHOLDS = 10  # places at which something that has no zero is looked at
 ONE = (5,)
 SEVERAL = (8, 4, 3)  # places on the axes of an effect's parameters
+WIDE = 0.08  # of a coordinate: a step off what changes nothing, where each place costs a full run
+LIMITS = (0.12, 0.3)  # more places of what may be a limit
+SPREAD = (0.12, 0.3, 0.6)  # places of a depth, a length: where nothing is known to change nothing
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,6 +50,7 @@ class Candidate:
     family: str
     search: Mapping[str, Search]
     channel: str | None = None
+    neutral: tuple[float | None, ...] | None = None  # coordinates that change nothing; given where a place costs a run
     shapes: Mapping[str, Search] = field(default_factory=dict)  # fitted only where what is left asks for them
     fixed: Mapping[str, Any] = field(default_factory=dict)  # parameters that are not fitted
 
@@ -71,16 +78,41 @@ class Candidate:
 
     def starts(self) -> list[tuple[float, ...]]:
         """Coordinates to look at first; the first of two parameters, a depth or a frequency, in the finer steps."""
+        if self.neutral is not None:
+            return self._beside(self.neutral)
         axes = []
         for s, many in zip(self.search.values(), ONE if len(self.search) == 1 else SEVERAL, strict=False):
             inside = [(k + 0.5) / many for k in range(many)]
             if len(self.search) == 1 and s.scale == "linear" and s.low < 0.0 < s.high:
-                middle = -s.low / (s.high - s.low)
-                inside = [middle + f * (1.0 - middle) for f in (0.05, 0.4)] + [middle - f * middle for f in (0.05, 0.4)]
+                middle, near = -s.low / (s.high - s.low), (0.05, 0.4)
+                inside = [middle + f * (1.0 - middle) for f in near] + [middle - f * middle for f in near]
             elif len(self.search) == 1 and s.scale == "log" and s.low < 1.0 < s.high and s.high / s.low < 20.0:
                 middle = math.log(1.0 / s.low) / math.log(s.high / s.low)
-                inside = [middle + f * (1.0 - middle) for f in (0.1, 0.5)] + [middle - f * middle for f in (0.1, 0.5)]
+                near = (0.1, 0.5)
+                inside = [middle + f * (1.0 - middle) for f in near] + [middle - f * middle for f in near]
             axes.append(inside)
+        return list(itertools.product(*axes))
+
+    def _beside(self, neutral: tuple[float | None, ...]) -> list[tuple[float, ...]]:
+        """Few coordinates: a step to either side of what changes nothing, places spread where nothing is known to."""
+        known = [k for k, n in enumerate(neutral) if n is not None]
+        if len(known) == len(neutral):
+            at = [float(n) for n in neutral if n is not None]
+            signs = (1.0, -1.0) if len(at) == 1 else (1.0,)
+            steps = [(k, sign * WIDE) for k in known for sign in signs]
+            beside = [tuple(a + (d if a + d < 1.0 else -d) * (j == k) for j, a in enumerate(at)) for k, d in steps]
+            # what the scenario has may be far above what ever acts: a yield force, a stop
+            is_limit = len(at) == 1 and None in EFFECTS[self.id].null.values()
+            return [*beside, *((x,) for x in LIMITS if is_limit)]
+        axes = []
+        for n, (name, search) in zip(neutral, self.search.items(), strict=True):
+            if n is not None:
+                axes.append([min(n + 2.0 * WIDE, 0.9)])
+            elif EFFECTS[self.id].null.get(name) == 0.0:  # a strength: what is usual shows the direction
+                usual = coordinate(getattr(EFFECTS[self.id](), name), search)
+                axes.append([min(max(usual, WIDE), 1.0 - WIDE)])
+            else:
+                axes.append(list(SPREAD))
         return list(itertools.product(*axes))
 
     def whole(self) -> Candidate:
@@ -96,6 +128,8 @@ class Candidate:
 
     def probes(self) -> list[tuple[float, ...]]:
         """Coordinates that span the directions in which the effect begins: small where it has a zero, else spread."""
+        if self.neutral is not None:
+            return self._beside(self.neutral)
         axes: list[list[float]] = []
         for name, s in self.search.items():
             null = EFFECTS[self.id].null.get(name)
@@ -137,7 +171,11 @@ def size_of(scenario: Scenario) -> tuple[float, float]:
 
 
 def candidates_of(
-    evidence: Sequence[Evidence], switched_on: Iterable[str], acts: str, size: tuple[float, float] = (1.0, 1.0)
+    evidence: Sequence[Evidence],
+    switched_on: Iterable[str],
+    acts: str,
+    scenario: Any = None,
+    size: tuple[float, float] = (1.0, 1.0),
 ) -> list[Candidate]:
     """All candidates for these recordings; effects that the scenario has switched on already do not compete.
 
@@ -158,8 +196,46 @@ def candidates_of(
         sized = {p: _sized(s, kind.grows.get(p), size) for p, s in kind.search.items()}
         search = {p: _widened(s, kind.null.get(p)) for p, s in sized.items() if p not in SHAPES.get(name, ())}
         shapes = {p: s for p, s in sized.items() if p in SHAPES.get(name, ())}
-        found.append(Candidate(id=name, kind=kind.kind, family=kind.family, search=search, shapes=shapes))
+        neutral = None if acts == "drop" else tuple(_neutral(kind, p, s, scenario) for p, s in search.items())
+        found.append(
+            Candidate(id=name, kind=kind.kind, family=kind.family, search=search, shapes=shapes, neutral=neutral)
+        )
     return found
+
+
+def _neutral(kind: Any, parameter: str, search: Search, scenario: Any) -> float | None:
+    """Coordinate at which a parameter changes nothing: its null, or what gives the scenario's own value; else None."""
+    null = kind.null.get(parameter)
+    if null is not None:
+        inside = search.low < null < search.high
+        return coordinate(float(null), search) if inside else None
+
+    def off(x: float) -> float | None:
+        others = {name: value for name, value in kind.null.items() if name != parameter}
+        changed = kind(**{**others, parameter: physical(x, search)}).changes(scenario)
+        ways = [d for path, value in changed.items() for d in _apart(value, value_at(scenario, path))]
+        return sum(ways) if ways and (min(ways) >= 0.0 or max(ways) <= 0.0) else None
+
+    low, high = 0.0, 1.0
+    first, last = off(low), off(high)
+    if first is None or last is None or first * last >= 0.0:
+        return None
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        here = off(middle)
+        if here is None:
+            return None
+        low, high = (middle, high) if here * first > 0.0 else (low, middle)
+    return 0.5 * (low + high)
+
+
+def _apart(value: Any, other: Any) -> list[float]:
+    """Differences of numbers, or of those in tuples."""
+    if isinstance(value, tuple) and isinstance(other, tuple):
+        return [d for a, b in zip(value, other, strict=True) for d in _apart(a, b)]
+    if isinstance(value, (int, float)) and isinstance(other, (int, float)):
+        return [float(value - other)] if value != other else []
+    return []
 
 
 def _sized(search: Search, powers: tuple[float, float] | None, size: tuple[float, float]) -> Search:

@@ -17,12 +17,12 @@ from rollover.noise import LENGTH, NoiseFloor, grown, noise_floor
 
 Array = NDArray[np.float64]
 ALIKE = 0.05  # of the logarithm of the rate: recordings so close were taken alike
-MANY = 10  # quiet windows from which on a criterion chooses the memory
 CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is believed
 OWN = 1.5  # times the common noise: beyond, a recording has its own
 SURELY = 4  # quiet windows from which on that is believed
 LONGEST = 4  # samples of memory
 NOT_COLOURED = 0.7  # of the whole error that is noise: below, the model's own error prevails, which is no process
+RINGING = 0.9  # largest complex root
 STEADY = 0.995  # largest root of a memory
 
 
@@ -51,7 +51,8 @@ def whole(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evid
             continue
         sigma, ar = autoregression([residuals[r][part] for r, _, _, part in members])
         for r, k, s, _ in members:
-            found[r][k] = with_noise(s, sigma, ar, evidence[r].model_error)
+            if s.weight is None:  # else what is left is the model's error as well
+                found[r][k] = with_noise(s, sigma, ar, evidence[r].model_error)
     return [replace(e, signals=tuple(s)) for e, s in zip(evidence, found, strict=True)]
 
 
@@ -83,8 +84,9 @@ def autoregression(series: Sequence[Array], most: int = LONGEST) -> tuple[float,
     for order in range(most + 1):
         past = X[:, 1 : order + 1]
         a = np.linalg.lstsq(past, X[:, 0], rcond=None)[0] if order else np.zeros(0)
-        if order and np.max(np.abs(np.roots([1.0, *(-a)]))) > STEADY:
-            continue
+        roots = np.roots([1.0, *(-a)])
+        if order and (np.max(np.abs(roots)) > STEADY or np.any((np.abs(roots) > RINGING) & (np.abs(roots.imag) > 0.0))):
+            continue  # no process, or one that rings at one frequency: hum is no noise
         power = float(np.mean((X[:, 0] - past @ a) ** 2)) * n / max(n - order, 1)
         score = n * np.log(max(power, 1e-300)) + order * np.log(n)
         if best is None or score < best[0]:
@@ -110,5 +112,4 @@ def _quieter(misfits: Sequence[Array], own: Sequence[Array]) -> NoiseFloor | Non
 def _floor(values: Sequence[Array]) -> NoiseFloor:
     """Level and memory of the quiet windows of several series, none across two, counted from their ends."""
     joined = np.concatenate([v[v.size % LENGTH :] for v in values if v.size >= LENGTH])
-    one = noise_floor(joined, order=1, strides=(1,))
-    return noise_floor(joined, order=2, strides=(1,)) if one.windows >= MANY else one
+    return noise_floor(joined, order=1, strides=(1,))

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.fit import NUDGES, Block, Fitted, Judge
+from rollover.diagnosis.fit import Block, Fitted, Judge
 from rollover.execute import map_cases
 
 Progress = Callable[[str], None]
@@ -32,13 +32,14 @@ class Job:
     start: tuple[float, ...]
     shifts: tuple[float, ...]
     only: tuple[int, ...] | None = None
-    rounds: int = 14
+    rounds: int | None = None  # as many as a whole fit may take
     width: int = 0
+    pinned: bool = False
 
     def key(self, about: str) -> str:
         """Hash of what is fitted and from where, with `about` for all else that it depends on."""
         names = [(c.key, sorted(c.search.items())) for c in self.candidates]
-        told = repr((about, self.how, names, self.start, self.shifts, self.only, self.rounds, self.width))
+        told = repr((about, self.how, names, self.start, self.shifts, self.only, self.rounds, self.width, self.pinned))
         return hashlib.sha256(told.encode()).hexdigest()
 
     @property
@@ -109,7 +110,13 @@ def work(judge: Judge, job: Job) -> Fitted | None:
     """Work off one job."""
     if job.how == "fit":
         return judge.fit(
-            job.candidates, job.start, rounds=job.rounds, only=job.only, shifts=job.shifts, width=job.width
+            job.candidates,
+            job.start,
+            rounds=job.rounds,
+            only=job.only,
+            shifts=job.shifts,
+            width=job.width,
+            pinned=job.pinned,
         )
     begun = _at(judge, job.candidates, job)
     if begun is None:
@@ -145,7 +152,7 @@ def _linearised(
 ) -> Fitted | None:
     blocks: list[Block] = []
     for r, shift in zip(recordings, shifts, strict=True):
-        block = judge.block(r, candidates, x, shift, NUDGES[1])
+        block = judge.block(r, candidates, x, shift, judge.effort.fine)
         if block is None:
             return None
         blocks.append(block)

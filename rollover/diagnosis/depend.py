@@ -126,7 +126,7 @@ def dependency(forces: Sequence[ResidualForce]) -> list[tuple[str, float]]:
         return []
     conditions = sorted({f.condition for f in forces})
     scores = []
-    for name in (TIME, DEPTH, SPEED, ACCELERATION):
+    for name in [n for n in forces[0].of if all(n in f.of for f in forces)]:
         wrong, all_ = 0.0, 0.0
         for left in conditions:
             train = [f for f in forces if f.condition != left] or list(forces)

@@ -69,7 +69,8 @@ def mismatch_of(
                 inside = np.flatnonzero((time >= start) & (time < end))
                 if inside.size >= 4:
                     rows = inside + part.start
-                    cells.append(_cell(r, signal.channel, name, time[inside], rows, block))
+                    trusted = signal.weight is None
+                    cells.append(_cell(r, signal.channel, name, time[inside], rows, block, trusted=trusted))
     structured = sum(c.structured for c in cells)
     waves = sum(c.waves for c in cells)
     rough = sum(c.rough for c in cells)
@@ -80,7 +81,9 @@ def mismatch_of(
     return Mismatch(cells=tuple(cells), p_value=p, adjusted=_holm([c.p_value for c in cells]))
 
 
-def _cell(r: int, channel: str, phase: str, time: Array, rows: NDArray[np.int64], block: Block) -> Cell:
+def _cell(
+    r: int, channel: str, phase: str, time: Array, rows: NDArray[np.int64], block: Block, *, trusted: bool
+) -> Cell:
     from scipy.stats import f as f_distribution
 
     w, s = block.residual[rows], block.slope[rows]
@@ -95,6 +98,8 @@ def _cell(r: int, channel: str, phase: str, time: Array, rows: NDArray[np.int64]
     inside = Q.T @ w
     structured, rough = float(inside @ inside), float(w @ w - inside @ inside)
     free = max(n - waves - 1, 1)
+    if not trusted:
+        rough = max(rough, float(n - waves))  # where the model is not sure, what is rough says nothing of what is slow
     p = (
         float(f_distribution.sf((structured / waves) / max(rough / free, 1e-300), waves, free))
         if n > waves + 1

@@ -11,19 +11,22 @@ import numpy as np
 from rollover.diagnosis import colour
 from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import candidates_of, size_of
+from rollover.diagnosis.chaos import weighted
+from rollover.diagnosis.chassis import degrees_of
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.depend import dependency, residual_forces
 from rollover.diagnosis.empirical import offered, proposed
 from rollover.diagnosis.evidence import Evidence, doubted, evidence_of, left_out
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import yardstick
-from rollover.diagnosis.phases import drop_phases
+from rollover.diagnosis.overturn import RunSimulator
+from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing, with_scatter
 from rollover.diagnosis.scores import judged
 from rollover.diagnosis.selection import SURE, decided, explained, matters
 from rollover.diagnosis.simulator import set_up
 from rollover.diagnosis.statements import considered, named, noise, places, sentence
-from rollover.diagnosis.verdict import Diagnosis
+from rollover.diagnosis.verdict import Degree, Diagnosis
 from rollover.drop import unfit
 from rollover.effects import EFFECTS
 from rollover.recording import Recording
@@ -59,6 +62,7 @@ def diagnose(
         raise ValueError(f"tolerance: not a share of a range, got {tolerance:g}; at least 0 and below 1")
     every, notes = _evidence(scenario, recordings)
     every = _weighed(scenario, [replace(e, model_error=float(np.hypot(e.model_error, tolerance))) for e in every])
+    every = [weighted(e, e.simulator.strays()) for e in every]
     found = [e for e in every if e.name not in hold_out]
     kept = [e for e in every if e.name in hold_out]
     if sum(e.count for e in found) < FEWEST:
@@ -72,16 +76,20 @@ def diagnose(
     base = judge.fit((), ())
     if base is None:
         return _nothing(every, names, [*notes, "the scenario itself could not be simulated"], began)
-    phases = [drop_phases(e) for e in found]
+    phases = [phases_of(e) for e in found]
     acts = "rollover" if any(unfit(set_up(scenario, e.recording)) for e in found) else "drop"
-    candidates = candidates_of(found, scenario.effects, acts, size_of(set_up(scenario, found[0].recording)))
+    candidates = candidates_of(found, scenario.effects, acts, scenario, size_of(set_up(scenario, found[0].recording)))
     explanation = explained(judge, base, candidates, groups, phases, say, crew or Crew())
     explanation, verdict = decided(judge, explanation, groups)
     found = list(judge.evidence)
     before, after = explanation.before, explanation.after if explanation.parts else explanation.before
     set_ups = [set_up(scenario, e.recording) for e in found]
     say("what the mismatch depends on")
-    dependencies = dependency(residual_forces(set_ups, found)) if acts == "drop" else []
+    degrees: tuple[Degree, ...] = ()
+    forces = residual_forces(set_ups, found) if acts == "drop" else []
+    if acts != "drop":
+        degrees, forces = degrees_of(set_ups, found, [b.shift for b in explanation.base.blocks])
+    dependencies = dependency(forces)
     law = None
     if verdict == "unexplained" and acts == "drop":
         say("a law for what no candidate explains")
@@ -96,6 +104,7 @@ def diagnose(
     is_mismatch = verdict not in ("no-mismatch", "cannot-tell")
     remains = after.p_value < SURE and matters(judge, explanation.fitted, after)
     training = tuple(e.name for e in found)
+    notes += [*(_felt(degrees[0]) for _ in degrees[:1] if is_mismatch), *_cost(found)]
     return Diagnosis(
         verdict=verdict,
         sentence=sentence(verdict, effects, before, h_before.held, h_after.held, found)
@@ -110,6 +119,7 @@ def diagnose(
         remaining_where=places(after, found, None) if verdict == "unexplained" or (effects and remains) else (),
         depends_on=depends if is_mismatch else None,
         dependencies=tuple(dependencies),
+        degrees=degrees if is_mismatch else (),
         smallest_detectable=detectable,
         training=training,
         held_out=tuple(e.name for e in kept) or training,
@@ -144,6 +154,19 @@ def _evidence(scenario: Scenario, recordings: Sequence[tuple[str, Recording]]) -
         else:
             found.append(one)
     return found, notes
+
+
+def _felt(d: Degree) -> str:
+    """The degree of freedom that misses most, in a sentence."""
+    what = "force" if d.unit == "N" else "moment"
+    return f"on the {d.body}, {d.share:.0%} of the misfit is a {what} {d.axis}, {d.rms:.3g} {d.unit} root mean square"
+
+
+def _cost(found: Sequence[Evidence]) -> list[str]:
+    """What full runs took, where there were any."""
+    made = [e.simulator for e in found if isinstance(e.simulator, RunSimulator)]
+    runs, seconds = sum(s.runs for s in made), sum(s.seconds for s in made)
+    return [f"{runs} full runs of {1e3 * seconds / runs:.0f} ms on the average"] if runs else []
 
 
 def _is_weak(detectable: Mapping[str, float]) -> bool:

@@ -39,6 +39,7 @@ class Signal:
     ar: tuple[float, ...]
     span: float
     scatter: float = 0.0  # between runs of one condition, SI
+    weight: Array | None = None  # (n,), below 1 where the model itself is not sure
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +52,7 @@ class Evidence:
     signals: tuple[Signal, ...]
     shift_prior: float
     condition: str
+    strays: tuple[Array, ...] = ()  # stacked, SI: what runs that nobody could tell apart differ by
     model_error: float = MODEL_ERROR  # of a channel's range
     averaged: int = 1  # samples in one
     doubts: Array | None = None  # what 1 sigma of each uncertain condition does to the stack, SI, (n, q)
@@ -133,6 +135,12 @@ class Evidence:
     @staticmethod
     def _whitened(signal: Signal, values: Array) -> Array:
         x = values / signal.sigma
+        if signal.weight is not None:
+            return Evidence._coloured(signal, x) * signal.weight
+        return Evidence._coloured(signal, x)
+
+    @staticmethod
+    def _coloured(signal: Signal, x: Array) -> Array:
         if not signal.ar:
             return x
         y = x.copy()

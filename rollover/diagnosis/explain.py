@@ -12,19 +12,17 @@ from numpy.typing import NDArray
 from rollover.diagnosis import colour
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.crew import Crew, Job
+from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.fit import NOISE_LEFT, Fitted, Judge
 from rollover.diagnosis.gate import Gate, freed
 from rollover.diagnosis.holdout import held_out, worse
 
 Array = NDArray[np.float64]
 SCORED = 18  # candidates looked at closer, by their score
-PROMISING = 14  # candidates fitted in full at each step
-FEW = 3  # recordings that candidates are looked at on
-SHORT = 5  # rounds of a first fit
-LEADERS, MOST_LEADERS = 4, 9  # first fits that are followed up, at least and at most
 WITHIN = 6.0  # times what the best leaves, up to which a first fit is followed up
 FAR = 3.0  # misfit over the noise from which on time shifts fitted to it are not believed
 ELSEWHERE = 0.2  # of a coordinate: starts so far apart are two
+RIVALS = 0.4  # of the best's gain: a first fit that gains less is no rival, where fits cost much
 CROOKED = 100.0  # times what the best leaves, up to which a fit of two parameters is polished
 SHAPED = 4.0  # times what the best leaves, up to which an effect's shape is fitted too
 WORTH = 12.0  # gain that pays for a shape
@@ -65,14 +63,14 @@ class Step:
         return replace(self, base=judge.again(self.base), fitted=best or judge.again(self.fitted), rivals=rivals)
 
 
-def spread(base: Fitted, groups: Sequence[Sequence[int]]) -> list[int]:
+def spread(base: Fitted, groups: Sequence[Sequence[int]], few: int = DROPS.few) -> list[int]:
     """Few recordings that stand for all: of the conditions that are met worst, best, and in the middle."""
     left = [b.normal()[2] / b.residual.size for b in base.blocks]
     members = [max(g, key=lambda r: left[r]) for g in groups if g]
     members.sort(key=lambda r: left[r])
-    if len(members) <= FEW:
-        return sorted(set(members)) if len(groups) > 1 else list(range(len(base.blocks)))[:FEW]
-    return sorted({members[0], members[len(members) // 2], members[-1]})
+    if len(members) <= few:
+        return sorted(set(members)) if len(groups) > 1 else list(range(len(base.blocks)))[:few]
+    return sorted({members[round(k * (len(members) - 1) / (few - 1))] for k in range(few)})
 
 
 def begun(judge: Judge, base: Fitted) -> list[float]:
@@ -143,8 +141,8 @@ def step(
     what it leaves; the step is then under that noise. None if nothing could be fitted.
     """
     say(f"looking at {len(candidates)} candidates beside {base.label}")
-    few = spread(base, groups)
-    screened = screen(judge, base, _promising(candidates, looked), few)
+    few = spread(base, groups, judge.effort.few)
+    screened = screen(judge, base, _promising(candidates, looked, judge.effort.scored), few)
     count = sum(b.residual.size for b in base.blocks)
     screened, begun_with = _first_fits(judge, base, screened, few, say, crew)
     jobs = [
@@ -157,10 +155,11 @@ def step(
     fits.sort(key=lambda f: f.left)
     # where a threshold makes the way crooked, the nearer ones are followed to the end
     if fits[0].left > NOISE_LEFT**2 * count:
-        near = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < CROOKED * fits[0].left][:2]
+        near = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < CROOKED * fits[0].left]
+        near = near[: judge.effort.polishes]
         polished = crew.fits(judge, [_from(f, "polish") for f in near], say)
         fits = [f for f in fits if f not in near] + [new or old for new, old in zip(polished, near, strict=True)]
-    fits = _shaped(judge, _one_each(fits), crew, say)
+    fits = _one_each(fits) if judge.effort.thrifty else _shaped(judge, _one_each(fits), crew, say)
     if fits[0].left < NEARLY_NOISE**2 * count:
         judge.weigh(colour.whole(judge.evidence, judge.residuals(fits[0])))
         base, fits = judge.again(base), [judge.again(f) for f in fits]
@@ -170,9 +169,11 @@ def step(
     return Step(base=base, fitted=fits[0], p_value=looked.p_value(phi), rivals=tuple(fits), screened=tuple(screened))
 
 
-def _promising(candidates: Sequence[Candidate], looked: Gate) -> list[Candidate]:
+def _promising(candidates: Sequence[Candidate], looked: Gate, scored: int | None) -> list[Candidate]:
     """Those that scored best, and of two parameters all: beside their thresholds a score tells little."""
     ranked = sorted(candidates, key=lambda c: -looked.scores.get(c.key, 0.0))
+    if scored is not None:
+        return ranked[:scored]
     return [c for k, c in enumerate(ranked) if k < SCORED or len(c.search) > 1]
 
 
@@ -196,17 +197,18 @@ def _first_fits(
     judge: Judge, base: Fitted, screened: Sequence[Screened], few: Sequence[int], say: Progress, crew: Crew
 ) -> tuple[list[Screened], list[Fitted]]:
     """Short fits to few recordings: the ones worth a full fit, best first, and what each leaves."""
-    by_potential = sorted(screened, key=lambda s: -s.potential)[:PROMISING]
-    by_start = sorted(screened, key=lambda s: s.left)[: PROMISING // 2]
+    by_potential = sorted(screened, key=lambda s: -s.potential)[: judge.effort.promising]
+    by_start = sorted(screened, key=lambda s: s.left)[: judge.effort.promising // 2]
     chosen = {s.candidate.key: s for s in (*by_start, *by_potential)}
     shifts = begun(judge, base)
     told: dict[str, float] = {}
     say(f"first fits of {len(chosen)} candidates to {len(few)} recordings")
     at = tuple(shifts[r] for r in few)
+    pinned = base.left > FAR**2 * sum(b.residual.size for b in base.blocks)
     jobs = [
         Job(
             candidates=(*base.candidates, s.candidate), start=(*base.x, *start), shifts=at, only=tuple(few),
-            rounds=SHORT,
+            rounds=judge.effort.short, pinned=pinned,
         )
         for s in chosen.values()
         for start in s.starts
@@ -216,7 +218,11 @@ def _first_fits(
         key, size = one.candidates[-1].key, sum(b.residual.size for b in one.blocks)
         told[key] = min(told.get(key, np.inf), float(np.sqrt(one.left / size)))
     fits.sort(key=lambda f: f.left)
-    worth = [f for k, f in enumerate(fits) if k < LEADERS or f.left < WITHIN * fits[0].left][:MOST_LEADERS]
+    worth = [f for k, f in enumerate(fits) if k < judge.effort.leaders or f.left < WITHIN * fits[0].left]
+    if judge.effort.thrifty and fits:
+        as_it_is = sum(base.blocks[r].normal()[2] for r in few)
+        worth = [f for f in worth if as_it_is - f.left >= RIVALS * (as_it_is - fits[0].left)]
+    worth = worth[: judge.effort.most_leaders]
     return [replace(s, nrmse=told.get(s.candidate.key, 0.0)) for s in screened], worth
 
 

@@ -1,81 +1,25 @@
-"""Least squares of effects over several recordings, the time shift of each profiled out.
-
-For recording r with whitened residual w, J = dy/dx of the effects' coordinates and s = dy/dtau of its time shift,
-
-    minimise sum_r |w_r - J_r dx - s_r dtau_r|^2 + ((tau_r + dtau_r)/sd)^2                                    (D1)
-
-tau_r is eliminated, which leaves for each recording a small A_r, b_r, c_r: enough to refit without any recording and
-to predict that one, so that holding out costs no simulation.
-"""
+"""Least squares of effects over several recordings by simulation, the time shift of each profiled out: (D1)."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.blocks import GENTLE, Block, Fitted, bounded, shift_of
 from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
 
 Array = NDArray[np.float64]
-NUDGES = (2e-2, 5e-3, 1e-3)  # of a coordinate, for differences: wide first, as thresholds show only over samples
+FAR = 3.0  # misfit over the noise from which on a step may be lengthened
+STRIDE, STRIDES = 2.0, 6  # by what factor, how often
+TRIES = 4  # of a step, each damped more
 PLACES = 241  # time shifts that are tried
-WIDEST = 4.0  # times its prior that a time shift may be
 NOISE_LEFT = 1.04  # misfit over the noise that needs no further search
 NONE = np.zeros(0, dtype=np.int64)
-GENTLE = 1e-4  # prior of a coordinate (1/variance): keeps what nothing determines where it is
-
-
-@dataclass(frozen=True, kw_only=True)
-class Block:
-    """One recording at the fitted point: residual (n,), Jacobian (n, p), slope of the shift (n,), shift, its prior."""
-
-    residual: Array
-    J: Array
-    slope: Array
-    shift: float
-    prior: float
-
-    @property
-    def weight(self) -> float:
-        """s's + 1/sd^2."""
-        return float(self.slope @ self.slope) + self.prior**-2
-
-    @property
-    def total(self) -> float:
-        """(D1) where it stands."""
-        return float(self.residual @ self.residual) + (self.shift / self.prior) ** 2
-
-    def normal(self) -> tuple[Array, Array, float]:
-        """A (p, p), b (p,), c: |..|^2 of (D1) with tau eliminated is c - 2 b'dx + dx'A dx."""
-        g = float(self.slope @ self.residual) - self.shift * self.prior**-2
-        h = self.J.T @ self.slope
-        A = self.J.T @ self.J - np.outer(h, h) / self.weight
-        b = self.J.T @ self.residual - h * g / self.weight
-        c = float(self.residual @ self.residual) + (self.shift / self.prior) ** 2 - g * g / self.weight
-        return A, b, c
-
-
-@dataclass(frozen=True, kw_only=True)
-class Fitted:
-    """Effects fitted to recordings: coordinates, blocks there, and what is left, sum of squares over the noise."""
-
-    candidates: tuple[Candidate, ...]
-    x: tuple[float, ...]
-    blocks: tuple[Block, ...]
-
-    @property
-    def left(self) -> float:
-        """Sum over the recordings of (D1) at its minimum."""
-        return sum(b.normal()[2] for b in self.blocks)
-
-    @property
-    def label(self) -> str:
-        """Keys of the effects."""
-        return " + ".join(c.key for c in self.candidates) or "as it is"
 
 
 class Judge:
@@ -83,9 +27,11 @@ class Judge:
 
     def __init__(self, evidence: Sequence[Evidence]) -> None:
         self.evidence = tuple(evidence)
+        self.effort = max((e.simulator.effort for e in self.evidence), key=lambda e: e.thrifty, default=DROPS)
         self.measured = [e.measured() for e in self.evidence]
         self.shifts = [0.0] * len(self.evidence)
         self.simulations = 0
+        self._pinned = False
         self._raw: dict[tuple[object, ...], Array | None] = {}
         self._leaps: dict[tuple[object, ...], NDArray[np.int64]] = {}
         self._known: dict[tuple[object, ...], Array | None] = {}
@@ -103,6 +49,8 @@ class Judge:
             total.update(repr((e.name, e.shift_prior)).encode())
             for s in e.signals:
                 total.update(repr((s.channel, s.sigma, s.ar)).encode() + s.values.tobytes() + s.rows.tobytes())
+                if s.weight is not None:
+                    total.update(s.weight.tobytes())
         return total.hexdigest()
 
     def weigh(self, evidence: Sequence[Evidence]) -> None:
@@ -113,7 +61,8 @@ class Judge:
 
     def again(self, fitted: Fitted) -> Fitted:
         """A fit where it stands, linearised anew under the noise as it is held now."""
-        blocks = [self.block(r, fitted.candidates, fitted.x, b.shift, NUDGES[1]) for r, b in enumerate(fitted.blocks)]
+        fine = self.effort.fine
+        blocks = [self.block(r, fitted.candidates, fitted.x, b.shift, fine) for r, b in enumerate(fitted.blocks)]
         kept = [new if new is not None else old for new, old in zip(blocks, fitted.blocks, strict=True)]
         return Fitted(candidates=fitted.candidates, x=fitted.x, blocks=tuple(kept))
 
@@ -206,9 +155,18 @@ class Judge:
         return float(np.sum(e.eased(self.measured[r] - y) ** 2)) + (shift / e.shift_prior) ** 2
 
     def block(
-        self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float, nudge: float
+        self,
+        r: int,
+        candidates: Sequence[Candidate],
+        x: Sequence[float],
+        shift: float,
+        nudge: float,
+        known: Array | None = None,
     ) -> Block | None:
-        """Recording r linearised at x by differences over `nudge`; no Jacobian for 0."""
+        """Recording r linearised at x by differences over `nudge`; no Jacobian for 0.
+
+        `known` (n, k) are the first k columns of the Jacobian where those of an earlier place will do.
+        """
         y = self.predicted(r, candidates, x, shift)
         if y is None:
             return None
@@ -216,7 +174,9 @@ class Judge:
         assert raw is not None
         leaps = self._leaps.get(_key(r, candidates, x, shift), NONE)
         J = np.zeros((y.size, len(x)))
-        for k in range(len(x) if nudge else 0):
+        if known is not None:
+            J[:, : known.shape[1]] = known
+        for k in range(0 if known is None else known.shape[1], len(x) if nudge else 0):
             step = nudge if x[k] < 0.5 else -nudge
             there = [*x[:k], x[k] + step, *x[k + 1 :]]
             moved = self.raw(r, candidates, there, shift)
@@ -225,44 +185,66 @@ class Judge:
             d = (moved - raw) / step
             for at in (*leaps, *self._leaps.get(_key(r, candidates, there, shift), NONE)):
                 d[at : at + 3] = 0.0  # a leap that moves past a sample is no slope
-            J[:, k] = e.whitened(d)
-        return Block(
-            residual=e.eased(self.measured[r] - y),
-            J=e.eased(J),
-            slope=e.eased(e.slope(raw, leaps)),
-            shift=shift,
-            prior=e.shift_prior,
-        )
+            J[:, k] = e.eased(e.whitened(d))
+        slope = e.eased(e.slope(raw, leaps))
+        if self._pinned and e.recording.clock.zero != "unknown":
+            slope = np.zeros_like(slope)
+        residual = e.eased(self.measured[r] - y)
+        return Block(residual=residual, J=J, slope=slope, shift=shift, prior=e.shift_prior)
 
     def fit(
         self,
         candidates: Sequence[Candidate],
         start: Sequence[float],
         *,
-        rounds: int = 14,
+        rounds: int | None = None,
         only: Sequence[int] | None = None,
         shifts: Sequence[float] | None = None,
         width: int = 0,
+        pinned: bool = False,
     ) -> Fitted | None:
-        """Levenberg-Marquardt on (D1) from a start within the unit box; None if nothing can be simulated there."""
+        """Levenberg-Marquardt on (D1) from a start within the unit box; None if nothing can be simulated there.
+
+        `pinned` keeps clocks whose zero is known where they say: far from an explanation a shift eats what is missing.
+        """
+        self._pinned = pinned
+        try:
+            return self._fit(candidates, start, rounds, only, shifts, width)
+        finally:
+            self._pinned = False
+
+    def _fit(
+        self,
+        candidates: Sequence[Candidate],
+        start: Sequence[float],
+        rounds: int | None,
+        only: Sequence[int] | None,
+        shifts: Sequence[float] | None,
+        width: int,
+    ) -> Fitted | None:
         use = list(range(len(self.evidence))) if only is None else list(only)
+        nudges = self.effort.nudges
+        rounds, width = self.effort.rounds if rounds is None else rounds, min(width, len(nudges) - 1)
         x = [float(v) for v in start]
         shifts = [self.shifts[r] for r in use] if shifts is None else list(shifts)
-        found = [self.block(r, candidates, x, s, NUDGES[width]) for r, s in zip(use, shifts, strict=True)]
+        found = [self.block(r, candidates, x, s, nudges[width]) for r, s in zip(use, shifts, strict=True)]
         if any(b is None for b in found):
             return None
         blocks: list[Block] = [b for b in found if b is not None]
         best, damping = self._total(blocks), 1e-3
+        fixed = len(x) - len(candidates[-1].search) if candidates else 0
         for _ in range(rounds):
             A, b = np.zeros((len(x), len(x))), np.zeros(len(x))
             for block in blocks:
                 Ar, br, _ = block.normal()
                 A, b = A + Ar, b + br
-            improved = False
-            for _ in range(5):
-                dx = _bounded(A, b, np.array(x), damping)
+            improved, enough, total = False, 1e-3 * max(1.0, 1e-2 * best), best
+            for _ in range(TRIES):
+                dx = bounded(A, b, np.array(x), damping)
                 trial = [float(v) for v in np.clip(np.array(x) + dx, 0.0, 1.0)]
                 moved = np.array(trial) - np.array(x)
+                if width and 2.0 * float(b @ moved) - float(moved @ A @ moved) < 0.1 * enough:
+                    break  # nothing more is to be had, by these slopes
                 steps = [shift_of(block, moved) for block in blocks]
                 after = [
                     self.block(r, candidates, trial, block.shift + d, 0.0)
@@ -272,30 +254,68 @@ class Judge:
                     total = self._total([a for a in after if a is not None])
                     if total < best:
                         improved = True
+                        if total > FAR**2 * sum(k.residual.size for k in blocks):
+                            trial, after, total = self._further(use, candidates, x, trial, after, total)
                         break
-                damping = max(10.0 * damping, 1e-3)
+                damping = max(30.0 * damping, 1e-2)
             gain = best - total if improved else 0.0
             if improved:
                 x, best, damping, shifts = trial, total, 0.1 * damping, [a.shift for a in after if a is not None]
-            if gain < 1e-3 * max(1.0, 1e-2 * best):
+            fresh = gain < enough
+            if fresh:
                 width, damping = width + 1, 1e-3
-            last = width >= len(NUDGES)
+            last = width >= len(nudges)
+            if last and not improved and len(nudges) == 1:
+                break
+            # what is held already moves little: its slopes are worked out anew only where the search narrows
             again = [
-                self.block(r, candidates, x, s, NUDGES[width if width < len(NUDGES) else 1])
-                for r, s in zip(use, shifts, strict=True)
+                self.block(
+                    r,
+                    candidates,
+                    x,
+                    s,
+                    self.effort.fine if last else nudges[width],
+                    None if fresh else block.J[:, :fixed],
+                )
+                for r, s, block in zip(use, shifts, blocks, strict=True)
             ]
             if any(b is None for b in again):
                 return None
             blocks = [b for b in again if b is not None]
             if last:
                 break
-        if width < len(NUDGES) and width != 1:
-            ended = [self.block(r, candidates, x, s, NUDGES[1]) for r, s in zip(use, shifts, strict=True)]
+        if width < len(nudges) and nudges[width] != self.effort.fine:
+            ended = [self.block(r, candidates, x, s, self.effort.fine) for r, s in zip(use, shifts, strict=True)]
             if all(b is not None for b in ended):
                 blocks = [b for b in ended if b is not None]
         return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=tuple(blocks))
 
-    def polish(self, fitted: Fitted, size: float = 0.02, most: int = 70) -> Fitted:
+    def _further(
+        self,
+        use: Sequence[int],
+        candidates: Sequence[Candidate],
+        x: Sequence[float],
+        trial: list[float],
+        after: list[Block | None],
+        total: float,
+    ) -> tuple[list[float], list[Block | None], float]:
+        """Go on the way of a step as long as that helps: events that come too late count for more than their slope."""
+        dx = np.array(trial) - np.array(x)
+        for _ in range(STRIDES):
+            dx = STRIDE * dx
+            there = [float(v) for v in np.clip(np.array(x) + dx, 0.0, 1.0)]
+            found = [
+                self.block(r, candidates, there, b.shift, 0.0) for r, b in zip(use, after, strict=True) if b is not None
+            ]
+            if there == trial or any(b is None for b in found):
+                break
+            left = self._total([b for b in found if b is not None])
+            if left >= total:
+                break
+            trial, after, total = there, list(found), left
+        return trial, after, total
+
+    def polish(self, fitted: Fitted, size: float = 0.02, most: int = 45) -> Fitted:
         """Follow a crooked valley by a simplex: where a threshold is crossed, differences mislead; never worse."""
         from scipy.optimize import minimize
 
@@ -346,29 +366,4 @@ def _key(r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: flo
     return (r, names, tuple(np.round(np.asarray(x, dtype=float), 12)), round(shift, 9))
 
 
-def shift_of(block: Block, dx: Array) -> float:
-    """Change of the time shift that goes with dx; it stays within `WIDEST` of its prior."""
-    g = float(block.slope @ (block.residual - block.J @ dx)) - block.shift * block.prior**-2
-    most = WIDEST * block.prior
-    return min(max(block.shift + g / block.weight, -most), most) - block.shift
-
-
-def _bounded(A: Array, b: Array, x: Array, damping: float) -> Array:
-    """Step that solves (A + damping diag A) dx = b, coordinates that would leave the unit box held at its border."""
-    p = x.size
-    free = np.ones(p, dtype=bool)
-    dx = np.zeros(p)
-    for _ in range(p + 1):
-        if not free.any():
-            break
-        M = A[np.ix_(free, free)].copy()
-        M[np.diag_indices_from(M)] *= 1.0 + damping
-        M[np.diag_indices_from(M)] += GENTLE
-        target = b[free] - A[np.ix_(free, ~free)] @ dx[~free]
-        dx[free] = np.linalg.solve(M, target)
-        out = free & ((x + dx < 0.0) | (x + dx > 1.0))
-        if not out.any():
-            break
-        dx[out] = np.clip(x[out] + dx[out], 0.0, 1.0) - x[out]
-        free &= ~out
-    return dx
+__all__ = ["GENTLE", "Block", "Fitted", "Judge", "shift_of"]

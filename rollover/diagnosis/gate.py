@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.chaos import FEW
 from rollover.diagnosis.fit import Block, Fitted, Judge
 from rollover.effects import EFFECTS
 
@@ -46,15 +47,17 @@ class Gate:
         return p_value(self.score / max(phi, 1.0), self.null)
 
 
-def gate(judge: Judge, base: Fitted, candidates: Sequence[Candidate]) -> Gate:
-    """Look at every candidate beside the base, in all recordings."""
-    misfit = np.concatenate([freed((b.residual + b.shift * b.slope)[:, None], b)[:, 0] for b in base.blocks])
-    held = np.concatenate([freed(b.J, b) for b in base.blocks]) if base.x else np.zeros((misfit.size, 0))
+def gate(judge: Judge, base: Fitted, candidates: Sequence[Candidate], only: Sequence[int] | None = None) -> Gate:
+    """Look at every candidate beside the base, in all recordings or `only` some."""
+    use = list(range(len(base.blocks))) if only is None else list(only)
+    blocks = [base.blocks[r] for r in use]
+    misfit = np.concatenate([freed((b.residual + b.shift * b.slope)[:, None], b)[:, 0] for b in blocks])
+    held = np.concatenate([freed(b.J, b) for b in blocks]) if base.x else np.zeros((misfit.size, 0))
     own, _ = np.linalg.qr(held)
     columns, names, values = [], [], []
     for c in candidates:
         for x in c.probes():
-            d = _direction(judge, base, c, x)
+            d = _direction(judge, base, c, x, use)
             if d is None:
                 continue
             d = d - own @ (own.T @ d)
@@ -66,7 +69,7 @@ def gate(judge: Judge, base: Fitted, candidates: Sequence[Candidate]) -> Gate:
     if not columns:
         return Gate(score=0.0, scores={}, null=np.zeros(DRAWS), detectable={})
     D = np.stack(columns, axis=1)
-    scores = (D.T @ (misfit - own @ (own.T @ misfit))) ** 2
+    scores = (D.T @ (misfit - own @ (own.T @ misfit))) ** 2 / (1.0 + _trust(judge, blocks, use, D))
     detectable: dict[str, float] = {}
     for name, value in zip(names, values, strict=True):
         detectable[name] = min(value, detectable.get(name, np.inf))
@@ -76,10 +79,24 @@ def gate(judge: Judge, base: Fitted, candidates: Sequence[Candidate]) -> Gate:
     return Gate(score=float(scores.max()), scores=own_best, null=null_of_the_best([D]), detectable=detectable)
 
 
-def _direction(judge: Judge, base: Fitted, c: Candidate, x: Sequence[float]) -> Array | None:
-    """What the candidate at x moves, all recordings, freed of their time shifts; None where it cannot be simulated."""
+def _trust(judge: Judge, blocks: Sequence[Block], use: Sequence[int], D: Array) -> Array:
+    """Variance along each direction (n, m) of what runs that nobody could tell apart differ by, (m,), noise units."""
+    many = min((len(judge.evidence[r].strays) for r in use), default=0)
+    found = np.zeros(D.shape[1])
+    for k in range(many):
+        strays = [
+            freed(judge.evidence[r].whitened(judge.evidence[r].strays[k])[:, None], block)[:, 0]
+            for r, block in zip(use, blocks, strict=True)
+        ]
+        found += (D.T @ np.concatenate(strays)) ** 2
+    return np.asarray(FEW * found / max(many, 1))
+
+
+def _direction(judge: Judge, base: Fitted, c: Candidate, x: Sequence[float], use: Sequence[int]) -> Array | None:
+    """What the candidate at x moves in the recordings `use`, without their time shifts; None if it fails."""
     found = []
-    for r, block in enumerate(base.blocks):
+    for r in use:
+        block = base.blocks[r]
         y = judge.predicted(r, (*base.candidates, c), (*base.x, *x), block.shift)
         if y is None:
             return None

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ground.quantity import quantities
 from rollover.diagnosis.candidates import physical
+from rollover.diagnosis.chaos import FEW
 from rollover.diagnosis.evidence import MODEL_ERROR
 from rollover.diagnosis.fit import GENTLE, Fitted, Judge
 from rollover.diagnosis.verdict import Interval
@@ -22,7 +23,8 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
     """For each effect, its parameters with 95 % intervals.
 
     cov = phi A^-1, phi the misfit left per sample (at least 1); beside it, in quadrature, what a gain error of the
-    model of `MODEL_ERROR` in any one channel would do, A^-1 J'(error): integrators differ, noise or not.
+    model of `MODEL_ERROR` in any one channel would do, A^-1 J'(error): integrators differ, noise or not. Where runs
+    that nobody could tell apart scatter, so do the parameters that would be fitted to them.
     """
     p = len(fitted.x)
     A = sum((b.normal()[0] for b in fitted.blocks), np.zeros((p, p))) + GENTLE * np.eye(p)
@@ -40,6 +42,9 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
                     y = (judge.measured[r] - block.residual)[part]
                     pull += block.J[part].T @ (MODEL_ERROR * y)
         moved += (inverse @ pull) ** 2
+    for e, block in zip(judge.evidence, fitted.blocks, strict=True):
+        for stray in e.strays:
+            moved += FEW / len(e.strays) * (inverse @ (block.J.T @ e.whitened(stray))) ** 2
     sd = np.sqrt(sd**2 + moved)
     found, at = [], 0
     for c in fitted.candidates:

@@ -3,7 +3,7 @@
 With N (n, q) what one standard deviation of each uncertain condition does to the whitened samples, a misfit has the
 covariance 1 + N N' in place of 1. With N = U S V',
 
-    w -> (1 + N N')^-1/2 w = w - U (1 - (1 + S^2)^-1/2) U'w                                                    (D3)
+    w -> (1 + N N')^-1/2 w = w - U (1 - (1 + S^2)^-1/2) U'w                                                    (D5)
 
 has the covariance 1 again: what an error of the conditions would do counts little, all else as before.
 """
@@ -28,7 +28,7 @@ LEAST = 1e-9  # of the largest: directions below are rounding
 
 @dataclass(frozen=True, kw_only=True)
 class Eased:
-    """(D3): directions U (n, q) of unit length, and the share of each that is taken out (q,)."""
+    """(D5): directions U (n, q) of unit length, and the share of each that is taken out (q,)."""
 
     directions: Array
     shares: Array

@@ -15,20 +15,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover import simulate
+from rollover.diagnosis.effort import RUNS
 from rollover.document import exchanged
 from rollover.effects import read
 from rollover.filters import filtered, least_rate
 from rollover.misfit import as_measured
 from rollover.recording import Recording
+from rollover.run import Run
 from rollover.scenario import Scenario
+from rollover.vehicle import Striker
 
 Array = NDArray[np.float64]
 SENSORS = "sensor-"
-KEPT = 400  # runs of one recording: a third of a megabyte each
-BEYOND = 0.06  # s by which a run goes on past the last stamp, so that it covers a time shift
+KEPT = 300  # runs of one recording: a third of a megabyte each
+BEYOND, FAR_BEYOND = 0.01, 0.06  # s by which a run goes on past the last stamp: time shifts, known zero or not
 SLOWEST = 20.0  # times the first run's wall time, and
-LEAST_TIME = 5.0  # s: a run that takes longer has lost its way in ever shorter steps
-MOTION = ("chassis/", "striker/", "axle/front/angle")  # what an instrument's place is worked out from
+LEAST_TIME = 2.0  # s: a run that takes longer has lost its way in ever shorter steps
+ELSEWHERE = ((0.34, 0.28), (-0.41, 0.17))  # of an element, by which neighbours lie elsewhere on the grid
+SHORTER = (3,)  # times shorter steps of neighbours
+BLOW = 2.0  # weights
+AFTER = 0.03  # s, shortest sliding that is a phase
+MOTION = ("chassis/", "striker/", "axle/front/angle", "ground/sinkage")  # what an instrument's place is worked out from
 
 
 class _TooSlowError(Exception):
@@ -38,17 +45,21 @@ class _TooSlowError(Exception):
 class RunSimulator:
     """Any scenario by full runs; `runs` counts those that were made, `seconds` is their wall time."""
 
+    effort = RUNS
+
     def __init__(self, scenario: Scenario, recording: Recording) -> None:
         self.recording = recording
         self.scenario = _covering(scenario, recording)
         self.runs = 0
         self.seconds = 0.0
+        self._phases: tuple[tuple[float, str], ...] = ()
         self._limit = np.inf
         self._known: dict[tuple[Any, ...], tuple[Scenario, Recording] | None] = {}
+        self._behind: dict[tuple[Any, ...], tuple[Recording, dict[str, Array]]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is sent to another process: not the runs."""
-        return {**self.__dict__, "_known": {}}
+        """Without the runs: another process makes its own."""
+        return {**self.__dict__, "_known": {}, "_behind": {}}
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """Channels (n,) at the recording's stamps less `shift` (s); None if the run fails.
@@ -61,32 +72,79 @@ class RunSimulator:
         if known is None:
             return None
         applied, run = known
-        run = read(chosen.effects, as_measured(applied, run, self.recording))
-        step = float(np.median(np.diff(run.time)))
+        key = _key(changes)
+        if key not in self._behind:
+            if len(self._behind) >= KEPT:
+                self._behind.pop(next(iter(self._behind)))
+            seen = as_measured(applied, run, self.recording)
+            self._behind[key] = (
+                seen,
+                {c: self._filtered(seen, c) for c in self.recording.channels if c in seen.channels},
+            )
+        seen, behind = self._behind[key]
+        spoiled = {e.channel for name, e in chosen.effects.items() if name.startswith(SENSORS)}
+        misread = read(chosen.effects, seen) if spoiled else seen
         at = self.recording.time - shift
-        outside = (at < run.time[0] - BEYOND) | (at > run.time[-1] + BEYOND)
+        outside = (at < seen.time[0] - FAR_BEYOND) | (at > seen.time[-1] + FAR_BEYOND)
         found = {}
-        for name in self.recording.channels:
-            if name not in run.channels:
-                continue
-            values, cfc = run[name], self.recording.cfc.get(name)
-            if cfc is not None and 1.0 / step >= least_rate(cfc) * (1.0 - 1e-9):
-                values = filtered(values, step, cfc)
-            found[name] = np.where(outside, np.nan, np.interp(at, run.time, values))
+        for name, values in behind.items():
+            values = self._filtered(misread, name) if name in spoiled else values
+            found[name] = np.where(outside, np.nan, np.interp(at, seen.time, values))
+        return found
+
+    def _filtered(self, run: Recording, channel: str) -> Array:
+        """A channel of a run behind the filter class that was applied to it, where the run is fast enough."""
+        step, cfc = float(np.median(np.diff(run.time))), self.recording.cfc.get(channel)
+        if cfc is None or 1.0 / step < least_rate(cfc) * (1.0 - 1e-9):
+            return run[channel]
+        return filtered(run[channel], step, cfc)
+
+    def marks(self) -> tuple[tuple[float, str], ...]:
+        """Phases of the run as it is; empty if it fails."""
+        self.predict({}, 0.0)
+        return self._phases
+
+    def state(self, shift: float) -> Mapping[str, Array]:
+        """Motion of the run as it is, (n,) at the stamps less `shift`; empty if it fails."""
+        known = self._run(self.scenario, {})
+        if known is None:
+            return {}
+        run, at = known[1], self.recording.time - shift
+        return {name: np.interp(at, run.time, values) for name, values in run.channels.items()}
+
+    def strays(self) -> list[dict[str, Array]]:
+        """What neighbours differ by from the run as it is, channels (n,) at the stamps; those that fail are left out.
+
+        Neighbours lie elsewhere on the ground's grid, or take shorter steps: nobody could say which of them is right.
+        """
+        base = self.predict({}, 0.0)
+        if base is None:
+            return []
+        elements, step = self.scenario.ground.elements, self.scenario.simulation.step
+        places = [
+            tuple(c + f * w for c, f, w in zip(elements.centre, fraction, elements.spacing, strict=True))
+            for fraction in ELSEWHERE
+        ]
+        changes: list[dict[str, Any]] = [{"ground.elements.centre": place} for place in places]
+        changes += [{"simulation.step": step / parts} for parts in SHORTER]
+        found = []
+        for change in changes:
+            there = self.predict(change, 0.0)
+            if there is not None:
+                found.append({name: there[name] - base[name] for name in base})
         return found
 
     def _run(self, chosen: Scenario, changes: Mapping[str, Any]) -> tuple[Scenario, Recording] | None:
         """The run before instruments, with the scenario as its effects made it; None if it failed."""
-        moving = {path: value for path, value in changes.items() if not path.startswith(f"effects.{SENSORS}")}
-        key = tuple(sorted(moving.items()))
+        key = _key(changes)
         if key not in self._known:
             if len(self._known) >= KEPT:
                 self._known.pop(next(iter(self._known)))
             physical = {name: e for name, e in chosen.effects.items() if not name.startswith(SENSORS)}
-            self._known[key] = self._made(replace(chosen, effects=physical))
+            self._known[key] = self._made(replace(chosen, effects=physical), is_base=not key)
         return self._known[key]
 
-    def _made(self, scenario: Scenario) -> tuple[Scenario, Recording] | None:
+    def _made(self, scenario: Scenario, *, is_base: bool) -> tuple[Scenario, Recording] | None:
         self.runs += 1
         try:
             run = simulate.run(scenario, progress=self._watch)
@@ -98,6 +156,8 @@ class RunSimulator:
             self._limit = max(SLOWEST * run.wall_time, LEAST_TIME)
         if run.status == "failed":
             return None
+        if is_base:
+            self._phases = phases_of(run)
         stems = {name[:-1] for name in self.recording.channels}  # the axes across, for a sensor that is turned
         kept = {n: v for n, v in run.recording.channels.items() if n[:-1] in stems or n.startswith(MOTION)}
         return scenario.applied(), replace(run.recording, channels=kept)
@@ -107,13 +167,39 @@ class RunSimulator:
             raise _TooSlowError
 
 
+def _key(changes: Mapping[str, Any]) -> tuple[Any, ...]:
+    """What of the changes moves the vehicle."""
+    return tuple(sorted((p, v) for p, v in changes.items() if not p.startswith(f"effects.{SENSORS}")))
+
+
+def phases_of(run: Run) -> tuple[tuple[float, str], ...]:
+    """(start s, name) of support, tipping, impact, sliding, rest: sliding is what comes after the last blow.
+
+    A blow is a force of the ground beyond `BLOW` times the weight; support ends with the first wheel that lifts off,
+    tipping with the first part that hits the ground and is no wheel.
+    """
+    marks = list(run.phases)
+    start = next((at for at, name in marks if name == "impact"), None)
+    if start is None:
+        return tuple(marks)
+    vehicle = run.scenario.vehicle
+    mass = vehicle.mass if isinstance(vehicle, Striker) else vehicle.whole.mass
+    time, force = run.recording.time, run.recording["ground/force_normal"]
+    blows = time[(force > BLOW * mass * run.scenario.gravity) & (time >= start)]
+    end = next((at for at, name in marks if name == "rest"), float(time[-1]))
+    sliding = float(blows[-1]) if blows.size else start
+    if start < sliding < end - AFTER:
+        marks.append((sliding, "sliding"))
+    return tuple(sorted(marks))
+
+
 def _covering(scenario: Scenario, recording: Recording) -> Scenario:
     """The scenario with the shortest duration that covers the recording and its time shifts.
 
     It does not stop at rest: what rests stays in the rows that later stamps are compared with.
     """
     settings = scenario.simulation
-    end = float(recording.time[-1]) + BEYOND
+    end = float(recording.time[-1]) + (FAR_BEYOND if recording.clock.zero == "unknown" else BEYOND)
     rows = max(1, int(np.ceil(end / settings.output_step)))
     duration = round(min(rows * settings.output_step, 120.0), 9)
     return replace(scenario, simulation=replace(settings, duration=duration, stop_at_rest=False))

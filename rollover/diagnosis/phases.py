@@ -1,4 +1,4 @@
-"""Phases of a drop as they were measured: free fall, first contact, loading, peak, unloading, rest."""
+"""Phases of a test: of a drop free fall, first contact, loading, peak, unloading, rest; else those of its run."""
 
 from __future__ import annotations
 
@@ -11,6 +11,17 @@ Array = NDArray[np.float64]
 FIRST_CONTACT = 0.005  # s, after the impact
 AROUND_PEAK = 0.10  # of the time to the deepest point, either side
 SETTLING = 0.06  # s after the deepest point until what is left is rest
+
+
+def phases_of(evidence: Evidence) -> tuple[tuple[float, str], ...]:
+    """(start s, name) of each phase that a recording went through."""
+    run = evidence.simulator.marks()
+    if not run:
+        return drop_phases(evidence)
+    first, last = float(evidence.recording.time[0]), float(evidence.recording.time[-1])
+    marks = [m for m in run if m[0] < last]
+    marks = [m for k, m in enumerate(marks) if k + 1 == len(marks) or marks[k + 1][0] > first]
+    return tuple((max(at, first) if k else first, name) for k, (at, name) in enumerate(marks)) or ((first, "approach"),)
 
 
 def drop_phases(evidence: Evidence) -> tuple[tuple[float, str], ...]:

@@ -11,7 +11,7 @@ from rollover.diagnosis import colour
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.detect import Mismatch, mismatch_of
-from rollover.diagnosis.explain import NEARLY_NOISE, Step, moves, step
+from rollover.diagnosis.explain import NEARLY_NOISE, Step, moves, spread, step
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate, gate
 from rollover.diagnosis.holdout import held_out
@@ -70,7 +70,8 @@ def explained(
         base = judge.again(base)
     before = mismatch_of(judge.evidence, base.blocks, phases)
     say(f"looking at {len(candidates)} candidates, which of them could matter")
-    looked = first_look = gate(judge, base, candidates)
+    few = spread(base, groups, judge.effort.few) if judge.effort.thrifty else None
+    looked = first_look = gate(judge, base, candidates, few)
     current, left, taken = base, before, []
     first: Step | None = None
     for _ in range(MOST):
@@ -85,9 +86,11 @@ def explained(
         taken.append(found)
         current = found.fitted
         left = mismatch_of(judge.evidence, current.blocks, phases)
+        if judge.effort.thrifty and (left.p_value > SURE or not matters(judge, current, left)):
+            break
         if len(taken) > 1 and current.left > HOPELESS**2 * count:
             break
-        looked = gate(judge, current, free(current, candidates))
+        looked = gate(judge, current, free(current, candidates), few)
     is_whole = left.p_value > SURE or not matters(judge, current, left)
     parts = [s.again(judge) for s in taken]
     if is_whole and len(taken) > 1:

@@ -17,7 +17,7 @@ from rollover.diagnosis.account import diagnosed_scenario
 from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.evidence import Evidence, evidence_of
 from rollover.diagnosis.fit import Judge
-from rollover.diagnosis.phases import drop_phases
+from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.simulator import simulator_of
 from rollover.diagnosis.verdict import Diagnosis
 from rollover.recording import Recording
@@ -112,7 +112,7 @@ def _told(
         recording=name,
         title=recording.title,
         held_out=held_out,
-        phases=drop_phases(evidence),
+        phases=phases_of(evidence),
         shift=at,
         tracks=tuple(tracks),
         condition=evidence.condition,

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.effort import DROPS, Effort
 from rollover.diagnosis.overturn import RunSimulator
 from rollover.drop import DropFailedError, DropModel, unfit
 from rollover.effects import every, read
@@ -33,9 +34,24 @@ class Simulator(Protocol):
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """Channels (n,) at the recording's stamps less `shift` (s); None if the simulation fails."""
 
+    def strays(self) -> list[dict[str, Array]]:
+        """What runs that nobody could tell apart differ by, channels (n,) at the stamps; empty if by nothing."""
+
+    def marks(self) -> tuple[tuple[float, str], ...]:
+        """(start s, name) of the phases of the scenario as it is; empty if the recording itself tells."""
+
+    def state(self, shift: float) -> Mapping[str, Array]:
+        """Motion of the scenario as it is, recorded or not, (n,) each; empty where the recording itself tells."""
+
+    @property
+    def effort(self) -> Effort:
+        """How much may be simulated."""
+
 
 class DropSimulator:
     """A drop test by its own integrator: two milliseconds a run."""
+
+    effort = DROPS
 
     def __init__(self, scenario: Scenario, recording: Recording) -> None:
         self.model = DropModel(scenario=scenario)
@@ -59,6 +75,19 @@ class DropSimulator:
         except DropFailedError:
             return None
         return behind_filters(run.channels, self.recording)
+
+    def strays(self) -> list[dict[str, Array]]:
+        """See `Simulator`: one striker on its guide has no neighbours."""
+        return []
+
+    def marks(self) -> tuple[tuple[float, str], ...]:
+        """See `Simulator`."""
+        return ()
+
+    def state(self, shift: float) -> Mapping[str, Array]:
+        """See `Simulator`."""
+        del shift
+        return {}
 
     def _edges(self, physical: Mapping[str, Any], shift: float, read_by: Mapping[str, Any]) -> dict[str, Array]:
         """Channels behind a lag or with a clock of their own: what these make of a leap lies between the stamps."""

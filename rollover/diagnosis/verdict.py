@@ -23,6 +23,20 @@ class Place:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Degree:
+    """A degree of freedom of a body: residual force (N) or moment (N m), rms over all recordings, share of the misfit.
+
+    `axis` is "along y" or "about x", body axes; shares of all degrees add up to 1.
+    """
+
+    body: str
+    axis: str
+    unit: str
+    rms: float
+    share: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class Interval:
     """A fitted parameter with its 95 % interval, in SI; `at_bound` where the search ended at an end of its range."""
 
@@ -113,5 +127,6 @@ class Diagnosis:
     candidates: tuple[Considered, ...]
     simulations: int
     seconds: float
+    degrees: tuple[Degree, ...] = ()
     notes: tuple[str, ...] = ()
     empirical: Law | None = None  # where no effect explains the mismatch

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rollover.document.check import check
-from rollover.document.exchange import exchanged
+from rollover.document.exchange import exchanged, value_at
 from rollover.document.include import expand, find, headings, shipped_folder
 from rollover.document.replace import parse_setting, replaced
 from rollover.document.resolved import Leaf, content_hash, dump, paths, to_mapping
@@ -38,6 +38,7 @@ __all__ = [
     "shipped_folder",
     "slot_of",
     "to_mapping",
+    "value_at",
 ]
 
 

@@ -177,6 +177,8 @@ class _Where:
         node = self.node
         for key in match[1].split("."):
             child = node.value.get(key) if isinstance(node.value, Mapping) else None
+            if isinstance(node.value, tuple) and key.isdecimal() and int(key) < len(node.value):
+                child = node.value[int(key)]
             if child is None:
                 break
             node = child

@@ -46,6 +46,13 @@ def exchanged(thing: T, changes: Mapping[str, Any]) -> T:
     return replace(thing, **here)  # type: ignore[type-var]
 
 
+def value_at(thing: Any, path: str) -> Any:
+    """The value at a path, with parts of a list by name or place. Raises ``KeyError`` for one that does not exist."""
+    for step in path.split("."):
+        thing = _part(thing, step)
+    return thing
+
+
 def _part(thing: Any, step: str) -> Any:
     if isinstance(thing, tuple):
         return next((item for item in thing if getattr(item, "name", None) == step), None) or thing[int(step)]

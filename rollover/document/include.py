@@ -39,7 +39,7 @@ def find(name: str | Path, folder: str = "") -> Path:
     known = [p.stem for p in sorted(shelf.glob("*.yaml"))]
     here = [str(p) for p in sorted(path.parent.glob("*.yaml"))] if path.parent.is_dir() else []
     close = nearest(path.stem, known) or nearest(str(path), here)
-    help_ = f"did you mean {close[0]!r}?" if close else f"shipped: {', '.join(known)}"
+    help_ = f"did you mean {close[0]!r}?" if close else f"shipped: {', '.join(known) or 'none'}"
     raise InputError(Fault(file=str(name), message=f"no such file; {help_}"))
 
 

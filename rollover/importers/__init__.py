@@ -6,7 +6,7 @@ import functools
 from collections.abc import Mapping
 from pathlib import Path
 
-from rollover.faults import Fault, InputError, hint
+from rollover.faults import Fault, InputError, absent, hint
 from rollover.importers import iso_mme, plain
 from rollover.importers.cone_drops import CONE_DROPS
 from rollover.importers.csv_profile import CSV
@@ -57,7 +57,7 @@ def read_recording(path: str | Path, *, profile: str | Path | Described | None =
     except (OSError, RuntimeError) as e:  # a link that leads to itself
         raise InputError(Fault(file=str(path), message=f"cannot be read: {getattr(e, 'strerror', e)}")) from None
     if not exists:
-        what = "cannot be read: a link that leads nowhere" if path.is_symlink() else "no such file"
+        what = "cannot be read: a link that leads nowhere" if path.is_symlink() else absent(path)
         raise InputError(Fault(file=str(path), message=what))
     given = profile if isinstance(profile, Described) or profile is None else read_profile(profile)
     return _importer(path, given, kind).read(path, given)
@@ -88,6 +88,11 @@ def _importer(path: Path, given: Described | None, kind: str) -> Importer:
         if importer.sniff(path) and not (importer is PLAIN and given is not None):
             return importer
     if path.is_dir():
-        raise InputError(Fault(file=str(path), message="a folder, and neither a run, an ISO-MME test nor a ROS bag"))
+        raise InputError(
+            Fault(
+                file=str(path),
+                message="a folder, and neither a run, an ISO-MME test nor a ROS bag; its files one by one",
+            )
+        )
     message = f"no importer knows this file; {', '.join(table)} are known, --profile says what its columns are"
     raise InputError(Fault(file=str(path), message=message))

@@ -1,6 +1,7 @@
 """The blind proof: cases are made and sealed, each is diagnosed in a process of its own, then the truth is opened.
 
-The diagnosis is known by name only (`module:function`): the proof imports nothing of it.
+The diagnosis is known by name only (`module:function`), and so is what makes the cases of a rig other than the drop
+rig: the proof imports nothing of them.
 """
 
 from __future__ import annotations
@@ -14,13 +15,14 @@ from typing import Any, cast
 
 from rollover.execute import map_cases
 from rollover.proof.folder import fingerprint, write_case
-from rollover.proof.generator import Order, make, plan
+from rollover.proof.generator import Case, Order
 from rollover.proof.score import score
 from rollover.proof.seal import Seal, opened, sealed, write_truth
 from rollover.proof.tally import tally
 
 FORMAT = "rollover-proof/1"
 DIAGNOSIS = "rollover.diagnosis:diagnose_folder"
+RIGS = {"drop": "rollover.proof.generator", "overturn": "rollover.overturns.generator"}  # with `plan` and `make`
 Diagnose = Callable[..., dict[str, Any]]
 
 
@@ -30,6 +32,7 @@ class Making:
 
     order: Order
     folder: Path
+    rig: str = "drop"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +56,7 @@ class Proof:
 
 def made(making: Making) -> dict[str, Any]:
     """Write the folder of one case; its truth, with the fingerprint of what is handed over."""
-    case = make(making.order)
+    case: Case = importlib.import_module(RIGS[making.rig]).make(making.order)
     write_case(case, making.folder)
     return {**case.truth, "handed_over": fingerprint(making.folder)}
 
@@ -69,6 +72,7 @@ def prove(
     count: int,
     seed: int,
     *,
+    rig: str = "drop",
     kinds: Sequence[str] = (),
     effects: Sequence[str] = (),
     workers: int | None = None,
@@ -79,14 +83,18 @@ def prove(
 ) -> Proof:
     """Make, seal, diagnose, open, score. `on_seal` is called before the first diagnosis, `show` after each case.
 
+    `rig` is one of `RIGS`.
+
     Cases stand in a temporary folder, the truth in another one until it is opened. Raises ``ValueError`` for what
     cannot be planned and ``RuntimeError`` if a case cannot be made.
     """
-    orders = plan(count, seed, kinds, effects)
+    if rig not in RIGS:
+        raise ValueError(f"rig: no such rig, got {rig!r}; {', '.join(RIGS)} are allowed")
+    orders: list[Order] = importlib.import_module(RIGS[rig]).plan(count, seed, kinds, effects)
     with tempfile.TemporaryDirectory(prefix="cases.") as given, tempfile.TemporaryDirectory(prefix="kept.") as kept:
         folders = [Path(given) / order.name for order in orders]
         truths: dict[int, dict[str, Any]] = {}
-        makings = [Making(order=o, folder=f) for o, f in zip(orders, folders, strict=True)]
+        makings = [Making(order=o, folder=f, rig=rig) for o, f in zip(orders, folders, strict=True)]
         for outcome in map_cases(made, makings, workers=workers):
             if outcome.value is None:
                 sentence = outcome.failure.sentence if outcome.failure else "no reason given"
@@ -114,6 +122,7 @@ def prove(
         "format": FORMAT,
         "cases": count,
         "seed": seed,
+        "rig": rig,
         "kinds": list(kinds),
         "effects": list(effects),
         "seal": seal.public(),

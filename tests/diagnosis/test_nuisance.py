@@ -80,7 +80,7 @@ def test_an_effect_is_fitted_better_beside_speeds_that_are_wrong(monkeypatch: py
     for sigma in (0.0, 0.08):
         found = evidence(misstated({"effects.co-moving-mass.fraction": truth}, sigma))
         judge = Judge(found)
-        c = next(c for c in candidates_of(found, (), "drop", size_of(scenario())) if c.id == "co-moving-mass")
+        c = next(c for c in candidates_of(found, (), "drop", None, size_of(scenario())) if c.id == "co-moving-mass")
         one = judge.fit((c,), [coordinate(0.12, c.search["fraction"])])
         assert one is not None
         off[sigma] = abs(c.values(one.x)["fraction"] - truth)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,11 +11,13 @@ import pytest
 
 from rollover import simulate
 from rollover.diagnosis import overturn
-from rollover.diagnosis.overturn import RunSimulator
+from rollover.diagnosis.evidence import evidence_of
+from rollover.diagnosis.overturn import RunSimulator, phases_of
+from rollover.diagnosis.phases import phases_of as phases
 from rollover.diagnosis.simulator import DropSimulator, simulator_of
 from rollover.filters import filtered
 from rollover.measured import at_sensor
-from rollover.recording import Recording, Sensor
+from rollover.recording import Clock, Recording, Sensor
 from rollover.scenario import Scenario
 from tests.physics.scenes import shipped
 
@@ -54,7 +57,9 @@ def test_a_prediction_is_the_run_at_the_stamps_less_the_shift() -> None:
 def test_the_run_is_no_longer_than_the_recording_needs() -> None:
     simulator = RunSimulator(toss(), recording(Z, until=0.3))
     last = float(recording(Z, until=0.3).time[-1])
-    assert last + 0.03 < simulator.scenario.simulation.duration < last + 0.1
+    assert last + 0.005 < simulator.scenario.simulation.duration < last + 0.02
+    loose = RunSimulator(toss(), recording(Z, until=0.3, clock=Clock(zero="unknown")))
+    assert last + 0.05 < loose.scenario.simulation.duration < last + 0.1
     assert RunSimulator(toss(), recording(Z, until=3.0)).scenario.simulation.duration > 2.99
 
 
@@ -140,3 +145,50 @@ def test_drops_keep_their_own_integrator() -> None:
     time = np.arange(0.0, 0.1, 0.001)
     made = Recording(title="r", time=time, channels={"ground/sinkage": np.zeros(time.size)})
     assert isinstance(simulator_of(shipped("drop_test"), made), DropSimulator)
+
+
+def test_phases_of_an_overturn_are_those_of_its_forces() -> None:
+    own = shipped("side_overturn").replaced(
+        {"initiation.excess_deg": 8.0, "initiation.roll_rate": 1.8, "simulation.duration": 0.8}
+    )
+    done = simulate.run(own)
+    marks = {name: at for at, name in phases_of(done)}
+    assert list(marks) == ["tipping", "impact", "sliding"]
+    time, force = done.recording.time, done.recording["ground/force_normal"]
+    weight = 3000.0 * 9.81
+    assert marks["impact"] == time[np.argmax(force > 0.1 * weight)]
+    assert np.all(force[time > marks["sliding"]] <= 2.0 * weight)
+    assert force[time == marks["sliding"]] > 2.0 * weight
+
+
+def test_phases_are_cut_to_the_recording() -> None:
+    made = recording(Z, until=0.4)
+    found = evidence_of(
+        "toss", replace(made, channels={Z: np.linspace(0.1, 0.0, made.time.size)}), RunSimulator(toss(), made)
+    )
+    assert found is not None
+    names = [name for _, name in phases(found)]
+    assert names[:2] == ["approach", "impact"]
+    assert phases(found)[0][0] == made.time[0]
+
+
+def test_neighbours_stray_after_the_first_contact_only() -> None:
+    simulator = RunSimulator(toss(), recording(Z, ROLL, until=0.5))
+    strays = simulator.strays()
+    assert len(strays) == len(overturn.ELSEWHERE) + len(overturn.SHORTER)
+    assert simulator.runs == 1 + len(strays)
+    time = simulator.recording.time
+    touch = next(at for at, name in simulator.marks() if name == "impact")
+    for stray in strays:
+        assert np.max(np.abs(stray[Z][time < touch])) < 1e-6
+    assert max(np.max(np.abs(s[ROLL][time > touch])) for s in strays) > 1e-4
+
+
+def test_the_motion_is_told_though_it_was_not_recorded() -> None:
+    simulator = RunSimulator(toss(), recording(Z))
+    state = simulator.state(0.002)
+    whole = run()
+    np.testing.assert_allclose(
+        state["chassis/roll"][1:20],
+        np.interp(simulator.recording.time - 0.002, whole.time, whole["chassis/roll"])[1:20],
+    )

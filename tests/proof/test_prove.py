@@ -68,7 +68,13 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     account = json.loads(answer.stdout)
     assert account["seal"]["digest"] in answer.stderr
     assert account == json.loads((out / "prove.json").read_text())
-    assert sorted(p.name for p in out.iterdir()) == ["diagnoses.jsonl", "prove.json", "seal.json", "truth.json"]
+    assert sorted(p.name for p in out.iterdir()) == [
+        "diagnoses.jsonl",
+        "prove.json",
+        "report.html",
+        "seal.json",
+        "truth.json",
+    ]
     assert len(opened(account["seal"]["digest"], out / "truth.json")) == 2
     assert len((out / "diagnoses.jsonl").read_text().splitlines()) == 2
     other = CliRunner().invoke(app, ["prove", *QUICK, "--seed", "2", "--out", str(out)])

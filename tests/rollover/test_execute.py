@@ -5,12 +5,17 @@ from __future__ import annotations
 import itertools
 import os
 import signal
+import subprocess
+import sys
 import threading
+import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from rollover import execute
 from rollover.execute import map_cases
 
 
@@ -23,6 +28,8 @@ def odd(case: Any) -> Any:
             os.kill(os.getpid(), signal.SIGKILL)
         case "hang":
             threading.Event().wait()
+        case "eat":
+            return len(bytearray(2_000_000_000))
         case "unpicklable":
             return lambda: None
     return case * case, os.getpid()
@@ -43,8 +50,81 @@ def test_what_goes_wrong_costs_one_case() -> None:
     assert [found[i].value[0] for i in (0, 5)] == [4, 9]
     assert os.getpid() not in [found[i].value[1] for i in (0, 5)]
     sentences = [found[i].failure.sentence for i in (1, 2, 3)]  # type: ignore[union-attr]
-    assert sentences == ["ValueError: not today", "its process ended with exit code -9", "took longer than 5 s"]
+    killed = "its process ended with exit code -9, as when the machine runs out of memory"
+    assert sentences == ["ValueError: not today", killed, "took longer than 5 s"]
     assert "in odd" in found[1].failure.detail  # type: ignore[union-attr]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no limit of the address space")
+def test_memory_beyond_the_limit_is_a_failure_and_the_child_goes_on() -> None:
+    found = {o.index: o for o in map_cases(odd, [2, "eat", 3], workers=1, memory_limit=1e9)}
+    assert found[1].failure is not None
+    assert (found[1].failure.kind, found[1].failure.sentence) == ("memory-limit", "needed more memory than it may have")
+    assert [found[i].value[0] for i in (0, 2)] == [4, 9]
+    assert found[0].value[1] == found[2].value[1], "the same child"
+    free = next(iter(map_cases(odd, ["eat"], workers=1, memory_limit=3e9)))
+    assert free.value == 2_000_000_000
+
+
+ORPHAN = """
+import sys
+from pathlib import Path
+from rollover.execute import map_cases
+from tests.rollover.odd import odd
+if __name__ == "__main__":
+    list(map_cases(odd, [Path(sys.argv[1])], workers=1))
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs /proc")
+def test_a_case_that_hangs_ends_with_its_parent(tmp_path: Path) -> None:
+    script, told = tmp_path / "orphan.py", tmp_path / "pid"
+    script.write_text(ORPHAN)
+    root = Path(__file__).resolve().parents[2]
+    parent = subprocess.Popen([sys.executable, str(script), str(told)], env={**os.environ, "PYTHONPATH": str(root)})
+    while not told.exists() or not told.read_text():
+        assert parent.poll() is None
+        time.sleep(0.05)
+    child = Path("/proc", told.read_text())
+    assert child.exists()
+    parent.kill()
+    parent.wait()
+    until = time.monotonic() + 60.0
+    while child.exists() and time.monotonic() < until:
+        time.sleep(0.1)
+    assert not child.exists()
+
+
+def warm() -> None:
+    os.environ["WARM"] = str(os.getpid())
+
+
+def warmed(case: int) -> str:
+    return os.environ["WARM"]
+
+
+def test_a_child_is_warmed_up_before_its_first_case() -> None:
+    found = [o.value for o in map_cases(warmed, [1, 2, 3], workers=1, warm_up=warm)]
+    assert found[0] not in (None, str(os.getpid()))
+    assert len(set(found)) == 1
+
+
+def test_a_pool_whose_idle_child_is_ended_is_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = []
+    pool_of = execute.child_pool
+    monkeypatch.setattr(execute, "child_pool", lambda *given: made.append(pool_of(*given)) or made[-1])
+
+    def slowly() -> Iterator[int]:
+        yield 2
+        for worker in list(made[0]._pool_manager.worker_manager.workers):
+            os.kill(worker, signal.SIGKILL)
+        while made[0].active:
+            threading.Event().wait(0.05)
+        yield 3
+
+    found = {o.index: o.value[0] for o in map_cases(odd, slowly(), workers=1) if o.value}
+    assert found == {0: 4, 1: 9}
+    assert len(made) == 2
 
 
 def test_without_workers_in_this_process() -> None:

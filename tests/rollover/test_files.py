@@ -18,6 +18,7 @@ from ground.array import Elements
 from ground.soils import soils
 from rollover import catalogue, document
 from rollover import scenario as scenarios
+from rollover import study as studies
 from rollover.document import Leaf
 from rollover.provenance import Provenance
 from rollover.rops import Rops
@@ -31,6 +32,7 @@ SCENARIOS = [path for path in FILES if path.parent == FOLDER]
 VEHICLES = [path for path in FILES if path.parent.name == "vehicles"]
 SOILS = [path for path in FILES if path.parent.name == "soils"]
 FRAMES = [path for path in FILES if path.parent.name == "rops"]
+STUDIES = [path for path in FILES if path.parent.name == "studies"]
 BASELINES = [path for path in FILES if path.parent.name == "baselines"]
 
 
@@ -45,12 +47,13 @@ def test_there_are_files_of_every_sort() -> None:
     assert more <= {p.stem for p in VEHICLES}
     assert {document.load(p, Rops).frame for p in FRAMES} == {"two-post-rear", "two-post-front", "four-post", "cab"}
     assert {"natural_clay"} <= {p.stem for p in SOILS}
-    assert set(FILES) == {*SCENARIOS, *VEHICLES, *SOILS, *FRAMES, *BASELINES}
+    assert set(FILES) == {*SCENARIOS, *VEHICLES, *SOILS, *FRAMES, *STUDIES, *BASELINES}
+    assert {"bank_slope_speed", "soil_side_overturn", "rops_stiffness"} <= {p.stem for p in STUDIES}
 
 
 @pytest.mark.parametrize("path", FILES, ids=name_of)
 def test_every_file_is_in_order(path: Path) -> None:
-    sort = {"vehicles": "vehicle", "soils": "soil", "rops": "rops", "baselines": "baseline"}.get(
+    sort = {"vehicles": "vehicle", "soils": "soil", "rops": "rops", "baselines": "baseline", "studies": "study"}.get(
         path.parent.name, "scenario"
     )
     assert catalogue.check(str(path)) == sort
@@ -60,11 +63,11 @@ def test_every_file_is_in_order(path: Path) -> None:
 def test_every_file_opens_with_comments(path: Path) -> None:
     lines = path.read_text(encoding="utf-8").splitlines()
     opening = lines[: next(i for i, line in enumerate(lines) if not line.startswith("#"))]
-    assert len(opening) >= (5 if path in SCENARIOS else 3)
+    assert len(opening) >= (5 if path in SCENARIOS + STUDIES else 3)
     assert 20 <= len(catalogue.headline(path)) <= 120
-    if path in SCENARIOS:
+    if path in SCENARIOS + STUDIES:
         text = " ".join(line.strip("# ") for line in opening)
-        assert "Look at" in text, "a scenario says what to look at"
+        assert "Look at" in text, "it says what to look at"
 
 
 # ---------------------------------------------------------------- provenance
@@ -122,6 +125,7 @@ def test_a_number_without_source_is_found() -> None:
 def schemas(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("schemas")
     parts = {"scenario": schema(), "vehicle": schema("vehicle"), "soil": schema("soil")}
+    parts["study"] = studies.schema()
     parts["rops"] = document.schema(Rops, "rollover rops")
     for name, content in parts.items():
         jsonschema.Draft202012Validator.check_schema(content)
@@ -130,7 +134,8 @@ def schemas(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 @pytest.mark.parametrize(
-    ("part", "files"), [("scenario", SCENARIOS), ("vehicle", VEHICLES), ("soil", SOILS), ("rops", FRAMES)]
+    ("part", "files"),
+    [("scenario", SCENARIOS), ("vehicle", VEHICLES), ("soil", SOILS), ("rops", FRAMES), ("study", STUDIES)],
 )
 def test_the_schema_accepts_all_shipped_files(schemas: dict[str, Path], part: str, files: list[Path]) -> None:
     command = [sys.executable, "-m", "check_jsonschema", "--schemafile", str(schemas[part]), *map(str, files)]

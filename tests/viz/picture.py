@@ -1,5 +1,7 @@
 """Pictures of a recording without a window, to be looked at: ``python -m tests.viz.picture RRD OUT TIME ...``.
 
+Each goes to OUT_TIME.png, 1200 pixels wide in 256 colours, small enough for a page.
+
 Needs a Vulkan driver; without a graphics card Debian's mesa-vulkan-drivers (lavapipe) will do.
 """
 
@@ -11,7 +13,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -23,6 +25,7 @@ from viz.viewer import viewer_binary
 
 KEPT = Path(__file__).resolve().parents[2] / "out" / "pictures"  # for people to look at after the tests
 DRIVERS = Path("/usr/share/vulkan/icd.d")
+PATIENCE = 60.0  # s, until a recording is loaded or a picture stands still
 _HARMLESS = ("Software rasterizer", "loss of performance", "not found for screenshot")
 
 
@@ -37,6 +40,17 @@ def kept(name: str, picture: bytes) -> Path:
     path = KEPT / name
     path.write_bytes(picture)
     return path
+
+
+def small(picture: bytes, width: int = 1200) -> bytes:
+    """The same PNG in fewer pixels and 256 colours."""
+    from PIL import Image
+
+    image = Image.open(io.BytesIO(picture)).convert("RGB")
+    image = image.resize((width, round(image.height * width / image.width)), Image.Resampling.LANCZOS)
+    out = io.BytesIO()
+    image.quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(out, "PNG", optimize=True)
+    return out.getvalue()
 
 
 def pixels(picture: bytes) -> NDArray[np.int64]:
@@ -79,33 +93,55 @@ def _patiently(attempt: Any, seconds: float = 30.0) -> Any:
             time.sleep(0.2)
 
 
+def complaints_of(viewer: Any) -> list[str]:
+    """What views report and the viewer logged, but for what every software renderer says."""
+    complaints = [f"{view.name}: {r.summary}" for view in viewer.get_state().views for r in view.reports]
+    return complaints + [
+        f"{entry.level}: {entry.message}"
+        for entry in viewer.get_logs()
+        if entry.level in ("WARN", "ERROR") and not any(h in entry.message for h in _HARMLESS)
+    ]
+
+
 def pictures(path: Path, times: Sequence[float]) -> tuple[list[bytes], list[str]]:
     """A PNG for each instant, and what the viewer complained about."""
     with headless_viewer() as viewer:
-        viewer.open([str(path.resolve())])
-        deadline = time.monotonic() + 30.0
-        while not (state := viewer.get_state()).recordings or not state.recordings[0].timelines:
-            assert time.monotonic() < deadline, "the recording was not loaded"
-            time.sleep(0.1)
+        load(viewer, path)
         found = []
         for instant in times:
             viewer.set_time("sim_time", duration=instant, play_state="paused")
-            before = b""
-            while (shot := viewer.take_screenshot(max_size=1600)) != before and time.monotonic() < deadline + 30.0:
-                before = shot
-            found.append(shot)
-        state = viewer.get_state()
-        complaints = [f"{view.name}: {r.summary}" for view in state.views for r in view.reports]
-        complaints += [
-            f"{entry.level}: {entry.message}"
-            for entry in viewer.get_logs()
-            if entry.level in ("WARN", "ERROR") and not any(h in entry.message for h in _HARMLESS)
-        ]
-        return found, complaints
+            found.append(settled(lambda: viewer.take_screenshot(max_size=1600)))
+        return found, complaints_of(viewer)
+
+
+def picture_of_view(path: Path, name: str) -> bytes:
+    """A PNG of one view at the recording's start."""
+    with headless_viewer() as viewer:
+        load(viewer, path)
+        viewer.set_time("sim_time", duration=0.0, play_state="paused")
+        settled(lambda: viewer.take_screenshot(max_size=1600))
+        (view,) = [v for v in viewer.get_state().views if v.name == name]
+        return settled(lambda: viewer.take_screenshot(view.view_id))
+
+
+def load(viewer: Any, path: Path) -> None:
+    viewer.open([str(path.resolve())])
+    deadline = time.monotonic() + PATIENCE
+    while not (state := viewer.get_state()).recordings or not state.recordings[0].timelines:
+        assert time.monotonic() < deadline, f"{path}: the recording was not loaded"
+        time.sleep(0.05)
+
+
+def settled(shoot: Callable[[], bytes]) -> bytes:
+    """A picture that is the same twice."""
+    before, deadline = b"", time.monotonic() + PATIENCE
+    while (shot := shoot()) != before and time.monotonic() < deadline:
+        before = shot
+    return shot
 
 
 if __name__ == "__main__":
     shots, said = pictures(Path(sys.argv[1]), [float(t) for t in sys.argv[3:]])
     for t, png in zip(sys.argv[3:], shots, strict=True):
-        Path(f"{sys.argv[2]}_{t}.png").write_bytes(png)
+        Path(f"{sys.argv[2]}_{t}.png").write_bytes(small(png))
     print("\n".join(said) or "nothing to complain about")

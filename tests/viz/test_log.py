@@ -327,7 +327,12 @@ def test_check_finds_what_is_wrong(tmp_path: Path) -> None:
     path = tmp_path / "wrong.rrd"
     rec = rr.RecordingStream("wrong", recording_id="wrong")
     views = rrb.Horizontal(
-        rrb.TimeSeriesView(origin="/a", contents=["+ /a/b"], name="there"),
+        rrb.TimeSeriesView(
+            origin="/a",
+            contents=["+ /a/b"],
+            name="there",
+            overrides={"a/b": rr.SeriesLines.from_fields(aggregation_policy=rr.components.AggregationPolicy.Average)},
+        ),
         rrb.TimeSeriesView(origin="/a", contents=["+ /a/c/**"], name="missing"),
     )
     rec.save(path, default_blueprint=rrb.Blueprint(views))
@@ -340,3 +345,5 @@ def test_check_finds_what_is_wrong(tmp_path: Path) -> None:
     assert "'there'" not in problems
     assert "/a/b: time lines ['step'], not sim_time alone" in problems
     assert "/a/b: drawn without MinMax" in problems
+    assert "wrong.rrd: the layout draws " in problems
+    assert problems.count("the layout draws") == 1

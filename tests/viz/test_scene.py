@@ -15,7 +15,8 @@ from rollover.scenario import load
 from rollover.shapes import Disc, Point, Points
 from rollover.vehicle import Attached, RigidBody, Striker, Vehicle
 from tests.viz import example
-from viz.scene import Balls, Block, Hull, Rod, extent, parts, path_of_centre, rotation
+from viz.scene import extent, parts, path_of_centre, rotation
+from viz.solids import Balls, Block, Hull, Rod
 
 
 def by_path(run: Run) -> dict[str, object]:

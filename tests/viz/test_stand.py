@@ -17,7 +17,8 @@ from tests.viz.test_report import ANSWER
 from viz.log import write_rrd
 from viz.page import Figure
 from viz.report import headline, page
-from viz.scene import Block, extent, parts, rotation
+from viz.scene import extent, parts, rotation
+from viz.solids import Block
 from viz.stand_view import stand_section
 from viz.verdict import verdict
 

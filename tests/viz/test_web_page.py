@@ -89,8 +89,9 @@ def test_a_browser_without_a_network_shows_it(overturn_rrd: Path, tmp_path: Path
         while time.monotonic() < deadline and not drawn(picture):
             time.sleep(2.0)
             picture = shown.screenshot(timeout=60_000)
-        kept("viewer_html.png", picture)
         assert drawn(picture), "soil, tractor and a plotted curve are not all in the picture"
+        time.sleep(5.0)  # plots come to their range
+        kept("viewer_html.png", shown.screenshot(timeout=60_000))
         assert shown.asked == [path.resolve().as_uri()], "it asked for something else than itself"
         assert shown.said == []
 

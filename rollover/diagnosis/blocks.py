@@ -1,0 +1,99 @@
+"""Recordings linearised at a point: what is left there, and where least squares would go from it.
+
+For recording r with whitened residual w, J = dy/dx of the effects' coordinates and s = dy/dtau of its time shift,
+
+    minimise sum_r |w_r - J_r dx - s_r dtau_r|^2 + ((tau_r + dtau_r)/sd)^2                                    (D1)
+
+tau_r is eliminated, which leaves for each recording a small A_r, b_r, c_r: enough to refit without any recording and
+to predict that one, so that holding out costs no simulation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.candidates import Candidate
+
+Array = NDArray[np.float64]
+WIDEST = 4.0  # times its prior that a time shift may be
+GENTLE = 1e-4  # prior of a coordinate (1/variance): keeps what nothing determines where it is
+
+
+@dataclass(frozen=True, kw_only=True)
+class Block:
+    """One recording at the fitted point: residual (n,), Jacobian (n, p), slope of the shift (n,), shift, its prior."""
+
+    residual: Array
+    J: Array
+    slope: Array
+    shift: float
+    prior: float
+
+    @property
+    def weight(self) -> float:
+        """s's + 1/sd^2."""
+        return float(self.slope @ self.slope) + self.prior**-2
+
+    @property
+    def total(self) -> float:
+        """(D1) where it stands."""
+        return float(self.residual @ self.residual) + (self.shift / self.prior) ** 2
+
+    def normal(self) -> tuple[Array, Array, float]:
+        """A (p, p), b (p,), c: |..|^2 of (D1) with tau eliminated is c - 2 b'dx + dx'A dx."""
+        g = float(self.slope @ self.residual) - self.shift * self.prior**-2
+        h = self.J.T @ self.slope
+        A = self.J.T @ self.J - np.outer(h, h) / self.weight
+        b = self.J.T @ self.residual - h * g / self.weight
+        c = float(self.residual @ self.residual) + (self.shift / self.prior) ** 2 - g * g / self.weight
+        return A, b, c
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fitted:
+    """Effects fitted to recordings: coordinates, blocks there, and what is left, sum of squares over the noise."""
+
+    candidates: tuple[Candidate, ...]
+    x: tuple[float, ...]
+    blocks: tuple[Block, ...]
+
+    @property
+    def left(self) -> float:
+        """Sum over the recordings of (D1) at its minimum."""
+        return sum(b.normal()[2] for b in self.blocks)
+
+    @property
+    def label(self) -> str:
+        """Keys of the effects."""
+        return " + ".join(c.key for c in self.candidates) or "as it is"
+
+
+def shift_of(block: Block, dx: Array) -> float:
+    """Change of the time shift that goes with dx; it stays within `WIDEST` of its prior."""
+    g = float(block.slope @ (block.residual - block.J @ dx)) - block.shift * block.prior**-2
+    most = WIDEST * block.prior
+    return min(max(block.shift + g / block.weight, -most), most) - block.shift
+
+
+def bounded(A: Array, b: Array, x: Array, damping: float) -> Array:
+    """Step that solves (A + damping diag A) dx = b, coordinates that would leave the unit box held at its border."""
+    p = x.size
+    free = np.ones(p, dtype=bool)
+    dx = np.zeros(p)
+    for _ in range(p + 1):
+        if not free.any():
+            break
+        M = A[np.ix_(free, free)].copy()
+        M[np.diag_indices_from(M)] *= 1.0 + damping
+        M[np.diag_indices_from(M)] += GENTLE
+        target = b[free] - A[np.ix_(free, ~free)] @ dx[~free]
+        dx[free] = np.linalg.solve(M, target)
+        out = free & ((x + dx < 0.0) | (x + dx > 1.0))
+        if not out.any():
+            break
+        dx[out] = np.clip(x[out] + dx[out], 0.0, 1.0) - x[out]
+        free &= ~out
+    return dx

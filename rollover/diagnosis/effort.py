@@ -1,0 +1,42 @@
+"""How much is simulated for an answer: a drop costs two milliseconds, a full run a hundred times that."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """Limits of a search; the defaults are those for drops."""
+
+    few: int = 3  # recordings that candidates are looked at on
+    scored: int | None = None  # candidates looked at closer; none: as many as for drops, and all of two parameters
+    promising: int = 14  # candidates that get a first fit at each step
+    short: int = 6  # rounds of a first fit
+    leaders: int = 4  # first fits that are followed up, at least
+    most_leaders: int = 9  # and at most
+    rounds: int = 14  # of a whole fit
+    nudges: tuple[float, ...] = (2e-2, 5e-3, 1e-3)  # of a coordinate, for differences: wide first
+    polishes: int = 2  # fits that are followed along a crooked valley
+    thrifty: bool = False  # looks at few recordings, fits no shapes, and stops where nothing but noise is left
+
+    @property
+    def fine(self) -> float:
+        """Of a coordinate, for differences where a fit has ended."""
+        return self.nudges[:2][-1]
+
+
+DROPS = Effort()
+# below a wide step, a run with many contacts shows chance and no slope
+RUNS = Effort(
+    few=2,
+    scored=12,
+    promising=4,
+    short=2,
+    leaders=2,
+    most_leaders=3,
+    rounds=5,
+    nudges=(3e-2,),
+    polishes=0,
+    thrifty=True,
+)

@@ -1,0 +1,278 @@
+"""Concealed cases: four side overturns each, recorded by accelerometers, gyroscopes and load cells in the ROPS mounts.
+
+`plan` and `make` are those of `rollover.proof.generator` for overturns; the folder, seal, score and table are the same.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.overturns import library
+from rollover.overturns.library import Change
+from rollover.proof.campaign import log_uniform
+from rollover.proof.generator import Case, Order
+from rollover.proof.instruments import Noise, channel_filter
+from rollover.proof.strength import strength
+from rollover.recording import Recording
+from rollover.scenario import Scenario, load
+from rollover.simulate import run
+
+Array = NDArray[np.float64]
+
+KINDS: dict[str, float] = {"null": 0.20, "negligible": 0.05, "single": 0.75}
+CHANNELS = (
+    *(f"chassis/acceleration_{axis}" for axis in "xyz"),
+    *(f"chassis/angular_velocity_{axis}" for axis in "xyz"),
+    "rops/mount/left/force_y",
+    "rops/mount/left/force_z",
+    "rops/mount/right/force_y",
+)
+CLASS = 60
+RATE = 1000.0  # Hz
+LENGTH = 0.6  # s of a recording: tipping, the blow on the tyres' side walls, and the ROPS
+LEAD = 0.06  # s more of the run behind the record, that the filter sees
+STEP, SPECTRAL_RADIUS = 2.5e-4, 0.85
+SPACING, POINTS = (0.035, 0.035), 0.016  # m, of elements and of contact points
+SHIFTED = 0.02  # m, by which the grid lies elsewhere, at most
+NOTHING = {"over_noise": 0.0, "signal_to_noise": 0.0, "where": [], "channels": {}}
+_PLAN = 2**31 - 1
+
+
+class FailedOverturnError(RuntimeError):
+    """An overturn could not be simulated."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shot:
+    """One test: how it began, the ground's inclination down towards a direction (deg), and the clock's lateness (s)."""
+
+    side: str
+    excess: float
+    rate: float
+    inclination: float
+    direction: float
+    late: float
+    shifted: tuple[float, float]
+
+    @property
+    def conditions(self) -> dict[str, Any]:
+        """Values of the scenario that this test was run with, as written down."""
+        return {
+            "initiation.side": self.side,
+            "initiation.excess_deg": self.excess,
+            "initiation.roll_rate": self.rate,
+            "ground.surface.angle_deg": self.inclination,
+            "ground.surface.direction_deg": self.direction,
+        }
+
+
+def plan(count: int, seed: int, kinds: Sequence[str] = (), effects: Sequence[str] = ()) -> list[Order]:
+    """Orders of a proof: shares of `KINDS` (or even ones of `kinds`), each effect as often as any other, shuffled.
+
+    Raises ``ValueError`` for a kind or an effect that there is none of.
+    """
+    for kind in kinds:
+        if kind not in KINDS:
+            raise ValueError(f"kinds: no such kind of overturns, got {kind!r}; {', '.join(KINDS)} are allowed")
+    for id in effects:
+        if id not in library.EFFECTS:
+            raise ValueError(f"effects: none of overturns, got {id!r}; {', '.join(library.EFFECTS)}")
+    random = np.random.default_rng([seed, _PLAN])
+    shares = dict.fromkeys(kinds, 1.0) if kinds else {"single": 1.0} if effects else dict(KINDS)
+    ends = np.round(np.cumsum(list(shares.values())) * count / sum(shares.values())).astype(int)
+    of_kind = [kind for kind, n in zip(shares, np.diff(ends, prepend=0), strict=True) for _ in range(n)]
+    listed = [id for id in library.EFFECTS if id in effects or not effects]
+    turn: list[str] = []
+    orders = []
+    for i, kind in enumerate(of_kind[k] for k in random.permutation(len(of_kind))):
+        ids: tuple[str, ...] = ()
+        if kind == "single":
+            turn = turn or [listed[k] for k in random.permutation(len(listed))]
+            ids = (turn.pop(),)
+        elif kind == "negligible":
+            ids = tuple(library.NEGLIGIBLE)
+        orders.append(Order(index=i, seed=seed, kind=kind, ids=ids))
+    return orders
+
+
+def make(order: Order) -> Case:
+    """Make one case: the same for the same order. Raises `FailedOverturnError`."""
+    random = np.random.default_rng([order.seed, order.index, 1])
+    shots = [_shot(random, k) for k in range(4)]
+    share = log_uniform(random, 0.005, 0.02)
+    plain = [_solved(shot, ()) for shot in shots]
+    nothing = [_read(shot, solved, ()) for shot, solved in zip(shots, plain, strict=True)]
+    spans = {c: max(float(np.ptp(one[c])) for one in nothing) for c in CHANNELS}
+    changes = tuple({**library.EFFECTS, **library.NEGLIGIBLE}[id](random, spans) for id in order.ids)
+    made = nothing
+    if changes:
+        moved = any(c.values or c.tilt for c in changes)
+        solved = [_solved(shot, changes) for shot in shots] if moved else plain
+        made = [_read(shot, one, changes) for shot, one in zip(shots, solved, strict=True)]
+    noise = {c: Noise(sigma=share * spans[c], cfc=CLASS) for c in CHANNELS}
+    recordings = tuple(
+        _recorded(k, shot, one, noise, random) for k, (shot, one) in enumerate(zip(shots, made, strict=True))
+    )
+    worth = {c: noise[c].independence(1.0 / RATE) for c in CHANNELS}
+    found = strength(
+        [_stamps(shot) for shot in shots],
+        made,
+        nothing,
+        {c: n.sigma for c, n in noise.items()},
+        [worth] * len(shots),
+    )
+    return Case(
+        name=order.name,
+        scenario=_SCENARIO,
+        recordings=recordings,
+        truth=_truth(order, changes, found, noise, share, shots, recordings),
+    )
+
+
+def _shot(random: np.random.Generator, k: int) -> Shot:
+    """The k-th test: to the left and to the right in turn, on ground that falls across and a little along."""
+    side = ("left", "right")[k % 2]
+    across = -90.0 if side == "left" else 90.0
+    return Shot(
+        side=side,
+        excess=round(float(random.uniform(4.0, 8.0)), 2),
+        rate=round(float(random.uniform(1.2, 2.0)), 3),
+        inclination=round(float(random.uniform(1.0, 14.0)), 1),
+        direction=round(across + float(random.uniform(-35.0, 35.0)), 0),
+        late=float(random.normal(0.0, 3e-4)),
+        shifted=(float(random.uniform(-SHIFTED, SHIFTED)), float(random.uniform(-SHIFTED, SHIFTED))),
+    )
+
+
+def _solved(shot: Shot, changes: Sequence[Change]) -> Recording:
+    """The overturn in finer steps, on a finer grid, with what the changes say written into its scenario."""
+    values: dict[str, Any] = dict(shot.conditions)
+    for change in changes:
+        values |= change.values
+        values["ground.surface.angle_deg"] = values["ground.surface.angle_deg"] + math.degrees(change.tilt)
+    base = _base().replaced(values)
+    x, y = base.ground.elements.centre
+    finer = base.replaced(
+        {
+            "ground.elements.spacing": SPACING,
+            "ground.elements.centre": (x + shot.shifted[0], y + shot.shifted[1]),
+            "vehicle.contact_spacing": POINTS,
+            "simulation.step": STEP,
+            "simulation.spectral_radius": SPECTRAL_RADIUS,
+        }
+    )
+    solved = run(finer)
+    if solved.status == "failed":
+        raise FailedOverturnError(solved.sentence)
+    return solved.recording
+
+
+def _base() -> Scenario:
+    import tempfile
+    from pathlib import Path
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "scenario.yaml"
+        path.write_text(_SCENARIO, encoding="utf-8")
+        return load(path)
+
+
+def _stamps(shot: Shot) -> Array:
+    return np.asarray(np.round(np.arange(int(LENGTH * RATE) + 1) / RATE + shot.late, 9))
+
+
+def _read(shot: Shot, solved: Recording, changes: Sequence[Change]) -> dict[str, Array]:
+    """What the instruments make of an overturn at the recorder's stamps, behind their filters, without noise."""
+    wrong = {c.channel: c.fault for c in changes if c.channel}
+    times = _stamps(shot) - shot.late
+    found = {}
+    for c in CHANNELS:
+        fault = wrong.get(c)
+        late = fault.offset if fault else 0.0
+        step = float(np.median(np.diff(solved.time)))
+        behind = channel_filter(solved[c], step, CLASS)
+        values = np.interp(times - late, solved.time, behind)
+        found[c] = values * fault.gain + fault.bias if fault else values
+    return found
+
+
+def _recorded(
+    k: int, shot: Shot, made: Mapping[str, Array], noise: Mapping[str, Noise], random: np.random.Generator
+) -> Recording:
+    time = _stamps(shot)
+    return Recording(
+        title=f"Side overturn {k + 1}",
+        source="overturning site, utility tractor on natural clay",
+        time=time,
+        channels={c: made[c] + noise[c].drawn(time.size, 1.0 / RATE, random) for c in CHANNELS},
+        conditions=shot.conditions,
+        cfc=dict.fromkeys(CHANNELS, CLASS),
+    )
+
+
+def _truth(
+    order: Order,
+    changes: Sequence[Change],
+    found: Mapping[str, Any],
+    noise: Mapping[str, Noise],
+    share: float,
+    shots: Sequence[Shot],
+    recordings: Sequence[Recording],
+) -> dict[str, Any]:
+    verdict = "no-mismatch"
+    if changes and order.kind != "negligible":
+        verdict = {"physics": "missing-physics"}.get(changes[0].kind, changes[0].kind)
+    whole: Mapping[str, Any] = found if changes else NOTHING
+    return {
+        "format": "rollover-truth/1",
+        "rig": "overturn",
+        "case": order.name,
+        "kind": order.kind,
+        "seed": order.seed,
+        "index": order.index,
+        "verdict": verdict,
+        "effects": [
+            {
+                "id": change.id,
+                "kind": change.kind,
+                "parameters": {name: float(value) for name, value in change.told.items()},
+                "channel": change.channel,
+                "depends_on": "",
+                "near": [],
+                "over_noise": float(whole["over_noise"]),
+                "signal_to_noise": float(whole["signal_to_noise"]),
+                "channels": whole["channels"],
+                "where": whole["where"],
+            }
+            for change in changes
+        ],
+        "over_noise": float(whole["over_noise"]),
+        "signal_to_noise": float(whole["signal_to_noise"]),
+        "where": whole["where"],
+        "noise": {c: float(n.sigma) for c, n in noise.items()},
+        "noise_share": dict.fromkeys(CHANNELS, share),
+        "recordings": [
+            {"title": r.title, "conditions": s.conditions, "late": s.late, "samples": r.time.size}
+            for r, s in zip(recordings, shots, strict=True)
+        ],
+    }  # fmt: skip
+
+
+_SCENARIO = f"""# Side overturns of a utility tractor; how each began, and its ground, is in its recording.
+format: rollover-scenario/1
+title: Side overturns of a 3 t utility tractor
+vehicle: vehicles/utility_tractor.yaml
+ground:
+  surface: {{kind: slope, angle_deg: 5.0, direction_deg: -90.0}}
+  elements: {{length: 8.0, width: 16.0, centre: [0.9, 0.0], spacing: [0.04, 0.04]}}
+  law: soils/natural_clay.yaml
+  friction: {{coefficient: 0.5}}
+initiation: {{kind: tip-over, side: left, excess_deg: 4.0, roll_rate: 1.2}}
+simulation: {{duration: {LENGTH + LEAD}, step: 0.001, output_step: 0.001}}
+"""

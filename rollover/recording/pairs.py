@@ -1,0 +1,99 @@
+"""Named numbers in small Parquet files, and tables of numbers and words: what a study keeps of its cases."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+KEY = b"rollover"
+Column = NDArray[Any] | Sequence[Any]
+
+
+class UnreadableError(ValueError):
+    """A file is not what it ought to be: cut off, or made by somebody else."""
+
+
+def write_pairs(values: Mapping[str, float], about: Mapping[str, Any], path: Path) -> None:
+    """Write names and numbers, two columns, with `about` (bare JSON values) in the file's metadata; whole or not."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    numbers = pa.array(list(values.values()), pa.float64())
+    table = pa.table({"name": pa.array(list(values), pa.string()), "value": numbers})
+    table = table.replace_schema_metadata({KEY: json.dumps(about)})
+    # small as they are, dictionaries and statistics would be most of the file
+    _put(path, lambda at: pq.write_table(table, at, compression="none", use_dictionary=False, write_statistics=False))
+
+
+def read_pairs(path: Path) -> tuple[dict[str, float], dict[str, Any]]:
+    """What `write_pairs` wrote, to the last bit. Raises `UnreadableError`."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        table = pq.ParquetFile(path).read(use_threads=False)
+        about = json.loads(table.schema.metadata[KEY])
+        values = dict(zip(table["name"].to_pylist(), table["value"].to_pylist(), strict=True))
+    except (OSError, pa.ArrowException, KeyError, TypeError, ValueError) as e:
+        raise UnreadableError(f"{path}: {e}") from None
+    return values, about
+
+
+def write_table(
+    columns: Mapping[str, Column], path: Path, meanings: Mapping[str, Mapping[str, str]], about: Mapping[str, Any]
+) -> None:
+    """Write columns of float64, whole numbers or words, each with unit and meaning; the same table, the same bytes."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    arrays = {name: pa.array(values) for name, values in columns.items()}
+    arrays = {name: a.cast(pa.string()) if pa.types.is_null(a.type) else a for name, a in arrays.items()}
+    fields = [pa.field(name, array.type, metadata=dict(meanings.get(name, {}))) for name, array in arrays.items()]
+    schema = pa.schema(fields, metadata={KEY: json.dumps(about)})
+    table = pa.Table.from_arrays(list(arrays.values()), schema=schema)
+    _put(path, lambda at: pq.write_table(table, at))
+
+
+def read_table(path: Path) -> tuple[dict[str, list[Any]], dict[str, Any]]:
+    """Columns as lists, None where there is nothing, and what the table says of itself. Raises `UnreadableError`."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        table = pq.ParquetFile(path).read()
+        about = json.loads((table.schema.metadata or {}).get(KEY, b"{}"))
+        return {name: table[name].to_pylist() for name in table.column_names}, about
+    except (OSError, pa.ArrowException, TypeError, ValueError) as e:
+        raise UnreadableError(f"{path}: {e}") from None
+
+
+def as_numbers(values: Sequence[Any]) -> NDArray[np.float64]:
+    """A column as float64, NaN where there is nothing."""
+    return np.array([np.nan if v is None else v for v in values], dtype=np.float64)
+
+
+def put_text(path: Path, text: str) -> None:
+    """Write a text file, whole or not at all."""
+    _put(path, lambda at: at.write_text(text, encoding="utf-8"))
+
+
+def _put(path: Path, write: Callable[[Path], Any]) -> None:
+    """Write beside the place and move there: a process that is killed leaves the whole file or none."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
+    os.close(handle)
+    part = Path(name)
+    try:
+        write(part)
+        part.chmod(0o644)
+        os.replace(part, path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise

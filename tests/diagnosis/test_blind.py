@@ -1,0 +1,54 @@
+"""Concealed cases with fixed seeds, from the proof's own generator: what must hold whatever is changed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from rollover.diagnosis import Diagnosis, diagnose
+from rollover.diagnosis.account import account
+from rollover.proof.generator import Case, Order, make
+from rollover.proof.score import score
+from rollover.scenario import load
+
+
+def diagnosed(order: Order, tmp_path: Any) -> tuple[Case, Diagnosis, dict[str, Any]]:
+    case = make(order)
+    path = tmp_path / "scenario.yaml"
+    path.write_text(case.scenario, encoding="utf-8")
+    recordings = [(f"r{k}", r) for k, r in enumerate(case.recordings, start=1)]
+    found = diagnose(load(path), recordings)
+    return case, found, score(case.truth, account(found))
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("null", 410), ("decoy", 411)])
+def test_nothing_is_named_where_nothing_is(kind: str, seed: int, tmp_path: Any) -> None:
+    _, found, row = diagnosed(Order(index=0, seed=seed, kind=kind), tmp_path)
+    assert found.verdict == "no-mismatch"
+    assert not row["false_alarm"]
+    assert not found.effects
+    assert found.p_value > 0.005
+    assert all(value > 0.0 for value in found.smallest_detectable.values())
+    assert "soil-viscous-damping" in found.smallest_detectable
+
+
+@pytest.mark.parametrize(
+    ("id", "seed", "verdict"),
+    [
+        ("sensor-gain", 420, "sensor"),
+        ("soil-stiffness", 421, "parameter"),
+        ("soil-viscous-damping", 422, "missing-physics"),
+    ],
+)
+def test_one_effect_is_named_with_its_value(id: str, seed: int, verdict: str, tmp_path: Any) -> None:
+    case, found, row = diagnosed(Order(index=0, seed=seed, kind="single", ids=(id,)), tmp_path)
+    assert case.truth["over_noise"] > 1.0  # else nothing would be asked of it
+    assert found.verdict == verdict
+    assert row["in_set"]
+    assert row["first"]
+    assert found.after["held_out"].nrmse < 1.2
+    assert row["parameters"]
+    for p in row["parameters"]:
+        assert p["error"] < 0.1
+    assert not found.remaining_significant

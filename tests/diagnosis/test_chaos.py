@@ -1,0 +1,95 @@
+"""What neighbouring runs scatter by weighs less: the weight itself, what it does to a test, and drops as they were."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis import chaos
+from rollover.diagnosis.chaos import memory, weighted
+from rollover.diagnosis.detect import mismatch_of
+from rollover.diagnosis.evidence import Evidence, Signal
+from rollover.diagnosis.fit import Block
+from rollover.diagnosis.simulator import simulator_of
+from rollover.recording import Recording
+from tests.physics.scenes import shipped
+
+CHANNEL = "chassis/acceleration_y"
+STEP, SIGMA, N = 0.004, 0.2, 300
+
+
+def evidence(values: np.ndarray) -> Evidence:
+    time = STEP * np.arange(values.size)
+    recording = Recording(title="r", time=time, channels={CHANNEL: values})
+    rows = np.arange(values.size)
+    signal = Signal(channel=CHANNEL, rows=rows, values=values, sigma=SIGMA, noise=SIGMA, ar=(), span=10.0)
+    simulator: Any = None
+    return Evidence(
+        name="r", recording=recording, simulator=simulator, signals=(signal,), shift_prior=1e-3, condition="r"
+    )
+
+
+def p_value(e: Evidence, off: np.ndarray) -> float:
+    """Of "nothing but noise" in all, or in any phase, for a misfit (n,) against a prediction of zero."""
+    residual = e.whitened(off)
+    block = Block(residual=residual, J=np.zeros((off.size, 0)), slope=np.zeros(off.size), shift=0.0, prior=1e-3)
+    phases = [((0.0, "tipping"), (0.5 * N * STEP, "impact"))]
+    found = mismatch_of([e], [block], phases)
+    return min(found.p_value, *found.adjusted)
+
+
+def test_a_sample_counts_by_its_noise_and_its_scatter() -> None:
+    e = evidence(np.zeros(N))
+    size = np.where(np.arange(N) < 100, 0.0, 0.5)
+    alternating = {CHANNEL: size * (-1.0) ** np.arange(N)}  # each sample by itself: L = 1
+    found = weighted(e, [alternating, {CHANNEL: -alternating[CHANNEL]}]).signals[0].weight
+    assert found is not None
+    inside = slice(110, N)
+    np.testing.assert_allclose(found[inside], SIGMA / np.sqrt(SIGMA**2 + chaos.FEW * 0.5**2), rtol=1e-12)
+    np.testing.assert_array_equal(found[:95], 1.0)
+
+
+def test_scatter_that_goes_together_counts_as_few_samples() -> None:
+    rng = np.random.default_rng(1)
+    white = rng.standard_normal((3, 4000))
+    assert memory(white) == pytest.approx(1.0, abs=0.1)
+    slow = np.stack([np.convolve(row, np.ones(12) / 12.0, mode="same") for row in white])
+    rho = 11.0 / 12.0  # of a running mean of 12, from one sample to the next
+    assert memory(slow) == pytest.approx((1.0 + rho) / (1.0 - rho), rel=0.1)
+
+
+def test_a_weight_is_applied_behind_the_whitening() -> None:
+    e = evidence(np.zeros(N))
+    strays = [{CHANNEL: np.full(N, 0.3)}]
+    w = weighted(e, strays)
+    values = np.random.default_rng(0).standard_normal(N)
+    weight = w.signals[0].weight
+    assert weight is not None
+    np.testing.assert_allclose(w.whitened(values), weight * e.whitened(values), rtol=1e-12)
+    assert w.strays[0].shape == (N,)
+
+
+def test_what_neighbours_differ_by_is_no_mismatch_and_more_than_that_is_one() -> None:
+    rng = np.random.default_rng(3)
+    t = np.linspace(0.0, 1.0, N)
+    wave = np.where(t > 0.5, np.sin(2.0 * np.pi * 6.0 * t), 0.0)
+    strays = [{CHANNEL: a * wave} for a in (0.6, -0.5, 0.4, -0.6)]
+    off = 0.5 * wave + SIGMA * rng.standard_normal(N)
+    plain = evidence(np.zeros(N))
+    sure = weighted(plain, strays)
+    assert p_value(plain, off) < 1e-6
+    assert p_value(sure, off) > 0.02
+    early = np.where(t < 0.4, 0.3 * np.sin(2.0 * np.pi * 3.0 * t), 0.0)  # where no neighbour strays
+    assert p_value(sure, off + early) < 1e-3
+    assert p_value(sure, off + 10.0 * wave) < 1e-3
+
+
+def test_without_neighbours_all_is_as_it_was() -> None:
+    e = evidence(np.zeros(N))
+    assert weighted(e, []) is e
+    assert weighted(e, [{CHANNEL: np.zeros(N)}]).signals[0].weight is None
+    time = np.arange(0.0, 0.1, 0.001)
+    drop = Recording(title="r", time=time, channels={"ground/sinkage": np.zeros(time.size)})
+    assert simulator_of(shipped("drop_test"), drop).strays() == []

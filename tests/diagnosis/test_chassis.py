@@ -1,0 +1,84 @@
+"""The residual generalised force on a chassis: which degree of freedom, how large, and what it depends on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis.chassis import degrees_of
+from rollover.diagnosis.depend import dependency
+from rollover.diagnosis.evidence import Evidence, evidence_of
+from rollover.diagnosis.overturn import RunSimulator
+from rollover.recording import Recording
+from rollover.scenario import Scenario
+from rollover.vehicle import chassis_of
+from tests.physics.scenes import shipped
+
+ALONG = tuple(f"chassis/acceleration_{axis}" for axis in "xyz")
+ABOUT = tuple(f"chassis/angular_velocity_{axis}" for axis in "xyz")
+
+
+def toss(speed: float) -> Scenario:
+    return shipped("cube_toss").replaced(
+        {"initiation.velocity": [-1.0, -0.85, -speed], "initiation.position": [0.2, 0.2, 0.4]}
+    )
+
+
+def thrown(speed: float, off: dict[str, str]) -> tuple[Scenario, Evidence]:
+    """A toss, recorded in flight, with `off`: channel -> what is added to it."""
+    time = np.arange(0.0, 0.16, 0.001)
+    own = toss(speed)
+    bare = Recording(title="r", time=time, channels=dict.fromkeys((*ALONG, *ABOUT), np.zeros(time.size)))
+    simulator = RunSimulator(own, bare)
+    run, state = simulator.predict({}, 0.0), simulator.state(0.0)
+    assert run is not None
+    rng = np.random.default_rng(int(100 * speed))
+    added = {c: eval(text, {"t": time, "state": state, "np": np}) for c, text in off.items()}
+    made = {c: run[c] + added.get(c, 0.0) + rng.normal(0.0, 0.01, time.size) for c in (*ALONG, *ABOUT)}
+    recording = Recording(title="r", time=time, channels=made)
+    found = evidence_of(f"v{speed}", recording, RunSimulator(own, recording))
+    assert found is not None
+    return own, found
+
+
+def test_a_force_along_one_axis_is_found_with_its_size() -> None:
+    tosses = [thrown(v, {ALONG[1]: "2.0 * np.sin(30.0 * t)"}) for v in (0.5, 1.0)]
+    degrees, forces = degrees_of([s for s, _ in tosses], [e for _, e in tosses], [0.0, 0.0])
+    first = degrees[0]
+    assert (first.body, first.axis, first.unit) == ("chassis", "along y", "N")
+    assert first.share > 0.95
+    assert sum(d.share for d in degrees) == pytest.approx(1.0)
+    mass = chassis_of(tosses[0][0].vehicle).mass  # type: ignore[arg-type]
+    expected = mass * np.sqrt(np.mean((2.0 * np.sin(30.0 * np.arange(0.0, 0.16, 0.001))) ** 2))
+    assert first.rms == pytest.approx(expected, rel=0.02)
+    assert len(forces) == 2
+
+
+def test_a_moment_is_the_inertia_times_what_the_turn_speeds_up_by() -> None:
+    own, e = thrown(0.7, {ABOUT[2]: "6.0 * t"})
+    degrees, forces = degrees_of([own], [e], [0.0])
+    assert degrees[0].axis == "about z"
+    assert degrees[0].unit == "N m"
+    inertia = chassis_of(own.vehicle).inertia[2]  # type: ignore[arg-type]
+    assert np.median(forces[0].force) == pytest.approx(6.0 * inertia, rel=0.05)
+
+
+def test_what_the_force_depends_on_is_told_from_the_run() -> None:
+    tosses = [thrown(v, {ALONG[1]: "4.0 * np.abs(state['chassis/velocity_z'])"}) for v in (0.4, 0.8, 1.2)]
+    _, forces = degrees_of([s for s, _ in tosses], [e for _, e in tosses], [0.0] * 3)
+    shares = dict(dependency(forces))
+    assert shares["chassis/velocity_z"] > 0.95
+    assert max(shares, key=lambda name: shares[name]) == "chassis/velocity_z"
+    assert shares["time"] < 0.93
+
+
+def test_instruments_elsewhere_are_no_forces_on_the_chassis() -> None:
+    own, e = thrown(0.7, {})
+    bare = Recording(title="r", time=e.recording.time, channels={"chassis/position_z": np.zeros(e.recording.time.size)})
+    there = evidence_of(
+        "r",
+        Recording(title="r", time=bare.time, channels={"chassis/position_z": np.linspace(0.0, 0.3, bare.time.size)}),
+        RunSimulator(own, bare),
+    )
+    assert there is not None
+    assert degrees_of([own], [there], [0.0]) == ((), [])

@@ -1,0 +1,131 @@
+"""Concealed overturns: nothing in the folder tells the truth, the same order gives the same case."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rollover.effects import EFFECTS
+from rollover.overturns import generator, library
+from rollover.overturns.generator import CHANNELS, make, plan
+from rollover.proof import examine
+from rollover.proof.folder import write_case
+from rollover.proof.generator import Order
+from rollover.scenario import Scenario, load
+from tests.physics.scenes import shipped
+
+
+@pytest.fixture(autouse=True)
+def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As little as shows what a case is made of."""
+    monkeypatch.setattr(generator, "STEP", 1e-3)
+    monkeypatch.setattr(generator, "LENGTH", 0.2)
+
+
+def written(order: Order, folder: Path) -> Scenario:
+    write_case(make(order), folder)
+    return load(folder / "scenario.yaml")
+
+
+def test_a_plan_takes_every_effect_in_turn() -> None:
+    orders = plan(2 * len(library.EFFECTS), 3, kinds=["single"])
+    assert Counter(o.ids[0] for o in orders) == Counter(dict.fromkeys(library.EFFECTS, 2))
+    assert {o.kind for o in plan(40, 3)} == set(generator.KINDS)
+    assert [o.ids for o in plan(12, 3)] != [o.ids for o in plan(12, 4)]
+
+
+@pytest.mark.parametrize(("kinds", "effects"), [(["pair"], []), ([], ["soil-crust"])])
+def test_what_there_are_no_overturns_of_is_refused(kinds: list[str], effects: list[str]) -> None:
+    with pytest.raises(ValueError, match=r"are allowed|none of overturns"):
+        plan(3, 1, kinds, effects)
+
+
+def test_every_effect_is_one_that_acts_in_overturns_with_the_parameters_of_its_name() -> None:
+    random = np.random.default_rng(0)
+    spans = dict.fromkeys(CHANNELS, 10.0)
+    for id, draw in {**library.EFFECTS, **library.NEGLIGIBLE}.items():
+        change, kind = draw(random, spans), EFFECTS[id]
+        assert change.id == id
+        assert change.kind == kind.kind
+        assert "rollover" in kind.acts
+        for name, value in change.told.items():
+            if id != "sensor-bias":  # searched over the channel's range
+                assert kind.search[name].low <= value <= kind.search[name].high, (id, name)
+
+
+def test_numbers_of_the_library_are_those_of_the_vehicle() -> None:
+    vehicle = shipped("side_overturn").vehicle
+    assert vehicle.whole.mass == library.MASS  # type: ignore[union-attr]
+    assert vehicle.whole.centre_of_mass == library.CENTRE  # type: ignore[union-attr]
+    assert vehicle.whole.inertia == library.INERTIA  # type: ignore[union-attr]
+    assert vehicle.front_axle.swing_deg == library.SWING  # type: ignore[union-attr]
+    assert [w.name for w in vehicle.wheels] == list(library.TYRES)  # type: ignore[union-attr]
+    assert {w.tyre.vertical_damping for w in vehicle.wheels} == {library.TYRE_DAMPING}  # type: ignore[union-attr]
+    assert [m.name for m in vehicle.rops.mounts] == list(library.MOUNTS)  # type: ignore[union-attr]
+
+
+def test_the_folder_holds_nothing_of_the_truth(tmp_path: Path) -> None:
+    order = Order(index=0, seed=5, kind="single", ids=("ground-friction",))
+    scenario = written(order, tmp_path / "case")
+    assert not scenario.effects
+    assert scenario.ground.friction.coefficient == library.FRICTION
+    names = sorted(p.name for p in (tmp_path / "case").iterdir())
+    assert names == [
+        "r1.parquet",
+        "r1.yaml",
+        "r2.parquet",
+        "r2.yaml",
+        "r3.parquet",
+        "r3.yaml",
+        "r4.parquet",
+        "r4.yaml",
+        "scenario.yaml",
+    ]
+    for path in (tmp_path / "case").glob("*.yaml"):
+        for word in ("friction: {coefficient: 0.3", "single", "seed", "truth", "ground-friction"):
+            assert word not in path.read_text(encoding="utf-8")
+
+
+def test_a_case_is_the_same_for_the_same_order_and_its_noise_is_as_told() -> None:
+    order = Order(index=2, seed=5, kind="null")
+    a, b = make(order), make(order)
+    for one, other in zip(a.recordings, b.recordings, strict=True):
+        for c in CHANNELS:
+            np.testing.assert_array_equal(one[c], other[c])
+    assert a.truth == b.truth
+    assert a.truth["verdict"] == "no-mismatch"
+    quiet = a.recordings[0]["chassis/angular_velocity_y"][:40]  # nothing has hit the ground yet
+    sigma = a.truth["noise"]["chassis/angular_velocity_y"]
+    trend = np.polyval(np.polyfit(np.arange(40), quiet, 3), np.arange(40))
+    assert 0.4 * sigma < np.std(quiet - trend) < 1.6 * sigma
+
+
+def test_an_effect_is_seen_where_it_acts_and_a_sensor_s_fault_in_its_channel_alone() -> None:
+    strong = make(Order(index=1, seed=5, kind="single", ids=("slope",)))
+    assert strong.truth["verdict"] == "parameter"
+    assert strong.truth["over_noise"] > 0.0
+    order = Order(index=1, seed=5, kind="single", ids=("sensor-gain",))
+    faulty, plain = make(order), make(replace(order, kind="null", ids=()))
+    effect = faulty.truth["effects"][0]
+    over = effect["channels"]
+    assert max(over, key=lambda c: over[c]) == effect["channel"]
+    assert effect["parameters"]["gain"] != 1.0
+    assert plain.truth["effects"] == []
+
+
+def test_a_rig_that_there_is_not_is_refused() -> None:
+    with pytest.raises(ValueError, match="rig: no such rig, got 'sled'; drop, overturn are allowed"):
+        examine.prove(1, 1, rig="sled")
+
+
+def test_overturns_are_sealed_handed_over_and_scored_like_drops() -> None:
+    proof = examine.prove(
+        1, 6, rig="overturn", kinds=["null"], workers=0, diagnosis="tests.proof.diagnoses:says_nothing"
+    )
+    assert proof.account["rig"] == "overturn"
+    assert proof.truths[0]["rig"] == "overturn"
+    assert proof.account["summary"]["false_alarms"]["hits"] == 0

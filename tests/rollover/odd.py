@@ -1,0 +1,27 @@
+"""A case that does what it is asked for; children import nothing else for it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from pathlib import Path
+from typing import Any
+
+
+def odd(case: Any) -> Any:
+    """What a case asks for, of the child that works it off or of the worker above it."""
+    match case:
+        case Path():
+            case.write_text(str(os.getpid()))
+            threading.Event().wait()
+        case "raise":
+            raise ValueError("not today")
+        case "die":
+            os.kill(os.getpid(), signal.SIGKILL)
+        case "hang":
+            threading.Event().wait()
+        case "worker":
+            os.kill(os.getppid(), signal.SIGKILL)
+            threading.Event().wait()
+    return case * case

@@ -1,0 +1,157 @@
+"""Every kind of page in a real browser: one look, no script needed, nothing fetched, and A4 paper."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rollover import store
+from rollover.baseline import Answer, Difference
+from rollover.loads import peak_loads
+from rollover.misfit import misfit
+from rollover.pair import pair, read
+from rollover.proof.tally import tally
+from rollover.recording import Recording
+from tests.rollover.diagnosed import sensor_at_fault, told
+from tests.viz import example
+from tests.viz.browser import CHROMIUM, has_browser
+from tests.viz.html import Parts
+from tests.viz.test_proof_page import row
+from tests.viz.test_study_page import written
+from viz import comparison_page, diagnosis_page, pair_page, proof_page, regression, report
+
+KINDS = ("run", "compare", "two runs", "diagnose", "prove", "regress", "study")
+HASH = "c0ffee" * 10 + "beef"
+PAPER = (179, 261)  # mm, what A4 leaves within its margins
+VERSIONS = {"rollover": "0.1.0", "exudyn": "1.13.6"}
+
+
+def page_of(kind: str, folder: Path) -> str:
+    """A page with everything on it, from made-up results."""
+    if kind == "run":
+        run = example.overturn()
+        answer = {"scenario_hash": HASH, "versions": VERSIONS, "files": ["run.json"], "half_step": None}
+        return report.page(run, peak_loads(run), answer, command="rollover run side_overturn")
+    about = {"scenario_hash": HASH, "versions": VERSIONS}
+    if kind == "compare":
+        run = example.drop()
+        channels = {
+            name: 1.1 * values for name, values in run.recording.channels.items() if name.startswith("ground/f")
+        }
+        measured = Recording(title="Drop", time=run.recording.time, channels=channels)
+        found = misfit(run, measured, name="drop 1", noise=lambda r, c: 20.0)
+        return comparison_page.page([found], title="Drop", command="rollover compare drop_test rec/d3.csv", **about)
+    if kind == "two runs":
+        for name, run in (("was", example.drop()), ("now", example.drop(2.0))):
+            store.write(folder / name, run, peak_loads(run))
+        found_pair = pair(read(folder / "was"), read(folder / "now"))
+        return pair_page.page(found_pair, command="rollover compare was now", versions=VERSIONS)
+    if kind == "diagnose":
+        return diagnosis_page.page(
+            sensor_at_fault(), told(), title="Drop", command="rollover diagnose drop_test rec", **about
+        )
+    if kind == "prove":
+        rows = [row("case-0001", "single", "mass", "mass"), row("case-0002", "null", "", "soil-layer")]
+        account = {"seed": 7, "summary": tally(rows), "rows": rows, "seal": {"digest": HASH, "algorithm": "sha256"}}
+        return proof_page.page(account, command="rollover prove --cases 2", versions=VERSIONS)
+    if kind == "study":
+        return written(folder, 24).read_text(encoding="utf-8")
+    load = Difference(
+        load="rops/force", filter="CFC 60", unit="N", was=18e3, now=19e3, time_was=2.0, time_now=2.1, change=0.06,
+        tolerance=0.02, same=False,
+    )  # fmt: skip
+    answers = [Answer(scenario="tip", verdict="changed", sentence="1 of 1 changed", differences=(load,))]
+    return regression.page(answers, command="rollover regress tip", scenario_hash=HASH)
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("pages")
+    found = {}
+    for kind in KINDS:
+        found[kind] = folder / f"{kind.replace(' ', '_')}.html"
+        found[kind].write_text(page_of(kind, folder), encoding="utf-8")
+    return found
+
+
+def test_all_share_one_look_and_say_what_they_rest_on(pages: dict[str, Path]) -> None:
+    styles = set()
+    for kind, path in pages.items():
+        text = path.read_text(encoding="utf-8")
+        parts = Parts(text)
+        (style,) = re.findall(r"<style>(.*?)</style>", text, flags=re.DOTALL)
+        styles.add(style)
+        fetched = set(parts.fetched()) - ({"script"} if kind == "study" else set())  # its own, for sorting
+        assert fetched == set(), kind
+        footer = re.sub(r"\s+", " ", text[text.index("<footer>") :])
+        assert re.search(r"<code>rollover \w+ [^<]+</code>", footer), kind
+        assert re.search(r"(Scenario|Scenarios|Seal) <code>[0-9a-f]{64}( and [0-9a-f]{64})?</code>", footer), kind
+        assert re.search(r"rollover \d+\.\d+\.\d+", footer), kind
+    assert len(styles) == 1
+
+
+needs_browser = pytest.mark.skipif(not has_browser(), reason="no chromium with playwright")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as play:
+        found = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield found
+        found.close()
+
+
+@needs_browser
+@pytest.mark.parametrize("kind", KINDS)
+def test_it_reads_without_a_script_and_without_a_network(kind: str, pages: dict[str, Path], browser: Any) -> None:
+    context = browser.new_context(java_script_enabled=False, offline=True, viewport={"width": 420, "height": 800})
+    tab = context.new_page()
+    asked: list[str] = []
+    tab.on("request", lambda request: asked.append(request.url))
+    tab.goto(pages[kind].as_uri())
+    assert asked == [pages[kind].as_uri()]
+    headline = tab.locator(".headline p").first
+    assert headline.is_visible()
+    assert len(headline.inner_text()) > 10
+    for drawing in tab.locator("main > section > figure svg").all():
+        box = drawing.bounding_box()
+        assert box is not None
+        assert box["width"] > 100
+        assert box["height"] > 15
+    # on a narrow screen tables scroll by themselves, the page does not
+    wide = tab.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+    assert wide <= 1
+    context.close()
+
+
+@needs_browser
+@pytest.mark.parametrize("kind", KINDS)
+def test_it_prints_in_full_on_light_paper(kind: str, pages: dict[str, Path], browser: Any, tmp_path: Path) -> None:
+    width = round(PAPER[0] / 25.4 * 96)
+    context = browser.new_context(color_scheme="dark", offline=True, viewport={"width": width, "height": 900})
+    tab = context.new_page()
+    tab.goto(pages[kind].as_uri())
+    dark = tab.evaluate("getComputedStyle(document.body).backgroundColor")
+    tab.emulate_media(media="print", color_scheme="dark")
+    assert tab.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)" != dark
+    assert tab.evaluate("getComputedStyle(document.body).color") == "rgb(0, 0, 0)"
+    for folded in tab.locator("details").all():
+        inside = folded.locator(":scope > *:not(summary)").first
+        assert inside.bounding_box(), "folded away on paper"
+        assert inside.bounding_box()["height"] > 0
+    beyond = tab.evaluate(
+        "[...document.querySelectorAll('table, svg, pre, code')].filter(e => e.getBoundingClientRect().width > 0)"
+        ".map(e => e.getBoundingClientRect().right - document.documentElement.clientWidth)"
+    )
+    assert max(beyond, default=0.0) <= 1.0, "cut off at the edge of the paper"
+    paper = tab.pdf(prefer_css_page_size=True)
+    assert paper.startswith(b"%PDF")
+    sheets = {tuple(round(float(x)) for x in m) for m in re.findall(rb"/MediaBox \[0 0 ([\d.]+) ([\d.]+)\]", paper)}
+    assert sheets <= {(595, 842), (596, 842)}, "A4 in points"
+    context.close()
