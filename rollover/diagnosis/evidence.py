@@ -22,6 +22,7 @@ MODEL_ERROR = 2e-4  # of a channel's range: what integrators differ by is no mis
 ALONE = 0.02  # s, prior of the time shift of a recording whose clock has no zero
 CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is believed
 MANY = 10  # quiet windows from which on a memory of two samples is told
+ROUGH = 0.5  # times the noise, from which on another error has a large part
 CORNER = 2.0775  # corner frequency over the filter class, forward and backward, Hz
 LEAP = 4.0  # times the steps beside it
 SHIFT = 1e-3  # s, prior of the time shift of a recording whose zero is known
@@ -65,12 +66,12 @@ class Evidence:
         return eased(np.stack([self.whitened(column) for column in self.doubts.T], axis=1))
 
     def is_rough(self, s: Signal) -> bool:
-        """Whether a scatter between runs, or a tolerance that was asked for, says more of the error than noise does.
+        """Whether a scatter between runs, or a tolerance that was asked for, has a large part in the error.
 
         Such an error is one for the whole signal, not one for each sample: within its size it is nothing.
         """
         known = s.scatter > 0.0 or self.model_error > MODEL_ERROR
-        return known and float(np.hypot(s.scatter, self.model_error * s.span)) > s.noise
+        return known and float(np.hypot(s.scatter, self.model_error * s.span)) > ROUGH * s.noise
 
     @property
     def count(self) -> int:

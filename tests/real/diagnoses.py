@@ -32,8 +32,7 @@ PLACE, ACCELERATION = "striker/position_z", "striker/acceleration_z"
 HEIGHTS = (25, 50, 75, 100, 125, 150)  # cm, of the cone drops
 CORRIDOR = 0.05  # of the range, ISO/TS 18571
 AREA = 0.01  # m2, to which drag areas of several balls are referred
-POSE = tuple(f"chassis/{k}" for k in ("position_x", "position_y", "position_z"))
-TURN = tuple(f"chassis/quaternion_{k}" for k in "wxyz")
+ALONG = ("chassis/position_x", "chassis/position_y")  # the table: where friction acts
 Recordings = list[tuple[str, Recording]]
 
 
@@ -153,7 +152,7 @@ def penetrometer(folder: Path, _: Mapping[str, Any]) -> tuple[Scenario, Recordin
 
 
 def cubes(numbers: Sequence[int]) -> Callable[[Path, Mapping[str, Any]], tuple[Scenario, Recordings]]:
-    """Tosses of a cube onto a table without friction, from the start to 0.1 s after the first contact.
+    """Tosses of a cube onto a table without friction, along the table, from the start to 0.1 s after the first contact.
 
     Tumbling is chaotic: nothing is asked of what comes later. The start is that of a flight fitted to the poses.
     """
@@ -167,7 +166,7 @@ def cubes(numbers: Sequence[int]) -> Callable[[Path, Mapping[str, Any]], tuple[S
         for name, r in COLLECTIONS["cube-tosses"].read(folder / "cube_tosses", names):
             rows = np.flatnonzero(r.time <= touched[int(name[4:])] + 0.1)
             doubt = {"initiation.velocity": (0.005,) * 3, "initiation.angular_velocity": (0.03,) * 3}
-            found.append((name, cut(r, rows, [*POSE, *TURN], uncertainty=doubt)))
+            found.append((name, cut(r, rows, ALONG, uncertainty=doubt)))
         return load("cube_toss").replaced({"ground.friction.coefficient": 0.0}), found
 
     return made
@@ -206,7 +205,7 @@ SETS: dict[str, Set] = {
     "cube tosses": Set(
         left_out="ground-friction",
         make=cubes((1, 4, 7, 9, 12)),
-        tolerance=0.01,
+        tolerance=0.015,
         value=friction,
         published="mu 0.15 to 0.18",
     ),
