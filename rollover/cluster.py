@@ -24,6 +24,7 @@ C = TypeVar("C")
 V = TypeVar("V")
 
 LOCAL, SLURM = "local", "slurm"
+REFRESH = 5.0  # s between two counts of the workers' threads
 PATIENCE = 60.0  # s that a scheduler and its first worker may take to answer
 
 
@@ -60,9 +61,12 @@ def _handed_out(
     todo = iter(enumerate(cases))
     open_: dict[str, tuple[int, C]] = {}
     over = as_completed(loop=client.loop)
+    threads, asked = 1, float("-inf")  # workers come and go
     try:
         while True:
-            room = AHEAD * max(1, sum(client.nthreads().values())) - len(open_)
+            if time.monotonic() - asked > REFRESH:
+                threads, asked = max(1, sum(client.nthreads().values())), time.monotonic()
+            room = AHEAD * threads - len(open_)
             for index, case in _first(todo, room):
                 args = (token, function, case, time_limit, memory_limit, warm_up)
                 task = client.submit(_in_child, *args, pure=False, retries=0, key=f"case-{token}-{index}")
@@ -193,8 +197,8 @@ def _local(workers: int | None) -> Any:
 
     from rollover.execute import cores
 
-    # a case that takes its worker along is not tried on three others
-    dask.config.set({"distributed.scheduler.allowed-failures": 0})
+    # a case that takes its worker along is not tried on three others; nobody looks at the profile of a waiting thread
+    dask.config.set({"distributed.scheduler.allowed-failures": 0, "distributed.worker.profile.enabled": False})
     return LocalCluster(n_workers=workers or cores(), threads_per_worker=1, dashboard_address=None, memory_limit=0)
 
 

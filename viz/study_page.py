@@ -216,8 +216,8 @@ def _mean(x: Array, y: Array) -> Curve | None:
 
 
 def _reliability(found: Mapping[str, Any]) -> Section:
-    if "failed" in found:
-        return Section(title="Reliability", blocks=[Note(text=f"No design point: {found['failed']}", warning=True)])
+    if "reason" in found:
+        return Section(title="Reliability", blocks=[Note(text=f"No design point: {found['reason']}", warning=True)])
     head = Table(
         columns=("way", "probability", "from", "to", "cases"),
         rows=[

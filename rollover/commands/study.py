@@ -168,7 +168,7 @@ def _reliability(chosen: Study, builder: Builder, target: Path, way: Way) -> dic
         found = reliability.form_and_importance_sampling(limit_state, names, chosen.reliability, chosen.confidence)
     except reliability.NoDesignPointError as e:
         console.say(f"No reliability: {e}")
-        return {"failed": str(e)}
+        return {"reason": str(e)}
     point = from_unit(chosen, ndtr(np.array([[found["design_point"][n] for n in names]]))).row(0)
     return {**found, "output": output.name, "limit": limit, "design_values": point}
 
@@ -234,7 +234,7 @@ def sentences(account: dict[str, Any]) -> list[str]:
             lines.append(f"  {s['axis']}: first {s['first']:.2f} +- {s['first_half_width']:.2f}, {total}")
         for m in each["morris"]:
             lines.append(f"  {m['axis']}: mean magnitude of effects {readable(m['magnitude'], each['unit'])}")
-    if (r := account["reliability"]) and "failed" not in r:
+    if (r := account["reliability"]) and "reason" not in r:
         lines.append(
             f"Beyond the limit by importance sampling {r['probability']:.3g} ({r['low']:.3g} to {r['high']:.3g}), "
             f"FORM {r['form_probability']:.3g}, beta {r['beta']:.3g}"

@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 ALIKE = 0.05  # of the logarithm of the rate: recordings so close were taken alike
 CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is believed
 OWN = 1.5  # times the common noise: beyond, a recording has its own
+UNLIKE = 4.0  # standard errors by which levels differ that are not one recorder's
 SURELY = 4  # quiet windows from which on that is believed
 LONGEST = 4  # samples of memory
 NOT_COLOURED = 0.7  # of the whole error that is noise: below, the model's own error prevails, which is no process
@@ -49,10 +50,16 @@ def whole(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evid
         members = [m for m in members if not evidence[m[0]].is_rough(m[2])]
         if not members:
             continue
-        sigma, ar = autoregression([residuals[r][part] for r, _, _, part in members])
-        for r, k, s, _ in members:
+        parts = [residuals[r][part] for r, _, _, part in members]
+        levels = np.array([max(float(np.sqrt(np.mean(p * p))), 1e-300) for p in parts])
+        sigma, ar = autoregression([p / level for p, level in zip(parts, levels, strict=True)])
+        # of one recorder unless they differ by more than so few samples can, each worth less for its memory
+        worth = np.array([p.size for p in parts]) * max(1.0 - sum(ar), 0.02) / (1.0 + max(sum(ar), 0.0))
+        common = float(np.sqrt(np.sum(levels**2 * worth) / worth.sum()))
+        own = np.abs(np.log(levels / common)) > UNLIKE / np.sqrt(2.0 * worth)
+        for (r, k, s, _), level in zip(members, levels if own.any() else np.full(levels.size, common), strict=True):
             if s.weight is None:  # else what is left is the model's error as well
-                found[r][k] = with_noise(s, sigma, ar, evidence[r].model_error)
+                found[r][k] = with_noise(s, sigma * float(level), ar, evidence[r].model_error)
     return [replace(e, signals=tuple(s)) for e, s in zip(evidence, found, strict=True)]
 
 

@@ -17,13 +17,14 @@ from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.depend import dependency, residual_forces
 from rollover.diagnosis.empirical import offered, proposed
 from rollover.diagnosis.evidence import Evidence, doubted, evidence_of, left_out
+from rollover.diagnosis.explain import SURE
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import yardstick
 from rollover.diagnosis.overturn import RunSimulator
 from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing, with_scatter
 from rollover.diagnosis.scores import judged
-from rollover.diagnosis.selection import SURE, decided, explained, matters
+from rollover.diagnosis.selection import decided, explained, matters
 from rollover.diagnosis.simulator import set_up
 from rollover.diagnosis.statements import considered, named, noise, places, sentence
 from rollover.diagnosis.verdict import Degree, Diagnosis
@@ -61,14 +62,13 @@ def diagnose(
     if not 0.0 <= tolerance < 1.0:
         raise ValueError(f"tolerance: not a share of a range, got {tolerance:g}; at least 0 and below 1")
     every, notes = _evidence(scenario, recordings)
-    every = _weighed(scenario, [replace(e, model_error=float(np.hypot(e.model_error, tolerance))) for e in every])
-    every = [weighted(e, e.simulator.strays()) for e in every]
-    found = [e for e in every if e.name not in hold_out]
-    kept = [e for e in every if e.name in hold_out]
+    every = [replace(e, model_error=float(np.hypot(e.model_error, tolerance))) for e in every]
+    found = _trusted(scenario, [e for e in every if e.name not in hold_out])
+    kept = [e for e in _trusted(scenario, every) if e.name in hold_out] if hold_out else []
     if sum(e.count for e in found) < FEWEST:
         return _nothing(every, names, notes, began)
     groups = left_out(found)
-    notes += differing(every)
+    notes += differing(found)
     if len(groups) == 1 and not kept:
         notes.append("one condition only: what stands as held out is predicted by the fit to it")
     judge = Judge(found)
@@ -95,7 +95,7 @@ def diagnose(
         say("a law for what no candidate explains")
         law = proposed(judge, explanation.base, set_ups, found, groups)
     detectable = dict(explanation.detectable)
-    contrary = differing(every, CONTRADICTING)
+    contrary = differing(found, CONTRADICTING)
     if verdict == "no-mismatch" and (contrary or _is_weak(detectable)):
         verdict = "cannot-tell"
     h_before, h_after = (judged(judge, f, kept, groups) for f in (explanation.base, explanation.fitted))
@@ -143,6 +143,11 @@ def _weighed(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:
     judge.aligned()
     base = judge.fit((), (), rounds=2)
     return list(every) if base is None else colour.quiet(every, judge.residuals(base))
+
+
+def _trusted(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:
+    """The recordings weighed, what the simulation itself is not sure of less."""
+    return [weighted(e, e.simulator.strays()) for e in _weighed(scenario, every)]
 
 
 def _evidence(scenario: Scenario, recordings: Sequence[tuple[str, Recording]]) -> tuple[list[Evidence], list[str]]:

@@ -35,8 +35,8 @@ RUNS = Effort(
     short=2,
     leaders=2,
     most_leaders=3,
-    rounds=5,
-    nudges=(3e-2,),
+    rounds=7,
+    nudges=(3e-2, 8e-3),
     polishes=0,
     thrifty=True,
 )

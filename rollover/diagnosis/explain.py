@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis import colour
-from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.candidates import BESIDE, Candidate
 from rollover.diagnosis.crew import Crew, Job
+from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.fit import NOISE_LEFT, Fitted, Judge
 from rollover.diagnosis.gate import Gate, freed
@@ -30,7 +31,11 @@ WITHIN_ONE = 1.0  # standard errors within which the simpler one is preferred
 APART = 2.0  # standard errors beyond which a rival is excluded
 NEARLY_NOISE = 1.3  # misfit over the noise up to which its own colour is believed
 
+LIKE_NOISE = 2.2  # misfit over the noise up to which it may be noise that was underrated
+SURE = 1e-3  # p-value below which there is a mismatch
+
 Progress = Callable[[str], None]
+Phases = Sequence[Sequence[tuple[float, str]]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,8 +86,11 @@ def is_far(judge: Judge, base: Fitted) -> bool:
 
 
 def begun(judge: Judge, base: Fitted) -> list[float]:
-    """Time shifts (s) to begin with: where the base is far off its shifts are bent by what is missing."""
-    if not is_far(judge, base):
+    """Time shifts (s) to begin with: where the base is far off its shifts are bent by what is missing.
+
+    Where samples are weighed by what neighbours scatter by, how far off it is cannot be told from what is left.
+    """
+    if not is_far(judge, base) and not judge.effort.thrifty:
         return [b.shift for b in base.blocks]
     return [
         b.shift if e.recording.clock.zero == "unknown" else 0.0
@@ -119,8 +127,16 @@ def screen(judge: Judge, base: Fitted, candidates: Sequence[Candidate], few: Seq
             met.append((left, start))
         if met:
             met.sort()
-            found.append(Screened(candidate=c, starts=_apart(met), left=met[0][0], potential=potential))
+            found.append(Screened(candidate=c, starts=_begun_at(c, met), left=met[0][0], potential=potential))
     return found
+
+
+def _begun_at(c: Candidate, met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float, ...], ...]:
+    """Where fits begin: the best starts; of few and far ones the best, and beside what changes nothing."""
+    neutral = [] if c.neutral is None else [n + BESIDE for n in c.neutral if n is not None]
+    if c.neutral is None or len(neutral) < len(c.neutral):
+        return _apart(met)
+    return (tuple(neutral), met[0][1])
 
 
 def _apart(met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float, ...], ...]:
@@ -137,6 +153,7 @@ def step(
     base: Fitted,
     candidates: Sequence[Candidate],
     groups: Sequence[Sequence[int]],
+    phases: Phases,
     say: Progress,
     looked: Gate,
     crew: Crew,
@@ -167,14 +184,28 @@ def step(
         others = [f for f in fits if not any(f is one for one in near)]
         fits = others + [new or old for new, old in zip(polished, near, strict=True)]
     fits = _one_each(fits) if judge.effort.thrifty else _shaped(judge, _one_each(fits), crew, say)
-    if fits[0].left < NEARLY_NOISE**2 * count:
-        judge.weigh(colour.whole(judge.evidence, judge.residuals(fits[0])))
+    if weighed(judge, fits[0], phases):
         base, fits = judge.again(base), [judge.again(f) for f in fits]
     fits.sort(key=lambda f: held_out(f, groups).left.sum())
     fits = simplest(fits, groups, judge.per_error)
     phi = max(1.0, min(f.left for f in fits) / count)  # what even the best leaves is no chance of the noise's size
     phi *= judge.per_error
     return Step(base=base, fitted=fits[0], p_value=looked.p_value(phi), rivals=tuple(fits), screened=tuple(screened))
+
+
+def weighed(judge: Judge, fitted: Fitted, phases: Phases) -> bool:
+    """Weigh the recordings by all that a fit leaves, if that is noise: as little as seen, or more without structure."""
+    left, count = fitted.left, sum(b.residual.size for b in fitted.blocks)
+    if left > LIKE_NOISE**2 * count:
+        return False
+    before = judge.evidence
+    judge.weigh(colour.whole(before, judge.residuals(fitted)))
+    if left < NEARLY_NOISE**2 * count:
+        return True
+    if mismatch_of(judge.evidence, judge.again(fitted).blocks, phases).p_value > SURE:
+        return True
+    judge.weigh(before)
+    return False
 
 
 def _promising(candidates: Sequence[Candidate], looked: Gate, scored: int | None) -> list[Candidate]:
@@ -212,7 +243,7 @@ def _first_fits(
     told: dict[str, float] = {}
     say(f"first fits of {len(chosen)} candidates to {len(few)} recordings")
     at = tuple(shifts[r] for r in few)
-    pinned = is_far(judge, base)
+    pinned = judge.effort.thrifty or is_far(judge, base)
     jobs = [
         Job(
             candidates=(*base.candidates, s.candidate), start=(*base.x, *start), shifts=at, only=tuple(few),
@@ -228,6 +259,7 @@ def _first_fits(
     fits.sort(key=lambda f: f.left)
     worth = [f for k, f in enumerate(fits) if k < judge.effort.leaders or f.left < WITHIN * fits[0].left]
     if judge.effort.thrifty and fits:
+        worth = _one_each(worth)
         as_it_is = sum(base.blocks[r].normal()[2] for r in few)
         worth = [f for f in worth if as_it_is - f.left >= RIVALS * (as_it_is - fits[0].left)]
     worth = worth[: judge.effort.most_leaders]

@@ -19,6 +19,7 @@ STRIDE, STRIDES = 2.0, 6  # by what factor, how often
 TRIES = 4  # of a step, each damped more
 PLACES = 241  # time shifts that are tried
 NOISE_LEFT = 1.04  # misfit over the noise that needs no further search
+Point = tuple[Sequence[Candidate], Sequence[float]]
 NONE = np.zeros(0, dtype=np.int64)
 
 
@@ -179,18 +180,30 @@ class Judge:
         for k in range(0 if known is None else known.shape[1], len(x) if nudge else 0):
             step = nudge if x[k] < 0.5 else -nudge
             there = [*x[:k], x[k] + step, *x[k + 1 :]]
-            moved = self.raw(r, candidates, there, shift)
+            moved = self.moved(r, (candidates, x), (candidates, there), shift)
             if moved is None:
                 return None
-            d = (moved - raw) / step
-            for at in (*leaps, *self._leaps.get(_key(r, candidates, there, shift), NONE)):
-                d[at : at + 3] = 0.0  # a leap that moves past a sample is no slope
-            J[:, k] = e.eased(e.whitened(d))
+            J[:, k] = moved / step
         slope = e.eased(e.slope(raw, leaps))
         if self._pinned and e.recording.clock.zero != "unknown":
             slope = np.zeros_like(slope)
         residual = e.eased(self.measured[r] - y)
         return Block(residual=residual, J=J, slope=slope, shift=shift, prior=e.shift_prior)
+
+    def moved(self, r: int, before: Point, after: Point, shift: float) -> Array | None:
+        """How the prediction of recording r differs between two points, whitened; nothing where either leaps.
+
+        A leap that moves past a sample is no slope, and what is forgiven there follows the measurement.
+        """
+        first, last = self.raw(r, *before, shift), self.raw(r, *after, shift)
+        if first is None or last is None:
+            return None
+        d = last - first
+        for point in (before, after):
+            for at in self._leaps.get(_key(r, *point, shift), NONE):
+                d[at : at + 3] = 0.0
+        e = self.evidence[r]
+        return e.eased(e.whitened(d))
 
     def fit(
         self,

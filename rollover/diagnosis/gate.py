@@ -97,10 +97,10 @@ def _direction(judge: Judge, base: Fitted, c: Candidate, x: Sequence[float], use
     found = []
     for r in use:
         block = base.blocks[r]
-        y = judge.predicted(r, (*base.candidates, c), (*base.x, *x), block.shift)
-        if y is None:
+        d = judge.moved(r, (base.candidates, base.x), ((*base.candidates, c), (*base.x, *x)), block.shift)
+        if d is None:
             return None
-        found.append(freed((y - (judge.measured[r] - block.residual))[:, None], block)[:, 0])
+        found.append(freed(d[:, None], block)[:, 0])
     return np.concatenate(found)
 
 

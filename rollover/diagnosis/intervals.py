@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from ground.quantity import quantities
 from rollover.diagnosis.candidates import physical
-from rollover.diagnosis.chaos import FEW
 from rollover.diagnosis.evidence import MODEL_ERROR
 from rollover.diagnosis.fit import GENTLE, Fitted, Judge
 from rollover.diagnosis.verdict import Interval
@@ -17,6 +16,7 @@ from rollover.effects import EFFECTS
 
 Array = NDArray[np.float64]
 TWO_SIDED = 1.96
+STUDENT = 2.6  # (t/1.96)^2 of Student's t for three neighbours: their scatter is itself an estimate
 
 
 def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
@@ -44,7 +44,7 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
         moved += (inverse @ pull) ** 2
     for e, block in zip(judge.evidence, fitted.blocks, strict=True):
         for stray in e.strays:
-            moved += FEW / len(e.strays) * (inverse @ (block.J.T @ e.whitened(stray))) ** 2
+            moved += STUDENT / len(e.strays) * (inverse @ (block.J.T @ e.whitened(stray))) ** 2
     sd = np.sqrt(sd**2 + moved)
     found, at = [], 0
     for c in fitted.candidates:

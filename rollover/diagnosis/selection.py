@@ -7,25 +7,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rollover.diagnosis import colour
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.detect import Mismatch, mismatch_of
-from rollover.diagnosis.explain import NEARLY_NOISE, Step, moves, spread, step
+from rollover.diagnosis.explain import SURE, Phases, Step, moves, spread, step, weighed
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate, gate
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.verdict import Verdict
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
-SURE = 1e-3  # p-value below which there is a mismatch
 MOST = 3  # effects in one explanation
 NEGLIGIBLE = 0.001  # of a channel's range: what moves nothing by more is not worth a name
 PARTLY = 0.02  # of the excess over the noise that one effect may leave and still be named
 HOPELESS = 2.0  # misfit over the noise that two effects leave and a third is not looked for
+BETTER = 0.5  # of what is left, that another first effect must leave
 NEEDED = 25.0  # gain, over what is left per sample, that an effect must bring beside all the others
 
-Phases = Sequence[Sequence[tuple[float, str]]]
 Groups = Sequence[Sequence[int]]
 Progress = Callable[[str], None]
 
@@ -65,8 +63,7 @@ def explained(
 ) -> Explanation:
     """Forward selection of up to three effects, each beyond chance, then each tried without and against its rivals."""
     count = sum(b.residual.size for b in base.blocks)
-    if base.left < NEARLY_NOISE**2 * count:
-        judge.weigh(colour.whole(judge.evidence, judge.residuals(base)))
+    if weighed(judge, base, phases):
         base = judge.again(base)
     before = mismatch_of(judge.evidence, base.blocks, phases)
     say(f"looking at {len(candidates)} candidates, which of them could matter")
@@ -79,7 +76,7 @@ def explained(
             break
         if looked.p_value() > CHANCE and (left.p_value > SURE or not matters(judge, current, left)):
             break
-        found = step(judge, current, free(current, candidates), groups, say, looked, crew)
+        found = step(judge, current, free(current, candidates), groups, phases, say, looked, crew)
         first = first or found
         if found is None or found.p_value > CHANCE or moves(judge, found.base, found.fitted) < NEGLIGIBLE:
             break
@@ -88,13 +85,20 @@ def explained(
         left = mismatch_of(judge.evidence, current.blocks, phases)
         if judge.effort.thrifty and (left.p_value > SURE or not matters(judge, current, left)):
             break
+        if len(taken) == 2 and left.p_value < SURE and matters(judge, current, left):
+            # of two that are strong the first may have been taken for something else: is there a better one?
+            other = _instead(judge, current, candidates, groups, phases, say, crew)
+            if other is not None and other.fitted.left < BETTER * current.left:
+                taken = [taken[1], other]
+                current = other.fitted
+                left = mismatch_of(judge.evidence, current.blocks, phases)
         if len(taken) > 1 and current.left > HOPELESS**2 * count:
             break
         looked = gate(judge, current, free(current, candidates), few)
     is_whole = left.p_value > SURE or not matters(judge, current, left)
     parts = [s.again(judge) for s in taken]
     if is_whole and len(taken) > 1:
-        parts = _needed(judge, taken, candidates, groups, say, crew)
+        parts = _needed(judge, taken, candidates, groups, phases, say, crew)
     base = judge.again(base)
     current = parts[-1].fitted if parts else base
     return Explanation(
@@ -126,8 +130,31 @@ def without(judge: Judge, fitted: Fitted, k: int, rounds: int = 8) -> Fitted | N
     return judge.fit(rest, x, rounds=rounds, shifts=[b.shift for b in fitted.blocks])
 
 
+def _instead(
+    judge: Judge,
+    current: Fitted,
+    candidates: Sequence[Candidate],
+    groups: Groups,
+    phases: Phases,
+    say: Progress,
+    crew: Crew,
+) -> Step | None:
+    """The first effect of an explanation taken out and looked for anew beside the rest: it comes back, or a better."""
+    rest = without(judge, current, 0)
+    if rest is None:
+        return None
+    others = free(rest, candidates)
+    return step(judge, rest, others, groups, phases, say, gate(judge, rest, others), crew)
+
+
 def _needed(
-    judge: Judge, taken: Sequence[Step], candidates: Sequence[Candidate], groups: Groups, say: Progress, crew: Crew
+    judge: Judge,
+    taken: Sequence[Step],
+    candidates: Sequence[Candidate],
+    groups: Groups,
+    phases: Phases,
+    say: Progress,
+    crew: Crew,
 ) -> list[Step]:
     """Steps of the effects that are needed: each dropped if that costs no more than chance, or given to a better one.
 
@@ -151,12 +178,7 @@ def _needed(
         if whole and {c.key for c in current.candidates} == {c.key for c in last.fitted.candidates}:
             parts.append(last)  # found beside just these others
             break
-        # the first of all is taken out and looked for anew beside the rest: it comes back last, or a better one does
-        rest = without(judge, current, 0)
-        if rest is None:
-            break
-        others = free(rest, candidates)
-        found = step(judge, rest, others, groups, say, gate(judge, rest, others), crew)
+        found = _instead(judge, current, candidates, groups, phases, say, crew)
         if found is None:
             break
         parts.append(found)

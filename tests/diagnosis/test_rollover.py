@@ -105,4 +105,4 @@ def test_values_are_found_by_their_paths() -> None:
 def test_full_runs_are_looked_at_sparingly() -> None:
     assert RUNS.thrifty
     assert RUNS.few < 3
-    assert min(RUNS.nudges) > 0.01  # below, chance decides
+    assert min(RUNS.nudges) > 0.005  # below, chance decides

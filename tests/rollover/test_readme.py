@@ -20,7 +20,8 @@ from tests.viz.picture import has_software_driver
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
-PAGES = [p for p in ROOT.rglob("*.md") if not {".venv", ".tools", "out", ".git"} & set(p.relative_to(ROOT).parts)]
+FOLDERS = ("docs", "ground", "rollover", "viz", "scenarios", "tests")
+PAGES = sorted([*ROOT.glob("*.md"), *(p for folder in FOLDERS for p in (ROOT / folder).rglob("*.md"))])
 BY_CI = "make demo"  # what .ci/run does by itself; here the line that make runs
 COMMANDS = {c.name or c.callback.__name__ for c in app.registered_commands if c.callback}
 

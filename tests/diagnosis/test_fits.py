@@ -1,0 +1,169 @@
+"""How fits are made: leaps, shifts, jobs, workers, and what is taken up again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis import diagnose, diagnosed_text
+from rollover.diagnosis.bins import simulated
+from rollover.diagnosis.candidates import Candidate, candidates_of
+from rollover.diagnosis.crew import Crew, Job
+from rollover.diagnosis.evidence import evidence_of
+from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.simulator import simulator_of
+from rollover.scenario import load
+from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
+
+GAIN = {"effects.sensor-gain.channel": FORCE, "effects.sensor-gain.gain": 1.05}
+
+
+def judge_of(recordings: Sequence[Any]) -> Judge:
+    found = [evidence_of(name, *simulated(scenario(), r)) for name, r in recordings]
+    return Judge([e for e in found if e is not None])
+
+
+def candidate(judge: Judge, key: str) -> Candidate:
+    return next(c for c in candidates_of(judge.evidence, (), "drop") if c.key == key)
+
+
+def test_a_leap_is_forgiven_within_a_sample_and_not_beyond() -> None:
+    judge = judge_of(recorded({}, speeds=(2.0,), noise=1e-3))
+    e = judge.evidence[0]
+    signal, part = next((s, p) for s, p in e.spans() if s.channel == DEPTH)
+    raw = np.concatenate([s.values for s in e.signals])
+    at = part.start + 50
+    stepped = raw.copy()
+    stepped[part] = 0.0
+    stepped[at : part.stop] = signal.span
+    measured = stepped.copy()
+    measured[at] = 0.4 * signal.span  # the sample that the leap falls into
+    moved = [s.values for s in e.signals]
+    k = list(e.signals).index(signal)
+    moved[k] = measured[part]
+    from dataclasses import replace
+
+    other = replace(e, signals=tuple(replace(s, values=v) for s, v in zip(e.signals, moved, strict=True)))
+    leaps = other.leaps(stepped)
+    assert at - 2 in leaps or at - 1 in leaps
+    left = (measured - other.forgiven(stepped, leaps))[part]
+    assert np.max(np.abs(left)) < 1e-12
+    late = measured.copy()
+    late[at : at + 4] = 0.0
+    moved[k] = late[part]
+    other = replace(e, signals=tuple(replace(s, values=v) for s, v in zip(e.signals, moved, strict=True)))
+    left = (late - other.forgiven(stepped, leaps))[part]
+    assert np.max(np.abs(left)) == pytest.approx(signal.span)
+
+
+def test_time_shifts_stay_where_their_clock_can_be() -> None:
+    judge = judge_of(recorded({"effects.soil-stiffness.scale": 2.5}, speeds=(2.0, 3.0), noise=1e-3))
+    base = judge.fit((), ())
+    assert base is not None
+    for e, block in zip(judge.evidence, base.blocks, strict=True):
+        assert abs(block.shift) <= 4.0 * e.shift_prior * (1.0 + 1e-9)
+
+
+def test_a_stiffness_far_off_is_found_from_every_start() -> None:
+    judge = judge_of(recorded({"effects.soil-stiffness.scale": 1.4}, speeds=(1.2, 3.2), noise=5e-3))
+    c = candidate(judge, "soil-stiffness")
+    for start in c.starts():
+        fitted = judge.fit((c,), start)
+        assert fitted is not None
+        assert c.values(fitted.x)["scale"] == pytest.approx(1.4, rel=0.01), start
+
+
+@pytest.mark.parametrize("workers", [2])
+def test_any_number_of_workers_gives_the_same_fits(workers: int) -> None:
+    recordings = recorded(GAIN, speeds=(1.2, 3.2))
+    jobs = []
+    for key in (f"sensor-gain:{FORCE}", "soil-stiffness"):
+        c = candidate(judge_of(recordings), key)
+        jobs.append(Job(candidates=(c,), start=c.starts()[0], shifts=(0.0, 0.0), rounds=3))
+    alone = Crew().fits(judge_of(recordings), jobs)
+    together = Crew(workers).fits(judge_of(recordings), jobs)
+    for a, b in zip(alone, together, strict=True):
+        assert a is not None
+        assert b is not None
+        assert a.x == b.x
+        assert a.left == b.left
+
+
+def test_what_was_fitted_is_taken_up_again(tmp_path: Path) -> None:
+    recordings = recorded(GAIN, speeds=(1.2, 3.2))
+    judge = judge_of(recordings)
+    c = candidate(judge, f"sensor-gain:{FORCE}")
+    job = Job(candidates=(c,), start=c.starts()[0], shifts=(0.0, 0.0))
+    notebook = tmp_path / "fits"
+    first = Crew(notebook=notebook).fits(judge, [job])[0]
+    with notebook.open("a") as file:
+        file.write('{"key": "broken off he')
+    other = judge_of(recordings)
+    crew = Crew(notebook=notebook)
+    again = crew.fits(other, [job])[0]
+    assert first is not None
+    assert again is not None
+    assert again.x == first.x
+    assert again.left == pytest.approx(first.left, rel=1e-12)
+    assert other.simulations < judge.simulations
+    assert Crew(notebook=notebook, about="another scenario")._done.keys() == crew._done.keys()
+    assert job.key("another") not in crew._done
+    crew.close()
+    assert not notebook.exists()
+
+
+def test_one_sensor_effect_on_two_channels_stands_twice_in_the_scenario(tmp_path: Path) -> None:
+    changes = {
+        "effects.sensor-bias.channel": FORCE,
+        "effects.sensor-bias.bias": 200.0,
+        "effects.sensor-bias-2.channel": DEPTH,
+        "effects.sensor-bias-2.bias": 0.02,
+    }
+    recordings = recorded(changes, speeds=(1.2, 2.2, 3.2), noise=3e-3)
+    found = diagnose(scenario(), recordings)
+    assert found.verdict == "sensor"
+    assert {(e.id, e.channel) for e in found.effects} == {("sensor-bias", FORCE), ("sensor-bias", DEPTH)}
+    path = tmp_path / "scenario.yaml"
+    path.write_text(diagnosed_text(scenario(), found), encoding="utf-8")
+    effects = load(path).effects
+    assert {e.channel: e.bias for e in effects.values()} == {
+        FORCE: pytest.approx(200.0, rel=0.05),
+        DEPTH: pytest.approx(0.02, rel=0.05),
+    }
+
+
+def test_what_is_held_out_has_no_part_in_the_fit() -> None:
+    good = recorded(GAIN, speeds=(1.2, 2.2, 3.2))
+    other = recorded({**GAIN, "effects.sensor-gain.gain": 1.4}, seed=3, speeds=(2.7,))
+    kept = [("kept", other[0][1])]
+    found = diagnose(scenario(), [*good, *kept], hold_out=["kept"])
+    alone = diagnose(scenario(), good)
+    assert [e.id for e in found.effects] == [e.id for e in alone.effects] == ["sensor-gain"]
+    assert found.effects[0].parameters["gain"].value == alone.effects[0].parameters["gain"].value
+    assert found.training == tuple(name for name, _ in good)
+    assert found.held_out == ("kept",)
+    assert found.after["training"].nrmse < 1.2
+    assert found.after["held_out"].nrmse > 3.0  # a recording of another world is not made to fit
+
+
+def test_one_condition_alone_says_that_nothing_was_held_out() -> None:
+    found = diagnose(scenario(), recorded({}, speeds=(2.0,)))
+    assert any("one condition only" in note for note in found.notes)
+
+
+def test_a_clock_of_its_own_is_simulated_at_its_own_stamps() -> None:
+    name, recording = recorded({}, speeds=(2.0,), channels=(FORCE, DEPTH, ACCELERATION), noise=1e-4)[0]
+    simulator = simulator_of(scenario(), recording)
+    late = simulator.predict(
+        {"effects.sensor-clock-offset.channel": FORCE, "effects.sensor-clock-offset.offset": 0.004}, 0.0
+    )
+    shifted, plain = simulator.predict({}, 0.004), simulator.predict({}, 0.0)
+    assert late is not None
+    assert shifted is not None
+    assert plain is not None
+    assert np.array_equal(late[FORCE], shifted[FORCE])
+    assert np.array_equal(late[DEPTH], plain[DEPTH]), name

@@ -1,0 +1,104 @@
+"""p-values on nothing but noise are uniform, for noise with and without a memory: no drop is made anew for a draw."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from scipy.stats import kstest
+
+from rollover.diagnosis import colour
+from rollover.diagnosis.candidates import candidates_of
+from rollover.diagnosis.detect import mismatch_of
+from rollover.diagnosis.evidence import Evidence, evidence_of
+from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.gate import gate
+from rollover.diagnosis.phases import drop_phases
+from rollover.diagnosis.simulator import Simulator, simulator_of
+from rollover.recording import Recording
+from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, scenario
+
+DRAWS = 40
+
+
+def noise(rng: np.random.Generator, count: int, memory: float) -> np.ndarray:
+    white = rng.standard_normal(count + 300)
+    return np.asarray(lfilter([np.sqrt(1.0 - memory**2)], [1.0, -memory], white)[300:])
+
+
+def silent() -> list[tuple[Recording, Simulator]]:
+    """Drops without noise, and what simulates them."""
+    found = []
+    for speed in (1.1, 1.9, 3.3):
+        time = np.arange(-0.04, 0.35, 1.0 / 700.0)
+        recording = Recording(
+            title=f"{speed}", time=time, conditions={"initiation.speed": speed},
+            channels={c: np.zeros(time.size) for c in (FORCE, DEPTH, ACCELERATION)},
+        )  # fmt: skip
+        simulator = simulator_of(scenario(), recording)
+        predicted = simulator.predict({}, 0.0)
+        assert predicted is not None
+        found.append((replace(recording, channels=predicted), simulator))
+    return found
+
+
+def noisy(drops: Sequence[tuple[Recording, Simulator]], rng: np.random.Generator, memory: float) -> list[Evidence]:
+    found = []
+    for k, (r, simulator) in enumerate(drops):
+        channels = {c: y + 0.01 * np.ptp(y) * noise(rng, y.size, memory) for c, y in r.channels.items()}
+        one = evidence_of(f"r{k}", replace(r, channels=channels), simulator)
+        assert one is not None
+        found.append(replace(one, shift_prior=1e-8))  # clocks are right: every draw meets the same simulations
+    return found
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.8])
+def test_p_values_are_uniform_where_there_is_only_noise(memory: float) -> None:
+    rng, drops = np.random.default_rng(7), silent()
+    omnibus, best = [], []
+    for _ in range(DRAWS):
+        evidence = noisy(drops, rng, memory)
+        misfit = [
+            np.concatenate([s.values - r.channels[s.channel][s.rows] for s in e.signals])
+            for e, (r, _) in zip(evidence, drops, strict=True)
+        ]
+        judge = Judge(colour.whole(evidence, misfit))
+        base = judge.fit((), (), rounds=1)
+        assert base is not None
+        phases = [drop_phases(e) for e in judge.evidence]
+        omnibus.append(mismatch_of(judge.evidence, base.blocks, phases).p_value)
+        few = [c for c in candidates_of(evidence, (), "drop") if c.kind == "sensor" and c.id != "sensor-lag"]
+        best.append(gate(judge, base, few).p_value())
+    assert kstest(omnibus, "uniform").pvalue > 0.01
+    assert kstest(best, "uniform").pvalue > 0.01
+    assert min(omnibus + best) > 1e-4
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.5, 0.9])
+def test_level_and_memory_of_the_noise_come_from_all_recordings_together(memory: float) -> None:
+    rng = np.random.default_rng(11)
+    sigma, ar = colour.autoregression([2.0 * noise(rng, 300, memory) for _ in range(6)])
+    assert sigma == pytest.approx(2.0, rel=0.12)
+    assert sum(ar) == pytest.approx(memory, abs=0.08)
+
+
+def test_hum_is_not_taken_for_the_memory_of_noise() -> None:
+    rng = np.random.default_rng(12)
+    t = np.arange(600)
+    series = [3.0 * np.sin(0.3 * t + k) + 0.3 * rng.standard_normal(600) for k in range(4)]
+    _, ar = colour.autoregression(series)
+    roots = np.roots([1.0, *(-a for a in ar)])
+    assert not np.any((np.abs(roots) > 0.9) & (np.abs(roots.imag) > 0.0))
+
+
+def test_quiet_noise_is_found_beneath_a_misfit_many_times_as_large() -> None:
+    rng, drops = np.random.default_rng(13), silent()
+    evidence = noisy(drops, rng, 0.0)
+    off = [np.concatenate([0.7 * s.values for s in e.signals]) for e in evidence]  # a scenario that says a third
+    for e, before in zip(colour.quiet(evidence, off), evidence, strict=True):
+        for s, b in zip(e.signals, before.signals, strict=True):
+            true = 0.01 * float(np.ptp(b.values))
+            assert 0.6 * true < s.noise < 2.0 * true, s.channel
