@@ -59,6 +59,7 @@ CONE, HEIGHT, NUMBERS = 13, 14, 15
 OUT_FORCE, OUT_SINKAGE, OUT_X, OUT_V, OUT_A, OUT_IMPULSE, OUT_COLUMNS = 0, 1, 2, 3, 4, 5, 6
 
 RESOLVED = 0.25  # longest step times the frequency on the ground
+FALLING = 5e-4  # s, step of a fall before the first contact
 HALVINGS = 20  # of a step, to the moment at which the soil stays behind
 CLOSE = 1e-7  # m: how near a step ends to a jump of the force
 
@@ -252,7 +253,10 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
     """
     row, state, s = np.zeros(COLUMNS), np.zeros(STATE_COLUMNS, np.int64), np.zeros(memory)
     y, end, a, now, stops = np.zeros(4), np.zeros(4), np.zeros((4, 2)), np.zeros(2), np.zeros(7)
-    at = np.zeros(4)
+    at, whole = np.zeros(4), f
+    if f[HEIGHT] > 0.0 and f[SPRING] > 0.0:
+        f = f.copy()  # gravity and air pull at nose and body alike: nothing bends until something is hit
+        f[SPRING], f[STEP] = 0.0, max(f[STEP], FALLING)
     i, n = 0, times.size
     g, m, guide, air = f[GRAVITY], f[MASS], f[GUIDE], f[AIR]
     while i < n and times[i] < 0.0:
@@ -268,7 +272,7 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
         impulse = hit(law, p, s, row, state, f, y)
     pull = p[law[EFFECTS] + ADHESION] * f[FACE] / REFERENCE_AREA
     t, steps = 0.0, 0
-    most = 10_000 + 200 * int(max(times[n - 1], 0.0) / f[STEP]) if n > 0 else 0
+    most = 10_000 + 200 * int(max(times[n - 1], 0.0) / whole[STEP]) if n > 0 else 0
     while i < n:
         steps += 1
         h = min(f[STEP], RESOLVED * math.sqrt((f[NOSE] + row[MASS_B]) / max(steepness(law, p, s, row, state), 1e-9)))
@@ -336,6 +340,7 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
             y[2] = y[0]
         if state[MODE] == IDLE:
             if y[0] >= rut_depth(row) - SAME and y[1] > 0.0:
+                f = whole
                 impulse += hit(law, p, s, row, state, f, y)
         else:
             cover(f, row, y[0])

@@ -40,6 +40,12 @@ def diagnose(
             show_default="each condition in turn",
         ),
     ] = None,
+    tolerance: Annotated[
+        float,
+        typer.Option(
+            help="Share of a channel's range by which a scenario that lacks nothing may miss it.", min=0, max=0.5
+        ),
+    ] = 0.0,
     set_: Setting = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/diagnose/NAME")] = None,
     workers: Annotated[
@@ -72,6 +78,7 @@ def diagnose(
         "scenario_hash": document.content_hash(chosen),
         "recordings": list(measured),
         "hold_out": held,
+        "tolerance": tolerance,
     }
     store.claim_account(folder, FORMAT, about, FILES, force=force)
     console.say("asking the sensors first")
@@ -79,12 +86,12 @@ def diagnose(
     # beside the results folder, which is written whole or not at all: what an interrupted diagnosis had fitted
     notebook = folder.parent / f".{folder.name}.fits"
     crew = Crew(workers or 1, notebook, json.dumps([about, store.versions()], sort_keys=True))
-    found = diagnosed(chosen, list(measured.items()), hold_out=held, say=console.say, crew=crew)
+    found = diagnosed(chosen, list(measured.items()), hold_out=held, tolerance=tolerance, say=console.say, crew=crew)
     sensors = tuple(f"{name}: {f.channel}: {f.sentence}" for name, f in findings)
     found = replace(found, notes=(*sensors, *found.notes))
     told = series(chosen, list(measured.items()), found)
     answer = account(found, about, [{"recording": name, **_plain(f)} for name, f in findings])
-    words = ["rollover", "diagnose", scenario, *recordings, *_options(hold_out, set_)]
+    words = ["rollover", "diagnose", scenario, *recordings, *_options(hold_out, set_, tolerance)]
     with store.whole(folder) as part:
         store.write_json(part / JSON, answer)
         (part / SCENARIO).write_text(diagnosed_text(chosen, found), encoding="utf-8")
@@ -196,8 +203,9 @@ def _plain(finding: Finding) -> dict[str, Any]:
     return bare
 
 
-def _options(hold_out: list[str] | None, set_: list[str] | None) -> list[str]:
-    given = (("--hold-out", hold_out or []), ("--set", set_ or []))
+def _options(hold_out: list[str] | None, set_: list[str] | None, tolerance: float) -> list[str]:
+    stated = [f"{tolerance:g}"] if tolerance else []
+    given = (("--hold-out", hold_out or []), ("--set", set_ or []), ("--tolerance", stated))
     return [part for name, texts in given for text in texts for part in (name, text)]
 
 

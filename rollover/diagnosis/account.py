@@ -10,7 +10,7 @@ from typing import Any
 
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.diagnose import diagnose
-from rollover.diagnosis.verdict import Diagnosis, Named, Place, Score
+from rollover.diagnosis.verdict import Diagnosis, Law, Named, Place, Score
 from rollover.document import dump
 from rollover.effects import nth
 from rollover.importers import read_recording
@@ -53,6 +53,7 @@ def account(
                 "held_out": _fit(found, "held_out", found.held_out),
                 "recordings": [{"name": n, "before": a, "after": b} for n, a, b in found.per_recording],
             },
+            **({} if found.empirical is None else {"empirical": _law(found.empirical)}),
             "candidates": [asdict(c) for c in found.candidates],
             "simulations": found.simulations,
             "seconds": found.seconds,
@@ -81,6 +82,17 @@ def _effect(effect: Named) -> dict[str, Any]:
     }
 
 
+def _law(law: Law) -> dict[str, Any]:
+    return {
+        "law": law.law,
+        "terms": [{"term": t.term, "depends_on": t.depends_on, "coefficient": asdict(t.force)} for t in law.terms],
+        "held_out_gain": law.held_out_gain,
+        "standard_error": law.standard_error,
+        "held_out": {"before": {"nrmse": law.before}, "after": {"nrmse": law.after}},
+        "settings": dict(law.settings),
+    }
+
+
 def _fit(found: Diagnosis, which: str, names: tuple[str, ...]) -> dict[str, Any]:
     def score(scores: Mapping[str, Score]) -> dict[str, Any]:
         return asdict(scores[which]) if which in scores else {}
@@ -89,9 +101,11 @@ def _fit(found: Diagnosis, which: str, names: tuple[str, ...]) -> dict[str, Any]
 
 
 def diagnosed_scenario(scenario: Scenario, found: Diagnosis) -> Scenario:
-    """The scenario with the found effects switched on and fitted."""
+    """The scenario with the found effects, or the law found by regression, switched on and fitted."""
     ids = [e.id for e in found.effects]
     changes = {f"effects.{nth(e.id, 1 + ids[:k].count(e.id))}": dict(e.settings) for k, e in enumerate(found.effects)}
+    if found.empirical is not None:
+        changes["effects.empirical"] = dict(found.empirical.settings)
     return scenario.replaced(changes, origin="diagnosis") if changes else scenario
 
 

@@ -11,10 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ground.law import REFERENCE_AREA, REFERENCE_MASS
 from rollover.channels import describe
 from rollover.diagnosis.evidence import Evidence
 from rollover.document import value_at
 from rollover.effects import EFFECTS, Search, effects, nth
+from rollover.scenario import Scenario
+from rollover.vehicle import Striker
 
 Array = NDArray[np.float64]
 
@@ -48,11 +51,13 @@ class Candidate:
     channel: str | None = None
     neutral: tuple[float | None, ...] | None = None  # coordinates that change nothing; given where a place costs a run
     shapes: Mapping[str, Search] = field(default_factory=dict)  # fitted only where what is left asks for them
+    fixed: Mapping[str, Any] = field(default_factory=dict)  # parameters that are not fitted
 
     @property
     def key(self) -> str:
-        """Id, with the channel of a sensor effect."""
-        return self.id if self.channel is None else f"{self.id}:{self.channel}"
+        """Id, with the channel of a sensor effect and what is not fitted."""
+        told = [str(v) for v in self.fixed.values()]
+        return ":".join([self.id, *([] if self.channel is None else [self.channel]), *told])
 
     def changes(self, x: Sequence[float], number: int = 1) -> dict[str, Any]:
         """Values to exchange in the scenario for coordinates x, each from 0 (low) to 1 (high).
@@ -61,6 +66,7 @@ class Candidate:
         """
         key = nth(self.id, number)
         found: dict[str, Any] = {} if self.channel is None else {f"effects.{key}.channel": self.channel}
+        found |= {f"effects.{key}.{name}": value for name, value in self.fixed.items()}
         for value, (name, search) in zip(x, self.search.items(), strict=True):
             found[f"effects.{key}.{name}"] = physical(value, search)
         return found
@@ -151,10 +157,29 @@ def coordinate(value: float, search: Search) -> float:
     return (value - search.low) / (search.high - search.low)
 
 
+def size_of(scenario: Scenario) -> tuple[float, float]:
+    """Mass and face over those of the reference striker, at most 1: what falls may be smaller than the ranges are for.
+
+    A vehicle has no face: 1.
+    """
+    vehicle = scenario.vehicle
+    if not isinstance(vehicle, Striker):
+        return min(vehicle.whole.mass / REFERENCE_MASS, 1.0), 1.0
+    face = math.pi * vehicle.nose_radius**2 if vehicle.nose == "cone" else vehicle.face_length * vehicle.face_width
+    return min(vehicle.mass / REFERENCE_MASS, 1.0), min(face / REFERENCE_AREA, 1.0)
+
+
 def candidates_of(
-    evidence: Sequence[Evidence], switched_on: Iterable[str], acts: str, scenario: Any = None
+    evidence: Sequence[Evidence],
+    switched_on: Iterable[str],
+    acts: str,
+    scenario: Any = None,
+    size: tuple[float, float] = (1.0, 1.0),
 ) -> list[Candidate]:
-    """All candidates for these recordings; effects that the scenario has switched on already do not compete."""
+    """All candidates for these recordings; effects that the scenario has switched on already do not compete.
+
+    `size` is that of what falls, see `size_of`.
+    """
     effects()
     spans: dict[str, float] = {}
     for e in evidence:
@@ -162,13 +187,14 @@ def candidates_of(
             spans[s.channel] = max(spans.get(s.channel, 0.0), s.span)
     found = []
     for name, kind in EFFECTS.items():
-        if name in switched_on or acts not in kind.acts:
+        if name in switched_on or acts not in kind.acts or not kind.competes:
             continue
         if kind.kind == "sensor":
             found += [c for channel in spans if (c := _sensor(name, kind, channel, spans))]
             continue
-        search = {p: _widened(s, kind.null.get(p)) for p, s in kind.search.items() if p not in SHAPES.get(name, ())}
-        shapes = {p: s for p, s in kind.search.items() if p in SHAPES.get(name, ())}
+        sized = {p: _sized(s, kind.grows.get(p), size) for p, s in kind.search.items()}
+        search = {p: _widened(s, kind.null.get(p)) for p, s in sized.items() if p not in SHAPES.get(name, ())}
+        shapes = {p: s for p, s in sized.items() if p in SHAPES.get(name, ())}
         neutral = None if acts == "drop" else tuple(_neutral(kind, p, s, scenario) for p, s in search.items())
         found.append(
             Candidate(id=name, kind=kind.kind, family=kind.family, search=search, shapes=shapes, neutral=neutral)
@@ -209,6 +235,14 @@ def _apart(value: Any, other: Any) -> list[float]:
     if isinstance(value, (int, float)) and isinstance(other, (int, float)):
         return [float(value - other)] if value != other else []
     return []
+
+
+def _sized(search: Search, powers: tuple[float, float] | None, size: tuple[float, float]) -> Search:
+    """The range for what falls; a range at the reference stays itself to the last bit."""
+    if powers is None or size == (1.0, 1.0):
+        return search
+    factor = size[0] ** powers[0] * size[1] ** powers[1]
+    return Search(factor * search.low, factor * search.high, search.scale)
 
 
 def _widened(search: Search, null: float | None) -> Search:

@@ -38,7 +38,8 @@ def quiet(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evid
             own = _quieter([residuals[r][part]], [s.values])
             loud = own is not None and own.windows >= SURELY and own.sigma > OWN * common.sigma
             best = own if own is not None and loud else common
-            found[r][k] = with_noise(s, best.sigma, best.ar, evidence[r].model_error)
+            found[r][k] = replace(s, noise=best.sigma, ar=best.ar)
+    found = [[with_noise(s, s.noise, s.ar, e.model_error) for s in f] for e, f in zip(evidence, found, strict=True)]
     return [replace(e, signals=tuple(s)) for e, s in zip(evidence, found, strict=True)]
 
 
@@ -46,6 +47,9 @@ def whole(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evid
     """The evidence with its noise from all of the misfits: an autoregression by least squares, recordings together."""
     found = [list(e.signals) for e in evidence]
     for members in alike(evidence):
+        members = [m for m in members if not evidence[m[0]].is_rough(m[2])]
+        if not members:
+            continue
         parts = [residuals[r][part] for r, _, _, part in members]
         levels = np.array([max(float(np.sqrt(np.mean(p * p))), 1e-300) for p in parts])
         sigma, ar = autoregression([p / level for p, level in zip(parts, levels, strict=True)])
@@ -100,7 +104,7 @@ def autoregression(series: Sequence[Array], most: int = LONGEST) -> tuple[float,
 
 def with_noise(s: Signal, noise: float, ar: tuple[float, ...], model_error: float) -> Signal:
     """The signal held against another noise."""
-    sigma = float(np.hypot(noise, model_error * s.span))
+    sigma = float(np.hypot(np.hypot(noise, model_error * s.span), s.scatter))
     return replace(s, noise=noise, sigma=sigma, ar=ar if noise >= NOT_COLOURED * sigma else ())
 
 

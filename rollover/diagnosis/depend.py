@@ -53,7 +53,7 @@ def _of(scenario: Scenario, e: Evidence) -> ResidualForce | None:
     mass, law = getattr(scenario.vehicle, "mass", None), scenario.ground.law
     if mass is None or not hasattr(start, "speed"):
         return None
-    state = _motion(r, float(start.speed) / (1.0 + scenario.ground.co_moving_mass.share))
+    state = motion(r, float(start.speed) / (1.0 + scenario.ground.co_moving_mass.share))
     if state is None:
         return None
     time, z, v, a = state
@@ -73,7 +73,7 @@ def _of(scenario: Scenario, e: Evidence) -> ResidualForce | None:
     return ResidualForce(recording=e.name, condition=e.condition or e.name, force=dF, of=of)
 
 
-def _motion(r: Recording, speed: float) -> tuple[Array, Array, Array, Array] | None:
+def motion(r: Recording, speed: float) -> tuple[Array, Array, Array, Array] | None:
     """Time, depth, its rate and second derivative (positive down) while loading, smoothed; None without either.
 
     `speed` is that just after the impact, m/s.

@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from rollover.diagnosis import colour
 from rollover.diagnosis.bins import simulated
-from rollover.diagnosis.candidates import candidates_of
+from rollover.diagnosis.candidates import candidates_of, size_of
 from rollover.diagnosis.chaos import weighted
 from rollover.diagnosis.chassis import degrees_of
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.depend import dependency, residual_forces
-from rollover.diagnosis.evidence import Evidence, evidence_of, groups_of
+from rollover.diagnosis.empirical import offered, proposed
+from rollover.diagnosis.evidence import Evidence, doubted, evidence_of, left_out
 from rollover.diagnosis.explain import SURE
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import yardstick
 from rollover.diagnosis.overturn import RunSimulator
 from rollover.diagnosis.phases import phases_of
+from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing, with_scatter
 from rollover.diagnosis.scores import judged
 from rollover.diagnosis.selection import decided, explained, matters
 from rollover.diagnosis.simulator import set_up
@@ -37,26 +42,33 @@ def diagnose(
     recordings: Sequence[tuple[str, Recording]],
     *,
     hold_out: Sequence[str] = (),
+    tolerance: float = 0.0,
     say: Callable[[str], None] = lambda _: None,
     crew: Crew | None = None,
 ) -> Diagnosis:
     """Compare a scenario with recordings and say what separates them.
 
     `recordings` are (name, recording); `hold_out` names those that are never fitted, otherwise each condition is left
-    out in turn. `crew` works off the fits, in children if it has any; the answer is the same. Raises `InputError` for
-    a condition that the scenario does not know, ``ValueError`` for a name in `hold_out` that is none.
+    out in turn. `tolerance` is the share of a channel's range by which a scenario that lacks nothing may still miss it:
+    what is smaller counts as noise. `crew` works off the fits, in children if it has any; the answer is the same.
+    Raises `InputError` for a condition that the scenario does not know, ``ValueError`` for a name in `hold_out` that is
+    none, and for a tolerance outside 0 to 1.
     """
     began = clock.perf_counter()
     names = [name for name, _ in recordings]
     unknown = [name for name in hold_out if name not in names]
     if unknown:
         raise ValueError(f"hold_out: no such recording, got {unknown[0]!r}; {', '.join(names)}")
+    if not 0.0 <= tolerance < 1.0:
+        raise ValueError(f"tolerance: not a share of a range, got {tolerance:g}; at least 0 and below 1")
     every, notes = _evidence(scenario, recordings)
-    found = _trusted([e for e in every if e.name not in hold_out])
-    kept = [e for e in _trusted(every) if e.name in hold_out] if hold_out else []
+    every = [replace(e, model_error=float(np.hypot(e.model_error, tolerance))) for e in every]
+    found = _trusted(scenario, [e for e in every if e.name not in hold_out])
+    kept = [e for e in _trusted(scenario, every) if e.name in hold_out] if hold_out else []
     if sum(e.count for e in found) < FEWEST:
         return _nothing(every, names, notes, began)
-    groups = groups_of(found)
+    groups = left_out(found)
+    notes += differing(found)
     if len(groups) == 1 and not kept:
         notes.append("one condition only: what stands as held out is predicted by the fit to it")
     judge = Judge(found)
@@ -66,7 +78,7 @@ def diagnose(
         return _nothing(every, names, [*notes, "the scenario itself could not be simulated"], began)
     phases = [phases_of(e) for e in found]
     acts = "rollover" if any(unfit(set_up(scenario, e.recording)) for e in found) else "drop"
-    candidates = candidates_of(found, scenario.effects, acts, scenario)
+    candidates = candidates_of(found, scenario.effects, acts, scenario, size_of(set_up(scenario, found[0].recording)))
     explanation = explained(judge, base, candidates, groups, phases, say, crew or Crew())
     explanation, verdict = decided(judge, explanation, groups)
     found = list(judge.evidence)
@@ -78,8 +90,13 @@ def diagnose(
     if acts != "drop":
         degrees, forces = degrees_of(set_ups, found, [b.shift for b in explanation.base.blocks])
     dependencies = dependency(forces)
+    law = None
+    if verdict == "unexplained" and acts == "drop":
+        say("a law for what no candidate explains")
+        law = proposed(judge, explanation.base, set_ups, found, groups)
     detectable = dict(explanation.detectable)
-    if verdict == "no-mismatch" and _is_weak(detectable):
+    contrary = differing(found, CONTRADICTING)
+    if verdict == "no-mismatch" and (contrary or _is_weak(detectable)):
         verdict = "cannot-tell"
     h_before, h_after = (judged(judge, f, kept, groups) for f in (explanation.base, explanation.fitted))
     effects = named(judge, explanation, groups) if verdict in ("parameter", "sensor", "missing-physics") else ()
@@ -90,7 +107,9 @@ def diagnose(
     notes += [*(_felt(degrees[0]) for _ in degrees[:1] if is_mismatch), *_cost(found)]
     return Diagnosis(
         verdict=verdict,
-        sentence=sentence(verdict, effects, before, h_before.held, h_after.held, found),
+        sentence=sentence(verdict, effects, before, h_before.held, h_after.held, found)
+        + offered(law)
+        + against_itself(verdict, contrary),
         p_value=explanation.p_value,
         noise=noise(found),
         where=places(before, found, depends) if is_mismatch else (),
@@ -113,20 +132,22 @@ def diagnose(
         simulations=judge.simulations,
         seconds=clock.perf_counter() - began,
         notes=tuple(notes),
+        empirical=law,
     )
 
 
-def _weighed(every: Sequence[Evidence]) -> list[Evidence]:
+def _weighed(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:
     """The recordings with the noise of those alike taken together, from their quiet stretches."""
+    every = [doubted(e, set_up(scenario, e.recording)) for e in with_scatter(every)]
     judge = Judge(every)
     judge.aligned()
     base = judge.fit((), (), rounds=2)
     return list(every) if base is None else colour.quiet(every, judge.residuals(base))
 
 
-def _trusted(every: Sequence[Evidence]) -> list[Evidence]:
+def _trusted(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:
     """The recordings weighed, what the simulation itself is not sure of less."""
-    return [weighted(e, e.simulator.strays()) for e in _weighed(every)]
+    return [weighted(e, e.simulator.strays()) for e in _weighed(scenario, every)]
 
 
 def _evidence(scenario: Scenario, recordings: Sequence[tuple[str, Recording]]) -> tuple[list[Evidence], list[str]]:

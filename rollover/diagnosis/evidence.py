@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.nuisance import Eased, doubts, eased
 from rollover.diagnosis.simulator import Simulator
 from rollover.noise import LENGTH, NoiseFloor, grown, noise_floor
 from rollover.recording import Recording
+from rollover.scenario import Scenario
 
 Array = NDArray[np.float64]
 
@@ -19,6 +22,7 @@ MODEL_ERROR = 2e-4  # of a channel's range: what integrators differ by is no mis
 ALONE = 0.02  # s, prior of the time shift of a recording whose clock has no zero
 CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is believed
 MANY = 10  # quiet windows from which on a memory of two samples is told
+ROUGH = 0.5  # times the noise, from which on another error has a large part
 CORNER = 2.0775  # corner frequency over the filter class, forward and backward, Hz
 LEAP = 4.0  # times the steps beside it
 SHIFT = 1e-3  # s, prior of the time shift of a recording whose zero is known
@@ -35,6 +39,7 @@ class Signal:
     noise: float
     ar: tuple[float, ...]
     span: float
+    scatter: float = 0.0  # between runs of one condition, SI
     weight: Array | None = None  # (n,), below 1 where the model itself is not sure
 
 
@@ -51,6 +56,22 @@ class Evidence:
     strays: tuple[Array, ...] = ()  # stacked, SI: what runs that nobody could tell apart differ by
     model_error: float = MODEL_ERROR  # of a channel's range
     averaged: int = 1  # samples in one
+    doubts: Array | None = None  # what 1 sigma of each uncertain condition does to the stack, SI, (n, q)
+
+    @cached_property
+    def eased(self) -> Eased:
+        """What takes the uncertain conditions out of a whitened misfit."""
+        if self.doubts is None:
+            return eased(np.zeros((self.count, 0)))
+        return eased(np.stack([self.whitened(column) for column in self.doubts.T], axis=1))
+
+    def is_rough(self, s: Signal) -> bool:
+        """Whether a scatter between runs, or a tolerance that was asked for, has a large part in the error.
+
+        Such an error is one for the whole signal, not one for each sample: within its size it is nothing.
+        """
+        known = s.scatter > 0.0 or self.model_error > MODEL_ERROR
+        return known and float(np.hypot(s.scatter, self.model_error * s.span)) > ROUGH * s.noise
 
     @property
     def count(self) -> int:
@@ -130,6 +151,15 @@ class Evidence:
         return y * grown(signal.ar)
 
 
+def doubted(e: Evidence, scenario: Scenario) -> Evidence:
+    """The evidence with what its conditions leave uncertain; `scenario` is under them. Raises `InputError`."""
+    changes = doubts(scenario, e.recording.uncertainty, e.name)
+    base = e.simulator.predict({}, 0.0)
+    moved = [e.simulator.predict(one, 0.0) for one in changes]
+    columns = [e.raw(m) - e.raw(base) for m in moved if m is not None and base is not None]
+    return replace(e, doubts=np.stack(columns, axis=1)) if columns else e
+
+
 def evidence_of(name: str, recording: Recording, simulator: Simulator, averaged: int = 1) -> Evidence | None:
     """Make a recording ready; None if it shares no channel with the simulation.
 
@@ -161,7 +191,7 @@ def evidence_of(name: str, recording: Recording, simulator: Simulator, averaged:
         recording=recording,
         simulator=simulator,
         signals=tuple(signals),
-        shift_prior=ALONE if loose else SHIFT + 0.5 * step,
+        shift_prior=recording.clock.within or (ALONE if loose else SHIFT + 0.5 * step),
         condition=condition_of(recording.conditions),
         averaged=averaged,
     )
@@ -205,6 +235,12 @@ def condition_of(conditions: Mapping[str, Any]) -> str:
         f"{path}={value:g}" if isinstance(value, float) else f"{path}={value}"
         for path, value in sorted(conditions.items())
     )
+
+
+def left_out(evidence: Sequence[Evidence]) -> list[list[int]]:
+    """What is left out in turn: one condition after another, or one recording after another if all share one."""
+    groups = groups_of(evidence)
+    return groups if len(groups) > 1 else [[k] for k in range(len(evidence))]
 
 
 def groups_of(evidence: Sequence[Evidence]) -> list[list[int]]:

@@ -27,6 +27,7 @@ RIVALS = 0.4  # of the best's gain: a first fit that gains less is no rival, whe
 CROOKED = 100.0  # times what the best leaves, up to which a fit of two parameters is polished
 SHAPED = 4.0  # times what the best leaves, up to which an effect's shape is fitted too
 WORTH = 12.0  # gain that pays for a shape
+WITHIN_ONE = 1.0  # standard errors within which the simpler one is preferred
 APART = 2.0  # standard errors beyond which a rival is excluded
 NEARLY_NOISE = 1.3  # misfit over the noise up to which its own colour is believed
 
@@ -78,13 +79,18 @@ def spread(base: Fitted, groups: Sequence[Sequence[int]], few: int = DROPS.few) 
     return sorted({members[round(k * (len(members) - 1) / (few - 1))] for k in range(few)})
 
 
+def is_far(judge: Judge, base: Fitted) -> bool:
+    """Whether a base is so far off that its time shifts tell of what is missing; beside a tolerance that is soon."""
+    far = FAR if judge.per_error == 1.0 else 1.0
+    return base.left > far**2 * sum(b.residual.size for b in base.blocks)
+
+
 def begun(judge: Judge, base: Fitted) -> list[float]:
     """Time shifts (s) to begin with: where the base is far off its shifts are bent by what is missing.
 
     Where samples are weighed by what neighbours scatter by, how far off it is cannot be told from what is left.
     """
-    count = sum(b.residual.size for b in base.blocks)
-    if base.left < FAR**2 * count and not judge.effort.thrifty:
+    if not is_far(judge, base) and not judge.effort.thrifty:
         return [b.shift for b in base.blocks]
     return [
         b.shift if e.recording.clock.zero == "unknown" else 0.0
@@ -175,12 +181,15 @@ def step(
         near = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < CROOKED * fits[0].left]
         near = near[: judge.effort.polishes]
         polished = crew.fits(judge, [_from(f, "polish") for f in near], say)
-        fits = [f for f in fits if f not in near] + [new or old for new, old in zip(polished, near, strict=True)]
+        others = [f for f in fits if not any(f is one for one in near)]
+        fits = others + [new or old for new, old in zip(polished, near, strict=True)]
     fits = _one_each(fits) if judge.effort.thrifty else _shaped(judge, _one_each(fits), crew, say)
     if weighed(judge, fits[0], phases):
         base, fits = judge.again(base), [judge.again(f) for f in fits]
     fits.sort(key=lambda f: held_out(f, groups).left.sum())
+    fits = simplest(fits, groups, judge.per_error)
     phi = max(1.0, min(f.left for f in fits) / count)  # what even the best leaves is no chance of the noise's size
+    phi *= judge.per_error
     return Step(base=base, fitted=fits[0], p_value=looked.p_value(phi), rivals=tuple(fits), screened=tuple(screened))
 
 
@@ -234,7 +243,7 @@ def _first_fits(
     told: dict[str, float] = {}
     say(f"first fits of {len(chosen)} candidates to {len(few)} recordings")
     at = tuple(shifts[r] for r in few)
-    pinned = judge.effort.thrifty or base.left > FAR**2 * sum(b.residual.size for b in base.blocks)
+    pinned = judge.effort.thrifty or is_far(judge, base)
     jobs = [
         Job(
             candidates=(*base.candidates, s.candidate), start=(*base.x, *start), shifts=at, only=tuple(few),
@@ -283,12 +292,21 @@ def moves(judge: Judge, base: Fitted, fitted: Fitted) -> float:
     return most
 
 
-def confusion(step_: Step, groups: Sequence[Sequence[int]]) -> list[Fitted]:
+def simplest(fits: Sequence[Fitted], groups: Sequence[Sequence[int]], shared: float) -> list[Fitted]:
+    """Fits, best first; where errors are one for a whole signal the simplest of those within a standard error leads."""
+    if shared == 1.0:
+        return list(fits)
+    near = [f for f in fits if f is fits[0] or worse(f, fits[0], groups, shared)[0] < WITHIN_ONE]
+    first = min(near, key=lambda f: len(f.x))
+    return [first, *(f for f in fits if f is not first)]
+
+
+def confusion(step_: Step, groups: Sequence[Sequence[int]], shared: float = 1.0) -> list[Fitted]:
     """Rivals that predict held-out recordings as well as the best does, the best first."""
     best, base = step_.fitted, step_.base
     found = [best]
     for rival in step_.rivals:
         explains = base.left - rival.left > 0.5 * (base.left - best.left)
-        if rival is not best and explains and min(worse(rival, best, groups)) < APART:
+        if rival is not best and explains and min(worse(rival, best, groups, shared)) < APART:
             found.append(rival)
     return found

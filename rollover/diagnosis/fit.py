@@ -67,6 +67,14 @@ class Judge:
         kept = [new if new is not None else old for new, old in zip(blocks, fitted.blocks, strict=True)]
         return Fitted(candidates=fitted.candidates, x=fitted.x, blocks=tuple(kept))
 
+    @property
+    def per_error(self) -> float:
+        """Samples that share one error: those of a signal where a scatter or a tolerance prevails, else 1."""
+        signals = [s for e in self.evidence for s in e.signals]
+        if not all(e.is_rough(s) for e in self.evidence for s in e.signals):
+            return 1.0
+        return sum(s.rows.size for s in signals) / len(signals)
+
     def residuals(self, fitted: Fitted) -> list[Array]:
         """Measured less predicted, stacked, SI, of each recording."""
         found = []
@@ -133,7 +141,7 @@ class Judge:
                 for signal, part in e.spans():
                     time = e.recording.time[signal.rows]
                     moved[part] = np.interp(time - s, time, y[part])
-                rough.append(float(np.sum((self.measured[r] - moved) ** 2)) + (s / e.shift_prior) ** 2)
+                rough.append(float(np.sum(e.eased(self.measured[r] - moved) ** 2)) + (s / e.shift_prior) ** 2)
             best = float(shifts[int(np.argmin(rough))])
             near = best + np.linspace(-2.0, 2.0, 5) * float(shifts[1] - shifts[0])
             left = [self._left(r, float(s)) for s in near]
@@ -144,7 +152,8 @@ class Judge:
         y = self.predicted(r, (), (), shift)
         if y is None:
             return np.inf
-        return float(np.sum((self.measured[r] - y) ** 2)) + (shift / self.evidence[r].shift_prior) ** 2
+        e = self.evidence[r]
+        return float(np.sum(e.eased(self.measured[r] - y) ** 2)) + (shift / e.shift_prior) ** 2
 
     def block(
         self,
@@ -175,10 +184,11 @@ class Judge:
             if moved is None:
                 return None
             J[:, k] = moved / step
-        slope = e.slope(raw, leaps)
+        slope = e.eased(e.slope(raw, leaps))
         if self._pinned and e.recording.clock.zero != "unknown":
             slope = np.zeros_like(slope)
-        return Block(residual=self.measured[r] - y, J=J, slope=slope, shift=shift, prior=e.shift_prior)
+        residual = e.eased(self.measured[r] - y)
+        return Block(residual=residual, J=J, slope=slope, shift=shift, prior=e.shift_prior)
 
     def moved(self, r: int, before: Point, after: Point, shift: float) -> Array | None:
         """How the prediction of recording r differs between two points, whitened; nothing where either leaps.
@@ -192,7 +202,8 @@ class Judge:
         for point in (before, after):
             for at in self._leaps.get(_key(r, *point, shift), NONE):
                 d[at : at + 3] = 0.0
-        return self.evidence[r].whitened(d)
+        e = self.evidence[r]
+        return e.eased(e.whitened(d))
 
     def fit(
         self,

@@ -59,12 +59,12 @@ def _step(A: Array, b: Array) -> Array:
     return np.asarray(np.linalg.solve(A + GENTLE * np.eye(b.size), b))
 
 
-def worse(rival: Fitted, best: Fitted, groups: Sequence[Sequence[int]]) -> tuple[float, float]:
+def worse(rival: Fitted, best: Fitted, groups: Sequence[Sequence[int]], shared: float = 1.0) -> tuple[float, float]:
     """How much worse a rival predicts held-out recordings, as two scores; both above 2 exclude it.
 
     First: the excess of its squares over that of the best, in standard errors of the noise: for predictions that differ
     by D (in noise units) the excess has sd 2 |D| phi, phi the best's own misfit per sample (at least 1). Second: the
-    mean over conditions of ln(E_rival/E_best) in its paired standard errors.
+    mean over conditions of ln(E_rival/E_best) in its paired standard errors. `shared` samples have one error in common.
     """
     a, b = held_out(rival, groups), held_out(best, groups)
     phi = max(1.0, float(np.sqrt(b.left.sum() / b.count.sum())))
@@ -76,7 +76,7 @@ def worse(rival: Fitted, best: Fitted, groups: Sequence[Sequence[int]]) -> tuple
     excess = float(a.left.sum() - b.left.sum())
     if excess <= 0.0:
         return 0.0, 0.0
-    first = excess / (2.0 * np.sqrt(max(distance, 1e-12)) * phi)
+    first = excess / (2.0 * np.sqrt(max(distance, 1e-12) * shared) * phi)
     # conditions under which the two say the same decide nothing
     telling = [list(g) for g in groups if apart[list(g)].sum() > 9.0 * phi**2]
     logs = np.array([0.5 * np.log(a.left[g].sum() / b.left[g].sum()) for g in telling])

@@ -30,7 +30,7 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
     A = sum((b.normal()[0] for b in fitted.blocks), np.zeros((p, p))) + GENTLE * np.eye(p)
     inverse = np.linalg.inv(A)
     count = sum(b.residual.size for b in fitted.blocks)
-    phi = max(1.0, fitted.left / count)
+    phi = max(1.0, fitted.left / count) * judge.per_error
     sd = np.sqrt(np.maximum(phi * np.diag(inverse), 0.0))
     moved = np.zeros(p)
     channels = {s.channel for e in judge.evidence for s in e.signals}
@@ -42,7 +42,7 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
                     y = (judge.measured[r] - block.residual)[part]
                     pull += block.J[part].T @ (MODEL_ERROR * y)
         moved += (inverse @ pull) ** 2
-    for e, block in zip(judge.evidence, fitted.blocks, strict=True):
+    for e, block in zip(judge.evidence, fitted.blocks, strict=False):
         for stray in e.strays:
             moved += STUDENT / len(e.strays) * (inverse @ (block.J.T @ e.whitened(stray))) ** 2
     sd = np.sqrt(sd**2 + moved)

@@ -72,6 +72,8 @@ def explained(
     current, left, taken = base, before, []
     first: Step | None = None
     for _ in range(MOST):
+        if is_tolerated(judge, current):
+            break
         if looked.p_value() > CHANCE and (left.p_value > SURE or not matters(judge, current, left)):
             break
         found = step(judge, current, free(current, candidates), groups, phases, say, looked, crew)
@@ -198,6 +200,7 @@ def decided(judge: Judge, found: Explanation, groups: Groups) -> tuple[Explanati
         if end**2 - 1.0 < PARTLY * (start**2 - 1.0):
             return replace(found, parts=(one,), fitted=one.fitted), _kind(one.fitted.candidates[-1])
     significant = found.before.p_value < SURE and matters(judge, found.base, found.before)
+    significant = significant and not is_tolerated(judge, found.base)
     verdict: Verdict = "unexplained" if significant or found.parts else "no-mismatch"
     return replace(found, parts=(), fitted=found.base), verdict
 
@@ -219,12 +222,23 @@ def strongest(judge: Judge, base: Fitted, fitted: Fitted) -> Candidate:
     return best
 
 
+def is_tolerated(judge: Judge, fitted: Fitted) -> bool:
+    """Whether what is left is no more than a scatter between runs, or a tolerance that was asked for, leaves by chance.
+
+    One error of unit size for each of k signals: a mean square of 1 with a standard deviation of sqrt(2/k).
+    """
+    rough = [e.is_rough(s) for e in judge.evidence for s in e.signals]
+    most = 1.0 + 2.0 * np.sqrt(2.0 / len(rough))
+    return all(rough) and bool(fitted.left < most * sum(b.residual.size for b in fitted.blocks))
+
+
 def matters(judge: Judge, base: Fitted, before: Mismatch) -> bool:
     """Whether the structure of the misfit is worth a word: beyond a share of a channel's range."""
     most = 0.0
     for r, e in enumerate(judge.evidence[: len(base.blocks)]):
         for signal, _ in e.spans():
             cells = [c for c in before.cells if c.recording == r and c.channel == signal.channel]
-            power = sum(c.structured - c.waves for c in cells) / max(sum(c.rows.size for c in cells), 1)
+            chance = sum(c.rows.size if e.is_rough(signal) else c.waves for c in cells)
+            power = (sum(c.structured for c in cells) - chance) / max(sum(c.rows.size for c in cells), 1)
             most = max(most, float(np.sqrt(max(power, 0.0))) * signal.sigma / signal.span)
     return most > NEGLIGIBLE

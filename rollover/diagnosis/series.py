@@ -74,7 +74,7 @@ def series(scenario: Scenario, recordings: Sequence[tuple[str, Recording]], foun
     judged = found.held_out if set(found.held_out) != set(found.training) else ()
     told = []
     for name, recording in recordings:
-        one = _told(name, recording, scenario, diagnosed if found.effects else None, name in judged)
+        one = _told(name, recording, scenario, diagnosed if found.effects or found.empirical else None, name in judged)
         if one is not None:
             told.append(one)
     return tuple(told)

@@ -31,7 +31,9 @@ def named(judge: Judge, found: Explanation, groups: Sequence[Sequence[int]]) -> 
         values: dict[str, Any] = {name: i.value for name, i in parameters.items()}
         if c.channel is not None:
             values["channel"] = c.channel
-        rivals = [f.candidates[-1] for f in confusion(by_key[c.key], groups) if f.candidates[-1].key != c.key]
+        rivals = [
+            f.candidates[-1] for f in confusion(by_key[c.key], groups, judge.per_error) if f.candidates[-1].key != c.key
+        ]
         tests = [kind.rivals[r.id] for r in rivals if r.id in kind.rivals]
         effects.append(
             Named(

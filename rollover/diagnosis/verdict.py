@@ -82,6 +82,28 @@ class Considered:
 
 
 @dataclass(frozen=True, kw_only=True)
+class LawTerm:
+    """One term of a law found by regression: its shape, what that depends on, and its force (N at the scales)."""
+
+    term: str
+    depends_on: str
+    force: Interval
+
+
+@dataclass(frozen=True, kw_only=True)
+class Law:
+    """A law without a name that predicts held-out recordings: gain ln(E_before/E_after) with its standard error."""
+
+    terms: tuple[LawTerm, ...]
+    law: str
+    held_out_gain: float
+    standard_error: float
+    before: float
+    after: float
+    settings: Mapping[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Diagnosis:
     """The whole answer."""
 
@@ -107,3 +129,4 @@ class Diagnosis:
     seconds: float
     degrees: tuple[Degree, ...] = ()
     notes: tuple[str, ...] = ()
+    empirical: Law | None = None  # where no effect explains the mismatch

@@ -41,8 +41,11 @@ class Effect:
     rivals: ClassVar[Mapping[str, str]] = {}  # look-alike -> the test that tells them apart
     acts: ClassVar[tuple[str, ...]] = ("drop", "rollover")
     channels: ClassVar[tuple[str, ...]] = ()  # that feel it first
+    competes: ClassVar[bool] = True  # as an explanation of what a scenario misses
     null: ClassVar[Mapping[str, float | None]] = {}
     search: ClassVar[Mapping[str, Search]] = {}
+    # parameter -> powers of mass and of face with which its range grows, from a striker of 132 kg on the reference face
+    grows: ClassVar[Mapping[str, tuple[float, float]]] = {}
 
     def __init_subclass__(cls) -> None:
         """Enter the table. Raises ``TypeError`` for a class without an id and for an id given twice."""

@@ -40,6 +40,7 @@ class SoilViscousDamping(Effect):
     channels = FORCE
     null: ClassVar[Mapping[str, float | None]] = {"damping": 0.0}
     search: ClassVar[Mapping[str, Search]] = {"damping": Search(30.0, 1e4, "log"), "exponent": Search(0.5, 2.0)}
+    grows: ClassVar[Mapping[str, tuple[float, float]]] = {"damping": (1.0, -1.0)}
 
     def places(self) -> Mapping[int, float]:
         """D and zeta."""
@@ -182,6 +183,7 @@ class SoilAdhesion(Effect):
     channels = ("ground/force_normal",)
     null: ClassVar[Mapping[str, float | None]] = {"stress": 0.0}
     search: ClassVar[Mapping[str, Search]] = {"stress": Search(500.0, 1e5, "log"), "reach": Search(5e-4, 0.05, "log")}
+    grows: ClassVar[Mapping[str, tuple[float, float]]] = {"stress": (1.0, -1.0)}
 
     def places(self) -> Mapping[int, float]:
         """The pull of the reference face, and its reach."""

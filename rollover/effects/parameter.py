@@ -33,6 +33,7 @@ class Mass(Effect):
     channels = ("ground/force_normal", "striker/acceleration_z")
     null: ClassVar[Mapping[str, float | None]] = {"added": 0.0}
     search: ClassVar[Mapping[str, Search]] = {"added": Search(-100.0, 300.0)}
+    grows: ClassVar[Mapping[str, tuple[float, float]]] = {"added": (1.0, 0.0)}
 
     def changes(self, scenario: Any) -> Mapping[str, Any]:
         """The mass of the striker or of the whole vehicle."""

@@ -34,6 +34,7 @@ class GuideFriction(Effect):
     channels = ("striker/acceleration_z", "striker/velocity_z")
     null: ClassVar[Mapping[str, float | None]] = {"force": 0.0}
     search: ClassVar[Mapping[str, Search]] = {"force": Search(5.0, 600.0, "log")}
+    grows: ClassVar[Mapping[str, tuple[float, float]]] = {"force": (1.0, 0.0)}
 
 
 @parameters
@@ -56,6 +57,7 @@ class AirDrag(Effect):
     channels = ("striker/acceleration_z", "striker/velocity_z")
     null: ClassVar[Mapping[str, float | None]] = {"area": 0.0}
     search: ClassVar[Mapping[str, Search]] = {"area": Search(1e-3, 10.0, "log")}
+    grows: ClassVar[Mapping[str, tuple[float, float]]] = {"area": (2.0 / 3.0, 0.0)}
 
     @property
     def factor(self) -> float:
@@ -84,6 +86,7 @@ class StructuralCompliance(Effect):
     channels = ("striker/acceleration_z", "ground/force_normal")
     null: ClassVar[Mapping[str, float | None]] = {"stiffness": None}
     search: ClassVar[Mapping[str, Search]] = {"stiffness": Search(1e4, 1e8, "log"), "damping": Search(10.0, 1e4, "log")}
+    grows: ClassVar[Mapping[str, tuple[float, float]]] = {"stiffness": (1.0, 0.0), "damping": (1.0, 0.0)}
 
 
 @parameters

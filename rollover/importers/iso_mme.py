@@ -78,7 +78,8 @@ def _read(path: Path, profile: Described | None) -> Recording:
         more["source"] = laboratory
     flipped = {name: sign(name) * values for name, values in found.channels.items() if sign(name) < 0.0}
     kept = {
-        field: getattr(found, field) for field in ("time", "conditions", "noise", "cfc", "clock", "sensors", "notes")
+        field: getattr(found, field)
+        for field in ("time", "conditions", "uncertainty", "noise", "cfc", "clock", "sensors", "notes")
     }
     return Recording(
         **{"title": found.title, "source": found.source, **more, **kept, "channels": {**found.channels, **flipped}}

@@ -16,7 +16,7 @@ from rollover.document import dump_mapping, to_mapping
 from rollover.faults import Fault, InputError
 from rollover.importers.sidecar import Described, Sidecar, read_described
 from rollover.importers.signals import Signal, assemble
-from rollover.recording import Recording, Sensor, is_run, read_parquet
+from rollover.recording import Clock, Recording, Sensor, is_run, read_parquet
 from rollover.recording.tables import (
     csv_heading,
     line_of_row,
@@ -120,8 +120,10 @@ def _about(recording: Recording) -> dict[str, Any]:
     about: dict[str, Any] = {"format": FORMAT, "title": recording.title, "source": recording.source}
     if recording.conditions:
         about["conditions"] = dict(recording.conditions)
-    if recording.clock.zero != "known":
-        about["clock"] = to_mapping(recording.clock)
+    if recording.uncertainty:
+        about["uncertainty"] = {k: list(v) if isinstance(v, tuple) else v for k, v in recording.uncertainty.items()}
+    if recording.clock != Clock():
+        about["clock"] = {k: v for k, v in to_mapping(recording.clock).items() if v is not None}
     if recording.notes:
         about["notes"] = list(recording.notes)
     return {**about, "channels": channels}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -13,7 +14,7 @@ from rollover import document
 from rollover.channels import describe, factor
 from rollover.document import Node
 from rollover.faults import Fault, InputError
-from rollover.recording import Clock, Sensor
+from rollover.recording import Clock, Doubt, Sensor
 
 MOST_BYTES = 1 << 18  # of a sidecar: what is longer is no sidecar, and would take long to be refused
 T = TypeVar("T")
@@ -85,9 +86,16 @@ class Sidecar:
     title: str = ""
     source: Annotated[str, "who measured it, licence, citation"] = ""
     conditions: Annotated[Mapping[str, Any], "scenario path -> value this was run with"] = field(default_factory=dict)
+    uncertainty: Annotated[Mapping[str, Doubt], "scenario path -> 1 sigma, a list's of each number"] = field(
+        default_factory=dict
+    )
     clock: Clock = field(default_factory=Clock)
     notes: tuple[str, ...] = ()
     channels: Annotated[Mapping[str, Any], "column -> what it is"]
+
+    def validate(self) -> None:
+        """Refuse an uncertainty that is none."""
+        _check_doubts(self.uncertainty)
 
 
 @parameters
@@ -98,12 +106,26 @@ class Profile:
     title: str = ""
     source: Annotated[str, "who measured it, licence, citation"] = ""
     conditions: Annotated[Mapping[str, Any], "scenario path -> value this was run with"] = field(default_factory=dict)
+    uncertainty: Annotated[Mapping[str, Doubt], "scenario path -> 1 sigma, a list's of each number"] = field(
+        default_factory=dict
+    )
     clock: Clock = field(default_factory=Clock)
     notes: tuple[str, ...] = ()
     csv: Csv = field(default_factory=Csv)
     rate: Annotated[float | None, Quantity("Hz", "where the file has no time column", above=0)] = None
     start: Annotated[float, Quantity("s", "time of the first sample, with `rate`")] = 0.0
     channels: Annotated[Mapping[str, Any], "column -> what it is"]
+
+    def validate(self) -> None:
+        """Refuse an uncertainty that is none."""
+        _check_doubts(self.uncertainty)
+
+
+def _check_doubts(uncertainty: Mapping[str, Doubt]) -> None:
+    for path, sigma in uncertainty.items():
+        for value in sigma if isinstance(sigma, tuple) else (sigma,):
+            if not 0.0 < value < math.inf:
+                raise ValueError(f"uncertainty: {path}: not one standard deviation, got {value:g}; above 0")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -87,6 +87,7 @@ def assemble(
         channels=table,
         source=about.source,
         conditions=dict(about.conditions),
+        uncertainty=dict(about.uncertainty),
         clock=about.clock,
         notes=about.notes,
         noise={

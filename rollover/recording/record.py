@@ -14,6 +14,7 @@ from rollover.frames import from_angles
 
 Array = NDArray[np.float64]
 Point = tuple[float, float, float]
+Doubt = float | tuple[float, ...]  # 1 sigma of a value, or of each number of a list
 
 
 @parameters
@@ -23,6 +24,7 @@ class Clock:
     zero: Annotated[
         Literal["known", "unknown"], "whether t = 0 is the scenario's start, or the trigger stood anywhere"
     ] = "known"
+    within: Annotated[float | None, Quantity("s", "1 sigma of how far its zero may be off", above=0)] = None
 
 
 @parameters
@@ -65,9 +67,9 @@ class Recording:
     """Channels (see `channels.CHANNELS`), SI, one value each per time stamp; gaps are NaN.
 
     `time` (n,) strictly increasing, s; `channels` name -> (n,); `noise` name -> 1 sigma; `cfc` name -> class
-    of the filter already applied; `conditions` scenario path -> value this was run with; `sensors` name -> where it
-    was measured; `notes` what the reader of the file has to say. A channel with its own, slower clock stands in the
-    common table with gaps between its samples; `samples` gives it back alone.
+    of the filter already applied; `conditions` scenario path -> value this was run with, `uncertainty` the same
+    path -> 1 sigma; `sensors` name -> where it was measured; `notes` what the reader of the file has to say. A channel
+    with its own, slower clock stands in the common table with gaps between its samples; `samples` gives it back alone.
     """
 
     title: str
@@ -75,6 +77,7 @@ class Recording:
     channels: Mapping[str, Array]
     source: str = ""
     conditions: Mapping[str, Any] = field(default_factory=dict)
+    uncertainty: Mapping[str, Doubt] = field(default_factory=dict)
     noise: Mapping[str, float] = field(default_factory=dict)
     cfc: Mapping[str, int] = field(default_factory=dict)
     clock: Clock = field(default_factory=Clock)

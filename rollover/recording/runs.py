@@ -29,6 +29,7 @@ def write_parquet(recording: Recording, path: Path) -> None:
         "title": recording.title,
         "source": recording.source,
         "conditions": dict(recording.conditions),
+        **({"uncertainty": dict(recording.uncertainty)} if recording.uncertainty else {}),
         "noise": dict(recording.noise),
         "cfc": dict(recording.cfc),
         "clock": asdict(recording.clock),
@@ -66,6 +67,7 @@ def read_parquet(path: Path) -> Recording:
             raise InputError(not_a_run)
         columns = {name: table[name].to_numpy() for name in table.column_names}
         about["clock"] = Clock(**about.get("clock", {}))
+        about["uncertainty"] = {path: _tuples(sigma) for path, sigma in about.get("uncertainty", {}).items()}
         about["sensors"] = {name: _sensor(values) for name, values in about.get("sensors", {}).items()}
         about["notes"] = tuple(about.get("notes", ()))
         return Recording(time=columns.pop("time"), channels=columns, **about)

@@ -13,7 +13,7 @@ from ground.bearing import Bearing
 from ground.penetration import chosen
 from rollover.cli import app
 from rollover.scenario import load
-from tests.real import cone_drops, cube_tosses, falling_balls, penetrometer
+from tests.real import cone_drops, cube_tosses, diagnoses, falling_balls, penetrometer
 
 DATA = os.environ.get("ROLLOVER_DATA", "")
 
@@ -114,3 +114,36 @@ def test_the_command_makes_a_soil_of_the_imported_drops_that_the_scenario_takes(
     assert law.calibration is not None
     assert 0.1 < law.calibration.log_scatter < 0.3
     assert len(law.calibration.recordings) == 3
+
+
+NAMED = {
+    "whiffle-ball-1": "air-drag",
+    "yellow-whiffle-ball": "air-drag",
+    "whiffle balls, one held out": "air-drag",
+    "cones, rigid, 60 deg": "soil-added-mass-growth",
+    "cones, sprung, 60 deg": "structural-compliance",
+    "cube tosses": "ground-friction",
+}
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_what_was_left_out_of_a_scenario_stands_first_in_the_diagnosis_of_real_recordings(name: str) -> None:
+    found = json.loads(diagnoses.RESULTS.read_text(encoding="utf-8"))[name]
+    assert found["verdict"] == "missing-physics"
+    assert found["effects"][0]["id"] == NAMED[name] == found["left_out"]
+    assert found["after"]["nrmse"] < 0.55 * found["before"]["nrmse"]
+    assert found["after"]["iso18571"] > found["before"]["iso18571"] + 0.1
+
+
+def test_a_diagnosis_of_real_recordings_is_made_again_as_it_was_written() -> None:
+    path = folder("falling_balls").parent
+    again, written = (
+        diagnoses.study(path, "whiffle-ball-1", {}),
+        json.loads(diagnoses.RESULTS.read_text(encoding="utf-8")),
+    )
+    known = written["whiffle-ball-1"]
+    assert again["verdict"] == known["verdict"]
+    assert [e["id"] for e in again["effects"]] == [e["id"] for e in known["effects"]]
+    assert again["value"]["drag_coefficient"] == pytest.approx(known["value"]["drag_coefficient"], rel=0.02)
+    # a ball with holes is no sphere: 0.4 to 0.75 by the fits of one drop each
+    assert 0.4 < again["value"]["drag_coefficient"] < 0.75

@@ -1,0 +1,106 @@
+"""Recordings that are short, gappy, contradictory, misaligned or of one channel: no crash, and no name by chance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis import account, diagnose
+from rollover.recording import Recording
+from tests.diagnosis.drops import DEPTH, FORCE, recorded, scenario
+
+Recordings = list[tuple[str, Recording]]
+SPEEDS = (1.5, 2.5)
+
+
+def short(made: Recordings) -> Recordings:
+    """Nine samples in the middle of each."""
+    return [(n, _rows(r, np.arange(40, 49))) for n, r in made]
+
+
+def gappy(made: Recordings) -> Recordings:
+    """Nine samples of ten are missing, each channel's own, in stretches."""
+    rng = np.random.default_rng(11)
+    found = []
+    for name, r in made:
+        channels = {}
+        for c, values in r.channels.items():
+            keep = np.repeat(rng.random(r.time.size // 6 + 1) < 0.12, 6)[: r.time.size]
+            channels[c] = np.where(keep, values, np.nan)
+        found.append((name, replace(r, channels=channels)))
+    return found
+
+
+def one_channel(made: Recordings) -> Recordings:
+    """The depth alone."""
+    return [(n, replace(r, channels={DEPTH: r[DEPTH]})) for n, r in made]
+
+
+def misaligned(made: Recordings) -> Recordings:
+    """Clocks that say they are right and are 30 ms off, one early and one late."""
+    return [(n, replace(r, time=r.time + off)) for (n, r), off in zip(made, (0.03, -0.03), strict=True)]
+
+
+def before_contact(made: Recordings) -> Recordings:
+    """Nothing but the fall."""
+    return [(n, _rows(r, np.flatnonzero(r.time < -0.002))) for n, r in made]
+
+
+def flat(made: Recordings) -> Recordings:
+    """A load cell that was not plugged in, and a depth gauge that stuck."""
+    return [(n, replace(r, channels={FORCE: 0.0 * r[FORCE], DEPTH: 0.0 * r[DEPTH] + 0.01})) for n, r in made]
+
+
+def drowned(made: Recordings) -> Recordings:
+    """As much noise as signal."""
+    rng = np.random.default_rng(12)
+    return [
+        (n, replace(r, channels={c: v + rng.normal(0.0, np.ptp(v), v.size) for c, v in r.channels.items()}))
+        for n, r in made
+    ]
+
+
+def alone(made: Recordings) -> Recordings:
+    """One recording, so that nothing can be held out."""
+    return made[:1]
+
+
+def _rows(r: Recording, rows: np.ndarray) -> Recording:
+    return replace(r, time=r.time[rows], channels={c: v[rows] for c, v in r.channels.items()})
+
+
+DAMAGES: tuple[Callable[[Recordings], Recordings], ...] = (
+    short, gappy, one_channel, before_contact, flat, drowned, alone,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("damaged", DAMAGES, ids=lambda d: d.__name__)
+def test_damaged_recordings_of_what_the_scenario_says_give_no_name(damaged: Callable[[Recordings], Recordings]) -> None:
+    found = diagnose(scenario(), damaged(recorded({}, 21, speeds=SPEEDS)))
+    if damaged is not flat:  # that is a fault of the channels, and one of them may be named
+        assert found.verdict in ("no-mismatch", "cannot-tell"), (found.verdict, found.sentence)
+        assert not found.effects
+    assert all(e.kind == "sensor" for e in found.effects)
+    if damaged in (before_contact, flat):
+        assert found.verdict in ("cannot-tell", "unexplained", "sensor"), found.sentence
+    assert account(found)["verdict"] == found.verdict
+    assert found.sentence
+
+
+def test_clocks_that_are_wrong_are_no_physics() -> None:
+    found = diagnose(scenario(), misaligned(recorded({}, 22, speeds=SPEEDS)))
+    assert all(e.kind == "sensor" for e in found.effects), found.sentence
+    assert found.verdict in ("sensor", "unexplained")
+
+
+def test_recordings_that_contradict_each_other_are_not_explained() -> None:
+    """The same drop, once on ground that is twice as stiff: no value of anything makes both."""
+    made = recorded({}, 23, speeds=SPEEDS)
+    other = recorded({"effects.soil-stiffness.scale": 2.0}, 24, speeds=SPEEDS)
+    found = diagnose(scenario(), [*made, *((f"{n} again", r) for n, r in other)])
+    assert not found.effects, found.sentence
+    assert found.verdict == "cannot-tell"
+    assert "They contradict each other: v1.5, v1.5 again: one condition" in found.sentence

@@ -1,0 +1,153 @@
+"""What conditions leave uncertain, what repeats differ by, and what is tolerated: none of it is an effect."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis import diagnose
+from rollover.diagnosis.candidates import candidates_of, coordinate, size_of
+from rollover.diagnosis.evidence import Evidence, doubted, evidence_of, groups_of, left_out
+from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.nuisance import doubts, eased
+from rollover.diagnosis.repeats import with_scatter
+from rollover.diagnosis.simulator import set_up, simulator_of
+from rollover.faults import InputError
+from rollover.importers import read_recording, write_recording
+from rollover.recording import Clock, Recording
+from tests.diagnosis.drops import DEPTH, FORCE, recorded, scenario
+from tests.physics.scenes import shipped
+
+SPEEDS = (1.5, 2.2, 3.0)
+OFF = (1.02, 0.975, 1.03)  # what the speeds were over what was written down
+
+
+def misstated(changes: dict[str, float], sigma: float) -> list[tuple[str, Recording]]:
+    """Drops whose speeds were written down wrongly, and how uncertain they are said to be, m/s."""
+    found = []
+    for seed, (speed, off) in enumerate(zip(SPEEDS, OFF, strict=True)):
+        ((name, r),) = recorded(changes, seed, speeds=(off * speed,), noise=0.004)
+        told = {"initiation.speed": speed}
+        found.append((name, replace(r, conditions=told, uncertainty={"initiation.speed": sigma} if sigma else {})))
+    return found
+
+
+def evidence(recordings: list[tuple[str, Recording]]) -> list[Evidence]:
+    found = []
+    for name, r in recordings:
+        one = evidence_of(name, r, simulator_of(scenario(), r))
+        assert one is not None
+        found.append(doubted(one, set_up(scenario(), r)))
+    return found
+
+
+def test_what_is_eased_has_the_covariance_of_noise_alone() -> None:
+    N = np.random.default_rng(2).normal(0.0, 3.0, (40, 3))
+    values, vectors = np.linalg.eigh(np.eye(40) + N @ N.T)
+    wanted = vectors @ np.diag(values**-0.5) @ vectors.T
+    assert eased(N)(np.eye(40)) == pytest.approx(wanted, abs=1e-12)
+    w = np.random.default_rng(3).normal(size=40)
+    assert eased(np.zeros((40, 0)))(w) is w
+
+
+def test_speeds_that_are_uncertain_explain_what_they_can_and_no_more() -> None:
+    left = {}
+    for sigma in (0.0, 0.06):
+        found = evidence(misstated({}, sigma))
+        judge = Judge(found)
+        judge.aligned()
+        base = judge.fit((), ())
+        assert base is not None
+        left[sigma] = np.sqrt(base.left / sum(e.count for e in found))
+    assert left[0.0] > 1.6
+    assert left[0.06] < 1.15
+    missing = evidence(
+        misstated({"effects.soil-crust.stiffness_ratio": 3.0, "effects.soil-crust.thickness": 0.06}, 0.06)
+    )
+    judge = Judge(missing)
+    base = judge.fit((), ())
+    assert base is not None
+    assert np.sqrt(base.left / sum(e.count for e in missing)) > 1.4 * left[0.06]  # a crust is no error of the speed
+
+
+def test_an_effect_is_fitted_better_beside_speeds_that_are_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.modules[__name__], "OFF", (1.04, 1.03, 1.05))
+    truth, off = 0.2, {}
+    for sigma in (0.0, 0.08):
+        found = evidence(misstated({"effects.co-moving-mass.fraction": truth}, sigma))
+        judge = Judge(found)
+        c = next(c for c in candidates_of(found, (), "drop", None, size_of(scenario())) if c.id == "co-moving-mass")
+        one = judge.fit((c,), [coordinate(0.12, c.search["fraction"])])
+        assert one is not None
+        off[sigma] = abs(c.values(one.x)["fraction"] - truth)
+    assert off[0.0] > 0.08  # all speeds were higher than written down, which a small mass of the soil looks like
+    assert off[0.08] < 0.3 * off[0.0]
+
+
+def test_each_number_of_a_list_is_uncertain_by_itself_and_a_wrong_path_is_one_line() -> None:
+    cube = shipped("cube_toss")
+    found = doubts(cube, {"initiation.velocity": (0.1, 0.2, 0.3)})
+    x, y, z = cube.initiation.velocity  # type: ignore[union-attr]
+    assert found[1] == {"initiation.velocity": pytest.approx((x, y + 0.2, z))}
+    assert len(found) == 3
+    for wrong in ({"initiation.velocty": 0.1}, {"initiation.velocity": 0.1}, {"title": 0.1}):
+        with pytest.raises(InputError, match="uncertainty: not a number of the scenario"):
+            doubts(cube, wrong, "r1")
+
+
+def test_repeats_that_differ_are_scatter_and_what_was_done_once_is_given_it() -> None:
+    one = recorded({}, 1, speeds=(2.0, 3.0), noise=0.003)
+    stiff = recorded({"effects.soil-stiffness.scale": 1.15}, 2, speeds=(2.0,), noise=0.003)
+    found = with_scatter(evidence([*one, ("again", stiff[0][1])]))
+    shares = [{s.channel: s.scatter / s.span for s in e.signals} for e in found]
+    sinkage = [r.channels[DEPTH] for r in (one[0][1], stiff[0][1])]
+    apart = np.sqrt(0.5 * np.mean((sinkage[0] - np.interp(one[0][1].time, stiff[0][1].time, sinkage[1])) ** 2))
+    assert shares[0][DEPTH] == pytest.approx(apart / np.ptp(sinkage[0]), rel=0.15)
+    assert shares[1][DEPTH] == pytest.approx(0.5 * (shares[0][DEPTH] + shares[2][DEPTH]), rel=1e-9)
+    alike = with_scatter(evidence([*one, ("again", recorded({}, 3, speeds=(2.0,), noise=0.003)[0][1])]))
+    assert max(s.scatter / s.span for e in alike for s in e.signals if s.channel == FORCE) < 0.004
+    assert all(s.scatter == 0.0 for e in with_scatter(evidence(one)) for s in e.signals)
+
+
+def test_recordings_of_one_condition_are_left_out_one_by_one() -> None:
+    found = evidence([*recorded({}, 1, speeds=(2.0,)), *recorded({}, 2, speeds=(2.0,))])
+    assert groups_of(found) == [[0, 1]]
+    assert left_out(found) == [[0], [1]]
+    assert left_out(evidence(recorded({}, 1, speeds=(2.0, 3.0)))) == [[0], [1]]
+
+
+def test_what_a_tolerance_covers_is_no_mismatch() -> None:
+    made = recorded({"effects.soil-stiffness.scale": 1.06}, 4, noise=0.003)
+    assert diagnose(scenario(), made).verdict == "parameter"
+    tolerant = diagnose(scenario(), made, tolerance=0.1)
+    assert tolerant.verdict in ("no-mismatch", "cannot-tell")
+    assert not tolerant.effects
+    with pytest.raises(ValueError, match="tolerance: not a share of a range, got 1"):
+        diagnose(scenario(), made, tolerance=1.0)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_a_recording_says_what_it_leaves_uncertain(suffix: str, tmp_path: Path) -> None:
+    _, r = recorded({}, 1, speeds=(2.0,))[0]
+    doubt = {"initiation.speed": 0.05, "initiation.velocity": (0.1, 0.2, 0.3)}
+    told = replace(r, uncertainty=doubt, clock=Clock(zero="unknown", within=0.004))
+    write_recording(told, tmp_path / f"one{suffix}")
+    again = read_recording(tmp_path / f"one{suffix}")
+    assert again.uncertainty == doubt
+    assert again.clock == told.clock
+    e = evidence_of("one", again, simulator_of(scenario(), again))
+    assert e is not None
+    assert e.shift_prior == 0.004
+
+
+def test_an_uncertainty_that_is_none_is_refused(tmp_path: Path) -> None:
+    _, r = recorded({}, 1, speeds=(2.0,))[0]
+    write_recording(replace(r, uncertainty={"initiation.speed": 0.05}), tmp_path / "one.csv")
+    sidecar = tmp_path / "one.yaml"
+    sidecar.write_text(sidecar.read_text().replace("0.05", "0.0", 1))
+    with pytest.raises(InputError, match=r"uncertainty: initiation.speed: not one standard deviation, got 0"):
+        read_recording(tmp_path / "one.csv")
