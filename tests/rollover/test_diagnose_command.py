@@ -14,9 +14,7 @@ from typer.testing import CliRunner, Result
 
 from rollover.cli import app
 from rollover.diagnosis import Diagnosis, account
-from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.series import series
-from rollover.diagnosis.simulator import simulator_of
 from rollover.document import find
 from rollover.drop import DropModel
 from rollover.importers import read_recording, write_recording
@@ -133,7 +131,6 @@ def test_the_diagnosed_scenario_runs_and_follows_the_recordings(
     out, _ = done
     diagnosed = load(out / "scenario-diagnosed.yaml")
     answer = json.loads((out / "diagnosis.json").read_text())
-    base = load(find("drop_test"))
     squares, count = 0.0, 0
     for name in ("v1", "v2", "v3"):
         recording = read_recording(folder / f"{name}.csv")
@@ -142,15 +139,13 @@ def test_the_diagnosed_scenario_runs_and_follows_the_recordings(
         left[np.abs(recording.time) < 0.004] = 0.0  # the leap of force at contact, where a microsecond decides
         assert float(np.sqrt(np.mean(left**2))) == pytest.approx(40.0, rel=0.25)
         if name in answer["fit"]["training"]["recordings"]:
-            judged = evidence_of(name, recording, simulator_of(base, recording))
-            predicted = simulator_of(diagnosed, recording).predict({}, 0.0)
-            assert judged is not None
-            assert predicted is not None
-            squares += float(np.sum((judged.measured() - judged.stacked(predicted)) ** 2))
-            count += judged.count
+            for channel, noise in answer["significance"]["noise"].items():
+                there = np.isfinite(recording[channel]) & (np.abs(recording.time) >= 0.004)
+                squares += float(np.sum(((recording[channel] - run[channel])[there] / noise) ** 2))
+                count += int(there.sum())
     # what is left after the fit, of which time shifts of microseconds explain a little
     after_fit = answer["fit"]["training"]["after"]["nrmse"]
-    assert float(np.sqrt(squares / count)) == pytest.approx(after_fit, rel=0.03)
+    assert float(np.sqrt(squares / count)) == pytest.approx(after_fit, rel=0.05)
     # the full run of it, shortened, is the drop by itself
     shortened = ["--set", "simulation.duration=0.03", "--set", "simulation.output_step=0.001"]
     ran = rollover("run", out / "scenario-diagnosed.yaml", *shortened, "--out", tmp_path / "run")
