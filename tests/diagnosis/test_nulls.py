@@ -88,7 +88,7 @@ def test_level_and_memory_of_the_noise_come_from_all_recordings_together(memory:
 def test_hum_is_not_taken_for_the_memory_of_noise() -> None:
     rng = np.random.default_rng(12)
     t = np.arange(600)
-    series = [3.0 * np.sin(0.3 * t + k) + 0.3 * rng.standard_normal(600) for k in range(4)]
+    series = [3.0 * np.sin(0.3 * t + k) + 0.1 * rng.standard_normal(600) for k in range(4)]
     _, ar = colour.autoregression(series)
     roots = np.roots([1.0, *(-a for a in ar)])
     assert not np.any((np.abs(roots) > 0.9) & (np.abs(roots.imag) > 0.0))

