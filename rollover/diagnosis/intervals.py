@@ -63,7 +63,7 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
                     y = (judge.measured[r] - block.residual)[part]
                     pull += block.J[part].T @ (MODEL_ERROR * y)
         moved += (inverse @ pull) ** 2
-    for e, block in zip(judge.evidence, fitted.blocks, strict=False):
+    for e, block in zip(judge.evidence, fitted.blocks, strict=True):
         for stray in e.strays:
             moved += STUDENT / len(e.strays) * (inverse @ (block.J.T @ e.whitened(stray))) ** 2
     # a fit that ended before it was at rest is off by what the next step would have been

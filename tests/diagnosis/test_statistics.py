@@ -127,7 +127,8 @@ def test_freed_directions_are_measured_as_the_shift_leaves_them() -> None:
 def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
     rng = np.random.default_rng(8)
     inside = []
-    judge = cast(Any, SimpleNamespace(evidence=(), measured=(), per_error=1.0))
+    bare = SimpleNamespace(signals=(), strays=())
+    judge = cast(Any, SimpleNamespace(evidence=(bare, bare, bare), measured=(), per_error=1.0))
     truth = np.array([0.02, -0.03])
     for _ in range(250):
         blocks = linear_blocks(rng, 3, 40, truth)
