@@ -54,6 +54,16 @@ def test_one_effect_is_named_with_its_value(id: str, seed: int, verdict: str, tm
     assert not found.remaining_significant
 
 
+def test_both_of_two_effects_are_named(tmp_path: Any) -> None:
+    """A soil 0.13 % softer than its law and an accelerometer 1.3 % short, both far above the noise."""
+    order = Order(index=0, seed=432, kind="pair", ids=("soil-stiffness", "sensor-gain"))
+    _, found, row = diagnosed(order, tmp_path)
+    assert {n.id for n in found.effects} == {"soil-stiffness", "sensor-gain"}
+    assert row["both"]
+    assert found.verdict == "sensor"
+    assert found.after["held_out"].nrmse < 1.05
+
+
 def test_what_no_table_holds_is_not_given_a_name(tmp_path: Any) -> None:
     order = Order(index=0, seed=440, kind="outside", ids=("outside:bands",))
     _, found, row = diagnosed(order, tmp_path)
