@@ -142,7 +142,10 @@ def test_the_command(folders: tuple[Path, Path], tmp_path: Path) -> None:
     ],
 )
 def test_what_two_runs_cannot_be_asked(folders: tuple[Path, Path], tmp_path: Path, more: list[str], said: str) -> None:
-    words = [str(folders[1]) if word == "NOW" else word for word in more]
+    table = tmp_path / "x.csv"
+    table.write_text("t,F\n0,1\n")
+    words = [{"NOW": str(folders[1]), "x.csv": str(table)}.get(word, word) for word in more]
+    said = said.replace("x.csv", str(table))
     done = CliRunner().invoke(app, ["compare", str(folders[0]), *words, "--out", str(tmp_path / "out")])
     assert done.exit_code == 2
     assert said in done.stderr

@@ -10,7 +10,7 @@ import random
 import subprocess
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import pytest
@@ -496,6 +496,8 @@ def test_settings_of_the_command_line_are_read_as_in_a_file() -> None:
 @parameters
 class Adhesion:
     """A made-up effect."""
+
+    kind: ClassVar[str] = "physics"
 
     stress: Annotated[float, Quantity("Pa", "pull-off stress", least=0)]
 
