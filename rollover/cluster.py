@@ -24,6 +24,7 @@ C = TypeVar("C")
 V = TypeVar("V")
 
 LOCAL, SLURM = "local", "slurm"
+LOST = "its worker was lost"
 REFRESH = 5.0  # s between two counts of the workers' threads
 PATIENCE = 60.0  # s that a scheduler and its first worker may take to answer
 
@@ -41,7 +42,8 @@ def map_on_cluster(
     """Like `execute.map_cases`, on the workers of a scheduler at `address` (``tcp://host:8786``).
 
     ``local`` starts `workers` single-threaded ones here, ``slurm`` asks Slurm for as many jobs by the settings of
-    dask-jobqueue. A worker that is lost, with all that it is given instead, costs the one case. Raises `InputError`.
+    dask-jobqueue. A worker that is lost costs the case that kills it: all that it held
+    are tried once more, each alone. Raises `InputError`.
     """
     with _client(address, workers) as client:
         yield from _handed_out(client, function, cases, time_limit, memory_limit, warm_up)
@@ -60,6 +62,8 @@ def _handed_out(
     token = uuid.uuid4().hex  # tells this study's children from those of others on the same workers
     todo = iter(enumerate(cases))
     open_: dict[str, tuple[int, C]] = {}
+    lost: list[tuple[int, C]] = []  # with a worker that another case may have killed: each tried again, alone
+    alone: set[int] = set()
     over = as_completed(loop=client.loop)
     threads, asked = 1, float("-inf")  # workers come and go
     try:
@@ -67,9 +71,13 @@ def _handed_out(
             if time.monotonic() - asked > REFRESH:
                 threads, asked = max(1, sum(client.nthreads().values())), time.monotonic()
             room = AHEAD * threads - len(open_)
-            for index, case in _first(todo, room):
+            given = list(_first(todo, room))
+            if not given and not open_ and lost:
+                given = [lost.pop(0)]
+                alone.add(given[0][0])
+            for index, case in given:
                 args = (token, function, case, time_limit, memory_limit, warm_up)
-                task = client.submit(_in_child, *args, pure=False, retries=0, key=f"case-{token}-{index}")
+                task = client.submit(_in_child, *args, pure=False, retries=0, key=f"case-{token}-{index}-{len(alone)}")
                 open_[task.key] = (index, case)
                 over.add(task)
             if not open_:
@@ -78,6 +86,9 @@ def _handed_out(
                 index, case = open_.pop(task.key)
                 value, failure, wall = _brought(task)
                 task.release()
+                if failure is not None and failure.sentence == LOST and index not in alone:
+                    lost.append((index, case))
+                    continue
                 yield Outcome(index=index, case=case, value=value, failure=failure, wall_time=wall)
     finally:
         with suppress(Exception):  # a worker that is lost has let go already
@@ -102,7 +113,7 @@ def _brought(task: Any) -> tuple[Any, Failure | None, float]:
         return answer
     reason = task.exception()
     lost = type(reason).__name__ in ("KilledWorker", "CancelledError", "FutureCancelledError")
-    sentence = "its worker was lost" if lost else f"{type(reason).__name__}: {reason}"
+    sentence = LOST if lost else f"{type(reason).__name__}: {reason}"
     return None, Failure(kind="crash" if lost else "error", sentence=sentence, detail=str(reason)), 0.0
 
 

@@ -59,6 +59,17 @@ def test_what_goes_wrong_costs_one_case_and_so_does_a_lost_worker() -> None:
     assert [found[i].value for i in (0, 5, 6, 7, 8)] == [4, 100, 121, 144, 169]
 
 
+def test_what_waited_beside_the_case_that_killed_its_worker_is_done() -> None:
+    pytest.importorskip("distributed", reason="the extra cluster is not installed")
+    from rollover.cluster import map_on_cluster
+
+    found = {o.index: o for o in map_on_cluster(odd, ["worker", 10, 11], address="local", workers=1)}
+    assert sorted(found) == [0, 1, 2]
+    assert found[0].failure is not None
+    assert found[0].failure.sentence == "its worker was lost"
+    assert [found[i].value for i in (1, 2)] == [100, 121]
+
+
 def test_the_same_study_gives_the_same_table(tmp_path: Path) -> None:
     pytest.importorskip("distributed", reason="the extra cluster is not installed")
     study = studies.load(drops(tmp_path))
