@@ -18,6 +18,7 @@ class Effort:
     rounds: int = 14  # of a whole fit
     nudges: tuple[float, ...] = (2e-2, 5e-3, 1e-3)  # of a coordinate, for differences: wide first
     polishes: int = 2  # fits that are followed along a crooked valley
+    later: float = 5e-5  # s, by which a clock is moved to see what that does
     thrifty: bool = False  # looks at few recordings, fits no shapes, and stops where nothing but noise is left
 
     @property
@@ -38,5 +39,6 @@ RUNS = Effort(
     rounds=12,
     nudges=(3e-2, 8e-3),
     polishes=0,
+    later=1e-3,  # from one row of a run to the next
     thrifty=True,
 )

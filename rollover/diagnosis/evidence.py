@@ -118,13 +118,6 @@ class Evidence:
             y[k : k + 3] = np.clip(measured[k : k + 3], near.min(), near.max())
         return y
 
-    def slope(self, raw: Array, leaps: NDArray[np.int64]) -> Array:
-        """dy/dtau = -dy/dt of each signal by differences along the stamps, whitened; none across a leap."""
-        found = np.concatenate([-np.gradient(raw[part], self.recording.time[s.rows]) for s, part in self.spans()])
-        for k in leaps:
-            found[k : k + 3] = 0.0
-        return self.whitened(found)
-
     def spans(self) -> list[tuple[Signal, slice]]:
         """Each signal with its place in the stack."""
         found, at = [], 0
