@@ -155,6 +155,8 @@ def _evidence(scenario: Scenario, recordings: Sequence[tuple[str, Recording]]) -
     found, notes = [], []
     for name, recording in recordings:
         one = evidence_of(name, *simulated(scenario, recording))
+        still = [c for c, v in recording.channels.items() if np.isfinite(v).any() and np.nanmin(v) == np.nanmax(v)]
+        notes += [f"{name}: {channel} never moves and was left aside" for channel in still]
         if one is None:
             notes.append(f"{name}: shares no usable channel with the simulation and was left aside")
         else:

@@ -154,7 +154,7 @@ def doubted(e: Evidence, scenario: Scenario) -> Evidence:
 
 
 def evidence_of(name: str, recording: Recording, simulator: Simulator, averaged: int = 1) -> Evidence | None:
-    """Make a recording ready; None if it shares no channel with the simulation.
+    """Make a recording ready; None if it shares no channel with the simulation. Channels that never move are left out.
 
     Noise is estimated from each channel itself; where it is too short for that, the noise that the recording states.
     """
@@ -167,6 +167,8 @@ def evidence_of(name: str, recording: Recording, simulator: Simulator, averaged:
         if channel not in predicted or rows.size < 8 or not np.all(np.isfinite(predicted[channel][rows])):
             continue
         y = values[rows]
+        if np.ptp(y) == 0.0:
+            continue  # an instrument that was not plugged in, or stuck
         span = float(max(np.ptp(predicted[channel][rows]), np.ptp(y)))
         if span <= 0.0:
             continue
