@@ -108,14 +108,18 @@ def begun(judge: Judge, base: Fitted) -> list[float]:
 
 
 def screen(
-    judge: Judge, base: Fitted, candidates: Sequence[Candidate], few: Sequence[int], looked: Gate
+    judge: Judge,
+    base: Fitted,
+    candidates: Sequence[Candidate],
+    few: Sequence[int],
+    shifts: Sequence[float],
+    looked: Gate,
 ) -> list[Screened]:
-    """Look at each candidate in some places beside the base, on a few recordings.
+    """Look at each candidate in some places beside the base, on a few recordings, from time `shifts` (s) of all.
 
     Not far from an explanation the places to which `looked` leads are enough.
     """
     found: list[Screened] = []
-    shifts = begun(judge, base)
     beside = [judge.block(r, base.candidates, base.x, shifts[r], 0.0) for r in few]
     blocks = [b for b in beside if b is not None]
     if len(blocks) < len(few):
@@ -180,13 +184,12 @@ def step(
     what it leaves; the step is then under that noise. None if nothing could be fitted.
     """
     say(f"looking at {len(candidates)} candidates beside {base.label}")
-    few = spread(base, groups, judge.effort.few)
-    screened = screen(judge, base, _promising(candidates, looked, judge.effort.scored), few, looked)
+    few, shifts = spread(base, groups, judge.effort.few), begun(judge, base)
+    screened = screen(judge, base, _promising(candidates, looked, judge.effort.scored), few, shifts, looked)
     count = sum(b.residual.size for b in base.blocks)
-    screened, begun_with = _first_fits(judge, base, screened, few, say, crew)
+    screened, begun_with = _first_fits(judge, base, screened, few, shifts, say, crew)
     jobs = [
-        Job(candidates=f.candidates, start=f.x, shifts=tuple(_all_shifts(judge, base, f, few)), width=1)
-        for f in begun_with
+        Job(candidates=f.candidates, start=f.x, shifts=tuple(_all_shifts(shifts, f, few)), width=1) for f in begun_with
     ]
     fits = [f for f in crew.fits(judge, jobs, say) if f is not None]
     if not fits:
@@ -256,13 +259,18 @@ def _shaped(
 
 
 def _first_fits(
-    judge: Judge, base: Fitted, screened: Sequence[Screened], few: Sequence[int], say: Progress, crew: Crew
+    judge: Judge,
+    base: Fitted,
+    screened: Sequence[Screened],
+    few: Sequence[int],
+    shifts: Sequence[float],
+    say: Progress,
+    crew: Crew,
 ) -> tuple[list[Screened], list[Fitted]]:
     """Short fits to few recordings: the ones worth a full fit, best first, and what each leaves."""
     by_potential = sorted(screened, key=lambda s: -s.potential)[: judge.effort.promising]
     by_start = sorted(screened, key=lambda s: s.left)[: judge.effort.promising // 2]
     chosen = {s.candidate.key: s for s in (*by_start, *by_potential)}
-    shifts = begun(judge, base)
     told: dict[str, float] = {}
     say(f"first fits of {len(chosen)} candidates to {len(few)} recordings")
     at = tuple(shifts[r] for r in few)
@@ -289,9 +297,9 @@ def _first_fits(
     return [replace(s, nrmse=told.get(s.candidate.key, 0.0)) for s in screened], worth
 
 
-def _all_shifts(judge: Judge, base: Fitted, first: Fitted, few: Sequence[int]) -> list[float]:
+def _all_shifts(begun_with: Sequence[float], first: Fitted, few: Sequence[int]) -> list[float]:
     """Time shifts of all recordings: as fitted where they are, elsewhere as begun with."""
-    shifts = begun(judge, base)
+    shifts = list(begun_with)
     for r, block in zip(few, first.blocks, strict=True):
         shifts[r] = block.shift
     return shifts
