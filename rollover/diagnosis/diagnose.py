@@ -108,7 +108,7 @@ def diagnose(
     notes += [*(_felt(degrees[0]) for _ in degrees[:1] if is_mismatch), *_cost(found)]
     return Diagnosis(
         verdict=verdict,
-        sentence=sentence(verdict, effects, before, h_before.held, h_after.held, found)
+        sentence=sentence(verdict, effects, explanation.p_value, h_before.held, h_after.held, found)
         + offered(law)
         + against_itself(verdict, contrary),
         p_value=explanation.p_value,

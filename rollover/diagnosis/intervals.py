@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ground.quantity import quantities
 from rollover.diagnosis.blocks import Block
 from rollover.diagnosis.candidates import physical
 from rollover.diagnosis.evidence import MODEL_ERROR
 from rollover.diagnosis.fit import GENTLE, Fitted, Judge
 from rollover.diagnosis.verdict import Interval
-from rollover.effects import EFFECTS
+from rollover.effects import EFFECTS, units_of
 
 Array = NDArray[np.float64]
 TWO_SIDED = 1.96
@@ -74,7 +73,7 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
     found, at = [], 0
     for c in fitted.candidates:
         kind: Any = EFFECTS[c.id]
-        units = quantities(kind)
+        units = units_of(kind, c.channel)
         values: dict[str, Interval] = {}
         for name, search in c.search.items():
             x = fitted.x[at]
@@ -82,7 +81,7 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
                 value=physical(x, search),
                 low=physical(x - TWO_SIDED * sd[at], search),
                 high=physical(x + TWO_SIDED * sd[at], search),
-                unit=units[name].unit if name in units else "",
+                unit=units.get(name, ""),
                 at_bound=not 1e-6 < x < 1.0 - 1e-6,
             )
             at += 1

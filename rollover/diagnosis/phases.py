@@ -27,14 +27,11 @@ def phases_of(evidence: Evidence) -> tuple[tuple[float, str], ...]:
 def drop_phases(evidence: Evidence) -> tuple[tuple[float, str], ...]:
     """(start s, name) of each phase of a drop: by the measured sinkage where there is any, else by the simulated."""
     recording = evidence.recording
-    predicted = evidence.simulator.predict({}, 0.0) or {}
     depth = recording.channels.get("ground/sinkage")
     if depth is None and "striker/position_z" in recording.channels:
         depth = -recording.channels["striker/position_z"]
     if depth is None:
-        depth = predicted.get("ground/sinkage")
-    if depth is None:
-        depth = _integrated(recording.time, predicted)
+        depth = evidence.simulator.state(0.0).get("ground/sinkage", np.full(recording.time.size, np.nan))
     known = np.isfinite(depth)
     time, z = recording.time[known], depth[known]
     start = float(recording.time[0])
@@ -52,10 +49,3 @@ def drop_phases(evidence: Evidence) -> tuple[tuple[float, str], ...]:
     ]
     marks = [m for k, m in enumerate(marks) if k == 0 or m[0] > marks[k - 1][0]]
     return tuple(m for k, m in enumerate(marks) if k + 1 == len(marks) or marks[k + 1][0] > start)
-
-
-def _integrated(time: Array, predicted: dict[str, Array]) -> Array:
-    speed = predicted.get("striker/velocity_z")
-    if speed is None:
-        return np.full(time.size, np.nan)
-    return np.concatenate([[0.0], np.cumsum(-0.5 * (speed[1:] + speed[:-1]) * np.diff(time))])

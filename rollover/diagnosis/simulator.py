@@ -41,7 +41,7 @@ class Simulator(Protocol):
         """(start s, name) of the phases of the scenario as it is; empty if the recording itself tells."""
 
     def state(self, shift: float) -> Mapping[str, Array]:
-        """Motion of the scenario as it is, recorded or not, (n,) each; empty where the recording itself tells."""
+        """Motion of the scenario as it is, recorded or not, (n,) each; empty if it cannot be simulated."""
 
     @property
     def effort(self) -> Effort:
@@ -86,8 +86,10 @@ class DropSimulator:
 
     def state(self, shift: float) -> Mapping[str, Array]:
         """See `Simulator`."""
-        del shift
-        return {}
+        try:
+            return self._at({}, shift).channels
+        except DropFailedError:
+            return {}
 
     def _edges(self, physical: Mapping[str, Any], shift: float, read_by: Mapping[str, Any]) -> dict[str, Array]:
         """Channels behind a lag or with a clock of their own: what these make of a leap lies between the stamps."""

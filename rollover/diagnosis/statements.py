@@ -10,11 +10,11 @@ import numpy as np
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.detect import Mismatch
 from rollover.diagnosis.evidence import Evidence
-from rollover.diagnosis.explain import confusion
+from rollover.diagnosis.explain import SURE, confusion
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.holdout import Held, held_out
 from rollover.diagnosis.intervals import intervals
-from rollover.diagnosis.selection import Explanation, strongest
+from rollover.diagnosis.selection import NEGLIGIBLE, Explanation, strongest
 from rollover.diagnosis.verdict import Considered, Named, Place, Verdict
 from rollover.effects import EFFECTS
 
@@ -118,14 +118,19 @@ def noise(evidence: Sequence[Evidence]) -> dict[str, float]:
 def sentence(
     verdict: Verdict,
     effects: Sequence[Named],
-    before: Mismatch,
+    p_value: float,
     first: Held,
     last: Held,
     evidence: Sequence[Evidence],
 ) -> str:
     """The verdict in one sentence or two."""
+    if verdict == "no-mismatch" and p_value < SURE:
+        return (
+            f"Simulation and {len(evidence)} recordings differ by more than noise (p = {p_value:.2g}), but by less "
+            f"than {NEGLIGIBLE:.1%} of any channel's range."
+        )
     if verdict == "no-mismatch":
-        return f"Simulation and {len(evidence)} recordings agree within the noise (p = {before.p_value:.2g})."
+        return f"Simulation and {len(evidence)} recordings agree within the noise (p = {p_value:.2g})."
     if verdict == "cannot-tell":
         return "These recordings are too weak to show even typical effects: nothing can be said."
     if verdict == "unexplained":

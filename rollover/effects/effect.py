@@ -8,10 +8,12 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 from ground.quantity import parameters, quantities
 from ground.settings import ForceTerm
+from rollover.channels import describe, is_known
 from rollover.recording import Recording
 
 EFFECTS: dict[str, type[Effect]] = {}
 
+CHANNELS_OWN = "SI unit of the channel"
 Kind = Literal["physics", "parameter", "sensor"]
 
 
@@ -74,16 +76,23 @@ class Effect:
 
     def says(self) -> str:
         """The sentence, with the values in it."""
-        kind: Any = type(self)
-        units = quantities(kind)
+        units = units_of(type(self), getattr(self, "channel", None))
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         spoken = {
-            name: f"{value:.3g} {units[name].unit if units[name].unit != '1' else ''}".strip()
+            name: f"{value:.3g} {units[name] if units[name] != '1' else ''}".strip()
             if isinstance(value, float) and name in units
             else value
             for name, value in values.items()
         }
         return self.sentence.format(**spoken)
+
+
+def units_of(effect: type[Effect], channel: str | None = None) -> dict[str, str]:
+    """Unit of each number of an effect; of a sensor's offset or limit that of its channel, where one is given."""
+    kind: Any = effect
+    found = {name: q.unit for name, q in quantities(kind).items()}
+    own = describe(channel).unit if channel is not None and is_known(channel) else CHANNELS_OWN
+    return {name: own if unit == CHANNELS_OWN else unit for name, unit in found.items()}
 
 
 def nothing(effect: type[Effect]) -> Effect:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ground.compiled import compiled
 from ground.quantity import Quantity, parameters
 from rollover.channels import is_known
-from rollover.effects.effect import Effect, Kind, Search
+from rollover.effects.effect import CHANNELS_OWN, Effect, Kind, Search
 from rollover.recording import Recording
 
 Array = NDArray[np.float64]
@@ -238,7 +238,7 @@ class SensorBias(Effect):
     """y = x + bias: a zero that was not set, or that moved."""
 
     channel: Annotated[str, "that is misread"] = "ground/force_normal"
-    bias: Annotated[float, Quantity("SI unit of the channel", "what is read of nothing")] = 50.0
+    bias: Annotated[float, Quantity(CHANNELS_OWN, "what is read of nothing")] = 50.0
 
     id = "sensor-bias"
     kind: ClassVar[Kind] = "sensor"
@@ -269,7 +269,7 @@ class SensorClipping(Effect):
     """y = min(max(x, -limit), limit): an amplifier or converter at the end of its range."""
 
     channel: Annotated[str, "that is misread"] = "ground/force_normal"
-    limit: Annotated[float | None, Quantity("SI unit of the channel", "end of the range to both sides", above=0)] = 3e3
+    limit: Annotated[float | None, Quantity(CHANNELS_OWN, "end of the range to both sides", above=0)] = 3e3
 
     id = "sensor-clipping"
     kind: ClassVar[Kind] = "sensor"
