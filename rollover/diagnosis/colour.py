@@ -102,7 +102,9 @@ def slower(told: Sequence[tuple[int, int, Signal, float, tuple[float, ...]]]) ->
         if s.noise > 0.0 and sigma > 0.0:
             memory = min(max(sum(s.ar), 0.0), STEADY)
             more = np.log(level_of(sigma, ar) / level_of(s.noise, s.ar))
-            by.setdefault(s.channel, []).append((float(more), SLOWER * (1.0 + UNSURE * memory / (1.0 - memory)), s.rows.size))
+            by.setdefault(s.channel, []).append(
+                (float(more), SLOWER * (1.0 + UNSURE * memory / (1.0 - memory)), s.rows.size)
+            )
     slow = set()
     for channel, each in by.items():
         weights = [float(n) for *_, n in each]

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from rollover.diagnosis.depend import ACCELERATION, DEPTH, SPEED, TIME
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.fit import Block, Fitted, Judge
-from rollover.diagnosis.response import WHERES, Descent, Where, channels_of, descents, hats
+from rollover.diagnosis.response import WHERES, Descent, Where, channels_of, descent, hats
 from rollover.scenario import Scenario
 
 Array = NDArray[np.float64]
@@ -30,6 +30,8 @@ FADES = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16)  # s, of a force that fades
 WORTH = 0.3  # of the excess over the noise, that a quantity must explain to be named
 STEADY = 1e-5  # prior of steps between knots: beyond what was seen a function stays as it ends
 ALONE = 0.1  # of the excess over the noise that channels beside a faulty one may have
+NEAR = 0.05  # of its prior: a time shift that is as good as another
+SHIFTS = 4  # that are tried
 RATHER = 0.5  # of what the best force leaves
 
 
@@ -83,35 +85,51 @@ def _steady(N: Array) -> Array:
 def dependence(judge: Judge, scenarios: Sequence[Scenario], base: Fitted) -> Dependence:
     """What is left beside a fit depends on what; `scenarios` under the conditions of the recordings."""
     evidence = judge.evidence
-    # far from an explanation a shift eats what is missing: where a clock says
-    blocks = [[b] for b in base.blocks]
-    for r, e in enumerate(evidence):
-        told = judge.block(r, base.candidates, base.x, 0.0, 0.0) if e.recording.clock.zero != "unknown" else None
-        blocks[r] += [] if told is None else [told]
-    found = descents(scenarios, evidence, blocks)
+    blocks, found = ways(judge, scenarios, base)
     channel = alone(evidence, blocks, found)
     if channel is not None:
         return Dependence(shares=_added(*_of_channel(channel, judge, base)), channel=channel)
     return Dependence(shares=_added(*_of_forces(found))) if found else Dependence()
 
 
-def alone(
-    evidence: Sequence[Evidence], blocks: Sequence[Sequence[Block]], found: Sequence[Descent]
-) -> str | None:
+def ways(judge: Judge, scenarios: Sequence[Scenario], base: Fitted) -> tuple[list[list[Block]], list[Descent]]:
+    """Each recording at some time shifts, and its way down at the best of them.
+
+    Far from an explanation a shift eats what is missing: tried are the base's, what a clock says, and the one that
+    goes with a force that may be anything.
+    """
+    blocks, found = [], []
+    for r, (e, scenario, b) in enumerate(zip(judge.evidence, scenarios, base.blocks, strict=True)):
+        here, best = [b], descent(scenario, e, b)
+        tried = [b.shift]
+        shift = 0.0 if e.recording.clock.zero != "unknown" else b.shift
+        for _ in range(SHIFTS):
+            if min(abs(shift - other) for other in tried) > NEAR * b.prior:
+                told = judge.block(r, base.candidates, base.x, shift, 0.0)
+                other = None if told is None else descent(scenario, e, told)
+                tried.append(shift)
+                here += [] if told is None else [told]
+                best = other if best is None or (other is not None and other.score < best.score) else best
+            shift = shift if best is None else best.better
+        blocks.append(here)
+        found += [] if best is None else [best]
+    return blocks, found
+
+
+def alone(evidence: Sequence[Evidence], blocks: Sequence[Sequence[Block]], found: Sequence[Descent]) -> str | None:
     """The channel without which nothing is left to explain, if there is one and no force does as well."""
     total = sum(min(float(b.residual @ b.residual) - b.residual.size for b in several) for several in blocks)
     free = min((sum(d.excess(where) for d in found) for where in WHERES), default=total)
-    best: tuple[float, str | None] = (np.inf, None)
+    best, alone_on = np.inf, ""
     for channel in sorted({s.channel for e in evidence for s in e.signals}):
         beside, many = 0.0, 0
         for e, several in zip(evidence, blocks, strict=True):
             rows = np.concatenate([np.full(s.rows.size, s.channel != channel) for s in e.signals])
             beside += min(_left(b, rows) for b in several) - float(rows.sum())
             many += int(rows.sum())
-        if many and beside < best[0]:
-            best = (beside, channel)
-    beside, channel = best
-    return channel if beside < min(ALONE * total, RATHER * free) else None
+        if many and beside < best:
+            best, alone_on = beside, channel
+    return alone_on if best < min(ALONE * total, RATHER * free) else None
 
 
 def _left(b: Block, rows: NDArray[np.bool_]) -> float:
@@ -144,6 +162,9 @@ def _of_forces(found: Sequence[Descent]) -> tuple[list[Model], list[Array], floa
                     functions.append((on, [b * s for b, s in zip(basis, strength, strict=True)]))
         faded = [_fading(d) for d in found]
         functions += [(TIME, [f[:, k : k + 2] for f in faded]) for k in range(len(FADES) - 1)]
+        functions.append((DEPTH, strength))  # the ground all the way, by a factor
+        if where == "push":  # friction: the sign of the speed, which stays the same
+            functions.append((SPEED, [np.ones((d.way.time.size, 1)) for d in found]))
         if where == "ground":
             by_touch = [np.array([[1.0, np.log(d.way.touch)]]) for d in found]
             functions.append((IMPACT, [s * row for s, row in zip(strength, by_touch, strict=True)]))
@@ -166,9 +187,7 @@ def _felt(found: Sequence[Descent], functions: Sequence[tuple[str, list[Array]]]
     return [Model(on=on, columns=tuple(c)) for (on, _), c in zip(functions, columns, strict=True)]
 
 
-def _of_channel(
-    channel: str, judge: Judge, base: Fitted
-) -> tuple[list[Model], list[Array], float, float]:
+def _of_channel(channel: str, judge: Judge, base: Fitted) -> tuple[list[Model], list[Array], float, float]:
     """Every model of a sensor that goes its own way by itself."""
     misfits, values, times, slots = [], [], [], []
     for e, b, off in zip(judge.evidence, base.blocks, judge.residuals(base), strict=True):

@@ -73,7 +73,11 @@ def mismatch_of(
                 if inside.size >= 4:
                     rows = inside + part.start
                     trusted = signal.weight is None
-                    cells.append(_cell(r, signal.channel, name, time[inside], rows, block, humming[signal.channel], trusted=trusted))
+                    cells.append(
+                        _cell(
+                            r, signal.channel, name, time[inside], rows, block, humming[signal.channel], trusted=trusted
+                        )
+                    )
     structured = sum(c.structured for c in cells)
     waves = sum(c.waves for c in cells)
     rough = sum(c.rough for c in cells)

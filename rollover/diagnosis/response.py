@@ -5,12 +5,12 @@ Beside a simulated way down z_0(t) a force f(t) moves the striker by
     (m + m_b1) dz'' = -k(t) dz - f,   dF_s = -m dz''                    (the ground resists more)
     (m + m_b1) dz'' = -k(t) dz + f,   dF_s = f - m dz''                 (something beside the ground pushes)    (D6)
 
-with the secant stiffness k = (F(z_0 + dz) - F(z_0))/dz of the way that was measured: linear in f, and exact for that way.
+with the secant stiffness k = (F(z_0 + dz) - F(z_0))/dz of the way that was measured: linear in f, exact on that way.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -27,6 +27,7 @@ from rollover.scenario import Scenario
 from rollover.vehicle import Striker
 
 Array = NDArray[np.float64]
+Moves = tuple[Array, Array, Array, Array]  # changes of depth, speed, acceleration, load cell, (n, k) each
 Where = Literal["ground", "push"]
 WHERES: tuple[Where, ...] = ("ground", "push")
 STEP = 5e-4  # s
@@ -63,7 +64,7 @@ class Way:
         fields = ("time", "depth", "speed", "acceleration", "force", "stiffness")
         return replace(self, **{name: getattr(self, name)[:n] for name in fields})
 
-    def moved(self, f: Array, where: Where, faster: float = 0.0) -> tuple[Array, Array, Array, Array]:
+    def moved(self, f: Array, where: Where, faster: float = 0.0) -> Moves:
         """(D6) for forces f (n, k): changes of depth, speed, acceleration and load cell, (n, k) each.
 
         `faster` is a change of speed (m/s) just after the impact. Newmark's rule of constant mean acceleration.
@@ -84,7 +85,7 @@ class Way:
         return z, v, a, felt
 
 
-def channels_of(way: Way, moves: tuple[Array, Array, Array, Array], e: Evidence, shift: float) -> Array:
+def channels_of(way: Way, moves: Moves, e: Evidence, shift: float) -> Array:
     """Those changes as the recording would show them: stacked, whitened, (n, k); what is later stays as it ends."""
     z, v, a, felt = moves
     shown = {
@@ -131,28 +132,20 @@ class Descent:
     prior: float
     left: Mapping[str, float]
     free: float
+    better: float
+
+    @property
+    def score(self) -> float:
+        """What a force leaves at this time shift."""
+        return min(self.excess(where) for where in WHERES) + (self.shift / self.prior) ** 2
 
     def excess(self, where: Where) -> float:
         """What the best force leaves over the noise."""
         return self.left[where] - (float(self.rows.sum()) - self.free)
 
 
-def descents(
-    scenarios: Sequence[Scenario], evidence: Sequence[Evidence], blocks: Sequence[Sequence[Block]]
-) -> list[Descent]:
-    """Each recording that has a way down; `scenarios` under the conditions of `evidence`.
-
-    `blocks` are those of the base at some time shifts of each recording: the one counts at which a force leaves least.
-    """
-    found = []
-    for s, e, several in zip(scenarios, evidence, blocks, strict=True):
-        here = [d for d in (_descent(s, e, b) for b in several) if d is not None]
-        if here:
-            found.append(min(here, key=lambda d: min(d.excess(where) for where in WHERES) + (d.shift / d.prior) ** 2))
-    return found
-
-
-def _descent(scenario: Scenario, e: Evidence, block: Block) -> Descent | None:
+def descent(scenario: Scenario, e: Evidence, block: Block) -> Descent | None:
+    """The way down of a recording under its `scenario`, beside the base's `block`; None if it has none."""
     striker, start = scenario.vehicle, scenario.initiation
     if not isinstance(striker, Striker) or not isinstance(start, Drop) or striker.nose == "cone":
         return None
@@ -189,7 +182,7 @@ def _descent(scenario: Scenario, e: Evidence, block: Block) -> Descent | None:
     measured = way
     for _ in range(TURNS):
         x, _, _ = _free(measured, f, "ground", e, block, rows)
-        dz, dv, da = (m @ x for m in _all_moves(measured, f, "ground")[:3])
+        dz, dv, da = (m @ x[:-1] for m in _all_moves(measured, f, "ground")[:3])
         depth = np.maximum(z + dz, 0.0)
         there = spring(depth, v)
         secant = np.where(np.abs(dz) > NUDGE, (there - force) / np.where(np.abs(dz) > NUDGE, dz, 1.0), tangent)
@@ -203,31 +196,35 @@ def _descent(scenario: Scenario, e: Evidence, block: Block) -> Descent | None:
         return None
     measured = measured.until(n)
     f, rows = f[:n], stamps <= time[n - 1]
-    left, free = {}, 0.0
-    for where in ("ground", "push"):
-        _, left[where], free = _free(measured, f, where, e, block, rows)
+    left: dict[str, float] = {}
+    free, later = 0.0, {}
+    for where in WHERES:
+        x, left[where], free = _free(measured, f, where, e, block, rows)
+        later[where] = float(x[-1]) * block.prior
     return Descent(
         evidence=e, way=measured, shift=block.shift, rows=rows, residual=block.residual, slope=block.slope,
         prior=block.prior, left=left, free=free,
+        better=block.shift + later[min(WHERES, key=lambda where: left[where])],
     )  # fmt: skip
 
 
-def _all_moves(way: Way, f: Array, where: Where) -> tuple[Array, ...]:
+def _all_moves(way: Way, f: Array, where: Where) -> Moves:
     """Changes by each force, and by a speed that is `FASTER`, (n, k + 1) each."""
     forced = way.moved(f, where)
     faster = way.moved(np.zeros((f.shape[0], 1)), where, FASTER * way.touch)
-    return tuple(np.hstack([a, b]) for a, b in zip(forced, faster, strict=True))
+    z, v, a, felt = (np.hstack([one, other]) for one, other in zip(forced, faster, strict=True))
+    return z, v, a, felt
 
 
 def _free(
     way: Way, f: Array, where: Where, e: Evidence, block: Block, rows: NDArray[np.bool_]
 ) -> tuple[Array, float, float]:
-    """Strengths of forces and of the speed that leave least of a recording, what that is, and how many they count as."""
-    J = channels_of(way, _all_moves(way, f, where), e, block.shift)[rows]  # type: ignore[arg-type]
+    """Strengths of forces and of the speed that leave least of a recording, what that is, and how many count."""
+    J = channels_of(way, _all_moves(way, f, where), e, block.shift)[rows]
     A = np.column_stack([J, block.slope[rows] * block.prior])
     w = block.residual[rows]
     N = A.T @ A
     inverse = np.linalg.inv(N + np.eye(N.shape[0]))
     x = inverse @ (A.T @ w)
     miss = w - A @ x
-    return x[:-1], float(miss @ miss), float(np.trace(inverse @ N))
+    return x, float(miss @ miss), float(np.trace(inverse @ N))
