@@ -23,11 +23,11 @@ CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is belie
 OWN = 1.5  # times the common noise: beyond, a recording has its own
 UNLIKE = 4.0  # standard errors by which levels differ that are not one recorder's
 SURELY = 4  # quiet windows from which on that is believed
-LONGEST = 4  # samples of memory
+LONGEST = 8  # samples of memory
 NOT_COLOURED = 0.7  # of the whole error that is noise: below, the model's own error prevails, which is no process
 RINGING = 0.9  # largest complex root
 SLOWER = 0.4  # of the logarithm of the slow noise's level, by which a misfit may exceed what is quiet
-UNSURE = 0.5  # of that, for each sample of memory: a long one is told badly from short windows
+UNSURE = 0.8  # of that, for each sample of memory: a long one is told badly from short windows
 STEADY = 0.995  # largest root of a memory
 
 
@@ -64,12 +64,14 @@ def whole(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evid
             continue
         parts = [_cleaned(evidence[r], s, residuals[r][part], humming) for r, _, s, part in members]
         levels = np.array([max(float(np.sqrt(np.mean(p * p))), 1e-300) for p in parts])
-        sigma, ar = autoregression([p / level for p, level in zip(parts, levels, strict=True)])
         # of one recorder unless they differ by more than so few samples can, each worth less for its memory
+        _, ar = autoregression([p / level for p, level in zip(parts, levels, strict=True)])
         worth = np.array([p.size for p in parts]) * max(1.0 - sum(ar), 0.02) / (1.0 + max(sum(ar), 0.0))
         common = float(np.sqrt(np.sum(levels**2 * worth) / worth.sum()))
-        own = np.abs(np.log(levels / common)) > UNLIKE / np.sqrt(2.0 * worth)
-        for (r, k, s, _), level in zip(members, levels if own.any() else np.full(levels.size, common), strict=True):
+        if not np.any(np.abs(np.log(levels / common)) > UNLIKE / np.sqrt(2.0 * worth)):
+            levels = np.full(levels.size, common)  # a level of each by itself would make the memory too short
+        sigma, ar = autoregression([p / level for p, level in zip(parts, levels, strict=True)])
+        for (r, k, s, _), level in zip(members, levels, strict=True):
             if s.weight is None:  # else what is left is the model's error as well
                 told.append((r, k, s, sigma * float(level), ar))
     slow = slower(told)
@@ -152,7 +154,8 @@ def autoregression(series: Sequence[Array], most: int = LONGEST) -> tuple[float,
         power = float(np.mean((X[:, 0] - past @ a) ** 2)) * n / max(n - order, 1)
         score = n * np.log(max(power, 1e-300)) + order * np.log(n)
         if best is None or score < best[0]:
-            best = (score, power, tuple(float(v) for v in a))
+            fair = 1.0 + 2.0 / n if order == 1 else 1.0  # least squares makes the memory too short by 2/n of itself
+            best = (score, power, tuple(float(v) for v in fair * a))
     assert best is not None
     return float(np.sqrt(best[1])) * grown(best[2]), best[2]
 

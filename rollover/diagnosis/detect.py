@@ -19,6 +19,7 @@ from rollover.diagnosis.fit import Block
 from rollover.diagnosis.lines import basis as line
 
 Array = NDArray[np.float64]
+LOUD = 4.0  # times the noise's power, above which what is rough is no noise
 MOST_WAVES = 12  # of the slow basis of a cell
 
 
@@ -84,7 +85,8 @@ def mismatch_of(
     count = sum(c.rows.size for c in cells) - waves - len(blocks)
     p = 1.0
     if waves and count > 0:
-        p = float(f_distribution.sf((structured / waves) / max(rough / count, 1e-300), waves, count))
+        # noise may be underrated, but not by so much: what is rough and far beyond it is no noise either
+        p = float(f_distribution.sf((structured / waves) / min(max(rough / count, 1e-300), LOUD), waves, count))
     return Mismatch(cells=tuple(cells), p_value=p, adjusted=_holm([c.p_value for c in cells]))
 
 
