@@ -11,6 +11,7 @@ import pytest
 
 from rollover.diagnosis import colour
 from rollover.diagnosis.bins import simulated
+from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.depend import ACCELERATION, DEPTH, TIME
 from rollover.diagnosis.dependence import IMPACT, VALUE, Dependence, dependence, ways
 from rollover.diagnosis.detect import mismatch_of
@@ -19,6 +20,7 @@ from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.lines import lines, without
 from rollover.diagnosis.phases import drop_phases
 from rollover.diagnosis.response import channels_of
+from rollover.diagnosis.selection import is_any_curve
 from rollover.diagnosis.simulator import set_up
 from rollover.proof.generator import Order, make
 from rollover.recording import Recording
@@ -161,3 +163,14 @@ def test_a_hum_is_a_mismatch_however_fast_and_its_channel_is_named() -> None:
     assert found.shares()[0][0].channel == drops.DEPTH
     for s in (s for e in judge.evidence for s in e.signals if s.channel == drops.DEPTH):
         assert s.noise < 0.007 * s.span  # what hums was left out of it
+
+
+def test_three_effects_of_one_sensor_are_any_curve_and_two_are_not() -> None:
+    def on(id: str, channel: str | None) -> Candidate:
+        return Candidate(id=id, kind="sensor", family="", search={}, channel=channel)
+
+    three = [on(id, drops.DEPTH) for id in ("sensor-scale", "sensor-clipping", "sensor-bias")]
+    assert is_any_curve(three)
+    assert not is_any_curve(three[:2])
+    assert not is_any_curve([*three[:2], on("sensor-bias", drops.FORCE)])
+    assert not is_any_curve([on("soil-layer", None)] * 3)

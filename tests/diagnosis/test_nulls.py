@@ -99,9 +99,7 @@ def test_a_memory_is_told_without_bias_though_each_recording_has_a_level() -> No
         evidence = noisy(drops, rng, 0.0)
         spans = [0.01 * s.span for s in evidence[0].signals]
         misfit = [
-            np.concatenate(
-                [span * noise(rng, s.rows.size, 0.8) for s, span in zip(e.signals, spans, strict=True)]
-            )
+            np.concatenate([span * noise(rng, s.rows.size, 0.8) for s, span in zip(e.signals, spans, strict=True)])
             for e in evidence
         ]
         told = colour.whole(colour.quiet(evidence, misfit), misfit)
