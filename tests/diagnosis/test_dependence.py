@@ -174,3 +174,9 @@ def test_three_effects_of_one_sensor_are_any_curve_and_two_are_not() -> None:
     assert not is_any_curve(three[:2])
     assert not is_any_curve([*three[:2], on("sensor-bias", drops.FORCE)])
     assert not is_any_curve([on("soil-layer", None)] * 3)
+
+
+def test_what_explains_little_is_not_named_and_a_sensor_without_a_quantity_goes_by_time() -> None:
+    assert Dependence(shares=((SPEED, 0.2),)).on is None
+    assert Dependence(shares=((VALUE, 0.2),), channel=drops.FORCE).on == TIME
+    assert Dependence(shares=((VALUE, 0.9),), channel=drops.FORCE).on == VALUE
