@@ -12,7 +12,7 @@ import pytest
 from rollover.diagnosis import colour
 from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.depend import ACCELERATION, DEPTH, TIME
+from rollover.diagnosis.depend import ACCELERATION, DEPTH, SPEED, TIME
 from rollover.diagnosis.dependence import IMPACT, VALUE, Dependence, dependence, ways
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.evidence import Evidence, evidence_of
