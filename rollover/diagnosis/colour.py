@@ -2,17 +2,19 @@
 
 Recordings at the same rate, behind the same filter class, share a channel's noise; each alone is too short to tell a
 long memory. First from the quiet stretches; where an explanation leaves little more than that, from all it leaves.
+Neither takes a line in the spectrum for noise, nor a misfit that is much slower than what is quiet: both are something.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.evidence import Evidence, Signal
+from rollover.diagnosis.lines import lines, without
 from rollover.noise import LENGTH, NoiseFloor, grown, noise_floor
 
 Array = NDArray[np.float64]
@@ -21,21 +23,29 @@ CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is belie
 OWN = 1.5  # times the common noise: beyond, a recording has its own
 UNLIKE = 4.0  # standard errors by which levels differ that are not one recorder's
 SURELY = 4  # quiet windows from which on that is believed
-LONGEST = 4  # samples of memory
+LONGEST = 8  # samples of memory
 NOT_COLOURED = 0.7  # of the whole error that is noise: below, the model's own error prevails, which is no process
 RINGING = 0.9  # largest complex root
+SLOWER = 0.4  # of the logarithm of the slow noise's level, by which a misfit may exceed what is quiet
+UNSURE = 0.8  # of that, for each sample of memory: a long one is told badly from short windows
 STEADY = 0.995  # largest root of a memory
 
 
 def quiet(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evidence]:
     """The evidence with its noise from the quiet stretches of the misfits (SI, stacked), recordings alike together."""
     found = [list(e.signals) for e in evidence]
+    humming = hums(evidence, residuals)
     for members in alike(evidence):
-        common = _quieter([residuals[r][part] for r, _, _, part in members], [s.values for _, _, s, _ in members])
+        misfits, values = [], []
+        for r, _, s, part in members:
+            without_hum = _cleaned(evidence[r], s, residuals[r][part], humming)
+            misfits.append(without_hum)
+            values.append(s.values - residuals[r][part] + without_hum)
+        common = _quieter(misfits, values)
         if common is None:
             continue  # too short: what each says by itself stands
-        for r, k, s, part in members:
-            own = _quieter([residuals[r][part]], [s.values])
+        for (r, k, s, _), misfit, value in zip(members, misfits, values, strict=True):
+            own = _quieter([misfit], [value])
             loud = own is not None and own.windows >= SURELY and own.sigma > OWN * common.sigma
             best = own if own is not None and loud else common
             found[r][k] = replace(s, noise=best.sigma, ar=best.ar)
@@ -46,21 +56,68 @@ def quiet(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evid
 def whole(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evidence]:
     """The evidence with its noise from all of the misfits: an autoregression by least squares, recordings together."""
     found = [list(e.signals) for e in evidence]
+    humming = hums(evidence, residuals)
+    told: list[tuple[int, int, Signal, float, tuple[float, ...]]] = []
     for members in alike(evidence):
         members = [m for m in members if not evidence[m[0]].is_rough(m[2])]
         if not members:
             continue
-        parts = [residuals[r][part] for r, _, _, part in members]
+        parts = [_cleaned(evidence[r], s, residuals[r][part], humming) for r, _, s, part in members]
         levels = np.array([max(float(np.sqrt(np.mean(p * p))), 1e-300) for p in parts])
-        sigma, ar = autoregression([p / level for p, level in zip(parts, levels, strict=True)])
         # of one recorder unless they differ by more than so few samples can, each worth less for its memory
+        _, ar = autoregression([p / level for p, level in zip(parts, levels, strict=True)])
         worth = np.array([p.size for p in parts]) * max(1.0 - sum(ar), 0.02) / (1.0 + max(sum(ar), 0.0))
         common = float(np.sqrt(np.sum(levels**2 * worth) / worth.sum()))
-        own = np.abs(np.log(levels / common)) > UNLIKE / np.sqrt(2.0 * worth)
-        for (r, k, s, _), level in zip(members, levels if own.any() else np.full(levels.size, common), strict=True):
+        if not np.any(np.abs(np.log(levels / common)) > UNLIKE / np.sqrt(2.0 * worth)):
+            levels = np.full(levels.size, common)  # a level of each by itself would make the memory too short
+        sigma, ar = autoregression([p / level for p, level in zip(parts, levels, strict=True)])
+        for (r, k, s, _), level in zip(members, levels, strict=True):
             if s.weight is None:  # else what is left is the model's error as well
-                found[r][k] = with_noise(s, sigma * float(level), ar, evidence[r].model_error)
+                told.append((r, k, s, sigma * float(level), ar))
+    slow = slower(told)
+    for r, k, s, sigma, ar in told:
+        if s.channel not in slow:
+            found[r][k] = with_noise(s, sigma, ar, evidence[r].model_error)
     return [replace(e, signals=tuple(s)) for e, s in zip(evidence, found, strict=True)]
+
+
+def hums(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> dict[str, tuple[float, ...]]:
+    """Lines (Hz) in the misfits of each channel."""
+    found: dict[str, tuple[list[Array], list[Array]]] = {}
+    for e, residual in zip(evidence, residuals, strict=True):
+        for s, part in e.spans():
+            times, misfits = found.setdefault(s.channel, ([], []))
+            times.append(e.recording.time[s.rows])
+            misfits.append(residual[part])
+    return {channel: lines(*both) for channel, both in found.items()}
+
+
+def _cleaned(e: Evidence, s: Signal, misfit: Array, humming: Mapping[str, tuple[float, ...]]) -> Array:
+    """A misfit without the lines of its channel."""
+    return without(e.recording.time[s.rows], misfit, humming[s.channel])
+
+
+def slower(told: Sequence[tuple[int, int, Signal, float, tuple[float, ...]]]) -> set[str]:
+    """Channels whose misfits are so much slower than their quiet stretches that they are no noise."""
+    by: dict[str, list[tuple[float, float, int]]] = {}
+    for _, _, s, sigma, ar in told:
+        if s.noise > 0.0 and sigma > 0.0:
+            memory = min(max(sum(s.ar), 0.0), STEADY)
+            more = np.log(level_of(sigma, ar) / level_of(s.noise, s.ar))
+            by.setdefault(s.channel, []).append(
+                (float(more), SLOWER * (1.0 + UNSURE * memory / (1.0 - memory)), s.rows.size)
+            )
+    slow = set()
+    for channel, each in by.items():
+        weights = [float(n) for *_, n in each]
+        if np.average([m for m, *_ in each], weights=weights) > np.average([a for _, a, _ in each], weights=weights):
+            slow.add(channel)
+    return slow
+
+
+def level_of(sigma: float, ar: tuple[float, ...]) -> float:
+    """Level of what is slow in a noise: sqrt of its spectral density at no frequency, per sample."""
+    return sigma / grown(ar) / max(1.0 - sum(ar), 1.0 - STEADY)
 
 
 def alike(evidence: Sequence[Evidence]) -> list[list[tuple[int, int, Signal, slice]]]:
@@ -97,7 +154,8 @@ def autoregression(series: Sequence[Array], most: int = LONGEST) -> tuple[float,
         power = float(np.mean((X[:, 0] - past @ a) ** 2)) * n / max(n - order, 1)
         score = n * np.log(max(power, 1e-300)) + order * np.log(n)
         if best is None or score < best[0]:
-            best = (score, power, tuple(float(v) for v in a))
+            fair = 1.0 + 2.0 / n if order == 1 else 1.0  # least squares makes the memory too short by 2/n of itself
+            best = (score, power, tuple(float(v) for v in fair * a))
     assert best is not None
     return float(np.sqrt(best[1])) * grown(best[2]), best[2]
 

@@ -1,12 +1,7 @@
-"""What the mismatch depends on: the residual force on the striker, regressed on one quantity after another.
+"""What a residual force depends on, regressed on one quantity after another, and the motion of a drop as measured.
 
-Inverse dynamics of a drop: from the measured depth z (or acceleration, twice integrated) and the load cell (or
-m (a + g)), the force that the law leaves unexplained is
-
-    dF = F_s - K'(z; v_s) z - m_b1 z''                                                                     (D2)
-
-while the ground is pushed deeper. A quantity that dF is a function of predicts it in recordings that were not
-fitted: the share of variance it predicts there, leaving one condition out, is its score.
+A quantity that a force is a function of predicts it in recordings that were not fitted: the share of variance it
+predicts there, leaving one condition out, is its score.
 """
 
 from __future__ import annotations
@@ -17,10 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ground.law import evaluate
-from rollover.diagnosis.evidence import Evidence
 from rollover.recording import Recording
-from rollover.scenario import Scenario
 
 Array = NDArray[np.float64]
 KNOTS = 7
@@ -35,42 +27,6 @@ class ResidualForce:
     condition: str
     force: Array
     of: dict[str, Array]
-
-
-def residual_forces(scenarios: Sequence[Scenario], evidence: Sequence[Evidence]) -> list[ResidualForce]:
-    """(D2) for each recording that has what it takes; `scenarios` with their conditions put in."""
-    found = []
-    for scenario, e in zip(scenarios, evidence, strict=True):
-        one = _of(scenario, e)
-        if one is not None:
-            found.append(one)
-    return found
-
-
-def _of(scenario: Scenario, e: Evidence) -> ResidualForce | None:
-    r = e.recording
-    start = scenario.initiation
-    mass, law = getattr(scenario.vehicle, "mass", None), scenario.ground.law
-    if mass is None or not hasattr(start, "speed"):
-        return None
-    state = motion(r, float(start.speed) / (1.0 + scenario.ground.co_moving_mass.share))
-    if state is None:
-        return None
-    time, z, v, a = state
-    area = scenario.vehicle.face_length * scenario.vehicle.face_width / (0.140 * 0.045)  # type: ignore[union-attr]
-    measured = r.channels.get("ground/force_normal")
-    force = mass * (scenario.gravity - a) if measured is None else np.interp(time, *r.samples("ground/force_normal"))
-    soil = scenario.ground.co_moving_mass.share * mass
-    going_in = (v > 0.15 * float(start.speed)) & (z > 0.002) & (time > 0.003)
-    if going_in.sum() < 12:
-        return None
-    rows = np.flatnonzero(going_in)
-    rows = rows[np.unique(np.linspace(0, rows.size - 1, min(rows.size, 120)).round().astype(int))]
-    speed = float(start.speed)
-    spring = np.array([evaluate(law, float(z[k]), float(v[k]), speed=speed) * area for k in rows])
-    dF = force[rows] - spring - soil * a[rows]
-    of = {TIME: time[rows], DEPTH: z[rows], SPEED: v[rows], ACCELERATION: -a[rows]}
-    return ResidualForce(recording=e.name, condition=e.condition or e.name, force=dF, of=of)
 
 
 def motion(r: Recording, speed: float) -> tuple[Array, Array, Array, Array] | None:

@@ -13,10 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.colour import hums
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.fit import Block
+from rollover.diagnosis.lines import basis as line
 
 Array = NDArray[np.float64]
+LOUD = 4.0  # times the noise's power, above which what is rough is no noise
 MOST_WAVES = 12  # of the slow basis of a cell
 
 
@@ -61,6 +64,7 @@ def mismatch_of(
     from scipy.stats import f as f_distribution
 
     cells: list[Cell] = []
+    humming = hums(evidence, [b.residual for b in blocks])
     for r, (e, block) in enumerate(zip(evidence, blocks, strict=True)):
         for signal, part in e.spans():
             time = e.recording.time[signal.rows]
@@ -70,19 +74,32 @@ def mismatch_of(
                 if inside.size >= 4:
                     rows = inside + part.start
                     trusted = signal.weight is None
-                    cells.append(_cell(r, signal.channel, name, time[inside], rows, block, trusted=trusted))
+                    cells.append(
+                        _cell(
+                            r, signal.channel, name, time[inside], rows, block, humming[signal.channel], trusted=trusted
+                        )
+                    )
     structured = sum(c.structured for c in cells)
     waves = sum(c.waves for c in cells)
     rough = sum(c.rough for c in cells)
     count = sum(c.rows.size for c in cells) - waves - len(blocks)
     p = 1.0
     if waves and count > 0:
-        p = float(f_distribution.sf((structured / waves) / max(rough / count, 1e-300), waves, count))
+        # noise may be underrated, but not by so much: what is rough and far beyond it is no noise either
+        p = float(f_distribution.sf((structured / waves) / min(max(rough / count, 1e-300), LOUD), waves, count))
     return Mismatch(cells=tuple(cells), p_value=p, adjusted=_holm([c.p_value for c in cells]))
 
 
 def _cell(
-    r: int, channel: str, phase: str, time: Array, rows: NDArray[np.int64], block: Block, *, trusted: bool
+    r: int,
+    channel: str,
+    phase: str,
+    time: Array,
+    rows: NDArray[np.int64],
+    block: Block,
+    humming: tuple[float, ...],
+    *,
+    trusted: bool,
 ) -> Cell:
     from scipy.stats import f as f_distribution
 
@@ -91,6 +108,10 @@ def _cell(
     waves = int(min(MOST_WAVES, max(1, n // 6)))
     phase_of = (np.arange(n) + 0.5) / n
     basis = np.cos(np.pi * phase_of[:, None] * np.arange(waves))
+    heard = tuple(f for f in humming if f * (time[-1] - time[0]) > 1.0 and n > waves + 4 * len(humming))
+    if heard:
+        basis = np.hstack([basis, line(time, heard)])
+        waves += 2 * len(heard)
     taken = s[:, None] / np.sqrt(block.weight)
     # what the recording's own time shift explains is no structure
     basis = basis - taken @ (taken.T @ basis)

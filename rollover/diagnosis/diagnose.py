@@ -15,7 +15,8 @@ from rollover.diagnosis.chaos import weighted
 from rollover.diagnosis.chassis import degrees_of
 from rollover.diagnosis.clocks import align
 from rollover.diagnosis.crew import Crew
-from rollover.diagnosis.depend import dependency, residual_forces
+from rollover.diagnosis.depend import dependency
+from rollover.diagnosis.dependence import Dependence, dependence
 from rollover.diagnosis.empirical import offered, proposed
 from rollover.diagnosis.evidence import Evidence, doubted, evidence_of, left_out
 from rollover.diagnosis.explain import SURE
@@ -85,12 +86,15 @@ def diagnose(
     found = list(judge.evidence)
     before, after = explanation.before, explanation.after if explanation.parts else explanation.before
     set_ups = [set_up(scenario, e.recording) for e in found]
+    is_mismatch = verdict not in ("no-mismatch", "cannot-tell")
     say("what the mismatch depends on")
+    depends_on = Dependence()
     degrees: tuple[Degree, ...] = ()
-    forces = residual_forces(set_ups, found) if acts == "drop" else []
-    if acts != "drop":
+    if acts == "drop" and is_mismatch:
+        depends_on = dependence(judge, set_ups, explanation.base)
+    elif acts != "drop":
         degrees, forces = degrees_of(set_ups, found, [b.shift for b in explanation.base.blocks])
-    dependencies = dependency(forces)
+        depends_on = Dependence(shares=tuple(dependency(forces)))
     law = None
     if verdict == "unexplained" and acts == "drop":
         say("a law for what no candidate explains")
@@ -101,8 +105,6 @@ def diagnose(
         verdict = "cannot-tell"
     h_before, h_after = (judged(judge, f, kept, groups) for f in (explanation.base, explanation.fitted))
     effects = named(judge, explanation, groups) if verdict in ("parameter", "sensor", "missing-physics") else ()
-    depends = dependencies[0][0] if dependencies and dependencies[0][1] > 0.3 else None
-    is_mismatch = verdict not in ("no-mismatch", "cannot-tell")
     remains = after.p_value < SURE and matters(judge, explanation.fitted, after)
     training = tuple(e.name for e in found)
     notes += [*(_felt(degrees[0]) for _ in degrees[:1] if is_mismatch), *_cost(found)]
@@ -113,13 +115,13 @@ def diagnose(
         + against_itself(verdict, contrary),
         p_value=explanation.p_value,
         noise=noise(found),
-        where=places(before, found, depends) if is_mismatch else (),
+        where=places(before, found, depends_on.on) if is_mismatch else (),
         effects=effects,
         remaining_significant=verdict == "unexplained" or (bool(effects) and remains),
         remaining_p_value=after.p_value,
         remaining_where=places(after, found, None) if verdict == "unexplained" or (effects and remains) else (),
-        depends_on=depends if is_mismatch else None,
-        dependencies=tuple(dependencies),
+        depends_on=depends_on.on if is_mismatch else None,
+        dependencies=depends_on.shares,
         degrees=degrees if is_mismatch else (),
         smallest_detectable=detectable,
         training=training,

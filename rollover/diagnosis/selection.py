@@ -191,6 +191,8 @@ def decided(judge: Judge, found: Explanation, groups: Groups) -> tuple[Explanati
 
     Several effects are named only if together they leave nothing but noise; one alone also where it takes nearly all.
     """
+    if is_any_curve(found.fitted.candidates):
+        return replace(found, parts=(), fitted=found.base), "unexplained"
     if found.parts and (found.after.p_value > SURE or not matters(judge, found.fitted, found.after)):
         return found, _kind(strongest(judge, found.base, found.fitted))
     start = held_out(found.base, groups).total
@@ -204,6 +206,11 @@ def decided(judge: Judge, found: Explanation, groups: Groups) -> tuple[Explanati
     significant = significant and not is_tolerated(judge, found.base)
     verdict: Verdict = "unexplained" if significant or found.parts else "no-mismatch"
     return replace(found, parts=(), fitted=found.base), verdict
+
+
+def is_any_curve(candidates: Sequence[Candidate]) -> bool:
+    """Whether as many effects as there may be are all of one sensor: together they draw any curve, and say nothing."""
+    return len(candidates) == MOST and len({c.channel for c in candidates}) == 1 and candidates[0].channel is not None
 
 
 def _kind(c: Candidate) -> Verdict:

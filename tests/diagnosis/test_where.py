@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.candidates import candidates_of, coordinate, physical
-from rollover.diagnosis.depend import ACCELERATION, DEPTH, SPEED, TIME, ResidualForce, dependency, residual_forces
+from rollover.diagnosis.depend import ACCELERATION, DEPTH, SPEED, TIME, ResidualForce, dependency
 from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.phases import drop_phases
-from rollover.diagnosis.simulator import set_up, simulator_of
+from rollover.diagnosis.simulator import simulator_of
 from rollover.effects import Search
 from tests.diagnosis import drops
 from tests.diagnosis.drops import recorded, scenario
@@ -86,16 +86,3 @@ def test_a_residual_force_is_put_down_to_what_it_was_made_from(wanted: str) -> N
     assert scores[0][0] == wanted
     assert scores[0][1] > 0.8
     assert scores[0][1] > scores[1][1] + 0.03
-
-
-def test_viscous_damping_shows_as_a_force_that_depends_on_speed() -> None:
-    own = scenario()
-    changes = {"effects.soil-viscous-damping.damping": 800.0}
-    made = recorded(changes, channels=(drops.FORCE, drops.DEPTH, drops.ACCELERATION), rate=2000.0, noise=1e-3)
-    found = [evidence_of(name, r, simulator_of(own, r)) for name, r in made]
-    forces = residual_forces([set_up(own, r) for _, r in made], [e for e in found if e is not None])
-    assert len(forces) == 3
-    for f in forces:
-        fast = f.of[SPEED] > 0.5 * f.of[SPEED].max()
-        assert np.median(f.force[fast] / f.of[SPEED][fast]) == pytest.approx(800.0, rel=0.1)
-    assert dependency(forces)[0][0] == SPEED

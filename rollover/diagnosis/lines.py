@@ -1,0 +1,87 @@
+"""Lines in the spectrum of what is left of a channel: a hum is no noise, however strong, and no colour explains it.
+
+The periodograms of all recordings, each over its own running median times 1/ln 2, add up at a frequency to a sum that
+is Gamma(R) distributed on noise of any smooth colour; a line is where that is beyond chance at all frequencies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+PADDED = 4
+BESIDE = 12  # places of a periodogram on either side, of the running median
+SLOWEST = 8.0  # periods in a recording, fewer are no line but a course
+FASTEST = 0.4  # times the rate
+CHANCE = 1e-6
+MOST = 3  # lines
+FEWEST = 64  # samples
+FINE = 17  # frequencies about the best
+
+
+def lines(times: Sequence[Array], misfits: Sequence[Array]) -> tuple[float, ...]:
+    """Frequencies (Hz) of lines in misfits (n_r,) at stamps (s), of one channel, the strongest first."""
+    use = [(t, w - w.mean()) for t, w in zip(times, misfits, strict=True) if w.size >= FEWEST and np.ptp(w) > 0.0]
+    found: list[float] = []
+    while use and len(found) < MOST:
+        f = _strongest(use)
+        if f is None:
+            break
+        found.append(f)
+        use = [(t, without(t, w, (f,))) for t, w in use]
+    return tuple(found)
+
+
+def without(t: Array, w: Array, frequencies: Sequence[float]) -> Array:
+    """What is left of a misfit beside sines at these frequencies, by least squares."""
+    if not frequencies or w.size < FEWEST:
+        return w
+    return w - fitted(t, w, frequencies)
+
+
+def fitted(t: Array, w: Array, frequencies: Sequence[float]) -> Array:
+    """The sines themselves; a constant is fitted beside them and left."""
+    B = basis(t, frequencies)
+    x = np.linalg.lstsq(np.column_stack([B, np.ones(t.size)]), w, rcond=None)[0]
+    return np.asarray(B @ x[:-1])
+
+
+def basis(t: Array, frequencies: Sequence[float]) -> Array:
+    """Cosines and sines, (n, 2 k)."""
+    turns = 2.0 * np.pi * t[:, None] * np.asarray(frequencies)
+    return np.hstack([np.cos(turns), np.sin(turns)])
+
+
+def _strongest(use: Sequence[tuple[Array, Array]]) -> float | None:
+    """The frequency of the strongest line, if it is one."""
+    from scipy.special import gammaincc
+
+    spans = [float(t[-1] - t[0]) for t, _ in use]
+    low = SLOWEST / min(spans)
+    high = min(FASTEST * (t.size - 1) / span for (t, _), span in zip(use, spans, strict=True))
+    step = 1.0 / (PADDED * max(spans))
+    if high - low < 4.0 * BESIDE * step:
+        return None
+    at = np.arange(low, high, step)
+    S = np.sum([_over_median(t, w, at) for t, w in use], axis=0)
+    k = int(np.argmax(S))
+    if gammaincc(len(use), S[k]) * at.size / PADDED > CHANCE:
+        return None
+    near = at[k] + np.linspace(-1.0, 1.0, FINE) * step * 0.75
+    power = [sum(float(np.sum(fitted(t, w, (float(f),)) ** 2)) for t, w in use) for f in near]
+    return float(near[int(np.argmax(power))])
+
+
+def _over_median(t: Array, w: Array, at: Array) -> Array:
+    """A recording's periodogram over what is usual beside each frequency, at frequencies (Hz)."""
+    from scipy.ndimage import median_filter
+
+    n = t.size
+    even = np.linspace(t[0], t[-1], n)
+    P = np.abs(np.fft.rfft(np.interp(even, t, w) * np.hanning(n), PADDED * n)) ** 2
+    usual = median_filter(P, 2 * PADDED * BESIDE + 1, mode="nearest") / np.log(2.0)
+    f = np.arange(P.size) / (PADDED * n * (even[1] - even[0]))
+    return np.asarray(np.interp(at, f, P / np.maximum(usual, 1e-300)))

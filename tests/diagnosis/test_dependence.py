@@ -1,0 +1,182 @@
+"""What a misfit depends on: forces that were left out, sensors that go their own way, lines that are no noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis import colour
+from rollover.diagnosis.bins import simulated
+from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.depend import ACCELERATION, DEPTH, SPEED, TIME
+from rollover.diagnosis.dependence import IMPACT, VALUE, Dependence, dependence, ways
+from rollover.diagnosis.detect import mismatch_of
+from rollover.diagnosis.evidence import Evidence, evidence_of
+from rollover.diagnosis.fit import Fitted, Judge
+from rollover.diagnosis.lines import lines, without
+from rollover.diagnosis.phases import drop_phases
+from rollover.diagnosis.response import channels_of
+from rollover.diagnosis.selection import is_any_curve
+from rollover.diagnosis.simulator import set_up
+from rollover.proof.generator import Order, make
+from rollover.recording import Recording
+from rollover.scenario import Scenario, load
+from tests.diagnosis import drops
+from tests.diagnosis.drops import recorded, scenario
+from tests.diagnosis.test_nulls import noise
+
+THREE = (drops.FORCE, drops.DEPTH, drops.ACCELERATION)
+
+
+def base_of(own: Scenario, recordings: Sequence[tuple[str, Recording]]) -> tuple[Judge, Fitted]:
+    """The scenario as it is beside recordings, their noise from quiet stretches."""
+    found = [evidence_of(name, *simulated(own, r)) for name, r in recordings]
+    evidence: list[Evidence] = [e for e in found if e is not None]
+    judge = Judge(evidence)
+    judge.aligned()
+    first = judge.fit((), (), rounds=2)
+    assert first is not None
+    judge.weigh(colour.quiet(evidence, judge.residuals(first)))
+    base = judge.fit((), ())
+    assert base is not None
+    return judge, base
+
+
+def told(own: Scenario, recordings: Sequence[tuple[str, Recording]]) -> Dependence:
+    judge, base = base_of(own, recordings)
+    return dependence(judge, [set_up(own, e.recording) for e in judge.evidence], base)
+
+
+def test_a_force_does_to_every_channel_what_the_simulation_says() -> None:
+    """(D6) against the integrator: viscous damping of 400 N s/m."""
+    own, damping = scenario(), 400.0
+    made = recorded({"effects.soil-viscous-damping.damping": damping}, channels=THREE, rate=2000.0, noise=1e-3)
+    judge, base = base_of(own, made)
+    for d in ways(judge, [set_up(own, r) for _, r in made], base)[1]:
+        moved = channels_of(d.way, d.way.moved(damping * d.way.speed[:, None], "ground"), d.evidence, d.shift)[d.rows]
+        s, w = d.slope[d.rows], d.residual[d.rows]
+        left = w - moved[:, 0]
+        left = left - s * float(s @ left) / float(s @ s + d.prior**-2)
+        at = np.flatnonzero(d.rows)
+        for signal, part in d.evidence.spans():
+            # the force leaps at the contact: on which side a sample lies there is the clock's
+            late = d.evidence.recording.time[signal.rows] - d.shift > 0.003
+            rows = np.isin(at, part.start + np.flatnonzero(late))
+            assert rows.sum() > 20
+            most = 0.03 * np.linalg.norm(moved[rows]) + 1.3 * np.sqrt(rows.sum())
+            assert np.linalg.norm(left[rows]) < most, signal.channel
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed", "wanted", "channel"),
+    [
+        ("memory", 22, TIME, None),
+        ("stone", 24, DEPTH, None),
+        ("side-load", 28, ACCELERATION, None),
+        ("stiffness-by-impact-speed", 29, IMPACT, None),
+        ("hum", 32, TIME, "own"),
+        ("coarse", 31, VALUE, "own"),
+    ],
+)
+def test_what_is_in_no_table_is_put_down_to_what_it_was_made_from(
+    kind: str, seed: int, wanted: str, channel: str | None, tmp_path: Path
+) -> None:
+    case = make(Order(index=seed, seed=5102, kind="outside", ids=(f"outside:{kind}",)))
+    path = tmp_path / "scenario.yaml"
+    path.write_text(case.scenario, encoding="utf-8")
+    found = told(load(path), [(f"r{k}", r) for k, r in enumerate(case.recordings, start=1)])
+    assert found.on == wanted
+    assert found.channel == (case.truth["effects"][0]["channel"] if channel else None)
+    assert found.shares[0][1] > 0.5
+    assert sum(share for _, share in found.shares) <= 1.0 + 1e-9
+
+
+def test_a_sensor_that_drops_out_is_told_from_a_force_and_comes_and_goes_in_time() -> None:
+    rng, made = np.random.default_rng(3), []
+    for name, r in recorded({}, channels=THREE, rate=1000.0, noise=0.005):
+        y = r.channels[drops.FORCE].copy()
+        for start in rng.uniform(-0.02, 0.3, 6):
+            y[(r.time >= start) & (r.time < start + 0.005)] = 0.0
+        made.append((name, replace(r, channels={**r.channels, drops.FORCE: y})))
+    found = told(scenario(), made)
+    assert found.channel == drops.FORCE
+    assert found.on == TIME
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.9])
+def test_a_line_is_found_in_coloured_noise_and_nothing_where_there_is_none(memory: float) -> None:
+    rng, alarms = np.random.default_rng(4), 0
+    for _ in range(40):
+        times = [np.arange(n) / 900.0 for n in (300, 420, 500)]
+        still = [noise(rng, t.size, memory) for t in times]
+        alarms += bool(lines(times, still))
+        # each recorder starts at its own place of the wave
+        found = lines(
+            times, [w + np.sin(2.0 * np.pi * 50.0 * t + k) for k, (t, w) in enumerate(zip(times, still, strict=True))]
+        )
+        assert len(found) == 1
+        assert found[0] == pytest.approx(50.0, abs=0.5)
+        left = without(times[2], still[2] + np.sin(2.0 * np.pi * 50.0 * times[2] + 2.0), found)
+        assert np.mean((left - still[2]) ** 2) < 0.15
+    assert alarms <= 1
+
+
+def held(misfit: np.ndarray, quiet: float, ar: tuple[float, ...], count: int = 3) -> list[Evidence]:
+    """Recordings of one channel whose noise was said to be `quiet` with a memory of `ar`."""
+    name, r = recorded({}, speeds=(2.0,), rate=1000.0, channels=(drops.FORCE,))[0]
+    n = misfit.size // count
+    one = evidence_of(name, *simulated(scenario(), r))
+    assert one is not None
+    s = replace(one.signals[0], rows=np.arange(n), values=np.zeros(n), noise=quiet, sigma=quiet, ar=ar)
+    recording = replace(r, time=np.arange(n) * 1e-3, channels={drops.FORCE: np.zeros(n)})
+    return [replace(one, recording=recording, signals=(s,)) for _ in range(count)]
+
+
+def test_noise_with_a_memory_is_weighed_by_all_that_is_left_and_a_drift_is_not() -> None:
+    rng, n = np.random.default_rng(5), 400
+    white = rng.standard_normal(3 * n)
+    slow = noise(rng, 3 * n, 0.6)
+    drift = white + 4.0 * np.tile(1.0 / (1.0 + np.exp(-(np.arange(n) - 200.0) / 15.0)), 3)
+    for misfit, ar, kept in ((slow, (0.5,), False), (white, (), False), (drift, (), True)):
+        before = held(misfit, 1.0, ar)
+        after = colour.whole(before, list(misfit.reshape(3, n)))
+        assert (after[0].signals[0] is before[0].signals[0]) == kept
+    assert sum(colour.whole(held(slow, 1.0, (0.5,)), list(slow.reshape(3, n)))[0].signals[0].ar) == pytest.approx(
+        0.6, abs=0.08
+    )
+
+
+def test_a_hum_is_a_mismatch_however_fast_and_its_channel_is_named() -> None:
+    """At 130 Hz it is beyond the slow waves of every phase."""
+    made = []
+    for name, r in recorded({}, channels=THREE, rate=1000.0, noise=0.005):
+        size = 0.01 * float(np.ptp(r.channels[drops.DEPTH]))
+        hum = size * np.sin(2.0 * np.pi * 130.0 * r.time)
+        made.append((name, replace(r, channels={**r.channels, drops.DEPTH: r.channels[drops.DEPTH] + hum})))
+    judge, base = base_of(scenario(), made)
+    found = mismatch_of(judge.evidence, base.blocks, [drop_phases(e) for e in judge.evidence])
+    assert found.p_value < 1e-6
+    assert found.shares()[0][0].channel == drops.DEPTH
+    for s in (s for e in judge.evidence for s in e.signals if s.channel == drops.DEPTH):
+        assert s.noise < 0.007 * s.span  # what hums was left out of it
+
+
+def test_three_effects_of_one_sensor_are_any_curve_and_two_are_not() -> None:
+    def on(id: str, channel: str | None) -> Candidate:
+        return Candidate(id=id, kind="sensor", family="", search={}, channel=channel)
+
+    three = [on(id, drops.DEPTH) for id in ("sensor-scale", "sensor-clipping", "sensor-bias")]
+    assert is_any_curve(three)
+    assert not is_any_curve(three[:2])
+    assert not is_any_curve([*three[:2], on("sensor-bias", drops.FORCE)])
+    assert not is_any_curve([on("soil-layer", None)] * 3)
+
+
+def test_what_explains_little_is_not_named_and_a_sensor_without_a_quantity_goes_by_time() -> None:
+    assert Dependence(shares=((SPEED, 0.2),)).on is None
+    assert Dependence(shares=((VALUE, 0.2),), channel=drops.FORCE).on == TIME
+    assert Dependence(shares=((VALUE, 0.9),), channel=drops.FORCE).on == VALUE
