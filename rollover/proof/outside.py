@@ -12,6 +12,10 @@ from rollover.proof.campaign import ACCELERATION, DEPTH, FORCE, SPEED, log_unifo
 from rollover.proof.library import Change, Draw, Random, Setting
 
 
+# over a short range a bend is a gain and an offset
+BENT = ("sensor-gain", "sensor-scale", "sensor-bias", "sensor-clipping")
+
+
 def _law(id: str, depends_on: str, told: dict[str, float], near: tuple[str, ...] = (), **rig: Any) -> Change:
     return Change(id=id, kind="outside", told=told, rig=rig, depends_on=depends_on, near=near)
 
@@ -160,7 +164,7 @@ def _loose(random: Random, s: Setting) -> Change:
 def _curved(random: Random, s: Setting) -> Change:
     channel = _on(random, s, FORCE, DEPTH)
     bend = log_uniform(random, 0.02, 0.25) * float(random.choice((-1.0, 1.0))) / s.peaks[channel]
-    return _fault("outside:curved", "value", channel, ("sensor-gain", "sensor-scale", "sensor-clipping"), curved=bend)
+    return _fault("outside:curved", "value", channel, BENT, curved=bend)
 
 
 OUTSIDE: dict[str, Draw] = {
