@@ -14,9 +14,10 @@ from rerun.error_utils import catch_and_log_exceptions
 
 from rollover.diagnosis import Diagnosis
 from rollover.diagnosis.series import Told, Track
+from viz.blueprint import framed
 from viz.diagnosis_page import ranked
 from viz.diagnosis_words import answer, markdown
-from viz.entities import LIMIT, MEASURED, SIMULATED, TIMELINE, escaped, series
+from viz.entities import LIMIT, MEASURED, SIMULATED, escaped, series
 from viz.log import closed
 from viz.stream import Stream, colour
 
@@ -122,14 +123,7 @@ def _blueprint(found: Diagnosis, told: Sequence[Told]) -> rrb.Blueprint:
         views = [*(_values(one, t) for t in tracks), _residual(one, tracks), _phase(one)]
         name = f"{one.recording}, held out" if one.held_out else one.recording
         tabs.append(rrb.Vertical(*views, row_shares=[*[3] * len(tracks), 3, 1], name=name))
-    return rrb.Blueprint(
-        rrb.Tabs(*tabs, active_tab=0),
-        rrb.TimePanel(timeline=TIMELINE, playback_speed=0.25, loop_mode="all", state="collapsed"),
-        rrb.BlueprintPanel(state="hidden"),
-        rrb.SelectionPanel(state="hidden"),
-        auto_layout=False,
-        auto_views=False,
-    )
+    return framed(rrb.Tabs(*tabs, active_tab=0))
 
 
 def _values(one: Told, track: Track) -> rrb.TimeSeriesView:

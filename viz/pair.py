@@ -16,8 +16,8 @@ from rerun.error_utils import catch_and_log_exceptions
 
 from rollover.pair import Pair, Result, difference
 from rollover.store import PICTURE
-from viz.blueprint import BACKGROUND, LOADS, MOTION, TOP, matching
-from viz.entities import MEASURED, PHASE, SIMULATED, TIMELINE, Series, series
+from viz.blueprint import BACKGROUND, LOADS, MOTION, TOP, framed, matching
+from viz.entities import MEASURED, PHASE, SIMULATED, Series, series
 from viz.log import closed
 from viz.pair_words import markdown
 from viz.stream import Stream, colour
@@ -121,14 +121,7 @@ def _blueprint(found: Pair, scenes: dict[str, list[Any]]) -> rrb.Blueprint:
     rows = [rrb.Vertical(_plot(*p), _plot(*p, less=True), name=p[0]) for p in plots[1:]]
     if rows:
         tabs.append(rrb.Tabs(*rows, name="Every plot"))
-    return rrb.Blueprint(
-        rrb.Tabs(*tabs, active_tab=0),
-        rrb.TimePanel(timeline=TIMELINE, playback_speed=0.25, loop_mode="all", state="collapsed"),
-        rrb.BlueprintPanel(state="hidden"),
-        rrb.SelectionPanel(state="hidden"),
-        auto_layout=False,
-        auto_views=False,
-    )
+    return framed(rrb.Tabs(*tabs, active_tab=0))
 
 
 def _both(found: Pair) -> tuple[Result, Result]:

@@ -11,7 +11,6 @@ from typing import Any
 from rollover.proof.campaign import ACCELERATION, DEPTH, FORCE, SPEED, log_uniform
 from rollover.proof.library import Change, Draw, Random, Setting
 
-
 # over a short range a bend is a gain and an offset
 BENT = ("sensor-gain", "sensor-scale", "sensor-bias", "sensor-clipping")
 
