@@ -25,6 +25,7 @@ from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing, with_scatter
 from rollover.diagnosis.scores import judged
 from rollover.diagnosis.selection import decided, explained, matters
+from rollover.diagnosis.settle import settled
 from rollover.diagnosis.simulator import set_up
 from rollover.diagnosis.statements import considered, named, noise, places, sentence
 from rollover.diagnosis.verdict import Degree, Diagnosis
@@ -80,6 +81,8 @@ def diagnose(
     acts = "rollover" if any(unfit(set_up(scenario, e.recording)) for e in found) else "drop"
     candidates = candidates_of(found, scenario.effects, acts, scenario, size_of(set_up(scenario, found[0].recording)))
     explanation = explained(judge, base, candidates, groups, phases, say, crew or Crew())
+    if judge.effort.thrifty:
+        explanation = settled(judge, explanation, phases)
     explanation, verdict = decided(judge, explanation, groups)
     found = list(judge.evidence)
     before, after = explanation.before, explanation.after if explanation.parts else explanation.before
@@ -153,7 +156,9 @@ def _trusted(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:
 def _evidence(scenario: Scenario, recordings: Sequence[tuple[str, Recording]]) -> tuple[list[Evidence], list[str]]:
     found, notes = [], []
     for name, recording in recordings:
-        one = evidence_of(name, *simulated(scenario, recording))
+        thin, simulator, averaged = simulated(scenario, recording)
+        simulator.settle()
+        one = evidence_of(name, thin, simulator, averaged)
         if one is None:
             notes.append(f"{name}: shares no usable channel with the simulation and was left aside")
         else:

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from ground.quantity import quantities
 from rollover.diagnosis.blocks import Block
 from rollover.diagnosis.candidates import physical
-from rollover.diagnosis.evidence import MODEL_ERROR
+from rollover.diagnosis.evidence import MODEL_ERROR, Evidence
 from rollover.diagnosis.fit import GENTLE, Fitted, Judge
+from rollover.diagnosis.settle import along, step_of_means
 from rollover.diagnosis.verdict import Interval
 from rollover.effects import EFFECTS
 
 Array = NDArray[np.float64]
 TWO_SIDED = 1.96
-STUDENT = 2.6  # (t/1.96)^2 of Student's t for three neighbours: their scatter is itself an estimate
 
 
 def without_one(blocks: Sequence[Block]) -> Array:
@@ -39,6 +39,35 @@ def without_one(blocks: Sequence[Block]) -> Array:
     return np.asarray(wide * np.sqrt((k - 1) / k * np.sum((dx - dx.mean(axis=0)) ** 2, axis=0)))
 
 
+def scattered(evidence: Sequence[Evidence], blocks: Sequence[Block], inverse: Array) -> Array:
+    """Variances (p,) of parameters fitted to one run each, by what neighbours of the run scatter by.
+
+    sum_r var_k(A^-1 J_r'd_rk) (1 + 1/k) (t/1.96)^2: what was measured is one run more, the model the mean of k.
+    """
+    from scipy.stats import t
+
+    found, free = np.zeros(inverse.shape[0]), 0
+    for e, block in zip(evidence, blocks, strict=True):
+        k = len(e.strays)
+        if k < 2:
+            continue
+        free += k - 1
+        each = np.array([inverse @ along(block, e, stray) for stray in e.strays])
+        found += (1.0 + 1.0 / k) * np.var(each, axis=0, ddof=1)
+    return np.asarray(found * (float(t.ppf(0.975, free)) / TWO_SIDED) ** 2) if free else found
+
+
+def _noise(judge: Judge, fitted: Fitted) -> Array:
+    """Covariance (p, p) of J'w that comes of the noise alone: a weighed sample's noise is below 1."""
+    found = GENTLE * np.eye(len(fitted.x))
+    for e, block in zip(judge.evidence, fitted.blocks, strict=True):
+        J = block.J - np.outer(block.slope, block.slope @ block.J) / block.weight
+        weights = [np.ones(s.rows.size) if s.weight is None else s.weight for s in e.signals]
+        J = J * np.concatenate(weights)[:, None]
+        found = found + J.T @ J
+    return np.asarray(found)
+
+
 def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
     """For each effect, its parameters with 95 % intervals.
 
@@ -49,10 +78,12 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
     """
     p = len(fitted.x)
     A = sum((b.normal()[0] for b in fitted.blocks), np.zeros((p, p))) + GENTLE * np.eye(p)
-    inverse = np.linalg.inv(A)
+    inverse: Array = np.asarray(np.linalg.inv(A), dtype=np.float64)
     count = sum(b.residual.size for b in fitted.blocks)
     phi = max(1.0, fitted.left / count) * judge.per_error
-    sd = np.sqrt(np.maximum(phi * np.diag(inverse), 0.0))
+    strayed = any(e.strays for e in judge.evidence)
+    noise = inverse @ _noise(judge, fitted) @ inverse if strayed else inverse
+    sd = np.sqrt(np.maximum(phi * np.diag(noise), 0.0))
     moved = np.zeros(p)
     channels = {s.channel for e in judge.evidence for s in e.signals}
     for channel in channels:
@@ -63,14 +94,12 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
                     y = (judge.measured[r] - block.residual)[part]
                     pull += block.J[part].T @ (MODEL_ERROR * y)
         moved += (inverse @ pull) ** 2
-    for e, block in zip(judge.evidence, fitted.blocks, strict=True):
-        for stray in e.strays:
-            moved += STUDENT / len(e.strays) * (inverse @ (block.J.T @ e.whitened(stray))) ** 2
     # a fit that ended before it was at rest is off by what the next step would have been
-    moved += (inverse @ sum((b.normal()[1] for b in fitted.blocks), np.zeros(p))) ** 2
-    sd = np.sqrt(sd**2 + moved)
-    if p and any(e.strays for e in judge.evidence):
-        sd = np.maximum(sd, without_one(fitted.blocks))
+    rest = inverse @ sum((b.normal()[1] for b in fitted.blocks), np.zeros(p))
+    if strayed:
+        moved += scattered(judge.evidence, fitted.blocks, inverse)
+        rest = step_of_means(judge.evidence, fitted.blocks)
+    sd = np.sqrt(sd**2 + moved + rest**2)
     found, at = [], 0
     for c in fitted.candidates:
         kind: Any = EFFECTS[c.id]

@@ -1,0 +1,89 @@
+"""What runs with the explanation itself scatter by, and the parameters that all of these neighbours ask for together.
+
+Scatter is looked at first where the scenario is; where an effect changes what hits the ground it is another. With
+neighbours y_k = y + d_k of the run at the fitted point, each recording's mean of them strays less than any one, and
+
+    dx = A^-1 sum_r J_r'(w_r - mean_k d_rk)                                                                    (D6)
+
+is the step to the least squares of the mean. A, J, w as in (D1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.blocks import GENTLE, Block, shift_of
+from rollover.diagnosis.chaos import weighted
+from rollover.diagnosis.detect import mismatch_of
+from rollover.diagnosis.evidence import Evidence
+from rollover.diagnosis.explain import Phases, Step
+from rollover.diagnosis.fit import Fitted, Judge
+from rollover.diagnosis.selection import Explanation
+
+Array = NDArray[np.float64]
+FARTHEST = 0.15  # of a coordinate, that a mean may move it
+
+
+def settled(judge: Judge, found: Explanation, phases: Phases) -> Explanation:
+    """The explanation under the scatter of runs with it, moved to where the mean of them is met best (D6)."""
+    if not found.parts:
+        return found
+    rescattered(judge, found.fitted)
+    parts = [s.again(judge) for s in found.parts]
+    parts[-1] = _moved(judge, parts[-1])
+    base, fitted = judge.again(found.base), parts[-1].fitted
+    return replace(
+        found,
+        base=base,
+        fitted=fitted,
+        parts=tuple(parts),
+        before=mismatch_of(judge.evidence, base.blocks, phases),
+        after=mismatch_of(judge.evidence, fitted.blocks, phases),
+        first=found.first.again(judge) if found.first is not None else None,
+    )
+
+
+def rescattered(judge: Judge, fitted: Fitted) -> None:
+    """Weigh the recordings by what runs at a fitted point scatter by."""
+    changes = judge.changes(fitted.candidates, fitted.x)
+    evidence = []
+    for e, block in zip(judge.evidence, fitted.blocks, strict=True):
+        plain = replace(e, signals=tuple(replace(s, weight=None) for s in e.signals), strays=())
+        evidence.append(weighted(plain, e.simulator.strays(changes, block.shift)))
+    judge.weigh(evidence)
+
+
+def along(block: Block, e: Evidence, stray: Array) -> Array:
+    """J'd of a deviation (n,), SI, with the recording's time shift taken out, (p,)."""
+    d = e.eased(e.whitened(stray))
+    return np.asarray(block.J.T @ d - (block.J.T @ block.slope) * float(block.slope @ d) / block.weight)
+
+
+def step_of_means(evidence: Sequence[Evidence], blocks: Sequence[Block]) -> Array:
+    """(D6), (p,)."""
+    p = blocks[0].J.shape[1]
+    A, b = GENTLE * np.eye(p), np.zeros(p)
+    for e, block in zip(evidence, blocks, strict=True):
+        Ar, br, _ = block.normal()
+        A, b = A + Ar, b + br
+        if e.strays:
+            b = b - np.mean([along(block, e, stray) for stray in e.strays], axis=0)
+    return np.asarray(np.linalg.solve(A, b))
+
+
+def _moved(judge: Judge, part: Step) -> Step:
+    """A step with its fit moved by (D6); as it was if nothing can be simulated there."""
+    old = part.fitted
+    dx = np.clip(step_of_means(judge.evidence, old.blocks), -FARTHEST, FARTHEST)
+    x = [float(v) for v in np.clip(np.array(old.x) + dx, 0.0, 1.0)]
+    shifts = [b.shift + shift_of(b, np.array(x) - np.array(old.x)) for b in old.blocks]
+    blocks = [judge.block(r, old.candidates, x, s, judge.effort.fine) for r, s in enumerate(shifts)]
+    if any(b is None for b in blocks):
+        return part
+    new = Fitted(candidates=old.candidates, x=tuple(x), blocks=tuple(b for b in blocks if b is not None))
+    rivals = tuple(new if f is old else f for f in part.rivals)
+    return replace(part, fitted=new, rivals=rivals)
