@@ -14,6 +14,7 @@ from rollover.diagnosis.explain import SURE, Phases, Step, moves, spread, step, 
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate, gate
 from rollover.diagnosis.holdout import held_out
+from rollover.diagnosis.settle import settled
 from rollover.diagnosis.verdict import Verdict
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
@@ -80,6 +81,8 @@ def explained(
         first = first or found
         if found is None or found.p_value > CHANCE or moves(judge, found.base, found.fitted) < NEGLIGIBLE:
             break
+        if judge.effort.thrifty:
+            found = settled(judge, found)
         taken.append(found)
         current = found.fitted
         left = mismatch_of(judge.evidence, current.blocks, phases)
@@ -172,6 +175,8 @@ def _needed(
             break
         current = rest
     kept, last = len(current.candidates), taken[-1]
+    if judge.effort.thrifty and kept == len(taken):
+        return [s.again(judge) for s in taken]
     parts: list[Step] = []
     for turn in range(kept):
         whole = turn == kept - 1 and current.candidates[0].key == last.fitted.candidates[-1].key

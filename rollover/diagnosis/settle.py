@@ -18,33 +18,33 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.blocks import GENTLE, Block, shift_of
 from rollover.diagnosis.chaos import weighted
-from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.evidence import Evidence
-from rollover.diagnosis.explain import Phases, Step
+from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.selection import Explanation
 
 Array = NDArray[np.float64]
 FARTHEST = 0.15  # of a coordinate, that a mean may move it
 
 
-def settled(judge: Judge, found: Explanation, phases: Phases) -> Explanation:
-    """The explanation under the scatter of runs with it, moved to where the mean of them is met best (D6)."""
-    if not found.parts:
-        return found
-    rescattered(judge, found.fitted)
-    parts = [s.again(judge) for s in found.parts]
-    parts[-1] = _moved(judge, parts[-1])
-    base, fitted = judge.again(found.base), parts[-1].fitted
-    return replace(
-        found,
-        base=base,
-        fitted=fitted,
-        parts=tuple(parts),
-        before=mismatch_of(judge.evidence, base.blocks, phases),
-        after=mismatch_of(judge.evidence, fitted.blocks, phases),
-        first=found.first.again(judge) if found.first is not None else None,
-    )
+def settled(judge: Judge, part: Step) -> Step:
+    """A step under the scatter of runs with its explanation, moved to where the mean of them is met best (D6).
+
+    As it was if nothing can be simulated there; where runs do not scatter too.
+    """
+    rescattered(judge, part.fitted)
+    part = part.again(judge)
+    old = part.fitted
+    if not any(e.strays for e in judge.evidence):
+        return part
+    dx = np.clip(step_of_means(judge.evidence, old.blocks), -FARTHEST, FARTHEST)
+    x = [float(v) for v in np.clip(np.array(old.x) + dx, 0.0, 1.0)]
+    shifts = [b.shift + shift_of(b, np.array(x) - np.array(old.x)) for b in old.blocks]
+    blocks = [judge.block(r, old.candidates, x, s, judge.effort.fine) for r, s in enumerate(shifts)]
+    if any(b is None for b in blocks):
+        return part
+    new = Fitted(candidates=old.candidates, x=tuple(x), blocks=tuple(b for b in blocks if b is not None))
+    rivals = tuple(new if f is old else f for f in part.rivals)
+    return replace(part, fitted=new, rivals=rivals)
 
 
 def rescattered(judge: Judge, fitted: Fitted) -> None:
@@ -73,17 +73,3 @@ def step_of_means(evidence: Sequence[Evidence], blocks: Sequence[Block]) -> Arra
         if e.strays:
             b = b - np.mean([along(block, e, stray) for stray in e.strays], axis=0)
     return np.asarray(np.linalg.solve(A, b))
-
-
-def _moved(judge: Judge, part: Step) -> Step:
-    """A step with its fit moved by (D6); as it was if nothing can be simulated there."""
-    old = part.fitted
-    dx = np.clip(step_of_means(judge.evidence, old.blocks), -FARTHEST, FARTHEST)
-    x = [float(v) for v in np.clip(np.array(old.x) + dx, 0.0, 1.0)]
-    shifts = [b.shift + shift_of(b, np.array(x) - np.array(old.x)) for b in old.blocks]
-    blocks = [judge.block(r, old.candidates, x, s, judge.effort.fine) for r, s in enumerate(shifts)]
-    if any(b is None for b in blocks):
-        return part
-    new = Fitted(candidates=old.candidates, x=tuple(x), blocks=tuple(b for b in blocks if b is not None))
-    rivals = tuple(new if f is old else f for f in part.rivals)
-    return replace(part, fitted=new, rivals=rivals)

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import overturn
-from rollover.diagnosis.blocks import GENTLE, Block, Fitted
+from rollover.diagnosis.blocks import GENTLE, Block
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.effort import DROPS, RUNS, Effort
 from rollover.diagnosis.evidence import Evidence, Signal
+from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.intervals import intervals, scattered
 from rollover.diagnosis.overturn import CENTRE, NEIGHBOURS, RunSimulator
@@ -226,23 +227,10 @@ def test_parameters_hold_though_runs_scatter() -> None:
         base, fitted = judge.fit((), ()), judge.fit((SLOPE,), (0.3,))
         assert base is not None
         assert fitted is not None
-        found = settled(judge, _explanation(base, fitted), [((0.0, "all"),)] * 4)
+        found = settled(judge, Step(base=base, fitted=fitted, p_value=0.0, rivals=(fitted,)))
+        assert found.rivals == (found.fitted,)
         interval = intervals(judge, found.fitted)[0]["angle"]
         hits.append(interval.low <= 0.37 <= interval.high)
         widths.append(interval.high - interval.low)
     assert np.mean(hits) > 0.87
     assert np.median(widths) < 0.02
-
-
-def _explanation(base: Fitted, fitted: Fitted) -> Any:
-    from rollover.diagnosis.detect import Mismatch
-    from rollover.diagnosis.explain import Step
-    from rollover.diagnosis.gate import Gate
-    from rollover.diagnosis.selection import Explanation
-
-    nothing = Mismatch(cells=(), p_value=1.0, adjusted=())
-    looked = Gate(score=0.0, scores={}, null=np.zeros(10), detectable={})
-    part = Step(base=base, fitted=fitted, p_value=0.0, rivals=(fitted,))
-    return Explanation(
-        base=base, fitted=fitted, parts=(part,), looked=looked, detectable={}, before=nothing, after=nothing
-    )
