@@ -82,7 +82,10 @@ def explained(
         if found is None or found.p_value > CHANCE or moves(judge, found.base, found.fitted) < NEGLIGIBLE:
             break
         if judge.effort.thrifty:
-            found = settled(judge, found)
+            held, found = judge.evidence, settled(judge, found)
+            if not outlasts(found, groups):
+                judge.weigh(held)
+                break
         taken.append(found)
         current = found.fitted
         left = mismatch_of(judge.evidence, current.blocks, phases)
@@ -114,6 +117,13 @@ def explained(
         after=mismatch_of(judge.evidence, current.blocks, phases),
         first=first.again(judge) if first is not None else None,
     )
+
+
+def outlasts(found: Step, groups: Groups) -> bool:
+    """Whether an effect predicts what was held out better by more than chance, under the scatter of its own runs."""
+    with_, without_ = held_out(found.fitted, groups), held_out(found.base, groups)
+    phi = max(1.0, float(with_.left.sum() / with_.count.sum()))
+    return bool(float(without_.left.sum() - with_.left.sum()) > NEEDED * phi)
 
 
 def free(current: Fitted, candidates: Sequence[Candidate]) -> list[Candidate]:

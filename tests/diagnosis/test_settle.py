@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import overturn
-from rollover.diagnosis.blocks import GENTLE, Block
+from rollover.diagnosis.blocks import GENTLE, Block, Fitted
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.effort import DROPS, RUNS, Effort
 from rollover.diagnosis.evidence import Evidence, Signal
@@ -18,6 +18,7 @@ from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.intervals import intervals, scattered
 from rollover.diagnosis.overturn import CENTRE, NEIGHBOURS, RunSimulator
+from rollover.diagnosis.selection import outlasts
 from rollover.diagnosis.settle import along, rescattered, settled, step_of_means
 from rollover.effects import Search
 from rollover.recording import Recording
@@ -234,3 +235,21 @@ def test_parameters_hold_though_runs_scatter() -> None:
         widths.append(interval.high - interval.low)
     assert np.mean(hits) > 0.87
     assert np.median(widths) < 0.02
+
+
+def test_what_gains_no_more_than_chance_on_held_out_recordings_is_not_taken() -> None:
+    rng = np.random.default_rng(2)
+
+    def step(size: float) -> Step:
+        """Four recordings with an effect of `size` noise units along J, fitted."""
+        J = [rng.standard_normal((N, 1)) for _ in range(4)]
+        w = [size * j[:, 0] + rng.standard_normal(N) for j in J]
+        dx = sum(float(j[:, 0] @ y) for j, y in zip(J, w, strict=True)) / sum(float(j[:, 0] @ j[:, 0]) for j in J)
+        base = [Block(residual=y, J=np.zeros((N, 0)), slope=np.zeros(N), shift=0.0, prior=1.0) for y in w]
+        ends = [replace(b, residual=y - j[:, 0] * dx, J=j) for b, y, j in zip(base, w, J, strict=True)]
+        as_it_is = Fitted(candidates=(), x=(), blocks=tuple(base))
+        return Step(base=as_it_is, fitted=Fitted(candidates=(SLOPE,), x=(0.5,), blocks=tuple(ends)), p_value=0.0)
+
+    groups = [[k] for k in range(4)]
+    assert not any(outlasts(step(0.0), groups) for _ in range(50))
+    assert all(outlasts(step(0.6), groups) for _ in range(50))
