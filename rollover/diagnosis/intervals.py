@@ -19,6 +19,7 @@ from rollover.effects import EFFECTS
 
 Array = NDArray[np.float64]
 TWO_SIDED = 1.96
+EVENLY = 12.0**-0.5  # standard deviation of what is spread evenly from 0 to 1
 
 
 def without_one(blocks: Sequence[Block]) -> Array:
@@ -55,6 +56,25 @@ def scattered(evidence: Sequence[Evidence], blocks: Sequence[Block], inverse: Ar
         each = np.array([inverse @ along(block, e, stray) for stray in e.strays])
         found += (1.0 + 1.0 / k) * np.var(each, axis=0, ddof=1)
     return np.asarray(found * (float(t.ppf(0.975, free)) / TWO_SIDED) ** 2) if free else found
+
+
+def unshaped(judge: Judge, fitted: Fitted, inverse: Array) -> Array:
+    """Variances (p,) of what the shapes that are not fitted would move: each by the spread of its range, evenly."""
+    found = np.zeros(len(fitted.x))
+    last, at = fitted.candidates[-1], list(fitted.x)
+    shapes = list(last.shapes)
+    begun = last.with_shapes(())[0] if shapes else ()
+    whole = (*fitted.candidates[:-1], last.whole())
+    for k in range(len(shapes)):
+        pull = np.zeros(len(fitted.x))
+        low, high = (min(max(begun[k] + s * EVENLY, 0.0), 1.0) for s in (-1.0, 1.0))
+        ends = [(whole, [*at, *begun[:k], v, *begun[k + 1 :]]) for v in (low, high)]
+        for r, block in enumerate(fitted.blocks):
+            d = judge.moved(r, ends[0], ends[1], block.shift)
+            if d is not None:
+                pull += block.J.T @ d - (block.J.T @ block.slope) * float(block.slope @ d) / block.weight
+        found += (EVENLY / (high - low) * (inverse @ pull)) ** 2
+    return found
 
 
 def _noise(judge: Judge, fitted: Fitted) -> Array:
@@ -97,7 +117,7 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
     # a fit that ended before it was at rest is off by what the next step would have been
     rest = inverse @ sum((b.normal()[1] for b in fitted.blocks), np.zeros(p))
     if strayed:
-        moved += scattered(judge.evidence, fitted.blocks, inverse)
+        moved += scattered(judge.evidence, fitted.blocks, inverse) + unshaped(judge, fitted, inverse)
         rest = step_of_means(judge.evidence, fitted.blocks)
     sd = np.sqrt(sd**2 + moved + rest**2)
     found, at = [], 0

@@ -72,7 +72,7 @@ class RunSimulator:
         self.scenario = _covering(scenario, recording)
         self.runs = 0
         self.seconds = 0.0
-        self._phases: tuple[tuple[float, str], ...] = ()
+        self._phases: dict[tuple[float, ...], tuple[tuple[float, str], ...]] = {}  # by where the grid lies
         self._centre: tuple[float, ...] = scenario.ground.elements.centre
         self._limit = np.inf
         self._known: dict[tuple[Any, ...], tuple[Scenario, Recording] | None] = {}
@@ -123,7 +123,7 @@ class RunSimulator:
     def marks(self) -> tuple[tuple[float, str], ...]:
         """Phases of the run as it is; empty if it fails."""
         self.predict({}, 0.0)
-        return self._phases
+        return self._phases.get(self.scenario.ground.elements.centre, ())
 
     def state(self, shift: float) -> Mapping[str, Array]:
         """Motion of the run as it is, (n,) at the stamps less `shift`; empty if it fails."""
@@ -199,7 +199,9 @@ class RunSimulator:
             if len(self._known) >= KEPT:
                 self._known.pop(next(iter(self._known)))
             physical = {name: e for name, e in chosen.effects.items() if not name.startswith(SENSORS)}
-            self._known[key] = self._made(replace(chosen, effects=physical), is_base=not key)
+            self._known[key] = self._made(
+                replace(chosen, effects=physical), is_base=all(path == CENTRE for path, _ in key)
+            )
         return self._known[key]
 
     def _made(self, scenario: Scenario, *, is_base: bool) -> tuple[Scenario, Recording] | None:
@@ -215,7 +217,7 @@ class RunSimulator:
         if run.status == "failed":
             return None
         if is_base:
-            self._phases = phases_of(run)
+            self._phases[scenario.ground.elements.centre] = phases_of(run)
         stems = {name[:-1] for name in self.recording.channels}  # the axes across, for a sensor that is turned
         kept = {n: v for n, v in run.recording.channels.items() if n[:-1] in stems or n.startswith(MOTION)}
         return scenario.applied(), replace(run.recording, channels=kept)

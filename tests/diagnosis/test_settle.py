@@ -16,7 +16,7 @@ from rollover.diagnosis.effort import DROPS, RUNS, Effort
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Judge
-from rollover.diagnosis.intervals import intervals, scattered
+from rollover.diagnosis.intervals import intervals, scattered, unshaped
 from rollover.diagnosis.overturn import CENTRE, NEIGHBOURS, RunSimulator
 from rollover.diagnosis.selection import outlasts
 from rollover.diagnosis.settle import along, rescattered, settled, step_of_means
@@ -67,6 +67,31 @@ def test_a_run_like_the_others_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     assert simulator.scenario.ground.elements.centre == own
 
 
+def test_phases_are_those_of_the_run_that_stands_for_all() -> None:
+    made = Recording(title="toss", time=np.arange(0.0, 0.4, 0.01), channels={"chassis/position_z": np.zeros(40)})
+    simulator = RunSimulator(shipped("cube_toss"), made)
+    simulator.settle()
+    runs = simulator.runs
+    marks = simulator.marks()
+    assert [name for _, name in marks][:2] == ["approach", "impact"]
+    assert simulator.runs == runs
+    plain = RunSimulator(shipped("cube_toss").replaced({CENTRE: simulator.scenario.ground.elements.centre}), made)
+    assert plain.marks() == marks
+
+
+def test_a_shape_that_is_not_fitted_widens_an_interval(monkeypatch: pytest.MonkeyPatch) -> None:
+    """y = 20 (x + f) sin t with f from 0 to 1 unknown: x is known to sqrt(1/12) and no better."""
+    judge = Judge([evidence(4, 0.0)])
+    alone = replace(SLOPE, shapes={"other": Search(0.0, 1.0)})
+    monkeypatch.setattr(Candidate, "with_shapes", lambda self, x: [(*x, 0.5)])
+    block = judge.block(0, (SLOPE,), (0.4,), 0.0, judge.effort.fine)
+    assert block is not None
+    inverse = np.linalg.inv(block.J.T @ block.J)
+    found = unshaped(judge, Fitted(candidates=(alone,), x=(0.4,), blocks=(block,)), inverse)
+    assert found[0] == pytest.approx(1.0 / 12.0, rel=0.05)
+    assert unshaped(judge, Fitted(candidates=(SLOPE,), x=(0.4,), blocks=(block,)), inverse) == 0.0
+
+
 def test_no_neighbour_is_the_run_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     simulator = a_toss(monkeypatch, {})
     place = simulator._place(NEIGHBOURS[0].place)
@@ -88,7 +113,8 @@ class Rough:
         self.seed, self.size = seed, size
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
-        x = changes.get("effects.slope.angle", 0.0) + changes.get("effects.sensor-gain.gain", 0.0)
+        x = changes.get("effects.slope.angle", 0.0) + changes.get("effects.slope.other", 0.0)
+        x += changes.get("effects.sensor-gain.gain", 0.0)
         moving = 0.0 if "effects.sensor-gain.gain" in changes else x
         rng = np.random.default_rng([self.seed, round(1e9 * moving), round(changes.get("neighbour", 0))])
         chance = np.convolve(rng.standard_normal(N + 6), np.ones(7) / np.sqrt(7.0), mode="valid")
