@@ -59,10 +59,12 @@ def scattered(evidence: Sequence[Evidence], blocks: Sequence[Block], inverse: Ar
 
 
 def unshaped(judge: Judge, fitted: Fitted, inverse: Array) -> Array:
-    """Variances (p,) of what the shapes that are not fitted would move: each by the spread of its range, evenly."""
+    """Variances (p,) of what shapes of the last effect that are not fitted would move: each evenly over its range."""
     found = np.zeros(len(fitted.x))
     last, at = fitted.candidates[-1], list(fitted.x)
     shapes = list(last.shapes)
+    if any(getattr(EFFECTS[last.id](), name, 0.0) is None for name in shapes):
+        return found  # as the scenario has it
     begun = last.with_shapes(())[0] if shapes else ()
     whole = (*fitted.candidates[:-1], last.whole())
     for k in range(len(shapes)):

@@ -25,6 +25,7 @@ def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     """As little as shows what a case is made of."""
     monkeypatch.setattr(generator, "STEP", 1e-3)
     monkeypatch.setattr(generator, "LENGTH", 0.2)
+    monkeypatch.setattr(generator, "NEIGHBOURS", 1)
 
 
 def written(order: Order, folder: Path) -> Scenario:
@@ -144,7 +145,7 @@ def test_each_of_two_effects_is_as_strong_as_what_the_other_leaves_to_it() -> No
         assert 0.0 < effect["over_scatter"] <= effect["over_noise"] * (1.0 + 1e-9)
 
 
-@pytest.mark.parametrize("id", OUTSIDE)
+@pytest.mark.parametrize("id", ["outside:pushed", "outside:hum"])
 def test_what_is_outside_shows_and_is_told_as_such(id: str) -> None:
     order = Order(index=1, seed=8, kind="outside", ids=(id,))
     found, plain = make(order), make(replace(order, kind="null", ids=()))
