@@ -82,9 +82,8 @@ def explained(
         if found is None or found.p_value > CHANCE or moves(judge, found.base, found.fitted) < NEGLIGIBLE:
             break
         if judge.effort.thrifty:
-            held, found = judge.evidence, settled(judge, found)
-            if not outlasts(found, groups):
-                judge.weigh(held)
+            found = lasting(judge, found, groups)
+            if found is None:
                 break
         taken.append(found)
         current = found.fitted
@@ -117,6 +116,17 @@ def explained(
         after=mismatch_of(judge.evidence, current.blocks, phases),
         first=first.again(judge) if first is not None else None,
     )
+
+
+def lasting(judge: Judge, found: Step, groups: Groups) -> Step | None:
+    """The first of a step's rivals that still gains under the scatter of its own runs; None if none does."""
+    held = judge.evidence
+    for rival in found.rivals:
+        one = settled(judge, replace(found, fitted=rival))
+        if outlasts(one, groups):
+            return one
+        judge.weigh(held)
+    return None
 
 
 def outlasts(found: Step, groups: Groups) -> bool:

@@ -18,7 +18,7 @@ from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.intervals import intervals, scattered, unshaped
 from rollover.diagnosis.overturn import CENTRE, NEIGHBOURS, RunSimulator
-from rollover.diagnosis.selection import outlasts
+from rollover.diagnosis.selection import lasting, outlasts
 from rollover.diagnosis.settle import along, rescattered, settled, step_of_means
 from rollover.effects import Search
 from rollover.recording import Recording
@@ -279,3 +279,25 @@ def test_what_gains_no_more_than_chance_on_held_out_recordings_is_not_taken() ->
     groups = [[k] for k in range(4)]
     assert not any(outlasts(step(0.0), groups) for _ in range(50))
     assert all(outlasts(step(0.6), groups) for _ in range(50))
+
+
+def test_where_the_first_does_not_last_the_next_one_is_taken() -> None:
+    """A step whose best fit gains nothing under the scatter of its runs, and whose second does."""
+    every = [evidence(r, 0.1, 8.0 * np.sin(30.0 * TIME)) for r in range(4)]
+    judge = Judge(every)
+    base, right = judge.fit((), ()), judge.fit((SLOPE,), (0.3,))
+    assert base is not None
+    assert right is not None
+    before = judge.evidence
+    wrong = judge.fit((candidate("inertia", "parameter", "scale"),), (0.5,))  # moves nothing
+    assert wrong is not None
+    step = Step(base=base, fitted=wrong, p_value=0.0, rivals=(wrong, right))
+    groups = [[k] for k in range(4)]
+    found = lasting(judge, step, groups)
+    assert found is not None
+    assert found.fitted.candidates[-1].key == "slope"
+    assert found.fitted.x[0] == pytest.approx(0.4, abs=0.02)
+    assert judge.evidence is not before
+    kept = judge.evidence
+    assert lasting(judge, replace(step, rivals=(wrong,)), groups) is None
+    assert judge.evidence == kept
