@@ -12,14 +12,13 @@ from rollover.diagnosis.blocks import GENTLE, Block, Fitted, bounded, shift_of
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
+from rollover.diagnosis.secant import secant
 
 Array = NDArray[np.float64]
 FAR = 3.0  # misfit over the noise from which on a step may be lengthened
 STRIDE, STRIDES = 2.0, 6  # by what factor, how often
 TRIES = 4  # of a step, each damped more
 PLACES = 241  # time shifts that are tried
-EXACT = 5e-3  # of a coordinate, for differences that are free of chance
-CLEAR = 12.0  # times the squares that runs scatter by, that a difference should move
 NOISE_LEFT = 1.04  # misfit over the noise that needs no further search
 Point = tuple[Sequence[Candidate], Sequence[float]]
 NONE = np.zeros(0, dtype=np.int64)
@@ -34,7 +33,7 @@ class Judge:
         self.measured = [e.measured() for e in self.evidence]
         self.shifts = [0.0] * len(self.evidence)
         self.simulations = 0
-        self.pinned = False
+        self._pinned = False
         self._raw: dict[tuple[object, ...], Array | None] = {}
         self._leaps: dict[tuple[object, ...], NDArray[np.int64]] = {}
         self._known: dict[tuple[object, ...], Array | None] = {}
@@ -181,7 +180,8 @@ class Judge:
             J[:, : known.shape[1]] = known
         for k in range(0 if known is None else known.shape[1], len(x) if nudge else 0):
             if self.effort.wide:
-                column = secant(self, r, candidates, x, k, shift, nudge)
+                widest = 0.0 if self._pinned else self.effort.wide  # a first fit is short
+                column = secant(e, lambda a, b: self.moved(r, a, b, shift), (candidates, x), k, nudge, widest)
                 if column is None:
                     return None
                 J[:, k] = column
@@ -193,7 +193,7 @@ class Judge:
                 return None
             J[:, k] = moved / step
         slope = e.eased(e.slope(raw, leaps))
-        if self.pinned and e.recording.clock.zero != "unknown":
+        if self._pinned and e.recording.clock.zero != "unknown":
             slope = np.zeros_like(slope)
         residual = e.eased(self.measured[r] - y)
         return Block(residual=residual, J=J, slope=slope, shift=shift, prior=e.shift_prior)
@@ -228,11 +228,11 @@ class Judge:
 
         `pinned` keeps clocks whose zero is known where they say: far from an explanation a shift eats what is missing.
         """
-        self.pinned = pinned
+        self._pinned = pinned
         try:
             return self._fit(candidates, start, rounds, only, shifts, width)
         finally:
-            self.pinned = False
+            self._pinned = False
 
     def _fit(
         self,
@@ -380,43 +380,6 @@ class Judge:
     @staticmethod
     def _total(blocks: Sequence[Block]) -> float:
         return sum(b.total for b in blocks)
-
-
-def secant(
-    judge: Judge, r: int, candidates: Sequence[Candidate], x: Sequence[float], k: int, shift: float, nudge: float
-) -> Array | None:
-    """dy/dx_k over both sides, over a wider step until it moves clearly more than runs scatter by; None if it fails."""
-    e = judge.evidence[r]
-    if not is_physical(candidates, k):
-        nudge = min(nudge, EXACT)
-    power = [float(np.sum(e.eased(e.whitened(stray)) ** 2)) for stray in e.strays]
-    enough = CLEAR * float(np.mean(power)) if power else 0.0
-    widest = 0.0 if judge.pinned else judge.effort.wide  # a first fit is short
-    while True:
-        low, high = max(x[k] - nudge, 0.0), min(x[k] + nudge, 1.0)
-        ends = [[*x[:k], v, *x[k + 1 :]] for v in (low, high)]
-        moved = judge.moved(r, (candidates, ends[0]), (candidates, ends[1]), shift)
-        if moved is None and low < x[k] < high:  # a wall on one side
-            for a, b in (ends, [ends[0], list(x)], [list(x), ends[1]]):
-                moved = judge.moved(r, (candidates, a), (candidates, b), shift)
-                if moved is not None:
-                    low, high = a[k], b[k]
-                    break
-        if moved is None:
-            return None
-        if float(moved @ moved) >= enough or 2.0 * nudge > widest or not is_physical(candidates, k):
-            return np.asarray(moved / (high - low))
-        nudge *= 2.0
-
-
-def is_physical(candidates: Sequence[Candidate], k: int) -> bool:
-    """Whether the k-th coordinate changes the motion: what a sensor makes of it is free of chance."""
-    at = 0
-    for c in candidates:
-        at += len(c.search)
-        if k < at:
-            return c.kind != "sensor"
-    return False
 
 
 def _key(r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> tuple[object, ...]:

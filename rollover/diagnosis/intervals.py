@@ -22,24 +22,6 @@ TWO_SIDED = 1.96
 EVENLY = 12.0**-0.5  # standard deviation of what is spread evenly from 0 to 1
 
 
-def without_one(blocks: Sequence[Block]) -> Array:
-    """Standard errors (p,) from fits that each leave one recording out, as wide as so few recordings make them.
-
-    sd^2 = (k - 1)/k sum_r (dx_r - mean dx)^2 (Tukey's jackknife), times (t/1.96)^2, t Student's 97.5 % quantile for
-    k - 1: what recordings disagree by, whatever makes them. Nothing is known of that from a single recording: 0.
-    """
-    from scipy.stats import t
-
-    k, p = len(blocks), blocks[0].J.shape[1]
-    if k < 2:
-        return np.zeros(p)
-    normals = [b.normal()[:2] for b in blocks]
-    A, b = sum(n[0] for n in normals) + GENTLE * np.eye(p), sum(n[1] for n in normals)
-    dx = np.array([np.linalg.solve(A - n[0], b - n[1]) for n in normals])
-    wide = float(t.ppf(0.975, k - 1)) / TWO_SIDED
-    return np.asarray(wide * np.sqrt((k - 1) / k * np.sum((dx - dx.mean(axis=0)) ** 2, axis=0)))
-
-
 def scattered(evidence: Sequence[Evidence], blocks: Sequence[Block], inverse: Array) -> Array:
     """Variances (p,) of parameters fitted to one run each, by what neighbours of the run scatter by.
 
@@ -95,8 +77,8 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
 
     cov = phi A^-1, phi the misfit left per sample (at least 1); beside it, in quadrature, what a gain error of the
     model of `MODEL_ERROR` in any one channel would do, A^-1 J'(error): integrators differ, noise or not. Where runs
-    that nobody could tell apart scatter, so do the parameters that would be fitted to them; there the disagreement of
-    the recordings counts where it is larger (`without_one`).
+    that nobody could tell apart scatter and samples are weighed by that, cov = phi A^-1 N A^-1 with N the covariance
+    that the noise alone gives J'w; beside it stand `scattered` and `unshaped`.
     """
     p = len(fitted.x)
     A = sum((b.normal()[0] for b in fitted.blocks), np.zeros((p, p))) + GENTLE * np.eye(p)
@@ -121,7 +103,8 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
     if strayed:
         moved += scattered(judge.evidence, fitted.blocks, inverse) + unshaped(judge, fitted, inverse)
         rest = step_of_means(judge.evidence, fitted.blocks)
-    sd = np.sqrt(sd**2 + moved + rest**2)
+    moved += rest**2
+    sd = np.sqrt(sd**2 + moved)
     found, at = [], 0
     for c in fitted.candidates:
         kind: Any = EFFECTS[c.id]
