@@ -23,6 +23,8 @@ from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Fitted, Judge
 
 Array = NDArray[np.float64]
+SHARES = (1.0, 0.5, 1.5)  # of the way: where a run leaps from one course to another beside it
+NEARLY = 1.15  # times the least misfit
 FARTHEST = 0.15  # of a coordinate, that a mean may move it
 
 
@@ -37,14 +39,23 @@ def settled(judge: Judge, part: Step) -> Step:
     if not any(e.strays for e in judge.evidence):
         return part
     dx = np.clip(step_of_means(judge.evidence, old.blocks), -FARTHEST, FARTHEST)
+    tried = [_at(judge, old, share * dx) for share in SHARES]
+    new = min([old, *(f for f in tried if f is not None)], key=lambda f: f.left)
+    # nearly as good, the whole way: the mean of runs is worth more than the one that happens to be there
+    if tried[0] is not None and tried[0].left < NEARLY * new.left:
+        new = tried[0]
+    rivals = tuple(new if f is old else f for f in part.rivals)
+    return replace(part, fitted=new, rivals=rivals)
+
+
+def _at(judge: Judge, old: Fitted, dx: Array) -> Fitted | None:
+    """A fit moved by dx; None if nothing can be simulated there."""
     x = [float(v) for v in np.clip(np.array(old.x) + dx, 0.0, 1.0)]
     shifts = [b.shift + shift_of(b, np.array(x) - np.array(old.x)) for b in old.blocks]
     blocks = [judge.block(r, old.candidates, x, s, judge.effort.fine) for r, s in enumerate(shifts)]
     if any(b is None for b in blocks):
-        return part
-    new = Fitted(candidates=old.candidates, x=tuple(x), blocks=tuple(b for b in blocks if b is not None))
-    rivals = tuple(new if f is old else f for f in part.rivals)
-    return replace(part, fitted=new, rivals=rivals)
+        return None
+    return Fitted(candidates=old.candidates, x=tuple(x), blocks=tuple(b for b in blocks if b is not None))
 
 
 def rescattered(judge: Judge, fitted: Fitted) -> None:

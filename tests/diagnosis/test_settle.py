@@ -301,3 +301,27 @@ def test_where_the_first_does_not_last_the_next_one_is_taken() -> None:
     kept = judge.evidence
     assert lasting(judge, replace(step, rivals=(wrong,)), groups) is None
     assert judge.evidence == kept
+
+
+def test_a_move_does_not_leap_to_another_course() -> None:
+    """Where the whole move goes, from x = 0.365 to 0.385, runs take another course than was measured."""
+
+    class Leaping(Rough):
+        def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+            x = float(changes.get("effects.slope.angle", 0.0))
+            return {CHANNEL: super().predict(changes, shift)[CHANNEL] + 8.0 * (0.365 < x < 0.385) * np.cos(20.0 * TIME)}
+
+    every = []
+    for r in range(4):
+        true = Rough(r, 0.02).predict({"effects.slope.angle": 0.374, "neighbour": 99}, 0.0)[CHANNEL]
+        one = evidence(r, 0.02, true)
+        every.append(replace(one, simulator=cast(Any, Leaping(r, 0.02))))
+    judge = Judge(every)
+    blocks = [judge.block(r, (SLOPE,), (0.30,), 0.0, 0.02) for r in range(4)]
+    fitted = Fitted(candidates=(SLOPE,), x=(0.30,), blocks=tuple(b for b in blocks if b is not None))
+    assert fitted.x[0] + step_of_means(judge.evidence, fitted.blocks)[0] == pytest.approx(0.374, abs=0.005)
+    base = judge.fit((), ())
+    assert base is not None
+    found = settled(judge, Step(base=base, fitted=fitted, p_value=0.0, rivals=(fitted,)))
+    assert not 0.365 < found.fitted.x[0] < 0.385
+    assert found.fitted.left < judge.again(fitted).left
