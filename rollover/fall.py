@@ -62,6 +62,7 @@ RESOLVED = 0.25  # longest step times the frequency on the ground
 FALLING = 5e-4  # s, step of a fall before the first contact
 HALVINGS = 20  # of a step, to the moment at which the soil stays behind
 CLOSE = 1e-7  # m: how near a step ends to a jump of the force
+AT_REST = 1e-8  # m/s, and m/s2 over a millisecond: what is slower on its line of unloading stays where it is
 
 
 @compiled
@@ -244,6 +245,15 @@ def held(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, now: An
 
 
 @compiled
+def at_rest(y: Any, a: Any) -> bool:
+    """Whether nose and body have come to rest, by their speeds and by the accelerations of the last step's stages."""
+    still = max(abs(y[1]), abs(y[3])) < AT_REST
+    for stage in range(4):
+        still = still and max(abs(a[stage, 0]), abs(a[stage, 1])) < 1e3 * AT_REST
+    return still  # type: ignore[no-any-return]
+
+
+@compiled
 def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
     """Fall on the ground at t = 0 with SPEED, or from HEIGHT at t = 0 with it.
 
@@ -359,4 +369,10 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
                 if law[PLASTIC] == 0:
                     row[LINE_Z] = 0.0  # no rut stays
         settle_one(law, p, row, state, f[NOSE])
+        if state[MODE] == UNLOADING and i < n and at_rest(y, a):
+            force = accelerate(law, p, s, row, state, f, y, now)
+            for k in range(i, n):
+                out[k, OUT_FORCE], out[k, OUT_SINKAGE], out[k, OUT_IMPULSE] = force, y[0], impulse
+                out[k, OUT_X], out[k, OUT_V], out[k, OUT_A] = y[2], 0.0, 0.0
+            i = n
     return steps

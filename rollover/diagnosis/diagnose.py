@@ -13,6 +13,7 @@ from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import candidates_of, size_of
 from rollover.diagnosis.chaos import weighted
 from rollover.diagnosis.chassis import degrees_of
+from rollover.diagnosis.clocks import align
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.depend import dependency, residual_forces
 from rollover.diagnosis.empirical import offered, proposed
@@ -72,7 +73,7 @@ def diagnose(
     if len(groups) == 1 and not kept:
         notes.append("one condition only: what stands as held out is predicted by the fit to it")
     judge = Judge(found)
-    judge.aligned()
+    align(judge)
     base = judge.fit((), ())
     if base is None:
         return _nothing(every, names, [*notes, "the scenario itself could not be simulated"], began)
@@ -140,7 +141,7 @@ def _weighed(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:
     """The recordings with the noise of those alike taken together, from their quiet stretches."""
     every = [doubted(e, set_up(scenario, e.recording)) for e in with_scatter(every)]
     judge = Judge(every)
-    judge.aligned()
+    align(judge)
     base = judge.fit((), (), rounds=2)
     return list(every) if base is None else colour.quiet(every, judge.residuals(base))
 
@@ -156,6 +157,8 @@ def _evidence(scenario: Scenario, recordings: Sequence[tuple[str, Recording]]) -
         thin, simulator, averaged = simulated(scenario, recording)
         simulator.settle()
         one = evidence_of(name, thin, simulator, averaged)
+        still = [c for c, v in recording.channels.items() if np.isfinite(v).any() and np.nanmin(v) == np.nanmax(v)]
+        notes += [f"{name}: {channel} never moves and was left aside" for channel in still]
         if one is None:
             notes.append(f"{name}: shares no usable channel with the simulation and was left aside")
         else:

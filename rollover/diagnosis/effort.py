@@ -20,6 +20,7 @@ class Effort:
     polishes: int = 2  # fits that are followed along a crooked valley
     wide: float = 0.0  # of a coordinate, to which a central difference may widen; 0: one-sided, as it is
     least: float = 0.0  # gain of a round below which a search narrows
+    later: float = 5e-5  # s, by which a clock is moved to see what that does
     thrifty: bool = False  # looks at few recordings, fits no shapes, and stops where nothing but noise is left
 
     @property
@@ -42,5 +43,6 @@ RUNS = Effort(
     wide=0.13,
     least=4.0,
     polishes=0,
+    later=1e-3,  # from one row of a run to the next
     thrifty=True,
 )

@@ -118,13 +118,6 @@ class Evidence:
             y[k : k + 3] = np.clip(measured[k : k + 3], near.min(), near.max())
         return y
 
-    def slope(self, raw: Array, leaps: NDArray[np.int64]) -> Array:
-        """dy/dtau = -dy/dt of each signal by differences along the stamps, whitened; none across a leap."""
-        found = np.concatenate([-np.gradient(raw[part], self.recording.time[s.rows]) for s, part in self.spans()])
-        for k in leaps:
-            found[k : k + 3] = 0.0
-        return self.whitened(found)
-
     def spans(self) -> list[tuple[Signal, slice]]:
         """Each signal with its place in the stack."""
         found, at = [], 0
@@ -161,7 +154,7 @@ def doubted(e: Evidence, scenario: Scenario) -> Evidence:
 
 
 def evidence_of(name: str, recording: Recording, simulator: Simulator, averaged: int = 1) -> Evidence | None:
-    """Make a recording ready; None if it shares no channel with the simulation.
+    """Make a recording ready; None if it shares no channel with the simulation. Channels that never move are left out.
 
     Noise is estimated from each channel itself; where it is too short for that, the noise that the recording states.
     """
@@ -174,6 +167,8 @@ def evidence_of(name: str, recording: Recording, simulator: Simulator, averaged:
         if channel not in predicted or rows.size < 8 or not np.all(np.isfinite(predicted[channel][rows])):
             continue
         y = values[rows]
+        if np.ptp(y) == 0.0:
+            continue  # an instrument that was not plugged in, or stuck
         span = float(max(np.ptp(predicted[channel][rows]), np.ptp(y)))
         if span <= 0.0:
             continue

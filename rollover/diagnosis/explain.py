@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis import colour
 from rollover.diagnosis.candidates import BESIDE, Candidate
+from rollover.diagnosis.clocks import by_first_contact
 from rollover.diagnosis.crew import Crew, Job
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.effort import DROPS
@@ -21,7 +22,8 @@ from rollover.diagnosis.holdout import held_out, worse
 Array = NDArray[np.float64]
 SCORED = 18  # candidates looked at closer, by their score
 WITHIN = 6.0  # times what the best leaves, up to which a first fit is followed up
-FAR = 3.0  # misfit over the noise from which on time shifts fitted to it are not believed
+BENT = 1.2  # misfit over the noise from which on time shifts fitted to it are bent by what is missing
+FAR = 3.0  # and from which on they are not fitted beside a first look
 ELSEWHERE = 0.2  # of a coordinate: starts so far apart are two
 RIVALS = 0.4  # of the best's gain: a first fit that gains less is no rival, where fits cost much
 CROOKED = 100.0  # times what the best leaves, up to which a fit of two parameters is polished
@@ -86,30 +88,48 @@ def is_far(judge: Judge, base: Fitted) -> bool:
 
 
 def begun(judge: Judge, base: Fitted) -> list[float]:
-    """Time shifts (s) to begin with: where the base is far off its shifts are bent by what is missing.
+    """Time shifts (s) to begin with: where the base is off its own are bent by what is missing, the contact's hardly.
 
     Where samples are weighed by what neighbours scatter by, how far off it is cannot be told from what is left.
     """
-    if not is_far(judge, base) and not judge.effort.thrifty:
+    count = sum(b.residual.size for b in base.blocks)
+    if judge.effort.thrifty or judge.per_error > 1.0:
+        told: list[float | None] = [None] * len(base.blocks)
+        if not judge.effort.thrifty and not is_far(judge, base):
+            return [b.shift for b in base.blocks]
+    elif base.left < BENT**2 * count:
         return [b.shift for b in base.blocks]
+    else:
+        told = by_first_contact(judge, base.candidates, base.x)
     return [
-        b.shift if e.recording.clock.zero == "unknown" else 0.0
-        for b, e in zip(base.blocks, judge.evidence, strict=True)
+        at if at is not None else b.shift if e.recording.clock.zero == "unknown" else 0.0
+        for at, b, e in zip(told, base.blocks, judge.evidence, strict=True)
     ]
 
 
-def screen(judge: Judge, base: Fitted, candidates: Sequence[Candidate], few: Sequence[int]) -> list[Screened]:
-    """Look at each candidate in some places beside the base, on a few recordings."""
+def screen(
+    judge: Judge,
+    base: Fitted,
+    candidates: Sequence[Candidate],
+    few: Sequence[int],
+    shifts: Sequence[float],
+    looked: Gate,
+) -> list[Screened]:
+    """Look at each candidate in some places beside the base, on a few recordings, from time `shifts` (s) of all.
+
+    Not far from an explanation the places to which `looked` leads are enough.
+    """
     found: list[Screened] = []
-    shifts = begun(judge, base)
     beside = [judge.block(r, base.candidates, base.x, shifts[r], 0.0) for r in few]
     blocks = [b for b in beside if b is not None]
     if len(blocks) < len(few):
         return found
+    near = not is_far(judge, base) and not judge.effort.thrifty
     for c in candidates:
         met: list[tuple[float, tuple[float, ...]]] = []
         potential = 0.0
-        for start in c.starts():
+        ways = () if judge.effort.thrifty else looked.starts.get(c.key, ())
+        for start in ways if near and ways else (*ways, *c.starts()):
             left, along, size, count = 0.0, 0.0, 0.0, 0
             for r, block in zip(few, blocks, strict=True):
                 there = judge.block(r, (*base.candidates, c), (*base.x, *start), shifts[r], 0.0)
@@ -164,13 +184,12 @@ def step(
     what it leaves; the step is then under that noise. None if nothing could be fitted.
     """
     say(f"looking at {len(candidates)} candidates beside {base.label}")
-    few = spread(base, groups, judge.effort.few)
-    screened = screen(judge, base, _promising(candidates, looked, judge.effort.scored), few)
+    few, shifts = spread(base, groups, judge.effort.few), begun(judge, base)
+    screened = screen(judge, base, _promising(candidates, looked, judge.effort.scored), few, shifts, looked)
     count = sum(b.residual.size for b in base.blocks)
-    screened, begun_with = _first_fits(judge, base, screened, few, say, crew)
+    screened, begun_with = _first_fits(judge, base, screened, few, shifts, say, crew)
     jobs = [
-        Job(candidates=f.candidates, start=f.x, shifts=tuple(_all_shifts(judge, base, f, few)), width=1)
-        for f in begun_with
+        Job(candidates=f.candidates, start=f.x, shifts=tuple(_all_shifts(shifts, f, few)), width=1) for f in begun_with
     ]
     fits = [f for f in crew.fits(judge, jobs, say) if f is not None]
     if not fits:
@@ -183,7 +202,7 @@ def step(
         polished = crew.fits(judge, [_from(f, "polish") for f in near], say)
         others = [f for f in fits if not any(f is one for one in near)]
         fits = others + [new or old for new, old in zip(polished, near, strict=True)]
-    fits = _one_each(fits) if judge.effort.thrifty else _shaped(judge, _one_each(fits), crew, say)
+    fits = _one_each(fits) if judge.effort.thrifty else _shaped(judge, _one_each(fits), groups, crew, say)
     if weighed(judge, fits[0], phases):
         base, fits = judge.again(base), [judge.again(f) for f in fits]
     fits.sort(key=lambda f: held_out(f, groups).left.sum())
@@ -220,11 +239,18 @@ def _from(f: Fitted, how: Literal["polish", "shape"]) -> Job:
     return Job(how=how, candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks))
 
 
-def _shaped(judge: Judge, fits: Sequence[Fitted], crew: Crew, say: Progress) -> list[Fitted]:
+def _shaped(
+    judge: Judge, fits: Sequence[Fitted], groups: Sequence[Sequence[int]], crew: Crew, say: Progress
+) -> list[Fitted]:
     """The fits with shapes fitted too where that pays, best first."""
     best = min(f.left for f in fits)
     size = sum(b.residual.size for b in fits[0].blocks)
-    able = [f for f in fits if f.candidates[-1].shapes and f.left < SHAPED * best]
+    ahead = min(held_out(f, groups).total for f in fits)
+    able = [
+        f
+        for f in fits
+        if f.candidates[-1].shapes and (f.left < SHAPED * best or held_out(f, groups).total ** 2 < SHAPED * ahead**2)
+    ]
     found = list(fits)
     for old, new in zip(able, crew.fits(judge, [_from(f, "shape") for f in able], say), strict=True):
         if new is not None and new.left < old.left - WORTH * max(1.0, best / size):
@@ -233,13 +259,18 @@ def _shaped(judge: Judge, fits: Sequence[Fitted], crew: Crew, say: Progress) -> 
 
 
 def _first_fits(
-    judge: Judge, base: Fitted, screened: Sequence[Screened], few: Sequence[int], say: Progress, crew: Crew
+    judge: Judge,
+    base: Fitted,
+    screened: Sequence[Screened],
+    few: Sequence[int],
+    shifts: Sequence[float],
+    say: Progress,
+    crew: Crew,
 ) -> tuple[list[Screened], list[Fitted]]:
     """Short fits to few recordings: the ones worth a full fit, best first, and what each leaves."""
     by_potential = sorted(screened, key=lambda s: -s.potential)[: judge.effort.promising]
     by_start = sorted(screened, key=lambda s: s.left)[: judge.effort.promising // 2]
     chosen = {s.candidate.key: s for s in (*by_start, *by_potential)}
-    shifts = begun(judge, base)
     told: dict[str, float] = {}
     say(f"first fits of {len(chosen)} candidates to {len(few)} recordings")
     at = tuple(shifts[r] for r in few)
@@ -266,9 +297,9 @@ def _first_fits(
     return [replace(s, nrmse=told.get(s.candidate.key, 0.0)) for s in screened], worth
 
 
-def _all_shifts(judge: Judge, base: Fitted, first: Fitted, few: Sequence[int]) -> list[float]:
+def _all_shifts(begun_with: Sequence[float], first: Fitted, few: Sequence[int]) -> list[float]:
     """Time shifts of all recordings: as fitted where they are, elsewhere as begun with."""
-    shifts = begun(judge, base)
+    shifts = list(begun_with)
     for r, block in zip(few, first.blocks, strict=True):
         shifts[r] = block.shift
     return shifts
@@ -293,9 +324,7 @@ def moves(judge: Judge, base: Fitted, fitted: Fitted) -> float:
 
 
 def simplest(fits: Sequence[Fitted], groups: Sequence[Sequence[int]], shared: float) -> list[Fitted]:
-    """Fits, best first; where errors are one for a whole signal the simplest of those within a standard error leads."""
-    if shared == 1.0:
-        return list(fits)
+    """Fits, best first, led by the one with the fewest numbers of those within a standard error of the best."""
     near = [f for f in fits if f is fits[0] or worse(f, fits[0], groups, shared)[0] < WITHIN_ONE]
     first = min(near, key=lambda f: len(f.x))
     return [first, *(f for f in fits if f is not first)]

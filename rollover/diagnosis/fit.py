@@ -18,7 +18,6 @@ Array = NDArray[np.float64]
 FAR = 3.0  # misfit over the noise from which on a step may be lengthened
 STRIDE, STRIDES = 2.0, 6  # by what factor, how often
 TRIES = 4  # of a step, each damped more
-PLACES = 241  # time shifts that are tried
 NOISE_LEFT = 1.04  # misfit over the noise that needs no further search
 Point = tuple[Sequence[Candidate], Sequence[float]]
 NONE = np.zeros(0, dtype=np.int64)
@@ -126,36 +125,6 @@ class Judge:
             at += len(c.search)
         return found
 
-    def aligned(self) -> None:
-        """Begin with the time shift at which each recording meets the scenario best, within three of its prior.
-
-        One run moved along the stamps tells where to look; the best places are then simulated.
-        """
-        for r, e in enumerate(self.evidence):
-            shifts = np.linspace(-3.0, 3.0, PLACES) * e.shift_prior
-            y = self.predicted(r, (), (), 0.0)
-            if y is None:
-                continue
-            rough = []
-            for s in shifts:
-                moved = y.copy()
-                for signal, part in e.spans():
-                    time = e.recording.time[signal.rows]
-                    moved[part] = np.interp(time - s, time, y[part])
-                rough.append(float(np.sum(e.eased(self.measured[r] - moved) ** 2)) + (s / e.shift_prior) ** 2)
-            best = float(shifts[int(np.argmin(rough))])
-            near = best + np.linspace(-2.0, 2.0, 5) * float(shifts[1] - shifts[0])
-            left = [self._left(r, float(s)) for s in near]
-            self.shifts[r] = float(near[int(np.argmin(left))])
-
-    def _left(self, r: int, shift: float) -> float:
-        """What the scenario as it is leaves of recording r at a time shift."""
-        y = self.predicted(r, (), (), shift)
-        if y is None:
-            return np.inf
-        e = self.evidence[r]
-        return float(np.sum(e.eased(self.measured[r] - y) ** 2)) + (shift / e.shift_prior) ** 2
-
     def block(
         self,
         r: int,
@@ -192,11 +161,29 @@ class Judge:
             if moved is None:
                 return None
             J[:, k] = moved / step
-        slope = e.eased(e.slope(raw, leaps))
+        slope = e.eased(e.whitened(self._slope(r, candidates, x, shift, raw, leaps)))
         if self._pinned and e.recording.clock.zero != "unknown":
             slope = np.zeros_like(slope)
         residual = e.eased(self.measured[r] - y)
         return Block(residual=residual, J=J, slope=slope, shift=shift, prior=e.shift_prior)
+
+    def _slope(
+        self,
+        r: int,
+        candidates: Sequence[Candidate],
+        x: Sequence[float],
+        shift: float,
+        raw: Array,
+        leaps: NDArray[np.int64],
+    ) -> Array:
+        """dy/dtau of recording r, stacked, SI; none across a leap, on whichever side a sample was and is."""
+        e, later = self.evidence[r], self.effort.later
+        found = e.simulator.predict(self.changes(candidates, x), shift + later)
+        after = raw if found is None else e.raw(found)
+        slope = (after - raw) / later
+        for k in (*leaps, *e.leaps(after)):
+            slope[k : k + 3] = 0.0
+        return np.nan_to_num(slope)
 
     def moved(self, r: int, before: Point, after: Point, shift: float) -> Array | None:
         """How the prediction of recording r differs between two points, whitened; nothing where either leaps.

@@ -9,12 +9,12 @@ single simulation. What is compared with it is the same maximum for the misfit.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.candidates import Candidate, coordinate, physical
 from rollover.diagnosis.chaos import FEW
 from rollover.diagnosis.fit import Block, Fitted, Judge
 from rollover.effects import EFFECTS
@@ -24,6 +24,8 @@ DRAWS = 4000
 SHOWS = 1e-3  # noise units: a direction that moves the whole by less is arithmetic's
 VISIBLE = 5.0  # standard errors of the noise at which an effect shows
 JITTER = 1e-9
+WAYS = 2  # places of one effect at which fits begin
+EDGE = 0.01  # of a coordinate, that they keep from its ends
 
 
 def freed(vectors: Array, block: Block) -> Array:
@@ -35,12 +37,17 @@ def freed(vectors: Array, block: Block) -> Array:
 
 @dataclass(frozen=True, kw_only=True)
 class Gate:
-    """The best score of all candidates, each one's own by key, the null (draws,), and the strength that would show."""
+    """The best score of all candidates, each one's own by key, the null (draws,), and the strength that would show.
+
+    `starts` are the places where a fit may begin, by key, the best first: the directions that score most, followed as
+    far as the misfit goes along them. Thresholds have no such way and are not in it.
+    """
 
     score: float
     scores: Mapping[str, float]
     null: Array
     detectable: Mapping[str, float]
+    starts: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
 
     def p_value(self, phi: float = 1.0) -> float:
         """p-value of the best score; `phi` is what is left per sample where not even an explanation leaves noise."""
@@ -48,13 +55,13 @@ class Gate:
 
 
 def gate(judge: Judge, base: Fitted, candidates: Sequence[Candidate], only: Sequence[int] | None = None) -> Gate:
-    """Look at every candidate beside the base, in all recordings or `only` some."""
+    """Look at every candidate beside the base, in all recordings or `only` some, from the base's own time shifts."""
     use = list(range(len(base.blocks))) if only is None else list(only)
     blocks = [base.blocks[r] for r in use]
     misfit = np.concatenate([freed((b.residual + b.shift * b.slope)[:, None], b)[:, 0] for b in blocks])
     held = np.concatenate([freed(b.J, b) for b in blocks]) if base.x else np.zeros((misfit.size, 0))
     own, _ = np.linalg.qr(held)
-    columns, names, values = [], [], []
+    columns, looks, sizes = [], [], []
     for c in candidates:
         for x in c.probes():
             d = _direction(judge, base, c, x, use)
@@ -64,19 +71,41 @@ def gate(judge: Judge, base: Fitted, candidates: Sequence[Candidate], only: Sequ
             size = float(np.sqrt(d @ d))
             if size > SHOWS:
                 columns.append(d / size)
-                names.append(c.key)
-                values.append(_visible(c, x, size))
+                looks.append((c, x))
+                sizes.append(size)
     if not columns:
         return Gate(score=0.0, scores={}, null=np.zeros(DRAWS), detectable={})
     D = np.stack(columns, axis=1)
-    scores = (D.T @ (misfit - own @ (own.T @ misfit))) ** 2 / (1.0 + _trust(judge, blocks, use, D))
+    along = D.T @ (misfit - own @ (own.T @ misfit))
+    scores = along**2 / (1.0 + _trust(judge, blocks, use, D))
     detectable: dict[str, float] = {}
-    for name, value in zip(names, values, strict=True):
-        detectable[name] = min(value, detectable.get(name, np.inf))
     own_best: dict[str, float] = {}
-    for name, score in zip(names, scores, strict=True):
-        own_best[name] = max(float(score), own_best.get(name, 0.0))
-    return Gate(score=float(scores.max()), scores=own_best, null=null_of_the_best([D]), detectable=detectable)
+    ways: dict[str, list[tuple[float, ...]]] = {}
+    for k in np.argsort(-scores, kind="stable"):
+        c, x = looks[k]
+        detectable[c.key] = min(_visible(c, x, sizes[k]), detectable.get(c.key, np.inf))
+        own_best.setdefault(c.key, float(scores[k]))
+        start = followed(c, x, float(along[k]) / sizes[k])
+        if start is not None and len(ways.setdefault(c.key, [])) < WAYS:
+            ways[c.key].append(start)
+    return Gate(
+        score=float(scores.max()),
+        scores=own_best,
+        null=null_of_the_best([D]),
+        detectable=detectable,
+        starts={key: tuple(each) for key, each in ways.items()},
+    )
+
+
+def followed(c: Candidate, x: Sequence[float], factor: float) -> tuple[float, ...] | None:
+    """Coordinates at which an effect is `factor` times as strong as at x; None for one without a zero to go from."""
+    name, null = yardstick(c.id, c.search)
+    if EFFECTS[c.id].null.get(name) is None:
+        return None
+    search, at = c.search[name], list(c.search).index(name)
+    value = null + factor * (physical(x[at], search) - null)
+    inside = coordinate(min(max(value, search.low), search.high), search)
+    return (*x[:at], min(max(inside, EDGE), 1.0 - EDGE), *x[at + 1 :])
 
 
 def _trust(judge: Judge, blocks: Sequence[Block], use: Sequence[int], D: Array) -> Array:

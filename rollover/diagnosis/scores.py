@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rollover.diagnosis.clocks import align
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.fit import Fitted, Judge, shift_of
 from rollover.diagnosis.holdout import Held, held_out
@@ -39,7 +40,7 @@ def judged(judge: Judge, fitted: Fitted, kept: Sequence[Evidence], groups: Seque
         scores = {"training": train, "held_out": replace(train, nrmse=held.total)}
         return Judged(scores=scores, held=held, by_recording=tuple(rows))
     other = Judge(kept)
-    other.aligned()
+    align(other)
     apart = predicted(other, fitted)
     if apart is None:
         return Judged(scores={"training": train}, held=held, by_recording=tuple(rows))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.account import diagnosed_scenario
 from rollover.diagnosis.bins import simulated
+from rollover.diagnosis.clocks import align
 from rollover.diagnosis.evidence import Evidence, evidence_of
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.phases import phases_of
@@ -127,7 +128,7 @@ def _rows_in_one(recording: Recording, thinner: Recording) -> float:
 def _shift(evidence: Evidence) -> float:
     """Time shift at which a simulation meets its recording best, within `WIDEST` of its prior, s."""
     judge = Judge([evidence])
-    judge.aligned()
+    align(judge)
     fitted = judge.fit((), ())
     best = judge.shifts[0] if fitted is None else fitted.blocks[0].shift
     most = WIDEST * evidence.shift_prior

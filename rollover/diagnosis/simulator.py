@@ -25,7 +25,7 @@ EDGES = ("sensor-lag", "sensor-clock-offset", "sensor-clock-drift")
 KINKED = ("soil-layer", "soil-crust", "structural-compliance", "guide-friction")
 SMOOTH = 1e-3  # s: longest step that keeps all others within 1e-4 of the range
 BESIDE = 1e-9  # s: on either side of the first contact
-KEPT = 64  # runs of one recording
+KEPT = 128  # runs of one recording
 
 
 class Simulator(Protocol):
@@ -70,7 +70,7 @@ class DropSimulator:
         physical = {path: value for path, value in changes.items() if not path.startswith(SENSORS)}
         stamps = self.recording.time
         try:
-            run = self._run(physical, stamps - shift, (shift,))
+            run = self._at(physical, shift)
             if len(physical) < len(changes):
                 read_by = self.model.with_({p: v for p, v in changes.items() if p not in physical}).scenario.effects
                 run = replace(run, time=stamps, channels={**run.channels, **self._edges(physical, shift, read_by)})
@@ -127,16 +127,36 @@ class DropSimulator:
         below = self.model.run(times)["ground/sinkage"] > 0.0
         return float(times[np.argmax(below)]) if below.any() else np.inf
 
+    def _at(self, physical: Mapping[str, Any], shift: float) -> Recording:
+        """The drop at the stamps less `shift`; what it is a little later is made along with it, for slopes."""
+        values, later = tuple(sorted(physical.items())), shift + self.effort.later
+        if (*values, shift) not in self._raw:
+            stamps = self.recording.time
+            times = np.concatenate([stamps - shift, stamps - later])
+            order = np.argsort(times, kind="stable")
+            run, back = self._made(physical, times[order]), np.argsort(order, kind="stable")
+            for key, part in ((shift, back[: stamps.size]), (later, back[stamps.size :])):
+                channels = {name: v[part] for name, v in run.channels.items()}
+                self._keep((*values, key), replace(run, time=run.time[part], channels=channels))
+        return self._raw[(*values, shift)]
+
     def _run(self, physical: Mapping[str, Any], times: Array, key: tuple[Any, ...]) -> Recording:
-        """The drop before instruments: what sensors alone change needs no second run."""
+        """The drop before instruments at `times`, which `key` stands for."""
         key = (*sorted(physical.items()), *key)
         if key not in self._raw:
-            if len(self._raw) >= KEPT:
-                self._raw.pop(next(iter(self._raw)))
-            model = self.model.with_(physical) if physical else self.model
-            fine = any(name in model.scenario.effects for name in KINKED)
-            self._raw[key] = (model if fine else replace(model, step=SMOOTH)).run(times)
+            self._keep(key, self._made(physical, times))
         return self._raw[key]
+
+    def _made(self, physical: Mapping[str, Any], times: Array) -> Recording:
+        model = self.model.with_(physical) if physical else self.model
+        fine = any(name in model.scenario.effects for name in KINKED)
+        return (model if fine else replace(model, step=SMOOTH)).run(times)
+
+    def _keep(self, key: tuple[Any, ...], run: Recording) -> None:
+        """What sensors alone change needs no second run."""
+        if len(self._raw) >= KEPT:
+            self._raw.pop(next(iter(self._raw)))
+        self._raw[key] = run
 
 
 def behind_filters(channels: Mapping[str, Array], recording: Recording) -> dict[str, Array]:

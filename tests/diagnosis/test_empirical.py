@@ -13,6 +13,7 @@ from ground.law import REFERENCE_AREA
 from rollover.diagnosis import account, diagnose, diagnosed_text
 from rollover.diagnosis.account import diagnosed_scenario
 from rollover.diagnosis.candidates import candidates_of
+from rollover.diagnosis.clocks import align
 from rollover.diagnosis.empirical import best_subsets, proposed
 from rollover.diagnosis.evidence import evidence_of, left_out
 from rollover.diagnosis.fit import Judge
@@ -199,7 +200,7 @@ def test_no_law_is_made_of_noise() -> None:
     made = recorded({}, 7, speeds=(1.5, 2.0, 2.5, 3.0), channels=(FORCE, DEPTH, ACCELERATION), rate=1000.0)
     found = [e for e in (evidence_of(n, r, simulator_of(scenario(), r)) for n, r in made) if e is not None]
     judge = Judge(found)
-    judge.aligned()
+    align(judge)
     base = judge.fit((), ())
     assert base is not None
     sets = [set_up(scenario(), e.recording) for e in found]

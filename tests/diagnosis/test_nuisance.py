@@ -11,6 +11,7 @@ import pytest
 
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.candidates import candidates_of, coordinate, size_of
+from rollover.diagnosis.clocks import align
 from rollover.diagnosis.evidence import Evidence, doubted, evidence_of, groups_of, left_out
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.nuisance import doubts, eased
@@ -59,7 +60,7 @@ def test_speeds_that_are_uncertain_explain_what_they_can_and_no_more() -> None:
     for sigma in (0.0, 0.06):
         found = evidence(misstated({}, sigma))
         judge = Judge(found)
-        judge.aligned()
+        align(judge)
         base = judge.fit((), ())
         assert base is not None
         left[sigma] = np.sqrt(base.left / sum(e.count for e in found))

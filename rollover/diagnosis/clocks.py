@@ -1,0 +1,82 @@
+"""When a recording's clock began: by all that was recorded, or by its first contact alone.
+
+A time shift that is fitted to a whole recording bends towards whatever the simulation misses. The first contact hardly
+depends on that: an error of the model grows with the force, so that samples after it are trusted to `TRUSTED` of what
+they have changed since the start, and none later than `SOON`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.fit import Judge
+
+Array = NDArray[np.float64]
+WIDTH = 3.0  # times its prior, within which a time shift is sought
+PLACES = 241  # time shifts that are tried
+SOON, LEAST = 8e-3, 4  # s after the first contact, and samples, that tell of it
+TRUSTED = 0.1  # of a change of a channel, by which the model may be off
+BELIEVED = 2.0  # times its prior: a shift beyond is the model's fault, where the clock's zero is known
+
+Cost = Callable[[int, Array, float], float]
+
+
+def align(judge: Judge) -> None:
+    """Begin with the time shift at which each recording meets the scenario best."""
+    for r in range(len(judge.evidence)):
+        found = _best(judge, r, (), (), lambda r, raw, shift: _whole(judge, r, raw, shift))
+        judge.shifts[r] = judge.shifts[r] if found is None else found
+
+
+def by_first_contact(judge: Judge, candidates: Sequence[Candidate], x: Sequence[float]) -> list[float | None]:
+    """Time shift (s) of each recording by its first contact; None where nothing comes of it."""
+    found: list[float | None] = []
+    for r, e in enumerate(judge.evidence):
+        at = _best(judge, r, candidates, x, lambda r, raw, shift: _early(judge, r, raw, shift))
+        known = e.recording.clock.zero != "unknown"
+        found.append(None if at is None or (known and abs(at) > BELIEVED * e.shift_prior) else at)
+    return found
+
+
+def _best(judge: Judge, r: int, candidates: Sequence[Candidate], x: Sequence[float], cost: Cost) -> float | None:
+    """One run moved along the stamps tells where to look; the best places are then simulated."""
+    e = judge.evidence[r]
+    shifts = np.linspace(-WIDTH, WIDTH, PLACES) * e.shift_prior
+    raw = judge.raw(r, candidates, x, 0.0)
+    if raw is None:
+        return None
+    rough = []
+    for s in shifts:
+        moved = raw.copy()
+        for signal, part in e.spans():
+            time = e.recording.time[signal.rows]
+            moved[part] = np.interp(time - s, time, raw[part])
+        rough.append(cost(r, moved, float(s)))
+    near = shifts[int(np.argmin(rough))] + np.linspace(-2.0, 2.0, 5) * float(shifts[1] - shifts[0])
+    made = [judge.raw(r, candidates, x, float(s)) for s in near]
+    left = [np.inf if y is None else cost(r, y, float(s)) for s, y in zip(near, made, strict=True)]
+    return float(near[int(np.argmin(left))])
+
+
+def _whole(judge: Judge, r: int, raw: Array, shift: float) -> float:
+    """What is left of recording r by all its samples."""
+    e = judge.evidence[r]
+    return float(np.sum(e.eased(judge.measured[r] - e.whitened(raw)) ** 2)) + (shift / e.shift_prior) ** 2
+
+
+def _early(judge: Judge, r: int, raw: Array, shift: float) -> float:
+    """What is left of it by those up to shortly after the first contact, coloured ones for what they are worth."""
+    e = judge.evidence[r]
+    total = (shift / e.shift_prior) ** 2
+    for s, part in e.spans():
+        time = e.recording.time[s.rows] - shift
+        after = time[time > 0.0][LEAST - 1 : LEAST]
+        inside = time < max(SOON, *after)
+        sigma = np.hypot(s.sigma, TRUSTED * (raw[part] - raw[part][0]))
+        worth = max(1.0 - sum(s.ar), 0.05) / (1.0 + max(sum(s.ar), 0.0))
+        total += worth * float(np.sum((((s.values - raw[part]) / sigma)[inside]) ** 2))
+    return total

@@ -1,0 +1,135 @@
+"""When a clock began: the first contact tells it, however wrong the simulation is later; and what a shift does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis.candidates import candidates_of, coordinate
+from rollover.diagnosis.clocks import BELIEVED, align, by_first_contact
+from rollover.diagnosis.evidence import Evidence, evidence_of
+from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.gate import followed, gate
+from rollover.diagnosis.simulator import DropSimulator, simulator_of
+from rollover.drop import DropModel
+from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
+
+HARDPAN = {"effects.soil-layer.depth": 0.08, "effects.soil-layer.stiffness_ratio": 1.6}
+CRUST = {"effects.soil-crust.thickness": 0.06, "effects.soil-crust.stiffness_ratio": 0.75}
+
+
+def judge_of(changes: dict[str, object], *, late: float = 0.0, rate: float = 1000.0, noise: float = 0.003) -> Judge:
+    """Three drops whose clocks are late by `late` more than `recorded` makes them by chance."""
+    found: list[Evidence] = []
+    for name, r in recorded(changes, 3, channels=(FORCE, DEPTH, ACCELERATION), rate=rate, noise=noise):
+        moved = replace(r, time=r.time + late)
+        one = evidence_of(name, moved, simulator_of(scenario(), moved))
+        assert one is not None
+        found.append(one)
+    return Judge(found)
+
+
+def known(judge: Judge, changes: dict[str, object]) -> np.ndarray:
+    """Time shifts by fits of the truth itself, s."""
+    id = next(iter(changes)).split(".")[1]
+    c = {c.id: c for c in candidates_of(judge.evidence, (), "drop")}[id]
+    x = [coordinate(float(str(changes[f"effects.{id}.{n}"])), s) for n, s in c.search.items()]
+    fitted = judge.fit((c,), x, shifts=[0.0] * len(judge.evidence))
+    assert fitted is not None
+    return np.array([b.shift for b in fitted.blocks])
+
+
+@pytest.mark.parametrize("missing", [HARDPAN, CRUST], ids=["hardpan", "crust"])
+def test_the_first_contact_is_not_bent_by_what_the_simulation_misses(missing: dict[str, object]) -> None:
+    judge = judge_of(missing, late=0.5e-3)
+    truth = known(judge, missing)
+    align(judge)
+    base = judge.fit((), ())
+    assert base is not None
+    bent = np.array([b.shift for b in base.blocks]) - truth
+    early = np.array([np.nan if v is None else v for v in by_first_contact(judge, (), ())]) - truth
+    assert np.abs(bent).max() > 0.6e-3  # a whole recording's shift eats part of it
+    assert np.abs(early).max() < 0.25e-3
+
+
+def test_a_clock_that_would_have_to_be_far_off_is_not_believed_where_its_zero_is_known() -> None:
+    judge = judge_of({}, late=5.0e-3)
+    loose = []
+    for e in judge.evidence:
+        clock = replace(e.recording.clock, zero="unknown")
+        loose.append(replace(e, recording=replace(e.recording, clock=clock)))
+    told = [np.nan if v is None else v for v in by_first_contact(Judge(loose), (), ())]
+    far = [abs(v) > BELIEVED * e.shift_prior for v, e in zip(told, loose, strict=True)]
+    assert any(far)
+    assert [v is None for v in by_first_contact(judge, (), ())] == far
+
+
+def test_the_slope_of_a_clock_is_that_of_the_simulation() -> None:
+    """Against central differences of the model itself, in the smooth part of the loading."""
+    judge = judge_of({}, rate=500.0)
+    block = judge.block(0, (), (), 0.0, 0.0)
+    assert block is not None
+    e = judge.evidence[0]
+    speed = e.recording.conditions["initiation.speed"]
+    model = DropModel(scenario=scenario(), step=1e-3).with_({"initiation.speed": speed})
+    time, h = e.recording.time, 1e-5
+    rates = {c: (model.run(time - h)[c] - model.run(time + h)[c]) / (2 * h) for c in (FORCE, DEPTH, ACCELERATION)}
+    wanted = e.whitened(np.concatenate([rates[s.channel][s.rows] for s in e.signals]))
+    smooth = np.concatenate([(time[s.rows] > 0.02) & (time[s.rows] < 0.1) for s in e.signals])
+    assert block.slope[smooth] == pytest.approx(wanted[smooth], rel=0.02, abs=2e-3 * np.abs(wanted).max())
+
+
+def test_one_run_serves_a_place_and_its_slope() -> None:
+    e = judge_of({}).evidence[0]
+    assert isinstance(e.simulator, DropSimulator)
+    first = e.simulator.predict({"effects.soil-stiffness.scale": 1.1}, 0.0)
+    runs = len(e.simulator._raw)
+    later = e.simulator.predict({"effects.soil-stiffness.scale": 1.1}, e.simulator.effort.later)
+    assert len(e.simulator._raw) == runs
+    alone = DropSimulator(e.simulator.model.scenario, e.recording).predict(
+        {"effects.soil-stiffness.scale": 1.1}, e.simulator.effort.later
+    )
+    assert first is not None
+    assert later is not None
+    assert alone is not None
+    assert all(np.array_equal(later[c], alone[c]) for c in alone)
+    assert not np.array_equal(first[DEPTH], later[DEPTH])
+
+
+def test_fits_from_two_places_end_at_one() -> None:
+    """A soil a thousandth softer than its law: what is left differs by less than one sample's worth."""
+    judge = judge_of({"effects.soil-stiffness.scale": 0.9987}, noise=0.0005)
+    candidate = {c.id: c for c in candidates_of(judge.evidence, (), "drop")}["soil-stiffness"]
+    align(judge)
+    ends = [judge.fit((candidate,), (start,)) for start in (0.40, 0.5, 0.62)]
+    left = [f.left for f in ends if f is not None]
+    assert len(left) == 3
+    assert max(left) - min(left) < 1.0
+
+
+def test_the_score_test_leads_to_where_the_effect_is() -> None:
+    mild = {**HARDPAN, "effects.soil-layer.stiffness_ratio": 1.05}
+    judge = judge_of(mild)
+    candidates = [c for c in candidates_of(judge.evidence, (), "drop") if c.id == "soil-layer"]
+    shifts = known(judge, mild)
+    base = judge.fit((), (), shifts=shifts.tolist(), rounds=0)
+    assert base is not None
+    starts = gate(judge, base, candidates).starts["soil-layer"]
+    values = [candidates[0].values(x) for x in starts]
+    assert any(abs(v["depth"] - 0.08) < 0.025 and 1.03 < v["stiffness_ratio"] < 1.07 for v in values), values
+
+
+def test_a_way_from_no_effect_is_followed_in_the_parameter_itself() -> None:
+    judge = judge_of({})
+    by_id = {c.key: c for c in candidates_of(judge.evidence, (), "drop")}
+    layer = by_id["soil-layer"]
+    x = layer.probes()[0]
+    there = followed(layer, x, 30.0)
+    assert there is not None
+    before, after = layer.values(x), layer.values(there)
+    assert after["stiffness_ratio"] - 1.0 == pytest.approx(30.0 * (before["stiffness_ratio"] - 1.0))
+    assert after["depth"] == before["depth"]
+    clip = by_id[f"sensor-clipping:{FORCE}"]
+    assert followed(clip, clip.probes()[0], 3.0) is None
