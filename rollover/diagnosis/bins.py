@@ -39,9 +39,13 @@ class Averaged:
     def _means(self, found: Mapping[str, Array]) -> dict[str, Array]:
         return {c: np.add.reduceat(v, self.starts) / self.counts for c, v in found.items()}
 
-    def strays(self) -> list[dict[str, Array]]:
+    def strays(self, changes: Mapping[str, Any] | None = None, shift: float = 0.0) -> list[dict[str, Array]]:
         """See `Simulator`."""
-        return [self._means(d) for d in self.inner.strays()]
+        return [self._means(d) for d in self.inner.strays(changes, shift)]
+
+    def settle(self) -> None:
+        """See `Simulator`."""
+        self.inner.settle()
 
     def marks(self) -> tuple[tuple[float, str], ...]:
         """See `Simulator`."""

@@ -27,6 +27,7 @@ SHAPES = {
     "soil-adhesion": ("reach",),
     "tank-slosh": ("damping",),
     "payload-shift": ("friction",),
+    "axle-stop": ("stiffness",),
 }
 
 PLACES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of a shape, at which a fit of it begins

@@ -21,7 +21,7 @@ from rollover.diagnosis.evidence import Evidence, Signal
 
 Array = NDArray[np.float64]
 WINDOW = 0.02  # s, over which the neighbours' squares are averaged: what is off by a little in time is off in size
-FEW = 2.0  # c, for four neighbours
+FEW = 1.5  # c, for six neighbours
 LONGEST = 0.1  # s, that scatter goes together
 UNTOUCHED = 0.99  # weights all above need no mention
 

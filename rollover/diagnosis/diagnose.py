@@ -156,7 +156,9 @@ def _trusted(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:
 def _evidence(scenario: Scenario, recordings: Sequence[tuple[str, Recording]]) -> tuple[list[Evidence], list[str]]:
     found, notes = [], []
     for name, recording in recordings:
-        one = evidence_of(name, *simulated(scenario, recording))
+        thin, simulator, averaged = simulated(scenario, recording)
+        simulator.settle()
+        one = evidence_of(name, thin, simulator, averaged)
         still = [c for c, v in recording.channels.items() if np.isfinite(v).any() and np.nanmin(v) == np.nanmax(v)]
         notes += [f"{name}: {channel} never moves and was left aside" for channel in still]
         if one is None:

@@ -18,6 +18,8 @@ class Effort:
     rounds: int = 14  # of a whole fit
     nudges: tuple[float, ...] = (2e-2, 5e-3, 1e-3)  # of a coordinate, for differences: wide first
     polishes: int = 2  # fits that are followed along a crooked valley
+    wide: float = 0.0  # of a coordinate, to which a central difference may widen; 0: one-sided, as it is
+    least: float = 0.0  # gain of a round below which a search narrows
     later: float = 5e-5  # s, by which a clock is moved to see what that does
     thrifty: bool = False  # looks at few recordings, fits no shapes, and stops where nothing but noise is left
 
@@ -28,16 +30,18 @@ class Effort:
 
 
 DROPS = Effort()
-# below a wide step, a run with many contacts shows chance and no slope
+# runs with many contacts differ by chance beside what a parameter does: over a narrow step that is all of the slope
 RUNS = Effort(
     few=2,
     scored=12,
     promising=4,
-    short=3,
+    short=2,
     leaders=2,
     most_leaders=3,
     rounds=12,
-    nudges=(3e-2, 8e-3),
+    nudges=(6e-2, 3e-2),
+    wide=0.13,
+    least=4.0,
     polishes=0,
     later=1e-3,  # from one row of a run to the next
     thrifty=True,

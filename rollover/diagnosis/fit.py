@@ -12,6 +12,7 @@ from rollover.diagnosis.blocks import GENTLE, Block, Fitted, bounded, shift_of
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
+from rollover.diagnosis.secant import secant
 
 Array = NDArray[np.float64]
 FAR = 3.0  # misfit over the noise from which on a step may be lengthened
@@ -147,6 +148,13 @@ class Judge:
         if known is not None:
             J[:, : known.shape[1]] = known
         for k in range(0 if known is None else known.shape[1], len(x) if nudge else 0):
+            if self.effort.wide:
+                widest = 0.0 if self._pinned else self.effort.wide  # a first fit is short
+                column = secant(e, lambda a, b: self.moved(r, a, b, shift), (candidates, x), k, nudge, widest)
+                if column is None:
+                    return None
+                J[:, k] = column
+                continue
             step = nudge if x[k] < 0.5 else -nudge
             there = [*x[:k], x[k] + step, *x[k + 1 :]]
             moved = self.moved(r, (candidates, x), (candidates, there), shift)
@@ -238,7 +246,7 @@ class Judge:
             for block in blocks:
                 Ar, br, _ = block.normal()
                 A, b = A + Ar, b + br
-            improved, enough, total = False, 1e-3 * max(1.0, 1e-2 * best), best
+            improved, enough, total = False, max(1e-3 * max(1.0, 1e-2 * best), self.effort.least), best
             for _ in range(TRIES):
                 dx = bounded(A, b, np.array(x), damping)
                 trial = [float(v) for v in np.clip(np.array(x) + dx, 0.0, 1.0)]

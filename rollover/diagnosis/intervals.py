@@ -10,32 +10,65 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.blocks import Block
 from rollover.diagnosis.candidates import physical
-from rollover.diagnosis.evidence import MODEL_ERROR
+from rollover.diagnosis.evidence import MODEL_ERROR, Evidence
 from rollover.diagnosis.fit import GENTLE, Fitted, Judge
+from rollover.diagnosis.settle import along, step_of_means
 from rollover.diagnosis.verdict import Interval
 from rollover.effects import EFFECTS, units_of
 
 Array = NDArray[np.float64]
 TWO_SIDED = 1.96
-STUDENT = 2.6  # (t/1.96)^2 of Student's t for three neighbours: their scatter is itself an estimate
+EVENLY = 12.0**-0.5  # standard deviation of what is spread evenly from 0 to 1
 
 
-def without_one(blocks: Sequence[Block]) -> Array:
-    """Standard errors (p,) from fits that each leave one recording out, as wide as so few recordings make them.
+def scattered(evidence: Sequence[Evidence], blocks: Sequence[Block], inverse: Array) -> Array:
+    """Variances (p,) of parameters fitted to one run each, by what neighbours of the run scatter by.
 
-    sd^2 = (k - 1)/k sum_r (dx_r - mean dx)^2 (Tukey's jackknife), times (t/1.96)^2, t Student's 97.5 % quantile for
-    k - 1: what recordings disagree by, whatever makes them. Nothing is known of that from a single recording: 0.
+    sum_r var_k(A^-1 J_r'd_rk) (1 + 1/k) (t/1.96)^2: what was measured is one run more, the model the mean of k.
     """
     from scipy.stats import t
 
-    k, p = len(blocks), blocks[0].J.shape[1]
-    if k < 2:
-        return np.zeros(p)
-    normals = [b.normal()[:2] for b in blocks]
-    A, b = sum(n[0] for n in normals) + GENTLE * np.eye(p), sum(n[1] for n in normals)
-    dx = np.array([np.linalg.solve(A - n[0], b - n[1]) for n in normals])
-    wide = float(t.ppf(0.975, k - 1)) / TWO_SIDED
-    return np.asarray(wide * np.sqrt((k - 1) / k * np.sum((dx - dx.mean(axis=0)) ** 2, axis=0)))
+    found, free = np.zeros(inverse.shape[0]), 0
+    for e, block in zip(evidence, blocks, strict=True):
+        k = len(e.strays)
+        if k < 2:
+            continue
+        free += k - 1
+        each = np.array([inverse @ along(block, e, stray) for stray in e.strays])
+        found += (1.0 + 1.0 / k) * np.var(each, axis=0, ddof=1)
+    return np.asarray(found * (float(t.ppf(0.975, free)) / TWO_SIDED) ** 2) if free else found
+
+
+def unshaped(judge: Judge, fitted: Fitted, inverse: Array) -> Array:
+    """Variances (p,) of what shapes of the last effect that are not fitted would move: each evenly over its range."""
+    found = np.zeros(len(fitted.x))
+    last, at = fitted.candidates[-1], list(fitted.x)
+    shapes = list(last.shapes)
+    if any(getattr(EFFECTS[last.id](), name, 0.0) is None for name in shapes):
+        return found  # as the scenario has it
+    begun = last.with_shapes(())[0] if shapes else ()
+    whole = (*fitted.candidates[:-1], last.whole())
+    for k in range(len(shapes)):
+        pull = np.zeros(len(fitted.x))
+        low, high = (min(max(begun[k] + s * EVENLY, 0.0), 1.0) for s in (-1.0, 1.0))
+        ends = [(whole, [*at, *begun[:k], v, *begun[k + 1 :]]) for v in (low, high)]
+        for r, block in enumerate(fitted.blocks):
+            d = judge.moved(r, ends[0], ends[1], block.shift)
+            if d is not None:
+                pull += block.J.T @ d - (block.J.T @ block.slope) * float(block.slope @ d) / block.weight
+        found += (EVENLY / (high - low) * (inverse @ pull)) ** 2
+    return found
+
+
+def _noise(judge: Judge, fitted: Fitted) -> Array:
+    """Covariance (p, p) of J'w that comes of the noise alone: a weighed sample's noise is below 1."""
+    found = GENTLE * np.eye(len(fitted.x))
+    for e, block in zip(judge.evidence, fitted.blocks, strict=True):
+        J = block.J - np.outer(block.slope, block.slope @ block.J) / block.weight
+        weights = [np.ones(s.rows.size) if s.weight is None else s.weight for s in e.signals]
+        J = J * np.concatenate(weights)[:, None]
+        found = found + J.T @ J
+    return np.asarray(found)
 
 
 def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
@@ -43,15 +76,17 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
 
     cov = phi A^-1, phi the misfit left per sample (at least 1); beside it, in quadrature, what a gain error of the
     model of `MODEL_ERROR` in any one channel would do, A^-1 J'(error): integrators differ, noise or not. Where runs
-    that nobody could tell apart scatter, so do the parameters that would be fitted to them; there the disagreement of
-    the recordings counts where it is larger (`without_one`).
+    that nobody could tell apart scatter and samples are weighed by that, cov = phi A^-1 N A^-1 with N the covariance
+    that the noise alone gives J'w; beside it stand `scattered` and `unshaped`.
     """
     p = len(fitted.x)
     A = sum((b.normal()[0] for b in fitted.blocks), np.zeros((p, p))) + GENTLE * np.eye(p)
-    inverse = np.linalg.inv(A)
+    inverse: Array = np.asarray(np.linalg.inv(A), dtype=np.float64)
     count = sum(b.residual.size for b in fitted.blocks)
     phi = max(1.0, fitted.left / count) * judge.per_error
-    sd = np.sqrt(np.maximum(phi * np.diag(inverse), 0.0))
+    strayed = any(e.strays for e in judge.evidence)
+    noise = inverse @ _noise(judge, fitted) @ inverse if strayed else inverse
+    sd = np.sqrt(np.maximum(phi * np.diag(noise), 0.0))
     moved = np.zeros(p)
     channels = {s.channel for e in judge.evidence for s in e.signals}
     for channel in channels:
@@ -62,14 +97,13 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
                     y = (judge.measured[r] - block.residual)[part]
                     pull += block.J[part].T @ (MODEL_ERROR * y)
         moved += (inverse @ pull) ** 2
-    for e, block in zip(judge.evidence, fitted.blocks, strict=True):
-        for stray in e.strays:
-            moved += STUDENT / len(e.strays) * (inverse @ (block.J.T @ e.whitened(stray))) ** 2
     # a fit that ended before it was at rest is off by what the next step would have been
-    moved += (inverse @ sum((b.normal()[1] for b in fitted.blocks), np.zeros(p))) ** 2
+    rest = inverse @ sum((b.normal()[1] for b in fitted.blocks), np.zeros(p))
+    if strayed:
+        moved += scattered(judge.evidence, fitted.blocks, inverse) + unshaped(judge, fitted, inverse)
+        rest = step_of_means(judge.evidence, fitted.blocks)
+    moved += rest**2
     sd = np.sqrt(sd**2 + moved)
-    if p and any(e.strays for e in judge.evidence):
-        sd = np.maximum(sd, without_one(fitted.blocks))
     found, at = [], 0
     for c in fitted.candidates:
         kind: Any = EFFECTS[c.id]

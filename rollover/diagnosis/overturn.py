@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,12 +27,13 @@ from rollover.vehicle import Striker
 
 Array = NDArray[np.float64]
 SENSORS = "sensor-"
+CENTRE = "ground.elements.centre"
 KEPT = 300  # runs of one recording: a third of a megabyte each
 BEYOND, FAR_BEYOND = 0.01, 0.06  # s by which a run goes on past the last stamp: time shifts, known zero or not
 SLOWEST = 20.0  # times the first run's wall time, and
 LEAST_TIME = 2.0  # s: a run that takes longer has lost its way in ever shorter steps
-ELSEWHERE = ((0.34, 0.28), (-0.41, 0.17))  # of an element, by which neighbours lie elsewhere on the grid
-SHORTER = (3,)  # times shorter steps of neighbours
+# of an element, by which neighbours lie elsewhere on the grid
+ELSEWHERE = ((0.34, 0.28), (-0.41, 0.17), (0.12, -0.37), (-0.22, -0.15))
 BLOW = 2.0  # weights
 AFTER = 0.03  # s, shortest sliding that is a phase
 MOTION = ("chassis/", "striker/", "axle/front/angle", "ground/sinkage")  # what an instrument's place is worked out from
@@ -40,6 +41,25 @@ MOTION = ("chassis/", "striker/", "axle/front/angle", "ground/sinkage")  # what 
 
 class _TooSlowError(Exception):
     """A run takes far longer than the first."""
+
+
+class Neighbour(NamedTuple):
+    """Where the grid lies, of an element; its spacing and that of contact points over their own; parts of a step."""
+
+    place: tuple[float, float]
+    spacing: float = 1.0
+    points: float = 1.0
+    parts: int = 1
+
+
+NEIGHBOURS = (
+    Neighbour((0.34, 0.28)),
+    Neighbour((-0.41, 0.17), spacing=0.9),
+    Neighbour((0.12, -0.37), points=0.8),
+    Neighbour((-0.22, -0.15), spacing=0.93, points=0.87),
+    Neighbour((0.45, -0.08), parts=2),
+    Neighbour((-0.07, 0.43), spacing=0.9, points=0.8, parts=3),
+)
 
 
 class RunSimulator:
@@ -52,7 +72,8 @@ class RunSimulator:
         self.scenario = _covering(scenario, recording)
         self.runs = 0
         self.seconds = 0.0
-        self._phases: tuple[tuple[float, str], ...] = ()
+        self._phases: dict[tuple[float, ...], tuple[tuple[float, str], ...]] = {}  # by where the grid lies
+        self._centre: tuple[float, ...] = scenario.ground.elements.centre
         self._limit = np.inf
         self._known: dict[tuple[Any, ...], tuple[Scenario, Recording] | None] = {}
         self._behind: dict[tuple[Any, ...], tuple[Recording, dict[str, Array]]] = {}
@@ -102,7 +123,7 @@ class RunSimulator:
     def marks(self) -> tuple[tuple[float, str], ...]:
         """Phases of the run as it is; empty if it fails."""
         self.predict({}, 0.0)
-        return self._phases
+        return self._phases.get(self.scenario.ground.elements.centre, ())
 
     def state(self, shift: float) -> Mapping[str, Array]:
         """Motion of the run as it is, (n,) at the stamps less `shift`; empty if it fails."""
@@ -112,27 +133,64 @@ class RunSimulator:
         run, at = known[1], self.recording.time - shift
         return {name: np.interp(at, run.time, values) for name, values in run.channels.items()}
 
-    def strays(self) -> list[dict[str, Array]]:
-        """What neighbours differ by from the run as it is, channels (n,) at the stamps; those that fail are left out.
+    def strays(self, changes: Mapping[str, Any] | None = None, shift: float = 0.0) -> list[dict[str, Array]]:
+        """What neighbours differ by from the run with `changes`, channels (n,) at the stamps less `shift` (s).
 
-        Neighbours lie elsewhere on the ground's grid, or take shorter steps: nobody could say which of them is right.
+        Neighbours lie elsewhere on the ground's grid, have finer elements, more points of contact, shorter steps:
+        nobody could say which of them is right. Those that fail are left out.
         """
-        base = self.predict({}, 0.0)
+        values = dict(changes or {})
+        base = self.predict(values, shift)
         if base is None:
             return []
-        elements, step = self.scenario.ground.elements, self.scenario.simulation.step
-        places = [
-            tuple(c + f * w for c, f, w in zip(elements.centre, fraction, elements.spacing, strict=True))
-            for fraction in ELSEWHERE
-        ]
-        changes: list[dict[str, Any]] = [{"ground.elements.centre": place} for place in places]
-        changes += [{"simulation.step": step / parts} for parts in SHORTER]
         found = []
-        for change in changes:
-            there = self.predict(change, 0.0)
+        for one in NEIGHBOURS:
+            there = self.predict({**values, **self._beside(one)}, shift)
             if there is not None:
                 found.append({name: there[name] - base[name] for name in base})
         return found
+
+    def settle(self) -> None:
+        """Lay the grid where the run is the most like all others: of two ways that runs go, it takes the common one.
+
+        The medoid: the least sum of the distances to the others, each the root mean square over the channels' ranges.
+        """
+        runs = {place: self.predict({CENTRE: place}, 0.0) for place in self._places()}
+        there = {place: run for place, run in runs.items() if run is not None}
+        if len(there) < 3:
+            return
+        stacks = {place: np.concatenate(list(_scaled(run).values())) for place, run in there.items()}
+        inside = np.all([np.isfinite(y) for y in stacks.values()], axis=0)
+        apart = {
+            place: sum(float(np.sqrt(np.mean((y - other)[inside] ** 2))) for other in stacks.values())
+            for place, y in stacks.items()
+        }
+        best = min(apart, key=lambda place: apart[place])
+        self.scenario = self.scenario.replaced({CENTRE: best})
+        known, behind = self._known.get(_key({CENTRE: best})), self._behind.get(_key({CENTRE: best}))
+        if known is not None and behind is not None:
+            self._known[()], self._behind[()] = known, behind
+
+    def _places(self) -> list[tuple[float, ...]]:
+        """Where the grid may lie as well, where the scenario has it first."""
+        return [self._place(fraction) for fraction in ((0.0, 0.0), *ELSEWHERE)]
+
+    def _beside(self, one: Neighbour) -> dict[str, Any]:
+        """Values of a neighbour."""
+        own, ground = self.scenario, self.scenario.ground.elements
+        place = self._place(one.place)
+        found: dict[str, Any] = {CENTRE: self._centre if place == ground.centre else place}
+        if one.spacing != 1.0:
+            found["ground.elements.spacing"] = tuple(one.spacing * w for w in ground.spacing)
+        if one.points != 1.0:
+            found["vehicle.contact_spacing"] = one.points * own.vehicle.contact_spacing
+        if one.parts > 1:
+            found["simulation.step"] = own.simulation.step / one.parts
+        return found
+
+    def _place(self, fraction: tuple[float, float]) -> tuple[float, ...]:
+        spacing = self.scenario.ground.elements.spacing
+        return tuple(c + f * w for c, f, w in zip(self._centre, fraction, spacing, strict=True))
 
     def _run(self, chosen: Scenario, changes: Mapping[str, Any]) -> tuple[Scenario, Recording] | None:
         """The run before instruments, with the scenario as its effects made it; None if it failed."""
@@ -141,7 +199,9 @@ class RunSimulator:
             if len(self._known) >= KEPT:
                 self._known.pop(next(iter(self._known)))
             physical = {name: e for name, e in chosen.effects.items() if not name.startswith(SENSORS)}
-            self._known[key] = self._made(replace(chosen, effects=physical), is_base=not key)
+            self._known[key] = self._made(
+                replace(chosen, effects=physical), is_base=all(path == CENTRE for path, _ in key)
+            )
         return self._known[key]
 
     def _made(self, scenario: Scenario, *, is_base: bool) -> tuple[Scenario, Recording] | None:
@@ -157,7 +217,7 @@ class RunSimulator:
         if run.status == "failed":
             return None
         if is_base:
-            self._phases = phases_of(run)
+            self._phases[scenario.ground.elements.centre] = phases_of(run)
         stems = {name[:-1] for name in self.recording.channels}  # the axes across, for a sensor that is turned
         kept = {n: v for n, v in run.recording.channels.items() if n[:-1] in stems or n.startswith(MOTION)}
         return scenario.applied(), replace(run.recording, channels=kept)
@@ -165,6 +225,12 @@ class RunSimulator:
     def _watch(self, _simulated: float, wall: float) -> None:
         if wall > self._limit:
             raise _TooSlowError
+
+
+def _scaled(channels: Mapping[str, Array]) -> dict[str, Array]:
+    """Channels over their ranges."""
+    ranges = {name: float(np.nanmax(values) - np.nanmin(values)) for name, values in channels.items()}
+    return {name: values / max(ranges[name], 1e-300) for name, values in channels.items()}
 
 
 def _key(changes: Mapping[str, Any]) -> tuple[Any, ...]:

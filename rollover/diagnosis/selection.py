@@ -14,6 +14,7 @@ from rollover.diagnosis.explain import SURE, Phases, Step, moves, spread, step, 
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate, gate
 from rollover.diagnosis.holdout import held_out
+from rollover.diagnosis.settle import settled
 from rollover.diagnosis.verdict import Verdict
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
@@ -80,6 +81,10 @@ def explained(
         first = first or found
         if found is None or found.p_value > CHANCE or moves(judge, found.base, found.fitted) < NEGLIGIBLE:
             break
+        if judge.effort.thrifty:
+            found = lasting(judge, found, groups)
+            if found is None:
+                break
         taken.append(found)
         current = found.fitted
         left = mismatch_of(judge.evidence, current.blocks, phases)
@@ -111,6 +116,24 @@ def explained(
         after=mismatch_of(judge.evidence, current.blocks, phases),
         first=first.again(judge) if first is not None else None,
     )
+
+
+def lasting(judge: Judge, found: Step, groups: Groups) -> Step | None:
+    """The first of a step's rivals that still gains under the scatter of its own runs; None if none does."""
+    held = judge.evidence
+    for rival in found.rivals:
+        one = settled(judge, replace(found, fitted=rival))
+        if outlasts(one, groups):
+            return one
+        judge.weigh(held)
+    return None
+
+
+def outlasts(found: Step, groups: Groups) -> bool:
+    """Whether an effect predicts what was held out better by more than chance, under the scatter of its own runs."""
+    with_, without_ = held_out(found.fitted, groups), held_out(found.base, groups)
+    phi = max(1.0, float(with_.left.sum() / with_.count.sum()))
+    return bool(float(without_.left.sum() - with_.left.sum()) > NEEDED * phi)
 
 
 def free(current: Fitted, candidates: Sequence[Candidate]) -> list[Candidate]:
@@ -172,6 +195,8 @@ def _needed(
             break
         current = rest
     kept, last = len(current.candidates), taken[-1]
+    if judge.effort.thrifty and kept == len(taken):
+        return [s.again(judge) for s in taken]
     parts: list[Step] = []
     for turn in range(kept):
         whole = turn == kept - 1 and current.candidates[0].key == last.fitted.candidates[-1].key

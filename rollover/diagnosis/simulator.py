@@ -34,8 +34,11 @@ class Simulator(Protocol):
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """Channels (n,) at the recording's stamps less `shift` (s); None if the simulation fails."""
 
-    def strays(self) -> list[dict[str, Array]]:
-        """What runs that nobody could tell apart differ by, channels (n,) at the stamps; empty if by nothing."""
+    def strays(self, changes: Mapping[str, Any] | None = None, shift: float = 0.0) -> list[dict[str, Array]]:
+        """What runs with `changes` that nobody could tell apart differ by, (n,) at the stamps less `shift`, s."""
+
+    def settle(self) -> None:
+        """Of runs that nobody could tell apart take the one that is the most like all."""
 
     def marks(self) -> tuple[tuple[float, str], ...]:
         """(start s, name) of the phases of the scenario as it is; empty if the recording itself tells."""
@@ -76,9 +79,13 @@ class DropSimulator:
             return None
         return behind_filters(run.channels, self.recording)
 
-    def strays(self) -> list[dict[str, Array]]:
+    def strays(self, changes: Mapping[str, Any] | None = None, shift: float = 0.0) -> list[dict[str, Array]]:
         """See `Simulator`: one striker on its guide has no neighbours."""
+        del changes, shift
         return []
+
+    def settle(self) -> None:
+        """See `Simulator`."""
 
     def marks(self) -> tuple[tuple[float, str], ...]:
         """See `Simulator`."""

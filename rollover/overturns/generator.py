@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from rollover.overturns import library
 from rollover.overturns.library import Change
+from rollover.overturns.outside import OUTSIDE
 from rollover.proof.campaign import log_uniform
 from rollover.proof.generator import Case, Order
-from rollover.proof.instruments import Noise, channel_filter
+from rollover.proof.instruments import Fault, Noise, channel_filter
 from rollover.proof.strength import strength
 from rollover.recording import Recording
 from rollover.scenario import Scenario, load
@@ -25,7 +26,7 @@ from rollover.simulate import run
 
 Array = NDArray[np.float64]
 
-KINDS: dict[str, float] = {"null": 0.20, "negligible": 0.05, "single": 0.75}
+KINDS: dict[str, float] = {"null": 0.20, "negligible": 0.05, "single": 0.55, "pair": 0.10, "outside": 0.10}
 CHANNELS = (
     *(f"chassis/acceleration_{axis}" for axis in "xyz"),
     *(f"chassis/angular_velocity_{axis}" for axis in "xyz"),
@@ -40,7 +41,9 @@ LEAD = 0.06  # s more of the run behind the record, that the filter sees
 STEP, SPECTRAL_RADIUS = 2.5e-4, 0.85
 SPACING, POINTS = (0.035, 0.035), 0.016  # m, of elements and of contact points
 SHIFTED = 0.02  # m, by which the grid lies elsewhere, at most
-NOTHING = {"over_noise": 0.0, "signal_to_noise": 0.0, "where": [], "channels": {}}
+NEIGHBOURS = 2  # of each test, that scatter is told from
+WINDOW = 0.02  # s, over which it is averaged
+NOTHING = {"over_noise": 0.0, "over_scatter": 0.0, "signal_to_noise": 0.0, "where": [], "channels": {}}
 _PLAN = 2**31 - 1
 
 
@@ -75,30 +78,42 @@ class Shot:
 def plan(count: int, seed: int, kinds: Sequence[str] = (), effects: Sequence[str] = ()) -> list[Order]:
     """Orders of a proof: shares of `KINDS` (or even ones of `kinds`), each effect as often as any other, shuffled.
 
-    Raises ``ValueError`` for a kind or an effect that there is none of.
+    Raises ``ValueError`` for a kind or an effect that there is none of, and for pairs of less than two effects.
     """
     for kind in kinds:
         if kind not in KINDS:
             raise ValueError(f"kinds: no such kind of overturns, got {kind!r}; {', '.join(KINDS)} are allowed")
     for id in effects:
-        if id not in library.EFFECTS:
-            raise ValueError(f"effects: none of overturns, got {id!r}; {', '.join(library.EFFECTS)}")
+        if id not in library.EFFECTS and id not in OUTSIDE:
+            raise ValueError(f"effects: none of overturns, got {id!r}; {', '.join([*library.EFFECTS, *OUTSIDE])}")
     random = np.random.default_rng([seed, _PLAN])
-    shares = dict.fromkeys(kinds, 1.0) if kinds else {"single": 1.0} if effects else dict(KINDS)
+    shares = dict.fromkeys(kinds, 1.0) if kinds else dict(KINDS)
+    if effects and not kinds:
+        shares = {"single": 1.0} if any(e in library.EFFECTS for e in effects) else {}
+        shares |= {"outside": 1.0} if any(e in OUTSIDE for e in effects) else {}
     ends = np.round(np.cumsum(list(shares.values())) * count / sum(shares.values())).astype(int)
     of_kind = [kind for kind, n in zip(shares, np.diff(ends, prepend=0), strict=True) for _ in range(n)]
-    listed = [id for id in library.EFFECTS if id in effects or not effects]
-    turn: list[str] = []
+    listed = [id for id in library.EFFECTS if id in effects] or list(library.EFFECTS)
+    if len(listed) < 2 and "pair" in shares:
+        raise ValueError(f"effects: a pair needs two, got {', '.join(effects)}")
+    outside = [id for id in OUTSIDE if id in effects] or list(OUTSIDE)
+    turns: dict[str, list[str]] = {"single": [], "pair": [], "outside": []}
     orders = []
     for i, kind in enumerate(of_kind[k] for k in random.permutation(len(of_kind))):
-        ids: tuple[str, ...] = ()
-        if kind == "single":
-            turn = turn or [listed[k] for k in random.permutation(len(listed))]
-            ids = (turn.pop(),)
-        elif kind == "negligible":
-            ids = tuple(library.NEGLIGIBLE)
+        ids: tuple[str, ...] = tuple(library.NEGLIGIBLE) if kind == "negligible" else ()
+        for _ in range({"pair": 2, "single": 1, "outside": 1}.get(kind, 0)):
+            ids += (_next(turns[kind], outside if kind == "outside" else listed, ids, random),)
         orders.append(Order(index=i, seed=seed, kind=kind, ids=ids))
     return orders
+
+
+def _next(turn: list[str], all_: Sequence[str], taken: Sequence[str], random: np.random.Generator) -> str:
+    """The next of a shuffled turn that is not taken yet; a new turn where it is used up."""
+    if not [id for id in turn if id not in taken]:
+        turn.extend(all_[k] for k in random.permutation(len(all_)))
+    found = next(id for id in turn if id not in taken)
+    turn.remove(found)
+    return found
 
 
 def make(order: Order) -> Case:
@@ -109,30 +124,76 @@ def make(order: Order) -> Case:
     plain = [_solved(shot, ()) for shot in shots]
     nothing = [_read(shot, solved, ()) for shot, solved in zip(shots, plain, strict=True)]
     spans = {c: max(float(np.ptp(one[c])) for one in nothing) for c in CHANNELS}
-    changes = tuple({**library.EFFECTS, **library.NEGLIGIBLE}[id](random, spans) for id in order.ids)
-    made = nothing
-    if changes:
-        moved = any(c.values or c.tilt for c in changes)
-        solved = [_solved(shot, changes) for shot in shots] if moved else plain
-        made = [_read(shot, one, changes) for shot, one in zip(shots, solved, strict=True)]
+    draws = {**library.EFFECTS, **library.NEGLIGIBLE, **OUTSIDE}
+    changes: tuple[Change, ...] = ()
+    for id in order.ids:
+        free = {c: span for c, span in spans.items() if c not in [one.channel for one in changes]}
+        changes += (draws[id](random, free),)
+    made = _told(shots, plain, changes)
     noise = {c: Noise(sigma=share * spans[c], cfc=CLASS) for c in CHANNELS}
     recordings = tuple(
         _recorded(k, shot, one, noise, random) for k, (shot, one) in enumerate(zip(shots, made, strict=True))
     )
     worth = {c: noise[c].independence(1.0 / RATE) for c in CHANNELS}
-    found = strength(
-        [_stamps(shot) for shot in shots],
-        made,
-        nothing,
-        {c: n.sigma for c, n in noise.items()},
-        [worth] * len(shots),
+    sigma = {c: n.sigma for c, n in noise.items()}
+    scatter = _scatter(shots, nothing, np.random.default_rng([order.seed, order.index, 2])) if changes else []
+
+    def shows(without: Sequence[Mapping[str, Array]]) -> dict[str, Any]:
+        """Strength of what tells the case from the one without, over the noise, and over the scatter as well."""
+        stamps = [_stamps(shot) for shot in shots]
+        found = strength(stamps, made, without, sigma, [worth] * len(shots))
+        over = [_over(one, sigma, s) for one, s in zip(made, scatter, strict=True)]
+        rest = [_over(one, sigma, s) for one, s in zip(without, scatter, strict=True)]
+        unit = dict.fromkeys(CHANNELS, 1.0)
+        return {**found, "over_scatter": strength(stamps, over, rest, unit, [worth] * len(shots))["over_noise"]}
+
+    rests = (
+        [nothing] if len(changes) == 1 else [_told(shots, plain, [o for o in changes if o is not c]) for c in changes]
     )
     return Case(
         name=order.name,
         scenario=_SCENARIO,
         recordings=recordings,
-        truth=_truth(order, changes, found, noise, share, shots, recordings),
+        truth=_truth(
+            order,
+            changes,
+            [shows(rest) for rest in rests] if changes else [],
+            shows(nothing) if changes else NOTHING,
+            noise,
+            share,
+            shots,
+            recordings,
+        ),
     )
+
+
+def _told(shots: Sequence[Shot], plain: Sequence[Recording], changes: Sequence[Change]) -> list[dict[str, Array]]:
+    """What the instruments make of all tests with these changes; `plain` are the overturns without any."""
+    moved = any(c.moves for c in changes)
+    solved = [_solved(shot, changes) for shot in shots] if moved else plain
+    return [_read(shot, one, changes) for shot, one in zip(shots, solved, strict=True)]
+
+
+def _scatter(
+    shots: Sequence[Shot], nothing: Sequence[Mapping[str, Array]], random: np.random.Generator
+) -> list[dict[str, Array]]:
+    """Root mean square that overturns on grids elsewhere differ by from these, channels (n,) of each test."""
+    found = []
+    for shot, one in zip(shots, nothing, strict=True):
+        squares = dict.fromkeys(CHANNELS, np.zeros(_stamps(shot).size))
+        for _ in range(NEIGHBOURS):
+            x, y = random.uniform(-SHIFTED, SHIFTED, 2)
+            there = replace(shot, shifted=(float(x), float(y)))
+            other = _read(there, _solved(there, ()), ())
+            squares = {c: squares[c] + (other[c] - one[c]) ** 2 / NEIGHBOURS for c in CHANNELS}
+        window = np.ones(round(WINDOW * RATE)) / round(WINDOW * RATE)
+        found.append({c: np.sqrt(np.convolve(squares[c], window, mode="same")) for c in CHANNELS})
+    return found
+
+
+def _over(made: Mapping[str, Array], sigma: Mapping[str, float], scatter: Mapping[str, Array]) -> dict[str, Array]:
+    """Channels over noise and scatter together."""
+    return {c: made[c] / np.hypot(sigma[c], scatter[c]) for c in CHANNELS}
 
 
 def _shot(random: np.random.Generator, k: int) -> Shot:
@@ -156,6 +217,7 @@ def _solved(shot: Shot, changes: Sequence[Change]) -> Recording:
     for change in changes:
         values |= change.values
         values["ground.surface.angle_deg"] = values["ground.surface.angle_deg"] + math.degrees(change.tilt)
+        values["initiation.roll_rate"] = values["initiation.roll_rate"] * change.pushed
     base = _base().replaced(values)
     x, y = base.ground.elements.centre
     finer = base.replaced(
@@ -198,8 +260,22 @@ def _read(shot: Shot, solved: Recording, changes: Sequence[Change]) -> dict[str,
         step = float(np.median(np.diff(solved.time)))
         behind = channel_filter(solved[c], step, CLASS)
         values = np.interp(times - late, solved.time, behind)
-        found[c] = values * fault.gain + fault.bias if fault else values
+        found[c] = _spoiled(values, times, fault) if fault else values
     return found
+
+
+def _spoiled(values: Array, times: Array, fault: Fault) -> Array:
+    """What an instrument that is wrong makes of a channel (n,) at times (n,)."""
+    warm = 1.0 + fault.warming / (1.0 + np.exp(-(times - fault.middle) / fault.width))
+    values = values * fault.gain * warm * (1.0 + fault.curved * np.abs(values)) + fault.bias
+    if fault.hum:
+        values = values + fault.hum * np.sin(2.0 * math.pi * fault.frequency * times + fault.phase)
+    if fault.dropouts:  # so often in each test, at places that only the fault's own numbers decide
+        rate, lasting = fault.dropouts, fault.lasting
+        random = np.random.default_rng([round(1e6 * rate), round(1e9 * lasting), round(1e9 * abs(float(values.sum())))])
+        for start in random.uniform(times[0], times[-1], max(1, round(rate * (times[-1] - times[0])))):
+            values = np.where((times >= start) & (times < start + lasting), 0.0, values)
+    return np.asarray(values)
 
 
 def _recorded(
@@ -219,7 +295,8 @@ def _recorded(
 def _truth(
     order: Order,
     changes: Sequence[Change],
-    found: Mapping[str, Any],
+    each: Sequence[Mapping[str, Any]],
+    whole: Mapping[str, Any],
     noise: Mapping[str, Noise],
     share: float,
     shots: Sequence[Shot],
@@ -227,8 +304,8 @@ def _truth(
 ) -> dict[str, Any]:
     verdict = "no-mismatch"
     if changes and order.kind != "negligible":
-        verdict = {"physics": "missing-physics"}.get(changes[0].kind, changes[0].kind)
-    whole: Mapping[str, Any] = found if changes else NOTHING
+        strongest = max(zip(changes, each, strict=True), key=lambda pair: float(pair[1]["signal_to_noise"]))[0]
+        verdict = {"physics": "missing-physics", "outside": "unexplained"}.get(strongest.kind, strongest.kind)
     return {
         "format": "rollover-truth/1",
         "rig": "overturn",
@@ -243,16 +320,18 @@ def _truth(
                 "kind": change.kind,
                 "parameters": {name: float(value) for name, value in change.told.items()},
                 "channel": change.channel,
-                "depends_on": "",
-                "near": [],
-                "over_noise": float(whole["over_noise"]),
-                "signal_to_noise": float(whole["signal_to_noise"]),
-                "channels": whole["channels"],
-                "where": whole["where"],
+                "depends_on": change.depends_on,
+                "near": list(change.near),
+                "over_noise": float(found["over_noise"]),
+                "over_scatter": float(found["over_scatter"]),
+                "signal_to_noise": float(found["signal_to_noise"]),
+                "channels": found["channels"],
+                "where": found["where"],
             }
-            for change in changes
+            for change, found in zip(changes, each, strict=True)
         ],
         "over_noise": float(whole["over_noise"]),
+        "over_scatter": float(whole["over_scatter"]),
         "signal_to_noise": float(whole["signal_to_noise"]),
         "where": whole["where"],
         "noise": {c: float(n.sigma) for c, n in noise.items()},

@@ -27,16 +27,25 @@ YIELD_X = 15_000.0
 class Change:
     """An effect at a strength: `told` are its parameters by the names of the contract, `values` those of the scenario.
 
-    `tilt` (rad) is added to the inclination of every test's ground; `channel` is the one that `fault` spoils.
+    `tilt` (rad) is added to the inclination of every test's ground, its roll rate is `pushed` times what is written
+    down; `channel` is the one that `fault` spoils; `depends_on` and `near` are for what no table of effects holds.
     """
 
     id: str
-    kind: str  # physics, parameter, sensor
+    kind: str  # physics, parameter, sensor, outside
     told: Mapping[str, float]
     values: Mapping[str, Any] = field(default_factory=dict)
     tilt: float = 0.0
+    pushed: float = 1.0
     channel: str = ""
     fault: Fault = field(default_factory=Fault)
+    depends_on: str = ""
+    near: tuple[str, ...] = ()
+
+    @property
+    def moves(self) -> bool:
+        """Whether the motion is another."""
+        return bool(self.values) or self.tilt != 0.0 or self.pushed != 1.0
 
 
 Draw = Callable[[Random, Mapping[str, float]], Change]

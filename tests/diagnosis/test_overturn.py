@@ -175,7 +175,7 @@ def test_phases_are_cut_to_the_recording() -> None:
 def test_neighbours_stray_after_the_first_contact_only() -> None:
     simulator = RunSimulator(toss(), recording(Z, ROLL, until=0.5))
     strays = simulator.strays()
-    assert len(strays) == len(overturn.ELSEWHERE) + len(overturn.SHORTER)
+    assert len(strays) == len(overturn.NEIGHBOURS)
     assert simulator.runs == 1 + len(strays)
     time = simulator.recording.time
     touch = next(at for at, name in simulator.marks() if name == "impact")

@@ -12,6 +12,7 @@ import pytest
 from rollover.effects import EFFECTS
 from rollover.overturns import generator, library
 from rollover.overturns.generator import CHANNELS, make, plan
+from rollover.overturns.outside import OUTSIDE
 from rollover.proof import examine
 from rollover.proof.folder import write_case
 from rollover.proof.generator import Order
@@ -24,6 +25,7 @@ def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     """As little as shows what a case is made of."""
     monkeypatch.setattr(generator, "STEP", 1e-3)
     monkeypatch.setattr(generator, "LENGTH", 0.2)
+    monkeypatch.setattr(generator, "NEIGHBOURS", 1)
 
 
 def written(order: Order, folder: Path) -> Scenario:
@@ -38,10 +40,22 @@ def test_a_plan_takes_every_effect_in_turn() -> None:
     assert [o.ids for o in plan(12, 3)] != [o.ids for o in plan(12, 4)]
 
 
-@pytest.mark.parametrize(("kinds", "effects"), [(["pair"], []), ([], ["soil-crust"])])
+@pytest.mark.parametrize(("kinds", "effects"), [(["decoy"], []), ([], ["soil-crust"])])
 def test_what_there_are_no_overturns_of_is_refused(kinds: list[str], effects: list[str]) -> None:
     with pytest.raises(ValueError, match=r"are allowed|none of overturns"):
         plan(3, 1, kinds, effects)
+
+
+def test_pairs_are_two_and_what_is_outside_comes_in_turn() -> None:
+    pairs = [o.ids for o in plan(26, 3, kinds=["pair"])]
+    assert all(len(set(ids)) == 2 and set(ids) <= set(library.EFFECTS) for ids in pairs)
+    assert set(Counter(id for ids in pairs for id in ids).values()) <= {3, 4, 5}
+    outside = [o.ids[0] for o in plan(2 * len(OUTSIDE), 3, kinds=["outside"])]
+    assert Counter(outside) == Counter(dict.fromkeys(OUTSIDE, 2))
+    asked = plan(4, 3, effects=["slope", "outside:hum"])
+    assert Counter((o.kind, o.ids) for o in asked) == {("single", ("slope",)): 2, ("outside", ("outside:hum",)): 2}
+    with pytest.raises(ValueError, match="a pair needs two, got slope"):
+        plan(3, 1, ["pair"], ["slope"])
 
 
 def test_every_effect_is_one_that_acts_in_overturns_with_the_parameters_of_its_name() -> None:
@@ -115,6 +129,38 @@ def test_an_effect_is_seen_where_it_acts_and_a_sensor_s_fault_in_its_channel_alo
     assert max(over, key=lambda c: over[c]) == effect["channel"]
     assert effect["parameters"]["gain"] != 1.0
     assert plain.truth["effects"] == []
+
+
+def test_each_of_two_effects_is_as_strong_as_what_the_other_leaves_to_it() -> None:
+    case = make(Order(index=3, seed=5, kind="pair", ids=("sensor-gain", "sensor-bias")))
+    gain, bias = case.truth["effects"]
+    assert gain["channel"] != bias["channel"]
+    for effect in (gain, bias):
+        over = effect["channels"]
+        assert max(over, key=lambda c: over[c]) == effect["channel"]
+        assert effect["signal_to_noise"] < case.truth["signal_to_noise"]
+    stronger = max((gain, bias), key=lambda e: float(e["signal_to_noise"]))
+    assert case.truth["verdict"] == stronger["kind"] == "sensor"
+    for effect in (gain, bias):
+        assert 0.0 < effect["over_scatter"] <= effect["over_noise"] * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("id", ["outside:pushed", "outside:hum"])
+def test_what_is_outside_shows_and_is_told_as_such(id: str) -> None:
+    order = Order(index=1, seed=8, kind="outside", ids=(id,))
+    found, plain = make(order), make(replace(order, kind="null", ids=()))
+    effect = found.truth["effects"][0]
+    assert found.truth["verdict"] == "unexplained"
+    assert id not in EFFECTS
+    assert set(effect["near"]) <= set(EFFECTS)
+    over = effect["channels"]
+    if effect["channel"]:
+        assert max(over, key=lambda c: over[c]) == effect["channel"]
+        assert over[effect["channel"]] > 0.1
+    else:
+        assert min(over.values()) > 1e-6
+    assert found.scenario == plain.scenario
+    assert [r.conditions for r in found.recordings] == [r.conditions for r in plain.recordings]
 
 
 def test_a_rig_that_there_is_not_is_refused() -> None:

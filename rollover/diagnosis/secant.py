@@ -1,0 +1,59 @@
+"""Slopes among runs that differ by chance: over both sides of a point, and over as wide a step as shows clearly more.
+
+Between two runs lies what the parameter does and what chance does. Over a narrow step that is mostly chance, which
+squares make look like a strong slope: steps too short, and intervals too narrow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.evidence import Evidence
+
+Array = NDArray[np.float64]
+Point = tuple[Sequence[Candidate], Sequence[float]]
+EXACT = 5e-3  # of a coordinate, for differences that are free of chance
+CLEAR = 12.0  # times the squares that runs scatter by, that a difference should move
+
+
+def secant(
+    e: Evidence, moved: Callable[[Point, Point], Array | None], at: Point, k: int, nudge: float, widest: float
+) -> Array | None:
+    """dy/dx_k (n,) of a recording about a point, over `nudge` to either side and up to `widest`; None if it fails.
+
+    `moved` is what the prediction differs by, whitened, from one point to another.
+    """
+    candidates, x = at
+    physical = is_physical(candidates, k)
+    power = [float(np.sum(e.eased(e.whitened(stray)) ** 2)) for stray in e.strays]
+    enough = CLEAR * float(np.mean(power)) if power else 0.0
+    nudge = nudge if physical else min(nudge, EXACT)
+    while True:
+        low, high = max(x[k] - nudge, 0.0), min(x[k] + nudge, 1.0)
+        found = None
+        for a, b in ((low, high), (x[k], high), (low, x[k])):  # one side where the other fails
+            if found is None and b > a:
+                found, over = moved((candidates, _with(x, k, a)), (candidates, _with(x, k, b))), b - a
+        if found is None:
+            return None
+        if float(found @ found) >= enough or 2.0 * nudge > widest or not physical:
+            return np.asarray(found / over)
+        nudge *= 2.0
+
+
+def is_physical(candidates: Sequence[Candidate], k: int) -> bool:
+    """Whether the k-th coordinate changes the motion: what a sensor makes of it is free of chance."""
+    at = 0
+    for c in candidates:
+        at += len(c.search)
+        if k < at:
+            return c.kind != "sensor"
+    return False
+
+
+def _with(x: Sequence[float], k: int, value: float) -> list[float]:
+    return [*x[:k], value, *x[k + 1 :]]

@@ -1,0 +1,327 @@
+"""Runs that nobody could tell apart: which one stands for all, slopes among them, and what is fitted to their mean."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis import overturn
+from rollover.diagnosis.blocks import GENTLE, Block, Fitted
+from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.effort import DROPS, RUNS, Effort
+from rollover.diagnosis.evidence import Evidence, Signal
+from rollover.diagnosis.explain import Step
+from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.intervals import intervals, scattered, unshaped
+from rollover.diagnosis.overturn import CENTRE, NEIGHBOURS, RunSimulator
+from rollover.diagnosis.selection import lasting, outlasts
+from rollover.diagnosis.settle import along, rescattered, settled, step_of_means
+from rollover.effects import Search
+from rollover.recording import Recording
+from rollover.scenario import Scenario
+from tests.physics.scenes import shipped
+
+CHANNEL = "chassis/acceleration_y"
+N = 60
+TIME = 0.004 * np.arange(N)
+
+
+def a_toss(monkeypatch: pytest.MonkeyPatch, off: Mapping[tuple[float, ...], float]) -> RunSimulator:
+    """A toss whose runs are 1 + what is said of the place of their grid."""
+    made = Recording(title="toss", time=np.arange(0.0, 0.2, 0.01), channels={CHANNEL: np.zeros(20)})
+    simulator = RunSimulator(shipped("cube_toss"), made)
+
+    def run(self: RunSimulator, scenario: Scenario, *, is_base: bool) -> tuple[Scenario, Recording]:
+        self.runs += 1
+        time = np.arange(0.0, 0.25, 0.005)
+        size = 1.0 + off.get(scenario.ground.elements.centre, 0.01 * self.runs)
+        return scenario, Recording(title="run", time=time, channels={CHANNEL: size * np.sin(40.0 * time) + time})
+
+    monkeypatch.setattr(RunSimulator, "_made", run)
+    return simulator
+
+
+def test_the_run_that_is_like_most_others_stands_for_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    own = shipped("cube_toss").ground.elements.centre
+    simulator = a_toss(monkeypatch, {own: 4.0})  # where the scenario has its grid the run goes the other way
+    simulator.settle()
+    chosen = simulator.scenario.ground.elements.centre
+    assert chosen != own
+    made = simulator.runs
+    assert made == 1 + len(overturn.ELSEWHERE)
+    found = simulator.predict({}, 0.0)
+    assert found is not None
+    assert np.max(found[CHANNEL]) < 2.0
+    assert simulator.runs == made  # it is known already
+    assert max(np.max(np.abs(s[CHANNEL])) for s in simulator.strays()) > 3.0  # the other way is a neighbour now
+
+
+def test_a_run_like_the_others_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    own = shipped("cube_toss").ground.elements.centre
+    simulator = a_toss(monkeypatch, {own: 0.03})
+    simulator.settle()
+    assert simulator.scenario.ground.elements.centre == own
+
+
+def test_phases_are_those_of_the_run_that_stands_for_all() -> None:
+    made = Recording(title="toss", time=np.arange(0.0, 0.4, 0.01), channels={"chassis/position_z": np.zeros(40)})
+    simulator = RunSimulator(shipped("cube_toss"), made)
+    simulator.settle()
+    runs = simulator.runs
+    marks = simulator.marks()
+    assert [name for _, name in marks][:2] == ["approach", "impact"]
+    assert simulator.runs == runs
+    plain = RunSimulator(shipped("cube_toss").replaced({CENTRE: simulator.scenario.ground.elements.centre}), made)
+    assert plain.marks() == marks
+
+
+def test_a_shape_that_is_not_fitted_widens_an_interval(monkeypatch: pytest.MonkeyPatch) -> None:
+    """y = 20 (x + f) sin t with f from 0 to 1 unknown: x is known to sqrt(1/12) and no better."""
+    judge = Judge([evidence(4, 0.0)])
+    alone = replace(SLOPE, shapes={"other": Search(0.0, 1.0)})
+    monkeypatch.setattr(Candidate, "with_shapes", lambda self, x: [(*x, 0.5)])
+    block = judge.block(0, (SLOPE,), (0.4,), 0.0, judge.effort.fine)
+    assert block is not None
+    inverse = np.linalg.inv(block.J.T @ block.J)
+    found = unshaped(judge, Fitted(candidates=(alone,), x=(0.4,), blocks=(block,)), inverse)
+    assert found[0] == pytest.approx(1.0 / 12.0, rel=0.05)
+    assert unshaped(judge, Fitted(candidates=(SLOPE,), x=(0.4,), blocks=(block,)), inverse) == 0.0
+
+
+def test_no_neighbour_is_the_run_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    simulator = a_toss(monkeypatch, {})
+    place = simulator._place(NEIGHBOURS[0].place)
+    simulator.scenario = simulator.scenario.replaced({CENTRE: place})
+    plain = simulator.scenario
+    others = [plain.replaced(simulator._beside(one)) for one in NEIGHBOURS]
+    assert all(one != plain for one in others)
+    assert len({repr(one) for one in others}) == len(NEIGHBOURS)
+    assert sorted({round(plain.simulation.step / one.simulation.step) for one in others}) == [1, 2, 3]
+    assert any(one.vehicle.contact_spacing < plain.vehicle.contact_spacing for one in others)  # type: ignore[union-attr]
+
+
+class Rough:
+    """y = 20 x sin(t) with what chance adds from one x to the next; each neighbour adds its own."""
+
+    effort: Effort = RUNS
+
+    def __init__(self, seed: int, size: float) -> None:
+        self.seed, self.size = seed, size
+
+    def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+        x = changes.get("effects.slope.angle", 0.0) + changes.get("effects.slope.other", 0.0)
+        x += changes.get("effects.sensor-gain.gain", 0.0)
+        moving = 0.0 if "effects.sensor-gain.gain" in changes else x
+        rng = np.random.default_rng([self.seed, round(1e9 * moving), round(changes.get("neighbour", 0))])
+        chance = np.convolve(rng.standard_normal(N + 6), np.ones(7) / np.sqrt(7.0), mode="valid")
+        return {CHANNEL: 20.0 * x * np.sin(30.0 * (TIME - shift)) + self.size * chance}
+
+    def strays(self, changes: Mapping[str, Any] | None = None, shift: float = 0.0) -> list[dict[str, np.ndarray]]:
+        values = dict(changes or {})
+        base = self.predict(values, shift)[CHANNEL]
+        return [{CHANNEL: self.predict({**values, "neighbour": k}, shift)[CHANNEL] - base} for k in range(1, 7)]
+
+
+def evidence(seed: int, size: float, values: np.ndarray | None = None, effort: Effort = RUNS) -> Evidence:
+    simulator = Rough(seed, size)
+    simulator.effort = effort
+    signal = Signal(
+        channel=CHANNEL, rows=np.arange(N), values=np.zeros(N) if values is None else values, sigma=0.1, noise=0.1,
+        ar=(), span=10.0,
+    )  # fmt: skip
+    recording = Recording(title="r", time=TIME, channels={CHANNEL: signal.values})
+    strays = tuple(s[CHANNEL] for s in simulator.strays()) if size else ()
+    return Evidence(
+        name="r", recording=recording, simulator=cast(Any, simulator), signals=(signal,), shift_prior=1e-3,
+        condition="r", strays=strays,
+    )  # fmt: skip
+
+
+def candidate(id: str, kind: str, name: str) -> Candidate:
+    return Candidate(id=id, kind=kind, family="any", search={name: Search(0.0, 1.0)})
+
+
+SLOPE, GAIN = candidate("slope", "parameter", "angle"), candidate("sensor-gain", "sensor", "gain")
+
+
+def gradient(judge: Judge, c: Candidate) -> float:
+    """dy/dx along sin, over its true value of 20."""
+    block = judge.block(0, (c,), (0.4,), 0.0, judge.effort.fine)
+    assert block is not None
+    wave = np.sin(30.0 * TIME) / 0.1
+    return float(block.J[:, 0] @ wave / (wave @ wave)) / 20.0
+
+
+def test_a_slope_among_runs_that_scatter_is_that_of_a_wide_step() -> None:
+    """Squares of J beyond those of the slope are chance's: 2 N (size/step)^2 one-sided over 0.008, and next to none."""
+    judge = Judge([evidence(3, 0.1)])
+    assert gradient(judge, SLOPE) == pytest.approx(1.0, abs=0.1)
+    block = judge.block(0, (SLOPE,), (0.4,), 0.0, judge.effort.fine)
+    assert block is not None
+    true = float(np.sum((20.0 * np.sin(30.0 * TIME) / 0.1) ** 2))
+    assert float(block.J[:, 0] @ block.J[:, 0]) < 1.3 * true
+    narrow = Judge([evidence(3, 0.1, effort=replace(DROPS, nudges=(8e-3,)))]).block(0, (SLOPE,), (0.4,), 0.0, 8e-3)
+    assert narrow is not None
+    assert float(narrow.J[:, 0] @ narrow.J[:, 0]) > 1.5 * true
+
+
+def test_what_moves_little_is_looked_at_over_a_wider_step_but_for_sensors() -> None:
+    seen: list[float] = []
+    judge = Judge([evidence(3, 0.5)])
+    predict = judge.evidence[0].simulator.predict
+
+    def watched(changes: Mapping[str, Any], shift: float) -> Any:
+        seen.extend(float(v) for k, v in changes.items() if k.startswith("effects."))
+        return predict(changes, shift)
+
+    judge.evidence[0].simulator.predict = watched  # type: ignore[method-assign]
+    gradient(judge, SLOPE)
+    assert max(seen) - min(seen) == pytest.approx(8.0 * RUNS.fine)
+    seen.clear()
+    gradient(judge, GAIN)
+    assert max(seen) - min(seen) < 0.02
+
+
+def test_a_step_to_the_mean_of_neighbours_holds_what_it_says() -> None:
+    """w = J x + d, the model J x + d_0, neighbours J x + d_k: d alike. The step takes d_0 out, intervals hold x."""
+    rng = np.random.default_rng(8)
+    inside, plain, wide = [], [], []
+    for _ in range(300):
+        blocks, every = [], []
+        for _ in range(4):
+            J = rng.standard_normal((N, 1))
+            d = rng.standard_normal((8, 1)) @ J.T * 0.4 + 0.3 * rng.standard_normal((8, N))  # along J above all
+            slope = np.zeros(N)
+            residual = d[0] - d[1] + 0.05 * rng.standard_normal(N)
+            blocks.append(Block(residual=residual, J=J, slope=slope, shift=0.0, prior=1e-3))
+            one = evidence(0, 0.0)
+            signal = replace(one.signals[0], sigma=1.0)
+            every.append(replace(one, signals=(signal,), strays=tuple(d[k] - d[1] for k in range(2, 8))))
+        A = sum(b.J.T @ b.J for b in blocks) + GENTLE * np.eye(1)
+        dx = step_of_means(every, blocks)
+        sd = np.sqrt(scattered(every, blocks, np.linalg.inv(A)))
+        inside.append(abs(dx[0]) < 1.96 * sd[0])
+        plain.append(float(np.linalg.solve(A, sum(b.normal()[1] for b in blocks))[0]))
+        wide.append((float(dx[0]), float(sd[0])))
+    assert 0.91 < np.mean(inside) < 0.985
+    assert np.std([x for x, _ in wide]) < 0.85 * np.std(plain)  # sqrt(1 + 1/6) beside sqrt(2)
+    assert np.mean([s for _, s in wide]) < 1.3 * np.std([x for x, _ in wide])
+
+
+def test_a_time_shift_takes_its_part_of_a_deviation() -> None:
+    rng = np.random.default_rng(1)
+    J, slope = rng.standard_normal((N, 1)), rng.standard_normal(N)
+    block = Block(residual=np.zeros(N), J=J, slope=1e3 * slope, shift=0.0, prior=1.0)
+    e = evidence(0, 0.0)
+    e = replace(e, signals=(replace(e.signals[0], sigma=1.0),))
+    assert abs(along(block, e, slope)[0]) < 1e-3
+    across = J[:, 0] - slope * float(slope @ J[:, 0]) / float(slope @ slope)
+    assert along(block, e, across)[0] == pytest.approx(float(J[:, 0] @ across), rel=1e-4)
+
+
+def test_the_scatter_is_that_of_runs_with_the_explanation() -> None:
+    """Strays that the scenario's own runs have are replaced by those at the fitted point, and weights with them."""
+    judge = Judge([evidence(5, 0.2, 6.0 * np.sin(30.0 * TIME))])
+    fitted = judge.fit((SLOPE,), (0.3,), rounds=1)
+    assert fitted is not None
+    before = judge.evidence[0].strays
+    rescattered(judge, fitted)
+    after = judge.evidence[0].strays
+    expected = judge.evidence[0].simulator.strays(judge.changes((SLOPE,), fitted.x), fitted.blocks[0].shift)
+    np.testing.assert_array_equal(np.stack(after), np.stack([s[CHANNEL] for s in expected]))
+    assert not np.array_equal(np.stack(before), np.stack(after))
+    weight = judge.evidence[0].signals[0].weight
+    assert weight is not None
+    assert np.all(weight < 0.6)
+
+
+def test_parameters_hold_though_runs_scatter() -> None:
+    """Rough runs measured at x = 0.37: settled fits and their intervals, twenty times."""
+    hits, widths = [], []
+    for seed in range(20):
+        rng = np.random.default_rng([seed, 7])
+        every = []
+        for r in range(4):
+            e = evidence(100 * seed + r, 0.3)
+            true = e.simulator.predict({"effects.slope.angle": 0.37, "neighbour": 99}, 0.0)
+            assert true is not None
+            every.append(evidence(100 * seed + r, 0.3, true[CHANNEL] + 0.1 * rng.standard_normal(N)))
+        judge = Judge(every)
+        base, fitted = judge.fit((), ()), judge.fit((SLOPE,), (0.3,))
+        assert base is not None
+        assert fitted is not None
+        found = settled(judge, Step(base=base, fitted=fitted, p_value=0.0, rivals=(fitted,)))
+        assert found.rivals == (found.fitted,)
+        interval = intervals(judge, found.fitted)[0]["angle"]
+        hits.append(interval.low <= 0.37 <= interval.high)
+        widths.append(interval.high - interval.low)
+    assert np.mean(hits) > 0.87
+    assert np.median(widths) < 0.02
+
+
+def test_what_gains_no_more_than_chance_on_held_out_recordings_is_not_taken() -> None:
+    rng = np.random.default_rng(2)
+
+    def step(size: float) -> Step:
+        """Four recordings with an effect of `size` noise units along J, fitted."""
+        J = [rng.standard_normal((N, 1)) for _ in range(4)]
+        w = [size * j[:, 0] + rng.standard_normal(N) for j in J]
+        dx = sum(float(j[:, 0] @ y) for j, y in zip(J, w, strict=True)) / sum(float(j[:, 0] @ j[:, 0]) for j in J)
+        base = [Block(residual=y, J=np.zeros((N, 0)), slope=np.zeros(N), shift=0.0, prior=1.0) for y in w]
+        ends = [replace(b, residual=y - j[:, 0] * dx, J=j) for b, y, j in zip(base, w, J, strict=True)]
+        as_it_is = Fitted(candidates=(), x=(), blocks=tuple(base))
+        return Step(base=as_it_is, fitted=Fitted(candidates=(SLOPE,), x=(0.5,), blocks=tuple(ends)), p_value=0.0)
+
+    groups = [[k] for k in range(4)]
+    assert not any(outlasts(step(0.0), groups) for _ in range(50))
+    assert all(outlasts(step(0.6), groups) for _ in range(50))
+
+
+def test_where_the_first_does_not_last_the_next_one_is_taken() -> None:
+    """A step whose best fit gains nothing under the scatter of its runs, and whose second does."""
+    every = [evidence(r, 0.1, 8.0 * np.sin(30.0 * TIME)) for r in range(4)]
+    judge = Judge(every)
+    base, right = judge.fit((), ()), judge.fit((SLOPE,), (0.3,))
+    assert base is not None
+    assert right is not None
+    before = judge.evidence
+    wrong = judge.fit((candidate("inertia", "parameter", "scale"),), (0.5,))  # moves nothing
+    assert wrong is not None
+    step = Step(base=base, fitted=wrong, p_value=0.0, rivals=(wrong, right))
+    groups = [[k] for k in range(4)]
+    found = lasting(judge, step, groups)
+    assert found is not None
+    assert found.fitted.candidates[-1].key == "slope"
+    assert found.fitted.x[0] == pytest.approx(0.4, abs=0.02)
+    assert judge.evidence is not before
+    kept = judge.evidence
+    assert lasting(judge, replace(step, rivals=(wrong,)), groups) is None
+    assert judge.evidence == kept
+
+
+def test_a_move_does_not_leap_to_another_course() -> None:
+    """Where the whole move goes, from x = 0.365 to 0.385, runs take another course than was measured."""
+
+    class Leaping(Rough):
+        def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+            x = float(changes.get("effects.slope.angle", 0.0))
+            return {CHANNEL: super().predict(changes, shift)[CHANNEL] + 8.0 * (0.365 < x < 0.385) * np.cos(20.0 * TIME)}
+
+    every = []
+    for r in range(4):
+        true = Rough(r, 0.02).predict({"effects.slope.angle": 0.374, "neighbour": 99}, 0.0)[CHANNEL]
+        one = evidence(r, 0.02, true)
+        every.append(replace(one, simulator=cast(Any, Leaping(r, 0.02))))
+    judge = Judge(every)
+    blocks = [judge.block(r, (SLOPE,), (0.30,), 0.0, 0.02) for r in range(4)]
+    fitted = Fitted(candidates=(SLOPE,), x=(0.30,), blocks=tuple(b for b in blocks if b is not None))
+    assert fitted.x[0] + step_of_means(judge.evidence, fitted.blocks)[0] == pytest.approx(0.374, abs=0.005)
+    base = judge.fit((), ())
+    assert base is not None
+    found = settled(judge, Step(base=base, fitted=fitted, p_value=0.0, rivals=(fitted,)))
+    assert not 0.365 < found.fitted.x[0] < 0.385
+    assert found.fitted.left < judge.again(fitted).left
