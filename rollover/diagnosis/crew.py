@@ -24,10 +24,11 @@ Progress = Callable[[str], None]
 class Job:
     """A fit to be made: `only` some recordings, from time `shifts` (s) of these; see `Judge.fit`.
 
-    "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too.
+    "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too, "time" tries out
+    the time shifts.
     """
 
-    how: Literal["fit", "polish", "shape"] = "fit"
+    how: Literal["fit", "polish", "shape", "time"] = "fit"
     candidates: tuple[Candidate, ...]
     start: tuple[float, ...]
     shifts: tuple[float, ...]
@@ -121,7 +122,12 @@ def work(judge: Judge, job: Job) -> Fitted | None:
     begun = _at(judge, job.candidates, job)
     if begun is None:
         return None
-    return judge.polish(begun) if job.how == "polish" else judge.shaped(begun)
+    ways: dict[str, Callable[[Fitted], Fitted | None]] = {
+        "polish": judge.polish,
+        "shape": judge.shaped,
+        "time": judge.timed,
+    }
+    return ways[job.how](begun)
 
 
 def _worked(case: tuple[Judge, Job]) -> tuple[Fitted | None, int]:

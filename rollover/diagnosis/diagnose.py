@@ -78,6 +78,8 @@ def diagnose(
     base = judge.fit((), ())
     if base is None:
         return _nothing(every, names, [*notes, "the scenario itself could not be simulated"], began)
+    if not judge.effort.thrifty:
+        base = judge.timed(base)
     phases = [phases_of(e) for e in found]
     acts = "rollover" if any(unfit(set_up(scenario, e.recording)) for e in found) else "drop"
     candidates = candidates_of(found, scenario.effects, acts, scenario, size_of(set_up(scenario, found[0].recording)))

@@ -27,6 +27,7 @@ FAR = 3.0  # and from which on they are not fitted beside a first look
 ELSEWHERE = 0.2  # of a coordinate: starts so far apart are two
 RIVALS = 0.4  # of the best's gain: a first fit that gains less is no rival, where fits cost much
 CROOKED = 100.0  # times what the best leaves, up to which a fit of two parameters is polished
+TIED = 1.2  # times what the best leaves, up to which time shifts are tried out
 SHAPED = 4.0  # times what the best leaves, up to which an effect's shape is fitted too
 WORTH = 12.0  # gain that pays for a shape
 WITHIN_ONE = 1.0  # standard errors within which the simpler one is preferred
@@ -203,6 +204,8 @@ def step(
         others = [f for f in fits if not any(f is one for one in near)]
         fits = others + [new or old for new, old in zip(polished, near, strict=True)]
     fits = _one_each(fits) if judge.effort.thrifty else _shaped(judge, _one_each(fits), groups, crew, say)
+    if not judge.effort.thrifty:
+        fits = _timed(judge, fits, crew, say)
     if weighed(judge, fits[0], phases):
         base, fits = judge.again(base), [judge.again(f) for f in fits]
     fits.sort(key=lambda f: held_out(f, groups).left.sum())
@@ -235,7 +238,16 @@ def _promising(candidates: Sequence[Candidate], looked: Gate, scored: int | None
     return [c for k, c in enumerate(ranked) if k < SCORED or len(c.search) > 1]
 
 
-def _from(f: Fitted, how: Literal["polish", "shape"]) -> Job:
+def _timed(judge: Judge, fits: Sequence[Fitted], crew: Crew, say: Progress) -> list[Fitted]:
+    """The fits, the near ones with their time shifts tried out, best first."""
+    least = min(f.left for f in fits)
+    near = [f for f in fits if f.left < TIED * least]
+    timed = crew.fits(judge, [_from(f, "time") for f in near], say)
+    others = [f for f in fits if f.left >= TIED * least]
+    return sorted([new or old for new, old in zip(timed, near, strict=True)] + others, key=lambda f: f.left)
+
+
+def _from(f: Fitted, how: Literal["polish", "shape", "time"]) -> Job:
     return Job(how=how, candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks))
 
 

@@ -12,6 +12,7 @@ import pytest
 from rollover.diagnosis import colour
 from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.clocks import align
 from rollover.diagnosis.depend import ACCELERATION, DEPTH, SPEED, TIME
 from rollover.diagnosis.dependence import IMPACT, VALUE, Dependence, dependence, ways
 from rollover.diagnosis.detect import mismatch_of
@@ -37,7 +38,7 @@ def base_of(own: Scenario, recordings: Sequence[tuple[str, Recording]]) -> tuple
     found = [evidence_of(name, *simulated(own, r)) for name, r in recordings]
     evidence: list[Evidence] = [e for e in found if e is not None]
     judge = Judge(evidence)
-    judge.aligned()
+    align(judge)
     first = judge.fit((), (), rounds=2)
     assert first is not None
     judge.weigh(colour.quiet(evidence, judge.residuals(first)))
