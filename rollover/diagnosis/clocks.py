@@ -8,6 +8,7 @@ they have changed since the start, and none later than `SOON`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +23,14 @@ SOON, LEAST = 8e-3, 4  # s after the first contact, and samples, that tell of it
 TRUSTED = 0.1  # of a change of a channel, by which the model may be off
 BELIEVED = 2.0  # times its prior: a shift beyond is the model's fault, where the clock's zero is known
 
-Cost = Callable[[int, Array, float], float]
+Made = Callable[[float], Array | None]
+Cost = Callable[[Array, float], float]
 
 
 def align(judge: Judge) -> None:
     """Begin with the time shift at which each recording meets the scenario best."""
     for r in range(len(judge.evidence)):
-        found = _best(judge, r, (), (), lambda r, raw, shift: _whole(judge, r, raw, shift))
+        found = _best(judge, r, partial(judge.raw, r, (), ()), partial(_whole, judge, r))
         judge.shifts[r] = judge.shifts[r] if found is None else found
 
 
@@ -36,17 +38,26 @@ def by_first_contact(judge: Judge, candidates: Sequence[Candidate], x: Sequence[
     """Time shift (s) of each recording by its first contact; None where nothing comes of it."""
     found: list[float | None] = []
     for r, e in enumerate(judge.evidence):
-        at = _best(judge, r, candidates, x, lambda r, raw, shift: _early(judge, r, raw, shift))
+        at = _best(judge, r, partial(_edged, judge, r, candidates, x), partial(_early, judge, r))
         known = e.recording.clock.zero != "unknown"
         found.append(None if at is None or (known and abs(at) > BELIEVED * e.shift_prior) else at)
     return found
 
 
-def _best(judge: Judge, r: int, candidates: Sequence[Candidate], x: Sequence[float], cost: Cost) -> float | None:
+def _edged(judge: Judge, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
+    """Stacked prediction of recording r, SI, with its leaps as they are: these are what tells the time."""
+    try:
+        found = judge.evidence[r].simulator.predict(judge.changes(candidates, x), shift)
+    except ValueError:
+        return None
+    return None if found is None else judge.evidence[r].raw(found)
+
+
+def _best(judge: Judge, r: int, made: Made, cost: Cost) -> float | None:
     """One run moved along the stamps tells where to look; the best places are then simulated."""
     e = judge.evidence[r]
     shifts = np.linspace(-WIDTH, WIDTH, PLACES) * e.shift_prior
-    raw = judge.raw(r, candidates, x, 0.0)
+    raw = made(0.0)
     if raw is None:
         return None
     rough = []
@@ -55,10 +66,10 @@ def _best(judge: Judge, r: int, candidates: Sequence[Candidate], x: Sequence[flo
         for signal, part in e.spans():
             time = e.recording.time[signal.rows]
             moved[part] = np.interp(time - s, time, raw[part])
-        rough.append(cost(r, moved, float(s)))
+        rough.append(cost(moved, float(s)))
     near = shifts[int(np.argmin(rough))] + np.linspace(-2.0, 2.0, 5) * float(shifts[1] - shifts[0])
-    made = [judge.raw(r, candidates, x, float(s)) for s in near]
-    left = [np.inf if y is None else cost(r, y, float(s)) for s, y in zip(near, made, strict=True)]
+    there = [made(float(s)) for s in near]
+    left = [np.inf if y is None else cost(y, float(s)) for s, y in zip(near, there, strict=True)]
     return float(near[int(np.argmin(left))])
 
 

@@ -30,6 +30,7 @@ CROOKED = 100.0  # times what the best leaves, up to which a fit of two paramete
 TIED = 1.2  # times what the best leaves, up to which time shifts are tried out
 SHAPED = 4.0  # times what the best leaves, up to which an effect's shape is fitted too
 WORTH = 12.0  # gain that pays for a shape
+ROUGHNESS = 0.01  # of the misfit
 WITHIN_ONE = 1.0  # standard errors within which the simpler one is preferred
 APART = 2.0  # standard errors beyond which a rival is excluded
 NEARLY_NOISE = 1.3  # misfit over the noise up to which its own colour is believed
@@ -336,8 +337,17 @@ def moves(judge: Judge, base: Fitted, fitted: Fitted) -> float:
 
 
 def simplest(fits: Sequence[Fitted], groups: Sequence[Sequence[int]], shared: float) -> list[Fitted]:
-    """Fits, best first, led by the one with the fewest numbers of those within a standard error of the best."""
-    near = [f for f in fits if f is fits[0] or worse(f, fits[0], groups, shared)[0] < WITHIN_ONE]
+    """Fits, best first, led by the one with the fewest numbers of those that are hardly worse than the best.
+
+    Hardly worse: within a standard error, or within what leaps make the misfit rough by.
+    """
+    least = held_out(fits[0], groups).left.sum()
+    near = [
+        f
+        for f in fits
+        if worse(f, fits[0], groups, shared)[0] < WITHIN_ONE
+        or held_out(f, groups).left.sum() < (1.0 + ROUGHNESS) * least
+    ]
     first = min(near, key=lambda f: len(f.x))
     return [first, *(f for f in fits if f is not first)]
 

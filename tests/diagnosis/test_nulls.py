@@ -42,7 +42,8 @@ def silent() -> list[tuple[Recording, Simulator]]:
         simulator = simulator_of(scenario(), recording)
         predicted = simulator.predict({}, 0.0)
         assert predicted is not None
-        found.append((replace(recording, channels=predicted), simulator))
+        channels = {name: predicted[name] for name in recording.channels}
+        found.append((replace(recording, channels=channels), simulator))
     return found
 
 
