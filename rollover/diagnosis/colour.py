@@ -103,8 +103,8 @@ def slower(told: Sequence[tuple[int, int, Signal, float, tuple[float, ...]]]) ->
     for _, _, s, sigma, ar in told:
         if s.noise > 0.0 and sigma > 0.0:
             memory = min(max(sum(s.ar), 0.0), STEADY)
-            # for its size: what is only louder was not quiet there
-            more = np.log(level_of(1.0, ar) / level_of(1.0, s.ar))
+            more = np.log(level_of(sigma, ar) / level_of(s.noise, s.ar))
+            more -= max(np.log(sigma / s.noise), 0.0)  # what is only louder was not quiet there
             by.setdefault(s.channel, []).append(
                 (float(more), SLOWER * (1.0 + UNSURE * memory / (1.0 - memory)), s.rows.size)
             )

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.nuisance import Eased, doubts, eased
-from rollover.diagnosis.simulator import LEAP, Simulator
+from rollover.diagnosis.simulator import Simulator
 from rollover.noise import LENGTH, NoiseFloor, grown, noise_floor
 from rollover.recording import Recording
 from rollover.scenario import Scenario
@@ -24,9 +24,7 @@ CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is belie
 MANY = 10  # quiet windows from which on a memory of two samples is told
 ROUGH = 0.5  # times the noise, from which on another error has a large part
 CORNER = 2.0775  # corner frequency over the filter class, forward and backward, Hz
-LEAP_OVER = 4.0  # times the steps beside it
-LARGE = 5.0  # times the noise: a leap whose instant is not believed to the sample
-BESIDE = 3  # samples to either side, between whose values one about a leap may be
+LEAP = 4.0  # times the steps beside it
 SHIFT = 1e-3  # s, prior of the time shift of a recording whose zero is known
 
 
@@ -96,9 +94,9 @@ class Evidence:
         """The same of the measurement."""
         return np.concatenate([self._whitened(s, s.values) for s in self.signals])
 
-    def leaps(self, raw: Array, found: Mapping[str, Array] | None = None) -> NDArray[np.int64]:
-        """Samples (stacked) about which a prediction leaps: where the simulation says so, and by what it shows."""
-        rows = []
+    def leaps(self, raw: Array) -> NDArray[np.int64]:
+        """First of each three samples (stacked) across which a prediction leaps."""
+        found = []
         for s, part in self.spans():
             x = raw[part]
             if x.size < 5:
@@ -106,26 +104,18 @@ class Evidence:
             step = np.abs(np.diff(x))
             beside = np.maximum(np.append(step[2:], 0.0), np.append(0.0, step[:-2])[: x.size - 2])
             leap = np.abs(x[2:] - x[:-2])
-            first = np.flatnonzero((leap > LEAP_OVER * beside) & (leap > 3.0 * s.sigma))
-            rows += [part.start + first + k for k in range(3)]
-            # when a body lifts off again hangs on little
-            large = first[leap[first] > LARGE * s.sigma]
-            rows += [np.clip(part.start + large + k, part.start, part.stop - 1) for k in (-2, -1, 3, 4)]
-            told = (found or {}).get(LEAP + s.channel)
-            if told is not None:
-                rows.append(part.start + np.flatnonzero(told[s.rows] > 0.0))
-        return np.unique(np.concatenate(rows)) if rows else np.zeros(0, dtype=np.int64)
+            found.append(part.start + np.flatnonzero((leap > LEAP * beside) & (leap > 3.0 * s.sigma)))
+        return np.concatenate(found) if found else np.zeros(0, dtype=np.int64)
 
     def forgiven(self, raw: Array, leaps: NDArray[np.int64]) -> Array:
-        """Predicted samples (stacked, SI) about a leap, moved towards the measured ones within their neighbours.
+        """Predicted samples (stacked, SI) on either side of a leap, moved towards the measured ones within it.
 
         On which side of a leap a sample lies is decided by clocks, not by physics.
         """
         y, measured = raw.copy(), np.concatenate([s.values for s in self.signals])
-        for _, part in self.spans():
-            inside = leaps[(leaps >= part.start) & (leaps < part.stop)]
-            near = raw[np.clip(inside[:, None] + np.arange(-BESIDE, BESIDE + 1), part.start, part.stop - 1)]
-            y[inside] = np.clip(measured[inside], near.min(axis=1), near.max(axis=1))
+        for k in leaps:
+            near = raw[k : k + 3]
+            y[k : k + 3] = np.clip(measured[k : k + 3], near.min(), near.max())
         return y
 
     def spans(self) -> list[tuple[Signal, slice]]:

@@ -112,7 +112,7 @@ class Judge:
         y = self.evidence[r].raw(found)
         if not np.all(np.isfinite(y)):
             return None
-        leaps = self.evidence[r].leaps(y, found)
+        leaps = self.evidence[r].leaps(y)
         if leaps.size:
             self._leaps[_key(r, candidates, x, shift)] = leaps
         return self.evidence[r].forgiven(y, leaps)
@@ -183,8 +183,8 @@ class Judge:
         found = e.simulator.predict(self.changes(candidates, x), shift + later)
         after = raw if found is None else e.raw(found)
         slope = (after - raw) / later
-        slope[leaps] = 0.0
-        slope[e.leaps(after, found)] = 0.0
+        for k in (*leaps, *e.leaps(after)):
+            slope[k : k + 3] = 0.0
         return np.nan_to_num(slope)
 
     def moved(self, r: int, before: Point, after: Point, shift: float) -> Array | None:
@@ -197,7 +197,8 @@ class Judge:
             return None
         d = last - first
         for point in (before, after):
-            d[self._leaps.get(_key(r, *point, shift), NONE)] = 0.0
+            for at in self._leaps.get(_key(r, *point, shift), NONE):
+                d[at : at + 3] = 0.0
         e = self.evidence[r]
         return e.eased(e.whitened(d))
 

@@ -25,7 +25,6 @@ EDGES = ("sensor-lag", "sensor-clock-offset", "sensor-clock-drift")
 KINKED = ("soil-layer", "soil-crust", "structural-compliance", "guide-friction")
 SMOOTH = 1e-3  # s: longest step that keeps all others within 1e-4 of the range
 BESIDE = 1e-9  # s: on either side of the first contact
-LEAP = "leap of "  # before a channel's name: above 0 where it may leap, by which side of an instant a stamp is on
 KEPT = 128  # runs of one recording
 
 
@@ -33,10 +32,7 @@ class Simulator(Protocol):
     """One recording's test, ready to be run with values exchanged by path."""
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
-        """Channels (n,) at the recording's stamps less `shift` (s); None if the simulation fails.
-
-        Beside a channel there may be another one, `LEAP` before its name.
-        """
+        """Channels (n,) at the recording's stamps less `shift` (s); None if the simulation fails."""
 
     def strays(self, changes: Mapping[str, Any] | None = None, shift: float = 0.0) -> list[dict[str, Array]]:
         """What runs with `changes` that nobody could tell apart differ by, (n,) at the stamps less `shift`, s."""
@@ -75,31 +71,13 @@ class DropSimulator:
         stamps = self.recording.time
         try:
             run = self._at(physical, shift)
-            instants, clocks = self._instants(run), dict.fromkeys(self.recording.channels, run.time)
             if len(physical) < len(changes):
                 read_by = self.model.with_({p: v for p, v in changes.items() if p not in physical}).scenario.effects
-                own = self._own(shift, read_by)
-                clocks |= {channel: time for channel, (time, _) in own.items()}
-                run = replace(run, time=stamps, channels={**run.channels, **self._edges(physical, own, read_by)})
+                run = replace(run, time=stamps, channels={**run.channels, **self._edges(physical, shift, read_by)})
                 run = read({n: e for n, e in read_by.items() if e.id not in EDGES}, run)
         except DropFailedError:
             return None
-        near = float(np.median(np.diff(stamps)))
-        leaps = {
-            LEAP + channel: np.any(np.abs(time[:, None] - instants) < near, axis=1).astype(float)
-            for channel, time in clocks.items()
-        }
-        return behind_filters(run.channels, self.recording) | leaps
-
-    def _instants(self, run: Recording) -> Array:
-        """When forces leap, s: at the first contact, and where the way down ends."""
-        time, v = run.time, run["striker/velocity_z"]
-        after = np.flatnonzero((time > self._contact + SMOOTH) & (v >= 0.0))
-        if after.size == 0 or after[0] < 2 or v[after[0] - 1] <= v[after[0] - 2]:
-            return np.array([self._contact])
-        k = int(after[0])
-        left = -v[k - 1] / (v[k - 1] - v[k - 2]) * (time[k - 1] - time[k - 2])
-        return np.array([self._contact, min(time[k - 1] + left, time[k])])
+        return behind_filters(run.channels, self.recording)
 
     def strays(self, changes: Mapping[str, Any] | None = None, shift: float = 0.0) -> list[dict[str, Array]]:
         """See `Simulator`: one striker on its guide has no neighbours."""
@@ -120,26 +98,18 @@ class DropSimulator:
         except DropFailedError:
             return {}
 
-    def _own(self, shift: float, read_by: Mapping[str, Any]) -> dict[str, tuple[Array, tuple[Any, ...]]]:
-        """Stamps by a channel's own clock, of those that have one or lag, and what they stand for."""
+    def _edges(self, physical: Mapping[str, Any], shift: float, read_by: Mapping[str, Any]) -> dict[str, Array]:
+        """Channels behind a lag or with a clock of their own: what these make of a leap lies between the stamps."""
+        stamps = self.recording.time
         lags, offsets, drifts = ({e.channel: e for e in every(read_by, name)} for name in EDGES)
         found = {}
         for channel in {*lags, *offsets, *drifts} & set(self.recording.channels):
-            own = self.recording.time
+            own, lag = stamps, lags.get(channel)
             if channel in offsets:
                 own = own - offsets[channel].offset
             if channel in drifts:
                 own = (1.0 - drifts[channel].drift) * own
-            found[channel] = own - shift, (shift, channel, offsets.get(channel), drifts.get(channel))
-        return found
-
-    def _edges(
-        self, physical: Mapping[str, Any], clocks: Mapping[str, tuple[Array, Any]], read_by: Mapping[str, Any]
-    ) -> dict[str, Array]:
-        """Channels behind a lag or with a clock of their own: what these make of a leap lies between the stamps."""
-        lags, found = {e.channel: e for e in every(read_by, "sensor-lag")}, {}
-        for channel, (own, key) in clocks.items():
-            lag = lags.get(channel)
+            own, key = own - shift, (shift, channel, offsets.get(channel), drifts.get(channel))
             if lag is None:
                 found[channel] = self._run(physical, own, key)[channel]
                 continue
