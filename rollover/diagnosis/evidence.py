@@ -25,6 +25,8 @@ MANY = 10  # quiet windows from which on a memory of two samples is told
 ROUGH = 0.5  # times the noise, from which on another error has a large part
 CORNER = 2.0775  # corner frequency over the filter class, forward and backward, Hz
 LEAP = 4.0  # times the steps beside it
+LARGE = 50.0  # times the noise: a leap whose instant is not believed to the sample
+BESIDE = 3  # samples to either side, between whose values one about a leap may be
 SHIFT = 1e-3  # s, prior of the time shift of a recording whose zero is known
 
 
@@ -95,8 +97,8 @@ class Evidence:
         return np.concatenate([self._whitened(s, s.values) for s in self.signals])
 
     def leaps(self, raw: Array) -> NDArray[np.int64]:
-        """First of each three samples (stacked) across which a prediction leaps."""
-        found = []
+        """Samples (stacked) about which a prediction leaps."""
+        rows = []
         for s, part in self.spans():
             x = raw[part]
             if x.size < 5:
@@ -104,19 +106,34 @@ class Evidence:
             step = np.abs(np.diff(x))
             beside = np.maximum(np.append(step[2:], 0.0), np.append(0.0, step[:-2])[: x.size - 2])
             leap = np.abs(x[2:] - x[:-2])
-            found.append(part.start + np.flatnonzero((leap > LEAP * beside) & (leap > 3.0 * s.sigma)))
-        return np.concatenate(found) if found else np.zeros(0, dtype=np.int64)
+            first = np.flatnonzero((leap > LEAP * beside) & (leap > 3.0 * s.sigma))
+            rows += [part.start + first + k for k in range(3)]
+            # when a body lifts off again hangs on little
+            large = first[leap[first] > LARGE * s.sigma]
+            rows += [np.clip(part.start + large + k, part.start, part.stop - 1) for k in (-2, -1, 3, 4)]
+        return np.unique(np.concatenate(rows)) if rows else np.zeros(0, dtype=np.int64)
 
     def forgiven(self, raw: Array, leaps: NDArray[np.int64]) -> Array:
-        """Predicted samples (stacked, SI) on either side of a leap, moved towards the measured ones within it.
+        """Predicted samples (stacked, SI) about a leap, moved towards the measured ones within their neighbours.
 
         On which side of a leap a sample lies is decided by clocks, not by physics.
         """
         y, measured = raw.copy(), np.concatenate([s.values for s in self.signals])
-        for k in leaps:
-            near = raw[k : k + 3]
-            y[k : k + 3] = np.clip(measured[k : k + 3], near.min(), near.max())
+        for _, part in self.spans():
+            inside = leaps[(leaps >= part.start) & (leaps < part.stop)]
+            near = raw[np.clip(inside[:, None] + np.arange(-BESIDE, BESIDE + 1), part.start, part.stop - 1)]
+            y[inside] = np.clip(measured[inside], near.min(axis=1), near.max(axis=1))
         return y
+
+    def worth(self, leaps: NDArray[np.int64]) -> Array:
+        """Weights (n,) of whitened samples: those whose past was forgiven are as wide as the noise itself."""
+        found = np.ones(self.count)
+        for s, part in self.spans():
+            inside = leaps[(leaps >= part.start) & (leaps < part.stop)]
+            for k in range(1, len(s.ar) + 1):
+                later = np.setdiff1d(inside + k, inside)
+                found[later[later < part.stop]] = 1.0 / grown(s.ar)
+        return found
 
     def spans(self) -> list[tuple[Signal, slice]]:
         """Each signal with its place in the stack."""

@@ -163,10 +163,11 @@ class Judge:
             if moved is None:
                 return None
             J[:, k] = moved / step
-        slope = e.eased(e.whitened(self._slope(r, candidates, x, shift, raw, leaps)))
+        worth = e.worth(leaps)
+        slope = e.eased(worth * e.whitened(self._slope(r, candidates, x, shift, raw, leaps)))
         if self._pinned and e.recording.clock.zero != "unknown":
             slope = np.zeros_like(slope)
-        residual = e.eased(self.measured[r] - y)
+        residual = e.eased(worth * (self.measured[r] - y))
         return Block(residual=residual, J=J, slope=slope, shift=shift, prior=e.shift_prior)
 
     def _slope(
@@ -183,8 +184,8 @@ class Judge:
         found = e.simulator.predict(self.changes(candidates, x), shift + later)
         after = raw if found is None else e.raw(found)
         slope = (after - raw) / later
-        for k in (*leaps, *e.leaps(after)):
-            slope[k : k + 3] = 0.0
+        slope[leaps] = 0.0
+        slope[e.leaps(after)] = 0.0
         return np.nan_to_num(slope)
 
     def moved(self, r: int, before: Point, after: Point, shift: float) -> Array | None:
@@ -197,10 +198,9 @@ class Judge:
             return None
         d = last - first
         for point in (before, after):
-            for at in self._leaps.get(_key(r, *point, shift), NONE):
-                d[at : at + 3] = 0.0
+            d[self._leaps.get(_key(r, *point, shift), NONE)] = 0.0
         e = self.evidence[r]
-        return e.eased(e.whitened(d))
+        return e.eased(e.worth(self._leaps.get(_key(r, *before, shift), NONE)) * e.whitened(d))
 
     def fit(
         self,

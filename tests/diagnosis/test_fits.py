@@ -49,11 +49,11 @@ def test_a_leap_is_forgiven_within_a_sample_and_not_beyond() -> None:
 
     other = replace(e, signals=tuple(replace(s, values=v) for s, v in zip(e.signals, moved, strict=True)))
     leaps = other.leaps(stepped)
-    assert at - 2 in leaps or at - 1 in leaps
+    assert {at - 1, at} <= set(leaps.tolist())
     left = (measured - other.forgiven(stepped, leaps))[part]
     assert np.max(np.abs(left)) < 1e-12
     late = measured.copy()
-    late[at : at + 4] = 0.0
+    late[at : at + 9] = 0.0
     moved[k] = late[part]
     other = replace(e, signals=tuple(replace(s, values=v) for s, v in zip(e.signals, moved, strict=True)))
     left = (late - other.forgiven(stepped, leaps))[part]
