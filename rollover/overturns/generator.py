@@ -19,7 +19,7 @@ from rollover.overturns.outside import OUTSIDE
 from rollover.proof.campaign import log_uniform
 from rollover.proof.generator import Case, Order
 from rollover.proof.instruments import Fault, Noise, channel_filter
-from rollover.proof.strength import strength
+from rollover.proof.strength import entry, strength
 from rollover.recording import Recording
 from rollover.scenario import Scenario, load
 from rollover.simulate import run
@@ -315,19 +315,7 @@ def _truth(
         "index": order.index,
         "verdict": verdict,
         "effects": [
-            {
-                "id": change.id,
-                "kind": change.kind,
-                "parameters": {name: float(value) for name, value in change.told.items()},
-                "channel": change.channel,
-                "depends_on": change.depends_on,
-                "near": list(change.near),
-                "over_noise": float(found["over_noise"]),
-                "over_scatter": float(found["over_scatter"]),
-                "signal_to_noise": float(found["signal_to_noise"]),
-                "channels": found["channels"],
-                "where": found["where"],
-            }
+            entry(change, found) | {"over_scatter": float(found["over_scatter"])}
             for change, found in zip(changes, each, strict=True)
         ],
         "over_noise": float(whole["over_noise"]),

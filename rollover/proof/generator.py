@@ -20,7 +20,7 @@ from rollover.proof.descent import CHANNELS, Descent, descend
 from rollover.proof.instruments import PAD, Fault, Instruments, channel_filter
 from rollover.proof.library import Change, Setting
 from rollover.proof.rig import Rig
-from rollover.proof.strength import strength
+from rollover.proof.strength import entry, strength
 from rollover.recording import Clock, Recording
 
 Array = NDArray[np.float64]
@@ -336,21 +336,7 @@ def _truth(
         "seed": order.seed,
         "index": order.index,
         "verdict": verdict,
-        "effects": [
-            {
-                "id": change.id,
-                "kind": change.kind,
-                "parameters": {name: float(value) for name, value in change.told.items()},
-                "channel": change.channel,
-                "depends_on": change.depends_on,
-                "near": list(change.near),
-                "over_noise": float(told["over_noise"]),
-                "signal_to_noise": float(told["signal_to_noise"]),
-                "channels": told["channels"],
-                "where": told["where"],
-            }
-            for change, told in zip(changes, each, strict=True)
-        ],
+        "effects": [entry(change, told) for change, told in zip(changes, each, strict=True)],
         "over_noise": float(whole["over_noise"]) if whole is not None else 0.0,
         "signal_to_noise": float(whole["signal_to_noise"]) if whole is not None else 0.0,
         "where": whole["where"] if whole is not None else [],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,4 +55,48 @@ def strength(
         "signal_to_noise": float(np.sqrt(total)),
         "channels": by_channel,
         "where": cells,
+    }
+
+
+class Concealed(Protocol):
+    """What is concealed in a case: an effect at a strength, as a rig's library draws it."""
+
+    @property
+    def id(self) -> str:
+        """Of the effect, by the contract."""
+
+    @property
+    def kind(self) -> str:
+        """Physics, parameter, sensor or outside."""
+
+    @property
+    def told(self) -> Mapping[str, float]:
+        """Its parameters."""
+
+    @property
+    def channel(self) -> str:
+        """The one that is misread; empty for physics."""
+
+    @property
+    def depends_on(self) -> str:
+        """What it is locked to."""
+
+    @property
+    def near(self) -> tuple[str, ...]:
+        """Listed effects that an unlisted one resembles."""
+
+
+def entry(change: Concealed, found: Mapping[str, Any]) -> dict[str, Any]:
+    """What the sealed truth says of one effect; `found` is its strength."""
+    return {
+        "id": change.id,
+        "kind": change.kind,
+        "parameters": {name: float(value) for name, value in change.told.items()},
+        "channel": change.channel,
+        "depends_on": change.depends_on,
+        "near": list(change.near),
+        "over_noise": float(found["over_noise"]),
+        "signal_to_noise": float(found["signal_to_noise"]),
+        "channels": found["channels"],
+        "where": found["where"],
     }
