@@ -184,6 +184,9 @@ class Judge:
         found = e.simulator.predict(self.changes(candidates, x), shift + later)
         after = raw if found is None else e.raw(found)
         slope = (after - raw) / later
+        if self.effort.thrifty:  # to both sides, where that costs no run
+            found = e.simulator.predict(self.changes(candidates, x), shift - later)
+            slope = slope if found is None else (after - e.raw(found)) / (2.0 * later)
         slope[leaps] = 0.0
         slope[e.leaps(after)] = 0.0
         return np.nan_to_num(slope)
