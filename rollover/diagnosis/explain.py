@@ -199,7 +199,8 @@ def step(
     fits.sort(key=lambda f: f.left)
     # where a threshold makes the way crooked, the nearer ones are followed to the end; of what explains the best alone
     able = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < CROOKED * fits[0].left]
-    near = able[: judge.effort.polishes] if fits[0].left > NOISE_LEFT**2 * count else able[:1]
+    alone = [f for f in able[:1] if f is fits[0] and not base.candidates]
+    near = able[: judge.effort.polishes] if fits[0].left > NOISE_LEFT**2 * count else alone
     if near and judge.effort.polishes:
         polished = crew.fits(judge, [_from(f, "polish") for f in near], say)
         others = [f for f in fits if not any(f is one for one in near)]
