@@ -78,6 +78,11 @@ def shift_of(block: Block, dx: Array) -> float:
     return min(max(block.shift + g / block.weight, -most), most) - block.shift
 
 
+def at_an_end(x: float) -> bool:
+    """Whether a coordinate ended at an end of its range."""
+    return not 1e-6 < x < 1.0 - 1e-6
+
+
 def bounded(A: Array, b: Array, x: Array, damping: float) -> Array:
     """Step that solves (A + damping diag A) dx = b, coordinates that would leave the unit box held at its border."""
     p = x.size

@@ -137,7 +137,7 @@ def _worked(case: tuple[Judge, Job]) -> tuple[Fitted | None, int]:
 
 
 def _at(judge: Judge, candidates: Sequence[Candidate], job: Job) -> Fitted | None:
-    return _linearised(judge, candidates, job.start, job.recordings, job.shifts)
+    return linearised(judge, candidates, job.start, job.recordings, job.shifts)
 
 
 def _rebuilt(judge: Judge, job: Job, row: dict[str, Any] | None) -> Fitted | None:
@@ -146,16 +146,17 @@ def _rebuilt(judge: Judge, job: Job, row: dict[str, Any] | None) -> Fitted | Non
     candidates = list(job.candidates)
     if len(row["x"]) > len(job.start):
         candidates[-1] = candidates[-1].whole()
-    return _linearised(judge, candidates, row["x"], job.recordings, row["shifts"])
+    return linearised(judge, candidates, row["x"], job.recordings, row["shifts"])
 
 
-def _linearised(
+def linearised(
     judge: Judge,
     candidates: Sequence[Candidate],
     x: Sequence[float],
     recordings: Sequence[int],
     shifts: Sequence[float],
 ) -> Fitted | None:
+    """A fit as it stands at x and these time shifts (s); None where nothing can be simulated."""
     blocks: list[Block] = []
     for r, shift in zip(recordings, shifts, strict=True):
         block = judge.block(r, candidates, x, shift, judge.effort.fine)

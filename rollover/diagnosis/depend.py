@@ -90,17 +90,17 @@ def dependency(forces: Sequence[ResidualForce]) -> list[tuple[str, float]]:
             x = np.concatenate([f.of[name] for f in train])
             y = np.concatenate([f.force for f in train])
             knots = np.unique(np.quantile(x, np.linspace(0.0, 1.0, KNOTS)))
-            weights = np.linalg.lstsq(_hats(x, knots), y, rcond=1e-8)[0]
+            weights = np.linalg.lstsq(hats(x, knots), y, rcond=1e-8)[0]
             for f in test:
                 # beyond what was seen nothing is predicted
                 seen = (f.of[name] >= knots[0]) & (f.of[name] <= knots[-1])
-                miss = f.force[seen] - _hats(f.of[name][seen], knots) @ weights
+                miss = f.force[seen] - hats(f.of[name][seen], knots) @ weights
                 wrong += float(miss @ miss) / max(int(seen.sum()), 1) * f.force.size
                 all_ += float(f.force @ f.force)
         scores.append((name, 1.0 - wrong / max(all_, 1e-300)))
     return sorted(scores, key=lambda pair: -pair[1])
 
 
-def _hats(x: Array, knots: Array) -> Array:
-    """Piecewise linear basis (n, k)."""
+def hats(x: Array, knots: Array) -> Array:
+    """Piecewise linear basis (n, k), constant beyond the ends."""
     return np.stack([np.interp(x, knots, row) for row in np.eye(knots.size)], axis=1)

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.depend import ACCELERATION, DEPTH, SPEED, TIME
+from rollover.diagnosis.depend import ACCELERATION, DEPTH, SPEED, TIME, hats
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.fit import Block, Fitted, Judge
-from rollover.diagnosis.response import WHERES, Descent, Where, channels_of, descent, hats
+from rollover.diagnosis.response import WHERES, Descent, Where, channels_of, descent
 from rollover.scenario import Scenario
 
 Array = NDArray[np.float64]

@@ -259,11 +259,11 @@ def _shaped(
     """The fits with shapes fitted too where that pays, best first."""
     best = min(f.left for f in fits)
     size = sum(b.residual.size for b in fits[0].blocks)
-    ahead = min(held_out(f, groups).total for f in fits)
+    held = [held_out(f, groups).total ** 2 for f in fits]
     able = [
         f
-        for f in fits
-        if f.candidates[-1].shapes and (f.left < SHAPED * best or held_out(f, groups).total ** 2 < SHAPED * ahead**2)
+        for f, ahead in zip(fits, held, strict=True)
+        if f.candidates[-1].shapes and (f.left < SHAPED * best or ahead < SHAPED * min(held))
     ]
     found = list(fits)
     for old, new in zip(able, crew.fits(judge, [_from(f, "shape") for f in able], say), strict=True):

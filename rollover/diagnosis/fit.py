@@ -12,7 +12,7 @@ from rollover.diagnosis.blocks import GENTLE, WIDEST, Block, Fitted, bounded, sh
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
-from rollover.diagnosis.secant import secant
+from rollover.diagnosis.secant import Point, secant
 
 Array = NDArray[np.float64]
 FAR = 3.0  # misfit over the noise from which on a step may be lengthened
@@ -21,7 +21,6 @@ TRIES = 4  # of a step, each damped more
 TICKS = (8e-5, 3e-5, 1e-5)  # s, by which a time shift is tried to either side
 TWICE, LITTLE = 2, 1.0  # how often; a gain that is not worth another time
 NOISE_LEFT = 1.04  # misfit over the noise that needs no further search
-Point = tuple[Sequence[Candidate], Sequence[float]]
 NONE = np.zeros(0, dtype=np.int64)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.blocks import Block
+from rollover.diagnosis.blocks import Block, at_an_end
 from rollover.diagnosis.candidates import physical
 from rollover.diagnosis.evidence import MODEL_ERROR, Evidence
 from rollover.diagnosis.fit import GENTLE, Fitted, Judge
@@ -116,7 +116,7 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
                 low=physical(x - TWO_SIDED * sd[at], search),
                 high=physical(x + TWO_SIDED * sd[at], search),
                 unit=units.get(name, ""),
-                at_bound=not 1e-6 < x < 1.0 - 1e-6,
+                at_bound=at_an_end(x),
             )
             at += 1
         found.append(values)

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ground.law import REFERENCE_AREA, evaluate
+from rollover.diagnosis.depend import hats
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.fit import Block
 from rollover.diagnosis.simulator import behind_filters
@@ -108,11 +109,6 @@ def channels_of(way: Way, moves: Moves, e: Evidence, shift: float) -> Array:
             columns = [behind_filters({channel: c}, e.recording)[channel] for c in found[channel].T]
             found[channel] = np.stack(columns, axis=1)
     return np.asarray(e.eased(e.whitened(e.raw(found))))
-
-
-def hats(x: Array, knots: Array) -> Array:
-    """Piecewise linear basis (n, k), constant beyond the ends."""
-    return np.stack([np.interp(x, knots, row) for row in np.eye(knots.size)], axis=1)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rollover.diagnosis.blocks import at_an_end
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.detect import Mismatch, mismatch_of
@@ -224,8 +225,8 @@ def decided(judge: Judge, found: Explanation, groups: Groups) -> tuple[Explanati
     if found.first is not None and found.parts:
         one = found.first
         end = held_out(one.fitted, groups).total
-        at_an_end = any(not 1e-6 < v < 1.0 - 1e-6 for v in one.fitted.x)
-        if end**2 - 1.0 < PARTLY * (start**2 - 1.0) and not at_an_end:
+        inside = not any(at_an_end(v) for v in one.fitted.x)
+        if end**2 - 1.0 < PARTLY * (start**2 - 1.0) and inside:
             return replace(found, parts=(one,), fitted=one.fitted), _kind(one.fitted.candidates[-1])
     significant = found.before.p_value < SURE and matters(judge, found.base, found.before)
     significant = significant and not is_tolerated(judge, found.base)

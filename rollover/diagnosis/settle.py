@@ -3,7 +3,7 @@
 Scatter is looked at first where the scenario is; where an effect changes what hits the ground it is another. With
 neighbours y_k = y + d_k of the run at the fitted point, each recording's mean of them strays less than any one, and
 
-    dx = A^-1 sum_r J_r'(w_r - mean_k d_rk)                                                                    (D6)
+    dx = A^-1 sum_r J_r'(w_r - mean_k d_rk)                                                                    (D8)
 
 is the step to the least squares of the mean. A, J, w as in (D1).
 """
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.blocks import GENTLE, Block, shift_of
 from rollover.diagnosis.chaos import weighted
+from rollover.diagnosis.crew import linearised
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Fitted, Judge
@@ -29,7 +30,7 @@ FARTHEST = 0.15  # of a coordinate, that a mean may move it
 
 
 def settled(judge: Judge, part: Step) -> Step:
-    """A step under the scatter of runs with its explanation, moved to where the mean of them is met best (D6).
+    """A step under the scatter of runs with its explanation, moved to where the mean of them is met best (D8).
 
     As it was if nothing can be simulated there; where runs do not scatter too.
     """
@@ -52,10 +53,7 @@ def _at(judge: Judge, old: Fitted, dx: Array) -> Fitted | None:
     """A fit moved by dx; None if nothing can be simulated there."""
     x = [float(v) for v in np.clip(np.array(old.x) + dx, 0.0, 1.0)]
     shifts = [b.shift + shift_of(b, np.array(x) - np.array(old.x)) for b in old.blocks]
-    blocks = [judge.block(r, old.candidates, x, s, judge.effort.fine) for r, s in enumerate(shifts)]
-    if any(b is None for b in blocks):
-        return None
-    return Fitted(candidates=old.candidates, x=tuple(x), blocks=tuple(b for b in blocks if b is not None))
+    return linearised(judge, old.candidates, x, range(len(shifts)), shifts)
 
 
 def rescattered(judge: Judge, fitted: Fitted) -> None:
@@ -75,7 +73,7 @@ def along(block: Block, e: Evidence, stray: Array) -> Array:
 
 
 def step_of_means(evidence: Sequence[Evidence], blocks: Sequence[Block]) -> Array:
-    """(D6), (p,)."""
+    """(D8), (p,)."""
     p = blocks[0].J.shape[1]
     A, b = GENTLE * np.eye(p), np.zeros(p)
     for e, block in zip(evidence, blocks, strict=True):
