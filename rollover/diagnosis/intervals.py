@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.blocks import Block, at_an_end
 from rollover.diagnosis.candidates import physical
+from rollover.diagnosis.crew import linearised
 from rollover.diagnosis.evidence import MODEL_ERROR, Evidence
 from rollover.diagnosis.fit import GENTLE, Fitted, Judge
 from rollover.diagnosis.settle import along, step_of_means
@@ -18,6 +20,8 @@ from rollover.effects import EFFECTS, units_of
 
 Array = NDArray[np.float64]
 TWO_SIDED = 1.96
+ALIKE, PILE, NEAR = 1e-9, 5, 0.1  # of a value: equal; so often, and so near to the fit: the end of a range
+KNOWN = 1e-3  # of such an end, by which it is known
 EVENLY = 12.0**-0.5  # standard deviation of what is spread evenly from 0 to 1
 
 
@@ -60,6 +64,28 @@ def unshaped(judge: Judge, fitted: Fitted, inverse: Array) -> Array:
     return found
 
 
+def with_shapes(judge: Judge, fitted: Fitted) -> tuple[Fitted, Array, list[int]]:
+    """The fit with the shapes of its effects that were not fitted, the prior of each coordinate, where the fitted are.
+
+    Such a shape is where it is usual, spread evenly over its range as far as the recordings do not tell.
+    """
+    candidates, x, kept, prior, at = [], list[float](), list[int](), list[float](), 0
+    for c in fitted.candidates:
+        own = fitted.x[at : at + len(c.search)]
+        at += len(c.search)
+        kept += range(len(x), len(x) + len(own))
+        whole = c.with_shapes(own)[0] if c.shapes else own
+        prior += [GENTLE] * len(own) + [EVENLY**-2] * (len(whole) - len(own))
+        x += whole
+        candidates.append(c.whole())
+    if len(x) > len(kept):
+        every, shifts = range(len(fitted.blocks)), [b.shift for b in fitted.blocks]
+        found = linearised(judge, candidates, x, every, shifts)
+        if found is not None:
+            return found, np.array(prior), kept
+    return fitted, np.full(len(fitted.x), GENTLE), list(range(len(fitted.x)))
+
+
 def _noise(judge: Judge, fitted: Fitted) -> Array:
     """Covariance (p, p) of J'w that comes of the noise alone: a weighed sample's noise is below 1."""
     found = GENTLE * np.eye(len(fitted.x))
@@ -77,10 +103,14 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
     cov = phi A^-1, phi the misfit left per sample (at least 1); beside it, in quadrature, what a gain error of the
     model of `MODEL_ERROR` in any one channel would do, A^-1 J'(error): integrators differ, noise or not. Where runs
     that nobody could tell apart scatter and samples are weighed by that, cov = phi A^-1 N A^-1 with N the covariance
-    that the noise alone gives J'w; beside it stand `scattered` and `unshaped`.
+    that the noise alone gives J'w; beside it stand `scattered` and `unshaped`. Elsewhere shapes that were not fitted
+    are in A, see `with_shapes`; an end of a range is read off where samples pile up there.
     """
+    told, prior, kept = fitted, np.full(len(fitted.x), GENTLE), list(range(len(fitted.x)))
+    if not judge.effort.thrifty:
+        fitted, prior, kept = with_shapes(judge, fitted)
     p = len(fitted.x)
-    A = sum((b.normal()[0] for b in fitted.blocks), np.zeros((p, p))) + GENTLE * np.eye(p)
+    A = sum((b.normal()[0] for b in fitted.blocks), np.zeros((p, p))) + np.diag(prior)
     inverse: Array = np.asarray(np.linalg.inv(A), dtype=np.float64)
     count = sum(b.residual.size for b in fitted.blocks)
     phi = max(1.0, fitted.left / count) * judge.per_error
@@ -103,14 +133,14 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
         moved += scattered(judge.evidence, fitted.blocks, inverse) + unshaped(judge, fitted, inverse)
         rest = step_of_means(judge.evidence, fitted.blocks)
     moved += rest**2
-    sd = np.sqrt(sd**2 + moved)
+    sd = np.sqrt(sd**2 + moved)[kept]
     found, at = [], 0
-    for c in fitted.candidates:
+    for c in told.candidates:
         kind: Any = EFFECTS[c.id]
         units = units_of(kind, c.channel)
         values: dict[str, Interval] = {}
         for name, search in c.search.items():
-            x = fitted.x[at]
+            x = told.x[at]
             values[name] = Interval(
                 value=physical(x, search),
                 low=physical(x - TWO_SIDED * sd[at], search),
@@ -119,5 +149,22 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
                 at_bound=at_an_end(x),
             )
             at += 1
+        if c.id == "sensor-clipping":
+            values = {name: read_off(one, end_of(judge.evidence, c.channel)) for name, one in values.items()}
         found.append(values)
     return found
+
+
+def end_of(evidence: Sequence[Evidence], channel: str | None) -> float | None:
+    """Size of the largest value of a channel if it is met again and again, to the last digit: the end of a range."""
+    every = [e.recording.channels[str(channel)] for e in evidence if channel in e.recording.channels]
+    sizes = np.abs(np.concatenate([np.zeros(1), *every]))
+    most = float(np.nanmax(sizes))
+    return most if most > 0.0 and np.count_nonzero(sizes >= most * (1.0 - ALIKE)) >= PILE else None
+
+
+def read_off(fitted: Interval, end: float | None) -> Interval:
+    """The limit that the recordings themselves show, beside one fitted to it: noise that is cut off bends the fit."""
+    if end is None or abs(end - fitted.value) > NEAR * end:
+        return fitted
+    return replace(fitted, value=end, low=(1.0 - KNOWN) * end, high=(1.0 + KNOWN) * end)

@@ -237,8 +237,9 @@ def decided(judge: Judge, found: Explanation, groups: Groups) -> tuple[Explanati
 
 
 def is_any_curve(candidates: Sequence[Candidate]) -> bool:
-    """Whether as many effects as there may be are all of one sensor: together they draw any curve, and say nothing."""
-    return len(candidates) == MOST and len({c.channel for c in candidates}) == 1 and candidates[0].channel is not None
+    """Whether as many effects as there may be are all of one sensor, or of the soil: they draw any curve, say nothing."""
+    subjects = {c.channel or ("soil" if c.id.startswith("soil-") else c.id) for c in candidates}
+    return len(candidates) == MOST and len(subjects) == 1
 
 
 def _kind(c: Candidate) -> Verdict:

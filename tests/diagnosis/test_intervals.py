@@ -1,0 +1,53 @@
+"""Stated intervals hold the true value also where something beside the fitted value is not known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis import intervals as stated
+from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.fit import Fitted, Judge
+from tests.diagnosis.drops import FORCE, recorded
+from tests.diagnosis.test_fits import candidate, judge_of
+
+
+def fit(judge: Judge, c: Candidate) -> Fitted:
+    found = judge.fit((c,), c.starts()[0])
+    assert found is not None
+    return found
+
+
+def test_an_exponent_that_was_not_fitted_widens_the_interval_of_the_strength() -> None:
+    """c v^0.9 fitted as c v: at 2 m/s, 7 % of the strength goes to the exponent, more than the noise leaves open."""
+    changes = {"effects.soil-viscous-damping.damping": 60.0, "effects.soil-viscous-damping.exponent": 0.9}
+    judge = judge_of(recorded(changes, speeds=(1.0, 1.5, 2.0), noise=0.01))
+    c = candidate(judge, "soil-viscous-damping")
+    assert set(c.shapes) == {"exponent"}
+    fitted = fit(judge, c)
+    bare = replace(fitted, candidates=(replace(c, shapes={}),))
+    wide, narrow = (stated.intervals(judge, f)[0]["damping"] for f in (fitted, bare))
+    assert wide.low <= 60.0 <= wide.high
+    assert wide.high - wide.low > 1.5 * (narrow.high - narrow.low)
+    assert wide.value == narrow.value
+
+
+@pytest.mark.parametrize("limit", [1500.0, 2000.0])
+def test_an_end_of_a_range_is_read_off_where_samples_pile_up(limit: float) -> None:
+    """Noise goes in before the range ends: tops lie below the limit on the average, and a fit ends up below it."""
+    recordings = []
+    for name, r in recorded({}, noise=0.02):
+        channels = {**r.channels, FORCE: np.clip(r[FORCE], -limit, limit)}
+        recordings.append((name, replace(r, channels=channels)))
+    judge = judge_of(recordings)
+    fitted = fit(judge, candidate(judge, f"sensor-clipping:{FORCE}"))
+    found = stated.intervals(judge, fitted)[0]["limit"]
+    assert found.value == limit
+    assert found.low < limit < found.high < 1.002 * limit
+
+
+def test_a_peak_that_is_met_once_is_no_end_of_a_range() -> None:
+    judge = judge_of(recorded({}, noise=0.02))
+    assert stated.end_of(judge.evidence, FORCE) is None
