@@ -237,7 +237,7 @@ def decided(judge: Judge, found: Explanation, groups: Groups) -> tuple[Explanati
 
 
 def is_any_curve(candidates: Sequence[Candidate]) -> bool:
-    """Whether as many effects as there may be are all of one sensor, or of the soil: they draw any curve, say nothing."""
+    """Whether there are as many effects as may be, all of one sensor or of the soil: they draw any curve."""
     subjects = {c.channel or ("soil" if c.id.startswith("soil-") else c.id) for c in candidates}
     return len(candidates) == MOST and len(subjects) == 1
 

@@ -167,7 +167,7 @@ def test_a_hum_is_a_mismatch_however_fast_and_its_channel_is_named() -> None:
         assert s.noise < 0.007 * s.span  # what hums was left out of it
 
 
-def test_three_effects_of_one_sensor_are_any_curve_and_two_are_not() -> None:
+def test_three_effects_of_one_sensor_or_of_the_soil_are_any_curve_and_two_are_not() -> None:
     def on(id: str, channel: str | None) -> Candidate:
         return Candidate(id=id, kind="sensor", family="", search={}, channel=channel)
 
@@ -175,7 +175,9 @@ def test_three_effects_of_one_sensor_are_any_curve_and_two_are_not() -> None:
     assert is_any_curve(three)
     assert not is_any_curve(three[:2])
     assert not is_any_curve([*three[:2], on("sensor-bias", drops.FORCE)])
-    assert not is_any_curve([on("soil-layer", None)] * 3)
+    soil = [on("soil-layer", None), on("soil-rate-hardening", None), on("soil-stiffness", None)]
+    assert is_any_curve(soil)
+    assert not is_any_curve([*soil[:2], on("mass", None)])
 
 
 def test_what_explains_little_is_not_named_and_a_sensor_without_a_quantity_goes_by_time() -> None:
