@@ -10,7 +10,7 @@ to predict that one, so that holding out costs no simulation.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,6 +69,17 @@ class Fitted:
     def label(self) -> str:
         """Keys of the effects."""
         return " + ".join(c.key for c in self.candidates) or "as it is"
+
+
+def turned(fitted: Fitted) -> Fitted:
+    """The same fit with its first effect last."""
+    first = len(fitted.candidates[0].search)
+    order = np.roll(np.arange(len(fitted.x)), -first)
+    return Fitted(
+        candidates=(*fitted.candidates[1:], fitted.candidates[0]),
+        x=tuple(fitted.x[k] for k in order),
+        blocks=tuple(replace(b, J=b.J[:, order]) for b in fitted.blocks),
+    )
 
 
 def shift_of(block: Block, dx: Array) -> float:

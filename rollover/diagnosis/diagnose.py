@@ -24,6 +24,7 @@ from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import yardstick
 from rollover.diagnosis.overturn import RunSimulator
 from rollover.diagnosis.phases import phases_of
+from rollover.diagnosis.readings import digitised, without_spikes
 from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing, with_scatter
 from rollover.diagnosis.scores import judged
 from rollover.diagnosis.selection import decided, explained, matters
@@ -157,7 +158,9 @@ def _trusted(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:
 
 def _evidence(scenario: Scenario, recordings: Sequence[tuple[str, Recording]]) -> tuple[list[Evidence], list[str]]:
     found, notes = [], []
-    for name, recording in recordings:
+    for name, whole in recordings:
+        recording, spiked = without_spikes(whole)
+        notes += [f"{name}: {line}" for line in spiked]
         thin, simulator, averaged = simulated(scenario, recording)
         simulator.settle()
         one = evidence_of(name, thin, simulator, averaged)
@@ -166,7 +169,7 @@ def _evidence(scenario: Scenario, recordings: Sequence[tuple[str, Recording]]) -
         if one is None:
             notes.append(f"{name}: shares no usable channel with the simulation and was left aside")
         else:
-            found.append(one)
+            found.append(digitised(one, recording))
     return found, notes
 
 

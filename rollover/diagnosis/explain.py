@@ -196,6 +196,8 @@ def step(
     fits = [f for f in crew.fits(judge, jobs, say) if f is not None]
     if not fits:
         return None
+    if base.candidates and not judge.effort.thrifty:
+        fits += _from_base(judge, base, fits, looked, crew, say)
     fits.sort(key=lambda f: f.left)
     # where a threshold makes the way crooked, the nearer ones are followed to the end; of what explains the best alone
     able = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < CROOKED * fits[0].left]
@@ -215,6 +217,21 @@ def step(
     phi = max(1.0, min(f.left for f in fits) / count)  # what even the best leaves is no chance of the noise's size
     phi *= judge.per_error
     return Step(base=base, fitted=fits[0], p_value=looked.p_value(phi), rivals=tuple(fits), screened=tuple(screened))
+
+
+def _from_base(
+    judge: Judge, base: Fitted, fits: Sequence[Fitted], looked: Gate, crew: Crew, say: Progress
+) -> list[Fitted]:
+    """Fits anew, from the base itself, of candidates that were led astray: beside them more is left than without."""
+    jobs = []
+    for f in fits:
+        if f.left > base.left:
+            own = f.x[len(base.x) :]
+            begin = looked.starts.get(f.candidates[-1].key, (own,))[0]
+            jobs.append(
+                Job(candidates=f.candidates, start=(*base.x, *begin), shifts=tuple(b.shift for b in base.blocks))
+            )
+    return [f for f in crew.fits(judge, jobs, say) if f is not None]
 
 
 def weighed(judge: Judge, fitted: Fitted, phases: Phases) -> bool:

@@ -51,7 +51,11 @@ def with_scatter(found: Sequence[Evidence]) -> list[Evidence]:
         replace(
             e,
             signals=tuple(
-                replace(s, scatter=own.get((r, s.channel), usual.get(s.channel, 0.0) * s.span)) for s in e.signals
+                replace(
+                    s,
+                    scatter=float(np.hypot(s.scatter, own.get((r, s.channel), usual.get(s.channel, 0.0) * s.span))),
+                )
+                for s in e.signals
             ),
         )
         for r, e in enumerate(found)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rollover.diagnosis.blocks import at_an_end
+from rollover.diagnosis.blocks import at_an_end, turned
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.detect import Mismatch, mismatch_of
@@ -170,7 +170,15 @@ def _instead(
     if rest is None:
         return None
     others = free(rest, candidates)
-    return step(judge, rest, others, groups, phases, say, gate(judge, rest, others), crew)
+    looked = gate(judge, rest, others)
+    found = step(judge, rest, others, groups, phases, say, looked, crew)
+    held = judge.again(turned(current))
+    if found is None or found.fitted.left > held.left + NEEDED:  # on the way back nothing came as far
+        rivals = () if found is None else found.rivals
+        others_ = tuple(f for f in rivals if f.candidates[-1].key != held.candidates[-1].key)
+        base = judge.again(rest)
+        return Step(base=base, fitted=held, p_value=looked.p_value(), rivals=(held, *others_))
+    return found
 
 
 def _needed(

@@ -1,0 +1,56 @@
+"""What a recorder makes of single samples: the steps of its digits, and spikes, which no model is asked about."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.evidence import Evidence
+from rollover.prechecks.finding import trace
+from rollover.prechecks.samples import spikes
+from rollover.recording import Recording
+
+Array = NDArray[np.float64]
+WHOLE = 0.02  # of a step, by which a level may stray from a whole number of them
+LEVELS = 3  # that a digitised channel has at least
+REPEATED = 0.5  # of the samples: with so many levels, or more, a channel has no steps that matter
+
+
+def resolution(values: Array) -> float:
+    """Step (SI) between the levels of a digitised channel (n,); 0 where it takes any value, or each but once."""
+    finite = values[np.isfinite(values)]
+    levels = np.unique(finite)
+    if not LEVELS <= levels.size < REPEATED * finite.size:
+        return 0.0
+    apart = np.diff(levels)
+    step = float(np.min(apart[apart > 1e-9 * (levels[-1] - levels[0])], initial=np.inf))
+    many = apart / step
+    return step if np.all(np.abs(many - np.round(many)) < WHOLE) else 0.0
+
+
+def digitised(e: Evidence, recording: Recording) -> Evidence:
+    """The evidence with half a step of its channels, as recorded, as an error that neighbouring samples share.
+
+    Noise larger than the step makes the error of each sample its own, and part of the noise.
+    """
+    signals = []
+    for s in e.signals:
+        step = resolution(recording.channels[s.channel])
+        dithered = s.noise * np.sqrt(e.averaged) > step
+        signals.append(s if dithered else replace(s, scatter=0.5 * step, sigma=float(np.hypot(s.sigma, 0.5 * step))))
+    return replace(e, signals=tuple(signals))
+
+
+def without_spikes(recording: Recording) -> tuple[Recording, list[str]]:
+    """The recording without single samples that its neighbours contradict, and a line for each channel that had any."""
+    channels, lines = dict(recording.channels), []
+    for name in recording.channels:
+        told = trace(recording, name)
+        found = [] if told is None else list(spikes(told, ""))
+        if found:
+            gone = np.isin(recording.time, [f.start for f in found])
+            channels[name] = np.where(gone, np.nan, recording.channels[name])
+            lines.append(f"{name}: {int(gone.sum())} spikes were left aside")
+    return (replace(recording, channels=channels), lines) if lines else (recording, [])
