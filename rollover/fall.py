@@ -63,6 +63,7 @@ FALLING = 5e-4  # s, step of a fall before the first contact
 HALVINGS = 20  # of a step, to the moment at which the soil stays behind
 CORRECTIONS = 4  # of a step that ends at such a place
 CLOSE = 1e-7  # m: how near a step ends to a jump of the force
+PAST = 2e-10  # m: how far beyond the end or the beginning of contact a step ends
 AT_REST = 1e-8  # m/s, and m/s2 over a millisecond: what is slower on its line of unloading stays where it is
 
 
@@ -293,16 +294,17 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
         advance(law, p, s, row, state, f, y, h, a, end)
         if steps > most or not (abs(end[1]) < 1e4 and abs(end[3]) < 1e4):
             return -1
-        share, jump, goal = 1.0, 0.0, 0.0
+        share, jump, goal, slack = 1.0, 0.0, 0.0, 0.0
         for k in range(levels(law, p, s, row, state, f, stops)):
             level = stops[k]
             way = 1.0 if end[0] > y[0] else -1.0
             # up to a jump of the force, just past where contact begins or ends, to a kink
-            near = level - way * CLOSE if k > 2 else level + way * CLOSE if k == 0 else level
+            near = level - way * CLOSE if k > 2 else level + way * PAST if k == 0 else level
             if abs(y[0] - level) > 2.0 * CLOSE and (y[0] - near) * (end[0] - near) < 0.0:
                 theta = crossing(near, h, y[0], y[1], end[0], end[1])
                 if theta < share:
                     share, jump, goal = theta, way * 2.0 * CLOSE if k > 2 else 0.0, near
+                    slack = 0.5 * PAST if k == 0 else 0.1 * CLOSE
         turning = state[MODE] == LOADING and y[1] > 0.0 and end[1] < 0.0
         if turning:
             accelerate(law, p, s, row, state, f, end, now)
@@ -315,7 +317,7 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
             advance(law, p, s, row, state, f, y, h, a, end)
             for _ in range(CORRECTIONS):  # what lies beyond bent the first guess
                 miss = end[0] - goal
-                if turning or abs(miss) < 0.1 * CLOSE or abs(miss) > 0.5 * h * abs(end[1]):
+                if turning or abs(miss) < slack or abs(miss) > 0.5 * h * abs(end[1]):
                     break
                 h -= miss / end[1]
                 advance(law, p, s, row, state, f, y, h, a, end)
