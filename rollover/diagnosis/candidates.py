@@ -195,6 +195,8 @@ def candidates_of(
             continue
         sized = {p: _sized(s, kind.grows.get(p), size) for p, s in kind.search.items()}
         search = {p: _widened(s, kind.null.get(p)) for p, s in sized.items() if p not in SHAPES.get(name, ())}
+        if scenario is not None:
+            search |= {p: _from(search[p], least) for p, least in kind.acts_from(scenario).items()}
         shapes = {p: s for p, s in sized.items() if p in SHAPES.get(name, ())}
         neutral = None if acts == "drop" else tuple(_neutral(kind, p, s, scenario) for p, s in search.items())
         found.append(
@@ -249,6 +251,11 @@ def _sized(search: Search, powers: tuple[float, float] | None, size: tuple[float
 def _widened(search: Search, null: float | None) -> Search:
     """The range with strengths that only a low noise shows."""
     return search._replace(low=search.low / FAINT) if search.scale == "log" and null == 0.0 else search
+
+
+def _from(search: Search, least: float) -> Search:
+    """The range without what changes nothing: there no fit finds its way."""
+    return search._replace(low=least) if search.low < least < search.high else search
 
 
 def _sensor(name: str, kind: Any, channel: str, spans: Mapping[str, float]) -> Candidate | None:

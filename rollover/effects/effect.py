@@ -70,6 +70,11 @@ class Effect:
         """Values of the scenario that the effect replaces, by path."""
         return {}
 
+    @classmethod
+    def acts_from(cls, scenario: Any) -> Mapping[str, float]:
+        """Values of parameters up to which a scenario has by itself what the effect would bring."""
+        return {}
+
     def read(self, recording: Recording) -> Recording:
         """What the sensors make of a recording."""
         return recording

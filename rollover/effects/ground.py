@@ -159,6 +159,11 @@ class SoilElasticRebound(Effect):
     null: ClassVar[Mapping[str, float | None]] = {"recovery": 0.0, "damping_ratio": 1.0}
     search: ClassVar[Mapping[str, Search]] = {"recovery": Search(0.02, 0.6, "log"), "damping_ratio": Search(0.0, 1.0)}
 
+    @classmethod
+    def acts_from(cls, scenario: Any) -> Mapping[str, float]:
+        """The law's own share."""
+        return {"recovery": scenario.ground.law.recovery}
+
     def places(self) -> Mapping[int, float]:
         """The least share that springs back, and the dashpot over the critical one."""
         return {k.RECOVERY: self.recovery, k.REBOUND_DAMPING: self.damping_ratio}

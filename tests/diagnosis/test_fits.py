@@ -175,3 +175,14 @@ def test_a_clock_of_its_own_is_simulated_at_its_own_stamps() -> None:
     assert plain is not None
     assert np.array_equal(late[FORCE], shifted[FORCE])
     assert np.array_equal(late[DEPTH], plain[DEPTH]), name
+
+
+def test_a_rebound_is_looked_for_from_what_the_law_springs_back_by_itself() -> None:
+    recordings = recorded({"effects.soil-elastic-rebound.recovery": 0.0222}, speeds=(1.5, 3.0), noise=5e-3)
+    judge = judge_of(recordings)
+    own = scenario().ground.law.recovery
+    c = next(c for c in candidates_of(judge.evidence, (), "drop", scenario()) if c.key == "soil-elastic-rebound")
+    assert c.search["recovery"].low == own > 0.0
+    fits = [f for start in c.starts()[:8] if (f := judge.fit((c,), start)) is not None]  # the lowest it may be
+    best = min(fits, key=lambda f: f.left)
+    assert c.values(best.x)["recovery"] == pytest.approx(0.0222, rel=0.02)
