@@ -29,6 +29,10 @@ PHASES = {
     "peak": 0xC2A23CFF,
     "unloading": 0x7A5FA3FF,
     "rest": 0x3F8A4BFF,
+    "support": 0x4A5B70FF,
+    "tipping": 0x3D6391FF,
+    "impact": 0xC24A44FF,
+    "sliding": 0xC2A23CFF,
 }
 # the viewer draws what was measured last, thin, so that the curve that follows it is seen below
 _SOURCES = (("measured", MEASURED, 1.0), ("before", LIMIT, 1.5), ("after", SIMULATED, 4.0))

@@ -126,12 +126,14 @@ def _figure(one: Told, track: Track, found: Diagnosis) -> Figure:
         label=f"{s.name}, {s.unit}",
         noise=track.noise * s.factor,
         phases=one.phases,
+        unsure=None if track.scatter is None else track.unsure,
     )
     fall = f"residual {_g(track.rms_before, 3)}"
     if track.rms_after is not None:
         fall += f" before, {_g(track.rms_after, 3)} after"
     judged = ", held out" if one.held_out else ""
-    caption = f"{one.recording}{judged}: {track.channel}; below, measured less simulated over the noise: {fall} (RMS)."
+    over = "over the noise" if track.scatter is None else "over the noise, grey what neighbouring runs differ by"
+    caption = f"{one.recording}{judged}: {track.channel}; below, measured less simulated {over}: {fall} (RMS)."
     return Figure(svg=svg, caption=caption)
 
 

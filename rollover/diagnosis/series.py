@@ -2,24 +2,28 @@
 
 The scenario before and the diagnosed one are simulated anew at every stamp of a recording: the latter is what
 `rollover run` makes of scenario-diagnosed.yaml. Both at one time shift, that of the better explanation: a shift of its
-own would hide part of what the scenario misses.
+own would hide part of what the scenario misses. Full runs lie on the ground's grid where the one that is most like its
+neighbours does, and are shown with what these differ by: what no simulation is sure of is no misfit.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.account import diagnosed_scenario
 from rollover.diagnosis.bins import simulated
+from rollover.diagnosis.chaos import averaged
 from rollover.diagnosis.clocks import align
 from rollover.diagnosis.evidence import Evidence, evidence_of
 from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.overturn import CENTRE, RunSimulator
 from rollover.diagnosis.phases import phases_of
-from rollover.diagnosis.simulator import simulator_of
+from rollover.diagnosis.simulator import Simulator, simulator_of
 from rollover.diagnosis.verdict import Diagnosis
 from rollover.recording import Recording
 from rollover.scenario import Scenario
@@ -32,7 +36,8 @@ WIDEST = 3.0  # times its prior that a time shift may be
 class Track:
     """One channel over time, SI: `time`, `measured`, `before` (n,), `after` (n,) or None; gaps are left out.
 
-    `noise` is 1 sigma of what the misfit is held against: the measured noise, and what integrators differ by.
+    `noise` is 1 sigma of what the misfit is held against: the measured noise, and what integrators differ by. Beside it
+    stands `scatter` (n,), 1 sigma of what neighbouring runs differ by; None where there are none.
     """
 
     channel: str
@@ -41,10 +46,18 @@ class Track:
     before: Array
     after: Array | None
     noise: float
+    scatter: Array | None = None
+
+    @property
+    def unsure(self) -> Array:
+        """1 sigma of noise and scatter together, over the noise, (n,)."""
+        if self.scatter is None:
+            return np.ones(self.time.size)
+        return np.hypot(1.0, self.scatter / self.noise)
 
     @property
     def rms_before(self) -> float:
-        """Root mean square of measured less simulated, over the noise."""
+        """Root mean square of measured less simulated, over the noise and the scatter."""
         return self._rms(self.before)
 
     @property
@@ -53,7 +66,7 @@ class Track:
         return None if self.after is None else self._rms(self.after)
 
     def _rms(self, simulated: Array) -> float:
-        return float(np.sqrt(np.mean((self.measured - simulated) ** 2))) / self.noise
+        return float(np.sqrt(np.mean(((self.measured - simulated) / (self.noise * self.unsure)) ** 2)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,6 +97,8 @@ def series(scenario: Scenario, recordings: Sequence[tuple[str, Recording]], foun
 def _told(
     name: str, recording: Recording, scenario: Scenario, diagnosed: Scenario | None, held_out: bool
 ) -> Told | None:
+    grid = _grid(scenario, recording)
+    scenario, diagnosed = scenario.replaced(grid), None if diagnosed is None else diagnosed.replaced(grid)
     simulator = simulator_of(scenario, recording)
     evidence = evidence_of(name, *simulated(scenario, recording))
     if evidence is None:
@@ -94,7 +109,9 @@ def _told(
     before = simulator.predict({}, at)
     if before is None:
         return None
-    after = None if diagnosed is None else simulator_of(diagnosed, recording).predict({}, at)
+    last = simulator if diagnosed is None else simulator_of(diagnosed, recording)
+    after = None if diagnosed is None else last.predict({}, at)
+    strays = last.strays({}, at)
     tracks = []
     for signal in evidence.signals:
         channel = signal.channel
@@ -107,6 +124,7 @@ def _told(
                 before=before[channel][there],
                 after=None if after is None else after[channel][there],
                 noise=signal.sigma * float(np.sqrt(_rows_in_one(recording, thinner))),
+                scatter=_scatter([d[channel][there] for d in strays], recording.time[there]),
             )
         )
     return Told(
@@ -118,6 +136,21 @@ def _told(
         tracks=tuple(tracks),
         condition=evidence.condition,
     )
+
+
+def _grid(scenario: Scenario, recording: Recording) -> dict[str, Any]:
+    """Where the ground's grid lies for the run that is the most like its neighbours; drops have no grid."""
+    simulator: Simulator = simulator_of(scenario, recording)
+    if not isinstance(simulator, RunSimulator):
+        return {}
+    simulator.settle()
+    return {CENTRE: simulator.scenario.ground.elements.centre}
+
+
+def _scatter(strays: Sequence[Array], time: Array) -> Array | None:
+    """1 sigma (n,) of what neighbouring runs differ by; None where there are none."""
+    whole = [d for d in strays if np.all(np.isfinite(d))]
+    return np.sqrt(averaged(np.mean(np.square(whole), axis=0), time)) if whole else None
 
 
 def _rows_in_one(recording: Recording, thinner: Recording) -> float:
