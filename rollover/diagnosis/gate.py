@@ -48,10 +48,11 @@ class Gate:
     null: Array
     detectable: Mapping[str, float]
     starts: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
+    tests: int = 1  # that were made, of which this is one
 
     def p_value(self, phi: float = 1.0) -> float:
         """p-value of the best score; `phi` is what is left per sample where not even an explanation leaves noise."""
-        return p_value(self.score / max(phi, 1.0), self.null)
+        return min(1.0, self.tests * p_value(self.score / max(phi, 1.0), self.null))
 
 
 def gate(judge: Judge, base: Fitted, candidates: Sequence[Candidate], only: Sequence[int] | None = None) -> Gate:

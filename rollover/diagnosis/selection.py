@@ -70,7 +70,7 @@ def explained(
     before = mismatch_of(judge.evidence, base.blocks, phases)
     say(f"looking at {len(candidates)} candidates, which of them could matter")
     few = spread(base, groups, judge.effort.few) if judge.effort.thrifty else None
-    looked = first_look = gate(judge, base, candidates, few)
+    looked = first_look = _look(judge, base, candidates, few)
     current, left, taken = base, before, []
     first: Step | None = None
     for _ in range(MOST):
@@ -100,7 +100,7 @@ def explained(
                 left = mismatch_of(judge.evidence, current.blocks, phases)
         if len(taken) > 1 and current.left > HOPELESS**2 * count:
             break
-        looked = gate(judge, current, free(current, candidates), few)
+        looked = _look(judge, current, free(current, candidates), few)
     is_whole = left.p_value > SURE or not matters(judge, current, left)
     parts = [s.again(judge) for s in taken]
     if is_whole and len(taken) > 1:
@@ -117,6 +117,18 @@ def explained(
         after=mismatch_of(judge.evidence, current.blocks, phases),
         first=first.again(judge) if first is not None else None,
     )
+
+
+def _look(judge: Judge, base: Fitted, candidates: Sequence[Candidate], few: Sequence[int] | None) -> Gate:
+    """A gate by `few` recordings where each look costs a run, and by all where these alone do not decide.
+
+    Two tests in place of one: the second's p-values count twice.
+    """
+    found = gate(judge, base, candidates, few)
+    if few is None or found.p_value() < CHANCE or len(few) == len(base.blocks):
+        return found
+    whole = gate(judge, base, candidates)
+    return replace(whole, tests=2)
 
 
 def lasting(judge: Judge, found: Step, groups: Groups) -> Step | None:
