@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.chaos import is_other, too_many
 from rollover.diagnosis.colour import hums
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.fit import Block
@@ -87,6 +88,7 @@ def mismatch_of(
     if waves and count > 0:
         # noise may be underrated, but not by so much: what is rough and far beyond it is no noise either
         p = float(f_distribution.sf((structured / waves) / min(max(rough / count, 1e-300), LOUD), waves, count))
+    p = min(p, too_many(sum(is_other(b.course) for b in blocks), len(blocks)))  # one may, not all of them
     return Mismatch(cells=tuple(cells), p_value=p, adjusted=_holm([c.p_value for c in cells]))
 
 

@@ -58,6 +58,7 @@ class Evidence:
     strays: tuple[Array, ...] = ()  # stacked, SI: what runs that nobody could tell apart differ by
     model_error: float = MODEL_ERROR  # of a channel's range
     averaged: int = 1  # samples in one
+    blow: float = np.inf  # s, after which a run may take another course
     doubts: Array | None = None  # what 1 sigma of each uncertain condition does to the stack, SI, (n, q)
 
     @cached_property

@@ -313,7 +313,7 @@ def _first_fits(
 def _chosen(screened: Sequence[Screened], effort: Effort, looked: Gate) -> list[Screened]:
     """Those worth a first fit: that start well, and that have most to gain.
 
-    Of runs that scatter what is gained by chance is taken off, and what a sensor makes of them costs none: as many more.
+    Of runs that scatter what is gained by chance is taken off; what a sensor makes of them costs none: as many more.
     """
     by_start = sorted(screened, key=lambda s: s.left)[: effort.promising // 2]
     if not effort.thrifty:

@@ -153,16 +153,19 @@ class RunSimulator:
     def settle(self) -> None:
         """Lay the grid where the run is the most like all others: of two ways that runs go, it takes the common one.
 
-        The medoid: the least sum of the distances to the others, each the root mean square over the channels' ranges.
+        The medoid: the least sum of the distances to the others and to the neighbours, each the root mean square over
+        the channels' ranges.
         """
         runs = {place: self.predict({CENTRE: place}, 0.0) for place in self._places()}
         there = {place: run for place, run in runs.items() if run is not None}
         if len(there) < 3:
             return
+        beside = [self.predict(self._beside(one), 0.0) for one in NEIGHBOURS]
         stacks = {place: np.concatenate(list(_scaled(run).values())) for place, run in there.items()}
-        inside = np.all([np.isfinite(y) for y in stacks.values()], axis=0)
+        every = [*stacks.values(), *(np.concatenate(list(_scaled(run).values())) for run in beside if run is not None)]
+        inside = np.all([np.isfinite(y) for y in every], axis=0)
         apart = {
-            place: sum(float(np.sqrt(np.mean((y - other)[inside] ** 2))) for other in stacks.values())
+            place: sum(float(np.sqrt(np.mean((y - other)[inside] ** 2))) for other in every)
             for place, y in stacks.items()
         }
         best = min(apart, key=lambda place: apart[place])

@@ -68,7 +68,7 @@ def rescattered(judge: Judge, fitted: Fitted) -> None:
 
 def along(block: Block, e: Evidence, stray: Array) -> Array:
     """J'd of a deviation (n,), SI, with the recording's time shift taken out, (p,)."""
-    d = e.eased(e.whitened(stray))
+    d = block.counted(e.eased(e.whitened(stray)))
     return np.asarray(block.J.T @ d - (block.J.T @ block.slope) * float(block.slope @ d) / block.weight)
 
 
