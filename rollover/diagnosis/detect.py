@@ -80,15 +80,18 @@ def mismatch_of(
                             r, signal.channel, name, time[inside], rows, block, humming[signal.channel], trusted=trusted
                         )
                     )
-    structured = sum(c.structured for c in cells)
-    waves = sum(c.waves for c in cells)
-    rough = sum(c.rough for c in cells)
-    count = sum(c.rows.size for c in cells) - waves - len(blocks)
+    # after a blow a recording that took another course tells nothing by itself
+    other = [is_other(b.course) for b in blocks]
+    telling = [c for c in cells if not (other[c.recording] and c.start >= evidence[c.recording].blow)]
+    structured = sum(c.structured for c in telling)
+    waves = sum(c.waves for c in telling)
+    rough = sum(c.rough for c in telling)
+    count = sum(c.rows.size for c in telling) - waves - len(blocks)
     p = 1.0
     if waves and count > 0:
         # noise may be underrated, but not by so much: what is rough and far beyond it is no noise either
         p = float(f_distribution.sf((structured / waves) / min(max(rough / count, 1e-300), LOUD), waves, count))
-    p = min(p, too_many(sum(is_other(b.course) for b in blocks), len(blocks)))  # one may, not all of them
+    p = min(p, too_many(sum(other), len(other)))  # one may, not all of them
     return Mismatch(cells=tuple(cells), p_value=p, adjusted=_holm([c.p_value for c in cells]))
 
 

@@ -160,7 +160,9 @@ class RunSimulator:
         there = {place: run for place, run in runs.items() if run is not None}
         if len(there) < 3:
             return
-        beside = [self.predict(self._beside(one), 0.0) for one in NEIGHBOURS]
+        places = [{CENTRE: place} for place in runs]
+        others = [values for values in map(self._beside, NEIGHBOURS) if values not in places]
+        beside = [self.predict(values, 0.0) for values in others]
         stacks = {place: np.concatenate(list(_scaled(run).values())) for place, run in there.items()}
         every = [*stacks.values(), *(np.concatenate(list(_scaled(run).values())) for run in beside if run is not None)]
         inside = np.all([np.isfinite(y) for y in every], axis=0)

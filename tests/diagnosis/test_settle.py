@@ -52,7 +52,7 @@ def test_the_run_that_is_like_most_others_stands_for_all(monkeypatch: pytest.Mon
     chosen = simulator.scenario.ground.elements.centre
     assert chosen != own
     made = simulator.runs
-    assert made == 1 + len(overturn.ELSEWHERE)
+    assert made == len(overturn.ELSEWHERE) + len(NEIGHBOURS)  # one neighbour is one of the places
     found = simulator.predict({}, 0.0)
     assert found is not None
     assert np.max(found[CHANNEL]) < 2.0
@@ -62,7 +62,7 @@ def test_the_run_that_is_like_most_others_stands_for_all(monkeypatch: pytest.Mon
 
 def test_a_run_like_the_others_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     own = shipped("cube_toss").ground.elements.centre
-    simulator = a_toss(monkeypatch, {own: 0.03})
+    simulator = a_toss(monkeypatch, {own: 0.055})
     simulator.settle()
     assert simulator.scenario.ground.elements.centre == own
 
@@ -111,6 +111,9 @@ class Rough:
 
     def __init__(self, seed: int, size: float) -> None:
         self.seed, self.size = seed, size
+
+    def marks(self) -> tuple[tuple[float, str], ...]:
+        return ()
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
         x = changes.get("effects.slope.angle", 0.0) + changes.get("effects.slope.other", 0.0)
