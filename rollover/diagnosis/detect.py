@@ -74,11 +74,9 @@ def mismatch_of(
                 inside = np.flatnonzero((time >= start) & (time < end))
                 if inside.size >= 4:
                     rows = inside + part.start
-                    trusted = signal.weight is None
+                    weight = None if signal.weight is None else signal.weight[inside]
                     cells.append(
-                        _cell(
-                            r, signal.channel, name, time[inside], rows, block, humming[signal.channel], trusted=trusted
-                        )
+                        _cell(r, signal.channel, name, time[inside], rows, block, humming[signal.channel], weight)
                     )
     # after a blow a recording that took another course tells nothing by itself
     other = [is_other(b.course) for b in blocks]
@@ -103,8 +101,7 @@ def _cell(
     rows: NDArray[np.int64],
     block: Block,
     humming: tuple[float, ...],
-    *,
-    trusted: bool,
+    weight: Array | None,
 ) -> Cell:
     from scipy.stats import f as f_distribution
 
@@ -124,16 +121,17 @@ def _cell(
     inside = Q.T @ w
     structured, rough = float(inside @ inside), float(w @ w - inside @ inside)
     free = max(n - waves - 1, 1)
-    if not trusted:
+    if weight is not None:
         rough = max(rough, float(n - waves))  # where the model is not sure, what is rough says nothing of what is slow
     p = (
         float(f_distribution.sf((structured / waves) / max(rough / free, 1e-300), waves, free))
         if n > waves + 1
         else 1.0
     )
+    noise = n if weight is None else float(weight @ weight)
     return Cell(
         recording=r, channel=channel, phase=phase, start=float(time[0]), end=float(time[-1]), rows=rows, p_value=p,
-        excess=float(w @ w) - n, structured=structured, waves=waves, rough=max(rough, 0.0),
+        excess=float(w @ w) - noise, structured=structured, waves=waves, rough=max(rough, 0.0),
     )  # fmt: skip
 
 

@@ -49,11 +49,10 @@ class Gate:
     null: Array
     detectable: Mapping[str, float]
     starts: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
-    tests: int = 1  # that were made, of which this is one
 
     def p_value(self, phi: float = 1.0) -> float:
         """p-value of the best score; `phi` is what is left per sample where not even an explanation leaves noise."""
-        return min(1.0, self.tests * p_value(self.score / max(phi, 1.0), self.null))
+        return p_value(self.score / max(phi, 1.0), self.null)
 
 
 def gate(judge: Judge, base: Fitted, candidates: Sequence[Candidate], only: Sequence[int] | None = None) -> Gate:
@@ -85,6 +84,8 @@ def gate(judge: Judge, base: Fitted, candidates: Sequence[Candidate], only: Sequ
     D = np.stack(columns, axis=1)
     along = D.T @ (misfit - own @ (own.T @ misfit))
     scores = along**2 / (1.0 + _trust(judge, blocks, use, D))
+    if any(judge.evidence[r].strays for r in use):
+        scores = scores / _at_odds(misfit - own @ (own.T @ misfit), D, [b.residual.size for b in blocks])
     detectable: dict[str, float] = {}
     own_best: dict[str, float] = {}
     ways: dict[str, list[tuple[float, ...]]] = {}
@@ -125,6 +126,20 @@ def followed(c: Candidate, x: Sequence[float], factor: float) -> tuple[float, ..
     value = null + factor * (physical(x[at], search) - null)
     inside = coordinate(min(max(value, search.low), search.high), search)
     return (*x[:at], min(max(inside, EDGE), 1.0 - EDGE), *x[at + 1 :])
+
+
+def _at_odds(misfit: Array, D: Array, sizes: Sequence[int]) -> Array:
+    """How far recordings of `sizes` rows disagree on how much there is of each direction (n, m): Birge's ratio, (m,).
+
+    With a_r = d_r'w_r/|d_r|^2 the amplitude by recording r and a that by all, sum_r |d_r|^2 (a_r - a)^2 over the number
+    of recordings but one, at least 1. A run that took another course asks for much of some effect, and does so alone.
+    """
+    ends = np.cumsum(sizes)
+    parts = [slice(int(end - n), int(end)) for end, n in zip(ends, sizes, strict=True)]
+    along = np.array([D[p].T @ misfit[p] for p in parts])
+    size = np.array([np.sum(D[p] ** 2, axis=0) for p in parts])
+    apart = np.sum(along**2 / np.maximum(size, 1e-12), axis=0) - along.sum(axis=0) ** 2 / size.sum(axis=0)
+    return np.asarray(np.maximum(1.0, apart / max(len(parts) - 1, 1)))
 
 
 def _trust(judge: Judge, blocks: Sequence[Block], use: Sequence[int], D: Array) -> Array:

@@ -47,10 +47,16 @@ class Explanation:
     before: Mismatch
     after: Mismatch
     first: Step | None = None
+    refuted: bool = False  # whether the best candidate's gain did not outlast the scatter of its own runs
 
     @property
     def p_value(self) -> float:
-        """Of "nothing but noise": the smaller of the omnibus test's and of the best candidate's, for two tests."""
+        """Of "nothing but noise": the smaller of the omnibus test's and of the best candidate's, for two tests.
+
+        A candidate that was looked at closer and refuted tells nothing.
+        """
+        if self.refuted:
+            return self.before.p_value
         return float(1.0 - (1.0 - min(self.before.p_value, self.looked.p_value())) ** 2)
 
 
@@ -69,10 +75,12 @@ def explained(
         base = judge.again(base)
     before = mismatch_of(judge.evidence, base.blocks, phases)
     say(f"looking at {len(candidates)} candidates, which of them could matter")
-    few = spread(base, groups, judge.effort.few) if judge.effort.thrifty else None
-    looked = first_look = _look(judge, base, candidates, few)
-    current, left, taken = base, before, []
+    few = spread(base, groups, judge.effort.looked_at) if judge.effort.thrifty else None
+    looked = first_look = gate(judge, base, candidates, few)
+    current, left = base, before
+    taken: list[Step] = []
     first: Step | None = None
+    refuted = False
     for _ in range(MOST):
         if is_tolerated(judge, current):
             break
@@ -85,6 +93,7 @@ def explained(
         if judge.effort.thrifty:
             found = lasting(judge, found, groups)
             if found is None:
+                refuted = not taken
                 break
         taken.append(found)
         current = found.fitted
@@ -100,7 +109,7 @@ def explained(
                 left = mismatch_of(judge.evidence, current.blocks, phases)
         if len(taken) > 1 and current.left > HOPELESS**2 * count:
             break
-        looked = _look(judge, current, free(current, candidates), few)
+        looked = gate(judge, current, free(current, candidates), few)
     is_whole = left.p_value > SURE or not matters(judge, current, left)
     parts = [s.again(judge) for s in taken]
     if is_whole and len(taken) > 1:
@@ -116,19 +125,8 @@ def explained(
         before=before,
         after=mismatch_of(judge.evidence, current.blocks, phases),
         first=first.again(judge) if first is not None else None,
+        refuted=refuted,
     )
-
-
-def _look(judge: Judge, base: Fitted, candidates: Sequence[Candidate], few: Sequence[int] | None) -> Gate:
-    """A gate by `few` recordings where each look costs a run, and by all where these alone do not decide.
-
-    Two tests in place of one: the second's p-values count twice.
-    """
-    found = gate(judge, base, candidates, few)
-    if few is None or found.p_value() < CHANCE or len(few) == len(base.blocks):
-        return found
-    whole = gate(judge, base, candidates)
-    return replace(whole, tests=2)
 
 
 def lasting(judge: Judge, found: Step, groups: Groups) -> Step | None:
