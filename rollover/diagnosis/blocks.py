@@ -27,7 +27,8 @@ class Block:
     """One recording at the fitted point: residual (n,), Jacobian (n, p), slope of the shift (n,), shift, its prior.
 
     `course` (n,) is what samples count where the run went another course than the recording; None where it did not.
-    All three have it in them already.
+    All three have it in them already. `expected` is the sum of squares that noise and scatter alone leave, where that
+    is not one for each sample.
     """
 
     residual: Array
@@ -36,6 +37,12 @@ class Block:
     shift: float
     prior: float
     course: Array | None = None
+    expected: float | None = None
+
+    @property
+    def size(self) -> float:
+        """Sum of squares that noise and scatter alone leave."""
+        return float(self.residual.size) if self.expected is None else self.expected
 
     def counted(self, values: Array) -> Array:
         """Other whitened samples (n,) for what they count here."""

@@ -68,6 +68,15 @@ class Evidence:
             return eased(np.zeros((self.count, 0)))
         return eased(np.stack([self.whitened(column) for column in self.doubts.T], axis=1))
 
+    @cached_property
+    def expected(self) -> float | None:
+        """Sum of squares that noise and scatter alone leave of the weighed samples; None where none is weighed."""
+        if all(s.weight is None for s in self.signals):
+            return None
+        noise = sum(s.rows.size if s.weight is None else float(s.weight @ s.weight) for s in self.signals)
+        scatter = [float(np.sum(self.whitened(stray) ** 2)) for stray in self.strays]
+        return noise + (float(np.mean(scatter)) if scatter else 0.0)
+
     def is_rough(self, s: Signal) -> bool:
         """Whether a scatter between runs, or a tolerance that was asked for, has a large part in the error.
 

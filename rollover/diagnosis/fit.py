@@ -171,7 +171,9 @@ class Judge:
         counts = course(e, residual)
         if counts is not None:
             residual, J, slope = counts * residual, counts[:, None] * J, counts * slope
-        return Block(residual=residual, J=J, slope=slope, shift=shift, prior=e.shift_prior, course=counts)
+        return Block(
+            residual=residual, J=J, slope=slope, shift=shift, prior=e.shift_prior, course=counts, expected=e.expected
+        )
 
     def _slope(
         self,
