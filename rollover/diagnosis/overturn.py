@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 SENSORS = "sensor-"
 CENTRE = "ground.elements.centre"
 KEPT = 300  # runs of one recording: a third of a megabyte each
+AHEAD = 0.06  # s that a filter sees beyond the last stamp, where the recording went on
 BEYOND, FAR_BEYOND = 0.01, 0.06  # s by which a run goes on past the last stamp: time shifts, known zero or not
 SLOWEST = 20.0  # times the first run's wall time, and
 LEAST_TIME = 2.0  # s: a run that takes longer has lost its way in ever shorter steps
@@ -175,6 +176,22 @@ class RunSimulator:
         known, behind = self._known.get(_key({CENTRE: best})), self._behind.get(_key({CENTRE: best}))
         if known is not None and behind is not None:
             self._known[()], self._behind[()] = known, behind
+
+    def until(self, n: int) -> RunSimulator:
+        """The same for the first n stamps: its runs end soon after them, where their filters no longer look ahead."""
+        first = replace(
+            self.recording,
+            time=self.recording.time[:n],
+            channels={c: v[:n] for c, v in self.recording.channels.items()},
+        )
+        found = RunSimulator(self.scenario, first)
+        settings = found.scenario.simulation
+        ahead = settings.output_step * np.ceil(AHEAD / settings.output_step) if self.recording.cfc else 0.0
+        longer = min(round(settings.duration + float(ahead), 9), self.scenario.simulation.duration)
+        found.scenario = replace(found.scenario, simulation=replace(settings, duration=longer))
+        found._centre = self._centre
+        found.runs, found.seconds = self.runs, self.seconds
+        return found
 
     def _places(self) -> list[tuple[float, ...]]:
         """Where the grid may lie as well, where the scenario has it first."""

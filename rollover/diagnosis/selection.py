@@ -75,8 +75,7 @@ def explained(
         base = judge.again(base)
     before = mismatch_of(judge.evidence, base.blocks, phases)
     say(f"looking at {len(candidates)} candidates, which of them could matter")
-    few = spread(base, groups, judge.effort.looked_at) if judge.effort.thrifty else None
-    looked = first_look = gate(judge, base, candidates, few)
+    looked = first_look = _look(judge, base, candidates, groups)
     current, left = base, before
     taken: list[Step] = []
     first: Step | None = None
@@ -109,7 +108,7 @@ def explained(
                 left = mismatch_of(judge.evidence, current.blocks, phases)
         if len(taken) > 1 and current.left > HOPELESS**2 * count:
             break
-        looked = gate(judge, current, free(current, candidates), few)
+        looked = _look(judge, current, free(current, candidates), groups)
     is_whole = left.p_value > SURE or not matters(judge, current, left)
     parts = [s.again(judge) for s in taken]
     if is_whole and len(taken) > 1:
@@ -126,6 +125,30 @@ def explained(
         after=mismatch_of(judge.evidence, current.blocks, phases),
         first=first.again(judge) if first is not None else None,
         refuted=refuted,
+    )
+
+
+def _look(judge: Judge, base: Fitted, candidates: Sequence[Candidate], groups: Groups) -> Gate:
+    """A gate by all recordings; where each look costs a run, of few and then of the best candidates by some more.
+
+    The null stays that of the best of all candidates: what was passed over could only have raised the maximum.
+    """
+    effort = judge.effort
+    if not effort.thrifty:
+        return gate(judge, base, candidates)
+    few, more = spread(base, groups, effort.few), spread(base, groups, effort.looked_at)
+    first = gate(judge, base, candidates, few)
+    if len(more) <= len(few):
+        return first
+    moving = sorted((c for c in candidates if c.kind != "sensor"), key=lambda c: -first.scores.get(c.key, 0.0))
+    able = [*moving[: effort.shortlist], *(c for c in candidates if c.kind == "sensor")]
+    second = gate(judge, base, able, more)
+    return replace(
+        second,
+        scores={**dict.fromkeys(first.scores, 0.0), **second.scores},
+        null=np.maximum(first.null, second.null),
+        detectable={**first.detectable, **second.detectable},
+        starts={**first.starts, **second.starts},
     )
 
 
