@@ -139,6 +139,7 @@ def diagnose(
         simulations=judge.simulations,
         seconds=clock.perf_counter() - began,
         notes=tuple(notes),
+        grids=_grids([*found, *kept]),
         empirical=law,
     )
 
@@ -177,6 +178,12 @@ def _left_aside(every: Sequence[Evidence], found: Sequence[Evidence]) -> list[st
     ends = {e.name: float(e.recording.time[-1]) for e in every}
     cut = [(e.name, float(e.recording.time[-1])) for e in found if float(e.recording.time[-1]) < ends[e.name]]
     return [f"{name}: what comes after {at:.2f} s depends on chance and was left aside" for name, at in cut]
+
+
+def _grids(evidence: Sequence[Evidence]) -> dict[str, tuple[float, ...]]:
+    """Centre of the ground's elements (m) of the run that stands for its neighbours, by recording; drops have none."""
+    made = [(e.name, getattr(e.simulator, "inner", e.simulator)) for e in evidence]
+    return {name: s.scenario.ground.elements.centre for name, s in made if isinstance(s, RunSimulator)}
 
 
 def _felt(d: Degree) -> str:

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from rollover.diagnosis.blocks import at_an_end
-from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.candidates import Candidate, physical
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.explain import SURE, Phases, Step, moves, spread, step, weighed
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate, gate
 from rollover.diagnosis.holdout import held_out
-from rollover.diagnosis.settle import settled
+from rollover.diagnosis.intervals import intervals
+from rollover.diagnosis.settle import left_of_means, settled
 from rollover.diagnosis.verdict import Verdict
+from rollover.effects import EFFECTS
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
 MOST = 3  # effects in one explanation
@@ -24,6 +27,7 @@ NEGLIGIBLE = 0.001  # of a channel's range: what moves nothing by more is not wo
 PARTLY = 0.02  # of the excess over the noise that one effect may leave and still be named
 HOPELESS = 2.0  # misfit over the noise that two effects leave and a third is not looked for
 BETTER = 0.5  # of what is left, that another first effect must leave
+RIVAL = 0.5  # of the best's gain, by the mean of its runs, that a rival must have
 NEEDED = 25.0  # gain, over what is left per sample, that an effect must bring beside all the others
 
 Groups = Sequence[Sequence[int]]
@@ -153,14 +157,33 @@ def _look(judge: Judge, base: Fitted, candidates: Sequence[Candidate], groups: G
 
 
 def lasting(judge: Judge, found: Step, groups: Groups) -> Step | None:
-    """The first of a step's rivals that still gains under the scatter of its own runs; None if none does."""
+    """The best of a step's rivals by the mean of its runs, if that gains and has a strength; None if none does.
+
+    Rivals whose mean gains much less are none.
+    """
     held = judge.evidence
-    for rival in found.rivals:
-        one = settled(judge, replace(found, fitted=rival))
-        if outlasts(one, groups):
+    start = left_of_means(judge, found.base)
+    gains = {id(f): start - left_of_means(judge, f) for f in found.rivals}
+    best = max(gains.values(), default=0.0)
+    near = [f for f in found.rivals if gains[id(f)] > RIVAL * best]
+    for rival in sorted(near, key=lambda f: -gains[id(f)]):
+        if gains[id(rival)] < NEEDED:
+            return None
+        one = settled(judge, replace(found, fitted=rival, rivals=tuple(near)))
+        if outlasts(one, groups) and is_there(judge, one.fitted):
             return one
         judge.weigh(held)
     return None
+
+
+def is_there(judge: Judge, fitted: Fitted) -> bool:
+    """Whether the strength of the last effect is told from none: its interval keeps away from what changes nothing."""
+    last = fitted.candidates[-1]
+    nulls: dict[str, Any] = dict(EFFECTS[last.id].null)
+    for (name, search), at in zip(last.search.items(), last.neutral or (None,) * len(last.search), strict=True):
+        nulls[name] = nulls.get(name) if at is None else physical(at, search)
+    known = {name: i for name, i in intervals(judge, fitted)[-1].items() if isinstance(nulls.get(name), (int, float))}
+    return not known or any(not i.low <= nulls[name] <= i.high for name, i in known.items())
 
 
 def outlasts(found: Step, groups: Groups) -> bool:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,7 @@ from rollover.diagnosis.chaos import averaged
 from rollover.diagnosis.clocks import align
 from rollover.diagnosis.evidence import Evidence, evidence_of
 from rollover.diagnosis.fit import Judge
-from rollover.diagnosis.overturn import CENTRE, RunSimulator
+from rollover.diagnosis.overturn import CENTRE
 from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.simulator import Simulator, simulator_of
 from rollover.diagnosis.verdict import Diagnosis
@@ -88,7 +87,9 @@ def series(scenario: Scenario, recordings: Sequence[tuple[str, Recording]], foun
     judged = found.held_out if set(found.held_out) != set(found.training) else ()
     told = []
     for name, recording in recordings:
-        one = _told(name, recording, scenario, diagnosed if found.effects or found.empirical else None, name in judged)
+        laid = {CENTRE: found.grids[name]} if name in found.grids else {}
+        other = diagnosed.replaced(laid) if found.effects or found.empirical else None
+        one = _told(name, recording, scenario.replaced(laid), other, name in judged)
         if one is not None:
             told.append(one)
     return tuple(told)
@@ -97,19 +98,15 @@ def series(scenario: Scenario, recordings: Sequence[tuple[str, Recording]], foun
 def _told(
     name: str, recording: Recording, scenario: Scenario, diagnosed: Scenario | None, held_out: bool
 ) -> Told | None:
-    grid = _grid(scenario, recording)
-    scenario, diagnosed = scenario.replaced(grid), None if diagnosed is None else diagnosed.replaced(grid)
-    simulator = simulator_of(scenario, recording)
-    evidence = evidence_of(name, *simulated(scenario, recording))
+    simulator, evidence = _ready(name, scenario, recording)
     if evidence is None:
         return None
     thinner = evidence.recording
-    best = evidence if diagnosed is None else evidence_of(name, *simulated(diagnosed, recording))
+    last, best = (simulator, evidence) if diagnosed is None else _ready(name, diagnosed, recording)
     at = _shift(best or evidence)
     before = simulator.predict({}, at)
     if before is None:
         return None
-    last = simulator if diagnosed is None else simulator_of(diagnosed, recording)
     after = None if diagnosed is None else last.predict({}, at)
     strays = last.strays({}, at)
     tracks = []
@@ -138,13 +135,10 @@ def _told(
     )
 
 
-def _grid(scenario: Scenario, recording: Recording) -> dict[str, Any]:
-    """Where the ground's grid lies for the run that is the most like its neighbours; drops have no grid."""
-    simulator: Simulator = simulator_of(scenario, recording)
-    if not isinstance(simulator, RunSimulator):
-        return {}
-    simulator.settle()
-    return {CENTRE: simulator.scenario.ground.elements.centre}
+def _ready(name: str, scenario: Scenario, recording: Recording) -> tuple[Simulator, Evidence | None]:
+    """What simulates all stamps, and the evidence at no more rows than are needed: of one and the same if it can be."""
+    thin, simulator, many = simulated(scenario, recording)
+    return simulator if many == 1 else simulator_of(scenario, recording), evidence_of(name, thin, simulator, many)
 
 
 def _scatter(strays: Sequence[Array], time: Array) -> Array | None:
