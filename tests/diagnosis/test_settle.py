@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis import overturn
+from rollover.diagnosis import overturn, selection
 from rollover.diagnosis.blocks import GENTLE, Block, Fitted
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.effort import DROPS, RUNS, Effort
@@ -18,8 +18,9 @@ from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.intervals import intervals, scattered, unshaped
 from rollover.diagnosis.overturn import CENTRE, NEIGHBOURS, RunSimulator
-from rollover.diagnosis.selection import lasting, outlasts
-from rollover.diagnosis.settle import along, rescattered, settled, step_of_means
+from rollover.diagnosis.selection import is_there, lasting, outlasts
+from rollover.diagnosis.settle import along, left_of_means, rescattered, settled, step_of_means
+from rollover.diagnosis.verdict import Interval
 from rollover.effects import Search
 from rollover.recording import Recording
 from rollover.scenario import Scenario
@@ -328,3 +329,60 @@ def test_a_move_does_not_leap_to_another_course() -> None:
     found = settled(judge, Step(base=base, fitted=fitted, p_value=0.0, rivals=(fitted,)))
     assert not 0.365 < found.fitted.x[0] < 0.385
     assert found.fitted.left < judge.again(fitted).left
+
+
+def test_rivals_are_judged_by_the_mean_of_their_runs() -> None:
+    """One rival's run meets the recordings by chance while its neighbours do not, the other's all do but itself."""
+
+    class Chance(Rough):
+        def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+            slope, scale = changes.get("effects.slope.angle", 0.0), changes.get("effects.inertia.scale", 0.0)
+            lucky = bool(scale) and not changes.get("neighbour", 0)
+            off = 0.4 * bool(slope) * (not changes.get("neighbour", 0)) * np.cos(20.0 * TIME)
+            return {CHANNEL: 20.0 * (slope or 0.4 * lucky) * np.sin(30.0 * TIME) + off}
+
+    rng = np.random.default_rng(4)
+    every = []
+    for r in range(4):
+        one = evidence(r, 0.1, 8.0 * np.sin(30.0 * TIME) + 0.1 * rng.standard_normal(N))
+        every.append(replace(one, simulator=cast(Any, Chance(r, 0.1))))
+    judge = Judge(every)
+    base, right = judge.fit((), ()), judge.fit((SLOPE,), (0.4,), rounds=0)
+    lucky = judge.fit((candidate("inertia", "parameter", "scale"),), (0.5,), rounds=0)
+    assert base is not None
+    assert right is not None
+    assert lucky is not None
+    assert lucky.left < right.left
+    assert left_of_means(judge, right) < 0.5 * right.left
+    assert left_of_means(judge, lucky) > 10.0 * left_of_means(judge, right)
+    found = lasting(judge, Step(base=base, fitted=lucky, p_value=0.0, rivals=(lucky, right)), [[k] for k in range(4)])
+    assert found is not None
+    assert [f.candidates[-1].key for f in found.rivals] == ["slope"]
+
+
+def test_a_strength_that_is_not_told_from_none_is_no_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+    judge = Judge([evidence(0, 0.1, np.zeros(N))])
+    layer = replace(
+        candidate("soil-layer", "physics", "depth"),
+        search={"depth": Search(0.0, 0.1), "stiffness_ratio": Search(0.1, 9.0, "log")},
+    )
+    fitted = Fitted(candidates=(layer,), x=(0.5, 0.5), blocks=())
+
+    def told(low: float, high: float) -> bool:
+        found = [{"depth": Interval(value=0.02, low=0.01, high=0.03, unit="m"), "stiffness_ratio": _from(low, high)}]
+        monkeypatch.setattr(selection, "intervals", lambda *_: found)
+        return is_there(judge, fitted)
+
+    assert not told(0.73, 1.37)
+    assert told(1.1, 1.4)
+    assert told(0.5, 0.9)
+    own = replace(candidate("ground-friction", "physics", "coefficient"), neutral=(0.5,))  # the scenario's is 0.5
+    fitted = Fitted(candidates=(own,), x=(0.6,), blocks=())
+    for low, high, there in ((0.4, 0.6, False), (0.55, 0.7, True)):
+        alone = [{"coefficient": _from(low, high)}]
+        monkeypatch.setattr(selection, "intervals", lambda *_, alone=alone: alone)
+        assert is_there(judge, fitted) is there
+
+
+def _from(low: float, high: float) -> Interval:
+    return Interval(value=0.5 * (low + high), low=low, high=high, unit="1")
