@@ -17,17 +17,18 @@ COUNTS = 0.3  # of what it would, on the average, from which on the end is kept
 FEWEST = 8  # samples of a signal
 
 
-def shortened(e: Evidence) -> Evidence:
+def shortened(e: Evidence, *, alone: bool = False) -> Evidence:
     """The evidence without its end, where that counts little: long after a blow neighbours differ as effects do.
 
-    As it is where samples are not weighed, and where the end counts.
+    As it is where samples are not weighed, and where the end counts. Of a recording that is `alone` nothing after the
+    blow is kept: whether an effect or another course of the run did it, only a second one could tell.
     """
-    time, end = e.recording.time, e.blow + LASTING
+    time, end = e.recording.time, e.blow + (0.0 if alone else LASTING)
     if not time[-1] > end + SHORT:
         return e
     late = [(s, time[s.rows] > end) for s in e.signals]
     worth = [np.ones(inside.sum()) if s.weight is None else s.weight[inside] ** 2 for s, inside in late]
-    if float(np.mean(np.concatenate(worth))) > COUNTS:
+    if not alone and float(np.mean(np.concatenate(worth))) > COUNTS:
         return e
     n = int(np.searchsorted(time, end, side="right"))
     simulator = _until(e.simulator, n)

@@ -155,7 +155,8 @@ def _weighed(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:
 
 def _trusted(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:
     """The recordings weighed, what the simulation itself is not sure of less."""
-    return [shortened(weighted(e, e.simulator.strays())) for e in _weighed(scenario, every)]
+    weighed = [weighted(e, e.simulator.strays()) for e in _weighed(scenario, every)]
+    return [shortened(e, alone=len(weighed) == 1) for e in weighed]
 
 
 def _evidence(scenario: Scenario, recordings: Sequence[tuple[str, Recording]]) -> tuple[list[Evidence], list[str]]:

@@ -60,6 +60,14 @@ def test_an_end_that_counts_is_kept() -> None:
     assert shortened(replace(plain, signals=(replace(plain.signals[0], weight=None),))).recording.time.size == 1000
 
 
+def test_of_one_recording_alone_nothing_after_the_blow_counts() -> None:
+    whole = evidence(0.9)
+    found = shortened(whole, alone=True)
+    assert found.recording.time[-1] == pytest.approx(BLOW, abs=STEP)
+    without = replace(whole, blow=np.inf)
+    assert shortened(without, alone=True) is without
+
+
 def test_a_shorter_run_is_the_same_run_and_its_filter_looks_ahead() -> None:
     whole = evidence(0.3, cfc=60)
     found = shortened(whole)
