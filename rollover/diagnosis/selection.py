@@ -77,6 +77,8 @@ def explained(
     count = sum(b.residual.size for b in base.blocks)
     if weighed(judge, base, phases):
         base = judge.again(base)
+    if not judge.effort.thrifty:
+        base = judge.timed(base)  # what a clock leaves is no effect's gain
     before = mismatch_of(judge.evidence, base.blocks, phases)
     say(f"looking at {len(candidates)} candidates, which of them could matter")
     looked = first_look = _look(judge, base, candidates, groups)
