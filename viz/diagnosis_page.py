@@ -15,7 +15,7 @@ from viz.entities import series
 from viz.page import Block, Cell, Details, Figure, Footer, Headline, Note, Section, Table, render
 from viz.plots import Curve
 
-LEAST_SHARE = 0.01  # of a force that one quantity predicts, that is worth a line
+LEAST_SHARE = 0.01  # of a force that some quantity predicts, that is worth a table
 PICTURES = 3  # recordings shown in full view; the others are folded away
 Row = list[str | Cell]
 
@@ -83,11 +83,10 @@ def _where(found: Diagnosis, told: Sequence[Told]) -> list[Block]:
         blocks.append(Details(summary="All other channels and recordings", blocks=rest))
     if found.where:
         blocks.append(_places(found.where, "Share: of all misfit beyond the noise, before anything was changed."))
-    depends = [(name, share) for name, share in found.dependencies if share >= LEAST_SHARE]
-    if depends and found.where:
+    if found.where and any(share >= LEAST_SHARE for _, share in found.dependencies):
         table = Table(
             columns=["the residual force as a function of", "predicts, %"],
-            rows=[[label_of(name), f"{100.0 * share:.0f}"] for name, share in depends],
+            rows=[[label_of(name), f"{100.0 * max(share, 0.0):.0f}"] for name, share in found.dependencies],
             numeric=(1,),
             caption="Share of the unexplained force that a curve over this one quantity predicts in conditions left "
             "out of its making.",

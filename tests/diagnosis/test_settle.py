@@ -331,7 +331,7 @@ def test_a_move_does_not_leap_to_another_course() -> None:
     assert found.fitted.left < judge.again(fitted).left
 
 
-def test_rivals_are_judged_by_the_mean_of_their_runs() -> None:
+def test_rivals_are_judged_by_the_mean_of_their_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     """One rival's run meets the recordings by chance while its neighbours do not, the other's all do but itself."""
 
     class Chance(Rough):
@@ -339,7 +339,8 @@ def test_rivals_are_judged_by_the_mean_of_their_runs() -> None:
             slope, scale = changes.get("effects.slope.angle", 0.0), changes.get("effects.inertia.scale", 0.0)
             lucky = bool(scale) and not changes.get("neighbour", 0)
             off = 0.4 * bool(slope) * (not changes.get("neighbour", 0)) * np.cos(20.0 * TIME)
-            return {CHANNEL: 20.0 * (slope or 0.4 * lucky) * np.sin(30.0 * TIME) + off}
+            weak = 0.3 * bool(changes.get("effects.mass.share", 0.0))
+            return {CHANNEL: 20.0 * (slope or weak or 0.4 * lucky) * np.sin(30.0 * TIME) + off}
 
     rng = np.random.default_rng(4)
     every = []
@@ -358,6 +359,14 @@ def test_rivals_are_judged_by_the_mean_of_their_runs() -> None:
     found = lasting(judge, Step(base=base, fitted=lucky, p_value=0.0, rivals=(lucky, right)), [[k] for k in range(4)])
     assert found is not None
     assert [f.candidates[-1].key for f in found.rivals] == ["slope"]
+    weaker = judge.fit((candidate("mass", "parameter", "share"),), (0.5,), rounds=0)
+    assert weaker is not None
+    monkeypatch.setattr(selection, "is_there", lambda *_: True)
+    step = Step(base=base, fitted=weaker, p_value=0.0, rivals=(weaker, right))
+    found = lasting(judge, step, [[k] for k in range(4)])
+    assert found is not None
+    assert found.fitted.candidates[-1].key == "slope"
+    assert len(found.rivals) == 2
 
 
 def test_a_strength_that_is_not_told_from_none_is_no_effect(monkeypatch: pytest.MonkeyPatch) -> None:
