@@ -359,6 +359,7 @@ def test_rivals_are_judged_by_the_mean_of_their_runs(monkeypatch: pytest.MonkeyP
     found = lasting(judge, Step(base=base, fitted=lucky, p_value=0.0, rivals=(lucky, right)), [[k] for k in range(4)])
     assert found is not None
     assert [f.candidates[-1].key for f in found.rivals] == ["slope"]
+    judge.weigh(every)
     weaker = judge.fit((candidate("mass", "parameter", "share"),), (0.5,), rounds=0)
     assert weaker is not None
     monkeypatch.setattr(selection, "is_there", lambda *_: True)
