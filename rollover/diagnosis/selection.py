@@ -165,7 +165,9 @@ def lasting(judge: Judge, found: Step, groups: Groups) -> Step | None:
     """
     held = judge.evidence
     start = left_of_means(judge, found.base)
-    gains = {id(f): start - left_of_means(judge, f) for f in found.rivals}
+    gains = {
+        id(f): max(a - b for a, b in zip(start, left_of_means(judge, f), strict=True)) for f in found.rivals
+    }  # what shows before the blow need not outweigh what chance does after it
     best = max(gains.values(), default=0.0)
     near = [f for f in found.rivals if gains[id(f)] > RIVAL * best]
     for rival in sorted(near, key=lambda f: -gains[id(f)]):

@@ -66,13 +66,14 @@ def rescattered(judge: Judge, fitted: Fitted) -> None:
     judge.weigh(evidence)
 
 
-def left_of_means(judge: Judge, fitted: Fitted) -> float:
-    """Sum of squares that the mean of a fit's neighbours leaves, under the noise and weights as they are held now.
+def left_of_means(judge: Judge, fitted: Fitted) -> tuple[float, float]:
+    """Sum of squares that the mean of a fit's neighbours leaves, in all and before the blow alone.
 
-    One run meets a recording well or badly by chance; the mean of seven much less so.
+    Under the noise and weights as they are held now. One run meets a recording
+    well or badly by chance; the mean of seven much less so.
     """
     changes = judge.changes(fitted.candidates, fitted.x)
-    total = 0.0
+    total = before = 0.0
     for e, block in zip(judge.evidence, fitted.blocks, strict=True):
         strays = alike(e, e.simulator.strays(changes, block.shift), e.blow)
         raw = [d for d in (e.raw(stray) for stray in strays) if np.all(np.isfinite(d))]
@@ -81,8 +82,10 @@ def left_of_means(judge: Judge, fitted: Fitted) -> float:
             w = w - e.eased(e.whitened(np.sum(raw, axis=0) / (1.0 + len(raw))))
         counts = course(e, w)
         w = w if counts is None else counts * w
+        early = np.concatenate([e.recording.time[s.rows] < e.blow for s in e.signals])
         total += float(w @ w) + (block.shift / block.prior) ** 2
-    return total
+        before += float(w[early] @ w[early]) + (block.shift / block.prior) ** 2
+    return total, before
 
 
 def along(block: Block, e: Evidence, stray: Array) -> Array:

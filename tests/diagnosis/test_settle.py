@@ -354,8 +354,13 @@ def test_rivals_are_judged_by_the_mean_of_their_runs(monkeypatch: pytest.MonkeyP
     assert right is not None
     assert lucky is not None
     assert lucky.left < right.left
-    assert left_of_means(judge, right) < 0.5 * right.left
-    assert left_of_means(judge, lucky) > 10.0 * left_of_means(judge, right)
+    assert left_of_means(judge, right)[0] < 0.5 * right.left
+    assert left_of_means(judge, lucky)[0] > 10.0 * left_of_means(judge, right)[0]
+    early = [replace(e, blow=TIME[20]) for e in every]
+    judge.weigh(early)
+    part = sum(float(b.residual[:20] @ b.residual[:20]) + (b.shift / b.prior) ** 2 for b in base.blocks)
+    assert left_of_means(judge, base)[1] == pytest.approx(part, rel=0.01)
+    judge.weigh(every)
     found = lasting(judge, Step(base=base, fitted=lucky, p_value=0.0, rivals=(lucky, right)), [[k] for k in range(4)])
     assert found is not None
     assert [f.candidates[-1].key for f in found.rivals] == ["slope"]
