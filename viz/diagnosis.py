@@ -29,7 +29,12 @@ PHASES = {
     "peak": 0xC2A23CFF,
     "unloading": 0x7A5FA3FF,
     "rest": 0x3F8A4BFF,
+    "support": 0x4A5B70FF,
+    "tipping": 0x3D6391FF,
+    "impact": 0xC24A44FF,
+    "sliding": 0xC2A23CFF,
 }
+STACKED = 4  # channels that stand one above the other; more stand in two columns
 # the viewer draws what was measured last, thin, so that the curve that follows it is seen below
 _SOURCES = (("measured", MEASURED, 1.0), ("before", LIMIT, 1.5), ("after", SIMULATED, 4.0))
 
@@ -92,7 +97,7 @@ def _recording(out: Stream, one: Told) -> None:
                 continue
             _columns(out, f"{_path(one, track, 'values')}/{source}", track.time, values * factor)
             if source != "measured":
-                left = (track.measured - values) / track.noise
+                left = (track.measured - values) / (track.noise * track.unsure)
                 _columns(out, f"{_path(one, track, 'residual')}/{source}", track.time, left)
     marks = [(at, name) for at, name in one.phases if name in PHASES]
     states = rr.StateChange.columns(state=[name for _, name in marks])
@@ -120,9 +125,14 @@ def _blueprint(found: Diagnosis, told: Sequence[Told]) -> rrb.Blueprint:
         )
     tabs = [front]
     for one, tracks in by_share:
-        views = [*(_values(one, t) for t in tracks), _residual(one, tracks), _phase(one)]
+        columns = 1 + (len(tracks) > STACKED)
+        plots = [_values(one, t) for t in tracks]
+        rows = [
+            rrb.Horizontal(*plots[k : k + columns]) if columns > 1 else plots[k] for k in range(0, len(plots), columns)
+        ]
         name = f"{one.recording}, held out" if one.held_out else one.recording
-        tabs.append(rrb.Vertical(*views, row_shares=[*[3] * len(tracks), 3, 1], name=name))
+        views = [*rows, _residual(one, tracks), _phase(one)]
+        tabs.append(rrb.Vertical(*views, row_shares=[*[3] * len(rows), 3, 1], name=name))
     return framed(rrb.Tabs(*tabs, active_tab=0))
 
 
@@ -133,7 +143,8 @@ def _values(one: Told, track: Track) -> rrb.TimeSeriesView:
 
 def _residual(one: Told, tracks: Sequence[Track]) -> rrb.TimeSeriesView:
     paths = [_path(one, t, "residual") for t in tracks]
-    return _plot(f"{one.recording}: measured less simulated, over the noise", paths)
+    over = "over the noise" if all(t.scatter is None for t in tracks) else "over noise and scatter of runs"
+    return _plot(f"{one.recording}: measured less simulated, {over}", paths)
 
 
 def _plot(name: str, paths: Sequence[str]) -> rrb.TimeSeriesView:

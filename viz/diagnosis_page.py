@@ -15,6 +15,7 @@ from viz.entities import series
 from viz.page import Block, Cell, Details, Figure, Footer, Headline, Note, Section, Table, render
 from viz.plots import Curve
 
+LEAST_SHARE = 0.01  # of a force that some quantity predicts, that is worth a table
 PICTURES = 3  # recordings shown in full view; the others are folded away
 Row = list[str | Cell]
 
@@ -82,7 +83,7 @@ def _where(found: Diagnosis, told: Sequence[Told]) -> list[Block]:
         blocks.append(Details(summary="All other channels and recordings", blocks=rest))
     if found.where:
         blocks.append(_places(found.where, "Share: of all misfit beyond the noise, before anything was changed."))
-    if found.dependencies and found.where:
+    if found.where and any(share >= LEAST_SHARE for _, share in found.dependencies):
         table = Table(
             columns=["the residual force as a function of", "predicts, %"],
             rows=[[label_of(name), f"{100.0 * max(share, 0.0):.0f}"] for name, share in found.dependencies],
@@ -126,12 +127,14 @@ def _figure(one: Told, track: Track, found: Diagnosis) -> Figure:
         label=f"{s.name}, {s.unit}",
         noise=track.noise * s.factor,
         phases=one.phases,
+        unsure=None if track.scatter is None else track.unsure,
     )
     fall = f"residual {_g(track.rms_before, 3)}"
     if track.rms_after is not None:
         fall += f" before, {_g(track.rms_after, 3)} after"
     judged = ", held out" if one.held_out else ""
-    caption = f"{one.recording}{judged}: {track.channel}; below, measured less simulated over the noise: {fall} (RMS)."
+    over = "over the noise" if track.scatter is None else "over the noise, grey what neighbouring runs differ by"
+    caption = f"{one.recording}{judged}: {track.channel}; below, measured less simulated {over}: {fall} (RMS)."
     return Figure(svg=svg, caption=caption)
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from rollover.channels import describe, is_known
+from rollover.channels import is_known
 from rollover.diagnosis import Diagnosis
+from viz.entities import series
 from viz.page import State
 
 STATES: Mapping[str, State] = {
@@ -47,7 +48,7 @@ def label_of(quantity: str) -> str:
         "ground/sinkage": "depth",
         "time": "time",
     }
-    return words.get(quantity, describe(quantity).meaning if is_known(quantity) else quantity)
+    return words.get(quantity, series(quantity).name if is_known(quantity) else quantity)
 
 
 def markdown(found: Diagnosis) -> str:

@@ -165,10 +165,12 @@ def before_after(
     label: str,
     noise: float,
     phases: Sequence[tuple[float, str]] = (),
+    unsure: Array | None = None,
 ) -> str:
     """Measured, simulated before and after at the same stamps; below, measured less each over `noise` (2 sigma drawn).
 
-    The residual's axis is linear up to ten times the noise and logarithmic beyond: both misfits can be read.
+    `unsure` (n,) times the noise is 1 sigma of what a simulation leaves by chance, where that is more. The
+    residual's axis is linear up to ten times the noise and logarithmic beyond: both misfits can be read.
     """
     with _canvas(WIDTH, 4.3) as (figure, svg):
         above, below = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [3, 1.8]})
@@ -181,7 +183,10 @@ def before_after(
         for curve in simulated:
             rest = Curve(name=curve.name, x=curve.x, y=(measured.y - curve.y) / noise, role=curve.role)
             _draw(below, [rest])
-        below.axhspan(-2.0, 2.0, color=COLOURS["muted"], alpha=0.18, lw=0)
+        if unsure is None:
+            below.axhspan(-2.0, 2.0, color=COLOURS["muted"], alpha=0.18, lw=0)
+        else:
+            below.fill_between(measured.x, -2.0 * unsure, 2.0 * unsure, color=COLOURS["muted"], alpha=0.18, lw=0)
         below.axhline(0.0, color=COLOURS["ink"], lw=0.6)
         below.set_yscale("symlog", linthresh=LINEAR)
         low, high = below.get_ylim()

@@ -24,13 +24,34 @@ GENTLE = 1e-4  # prior of a coordinate (1/variance): keeps what nothing determin
 
 @dataclass(frozen=True, kw_only=True)
 class Block:
-    """One recording at the fitted point: residual (n,), Jacobian (n, p), slope of the shift (n,), shift, its prior."""
+    """One recording at the fitted point: residual (n,), Jacobian (n, p), slope of the shift (n,), shift, its prior.
+
+    `course` (n,) is what samples count where the run went another course than the recording; None where it did not.
+    All three have it in them already. `expected` is the sum of squares that noise and scatter alone leave, where that
+    is not one for each sample.
+    """
 
     residual: Array
     J: Array
     slope: Array
     shift: float
     prior: float
+    course: Array | None = None
+    expected: float | None = None
+
+    @property
+    def size(self) -> float:
+        """Sum of squares that noise and scatter alone leave."""
+        return float(self.residual.size) if self.expected is None else self.expected
+
+    def counted(self, values: Array) -> Array:
+        """Other whitened samples (n,) for what they count here."""
+        return values if self.course is None else values * self.course
+
+    @property
+    def plain_J(self) -> Array:
+        """J of samples that count in full."""
+        return self.J if self.course is None else self.J / self.course[:, None]
 
     @property
     def weight(self) -> float:

@@ -7,6 +7,16 @@ differ by there is no mismatch. With scatter s(t) beside the noise sigma, each s
 
 of what it would: L samples of the scatter go together, so that each of them is worth 1/L of one that stands alone;
 c makes up for the few neighbours.
+
+Few neighbours do not show every course that a run may take. One that takes another after a blow begins it anew from a
+state of d = 14 numbers, place and speed of the chassis in six degrees of freedom and of the front axle in one, which
+nobody knows the size of. What such a state leaves beyond the E that is expected, x, has the likelihood of d normal
+numbers of unknown variance,
+
+    -2 ln p = E + d ln(1 + x/d)                                                                                (D9)
+
+in place of E + x. Another course shows in all channels: x is E (m - 1), m the middle one of what the channels leave
+over what they are expected to. What one channel leaves alone is not forgiven.
 """
 
 from __future__ import annotations
@@ -24,15 +34,30 @@ WINDOW = 0.02  # s, over which the neighbours' squares are averaged: what is off
 FEW = 1.5  # c, for six neighbours
 LONGEST = 0.1  # s, that scatter goes together
 UNTOUCHED = 0.99  # weights all above need no mention
+STATE = 14  # d
+ALONE = 3  # channels below which none is told from a course
+OTHER = 0.5  # of what it would count, below which a recording took another course
+OFTEN = 0.15  # of recordings that may
+FAR = 9.0  # times the middle power of neighbours, beyond which one took another course
 
 
 def weighted(e: Evidence, strays: Sequence[Mapping[str, Array]]) -> Evidence:
     """The evidence with each sample's weight (D3); `strays` are the neighbours' deviations at its stamps."""
+    blow = next((at for at, name in e.simulator.marks() if name == "impact"), np.inf)
+    strays = alike(e, strays, blow)
     if not strays:
         return e
     signals = tuple(_weighted(e, s, np.stack([d[s.channel][s.rows] for d in strays])) for s in e.signals)
     stacked = [e.raw(d) for d in strays]
-    return replace(e, signals=signals, strays=tuple(d for d in stacked if np.all(np.isfinite(d))))
+    return replace(e, signals=signals, strays=tuple(d for d in stacked if np.all(np.isfinite(d))), blow=blow)
+
+
+def alike(e: Evidence, strays: Sequence[Mapping[str, Array]], blow: float) -> list[Mapping[str, Array]]:
+    """Neighbours without those that took a clearly other course after the `blow` (s): (D9) is for these."""
+    late = [(s, s.rows[e.recording.time[s.rows] >= blow]) for s in e.signals]
+    power = [sum(float(np.nansum((d[s.channel][rows] / s.sigma) ** 2)) for s, rows in late) for d in strays]
+    most = FAR * float(np.median(power)) if power else 0.0
+    return [d for d, p in zip(strays, power, strict=True) if p <= most]
 
 
 def _weighted(e: Evidence, s: Signal, strays: Array) -> Signal:
@@ -63,3 +88,37 @@ def memory(strays: Array) -> float:
         return 1.0
     rho = float(np.sum(strays[:, 1:] * strays[:, :-1])) / power
     return max(1.0, (1.0 + rho) / max(1.0 - rho, 1e-3))
+
+
+def course(e: Evidence, residual: Array) -> Array | None:
+    """What samples (n,) of a whitened misfit (n,) count by (D9), root of the share; None where all count in full."""
+    if len(e.signals) < ALONE or not any(s.weight is not None for s in e.signals):
+        return None
+    over, expected, inside = [], 0.0, np.zeros(residual.size, dtype=bool)
+    for s, part in e.spans():
+        later = e.recording.time[s.rows] >= e.blow
+        if not later.any():
+            continue
+        inside[part] = later
+        own = float(np.sum(s.weight[later] ** 2)) if s.weight is not None else float(later.sum())
+        over.append(float(np.sum(residual[part][later] ** 2)) / max(own, 1.0))
+        expected += max(own, 1.0)
+    if len(over) < ALONE:
+        return None
+    beyond = (float(np.median(over)) - 1.0) * expected
+    if beyond <= 0.0:
+        return None
+    share = (expected + STATE * np.log1p(beyond / STATE)) / (expected + beyond)
+    return np.where(inside, np.sqrt(share), 1.0)
+
+
+def is_other(block_course: Array | None) -> bool:
+    """Whether a recording took a clearly other course than its run."""
+    return block_course is not None and float(block_course.min()) ** 2 < OTHER
+
+
+def too_many(others: int, of: int) -> float:
+    """p-value of so many recordings that took another course, where each may in `OFTEN` of all cases."""
+    from scipy.stats import binom
+
+    return float(binom.sf(others - 1, of, OFTEN)) if others else 1.0

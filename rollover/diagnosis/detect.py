@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.chaos import is_other, too_many
 from rollover.diagnosis.colour import hums
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.fit import Block
@@ -73,20 +74,22 @@ def mismatch_of(
                 inside = np.flatnonzero((time >= start) & (time < end))
                 if inside.size >= 4:
                     rows = inside + part.start
-                    trusted = signal.weight is None
+                    weight = None if signal.weight is None else signal.weight[inside]
                     cells.append(
-                        _cell(
-                            r, signal.channel, name, time[inside], rows, block, humming[signal.channel], trusted=trusted
-                        )
+                        _cell(r, signal.channel, name, time[inside], rows, block, humming[signal.channel], weight)
                     )
-    structured = sum(c.structured for c in cells)
-    waves = sum(c.waves for c in cells)
-    rough = sum(c.rough for c in cells)
-    count = sum(c.rows.size for c in cells) - waves - len(blocks)
+    # after a blow a recording that took another course tells nothing by itself
+    other = [is_other(b.course) for b in blocks]
+    telling = [c for c in cells if not (other[c.recording] and c.start >= evidence[c.recording].blow)]
+    structured = sum(c.structured for c in telling)
+    waves = sum(c.waves for c in telling)
+    rough = sum(c.rough for c in telling)
+    count = sum(c.rows.size for c in telling) - waves - len(blocks)
     p = 1.0
     if waves and count > 0:
         # noise may be underrated, but not by so much: what is rough and far beyond it is no noise either
         p = float(f_distribution.sf((structured / waves) / min(max(rough / count, 1e-300), LOUD), waves, count))
+    p = min(p, too_many(sum(other), len(other)))  # one may, not all of them
     return Mismatch(cells=tuple(cells), p_value=p, adjusted=_holm([c.p_value for c in cells]))
 
 
@@ -98,8 +101,7 @@ def _cell(
     rows: NDArray[np.int64],
     block: Block,
     humming: tuple[float, ...],
-    *,
-    trusted: bool,
+    weight: Array | None,
 ) -> Cell:
     from scipy.stats import f as f_distribution
 
@@ -119,16 +121,17 @@ def _cell(
     inside = Q.T @ w
     structured, rough = float(inside @ inside), float(w @ w - inside @ inside)
     free = max(n - waves - 1, 1)
-    if not trusted:
+    if weight is not None:
         rough = max(rough, float(n - waves))  # where the model is not sure, what is rough says nothing of what is slow
     p = (
         float(f_distribution.sf((structured / waves) / max(rough / free, 1e-300), waves, free))
         if n > waves + 1
         else 1.0
     )
+    noise = n if weight is None else float(weight @ weight)
     return Cell(
         recording=r, channel=channel, phase=phase, start=float(time[0]), end=float(time[-1]), rows=rows, p_value=p,
-        excess=float(w @ w) - n, structured=structured, waves=waves, rough=max(rough, 0.0),
+        excess=float(w @ w) - noise, structured=structured, waves=waves, rough=max(rough, 0.0),
     )  # fmt: skip
 
 

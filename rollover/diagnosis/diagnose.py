@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from rollover.diagnosis import colour
+from rollover.diagnosis.aftermath import shortened
 from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import candidates_of, size_of
 from rollover.diagnosis.chaos import weighted
@@ -70,6 +71,7 @@ def diagnose(
     kept = [e for e in _trusted(scenario, every) if e.name in hold_out] if hold_out else []
     if sum(e.count for e in found) < FEWEST:
         return _nothing(every, names, notes, began)
+    notes += _left_aside(every, found)
     groups = left_out(found)
     notes += differing(found)
     if len(groups) == 1 and not kept:
@@ -138,6 +140,7 @@ def diagnose(
         simulations=judge.simulations,
         seconds=clock.perf_counter() - began,
         notes=tuple(notes),
+        grids=_grids([*found, *kept]),
         empirical=law,
     )
 
@@ -153,7 +156,8 @@ def _weighed(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:
 
 def _trusted(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:
     """The recordings weighed, what the simulation itself is not sure of less."""
-    return [weighted(e, e.simulator.strays()) for e in _weighed(scenario, every)]
+    weighed = [weighted(e, e.simulator.strays()) for e in _weighed(scenario, every)]
+    return [shortened(e, alone=len(weighed) == 1) for e in weighed]
 
 
 def _evidence(scenario: Scenario, recordings: Sequence[tuple[str, Recording]]) -> tuple[list[Evidence], list[str]]:
@@ -171,6 +175,19 @@ def _evidence(scenario: Scenario, recordings: Sequence[tuple[str, Recording]]) -
         else:
             found.append(digitised(one, recording))
     return found, notes
+
+
+def _left_aside(every: Sequence[Evidence], found: Sequence[Evidence]) -> list[str]:
+    """The ends of recordings that do not count, in sentences."""
+    ends = {e.name: float(e.recording.time[-1]) for e in every}
+    cut = [(e.name, float(e.recording.time[-1])) for e in found if float(e.recording.time[-1]) < ends[e.name]]
+    return [f"{name}: what comes after {at:.2f} s depends on chance and was left aside" for name, at in cut]
+
+
+def _grids(evidence: Sequence[Evidence]) -> dict[str, tuple[float, ...]]:
+    """Centre of the ground's elements (m) of the run that stands for its neighbours, by recording; drops have none."""
+    made = [(e.name, getattr(e.simulator, "inner", e.simulator)) for e in evidence]
+    return {name: s.scenario.ground.elements.centre for name, s in made if isinstance(s, RunSimulator)}
 
 
 def _felt(d: Degree) -> str:

@@ -58,6 +58,7 @@ class Evidence:
     strays: tuple[Array, ...] = ()  # stacked, SI: what runs that nobody could tell apart differ by
     model_error: float = MODEL_ERROR  # of a channel's range
     averaged: int = 1  # samples in one
+    blow: float = np.inf  # s, after which a run may take another course
     doubts: Array | None = None  # what 1 sigma of each uncertain condition does to the stack, SI, (n, q)
 
     @cached_property
@@ -66,6 +67,15 @@ class Evidence:
         if self.doubts is None:
             return eased(np.zeros((self.count, 0)))
         return eased(np.stack([self.whitened(column) for column in self.doubts.T], axis=1))
+
+    @cached_property
+    def expected(self) -> float | None:
+        """Sum of squares that noise and scatter alone leave of the weighed samples; None where none is weighed."""
+        if all(s.weight is None for s in self.signals):
+            return None
+        noise = sum(s.rows.size if s.weight is None else float(s.weight @ s.weight) for s in self.signals)
+        scatter = [float(np.sum(self.whitened(stray) ** 2)) for stray in self.strays]
+        return noise + (float(np.mean(scatter)) if scatter else 0.0)
 
     def is_rough(self, s: Signal) -> bool:
         """Whether a scatter between runs, or a tolerance that was asked for, has a large part in the error.

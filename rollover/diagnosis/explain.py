@@ -14,7 +14,7 @@ from rollover.diagnosis.candidates import BESIDE, Candidate
 from rollover.diagnosis.clocks import by_first_contact
 from rollover.diagnosis.crew import Crew, Job
 from rollover.diagnosis.detect import mismatch_of
-from rollover.diagnosis.effort import DROPS
+from rollover.diagnosis.effort import DROPS, Effort
 from rollover.diagnosis.fit import NOISE_LEFT, Fitted, Judge
 from rollover.diagnosis.gate import Gate, freed
 from rollover.diagnosis.holdout import held_out, worse
@@ -189,7 +189,7 @@ def step(
     few, shifts = spread(base, groups, judge.effort.few), begun(judge, base)
     screened = screen(judge, base, _promising(candidates, looked, judge.effort.scored), few, shifts, looked)
     count = sum(b.residual.size for b in base.blocks)
-    screened, begun_with = _first_fits(judge, base, screened, few, shifts, say, crew)
+    screened, begun_with = _first_fits(judge, base, screened, few, shifts, say, crew, looked)
     jobs = [
         Job(candidates=f.candidates, start=f.x, shifts=tuple(_all_shifts(shifts, f, few)), width=1) for f in begun_with
     ]
@@ -297,11 +297,10 @@ def _first_fits(
     shifts: Sequence[float],
     say: Progress,
     crew: Crew,
+    looked: Gate,
 ) -> tuple[list[Screened], list[Fitted]]:
     """Short fits to few recordings: the ones worth a full fit, best first, and what each leaves."""
-    by_potential = sorted(screened, key=lambda s: -s.potential)[: judge.effort.promising]
-    by_start = sorted(screened, key=lambda s: s.left)[: judge.effort.promising // 2]
-    chosen = {s.candidate.key: s for s in (*by_start, *by_potential)}
+    chosen = {s.candidate.key: s for s in _chosen(screened, judge.effort, looked)}
     told: dict[str, float] = {}
     say(f"first fits of {len(chosen)} candidates to {len(few)} recordings")
     at = tuple(shifts[r] for r in few)
@@ -326,6 +325,20 @@ def _first_fits(
         worth = [f for f in worth if as_it_is - f.left >= RIVALS * (as_it_is - fits[0].left)]
     worth = worth[: judge.effort.most_leaders]
     return [replace(s, nrmse=told.get(s.candidate.key, 0.0)) for s in screened], worth
+
+
+def _chosen(screened: Sequence[Screened], effort: Effort, looked: Gate) -> list[Screened]:
+    """Those worth a first fit: that start well, and that have most to gain.
+
+    Of runs that scatter what is gained by chance is taken off; what a sensor makes of them costs none: as many more.
+    """
+    by_start = sorted(screened, key=lambda s: s.left)[: effort.promising // 2]
+    if not effort.thrifty:
+        return [*by_start, *sorted(screened, key=lambda s: -s.potential)[: effort.promising]]
+    ranked = sorted(screened, key=lambda s: -looked.scores.get(s.candidate.key, 0.0))
+    moving = [s for s in ranked if s.candidate.kind != "sensor"]
+    reading = [s for s in ranked if s.candidate.kind == "sensor"]
+    return [*by_start, *moving[: effort.promising], *reading[: effort.promising]]
 
 
 def _all_shifts(begun_with: Sequence[float], first: Fitted, few: Sequence[int]) -> list[float]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.blocks import GENTLE, WIDEST, Block, Fitted, bounded, shift_of
 from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.chaos import course
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.secant import Point, secant
@@ -168,7 +169,12 @@ class Judge:
         if self._pinned and e.recording.clock.zero != "unknown":
             slope = np.zeros_like(slope)
         residual = e.eased(worth * (self.measured[r] - y))
-        return Block(residual=residual, J=J, slope=slope, shift=shift, prior=e.shift_prior)
+        counts = course(e, residual)
+        if counts is not None:
+            residual, J, slope = counts * residual, counts[:, None] * J, counts * slope
+        return Block(
+            residual=residual, J=J, slope=slope, shift=shift, prior=e.shift_prior, course=counts, expected=e.expected
+        )
 
     def _slope(
         self,
@@ -288,7 +294,7 @@ class Judge:
                     x,
                     s,
                     self.effort.fine if last else nudges[width],
-                    None if fresh else block.J[:, :fixed],
+                    None if fresh else block.plain_J[:, :fixed],
                 )
                 for r, s, block in zip(use, shifts, blocks, strict=True)
             ]

@@ -1,7 +1,8 @@
 """When a gain is more than chance: the score of the best of all candidates against its null distribution.
 
 Each candidate looked at in a few places beside what is held already gives directions d in the space of the whitened
-samples, freed of what the time shifts and the effects already held explain. On noise alone the gain of a direction is
+samples, freed of what the time shifts and the effects already held explain. Where runs depend on chance after a blow,
+what it does before is a direction of its own. On noise alone the gain of a direction is
 z^2, z = d'n/|d|, and the best of all is max z^2: drawn from N(0, G), G the matrix of the directions' cosines, without a
 single simulation. What is compared with it is the same maximum for the misfit.
 """
@@ -62,22 +63,29 @@ def gate(judge: Judge, base: Fitted, candidates: Sequence[Candidate], only: Sequ
     held = np.concatenate([freed(b.J, b) for b in blocks]) if base.x else np.zeros((misfit.size, 0))
     own, _ = np.linalg.qr(held)
     columns, looks, sizes = [], [], []
+    quiet = _before_the_blow(judge, use)
     for c in candidates:
         for x in c.probes():
             d = _direction(judge, base, c, x, use)
             if d is None:
                 continue
-            d = d - own @ (own.T @ d)
-            size = float(np.sqrt(d @ d))
-            if size > SHOWS:
-                columns.append(d / size)
-                looks.append((c, x))
-                sizes.append(size)
+            parts = [(d, SHOWS)]
+            if c.kind != "sensor" and quiet is not None:
+                parts.append((d * quiet, VISIBLE))
+            for part, least in parts:
+                way = part - own @ (own.T @ part)
+                size = float(np.sqrt(way @ way))
+                if size > least:
+                    columns.append(way / size)
+                    looks.append((c, x))
+                    sizes.append(size)
     if not columns:
         return Gate(score=0.0, scores={}, null=np.zeros(DRAWS), detectable={})
     D = np.stack(columns, axis=1)
     along = D.T @ (misfit - own @ (own.T @ misfit))
     scores = along**2 / (1.0 + _trust(judge, blocks, use, D))
+    if any(judge.evidence[r].strays for r in use):
+        scores = scores / _at_odds(misfit - own @ (own.T @ misfit), D, [b.residual.size for b in blocks])
     detectable: dict[str, float] = {}
     own_best: dict[str, float] = {}
     ways: dict[str, list[tuple[float, ...]]] = {}
@@ -97,6 +105,18 @@ def gate(judge: Judge, base: Fitted, candidates: Sequence[Candidate], only: Sequ
     )
 
 
+def _before_the_blow(judge: Judge, use: Sequence[int]) -> Array | None:
+    """1 for the stacked samples before runs depend on chance, 0 after; None where they never do.
+
+    What an effect does there is the effect's alone; beyond, one run's difference is chance to a large part.
+    """
+    found = []
+    for e in (judge.evidence[r] for r in use):
+        found += [(e.recording.time[s.rows] < e.blow).astype(float) for s in e.signals]
+    stacked = np.concatenate(found)
+    return None if stacked.all() or not stacked.any() else stacked
+
+
 def followed(c: Candidate, x: Sequence[float], factor: float) -> tuple[float, ...] | None:
     """Coordinates at which an effect is `factor` times as strong as at x; None for one without a zero to go from."""
     name, null = yardstick(c.id, c.search)
@@ -108,13 +128,27 @@ def followed(c: Candidate, x: Sequence[float], factor: float) -> tuple[float, ..
     return (*x[:at], min(max(inside, EDGE), 1.0 - EDGE), *x[at + 1 :])
 
 
+def _at_odds(misfit: Array, D: Array, sizes: Sequence[int]) -> Array:
+    """How far recordings of `sizes` rows disagree on how much there is of each direction (n, m): Birge's ratio, (m,).
+
+    With a_r = d_r'w_r/|d_r|^2 the amplitude by recording r and a that by all, sum_r |d_r|^2 (a_r - a)^2 over the number
+    of recordings but one, at least 1. A run that took another course asks for much of some effect, and does so alone.
+    """
+    ends = np.cumsum(sizes)
+    parts = [slice(int(end - n), int(end)) for end, n in zip(ends, sizes, strict=True)]
+    along = np.array([D[p].T @ misfit[p] for p in parts])
+    size = np.array([np.sum(D[p] ** 2, axis=0) for p in parts])
+    apart = np.sum(along**2 / np.maximum(size, 1e-12), axis=0) - along.sum(axis=0) ** 2 / size.sum(axis=0)
+    return np.asarray(np.maximum(1.0, apart / max(len(parts) - 1, 1)))
+
+
 def _trust(judge: Judge, blocks: Sequence[Block], use: Sequence[int], D: Array) -> Array:
     """Variance along each direction (n, m) of what runs that nobody could tell apart differ by, (m,), noise units."""
     many = min((len(judge.evidence[r].strays) for r in use), default=0)
     found = np.zeros(D.shape[1])
     for k in range(many):
         strays = [
-            freed(judge.evidence[r].whitened(judge.evidence[r].strays[k])[:, None], block)[:, 0]
+            freed(block.counted(judge.evidence[r].whitened(judge.evidence[r].strays[k]))[:, None], block)[:, 0]
             for r, block in zip(use, blocks, strict=True)
         ]
         found += (D.T @ np.concatenate(strays)) ** 2
@@ -129,7 +163,7 @@ def _direction(judge: Judge, base: Fitted, c: Candidate, x: Sequence[float], use
         d = judge.moved(r, (base.candidates, base.x), ((*base.candidates, c), (*base.x, *x)), block.shift)
         if d is None:
             return None
-        found.append(freed(d[:, None], block)[:, 0])
+        found.append(freed(block.counted(d)[:, None], block)[:, 0])
     return np.concatenate(found)
 
 

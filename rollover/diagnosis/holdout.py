@@ -20,7 +20,7 @@ NOISE_ALONE = 1.5  # misfit over the noise up to which the noise's own statistic
 
 @dataclass(frozen=True, kw_only=True)
 class Held:
-    """Held-out misfit: `left` (k,) sum of squares over the noise of each recording, `count` (k,) its samples."""
+    """Held-out misfit: `left` (k,) sum of squares over the noise of each recording, `count` (k,) that noise leaves."""
 
     left: Array
     count: Array
@@ -50,7 +50,7 @@ def held_out(fitted: Fitted, groups: Sequence[Sequence[int]]) -> Held:
         for r in group:
             A, b, c = normals[r]
             left[r] = max(c - 2.0 * float(b @ dx) + float(dx @ A @ dx), 0.0)
-    return Held(left=left, count=np.array([b.residual.size for b in fitted.blocks], dtype=float))
+    return Held(left=left, count=np.array([b.size for b in fitted.blocks], dtype=float))
 
 
 def _step(A: Array, b: Array) -> Array:

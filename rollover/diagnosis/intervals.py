@@ -59,6 +59,7 @@ def unshaped(judge: Judge, fitted: Fitted, inverse: Array) -> Array:
         for r, block in enumerate(fitted.blocks):
             d = judge.moved(r, ends[0], ends[1], block.shift)
             if d is not None:
+                d = block.counted(d)
                 pull += block.J.T @ d - (block.J.T @ block.slope) * float(block.slope @ d) / block.weight
         found += (EVENLY / (high - low) * (inverse @ pull)) ** 2
     return found
@@ -92,7 +93,7 @@ def _noise(judge: Judge, fitted: Fitted) -> Array:
     for e, block in zip(judge.evidence, fitted.blocks, strict=True):
         J = block.J - np.outer(block.slope, block.slope @ block.J) / block.weight
         weights = [np.ones(s.rows.size) if s.weight is None else s.weight for s in e.signals]
-        J = J * np.concatenate(weights)[:, None]
+        J = J * block.counted(np.concatenate(weights))[:, None]
         found = found + J.T @ J
     return np.asarray(found)
 

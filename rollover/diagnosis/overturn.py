@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 SENSORS = "sensor-"
 CENTRE = "ground.elements.centre"
 KEPT = 300  # runs of one recording: a third of a megabyte each
+AHEAD = 0.06  # s that a filter sees beyond the last stamp, where the recording went on
 BEYOND, FAR_BEYOND = 0.01, 0.06  # s by which a run goes on past the last stamp: time shifts, known zero or not
 SLOWEST = 20.0  # times the first run's wall time, and
 LEAST_TIME = 2.0  # s: a run that takes longer has lost its way in ever shorter steps
@@ -153,16 +154,21 @@ class RunSimulator:
     def settle(self) -> None:
         """Lay the grid where the run is the most like all others: of two ways that runs go, it takes the common one.
 
-        The medoid: the least sum of the distances to the others, each the root mean square over the channels' ranges.
+        The medoid: the least sum of the distances to the others and to the neighbours, each the root mean square over
+        the channels' ranges.
         """
         runs = {place: self.predict({CENTRE: place}, 0.0) for place in self._places()}
         there = {place: run for place, run in runs.items() if run is not None}
         if len(there) < 3:
             return
+        places = [{CENTRE: place} for place in runs]
+        others = [values for values in map(self._beside, NEIGHBOURS) if values not in places]
+        beside = [self.predict(values, 0.0) for values in others]
         stacks = {place: np.concatenate(list(_scaled(run).values())) for place, run in there.items()}
-        inside = np.all([np.isfinite(y) for y in stacks.values()], axis=0)
+        every = [*stacks.values(), *(np.concatenate(list(_scaled(run).values())) for run in beside if run is not None)]
+        inside = np.all([np.isfinite(y) for y in every], axis=0)
         apart = {
-            place: sum(float(np.sqrt(np.mean((y - other)[inside] ** 2))) for other in stacks.values())
+            place: sum(float(np.sqrt(np.mean((y - other)[inside] ** 2))) for other in every)
             for place, y in stacks.items()
         }
         best = min(apart, key=lambda place: apart[place])
@@ -170,6 +176,22 @@ class RunSimulator:
         known, behind = self._known.get(_key({CENTRE: best})), self._behind.get(_key({CENTRE: best}))
         if known is not None and behind is not None:
             self._known[()], self._behind[()] = known, behind
+
+    def until(self, n: int) -> RunSimulator:
+        """The same for the first n stamps: its runs end soon after them, where their filters no longer look ahead."""
+        first = replace(
+            self.recording,
+            time=self.recording.time[:n],
+            channels={c: v[:n] for c, v in self.recording.channels.items()},
+        )
+        found = RunSimulator(self.scenario, first)
+        settings = found.scenario.simulation
+        ahead = settings.output_step * np.ceil(AHEAD / settings.output_step) if self.recording.cfc else 0.0
+        longer = min(round(settings.duration + float(ahead), 9), self.scenario.simulation.duration)
+        found.scenario = replace(found.scenario, simulation=replace(settings, duration=longer))
+        found._centre = self._centre
+        found.runs, found.seconds = self.runs, self.seconds
+        return found
 
     def _places(self) -> list[tuple[float, ...]]:
         """Where the grid may lie as well, where the scenario has it first."""

@@ -31,9 +31,7 @@ def judged(judge: Judge, fitted: Fitted, kept: Sequence[Evidence], groups: Seque
     """Judge an explanation by recordings that were kept from it, or without such by leaving conditions out in turn."""
     every = range(len(judge.evidence))
     left = sum(b.normal()[2] for b in fitted.blocks)
-    train = _score(
-        [_rated(judge, fitted, r) for r in every], float(np.sqrt(left / sum(b.residual.size for b in fitted.blocks)))
-    )
+    train = _score([_rated(judge, fitted, r) for r in every], float(np.sqrt(left / sum(b.size for b in fitted.blocks))))
     held = held_out(fitted, groups)
     rows = [(e.name, float(v)) for e, v in zip(judge.evidence, held.nrmse, strict=True)]
     if not kept:

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from rollover.diagnosis.blocks import at_an_end, turned
-from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.candidates import Candidate, physical
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.explain import SURE, Phases, Step, moves, spread, step, weighed
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate, gate
 from rollover.diagnosis.holdout import held_out
-from rollover.diagnosis.settle import settled
+from rollover.diagnosis.intervals import intervals
+from rollover.diagnosis.settle import left_of_means, settled
 from rollover.diagnosis.verdict import Verdict
+from rollover.effects import EFFECTS
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
 MOST = 3  # effects in one explanation
@@ -24,6 +27,7 @@ NEGLIGIBLE = 0.001  # of a channel's range: what moves nothing by more is not wo
 PARTLY = 0.02  # of the excess over the noise that one effect may leave and still be named
 HOPELESS = 2.0  # misfit over the noise that two effects leave and a third is not looked for
 BETTER = 0.5  # of what is left, that another first effect must leave
+RIVAL = 0.5  # of the best's gain, by the mean of its runs, that a rival must have
 NEEDED = 25.0  # gain, over what is left per sample, that an effect must bring beside all the others
 
 Groups = Sequence[Sequence[int]]
@@ -47,10 +51,16 @@ class Explanation:
     before: Mismatch
     after: Mismatch
     first: Step | None = None
+    refuted: bool = False  # whether the best candidate's gain did not outlast the scatter of its own runs
 
     @property
     def p_value(self) -> float:
-        """Of "nothing but noise": the smaller of the omnibus test's and of the best candidate's, for two tests."""
+        """Of "nothing but noise": the smaller of the omnibus test's and of the best candidate's, for two tests.
+
+        A candidate that was looked at closer and refuted tells nothing.
+        """
+        if self.refuted:
+            return self.before.p_value
         return float(1.0 - (1.0 - min(self.before.p_value, self.looked.p_value())) ** 2)
 
 
@@ -71,10 +81,11 @@ def explained(
         base = judge.timed(base)  # what a clock leaves is no effect's gain
     before = mismatch_of(judge.evidence, base.blocks, phases)
     say(f"looking at {len(candidates)} candidates, which of them could matter")
-    few = spread(base, groups, judge.effort.few) if judge.effort.thrifty else None
-    looked = first_look = gate(judge, base, candidates, few)
-    current, left, taken = base, before, []
+    looked = first_look = _look(judge, base, candidates, groups)
+    current, left = base, before
+    taken: list[Step] = []
     first: Step | None = None
+    refuted = False
     for _ in range(MOST):
         if is_tolerated(judge, current):
             break
@@ -87,6 +98,7 @@ def explained(
         if judge.effort.thrifty:
             found = lasting(judge, found, groups)
             if found is None:
+                refuted = not taken
                 break
         taken.append(found)
         current = found.fitted
@@ -102,7 +114,7 @@ def explained(
                 left = mismatch_of(judge.evidence, current.blocks, phases)
         if len(taken) > 1 and current.left > HOPELESS**2 * count:
             break
-        looked = gate(judge, current, free(current, candidates), few)
+        looked = _look(judge, current, free(current, candidates), groups)
     is_whole = left.p_value > SURE or not matters(judge, current, left)
     parts = [s.again(judge) for s in taken]
     if is_whole and len(taken) > 1:
@@ -118,18 +130,64 @@ def explained(
         before=before,
         after=mismatch_of(judge.evidence, current.blocks, phases),
         first=first.again(judge) if first is not None else None,
+        refuted=refuted,
+    )
+
+
+def _look(judge: Judge, base: Fitted, candidates: Sequence[Candidate], groups: Groups) -> Gate:
+    """A gate by all recordings; where each look costs a run, of few and then of the best candidates by some more.
+
+    The null stays that of the best of all candidates: what was passed over could only have raised the maximum.
+    """
+    effort = judge.effort
+    if not effort.thrifty:
+        return gate(judge, base, candidates)
+    few, more = spread(base, groups, effort.few), spread(base, groups, effort.looked_at)
+    first = gate(judge, base, candidates, few)
+    if len(more) <= len(few):
+        return first
+    moving = sorted((c for c in candidates if c.kind != "sensor"), key=lambda c: -first.scores.get(c.key, 0.0))
+    able = [*moving[: effort.shortlist], *(c for c in candidates if c.kind == "sensor")]
+    second = gate(judge, base, able, more)
+    return replace(
+        second,
+        scores={**dict.fromkeys(first.scores, 0.0), **second.scores},
+        null=np.maximum(first.null, second.null),
+        detectable={**first.detectable, **second.detectable},
+        starts={**first.starts, **second.starts},
     )
 
 
 def lasting(judge: Judge, found: Step, groups: Groups) -> Step | None:
-    """The first of a step's rivals that still gains under the scatter of its own runs; None if none does."""
+    """The best of a step's rivals by the mean of its runs, if that gains and has a strength; None if none does.
+
+    Rivals whose mean gains much less are none.
+    """
     held = judge.evidence
-    for rival in found.rivals:
-        one = settled(judge, replace(found, fitted=rival))
-        if outlasts(one, groups):
+    start = left_of_means(judge, found.base)
+    gains = {
+        id(f): max(a - b for a, b in zip(start, left_of_means(judge, f), strict=True)) for f in found.rivals
+    }  # what shows before the blow need not outweigh what chance does after it
+    best = max(gains.values(), default=0.0)
+    near = [f for f in found.rivals if gains[id(f)] > RIVAL * best]
+    for rival in sorted(near, key=lambda f: -gains[id(f)]):
+        if gains[id(rival)] < NEEDED:
+            return None
+        one = settled(judge, replace(found, fitted=rival, rivals=tuple(near)))
+        if outlasts(one, groups) and is_there(judge, one.fitted):
             return one
         judge.weigh(held)
     return None
+
+
+def is_there(judge: Judge, fitted: Fitted) -> bool:
+    """Whether the strength of the last effect is told from none: its interval keeps away from what changes nothing."""
+    last = fitted.candidates[-1]
+    nulls: dict[str, Any] = dict(EFFECTS[last.id].null)
+    for (name, search), at in zip(last.search.items(), last.neutral or (None,) * len(last.search), strict=True):
+        nulls[name] = nulls.get(name) if at is None else physical(at, search)
+    known = {name: i for name, i in intervals(judge, fitted)[-1].items() if isinstance(nulls.get(name), (int, float))}
+    return not known or any(not i.low <= nulls[name] <= i.high for name, i in known.items())
 
 
 def outlasts(found: Step, groups: Groups) -> bool:

@@ -2,7 +2,8 @@
 
 The scenario before and the diagnosed one are simulated anew at every stamp of a recording: the latter is what
 `rollover run` makes of scenario-diagnosed.yaml. Both at one time shift, that of the better explanation: a shift of its
-own would hide part of what the scenario misses.
+own would hide part of what the scenario misses. Full runs lie on the ground's grid where the one that is most like its
+neighbours does, and are shown with what these differ by: what no simulation is sure of is no misfit.
 """
 
 from __future__ import annotations
@@ -15,11 +16,13 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.account import diagnosed_scenario
 from rollover.diagnosis.bins import simulated
+from rollover.diagnosis.chaos import averaged
 from rollover.diagnosis.clocks import align
 from rollover.diagnosis.evidence import Evidence, evidence_of
 from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.overturn import CENTRE
 from rollover.diagnosis.phases import phases_of
-from rollover.diagnosis.simulator import simulator_of
+from rollover.diagnosis.simulator import Simulator, simulator_of
 from rollover.diagnosis.verdict import Diagnosis
 from rollover.recording import Recording
 from rollover.scenario import Scenario
@@ -32,7 +35,8 @@ WIDEST = 3.0  # times its prior that a time shift may be
 class Track:
     """One channel over time, SI: `time`, `measured`, `before` (n,), `after` (n,) or None; gaps are left out.
 
-    `noise` is 1 sigma of what the misfit is held against: the measured noise, and what integrators differ by.
+    `noise` is 1 sigma of what the misfit is held against: the measured noise, and what integrators differ by. Beside it
+    stands `scatter` (n,), 1 sigma of what neighbouring runs differ by; None where there are none.
     """
 
     channel: str
@@ -41,10 +45,18 @@ class Track:
     before: Array
     after: Array | None
     noise: float
+    scatter: Array | None = None
+
+    @property
+    def unsure(self) -> Array:
+        """1 sigma of noise and scatter together, over the noise, (n,)."""
+        if self.scatter is None:
+            return np.ones(self.time.size)
+        return np.hypot(1.0, self.scatter / self.noise)
 
     @property
     def rms_before(self) -> float:
-        """Root mean square of measured less simulated, over the noise."""
+        """Root mean square of measured less simulated, over the noise and the scatter."""
         return self._rms(self.before)
 
     @property
@@ -53,7 +65,7 @@ class Track:
         return None if self.after is None else self._rms(self.after)
 
     def _rms(self, simulated: Array) -> float:
-        return float(np.sqrt(np.mean((self.measured - simulated) ** 2))) / self.noise
+        return float(np.sqrt(np.mean(((self.measured - simulated) / (self.noise * self.unsure)) ** 2)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +87,9 @@ def series(scenario: Scenario, recordings: Sequence[tuple[str, Recording]], foun
     judged = found.held_out if set(found.held_out) != set(found.training) else ()
     told = []
     for name, recording in recordings:
-        one = _told(name, recording, scenario, diagnosed if found.effects or found.empirical else None, name in judged)
+        laid = {CENTRE: found.grids[name]} if name in found.grids else {}
+        other = diagnosed.replaced(laid) if found.effects or found.empirical else None
+        one = _told(name, recording, scenario.replaced(laid), other, name in judged)
         if one is not None:
             told.append(one)
     return tuple(told)
@@ -84,17 +98,17 @@ def series(scenario: Scenario, recordings: Sequence[tuple[str, Recording]], foun
 def _told(
     name: str, recording: Recording, scenario: Scenario, diagnosed: Scenario | None, held_out: bool
 ) -> Told | None:
-    simulator = simulator_of(scenario, recording)
-    evidence = evidence_of(name, *simulated(scenario, recording))
+    simulator, evidence = _ready(name, scenario, recording)
     if evidence is None:
         return None
     thinner = evidence.recording
-    best = evidence if diagnosed is None else evidence_of(name, *simulated(diagnosed, recording))
+    last, best = (simulator, evidence) if diagnosed is None else _ready(name, diagnosed, recording)
     at = _shift(best or evidence)
     before = simulator.predict({}, at)
     if before is None:
         return None
-    after = None if diagnosed is None else simulator_of(diagnosed, recording).predict({}, at)
+    after = None if diagnosed is None else last.predict({}, at)
+    strays = last.strays({}, at)
     tracks = []
     for signal in evidence.signals:
         channel = signal.channel
@@ -107,6 +121,7 @@ def _told(
                 before=before[channel][there],
                 after=None if after is None else after[channel][there],
                 noise=signal.sigma * float(np.sqrt(_rows_in_one(recording, thinner))),
+                scatter=_scatter([d[channel][there] for d in strays], recording.time[there]),
             )
         )
     return Told(
@@ -118,6 +133,18 @@ def _told(
         tracks=tuple(tracks),
         condition=evidence.condition,
     )
+
+
+def _ready(name: str, scenario: Scenario, recording: Recording) -> tuple[Simulator, Evidence | None]:
+    """What simulates all stamps, and the evidence at no more rows than are needed: of one and the same if it can be."""
+    thin, simulator, many = simulated(scenario, recording)
+    return simulator if many == 1 else simulator_of(scenario, recording), evidence_of(name, thin, simulator, many)
+
+
+def _scatter(strays: Sequence[Array], time: Array) -> Array | None:
+    """1 sigma (n,) of what neighbouring runs differ by; None where there are none."""
+    whole = [d for d in strays if np.all(np.isfinite(d))]
+    return np.sqrt(averaged(np.mean(np.square(whole), axis=0), time)) if whole else None
 
 
 def _rows_in_one(recording: Recording, thinner: Recording) -> float:

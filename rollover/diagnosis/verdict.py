@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 Verdict = Literal["no-mismatch", "parameter", "sensor", "missing-physics", "unexplained", "cannot-tell"]
@@ -129,4 +129,5 @@ class Diagnosis:
     seconds: float
     degrees: tuple[Degree, ...] = ()
     notes: tuple[str, ...] = ()
+    grids: Mapping[str, tuple[float, ...]] = field(default_factory=dict)  # of full runs: centre of the elements, m
     empirical: Law | None = None  # where no effect explains the mismatch

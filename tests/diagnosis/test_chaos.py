@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from rollover.diagnosis import chaos
-from rollover.diagnosis.chaos import memory, weighted
+from rollover.diagnosis.chaos import STATE, alike, course, is_other, memory, weighted
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.fit import Block
@@ -20,12 +21,22 @@ CHANNEL = "chassis/acceleration_y"
 STEP, SIGMA, N = 0.004, 0.2, 300
 
 
+class Blown:
+    """A simulator that says only when its run depends on chance."""
+
+    def __init__(self, blow: float | None = None) -> None:
+        self.blow = blow
+
+    def marks(self) -> tuple[tuple[float, str], ...]:
+        return () if self.blow is None else ((0.0, "tipping"), (self.blow, "impact"))
+
+
 def evidence(values: np.ndarray) -> Evidence:
     time = STEP * np.arange(values.size)
     recording = Recording(title="r", time=time, channels={CHANNEL: values})
     rows = np.arange(values.size)
     signal = Signal(channel=CHANNEL, rows=rows, values=values, sigma=SIGMA, noise=SIGMA, ar=(), span=10.0)
-    simulator: Any = None
+    simulator: Any = Blown()
     return Evidence(
         name="r", recording=recording, simulator=simulator, signals=(signal,), shift_prior=1e-3, condition="r"
     )
@@ -93,3 +104,95 @@ def test_without_neighbours_all_is_as_it_was() -> None:
     time = np.arange(0.0, 0.1, 0.001)
     drop = Recording(title="r", time=time, channels={"ground/sinkage": np.zeros(time.size)})
     assert simulator_of(shipped("drop_test"), drop).strays() == []
+
+
+CHANNELS = (*(f"chassis/acceleration_{axis}" for axis in "xyz"), "chassis/angular_velocity_x")
+BLOW, WEIGHT = 0.6, 0.5  # s, and what a sample counts after it
+
+
+def blown(channels: tuple[str, ...] = CHANNELS) -> Evidence:
+    """Quiet channels of a run that depends on chance after `BLOW`."""
+    time = STEP * np.arange(N)
+    recording = Recording(title="r", time=time, channels={c: np.zeros(N) for c in channels})
+    weight = np.where(time < BLOW, 1.0, WEIGHT)
+    signals = tuple(
+        Signal(
+            channel=c, rows=np.arange(N), values=np.zeros(N), sigma=SIGMA, noise=SIGMA, ar=(), span=10.0, weight=weight
+        )
+        for c in channels
+    )
+    simulator: Any = Blown(BLOW)
+    return Evidence(
+        name="r", recording=recording, simulator=simulator, signals=signals, shift_prior=1e-3, condition="r", blow=BLOW
+    )
+
+
+def misfit(e: Evidence, factors: list[float]) -> np.ndarray:
+    """What channels leave: noise, after the blow so many times as much as expected."""
+    rng = np.random.default_rng(7)
+    after = e.recording.time >= BLOW
+    return np.concatenate([rng.standard_normal(N) * np.where(after, WEIGHT * f, 1.0) for f in factors])
+
+
+def test_another_course_counts_as_one_state_of_unknown_size() -> None:
+    e = blown()
+    w = misfit(e, [6.0] * 4)
+    found = course(e, w)
+    assert found is not None
+    late = np.tile(e.recording.time >= BLOW, 4)
+    assert np.all(found[~late] == 1.0)
+    q = np.sum(w[late].reshape(4, -1) ** 2, axis=1)
+    expected = 4.0 * WEIGHT**2 * late.sum() / 4.0
+    beyond = np.median(q / (expected / 4.0)) * expected - expected
+    share = (expected + STATE * np.log1p(beyond / STATE)) / (expected + beyond)
+    np.testing.assert_allclose(found[late] ** 2, share, rtol=1e-12)
+    assert is_other(found)
+
+
+def test_a_course_like_the_neighbours_counts_in_full() -> None:
+    e = blown()
+    found = course(e, misfit(e, [0.7] * 4))
+    assert found is None
+    assert not is_other(found)
+
+
+def test_what_one_channel_leaves_alone_is_not_forgiven() -> None:
+    e = blown()
+    assert course(e, misfit(e, [20.0, 0.9, 0.9, 0.9])) is None
+    few = blown(CHANNELS[:2])
+    assert course(few, misfit(few, [20.0, 20.0])) is None
+
+
+def of_courses(others: int) -> float:
+    """p-value of "nothing but noise" of four recordings, some of which took another course."""
+    blocks = []
+    for k in range(4):
+        e = blown()
+        w = misfit(e, [0.9] * 4)
+        if k < others:
+            w += np.tile(np.where(e.recording.time < BLOW, 0.0, 4.0 * np.sin(9.0 * e.recording.time)), 4)
+        counts = course(e, w)
+        w = w if counts is None else counts * w
+        n = w.size
+        blocks.append(Block(residual=w, J=np.zeros((n, 0)), slope=np.zeros(n), shift=0.0, prior=1e-3, course=counts))
+    return mismatch_of([blown()] * 4, blocks, [((0.0, "tipping"), (BLOW, "sliding"))] * 4).p_value
+
+
+def test_one_recording_may_take_another_course_but_not_all_of_them() -> None:
+    assert of_courses(0) > 0.05
+    assert of_courses(1) > 0.05
+    assert of_courses(4) < 1e-3
+
+
+def test_a_neighbour_on_another_course_is_none() -> None:
+    e = evidence(np.zeros(N))
+    t = e.recording.time
+    late = np.where(t > 0.6, np.sin(40.0 * t), 0.0)
+    strays = [{CHANNEL: a * late} for a in (0.3, -0.2, 0.25, 4.0, -0.3)]
+    assert [d[CHANNEL].max() < 1.0 for d in alike(e, strays, 0.5)] == [True] * 4
+    early = [{CHANNEL: a * np.where(t < 0.4, 1.0, 0.0)} for a in (0.3, 4.0)]
+    assert len(alike(e, early, 0.5)) == 2  # before the blow there are no courses
+    simulator: Any = Blown(0.5)
+    found = weighted(replace(e, simulator=simulator), strays)
+    assert found.blow == 0.5
+    assert len(found.strays) == 4

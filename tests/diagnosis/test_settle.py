@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis import overturn
+from rollover.diagnosis import overturn, selection
 from rollover.diagnosis.blocks import GENTLE, Block, Fitted
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.effort import DROPS, RUNS, Effort
@@ -18,8 +18,9 @@ from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.intervals import intervals, scattered, unshaped
 from rollover.diagnosis.overturn import CENTRE, NEIGHBOURS, RunSimulator
-from rollover.diagnosis.selection import lasting, outlasts
-from rollover.diagnosis.settle import along, rescattered, settled, step_of_means
+from rollover.diagnosis.selection import is_there, lasting, outlasts
+from rollover.diagnosis.settle import along, left_of_means, rescattered, settled, step_of_means
+from rollover.diagnosis.verdict import Interval
 from rollover.effects import Search
 from rollover.recording import Recording
 from rollover.scenario import Scenario
@@ -52,7 +53,7 @@ def test_the_run_that_is_like_most_others_stands_for_all(monkeypatch: pytest.Mon
     chosen = simulator.scenario.ground.elements.centre
     assert chosen != own
     made = simulator.runs
-    assert made == 1 + len(overturn.ELSEWHERE)
+    assert made == len(overturn.ELSEWHERE) + len(NEIGHBOURS)  # one neighbour is one of the places
     found = simulator.predict({}, 0.0)
     assert found is not None
     assert np.max(found[CHANNEL]) < 2.0
@@ -62,7 +63,7 @@ def test_the_run_that_is_like_most_others_stands_for_all(monkeypatch: pytest.Mon
 
 def test_a_run_like_the_others_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     own = shipped("cube_toss").ground.elements.centre
-    simulator = a_toss(monkeypatch, {own: 0.03})
+    simulator = a_toss(monkeypatch, {own: 0.055})
     simulator.settle()
     assert simulator.scenario.ground.elements.centre == own
 
@@ -111,6 +112,9 @@ class Rough:
 
     def __init__(self, seed: int, size: float) -> None:
         self.seed, self.size = seed, size
+
+    def marks(self) -> tuple[tuple[float, str], ...]:
+        return ()
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
         x = changes.get("effects.slope.angle", 0.0) + changes.get("effects.slope.other", 0.0)
@@ -325,3 +329,75 @@ def test_a_move_does_not_leap_to_another_course() -> None:
     found = settled(judge, Step(base=base, fitted=fitted, p_value=0.0, rivals=(fitted,)))
     assert not 0.365 < found.fitted.x[0] < 0.385
     assert found.fitted.left < judge.again(fitted).left
+
+
+def test_rivals_are_judged_by_the_mean_of_their_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One rival's run meets the recordings by chance while its neighbours do not, the other's all do but itself."""
+
+    class Chance(Rough):
+        def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+            slope, scale = changes.get("effects.slope.angle", 0.0), changes.get("effects.inertia.scale", 0.0)
+            lucky = bool(scale) and not changes.get("neighbour", 0)
+            off = 0.4 * bool(slope) * (not changes.get("neighbour", 0)) * np.cos(20.0 * TIME)
+            weak = 0.3 * bool(changes.get("effects.mass.share", 0.0))
+            return {CHANNEL: 20.0 * (slope or weak or 0.4 * lucky) * np.sin(30.0 * TIME) + off}
+
+    rng = np.random.default_rng(4)
+    every = []
+    for r in range(4):
+        one = evidence(r, 0.1, 8.0 * np.sin(30.0 * TIME) + 0.1 * rng.standard_normal(N))
+        every.append(replace(one, simulator=cast(Any, Chance(r, 0.1))))
+    judge = Judge(every)
+    base, right = judge.fit((), ()), judge.fit((SLOPE,), (0.4,), rounds=0)
+    lucky = judge.fit((candidate("inertia", "parameter", "scale"),), (0.5,), rounds=0)
+    assert base is not None
+    assert right is not None
+    assert lucky is not None
+    assert lucky.left < right.left
+    assert left_of_means(judge, right)[0] < 0.5 * right.left
+    assert left_of_means(judge, lucky)[0] > 10.0 * left_of_means(judge, right)[0]
+    early = [replace(e, blow=TIME[20]) for e in every]
+    judge.weigh(early)
+    part = sum(float(b.residual[:20] @ b.residual[:20]) + (b.shift / b.prior) ** 2 for b in base.blocks)
+    assert left_of_means(judge, base)[1] == pytest.approx(part, rel=0.01)
+    judge.weigh(every)
+    found = lasting(judge, Step(base=base, fitted=lucky, p_value=0.0, rivals=(lucky, right)), [[k] for k in range(4)])
+    assert found is not None
+    assert [f.candidates[-1].key for f in found.rivals] == ["slope"]
+    judge.weigh(every)
+    weaker = judge.fit((candidate("mass", "parameter", "share"),), (0.5,), rounds=0)
+    assert weaker is not None
+    monkeypatch.setattr(selection, "is_there", lambda *_: True)
+    step = Step(base=base, fitted=weaker, p_value=0.0, rivals=(weaker, right))
+    found = lasting(judge, step, [[k] for k in range(4)])
+    assert found is not None
+    assert found.fitted.candidates[-1].key == "slope"
+    assert len(found.rivals) == 2
+
+
+def test_a_strength_that_is_not_told_from_none_is_no_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+    judge = Judge([evidence(0, 0.1, np.zeros(N))])
+    layer = replace(
+        candidate("soil-layer", "physics", "depth"),
+        search={"depth": Search(0.0, 0.1), "stiffness_ratio": Search(0.1, 9.0, "log")},
+    )
+    fitted = Fitted(candidates=(layer,), x=(0.5, 0.5), blocks=())
+
+    def told(low: float, high: float) -> bool:
+        found = [{"depth": Interval(value=0.02, low=0.01, high=0.03, unit="m"), "stiffness_ratio": _from(low, high)}]
+        monkeypatch.setattr(selection, "intervals", lambda *_: found)
+        return is_there(judge, fitted)
+
+    assert not told(0.73, 1.37)
+    assert told(1.1, 1.4)
+    assert told(0.5, 0.9)
+    own = replace(candidate("ground-friction", "physics", "coefficient"), neutral=(0.5,))  # the scenario's is 0.5
+    fitted = Fitted(candidates=(own,), x=(0.6,), blocks=())
+    for low, high, there in ((0.4, 0.6, False), (0.55, 0.7, True)):
+        alone = [{"coefficient": _from(low, high)}]
+        monkeypatch.setattr(selection, "intervals", lambda *_, alone=alone: alone)
+        assert is_there(judge, fitted) is there
+
+
+def _from(low: float, high: float) -> Interval:
+    return Interval(value=0.5 * (low + high), low=low, high=high, unit="1")

@@ -1,0 +1,66 @@
+"""What comes long after a blow and hardly counts, left aside: the end of a long recording costs most of a run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from rollover.diagnosis.bins import Averaged
+from rollover.diagnosis.evidence import Evidence
+from rollover.diagnosis.overturn import RunSimulator
+from rollover.diagnosis.simulator import Simulator
+
+LASTING = 0.6  # s after the blow that are always kept
+SHORT = 0.1  # s that are not worth cutting off
+COUNTS = 0.3  # of what it would, on the average, from which on the end is kept
+FEWEST = 8  # samples of a signal
+
+
+def shortened(e: Evidence, *, alone: bool = False) -> Evidence:
+    """The evidence without its end, where that counts little: long after a blow neighbours differ as effects do.
+
+    As it is where samples are not weighed, and where the end counts. Of a recording that is `alone` nothing after the
+    blow is kept: whether an effect or another course of the run did it, only a second one could tell.
+    """
+    time, end = e.recording.time, e.blow + (0.0 if alone else LASTING)
+    if not time[-1] > end + SHORT:
+        return e
+    late = [(s, time[s.rows] > end) for s in e.signals]
+    worth = [np.ones(inside.sum()) if s.weight is None else s.weight[inside] ** 2 for s, inside in late]
+    if not alone and float(np.mean(np.concatenate(worth))) > COUNTS:
+        return e
+    n = int(np.searchsorted(time, end, side="right"))
+    simulator = _until(e.simulator, n)
+    kept = [(s, s.rows < n) for s in e.signals]
+    if simulator is None or any(inside.sum() < FEWEST for _, inside in kept):
+        return e
+    signals = tuple(
+        replace(
+            s,
+            rows=s.rows[inside],
+            values=s.values[inside],
+            weight=None if s.weight is None else s.weight[inside],
+        )
+        for s, inside in kept
+    )
+    rows = np.concatenate([inside for _, inside in kept])
+    recording = replace(e.recording, time=time[:n], channels={c: v[:n] for c, v in e.recording.channels.items()})
+    return replace(
+        e,
+        recording=recording,
+        simulator=simulator,
+        signals=signals,
+        strays=tuple(d[rows] for d in e.strays),
+        doubts=None if e.doubts is None else e.doubts[rows],
+    )
+
+
+def _until(simulator: Simulator, n: int) -> Simulator | None:
+    """What simulates the first n stamps; None for what is not full runs."""
+    if isinstance(simulator, RunSimulator):
+        return simulator.until(n)
+    if isinstance(simulator, Averaged) and isinstance(simulator.inner, RunSimulator):
+        rows = int(simulator.starts[n]) if n < simulator.starts.size else int(simulator.inner.recording.time.size)
+        return Averaged(inner=simulator.inner.until(rows), starts=simulator.starts[:n], counts=simulator.counts[:n])
+    return None

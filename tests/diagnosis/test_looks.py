@@ -1,0 +1,135 @@
+"""What decides whether there is anything where runs depend on chance: recordings at odds, looks before the blow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis import selection
+from rollover.diagnosis.blocks import Block, Fitted
+from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.effort import RUNS
+from rollover.diagnosis.evidence import Evidence, Signal
+from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.gate import VISIBLE, Gate, _at_odds, gate
+from rollover.effects import Search
+from rollover.recording import Recording
+
+CHANNEL = "chassis/acceleration_y"
+N, BLOW = 80, 0.16
+TIME = 0.004 * np.arange(N)
+
+
+class Wave:
+    """y = x sin before the blow; after it whatever the course says, times x."""
+
+    effort = RUNS
+
+    def __init__(self, after: float) -> None:
+        self.after, self.runs = after, 0
+
+    def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+        self.runs += 1
+        x = changes.get("effects.slope.angle", 0.0)
+        return {CHANNEL: x * np.where(TIME < BLOW, np.sin(30.0 * TIME), self.after * np.cos(90.0 * TIME))}
+
+
+SLOPE = Candidate(id="slope", kind="parameter", family="x", search={"angle": Search(-100.0, 100.0)}, neutral=(0.5,))
+
+
+def judge_of(after: tuple[float, ...], amplitudes: tuple[float, ...], *, blow: float = BLOW) -> tuple[Judge, Fitted]:
+    """Recordings with so much of the wave before the blow, and noise; and the base."""
+    rng = np.random.default_rng(5)
+    evidence = []
+    for r, (a, much) in enumerate(zip(after, amplitudes, strict=True)):
+        simulator: Any = Wave(a)
+        values = much * np.where(TIME < BLOW, np.sin(30.0 * TIME), 0.0) + rng.standard_normal(N)
+        signal = Signal(channel=CHANNEL, rows=np.arange(N), values=values, sigma=1.0, noise=1.0, ar=(), span=10.0)
+        recording = Recording(title="r", time=TIME, channels={CHANNEL: values})
+        evidence.append(
+            Evidence(
+                name=f"r{r}",
+                recording=recording,
+                simulator=simulator,
+                signals=(signal,),
+                shift_prior=1e-3,
+                condition="",
+                strays=(0.1 * rng.standard_normal(N),),
+                blow=blow,
+            )
+        )
+    judge = Judge(evidence)
+    blocks = tuple(
+        Block(residual=w, J=np.zeros((N, 0)), slope=np.zeros(N), shift=0.0, prior=1e-3) for w in judge.measured
+    )
+    return judge, Fitted(candidates=(), x=(), blocks=blocks)
+
+
+def test_recordings_that_agree_count_in_full_and_one_alone_hardly() -> None:
+    rng = np.random.default_rng(0)
+    d = rng.standard_normal((4, 50))
+    D = (d / np.sqrt(np.sum(d * d))).reshape(-1, 1)
+    agree = 30.0 * D[:, 0]
+    alone = np.where(np.arange(200) < 50, 30.0 * D[:, 0], 0.0)
+    assert _at_odds(agree, D, [50] * 4)[0] == 1.0
+    a = np.array([30.0, 0.0, 0.0, 0.0])
+    weight = np.sum(D.reshape(4, 50) ** 2, axis=1)
+    wanted = np.sum(weight * (a - np.sum(weight * a)) ** 2) / 3.0
+    assert _at_odds(alone, D, [50] * 4)[0] == pytest.approx(wanted, rel=1e-9)
+    assert wanted > 10.0
+
+
+def test_an_effect_of_all_recordings_beats_one_that_a_single_course_asks_for() -> None:
+    judge, base = judge_of((0.0,) * 4, (2.0,) * 4)
+    everywhere = gate(judge, base, [SLOPE])
+    judge, base = judge_of((0.0,) * 4, (4.0, 0.0, 0.0, 0.0))  # as much in all
+    alone = gate(judge, base, [SLOPE])
+    assert everywhere.score > 100.0
+    assert alone.score < 0.1 * everywhere.score
+
+
+def test_what_an_effect_does_before_the_blow_is_looked_at_by_itself() -> None:
+    """After the blow the run with the effect goes ten times as far the wrong way."""
+    judge, base = judge_of((10.0,) * 4, (2.0,) * 4)
+    with_ = gate(judge, base, [SLOPE])
+    blind, base = judge_of((10.0,) * 4, (2.0,) * 4, blow=np.inf)
+    assert with_.score > 10.0 * gate(blind, base, [SLOPE]).score
+    assert with_.score > 100.0
+    judge, base = judge_of((10.0,) * 4, (2.0,) * 4)
+    faint = replace(SLOPE, search={"angle": Search(-0.2 * VISIBLE, 0.2 * VISIBLE)})  # its step shows nothing by itself
+    assert gate(judge, base, [faint]).score < 0.1 * with_.score
+
+
+def test_few_recordings_choose_who_is_looked_at_on_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[int, list[str]]] = []
+
+    def looks(_: Judge, base: Fitted, candidates: Any, only: Any = None) -> Gate:
+        asked.append((len(only), [c.key for c in candidates]))
+        scores = {c.key: 90.0 - int(c.key[1:]) for c in candidates}
+        return Gate(score=max(scores.values()), scores=scores, null=np.full(10, float(len(only))), detectable=scores)
+
+    monkeypatch.setattr(selection, "gate", looks)
+    judge, base = judge_of((0.0,) * 5, (0.0,) * 5)
+    every = [replace(SLOPE, id=f"c{k}") for k in range(30)] + [replace(SLOPE, id="c77", kind="sensor")]
+    found = selection._look(judge, base, every, [[r] for r in range(5)])
+    assert [n for n, _ in asked] == [RUNS.few, RUNS.looked_at]
+    assert len(asked[0][1]) == 31
+    assert asked[1][1] == [f"c{k}" for k in range(RUNS.shortlist)] + ["c77"]
+    assert found.scores["c29"] == 0.0  # passed over
+    assert found.detectable["c29"] == 61.0
+    assert found.null[0] == RUNS.looked_at
+
+
+def test_what_was_refuted_tells_nothing() -> None:
+    judge, base = judge_of((0.0,) * 4, (2.0,) * 4)
+    looked = gate(judge, base, [SLOPE])
+    before: Any = type("M", (), {"p_value": 0.3})()
+    found = selection.Explanation(
+        base=base, fitted=base, parts=(), looked=looked, detectable={}, before=before, after=before
+    )
+    assert found.p_value < 1e-6
+    assert replace(found, refuted=True).p_value == 0.3
