@@ -68,6 +68,7 @@ def map_cases(
     time_limit: float | None = None,
     memory_limit: float | None = None,
     warm_up: Callable[[], None] | None = None,
+    children: Children | None = None,
 ) -> Iterator[Outcome[C, V]]:
     """Outcome of ``function(case)`` for each case, as they become ready; `Outcome.index` restores the order.
 
@@ -75,7 +76,8 @@ def map_cases(
     long. `workers` is the number of child processes (default: `cores`), 0 works in this very process, where a crash
     is a crash and no limit holds. For each case, `time_limit` is in s of wall time, `memory_limit` in bytes that it may
     take beyond what its process has (address space; not on Windows). A child calls `warm_up` once, outside all limits.
-    Closing the iterator, an interrupt too, ends the children.
+    Closing the iterator, an interrupt too, ends the children; `children` that are given, instead of `workers`, outlive
+    it if nothing is left open.
     """
     workers = cores() if workers is None else workers
     if workers < 0 or (time_limit is not None and time_limit <= 0.0):
@@ -84,7 +86,30 @@ def map_cases(
         raise ValueError(f"memory_limit: got {memory_limit!r}; more than 0 bytes")
     if workers == 0:
         return (_done(i, case, _guarded(function, case)) for i, case in enumerate(cases))
-    return _in_children(function, cases, workers, time_limit, memory_limit, warm_up)
+    own = children or Children(workers, warm_up)
+    return _in_children(function, cases, own, time_limit, memory_limit, keep=children is not None)
+
+
+class Children:
+    """Child processes that are begun with the first case and stay for more than one `map_cases`; see there."""
+
+    def __init__(self, workers: int, warm_up: Callable[[], None] | None = None) -> None:
+        self.workers, self._warm_up = workers, warm_up
+        self._pool: Any = None
+
+    @property
+    def pool(self) -> Any:
+        """The pool of them."""
+        if self._pool is None:
+            self._pool = child_pool(self.workers, self._warm_up)
+        return self._pool
+
+    def stop(self) -> None:
+        """End them; a next case would begin new ones."""
+        if self._pool is not None:
+            self._pool.stop()
+            self._pool.join()
+            self._pool = None
 
 
 def child_pool(workers: int, warm_up: Callable[[], None] | None = None) -> Any:
@@ -117,19 +142,20 @@ def _leave_with(parent: int) -> None:
 def _in_children(
     function: Callable[[C], V],
     cases: Iterable[C],
-    workers: int,
+    children: Children,
     time_limit: float | None,
     memory_limit: float | None,
-    warm_up: Callable[[], None] | None,
+    *,
+    keep: bool,
 ) -> Iterator[Outcome[C, V]]:
     todo, again = iter(enumerate(cases)), deque[tuple[int, C]]()
     broken = 0
     while True:
-        pool = child_pool(workers, warm_up)
+        pool, ended = children.pool, False
         open_: dict[Any, tuple[int, C]] = {}
         try:
             while True:
-                while len(open_) < AHEAD * workers:
+                while len(open_) < AHEAD * children.workers:
                     following = again.popleft() if again else next(todo, None)
                     if following is None:
                         break
@@ -141,6 +167,7 @@ def _in_children(
                         raise BrokenProcessPool(str(e)) from e
                     open_[task] = following
                 if not open_:
+                    ended = True
                     return
                 for future in wait(open_, return_when=FIRST_COMPLETED).done:
                     answer = answer_of(future, time_limit)
@@ -154,8 +181,8 @@ def _in_children(
                 raise
             again.extend(open_.values())
         finally:
-            pool.stop()
-            pool.join()
+            if not (keep and ended):
+                children.stop()
 
 
 def _guarded(function: Callable[[C], V], case: C) -> tuple[V | None, Failure | None, float]:

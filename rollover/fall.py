@@ -63,6 +63,7 @@ OUT_FORCE, OUT_SINKAGE, OUT_X, OUT_V, OUT_A, OUT_IMPULSE, OUT_COLUMNS = 0, 1, 2,
 RESOLVED = 0.25  # longest step times the frequency on the ground
 FALLING = 5e-4  # s, step of a fall before the first contact
 HALVINGS = 20  # of a step, to the moment at which the soil stays behind
+CORRECTIONS = 4  # of a step that ends at such a place
 CLOSE = 1e-7  # m: how near a step ends to a jump of the force
 AT_REST = 1e-8  # m/s, and m/s2 over a millisecond: what is slower on its line of unloading stays where it is
 
@@ -184,7 +185,7 @@ def crossing(level: float, h: float, u0: float, d0: float, u1: float, d1: float)
 
 @compiled
 def levels(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, out: Any) -> int:
-    """Depths at which the force may have a kink or a jump, or the contact begin or end, into out (7,)."""
+    """Depths at which the force may have a kink or a jump, or the contact begin or end, into out (8,)."""
     if state[MODE] == IDLE:
         out[0] = rut_depth(row)
         return 1
@@ -204,6 +205,9 @@ def levels(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, out: Any) -> 
         count += 1
     if f[CONE] > 0.0:
         out[count] = f[CONE]
+        count += 1
+    if state[MODE] == UNLOADING and p[e + ADHESION] > 0.0:
+        out[count] = rut_depth(row)  # what clings to the striker is pressed again, by the line's dashpot at once
         count += 1
     return count
 
@@ -265,7 +269,7 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
     Returns the number of steps, or -1 if the state left what can be.
     """
     row, state, s = np.zeros(COLUMNS), np.zeros(STATE_COLUMNS, np.int64), np.zeros(memory)
-    y, end, a, now, stops = np.zeros(4), np.zeros(4), np.zeros((4, 2)), np.zeros(2), np.zeros(7)
+    y, end, a, now, stops = np.zeros(4), np.zeros(4), np.zeros((4, 2)), np.zeros(2), np.zeros(8)
     at, whole = np.zeros(4), f
     if f[HEIGHT] > 0.0 and f[SPRING] > 0.0:
         f = f.copy()  # gravity and air pull at nose and body alike: nothing bends until something is hit
@@ -292,15 +296,16 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
         advance(law, p, s, row, state, f, y, h, a, end)
         if steps > most or not (abs(end[1]) < 1e4 and abs(end[3]) < 1e4):
             return -1
-        share, jump = 1.0, 0.0
+        share, jump, goal = 1.0, 0.0, 0.0
         for k in range(levels(law, p, s, row, state, f, stops)):
             level = stops[k]
             way = 1.0 if end[0] > y[0] else -1.0
-            near = level - way * CLOSE if k > 2 else level
+            # up to a jump of the force, just past where contact begins or ends, to a kink
+            near = level - way * CLOSE if k > 2 else level + way * CLOSE if k == 0 else level
             if abs(y[0] - level) > 2.0 * CLOSE and (y[0] - near) * (end[0] - near) < 0.0:
                 theta = crossing(near, h, y[0], y[1], end[0], end[1])
                 if theta < share:
-                    share, jump = theta, way * 2.0 * CLOSE if k > 2 else 0.0
+                    share, jump, goal = theta, way * 2.0 * CLOSE if k > 2 else 0.0, near
         turning = state[MODE] == LOADING and y[1] > 0.0 and end[1] < 0.0
         if turning:
             accelerate(law, p, s, row, state, f, end, now)
@@ -311,6 +316,12 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
         if share < 1.0:
             h = max(share, 1e-9) * h
             advance(law, p, s, row, state, f, y, h, a, end)
+            for _ in range(CORRECTIONS):  # what lies beyond bent the first guess
+                miss = end[0] - goal
+                if turning or abs(miss) < 0.1 * CLOSE or abs(miss) > 0.5 * h * abs(end[1]):
+                    break
+                h -= miss / end[1]
+                advance(law, p, s, row, state, f, y, h, a, end)
         if row[MASS_B] > 0.0 and f[SPRING] > 0.0 and held(law, p, s, row, state, f, end, now) < -pull:
             low, high = 0.0, h  # the step ends where the soil stays behind
             for _ in range(HALVINGS):

@@ -7,6 +7,7 @@ the two-pass -3 dB point at CFC/0.6 Hz.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -35,11 +36,19 @@ def filtered(values: NDArray[np.float64], step: float, cfc: int, *, constant: fl
         )
     if values.size < 2:
         return np.array(values, dtype=float)
-    from scipy.signal import butter, filtfilt  # slow to import, and a scenario's check needs only the rates
+    from scipy.signal import filtfilt  # slow to import, and a scenario's check needs only the rates
 
-    b, a = butter(2, cfc * constant, fs=1.0 / step)
+    b, a = _coefficients(cfc * constant, step)
     pad = min(max(round(0.01 / step), 100), values.size - 1)
     return np.asarray(filtfilt(b, a, values, padtype="odd", padlen=pad))
+
+
+@lru_cache(maxsize=64)
+def _coefficients(frequency: float, step: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    from scipy.signal import butter
+
+    b, a = butter(2, frequency, fs=1.0 / step)
+    return b, a
 
 
 def attenuation(frequency: float, step: float, cfc: int, *, constant: float = J211) -> float:

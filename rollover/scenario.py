@@ -109,11 +109,12 @@ class Scenario:
 
     def validate(self) -> None:
         """Refuse parts that do not fit together."""
+        known = entries() if self.effects else {}
         for name, parameters_ in self.effects.items():
-            if name not in entries():
-                raise ValueError(f"effects: unknown effect, got {name!r}; allowed: {', '.join(entries()) or 'none'}")
-            if not isinstance(parameters_, entries()[name]):
-                raise ValueError(f"effects: not parameters of {name}, got {parameters_!r}; {entries()[name].__name__}")
+            if name not in known:
+                raise ValueError(f"effects: unknown effect, got {name!r}; allowed: {', '.join(known) or 'none'}")
+            if not isinstance(parameters_, known[name]):
+                raise ValueError(f"effects: not parameters of {name}, got {parameters_!r}; {known[name].__name__}")
         rate = 1.0 / self.simulation.output_step
         if rate < least_rate(self.loads.cfc) * (1.0 - 1e-9):
             raise ValueError(

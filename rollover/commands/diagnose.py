@@ -50,7 +50,7 @@ def diagnose(
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/diagnose/NAME")] = None,
     workers: Annotated[
         int | None,
-        typer.Option(help="Processes that fit at once; the answer is the same  [default: 1]", min=0),
+        typer.Option(help="Processes that fit at once; the answer is the same.", show_default="number of cores", min=0),
     ] = None,
     force: Force = False,
     as_json: AsJson = False,
@@ -65,6 +65,7 @@ def diagnose(
     from rollover.diagnosis.account import FILES, FORMAT, JSON, PAGE, PICTURE, SCENARIO
     from rollover.diagnosis.crew import Crew
     from rollover.diagnosis.series import series
+    from rollover.execute import cores
 
     path = document.find(scenario)
     chosen = scenarios.load(path)
@@ -85,8 +86,11 @@ def diagnose(
     findings = _prechecks(chosen, measured)
     # beside the results folder, which is written whole or not at all: what an interrupted diagnosis had fitted
     notebook = folder.parent / f".{folder.name}.fits"
-    crew = Crew(workers or 1, notebook, json.dumps([about, store.versions()], sort_keys=True))
-    found = diagnosed(chosen, list(measured.items()), hold_out=held, tolerance=tolerance, say=console.say, crew=crew)
+    about_fits = json.dumps([about, store.versions()], sort_keys=True)
+    with Crew(cores() if workers is None else workers, notebook, about_fits) as crew:
+        found = diagnosed(
+            chosen, list(measured.items()), hold_out=held, tolerance=tolerance, say=console.say, crew=crew
+        )
     sensors = tuple(f"{name}: {f.channel}: {f.sentence}" for name, f in findings)
     found = replace(found, notes=(*sensors, *found.notes))
     told = series(chosen, list(measured.items()), found)

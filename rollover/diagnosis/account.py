@@ -123,4 +123,5 @@ def recordings_in(folder: Path) -> list[tuple[str, Recording]]:
 def diagnose_folder(folder: Path, out: Path | None = None, workers: int = 1) -> dict[str, Any]:
     """Diagnose a folder that holds scenario.yaml and its recordings; returns what diagnosis.json says."""
     del out
-    return account(diagnose(load(folder / "scenario.yaml"), recordings_in(folder), crew=Crew(workers)))
+    with Crew(workers) as crew:
+        return account(diagnose(load(folder / "scenario.yaml"), recordings_in(folder), crew=crew))

@@ -11,13 +11,15 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from time import perf_counter
 from typing import Any, Literal
 
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Block, Fitted, Judge
-from rollover.execute import map_cases
+from rollover.execute import Children, map_cases
 
 Progress = Callable[[str], None]
+PATIENCE = 3.0  # s of fits in this process, after which children are worth what it takes to begin them
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +59,8 @@ class Crew:
 
     def __init__(self, workers: int = 1, notebook: Path | None = None, about: str = "") -> None:
         self.workers, self.notebook, self.about = workers, notebook, about
+        self._children = Children(workers)
+        self._worked = 0.0  # s, on fits in this process
         self._done: dict[str, dict[str, Any] | None] = {}
         if notebook is not None and notebook.exists():
             for line in notebook.read_text(encoding="utf-8").splitlines():
@@ -65,6 +69,12 @@ class Crew:
                     self._done[row["key"]] = row["fit"]
                 except (ValueError, KeyError, TypeError):
                     continue  # the line at which it was interrupted
+
+    def __enter__(self) -> Crew:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._children.stop()
 
     def close(self) -> None:
         """All is done: nothing needs to be taken up again."""
@@ -80,20 +90,23 @@ class Crew:
         for k, key in enumerate(keys):
             if key in self._done:
                 found[k] = _rebuilt(judge, jobs[k], self._done[key])
-        if self.workers > 1 and len(todo) > 1:
-            bare = judge.bare()
-            outcomes = map_cases(_worked, [(bare, jobs[k]) for k in todo], workers=self.workers)
-            for count, outcome in enumerate(outcomes, start=1):
-                k = todo[outcome.index]
-                if outcome.failure is not None:
-                    raise RuntimeError(f"a fit of {jobs[k].candidates[-1].key}: {outcome.failure.sentence}")
-                found[k], made = outcome.value if outcome.value is not None else (None, 0)
-                judge.simulations += made
-                self._note(keys[k], found[k])
-                say(f"fitted {jobs[k].candidates[-1].key}, {count} of {len(todo)}")
+        done = 0
+        while done < len(todo) and not (self.workers > 1 and self._worked > PATIENCE and len(todo) - done > 1):
+            k, began = todo[done], perf_counter()
+            found[k], done = work(judge, jobs[k]), done + 1
+            self._worked += perf_counter() - began
+            self._note(keys[k], found[k])
+            say(f"fitted {jobs[k].candidates[-1].key}, {done} of {len(todo)}")
+        if done == len(todo):
             return found
-        for count, k in enumerate(todo, start=1):
-            found[k] = work(judge, jobs[k])
+        bare, rest, about = judge.bare(), todo[done:], f"{about} {judge.shifts}"
+        outcomes = map_cases(_worked, [(about, bare, jobs[k]) for k in rest], children=self._children)
+        for count, outcome in enumerate(outcomes, start=done + 1):
+            k = rest[outcome.index]
+            if outcome.failure is not None:
+                raise RuntimeError(f"a fit of {jobs[k].candidates[-1].key}: {outcome.failure.sentence}")
+            found[k], made = outcome.value if outcome.value is not None else (None, 0)
+            judge.simulations += made
             self._note(keys[k], found[k])
             say(f"fitted {jobs[k].candidates[-1].key}, {count} of {len(todo)}")
         return found
@@ -130,10 +143,16 @@ def work(judge: Judge, job: Job) -> Fitted | None:
     return ways[job.how](begun)
 
 
-def _worked(case: tuple[Judge, Job]) -> tuple[Fitted | None, int]:
-    judge, job = case
-    found = work(judge, job)
-    return found, judge.simulations
+_held: dict[str, Judge] = {}  # in a child: what it simulated for the job before
+
+
+def _worked(case: tuple[str, Judge, Job]) -> tuple[Fitted | None, int]:
+    about, sent, job = case
+    if about not in _held:
+        _held.clear()
+    judge = _held.setdefault(about, sent)
+    before = judge.simulations
+    return work(judge, job), judge.simulations - before
 
 
 def _at(judge: Judge, candidates: Sequence[Candidate], job: Job) -> Fitted | None:

@@ -104,9 +104,13 @@ class Evidence:
             if x.size < 5:
                 continue
             step = np.abs(np.diff(x))
-            beside = np.maximum(np.append(step[2:], 0.0), np.append(0.0, step[:-2])[: x.size - 2])
+            beside = np.zeros(x.size - 2)
+            beside[:-1] = step[2:]
+            beside[1:] = np.maximum(beside[1:], step[:-2])
             leap = np.abs(x[2:] - x[:-2])
             first = np.flatnonzero((leap > LEAP * beside) & (leap > 3.0 * s.sigma))
+            if not first.size:
+                continue
             rows += [part.start + first + k for k in range(3)]
             # when a body lifts off again hangs on little
             large = first[leap[first] > LARGE * s.sigma]
@@ -118,6 +122,8 @@ class Evidence:
 
         On which side of a leap a sample lies is decided by clocks, not by physics.
         """
+        if not leaps.size:
+            return raw
         y, measured = raw.copy(), np.concatenate([s.values for s in self.signals])
         for _, part in self.spans():
             inside = leaps[(leaps >= part.start) & (leaps < part.stop)]
@@ -128,6 +134,8 @@ class Evidence:
     def worth(self, leaps: NDArray[np.int64]) -> Array:
         """Weights (n,) of whitened samples: those whose past was forgiven are as wide as the noise itself."""
         found = np.ones(self.count)
+        if not leaps.size:
+            return found
         for s, part in self.spans():
             inside = leaps[(leaps >= part.start) & (leaps < part.stop)]
             for k in range(1, len(s.ar) + 1):

@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 FAR = 3.0  # misfit over the noise from which on a step may be lengthened
 STRIDE, STRIDES = 2.0, 6  # by what factor, how often
 TRIES = 4  # of a step, each damped more
-TICKS = (8e-5, 3e-5, 1e-5)  # s, by which a time shift is tried to either side
+TICK, SHORTEST, NARROWER = 8e-5, 5e-6, 0.4  # s, by which a time shift is tried to either side; then less, by a factor
+TRIED = 40  # at most so many
 TWICE, LITTLE = 2, 1.0  # how often; a gain that is not worth another time
 NOISE_LEFT = 1.04  # misfit over the noise that needs no further search
 NONE = np.zeros(0, dtype=np.int64)
@@ -363,13 +364,17 @@ class Judge:
         return best
 
     def _tried(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], block: Block) -> Block:
-        """Recording r at the best of some time shifts beside the block's."""
-        for step in TICKS:
+        """Recording r at a time shift beside which none is better."""
+        step, tried = TICK, 0
+        while step > SHORTEST and tried < TRIED:
             for there in (block.shift + step, block.shift - step):
+                tried += 1
                 other = self.block(r, candidates, x, there, 0.0)
                 if other is not None and other.total < block.total and abs(there) < WIDEST * other.prior:
                     block = other
                     break
+            else:
+                step *= NARROWER
         return block
 
     def shaped(self, f: Fitted) -> Fitted | None:

@@ -67,6 +67,8 @@ def explained(
     count = sum(b.residual.size for b in base.blocks)
     if weighed(judge, base, phases):
         base = judge.again(base)
+    if not judge.effort.thrifty:
+        base = judge.timed(base)  # what a clock leaves is no effect's gain
     before = mismatch_of(judge.evidence, base.blocks, phases)
     say(f"looking at {len(candidates)} candidates, which of them could matter")
     few = spread(base, groups, judge.effort.few) if judge.effort.thrifty else None

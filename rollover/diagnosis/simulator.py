@@ -22,7 +22,7 @@ from rollover.scenario import Scenario
 Array = NDArray[np.float64]
 SENSORS = "effects.sensor-"
 EDGES = ("sensor-lag", "sensor-clock-offset", "sensor-clock-drift")
-KINKED = ("soil-layer", "soil-crust", "structural-compliance", "guide-friction")
+KINKED = ("structural-compliance", "guide-friction")
 SMOOTH = 1e-3  # s: longest step that keeps all others within 1e-4 of the range
 BESIDE = 1e-9  # s: on either side of the first contact
 KEPT = 128  # runs of one recording

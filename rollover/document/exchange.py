@@ -32,7 +32,8 @@ def exchanged(thing: T, changes: Mapping[str, Any]) -> T:
         slot = None if isinstance(thing, (tuple, Mapping)) else slots(kind)[step]
         if slot and slot.by_key:
             fresh = {key.partition(".")[0] for key in deeper} - inner.keys()
-            inner = {**inner, **{key: slot.by_key.table()[key]() for key in fresh}}
+            table = slot.by_key.table() if fresh else {}
+            inner = {**inner, **{key: table[key]() for key in fresh}}
         here[step] = exchanged(inner, deeper)
     if isinstance(thing, tuple):
         names = {getattr(item, "name", None): i for i, item in enumerate(thing)}

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.diagnosis import diagnose, diagnosed_text
+from rollover.diagnosis import crew, diagnose, diagnosed_text
 from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import Candidate, candidates_of
 from rollover.diagnosis.crew import Crew, Job
@@ -79,14 +79,21 @@ def test_a_stiffness_far_off_is_found_from_every_start() -> None:
 
 
 @pytest.mark.parametrize("workers", [2])
-def test_any_number_of_workers_gives_the_same_fits(workers: int) -> None:
+def test_any_number_of_workers_gives_the_same_fits(workers: int, monkeypatch: pytest.MonkeyPatch) -> None:
     recordings = recorded(GAIN, speeds=(1.2, 3.2))
     jobs = []
     for key in (f"sensor-gain:{FORCE}", "soil-stiffness"):
         c = candidate(judge_of(recordings), key)
         jobs.append(Job(candidates=(c,), start=c.starts()[0], shifts=(0.0, 0.0), rounds=3))
     alone = Crew().fits(judge_of(recordings), jobs)
-    together = Crew(workers).fits(judge_of(recordings), jobs)
+    with Crew(workers) as many:
+        assert many.fits(judge_of(recordings), jobs[:1])[0] is not None  # in this process: it took no time yet
+        assert many._children._pool is None
+    monkeypatch.setattr(crew, "PATIENCE", -1.0)
+    with Crew(workers) as many:
+        together = many.fits(judge_of(recordings), jobs)
+        assert many._children._pool is not None
+    assert many._children._pool is None
     for a, b in zip(alone, together, strict=True):
         assert a is not None
         assert b is not None
@@ -104,16 +111,16 @@ def test_what_was_fitted_is_taken_up_again(tmp_path: Path) -> None:
     with notebook.open("a") as file:
         file.write('{"key": "broken off he')
     other = judge_of(recordings)
-    crew = Crew(notebook=notebook)
-    again = crew.fits(other, [job])[0]
+    other_crew = Crew(notebook=notebook)
+    again = other_crew.fits(other, [job])[0]
     assert first is not None
     assert again is not None
     assert again.x == first.x
     assert again.left == pytest.approx(first.left, rel=1e-12)
     assert other.simulations < judge.simulations
-    assert Crew(notebook=notebook, about="another scenario")._done.keys() == crew._done.keys()
-    assert job.key("another") not in crew._done
-    crew.close()
+    assert Crew(notebook=notebook, about="another scenario")._done.keys() == other_crew._done.keys()
+    assert job.key("another") not in other_crew._done
+    other_crew.close()
     assert not notebook.exists()
 
 

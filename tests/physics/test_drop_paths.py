@@ -78,6 +78,35 @@ def test_both_paths_give_the_same_drop_and_the_ledger_closes(name: str) -> None:
     assert np.abs(full.recording["energy/residual"]).max() < 1e-3 * full.released
 
 
+@pytest.mark.parametrize("step", [1e-3, 4.1e-4])
+def test_a_flight_after_a_rebound_lasts_as_long_as_gravity_says_whatever_the_step(step: float) -> None:
+    """Thrown up at v from the rut, the striker is back at the rut after 2 v/g; its steps end at both places."""
+    scenario = scene({"effects.soil-elastic-rebound.recovery": 0.1, "effects.soil-elastic-rebound.damping_ratio": 0.1})
+    at = np.arange(0.15, 0.5, 1e-5)
+    found = DropModel(scenario=scenario, step=step).run(at)
+    flies = (found["ground/force_normal"] == 0.0) & (found["ground/sinkage"] == 0.0)
+    first = int(np.argmax(flies))
+    last = first + int(np.argmin(flies[first:]))
+    thrown = found["striker/velocity_z"][first] + scenario.gravity * 5e-6  # on the average it left half a row before
+    assert thrown > 0.2
+    assert at[last] - at[first] == pytest.approx(2.0 * thrown / scenario.gravity, abs=1.5e-5)
+
+
+@pytest.mark.parametrize("effect", ["soil-crust", "soil-layer", "soil-adhesion"])
+def test_a_jump_of_the_force_is_met_where_it_is_whatever_the_step(effect: str) -> None:
+    rebound = {"effects.soil-elastic-rebound.recovery": 0.1, "effects.soil-elastic-rebound.damping_ratio": 0.1}
+    changes: dict[str, dict[str, Any]] = {
+        "soil-crust": {"effects.soil-crust.thickness": 0.0794, "effects.soil-crust.stiffness_ratio": 2.405},
+        "soil-layer": {"effects.soil-layer.depth": 0.1, "effects.soil-layer.stiffness_ratio": 3.0},
+        "soil-adhesion": {"effects.soil-adhesion.stress": 9119.0, "effects.soil-adhesion.reach": 0.0076} | rebound,
+    }
+    at, model = np.arange(0.0, 0.45, 1e-3), DropModel(scenario=scene(changes[effect]))
+    fine = DropModel(scenario=model.scenario, step=1e-5).run(at)["striker/position_z"]
+    for step in (1e-3, 5e-4, 3.7e-4):
+        coarse = DropModel(scenario=model.scenario, step=step).run(at)["striker/position_z"]
+        assert np.abs(coarse - fine).max() < 3e-6, step
+
+
 @pytest.mark.parametrize("law", EXAMPLES.values(), ids=EXAMPLES.keys())
 def test_both_paths_agree_for_every_law(law: Any) -> None:
     scenario = drop(2.0, step=STEP, duration=0.3, law=law)

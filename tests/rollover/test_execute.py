@@ -103,10 +103,24 @@ def warmed(case: int) -> str:
     return os.environ["WARM"]
 
 
+def whoever(_: int) -> int:
+    return os.getpid()
+
+
 def test_a_child_is_warmed_up_before_its_first_case() -> None:
     found = [o.value for o in map_cases(warmed, [1, 2, 3], workers=1, warm_up=warm)]
     assert found[0] not in (None, str(os.getpid()))
     assert len(set(found)) == 1
+
+
+def test_children_that_are_kept_work_off_a_second_batch() -> None:
+    children = execute.Children(1)
+    first, second = ([o.value for o in map_cases(whoever, [0], children=children)] for _ in range(2))
+    assert first == second != [os.getpid()]
+    children.stop()
+    again = [o.value for o in map_cases(whoever, [0], children=children)]
+    children.stop()
+    assert again != first
 
 
 def test_a_pool_whose_idle_child_is_ended_is_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
