@@ -56,8 +56,8 @@ RECOVERY, REBOUND_DAMPING = 6, 7  # least share that springs back; dashpot of th
 ADHESION, REACH = 8, 9  # pull-off force, N; gap over which it fades, m
 LAYER_DEPTH, LAYER_RATIO, CRUST_DEPTH, CRUST_RATIO = 10, 11, 12, 13
 STIFFNESS = 14  # factor on the law
-GROWTH_END = 15  # sinkage at which the co-moving mass has grown to its whole, m
-EFFECT_PLACES = 16  # numbers of the compiled terms follow, TERM_PLACES for each
+GROWTH_END, FADE = 15, 16  # sinkage at which the growth ends, and over which it dies out behind, m
+EFFECT_PLACES = 17  # numbers of the compiled terms follow, TERM_PLACES for each
 TERM_PLACES = 8
 
 SAME = 1e-10  # m: sinkages closer than this are one, so that rounding does not switch a loaded element to its line
@@ -97,6 +97,24 @@ def springs_back(law: Any, p: Any) -> float:
 
 
 @compiled
+def growth(law: Any, p: Any, z: float) -> float:
+    """How fast the co-moving mass grows at sinkage z, over how it grows before the end: exp(-(z - end)/fade) behind."""
+    beyond, fade = z - p[law[EFFECTS] + GROWTH_END], p[law[EFFECTS] + FADE]
+    if beyond < 0.0:
+        return 1.0
+    return math.exp(-beyond / fade) if fade > 0.0 else 0.0
+
+
+@compiled
+def grown(law: Any, p: Any, z: float) -> float:
+    """Sinkage at which the mass would be as large, had it grown evenly: the integral of `growth`, m."""
+    end, fade = p[law[EFFECTS] + GROWTH_END], p[law[EFFECTS] + FADE]
+    if z <= end:
+        return z
+    return end - fade * math.expm1((end - z) / fade) if fade > 0.0 else end  # type: ignore[no-any-return]
+
+
+@compiled
 def normal_force(law: Any, p: Any, s: Any, row: Any, z: float, v: float) -> float:
     """Spring force of one element at sinkage z and rate v, N: a pull only from adhesion; memory is only read.
 
@@ -108,8 +126,9 @@ def normal_force(law: Any, p: Any, s: Any, row: Any, z: float, v: float) -> floa
         return 0.0
     if law[PLASTIC] == 0 or z >= row[LINE_Z] - SAME:
         f = max(loading_force(law, p, s, max(z - row[SPREAD], 0.0), v), 0.0)
-        if v > 0.0 and row[GROWING] != 0.0 and row[LINE_Z] - SAME <= z < p[law[EFFECTS] + GROWTH_END]:
-            f += p[law[EFFECTS] + GROWTH] * v * v  # soil set moving takes its momentum, d(m_b1)/dt v
+        if v > 0.0 and row[GROWING] != 0.0 and row[LINE_Z] - SAME <= z:
+            # soil set moving takes its momentum, d(m_b1)/dt v
+            f += growth(law, p, z) * p[law[EFFECTS] + GROWTH] * v * v
     else:
         f = min(row[LINE_F] - row[LINE_K] * (row[LINE_Z] - z) + row[LINE_C] * v, row[LINE_F])
         pull = p[law[EFFECTS] + ADHESION]
@@ -185,7 +204,7 @@ def commit(law: Any, p: Any, s: Any, row: Any, state: Any, z: float, v: float, h
         # the mean rate makes a law's own states second order in the step
         call_advance(law[ADDRESS_ADVANCE], (p.ctypes, s.ctypes, max(z - row[SPREAD], 0.0), (z - before) / h, h))
     if row[GROWING] != 0.0 and z > row[LINE_Z]:
-        swept = max(min(z, p[law[EFFECTS] + GROWTH_END]) - row[LINE_Z], 0.0)
+        swept = max(grown(law, p, z) - grown(law, p, row[LINE_Z]), 0.0)
         row[MASS_B] += p[law[EFFECTS] + GROWTH] * row[AREA] / REFERENCE_AREA * swept
         if law[PLASTIC] == 0:
             row[LINE_Z] = z  # how far it has grown; no line starts there

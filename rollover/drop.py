@@ -97,8 +97,10 @@ class DropModel:
             )
         if "guide-friction" in s.effects:
             f[fall.GUIDE] = s.effects["guide-friction"].force
+        f[fall.CRISIS], f[fall.THIN] = math.inf, 1.0
         if "air-drag" in s.effects:
-            f[fall.AIR] = s.effects["air-drag"].factor
+            air = s.effects["air-drag"]
+            f[fall.AIR], f[fall.CRISIS], f[fall.THIN] = air.factor, air.critical, air.crisis_ratio
         return f
 
     @cached_property

@@ -43,18 +43,20 @@ from ground.kernel import (
     UNLOADING,
     begin,
     commit,
+    grown,
     lets_go,
     loading_force,
     normal_force,
     rut_depth,
 )
 from ground.law import BRANCH, REFERENCE_AREA
-from rollover.terms import CREEP
+from rollover.terms import CREEP, drag
 
 # numbers of a drop: kg, kg, N/m, N s/m (no spring: rigid), -, m2, kg, N s, m/s2, m/s, s, N, N s2/m2,
 # m (height of a cone whose base is the face, 0: flat), m (above the ground at t = 0 with the speed, 0: first contact)
 MASS, NOSE, SPRING, DASHPOT, FRACTION, FACE, LAW_MASS, MOMENTUM_MOST, GRAVITY, SPEED, STEP, GUIDE, AIR = range(13)
-CONE, HEIGHT, NUMBERS = 13, 14, 15
+# m/s (critical speed of the air, inf: none), - (its drag above over that below)
+CONE, HEIGHT, CRISIS, THIN, NUMBERS = 13, 14, 15, 16, 17
 # columns of what comes out
 OUT_FORCE, OUT_SINKAGE, OUT_X, OUT_V, OUT_A, OUT_IMPULSE, OUT_COLUMNS = 0, 1, 2, 3, 4, 5, 6
 
@@ -68,25 +70,27 @@ AT_REST = 1e-8  # m/s, and m/s2 over a millisecond: what is slower on its line o
 
 
 @compiled
-def free(g: float, mass: float, guide: float, air: float, v: float) -> float:
+def free(g: float, mass: float, guide: float, air: float, crisis: float, thin: float, v: float) -> float:
     """Downward acceleration of a body that falls with v on a guide through air, m/s2."""
     if guide == 0.0 and air == 0.0:
         return g
-    return g - (guide * min(max(v / CREEP, -1.0), 1.0) + air * v * abs(v)) / mass
+    return g - (guide * min(max(v / CREEP, -1.0), 1.0) + drag(air, crisis, thin, abs(v)) * v * abs(v)) / mass
 
 
 @compiled
-def fall_back(g: float, mass: float, guide: float, air: float, v: float, time: float) -> Any:
+def fall_back(
+    g: float, mass: float, guide: float, air: float, crisis: float, thin: float, v: float, time: float
+) -> Any:
     """Depth (m) and speed (m/s) `time` seconds before a body that falls freely has depth 0 and speed v."""
     if guide == 0.0 and air == 0.0:
         return -(v * time - 0.5 * g * time * time), v - g * time
     x, count = 0.0, max(math.ceil(time / 1e-3), 1)
     h = -time / count
     for _ in range(count):
-        k1 = free(g, mass, guide, air, v)
-        k2 = free(g, mass, guide, air, v + 0.5 * h * k1)
-        k3 = free(g, mass, guide, air, v + 0.5 * h * k2)
-        k4 = free(g, mass, guide, air, v + h * k3)
+        k1 = free(g, mass, guide, air, crisis, thin, v)
+        k2 = free(g, mass, guide, air, crisis, thin, v + 0.5 * h * k1)
+        k3 = free(g, mass, guide, air, crisis, thin, v + 0.5 * h * k2)
+        k4 = free(g, mass, guide, air, crisis, thin, v + h * k3)
         x += h * (v + h * (k1 + k2 + k3) / 6.0)
         v += h * (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0
     return x, v
@@ -112,11 +116,10 @@ def swept(f: Any, z: float) -> float:
 @compiled
 def along(law: Any, p: Any, row: Any, f: Any, z: float) -> float:
     """Co-moving mass at sinkage z: what there was at the last commit and what has grown since, kg."""
-    end = p[law[EFFECTS] + GROWTH_END]
-    if row[GROWING] == 0.0 or z <= row[LINE_Z] or row[LINE_Z] >= end:
+    if row[GROWING] == 0.0 or z <= row[LINE_Z]:
         return row[MASS_B]  # type: ignore[no-any-return]
-    grown = swept(f, min(z, end)) - swept(f, row[LINE_Z])
-    return row[MASS_B] + p[law[EFFECTS] + GROWTH] / REFERENCE_AREA * grown  # type: ignore[no-any-return]
+    more = swept(f, grown(law, p, z)) - swept(f, grown(law, p, row[LINE_Z]))
+    return row[MASS_B] + p[law[EFFECTS] + GROWTH] / REFERENCE_AREA * more  # type: ignore[no-any-return]
 
 
 @compiled
@@ -126,11 +129,11 @@ def accelerate(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, a
     if state[MODE] != IDLE:
         cover(f, row, y[0])
         force, soil = normal_force(law, p, s, row, y[0], y[1]), along(law, p, row, f, y[0])
-    nose = f[NOSE] * free(f[GRAVITY], f[MASS], f[GUIDE], f[AIR], y[1]) - force
+    nose = f[NOSE] * free(f[GRAVITY], f[MASS], f[GUIDE], f[AIR], f[CRISIS], f[THIN], y[1]) - force
     if f[SPRING] > 0.0:
         between = f[SPRING] * (y[2] - y[0]) + f[DASHPOT] * (y[3] - y[1])
         nose += between
-        a[1] = free(f[GRAVITY], f[MASS], f[GUIDE], f[AIR], y[3]) - between / (f[MASS] - f[NOSE])
+        a[1] = free(f[GRAVITY], f[MASS], f[GUIDE], f[AIR], f[CRISIS], f[THIN], y[3]) - between / (f[MASS] - f[NOSE])
     a[0] = nose / (f[NOSE] + soil)
     if f[SPRING] <= 0.0:
         a[1] = a[0]
@@ -273,11 +276,11 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
         f = f.copy()  # gravity and air pull at nose and body alike: nothing bends until something is hit
         f[SPRING], f[STEP] = 0.0, max(f[STEP], FALLING)
     i, n = 0, times.size
-    g, m, guide, air = f[GRAVITY], f[MASS], f[GUIDE], f[AIR]
+    g, m, guide, air, crisis, thin = f[GRAVITY], f[MASS], f[GUIDE], f[AIR], f[CRISIS], f[THIN]
     while i < n and times[i] < 0.0:
-        x, v = fall_back(g, m, guide, air, f[SPEED], -times[i])
+        x, v = fall_back(g, m, guide, air, crisis, thin, f[SPEED], -times[i])
         out[i, OUT_FORCE], out[i, OUT_SINKAGE], out[i, OUT_IMPULSE] = 0.0, 0.0, 0.0
-        out[i, OUT_X], out[i, OUT_V], out[i, OUT_A] = x - f[HEIGHT], v, free(g, m, guide, air, v)
+        out[i, OUT_X], out[i, OUT_V], out[i, OUT_A] = x - f[HEIGHT], v, free(g, m, guide, air, crisis, thin, v)
         i += 1
     row[AREA] = f[FACE]
     y[1], y[3], impulse = f[SPEED], f[SPEED], 0.0

@@ -54,7 +54,8 @@ def term_rows(scenario: Scenario, bodies: tuple[Body, ...]) -> tuple[Index, Arra
         if "guide-friction" in effects and isinstance(scenario.vehicle, Striker):
             rows.append(((terms.GUIDE_BRAKE, b, b), [share * effects["guide-friction"].force]))
         if "air-drag" in effects:
-            rows.append(((terms.AIR_DRAG, b, b), [share * effects["air-drag"].factor]))
+            air = effects["air-drag"]
+            rows.append(((terms.AIR_DRAG, b, b), [share * air.factor, air.critical, air.crisis_ratio]))
     if "gyroscopic-rotor" in effects and not isinstance(scenario.vehicle, Striker):
         rows.append(((terms.ROTOR, 0, 0), list(effects["gyroscopic-rotor"].vector)))
     if "drive-torque" in effects and not isinstance(scenario.vehicle, Striker):

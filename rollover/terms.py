@@ -22,7 +22,17 @@ B_PLACE, B_K, B_C, B_KR, B_CR, B_SPRING, B_DASHPOT, B_MU, B_TRAVEL = 0, 3, 4, 5,
 TERM_NUMBERS = 11
 WEIGHT = 10.0  # N/kg, what presses a load on its bed as far as Newton's matrix is concerned
 WALL = 0.005  # m, in a wall, over which its dashpot grows to its whole
+CRISIS_WIDTH = 0.1  # of the critical speed, over which the drag falls
 CREEP = 0.005  # m/s: below it the friction of the guide is a dashpot, so that it has a value at rest
+
+
+@compiled
+def drag(factor: float, crisis: float, ratio: float, speed: float) -> float:
+    """1/2 rho C_d A at a speed: C_d falls to `ratio` of itself about the speed `crisis`, N s2/m2."""
+    if crisis == np.inf:
+        return factor
+    over = (speed / crisis - 1.0) / CRISIS_WIDTH
+    return factor * (ratio + (1.0 - ratio) / (1.0 + np.exp(min(over, 100.0))))  # type: ignore[no-any-return]
 
 
 @compiled
@@ -39,9 +49,10 @@ def try_terms(t: Any, Q: Any) -> None:
             power = -force * v
         elif kind == AIR_DRAG:
             speed = np.sqrt(row[VEL] ** 2 + row[VEL + 1] ** 2 + row[VEL + 2] ** 2)
+            held_back = drag(f[0], f[1], f[2], speed)
             for k in range(3):
-                Q[6 * b + k] -= f[0] * speed * row[VEL + k]
-            power = f[0] * speed**3
+                Q[6 * b + k] -= held_back * speed * row[VEL + k]
+            power = held_back * speed**3
         elif kind == BETWEEN:
             # nose b below, body `other` above on the same guide
             shut = f[2] - (t.pose[other, X + 2] - row[X + 2])

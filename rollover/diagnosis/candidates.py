@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from ground.law import REFERENCE_AREA, REFERENCE_MASS
 from rollover.channels import describe
 from rollover.diagnosis.evidence import Evidence
+from rollover.diagnosis.simulator import set_up
 from rollover.document import value_at
 from rollover.effects import EFFECTS, Search, effects, nth
+from rollover.initiation import Release
 from rollover.scenario import Scenario
 from rollover.vehicle import Striker
 
@@ -24,12 +26,16 @@ Array = NDArray[np.float64]
 # shape parameters that stay at their default: few recordings tell them apart from the strength
 SHAPES = {
     "soil-viscous-damping": ("exponent",),
+    "soil-added-mass-growth": ("fade",),
+    "air-drag": ("crisis_speed",),
     "soil-adhesion": ("reach",),
     "tank-slosh": ("damping",),
     "payload-shift": ("friction",),
     "axle-stop": ("stiffness",),
 }
 
+CRITICAL = (1e5, 4e5)  # Reynolds numbers of the drag crisis of a sphere, rough and smooth (Achenbach, M+)
+AIR_VISCOSITY = 1.51e-5  # m2/s
 PLACES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of a shape, at which a fit of it begins
 FAINT = 20.0  # times weaker than an effect usually is, and still looked for
 BESIDE = 0.01  # of a coordinate: how far from its zero an effect is looked at
@@ -122,7 +128,7 @@ class Candidate:
     def with_shapes(self, x: Sequence[float]) -> list[tuple[float, ...]]:
         """Coordinates of `whole` at which its fit may begin: the shape's default, and others."""
         kind: Any = EFFECTS[self.id]()
-        default = [min(max(coordinate(getattr(kind, n), s), 0.02), 0.98) for n, s in self.shapes.items()]
+        default = [_begun(getattr(kind, n), s) for n, s in self.shapes.items()]
         places = [tuple(default), *itertools.product(*[PLACES] * len(default))]
         return [(*x, *place) for place in places]
 
@@ -142,6 +148,13 @@ class Candidate:
                 many = (THRESHOLDS if len(self.search) > 1 else 4) if not axes else 1
                 axes.append([(k + 0.5) / many for k in range(many)])
         return list(itertools.product(*axes))
+
+
+def _begun(value: float | None, search: Search) -> float:
+    """Coordinate at which the fit of a shape begins: its default, if that is inside; what has none begins low."""
+    if value is None or (search.scale == "log" and value <= 0.0):
+        return 0.02
+    return min(max(coordinate(value, search), 0.02), 0.98)
 
 
 def physical(x: float, search: Search) -> float:
@@ -187,6 +200,7 @@ def candidates_of(
         for s in e.signals:
             spans[s.channel] = max(spans.get(s.channel, 0.0), s.span)
     found = []
+    tried = None if scenario is None else set_up(scenario, evidence[0].recording)
     for name, kind in EFFECTS.items():
         if name in switched_on or acts not in kind.acts or not kind.competes:
             continue
@@ -197,12 +211,27 @@ def candidates_of(
         search = {p: _widened(s, kind.null.get(p)) for p, s in sized.items() if p not in SHAPES.get(name, ())}
         if scenario is not None:
             search |= {p: _from(search[p], least) for p, least in kind.acts_from(scenario).items()}
-        shapes = {p: s for p, s in sized.items() if p in SHAPES.get(name, ())}
+        parts = {p: _shape(p, sized[p], tried) for p in SHAPES.get(name, ()) if p in sized}
+        shapes = {p: s for p, s in parts.items() if s is not None}
         neutral = None if acts == "drop" else tuple(_neutral(kind, p, s, scenario) for p, s in search.items())
         found.append(
             Candidate(id=name, kind=kind.kind, family=kind.family, search=search, shapes=shapes, neutral=neutral)
         )
     return found
+
+
+def _shape(name: str, search: Search, scenario: Any) -> Search | None:
+    """Where a shape is looked for; None where it has no part: growth that ends on a face, a drag crisis in no fall."""
+    if name not in ("fade", "crisis_speed"):
+        return search
+    body = None if scenario is None else scenario.vehicle
+    if not isinstance(body, Striker):
+        return None
+    if name == "fade":
+        return search if body.nose == "cone" else None
+    across = 2.0 * math.sqrt(body.face_length * body.face_width / math.pi)
+    low, high = (re * AIR_VISCOSITY / across for re in CRITICAL)
+    return Search(low, high, "log") if isinstance(scenario.initiation, Release) else None
 
 
 def _neutral(kind: Any, parameter: str, search: Search, scenario: Any) -> float | None:

@@ -18,6 +18,7 @@ from rollover.diagnosis.clocks import align
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.depend import dependency
 from rollover.diagnosis.dependence import Dependence, dependence
+from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.empirical import offered, proposed
 from rollover.diagnosis.evidence import Evidence, doubted, evidence_of, left_out
 from rollover.diagnosis.explain import SURE
@@ -28,7 +29,7 @@ from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.readings import digitised, without_spikes
 from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing, with_scatter
 from rollover.diagnosis.scores import judged
-from rollover.diagnosis.selection import decided, explained, matters
+from rollover.diagnosis.selection import Explanation, decided, explained, matters
 from rollover.diagnosis.simulator import set_up
 from rollover.diagnosis.statements import considered, named, noise, places, sentence
 from rollover.diagnosis.verdict import Degree, Diagnosis
@@ -37,6 +38,7 @@ from rollover.effects import EFFECTS
 from rollover.recording import Recording
 from rollover.scenario import Scenario
 
+ROUNDS = 3  # of an explanation with the errors of the conditions as they act beside it
 MOSTLY = 0.6  # of the effects of the ground that would not have shown: then nothing can be told
 FEWEST = 24  # samples in all, below which nothing is said
 
@@ -88,6 +90,7 @@ def diagnose(
     candidates = candidates_of(found, scenario.effects, acts, scenario, size_of(set_up(scenario, found[0].recording)))
     explanation = explained(judge, base, candidates, groups, phases, say, crew or Crew())
     explanation, verdict = decided(judge, explanation, groups)
+    explanation, kept = eased_beside(scenario, judge, explanation, kept, phases)
     found = list(judge.evidence)
     before, after = explanation.before, explanation.after if explanation.parts else explanation.before
     set_ups = [set_up(scenario, e.recording) for e in found]
@@ -152,6 +155,35 @@ def _weighed(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:
     align(judge)
     base = judge.fit((), (), rounds=2)
     return list(every) if base is None else colour.quiet(every, judge.residuals(base))
+
+
+def eased_beside(
+    scenario: Scenario,
+    judge: Judge,
+    explanation: Explanation,
+    kept: Sequence[Evidence],
+    phases: Sequence[Sequence[tuple[float, str]]],
+) -> tuple[Explanation, list[Evidence]]:
+    """The explanation fitted again with what the conditions leave uncertain as it acts beside it; kept ones too.
+
+    What an error of a condition does was seen on the scenario as it is: a mass in doubt moves a spike there, and
+    beside a spring that was found its frequency. Only where a run costs little.
+    """
+    fitted, doubtful = explanation.fitted, any(e.doubts is not None for e in judge.evidence)
+    if not explanation.parts or not doubtful or judge.effort.thrifty:
+        return explanation, list(kept)
+    for _ in range(ROUNDS):
+        beside = judge.changes(fitted.candidates, fitted.x)
+        shifts = [b.shift for b in fitted.blocks]
+        judge.weigh(
+            [doubted(e, set_up(scenario, e.recording), beside, s) for e, s in zip(judge.evidence, shifts, strict=True)]
+        )
+        again = judge.fit(fitted.candidates, fitted.x, shifts=shifts, width=1)
+        fitted = again or judge.again(fitted)
+    beside = judge.changes(fitted.candidates, fitted.x)
+    after = mismatch_of(judge.evidence, fitted.blocks, phases)
+    others = [doubted(e, set_up(scenario, e.recording), beside) for e in kept]
+    return replace(explanation, fitted=fitted, after=after), others
 
 
 def _trusted(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:

@@ -179,11 +179,14 @@ class Evidence:
         return y * grown(signal.ar)
 
 
-def doubted(e: Evidence, scenario: Scenario) -> Evidence:
-    """The evidence with what its conditions leave uncertain; `scenario` is under them. Raises `InputError`."""
-    changes = doubts(scenario, e.recording.uncertainty, e.name)
-    base = e.simulator.predict({}, 0.0)
-    moved = [e.simulator.predict(one, 0.0) for one in changes]
+def doubted(e: Evidence, scenario: Scenario, beside: Mapping[str, Any] | None = None, shift: float = 0.0) -> Evidence:
+    """The evidence with what its conditions leave uncertain; `scenario` is under them. Raises `InputError`.
+
+    `beside` are values that are exchanged too: where an effect acts, an error of the conditions does something else.
+    """
+    changes, beside = doubts(scenario, e.recording.uncertainty, e.name), dict(beside or {})
+    base = e.simulator.predict(beside, shift)
+    moved = [e.simulator.predict({**beside, **one}, shift) for one in changes]
     columns = [e.raw(m) - e.raw(base) for m in moved if m is not None and base is not None]
     return replace(e, doubts=np.stack(columns, axis=1)) if columns else e
 

@@ -68,17 +68,20 @@ def unshaped(judge: Judge, fitted: Fitted, inverse: Array) -> Array:
 def with_shapes(judge: Judge, fitted: Fitted) -> tuple[Fitted, Array, list[int]]:
     """The fit with the shapes of its effects that were not fitted, the prior of each coordinate, where the fitted are.
 
-    Such a shape is where it is usual, spread evenly over its range as far as the recordings do not tell.
+    Such a shape is where it is usual, spread evenly over its range as far as the recordings do not tell; one that is
+    usually not there is left out.
     """
     candidates, x, kept, prior, at = [], list[float](), list[int](), list[float](), 0
     for c in fitted.candidates:
         own = fitted.x[at : at + len(c.search)]
         at += len(c.search)
         kept += range(len(x), len(x) + len(own))
-        whole = c.with_shapes(own)[0] if c.shapes else own
+        usual = {name: getattr(EFFECTS[c.id](), name) for name in c.shapes}
+        told = all(v is not None and c.shapes[name].low <= v <= c.shapes[name].high for name, v in usual.items())
+        whole = c.with_shapes(own)[0] if told and usual else own
         prior += [GENTLE] * len(own) + [EVENLY**-2] * (len(whole) - len(own))
         x += whole
-        candidates.append(c.whole())
+        candidates.append(c.whole() if told else c)
     if len(x) > len(kept):
         every, shifts = range(len(fitted.blocks)), [b.shift for b in fitted.blocks]
         found = linearised(judge, candidates, x, every, shifts)

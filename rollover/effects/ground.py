@@ -103,19 +103,24 @@ class SoilAddedMassGrowth(Effect):
 
     On a face it grows with the depth. On a cone, whose area A grows too, it follows the cube of the wetted radius,
     m_b1 = rate/A_ref pi/3 r^3/tan(half angle), until the cone is in: the accompanying mass of a body entering water.
+    Behind its reach the growth dies out over `fade`: the water about the cone is not all in motion when its base is in.
     """
 
     rate: Annotated[float, Quantity("kg/m", "of the co-moving mass with depth, on the reference face", least=0)] = 20.0
     reach: Annotated[
         float | None, Quantity("m", "sinkage up to which it grows; none: a cone's height, no end on a face", above=0)
     ] = None
+    fade: Annotated[float, Quantity("m", "sinkage behind the reach over which the growth dies out", least=0)] = 0.0
 
     id = "soil-added-mass-growth"
     family = SPEED
-    equation = "m_b1(z) = m_b1(0) + rate/A_ref integral of A dz; F_s += rate A/A_ref v^2 (momentum (m + m_b1) v)"
+    equation = (
+        "m_b1(z) = m_b1(0) + rate/A_ref integral of g A dz; F_s += rate g A/A_ref v^2 (momentum (m + m_b1) v); "
+        "g = 1, behind the reach exp(-(z - reach)/fade)"
+    )
     source = (
         "m_b1 = rho A (beta z + alpha sqrt A), rho 1700-2000 kg/m3, rho A = 11 kg/m on the reference face (M); "
-        "k rho r^3 of a cone, von Karman 1929, Wagner 1932 (M+)"
+        "k rho r^3 of a cone, von Karman 1929, Wagner 1932 (M+); the fade is a number to be fitted"
     )
     sentence = "The soil or fluid that moves along grows by {rate} of depth."
     rivals: ClassVar[Mapping[str, str]] = {
@@ -124,11 +129,12 @@ class SoilAddedMassGrowth(Effect):
     }
     channels = FORCE
     null: ClassVar[Mapping[str, float | None]] = {"rate": 0.0}
-    search: ClassVar[Mapping[str, Search]] = {"rate": Search(1.0, 300.0, "log")}
+    search: ClassVar[Mapping[str, Search]] = {"rate": Search(1.0, 300.0, "log"), "fade": Search(3e-4, 0.03, "log")}
 
     def places(self) -> Mapping[int, float]:
         """dm_b1/dz."""
-        return {k.GROWTH: self.rate} | ({} if self.reach is None else {k.GROWTH_END: self.reach})
+        ends = {} if self.reach is None else {k.GROWTH_END: self.reach, k.FADE: self.fade}
+        return {k.GROWTH: self.rate, **ends}
 
     def changes(self, scenario: Any) -> Mapping[str, Any]:
         """The reach that a cone's height gives."""

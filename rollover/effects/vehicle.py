@@ -39,16 +39,25 @@ class GuideFriction(Effect):
 
 @parameters
 class AirDrag(Effect):
-    """F = -1/2 rho C_d A v |v| on the centre of mass of the striker or the chassis."""
+    """F = -1/2 rho C_d A v |v| on the centre of mass of the striker or the chassis.
+
+    Behind a round body the flow closes above a critical speed: with `crisis_speed` C_d falls there to `crisis_ratio`
+    of itself, C_d (r + (1 - r)/(1 + exp((v/v_c - 1)/0.1))).
+    """
 
     area: Annotated[float, Quantity("m2", "A, frontal", least=0)] = 0.05
     drag_coefficient: Annotated[float, Quantity("1", "C_d", above=0, most=5)] = 1.0
     density: Annotated[float, Quantity("kg/m3", "rho", above=0)] = AIR_DENSITY
+    crisis_speed: Annotated[float | None, Quantity("m/s", "v_c of the drag crisis; none: no crisis", above=0)] = None
+    crisis_ratio: Annotated[float, Quantity("1", "C_d above v_c over that below", above=0, most=1)] = 0.25
 
     id = "air-drag"
     family = "a drag on the falling body"
     equation = "F = -1/2 rho C_d A v |v|"
-    source = "C_d of blunt bodies about 1 (M+); 60 N at 5 m/s on a tractor: as a rule nothing to be seen"
+    source = (
+        "C_d of blunt bodies about 1 (M+); 60 N at 5 m/s on a tractor: as a rule nothing to be seen; C_d of a smooth "
+        "sphere 0.5, beyond Re 2e5 to 4e5 0.1 to 0.2 (Achenbach, J. Fluid Mech. 54, 1972; M+)"
+    )
     sentence = "The air brakes the fall like a blunt body of {area}."
     rivals: ClassVar[Mapping[str, str]] = {
         "guide-friction": "the free fall at small speed: air has no part in it",
@@ -56,13 +65,21 @@ class AirDrag(Effect):
     }
     channels = ("striker/acceleration_z", "striker/velocity_z")
     null: ClassVar[Mapping[str, float | None]] = {"area": 0.0}
-    search: ClassVar[Mapping[str, Search]] = {"area": Search(1e-3, 10.0, "log")}
+    search: ClassVar[Mapping[str, Search]] = {
+        "area": Search(1e-3, 10.0, "log"),
+        "crisis_speed": Search(5.0, 40.0, "log"),
+    }
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {"area": (2.0 / 3.0, 0.0)}
 
     @property
     def factor(self) -> float:
         """1/2 rho C_d A, N s2/m2."""
         return 0.5 * self.density * self.drag_coefficient * self.area
+
+    @property
+    def critical(self) -> float:
+        """Speed of the drag crisis, m/s; infinite without one."""
+        return math.inf if self.crisis_speed is None else self.crisis_speed
 
 
 @parameters

@@ -37,8 +37,10 @@ def _read(path: Path, select: Sequence[str]) -> Iterator[tuple[str, Recording]]:
         )
         mass, circumference = known.get(_key(ball), (None, None))
         if mass is not None and circumference is not None:
-            conditions["vehicle.mass"] = mass
-            notes += (f"radius {circumference / (2.0 * math.pi):.4f} m",)
+            radius = circumference / (2.0 * math.pi)
+            side = math.sqrt(math.pi) * radius  # of a square of the ball's frontal area
+            conditions |= {"vehicle.mass": mass, "vehicle.face_length": side, "vehicle.face_width": side}
+            notes += (f"radius {radius:.4f} m",)
         else:
             notes += ("mass and size of this ball are not stated",)
         yield (

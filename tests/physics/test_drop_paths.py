@@ -41,6 +41,12 @@ CHANGES: dict[str, dict[str, Any]] = {
     "co-moving": {"effects.co-moving-mass.fraction": 0.3},
     "guide": {"effects.guide-friction.force": 150.0, "initiation.lead_time": 0.1},
     "air": {"effects.air-drag.area": 3.0, "initiation.lead_time": 0.1},
+    "thin air": {
+        "effects.air-drag.area": 3.0,
+        "effects.air-drag.crisis_speed": 3.05,
+        "effects.air-drag.crisis_ratio": 0.1,
+        "initiation.lead_time": 0.1,
+    },
     "two parts": {"effects.structural-compliance.stiffness": 1e5, "effects.structural-compliance.damping": 100.0},
 }
 

@@ -11,12 +11,13 @@ import math
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from ground.law import REFERENCE_AREA
 from ground.ye import Ye2006
-from rollover.drop import DropModel
-from tests.physics.scenes import drop
+from rollover.drop import DropModel, simulate_drop
+from tests.physics.scenes import drop, shipped
 
 Array = NDArray[np.float64]
 m, g, FRACTION = 132.0, 9.81, 0.1
@@ -216,6 +217,26 @@ def test_air_brakes_towards_the_terminal_speed() -> None:
     assert -r["striker/velocity_z"] == pytest.approx(v_t * np.tanh(phase), rel=1e-9, abs=1e-9)
     x = v_t**2 / g * (np.log(np.cosh(phase)) - math.log(math.cosh(math.atanh(14.0 / v_t))))
     assert -r["striker/position_z"] == pytest.approx(x, rel=1e-9, abs=1e-9)
+
+
+def test_behind_a_drag_crisis_a_round_body_falls_faster() -> None:
+    """m v' = m g - c(v) v^2 with c(v) = c (r + (1 - r)/(1 + exp((v/v_c - 1)/0.1))), by an integrator of its own."""
+    mass, area, critical, ratio = 0.27, 0.035, 10.0, 0.25
+    drag = {"area": area, "drag_coefficient": 0.5, "crisis_speed": critical, "crisis_ratio": ratio}
+    t = np.linspace(0.0, 2.5, 51)
+    scenario = shipped("ball_drop").replaced({f"effects.air-drag.{n}": x for n, x in drag.items()})
+    scenario = scenario.replaced({"vehicle.mass": mass, "initiation.height": 60.0})
+
+    def falls(_: float, y: Array) -> list[float]:
+        c = 0.5 * 1.204 * 0.5 * area * (ratio + (1.0 - ratio) / (1.0 + math.exp((y[1] / critical - 1.0) / 0.1)))
+        return [y[1], 9.81 - c * y[1] ** 2 / mass]
+
+    own = solve_ivp(falls, (0.0, 2.5), [0.0, 0.0], t_eval=t, rtol=1e-10, atol=1e-12).y
+    r = simulate_drop(scenario, t)
+    assert r["striker/position_z"] == pytest.approx(60.0 - own[0], abs=1e-6)
+    thick = simulate_drop(scenario.replaced({"effects.air-drag.crisis_speed": None}), t)
+    assert thick["striker/position_z"][-1] > r["striker/position_z"][-1] + 1.0
+    assert thick["striker/position_z"][t < 0.6] == pytest.approx(r["striker/position_z"][t < 0.6], abs=2e-3)
 
 
 def test_a_striker_in_two_parts_is_the_two_mass_oscillator() -> None:

@@ -81,6 +81,25 @@ def test_the_mass_grows_up_to_a_stated_reach_and_with_depth_on_a_face() -> None:
     assert v == pytest.approx(v0 * m / (m + rate * z), rel=1e-6)
 
 
+def test_growth_that_dies_out_behind_the_base_is_its_own_momentum_and_that_of_the_full_run() -> None:
+    """m_a = rate/A_ref (V(h) + A l (1 - exp(-(z - h)/l))) behind the base, and m v is kept as before."""
+    rate, fade = 12.0, 0.004
+    scenario = cone(nothing(), {RATE: rate, "effects.soil-added-mass-growth.fade": fade, "gravity": 0.0})
+    z, v, a = motion(scenario)
+    behind = BASE * fade * -np.expm1(-np.maximum(z - h, 0.0) / fade)
+    held = rate / REFERENCE_AREA * (volume(np.minimum(z, h)) + behind)
+    assert z[-1] > 4.0 * h
+    assert v == pytest.approx(v0 * m / (m + held), rel=3e-6)
+    late = z > 1.05 * h  # dm_a/dt v on what moves
+    grows = rate / REFERENCE_AREA * BASE * np.exp(-(z - h) / fade) * v
+    assert a[late] == pytest.approx(-(grows * v / (m + held))[late], rel=1e-4)
+    # first order in the step, as without a fade: 0.005 m/s here, where the growth behind the base takes 0.1 m/s
+    full = run(scenario).recording
+    alone = simulate_drop(scenario, full.time)
+    assert full["striker/velocity_z"] == pytest.approx(alone["striker/velocity_z"], abs=0.006)
+    assert v[-1] < v0 * m / (m + rate / REFERENCE_AREA * volume(np.array(h))) - 0.09
+
+
 def test_the_null_of_the_mass_is_drag_and_buoyancy_bit_for_bit() -> None:
     law = FluidEntry(density=1000.0, drag_coefficient=0.7)
     plain, null = simulate_drop(cone(law)), simulate_drop(cone(law, {RATE: 0.0}))

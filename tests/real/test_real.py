@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -120,7 +122,9 @@ NAMED = {
     "whiffle-ball-1": "air-drag",
     "yellow-whiffle-ball": "air-drag",
     "whiffle balls, one held out": "air-drag",
+    "volleyball": "air-drag",
     "cones, rigid, 60 deg": "soil-added-mass-growth",
+    "cones, rigid, 80 deg": "soil-added-mass-growth",
     "cones, sprung, 60 deg": "structural-compliance",
     "cube tosses": "ground-friction",
 }
@@ -133,6 +137,40 @@ def test_what_was_left_out_of_a_scenario_stands_first_in_the_diagnosis_of_real_r
     assert found["effects"][0]["id"] == NAMED[name] == found["left_out"]
     assert found["after"]["nrmse"] < 0.55 * found["before"]["nrmse"]
     assert found["after"]["iso18571"] > found["before"]["iso18571"] + 0.1
+
+
+def written(name: str) -> Any:
+    """Numbers of a set as they were written."""
+    return json.loads(diagnoses.RESULTS.read_text(encoding="utf-8"))[name]
+
+
+def test_the_written_spring_covers_the_authors_and_stands_below_it() -> None:
+    value, low, high = written("cones, sprung, 60 deg")["effects"][0]["parameters"]["stiffness"]
+    assert low < cone_drops.SPRING < high
+    assert 0.85 * cone_drops.SPRING < value < cone_drops.SPRING
+
+
+def test_draws_of_tosses_name_friction_or_nothing() -> None:
+    found = written(diagnoses.DRAWS)
+    assert found["named"] >= 14
+    assert found["draws"] == 16
+    assert all(answer == ["unexplained"] for answer in found["not_named"].values())
+    # published 0.15 to 0.18
+    assert 0.15 < float(np.median(found["coefficients"])) < 0.18
+    assert all(low < 0.18 and high > 0.15 for low, high in found["intervals"])
+
+
+@pytest.mark.parametrize("name", ["baseball", "golf-ball", "penetrometer"])
+def test_where_nothing_is_left_out_nothing_is_named(name: str) -> None:
+    assert written(name)["verdict"] == "no-mismatch"
+    assert written(name)["effects"] == []
+
+
+def test_a_rate_that_three_drops_cannot_prove_is_not_named_but_stands_first() -> None:
+    found = written("penetrometer, no rate")
+    assert found["verdict"] == "unexplained"
+    assert found["next_best"][0][0] == "soil-rate-hardening"
+    assert found["next_best"][0][2] > 0.3
 
 
 def test_a_diagnosis_of_real_recordings_is_made_again_as_it_was_written() -> None:
