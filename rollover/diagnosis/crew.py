@@ -16,6 +16,7 @@ from typing import Any, Literal
 
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Block, Fitted, Judge
+from rollover.diagnosis.refine import polish, shaped, timed
 from rollover.execute import Children, map_cases
 
 Progress = Callable[[str], None]
@@ -135,12 +136,8 @@ def work(judge: Judge, job: Job) -> Fitted | None:
     begun = _at(judge, job.candidates, job)
     if begun is None:
         return None
-    ways: dict[str, Callable[[Fitted], Fitted | None]] = {
-        "polish": judge.polish,
-        "shape": judge.shaped,
-        "time": judge.timed,
-    }
-    return ways[job.how](begun)
+    ways: dict[str, Callable[[Judge, Fitted], Fitted | None]] = {"polish": polish, "shape": shaped, "time": timed}
+    return ways[job.how](judge, begun)
 
 
 _held: dict[str, Judge] = {}  # in a child: what it simulated for the job before

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.blocks import GENTLE, WIDEST, Block, Fitted, bounded, shift_of
+from rollover.diagnosis.blocks import GENTLE, Block, Fitted, bounded, shift_of
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.chaos import course
 from rollover.diagnosis.effort import DROPS
@@ -19,9 +19,6 @@ Array = NDArray[np.float64]
 FAR = 3.0  # misfit over the noise from which on a step may be lengthened
 STRIDE, STRIDES = 2.0, 6  # by what factor, how often
 TRIES = 4  # of a step, each damped more
-TICK, SHORTEST, NARROWER = 8e-5, 5e-6, 0.4  # s, by which a time shift is tried to either side; then less, by a factor
-TRIED = 40  # at most so many
-TWICE, LITTLE = 2, 1.0  # how often; a gain that is not worth another time
 NOISE_LEFT = 1.04  # misfit over the noise that needs no further search
 NONE = np.zeros(0, dtype=np.int64)
 
@@ -333,72 +330,6 @@ class Judge:
                 break
             trial, after, total = there, list(found), left
         return trial, after, total
-
-    def polish(self, fitted: Fitted, size: float = 0.02, most: int = 45) -> Fitted:
-        """Follow a crooked valley by a simplex: where a threshold is crossed, differences mislead; never worse."""
-        from scipy.optimize import minimize
-
-        shifts = [b.shift for b in fitted.blocks]
-
-        def left(x: Array) -> float:
-            inside = [float(v) for v in np.clip(x, 0.0, 1.0)]
-            out = float(np.sum(np.abs(x - np.array(inside))))
-            blocks = [self.block(r, fitted.candidates, inside, s, 0.0) for r, s in enumerate(shifts)]
-            if any(b is None for b in blocks):
-                return 1e300
-            return sum(b.normal()[2] for b in blocks if b is not None) * (1.0 + out)
-
-        start = np.array(fitted.x)
-        simplex = np.vstack(
-            [start, *(start + size * (1.0 if v < 0.9 else -1.0) * np.eye(start.size)[k] for k, v in enumerate(start))]
-        )
-        found = minimize(
-            left, start, method="Nelder-Mead", options={"initial_simplex": simplex, "maxfev": most, "xatol": 1e-4}
-        )
-        again = self.fit(fitted.candidates, np.clip(found.x, 0.0, 1.0), rounds=3, shifts=shifts, width=2)
-        return again if again is not None and again.left < fitted.left else fitted
-
-    def timed(self, fitted: Fitted) -> Fitted:
-        """The fit with each time shift tried out to either side: edges make its slope crooked; never worse."""
-        best = fitted
-        for _ in range(TWICE):
-            blocks = [self._tried(r, best.candidates, best.x, b) for r, b in enumerate(best.blocks)]
-            again = self.fit(best.candidates, best.x, rounds=3, shifts=[b.shift for b in blocks], width=2)
-            if again is None or again.left > best.left - LITTLE:
-                break
-            best = again
-        return best
-
-    def _tried(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], block: Block) -> Block:
-        """Recording r at a time shift beside which none is better."""
-        step, tried = TICK, 0
-        while step > SHORTEST and tried < TRIED:
-            for there in (block.shift + step, block.shift - step):
-                tried += 1
-                other = self.block(r, candidates, x, there, 0.0)
-                if other is not None and other.total < block.total and abs(there) < WIDEST * other.prior:
-                    block = other
-                    break
-            else:
-                step *= NARROWER
-        return block
-
-    def shaped(self, f: Fitted) -> Fitted | None:
-        """The fit with the shape of its last effect fitted too, from the best of some places."""
-        last, shifts = f.candidates[-1], [b.shift for b in f.blocks]
-        candidates, at = (*f.candidates[:-1], last.whole()), len(f.x) - len(last.search)
-        begun: list[tuple[float, tuple[float, ...]]] = []
-        for start in last.with_shapes(f.x[at:]):
-            x = (*f.x[:at], *start)
-            blocks = [self.block(r, candidates, x, s, 0.0) for r, s in enumerate(shifts)]
-            if all(b is not None for b in blocks):
-                begun.append((sum(b.normal()[2] for b in blocks if b is not None), x))
-        if not begun:
-            return None
-        again = self.fit(candidates, min(begun)[1], shifts=shifts)
-        if again is not None and again.left > NOISE_LEFT**2 * sum(b.residual.size for b in again.blocks):
-            again = self.polish(again)
-        return again
 
     @staticmethod
     def _total(blocks: Sequence[Block]) -> float:

@@ -17,6 +17,7 @@ from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate, gate
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.intervals import intervals
+from rollover.diagnosis.refine import timed
 from rollover.diagnosis.settle import left_of_means, settled
 from rollover.diagnosis.verdict import Verdict
 from rollover.effects import EFFECTS
@@ -78,7 +79,7 @@ def explained(
     if weighed(judge, base, phases):
         base = judge.again(base)
     if not judge.effort.thrifty:
-        base = judge.timed(base)  # what a clock leaves is no effect's gain
+        base = timed(judge, base)  # what a clock leaves is no effect's gain
     before = mismatch_of(judge.evidence, base.blocks, phases)
     say(f"looking at {len(candidates)} candidates, which of them could matter")
     looked = first_look = _look(judge, base, candidates, groups)

@@ -1,0 +1,77 @@
+"""Steps of digits and spikes are the recorder's: no mismatch, and not a sample that a model is held against."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis import diagnose
+from rollover.diagnosis.blocks import Fitted, turned
+from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.holdout import held_out
+from rollover.diagnosis.readings import resolution, without_spikes
+from rollover.effects import Search
+from rollover.recording import Recording
+from tests.diagnosis.drops import DEPTH, FORCE, linear_blocks, recorded, scenario
+
+Recordings = list[tuple[str, Recording]]
+
+
+def each(recordings: Recordings, read: Callable[[np.ndarray], np.ndarray]) -> Recordings:
+    return [(n, replace(r, channels={c: read(v) for c, v in r.channels.items()})) for n, r in recordings]
+
+
+def test_the_step_of_a_digitised_channel_is_its_own() -> None:
+    rng = np.random.default_rng(1)
+    x = np.cumsum(rng.standard_normal(2000))
+    assert resolution(np.round(x / 0.25) * 0.25 + 3.1) == pytest.approx(0.25, rel=1e-9)
+    assert resolution(np.append(np.round(x), np.nan)) == 1.0
+    assert resolution(x) == 0.0
+    assert resolution(np.where(x > 0.0, 1.0, 0.0)) == 0.0  # a switch
+    assert resolution(np.sort(rng.choice(rng.uniform(0.0, 1.0, 40), 2000))) == 0.0  # levels without a common step
+
+
+def test_coarse_digits_are_no_mismatch_and_hide_no_large_one() -> None:
+    """One part in 128 of the range, no noise: the error of neighbouring samples is one, and looks like structure."""
+    coarse = lambda v: np.round(v / np.ptp(v) * 128.0) * np.ptp(v) / 128.0  # noqa: E731
+    conditions = {"speeds": (1.2, 2.0, 3.0), "noise": 0.0, "rate": 1000.0}
+    assert diagnose(scenario(), each(recorded({}, **conditions), coarse)).verdict == "no-mismatch"
+    heavier = recorded({"effects.mass.added": 25.0}, **conditions)
+    found = diagnose(scenario(), each(heavier, coarse))
+    assert [e.id for e in found.effects] == ["mass"]
+    assert found.effects[0].parameters["added"].value == pytest.approx(25.0, rel=0.05)
+
+
+def test_spikes_are_left_aside_and_said_so() -> None:
+    made, clean = [], recorded({}, speeds=(1.5, 3.0), rate=4000.0)
+    for name, r in clean:
+        values = r[FORCE].copy()
+        values[[500, 840, 1200]] += 0.6 * np.ptp(values)
+        made.append((name, replace(r, channels={**r.channels, FORCE: values})))
+    kept, lines = without_spikes(made[0][1])
+    assert lines == [f"{FORCE}: 3 spikes were left aside"]
+    assert (
+        np.flatnonzero(np.isnan(kept[FORCE])).tolist()
+        == np.flatnonzero(made[0][1][FORCE] != clean[0][1][FORCE]).tolist()
+    )
+    assert without_spikes(clean[0][1]) == (clean[0][1], [])
+    found = diagnose(scenario(), made)
+    assert found.verdict == "no-mismatch"
+    assert sum("spikes were left aside" in note for note in found.notes) == 2
+
+
+def test_a_fit_with_its_first_effect_last_is_the_same_fit() -> None:
+    rng = np.random.default_rng(2)
+    truth = np.array([0.3, -0.2, 0.5])
+    two = Candidate(id="soil-layer", kind="physics", family="", search={"a": Search(0, 1), "b": Search(0, 1)})
+    one = Candidate(id="mass", kind="parameter", family="", search={"c": Search(0, 1)}, channel=DEPTH)
+    fitted = Fitted(candidates=(two, one), x=(0.1, 0.2, 0.3), blocks=tuple(linear_blocks(rng, 3, 40, truth)))
+    other = turned(fitted)
+    assert [c.id for c in other.candidates] == ["mass", "soil-layer"]
+    assert other.x == (0.3, 0.1, 0.2)
+    assert np.array_equal(other.blocks[1].J[:, 0], fitted.blocks[1].J[:, 2])
+    groups = [[0], [1], [2]]
+    assert held_out(other, groups).left == pytest.approx(held_out(fitted, groups).left, rel=1e-9)
