@@ -200,7 +200,7 @@ def candidates_of(
         for s in e.signals:
             spans[s.channel] = max(spans.get(s.channel, 0.0), s.span)
     found = []
-    tried = None if scenario is None else set_up(scenario, evidence[0].recording)
+    tried = set_up(scenario, evidence[0].recording) if scenario is not None and evidence else scenario
     for name, kind in EFFECTS.items():
         if name in switched_on or acts not in kind.acts or not kind.competes:
             continue

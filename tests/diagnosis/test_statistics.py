@@ -14,6 +14,7 @@ from scipy.stats import kstest
 from rollover.diagnosis.bins import binned
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.detect import mismatch_of
+from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.fit import GENTLE, Block, Fitted
 from rollover.diagnosis.gate import freed, null_of_the_best, p_value
@@ -128,7 +129,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
     rng = np.random.default_rng(8)
     inside = []
     bare = SimpleNamespace(signals=(), strays=())
-    judge = cast(Any, SimpleNamespace(evidence=(bare, bare, bare), measured=(), per_error=1.0))
+    judge = cast(Any, SimpleNamespace(evidence=(bare, bare, bare), measured=(), per_error=1.0, effort=DROPS))
     truth = np.array([0.02, -0.03])
     for _ in range(250):
         blocks = linear_blocks(rng, 3, 40, truth)
