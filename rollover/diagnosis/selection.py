@@ -26,6 +26,7 @@ CHANCE = 0.005  # p-value of the best of all candidates that admits one
 MOST = 3  # effects in one explanation
 NEGLIGIBLE = 0.001  # of a channel's range: what moves nothing by more is not worth a name
 PARTLY = 0.02  # of the excess over the noise that one effect may leave and still be named
+SEVERAL = 0.01  # p-value of what several effects leave, below which they are no explanation
 HOPELESS = 2.0  # misfit over the noise that two effects leave and a third is not looked for
 BETTER = 0.5  # of what is left, that another first effect must leave
 RIVAL = 0.5  # of the best's gain, by the mean of its runs, that a rival must have
@@ -284,11 +285,13 @@ def _needed(
 def decided(judge: Judge, found: Explanation, groups: Groups) -> tuple[Explanation, Verdict]:
     """The verdict; what does not explain is not named.
 
-    Several effects are named only if together they leave nothing but noise; one alone also where it takes nearly all.
+    Several effects are named only if together they leave nothing but noise, and more surely so than one, as together
+    they can be bent to more; one alone also where it takes nearly all.
     """
     if is_any_curve(found.fitted.candidates):
         return replace(found, parts=(), fitted=found.base), "unexplained"
-    if found.parts and (found.after.p_value > SURE or not matters(judge, found.fitted, found.after)):
+    least = SURE if len(found.parts) < 2 else SEVERAL
+    if found.parts and (found.after.p_value > least or not matters(judge, found.fitted, found.after)):
         return found, _kind(strongest(judge, found.base, found.fitted))
     start = held_out(found.base, groups).total
     if found.first is not None and found.parts:
