@@ -6,10 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rollover.diagnosis.bins import Averaged
 from rollover.diagnosis.evidence import Evidence
-from rollover.diagnosis.overturn import RunSimulator
-from rollover.diagnosis.simulator import Simulator
 
 LASTING = 0.6  # s after the blow that are always kept
 SHORT = 0.1  # s that are not worth cutting off
@@ -31,7 +28,7 @@ def shortened(e: Evidence, *, alone: bool = False) -> Evidence:
     if not alone and float(np.mean(np.concatenate(worth))) > COUNTS:
         return e
     n = int(np.searchsorted(time, end, side="right"))
-    simulator = _until(e.simulator, n)
+    simulator = e.simulator.until(n)
     kept = [(s, s.rows < n) for s in e.signals]
     if simulator is None or any(inside.sum() < FEWEST for _, inside in kept):
         return e
@@ -54,13 +51,3 @@ def shortened(e: Evidence, *, alone: bool = False) -> Evidence:
         strays=tuple(d[rows] for d in e.strays),
         doubts=None if e.doubts is None else e.doubts[rows],
     )
-
-
-def _until(simulator: Simulator, n: int) -> Simulator | None:
-    """What simulates the first n stamps; None for what is not full runs."""
-    if isinstance(simulator, RunSimulator):
-        return simulator.until(n)
-    if isinstance(simulator, Averaged) and isinstance(simulator.inner, RunSimulator):
-        rows = int(simulator.starts[n]) if n < simulator.starts.size else int(simulator.inner.recording.time.size)
-        return Averaged(inner=simulator.inner.until(rows), starts=simulator.starts[:n], counts=simulator.counts[:n])
-    return None

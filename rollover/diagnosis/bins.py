@@ -47,6 +47,12 @@ class Averaged:
         """See `Simulator`."""
         self.inner.settle()
 
+    def until(self, n: int) -> Averaged | None:
+        """See `Simulator`."""
+        last = int(self.starts[n]) if n < self.starts.size else int(self.counts.sum())
+        inner = self.inner.until(last)
+        return None if inner is None else Averaged(inner=inner, starts=self.starts[:n], counts=self.counts[:n])
+
     def marks(self) -> tuple[tuple[float, str], ...]:
         """See `Simulator`."""
         return self.inner.marks()

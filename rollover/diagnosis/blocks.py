@@ -49,6 +49,11 @@ class Block:
         return values if self.course is None else values * self.course
 
     @property
+    def plain_residual(self) -> Array:
+        """Residual of samples that count in full."""
+        return self.residual if self.course is None else self.residual / self.course
+
+    @property
     def plain_J(self) -> Array:
         """J of samples that count in full."""
         return self.J if self.course is None else self.J / self.course[:, None]

@@ -17,7 +17,6 @@ from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.simulator import set_up
 from rollover.document import value_at
 from rollover.effects import EFFECTS, Search, effects, nth
-from rollover.initiation import Release
 from rollover.scenario import Scenario
 from rollover.vehicle import Striker
 
@@ -34,8 +33,6 @@ SHAPES = {
     "axle-stop": ("stiffness",),
 }
 
-CRITICAL = (1e5, 4e5)  # Reynolds numbers of the drag crisis of a sphere, rough and smooth (Achenbach, M+)
-AIR_VISCOSITY = 1.51e-5  # m2/s
 PLACES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of a shape, at which a fit of it begins
 FAINT = 20.0  # times weaker than an effect usually is, and still looked for
 BESIDE = 0.01  # of a coordinate: how far from its zero an effect is looked at
@@ -208,30 +205,16 @@ def candidates_of(
             found += [c for channel in spans if (c := _sensor(name, kind, channel, spans))]
             continue
         sized = {p: _sized(s, kind.grows.get(p), size) for p, s in kind.search.items()}
-        search = {p: _widened(s, kind.null.get(p)) for p, s in sized.items() if p not in SHAPES.get(name, ())}
-        if scenario is not None:
-            search |= {p: _from(search[p], least) for p, least in kind.acts_from(scenario).items()}
-        parts = {p: _shape(p, sized[p], tried) for p in SHAPES.get(name, ()) if p in sized}
-        shapes = {p: s for p, s in parts.items() if s is not None}
+        of_shape = SHAPES.get(name, ())
+        wide = {p: s if p in of_shape else _widened(s, kind.null.get(p)) for p, s in sized.items()}
+        there = {p: own for p, w in wide.items() if (own := kind.looked_for(p, w, tried)) is not None}
+        search = {p: s for p, s in there.items() if p not in of_shape}
+        shapes = {p: there[p] for p in of_shape if p in there}
         neutral = None if acts == "drop" else tuple(_neutral(kind, p, s, scenario) for p, s in search.items())
         found.append(
             Candidate(id=name, kind=kind.kind, family=kind.family, search=search, shapes=shapes, neutral=neutral)
         )
     return found
-
-
-def _shape(name: str, search: Search, scenario: Any) -> Search | None:
-    """Where a shape is looked for; None where it has no part: growth that ends on a face, a drag crisis in no fall."""
-    if name not in ("fade", "crisis_speed"):
-        return search
-    body = None if scenario is None else scenario.vehicle
-    if not isinstance(body, Striker):
-        return None
-    if name == "fade":
-        return search if body.nose == "cone" else None
-    across = 2.0 * math.sqrt(body.face_length * body.face_width / math.pi)
-    low, high = (re * AIR_VISCOSITY / across for re in CRITICAL)
-    return Search(low, high, "log") if isinstance(scenario.initiation, Release) else None
 
 
 def _neutral(kind: Any, parameter: str, search: Search, scenario: Any) -> float | None:
@@ -280,11 +263,6 @@ def _sized(search: Search, powers: tuple[float, float] | None, size: tuple[float
 def _widened(search: Search, null: float | None) -> Search:
     """The range with strengths that only a low noise shows."""
     return search._replace(low=search.low / FAINT) if search.scale == "log" and null == 0.0 else search
-
-
-def _from(search: Search, least: float) -> Search:
-    """The range without what changes nothing: there no fit finds its way."""
-    return search._replace(low=least) if search.low < least < search.high else search
 
 
 def _sensor(name: str, kind: Any, channel: str, spans: Mapping[str, float]) -> Candidate | None:

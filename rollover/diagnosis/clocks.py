@@ -38,19 +38,11 @@ def by_first_contact(judge: Judge, candidates: Sequence[Candidate], x: Sequence[
     """Time shift (s) of each recording by its first contact; None where nothing comes of it."""
     found: list[float | None] = []
     for r, e in enumerate(judge.evidence):
-        at = _best(judge, r, partial(_edged, judge, r, candidates, x), partial(_early, judge, r))
+        # leaps as they are: these are what tells the time
+        at = _best(judge, r, partial(judge.edged, r, candidates, x), partial(_early, judge, r))
         known = e.recording.clock.zero != "unknown"
         found.append(None if at is None or (known and abs(at) > BELIEVED * e.shift_prior) else at)
     return found
-
-
-def _edged(judge: Judge, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
-    """Stacked prediction of recording r, SI, with its leaps as they are: these are what tells the time."""
-    try:
-        found = judge.evidence[r].simulator.predict(judge.changes(candidates, x), shift)
-    except ValueError:
-        return None
-    return None if found is None else judge.evidence[r].raw(found)
 
 
 def _best(judge: Judge, r: int, made: Made, cost: Cost) -> float | None:

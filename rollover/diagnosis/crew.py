@@ -92,24 +92,29 @@ class Crew:
             if key in self._done:
                 found[k] = _rebuilt(judge, jobs[k], self._done[key])
         done = 0
+
+        def ended(k: int, fitted: Fitted | None) -> None:
+            nonlocal done
+            found[k], done = fitted, done + 1
+            self._note(keys[k], fitted)
+            say(f"fitted {jobs[k].candidates[-1].key}, {done} of {len(todo)}")
+
         while done < len(todo) and not (self.workers > 1 and self._worked > PATIENCE and len(todo) - done > 1):
             k, began = todo[done], perf_counter()
-            found[k], done = work(judge, jobs[k]), done + 1
+            fitted = work(judge, jobs[k])
             self._worked += perf_counter() - began
-            self._note(keys[k], found[k])
-            say(f"fitted {jobs[k].candidates[-1].key}, {done} of {len(todo)}")
+            ended(k, fitted)
         if done == len(todo):
             return found
         bare, rest, about = judge.bare(), todo[done:], f"{about} {judge.shifts}"
         outcomes = map_cases(_worked, [(about, bare, jobs[k]) for k in rest], children=self._children)
-        for count, outcome in enumerate(outcomes, start=done + 1):
+        for outcome in outcomes:
             k = rest[outcome.index]
             if outcome.failure is not None:
                 raise RuntimeError(f"a fit of {jobs[k].candidates[-1].key}: {outcome.failure.sentence}")
-            found[k], made = outcome.value if outcome.value is not None else (None, 0)
+            fitted, made = outcome.value if outcome.value is not None else (None, 0)
             judge.simulations += made
-            self._note(keys[k], found[k])
-            say(f"fitted {jobs[k].candidates[-1].key}, {count} of {len(todo)}")
+            ended(k, fitted)
         return found
 
     def _note(self, key: str, fitted: Fitted | None) -> None:
@@ -133,7 +138,7 @@ def work(judge: Judge, job: Job) -> Fitted | None:
             width=job.width,
             pinned=job.pinned,
         )
-    begun = _at(judge, job.candidates, job)
+    begun = linearised(judge, job.candidates, job.start, job.recordings, job.shifts)
     if begun is None:
         return None
     ways: dict[str, Callable[[Judge, Fitted], Fitted | None]] = {"polish": polish, "shape": shaped, "time": timed}
@@ -150,10 +155,6 @@ def _worked(case: tuple[str, Judge, Job]) -> tuple[Fitted | None, int]:
     judge = _held.setdefault(about, sent)
     before = judge.simulations
     return work(judge, job), judge.simulations - before
-
-
-def _at(judge: Judge, candidates: Sequence[Candidate], job: Job) -> Fitted | None:
-    return linearised(judge, candidates, job.start, job.recordings, job.shifts)
 
 
 def _rebuilt(judge: Judge, job: Job, row: dict[str, Any] | None) -> Fitted | None:

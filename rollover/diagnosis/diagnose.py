@@ -27,7 +27,6 @@ from rollover.diagnosis.gate import yardstick
 from rollover.diagnosis.overturn import RunSimulator
 from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.readings import digitised, without_spikes
-from rollover.diagnosis.refine import timed
 from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing, with_scatter
 from rollover.diagnosis.scores import judged
 from rollover.diagnosis.selection import Explanation, decided, explained, matters
@@ -84,8 +83,6 @@ def diagnose(
     base = judge.fit((), ())
     if base is None:
         return _nothing(every, names, [*notes, "the scenario itself could not be simulated"], began)
-    if not judge.effort.thrifty:
-        base = timed(judge, base)
     phases = [phases_of(e) for e in found]
     acts = "rollover" if any(unfit(set_up(scenario, e.recording)) for e in found) else "drop"
     candidates = candidates_of(found, scenario.effects, acts, scenario, size_of(set_up(scenario, found[0].recording)))

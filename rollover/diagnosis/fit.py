@@ -101,19 +101,22 @@ class Judge:
 
     def _simulated(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
         self.simulations += 1
-        try:
-            found = self.evidence[r].simulator.predict(self.changes(candidates, x), shift)
-        except ValueError:
-            return None
-        if found is None:
-            return None
-        y = self.evidence[r].raw(found)
-        if not np.all(np.isfinite(y)):
+        y = self.edged(r, candidates, x, shift)
+        if y is None:
             return None
         leaps = self.evidence[r].leaps(y)
         if leaps.size:
             self._leaps[_key(r, candidates, x, shift)] = leaps
         return self.evidence[r].forgiven(y, leaps)
+
+    def edged(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
+        """Stacked prediction of recording r, SI, with its leaps as they are; not remembered. None if it fails."""
+        try:
+            found = self.evidence[r].simulator.predict(self.changes(candidates, x), shift)
+        except ValueError:
+            return None
+        y = None if found is None else self.evidence[r].raw(found)
+        return y if y is not None and np.all(np.isfinite(y)) else None
 
     @staticmethod
     def changes(candidates: Sequence[Candidate], x: Sequence[float]) -> dict[str, object]:

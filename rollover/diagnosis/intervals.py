@@ -69,7 +69,7 @@ def with_shapes(judge: Judge, fitted: Fitted) -> tuple[Fitted, Array, list[int]]
     """The fit with the shapes of its effects that were not fitted, the prior of each coordinate, where the fitted are.
 
     Such a shape is where it is usual, spread evenly over its range as far as the recordings do not tell; one that is
-    usually not there is left out.
+    usually not there is left out, and where a look costs a run all are: see `unshaped`.
     """
     candidates, x, kept, prior, at = [], list[float](), list[int](), list[float](), 0
     for c in fitted.candidates:
@@ -82,7 +82,7 @@ def with_shapes(judge: Judge, fitted: Fitted) -> tuple[Fitted, Array, list[int]]
         prior += [GENTLE] * len(own) + [EVENLY**-2] * (len(whole) - len(own))
         x += whole
         candidates.append(c.whole() if told else c)
-    if len(x) > len(kept):
+    if len(x) > len(kept) and not judge.effort.thrifty:
         every, shifts = range(len(fitted.blocks)), [b.shift for b in fitted.blocks]
         found = linearised(judge, candidates, x, every, shifts)
         if found is not None:
@@ -110,9 +110,8 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
     that the noise alone gives J'w; beside it stand `scattered` and `unshaped`. Elsewhere shapes that were not fitted
     are in A, see `with_shapes`; an end of a range is read off where samples pile up there.
     """
-    told, prior, kept = fitted, np.full(len(fitted.x), GENTLE), list(range(len(fitted.x)))
-    if not judge.effort.thrifty:
-        fitted, prior, kept = with_shapes(judge, fitted)
+    told = fitted
+    fitted, prior, kept = with_shapes(judge, fitted)
     p = len(fitted.x)
     A = sum((b.normal()[0] for b in fitted.blocks), np.zeros((p, p))) + np.diag(prior)
     inverse: Array = np.asarray(np.linalg.inv(A), dtype=np.float64)

@@ -77,10 +77,11 @@ def explained(
 ) -> Explanation:
     """Forward selection of up to three effects, each beyond chance, then each tried without and against its rivals."""
     count = sum(b.residual.size for b in base.blocks)
+    thrifty = judge.effort.thrifty
+    base = base if thrifty else timed(judge, base)  # what a clock leaves is no noise,
     if weighed(judge, base, phases):
         base = judge.again(base)
-    if not judge.effort.thrifty:
-        base = timed(judge, base)  # what a clock leaves is no effect's gain
+    base = base if thrifty else timed(judge, base)  # and no effect's gain
     before = mismatch_of(judge.evidence, base.blocks, phases)
     say(f"looking at {len(candidates)} candidates, which of them could matter")
     looked = first_look = _look(judge, base, candidates, groups)
@@ -235,9 +236,8 @@ def _instead(
     held = judge.again(turned(current))
     if found is None or found.fitted.left > held.left + NEEDED:  # on the way back nothing came as far
         rivals = () if found is None else found.rivals
-        others_ = tuple(f for f in rivals if f.candidates[-1].key != held.candidates[-1].key)
-        base = judge.again(rest)
-        return Step(base=base, fitted=held, p_value=looked.p_value(), rivals=(held, *others_))
+        beside = tuple(f for f in rivals if f.candidates[-1].key != held.candidates[-1].key)
+        return Step(base=judge.again(rest), fitted=held, p_value=looked.p_value(), rivals=(held, *beside))
     return found
 
 

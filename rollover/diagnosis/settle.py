@@ -69,15 +69,15 @@ def rescattered(judge: Judge, fitted: Fitted) -> None:
 def left_of_means(judge: Judge, fitted: Fitted) -> tuple[float, float]:
     """Sum of squares that the mean of a fit's neighbours leaves, in all and before the blow alone.
 
-    Under the noise and weights as they are held now. One run meets a recording
-    well or badly by chance; the mean of seven much less so.
+    Under the noise and weights as they are held now. One run meets a recording well or badly by chance; the mean of
+    seven much less so.
     """
     changes = judge.changes(fitted.candidates, fitted.x)
     total = before = 0.0
     for e, block in zip(judge.evidence, fitted.blocks, strict=True):
         strays = alike(e, e.simulator.strays(changes, block.shift), e.blow)
         raw = [d for d in (e.raw(stray) for stray in strays) if np.all(np.isfinite(d))]
-        w = block.residual if block.course is None else block.residual / block.course
+        w = block.plain_residual
         if raw:
             w = w - e.eased(e.whitened(np.sum(raw, axis=0) / (1.0 + len(raw))))
         counts = course(e, w)

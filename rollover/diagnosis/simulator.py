@@ -40,6 +40,9 @@ class Simulator(Protocol):
     def settle(self) -> None:
         """Of runs that nobody could tell apart take the one that is the most like all."""
 
+    def until(self, n: int) -> Simulator | None:
+        """The same for the first n stamps, if that is the cheaper; None if not."""
+
     def marks(self) -> tuple[tuple[float, str], ...]:
         """(start s, name) of the phases of the scenario as it is; empty if the recording itself tells."""
 
@@ -86,6 +89,9 @@ class DropSimulator:
 
     def settle(self) -> None:
         """See `Simulator`."""
+
+    def until(self, n: int) -> None:
+        """See `Simulator`: a drop is over soon."""
 
     def marks(self) -> tuple[tuple[float, str], ...]:
         """See `Simulator`."""

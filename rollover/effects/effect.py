@@ -71,9 +71,9 @@ class Effect:
         return {}
 
     @classmethod
-    def acts_from(cls, scenario: Any) -> Mapping[str, float]:
-        """Values of parameters up to which a scenario has by itself what the effect would bring."""
-        return {}
+    def looked_for(cls, parameter: str, search: Search, scenario: Any) -> Search | None:
+        """Range of a fitted parameter in a scenario (if known), from its usual one; None where it has no part."""
+        return search
 
     def read(self, recording: Recording) -> Recording:
         """What the sensors make of a recording."""

@@ -131,6 +131,13 @@ class SoilAddedMassGrowth(Effect):
     null: ClassVar[Mapping[str, float | None]] = {"rate": 0.0}
     search: ClassVar[Mapping[str, Search]] = {"rate": Search(1.0, 300.0, "log"), "fade": Search(3e-4, 0.03, "log")}
 
+    @classmethod
+    def looked_for(cls, parameter: str, search: Search, scenario: Any) -> Search | None:
+        """Growth fades behind a cone; on a face it has no end."""
+        striker = None if scenario is None else scenario.vehicle
+        has_end = isinstance(striker, Striker) and striker.nose == "cone"
+        return search if parameter != "fade" or has_end else None
+
     def places(self) -> Mapping[int, float]:
         """dm_b1/dz."""
         ends = {} if self.reach is None else {k.GROWTH_END: self.reach, k.FADE: self.fade}
@@ -166,9 +173,12 @@ class SoilElasticRebound(Effect):
     search: ClassVar[Mapping[str, Search]] = {"recovery": Search(0.02, 0.6, "log"), "damping_ratio": Search(0.0, 1.0)}
 
     @classmethod
-    def acts_from(cls, scenario: Any) -> Mapping[str, float]:
-        """The law's own share."""
-        return {"recovery": scenario.ground.law.recovery}
+    def looked_for(cls, parameter: str, search: Search, scenario: Any) -> Search | None:
+        """No less than the law's own share: what changes nothing shows no fit its way."""
+        if parameter != "recovery" or scenario is None:
+            return search
+        least = scenario.ground.law.recovery
+        return search._replace(low=least) if search.low < least < search.high else search
 
     def places(self) -> Mapping[int, float]:
         """The least share that springs back, and the dashpot over the critical one."""

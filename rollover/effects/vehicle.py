@@ -8,10 +8,13 @@ from typing import Annotated, Any, ClassVar
 
 from ground.quantity import Quantity, parameters
 from rollover.effects.effect import Effect, Search
+from rollover.initiation import Release
 from rollover.shapes import Point
-from rollover.vehicle import Vehicle
+from rollover.vehicle import Striker, Vehicle
 
 AIR_DENSITY = 1.204  # kg/m3 at 20 degrees and 1013 hPa
+AIR_VISCOSITY = 1.51e-5  # m2/s
+CRITICAL = (1e5, 4e5)  # Reynolds numbers of the drag crisis of a sphere, rough and smooth (Achenbach, M+)
 
 
 @parameters
@@ -70,6 +73,18 @@ class AirDrag(Effect):
         "crisis_speed": Search(5.0, 40.0, "log"),
     }
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {"area": (2.0 / 3.0, 0.0)}
+
+    @classmethod
+    def looked_for(cls, parameter: str, search: Search, scenario: Any) -> Search | None:
+        """A drag crisis where the Reynolds number of a sphere as large as the face is critical, and in a fall alone."""
+        if parameter != "crisis_speed":
+            return search
+        body = None if scenario is None else scenario.vehicle
+        if not isinstance(body, Striker) or not isinstance(scenario.initiation, Release):
+            return None
+        across = 2.0 * math.sqrt(body.face_length * body.face_width / math.pi)
+        low, high = (re * AIR_VISCOSITY / across for re in CRITICAL)
+        return Search(low, high, "log")
 
     @property
     def factor(self) -> float:

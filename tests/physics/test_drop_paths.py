@@ -89,6 +89,7 @@ def test_a_flight_after_a_rebound_lasts_as_long_as_gravity_says_whatever_the_ste
     last = first + int(np.argmin(flies[first:]))
     thrown = found["striker/velocity_z"][first] + scenario.gravity * 5e-6  # on the average it left half a row before
     assert thrown > 0.2
+    # rows are 1e-5 s apart: either end is seen up to one row late, the speed is that of half a row before
     assert at[last] - at[first] == pytest.approx(2.0 * thrown / scenario.gravity, abs=1.5e-5)
 
 
