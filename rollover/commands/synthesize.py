@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zlib
 from pathlib import Path
 from typing import Annotated
 
@@ -48,7 +49,7 @@ def synthesize(
     rate: Annotated[float, typer.Option(help="Sampling rate, Hz.", min=1.0, max=1e6)] = 1000.0,
     cfc: Annotated[int | None, typer.Option(help="Filter class that the instruments apply.")] = None,
     late: Annotated[float, typer.Option(help="How late the instruments' clock is, s.")] = 0.0,
-    seed: Annotated[int, typer.Option(help="Of the noise.")] = 0,
+    seed: Annotated[int | None, typer.Option(help="Of the noise", min=0, show_default="another for each name")] = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
@@ -78,7 +79,7 @@ def synthesize(
             sigmas=sigmas,
             cfc=cfc,
             late=late,
-            seed=seed,
+            seed=zlib.crc32(target.stem.encode()) if seed is None else seed,  # two recordings never share their noise
             conditions={leaf.path: leaf.value for leaf in document.paths(chosen) if leaf.path in stated},
         )
     except ValueError as e:

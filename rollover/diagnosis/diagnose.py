@@ -87,7 +87,7 @@ def diagnose(
     acts = "rollover" if any(unfit(set_up(scenario, e.recording)) for e in found) else "drop"
     candidates = candidates_of(found, scenario.effects, acts, scenario, size_of(set_up(scenario, found[0].recording)))
     explanation = explained(judge, base, candidates, groups, phases, say, crew or Crew())
-    explanation, verdict = decided(judge, explanation, groups)
+    explanation, verdict = decided(judge, explanation, groups, phases)
     explanation, kept = eased_beside(scenario, judge, explanation, kept, phases)
     found = list(judge.evidence)
     before, after = explanation.before, explanation.after if explanation.parts else explanation.before

@@ -12,12 +12,12 @@ from rollover.diagnosis.blocks import at_an_end, turned
 from rollover.diagnosis.candidates import Candidate, physical
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.detect import Mismatch, mismatch_of
-from rollover.diagnosis.explain import SURE, Phases, Step, moves, spread, step, weighed
+from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Phases, Step, moves, spread, step, weighed
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate, gate
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.intervals import intervals
-from rollover.diagnosis.refine import timed
+from rollover.diagnosis.refine import polish, timed
 from rollover.diagnosis.settle import left_of_means, settled
 from rollover.diagnosis.verdict import Verdict
 from rollover.effects import EFFECTS
@@ -26,7 +26,7 @@ CHANCE = 0.005  # p-value of the best of all candidates that admits one
 MOST = 3  # effects in one explanation
 NEGLIGIBLE = 0.001  # of a channel's range: what moves nothing by more is not worth a name
 PARTLY = 0.02  # of the excess over the noise that one effect may leave and still be named
-SEVERAL = 0.01  # p-value of what several effects leave, below which they are no explanation
+MANY = 0.01  # p-value of what as many effects as may be leave, below which they are no explanation
 HOPELESS = 2.0  # misfit over the noise that two effects leave and a third is not looked for
 BETTER = 0.5  # of what is left, that another first effect must leave
 RIVAL = 0.5  # of the best's gain, by the mean of its runs, that a rival must have
@@ -103,18 +103,18 @@ def explained(
             if found is None:
                 refuted = not taken
                 break
+        found, left = followed(judge, found, phases)
         taken.append(found)
         current = found.fitted
-        left = mismatch_of(judge.evidence, current.blocks, phases)
         if judge.effort.thrifty and (left.p_value > SURE or not matters(judge, current, left)):
             break
         if len(taken) == 2 and left.p_value < SURE and matters(judge, current, left):
             # of two that are strong the first may have been taken for something else: is there a better one?
             other = _instead(judge, current, candidates, groups, phases, say, crew)
             if other is not None and other.fitted.left < BETTER * current.left:
+                other, left = followed(judge, other, phases)
                 taken = [taken[1], other]
                 current = other.fitted
-                left = mismatch_of(judge.evidence, current.blocks, phases)
         if len(taken) > 1 and current.left > HOPELESS**2 * count:
             break
         looked = _look(judge, current, free(current, candidates), groups)
@@ -181,6 +181,23 @@ def lasting(judge: Judge, found: Step, groups: Groups) -> Step | None:
             return one
         judge.weigh(held)
     return None
+
+
+def followed(judge: Judge, found: Step, phases: Phases) -> tuple[Step, Mismatch]:
+    """A step and what it leaves, its fit followed to the end if it leaves little more than noise, but that in doubt.
+
+    Beside a kink, or a sample that a clock carries over a leap, a fit may end too early; never worse.
+    """
+    old = found.fitted
+    left = mismatch_of(judge.evidence, old.blocks, phases)
+    is_near = old.left < NEARLY_NOISE**2 * sum(b.residual.size for b in old.blocks)
+    if judge.effort.thrifty or not is_near or left.p_value > MANY:
+        return found, left
+    new = timed(judge, polish(judge, old))
+    if new.left >= old.left:
+        return found, left
+    rivals = tuple(new if f is old else f for f in found.rivals)
+    return replace(found, fitted=new, rivals=rivals), mismatch_of(judge.evidence, new.blocks, phases)
 
 
 def is_there(judge: Judge, fitted: Fitted) -> bool:
@@ -282,15 +299,15 @@ def _needed(
     return [s.again(judge) for s in parts] if len(parts) == kept else [s.again(judge) for s in taken]
 
 
-def decided(judge: Judge, found: Explanation, groups: Groups) -> tuple[Explanation, Verdict]:
+def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) -> tuple[Explanation, Verdict]:
     """The verdict; what does not explain is not named.
 
-    Several effects are named only if together they leave nothing but noise, and more surely so than one, as together
-    they can be bent to more; one alone also where it takes nearly all.
+    Several effects are named only if together they leave nothing but noise, as many as may be more surely so, as they
+    can be bent to more; one alone also where it takes nearly all.
     """
     if is_any_curve(found.fitted.candidates):
         return replace(found, parts=(), fitted=found.base), "unexplained"
-    least = SURE if len(found.parts) < 2 else SEVERAL
+    least = SURE if len(found.parts) < MOST else MANY
     if found.parts and (found.after.p_value > least or not matters(judge, found.fitted, found.after)):
         return found, _kind(strongest(judge, found.base, found.fitted))
     start = held_out(found.base, groups).total
@@ -299,7 +316,8 @@ def decided(judge: Judge, found: Explanation, groups: Groups) -> tuple[Explanati
         end = held_out(one.fitted, groups).total
         inside = not any(at_an_end(v) for v in one.fitted.x)
         if end**2 - 1.0 < PARTLY * (start**2 - 1.0) and inside:
-            return replace(found, parts=(one,), fitted=one.fitted), _kind(one.fitted.candidates[-1])
+            after = mismatch_of(judge.evidence, one.fitted.blocks, phases)
+            return replace(found, parts=(one,), fitted=one.fitted, after=after), _kind(one.fitted.candidates[-1])
     significant = found.before.p_value < SURE and matters(judge, found.base, found.before)
     significant = significant and not is_tolerated(judge, found.base)
     verdict: Verdict = "unexplained" if significant or found.parts else "no-mismatch"

@@ -52,6 +52,16 @@ def test_a_synthetic_recording_states_what_it_may(folder: Path) -> None:
     assert rollover("synthesize", "drop_test", "--out", folder, "--name", "d3.0").exit_code == 2
 
 
+def test_no_two_recordings_share_their_noise_unless_told_so(tmp_path: Path) -> None:
+    for name, seed in (("a", ()), ("b", ()), ("c", ("--seed", 4)), ("d", ("--seed", 4))):
+        done = rollover("synthesize", "drop_test", "--rate", 200, *seed, "--out", tmp_path, "--name", name)
+        assert done.exit_code == 0, done.output
+    a, b, c, d = (read_recording(tmp_path / f"{name}.csv")["ground/sinkage"] for name in "abcd")
+    before = slice(0, 4)  # of the contact, where all that is recorded is noise
+    assert not np.any(a[before] == b[before])
+    assert np.array_equal(c, d)
+
+
 def test_compare_writes_its_folder(folder: Path, tmp_path: Path) -> None:
     done = rollover("compare", "drop_test", folder / "d3.0.csv", "--out", tmp_path / "c", "--json")
     assert done.exit_code == 0, done.output

@@ -55,6 +55,8 @@ def test_the_window_does_not_outlive_the_command(number: int, tmp_path: Path) ->
     note = tmp_path / "child"
     child = f"import os, time; open({str(note)!r}, 'w').write(str(os.getpid())); time.sleep(60)"
     code = f"import sys; from viz.viewer import wait_for; wait_for([sys.executable, '-c', {child!r}])"
+    # whoever starts the tests behind a shell has the interrupt ignored, and children inherit that
+    code = f"import signal; signal.signal(signal.SIGINT, signal.default_int_handler); {code}"
     parent = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL)
     deadline = time.monotonic() + 30.0
     while not (note.exists() and note.read_text()):
