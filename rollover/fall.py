@@ -66,6 +66,7 @@ HALVINGS = 20  # of a step, to the moment at which the soil stays behind
 CORRECTIONS = 4  # of a step that ends at such a place
 CLOSE = 1e-7  # m: how near a step ends to a jump of the force
 PAST = 2e-10  # m: how far beyond the end or the beginning of contact a step ends
+SAME_SPEED = 1e-7  # m/s: how near a step begins to where friction turns into a dashpot
 AT_REST = 1e-8  # m/s, and m/s2 over a millisecond: what is slower on its line of unloading stays where it is
 
 
@@ -315,12 +316,20 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
             turning = theta <= share
             if turning:
                 share, jump = theta, 0.0
+        creeping = False  # the friction of the guide begins or ceases to be a dashpot
+        if guide > 0.0 and f[SPRING] <= 0.0 and (abs(y[1]) < CREEP or abs(end[1]) < CREEP):
+            accelerate(law, p, s, row, state, f, end, now)
+            for side in (-CREEP, CREEP):
+                if abs(y[1] - side) > SAME_SPEED and (y[1] - side) * (end[1] - side) < 0.0:
+                    theta = crossing(side, h, y[1], a[0, 0], end[1], now[0])
+                    if theta < share:
+                        share, jump, turning, creeping = theta, 0.0, False, True
         if share < 1.0:
             h = max(share, 1e-9) * h
             advance(law, p, s, row, state, f, y, h, a, end)
             for _ in range(CORRECTIONS):  # what lies beyond bent the first guess
                 miss = end[0] - goal
-                if turning or abs(miss) < slack or abs(miss) > 0.5 * h * abs(end[1]):
+                if turning or creeping or abs(miss) < slack or abs(miss) > 0.5 * h * abs(end[1]):
                     break
                 h -= miss / end[1]
                 advance(law, p, s, row, state, f, y, h, a, end)

@@ -1,0 +1,40 @@
+"""How exactly the many drops of a diagnosis are integrated."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis.simulator import DropSimulator
+from rollover.drop import DropModel
+from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
+
+ENOUGH = 1e-4  # of the range, root mean square: half of what counts as an error of the model
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"effects.soil-crust.thickness": 0.03},
+        {"effects.guide-friction.force": 40.0},
+        {"effects.guide-friction.force": 400.0, "effects.soil-elastic-rebound.recovery": 0.15},
+        {"effects.structural-compliance.stiffness": 2e6},
+        {"effects.structural-compliance.stiffness": 2e5, "effects.guide-friction.force": 100.0},
+        {"effects.soil-viscous-damping.damping": 1500.0, "effects.soil-layer.depth": 0.08},
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("speed", [1.3, 3.2])
+def test_a_drop_of_a_diagnosis_is_that_of_a_hundredth_of_its_step(changes: dict[str, Any], speed: float) -> None:
+    ((_, recording),) = recorded({}, speeds=(speed,), rate=1000.0, channels=(FORCE, DEPTH, ACCELERATION), noise=0.0)
+    model = DropModel(scenario=scenario(), step=1e-5).with_({"initiation.speed": speed, **changes})
+    shift = 1.3e-4  # no stamp is an instant of the drop's own
+    exact = model.run(recording.time - shift)
+    made = DropSimulator(scenario().replaced({"initiation.speed": speed}), recording).predict(changes, shift)
+    assert made is not None
+    for channel in (FORCE, DEPTH, ACCELERATION):
+        off = np.sqrt(np.mean((made[channel] - exact[channel]) ** 2)) / np.ptp(exact[channel])
+        assert off < ENOUGH, channel
