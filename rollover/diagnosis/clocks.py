@@ -3,6 +3,8 @@
 A time shift that is fitted to a whole recording bends towards whatever the simulation misses. The first contact hardly
 depends on that: an error of the model grows with the force, so that samples after it are trusted to `TRUSTED` of what
 they have changed since the start, and none later than `SOON`.
+
+It is sought before by what hardly asks for a model: until then a body falls, then it does something else (`onset`).
 """
 
 from __future__ import annotations
@@ -14,11 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.evidence import Signal
 from rollover.diagnosis.fit import Judge
 
 Array = NDArray[np.float64]
 WIDTH = 3.0  # times its prior, within which a time shift is sought
 PLACES = 241  # time shifts that are tried
+NEAR, AT_THE_END = 1e-3, 0.9  # s, about a first contact found without a model; of that, from which on it ends there
 SOON, LEAST = 8e-3, 4  # s after the first contact, and samples, that tell of it
 TRUSTED = 0.1  # of a change of a channel, by which the model may be off
 BELIEVED = 2.0  # times its prior: a shift beyond is the model's fault, where the clock's zero is known
@@ -30,7 +34,8 @@ Cost = Callable[[Array, float], float]
 def align(judge: Judge) -> None:
     """Begin with the time shift at which each recording meets the scenario best."""
     for r in range(len(judge.evidence)):
-        found = _best(judge, r, partial(judge.raw, r, (), ()), partial(_whole, judge, r))
+        places = WIDTH * judge.evidence[r].shift_prior * np.linspace(-1.0, 1.0, PLACES)
+        found = _best(judge, r, partial(judge.raw, r, (), ()), partial(_whole, judge, r), places)
         judge.shifts[r] = judge.shifts[r] if found is None else found
 
 
@@ -39,16 +44,20 @@ def by_first_contact(judge: Judge, candidates: Sequence[Candidate], x: Sequence[
     found: list[float | None] = []
     for r, e in enumerate(judge.evidence):
         # leaps as they are: these are what tells the time
-        at = _best(judge, r, partial(judge.edged, r, candidates, x), partial(_early, judge, r))
-        known = e.recording.clock.zero != "unknown"
-        found.append(None if at is None or (known and abs(at) > BELIEVED * e.shift_prior) else at)
+        made, known = partial(judge.edged, r, candidates, x), e.recording.clock.zero != "unknown"
+        places = WIDTH * e.shift_prior * np.linspace(-1.0, 1.0, PLACES)
+        places = places[places > e.recording.time[LEAST]]  # what never fell tells of no contact
+        about = _best(judge, r, made, partial(onset, judge, r), places)
+        if about is not None:
+            at = _best(judge, r, made, partial(_early, judge, r), about + NEAR * np.linspace(-1.0, 1.0, PLACES))
+            about = about if at is None or abs(at - about) > AT_THE_END * NEAR else at  # the model leads away from it
+        found.append(None if about is None or (known and abs(about) > BELIEVED * e.shift_prior) else about)
     return found
 
 
-def _best(judge: Judge, r: int, made: Made, cost: Cost) -> float | None:
-    """One run moved along the stamps tells where to look; the best places are then simulated."""
+def _best(judge: Judge, r: int, made: Made, cost: Cost, shifts: Array) -> float | None:
+    """One run moved along the stamps tells where to look among `shifts` (s); the best places are then simulated."""
     e = judge.evidence[r]
-    shifts = np.linspace(-WIDTH, WIDTH, PLACES) * e.shift_prior
     raw = made(0.0)
     if raw is None:
         return None
@@ -71,6 +80,28 @@ def _whole(judge: Judge, r: int, raw: Array, shift: float) -> float:
     return float(np.sum(e.eased(judge.measured[r] - e.whitened(raw)) ** 2)) + (shift / e.shift_prior) ** 2
 
 
+def onset(judge: Judge, r: int, raw: Array, shift: float) -> float:
+    """-2 ln of the likelihood that recording r falls until `shift` (s) and is something else thereafter.
+
+    Before, what it misses is noise; thereafter it may be as large as what is predicted, and larger at times: a Cauchy
+    distribution of that width.
+    """
+    e = judge.evidence[r]
+    total = (shift / e.shift_prior) ** 2
+    for s, part in e.spans():
+        late = e.recording.time[s.rows] > shift
+        z = (s.values - raw[part]) / s.sigma
+        wide = np.hypot(1.0, (raw[part] - raw[part][0]) / s.sigma)
+        each = np.where(late, 2.0 * np.log(wide) + 2.0 * np.log1p((z / wide) ** 2), z**2)
+        total += _worth(s) * float(np.sum(each))
+    return total
+
+
+def _worth(s: Signal) -> float:
+    """What a sample of a coloured noise is worth of one of a white one."""
+    return max(1.0 - sum(s.ar), 0.05) / (1.0 + max(sum(s.ar), 0.0))
+
+
 def _early(judge: Judge, r: int, raw: Array, shift: float) -> float:
     """What is left of it by those up to shortly after the first contact, coloured ones for what they are worth."""
     e = judge.evidence[r]
@@ -80,6 +111,5 @@ def _early(judge: Judge, r: int, raw: Array, shift: float) -> float:
         after = time[time > 0.0][LEAST - 1 : LEAST]
         inside = time < max(SOON, *after)
         sigma = np.hypot(s.sigma, TRUSTED * (raw[part] - raw[part][0]))
-        worth = max(1.0 - sum(s.ar), 0.05) / (1.0 + max(sum(s.ar), 0.0))
-        total += worth * float(np.sum((((s.values - raw[part]) / sigma)[inside]) ** 2))
+        total += _worth(s) * float(np.sum((((s.values - raw[part]) / sigma)[inside]) ** 2))
     return total

@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Block, Fitted, Judge
-from rollover.diagnosis.refine import polish, shaped, timed
+from rollover.diagnosis.refine import combed, polish, shaped, timed
 from rollover.execute import Children, map_cases
 
 Progress = Callable[[str], None]
@@ -31,7 +31,7 @@ class Job:
     the time shifts.
     """
 
-    how: Literal["fit", "polish", "shape", "time"] = "fit"
+    how: Literal["fit", "polish", "shape", "time", "comb"] = "fit"
     candidates: tuple[Candidate, ...]
     start: tuple[float, ...]
     shifts: tuple[float, ...]
@@ -141,7 +141,9 @@ def work(judge: Judge, job: Job) -> Fitted | None:
     begun = linearised(judge, job.candidates, job.start, job.recordings, job.shifts)
     if begun is None:
         return None
-    ways: dict[str, Callable[[Judge, Fitted], Fitted | None]] = {"polish": polish, "shape": shaped, "time": timed}
+    ways: dict[str, Callable[[Judge, Fitted], Fitted | None]] = {
+        "polish": polish, "shape": shaped, "time": timed, "comb": combed,
+    }  # fmt: skip
     return ways[job.how](judge, begun)
 
 

@@ -24,6 +24,7 @@ from rollover.diagnosis.evidence import Evidence, doubted, evidence_of, left_out
 from rollover.diagnosis.explain import SURE
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import yardstick
+from rollover.diagnosis.loudness import with_loudness
 from rollover.diagnosis.overturn import RunSimulator
 from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.readings import digitised, without_spikes
@@ -204,6 +205,9 @@ def _evidence(scenario: Scenario, recordings: Sequence[tuple[str, Recording]]) -
             notes.append(f"{name}: shares no usable channel with the simulation and was left aside")
         else:
             found.append(digitised(one, recording))
+    found = with_loudness(found)
+    louder = {s.channel: float(s.level.max()) for e in found for s in e.signals if s.level is not None}
+    notes += [f"{c}: the noise grows with the value, to {most:.1f} times its least" for c, most in louder.items()]
     return found, notes
 
 

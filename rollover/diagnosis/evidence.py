@@ -43,6 +43,7 @@ class Signal:
     span: float
     scatter: float = 0.0  # between runs of one condition, SI
     weight: Array | None = None  # (n,), below 1 where the model itself is not sure
+    level: Array | None = None  # (n,), noise over `noise` where it grows with the value
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,6 +165,8 @@ class Evidence:
     @staticmethod
     def _whitened(signal: Signal, values: Array) -> Array:
         x = values / signal.sigma
+        if signal.level is not None:
+            x = (x.T / signal.level).T  # samples, or columns of them
         if signal.weight is not None:
             return Evidence._coloured(signal, x) * signal.weight
         return Evidence._coloured(signal, x)

@@ -27,6 +27,8 @@ FAR = 3.0  # and from which on they are not fitted beside a first look
 ELSEWHERE = 0.2  # of a coordinate: starts so far apart are two
 RIVALS = 0.4  # of the best's gain: a first fit that gains less is no rival, where fits cost much
 CROOKED = 100.0  # times what the best leaves, up to which a fit of two parameters is polished
+RUGGED = 2.0  # misfit over the noise that the best leaves, from which on there may be something behind a cliff
+LEADS = 1.5  # times what the best leaves, up to which it is looked for
 TIED = 1.2  # times what the best leaves, up to which time shifts are tried out
 SHAPED = 4.0  # times what the best leaves, up to which an effect's shape is fitted too
 WORTH = 12.0  # gain that pays for a shape
@@ -154,10 +156,12 @@ def screen(
 
 
 def _begun_at(c: Candidate, met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float, ...], ...]:
-    """Where fits begin: the best starts; of few and far ones the best, and beside what changes nothing."""
-    neutral = [] if c.neutral is None else [n + BESIDE for n in c.neutral if n is not None]
-    if c.neutral is None or len(neutral) < len(c.neutral):
+    """Where fits begin: the best starts; of few and far ones all, or the best and beside what changes nothing."""
+    if c.neutral is None:
         return _apart(met)
+    neutral = [n + BESIDE for n in c.neutral if n is not None]
+    if len(neutral) < len(c.neutral):
+        return tuple(start for _, start in met)
     return (tuple(neutral), met[0][1])
 
 
@@ -199,6 +203,8 @@ def step(
     if base.candidates and not judge.effort.thrifty:
         fits += _from_base(judge, base, fits, looked, crew, say)
     fits.sort(key=lambda f: f.left)
+    if fits[0].left > RUGGED**2 * count and not judge.effort.thrifty:
+        fits = _combed(judge, fits, shifts, crew, say)
     # where a threshold makes the way crooked, the nearer ones are followed to the end; of what explains the best alone
     able = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < CROOKED * fits[0].left]
     alone = [f for f in able[:1] if f is fits[0] and not base.candidates]
@@ -217,6 +223,17 @@ def step(
     phi = max(1.0, min(f.left for f in fits) / count)  # what even the best leaves is no chance of the noise's size
     phi *= judge.per_error
     return Step(base=base, fitted=fits[0], p_value=looked.p_value(phi), rivals=tuple(fits), screened=tuple(screened))
+
+
+def _combed(judge: Judge, fits: Sequence[Fitted], shifts: Sequence[float], crew: Crew, say: Progress) -> list[Fitted]:
+    """The fits, best first, the best of two parameters begun anew along the second if it leads or nearly so."""
+    found = list(fits)
+    for k, f in enumerate(fits):
+        if len(f.candidates[-1].search) == 2 and f.left < LEADS * fits[0].left:
+            (new,) = crew.fits(judge, [Job(how="comb", candidates=f.candidates, start=f.x, shifts=tuple(shifts))], say)
+            found[k] = new if new is not None and new.left < f.left else f
+            break
+    return sorted(found, key=lambda f: f.left)
 
 
 def _from_base(
@@ -320,7 +337,7 @@ def _first_fits(
     fits.sort(key=lambda f: f.left)
     worth = [f for k, f in enumerate(fits) if k < judge.effort.leaders or f.left < WITHIN * fits[0].left]
     if judge.effort.thrifty and fits:
-        worth = _one_each(worth)
+        worth = _one_each(worth) + _elsewhere(worth)
         as_it_is = sum(base.blocks[r].normal()[2] for r in few)
         worth = [f for f in worth if as_it_is - f.left >= RIVALS * (as_it_is - fits[0].left)]
     worth = worth[: judge.effort.most_leaders]
@@ -347,6 +364,13 @@ def _all_shifts(begun_with: Sequence[float], first: Fitted, few: Sequence[int]) 
     for r, block in zip(few, first.blocks, strict=True):
         shifts[r] = block.shift
     return shifts
+
+
+def _elsewhere(fits: Sequence[Fitted]) -> list[Fitted]:
+    """Of the candidate that leads, best first, the best fit that came to another place."""
+    lead = fits[0]
+    same = [f for f in fits[1:] if f.candidates[-1].key == lead.candidates[-1].key]
+    return [f for f in same if max(abs(a - b) for a, b in zip(f.x, lead.x, strict=True)) > 0.5 * ELSEWHERE][:1]
 
 
 def _one_each(fits: Sequence[Fitted]) -> list[Fitted]:

@@ -9,6 +9,8 @@ from rollover.diagnosis.blocks import WIDEST, Block, Fitted
 from rollover.diagnosis.fit import NOISE_LEFT, Judge
 
 Array = NDArray[np.float64]
+TEETH, COMBED, BESIDE = 11, 0.05, 20  # places on a first coordinate, within so much of its fit; on the other, over all
+STARTS, APART = 3, 0.06  # of the best places, so far apart
 TICK, SHORTEST, NARROWER = 8e-5, 5e-6, 0.4  # s, by which a time shift is tried to either side; then less, by a factor
 TRIED = 40  # at most so many
 TWICE, LITTLE = 2, 1.0  # how often; a gain that is not worth another time
@@ -37,6 +39,29 @@ def polish(judge: Judge, fitted: Fitted, size: float = 0.02, most: int = 45) -> 
     )
     again = judge.fit(fitted.candidates, np.clip(found.x, 0.0, 1.0), rounds=3, shifts=shifts, width=2)
     return again if again is not None and again.left < fitted.left else fitted
+
+
+def combed(judge: Judge, fitted: Fitted) -> Fitted:
+    """The fit begun anew all along the second parameter of its last effect; never worse.
+
+    What hops leaves a misfit full of cliffs: a frequency is found soon, what damps it may lie far off behind one.
+    """
+    at, shifts = len(fitted.x) - 2, [b.shift for b in fitted.blocks]
+    firsts = np.clip(fitted.x[at] + COMBED * np.linspace(-1.0, 1.0, TEETH), 0.0, 1.0)
+    places = [(*fitted.x[:at], float(a), float(b)) for a in firsts for b in (np.arange(BESIDE) + 0.5) / BESIDE]
+    met = []
+    for x in places:
+        blocks = [judge.block(r, fitted.candidates, x, s, 0.0) for r, s in enumerate(shifts)]
+        if all(b is not None for b in blocks):
+            met.append((sum(b.normal()[2] for b in blocks if b is not None), x))
+    chosen: list[tuple[float, ...]] = []
+    for _, x in sorted(met):
+        if len(chosen) < STARTS and all(max(abs(a - b) for a, b in zip(x, c, strict=True)) > APART for c in chosen):
+            chosen.append(x)
+    found = [judge.fit(fitted.candidates, x, shifts=shifts, width=1) for x in chosen]
+    best = min((f for f in found if f is not None), key=lambda f: f.left, default=fitted)
+    best = timed(judge, polish(judge, best))
+    return best if best.left < fitted.left else fitted
 
 
 def timed(judge: Judge, fitted: Fitted) -> Fitted:

@@ -12,9 +12,9 @@ from rollover.diagnosis.blocks import at_an_end, turned
 from rollover.diagnosis.candidates import Candidate, physical
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.detect import Mismatch, mismatch_of
-from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Phases, Step, moves, spread, step, weighed
+from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Phases, Step, begun, moves, spread, step, weighed
 from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.gate import Gate, gate
+from rollover.diagnosis.gate import Gate, gate, p_value
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.intervals import intervals
 from rollover.diagnosis.refine import polish, timed
@@ -23,6 +23,7 @@ from rollover.diagnosis.verdict import Verdict
 from rollover.effects import EFFECTS
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
+SPOKEN = 0.05  # and of a candidate's own, beyond which its fit to runs that scatter is one to chance
 MOST = 3  # effects in one explanation
 NEGLIGIBLE = 0.001  # of a channel's range: what moves nothing by more is not worth a name
 PARTLY = 0.02  # of the excess over the noise that one effect may leave and still be named
@@ -77,11 +78,11 @@ def explained(
 ) -> Explanation:
     """Forward selection of up to three effects, each beyond chance, then each tried without and against its rivals."""
     count = sum(b.residual.size for b in base.blocks)
-    thrifty = judge.effort.thrifty
-    base = base if thrifty else timed(judge, base)  # what a clock leaves is no noise,
+    clocked = begun_anew if judge.effort.thrifty else timed
+    base = clocked(judge, base)  # what a clock leaves is no noise,
     if weighed(judge, base, phases):
         base = judge.again(base)
-    base = base if thrifty else timed(judge, base)  # and no effect's gain
+    base = clocked(judge, base)  # and no effect's gain
     before = mismatch_of(judge.evidence, base.blocks, phases)
     say(f"looking at {len(candidates)} candidates, which of them could matter")
     looked = first_look = _look(judge, base, candidates, groups)
@@ -99,7 +100,7 @@ def explained(
         if found is None or found.p_value > CHANCE or moves(judge, found.base, found.fitted) < NEGLIGIBLE:
             break
         if judge.effort.thrifty:
-            found = lasting(judge, found, groups)
+            found = lasting(judge, backed(found, looked), groups)
             if found is None:
                 refuted = not taken
                 break
@@ -140,11 +141,13 @@ def explained(
 def _look(judge: Judge, base: Fitted, candidates: Sequence[Candidate], groups: Groups) -> Gate:
     """A gate by all recordings; where each look costs a run, of few and then of the best candidates by some more.
 
-    The null stays that of the best of all candidates: what was passed over could only have raised the maximum.
+    The null stays that of the best of all candidates: what was passed over could only have raised the maximum. Clocks
+    are then taken where they say, or nearly so: far off they have eaten what is missing.
     """
     effort = judge.effort
     if not effort.thrifty:
         return gate(judge, base, candidates)
+    base = unbent(judge, base)
     few, more = spread(base, groups, effort.few), spread(base, groups, effort.looked_at)
     first = gate(judge, base, candidates, few)
     if len(more) <= len(few):
@@ -159,6 +162,32 @@ def _look(judge: Judge, base: Fitted, candidates: Sequence[Candidate], groups: G
         detectable={**first.detectable, **second.detectable},
         starts={**first.starts, **second.starts},
     )
+
+
+def begun_anew(judge: Judge, base: Fitted) -> Fitted:
+    """A base from the time shifts that its rivals begin with, if that leaves less: where runs scatter it hangs on them.
+
+    Else what a better clock gains would be every rival's.
+    """
+    again = judge.fit(base.candidates, base.x, shifts=begun(judge, base))
+    return min((f for f in (base, again) if f is not None), key=lambda f: sum(b.total for b in f.blocks))
+
+
+def unbent(judge: Judge, base: Fitted) -> Fitted:
+    """A base with its time shifts no further from where known clocks say than their error."""
+    blocks = []
+    for r, b in enumerate(base.blocks):
+        known = judge.evidence[r].recording.clock.zero != "unknown"
+        there = min(max(b.shift, -b.prior), b.prior) if known else b.shift
+        new = judge.block(r, base.candidates, base.x, there, judge.effort.fine) if there != b.shift else b
+        blocks.append(new or b)
+    return replace(base, blocks=tuple(blocks))
+
+
+def backed(found: Step, looked: Gate) -> Step:
+    """A step without rivals that nothing spoke for when looked at: their runs met the recordings by chance."""
+    told = [f for f in found.rivals if p_value(looked.scores.get(f.candidates[-1].key, 0.0), looked.null) < SPOKEN]
+    return replace(found, rivals=tuple(told))
 
 
 def lasting(judge: Judge, found: Step, groups: Groups) -> Step | None:
@@ -177,7 +206,7 @@ def lasting(judge: Judge, found: Step, groups: Groups) -> Step | None:
         if gains[id(rival)] < NEEDED:
             return None
         one = settled(judge, replace(found, fitted=rival, rivals=tuple(near)))
-        if outlasts(one, groups) and is_there(judge, one.fitted):
+        if (outlasts(one, groups) or outlasts(before_the_blow(judge, one), groups)) and is_there(judge, one.fitted):
             return one
         judge.weigh(held)
     return None
@@ -198,6 +227,20 @@ def followed(judge: Judge, found: Step, phases: Phases) -> tuple[Step, Mismatch]
         return found, left
     rivals = tuple(new if f is old else f for f in found.rivals)
     return replace(found, fitted=new, rivals=rivals), mismatch_of(judge.evidence, new.blocks, phases)
+
+
+def before_the_blow(judge: Judge, found: Step) -> Step:
+    """A step judged by samples alone that no course a run may take has touched."""
+    early = [np.concatenate([e.recording.time[s.rows] < e.blow for s in e.signals]) for e in judge.evidence]
+
+    def cut(f: Fitted) -> Fitted:
+        blocks = [
+            replace(b, residual=b.residual[k], J=b.J[k], slope=b.slope[k], course=None, expected=None)
+            for b, k in zip(f.blocks, early, strict=True)
+        ]
+        return replace(f, blocks=tuple(blocks))
+
+    return replace(found, base=cut(found.base), fitted=cut(found.fitted), rivals=())
 
 
 def is_there(judge: Judge, fitted: Fitted) -> bool:

@@ -18,8 +18,9 @@ from rollover.diagnosis.account import diagnosed_scenario
 from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.chaos import averaged
 from rollover.diagnosis.clocks import align
-from rollover.diagnosis.evidence import Evidence, evidence_of
+from rollover.diagnosis.evidence import Evidence, Signal, evidence_of
 from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.loudness import with_loudness
 from rollover.diagnosis.overturn import CENTRE
 from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.simulator import Simulator, simulator_of
@@ -36,7 +37,8 @@ class Track:
     """One channel over time, SI: `time`, `measured`, `before` (n,), `after` (n,) or None; gaps are left out.
 
     `noise` is 1 sigma of what the misfit is held against: the measured noise, and what integrators differ by. Beside it
-    stands `scatter` (n,), 1 sigma of what neighbouring runs differ by; None where there are none.
+    stands `scatter` (n,), 1 sigma of what neighbouring runs differ by and of a noise that grows with the value; None
+    where there is neither.
     """
 
     channel: str
@@ -101,7 +103,7 @@ def _told(
     simulator, evidence = _ready(name, scenario, recording)
     if evidence is None:
         return None
-    thinner = evidence.recording
+    (evidence,), thinner = with_loudness([evidence]), evidence.recording
     last, best = (simulator, evidence) if diagnosed is None else _ready(name, diagnosed, recording)
     at = _shift(best or evidence)
     before = simulator.predict({}, at)
@@ -110,18 +112,22 @@ def _told(
     after = None if diagnosed is None else last.predict({}, at)
     strays = last.strays({}, at)
     tracks = []
+    single = float(np.sqrt(_rows_in_one(recording, thinner)))
     for signal in evidence.signals:
         channel = signal.channel
         there = np.isfinite(recording.channels[channel])
+        stamps = recording.time[there]
+        both = (_scatter([d[channel][there] for d in strays], stamps), _louder(signal, thinner.time, stamps, single))
+        more = [s for s in both if s is not None]
         tracks.append(
             Track(
                 channel=channel,
-                time=recording.time[there],
+                time=stamps,
                 measured=recording.channels[channel][there],
                 before=before[channel][there],
                 after=None if after is None else after[channel][there],
-                noise=signal.sigma * float(np.sqrt(_rows_in_one(recording, thinner))),
-                scatter=_scatter([d[channel][there] for d in strays], recording.time[there]),
+                noise=signal.sigma * single,
+                scatter=np.sqrt(np.sum(np.square(more), axis=0)) if more else None,
             )
         )
     return Told(
@@ -145,6 +151,13 @@ def _scatter(strays: Sequence[Array], time: Array) -> Array | None:
     """1 sigma (n,) of what neighbouring runs differ by; None where there are none."""
     whole = [d for d in strays if np.all(np.isfinite(d))]
     return np.sqrt(averaged(np.mean(np.square(whole), axis=0), time)) if whole else None
+
+
+def _louder(signal: Signal, time: Array, stamps: Array, single: float) -> Array | None:
+    """1 sigma (n,) at `stamps` of the noise beyond its least, of `single` samples; None where it does not grow."""
+    if signal.level is None:
+        return None
+    return np.interp(stamps, time[signal.rows], signal.sigma * single * np.sqrt(signal.level**2 - 1.0))
 
 
 def _rows_in_one(recording: Recording, thinner: Recording) -> float:

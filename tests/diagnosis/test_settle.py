@@ -16,9 +16,10 @@ from rollover.diagnosis.effort import DROPS, RUNS, Effort
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.intervals import intervals, scattered, unshaped
 from rollover.diagnosis.overturn import CENTRE, NEIGHBOURS, RunSimulator
-from rollover.diagnosis.selection import is_there, lasting, outlasts
+from rollover.diagnosis.selection import backed, before_the_blow, begun_anew, is_there, lasting, outlasts, unbent
 from rollover.diagnosis.settle import along, left_of_means, rescattered, settled, step_of_means
 from rollover.diagnosis.verdict import Interval
 from rollover.effects import Search
@@ -305,6 +306,48 @@ def test_where_the_first_does_not_last_the_next_one_is_taken() -> None:
     kept = judge.evidence
     assert lasting(judge, replace(step, rivals=(wrong,)), groups) is None
     assert judge.evidence == kept
+
+
+def test_a_rival_that_nothing_spoke_for_is_none() -> None:
+    fits = [
+        Fitted(candidates=(candidate(k, "physics", "a"),), x=(0.5,), blocks=()) for k in ("slope", "mass", "inertia")
+    ]
+    null = np.sort(np.random.default_rng(0).standard_normal((4000, 20)).max(axis=1) ** 2)
+    looked = Gate(score=60.0, scores={"slope": 60.0, "mass": 4.0}, null=null, detectable={})
+    step = Step(base=fits[0], fitted=fits[1], p_value=0.0, rivals=tuple(fits))
+    assert backed(step, looked).rivals == (fits[0],)
+
+
+def test_what_shows_before_the_blow_alone_lasts() -> None:
+    """An effect that is sure while a body tips, and runs that go elsewhere after the blow."""
+    rng = np.random.default_rng(3)
+    every = [replace(evidence(r, 0.1), blow=TIME[N // 2]) for r in range(4)]
+    early = TIME[N // 2] > TIME
+    J = [rng.standard_normal((N, 1)) for _ in range(4)]
+    w = [np.where(early, 0.6, rng.uniform(-30.0, 30.0)) * j[:, 0] + rng.standard_normal(N) for j in J]
+    base = [Block(residual=y, J=np.zeros((N, 0)), slope=np.zeros(N), shift=0.0, prior=1.0) for y in w]
+    ends = [replace(b, residual=y - 0.6 * j[:, 0], J=j) for b, y, j in zip(base, w, J, strict=True)]
+    whole = Step(
+        base=Fitted(candidates=(), x=(), blocks=tuple(base)),
+        fitted=Fitted(candidates=(SLOPE,), x=(0.5,), blocks=tuple(ends)),
+        p_value=0.0,
+    )
+    groups = [[k] for k in range(4)]
+    assert not outlasts(whole, groups)
+    assert outlasts(before_the_blow(Judge(every), whole), groups)
+
+
+def test_a_base_is_begun_where_its_rivals_are() -> None:
+    """A base whose clock was bent far off, and leaves more there than where the clock says."""
+    rng = np.random.default_rng(5)
+    judge = Judge([evidence(0, 0.0, 0.1 * rng.standard_normal(N))])
+    bent = judge.block(0, (), (), 3.0 * judge.evidence[0].shift_prior, judge.effort.fine)
+    assert bent is not None
+    base = Fitted(candidates=(), x=(), blocks=(bent,))
+    assert begun_anew(judge, base).blocks[0].shift == 0.0
+    assert unbent(judge, base).blocks[0].shift == judge.evidence[0].shift_prior
+    good = begun_anew(judge, base)
+    assert begun_anew(judge, good).blocks[0].total <= good.blocks[0].total
 
 
 def test_a_move_does_not_leap_to_another_course() -> None:

@@ -1,0 +1,87 @@
+"""Noise that grows with the value is known for what it is, and nothing else is taken for it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis import diagnose
+from rollover.diagnosis.bins import simulated
+from rollover.diagnosis.evidence import Evidence, evidence_of
+from rollover.diagnosis.loudness import with_loudness
+from rollover.recording import Recording
+from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
+
+CHANNELS = (FORCE, DEPTH, ACCELERATION)
+FLOOR, SHARE = 0.002, 0.02  # of the largest range, of the value
+
+
+def most(recordings: list[tuple[str, Recording]], channel: str) -> float:
+    return max(float(np.ptp(r[channel])) for _, r in recordings)
+
+
+def louder(recordings: list[tuple[str, Recording]], seed: int) -> list[tuple[str, Recording]]:
+    rng, found = np.random.default_rng(seed), []
+    for name, r in recordings:
+        noise = {c: FLOOR * most(recordings, c) + SHARE * np.abs(v) for c, v in r.channels.items()}
+        noisy = {c: v + noise[c] * rng.normal(size=v.size) for c, v in r.channels.items()}
+        found.append((name, replace(r, channels=noisy)))
+    return found
+
+
+def evidence(recordings: list[tuple[str, Recording]]) -> list[Evidence]:
+    made = []
+    for name, r in recordings:
+        thin, simulator, averaged = simulated(scenario(), r)
+        one = evidence_of(name, thin, simulator, averaged)
+        assert one is not None
+        made.append(one)
+    return made
+
+
+def test_its_law_is_told_from_the_samples_alone() -> None:
+    quiet = recorded({"effects.soil-crust.thickness": 0.03}, noise=0.0, rate=2000.0, channels=CHANNELS)
+    for e, (_, clean) in zip(with_loudness(evidence(louder(quiet, 1))), quiet, strict=True):
+        for s in e.signals:
+            y = clean[s.channel][s.rows]
+            true = 1.0 + SHARE / FLOOR * np.abs(y) / most(quiet, s.channel)
+            assert s.level is not None, s.channel
+            inside = np.abs(np.gradient(y)) < 0.05 * np.ptp(y)  # not beside a leap, over which the value is averaged
+            assert np.corrcoef(s.level[inside], true[inside])[0, 1] > 0.9, s.channel
+            if s.channel == FORCE:  # of the acceleration the least is not at nothing, but somewhere in the fall
+                assert s.level.max() == pytest.approx(true.max(), rel=0.25)
+
+
+@pytest.mark.parametrize("cfc", [None, 180])
+@pytest.mark.parametrize("rate", [500.0, 5000.0])
+def test_an_even_noise_or_a_filter_is_not_taken_for_it(rate: float, cfc: int | None) -> None:
+    from rollover.filters import filtered
+
+    made = recorded({"effects.soil-crust.thickness": 0.03}, seed=2, noise=0.01, rate=rate, channels=CHANNELS)
+    if cfc is not None and rate > 10.0 * cfc:
+        made = [
+            (
+                name,
+                replace(
+                    r,
+                    channels={c: filtered(v, 1.0 / rate, cfc) for c, v in r.channels.items()},
+                    cfc=dict.fromkeys(CHANNELS, cfc),
+                ),
+            )
+            for name, r in made
+        ]
+    assert all(s.level is None for e in with_loudness(evidence(made)) for s in e.signals)
+
+
+def test_it_is_no_mismatch_and_hides_none() -> None:
+    conditions = {"speeds": (1.2, 2.0, 3.0), "noise": 0.0, "rate": 2000.0, "channels": CHANNELS}
+    nothing = diagnose(scenario(), louder(recorded({}, **conditions), 3))
+    assert nothing.verdict == "no-mismatch"
+    assert any("grows with the value" in note for note in nothing.notes)
+    found = diagnose(scenario(), louder(recorded({"effects.mass.added": 4.0}, **conditions), 4))
+    assert [e.id for e in found.effects] == ["mass"]
+    added = found.effects[0].parameters["added"]
+    assert added.low < 4.0 < added.high
+    assert found.after["held_out"].nrmse == pytest.approx(1.0, abs=0.1)
