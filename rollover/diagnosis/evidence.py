@@ -42,6 +42,7 @@ class Signal:
     ar: tuple[float, ...]
     span: float
     scatter: float = 0.0  # between runs of one condition, SI
+    step: float = 0.0  # of its digits, where noise does not hide it, SI
     weight: Array | None = None  # (n,), below 1 where the model itself is not sure
     level: Array | None = None  # (n,), noise over `noise` where it grows with the value
 

@@ -382,12 +382,17 @@ def _one_each(fits: Sequence[Fitted]) -> list[Fitted]:
 
 
 def moves(judge: Judge, base: Fitted, fitted: Fitted) -> float:
-    """How far the added effect moves any channel of any recording, largest root mean square over the range."""
+    """How far the added effect moves any channel of any recording, largest root mean square over the range.
+
+    Within half a step of a channel's digits nothing is told to have moved.
+    """
     most = 0.0
     for r, (a, b) in enumerate(zip(base.blocks, fitted.blocks, strict=True)):
         for signal, part in judge.evidence[r].spans():
             d = (a.residual - b.residual)[part]
-            most = max(most, float(np.sqrt(np.mean(d * d))) * signal.sigma / signal.span)
+            size = float(np.sqrt(np.mean(d * d))) * signal.sigma
+            if size > 0.5 * signal.step:
+                most = max(most, size / signal.span)
     return most
 
 

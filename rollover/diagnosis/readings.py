@@ -39,7 +39,8 @@ def digitised(e: Evidence, recording: Recording) -> Evidence:
     for s in e.signals:
         step = resolution(recording.channels[s.channel])
         dithered = s.noise * np.sqrt(e.averaged) > step
-        signals.append(s if dithered else replace(s, scatter=0.5 * step, sigma=float(np.hypot(s.sigma, 0.5 * step))))
+        error = 0.0 if dithered else 0.5 * step
+        signals.append(replace(s, step=2.0 * error, scatter=error, sigma=float(np.hypot(s.sigma, error))))
     return replace(e, signals=tuple(signals))
 
 

@@ -54,6 +54,26 @@ def test_the_first_contact_is_not_bent_by_what_the_simulation_misses(missing: di
     assert np.abs(early).max() < 0.25e-3
 
 
+@pytest.mark.parametrize("late", [-0.008, 0.013])
+def test_the_onset_of_contact_is_found_whatever_happens_then(late: float) -> None:
+    """A striker that gives way rings from the first instant, and its recorder's clock has no zero."""
+    ringing = {"effects.structural-compliance.stiffness": 1.9e6, "effects.structural-compliance.damping": 1400.0}
+    found = []
+    for e in judge_of(ringing, late=late).evidence:
+        r = replace(e.recording, clock=replace(e.recording.clock, zero="unknown"))
+        one = evidence_of(e.name, r, simulator_of(scenario(), r))
+        assert one is not None
+        found.append(one)
+    judge = Judge(found)
+    align(judge)
+    base = judge.fit((), ())
+    assert base is not None
+    bent = np.array([b.shift for b in base.blocks]) - late
+    early = np.array([np.nan if v is None else v for v in by_first_contact(judge, (), ())]) - late
+    assert np.abs(bent).max() > 2e-3
+    assert np.abs(early).max() < 1.3e-3  # the clocks themselves stray by half a millisecond
+
+
 def test_a_clock_that_would_have_to_be_far_off_is_not_believed_where_its_zero_is_known() -> None:
     judge = judge_of({}, late=5.0e-3)
     loose = []
