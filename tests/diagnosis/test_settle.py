@@ -9,7 +9,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis import overturn, selection
+from rollover.diagnosis import lasting as believed
+from rollover.diagnosis import overturn
 from rollover.diagnosis.blocks import GENTLE, Block, Fitted
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.effort import DROPS, RUNS, Effort
@@ -18,8 +19,8 @@ from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.intervals import intervals, scattered, unshaped
+from rollover.diagnosis.lasting import backed, before_the_blow, begun_anew, is_there, lasting, outlasts, unbent
 from rollover.diagnosis.overturn import CENTRE, NEIGHBOURS, RunSimulator
-from rollover.diagnosis.selection import backed, before_the_blow, begun_anew, is_there, lasting, outlasts, unbent
 from rollover.diagnosis.settle import along, left_of_means, rescattered, settled, step_of_means
 from rollover.diagnosis.verdict import Interval
 from rollover.effects import Search
@@ -410,7 +411,7 @@ def test_rivals_are_judged_by_the_mean_of_their_runs(monkeypatch: pytest.MonkeyP
     judge.weigh(every)
     weaker = judge.fit((candidate("mass", "parameter", "share"),), (0.5,), rounds=0)
     assert weaker is not None
-    monkeypatch.setattr(selection, "is_there", lambda *_: True)
+    monkeypatch.setattr(believed, "is_there", lambda *_: True)
     step = Step(base=base, fitted=weaker, p_value=0.0, rivals=(weaker, right))
     found = lasting(judge, step, [[k] for k in range(4)])
     assert found is not None
@@ -428,7 +429,7 @@ def test_a_strength_that_is_not_told_from_none_is_no_effect(monkeypatch: pytest.
 
     def told(low: float, high: float) -> bool:
         found = [{"depth": Interval(value=0.02, low=0.01, high=0.03, unit="m"), "stiffness_ratio": _from(low, high)}]
-        monkeypatch.setattr(selection, "intervals", lambda *_: found)
+        monkeypatch.setattr(believed, "intervals", lambda *_: found)
         return is_there(judge, fitted)
 
     assert not told(0.73, 1.37)
@@ -438,7 +439,7 @@ def test_a_strength_that_is_not_told_from_none_is_no_effect(monkeypatch: pytest.
     fitted = Fitted(candidates=(own,), x=(0.6,), blocks=())
     for low, high, there in ((0.4, 0.6, False), (0.55, 0.7, True)):
         alone = [{"coefficient": _from(low, high)}]
-        monkeypatch.setattr(selection, "intervals", lambda *_, alone=alone: alone)
+        monkeypatch.setattr(believed, "intervals", lambda *_, alone=alone: alone)
         assert is_there(judge, fitted) is there
 
 

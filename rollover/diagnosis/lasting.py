@@ -1,0 +1,103 @@
+"""What is believed of an effect where runs scatter: a base as well off as its rivals, and gains that outlast chance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from rollover.diagnosis.candidates import physical
+from rollover.diagnosis.explain import Step
+from rollover.diagnosis.fit import Fitted, Judge
+from rollover.diagnosis.gate import Gate, p_value
+from rollover.diagnosis.holdout import held_out
+from rollover.diagnosis.intervals import intervals
+from rollover.diagnosis.screening import begun
+from rollover.diagnosis.settle import left_of_means, settled
+from rollover.effects import EFFECTS
+
+Groups = Sequence[Sequence[int]]
+SPOKEN = 0.05  # p-value of a candidate's own score, beyond which its fit to runs that scatter is one to chance
+RIVAL = 0.5  # of the best's gain, by the mean of its runs, that a rival must have
+NEEDED = 25.0  # gain, over what is left per sample, that an effect must bring beside all the others
+
+
+def begun_anew(judge: Judge, base: Fitted) -> Fitted:
+    """A base from the time shifts that its rivals begin with, if that leaves less: where runs scatter it hangs on them.
+
+    Else what a better clock gains would be every rival's.
+    """
+    again = judge.fit(base.candidates, base.x, shifts=begun(judge, base))
+    return min((f for f in (base, again) if f is not None), key=lambda f: sum(b.total for b in f.blocks))
+
+
+def unbent(judge: Judge, base: Fitted) -> Fitted:
+    """A base with its time shifts no further from where known clocks say than their error."""
+    blocks = []
+    for r, b in enumerate(base.blocks):
+        known = judge.evidence[r].recording.clock.zero != "unknown"
+        there = min(max(b.shift, -b.prior), b.prior) if known else b.shift
+        new = judge.block(r, base.candidates, base.x, there, judge.effort.fine) if there != b.shift else b
+        blocks.append(new or b)
+    return replace(base, blocks=tuple(blocks))
+
+
+def backed(found: Step, looked: Gate) -> Step:
+    """A step without rivals that nothing spoke for when looked at: their runs met the recordings by chance."""
+    told = [f for f in found.rivals if p_value(looked.scores.get(f.candidates[-1].key, 0.0), looked.null) < SPOKEN]
+    return replace(found, rivals=tuple(told))
+
+
+def lasting(judge: Judge, found: Step, groups: Groups) -> Step | None:
+    """The best of a step's rivals by the mean of its runs, if that gains and has a strength; None if none does.
+
+    Rivals whose mean gains much less are none.
+    """
+    held = judge.evidence
+    start = left_of_means(judge, found.base)
+    gains = {
+        id(f): max(a - b for a, b in zip(start, left_of_means(judge, f), strict=True)) for f in found.rivals
+    }  # what shows before the blow need not outweigh what chance does after it
+    best = max(gains.values(), default=0.0)
+    near = [f for f in found.rivals if gains[id(f)] > RIVAL * best]
+    for rival in sorted(near, key=lambda f: -gains[id(f)]):
+        if gains[id(rival)] < NEEDED:
+            return None
+        one = settled(judge, replace(found, fitted=rival, rivals=tuple(near)))
+        if (outlasts(one, groups) or outlasts(before_the_blow(judge, one), groups)) and is_there(judge, one.fitted):
+            return one
+        judge.weigh(held)
+    return None
+
+
+def before_the_blow(judge: Judge, found: Step) -> Step:
+    """A step judged by samples alone that no course a run may take has touched."""
+    early = [np.concatenate([e.recording.time[s.rows] < e.blow for s in e.signals]) for e in judge.evidence]
+
+    def cut(f: Fitted) -> Fitted:
+        blocks = [
+            replace(b, residual=b.residual[k], J=b.J[k], slope=b.slope[k], course=None, expected=None)
+            for b, k in zip(f.blocks, early, strict=True)
+        ]
+        return replace(f, blocks=tuple(blocks))
+
+    return replace(found, base=cut(found.base), fitted=cut(found.fitted), rivals=())
+
+
+def is_there(judge: Judge, fitted: Fitted) -> bool:
+    """Whether the strength of the last effect is told from none: its interval keeps away from what changes nothing."""
+    last = fitted.candidates[-1]
+    nulls: dict[str, Any] = dict(EFFECTS[last.id].null)
+    for (name, search), at in zip(last.search.items(), last.neutral or (None,) * len(last.search), strict=True):
+        nulls[name] = nulls.get(name) if at is None else physical(at, search)
+    known = {name: i for name, i in intervals(judge, fitted)[-1].items() if isinstance(nulls.get(name), (int, float))}
+    return not known or any(not i.low <= nulls[name] <= i.high for name, i in known.items())
+
+
+def outlasts(found: Step, groups: Groups) -> bool:
+    """Whether an effect predicts what was held out better by more than chance, under the scatter of its own runs."""
+    with_, without_ = held_out(found.fitted, groups), held_out(found.base, groups)
+    phi = max(1.0, float(with_.left.sum() / with_.count.sum()))
+    return bool(float(without_.left.sum() - with_.left.sum()) > NEEDED * phi)

@@ -1,0 +1,140 @@
+"""Candidates looked at on a few recordings, in a few places each: which are worth a fit, and where it may begin."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rollover.diagnosis.candidates import BESIDE, Candidate
+from rollover.diagnosis.clocks import by_first_contact
+from rollover.diagnosis.effort import DROPS
+from rollover.diagnosis.fit import Fitted, Judge
+from rollover.diagnosis.gate import Gate, freed
+
+SCORED = 18  # candidates looked at closer, by their score
+BENT = 1.2  # misfit over the noise from which on time shifts fitted to it are bent by what is missing
+FAR = 3.0  # and from which on they are not fitted beside a first look
+ELSEWHERE = 0.2  # of a coordinate: starts so far apart are two
+
+
+@dataclass(frozen=True, kw_only=True)
+class Screened:
+    """A candidate looked at on a few recordings: the best starts, what is left there, the gain of its best direction.
+
+    `nrmse` is what a first fit leaves over the noise, 0 where there was none.
+    """
+
+    candidate: Candidate
+    starts: tuple[tuple[float, ...], ...]
+    left: float
+    potential: float
+    nrmse: float = 0.0
+
+
+def spread(base: Fitted, groups: Sequence[Sequence[int]], few: int = DROPS.few) -> list[int]:
+    """Few recordings that stand for all: of the conditions that are met worst, best, and in the middle."""
+    left = [b.normal()[2] / b.residual.size for b in base.blocks]
+    members = [max(g, key=lambda r: left[r]) for g in groups if g]
+    members.sort(key=lambda r: left[r])
+    if len(members) <= few:
+        return sorted(set(members)) if len(groups) > 1 else list(range(len(base.blocks)))[:few]
+    return sorted({members[round(k * (len(members) - 1) / (few - 1))] for k in range(few)})
+
+
+def is_far(judge: Judge, base: Fitted) -> bool:
+    """Whether a base is so far off that its time shifts tell of what is missing; beside a tolerance that is soon."""
+    far = FAR if judge.per_error == 1.0 else 1.0
+    return base.left > far**2 * sum(b.residual.size for b in base.blocks)
+
+
+def begun(judge: Judge, base: Fitted) -> list[float]:
+    """Time shifts (s) to begin with: where the base is off its own are bent by what is missing, the contact's hardly.
+
+    Where samples are weighed by what neighbours scatter by, how far off it is cannot be told from what is left.
+    """
+    count = sum(b.residual.size for b in base.blocks)
+    if judge.effort.thrifty or judge.per_error > 1.0:
+        told: list[float | None] = [None] * len(base.blocks)
+        if not judge.effort.thrifty and not is_far(judge, base):
+            return [b.shift for b in base.blocks]
+    elif base.left < BENT**2 * count:
+        return [b.shift for b in base.blocks]
+    else:
+        told = by_first_contact(judge, base.candidates, base.x)
+    return [
+        at if at is not None else b.shift if e.recording.clock.zero == "unknown" else 0.0
+        for at, b, e in zip(told, base.blocks, judge.evidence, strict=True)
+    ]
+
+
+def screen(
+    judge: Judge,
+    base: Fitted,
+    candidates: Sequence[Candidate],
+    few: Sequence[int],
+    shifts: Sequence[float],
+    looked: Gate,
+) -> list[Screened]:
+    """Look at each candidate in some places beside the base, on a few recordings, from time `shifts` (s) of all.
+
+    Not far from an explanation the places to which `looked` leads are enough.
+    """
+    found: list[Screened] = []
+    beside = [judge.block(r, base.candidates, base.x, shifts[r], 0.0) for r in few]
+    blocks = [b for b in beside if b is not None]
+    if len(blocks) < len(few):
+        return found
+    near = not is_far(judge, base) and not judge.effort.thrifty
+    for c in candidates:
+        met: list[tuple[float, tuple[float, ...]]] = []
+        potential = 0.0
+        ways = () if judge.effort.thrifty else looked.starts.get(c.key, ())
+        for start in ways if near and ways else (*ways, *c.starts()):
+            left, along, size, count = 0.0, 0.0, 0.0, 0
+            for r, block in zip(few, blocks, strict=True):
+                there = judge.block(r, (*base.candidates, c), (*base.x, *start), shifts[r], 0.0)
+                if there is None:
+                    break
+                count += 1
+                left += there.normal()[2]
+                free = freed(np.column_stack([block.residual - there.residual, block.residual]), block)
+                along += float(free[:, 0] @ free[:, 1])
+                size += float(free[:, 0] @ free[:, 0])
+            if count < len(blocks):
+                continue
+            if size > 1e-12:
+                potential = max(potential, along * along / size)
+            met.append((left, start))
+        if met:
+            met.sort()
+            found.append(Screened(candidate=c, starts=_begun_at(c, met), left=met[0][0], potential=potential))
+    return found
+
+
+def _begun_at(c: Candidate, met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float, ...], ...]:
+    """Where fits begin: the best starts; of few and far ones all, or the best and beside what changes nothing."""
+    if c.neutral is None:
+        return _apart(met)
+    neutral = [n + BESIDE for n in c.neutral if n is not None]
+    if len(neutral) < len(c.neutral):
+        return tuple(start for _, start in met)
+    return (tuple(neutral), met[0][1])
+
+
+def _apart(met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float, ...], ...]:
+    """The best start, and of two parameters the best one that is not beside it."""
+    best = met[0][1]
+    if len(best) < 2:
+        return (best,)
+    other = [s for _, s in met if max(abs(a - b) for a, b in zip(s, best, strict=True)) > ELSEWHERE]
+    return (best, *other[:1])
+
+
+def promising(candidates: Sequence[Candidate], looked: Gate, scored: int | None) -> list[Candidate]:
+    """Those that scored best, and of two parameters all: beside their thresholds a score tells little."""
+    ranked = sorted(candidates, key=lambda c: -looked.scores.get(c.key, 0.0))
+    if scored is not None:
+        return ranked[:scored]
+    return [c for k, c in enumerate(ranked) if k < SCORED or len(c.search) > 1]
