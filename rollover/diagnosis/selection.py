@@ -118,6 +118,7 @@ def explained(
     parts = [s.again(judge) for s in taken]
     if is_whole and len(taken) > 1:
         parts = _needed(judge, taken, candidates, groups, phases, say, crew)
+        parts[-1], _ = followed(judge, parts[-1], phases)
     base = judge.again(base)
     current = parts[-1].fitted if parts else base
     return Explanation(
@@ -160,14 +161,15 @@ def _look(judge: Judge, base: Fitted, candidates: Sequence[Candidate], groups: G
 
 
 def followed(judge: Judge, found: Step, phases: Phases) -> tuple[Step, Mismatch]:
-    """A step and what it leaves, its fit followed to the end if it leaves little more than noise, but that in doubt.
+    """A step and what it leaves; where that is little more than noise, its fit followed to the end; never worse.
 
-    Beside a kink, or a sample that a clock carries over a leap, a fit may end too early; never worse.
+    Beside a kink, or a sample that a clock carries over a leap, or in the valley that two effects share, a fit may end
+    too early. One effect's is followed only if what it leaves is in doubt.
     """
     old = found.fitted
     left = mismatch_of(judge.evidence, old.blocks, phases)
     is_near = old.left < NEARLY_NOISE**2 * sum(b.residual.size for b in old.blocks)
-    if judge.effort.thrifty or not is_near or left.p_value > MANY:
+    if judge.effort.thrifty or not is_near or (len(old.candidates) < 2 and left.p_value > MANY):
         return found, left
     new = timed(judge, polish(judge, old))
     if new.left >= old.left:
