@@ -43,6 +43,7 @@ class Signal:
     span: float
     scatter: float = 0.0  # between runs of one condition, SI
     step: float = 0.0  # of its digits, where noise does not hide it, SI
+    end: float = 0.0  # of its range, where values pile up, SI; 0: none is seen
     weight: Array | None = None  # (n,), below 1 where the model itself is not sure
     level: Array | None = None  # (n,), noise over `noise` where it grows with the value
 

@@ -20,7 +20,7 @@ from rollover.effects import EFFECTS, units_of
 
 Array = NDArray[np.float64]
 TWO_SIDED = 1.96
-ALIKE, PILE, NEAR = 1e-9, 5, 0.1  # of a value: equal; so often, and so near to the fit: the end of a range
+NEAR = 0.1  # of a value, by which the end of a range may lie beside the fit
 KNOWN = 1e-3  # of such an end, by which it is known
 EVENLY = 12.0**-0.5  # standard deviation of what is spread evenly from 0 to 1
 
@@ -160,10 +160,8 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
 
 def end_of(evidence: Sequence[Evidence], channel: str | None) -> float | None:
     """Size of the largest value of a channel if it is met again and again, to the last digit: the end of a range."""
-    every = [e.recording.channels[str(channel)] for e in evidence if channel in e.recording.channels]
-    sizes = np.abs(np.concatenate([np.zeros(1), *every]))
-    most = float(np.nanmax(sizes))
-    return most if most > 0.0 and np.count_nonzero(sizes >= most * (1.0 - ALIKE)) >= PILE else None
+    ends = [s.end for e in evidence for s in e.signals if s.channel == channel]
+    return max(ends, default=0.0) or None
 
 
 def read_off(fitted: Interval, end: float | None) -> Interval:

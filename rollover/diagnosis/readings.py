@@ -15,6 +15,7 @@ from rollover.recording import Recording
 Array = NDArray[np.float64]
 WHOLE = 0.02  # of a step, by which a level may stray from a whole number of them
 LEVELS = 3  # that a digitised channel has at least
+ALIKE, PILE = 1e-9, 5  # of a value: equal; so often: the end of a range
 REPEATED = 0.5  # of the samples: with so many levels, or more, a channel has no steps that matter
 
 
@@ -30,17 +31,25 @@ def resolution(values: Array) -> float:
     return step if np.all(np.abs(many - np.round(many)) < WHOLE) else 0.0
 
 
+def pile(values: Array) -> float:
+    """Size of the largest value (n,) if it is met again and again, to the last digit; 0 if not."""
+    sizes = np.abs(values[np.isfinite(values)])
+    most = float(np.max(sizes, initial=0.0))
+    return most if most > 0.0 and np.count_nonzero(sizes >= most * (1.0 - ALIKE)) >= PILE else 0.0
+
+
 def digitised(e: Evidence, recording: Recording) -> Evidence:
     """The evidence with half a step of its channels, as recorded, as an error that neighbouring samples share.
 
-    Noise larger than the step makes the error of each sample its own, and part of the noise.
+    Noise larger than the step makes the error of each sample its own, and part of the noise. Where values pile up at
+    the end of a range is kept too: samples that are averaged no longer show it.
     """
     signals = []
     for s in e.signals:
         step = resolution(recording.channels[s.channel])
         dithered = s.noise * np.sqrt(e.averaged) > step
-        error = 0.0 if dithered else 0.5 * step
-        signals.append(replace(s, step=2.0 * error, scatter=error, sigma=float(np.hypot(s.sigma, error))))
+        error, end = 0.0 if dithered else 0.5 * step, pile(recording.channels[s.channel])
+        signals.append(replace(s, step=2.0 * error, scatter=error, sigma=float(np.hypot(s.sigma, error)), end=end))
     return replace(e, signals=tuple(signals))
 
 

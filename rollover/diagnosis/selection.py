@@ -24,7 +24,7 @@ CHANCE = 0.005  # p-value of the best of all candidates that admits one
 MOST = 3  # effects in one explanation
 NEGLIGIBLE = 0.001  # of a channel's range: what moves nothing by more is not worth a name
 PARTLY = 0.02  # of the excess over the noise that one effect may leave and still be named
-MANY = 0.01  # p-value of what as many effects as may be leave, below which they are no explanation
+MANY = 0.05  # p-value of what as many effects as may be leave, below which they are no explanation
 HOPELESS = 2.0  # misfit over the noise that two effects leave and a third is not looked for
 BETTER = 0.5  # of what is left, that another first effect must leave
 

@@ -8,9 +8,13 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import intervals as stated
+from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.fit import Fitted, Judge
-from tests.diagnosis.drops import FORCE, recorded
+from rollover.diagnosis.readings import digitised
+from rollover.recording import Recording
+from tests.diagnosis.drops import FORCE, recorded, scenario
 from tests.diagnosis.test_fits import candidate, judge_of
 
 
@@ -34,14 +38,27 @@ def test_an_exponent_that_was_not_fitted_widens_the_interval_of_the_strength() -
     assert wide.value == narrow.value
 
 
+def read(recordings: list[tuple[str, Recording]]) -> Judge:
+    """Recordings made ready as a diagnosis does: many samples averaged, what the recorder makes of each kept."""
+    found = []
+    for name, r in recordings:
+        thin, simulator, averaged = simulated(scenario(), r)
+        e = evidence_of(name, thin, simulator, averaged)
+        assert e is not None
+        found.append(digitised(e, r))
+    return Judge(found)
+
+
+@pytest.mark.parametrize("rate", [300.0, 9000.0])  # of the faster several samples are averaged into one
 @pytest.mark.parametrize("limit", [1500.0, 2000.0])
-def test_an_end_of_a_range_is_read_off_where_samples_pile_up(limit: float) -> None:
+def test_an_end_of_a_range_is_read_off_where_samples_pile_up(limit: float, rate: float) -> None:
     """Noise goes in before the range ends: tops lie below the limit on the average, and a fit ends up below it."""
     recordings = []
-    for name, r in recorded({}, noise=0.02):
+    for name, r in recorded({}, noise=0.02, rate=rate, until=0.25):
         channels = {**r.channels, FORCE: np.clip(r[FORCE], -limit, limit)}
         recordings.append((name, replace(r, channels=channels)))
-    judge = judge_of(recordings)
+    judge = read(recordings)
+    assert (judge.evidence[0].averaged > 1) == (rate > 5000.0)
     fitted = fit(judge, candidate(judge, f"sensor-clipping:{FORCE}"))
     found = stated.intervals(judge, fitted)[0]["limit"]
     assert found.value == limit
@@ -49,5 +66,5 @@ def test_an_end_of_a_range_is_read_off_where_samples_pile_up(limit: float) -> No
 
 
 def test_a_peak_that_is_met_once_is_no_end_of_a_range() -> None:
-    judge = judge_of(recorded({}, noise=0.02))
+    judge = read(recorded({}, noise=0.02))
     assert stated.end_of(judge.evidence, FORCE) is None
