@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.blocks import Fitted, turned
+from rollover.diagnosis.blocks import Block, Fitted, turned
 from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.explain import moves
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.readings import resolution, without_spikes
 from rollover.effects import Search
 from rollover.recording import Recording
-from tests.diagnosis.drops import DEPTH, FORCE, linear_blocks, recorded, scenario
+from tests.diagnosis.drops import DEPTH, FORCE, linear_blocks, recorded, scenario, signal
 
 Recordings = list[tuple[str, Recording]]
 
@@ -75,3 +78,18 @@ def test_a_fit_with_its_first_effect_last_is_the_same_fit() -> None:
     assert np.array_equal(other.blocks[1].J[:, 0], fitted.blocks[1].J[:, 2])
     groups = [[0], [1], [2]]
     assert held_out(other, groups).left == pytest.approx(held_out(fitted, groups).left, rel=1e-9)
+
+
+def test_within_half_a_step_of_its_digits_nothing_has_moved() -> None:
+    """An offset of 0.4 of a step is what rounding makes of a value that does not change; one of 0.6 is none."""
+    values = np.linspace(0.0, 20.0, 100)
+    for share, told in ((0.4, 0.0), (0.6, 0.6 / 20.0)):
+        s = replace(signal(values, 0.1), step=1.0, span=20.0)
+        e: Any = SimpleNamespace(spans=lambda s=s: [(s, slice(0, 100))])
+        judge: Any = SimpleNamespace(evidence=[e])
+        blocks = [
+            Block(residual=np.full(100, off / 0.1), J=np.zeros((100, 0)), slope=np.zeros(100), shift=0.0, prior=1.0)
+            for off in (share, 0.0)
+        ]
+        base, fitted = (Fitted(candidates=(), x=(), blocks=(b,)) for b in blocks)
+        assert moves(judge, base, fitted) == pytest.approx(told)

@@ -1,0 +1,77 @@
+"""What is left decides whether effects are named, and more strictly where there are as many as may be."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis import selection
+from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.detect import Mismatch
+from rollover.diagnosis.explain import Step
+from rollover.diagnosis.fit import Fitted, Judge
+from rollover.diagnosis.gate import Gate
+from rollover.diagnosis.selection import MOST, Explanation, decided
+from rollover.effects import Search
+
+IDS = ("soil-crust", "guide-friction", "mass")
+
+
+def left(p_value: float) -> Mismatch:
+    return Mismatch(cells=(), p_value=p_value, adjusted=())
+
+
+def step(count: int) -> Step:
+    candidates = [Candidate(id=i, kind="physics", family="", search={"a": Search(0, 1)}) for i in IDS[:count]]
+    bare = Fitted(candidates=(), x=(), blocks=())
+    return Step(base=bare, fitted=Fitted(candidates=tuple(candidates), x=(0.5,) * count, blocks=()), p_value=0.0)
+
+
+def explanation(count: int, p_value: float) -> Explanation:
+    parts = tuple(step(k + 1) for k in range(count))
+    looked = Gate(score=99.0, scores={}, null=np.zeros(10), detectable={})
+    return Explanation(
+        base=parts[0].base,
+        fitted=parts[-1].fitted,
+        parts=parts,
+        looked=looked,
+        detectable={},
+        before=left(0.0),
+        after=left(p_value),
+        first=parts[0],
+    )
+
+
+@pytest.fixture
+def judged(monkeypatch: pytest.MonkeyPatch) -> dict[str, float]:
+    """Held-out misfit by label; everything that is left matters."""
+    misfits = {"as it is": 20.0, "soil-crust": 3.5}
+    monkeypatch.setattr(selection, "matters", lambda *_: True)
+    monkeypatch.setattr(selection, "is_tolerated", lambda *_: False)
+    monkeypatch.setattr(selection, "strongest", lambda *one: one[-1].candidates[0])
+    monkeypatch.setattr(selection, "held_out", lambda f, _: SimpleNamespace(total=misfits[f.label]))
+    monkeypatch.setattr(selection, "mismatch_of", lambda *_: left(1e-9))
+    return misfits
+
+
+@pytest.mark.parametrize(
+    ("count", "p_value", "named"), [(1, 0.002, 1), (2, 0.002, 2), (2, 1e-4, 0), (MOST, 0.02, 0), (MOST, 0.2, MOST)]
+)
+def test_as_many_effects_as_may_be_must_leave_what_chance_leaves(
+    count: int, p_value: float, named: int, judged: dict[str, float]
+) -> None:
+    found, verdict = decided(cast(Judge, SimpleNamespace(evidence=())), explanation(count, p_value), [], [])
+    assert len(found.parts) == named
+    assert verdict == ("missing-physics" if named else "unexplained")
+
+
+def test_one_that_takes_nearly_all_is_named_with_what_it_leaves_itself(judged: dict[str, float]) -> None:
+    judged["soil-crust"] = 1.5
+    judge: Any = SimpleNamespace(evidence=())
+    found, verdict = decided(judge, explanation(2, 1e-4), [], [])
+    assert verdict == "missing-physics"
+    assert found.fitted.label == "soil-crust"
+    assert found.after.p_value == 1e-9  # and not that of both
