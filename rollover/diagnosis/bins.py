@@ -62,6 +62,11 @@ class Averaged:
         return self._means(self.inner.state(shift))
 
     @property
+    def contact(self) -> float:
+        """See `Simulator`."""
+        return self.inner.contact
+
+    @property
     def effort(self) -> Effort:
         """See `Simulator`."""
         return self.inner.effort

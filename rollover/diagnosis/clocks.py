@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 WIDTH = 3.0  # times its prior, within which a time shift is sought
 PLACES = 241  # time shifts that are tried
 NEAR, AT_THE_END = 1e-3, 0.9  # s, about a first contact found without a model; of that, from which on it ends there
+QUIET = 2.0  # noise units, that the middle sample of a fall may miss
 SOON, LEAST = 8e-3, 4  # s after the first contact, and samples, that tell of it
 TRUSTED = 0.1  # of a change of a channel, by which the model may be off
 BELIEVED = 2.0  # times its prior: a shift beyond is the model's fault, where the clock's zero is known
@@ -46,8 +47,13 @@ def by_first_contact(judge: Judge, candidates: Sequence[Candidate], x: Sequence[
         # leaps as they are: these are what tells the time
         made, known = partial(judge.edged, r, candidates, x), e.recording.clock.zero != "unknown"
         places = WIDTH * e.shift_prior * np.linspace(-1.0, 1.0, PLACES)
-        places = places[places > e.recording.time[LEAST]]  # what never fell tells of no contact
+        places = places[places + e.simulator.contact > e.recording.time[LEAST]]  # what never fell tells of no contact
+        if not (np.isfinite(e.simulator.contact) and places.size):
+            found.append(None)
+            continue
         about = _best(judge, r, made, partial(onset, judge, r), places)
+        if about is not None and not _falls(judge, r, made(about), about):
+            about = None
         if about is not None:
             at = _best(judge, r, made, partial(_early, judge, r), about + NEAR * np.linspace(-1.0, 1.0, PLACES))
             about = about if at is None or abs(at - about) > AT_THE_END * NEAR else at  # the model leads away from it
@@ -81,7 +87,7 @@ def _whole(judge: Judge, r: int, raw: Array, shift: float) -> float:
 
 
 def onset(judge: Judge, r: int, raw: Array, shift: float) -> float:
-    """-2 ln of the likelihood that recording r falls until `shift` (s) and is something else thereafter.
+    """-2 ln of the likelihood that recording r falls until its contact, `shift` (s) late, and is something else then.
 
     Before, what it misses is noise; thereafter it may be as large as what is predicted, and larger at times: a Cauchy
     distribution of that width.
@@ -89,12 +95,24 @@ def onset(judge: Judge, r: int, raw: Array, shift: float) -> float:
     e = judge.evidence[r]
     total = (shift / e.shift_prior) ** 2
     for s, part in e.spans():
-        late = e.recording.time[s.rows] > shift
+        late = e.recording.time[s.rows] > e.simulator.contact + shift
         z = (s.values - raw[part]) / s.sigma
         wide = np.hypot(1.0, (raw[part] - raw[part][0]) / s.sigma)
         each = np.where(late, 2.0 * np.log(wide) + 2.0 * np.log1p((z / wide) ** 2), z**2)
         total += _worth(s) * float(np.sum(each))
     return total
+
+
+def _falls(judge: Judge, r: int, raw: Array | None, shift: float) -> bool:
+    """Whether what recording r shows before its contact, `shift` (s) late, is a fall: it may have begun too late."""
+    e = judge.evidence[r]
+    if raw is None:
+        return False
+    z = [
+        ((s.values - raw[part]) / s.sigma)[e.recording.time[s.rows] <= e.simulator.contact + shift]
+        for s, part in e.spans()
+    ]
+    return bool(np.median(np.abs(np.concatenate([np.zeros(1), *z]))) < QUIET)
 
 
 def _worth(s: Signal) -> float:
@@ -107,7 +125,7 @@ def _early(judge: Judge, r: int, raw: Array, shift: float) -> float:
     e = judge.evidence[r]
     total = (shift / e.shift_prior) ** 2
     for s, part in e.spans():
-        time = e.recording.time[s.rows] - shift
+        time = e.recording.time[s.rows] - shift - e.simulator.contact
         after = time[time > 0.0][LEAST - 1 : LEAST]
         inside = time < max(SOON, *after)
         sigma = np.hypot(s.sigma, TRUSTED * (raw[part] - raw[part][0]))

@@ -177,6 +177,11 @@ class RunSimulator:
         if known is not None and behind is not None:
             self._known[()], self._behind[()] = known, behind
 
+    @property
+    def contact(self) -> float:
+        """See `Simulator`: which contact is the first depends on what is recorded."""
+        return float("inf")
+
     def until(self, n: int) -> RunSimulator:
         """The same for the first n stamps: its runs end soon after them, where their filters no longer look ahead."""
         first = replace(

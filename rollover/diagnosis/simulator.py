@@ -49,6 +49,10 @@ class Simulator(Protocol):
         """Motion of the scenario as it is, recorded or not, (n,) each; empty if it cannot be simulated."""
 
     @property
+    def contact(self) -> float:
+        """When a scenario as it is first touches the ground, s; infinite if it never does or none can tell."""
+
+    @property
     def effort(self) -> Effort:
         """How much may be simulated."""
 
@@ -118,7 +122,7 @@ class DropSimulator:
             if lag is None:
                 found[channel] = self._run(physical, own, key)[channel]
                 continue
-            beside = self._contact + np.array([-BESIDE, BESIDE])
+            beside = self.contact + np.array([-BESIDE, BESIDE])
             fine = np.concatenate([own, 0.5 * (own[1:] + own[:-1]), beside[(beside > own[0]) & (beside < own[-1])]])
             dense, where = np.unique(fine, return_inverse=True)
             raw = replace(self._run(physical, dense, (*key, "dense")), time=dense)
@@ -126,7 +130,8 @@ class DropSimulator:
         return found
 
     @cached_property
-    def _contact(self) -> float:
+    def contact(self) -> float:
+        """See `Simulator`."""
         start = self.model.scenario.initiation
         if isinstance(start, Drop):
             return 0.0

@@ -74,6 +74,19 @@ def test_the_onset_of_contact_is_found_whatever_happens_then(late: float) -> Non
     assert np.abs(early).max() < 1.3e-3  # the clocks themselves stray by half a millisecond
 
 
+def test_a_recording_that_began_in_the_ground_tells_of_no_contact() -> None:
+    found = []
+    for e in judge_of({}).evidence:
+        inside = e.recording.time > 0.012
+        clock = replace(e.recording.clock, zero="unknown")
+        channels = {c: v[inside] for c, v in e.recording.channels.items()}
+        r = replace(e.recording, time=e.recording.time[inside], channels=channels, clock=clock)
+        one = evidence_of(e.name, r, simulator_of(scenario(), r))
+        assert one is not None
+        found.append(one)
+    assert by_first_contact(Judge(found), (), ()) == [None, None, None]
+
+
 def test_a_clock_that_would_have_to_be_far_off_is_not_believed_where_its_zero_is_known() -> None:
     judge = judge_of({}, late=5.0e-3)
     loose = []
