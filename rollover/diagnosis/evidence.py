@@ -168,7 +168,9 @@ class Evidence:
     def _whitened(signal: Signal, values: Array) -> Array:
         x = values / signal.sigma
         if signal.level is not None:
-            x = (x.T / signal.level).T  # samples, or columns of them
+            # the noise alone grows, not what a model may be off by; samples, or columns of them
+            rest = max(signal.sigma**2 - signal.noise**2, 0.0)
+            x = (x.T * signal.sigma / np.sqrt((signal.noise * signal.level) ** 2 + rest)).T
         if signal.weight is not None:
             return Evidence._coloured(signal, x) * signal.weight
         return Evidence._coloured(signal, x)

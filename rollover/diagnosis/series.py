@@ -157,7 +157,7 @@ def _louder(signal: Signal, time: Array, stamps: Array, single: float) -> Array 
     """1 sigma (n,) at `stamps` of the noise beyond its least, of `single` samples; None where it does not grow."""
     if signal.level is None:
         return None
-    return np.interp(stamps, time[signal.rows], signal.sigma * single * np.sqrt(signal.level**2 - 1.0))
+    return np.interp(stamps, time[signal.rows], signal.noise * single * np.sqrt(signal.level**2 - 1.0))
 
 
 def _rows_in_one(recording: Recording, thinner: Recording) -> float:

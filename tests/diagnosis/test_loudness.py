@@ -12,7 +12,7 @@ from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.evidence import Evidence, evidence_of
 from rollover.diagnosis.loudness import with_loudness
 from rollover.recording import Recording
-from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
+from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario, signal
 
 CHANNELS = (FORCE, DEPTH, ACCELERATION)
 FLOOR, SHARE = 0.002, 0.02  # of the largest range, of the value
@@ -85,3 +85,12 @@ def test_it_is_no_mismatch_and_hides_none() -> None:
     added = found.effects[0].parameters["added"]
     assert added.low < 4.0 < added.high
     assert found.after["held_out"].nrmse == pytest.approx(1.0, abs=0.1)
+
+
+def test_what_a_model_may_be_off_by_does_not_grow_with_the_noise() -> None:
+    """A noise of 0.1 that is ten times as loud at the end, beside an error of the model of 1."""
+    values, level = np.ones(50), np.linspace(1.0, 10.0, 50)
+    s = replace(signal(values, float(np.hypot(0.1, 1.0))), noise=0.1, level=level)
+    assert Evidence._whitened(s, values) == pytest.approx(1.0 / np.hypot(0.1 * level, 1.0))
+    columns = np.stack([values, 2.0 * values], axis=1)
+    assert Evidence._whitened(s, columns)[:, 1] == pytest.approx(2.0 / np.hypot(0.1 * level, 1.0))
