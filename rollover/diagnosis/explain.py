@@ -15,7 +15,7 @@ from rollover.diagnosis.crew import Crew, Job
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.effort import Effort
 from rollover.diagnosis.fit import NOISE_LEFT, Fitted, Judge
-from rollover.diagnosis.gate import Gate
+from rollover.diagnosis.gate import Gate, p_value
 from rollover.diagnosis.holdout import held_out, worse
 from rollover.diagnosis.screening import ELSEWHERE, Screened, begun, is_far, promising, screen, spread
 
@@ -103,9 +103,14 @@ def step(
         base, fits = judge.again(base), [judge.again(f) for f in fits]
     fits.sort(key=lambda f: held_out(f, groups).left.sum())
     fits = simplest(fits, groups, judge.per_error)
-    phi = max(1.0, min(f.left for f in fits) / count)  # what even the best leaves is no chance of the noise's size
-    phi *= judge.per_error
-    return Step(base=base, fitted=fits[0], p_value=looked.p_value(phi), rivals=tuple(fits), screened=tuple(screened))
+    least = min(f.left for f in fits)
+    phi = max(1.0, least / count)  # what even the best leaves is no chance of the noise's size
+    score = looked.score
+    if judge.per_error > 1.0:
+        # beside a tolerance what is missing is large, and a fit finds more of it than its slope where it is not
+        phi, score = phi * judge.per_error, max(score, base.left - least)
+    p = p_value(score / phi, looked.null)
+    return Step(base=base, fitted=fits[0], p_value=p, rivals=tuple(fits), screened=tuple(screened))
 
 
 def _combed(judge: Judge, fits: Sequence[Fitted], shifts: Sequence[float], crew: Crew, say: Progress) -> list[Fitted]:

@@ -143,7 +143,8 @@ def _look(judge: Judge, base: Fitted, candidates: Sequence[Candidate], groups: G
     effort = judge.effort
     if not effort.thrifty:
         return gate(judge, base, candidates)
-    base = unbent(judge, base)
+    if judge.per_error == 1.0:  # beside a tolerance it cannot be told what a clock has eaten
+        base = unbent(judge, base)
     few, more = spread(base, groups, effort.few), spread(base, groups, effort.looked_at)
     first = gate(judge, base, candidates, few)
     if len(more) <= len(few):
