@@ -50,7 +50,7 @@ from ground.kernel import (
     rut_depth,
 )
 from ground.law import BRANCH, REFERENCE_AREA
-from rollover.terms import CREEP, drag
+from rollover.terms import CREEP, fall_back, free
 
 # numbers of a drop: kg, kg, N/m, N s/m (no spring: rigid), -, m2, kg, N s, m/s2, m/s, s, N, N s2/m2,
 # m (height of a cone whose base is the face, 0: flat), m (above the ground at t = 0 with the speed, 0: first contact)
@@ -68,33 +68,6 @@ CLOSE = 1e-7  # m: how near a step ends to a jump of the force
 PAST = 2e-10  # m: how far beyond the end or the beginning of contact a step ends
 SAME_SPEED = 1e-7  # m/s: how near a step begins to where friction turns into a dashpot
 AT_REST = 1e-8  # m/s, and m/s2 over a millisecond: what is slower on its line of unloading stays where it is
-
-
-@compiled
-def free(g: float, mass: float, guide: float, air: float, crisis: float, thin: float, v: float) -> float:
-    """Downward acceleration of a body that falls with v on a guide through air, m/s2."""
-    if guide == 0.0 and air == 0.0:
-        return g
-    return g - (guide * min(max(v / CREEP, -1.0), 1.0) + drag(air, crisis, thin, abs(v)) * v * abs(v)) / mass
-
-
-@compiled
-def fall_back(
-    g: float, mass: float, guide: float, air: float, crisis: float, thin: float, v: float, time: float
-) -> Any:
-    """Depth (m) and speed (m/s) `time` seconds before a body that falls freely has depth 0 and speed v."""
-    if guide == 0.0 and air == 0.0:
-        return -(v * time - 0.5 * g * time * time), v - g * time
-    x, count = 0.0, max(math.ceil(time / 1e-3), 1)
-    h = -time / count
-    for _ in range(count):
-        k1 = free(g, mass, guide, air, crisis, thin, v)
-        k2 = free(g, mass, guide, air, crisis, thin, v + 0.5 * h * k1)
-        k3 = free(g, mass, guide, air, crisis, thin, v + 0.5 * h * k2)
-        k4 = free(g, mass, guide, air, crisis, thin, v + h * k3)
-        x += h * (v + h * (k1 + k2 + k3) / 6.0)
-        v += h * (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0
-    return x, v
 
 
 @compiled

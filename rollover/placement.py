@@ -12,7 +12,6 @@ from ground.relief import element_plane
 from ground.surface import Surface, height, is_flat
 from rollover.bodies import Body
 from rollover.equilibrium import ROLL, Equilibrium, tread_point
-from rollover.fall import fall_back
 from rollover.faults import Fault, InputError
 from rollover.forces import generalised_forces
 from rollover.frames import from_angles, from_quaternion, rotation_vector
@@ -20,6 +19,7 @@ from rollover.initiation import Driving, Drop, Release, Standing, Throw, TipOver
 from rollover.scenario import Scenario
 from rollover.step import stand
 from rollover.tables import W_RADIUS, Tables, handle
+from rollover.terms import fall_back
 from rollover.vehicle import Striker, Vehicle
 
 Array = NDArray[np.float64]

@@ -6,6 +6,7 @@ that it takes are kept for the start of the step and for now; the ledger books t
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,33 @@ def drag(factor: float, crisis: float, ratio: float, speed: float) -> float:
         return factor
     over = (speed / crisis - 1.0) / CRISIS_WIDTH
     return factor * (ratio + (1.0 - ratio) / (1.0 + np.exp(min(over, 100.0))))  # type: ignore[no-any-return]
+
+
+@compiled
+def free(g: float, mass: float, guide: float, air: float, crisis: float, thin: float, v: float) -> float:
+    """Downward acceleration of a body that falls with v on a guide through air, m/s2."""
+    if guide == 0.0 and air == 0.0:
+        return g
+    return g - (guide * min(max(v / CREEP, -1.0), 1.0) + drag(air, crisis, thin, abs(v)) * v * abs(v)) / mass
+
+
+@compiled
+def fall_back(
+    g: float, mass: float, guide: float, air: float, crisis: float, thin: float, v: float, time: float
+) -> Any:
+    """Depth (m) and speed (m/s) `time` seconds before a body that falls freely has depth 0 and speed v."""
+    if guide == 0.0 and air == 0.0:
+        return -(v * time - 0.5 * g * time * time), v - g * time
+    x, count = 0.0, max(math.ceil(time / 1e-3), 1)
+    h = -time / count
+    for _ in range(count):
+        k1 = free(g, mass, guide, air, crisis, thin, v)
+        k2 = free(g, mass, guide, air, crisis, thin, v + 0.5 * h * k1)
+        k3 = free(g, mass, guide, air, crisis, thin, v + 0.5 * h * k2)
+        k4 = free(g, mass, guide, air, crisis, thin, v + h * k3)
+        x += h * (v + h * (k1 + k2 + k3) / 6.0)
+        v += h * (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0
+    return x, v
 
 
 @compiled

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.evidence import Signal
+from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.fit import Judge
 
 Array = NDArray[np.float64]
@@ -34,9 +34,8 @@ Cost = Callable[[Array, float], float]
 
 def align(judge: Judge) -> None:
     """Begin with the time shift at which each recording meets the scenario best."""
-    for r in range(len(judge.evidence)):
-        places = WIDTH * judge.evidence[r].shift_prior * np.linspace(-1.0, 1.0, PLACES)
-        found = _best(judge, r, partial(judge.raw, r, (), ()), partial(_whole, judge, r), places)
+    for r, e in enumerate(judge.evidence):
+        found = _best(judge, r, partial(judge.raw, r, (), ()), partial(_whole, judge, r), _places(e))
         judge.shifts[r] = judge.shifts[r] if found is None else found
 
 
@@ -45,20 +44,29 @@ def by_first_contact(judge: Judge, candidates: Sequence[Candidate], x: Sequence[
     found: list[float | None] = []
     for r, e in enumerate(judge.evidence):
         # leaps as they are: these are what tells the time
-        made, known = partial(judge.edged, r, candidates, x), e.recording.clock.zero != "unknown"
-        places = WIDTH * e.shift_prior * np.linspace(-1.0, 1.0, PLACES)
-        places = places[places + e.simulator.contact > e.recording.time[LEAST]]  # what never fell tells of no contact
-        if not (np.isfinite(e.simulator.contact) and places.size):
-            found.append(None)
-            continue
-        about = _best(judge, r, made, partial(onset, judge, r), places)
-        if about is not None and not _falls(judge, r, made(about), about):
-            about = None
-        if about is not None:
-            at = _best(judge, r, made, partial(_early, judge, r), about + NEAR * np.linspace(-1.0, 1.0, PLACES))
-            about = about if at is None or abs(at - about) > AT_THE_END * NEAR else at  # the model leads away from it
-        found.append(None if about is None or (known and abs(about) > BELIEVED * e.shift_prior) else about)
+        at = _first_contact(judge, r, partial(judge.edged, r, candidates, x))
+        known = e.recording.clock.zero != "unknown"
+        found.append(None if at is None or (known and abs(at) > BELIEVED * e.shift_prior) else at)
     return found
+
+
+def _first_contact(judge: Judge, r: int, made: Made) -> float | None:
+    """Time shift (s) of recording r by its first contact: found without a model, then beside there by the model."""
+    e = judge.evidence[r]
+    places = _places(e)
+    places = places[places + e.simulator.contact > e.recording.time[LEAST]]  # what never fell tells of no contact
+    if not (np.isfinite(e.simulator.contact) and places.size):
+        return None
+    about = _best(judge, r, made, partial(onset, judge, r), places)
+    if about is None or not _falls(judge, r, made(about), about):
+        return None
+    at = _best(judge, r, made, partial(_early, judge, r), about + NEAR * np.linspace(-1.0, 1.0, PLACES))
+    return about if at is None or abs(at - about) > AT_THE_END * NEAR else at  # the model leads away from it
+
+
+def _places(e: Evidence) -> Array:
+    """Time shifts (s) that a recording's may be."""
+    return np.asarray(WIDTH * e.shift_prior * np.linspace(-1.0, 1.0, PLACES))
 
 
 def _best(judge: Judge, r: int, made: Made, cost: Cost, shifts: Array) -> float | None:

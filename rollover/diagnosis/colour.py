@@ -39,9 +39,8 @@ def quiet(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evid
         misfits, values = [], []
         for r, _, s, part in members:
             without_hum = _cleaned(evidence[r], s, residuals[r][part], humming)
-            level = 1.0 if s.level is None else s.level
-            misfits.append(without_hum / level)
-            values.append((s.values - residuals[r][part] + without_hum) / level)
+            misfits.append(without_hum / s.loudness)
+            values.append((s.values - residuals[r][part] + without_hum) / s.loudness)
         common = _quieter(misfits, values)
         if common is None:
             continue  # too short: what each says by itself stands
@@ -63,7 +62,7 @@ def whole(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evid
         members = [m for m in members if not evidence[m[0]].is_rough(m[2])]
         if not members:
             continue
-        parts = [_even(evidence[r], s, residuals[r][part], humming) for r, _, s, part in members]
+        parts = [_cleaned(evidence[r], s, residuals[r][part], humming) / s.loudness for r, _, s, part in members]
         levels = np.array([max(float(np.sqrt(np.mean(p * p))), 1e-300) for p in parts])
         # of one recorder unless they differ by more than so few samples can, each worth less for its memory
         _, ar = autoregression([p / level for p, level in zip(parts, levels, strict=True)])
@@ -96,12 +95,6 @@ def hums(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> dict[str, 
 def _cleaned(e: Evidence, s: Signal, misfit: Array, humming: Mapping[str, tuple[float, ...]]) -> Array:
     """A misfit without the lines of its channel."""
     return without(e.recording.time[s.rows], misfit, humming[s.channel])
-
-
-def _even(e: Evidence, s: Signal, misfit: Array, humming: Mapping[str, tuple[float, ...]]) -> Array:
-    """The same, of one level throughout."""
-    found = _cleaned(e, s, misfit, humming)
-    return found if s.level is None else found / s.level
 
 
 def slower(told: Sequence[tuple[int, int, Signal, float, tuple[float, ...]]]) -> set[str]:

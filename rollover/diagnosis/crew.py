@@ -28,7 +28,7 @@ class Job:
     """A fit to be made: `only` some recordings, from time `shifts` (s) of these; see `Judge.fit`.
 
     "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too, "time" tries out
-    the time shifts.
+    the time shifts, "comb" begins anew all along the second parameter of the last effect.
     """
 
     how: Literal["fit", "polish", "shape", "time", "comb"] = "fit"

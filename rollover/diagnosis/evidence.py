@@ -47,6 +47,11 @@ class Signal:
     weight: Array | None = None  # (n,), below 1 where the model itself is not sure
     level: Array | None = None  # (n,), noise over `noise` where it grows with the value
 
+    @property
+    def loudness(self) -> Array | float:
+        """Noise over `noise`, (n,); 1 where it is the same throughout."""
+        return 1.0 if self.level is None else self.level
+
 
 @dataclass(frozen=True, kw_only=True)
 class Evidence:

@@ -56,6 +56,10 @@ class Step:
         best = next((new for new, old in zip(rivals, self.rivals, strict=True) if old is self.fitted), None)
         return replace(self, base=judge.again(self.base), fitted=best or judge.again(self.fitted), rivals=rivals)
 
+    def moved_to(self, new: Fitted) -> Step:
+        """The same with another fit of its best, among the rivals too."""
+        return replace(self, fitted=new, rivals=tuple(new if f is self.fitted else f for f in self.rivals))
+
 
 def step(
     judge: Judge,
@@ -115,13 +119,11 @@ def step(
 
 def _combed(judge: Judge, fits: Sequence[Fitted], shifts: Sequence[float], crew: Crew, say: Progress) -> list[Fitted]:
     """The fits, best first, the best of two parameters begun anew along the second if it leads or nearly so."""
-    found = list(fits)
-    for k, f in enumerate(fits):
-        if len(f.candidates[-1].search) == 2 and f.left < LEADS * fits[0].left:
-            (new,) = crew.fits(judge, [Job(how="comb", candidates=f.candidates, start=f.x, shifts=tuple(shifts))], say)
-            found[k] = new if new is not None and new.left < f.left else f
-            break
-    return sorted(found, key=lambda f: f.left)
+    able = [f for f in fits if len(f.candidates[-1].search) == 2 and f.left < LEADS * fits[0].left][:1]
+    jobs = [Job(how="comb", candidates=f.candidates, start=f.x, shifts=tuple(shifts)) for f in able]
+    tried = zip(crew.fits(judge, jobs, say), able, strict=True)
+    better = [new if new is not None and new.left < old.left else old for new, old in tried]
+    return sorted([*better, *(f for f in fits if not any(f is one for one in able))], key=lambda f: f.left)
 
 
 def _from_base(

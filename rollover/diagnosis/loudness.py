@@ -77,7 +77,7 @@ def _grows(told: Sequence[tuple[Array, Array]]) -> bool:
 
 
 def _law(told: Sequence[tuple[Array, Array]]) -> tuple[Array, float]:
-    """Coefficients of s^2 by the value, highest power first, by least squares of its logarithm's size; its least."""
+    """Coefficients of s^2 by the value, highest power first, by least squares over what is seen; its least."""
     value, size, _ = _sizes(told, np.concatenate([values for values, _ in told]))
     scale = float(np.max(np.abs(value)))
     x = np.vander(value / scale, 3)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.blocks import WIDEST, Block, Fitted
+from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import NOISE_LEFT, Judge
 
 Array = NDArray[np.float64]
@@ -14,6 +17,12 @@ STARTS, APART = 3, 0.06  # of the best places, so far apart
 TICK, SHORTEST, NARROWER = 8e-5, 5e-6, 0.4  # s, by which a time shift is tried to either side; then less, by a factor
 TRIED = 40  # at most so many
 TWICE, LITTLE = 2, 1.0  # how often; a gain that is not worth another time
+
+
+def left_at(judge: Judge, candidates: Sequence[Candidate], x: Sequence[float], shifts: Sequence[float]) -> float | None:
+    """What is left of all recordings at x and these time shifts (s); None where one cannot be simulated."""
+    blocks = [judge.block(r, candidates, x, s, 0.0) for r, s in enumerate(shifts)]
+    return None if any(b is None for b in blocks) else sum(b.normal()[2] for b in blocks if b is not None)
 
 
 def polish(judge: Judge, fitted: Fitted, size: float = 0.02, most: int = 45) -> Fitted:
@@ -25,10 +34,8 @@ def polish(judge: Judge, fitted: Fitted, size: float = 0.02, most: int = 45) -> 
     def left(x: Array) -> float:
         inside = [float(v) for v in np.clip(x, 0.0, 1.0)]
         out = float(np.sum(np.abs(x - np.array(inside))))
-        blocks = [judge.block(r, fitted.candidates, inside, s, 0.0) for r, s in enumerate(shifts)]
-        if any(b is None for b in blocks):
-            return 1e300
-        return sum(b.normal()[2] for b in blocks if b is not None) * (1.0 + out)
+        there = left_at(judge, fitted.candidates, inside, shifts)
+        return 1e300 if there is None else there * (1.0 + out)
 
     start = np.array(fitted.x)
     simplex = np.vstack(
@@ -49,11 +56,7 @@ def combed(judge: Judge, fitted: Fitted) -> Fitted:
     at, shifts = len(fitted.x) - 2, [b.shift for b in fitted.blocks]
     firsts = np.clip(fitted.x[at] + COMBED * np.linspace(-1.0, 1.0, TEETH), 0.0, 1.0)
     places = [(*fitted.x[:at], float(a), float(b)) for a in firsts for b in (np.arange(BESIDE) + 0.5) / BESIDE]
-    met = []
-    for x in places:
-        blocks = [judge.block(r, fitted.candidates, x, s, 0.0) for r, s in enumerate(shifts)]
-        if all(b is not None for b in blocks):
-            met.append((sum(b.normal()[2] for b in blocks if b is not None), x))
+    met = [(there, x) for x in places if (there := left_at(judge, fitted.candidates, x, shifts)) is not None]
     chosen: list[tuple[float, ...]] = []
     for _, x in sorted(met):
         if len(chosen) < STARTS and all(max(abs(a - b) for a, b in zip(x, c, strict=True)) > APART for c in chosen):
@@ -95,12 +98,8 @@ def shaped(judge: Judge, f: Fitted) -> Fitted | None:
     """The fit with the shape of its last effect fitted too, from the best of some places."""
     last, shifts = f.candidates[-1], [b.shift for b in f.blocks]
     candidates, at = (*f.candidates[:-1], last.whole()), len(f.x) - len(last.search)
-    begun: list[tuple[float, tuple[float, ...]]] = []
-    for start in last.with_shapes(f.x[at:]):
-        x = (*f.x[:at], *start)
-        blocks = [judge.block(r, candidates, x, s, 0.0) for r, s in enumerate(shifts)]
-        if all(b is not None for b in blocks):
-            begun.append((sum(b.normal()[2] for b in blocks if b is not None), x))
+    places = [(*f.x[:at], *start) for start in last.with_shapes(f.x[at:])]
+    begun = [(there, x) for x in places if (there := left_at(judge, candidates, x, shifts)) is not None]
     if not begun:
         return None
     again = judge.fit(candidates, min(begun)[1], shifts=shifts)

@@ -175,8 +175,7 @@ def followed(judge: Judge, found: Step, phases: Phases) -> tuple[Step, Mismatch]
     new = timed(judge, polish(judge, old))
     if new.left >= old.left:
         return found, left
-    rivals = tuple(new if f is old else f for f in found.rivals)
-    return replace(found, fitted=new, rivals=rivals), mismatch_of(judge.evidence, new.blocks, phases)
+    return found.moved_to(new), mismatch_of(judge.evidence, new.blocks, phases)
 
 
 def free(current: Fitted, candidates: Sequence[Candidate]) -> list[Candidate]:

@@ -45,8 +45,7 @@ def settled(judge: Judge, part: Step) -> Step:
     # nearly as good, the whole way: the mean of runs is worth more than the one that happens to be there
     if tried[0] is not None and tried[0].left < NEARLY * new.left:
         new = tried[0]
-    rivals = tuple(new if f is old else f for f in part.rivals)
-    return replace(part, fitted=new, rivals=rivals)
+    return part.moved_to(new)
 
 
 def _at(judge: Judge, old: Fitted, dx: Array) -> Fitted | None:

@@ -31,6 +31,19 @@ def judge_of(changes: dict[str, object], *, late: float = 0.0, rate: float = 100
     return Judge(found)
 
 
+def without_zero(judge: Judge, since: float = -np.inf) -> Judge:
+    """The same recordings from `since` (s) on, by clocks that have no zero."""
+    found = []
+    for e in judge.evidence:
+        inside, clock = e.recording.time > since, replace(e.recording.clock, zero="unknown")
+        channels = {c: v[inside] for c, v in e.recording.channels.items()}
+        r = replace(e.recording, time=e.recording.time[inside], channels=channels, clock=clock)
+        one = evidence_of(e.name, r, simulator_of(scenario(), r))
+        assert one is not None
+        found.append(one)
+    return Judge(found)
+
+
 def known(judge: Judge, changes: dict[str, object]) -> np.ndarray:
     """Time shifts by fits of the truth itself, s."""
     id = next(iter(changes)).split(".")[1]
@@ -58,13 +71,7 @@ def test_the_first_contact_is_not_bent_by_what_the_simulation_misses(missing: di
 def test_the_onset_of_contact_is_found_whatever_happens_then(late: float) -> None:
     """A striker that gives way rings from the first instant, and its recorder's clock has no zero."""
     ringing = {"effects.structural-compliance.stiffness": 1.9e6, "effects.structural-compliance.damping": 1400.0}
-    found = []
-    for e in judge_of(ringing, late=late).evidence:
-        r = replace(e.recording, clock=replace(e.recording.clock, zero="unknown"))
-        one = evidence_of(e.name, r, simulator_of(scenario(), r))
-        assert one is not None
-        found.append(one)
-    judge = Judge(found)
+    judge = without_zero(judge_of(ringing, late=late))
     align(judge)
     base = judge.fit((), ())
     assert base is not None
@@ -75,16 +82,7 @@ def test_the_onset_of_contact_is_found_whatever_happens_then(late: float) -> Non
 
 
 def test_a_recording_that_began_in_the_ground_tells_of_no_contact() -> None:
-    found = []
-    for e in judge_of({}).evidence:
-        inside = e.recording.time > 0.012
-        clock = replace(e.recording.clock, zero="unknown")
-        channels = {c: v[inside] for c, v in e.recording.channels.items()}
-        r = replace(e.recording, time=e.recording.time[inside], channels=channels, clock=clock)
-        one = evidence_of(e.name, r, simulator_of(scenario(), r))
-        assert one is not None
-        found.append(one)
-    assert by_first_contact(Judge(found), (), ()) == [None, None, None]
+    assert by_first_contact(without_zero(judge_of({}), since=0.012), (), ()) == [None, None, None]
 
 
 def test_a_clock_that_would_have_to_be_far_off_is_not_believed_where_its_zero_is_known() -> None:

@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import intervals as stated
-from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.readings import digitised
 from rollover.recording import Recording
-from tests.diagnosis.drops import FORCE, recorded, scenario
+from tests.diagnosis.drops import FORCE, recorded
 from tests.diagnosis.test_fits import candidate, judge_of
 
 
@@ -40,13 +38,8 @@ def test_an_exponent_that_was_not_fitted_widens_the_interval_of_the_strength() -
 
 def read(recordings: list[tuple[str, Recording]]) -> Judge:
     """Recordings made ready as a diagnosis does: many samples averaged, what the recorder makes of each kept."""
-    found = []
-    for name, r in recordings:
-        thin, simulator, averaged = simulated(scenario(), r)
-        e = evidence_of(name, thin, simulator, averaged)
-        assert e is not None
-        found.append(digitised(e, r))
-    return Judge(found)
+    made = judge_of(recordings).evidence
+    return Judge([digitised(e, r) for e, (_, r) in zip(made, recordings, strict=True)])
 
 
 @pytest.mark.parametrize("rate", [300.0, 9000.0])  # of the faster several samples are averaged into one

@@ -5,14 +5,11 @@ from __future__ import annotations
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.candidates import candidates_of
-from rollover.diagnosis.evidence import Evidence, evidence_of
-from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.refine import combed
-from rollover.diagnosis.simulator import simulator_of
 from rollover.simulate import run
 from rollover.synthesis import synthetic
-from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
+from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded
+from tests.diagnosis.test_fits import candidate, judge_of
 from tests.physics.scenes import shipped
 
 CHANNELS = (FORCE, DEPTH, ACCELERATION)
@@ -22,17 +19,11 @@ def test_a_damping_behind_a_cliff_is_found() -> None:
     """A hopping striker: what its body does after each landing hangs on the one before."""
     true = {"stiffness": 1.888e6, "damping": 1372.0}
     hidden = {f"effects.structural-compliance.{name}": value for name, value in true.items()}
-    evidence: list[Evidence] = []
-    for name, r in recorded(
-        hidden, 1, speeds=(1.13, 2.4, 2.8, 1.98, 1.6, 3.1), channels=CHANNELS, rate=1500.0, noise=0.005
-    ):
-        one = evidence_of(name, r, simulator_of(scenario(), r))
-        assert one is not None
-        evidence.append(one)
-    judge = Judge(evidence)
-    (c,) = (c for c in candidates_of(evidence, (), "drop") if c.id == "structural-compliance")
-    count = sum(e.count for e in evidence)
-    led_astray = judge.fit((c,), (0.5625, 0.2), shifts=[0.0] * len(evidence))
+    speeds = (1.13, 2.4, 2.8, 1.98, 1.6, 3.1)
+    judge = judge_of(recorded(hidden, 1, speeds=speeds, channels=CHANNELS, rate=1500.0, noise=0.005))
+    c = candidate(judge, "structural-compliance")
+    count = sum(e.count for e in judge.evidence)
+    led_astray = judge.fit((c,), (0.5625, 0.2), shifts=[0.0] * len(speeds))
     assert led_astray is not None
     assert led_astray.left > 4.0 * count
     found = combed(judge, led_astray)

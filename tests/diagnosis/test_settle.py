@@ -9,7 +9,6 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis import lasting as believed
 from rollover.diagnosis import overturn
 from rollover.diagnosis.blocks import GENTLE, Block, Fitted
 from rollover.diagnosis.candidates import Candidate
@@ -17,12 +16,9 @@ from rollover.diagnosis.effort import DROPS, RUNS, Effort
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Judge
-from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.intervals import intervals, scattered, unshaped
-from rollover.diagnosis.lasting import backed, before_the_blow, begun_anew, is_there, lasting, outlasts, unbent
 from rollover.diagnosis.overturn import CENTRE, NEIGHBOURS, RunSimulator
-from rollover.diagnosis.settle import along, left_of_means, rescattered, settled, step_of_means
-from rollover.diagnosis.verdict import Interval
+from rollover.diagnosis.settle import along, rescattered, settled, step_of_means
 from rollover.effects import Search
 from rollover.recording import Recording
 from rollover.scenario import Scenario
@@ -269,88 +265,6 @@ def test_parameters_hold_though_runs_scatter() -> None:
     assert np.median(widths) < 0.02
 
 
-def test_what_gains_no_more_than_chance_on_held_out_recordings_is_not_taken() -> None:
-    rng = np.random.default_rng(2)
-
-    def step(size: float) -> Step:
-        """Four recordings with an effect of `size` noise units along J, fitted."""
-        J = [rng.standard_normal((N, 1)) for _ in range(4)]
-        w = [size * j[:, 0] + rng.standard_normal(N) for j in J]
-        dx = sum(float(j[:, 0] @ y) for j, y in zip(J, w, strict=True)) / sum(float(j[:, 0] @ j[:, 0]) for j in J)
-        base = [Block(residual=y, J=np.zeros((N, 0)), slope=np.zeros(N), shift=0.0, prior=1.0) for y in w]
-        ends = [replace(b, residual=y - j[:, 0] * dx, J=j) for b, y, j in zip(base, w, J, strict=True)]
-        as_it_is = Fitted(candidates=(), x=(), blocks=tuple(base))
-        return Step(base=as_it_is, fitted=Fitted(candidates=(SLOPE,), x=(0.5,), blocks=tuple(ends)), p_value=0.0)
-
-    groups = [[k] for k in range(4)]
-    assert not any(outlasts(step(0.0), groups) for _ in range(50))
-    assert all(outlasts(step(0.6), groups) for _ in range(50))
-
-
-def test_where_the_first_does_not_last_the_next_one_is_taken() -> None:
-    """A step whose best fit gains nothing under the scatter of its runs, and whose second does."""
-    every = [evidence(r, 0.1, 8.0 * np.sin(30.0 * TIME)) for r in range(4)]
-    judge = Judge(every)
-    base, right = judge.fit((), ()), judge.fit((SLOPE,), (0.3,))
-    assert base is not None
-    assert right is not None
-    before = judge.evidence
-    wrong = judge.fit((candidate("inertia", "parameter", "scale"),), (0.5,))  # moves nothing
-    assert wrong is not None
-    step = Step(base=base, fitted=wrong, p_value=0.0, rivals=(wrong, right))
-    groups = [[k] for k in range(4)]
-    found = lasting(judge, step, groups)
-    assert found is not None
-    assert found.fitted.candidates[-1].key == "slope"
-    assert found.fitted.x[0] == pytest.approx(0.4, abs=0.02)
-    assert judge.evidence is not before
-    kept = judge.evidence
-    assert lasting(judge, replace(step, rivals=(wrong,)), groups) is None
-    assert judge.evidence == kept
-
-
-def test_a_rival_that_nothing_spoke_for_is_none() -> None:
-    fits = [
-        Fitted(candidates=(candidate(k, "physics", "a"),), x=(0.5,), blocks=()) for k in ("slope", "mass", "inertia")
-    ]
-    null = np.sort(np.random.default_rng(0).standard_normal((4000, 20)).max(axis=1) ** 2)
-    looked = Gate(score=60.0, scores={"slope": 60.0, "mass": 4.0}, null=null, detectable={})
-    step = Step(base=fits[0], fitted=fits[1], p_value=0.0, rivals=tuple(fits))
-    assert backed(step, looked).rivals == (fits[0],)
-
-
-def test_what_shows_before_the_blow_alone_lasts() -> None:
-    """An effect that is sure while a body tips, and runs that go elsewhere after the blow."""
-    rng = np.random.default_rng(3)
-    every = [replace(evidence(r, 0.1), blow=TIME[N // 2]) for r in range(4)]
-    early = TIME[N // 2] > TIME
-    J = [rng.standard_normal((N, 1)) for _ in range(4)]
-    w = [np.where(early, 0.6, rng.uniform(-30.0, 30.0)) * j[:, 0] + rng.standard_normal(N) for j in J]
-    base = [Block(residual=y, J=np.zeros((N, 0)), slope=np.zeros(N), shift=0.0, prior=1.0) for y in w]
-    ends = [replace(b, residual=y - 0.6 * j[:, 0], J=j) for b, y, j in zip(base, w, J, strict=True)]
-    whole = Step(
-        base=Fitted(candidates=(), x=(), blocks=tuple(base)),
-        fitted=Fitted(candidates=(SLOPE,), x=(0.5,), blocks=tuple(ends)),
-        p_value=0.0,
-    )
-    groups = [[k] for k in range(4)]
-    assert not outlasts(whole, groups)
-    assert outlasts(before_the_blow(Judge(every), whole), groups)
-
-
-def test_a_base_is_begun_where_its_rivals_are() -> None:
-    """A base whose clock was bent far off, and leaves more there than where the clock says."""
-    rng = np.random.default_rng(5)
-    judge = Judge([evidence(0, 0.0, 0.1 * rng.standard_normal(N))])
-    bent = judge.block(0, (), (), 3.0 * judge.evidence[0].shift_prior, judge.effort.fine)
-    assert bent is not None
-    base = Fitted(candidates=(), x=(), blocks=(bent,))
-    assert begun_anew(judge, base).blocks[0].shift == 0.0
-    assert unbent(judge, base).blocks[0].shift == judge.evidence[0].shift_prior
-    good = begun_anew(judge, base)
-    assert begun_anew(judge, good).blocks[0].total <= good.blocks[0].total
-
-
 def test_a_move_does_not_leap_to_another_course() -> None:
     """Where the whole move goes, from x = 0.365 to 0.385, runs take another course than was measured."""
 
@@ -373,75 +287,3 @@ def test_a_move_does_not_leap_to_another_course() -> None:
     found = settled(judge, Step(base=base, fitted=fitted, p_value=0.0, rivals=(fitted,)))
     assert not 0.365 < found.fitted.x[0] < 0.385
     assert found.fitted.left < judge.again(fitted).left
-
-
-def test_rivals_are_judged_by_the_mean_of_their_runs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One rival's run meets the recordings by chance while its neighbours do not, the other's all do but itself."""
-
-    class Chance(Rough):
-        def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
-            slope, scale = changes.get("effects.slope.angle", 0.0), changes.get("effects.inertia.scale", 0.0)
-            lucky = bool(scale) and not changes.get("neighbour", 0)
-            off = 0.4 * bool(slope) * (not changes.get("neighbour", 0)) * np.cos(20.0 * TIME)
-            weak = 0.3 * bool(changes.get("effects.mass.share", 0.0))
-            return {CHANNEL: 20.0 * (slope or weak or 0.4 * lucky) * np.sin(30.0 * TIME) + off}
-
-    rng = np.random.default_rng(4)
-    every = []
-    for r in range(4):
-        one = evidence(r, 0.1, 8.0 * np.sin(30.0 * TIME) + 0.1 * rng.standard_normal(N))
-        every.append(replace(one, simulator=cast(Any, Chance(r, 0.1))))
-    judge = Judge(every)
-    base, right = judge.fit((), ()), judge.fit((SLOPE,), (0.4,), rounds=0)
-    lucky = judge.fit((candidate("inertia", "parameter", "scale"),), (0.5,), rounds=0)
-    assert base is not None
-    assert right is not None
-    assert lucky is not None
-    assert lucky.left < right.left
-    assert left_of_means(judge, right)[0] < 0.5 * right.left
-    assert left_of_means(judge, lucky)[0] > 10.0 * left_of_means(judge, right)[0]
-    early = [replace(e, blow=TIME[20]) for e in every]
-    judge.weigh(early)
-    part = sum(float(b.residual[:20] @ b.residual[:20]) + (b.shift / b.prior) ** 2 for b in base.blocks)
-    assert left_of_means(judge, base)[1] == pytest.approx(part, rel=0.01)
-    judge.weigh(every)
-    found = lasting(judge, Step(base=base, fitted=lucky, p_value=0.0, rivals=(lucky, right)), [[k] for k in range(4)])
-    assert found is not None
-    assert [f.candidates[-1].key for f in found.rivals] == ["slope"]
-    judge.weigh(every)
-    weaker = judge.fit((candidate("mass", "parameter", "share"),), (0.5,), rounds=0)
-    assert weaker is not None
-    monkeypatch.setattr(believed, "is_there", lambda *_: True)
-    step = Step(base=base, fitted=weaker, p_value=0.0, rivals=(weaker, right))
-    found = lasting(judge, step, [[k] for k in range(4)])
-    assert found is not None
-    assert found.fitted.candidates[-1].key == "slope"
-    assert len(found.rivals) == 2
-
-
-def test_a_strength_that_is_not_told_from_none_is_no_effect(monkeypatch: pytest.MonkeyPatch) -> None:
-    judge = Judge([evidence(0, 0.1, np.zeros(N))])
-    layer = replace(
-        candidate("soil-layer", "physics", "depth"),
-        search={"depth": Search(0.0, 0.1), "stiffness_ratio": Search(0.1, 9.0, "log")},
-    )
-    fitted = Fitted(candidates=(layer,), x=(0.5, 0.5), blocks=())
-
-    def told(low: float, high: float) -> bool:
-        found = [{"depth": Interval(value=0.02, low=0.01, high=0.03, unit="m"), "stiffness_ratio": _from(low, high)}]
-        monkeypatch.setattr(believed, "intervals", lambda *_: found)
-        return is_there(judge, fitted)
-
-    assert not told(0.73, 1.37)
-    assert told(1.1, 1.4)
-    assert told(0.5, 0.9)
-    own = replace(candidate("ground-friction", "physics", "coefficient"), neutral=(0.5,))  # the scenario's is 0.5
-    fitted = Fitted(candidates=(own,), x=(0.6,), blocks=())
-    for low, high, there in ((0.4, 0.6, False), (0.55, 0.7, True)):
-        alone = [{"coefficient": _from(low, high)}]
-        monkeypatch.setattr(believed, "intervals", lambda *_, alone=alone: alone)
-        assert is_there(judge, fitted) is there
-
-
-def _from(low: float, high: float) -> Interval:
-    return Interval(value=0.5 * (low + high), low=low, high=high, unit="1")
