@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Block, Fitted, Judge
-from rollover.diagnosis.refine import combed, polish, shaped, timed
+from rollover.diagnosis.refine import combed, polish, scanned, shaped, timed
 from rollover.execute import Children, map_cases
 
 Progress = Callable[[str], None]
@@ -28,10 +28,10 @@ class Job:
     """A fit to be made: `only` some recordings, from time `shifts` (s) of these; see `Judge.fit`.
 
     "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too, "time" tries out
-    the time shifts, "comb" begins anew all along the second parameter of the last effect.
+    the time shifts, "comb" begins anew all along the second parameter of the last effect, "scan" all along its shape.
     """
 
-    how: Literal["fit", "polish", "shape", "time", "comb"] = "fit"
+    how: Literal["fit", "polish", "shape", "time", "comb", "scan"] = "fit"
     candidates: tuple[Candidate, ...]
     start: tuple[float, ...]
     shifts: tuple[float, ...]
@@ -60,7 +60,7 @@ class Crew:
 
     def __init__(self, workers: int = 1, notebook: Path | None = None, about: str = "") -> None:
         self.workers, self.notebook, self.about = workers, notebook, about
-        self._children = Children(workers)
+        self.children = Children(workers)
         self._worked = 0.0  # s, on fits in this process
         self._done: dict[str, dict[str, Any] | None] = {}
         if notebook is not None and notebook.exists():
@@ -75,7 +75,7 @@ class Crew:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._children.stop()
+        self.children.stop()
 
     def close(self) -> None:
         """All is done: nothing needs to be taken up again."""
@@ -107,7 +107,7 @@ class Crew:
         if done == len(todo):
             return found
         bare, rest, about = judge.bare(), todo[done:], f"{about} {judge.shifts}"
-        outcomes = map_cases(_worked, [(about, bare, jobs[k]) for k in rest], children=self._children)
+        outcomes = map_cases(_worked, [(about, bare, jobs[k]) for k in rest], children=self.children)
         for outcome in outcomes:
             k = rest[outcome.index]
             if outcome.failure is not None:
@@ -142,7 +142,7 @@ def work(judge: Judge, job: Job) -> Fitted | None:
     if begun is None:
         return None
     ways: dict[str, Callable[[Judge, Fitted], Fitted | None]] = {
-        "polish": polish, "shape": shaped, "time": timed, "comb": combed,
+        "polish": polish, "shape": shaped, "time": timed, "comb": combed, "scan": scanned,
     }  # fmt: skip
     return ways[job.how](judge, begun)
 

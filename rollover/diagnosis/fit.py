@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.chaos import course
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
+from rollover.diagnosis.overturn import RunSimulator, made_ahead
 from rollover.diagnosis.secant import Point, secant
 
 Array = NDArray[np.float64]
@@ -36,6 +37,13 @@ class Judge:
         self._raw: dict[tuple[object, ...], Array | None] = {}
         self._leaps: dict[tuple[object, ...], NDArray[np.int64]] = {}
         self._known: dict[tuple[object, ...], Array | None] = {}
+
+    def made_ahead(self, wanted: Iterable[tuple[int, Sequence[Candidate], Sequence[float]]]) -> None:
+        """Make full runs of (recording, candidates, x) side by side where there are children to do it."""
+        for e in self.evidence[:1]:
+            one = getattr(e.simulator, "inner", e.simulator)
+            if isinstance(one, RunSimulator):
+                made_ahead(one.children, [(self.evidence[r].simulator, self.changes(c, x)) for r, c, x in wanted])
 
     def bare(self) -> Judge:
         """The same without what was simulated, to be sent to another process."""
@@ -171,7 +179,7 @@ class Judge:
         residual = e.eased(worth * (self.measured[r] - y))
         counts = course(e, residual)
         if counts is not None:
-            residual, J, slope = counts * residual, counts[:, None] * J, counts * slope
+            residual, J, slope = counts.samples * residual, counts.samples[:, None] * J, counts.samples * slope
         return Block(
             residual=residual, J=J, slope=slope, shift=shift, prior=e.shift_prior, course=counts, expected=e.expected
         )
@@ -246,6 +254,7 @@ class Judge:
         rounds, width = self.effort.rounds if rounds is None else rounds, min(width, len(nudges) - 1)
         x = [float(v) for v in start]
         shifts = [self.shifts[r] for r in use] if shifts is None else list(shifts)
+        self.made_ahead(self._about(use, candidates, x, nudges[width]))
         found = [self.block(r, candidates, x, s, nudges[width]) for r, s in zip(use, shifts, strict=True)]
         if any(b is None for b in found):
             return None
@@ -265,6 +274,7 @@ class Judge:
                 if width and 2.0 * float(b @ moved) - float(moved @ A @ moved) < 0.1 * enough:
                     break  # nothing more is to be had, by these slopes
                 steps = [shift_of(block, moved) for block in blocks]
+                self.made_ahead((r, candidates, trial) for r in use)
                 after = [
                     self.block(r, candidates, trial, block.shift + d, 0.0)
                     for r, block, d in zip(use, blocks, steps, strict=True)
@@ -286,6 +296,8 @@ class Judge:
             last = width >= len(nudges)
             if last and not improved and len(nudges) == 1:
                 break
+            nudge = self.effort.fine if last else nudges[width]
+            self.made_ahead(self._about(use, candidates, x, nudge))
             # what is held already moves little: its slopes are worked out anew only where the search narrows
             again = [
                 self.block(
@@ -293,7 +305,7 @@ class Judge:
                     candidates,
                     x,
                     s,
-                    self.effort.fine if last else nudges[width],
+                    nudge,
                     None if fresh else block.plain_J[:, :fixed],
                 )
                 for r, s, block in zip(use, shifts, blocks, strict=True)
@@ -308,6 +320,17 @@ class Judge:
             if all(b is not None for b in ended):
                 blocks = [b for b in ended if b is not None]
         return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=tuple(blocks))
+
+    @staticmethod
+    def _about(
+        use: Sequence[int], candidates: Sequence[Candidate], x: Sequence[float], nudge: float
+    ) -> Iterable[tuple[int, Sequence[Candidate], Sequence[float]]]:
+        """A place and those a nudge to either side of it."""
+        for r in use:
+            yield r, candidates, x
+            for k, value in enumerate(x):
+                for there in (max(value - nudge, 0.0), min(value + nudge, 1.0)):
+                    yield r, candidates, [*x[:k], there, *x[k + 1 :]]
 
     def _further(
         self,

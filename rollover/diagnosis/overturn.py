@@ -7,7 +7,7 @@ the axes that the recording states for them, then through the channel's filter c
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -18,6 +18,7 @@ from rollover import simulate
 from rollover.diagnosis.effort import RUNS
 from rollover.document import exchanged
 from rollover.effects import read
+from rollover.execute import Children, map_cases
 from rollover.filters import filtered, least_rate
 from rollover.misfit import as_measured
 from rollover.recording import Recording
@@ -28,7 +29,7 @@ from rollover.vehicle import Striker
 Array = NDArray[np.float64]
 SENSORS = "sensor-"
 CENTRE = "ground.elements.centre"
-KEPT = 300  # runs of one recording: a third of a megabyte each
+KEPT = 600  # runs of one recording: a third of a megabyte each
 AHEAD = 0.06  # s that a filter sees beyond the last stamp, where the recording went on
 BEYOND, FAR_BEYOND = 0.01, 0.06  # s by which a run goes on past the last stamp: time shifts, known zero or not
 SLOWEST = 20.0  # times the first run's wall time, and
@@ -63,6 +64,40 @@ NEIGHBOURS = (
 )
 
 
+class Making(NamedTuple):
+    """A run to be made: what of the changes moves the vehicle, the scenario, axes that are kept, its longest time."""
+
+    key: tuple[Any, ...]
+    scenario: Scenario
+    stems: frozenset[str]
+    limit: float
+
+
+class Made(NamedTuple):
+    """A run before instruments, with the scenario as its effects made it (None if it failed), phases, wall time (s)."""
+
+    run: tuple[Scenario, Recording] | None
+    phases: tuple[tuple[float, str], ...]
+    seconds: float
+
+
+def make(making: Making) -> Made:
+    """Run a scenario; one that takes too long has failed."""
+
+    def watch(_simulated: float, wall: float) -> None:
+        if wall > making.limit:
+            raise _TooSlowError
+
+    try:
+        run = simulate.run(making.scenario, progress=watch)
+    except _TooSlowError:
+        return Made(None, (), making.limit)
+    if run.status == "failed":
+        return Made(None, (), run.wall_time)
+    kept = {n: v for n, v in run.recording.channels.items() if n[:-1] in making.stems or n.startswith(MOTION)}
+    return Made((making.scenario.applied(), replace(run.recording, channels=kept)), phases_of(run), run.wall_time)
+
+
 class RunSimulator:
     """Any scenario by full runs; `runs` counts those that were made, `seconds` is their wall time."""
 
@@ -76,12 +111,13 @@ class RunSimulator:
         self._phases: dict[tuple[float, ...], tuple[tuple[float, str], ...]] = {}  # by where the grid lies
         self._centre: tuple[float, ...] = scenario.ground.elements.centre
         self._limit = np.inf
+        self.children: Children | None = None  # make runs that are wanted next
         self._known: dict[tuple[Any, ...], tuple[Scenario, Recording] | None] = {}
         self._behind: dict[tuple[Any, ...], tuple[Recording, dict[str, Array]]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the runs: another process makes its own."""
-        return {**self.__dict__, "_known": {}, "_behind": {}}
+        return {**self.__dict__, "_known": {}, "_behind": {}, "children": None}
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """Channels (n,) at the recording's stamps less `shift` (s); None if the run fails.
@@ -145,8 +181,10 @@ class RunSimulator:
         if base is None:
             return []
         found = []
-        for one in NEIGHBOURS:
-            there = self.predict({**values, **self._beside(one)}, shift)
+        several = [{**values, **self._beside(one)} for one in NEIGHBOURS]
+        made_ahead(self.children, [(self, beside) for beside in several])
+        for beside in several:
+            there = self.predict(beside, shift)
             if there is not None:
                 found.append({name: there[name] - base[name] for name in base})
         return found
@@ -157,12 +195,16 @@ class RunSimulator:
         The medoid: the least sum of the distances to the others and to the neighbours, each the root mean square over
         the channels' ranges.
         """
-        runs = {place: self.predict({CENTRE: place}, 0.0) for place in self._places()}
+        places = self._places()
+        self.predict({CENTRE: places[0]}, 0.0)  # how long one takes
+        wanted = [{CENTRE: place} for place in places] + [self._beside(one) for one in NEIGHBOURS]
+        made_ahead(self.children, [(self, values) for values in wanted])
+        runs = {place: self.predict({CENTRE: place}, 0.0) for place in places}
         there = {place: run for place, run in runs.items() if run is not None}
         if len(there) < 3:
             return
-        places = [{CENTRE: place} for place in runs]
-        others = [values for values in map(self._beside, NEIGHBOURS) if values not in places]
+        own = [{CENTRE: place} for place in runs]
+        others = [values for values in map(self._beside, NEIGHBOURS) if values not in own]
         beside = [self.predict(values, 0.0) for values in others]
         stacks = {place: np.concatenate(list(_scaled(run).values())) for place, run in there.items()}
         every = [*stacks.values(), *(np.concatenate(list(_scaled(run).values())) for run in beside if run is not None)]
@@ -194,7 +236,7 @@ class RunSimulator:
         ahead = settings.output_step * np.ceil(AHEAD / settings.output_step) if self.recording.cfc else 0.0
         longer = min(round(settings.duration + float(ahead), 9), self.scenario.simulation.duration)
         found.scenario = replace(found.scenario, simulation=replace(settings, duration=longer))
-        found._centre = self._centre
+        found._centre, found.children = self._centre, self.children
         found.runs, found.seconds = self.runs, self.seconds
         return found
 
@@ -219,39 +261,60 @@ class RunSimulator:
         spacing = self.scenario.ground.elements.spacing
         return tuple(c + f * w for c, f, w in zip(self._centre, fraction, spacing, strict=True))
 
+    def making(self, changes: Mapping[str, Any]) -> Making | None:
+        """What a run with changes takes; None for one that is known, or out of bounds."""
+        if _key(changes) in self._known:
+            return None
+        try:
+            return self._making(exchanged(self.scenario, changes) if changes else self.scenario, changes)
+        except ValueError:
+            return None
+
+    def take(self, making: Making, made: Made) -> None:
+        """Keep a run that was made."""
+        self.runs += 1
+        self.seconds += made.seconds
+        if made.run is not None and self._limit == np.inf:
+            self._limit = max(SLOWEST * made.seconds, LEAST_TIME)
+        if made.run is not None and all(path == CENTRE for path, _ in making.key):
+            self._phases[making.scenario.ground.elements.centre] = made.phases
+        if len(self._known) >= KEPT:
+            self._known.pop(next(iter(self._known)))
+        self._known[making.key] = made.run
+
+    def _making(self, chosen: Scenario, changes: Mapping[str, Any]) -> Making:
+        physical = {name: e for name, e in chosen.effects.items() if not name.startswith(SENSORS)}
+        stems = frozenset(name[:-1] for name in self.recording.channels)  # the axes across, for a sensor that is turned
+        return Making(_key(changes), replace(chosen, effects=physical), stems, self._limit)
+
     def _run(self, chosen: Scenario, changes: Mapping[str, Any]) -> tuple[Scenario, Recording] | None:
         """The run before instruments, with the scenario as its effects made it; None if it failed."""
-        key = _key(changes)
-        if key not in self._known:
-            if len(self._known) >= KEPT:
-                self._known.pop(next(iter(self._known)))
-            physical = {name: e for name, e in chosen.effects.items() if not name.startswith(SENSORS)}
-            self._known[key] = self._made(
-                replace(chosen, effects=physical), is_base=all(path == CENTRE for path, _ in key)
-            )
-        return self._known[key]
+        if _key(changes) not in self._known:
+            making = self._making(chosen, changes)
+            self.take(making, make(making))
+        return self._known[_key(changes)]
 
-    def _made(self, scenario: Scenario, *, is_base: bool) -> tuple[Scenario, Recording] | None:
-        self.runs += 1
-        try:
-            run = simulate.run(scenario, progress=self._watch)
-        except _TooSlowError:
-            self.seconds += self._limit
-            return None
-        self.seconds += run.wall_time
-        if self._limit == np.inf:
-            self._limit = max(SLOWEST * run.wall_time, LEAST_TIME)
-        if run.status == "failed":
-            return None
-        if is_base:
-            self._phases[scenario.ground.elements.centre] = phases_of(run)
-        stems = {name[:-1] for name in self.recording.channels}  # the axes across, for a sensor that is turned
-        kept = {n: v for n, v in run.recording.channels.items() if n[:-1] in stems or n.startswith(MOTION)}
-        return scenario.applied(), replace(run.recording, channels=kept)
 
-    def _watch(self, _simulated: float, wall: float) -> None:
-        if wall > self._limit:
-            raise _TooSlowError
+def made_ahead(children: Children | None, wanted: Iterable[tuple[Any, Mapping[str, Any]]]) -> None:
+    """Make runs of (simulator, changes) side by side in children, as far as they are full runs that are not known.
+
+    Nothing happens without children; what fails in one is left to be made, or to fail, where it is needed.
+    """
+    if children is None or children.workers < 2:
+        return
+    todo: dict[tuple[int, Any], tuple[RunSimulator, Making]] = {}
+    for simulator, changes in wanted:
+        own = getattr(simulator, "inner", simulator)
+        making = own.making(changes) if isinstance(own, RunSimulator) else None
+        if making is not None:
+            todo[id(own), making.key] = (own, making)
+    every = list(todo.values())
+    if len(every) < 2:
+        return
+    for outcome in map_cases(make, [making for _, making in every], children=children):
+        if outcome.value is not None:
+            own, making = every[outcome.index]
+            own.take(making, outcome.value)
 
 
 def _scaled(channels: Mapping[str, Array]) -> dict[str, Array]:

@@ -14,6 +14,7 @@ from rollover.diagnosis.fit import NOISE_LEFT, Judge
 Array = NDArray[np.float64]
 TEETH, COMBED, BESIDE = 11, 0.05, 20  # places on a first coordinate, within so much of its fit; on the other, over all
 STARTS, APART = 3, 0.06  # of the best places, so far apart
+SCANNED = (np.arange(40) + 0.5) / 40  # places of a shape
 TICK, SHORTEST, NARROWER = 8e-5, 5e-6, 0.4  # s, by which a time shift is tried to either side; then less, by a factor
 TRIED = 40  # at most so many
 TWICE, LITTLE = 2, 1.0  # how often; a gain that is not worth another time
@@ -65,6 +66,20 @@ def combed(judge: Judge, fitted: Fitted) -> Fitted:
     best = min((f for f in found if f is not None), key=lambda f: f.left, default=fitted)
     best = timed(judge, polish(judge, best))
     return best if best.left < fitted.left else fitted
+
+
+def scanned(judge: Judge, fitted: Fitted) -> Fitted | None:
+    """A fit of the last effect with its shape, begun where least is left all along each parameter of the shape.
+
+    A recording in which a face lets go, or does not, is met within a narrow stretch alone.
+    """
+    last, at, shifts = fitted.candidates[-1], len(fitted.x), [b.shift for b in fitted.blocks]
+    candidates, usual = (*fitted.candidates[:-1], last.whole()), last.with_shapes(fitted.x[-len(last.search) :])[0]
+    begun = (*fitted.x[: at - len(last.search)], *usual)
+    places = [(*begun[:k], float(v), *begun[k + 1 :]) for k in range(at, len(begun)) for v in SCANNED]
+    met = [(there, x) for x in places if (there := left_at(judge, candidates, x, shifts)) is not None]
+    again = judge.fit(candidates, min(met)[1], shifts=shifts, width=1) if met else None
+    return None if again is None else polish(judge, again)
 
 
 def timed(judge: Judge, fitted: Fitted) -> Fitted:

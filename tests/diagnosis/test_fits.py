@@ -88,12 +88,12 @@ def test_any_number_of_workers_gives_the_same_fits(workers: int, monkeypatch: py
     alone = Crew().fits(judge_of(recordings), jobs)
     with Crew(workers) as many:
         assert many.fits(judge_of(recordings), jobs[:1])[0] is not None  # in this process: it took no time yet
-        assert many._children._pool is None
+        assert many.children._pool is None
     monkeypatch.setattr(crew, "PATIENCE", -1.0)
     with Crew(workers) as many:
         together = many.fits(judge_of(recordings), jobs)
-        assert many._children._pool is not None
-    assert many._children._pool is None
+        assert many.children._pool is not None
+    assert many.children._pool is None
     for a, b in zip(alone, together, strict=True):
         assert a is not None
         assert b is not None

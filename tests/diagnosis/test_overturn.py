@@ -15,6 +15,7 @@ from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.overturn import RunSimulator, phases_of
 from rollover.diagnosis.phases import phases_of as phases
 from rollover.diagnosis.simulator import DropSimulator, simulator_of
+from rollover.execute import Children
 from rollover.filters import filtered
 from rollover.measured import at_sensor
 from rollover.recording import Clock, Recording, Sensor
@@ -139,6 +140,28 @@ def test_a_run_that_loses_its_way_is_given_up(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(simulate, "run", endless)
     assert simulator.predict({FRICTION: 0.4}, 0.0) is None
+
+
+def test_runs_made_side_by_side_are_those_made_one_by_one() -> None:
+    paths = ({"ground.friction.coefficient": 0.2}, {"ground.friction.coefficient": 0.4}, {})
+    alone, helped = (RunSimulator(toss(), recording("chassis/acceleration_z")) for _ in range(2))
+    children = Children(2)
+    try:
+        overturn.made_ahead(None, [(helped, changes) for changes in paths])
+        assert helped.runs == 0  # nobody to make them
+        wrong = {"ground.friction.coefficient": -1.0}
+        overturn.made_ahead(children, [(helped, changes) for changes in (*paths, *paths, wrong)])
+    finally:
+        children.stop()
+    assert helped.runs == len(paths)
+    assert helped.marks() == alone.marks()
+    for changes in paths:
+        one, other = alone.predict(changes, 1e-4), helped.predict(changes, 1e-4)
+        assert one is not None
+        assert other is not None
+        for name, values in one.items():
+            np.testing.assert_array_equal(values, other[name])
+    assert helped.runs == len(paths)
 
 
 def test_drops_keep_their_own_integrator() -> None:

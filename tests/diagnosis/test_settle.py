@@ -17,11 +17,10 @@ from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.intervals import intervals, scattered, unshaped
-from rollover.diagnosis.overturn import CENTRE, NEIGHBOURS, RunSimulator
+from rollover.diagnosis.overturn import CENTRE, NEIGHBOURS, Made, Making, RunSimulator
 from rollover.diagnosis.settle import along, rescattered, settled, step_of_means
 from rollover.effects import Search
 from rollover.recording import Recording
-from rollover.scenario import Scenario
 from tests.physics.scenes import shipped
 
 CHANNEL = "chassis/acceleration_y"
@@ -34,13 +33,13 @@ def a_toss(monkeypatch: pytest.MonkeyPatch, off: Mapping[tuple[float, ...], floa
     made = Recording(title="toss", time=np.arange(0.0, 0.2, 0.01), channels={CHANNEL: np.zeros(20)})
     simulator = RunSimulator(shipped("cube_toss"), made)
 
-    def run(self: RunSimulator, scenario: Scenario, *, is_base: bool) -> tuple[Scenario, Recording]:
-        self.runs += 1
+    def run(making: Making) -> Made:
         time = np.arange(0.0, 0.25, 0.005)
-        size = 1.0 + off.get(scenario.ground.elements.centre, 0.01 * self.runs)
-        return scenario, Recording(title="run", time=time, channels={CHANNEL: size * np.sin(40.0 * time) + time})
+        size = 1.0 + off.get(making.scenario.ground.elements.centre, 0.01 * (simulator.runs + 1))
+        run = Recording(title="run", time=time, channels={CHANNEL: size * np.sin(40.0 * time) + time})
+        return Made((making.scenario, run), (), 0.01)
 
-    monkeypatch.setattr(RunSimulator, "_made", run)
+    monkeypatch.setattr(overturn, "make", run)
     return simulator
 
 
