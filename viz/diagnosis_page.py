@@ -242,10 +242,11 @@ def _detectable(found: Diagnosis) -> list[Block]:
         first = next(iter(getattr(kinds.get(id), "search", {})), "")
         rows.append([named(id, channel or None), first, _g(value)])
     table = Table(
-        columns=["effect", "parameter", "smallest that shows"],
+        columns=["effect", "parameter", "least that shows"],
         rows=rows,
         numeric=(2,),
-        caption="Strengths whose trace would stand at five standard errors of the noise, SI.",
+        caption="Strengths whose trace would stand at five standard errors of the noise, SI: how far from none, "
+        "or from what the scenario has; of a limit, the largest that was tried and shows.",
     )
     return [Section(title="What these recordings would have shown", blocks=[table])]
 

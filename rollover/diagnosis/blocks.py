@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.chaos import Course
 
 Array = NDArray[np.float64]
 WIDEST = 4.0  # times its prior that a time shift may be
@@ -26,9 +27,9 @@ GENTLE = 1e-4  # prior of a coordinate (1/variance): keeps what nothing determin
 class Block:
     """One recording at the fitted point: residual (n,), Jacobian (n, p), slope of the shift (n,), shift, its prior.
 
-    `course` (n,) is what samples count where the run went another course than the recording; None where it did not.
-    All three have it in them already. `expected` is the sum of squares that noise and scatter alone leave, where that
-    is not one for each sample.
+    `course` is what samples count where the run went another course than the recording; None where it did not.
+    Residual, Jacobian and slope have it in them already. `expected` is the sum of squares that noise and scatter alone
+    leave, where that is not one for each sample.
     """
 
     residual: Array
@@ -36,7 +37,7 @@ class Block:
     slope: Array
     shift: float
     prior: float
-    course: Array | None = None
+    course: Course | None = None
     expected: float | None = None
 
     @property
@@ -46,17 +47,29 @@ class Block:
 
     def counted(self, values: Array) -> Array:
         """Other whitened samples (n,) for what they count here."""
-        return values if self.course is None else values * self.course
+        return values if self.course is None else values * self.course.samples
 
     @property
     def plain_residual(self) -> Array:
         """Residual of samples that count in full."""
-        return self.residual if self.course is None else self.residual / self.course
+        return self.residual if self.course is None else self.residual / self.course.samples
+
+    @property
+    def valued(self) -> Array:
+        """Residual whose squares add up to what is left."""
+        if self.course is None:
+            return self.residual
+        return np.where(self.course.samples < 1.0, np.sqrt(self.course.share) * self.plain_residual, self.residual)
 
     @property
     def plain_J(self) -> Array:
         """J of samples that count in full."""
-        return self.J if self.course is None else self.J / self.course[:, None]
+        return self.J if self.course is None else self.J / self.course.samples[:, None]
+
+    @property
+    def squares(self) -> float:
+        """Sum of squares of what is left, another course for what it counts (D9)."""
+        return float(self.residual @ self.residual) + (0.0 if self.course is None else self.course.more)
 
     @property
     def weight(self) -> float:
@@ -66,7 +79,7 @@ class Block:
     @property
     def total(self) -> float:
         """(D1) where it stands."""
-        return float(self.residual @ self.residual) + (self.shift / self.prior) ** 2
+        return self.squares + (self.shift / self.prior) ** 2
 
     def normal(self) -> tuple[Array, Array, float]:
         """A (p, p), b (p,), c: |..|^2 of (D1) with tau eliminated is c - 2 b'dx + dx'A dx."""
@@ -74,7 +87,7 @@ class Block:
         h = self.J.T @ self.slope
         A = self.J.T @ self.J - np.outer(h, h) / self.weight
         b = self.J.T @ self.residual - h * g / self.weight
-        c = float(self.residual @ self.residual) + (self.shift / self.prior) ** 2 - g * g / self.weight
+        c = self.total - g * g / self.weight
         return A, b, c
 
 

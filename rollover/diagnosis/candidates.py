@@ -56,6 +56,7 @@ class Candidate:
     neutral: tuple[float | None, ...] | None = None  # coordinates that change nothing; given where a place costs a run
     shapes: Mapping[str, Search] = field(default_factory=dict)  # fitted only where what is left asks for them
     fixed: Mapping[str, Any] = field(default_factory=dict)  # parameters that are not fitted
+    own: Mapping[str, float] = field(default_factory=dict)  # the scenario's values, where no number is an effect's null
 
     @property
     def key(self) -> str:
@@ -101,8 +102,7 @@ class Candidate:
         known = [k for k, n in enumerate(neutral) if n is not None]
         if len(known) == len(neutral):
             at = [float(n) for n in neutral if n is not None]
-            signs = (1.0, -1.0) if len(at) == 1 else (1.0,)
-            steps = [(k, sign * WIDE) for k in known for sign in signs]
+            steps = [(k, sign * WIDE) for k in known for sign in (1.0, -1.0)]
             beside = [tuple(a + (d if a + d < 1.0 else -d) * (j == k) for j, a in enumerate(at)) for k, d in steps]
             # what the scenario has may be far above what ever acts: a yield force, a stop
             is_limit = len(at) == 1 and None in EFFECTS[self.id].null.values()
@@ -210,9 +210,13 @@ def candidates_of(
         there = {p: own for p, w in wide.items() if (own := kind.looked_for(p, w, tried)) is not None}
         search = {p: s for p, s in there.items() if p not in of_shape}
         shapes = {p: there[p] for p in of_shape if p in there}
-        neutral = None if acts == "drop" else tuple(_neutral(kind, p, s, scenario) for p, s in search.items())
+        unlike = {} if scenario is None else {p: _neutral(kind, p, s, scenario) for p, s in search.items()}
+        neutral = None if acts == "drop" else tuple(unlike.get(p) for p in search)
+        held = {p: physical(x, search[p]) for p, x in unlike.items() if x is not None and kind.null.get(p) is None}
         found.append(
-            Candidate(id=name, kind=kind.kind, family=kind.family, search=search, shapes=shapes, neutral=neutral)
+            Candidate(
+                id=name, kind=kind.kind, family=kind.family, search=search, shapes=shapes, neutral=neutral, own=held
+            )
         )
     return found
 

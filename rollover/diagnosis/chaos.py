@@ -16,13 +16,22 @@ numbers of unknown variance,
     -2 ln p = E + d ln(1 + x/d)                                                                                (D9)
 
 in place of E + x. Another course shows in all channels: x is E (m - 1), m the middle one of what the channels leave
-over what they are expected to. What one channel leaves alone is not forgiven.
+over what they are expected to. What one channel leaves alone is not forgiven. A change of x changes (D9) by
+
+    w = d / (d + x)                                                                                           (D11)
+
+of itself, far less than (D9) is of E + x: sums of squares are of samples times sqrt(w), and what (D9) is beyond them is
+added. Such a sum lies above (D9) wherever it does not touch it, so that what lowers it lowers (D9) by more:
+
+    g becomes -d ln(1 - g/d)                                                                                  (D12)
+
+for a sum that falls by g, up to all of x; so much is gained along a straight line.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,8 +99,20 @@ def memory(strays: Array) -> float:
     return max(1.0, (1.0 + rho) / max(1.0 - rho, 1e-3))
 
 
-def course(e: Evidence, residual: Array) -> Array | None:
-    """What samples (n,) of a whitened misfit (n,) count by (D9), root of the share; None where all count in full."""
+@dataclass(frozen=True, kw_only=True)
+class Course:
+    """What samples count in sums of squares where a run took another course, and what is added to such a sum.
+
+    `samples` (n,) are the roots of (D11), 1 before the blow; `share` is (D9) over the plain sum of what comes after.
+    """
+
+    samples: Array
+    share: float
+    more: float
+
+
+def course(e: Evidence, residual: Array) -> Course | None:
+    """How a whitened misfit (n,) counts by (D9); None where all samples count in full."""
     if len(e.signals) < ALONE or not any(s.weight is not None for s in e.signals):
         return None
     over, expected, inside = [], 0.0, np.zeros(residual.size, dtype=bool)
@@ -105,16 +126,27 @@ def course(e: Evidence, residual: Array) -> Array | None:
         expected += max(own, 1.0)
     if len(over) < ALONE:
         return None
-    beyond = (float(np.median(over)) - 1.0) * expected
+    left = float(np.sum(residual[inside] ** 2))
+    beyond = min(float(np.median(over)) * expected, left) - expected  # never more than there is
     if beyond <= 0.0:
         return None
     share = (expected + STATE * np.log1p(beyond / STATE)) / (expected + beyond)
-    return np.where(inside, np.sqrt(share), 1.0)
+    slope = STATE / (STATE + beyond)
+    return Course(samples=np.where(inside, np.sqrt(slope), 1.0), share=share, more=(share - slope) * left)
 
 
-def is_other(block_course: Array | None) -> bool:
+def gained(less: Array, slope: float) -> Array:
+    """(D12): gains by sums of squares (m,) that fall by `less` where they count `slope` (D11); all where that is 1."""
+    if slope == 1.0:
+        return less
+    most = (1.0 - slope) * STATE  # all of x
+    within = np.minimum(less, most)
+    return np.asarray(-STATE * np.log1p(-within / STATE) + (less - within) / slope)
+
+
+def is_other(found: Course | None) -> bool:
     """Whether a recording took a clearly other course than its run."""
-    return block_course is not None and float(block_course.min()) ** 2 < OTHER
+    return found is not None and found.share < OTHER
 
 
 def too_many(others: int, of: int) -> float:

@@ -65,7 +65,7 @@ def mismatch_of(
     from scipy.stats import f as f_distribution
 
     cells: list[Cell] = []
-    humming = hums(evidence, [b.residual for b in blocks])
+    humming = hums(evidence, [b.valued for b in blocks])
     for r, (e, block) in enumerate(zip(evidence, blocks, strict=True)):
         for signal, part in e.spans():
             time = e.recording.time[signal.rows]
@@ -105,7 +105,7 @@ def _cell(
 ) -> Cell:
     from scipy.stats import f as f_distribution
 
-    w, s = block.residual[rows], block.slope[rows]
+    w, s = block.valued[rows], block.slope[rows]
     n = rows.size
     waves = int(min(MOST_WAVES, max(1, n // 6)))
     phase_of = (np.arange(n) + 0.5) / n

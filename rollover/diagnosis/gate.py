@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.candidates import Candidate, coordinate, physical
-from rollover.diagnosis.chaos import FEW
+from rollover.diagnosis.chaos import FEW, gained
 from rollover.diagnosis.fit import Block, Fitted, Judge
 from rollover.effects import EFFECTS
 
@@ -25,6 +25,7 @@ DRAWS = 4000
 SHOWS = 1e-3  # noise units: a direction that moves the whole by less is arithmetic's
 VISIBLE = 5.0  # standard errors of the noise at which an effect shows
 JITTER = 1e-9
+LIMITS = ("limit", "yield_force", "stiffness", "angle")  # what acts the more the lower it is
 WAYS = 2  # places of one effect at which fits begin
 EDGE = 0.01  # of a coordinate, that they keep from its ends
 
@@ -64,6 +65,7 @@ def gate(judge: Judge, base: Fitted, candidates: Sequence[Candidate], only: Sequ
     own, _ = np.linalg.qr(held)
     columns, looks, sizes = [], [], []
     quiet = _before_the_blow(judge, use)
+    judge.made_ahead((r, (*base.candidates, c), (*base.x, *x)) for c in candidates for x in c.probes() for r in use)
     for c in candidates:
         for x in c.probes():
             d = _direction(judge, base, c, x, use)
@@ -82,8 +84,8 @@ def gate(judge: Judge, base: Fitted, candidates: Sequence[Candidate], only: Sequ
     if not columns:
         return Gate(score=0.0, scores={}, null=np.zeros(DRAWS), detectable={})
     D = np.stack(columns, axis=1)
-    along = D.T @ (misfit - own @ (own.T @ misfit))
-    scores = along**2 / (1.0 + _trust(judge, blocks, use, D))
+    along, scores = _best_along(misfit - own @ (own.T @ misfit), D, blocks)
+    scores = scores / (1.0 + _trust(judge, blocks, use, D))
     if any(judge.evidence[r].strays for r in use):
         scores = scores / _at_odds(misfit - own @ (own.T @ misfit), D, [b.residual.size for b in blocks])
     detectable: dict[str, float] = {}
@@ -91,7 +93,9 @@ def gate(judge: Judge, base: Fitted, candidates: Sequence[Candidate], only: Sequ
     ways: dict[str, list[tuple[float, ...]]] = {}
     for k in np.argsort(-scores, kind="stable"):
         c, x = looks[k]
-        detectable[c.key] = min(_visible(c, x, sizes[k]), detectable.get(c.key, np.inf))
+        shows = _visible(c, x, sizes[k])
+        if shows is not None:
+            detectable[c.key] = (max if is_limit(c) else min)(shows, detectable.get(c.key, shows))
         own_best.setdefault(c.key, float(scores[k]))
         start = followed(c, x, float(along[k]) / sizes[k])
         if start is not None and len(ways.setdefault(c.key, [])) < WAYS:
@@ -126,6 +130,31 @@ def followed(c: Candidate, x: Sequence[float], factor: float) -> tuple[float, ..
     value = null + factor * (physical(x[at], search) - null)
     inside = coordinate(min(max(value, search.low), search.high), search)
     return (*x[:at], min(max(inside, EDGE), 1.0 - EDGE), *x[at + 1 :])
+
+
+def _best_along(misfit: Array, D: Array, blocks: Sequence[Block]) -> tuple[Array, Array]:
+    """How far along each unit direction (n, m) is best, (m,), and what that gains, (m,), noise units.
+
+    z and z^2, z = d'n, where all samples count in full. Where recordings took another course more may be gained further
+    on (D12): as far as each of them asks for is tried.
+    """
+    along = D.T @ misfit
+    if all(b.course is None for b in blocks):
+        return along, along**2
+    ends = np.cumsum([b.residual.size for b in blocks])
+    tried, parts = [along], []
+    for b, end in zip(blocks, ends, strict=True):
+        whole = slice(int(end - b.residual.size), int(end))
+        late = np.zeros(b.residual.size, dtype=bool) if b.course is None else b.course.samples < 1.0
+        cells = [(1.0, ~late)] if b.course is None else [(1.0, ~late), (float(b.course.samples.min()) ** 2, late)]
+        for slope, rows in cells:
+            d, w = D[whole][rows], misfit[whole][rows]
+            pull, size = d.T @ w, np.sum(d**2, axis=0)
+            parts.append((slope, pull, size))
+            tried.append(pull / np.maximum(size, 1e-12))
+    gains = np.array([sum(gained(2.0 * a * pull - a**2 * size, slope) for slope, pull, size in parts) for a in tried])
+    best, every = np.argmax(gains, axis=0), np.arange(along.size)
+    return np.array(tried)[best, every], np.maximum(gains[best, every], 0.0)
 
 
 def _at_odds(misfit: Array, D: Array, sizes: Sequence[int]) -> Array:
@@ -178,11 +207,24 @@ def yardstick(id: str, names: Collection[str]) -> tuple[str, float]:
     return next(iter(names)), 0.0
 
 
-def _visible(c: Candidate, x: Sequence[float], size: float) -> float:
-    """How far from its null an effect's parameter must be for a trace `VISIBLE` times the noise's, by that at x."""
+def is_limit(c: Candidate) -> bool:
+    """Whether an effect is the stronger the lower its first parameter is, without a number at which it is none."""
+    name, _ = yardstick(c.id, c.search)
+    return name in LIMITS and EFFECTS[c.id].null.get(name) is None and name not in c.own
+
+
+def _visible(c: Candidate, x: Sequence[float], size: float) -> float | None:
+    """How far from its null an effect's parameter must be for a trace `VISIBLE` times the noise's, by that at x.
+
+    Of a limit its value at x if that shows, else None; so where no value is known to be none.
+    """
     values = c.values(x)
     name, null = yardstick(c.id, values)
-    return abs(values[name] - null) * VISIBLE / size
+    if is_limit(c):
+        return values[name] if size >= VISIBLE else None
+    if EFFECTS[c.id].null.get(name) is None and name not in c.own:
+        return None
+    return abs(values[name] - c.own.get(name, null)) * VISIBLE / size
 
 
 def null_of_the_best(directions: Sequence[Array], draws: int = DRAWS, seed: int = 0) -> Array:

@@ -70,7 +70,7 @@ def worse(rival: Fitted, best: Fitted, groups: Sequence[Sequence[int]], shared: 
     phi = max(1.0, float(np.sqrt(b.left.sum() / b.count.sum())))
     apart = np.zeros(len(best.blocks))
     for r, (x, y) in enumerate(zip(rival.blocks, best.blocks, strict=True)):
-        d = x.residual - y.residual
+        d = y.counted(x.plain_residual - y.plain_residual)
         apart[r] = float(d @ d) - float(y.slope @ d) ** 2 / y.weight
     distance = float(apart.sum())
     excess = float(a.left.sum() - b.left.sum())

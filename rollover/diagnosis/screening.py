@@ -99,7 +99,8 @@ def screen(
                     break
                 count += 1
                 left += there.normal()[2]
-                free = freed(np.column_stack([block.residual - there.residual, block.residual]), block)
+                way = block.counted(block.plain_residual - there.plain_residual)
+                free = freed(np.column_stack([way, block.residual]), block)
                 along += float(free[:, 0] @ free[:, 1])
                 size += float(free[:, 0] @ free[:, 0])
             if count < len(blocks):

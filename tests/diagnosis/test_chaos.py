@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import chaos
-from rollover.diagnosis.chaos import STATE, alike, course, is_other, memory, weighted
+from rollover.diagnosis.chaos import STATE, Course, alike, course, gained, is_other, memory, weighted
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.fit import Block
@@ -140,13 +140,58 @@ def test_another_course_counts_as_one_state_of_unknown_size() -> None:
     found = course(e, w)
     assert found is not None
     late = np.tile(e.recording.time >= BLOW, 4)
-    assert np.all(found[~late] == 1.0)
+    assert np.all(found.samples[~late] == 1.0)
     q = np.sum(w[late].reshape(4, -1) ** 2, axis=1)
     expected = 4.0 * WEIGHT**2 * late.sum() / 4.0
     beyond = np.median(q / (expected / 4.0)) * expected - expected
     share = (expected + STATE * np.log1p(beyond / STATE)) / (expected + beyond)
-    np.testing.assert_allclose(found[late] ** 2, share, rtol=1e-12)
+    assert found.share == pytest.approx(share, rel=1e-12)
     assert is_other(found)
+
+
+def test_no_more_is_forgiven_than_there_is() -> None:
+    """The middle channel leaves more than all on the average: what counts is E + d ln(1 + x/d), and never less."""
+    e = blown((*CHANNELS, "chassis/angular_velocity_y"))
+    w = misfit(e, [6.0, 6.0, 6.0, 0.3, 0.3])
+    late = np.tile(e.recording.time >= BLOW, 5)
+    expected = WEIGHT**2 * late.sum()
+    x = float(w[late] @ w[late]) - expected
+    wanted = float(w[~late] @ w[~late]) + expected + STATE * np.log1p(x / STATE)
+    assert counted(e, w) == pytest.approx(wanted, rel=1e-12)
+
+
+def counted(e: Evidence, w: np.ndarray, held: Course | None = None) -> float:
+    """What a misfit counts by (D9), or by the sum of squares that is `held`."""
+    found = held or course(e, w)
+    return float(w @ w) if found is None else float(np.sum((found.samples * w) ** 2)) + found.more
+
+
+def test_sums_of_squares_touch_what_another_course_counts_and_lie_above_it() -> None:
+    """What is left of all channels, scaled by a^2: its slope at a = 1 is that of (D9), elsewhere the sum is larger."""
+    e = blown()
+    w = misfit(e, [6.0] * 4)
+    late = np.tile(e.recording.time >= BLOW, 4)
+    held = course(e, w)
+    assert held is not None
+    small = 1e-5
+    up, down = (np.where(late, (1.0 + s) * w, w) for s in (small, -small))
+    slope = (counted(e, up) - counted(e, down)) / (2.0 * small)
+    assert slope == pytest.approx((counted(e, up, held) - counted(e, down, held)) / (2.0 * small), rel=1e-6)
+    assert slope < 0.2 * 2.0 * held.share * float(w[late] @ w[late])  # far less than the share itself
+    for a in (0.0, 0.3, 0.8, 1.2, 3.0):
+        there = np.where(late, a * w, w)
+        assert counted(e, there, held) > counted(e, there)
+
+
+@pytest.mark.parametrize("fall", [-100.0, 1.0, 50.0, 500.0, 550.0])
+def test_what_is_gained_along_a_line_is_the_fall_of_what_a_course_counts(fall: float) -> None:
+    """E + x falls by `fall`: (D9) by d ln((d + x)/(d + x - fall)) down to x = 0; beyond, samples count in full."""
+    x, d = 500.0, float(STATE)
+    slope = d / (d + x)
+    within = min(fall, x)
+    wanted = d * np.log((d + x) / (d + x - within)) + (fall - within)
+    np.testing.assert_allclose(gained(np.array([slope * fall]), slope), wanted, rtol=1e-12)
+    assert gained(np.array([fall]), 1.0) == fall
 
 
 def test_a_course_like_the_neighbours_counts_in_full() -> None:
@@ -172,7 +217,7 @@ def of_courses(others: int) -> float:
         if k < others:
             w += np.tile(np.where(e.recording.time < BLOW, 0.0, 4.0 * np.sin(9.0 * e.recording.time)), 4)
         counts = course(e, w)
-        w = w if counts is None else counts * w
+        w = w if counts is None else counts.samples * w
         n = w.size
         blocks.append(Block(residual=w, J=np.zeros((n, 0)), slope=np.zeros(n), shift=0.0, prior=1e-3, course=counts))
     return mismatch_of([blown()] * 4, blocks, [((0.0, "tipping"), (BLOW, "sliding"))] * 4).p_value

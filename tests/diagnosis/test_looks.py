@@ -12,12 +12,16 @@ import pytest
 from rollover.diagnosis import selection
 from rollover.diagnosis.blocks import Block, Fitted
 from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.chaos import STATE, Course
 from rollover.diagnosis.effort import RUNS
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.fit import Judge
-from rollover.diagnosis.gate import VISIBLE, Gate, _at_odds, gate
+from rollover.diagnosis.gate import VISIBLE, Gate, _at_odds, _best_along, _visible, gate
 from rollover.effects import Search
 from rollover.recording import Recording
+from tests.diagnosis import test_fits
+from tests.diagnosis.drops import FORCE, recorded
+from tests.diagnosis.test_fits import candidate
 
 CHANNEL = "chassis/acceleration_y"
 N, BLOW = 80, 0.16
@@ -133,3 +137,55 @@ def test_what_was_refuted_tells_nothing() -> None:
     )
     assert found.p_value < 1e-6
     assert replace(found, refuted=True).p_value == 0.3
+
+
+def test_a_limit_shows_up_to_the_largest_that_was_tried_and_shows() -> None:
+    """A force cell that ends at three quarters of its range shows, at more than the range it does not."""
+    judge = test_fits.judge_of(recorded({}, noise=0.01, speeds=(1.5, 2.5)))
+    base = judge.fit((), ())
+    assert base is not None
+    cell = candidate(judge, f"sensor-clipping:{FORCE}")
+    strength = candidate(judge, "soil-viscous-damping")
+    found = gate(judge, base, [cell, strength]).detectable
+    span = max(s.span for e in judge.evidence for s in e.signals if s.channel == FORCE)
+    assert 0.4 * span < found[cell.key] < span
+    assert 0.0 < found[strength.key] < 50.0
+    assert _visible(cell, (0.5,), 0.9 * VISIBLE) is None
+    assert _visible(cell, (0.5,), 1.1 * VISIBLE) == cell.values((0.5,))["limit"]
+    bare = replace(candidate(judge, "co-moving-mass"), own={})
+    assert "co-moving-mass" not in gate(judge, base, [bare]).detectable
+    known = gate(judge, base, [replace(bare, own={"fraction": 0.1})]).detectable["co-moving-mass"]
+    assert 0.0 < known < 0.1
+
+
+def test_a_look_goes_as_far_along_a_direction_as_gains_most() -> None:
+    """One recording took another course, which a direction explains altogether; the other one has a little of it."""
+    rng = np.random.default_rng(2)
+    n, expected, beyond = 60, 30.0, 900.0
+    slope = STATE / (STATE + beyond)
+    late = np.arange(n) >= 30
+    wave = np.where(late, np.sin(0.7 * np.arange(n)), 0.0)
+    wave /= np.sqrt(wave @ wave)
+    other = Course(samples=np.where(late, np.sqrt(slope), 1.0), share=0.1, more=0.0)
+    left = np.where(late, np.sqrt(slope) * np.sqrt(expected + beyond) * wave, rng.standard_normal(n))
+    as_seen = np.where(late, np.sqrt(slope), 1.0) * wave  # a direction counts as the samples do
+    none: Any = {"J": np.zeros((n, 0)), "slope": np.zeros(n), "shift": 0.0, "prior": 1e-3}
+    little = 0.05 * wave
+    blocks = [Block(residual=left, course=other, **none), Block(residual=30.0 * little + rng.normal(size=n), **none)]
+    D = np.concatenate([as_seen, little])[:, None]
+    size = float(np.sqrt(D[:, 0] @ D[:, 0]))
+    misfit = np.concatenate([b.residual for b in blocks])
+    along, gains = _best_along(misfit, D / size, blocks)
+
+    def gain(a: float) -> float:
+        """Fall of (D9) of the first, which leaves (E + x)(1 - a/sqrt(E + x))^2, and of squares of the second."""
+        plain = (np.sqrt(expected + beyond) - a) ** 2
+        x = plain - expected
+        first = STATE * np.log1p(beyond / STATE) - (STATE * np.log1p(x / STATE) if x > 0.0 else x)
+        w = blocks[1].residual
+        return float(first + w @ w - (w - a * little) @ (w - a * little))
+
+    best = max(gain(a) for a in np.linspace(0.0, 60.0, 6001))
+    assert gains[0] == pytest.approx(gain(float(along[0]) / size), rel=1e-9)
+    assert gains[0] > 0.9 * best
+    assert gains[0] > 3.0 * float(misfit @ D[:, 0] / size) ** 2  # which the slopes alone would have said
