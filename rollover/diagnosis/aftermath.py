@@ -32,15 +32,7 @@ def shortened(e: Evidence, *, alone: bool = False) -> Evidence:
     kept = [(s, s.rows < n) for s in e.signals]
     if simulator is None or any(inside.sum() < FEWEST for _, inside in kept):
         return e
-    signals = tuple(
-        replace(
-            s,
-            rows=s.rows[inside],
-            values=s.values[inside],
-            weight=None if s.weight is None else s.weight[inside],
-        )
-        for s, inside in kept
-    )
+    signals = tuple(s.cut(inside) for s, inside in kept)
     rows = np.concatenate([inside for _, inside in kept])
     recording = replace(e.recording, time=time[:n], channels={c: v[:n] for c, v in e.recording.channels.items()})
     return replace(

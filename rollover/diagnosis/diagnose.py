@@ -68,7 +68,8 @@ def diagnose(
         raise ValueError(f"hold_out: no such recording, got {unknown[0]!r}; {', '.join(names)}")
     if not 0.0 <= tolerance < 1.0:
         raise ValueError(f"tolerance: not a share of a range, got {tolerance:g}; at least 0 and below 1")
-    every, notes = _evidence(scenario, recordings)
+    crew = crew or Crew()
+    every, notes = _evidence(scenario, recordings, crew)
     every = [replace(e, model_error=float(np.hypot(e.model_error, tolerance))) for e in every]
     found = _trusted(scenario, [e for e in every if e.name not in hold_out])
     kept = [e for e in _trusted(scenario, every) if e.name in hold_out] if hold_out else []
@@ -87,7 +88,7 @@ def diagnose(
     phases = [phases_of(e) for e in found]
     acts = "rollover" if any(unfit(set_up(scenario, e.recording)) for e in found) else "drop"
     candidates = candidates_of(found, scenario.effects, acts, scenario, size_of(set_up(scenario, found[0].recording)))
-    explanation = explained(judge, base, candidates, groups, phases, say, crew or Crew())
+    explanation = explained(judge, base, candidates, groups, phases, say, crew)
     explanation, verdict = decided(judge, explanation, groups, phases)
     explanation, kept = eased_beside(scenario, judge, explanation, kept, phases)
     found = list(judge.evidence)
@@ -191,13 +192,22 @@ def _trusted(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:
     return [shortened(e, alone=len(weighed) == 1) for e in weighed]
 
 
-def _evidence(scenario: Scenario, recordings: Sequence[tuple[str, Recording]]) -> tuple[list[Evidence], list[str]]:
+def _evidence(
+    scenario: Scenario, recordings: Sequence[tuple[str, Recording]], crew: Crew | None = None
+) -> tuple[list[Evidence], list[str]]:
     found, notes = [], []
     for name, whole in recordings:
         recording, spiked = without_spikes(whole)
-        notes += [f"{name}: {line}" for line in spiked]
         thin, simulator, averaged = simulated(scenario, recording)
+        if spiked:
+            blow = next((at for at, phase in simulator.marks() if phase == "impact"), np.inf)
+            recording, spiked = without_spikes(whole, blow)
+            thin, simulator, averaged = simulated(scenario, recording)
+        inner = getattr(simulator, "inner", simulator)
+        if isinstance(inner, RunSimulator) and crew is not None:
+            inner.children = crew.children
         simulator.settle()
+        notes += [f"{name}: {line}" for line in spiked]
         one = evidence_of(name, thin, simulator, averaged)
         still = [c for c, v in recording.channels.items() if np.isfinite(v).any() and np.nanmin(v) == np.nanmax(v)]
         notes += [f"{name}: {channel} never moves and was left aside" for channel in still]
@@ -232,14 +242,19 @@ def _felt(d: Degree) -> str:
 
 def _cost(found: Sequence[Evidence]) -> list[str]:
     """What full runs took, where there were any."""
-    made = [e.simulator for e in found if isinstance(e.simulator, RunSimulator)]
+    inner = [getattr(e.simulator, "inner", e.simulator) for e in found]
+    made = [s for s in inner if isinstance(s, RunSimulator)]
     runs, seconds = sum(s.runs for s in made), sum(s.seconds for s in made)
     return [f"{runs} full runs of {1e3 * seconds / runs:.0f} ms on the average"] if runs else []
 
 
 def _is_weak(detectable: Mapping[str, float]) -> bool:
     """Whether even typical strengths of most effects of the ground would have stayed below what shows."""
-    typical = {name: value for name, value in detectable.items() if name in EFFECTS and EFFECTS[name].kind == "physics"}
+    typical = {
+        name: value
+        for name, value in detectable.items()
+        if name in EFFECTS and EFFECTS[name].kind == "physics" and None not in EFFECTS[name].null.values()
+    }  # of a limit, and of what the scenario has already, nothing is usual
     blind = 0
     for name, value in typical.items():
         parameter, null = yardstick(name, EFFECTS[name].search)

@@ -47,6 +47,11 @@ class Signal:
     weight: Array | None = None  # (n,), below 1 where the model itself is not sure
     level: Array | None = None  # (n,), noise over `noise` where it grows with the value
 
+    def cut(self, inside: NDArray[np.bool_]) -> Signal:
+        """The samples that are `inside` (n,)."""
+        weight, level = (None if v is None else v[inside] for v in (self.weight, self.level))
+        return replace(self, rows=self.rows[inside], values=self.values[inside], weight=weight, level=level)
+
     @property
     def loudness(self) -> Array | float:
         """Noise over `noise`, (n,); 1 where it is the same throughout."""

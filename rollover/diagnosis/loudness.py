@@ -6,7 +6,7 @@ period keeps a thousandth of its size). Sorted by the value their median size s 
     s^2 = a + b y + c y^2,   level(y) = sqrt(s^2(y)/min s^2)                                                    (D10)
 
 in units of the smallest. Only what is clear in all recordings of a channel counts: a kink or a filter does a little of
-the same.
+the same. What comes after a blow in an overturn is left out: there one contact follows another.
 """
 
 from __future__ import annotations
@@ -47,6 +47,8 @@ def with_loudness(evidence: Sequence[Evidence]) -> list[Evidence]:
 
 def _told(e: Evidence, s: Signal) -> tuple[Array, Array] | None:
     """Values (n,) of a signal and the size of its noise there; None of too few or unevenly spaced samples."""
+    blow = next((at for at, name in e.simulator.marks() if name == "impact"), np.inf)
+    s = s.cut(e.recording.time[s.rows] < blow)
     stamps = np.diff(e.recording.time[s.rows])
     if s.values.size < max(BINS * FEWEST, LENGTH) or s.scatter > 0.0:
         return None  # the steps of digits are no noise

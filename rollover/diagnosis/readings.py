@@ -53,12 +53,15 @@ def digitised(e: Evidence, recording: Recording) -> Evidence:
     return replace(e, signals=tuple(signals))
 
 
-def without_spikes(recording: Recording) -> tuple[Recording, list[str]]:
-    """The recording without single samples that its neighbours contradict, and a line for each channel that had any."""
+def without_spikes(recording: Recording, before: float = np.inf) -> tuple[Recording, list[str]]:
+    """The recording without single samples that its neighbours contradict, and a line for each channel that had any.
+
+    Only those `before` a time (s): after a blow one contact follows another, and some last no longer than a sample.
+    """
     channels, lines = dict(recording.channels), []
     for name in recording.channels:
         told = trace(recording, name)
-        found = [] if told is None else list(spikes(told, ""))
+        found = [] if told is None else [f for f in spikes(told, "") if f.start < before]
         if found:
             gone = np.isin(recording.time, [f.start for f in found])
             channels[name] = np.where(gone, np.nan, recording.channels[name])

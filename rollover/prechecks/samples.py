@@ -139,7 +139,7 @@ def spikes(t: Trace, unit: str) -> Iterator[Finding]:
             unit=unit,
             error=scale,
             sentence=f"one sample lies {error[i]:.4g} {unit} off its neighbours, {abs(error[i]) / scale:.1f} sigma: "
-            "a disturbance, not a force",
+            "a disturbance, or a contact of no more than a sample",
         )
 
 

@@ -29,7 +29,15 @@ def evidence(counts: float, *, cfc: int | None = None) -> Evidence:
     rows = np.arange(0, time.size, 2)
     weight = np.where(time[rows] < BLOW, 1.0, counts)
     signal = Signal(
-        channel=CHANNEL, rows=rows, values=made[CHANNEL][rows], sigma=1.0, noise=1.0, ar=(), span=2.0, weight=weight
+        channel=CHANNEL,
+        rows=rows,
+        values=made[CHANNEL][rows],
+        sigma=1.0,
+        noise=1.0,
+        ar=(),
+        span=2.0,
+        weight=weight,
+        level=1.0 + time[rows],
     )
     return Evidence(
         name="toss", recording=made, simulator=RunSimulator(scenario, made), signals=(signal,), shift_prior=1e-3,
@@ -47,6 +55,8 @@ def test_an_end_that_hardly_counts_is_left_aside() -> None:
     assert n == np.count_nonzero(whole.recording.time[whole.signals[0].rows] <= BLOW + LASTING)
     np.testing.assert_array_equal(signal.values, whole.signals[0].values[:n])
     assert signal.weight.size == n
+    np.testing.assert_array_equal(signal.level, 1.0 + found.recording.time[signal.rows])
+    assert found.measured().size == n
     np.testing.assert_array_equal(found.strays[0], np.arange(n))
     assert isinstance(found.simulator, RunSimulator)
     assert found.simulator.scenario.simulation.duration < BLOW + LASTING + 0.05

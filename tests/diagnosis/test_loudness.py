@@ -10,9 +10,13 @@ import pytest
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.loudness import SPREAD, with_loudness
+from rollover.diagnosis.simulator import simulator_of
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario, signal
+from tests.diagnosis.test_chaos import BLOW, blown
+from tests.diagnosis.test_chaos import CHANNELS as CHASSIS
 from tests.diagnosis.test_fits import judge_of
+from tests.physics.scenes import shipped
 
 CHANNELS = (FORCE, DEPTH, ACCELERATION)
 FLOOR, SHARE = 0.002, 0.02  # of the largest range, of the value
@@ -85,3 +89,16 @@ def test_what_a_model_may_be_off_by_does_not_grow_with_the_noise() -> None:
     assert Evidence._whitened(s, values) == pytest.approx(1.0 / np.hypot(0.1 * level, 1.0), rel=1e-12)
     columns = np.stack([values, 2.0 * values], axis=1)
     assert Evidence._whitened(s, columns)[:, 1] == pytest.approx(2.0 / np.hypot(0.1 * level, 1.0), rel=1e-12)
+
+
+def test_contacts_after_a_blow_are_no_noise() -> None:
+    """Twice the noise of a motion after the blow, where values are large, in an overturn and in anything else."""
+    rng = np.random.default_rng(3)
+    e = blown(CHASSIS)
+    n, time = e.signals[0].rows.size, e.recording.time
+    after = time >= BLOW
+    values = np.where(after, 5.0 + np.sin(20.0 * time), 0.1) + np.where(after, 0.3, 0.05) * rng.standard_normal(n)
+    found = replace(e, signals=tuple(replace(s, values=values) for s in e.signals))
+    assert all(s.level is None for s in with_loudness([found])[0].signals)
+    elsewhere = simulator_of(shipped("drop_test"), e.recording)
+    assert all(s.level is not None for s in with_loudness([replace(found, simulator=elsewhere)])[0].signals)
