@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.blocks import Block, at_an_end
+from rollover.diagnosis.blocks import Block, at_an_end, shift_of
 from rollover.diagnosis.candidates import physical
 from rollover.diagnosis.crew import linearised
 from rollover.diagnosis.evidence import MODEL_ERROR, Evidence
 from rollover.diagnosis.fit import GENTLE, Fitted, Judge
-from rollover.diagnosis.settle import along, step_of_means
+from rollover.diagnosis.settle import along, left_of_means, step_of_means
 from rollover.diagnosis.verdict import Interval
 from rollover.effects import EFFECTS, units_of
 
@@ -22,6 +22,11 @@ Array = NDArray[np.float64]
 TWO_SIDED = 1.96
 NEAR = 0.1  # of a value, by which the end of a range may lie beside the fit
 KNOWN = 1e-3  # of such an end, by which it is known
+CLEARLY = 0.4  # of the rise that is due, and
+ROUGH = 8.0  # rise that is no chance: from place to place the misfit of a mean of runs differs by 3 (1 sd)
+FURTHER, FARTHEST = 2.0, 30.0  # factors by which one goes on at a time, and at most
+BEYOND = 1.2  # factor below which an interval that is too narrow is chance
+CLOCKED = 3  # times that a clock is fitted anew
 EVENLY = 12.0**-0.5  # standard deviation of what is spread evenly from 0 to 1
 
 
@@ -90,6 +95,54 @@ def with_shapes(judge: Judge, fitted: Fitted) -> tuple[Fitted, Array, list[int]]
     return fitted, np.full(len(fitted.x), GENTLE), list(range(len(fitted.x)))
 
 
+def reaches(judge: Judge, fitted: Fitted, own: Array, phi: float) -> Array:
+    """How much further than by its slopes a misfit stays low, factors (p, 2) of `own` deviations down and up, >= 1.
+
+    `TWO_SIDED` deviations off, the other parameters going along, it should have risen by `TWO_SIDED`^2 phi. Leaps and
+    chance make slopes too steep: where it has clearly not, one goes on until it has, and back on a parabola. Of runs
+    that scatter it is the misfit of their mean, which is rough by itself.
+    """
+    inverse = np.linalg.inv(sum((b.normal()[0] for b in fitted.blocks), GENTLE * np.eye(len(fitted.x))))
+    start = _misfit(judge, fitted, np.zeros(len(fitted.x)))
+    due = TWO_SIDED**2 * phi
+    enough = max(CLEARLY * due, ROUGH if any(e.strays for e in judge.evidence) else 0.0)
+    found = np.ones((own.size, 2))
+    if start is None:
+        return found
+    for k in range(own.size):
+        way = TWO_SIDED * own[k] * inverse[:, k] / inverse[k, k]
+        for side, sign in enumerate((-1.0, 1.0)):
+            far = 1.0
+            while far < FARTHEST:
+                x = np.array(fitted.x) + sign * far * way
+                there = _misfit(judge, fitted, sign * far * way) if np.all((x >= 0.0) & (x <= 1.0)) else None
+                if there is None:
+                    break
+                if there - start > enough:
+                    far *= float(np.sqrt(due / (there - start)))
+                    break
+                far *= FURTHER
+            found[k, side] = far if far > BEYOND else 1.0
+    return found
+
+
+def _misfit(judge: Judge, fitted: Fitted, way: Array) -> float | None:
+    """What is left some way (p,) from a fit; None where it cannot be simulated."""
+    x = [float(v) for v in np.array(fitted.x) + way]
+    judge.made_ahead((r, fitted.candidates, x) for r in range(len(fitted.blocks)))
+    blocks: list[Block] = []
+    for r, b in enumerate(fitted.blocks):
+        shift, there = b.shift + shift_of(b, way), None
+        for _ in range(CLOCKED):  # its clock goes along, by more than the slopes at the fit say
+            there = judge.block(r, fitted.candidates, x, shift, 0.0)
+            if there is None:
+                return None
+            shift = there.shift + shift_of(there, np.zeros(way.size))
+        blocks += [] if there is None else [there]
+    moved = replace(fitted, x=tuple(x), blocks=tuple(blocks))
+    return left_of_means(judge, moved)[0] if any(e.strays for e in judge.evidence) else moved.left
+
+
 def _noise(judge: Judge, fitted: Fitted) -> Array:
     """Covariance (p, p) of J'w that comes of the noise alone: a weighed sample's noise is below 1."""
     found = GENTLE * np.eye(len(fitted.x))
@@ -127,7 +180,7 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
         for r, block in enumerate(fitted.blocks):
             for signal, part in judge.evidence[r].spans():
                 if signal.channel == channel:
-                    y = (judge.measured[r] - block.residual)[part]
+                    y = block.counted(judge.measured[r] - block.plain_residual)[part]
                     pull += block.J[part].T @ (MODEL_ERROR * y)
         moved += (inverse @ pull) ** 2
     # a fit that ended before it was at rest is off by what the next step would have been
@@ -137,6 +190,8 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
         rest = step_of_means(judge.evidence, fitted.blocks)
     moved += rest**2
     sd = np.sqrt(sd**2 + moved)[kept]
+    own = np.sqrt(phi * np.diag(inverse))[kept]
+    wide = np.sqrt(sd[:, None] ** 2 + own[:, None] ** 2 * (reaches(judge, told, own, phi) ** 2 - 1.0))
     found, at = [], 0
     for c in told.candidates:
         kind: Any = EFFECTS[c.id]
@@ -146,8 +201,8 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
             x = told.x[at]
             values[name] = Interval(
                 value=physical(x, search),
-                low=physical(x - TWO_SIDED * sd[at], search),
-                high=physical(x + TWO_SIDED * sd[at], search),
+                low=physical(x - TWO_SIDED * wide[at, 0], search),
+                high=physical(x + TWO_SIDED * wide[at, 1], search),
                 unit=units.get(name, ""),
                 at_bound=at_an_end(x),
             )

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from rollover.diagnosis import intervals as stated
+from rollover.diagnosis.blocks import Block
 from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.readings import digitised
+from rollover.effects import Search
 from rollover.recording import Recording
 from tests.diagnosis.drops import FORCE, recorded
 from tests.diagnosis.test_fits import candidate, judge_of
@@ -34,6 +39,27 @@ def test_an_exponent_that_was_not_fitted_widens_the_interval_of_the_strength() -
     assert wide.low <= 60.0 <= wide.high
     assert wide.high - wide.low > 1.5 * (narrow.high - narrow.low)
     assert wide.value == narrow.value
+
+
+@pytest.mark.parametrize(("flatter", "least", "most"), [(1.0, 1.0, 1.0), (4.0, 2.5, 4.0)])
+def test_an_interval_reaches_as_far_as_the_misfit_stays_low(flatter: float, least: float, most: float) -> None:
+    """Slopes say |w - J dx|^2 with J = 40, the misfit rises as if J were `flatter` times less."""
+    J, n = 40.0, 50
+    rng = np.random.default_rng(1)
+    w = rng.standard_normal(n)
+    way = rng.standard_normal(n)
+    way -= w * (w @ way) / (w @ w)  # the misfit is least where the fit is
+    way /= np.sqrt(way @ way)
+
+    def block(_r: int, _c: object, x: list[float], _s: float, _n: float) -> Block:
+        there = w - J / flatter * (x[0] - 0.5) * way
+        return Block(residual=there, J=J * way[:, None], slope=np.zeros(n), shift=0.0, prior=1e-3)
+
+    judge: Any = SimpleNamespace(block=block, evidence=(), effort=DROPS, made_ahead=lambda _: None)
+    candidate = Candidate(id="mass", kind="parameter", family="", search={"added": Search(0, 1)})
+    fitted = Fitted(candidates=(candidate,), x=(0.5,), blocks=(block(0, None, [0.5], 0.0, 0.0),))
+    found = stated.reaches(judge, fitted, np.array([1.0 / J]), 1.0)
+    assert np.all((found >= least) & (found <= most))
 
 
 def read(recordings: list[tuple[str, Recording]]) -> Judge:
