@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis import colour
+from rollover.diagnosis.blocks import Block
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.crew import Crew, Job
 from rollover.diagnosis.detect import mismatch_of
@@ -25,6 +26,7 @@ RIVALS = 0.4  # of the best's gain: a first fit that gains less is no rival, whe
 CROOKED = 100.0  # times what the best leaves, up to which a fit of two parameters is polished
 RUGGED = 2.0  # misfit over the noise that the best leaves, from which on there may be something behind a cliff
 LEADS = 1.5  # times what the best leaves, up to which it is looked for
+MOSTLY = 0.25  # of what the middle recording is left with by the best, below which an effect is the better one there
 TIED = 1.2  # times what the best leaves, up to which time shifts are tried out
 SHAPED = 4.0  # times what the best leaves, up to which an effect's shape is fitted too
 WORTH = 12.0  # gain that pays for a shape
@@ -92,6 +94,7 @@ def step(
     fits.sort(key=lambda f: f.left)
     if fits[0].left > RUGGED**2 * count and not judge.effort.thrifty:
         fits = _combed(judge, fits, shifts, crew, say)
+        fits = _but_for_some(judge, base, fits, candidates, looked, shifts, crew, say)
     # where a threshold makes the way crooked, the nearer ones are followed to the end; of what explains the best alone
     able = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < CROOKED * fits[0].left]
     alone = [f for f in able[:1] if f is fits[0] and not base.candidates]
@@ -124,6 +127,39 @@ def _combed(judge: Judge, fits: Sequence[Fitted], shifts: Sequence[float], crew:
     tried = zip(crew.fits(judge, jobs, say), able, strict=True)
     better = [new if new is not None and new.left < old.left else old for new, old in tried]
     return sorted([*better, *(f for f in fits if not any(f is one for one in able))], key=lambda f: f.left)
+
+
+def _but_for_some(
+    judge: Judge,
+    base: Fitted,
+    fits: Sequence[Fitted],
+    candidates: Sequence[Candidate],
+    looked: Gate,
+    shifts: Sequence[float],
+    crew: Crew,
+    say: Progress,
+) -> list[Fitted]:
+    """The fits, best first, with those whose shape may be wrong for a few recordings alone, fitted together with it.
+
+    Such a one meets most recordings far better than the best does, by the middle one, and leaves a few altogether: a
+    face that is held lets go or does not.
+    """
+    usual, jobs = _middle(fits[0].blocks), []
+    for c in (c for c in candidates if c.shapes):
+        met = []
+        for start in (*looked.starts.get(c.key, ()), *c.starts()):
+            x = (*base.x, *start)
+            blocks = [judge.block(r, (*base.candidates, c), x, s, 0.0) for r, s in enumerate(shifts)]
+            if all(b is not None for b in blocks):
+                met.append((_middle([b for b in blocks if b is not None]), x))
+        if met and min(met)[0] < MOSTLY * usual:
+            jobs.append(Job(how="scan", candidates=(*base.candidates, c), start=min(met)[1], shifts=tuple(shifts)))
+    return sorted([*fits, *(f for f in crew.fits(judge, jobs, say) if f is not None)], key=lambda f: f.left)
+
+
+def _middle(blocks: Sequence[Block]) -> float:
+    """What the middle one of several recordings leaves per sample."""
+    return float(np.median([b.normal()[2] / b.residual.size for b in blocks]))
 
 
 def _from_base(
@@ -271,7 +307,7 @@ def moves(judge: Judge, base: Fitted, fitted: Fitted) -> float:
     most = 0.0
     for r, (a, b) in enumerate(zip(base.blocks, fitted.blocks, strict=True)):
         for signal, part in judge.evidence[r].spans():
-            d = (a.residual - b.residual)[part]
+            d = (a.plain_residual - b.plain_residual)[part]
             size = float(np.sqrt(np.mean(d * d))) * signal.sigma
             if size > 0.5 * signal.step:
                 most = max(most, size / signal.span)

@@ -9,7 +9,7 @@ import numpy as np
 
 from rollover.diagnosis.blocks import at_an_end, turned
 from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.crew import Crew
+from rollover.diagnosis.crew import Crew, Job
 from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Phases, Step, moves, step, weighed
 from rollover.diagnosis.fit import Fitted, Judge
@@ -26,6 +26,7 @@ NEGLIGIBLE = 0.001  # of a channel's range: what moves nothing by more is not wo
 PARTLY = 0.02  # of the excess over the noise that one effect may leave and still be named
 MANY = 0.05  # p-value of what as many effects as may be leave, below which they are no explanation
 HOPELESS = 2.0  # misfit over the noise that two effects leave and a third is not looked for
+LEADING, FOLLOWING = 4, 2  # of the first effects, and of later ones each, that are tried two by two
 BETTER = 0.5  # of what is left, that another first effect must leave
 
 Groups = Sequence[Sequence[int]]
@@ -102,8 +103,6 @@ def explained(
         found, left = followed(judge, found, phases)
         taken.append(found)
         current = found.fitted
-        if judge.effort.thrifty and (left.p_value > SURE or not matters(judge, current, left)):
-            break
         if len(taken) == 2 and left.p_value < SURE and matters(judge, current, left):
             # of two that are strong the first may have been taken for something else: is there a better one?
             other = _instead(judge, current, candidates, groups, phases, say, crew)
@@ -115,6 +114,15 @@ def explained(
             break
         looked = _look(judge, current, free(current, candidates), groups)
     is_whole = left.p_value > SURE or not matters(judge, current, left)
+    if first is not None and not judge.effort.thrifty and (not is_whole or len(taken) == MOST):
+        both = _together(judge, first, taken, phases, say, crew)
+        if (
+            both is not None
+            and (both[1].p_value > SURE or not is_whole)
+            and both[0][-1].fitted.left < BETTER * (base.left if is_whole else current.left)
+        ):
+            (taken, left), current = both, both[0][-1].fitted
+            is_whole = left.p_value > SURE or not matters(judge, current, left)
     parts = [s.again(judge) for s in taken]
     if is_whole and len(taken) > 1:
         parts = _needed(judge, taken, candidates, groups, phases, say, crew)
@@ -217,6 +225,32 @@ def _instead(
         beside = tuple(f for f in rivals if f.candidates[-1].key != held.candidates[-1].key)
         return Step(base=judge.again(rest), fitted=held, p_value=looked.p_value(), rivals=(held, *beside))
     return found
+
+
+def _together(
+    judge: Judge, first: Step, taken: Sequence[Step], phases: Phases, say: Progress, crew: Crew
+) -> tuple[list[Step], Mismatch] | None:
+    """The best pair of the first step's rivals, and of these with what led later, as steps, and what it leaves.
+
+    Of two effects neither need come first alone: a third may be like both.
+    """
+    leading = sorted((judge.again(f) for f in first.rivals), key=lambda f: f.left)[:LEADING]
+    later = [f for s in taken[1:] for f in sorted(s.rivals, key=lambda f: f.left)[:FOLLOWING]]
+    partners: dict[str, tuple[Candidate, tuple[float, ...]]] = {}
+    for f in (*leading, *later):
+        last = f.candidates[-1]
+        partners.setdefault(last.key, (last, f.x[len(f.x) - len(last.search) :]))
+    every, shifts = list(partners.values()), tuple(b.shift for b in leading[0].blocks)
+    pairs = [(a, b) for k, a in enumerate(leading) for b in every[k + 1 :]]
+    say(f"{len(pairs)} pairs of effects")
+    jobs = [Job(candidates=(*a.candidates, c), start=(*a.x, *x), shifts=shifts, width=1) for a, (c, x) in pairs]
+    fits = [(f, a) for f, (a, _) in zip(crew.fits(judge, jobs, say), pairs, strict=True) if f is not None]
+    if not fits:
+        return None
+    best, alone = min(fits, key=lambda pair: pair[0].left)
+    pair = Step(base=alone, fitted=best, p_value=first.p_value, rivals=(best,))
+    last_step, left = followed(judge, pair, phases)
+    return [replace(first, fitted=alone), last_step], left
 
 
 def _needed(

@@ -5,10 +5,14 @@ from __future__ import annotations
 import pytest
 
 from rollover.diagnosis import diagnose
+from rollover.diagnosis.crew import Crew
+from rollover.diagnosis.explain import Step
+from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.refine import combed
+from rollover.diagnosis.selection import _together
 from rollover.simulate import run
 from rollover.synthesis import synthetic
-from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded
+from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 from tests.diagnosis.test_fits import candidate, judge_of
 from tests.physics.scenes import shipped
 
@@ -47,3 +51,47 @@ def test_a_pair_that_leaves_nothing_is_named_by_both() -> None:
     assert by["soil-crust"]["thickness"].value == pytest.approx(0.03, rel=0.01)
     assert by["guide-friction"]["force"].value == pytest.approx(40.0, rel=0.05)
     assert found.after["held_out"].nrmse == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_shape_that_one_recording_alone_hangs_on_is_found() -> None:
+    """A face that springs back and is held: one drop of six lets go, within 5 % of the reach."""
+    sprung = {"effects.soil-elastic-rebound.recovery": 0.1, "effects.soil-elastic-rebound.damping_ratio": 0.1}
+    true = {"stress": 7508.0, "reach": 0.00396}
+    hidden = {f"effects.soil-adhesion.{name}": value for name, value in true.items()}
+    speeds = (1.621, 2.624, 1.395, 1.852, 2.123, 2.439)
+    made = recorded({**sprung, **hidden}, 1, speeds=speeds, rate=1500.0, until=0.6, noise=0.003)
+    base = scenario().replaced({**sprung, "simulation.duration": 0.8})
+    found = diagnose(base, made)
+    assert [e.id for e in found.effects] == ["soil-adhesion"]
+    by = found.effects[0].parameters
+    for name, value in true.items():
+        assert by[name].value == pytest.approx(value, rel=0.05), name
+    assert found.after["held_out"].nrmse == pytest.approx(1.0, abs=0.03)
+
+
+def test_two_effects_of_which_neither_comes_first_are_tried_together() -> None:
+    """A heavier striker on a guide that rubs: a stiffness and the mass led, and friction beside the first."""
+    hidden = {"effects.mass.added": 2.3, "effects.guide-friction.force": 31.0}
+    judge = judge_of(recorded(hidden, 1, speeds=(1.4, 2.0, 2.6, 3.2), rate=1000.0, noise=0.003, channels=CHANNELS))
+    c = {name: candidate(judge, name) for name in ("mass", "soil-stiffness", "guide-friction")}
+    base = judge.fit((), ())
+    stiffer, heavier = (judge.fit((c[name],), c[name].starts()[0]) for name in ("soil-stiffness", "mass"))
+    assert base is not None
+    assert stiffer is not None
+    assert heavier is not None
+    beside = judge.fit((*stiffer.candidates, c["guide-friction"]), (*stiffer.x, *c["guide-friction"].starts()[0]))
+    assert beside is not None
+    count = sum(e.count for e in judge.evidence)
+    assert min(stiffer.left, heavier.left, beside.left) > 1.5 * count
+    first = Step(base=base, fitted=stiffer, p_value=0.0, rivals=(stiffer, heavier))
+    then = Step(base=stiffer, fitted=beside, p_value=0.0, rivals=(beside,))
+    found = _together(judge, first, [first, then], [phases_of(e) for e in judge.evidence], lambda _: None, Crew())
+    assert found is not None
+    (one, both), left = found
+    assert one.fitted.label == "mass"
+    assert both.base is one.fitted
+    assert both.fitted.label == "mass + guide-friction"
+    assert both.fitted.left < 1.1 * count
+    assert left.p_value > 0.01
+    assert c["mass"].values(both.fitted.x[:1])["added"] == pytest.approx(2.3, rel=0.05)
+    assert c["guide-friction"].values(both.fitted.x[1:])["force"] == pytest.approx(31.0, rel=0.05)
