@@ -106,20 +106,20 @@ def explained(
         if len(taken) == 2 and left.p_value < SURE and matters(judge, current, left):
             # of two that are strong the first may have been taken for something else: is there a better one?
             other = _instead(judge, current, candidates, groups, phases, say, crew)
-            if other is not None and other.fitted.left < BETTER * current.left:
-                other, left = followed(judge, other, phases)
-                taken = [taken[1], other]
-                current = other.fitted
+            if other is not None and other.fitted.left < current.left:
+                other, beside = followed(judge, other, phases)
+                if is_better(other.fitted, beside, current):
+                    taken, left = [taken[1], other], beside
+                    current = other.fitted
         if len(taken) > 1 and current.left > HOPELESS**2 * count:
             break
         looked = _look(judge, current, free(current, candidates), groups)
     is_whole = left.p_value > SURE or not matters(judge, current, left)
     if first is not None and not judge.effort.thrifty and (not is_whole or len(taken) == MOST):
         both = _together(judge, first, taken, phases, say, crew)
-        if (
-            both is not None
-            and (both[1].p_value > SURE or not is_whole)
-            and both[0][-1].fitted.left < BETTER * (base.left if is_whole else current.left)
+        # two that leave what chance leaves are preferred to three that do
+        if both is not None and (
+            both[1].p_value > SURE if is_whole else is_better(both[0][-1].fitted, both[1], current)
         ):
             (taken, left), current = both, both[0][-1].fitted
             is_whole = left.p_value > SURE or not matters(judge, current, left)
@@ -225,6 +225,11 @@ def _instead(
         beside = tuple(f for f in rivals if f.candidates[-1].key != held.candidates[-1].key)
         return Step(base=judge.again(rest), fitted=held, p_value=looked.p_value(), rivals=(held, *beside))
     return found
+
+
+def is_better(other: Fitted, left: Mismatch, current: Fitted) -> bool:
+    """Whether an explanation is to be taken instead of another: it leaves far less, or less and no more than chance."""
+    return other.left < current.left * (1.0 if left.p_value > SURE else BETTER)
 
 
 def _together(

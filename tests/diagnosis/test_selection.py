@@ -14,7 +14,7 @@ from rollover.diagnosis.detect import Mismatch
 from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
-from rollover.diagnosis.selection import MOST, Explanation, decided
+from rollover.diagnosis.selection import MOST, Explanation, decided, is_better
 from rollover.effects import Search
 
 IDS = ("soil-crust", "guide-friction", "mass")
@@ -66,6 +66,14 @@ def test_as_many_effects_as_may_be_must_leave_what_chance_leaves(
     found, verdict = decided(cast(Judge, SimpleNamespace(evidence=())), explanation(count, p_value), [], [])
     assert len(found.parts) == named
     assert verdict == ("missing-physics" if named else "unexplained")
+
+
+@pytest.mark.parametrize(
+    ("other", "p_value", "better"), [(90.0, 0.4, True), (90.0, 1e-9, False), (40.0, 1e-9, True), (110.0, 0.4, False)]
+)
+def test_a_little_less_is_better_where_it_is_all_that_chance_leaves(other: float, p_value: float, better: bool) -> None:
+    fits: Any = [SimpleNamespace(left=other), SimpleNamespace(left=100.0)]
+    assert is_better(fits[0], left(p_value), fits[1]) is better
 
 
 def test_one_that_takes_nearly_all_is_named_with_what_it_leaves_itself(judged: dict[str, float]) -> None:
