@@ -59,7 +59,7 @@ class Block:
         """Residual whose squares add up to what is left."""
         if self.course is None:
             return self.residual
-        return np.where(self.course.samples < 1.0, np.sqrt(self.course.share) * self.plain_residual, self.residual)
+        return np.where(self.course.late, np.sqrt(self.course.share) * self.plain_residual, self.residual)
 
     @property
     def plain_J(self) -> Array:

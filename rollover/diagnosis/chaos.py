@@ -37,6 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.evidence import Evidence, Signal
+from rollover.diagnosis.simulator import blow_of
 
 Array = NDArray[np.float64]
 WINDOW = 0.02  # s, over which the neighbours' squares are averaged: what is off by a little in time is off in size
@@ -52,7 +53,7 @@ FAR = 9.0  # times the middle power of neighbours, beyond which one took another
 
 def weighted(e: Evidence, strays: Sequence[Mapping[str, Array]]) -> Evidence:
     """The evidence with each sample's weight (D3); `strays` are the neighbours' deviations at its stamps."""
-    blow = next((at for at, name in e.simulator.marks() if name == "impact"), np.inf)
+    blow = blow_of(e.simulator)
     strays = alike(e, strays, blow)
     if not strays:
         return e
@@ -109,6 +110,16 @@ class Course:
     samples: Array
     share: float
     more: float
+
+    @property
+    def late(self) -> NDArray[np.bool_]:
+        """Samples (n,) after the blow."""
+        return self.samples < 1.0
+
+    @property
+    def slope(self) -> float:
+        """(D11)."""
+        return float(self.samples.min()) ** 2
 
 
 def course(e: Evidence, residual: Array) -> Course | None:

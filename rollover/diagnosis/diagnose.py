@@ -25,13 +25,13 @@ from rollover.diagnosis.explain import SURE
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import yardstick
 from rollover.diagnosis.loudness import with_loudness
-from rollover.diagnosis.overturn import RunSimulator
+from rollover.diagnosis.overturn import full_runs
 from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.readings import digitised, without_spikes
 from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing, with_scatter
 from rollover.diagnosis.scores import judged
 from rollover.diagnosis.selection import Explanation, decided, explained, matters
-from rollover.diagnosis.simulator import set_up
+from rollover.diagnosis.simulator import blow_of, set_up
 from rollover.diagnosis.statements import considered, named, noise, places, sentence
 from rollover.diagnosis.verdict import Degree, Diagnosis
 from rollover.drop import unfit
@@ -193,19 +193,18 @@ def _trusted(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:
 
 
 def _evidence(
-    scenario: Scenario, recordings: Sequence[tuple[str, Recording]], crew: Crew | None = None
+    scenario: Scenario, recordings: Sequence[tuple[str, Recording]], crew: Crew
 ) -> tuple[list[Evidence], list[str]]:
     found, notes = [], []
     for name, whole in recordings:
         recording, spiked = without_spikes(whole)
         thin, simulator, averaged = simulated(scenario, recording)
-        if spiked:
-            blow = next((at for at, phase in simulator.marks() if phase == "impact"), np.inf)
+        if spiked and (blow := blow_of(simulator)) < np.inf:
             recording, spiked = without_spikes(whole, blow)
             thin, simulator, averaged = simulated(scenario, recording)
-        inner = getattr(simulator, "inner", simulator)
-        if isinstance(inner, RunSimulator) and crew is not None:
-            inner.children = crew.children
+        runs = full_runs(simulator)
+        if runs is not None:
+            runs.children = crew.children
         simulator.settle()
         notes += [f"{name}: {line}" for line in spiked]
         one = evidence_of(name, thin, simulator, averaged)
@@ -230,8 +229,8 @@ def _left_aside(every: Sequence[Evidence], found: Sequence[Evidence]) -> list[st
 
 def _grids(evidence: Sequence[Evidence]) -> dict[str, tuple[float, ...]]:
     """Centre of the ground's elements (m) of the run that stands for its neighbours, by recording; drops have none."""
-    made = [(e.name, getattr(e.simulator, "inner", e.simulator)) for e in evidence]
-    return {name: s.scenario.ground.elements.centre for name, s in made if isinstance(s, RunSimulator)}
+    made = [(e.name, full_runs(e.simulator)) for e in evidence]
+    return {name: s.scenario.ground.elements.centre for name, s in made if s is not None}
 
 
 def _felt(d: Degree) -> str:
@@ -242,8 +241,7 @@ def _felt(d: Degree) -> str:
 
 def _cost(found: Sequence[Evidence]) -> list[str]:
     """What full runs took, where there were any."""
-    inner = [getattr(e.simulator, "inner", e.simulator) for e in found]
-    made = [s for s in inner if isinstance(s, RunSimulator)]
+    made = [s for e in found if (s := full_runs(e.simulator)) is not None]
     runs, seconds = sum(s.runs for s in made), sum(s.seconds for s in made)
     return [f"{runs} full runs of {1e3 * seconds / runs:.0f} ms on the average"] if runs else []
 

@@ -13,7 +13,7 @@ from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.chaos import course
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
-from rollover.diagnosis.overturn import RunSimulator, made_ahead
+from rollover.diagnosis.overturn import full_runs, made_ahead
 from rollover.diagnosis.secant import Point, secant
 
 Array = NDArray[np.float64]
@@ -40,10 +40,9 @@ class Judge:
 
     def made_ahead(self, wanted: Iterable[tuple[int, Sequence[Candidate], Sequence[float]]]) -> None:
         """Make full runs of (recording, candidates, x) side by side where there are children to do it."""
-        for e in self.evidence[:1]:
-            one = getattr(e.simulator, "inner", e.simulator)
-            if isinstance(one, RunSimulator):
-                made_ahead(one.children, [(self.evidence[r].simulator, self.changes(c, x)) for r, c, x in wanted])
+        runs = full_runs(self.evidence[0].simulator) if self.evidence else None
+        if runs is not None:
+            made_ahead(runs.children, [(self.evidence[r].simulator, self.changes(c, x)) for r, c, x in wanted])
 
     def bare(self) -> Judge:
         """The same without what was simulated, to be sent to another process."""

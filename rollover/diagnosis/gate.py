@@ -84,10 +84,11 @@ def gate(judge: Judge, base: Fitted, candidates: Sequence[Candidate], only: Sequ
     if not columns:
         return Gate(score=0.0, scores={}, null=np.zeros(DRAWS), detectable={})
     D = np.stack(columns, axis=1)
-    along, scores = _best_along(misfit - own @ (own.T @ misfit), D, blocks)
+    misfit = misfit - own @ (own.T @ misfit)
+    along, scores = _best_along(misfit, D, blocks)
     scores = scores / (1.0 + _trust(judge, blocks, use, D))
     if any(judge.evidence[r].strays for r in use):
-        scores = scores / _at_odds(misfit - own @ (own.T @ misfit), D, [b.residual.size for b in blocks])
+        scores = scores / _at_odds(misfit, D, [b.residual.size for b in blocks])
     detectable: dict[str, float] = {}
     own_best: dict[str, float] = {}
     ways: dict[str, list[tuple[float, ...]]] = {}
@@ -141,20 +142,23 @@ def _best_along(misfit: Array, D: Array, blocks: Sequence[Block]) -> tuple[Array
     along = D.T @ misfit
     if all(b.course is None for b in blocks):
         return along, along**2
-    ends = np.cumsum([b.residual.size for b in blocks])
     tried, parts = [along], []
-    for b, end in zip(blocks, ends, strict=True):
-        whole = slice(int(end - b.residual.size), int(end))
-        late = np.zeros(b.residual.size, dtype=bool) if b.course is None else b.course.samples < 1.0
-        cells = [(1.0, ~late)] if b.course is None else [(1.0, ~late), (float(b.course.samples.min()) ** 2, late)]
+    for b, whole in zip(blocks, _stacked([b.residual.size for b in blocks]), strict=True):
+        every = slice(None)
+        cells = [(1.0, every)] if b.course is None else [(1.0, ~b.course.late), (b.course.slope, b.course.late)]
         for slope, rows in cells:
             d, w = D[whole][rows], misfit[whole][rows]
             pull, size = d.T @ w, np.sum(d**2, axis=0)
             parts.append((slope, pull, size))
             tried.append(pull / np.maximum(size, 1e-12))
     gains = np.array([sum(gained(2.0 * a * pull - a**2 * size, slope) for slope, pull, size in parts) for a in tried])
-    best, every = np.argmax(gains, axis=0), np.arange(along.size)
-    return np.array(tried)[best, every], np.maximum(gains[best, every], 0.0)
+    best, each = np.argmax(gains, axis=0), np.arange(along.size)
+    return np.array(tried)[best, each], np.maximum(gains[best, each], 0.0)
+
+
+def _stacked(sizes: Sequence[int]) -> list[slice]:
+    """Where recordings of `sizes` rows lie in the stack of all."""
+    return [slice(int(end - n), int(end)) for end, n in zip(np.cumsum(sizes), sizes, strict=True)]
 
 
 def _at_odds(misfit: Array, D: Array, sizes: Sequence[int]) -> Array:
@@ -163,8 +167,7 @@ def _at_odds(misfit: Array, D: Array, sizes: Sequence[int]) -> Array:
     With a_r = d_r'w_r/|d_r|^2 the amplitude by recording r and a that by all, sum_r |d_r|^2 (a_r - a)^2 over the number
     of recordings but one, at least 1. A run that took another course asks for much of some effect, and does so alone.
     """
-    ends = np.cumsum(sizes)
-    parts = [slice(int(end - n), int(end)) for end, n in zip(ends, sizes, strict=True)]
+    parts = _stacked(sizes)
     along = np.array([D[p].T @ misfit[p] for p in parts])
     size = np.array([np.sum(D[p] ** 2, axis=0) for p in parts])
     apart = np.sum(along**2 / np.maximum(size, 1e-12), axis=0) - along.sum(axis=0) ** 2 / size.sum(axis=0)
@@ -207,10 +210,16 @@ def yardstick(id: str, names: Collection[str]) -> tuple[str, float]:
     return next(iter(names)), 0.0
 
 
+def zero_of(c: Candidate) -> tuple[str, float | None]:
+    """The parameter of `yardstick` and its value at no effect, which the scenario may say; None where none is known."""
+    name, null = yardstick(c.id, c.search)
+    return name, c.own.get(name) if EFFECTS[c.id].null.get(name) is None else null
+
+
 def is_limit(c: Candidate) -> bool:
     """Whether an effect is the stronger the lower its first parameter is, without a number at which it is none."""
-    name, _ = yardstick(c.id, c.search)
-    return name in LIMITS and EFFECTS[c.id].null.get(name) is None and name not in c.own
+    name, zero = zero_of(c)
+    return zero is None and name in LIMITS
 
 
 def _visible(c: Candidate, x: Sequence[float], size: float) -> float | None:
@@ -218,13 +227,11 @@ def _visible(c: Candidate, x: Sequence[float], size: float) -> float | None:
 
     Of a limit its value at x if that shows, else None; so where no value is known to be none.
     """
-    values = c.values(x)
-    name, null = yardstick(c.id, values)
-    if is_limit(c):
-        return values[name] if size >= VISIBLE else None
-    if EFFECTS[c.id].null.get(name) is None and name not in c.own:
-        return None
-    return abs(values[name] - c.own.get(name, null)) * VISIBLE / size
+    name, zero = zero_of(c)
+    value = c.values(x)[name]
+    if zero is not None:
+        return abs(value - zero) * VISIBLE / size
+    return value if is_limit(c) and size >= VISIBLE else None
 
 
 def null_of_the_best(directions: Sequence[Array], draws: int = DRAWS, seed: int = 0) -> Array:

@@ -131,14 +131,14 @@ def _misfit(judge: Judge, fitted: Fitted, way: Array) -> float | None:
     x = [float(v) for v in np.array(fitted.x) + way]
     judge.made_ahead((r, fitted.candidates, x) for r in range(len(fitted.blocks)))
     blocks: list[Block] = []
-    for r, b in enumerate(fitted.blocks):
-        shift, there = b.shift + shift_of(b, way), None
+    for r, there in enumerate(fitted.blocks):
+        left = way
         for _ in range(CLOCKED):  # its clock goes along, by more than the slopes at the fit say
-            there = judge.block(r, fitted.candidates, x, shift, 0.0)
-            if there is None:
+            found = judge.block(r, fitted.candidates, x, there.shift + shift_of(there, left), 0.0)
+            if found is None:
                 return None
-            shift = there.shift + shift_of(there, np.zeros(way.size))
-        blocks += [] if there is None else [there]
+            there, left = found, np.zeros(way.size)
+        blocks.append(there)
     moved = replace(fitted, x=tuple(x), blocks=tuple(blocks))
     return left_of_means(judge, moved)[0] if any(e.strays for e in judge.evidence) else moved.left
 

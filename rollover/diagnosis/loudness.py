@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.colour import alike
 from rollover.diagnosis.evidence import Evidence, Signal
+from rollover.diagnosis.simulator import blow_of
 from rollover.noise import LENGTH
 
 Array = NDArray[np.float64]
@@ -47,8 +48,7 @@ def with_loudness(evidence: Sequence[Evidence]) -> list[Evidence]:
 
 def _told(e: Evidence, s: Signal) -> tuple[Array, Array] | None:
     """Values (n,) of a signal and the size of its noise there; None of too few or unevenly spaced samples."""
-    blow = next((at for at, name in e.simulator.marks() if name == "impact"), np.inf)
-    s = s.cut(e.recording.time[s.rows] < blow)
+    s = s.cut(e.recording.time[s.rows] < blow_of(e.simulator))
     stamps = np.diff(e.recording.time[s.rows])
     if s.values.size < max(BINS * FEWEST, LENGTH) or s.scatter > 0.0:
         return None  # the steps of digits are no noise

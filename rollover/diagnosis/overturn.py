@@ -196,15 +196,14 @@ class RunSimulator:
         the channels' ranges.
         """
         places = self._places()
-        self.predict({CENTRE: places[0]}, 0.0)  # how long one takes
-        wanted = [{CENTRE: place} for place in places] + [self._beside(one) for one in NEIGHBOURS]
-        made_ahead(self.children, [(self, values) for values in wanted])
+        own = [{CENTRE: place} for place in places]
+        others = [values for values in map(self._beside, NEIGHBOURS) if values not in own]
+        self.predict(own[0], 0.0)  # how long one takes
+        made_ahead(self.children, [(self, values) for values in (*own, *others)])
         runs = {place: self.predict({CENTRE: place}, 0.0) for place in places}
         there = {place: run for place, run in runs.items() if run is not None}
         if len(there) < 3:
             return
-        own = [{CENTRE: place} for place in runs]
-        others = [values for values in map(self._beside, NEIGHBOURS) if values not in own]
         beside = [self.predict(values, 0.0) for values in others]
         stacks = {place: np.concatenate(list(_scaled(run).values())) for place, run in there.items()}
         every = [*stacks.values(), *(np.concatenate(list(_scaled(run).values())) for run in beside if run is not None)]
@@ -295,6 +294,12 @@ class RunSimulator:
         return self._known[_key(changes)]
 
 
+def full_runs(simulator: Any) -> RunSimulator | None:
+    """What makes the full runs of a simulator, behind means of neighbouring samples too; None where there are none."""
+    own = getattr(simulator, "inner", simulator)
+    return own if isinstance(own, RunSimulator) else None
+
+
 def made_ahead(children: Children | None, wanted: Iterable[tuple[Any, Mapping[str, Any]]]) -> None:
     """Make runs of (simulator, changes) side by side in children, as far as they are full runs that are not known.
 
@@ -304,9 +309,9 @@ def made_ahead(children: Children | None, wanted: Iterable[tuple[Any, Mapping[st
         return
     todo: dict[tuple[int, Any], tuple[RunSimulator, Making]] = {}
     for simulator, changes in wanted:
-        own = getattr(simulator, "inner", simulator)
-        making = own.making(changes) if isinstance(own, RunSimulator) else None
-        if making is not None:
+        own = full_runs(simulator)
+        making = None if own is None else own.making(changes)
+        if own is not None and making is not None:
             todo[id(own), making.key] = (own, making)
     every = list(todo.values())
     if len(every) < 2:

@@ -26,6 +26,14 @@ def left_at(judge: Judge, candidates: Sequence[Candidate], x: Sequence[float], s
     return None if any(b is None for b in blocks) else sum(b.normal()[2] for b in blocks if b is not None)
 
 
+def _by_what_is_left(
+    judge: Judge, candidates: Sequence[Candidate], places: Sequence[tuple[float, ...]], shifts: Sequence[float]
+) -> list[tuple[float, ...]]:
+    """Those places that can be simulated, the one that leaves least first."""
+    met = [(there, x) for x in places if (there := left_at(judge, candidates, x, shifts)) is not None]
+    return [x for _, x in sorted(met)]
+
+
 def polish(judge: Judge, fitted: Fitted, size: float = 0.02, most: int = 45) -> Fitted:
     """Follow a crooked valley by a simplex: where a threshold is crossed, differences mislead; never worse."""
     from scipy.optimize import minimize
@@ -57,9 +65,8 @@ def combed(judge: Judge, fitted: Fitted) -> Fitted:
     at, shifts = len(fitted.x) - 2, [b.shift for b in fitted.blocks]
     firsts = np.clip(fitted.x[at] + COMBED * np.linspace(-1.0, 1.0, TEETH), 0.0, 1.0)
     places = [(*fitted.x[:at], float(a), float(b)) for a in firsts for b in (np.arange(BESIDE) + 0.5) / BESIDE]
-    met = [(there, x) for x in places if (there := left_at(judge, fitted.candidates, x, shifts)) is not None]
     chosen: list[tuple[float, ...]] = []
-    for _, x in sorted(met):
+    for x in _by_what_is_left(judge, fitted.candidates, places, shifts):
         if len(chosen) < STARTS and all(max(abs(a - b) for a, b in zip(x, c, strict=True)) > APART for c in chosen):
             chosen.append(x)
     found = [judge.fit(fitted.candidates, x, shifts=shifts, width=1) for x in chosen]
@@ -77,8 +84,8 @@ def scanned(judge: Judge, fitted: Fitted) -> Fitted | None:
     candidates, usual = (*fitted.candidates[:-1], last.whole()), last.with_shapes(fitted.x[-len(last.search) :])[0]
     begun = (*fitted.x[: at - len(last.search)], *usual)
     places = [(*begun[:k], float(v), *begun[k + 1 :]) for k in range(at, len(begun)) for v in SCANNED]
-    met = [(there, x) for x in places if (there := left_at(judge, candidates, x, shifts)) is not None]
-    again = judge.fit(candidates, min(met)[1], shifts=shifts, width=1) if met else None
+    met = _by_what_is_left(judge, candidates, places, shifts)
+    again = judge.fit(candidates, met[0], shifts=shifts, width=1) if met else None
     return None if again is None else polish(judge, again)
 
 
@@ -114,10 +121,10 @@ def shaped(judge: Judge, f: Fitted) -> Fitted | None:
     last, shifts = f.candidates[-1], [b.shift for b in f.blocks]
     candidates, at = (*f.candidates[:-1], last.whole()), len(f.x) - len(last.search)
     places = [(*f.x[:at], *start) for start in last.with_shapes(f.x[at:])]
-    begun = [(there, x) for x in places if (there := left_at(judge, candidates, x, shifts)) is not None]
+    begun = _by_what_is_left(judge, candidates, places, shifts)
     if not begun:
         return None
-    again = judge.fit(candidates, min(begun)[1], shifts=shifts)
+    again = judge.fit(candidates, begun[0], shifts=shifts)
     if again is not None and again.left > NOISE_LEFT**2 * sum(b.residual.size for b in again.blocks):
         again = polish(judge, again)
     return again

@@ -57,6 +57,11 @@ class Simulator(Protocol):
         """How much may be simulated."""
 
 
+def blow_of(simulator: Simulator) -> float:
+    """When the scenario as it is first hits the ground with more than its wheels, s; infinite if it never does."""
+    return next((at for at, name in simulator.marks() if name == "impact"), np.inf)
+
+
 class DropSimulator:
     """A drop test by its own integrator: two milliseconds a run."""
 
@@ -198,4 +203,4 @@ def set_up(scenario: Scenario, recording: Recording) -> Scenario:
     return scenario.replaced(dict(recording.conditions), origin=recording.title) if recording.conditions else scenario
 
 
-__all__ = ["DropSimulator", "RunSimulator", "Simulator", "behind_filters", "set_up", "simulator_of"]
+__all__ = ["DropSimulator", "RunSimulator", "Simulator", "behind_filters", "blow_of", "set_up", "simulator_of"]

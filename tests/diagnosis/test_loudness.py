@@ -83,7 +83,7 @@ def test_it_is_no_mismatch_and_hides_none() -> None:
 
 
 def test_what_a_model_may_be_off_by_does_not_grow_with_the_noise() -> None:
-    """A noise of 0.1 that is ten times as loud at the end, beside an error of the model of 1."""
+    """A noise of 0.1, ten times as loud at the end, beside an error of the model of 1: equal but for rounding."""
     values, level = np.ones(50), np.linspace(1.0, 10.0, 50)
     s = replace(signal(values, float(np.hypot(0.1, 1.0))), noise=0.1, level=level)
     assert Evidence._whitened(s, values) == pytest.approx(1.0 / np.hypot(0.1 * level, 1.0), rel=1e-12)
