@@ -11,7 +11,7 @@ from ground.compiled import compiled
 
 # columns of a part: kind, a point, the unit vector across its edge (towards which u grows; v stands to its left),
 # and numbers of its own as named in `profile`
-KIND, PX, PY, DX, DY, A, B, C, D, E, PART_COLUMNS = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10
+KIND, PX, PY, DX, DY, A, B, C, D, E, OVER, PART_COLUMNS = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11
 # A, B: gradient | tan of the face, height | tan, depth, half width at the top | tan of the rise, height, length
 # with the top, tan of the faces, half width | tan, height | grid's steps along x and y, nodes along x and y, first node
 SLOPED, BANK, DITCH, RAMP, KERB, MAP = 0, 1, 2, 3, 4, 5
@@ -21,53 +21,54 @@ _STEEPEST_TAN = math.tan(math.radians(STEEPEST))
 
 
 @compiled
-def node(part: Any, nodes: Any, ix: int, iy: int) -> float:
+def node(parts: Any, nodes: Any, k: int, ix: int, iy: int) -> float:
     """Height at a node of a map; beyond its rim that of the rim."""
-    nx, ny = int(part[C]), int(part[D])
+    nx, ny = int(parts[k, C]), int(parts[k, D])
     ix, iy = min(max(ix, 0), nx - 1), min(max(iy, 0), ny - 1)
-    return nodes[int(part[E]) + ix * ny + iy]  # type: ignore[no-any-return]
+    return nodes[int(parts[k, E]) + ix * ny + iy]  # type: ignore[no-any-return]
 
 
 @compiled
-def on_map(part: Any, nodes: Any, x: float, y: float) -> Any:
+def on_map(parts: Any, nodes: Any, k: int, x: float, y: float) -> Any:
     """Height and gradient of a map, bilinear between its nodes, level beyond its rim."""
-    u, v = (x - part[PX]) / part[A], (y - part[PY]) / part[B]
+    u, v = (x - parts[k, PX]) / parts[k, A], (y - parts[k, PY]) / parts[k, B]
     ix, iy = math.floor(u), math.floor(v)
     a, b = u - ix, v - iy
-    z00, z10 = node(part, nodes, ix, iy), node(part, nodes, ix + 1, iy)
-    z01, z11 = node(part, nodes, ix, iy + 1), node(part, nodes, ix + 1, iy + 1)
+    z00, z10 = node(parts, nodes, k, ix, iy), node(parts, nodes, k, ix + 1, iy)
+    z01, z11 = node(parts, nodes, k, ix, iy + 1), node(parts, nodes, k, ix + 1, iy + 1)
     low, high = z00 + a * (z10 - z00), z01 + a * (z11 - z01)
-    gx = ((z10 - z00) * (1.0 - b) + (z11 - z01) * b) / part[A]
-    return low + b * (high - low), gx, (high - low) / part[B]
+    gx = ((z10 - z00) * (1.0 - b) + (z11 - z01) * b) / parts[k, A]
+    return low + b * (high - low), gx, (high - low) / parts[k, B]
 
 
 @compiled
-def profile(part: Any, u: float, v: float) -> Any:
-    """Height of a part over u and v, and its derivatives along both."""
-    kind = int(part[KIND])
+def profile(parts: Any, k: int, u: float, v: float) -> Any:
+    """Height of part k over u and v, and its derivatives along both."""
+    kind, a, b = int(parts[k, KIND]), parts[k, A], parts[k, B]
     if kind == BANK:
         if u <= 0.0:
             return 0.0, 0.0, 0.0
-        return (-u * part[A], -part[A], 0.0) if u * part[A] < part[B] else (-part[B], 0.0, 0.0)
+        return (-u * a, -a, 0.0) if u * a < b else (-b, 0.0, 0.0)
     if kind == KERB:
         if u <= 0.0:
             return 0.0, 0.0, 0.0
-        return (u * part[A], part[A], 0.0) if u * part[A] < part[B] else (part[B], 0.0, 0.0)
+        return (u * a, a, 0.0) if u * a < b else (b, 0.0, 0.0)
     if kind == DITCH:
-        inside = (part[C] - abs(u)) * part[A]
+        inside = (parts[k, C] - abs(u)) * a
         if inside <= 0.0:
             return 0.0, 0.0, 0.0
-        return (-inside, math.copysign(part[A], u), 0.0) if inside < part[B] else (-part[B], 0.0, 0.0)
-    rise, end = u * part[A], (part[C] - u) * part[D] + part[B]
-    side = (part[E] - abs(v)) * part[D] + part[B]
-    z = min(min(rise, end), min(side, part[B]))
+        return (-inside, math.copysign(a, u), 0.0) if inside < b else (-b, 0.0, 0.0)
+    d = parts[k, D]
+    rise, end = u * a, (parts[k, C] - u) * d + b
+    side = (parts[k, E] - abs(v)) * d + b
+    z = min(min(rise, end), min(side, b))
     if z <= 0.0:
         return 0.0, 0.0, 0.0
-    if z == part[B]:
+    if z == b:
         return z, 0.0, 0.0
     if z == rise:
-        return z, part[A], 0.0
-    return (z, -part[D], 0.0) if z == end else (z, 0.0, -math.copysign(part[D], v))
+        return z, a, 0.0
+    return (z, -d, 0.0) if z == end else (z, 0.0, -math.copysign(d, v))
 
 
 @compiled
@@ -75,50 +76,53 @@ def height_and_gradient(parts: Any, nodes: Any, x: float, y: float) -> Any:
     """z(x, y), dz/dx and dz/dy of all parts together."""
     z, gx, gy = 0.0, 0.0, 0.0
     for k in range(parts.shape[0]):
-        part = parts[k]
-        if part[KIND] == SLOPED:
-            z += part[A] * x + part[B] * y
-            gx += part[A]
-            gy += part[B]
-        elif part[KIND] == MAP:
-            h, a, b = on_map(part, nodes, x, y)
+        if parts[k, KIND] == SLOPED:
+            z += parts[k, A] * x + parts[k, B] * y
+            gx += parts[k, A]
+            gy += parts[k, B]
+        elif parts[k, KIND] == MAP:
+            h, a, b = on_map(parts, nodes, k, x, y)
             z += h
             gx += a
             gy += b
         else:
-            dx, dy = x - part[PX], y - part[PY]
-            h, a, b = profile(part, dx * part[DX] + dy * part[DY], dy * part[DX] - dx * part[DY])
+            dx, dy, along, across = x - parts[k, PX], y - parts[k, PY], parts[k, DX], parts[k, DY]
+            h, a, b = profile(parts, k, dx * along + dy * across, dy * along - dx * across)
             z += h
-            gx += a * part[DX] - b * part[DY]
-            gy += a * part[DY] + b * part[DX]
+            gx += a * along - b * across
+            gy += a * across + b * along
     return z, gx, gy
 
 
 @compiled
 def highest(parts: Any, nodes: Any, x: float, y: float, reach: float) -> float:
-    """No point of the surface within `reach` of (x, y) is higher than this, m."""
+    """No point of the surface within `reach` of (x, y) is higher than this, m; nor of planes, see `overshoots`."""
     z = 0.0
     for k in range(parts.shape[0]):
-        part = parts[k]
-        kind = int(part[KIND])
+        a, b = parts[k, A], parts[k, B]
+        kind = int(parts[k, KIND])
         if kind == SLOPED:
-            z += part[A] * x + part[B] * y + math.hypot(part[A], part[B]) * reach
+            z += a * x + b * y + math.hypot(a, b) * reach
         elif kind == MAP:
-            z += highest_node(part, nodes, x, y, reach)
+            z += highest_node(parts[k], nodes, x, y, reach) + parts[k, OVER]
         else:
-            dx, dy = x - part[PX], y - part[PY]
-            u, v = dx * part[DX] + dy * part[DY], dy * part[DX] - dx * part[DY]
+            dx, dy, along, across = x - parts[k, PX], y - parts[k, PY], parts[k, DX], parts[k, DY]
+            u, v, level = dx * along + dy * across, dy * along - dx * across, 0.0
             if kind == BANK:
-                h, _, _ = profile(part, u - reach, v)
+                h, _, _ = profile(parts, k, u - reach, v)
+                level = -b
             elif kind == KERB:
-                h, _, _ = profile(part, u + reach, v)
+                h, _, _ = profile(parts, k, u + reach, v)
             elif kind == DITCH:
-                h, _, _ = profile(part, abs(u) + reach, v)
+                h, _, _ = profile(parts, k, abs(u) + reach, v)
+                level = -b
             else:
-                rise, end = (u + reach) * part[A], (part[C] - u + reach) * part[D] + part[B]
-                side = (part[E] - abs(v) + reach) * part[D] + part[B]
-                h = max(min(min(rise, end), min(side, part[B])), 0.0)
+                rise, end = (u + reach) * a, (parts[k, C] - u + reach) * parts[k, D] + b
+                side = (parts[k, E] - abs(v) + reach) * parts[k, D] + b
+                h = max(min(min(rise, end), min(side, b)), 0.0)
             z += h
+            if h != level:  # as low as it gets: nothing bends within reach
+                z += parts[k, OVER]
     return z
 
 
@@ -185,3 +189,22 @@ def highest_of_blocks(grid: Any) -> Any:
     return np.array(
         [grid[i : i + BLOCK + 1, j : j + BLOCK + 1].max() for i in range(0, nx, BLOCK) for j in range(0, ny, BLOCK)]
     )
+
+
+def overshoots(parts: Any, nodes: Any, dx: float, dy: float) -> Any:
+    """How much higher than its highest corner the plane of an element of dx by dy may stand within it, m, (parts,).
+
+    The plane misses each of the corners' heights a, b, c, d by |a - b + c - d|/4, of which each part adds its own:
+    at most half of what it rises along an edge. `STEEPEST` only lays a plane flatter.
+    """
+    found = np.zeros(len(parts))
+    for k, part in enumerate(parts):
+        if part[KIND] == MAP:
+            nx, ny, first = (int(v) for v in part[[C, D, E]])
+            grid = nodes[first : first + nx * ny].reshape(nx, ny)
+            rises = (np.abs(np.diff(grid, axis=i)).max(initial=0.0) / part[A + i] * (dx, dy)[i] for i in (0, 1))
+            found[k] = 0.5 * min(rises)
+        elif part[KIND] != SLOPED:
+            steepest = max(part[A], part[D]) if part[KIND] == RAMP else part[A]
+            found[k] = 0.5 * min(steepest * min(dx, dy), part[B])
+    return found

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ground.kernel import COLUMNS, STATE_COLUMNS
 from ground.law import HIDDEN, REFERENCE_MASS, GroundLaw
+from ground.relief import OVER, overshoots
 from ground.settings import settings
 from ground.surface import is_flat, normal
 from ground.surface import tables as surface_tables
@@ -16,6 +17,7 @@ from rollover.bodies import Body, bodies_of, nose_share
 from rollover.effects import acting
 from rollover.rows import joint_rows, mount_rows, term_rows, turning_rows, upright, wheel_rows
 from rollover.scenario import Ground, Patch, Scenario
+from rollover.shapes import SurfacePoints
 from rollover.spin import spin_mass
 from rollover.tables import Tables
 from rollover.vehicle import Striker
@@ -23,6 +25,7 @@ from rollover.vehicle import Striker
 __all__ = ["Body", "bodies_of", "grown", "nose_share", "tables_of"]
 
 Array = NDArray[np.float64]
+PIECE = 0.2  # m: of a patch over uneven ground, most of which is nowhere near it
 
 
 def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
@@ -34,17 +37,19 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
     for b, body in enumerate(bodies):
         mass[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = body.inertia.mass * np.eye(3)
         mass[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = body.tensor
-    points, members_f, members_i, owner = [], [], [], []
+    points, members_f, owner = [], [], []
+    members_i: list[tuple[int, int, int, int]] = []
     start = 0
     for b, body in enumerate(bodies):
         for _, surface in body.surfaces:
-            r = surface.position - body.centre
-            middle, half = 0.5 * (r.min(axis=0) + r.max(axis=0)), 0.5 * (r.max(axis=0) - r.min(axis=0)) + 1e-6
-            members_f.append([*middle, *half, *(surface.normal[0] if surface.is_flat else (0.0, 0.0, 0.0))])
-            members_i.append([b, start, start + len(r)])
-            points.append((r, surface.normal, surface.area))
-            owner += [b] * len(r)
-            start += len(r)
+            pieces = () if is_flat(ground.surface) else surface.pieces(PIECE)
+            following = len(members_i) + 1 + len(pieces)
+            for k, piece in enumerate((surface.at(slice(0)) if pieces else surface, *pieces)):
+                members_f.append(_box(piece if k else surface, body.centre))
+                members_i.append((b, start, start + len(piece.area), len(members_i) + 1 if k else following))
+                points.append((piece.position - body.centre, piece.normal, piece.area))
+                owner += [b] * len(piece.area)
+                start += len(piece.area)
     wheels = () if isinstance(vehicle, Striker) else vehicle.wheels
     wheel_f = wheel_rows(wheels, bodies, row)
     spin_i, spin_f, drive = turning_rows(scenario, wheel_f, 6 * nb)
@@ -59,6 +64,8 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
     term_i, term_f = term_rows(scenario, bodies)
     n = normal(ground.surface) if is_flat(ground.surface) else np.array([0.0, 0.0, 1.0])
     relief, nodes = surface_tables(ground.surface)
+    relief = relief.copy()
+    relief[:, OVER] = overshoots(relief, nodes, *ground.elements.spacing)
     nx, ny = ground.elements.count
     elements = ground.elements
     rows: list[tuple[GroundLaw, Ground | Patch]] = [(ground.law, ground), *((p.law, p) for p in ground.patches)]
@@ -80,7 +87,7 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         point_a=np.concatenate([p[2] for p in points] or [np.zeros(0)]),
         point_body=np.array(owner, dtype=np.int64),
         member_f=np.array(members_f).reshape(-1, 9),
-        member_i=np.array(members_i, dtype=np.int64).reshape(-1, 3),
+        member_i=np.array(members_i, dtype=np.int64).reshape(-1, 4),
         wheel_f=wheel_f,
         wheel_i=wheel_i,
         spin_i=spin_i,
@@ -137,6 +144,13 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         device_x=np.zeros((nb, 6)),
         device_out=np.zeros(c.OUT_COLUMNS),
     )
+
+
+def _box(surface: SurfacePoints, centre: Array) -> list[float]:
+    """Row of a patch in `member_f`."""
+    r = surface.position - centre
+    middle, half = 0.5 * (r.min(axis=0) + r.max(axis=0)), 0.5 * (r.max(axis=0) - r.min(axis=0)) + 1e-6
+    return [*middle, *half, *(surface.normal[0] if surface.is_flat else (0.0, 0.0, 0.0))]
 
 
 def _soil(ground: Ground, law: GroundLaw, place: Ground | Patch, share: float) -> list[float]:

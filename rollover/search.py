@@ -118,7 +118,9 @@ def on_relief(t: Any) -> Any:
     """Points below the planes of their elements on an uneven surface; returns as `on_plane` does."""
     candidates, count = 0, 0
     plane = np.empty(4)
-    for member in range(t.member_i.shape[0]):
+    member, following = 0, 0
+    while following < t.member_i.shape[0]:
+        member, following = following, following + 1
         row, m = t.pose[t.member_i[member, 0]], t.member_f[member]
         x, y, z = place(row, m[0], m[1], m[2])
         a, b, c = m[3], m[4], m[5]
@@ -129,6 +131,7 @@ def on_relief(t: Any) -> Any:
         reach = math.hypot(wide, long) + t.grid_f[2] + t.grid_f[3]
         top = highest(t.relief, t.nodes, x, y, reach)
         if z - tall > top:
+            following = t.member_i[member, 3]  # past its pieces
             continue
         for i in range(t.member_i[member, 1], t.member_i[member, 2]):
             x, y, z = place(row, t.point_r[i, 0], t.point_r[i, 1], t.point_r[i, 2])

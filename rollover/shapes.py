@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,6 +87,16 @@ class SurfacePoints:
     def is_flat(self) -> bool:
         """Whether all normals are the same: the whole patch faces the ground or none of it."""
         return bool(np.all(self.normal == self.normal[0]))
+
+    def at(self, chosen: Any) -> SurfacePoints:
+        """Some of the points, by an index or a mask (n,)."""
+        return SurfacePoints(position=self.position[chosen], normal=self.normal[chosen], area=self.area[chosen])
+
+    def pieces(self, size: float) -> tuple[SurfacePoints, ...]:
+        """The points by cubes of `size` (m) along the axes."""
+        cube = np.floor((self.position - self.position.min(axis=0)) / size)
+        _, piece = np.unique(cube, axis=0, return_inverse=True)
+        return tuple(self.at(piece.ravel() == k) for k in range(piece.max() + 1))
 
 
 def sample(shape: Shape, spacing: float) -> tuple[SurfacePoints, ...]:

@@ -106,7 +106,7 @@ class Tables(NamedTuple):
     point_a: Any  # (np,)
     point_body: Any  # (np,)
     member_f: Any  # (nm, 9) centre and half size of a box around a patch's points, normal of a flat patch or 0
-    member_i: Any  # (nm, 3) body, first point, end
+    member_i: Any  # (nm, 4) body, first point, end, next member if the box is nowhere near the ground
     wheel_f: Any  # (nw, WHEEL_COLUMNS)
     wheel_i: Any  # (nw,) carrier
     spin_i: Any  # (nw,) coordinate of the wheel's angle, or -1: it does not turn by itself

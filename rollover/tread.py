@@ -58,7 +58,10 @@ def stretch(R: float, a: float, b: float, ra: float, rb: float) -> Any:
 
     In the disc's plane about its centre: s forward from `a` to `b`, heights `ra`, `rb`; arc at -sqrt(R^2 - s^2).
     """
-    fa, fb = ra + math.sqrt(max(R * R - a * a, 0.0)), rb + math.sqrt(max(R * R - b * b, 0.0))
+    at_a, at_b = math.sqrt(max(R * R - a * a, 0.0)), math.sqrt(max(R * R - b * b, 0.0))
+    if max(ra, rb) < -max(at_a, at_b) and a * b >= 0.0:
+        return 0.0, 0.0, 0.0  # below the lower end of the arc, which does not turn in between: most stretches
+    fa, fb = ra + at_a, rb + at_b
     slope = (rb - ra) / (b - a)
     c = ra - slope * a
     low, high = a, b
@@ -122,17 +125,16 @@ def slice_through(
     The disc's plane is spanned by `forward` and `up`. Where the ground does not reach the disc, the (negative)
     depth of what comes nearest to it.
     """
-    nearest, best = -1e30, 0
+    relief, nodes, nearest, best = t.relief, t.nodes, -1e30, 0
     for i in range(NODES):
         s = R * (2.0 * i / (NODES - 1) - 1.0)
         arc = math.sqrt(max(R * R - s * s, 0.0))
-        p = at[i]
         x, y = centre[0] + s * forward[0] - arc * up[0], centre[1] + s * forward[1] - arc * up[1]
-        z, p[2], p[3] = height_and_gradient(t.relief, t.nodes, x, y)
-        p[4] = z - centre[2] - s * forward[2] + arc * up[2]
-        p[0], p[1], weight[i] = s, p[4] * flat - arc, 0.0
-        if p[4] > nearest:
-            nearest, best = p[4], i
+        z, at[i, 2], at[i, 3] = height_and_gradient(relief, nodes, x, y)
+        over = z - centre[2] - s * forward[2] + arc * up[2]
+        at[i, 0], at[i, 1], at[i, 4], weight[i] = s, over * flat - arc, over, 0.0
+        if over > nearest:
+            nearest, best = over, i
     area = 0.0
     for i in range(NODES - 1):
         more, left, right = stretch(R, at[i, 0], at[i + 1, 0], at[i, 1], at[i + 1, 1])
@@ -149,14 +151,14 @@ def slice_through(
         weight[best] = 1.0
     for i in range(NODES):
         if weight[i] > 0.0:
-            p, by = at[i], factor * weight[i]
-            arc = math.sqrt(max(R * R - p[0] * p[0], 0.0))
+            s, by = at[i, 0], factor * weight[i]
+            arc = math.sqrt(max(R * R - s * s, 0.0))
             for k in range(3):
-                way = -by if k == 2 else by * p[2 + k]
+                way = -by if k == 2 else by * at[i, 2 + k]
                 one[S_PLACE + k] += way
-                one[S_FORWARD + k] += p[0] * way
+                one[S_FORWARD + k] += s * way
                 one[S_UP + k] -= arc * way
-            one[S_HEIGHT] += by * p[4]
+            one[S_HEIGHT] += by * at[i, 4]
 
 
 @compiled

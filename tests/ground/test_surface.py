@@ -105,6 +105,25 @@ def test_the_plane_of_an_element() -> None:
     assert math.degrees(math.acos(plane[2])) == pytest.approx(75.0)
 
 
+def test_no_plane_of_an_element_stands_higher_than_said() -> None:
+    """Planes at the corners of elements large and small; some stand higher than the ground anywhere near."""
+    rng, plane, over = np.random.default_rng(4), np.empty(4), []
+    turned = Kerb(height=0.15, face_deg=70.0, direction_deg=40.0)
+    for surface in (*UNEVEN, turned):
+        for _ in range(400):
+            (x, y), (dx, dy) = rng.uniform(-3, 3, 2), rng.uniform(0.02, 0.6, 2)
+            parts, nodes = (table.copy() for table in tables(surface))
+            ground = relief.highest(parts, nodes, x + 0.5 * dx, y + 0.5 * dy, math.hypot(dx, dy))
+            parts[:, relief.OVER] = relief.overshoots(parts, nodes, dx, dy)
+            most = relief.highest(parts, nodes, x + 0.5 * dx, y + 0.5 * dy, 0.5 * math.hypot(dx, dy))
+            relief.element_plane(parts, nodes, x, y, dx, dy, plane)
+            cx, cy = np.array([x, x + dx, x + dx, x]), np.array([y, y, y + dy, y + dy])
+            high = float(((plane[3] - plane[0] * cx - plane[1] * cy) / plane[2]).max())
+            assert high <= most + 1e-9, (surface.kind, x, y, dx, dy)
+            over.append(high - ground)
+    assert max(over) > 0.01
+
+
 def test_what_is_no_surface_is_refused() -> None:
     with pytest.raises(ValueError, match="not a grid"):
         Heightmap(heights=((0.0, 1.0), (0.0,)), spacing=(1.0, 1.0))

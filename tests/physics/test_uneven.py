@@ -9,13 +9,19 @@ import numpy as np
 import pytest
 
 from ground.array import Elements
+from ground.kernel import CELL
 from ground.surface import Bank, Heightmap, Slope, Surface
 from ground.ye import Ye2006
+from rollover import contact
 from rollover.faults import InputError
+from rollover.forces import read_poses
 from rollover.initiation import Drop
+from rollover.rig import set_up
 from rollover.run import Run
 from rollover.scenario import load
+from rollover.search import search
 from rollover.simulate import run
+from rollover.tables import handle
 from tests.physics.scenes import block
 
 ANGLE = 20.0
@@ -91,6 +97,27 @@ def test_a_million_uneven_elements_cost_what_is_touched() -> None:
     assert len(few.track.element) == len(many.track.element) < 400
     # the cells' corners are sums from the array's own corner: equal to rounding, no more
     np.testing.assert_allclose(many.recording["chassis/roll"], few.recording["chassis/roll"], atol=1e-7)
+
+
+def test_what_is_nowhere_near_the_ground_is_passed_over_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A tractor pushed into a bank in many attitudes: by pieces of its patches as by patches whole."""
+    scenario, found = load("bank_overturn").applied(), []
+    for piece in (0.2, 100.0):
+        monkeypatch.setattr(contact, "PIECE", piece)
+        rig = set_up(scenario)
+        q, random, own = rig.start.q.copy(), np.random.default_rng(5), []
+        for _ in range(12):
+            q[:6] = [*random.uniform(-1.0, 1.0, 2), random.uniform(-1.2, 1.0), *random.uniform(-2.0, 2.0, 3)]
+            read_poses(rig.tables.pose, q, np.zeros_like(q))
+            t = rig.tables
+            slots = t.touched[: search(handle(t))]
+            cells = np.argsort(t.state[slots, CELL])
+            own.append(np.column_stack([t.state[slots, CELL], t.found[slots][:, [0, 1, 3, 4, 5, 6]]])[cells])
+            t.found[slots, 0] = 0.0
+        found.append(own)
+    assert sum(map(len, found[0])) > 100
+    for by_piece, whole in zip(*found, strict=True):
+        np.testing.assert_allclose(by_piece, whole, rtol=1e-12, atol=1e-12)
 
 
 def test_two_soils_side_by_side_are_each_its_own() -> None:

@@ -67,3 +67,14 @@ def test_a_cone_has_its_area_and_faces_outward() -> None:
     assert np.hypot(above[:, 0], above[:, 1]) == pytest.approx(above[:, 2] * r / h, abs=1e-12)
     assert np.linalg.norm(patch.normal, axis=1) == pytest.approx(1.0)
     assert np.all(np.sum(patch.normal[1:] * above[1:], axis=1) == pytest.approx(0.0, abs=1e-12))
+
+
+def test_pieces_are_all_of_a_patch() -> None:
+    whole = sample(Box(name="b", low=(-0.3, 0.1, 0.0), high=(0.5, 0.4, 1.2)), 0.05)[0]
+    pieces = whole.pieces(0.25)
+    assert len(pieces) > 4
+    for piece in pieces:
+        assert np.all(np.ptp(piece.position, axis=0) <= 0.25)
+    rows = [np.column_stack([p.position, p.normal, p.area]) for p in (whole, *pieces)]
+    assert np.array_equal(np.unique(rows[0], axis=0), np.unique(np.concatenate(rows[1:]), axis=0))
+    assert sum(len(p.area) for p in pieces) == len(whole.area)
