@@ -99,7 +99,9 @@ class Crew:
             self._note(keys[k], fitted)
             say(f"fitted {jobs[k].candidates[-1].key}, {done} of {len(todo)}")
 
-        while done < len(todo) and not (self.workers > 1 and self._worked > PATIENCE and len(todo) - done > 1):
+        # full runs are made side by side for each fit in turn, and kept here
+        shared = self.workers > 1 and not judge.effort.thrifty
+        while done < len(todo) and not (shared and self._worked > PATIENCE and len(todo) - done > 1):
             k, began = todo[done], perf_counter()
             fitted = work(judge, jobs[k])
             self._worked += perf_counter() - began
@@ -177,6 +179,7 @@ def linearised(
 ) -> Fitted | None:
     """A fit as it stands at x and these time shifts (s); None where nothing can be simulated."""
     blocks: list[Block] = []
+    judge.made_ahead(judge.about(recordings, candidates, x, judge.effort.fine))
     for r, shift in zip(recordings, shifts, strict=True):
         block = judge.block(r, candidates, x, shift, judge.effort.fine)
         if block is None:

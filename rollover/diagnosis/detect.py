@@ -49,6 +49,11 @@ class Mismatch:
     p_value: float
     adjusted: tuple[float, ...]
 
+    @property
+    def structure(self) -> float:
+        """Sum of squares of what is slow, beyond what chance leaves of it."""
+        return sum(c.structured - c.waves for c in self.cells)
+
     def shares(self) -> list[tuple[Cell, float]]:
         """Cells with their share of all excess, largest first; shares add up to 1 (or there are none)."""
         total = sum(max(c.excess, 0.0) for c in self.cells)
@@ -81,6 +86,9 @@ def mismatch_of(
     # after a blow a recording that took another course tells nothing by itself
     other = [is_other(b.course) for b in blocks]
     telling = [c for c in cells if not (other[c.recording] and c.start >= evidence[c.recording].blow)]
+    # within half a step of its digits a channel tells nothing, however alike neighbouring samples err
+    stepped = {(r, s.channel) for r, e in enumerate(evidence) for s in e.signals if s.step > 0.0}
+    telling = [c for c in telling if c.excess > 0.0 or (c.recording, c.channel) not in stepped]
     structured = sum(c.structured for c in telling)
     waves = sum(c.waves for c in telling)
     rough = sum(c.rough for c in telling)

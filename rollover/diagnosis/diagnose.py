@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rollover.channels import describe
 from rollover.diagnosis import colour
 from rollover.diagnosis.aftermath import shortened
 from rollover.diagnosis.bins import simulated
@@ -32,7 +33,7 @@ from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing,
 from rollover.diagnosis.scores import judged
 from rollover.diagnosis.selection import Explanation, decided, explained, matters
 from rollover.diagnosis.simulator import blow_of, set_up
-from rollover.diagnosis.statements import considered, named, noise, places, sentence
+from rollover.diagnosis.statements import closest, considered, named, noise, places, sentence
 from rollover.diagnosis.verdict import Degree, Diagnosis
 from rollover.drop import unfit
 from rollover.effects import EFFECTS
@@ -119,6 +120,7 @@ def diagnose(
     return Diagnosis(
         verdict=verdict,
         sentence=sentence(verdict, effects, explanation.p_value, h_before.held, h_after.held, found)
+        + (closest(explanation, groups) if verdict == "unexplained" else "")
         + offered(law)
         + against_itself(verdict, contrary),
         p_value=explanation.p_value,
@@ -217,6 +219,11 @@ def _evidence(
     found = with_loudness(found)
     louder = {s.channel: float(s.level.max()) for e in found for s in e.signals if s.level is not None}
     notes += [f"{c}: the noise grows with the value, to {most:.1f} times its least" for c, most in louder.items()]
+    steps = {s.channel: s.step for e in found for s in e.signals if s.step > 0.0}
+    notes += [
+        f"{c}: recorded in steps of {step:.3g} {describe(c).unit}, more than its noise: what is smaller does not show"
+        for c, step in steps.items()
+    ]
     return found, notes
 
 

@@ -253,7 +253,7 @@ class Judge:
         rounds, width = self.effort.rounds if rounds is None else rounds, min(width, len(nudges) - 1)
         x = [float(v) for v in start]
         shifts = [self.shifts[r] for r in use] if shifts is None else list(shifts)
-        self.made_ahead(self._about(use, candidates, x, nudges[width]))
+        self.made_ahead(self.about(use, candidates, x, nudges[width]))
         found = [self.block(r, candidates, x, s, nudges[width]) for r, s in zip(use, shifts, strict=True)]
         if any(b is None for b in found):
             return None
@@ -296,7 +296,7 @@ class Judge:
             if last and not improved and len(nudges) == 1:
                 break
             nudge = self.effort.fine if last else nudges[width]
-            self.made_ahead(self._about(use, candidates, x, nudge))
+            self.made_ahead(self.about(use, candidates, x, nudge))
             # what is held already moves little: its slopes are worked out anew only where the search narrows
             again = [
                 self.block(
@@ -321,7 +321,7 @@ class Judge:
         return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=tuple(blocks))
 
     @staticmethod
-    def _about(
+    def about(
         use: Sequence[int], candidates: Sequence[Candidate], x: Sequence[float], nudge: float
     ) -> Iterable[tuple[int, Sequence[Candidate], Sequence[float]]]:
         """A place and those a nudge to either side of it."""

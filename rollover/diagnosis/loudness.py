@@ -27,6 +27,7 @@ BINS = 12
 FEWEST = 14  # samples of a bin
 TWICE = float(np.log(2.0))  # by how much the noise of the largest quarter must exceed that of the smallest
 SURELY = 4.0  # standard errors by which it must
+FAR = 8.0  # times the noise, that large values lie beyond small ones
 EVEN = 0.02  # of the sampling interval, by which stamps may stray
 SPREAD = 1.17 * 3.0**0.5  # standard error of ln s times sqrt(samples): of a median, of differences that overlap
 SMOOTHED = 9  # samples, over which the value is averaged
@@ -36,7 +37,7 @@ def with_loudness(evidence: Sequence[Evidence]) -> list[Evidence]:
     """The evidence with each sample's noise where that clearly grows with the value, (D10)."""
     found = [list(e.signals) for e in evidence]
     for members in alike(evidence):
-        told = [t for r, _, s, _ in members if (t := _told(evidence[r], s)) is not None]
+        told = [t for r, _, s, _ in members if (t := _told(evidence[r], s)) is not None and _varies(*t)]
         if not told or not _grows(told):
             continue
         law, least = _law(told)
@@ -63,6 +64,12 @@ def _sizes(told: Sequence[tuple[Array, Array]], by: Array) -> tuple[Array, Array
     parts = np.array_split(np.argsort(by, kind="stable"), BINS)
     found = np.array([[np.median(values[p]), 1.4826 * np.median(sizes[p])] for p in parts])
     return found[:, 0], found[:, 1], parts[0].size
+
+
+def _varies(values: Array, sizes: Array) -> bool:
+    """Whether values (n,) are more than noise of `sizes` (n,): sorted by itself, noise seems to grow with its size."""
+    low, high = np.quantile(np.abs(values), (0.125, 0.875))
+    return bool(high - low > FAR * 1.4826 * np.median(sizes))
 
 
 def _grows(told: Sequence[tuple[Array, Array]]) -> bool:

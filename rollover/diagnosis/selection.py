@@ -23,7 +23,7 @@ from rollover.diagnosis.verdict import Verdict
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
 MOST = 3  # effects in one explanation
 NEGLIGIBLE = 0.001  # of a channel's range: what moves nothing by more is not worth a name
-PARTLY = 0.02  # of the excess over the noise that one effect may leave and still be named
+PARTLY = 0.005  # of the excess over the noise that one effect may leave, were it structured, and still be named
 MANY = 0.05  # p-value of what as many effects as may be leave, below which they are no explanation
 HOPELESS = 2.0  # misfit over the noise that two effects leave and a third is not looked for
 LEADING, FOLLOWING = 4, 2  # of the first effects, and of later ones each, that are tried two by two
@@ -315,8 +315,9 @@ def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) ->
         one = found.first
         end = held_out(one.fitted, groups).total
         inside = not any(at_an_end(v) for v in one.fitted.x)
-        if end**2 - 1.0 < PARTLY * (start**2 - 1.0) and inside:
-            after = mismatch_of(judge.evidence, one.fitted.blocks, phases)
+        after = mismatch_of(judge.evidence, one.fitted.blocks, phases)
+        is_nearly_all = end**2 - 1.0 < PARTLY * (start**2 - 1.0) and after.structure <= PARTLY * found.before.structure
+        if is_nearly_all and inside:
             return replace(found, parts=(one,), fitted=one.fitted, after=after), _kind(one.fitted.candidates[-1])
     significant = found.before.p_value < SURE and matters(judge, found.base, found.before)
     significant = significant and not is_tolerated(judge, found.base)

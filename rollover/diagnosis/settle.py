@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.blocks import GENTLE, Block, shift_of
+from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.chaos import alike, course, weighted
 from rollover.diagnosis.crew import linearised
 from rollover.diagnosis.evidence import Evidence
@@ -40,19 +41,28 @@ def settled(judge: Judge, part: Step) -> Step:
     if not any(e.strays for e in judge.evidence):
         return part
     dx = np.clip(step_of_means(judge.evidence, old.blocks), -FARTHEST, FARTHEST)
-    tried = [_at(judge, old, share * dx) for share in SHARES]
-    new = min([old, *(f for f in tried if f is not None)], key=lambda f: f.left)
-    # nearly as good, the whole way: the mean of runs is worth more than the one that happens to be there
-    if tried[0] is not None and tried[0].left < NEARLY * new.left:
-        new = tried[0]
-    return part.moved_to(new)
+    places = [_moved(old, share * dx) for share in SHARES]
+    judge.made_ahead((r, old.candidates, x) for x, _ in places for r in range(len(old.blocks)))
+    lefts = [_left_at(judge, old.candidates, *place) for place in places]
+    best = int(np.argmin(lefts))
+    if lefts[0] < NEARLY * min(old.left, *lefts):
+        best = 0  # the whole way: the mean of runs is worth more than the one that happens to be there
+    elif lefts[best] >= old.left:
+        return part
+    x, shifts = places[best]
+    return part.moved_to(linearised(judge, old.candidates, x, range(len(shifts)), shifts) or old)
 
 
-def _at(judge: Judge, old: Fitted, dx: Array) -> Fitted | None:
-    """A fit moved by dx; None if nothing can be simulated there."""
-    x = [float(v) for v in np.clip(np.array(old.x) + dx, 0.0, 1.0)]
-    shifts = [b.shift + shift_of(b, np.array(x) - np.array(old.x)) for b in old.blocks]
-    return linearised(judge, old.candidates, x, range(len(shifts)), shifts)
+def _moved(old: Fitted, dx: Array) -> tuple[list[float], list[float]]:
+    """Coordinates and time shifts (s) of a fit moved by dx."""
+    x = np.clip(np.array(old.x) + dx, 0.0, 1.0)
+    return [float(v) for v in x], [b.shift + shift_of(b, x - np.array(old.x)) for b in old.blocks]
+
+
+def _left_at(judge: Judge, candidates: Sequence[Candidate], x: Sequence[float], shifts: Sequence[float]) -> float:
+    """What is left at a place, slopes aside; infinite if nothing can be simulated there."""
+    blocks = [judge.block(r, candidates, x, shift, 0.0) for r, shift in enumerate(shifts)]
+    return sum(np.inf if b is None else b.normal()[2] for b in blocks)
 
 
 def rescattered(judge: Judge, fitted: Fitted) -> None:

@@ -89,6 +89,19 @@ def considered(
     return tuple(sorted(lines.values(), key=lambda c: -c.held_out_gain))
 
 
+def closest(found: Explanation, groups: Sequence[Sequence[int]]) -> str:
+    """Which candidate comes closest to explaining what none explains, if one takes at least half; else nothing."""
+    one = found.first
+    if one is None:
+        return ""
+    start, end = held_out(one.base, groups).total, held_out(one.fitted, groups).total
+    if end > 0.5 * start:
+        return ""
+    last = one.fitted.candidates[-1]
+    of = f" of {last.channel}" if last.channel else ""
+    return f" The closest, {last.id}{of}, leaves {end:.2f} times the noise, and in that there is structure."
+
+
 def places(mismatch: Mismatch, evidence: Sequence[Evidence], depends: str | None) -> tuple[Place, ...]:
     """Where the misfit is more than noise, largest share first."""
     return tuple(

@@ -49,6 +49,16 @@ def test_its_law_is_told_from_the_samples_alone() -> None:
                 assert s.level.max() == pytest.approx(true.max(), rel=SPREAD / np.sqrt(190.0))
 
 
+def test_noise_alone_does_not_grow_with_itself() -> None:
+    """A channel that is nothing but noise: its largest samples are those that differ most from their neighbours."""
+    rng = np.random.default_rng(8)
+    made = [
+        (name, replace(r, channels={**r.channels, FORCE: rng.normal(size=r.time.size)}))
+        for name, r in recorded({}, noise=0.01, rate=2000.0, channels=CHANNELS)
+    ]
+    assert all(s.level is None for e in with_loudness(judge_of(made).evidence) for s in e.signals)
+
+
 @pytest.mark.parametrize("cfc", [None, 180])
 @pytest.mark.parametrize("rate", [500.0, 5000.0])
 def test_an_even_noise_or_a_filter_is_not_taken_for_it(rate: float, cfc: int | None) -> None:

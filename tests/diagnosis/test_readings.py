@@ -41,11 +41,30 @@ def test_coarse_digits_are_no_mismatch_and_hide_no_large_one() -> None:
     """One part in 128 of the range, no noise: the error of neighbouring samples is one, and looks like structure."""
     coarse = lambda v: np.round(v / np.ptp(v) * 128.0) * np.ptp(v) / 128.0  # noqa: E731
     conditions = {"speeds": (1.2, 2.0, 3.0), "noise": 0.0, "rate": 1000.0}
-    assert diagnose(scenario(), each(recorded({}, **conditions), coarse)).verdict == "no-mismatch"
+    agrees = diagnose(scenario(), each(recorded({}, **conditions), coarse))
+    assert agrees.verdict == "no-mismatch"
+    assert any(n.startswith(f"{FORCE}: recorded in steps of") for n in agrees.notes)
     heavier = recorded({"effects.mass.added": 25.0}, **conditions)
     found = diagnose(scenario(), each(heavier, coarse))
     assert [e.id for e in found.effects] == ["mass"]
     assert found.effects[0].parameters["added"].value == pytest.approx(25.0, rel=0.05)
+
+
+def test_noise_within_coarse_digits_is_no_structure() -> None:
+    """A sixteenth of the range, on a channel with noise below that: its error is one for many samples."""
+    made = recorded({}, speeds=(1.2, 2.0, 3.0), rate=1000.0)
+    coarse = [
+        (
+            n,
+            replace(
+                r, channels={**r.channels, FORCE: np.round(r[FORCE] / np.ptp(r[FORCE]) * 16) * np.ptp(r[FORCE]) / 16}
+            ),
+        )
+        for n, r in made
+    ]
+    found = diagnose(scenario(), coarse)
+    assert found.verdict == "no-mismatch"
+    assert found.p_value > 0.01, found.sentence
 
 
 def test_spikes_are_left_aside_and_said_so() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from rollover.diagnosis import selection
 from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.detect import Mismatch
+from rollover.diagnosis.detect import Cell, Mismatch
 from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
@@ -20,8 +20,12 @@ from rollover.effects import Search
 IDS = ("soil-crust", "guide-friction", "mass")
 
 
-def left(p_value: float) -> Mismatch:
-    return Mismatch(cells=(), p_value=p_value, adjusted=())
+def left(p_value: float, structure: float = 0.0) -> Mismatch:
+    cell = Cell(
+        recording=0, channel="c", phase="impact", start=0.0, end=1.0, rows=np.arange(0), p_value=p_value, excess=0.0,
+        structured=structure + 12.0, waves=12, rough=0.0,
+    )  # fmt: skip
+    return Mismatch(cells=(cell,), p_value=p_value, adjusted=())
 
 
 def step(count: int) -> Step:
@@ -39,7 +43,7 @@ def explanation(count: int, p_value: float) -> Explanation:
         parts=parts,
         looked=looked,
         detectable={},
-        before=left(0.0),
+        before=left(0.0, structure=1e5),
         after=left(p_value),
         first=parts[0],
     )
@@ -76,10 +80,18 @@ def test_a_little_less_is_better_where_it_is_all_that_chance_leaves(other: float
     assert is_better(fits[0], left(p_value), fits[1]) is better
 
 
-def test_one_that_takes_nearly_all_is_named_with_what_it_leaves_itself(judged: dict[str, float]) -> None:
-    judged["soil-crust"] = 1.5
+@pytest.mark.parametrize(
+    ("misfit", "structure", "named"), [(1.5, 100.0, True), (1.5, 2000.0, False), (2.5, 100.0, False)]
+)
+def test_one_that_takes_nearly_all_is_named_with_what_it_leaves_itself(
+    misfit: float, structure: float, named: bool, judged: dict[str, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """20 times the noise before: of the excess 0.3 or 1.3 % is left, of what is structured 0.1 or 2 %."""
+    judged["soil-crust"] = misfit
+    monkeypatch.setattr(selection, "mismatch_of", lambda *_: left(1e-9, structure))
     judge: Any = SimpleNamespace(evidence=())
     found, verdict = decided(judge, explanation(2, 1e-4), [], [])
-    assert verdict == "missing-physics"
-    assert found.fitted.label == "soil-crust"
-    assert found.after.p_value == 1e-9  # and not that of both
+    assert verdict == ("missing-physics" if named else "unexplained")
+    if named:
+        assert found.fitted.label == "soil-crust"
+        assert found.after.p_value == 1e-9  # and not that of both
