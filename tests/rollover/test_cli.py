@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
-import subprocess
 import sys
 import types
 from collections.abc import Callable
@@ -359,94 +356,3 @@ def test_view(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert rollover("view", str(picture)).exit_code == 0
     assert shown == [picture, picture]
     assert "it ended with status 7" in rollover("view", str(picture)).stderr
-
-
-# ---------------------------------------------------------------- the process
-
-
-def python(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    env = {**os.environ, "PYTHONPATH": str(ROOT), **environment}
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=env, check=False)
-
-
-MAIN = "import sys; sys.argv = ['rollover', {arguments}]; from rollover.cli import main; main()"
-
-
-def test_help_imports_nothing_heavy() -> None:
-    code = MAIN.format(arguments="'--help'").replace("main()", "app(standalone_mode=False)").replace("main;", "app;")
-    heavy = {"exudyn", "matplotlib", "numba", "numpy", "pyarrow", "pydantic_core", "rerun", "scipy"}
-    done = python(f"{code}\nprint(sorted({heavy} & set(sys.modules)))")
-    assert done.stdout.splitlines()[-1] == "[]", done.stderr
-
-
-def test_a_bug_shows_its_traceback_and_is_neither_of_the_answers() -> None:
-    code = "import rollover.catalogue as c\nc.TABLES['laws'] = lambda: 1 / 0\n" + MAIN.format(
-        arguments="'list', 'laws'"
-    )
-    done = python(code)
-    assert done.returncode == 70
-    assert "ZeroDivisionError" in done.stderr
-    assert "Traceback" in done.stderr
-
-
-def test_wrong_usage_is_2() -> None:
-    assert rollover("rn").exit_code == 2
-    assert rollover("run").exit_code == 2
-    assert rollover("run", "drop_test", "--jbs", "3").exit_code == 2
-
-
-SLOW = """
-import signal, sys, time
-signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that runs tests in the background ignores it
-from rollover import store
-from rollover.scenario import load
-from tests.rollover.example import run_of
-
-def picture(path):
-    path.write_bytes(b"half")
-    print("writing", flush=True)
-    time.sleep(60.0)
-
-from pathlib import Path
-import rollover.catalogue as c
-c.TABLES["laws"] = lambda: store.write(Path("out/slow"), run_of(load("drop_test")), (), picture=picture)
-"""
-
-
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_while_writing_leaves_nothing(tmp_path: Path, number: signal.Signals, status: int) -> None:
-    code = SLOW + MAIN.format(arguments="'list', 'laws'")
-    env = {**os.environ, "PYTHONPATH": str(ROOT)}
-    with subprocess.Popen(
-        [sys.executable, "-c", code], cwd=tmp_path, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as child:
-        assert child.stdout is not None
-        assert child.stdout.readline() == "writing\n"
-        child.send_signal(number)
-        child.communicate(timeout=30)
-    assert child.returncode == status
-    assert list((tmp_path / "out").iterdir()) == []
-
-
-# ---------------------------------------------------------------- import names that others own
-
-
-@pytest.mark.parametrize("name", ["ground", "viz"])
-def test_a_foreign_package_of_our_name_is_named(tmp_path: Path, name: str) -> None:
-    (tmp_path / name).mkdir()
-    (tmp_path / name / "__init__.py").write_text("raise SystemExit('foreign code ran')\n")
-    done = python(f"import sys; sys.path[:0] = [{str(tmp_path)!r}]; import rollover")
-    assert done.returncode == 1
-    line = done.stderr.strip().splitlines()[-1]
-    assert line.startswith(
-        f"ImportError: import {name}: taken by another package, got {tmp_path / name / '__init__.py'}; "
-    )
-    (tmp_path / name / "__init__.py").unlink()
-    done = python(f"import sys; sys.path[:0] = [{str(tmp_path)!r}]; import rollover")
-    assert done.returncode == 0, "a folder without __init__ does not stand before a package"
-
-
-def test_the_version_is_that_of_the_distribution() -> None:
-    import rollover as package
-
-    assert store.versions()["rollover"] == package.__version__
