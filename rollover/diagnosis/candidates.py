@@ -64,6 +64,11 @@ class Candidate:
         told = [str(v) for v in self.fixed.values()]
         return ":".join([self.id, *([] if self.channel is None else [self.channel]), *told])
 
+    @property
+    def is_placed(self) -> bool:
+        """Whether a parameter says where or when it acts: one that changes nothing nowhere."""
+        return self.neutral is not None and len(self.search) > 1 and None in self.neutral
+
     def changes(self, x: Sequence[float], number: int = 1) -> dict[str, Any]:
         """Values to exchange in the scenario for coordinates x, each from 0 (low) to 1 (high).
 

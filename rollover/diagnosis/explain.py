@@ -18,7 +18,7 @@ from rollover.diagnosis.effort import Effort
 from rollover.diagnosis.fit import NOISE_LEFT, Fitted, Judge
 from rollover.diagnosis.gate import Gate, p_value
 from rollover.diagnosis.holdout import held_out, worse
-from rollover.diagnosis.screening import ELSEWHERE, Screened, begun, is_far, promising, screen, spread
+from rollover.diagnosis.screening import ELSEWHERE, Screened, begun, is_far, kin, promising, screen, spread
 
 Array = NDArray[np.float64]
 WITHIN = 6.0  # times what the best leaves, up to which a first fit is followed up
@@ -80,7 +80,7 @@ def step(
     """
     say(f"looking at {len(candidates)} candidates beside {base.label}")
     few, shifts = spread(base, groups, judge.effort.few), begun(judge, base)
-    screened = screen(judge, base, promising(candidates, looked, judge.effort.scored), few, shifts, looked)
+    screened = screen(judge, base, promising(candidates, looked, judge.effort), few, shifts, looked)
     count = sum(b.residual.size for b in base.blocks)
     screened, begun_with = _first_fits(judge, base, screened, few, shifts, say, crew, looked)
     jobs = [
@@ -266,6 +266,7 @@ def _chosen(screened: Sequence[Screened], effort: Effort, looked: Gate) -> list[
     """Those worth a first fit: that start well, and that have most to gain.
 
     Of runs that scatter what is gained by chance is taken off; what a sensor makes of them costs none: as many more.
+    With a leader come its kin.
     """
     by_start = sorted(screened, key=lambda s: s.left)[: effort.promising // 2]
     if not effort.thrifty:
@@ -273,7 +274,9 @@ def _chosen(screened: Sequence[Screened], effort: Effort, looked: Gate) -> list[
     ranked = sorted(screened, key=lambda s: -looked.scores.get(s.candidate.key, 0.0))
     moving = [s for s in ranked if s.candidate.kind != "sensor"]
     reading = [s for s in ranked if s.candidate.kind == "sensor"]
-    return [*by_start, *moving[: effort.promising], *reading[: effort.promising]]
+    akin = kin([s.candidate for s in moving], effort.promising, effort.leaders)
+    beside = [s for s in moving if s.candidate in akin]
+    return [*by_start, *moving[: effort.promising], *beside, *reading[: effort.promising]]
 
 
 def _all_shifts(begun_with: Sequence[float], first: Fitted, few: Sequence[int]) -> list[float]:

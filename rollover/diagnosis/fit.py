@@ -33,6 +33,7 @@ class Judge:
         self.measured = [e.measured() for e in self.evidence]
         self.shifts = [0.0] * len(self.evidence)
         self.simulations = 0
+        self.straying = True  # whether a recording may have taken another course than its run
         self._pinned = False
         self._raw: dict[tuple[object, ...], Array | None] = {}
         self._leaps: dict[tuple[object, ...], NDArray[np.int64]] = {}
@@ -176,7 +177,7 @@ class Judge:
         if self._pinned and e.recording.clock.zero != "unknown":
             slope = np.zeros_like(slope)
         residual = e.eased(worth * (self.measured[r] - y))
-        counts = course(e, residual)
+        counts = course(e, residual) if self.straying else None
         if counts is not None:
             residual, J, slope = counts.samples * residual, counts.samples[:, None] * J, counts.samples * slope
         return Block(

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from rollover.diagnosis.candidates import physical
-from rollover.diagnosis.explain import Step
+from rollover.diagnosis.chaos import is_other, too_many
+from rollover.diagnosis.explain import SURE, Step
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate, p_value
 from rollover.diagnosis.holdout import held_out
@@ -44,10 +45,29 @@ def unbent(judge: Judge, base: Fitted) -> Fitted:
     return replace(base, blocks=tuple(blocks))
 
 
+def astray(judge: Judge, fitted: Fitted) -> Fitted:
+    """A fit with all samples counted in full if more recordings took another course than chance sends there.
+
+    What so many do together is missing from the simulation, and where they went tells what.
+    """
+    judge.straying = True
+    found = judge.again(fitted)
+    if too_many(sum(is_other(b.course) for b in found.blocks), len(found.blocks)) > SURE:
+        return found
+    judge.straying = False
+    return judge.again(fitted)
+
+
 def backed(found: Step, looked: Gate) -> Step:
-    """A step without rivals that nothing spoke for when looked at: their runs met the recordings by chance."""
-    told = [f for f in found.rivals if p_value(looked.scores.get(f.candidates[-1].key, 0.0), looked.null) < SPOKEN]
-    return replace(found, rivals=tuple(told))
+    """A step without rivals that nothing spoke for when looked at: their runs met the recordings by chance.
+
+    What speaks for one that acts somewhere speaks for its kin.
+    """
+    last = [f.candidates[-1] for f in found.rivals]
+    told = [c for c in last if p_value(looked.scores.get(c.key, 0.0), looked.null) < SPOKEN]
+    families = [c.family for c in told if c.is_placed]
+    kept = [c in told or (c.is_placed and c.family in families) for c in last]
+    return replace(found, rivals=tuple(f for f, k in zip(found.rivals, kept, strict=True) if k))
 
 
 def lasting(judge: Judge, found: Step, groups: Groups) -> Step | None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from rollover.diagnosis.candidates import BESIDE, Candidate
 from rollover.diagnosis.clocks import by_first_contact
-from rollover.diagnosis.effort import DROPS
+from rollover.diagnosis.effort import DROPS, Effort
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate, freed
 
@@ -114,6 +114,16 @@ def screen(
     return found
 
 
+def kin(ranked: Sequence[Candidate], taken: int, leaders: int) -> list[Candidate]:
+    """Beyond the first that are `taken`, those akin to one of the `leaders` that move the vehicle, by where they act.
+
+    A depth, a length: one is taken for the other where a look shows little of its place.
+    """
+    moving = [c for c in ranked if c.kind != "sensor"]
+    families = [c.family for c in moving[:leaders] if c.is_placed]
+    return [c for c in ranked[taken:] if c in moving and c.is_placed and c.family in families]
+
+
 def _begun_at(c: Candidate, met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float, ...], ...]:
     """Where fits begin: the best starts; of few and far ones all, or the best and beside what changes nothing."""
     if c.neutral is None:
@@ -133,9 +143,12 @@ def _apart(met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float,
     return (best, *other[:1])
 
 
-def promising(candidates: Sequence[Candidate], looked: Gate, scored: int | None) -> list[Candidate]:
-    """Those that scored best, and of two parameters all: beside their thresholds a score tells little."""
+def promising(candidates: Sequence[Candidate], looked: Gate, effort: Effort = DROPS) -> list[Candidate]:
+    """Those that scored best, and of two parameters all: beside their thresholds a score tells little.
+
+    Where each costs runs, of these only the kin of what leads.
+    """
     ranked = sorted(candidates, key=lambda c: -looked.scores.get(c.key, 0.0))
-    if scored is not None:
-        return ranked[:scored]
+    if effort.scored is not None:
+        return [*ranked[: effort.scored], *kin(ranked, effort.scored, effort.leaders)]
     return [c for k, c in enumerate(ranked) if k < SCORED or len(c.search) > 1]

@@ -15,7 +15,7 @@ from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Phases, Step, moves, 
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate, gate
 from rollover.diagnosis.holdout import held_out
-from rollover.diagnosis.lasting import NEEDED, backed, begun_anew, lasting, unbent
+from rollover.diagnosis.lasting import NEEDED, astray, backed, begun_anew, lasting, unbent
 from rollover.diagnosis.refine import polish, timed
 from rollover.diagnosis.screening import spread
 from rollover.diagnosis.verdict import Verdict
@@ -80,6 +80,7 @@ def explained(
         base = judge.again(base)
     base = clocked(judge, base)  # and no effect's gain
     before = mismatch_of(judge.evidence, base.blocks, phases)
+    base = astray(judge, base)
     say(f"looking at {len(candidates)} candidates, which of them could matter")
     looked = first_look = _look(judge, base, candidates, groups)
     current, left = base, before
@@ -103,6 +104,9 @@ def explained(
         found, left = followed(judge, found, phases)
         taken.append(found)
         current = found.fitted
+        if not judge.straying:
+            current = astray(judge, current)
+            left = mismatch_of(judge.evidence, current.blocks, phases)
         if len(taken) == 2 and left.p_value < SURE and matters(judge, current, left):
             # of two that are strong the first may have been taken for something else: is there a better one?
             other = _instead(judge, current, candidates, groups, phases, say, crew)
@@ -114,6 +118,9 @@ def explained(
         if len(taken) > 1 and current.left > HOPELESS**2 * count:
             break
         looked = _look(judge, current, free(current, candidates), groups)
+    if not judge.straying:
+        judge.straying, current = True, judge.again(current)
+        left = mismatch_of(judge.evidence, current.blocks, phases)
     is_whole = left.p_value > SURE or not matters(judge, current, left)
     if first is not None and not judge.effort.thrifty and (not is_whole or len(taken) == MOST):
         both = _together(judge, first, taken, phases, say, crew)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -11,10 +12,14 @@ import pytest
 
 from rollover.diagnosis import lasting as believed
 from rollover.diagnosis.blocks import Block, Fitted
-from rollover.diagnosis.explain import Step
+from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.chaos import Course
+from rollover.diagnosis.effort import RUNS
+from rollover.diagnosis.explain import Step, _chosen
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import Gate
-from rollover.diagnosis.lasting import backed, before_the_blow, begun_anew, is_there, lasting, outlasts, unbent
+from rollover.diagnosis.lasting import astray, backed, before_the_blow, begun_anew, is_there, lasting, outlasts, unbent
+from rollover.diagnosis.screening import Screened, kin
 from rollover.diagnosis.settle import left_of_means
 from rollover.diagnosis.verdict import Interval
 from rollover.effects import Search
@@ -61,6 +66,36 @@ def test_where_the_first_does_not_last_the_next_one_is_taken() -> None:
     assert judge.evidence == kept
 
 
+@pytest.mark.parametrize(("others", "in_full"), [(0, False), (1, False), (3, False), (4, True)])
+def test_what_all_recordings_do_after_a_blow_is_no_chance(others: int, in_full: bool) -> None:
+    """Of four that may each take another course in 15 % of cases: four do in 0.05 %, three in 1 %."""
+    far = Course(samples=np.full(N, 0.1), share=0.2, more=1.0)
+    bare = Block(residual=np.ones(N), J=np.zeros((N, 0)), slope=np.zeros(N), shift=0.0, prior=1.0)
+
+    def again(f: Fitted) -> Fitted:
+        of = [far if judge.straying and k < others else None for k in range(4)]
+        return replace(f, blocks=tuple(replace(bare, course=course) for course in of))
+
+    judge: Any = SimpleNamespace(straying=False, again=again)
+    found = astray(judge, Fitted(candidates=(), x=(), blocks=(bare,) * 4))
+    assert judge.straying is not in_full
+    assert sum(b.course is not None for b in found.blocks) == (0 if in_full else others)
+
+
+def test_with_what_leads_its_kin_gets_a_first_fit() -> None:
+    """Six of the ground, three sensors; the last one of the ground is akin to the best one."""
+    kinds = [("a", "depth"), ("b", "x"), ("c", "y"), ("d", "z"), ("e", "u"), ("f", "depth")]
+    two = {"depth": Search(0, 1), "ratio": Search(0, 1)}
+    every = [Candidate(id=i, kind="physics", family=f, search=two, neutral=(None, 0.5)) for i, f in kinds]
+    every += [Candidate(id=i, kind="sensor", family="depth", search={}) for i in ("g", "h", "i")]
+    screened = [Screened(candidate=c, starts=(), left=float(k), potential=0.0) for k, c in enumerate(every)]
+    looked = Gate(score=9.0, scores={c.key: 9.0 - k for k, c in enumerate(every)}, null=np.zeros(9), detectable={})
+    chosen = {s.candidate.key for s in _chosen(screened, RUNS, looked)}
+    assert chosen == {"a", "b", "c", "d", "f", "g", "h", "i"}
+    every[0] = replace(every[0], neutral=(0.5, 0.5))  # it acts everywhere
+    assert kin(every, 4, 2) == []
+
+
 def test_a_rival_that_nothing_spoke_for_is_none() -> None:
     fits = [
         Fitted(candidates=(candidate(k, "physics", "a"),), x=(0.5,), blocks=()) for k in ("slope", "mass", "inertia")
@@ -69,6 +104,10 @@ def test_a_rival_that_nothing_spoke_for_is_none() -> None:
     looked = Gate(score=60.0, scores={"slope": 60.0, "mass": 4.0}, null=null, detectable={})
     step = Step(base=fits[0], fitted=fits[1], p_value=0.0, rivals=tuple(fits))
     assert backed(step, looked).rivals == (fits[0],)
+    two = {"depth": Search(0, 1), "ratio": Search(0, 1)}
+    placed = [Candidate(id=i, kind="physics", family="f", search=two, neutral=(None, 0.5)) for i in ("slope", "mass")]
+    akin = [Fitted(candidates=(c,), x=(0.5, 0.5), blocks=()) for c in placed]
+    assert backed(replace(step, rivals=(*akin, fits[2])), looked).rivals == tuple(akin)
 
 
 def test_what_shows_before_the_blow_alone_lasts() -> None:
