@@ -37,19 +37,7 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
     for b, body in enumerate(bodies):
         mass[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = body.inertia.mass * np.eye(3)
         mass[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = body.tensor
-    points, members_f, owner = [], [], []
-    members_i: list[tuple[int, int, int, int]] = []
-    start = 0
-    for b, body in enumerate(bodies):
-        for _, surface in body.surfaces:
-            pieces = () if is_flat(ground.surface) else surface.pieces(PIECE)
-            following = len(members_i) + 1 + len(pieces)
-            for k, piece in enumerate((surface.at(slice(0)) if pieces else surface, *pieces)):
-                members_f.append(_box(piece if k else surface, body.centre))
-                members_i.append((b, start, start + len(piece.area), len(members_i) + 1 if k else following))
-                points.append((piece.position - body.centre, piece.normal, piece.area))
-                owner += [b] * len(piece.area)
-                start += len(piece.area)
+    points, owner, members_f, members_i = _point_rows(bodies, uneven=not is_flat(ground.surface))
     wheels = () if isinstance(vehicle, Striker) else vehicle.wheels
     wheel_f = wheel_rows(wheels, bodies, row)
     spin_i, spin_f, drive = turning_rows(scenario, wheel_f, 6 * nb)
@@ -69,7 +57,7 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
     nx, ny = ground.elements.count
     elements = ground.elements
     rows: list[tuple[GroundLaw, Ground | Patch]] = [(ground.law, ground), *((p.law, p) for p in ground.patches)]
-    number = start
+    number = len(owner)
     capacity = 2 * number + 64
     hidden = HIDDEN + max(law.hidden for law, _ in rows)
     told = [settings(law, *acting(scenario.effects)) for law, _ in rows]
@@ -144,6 +132,28 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         device_x=np.zeros((nb, 6)),
         device_out=np.zeros(c.OUT_COLUMNS),
     )
+
+
+def _point_rows(
+    bodies: tuple[Body, ...], uneven: bool
+) -> tuple[list[tuple[Array, Array, Array]], list[int], list[list[float]], list[tuple[int, int, int, int]]]:
+    """Points of the bodies' patches, whose they are, and the rows of their boxes; of pieces over uneven ground."""
+    points: list[tuple[Array, Array, Array]] = []
+    owner: list[int] = []
+    members_f: list[list[float]] = []
+    members_i: list[tuple[int, int, int, int]] = []
+    for b, body in enumerate(bodies):
+        for _, whole in body.surfaces:
+            pieces = whole.pieces(PIECE) if uneven else ()
+            if pieces:  # without points of its own: where it is far from the ground, so are its pieces
+                members_f.append(_box(whole, body.centre))
+                members_i.append((b, len(owner), len(owner), len(members_i) + 1 + len(pieces)))
+            for piece in pieces or (whole,):
+                members_f.append(_box(piece, body.centre))
+                members_i.append((b, len(owner), len(owner) + len(piece.area), len(members_i) + 1))
+                points.append((piece.position - body.centre, piece.normal, piece.area))
+                owner += [b] * len(piece.area)
+    return points, owner, members_f, members_i
 
 
 def _box(surface: SurfacePoints, centre: Array) -> list[float]:
