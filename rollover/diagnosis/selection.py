@@ -309,12 +309,12 @@ def _needed(
 def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) -> tuple[Explanation, Verdict]:
     """The verdict; what does not explain is not named.
 
-    Several effects are named only if together they leave nothing but noise, as many as may be more surely so, as they
-    can be bent to more; one alone also where it takes nearly all.
+    Several effects are named only if together they leave nothing but noise, as many as may be, or two of one sensor,
+    more surely so, as they can be bent to more; one alone also where it takes nearly all.
     """
     if is_any_curve(found.fitted.candidates):
         return replace(found, parts=(), fitted=found.base), "unexplained"
-    least = SURE if len(found.parts) < MOST else MANY
+    least = MANY if len(found.parts) == MOST or is_one_sensor(found.fitted.candidates) else SURE
     if found.parts and (found.after.p_value > least or not matters(judge, found.fitted, found.after)):
         return found, _kind(strongest(judge, found.base, found.fitted))
     start = held_out(found.base, groups).total
@@ -336,6 +336,11 @@ def is_any_curve(candidates: Sequence[Candidate]) -> bool:
     """Whether there are as many effects as may be, all of one sensor or of the soil: they draw any curve."""
     subjects = {c.channel or ("soil" if c.id.startswith("soil-") else c.id) for c in candidates}
     return len(candidates) == MOST and len(subjects) == 1
+
+
+def is_one_sensor(candidates: Sequence[Candidate]) -> bool:
+    """Whether several effects are all of one sensor."""
+    return len(candidates) > 1 and len({c.channel for c in candidates}) == 1 and candidates[0].channel is not None
 
 
 def _kind(c: Candidate) -> Verdict:

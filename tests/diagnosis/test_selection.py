@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -70,6 +71,17 @@ def test_as_many_effects_as_may_be_must_leave_what_chance_leaves(
     found, verdict = decided(cast(Judge, SimpleNamespace(evidence=())), explanation(count, p_value), [], [])
     assert len(found.parts) == named
     assert verdict == ("missing-physics" if named else "unexplained")
+
+
+@pytest.mark.parametrize(("channels", "named"), [(("a", "a"), 0), (("a", "b"), 2), ((None, None), 2), ((None, "a"), 2)])
+def test_two_of_one_sensor_must_leave_what_chance_leaves(
+    channels: tuple[str | None, ...], named: int, judged: dict[str, float]
+) -> None:
+    found = explanation(2, 0.002)
+    candidates = tuple(replace(c, channel=k) for c, k in zip(found.fitted.candidates, channels, strict=True))
+    found = replace(found, fitted=replace(found.fitted, candidates=candidates))
+    judge: Any = SimpleNamespace(evidence=())
+    assert len(decided(judge, found, [], [])[0].parts) == named
 
 
 @pytest.mark.parametrize(
