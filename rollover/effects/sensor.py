@@ -97,8 +97,11 @@ class SensorLag(Effect):
         _checked(self.channel)
 
     def read(self, recording: Recording) -> Recording:
-        """Solve the lag exactly for a signal that is straight between its samples; it begins settled."""
-        if self.time == 0.0 or self.channel not in recording.channels:
+        """Solve the lag exactly for a signal that is straight between its samples.
+
+        It begins as if the signal had always moved as it does at first: tau dx/dt behind.
+        """
+        if self.time == 0.0 or self.channel not in recording.channels or recording.time.size < 2:
             return recording
         x, h = recording[self.channel], np.diff(recording.time)
         ratio = h / self.time
@@ -106,6 +109,7 @@ class SensorLag(Effect):
         rest = -np.expm1(-ratio) / ratio  # mean of the fading over the step
         gain_old, gain_new = rest - fade, 1.0 - rest
         y = x.copy()
+        y[0] -= self.time * (x[1] - x[0]) / h[0]
         _follow(fade, gain_old * x[:-1] + gain_new * x[1:], y)
         return _with(recording, self.channel, y)
 

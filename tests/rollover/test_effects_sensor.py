@@ -46,6 +46,12 @@ def test_lag_is_the_first_order_answer() -> None:
     assert wave[settled] == pytest.approx((gain * np.sin(9 * t - math.atan(9 * tau)))[settled], abs=1e-3)
 
 
+def test_lag_of_what_moves_from_the_start() -> None:
+    """A body that falls before it is recorded: a ramp of slope v is read tau v behind from the first sample on."""
+    falling = SensorLag(time=0.2, channel="striker/position_z").read(recorded(striker__position_z=5.0 - 3.0 * t))
+    assert falling["striker/position_z"] == pytest.approx(5.0 - 3.0 * (t - 0.2), abs=1e-12)
+
+
 def test_clock_moves_and_stretches() -> None:
     x = np.exp(-4 * (t - 1) ** 2)
     late = SensorClockOffset(offset=0.25).read(recorded(ground__force_normal=x))[FORCE]
