@@ -123,7 +123,7 @@ def explained(
         left = mismatch_of(judge.evidence, current.blocks, phases)
     is_whole = left.p_value > SURE or not matters(judge, current, left)
     if first is not None and not judge.effort.thrifty and (not is_whole or len(taken) == MOST):
-        both = _together(judge, first, taken, phases, say, crew)
+        both = _together(judge, first, taken, first_look, phases, say, crew)
         # two that leave what chance leaves are preferred to three that do
         if both is not None and (
             both[1].p_value > SURE if is_whole else is_better(both[0][-1].fitted, both[1], current)
@@ -240,11 +240,18 @@ def is_better(other: Fitted, left: Mismatch, current: Fitted) -> bool:
 
 
 def _together(
-    judge: Judge, first: Step, taken: Sequence[Step], phases: Phases, say: Progress, crew: Crew
+    judge: Judge,
+    first: Step,
+    taken: Sequence[Step],
+    looked: Gate,
+    phases: Phases,
+    say: Progress,
+    crew: Crew,
 ) -> tuple[list[Step], Mismatch] | None:
     """The best pair of the first step's rivals, and of these with what led later, as steps, and what it leaves.
 
-    Of two effects neither need come first alone: a third may be like both.
+    Of two effects neither need come first alone: a third may be like both, and the second may leave much alone; so
+    what scored most when first `looked` at is tried beside the rivals too.
     """
     leading = sorted((judge.again(f) for f in first.rivals), key=lambda f: f.left)[:LEADING]
     later = [f for s in taken[1:] for f in sorted(s.rivals, key=lambda f: f.left)[:FOLLOWING]]
@@ -252,6 +259,8 @@ def _together(
     for f in (*leading, *later):
         last = f.candidates[-1]
         partners.setdefault(last.key, (last, f.x[len(f.x) - len(last.search) :]))
+    for s in sorted(first.screened, key=lambda s: -looked.scores.get(s.candidate.key, 0.0))[:LEADING]:
+        partners.setdefault(s.candidate.key, (s.candidate, s.starts[0]))
     every, shifts = list(partners.values()), tuple(b.shift for b in leading[0].blocks)
     pairs = [(a, b) for k, a in enumerate(leading) for b in every[k + 1 :]]
     say(f"{len(pairs)} pairs of effects")

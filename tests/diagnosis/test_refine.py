@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.explain import Step
+from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.refine import combed
+from rollover.diagnosis.screening import Screened
 from rollover.diagnosis.selection import _together
 from rollover.simulate import run
 from rollover.synthesis import synthetic
@@ -85,7 +90,13 @@ def test_two_effects_of_which_neither_comes_first_are_tried_together() -> None:
     assert min(stiffer.left, heavier.left, beside.left) > 1.5 * count
     first = Step(base=base, fitted=stiffer, p_value=0.0, rivals=(stiffer, heavier))
     then = Step(base=stiffer, fitted=beside, p_value=0.0, rivals=(beside,))
-    found = _together(judge, first, [first, then], [phases_of(e) for e in judge.evidence], lambda _: None, Crew())
+    looked = Gate(score=9.0, scores={"guide-friction": 9.0}, null=np.zeros(9), detectable={})
+    guide = Screened(candidate=c["guide-friction"], starts=tuple(c["guide-friction"].starts()), left=9.0, potential=0.0)
+    phases = [phases_of(e) for e in judge.evidence]
+    alone = _together(judge, replace(first, screened=(guide,)), [first], looked, phases, lambda _: None, Crew())
+    assert alone is not None  # what scored most need not have led anything
+    assert alone[0][-1].fitted.label == "mass + guide-friction"
+    found = _together(judge, first, [first, then], looked, phases, lambda _: None, Crew())
     assert found is not None
     (one, both), left = found
     assert one.fitted.label == "mass"
