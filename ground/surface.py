@@ -156,8 +156,11 @@ def gradient(surface: Surface) -> tuple[float, float]:
 
 
 @functools.lru_cache(maxsize=8)
-def tables(surface: Surface) -> tuple[Array, Array]:
-    """Parts (k, PART_COLUMNS) and map nodes (n,) for the kernels of `ground.relief`; none for a flat surface."""
+def tables(surface: Surface, spacing: tuple[float, float] = (0.0, 0.0)) -> tuple[Array, Array]:
+    """Parts (k, PART_COLUMNS) and map nodes (n,) for the kernels of `ground.relief`; none for a flat surface.
+
+    `spacing` (m) is that of the elements whose planes stand for the surface; 0: the surface itself is asked for.
+    """
     rows: list[list[float]] = []
     nodes: list[Array] = [np.zeros(0)]
     if not is_flat(surface):
@@ -169,7 +172,9 @@ def tables(surface: Surface) -> tuple[Array, Array]:
                 nodes += [grid.ravel(), relief.highest_of_blocks(grid)]
             elif not isinstance(part, Plane):
                 rows.append(_profile(part))
-    return np.array(rows).reshape(-1, relief.PART_COLUMNS), np.concatenate(nodes)
+    parts, heights = np.array(rows).reshape(-1, relief.PART_COLUMNS), np.concatenate(nodes)
+    parts[:, relief.OVER] = relief.overshoots(parts, heights, *spacing)
+    return parts, heights
 
 
 def _profile(part: Slope | Bank | Ditch | Ramp | Kerb) -> list[float]:

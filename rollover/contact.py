@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from ground.kernel import COLUMNS, STATE_COLUMNS
 from ground.law import HIDDEN, REFERENCE_MASS, GroundLaw
-from ground.relief import OVER, overshoots
 from ground.settings import settings
 from ground.surface import is_flat, normal
 from ground.surface import tables as surface_tables
@@ -51,9 +50,7 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
     joint_i, joint_f, axle_f, axle_i = joint_rows(vehicle, bodies, row)
     term_i, term_f = term_rows(scenario, bodies)
     n = normal(ground.surface) if is_flat(ground.surface) else np.array([0.0, 0.0, 1.0])
-    relief, nodes = surface_tables(ground.surface)
-    relief = relief.copy()
-    relief[:, OVER] = overshoots(relief, nodes, *ground.elements.spacing)
+    relief, nodes = surface_tables(ground.surface, ground.elements.spacing)
     nx, ny = ground.elements.count
     elements = ground.elements
     rows: list[tuple[GroundLaw, Ground | Patch]] = [(ground.law, ground), *((p.law, p) for p in ground.patches)]

@@ -58,10 +58,10 @@ def stretch(R: float, a: float, b: float, ra: float, rb: float) -> Any:
 
     In the disc's plane about its centre: s forward from `a` to `b`, heights `ra`, `rb`; arc at -sqrt(R^2 - s^2).
     """
-    at_a, at_b = math.sqrt(max(R * R - a * a, 0.0)), math.sqrt(max(R * R - b * b, 0.0))
-    if max(ra, rb) < -max(at_a, at_b) and a * b >= 0.0:
+    low_a, low_b = math.sqrt(max(R * R - a * a, 0.0)), math.sqrt(max(R * R - b * b, 0.0))
+    if max(ra, rb) < -max(low_a, low_b) and a * b >= 0.0:
         return 0.0, 0.0, 0.0  # below the lower end of the arc, which does not turn in between: most stretches
-    fa, fb = ra + at_a, rb + at_b
+    fa, fb = ra + low_a, rb + low_b
     slope = (rb - ra) / (b - a)
     c = ra - slope * a
     low, high = a, b

@@ -152,6 +152,15 @@ class Candidate:
         return list(itertools.product(*axes))
 
 
+def akin(candidates: Iterable[Candidate], to: Iterable[Candidate]) -> list[Candidate]:
+    """Candidates that act somewhere, of the family of one that does.
+
+    A depth, a length: one is taken for the other where a look shows little of its place.
+    """
+    families = {c.family for c in to if c.is_placed}
+    return [c for c in candidates if c.is_placed and c.family in families]
+
+
 def _begun(value: float | None, search: Search) -> float:
     """Coordinate at which the fit of a shape begins: its default, if that is inside; what has none begins low."""
     if value is None or (search.scale == "log" and value <= 0.0):

@@ -274,8 +274,8 @@ def _chosen(screened: Sequence[Screened], effort: Effort, looked: Gate) -> list[
     ranked = sorted(screened, key=lambda s: -looked.scores.get(s.candidate.key, 0.0))
     moving = [s for s in ranked if s.candidate.kind != "sensor"]
     reading = [s for s in ranked if s.candidate.kind == "sensor"]
-    akin = kin([s.candidate for s in moving], effort.promising, effort.leaders)
-    beside = [s for s in moving if s.candidate in akin]
+    related = kin([s.candidate for s in moving], effort.promising, effort.leaders)
+    beside = [s for s in moving if s.candidate in related]
     return [*by_start, *moving[: effort.promising], *beside, *reading[: effort.promising]]
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rollover.diagnosis.candidates import physical
+from rollover.diagnosis.candidates import akin, physical
 from rollover.diagnosis.chaos import is_other, too_many
 from rollover.diagnosis.explain import SURE, Step
 from rollover.diagnosis.fit import Fitted, Judge
@@ -65,9 +65,8 @@ def backed(found: Step, looked: Gate) -> Step:
     """
     last = [f.candidates[-1] for f in found.rivals]
     told = [c for c in last if p_value(looked.scores.get(c.key, 0.0), looked.null) < SPOKEN]
-    families = [c.family for c in told if c.is_placed]
-    kept = [c in told or (c.is_placed and c.family in families) for c in last]
-    return replace(found, rivals=tuple(f for f, k in zip(found.rivals, kept, strict=True) if k))
+    kept = [*told, *akin(last, told)]
+    return replace(found, rivals=tuple(f for f in found.rivals if f.candidates[-1] in kept))
 
 
 def lasting(judge: Judge, found: Step, groups: Groups) -> Step | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rollover.diagnosis.candidates import BESIDE, Candidate
+from rollover.diagnosis.candidates import BESIDE, Candidate, akin
 from rollover.diagnosis.clocks import by_first_contact
 from rollover.diagnosis.effort import DROPS, Effort
 from rollover.diagnosis.fit import Fitted, Judge
@@ -115,13 +115,8 @@ def screen(
 
 
 def kin(ranked: Sequence[Candidate], taken: int, leaders: int) -> list[Candidate]:
-    """Beyond the first that are `taken`, those akin to one of the `leaders` that move the vehicle, by where they act.
-
-    A depth, a length: one is taken for the other where a look shows little of its place.
-    """
-    moving = [c for c in ranked if c.kind != "sensor"]
-    families = [c.family for c in moving[:leaders] if c.is_placed]
-    return [c for c in ranked[taken:] if c in moving and c.is_placed and c.family in families]
+    """Beyond the first that are `taken`, those akin to one of the `leaders` that move the vehicle."""
+    return akin(ranked[taken:], [c for c in ranked if c.kind != "sensor"][:leaders])
 
 
 def _begun_at(c: Candidate, met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float, ...], ...]:

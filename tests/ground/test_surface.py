@@ -112,9 +112,9 @@ def test_no_plane_of_an_element_stands_higher_than_said() -> None:
     for surface in (*UNEVEN, turned):
         for _ in range(400):
             (x, y), (dx, dy) = rng.uniform(-3, 3, 2), rng.uniform(0.02, 0.6, 2)
-            parts, nodes = (table.copy() for table in tables(surface))
-            ground = relief.highest(parts, nodes, x + 0.5 * dx, y + 0.5 * dy, math.hypot(dx, dy))
-            parts[:, relief.OVER] = relief.overshoots(parts, nodes, dx, dy)
+            ground = relief.highest(*tables(surface), x + 0.5 * dx, y + 0.5 * dy, math.hypot(dx, dy))
+            parts, nodes = tables(surface, (dx, dy))
+            # half the diagonal is no tolerance: from its centre it reaches the element's corners and nothing beyond
             most = relief.highest(parts, nodes, x + 0.5 * dx, y + 0.5 * dy, 0.5 * math.hypot(dx, dy))
             relief.element_plane(parts, nodes, x, y, dx, dy, plane)
             cx, cy = np.array([x, x + dx, x + dx, x]), np.array([y, y, y + dy, y + dy])
