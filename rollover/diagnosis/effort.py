@@ -23,6 +23,7 @@ class Effort:
     wide: float = 0.0  # of a coordinate, to which a central difference may widen; 0: one-sided, as it is
     least: float = 0.0  # gain of a round below which a search narrows
     later: float = 5e-5  # s, by which a clock is moved to see what that does
+    clocked: int = 0  # times that a trial's time shifts are moved to where they fit: reading a run again costs little
     thrifty: bool = False  # looks at few recordings, fits no shapes, and stops where nothing but noise is left
 
     @property
@@ -46,5 +47,6 @@ RUNS = Effort(
     least=4.0,
     polishes=0,
     later=1e-3,  # from one row of a run to the next
+    clocked=3,
     thrifty=True,
 )

@@ -256,7 +256,8 @@ def _first_fits(
     worth = [f for k, f in enumerate(fits) if k < judge.effort.leaders or f.left < WITHIN * fits[0].left]
     if judge.effort.thrifty and fits:
         worth = _one_each(worth) + _elsewhere(worth)
-        as_it_is = sum(base.blocks[r].normal()[2] for r in few)
+        before = [judge.block(r, base.candidates, base.x, shifts[r], 0.0) for r in few]  # clocks where they are held
+        as_it_is = sum(b.total for b in before if b is not None)
         worth = [f for f in worth if as_it_is - f.left >= RIVALS * (as_it_is - fits[0].left)]
     worth = worth[: judge.effort.most_leaders]
     return [replace(s, nrmse=told.get(s.candidate.key, 0.0)) for s in screened], worth

@@ -14,7 +14,7 @@ from rollover.diagnosis.chaos import course
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.overturn import full_runs, made_ahead
-from rollover.diagnosis.secant import Point, secant
+from rollover.diagnosis.secant import Point, followed, secant
 
 Array = NDArray[np.float64]
 FAR = 3.0  # misfit over the noise from which on a step may be lengthened
@@ -158,10 +158,15 @@ class Judge:
         J = np.zeros((y.size, len(x)))
         if known is not None:
             J[:, : known.shape[1]] = known
+
+        def across(a: Point, b: Point) -> Array | None:
+            ends = [self.moved(r, (candidates, x), end, shift) for end in (a, b)]
+            return None if ends[0] is None or ends[1] is None else np.asarray(ends[1] - ends[0])
+
         for k in range(0 if known is None else known.shape[1], len(x) if nudge else 0):
             if self.effort.wide:
                 widest = 0.0 if self._pinned else self.effort.wide  # a first fit is short
-                column = secant(e, lambda a, b: self.moved(r, a, b, shift), (candidates, x), k, nudge, widest)
+                column = secant(e, across, (candidates, x), k, nudge, widest)
                 if column is None:
                     return None
                 J[:, k] = column
@@ -208,16 +213,34 @@ class Judge:
     def moved(self, r: int, before: Point, after: Point, shift: float) -> Array | None:
         """How the prediction of recording r differs between two points, whitened; nothing where either leaps.
 
-        A leap that moves past a sample is no slope, and what is forgiven there follows the measurement.
+        A leap that moves past a sample is no slope, and what is forgiven there follows the measurement. Full runs are
+        compared as clocks would have them, see `followed`.
         """
         first, last = self.raw(r, *before, shift), self.raw(r, *after, shift)
         if first is None or last is None:
             return None
+        if self.effort.thrifty and not self._pinned:
+            slope = self._slope(r, *before, shift, first, NONE)
+            last = followed(self.evidence[r], first, last, slope, lambda d: self.edged(r, *after, shift + d))
         d = last - first
         for point in (before, after):
             d[self._leaps.get(_key(r, *point, shift), NONE)] = 0.0
         e = self.evidence[r]
         return e.eased(e.worth(self._leaps.get(_key(r, *before, shift), NONE)) * e.whitened(d))
+
+    def clocked(
+        self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float, rounds: int
+    ) -> Block | None:
+        """Recording r at x without slopes, its time shift moved to where it is met best: no run more, of full runs."""
+        found = self.block(r, candidates, x, shift, 0.0)
+        for _ in range(rounds):
+            if self._pinned or found is None:
+                break
+            new = self.block(r, candidates, x, found.shift + shift_of(found, np.zeros(len(x))), 0.0)
+            if new is None or new.total >= found.total:
+                break
+            found = new
+        return found
 
     def fit(
         self,
@@ -276,7 +299,7 @@ class Judge:
                 steps = [shift_of(block, moved) for block in blocks]
                 self.made_ahead((r, candidates, trial) for r in use)
                 after = [
-                    self.block(r, candidates, trial, block.shift + d, 0.0)
+                    self.clocked(r, candidates, trial, block.shift + d, self.effort.clocked)
                     for r, block, d in zip(use, blocks, steps, strict=True)
                 ]
                 if all(a is not None for a in after):
@@ -300,14 +323,7 @@ class Judge:
             self.made_ahead(self.about(use, candidates, x, nudge))
             # what is held already moves little: its slopes are worked out anew only where the search narrows
             again = [
-                self.block(
-                    r,
-                    candidates,
-                    x,
-                    s,
-                    nudge,
-                    None if fresh else block.plain_J[:, :fixed],
-                )
+                self.block(r, candidates, x, s, nudge, None if fresh else block.plain_J[:, :fixed])
                 for r, s, block in zip(use, shifts, blocks, strict=True)
             ]
             if any(b is None for b in again):
@@ -347,7 +363,9 @@ class Judge:
             dx = STRIDE * dx
             there = [float(v) for v in np.clip(np.array(x) + dx, 0.0, 1.0)]
             found = [
-                self.block(r, candidates, there, b.shift, 0.0) for r, b in zip(use, after, strict=True) if b is not None
+                self.clocked(r, candidates, there, b.shift, self.effort.clocked)
+                for r, b in zip(use, after, strict=True)
+                if b is not None
             ]
             if there == trial or any(b is None for b in found):
                 break

@@ -26,7 +26,7 @@ CLEARLY = 0.4  # of the rise that is due, and
 ROUGH = 8.0  # rise that is no chance: from place to place the misfit of a mean of runs differs by 3 (1 sd)
 FURTHER, FARTHEST = 2.0, 30.0  # factors by which one goes on at a time, and at most
 BEYOND = 1.2  # factor below which an interval that is too narrow is chance
-CLOCKED = 3  # times that a clock is fitted anew
+CLOCKED = 3  # times that a clock is moved along
 EVENLY = 12.0**-0.5  # standard deviation of what is spread evenly from 0 to 1
 
 
@@ -130,15 +130,13 @@ def _misfit(judge: Judge, fitted: Fitted, way: Array) -> float | None:
     """What is left some way (p,) from a fit; None where it cannot be simulated."""
     x = [float(v) for v in np.array(fitted.x) + way]
     judge.made_ahead((r, fitted.candidates, x) for r in range(len(fitted.blocks)))
-    blocks: list[Block] = []
-    for r, there in enumerate(fitted.blocks):
-        left = way
-        for _ in range(CLOCKED):  # its clock goes along, by more than the slopes at the fit say
-            found = judge.block(r, fitted.candidates, x, there.shift + shift_of(there, left), 0.0)
-            if found is None:
-                return None
-            there, left = found, np.zeros(way.size)
-        blocks.append(there)
+    found = [
+        judge.clocked(r, fitted.candidates, x, there.shift + shift_of(there, way), CLOCKED)
+        for r, there in enumerate(fitted.blocks)
+    ]
+    blocks = [b for b in found if b is not None]
+    if len(blocks) < len(found):
+        return None
     moved = replace(fitted, x=tuple(x), blocks=tuple(blocks))
     return left_of_means(judge, moved)[0] if any(e.strays for e in judge.evidence) else moved.left
 

@@ -2,6 +2,13 @@
 
 Between two runs lies what the parameter does and what chance does. Over a narrow step that is mostly chance, which
 squares make look like a strong slope: steps too short, and intervals too narrow.
+
+So does a blow that comes some ms later: to a slope it is another blow, to a clock the same one. A prediction y(tau) of
+a recording with time shift tau is compared with another, y0(0), at the d where it is most like it,
+
+    y(d) - s d - y0(0),   d = argmin |y(d) - y0(0)|,   s = dy0/dtau                                           (D13)
+
+which a clock explains as far as ever, and no less where s d is far from a blow that comes d later.
 """
 
 from __future__ import annotations
@@ -11,12 +18,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.blocks import WIDEST
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.evidence import Evidence
 
 Array = NDArray[np.float64]
 Point = tuple[Sequence[Candidate], Sequence[float]]
 EXACT = 5e-3  # of a coordinate, for differences that are free of chance
+CLOCKED = 3  # times that d is moved
 CLEAR = 12.0  # times the squares that runs scatter by, that a difference should move
 
 
@@ -43,6 +52,23 @@ def secant(
         if float(found @ found) >= enough or 2.0 * nudge > widest or not physical:
             return np.asarray(found / over)
         nudge *= 2.0
+
+
+def followed(e: Evidence, first: Array, last: Array, slope: Array, read: Callable[[float], Array | None]) -> Array:
+    """y(d) - s d of (D13), (n,), SI; `last` is y(0), `first` y0, `slope` s, `read` gives y or None."""
+    s = e.eased(e.whitened(slope))
+    size, most = float(s @ s), WIDEST * e.shift_prior
+    found, at, w = last, 0.0, e.eased(e.whitened(last - first))
+    for _ in range(CLOCKED if size > 0.0 else 0):
+        there = min(max(at - float(s @ w) / size, -most), most)
+        y = read(there)
+        if y is None:
+            break
+        left = e.eased(e.whitened(y - first))
+        if float(left @ left) >= float(w @ w):
+            break
+        found, at, w = y, there, left
+    return found - slope * at
 
 
 def is_physical(candidates: Sequence[Candidate], k: int) -> bool:

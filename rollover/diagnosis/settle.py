@@ -27,36 +27,72 @@ from rollover.diagnosis.fit import Fitted, Judge
 Array = NDArray[np.float64]
 SHARES = (1.0, 0.5, 1.5)  # of the way: where a run leaps from one course to another beside it
 NEARLY = 1.15  # times the least misfit
-FARTHEST = 0.15  # of a coordinate, that a mean may move it
+FARTHEST = 0.15  # of a coordinate, that a mean may move it at a time
+STEPS = 5  # at most
+WORTH = 2.0  # gain that pays for one
 
 
 def settled(judge: Judge, part: Step) -> Step:
     """A step under the scatter of runs with its explanation, moved to where the mean of them is met best (D8).
 
-    As it was if nothing can be simulated there; where runs do not scatter too.
+    Slopes beside a leap lead astray, and so may clocks that a wrong place has bent: it is moved again until a step
+    would gain no more than chance, and of all places on the way the one is kept whose mean is met best. As it was if
+    nothing can be simulated there; where runs do not scatter too.
     """
     rescattered(judge, part.fitted)
     part = part.again(judge)
-    old = part.fitted
-    if not any(e.strays for e in judge.evidence):
+    places = [part.fitted]
+    for _ in range(STEPS):
+        here = places[-1]
+        if not any(e.strays for e in judge.evidence):
+            break
+        dx = step_of_means(judge.evidence, here.blocks)
+        if promised(here.blocks, dx) < WORTH:
+            break
+        there = _onward(judge, here, np.clip(dx, -FARTHEST, FARTHEST))
+        if there is None:
+            break
+        rescattered(judge, there)
+        places.append(judge.again(there))
+    if len(places) == 1:
         return part
-    dx = np.clip(step_of_means(judge.evidence, old.blocks), -FARTHEST, FARTHEST)
-    places = [_moved(old, share * dx) for share in SHARES]
-    judge.made_ahead((r, old.candidates, x) for x, _ in places for r in range(len(old.blocks)))
+    best = min((judge.again(f) for f in places), key=lambda f: left_of_means(judge, f)[0])
+    if best.x != places[-1].x:
+        rescattered(judge, best)
+    return part.moved_to(best).again(judge)
+
+
+def promised(blocks: Sequence[Block], dx: Array) -> float:
+    """Gain dx'A dx of a step to a minimum, noise units."""
+    return float(sum(dx @ b.normal()[0] @ dx for b in blocks))
+
+
+def _onward(judge: Judge, old: Fitted, dx: Array) -> Fitted | None:
+    """A fit moved by dx, or by a share of that which leaves less; None where nothing can be simulated."""
+    begun = [_moved(old, share * dx) for share in SHARES]
+    judge.made_ahead((r, old.candidates, x) for x, _ in begun for r in range(len(old.blocks)))
+    places = [(x, _clocked(judge, old.candidates, x, shifts)) for x, shifts in begun]
     lefts = [_left_at(judge, old.candidates, *place) for place in places]
     best = int(np.argmin(lefts))
     if lefts[0] < NEARLY * min(old.left, *lefts):
         best = 0  # the whole way: the mean of runs is worth more than the one that happens to be there
     elif lefts[best] >= old.left:
-        return part
+        return None
     x, shifts = places[best]
-    return part.moved_to(linearised(judge, old.candidates, x, range(len(shifts)), shifts) or old)
+    return linearised(judge, old.candidates, x, range(len(shifts)), shifts)
 
 
 def _moved(old: Fitted, dx: Array) -> tuple[list[float], list[float]]:
     """Coordinates and time shifts (s) of a fit moved by dx."""
     x = np.clip(np.array(old.x) + dx, 0.0, 1.0)
     return [float(v) for v in x], [b.shift + shift_of(b, x - np.array(old.x)) for b in old.blocks]
+
+
+def _clocked(judge: Judge, candidates: Sequence[Candidate], x: Sequence[float], shifts: Sequence[float]) -> list[float]:
+    """Time shifts (s) at which a place meets the recordings best; as they are where it cannot be simulated."""
+    rounds = judge.effort.clocked
+    blocks = [judge.clocked(r, candidates, x, shift, rounds) for r, shift in enumerate(shifts)]
+    return [shift if b is None else b.shift for b, shift in zip(blocks, shifts, strict=True)]
 
 
 def _left_at(judge: Judge, candidates: Sequence[Candidate], x: Sequence[float], shifts: Sequence[float]) -> float:

@@ -1,0 +1,122 @@
+"""Slopes of full runs beside clocks: a blow that comes later is the same blow to a clock."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.crew import Crew
+from rollover.diagnosis.effort import DROPS, RUNS, Effort
+from rollover.diagnosis.evidence import Evidence, Signal
+from rollover.diagnosis.explain import Step, _first_fits
+from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.gate import Gate
+from rollover.diagnosis.screening import Screened
+from rollover.diagnosis.settle import settled
+from rollover.effects import Search
+from rollover.recording import Recording
+
+CHANNEL = "chassis/acceleration_y"
+TIME = 0.0005 * np.arange(200)
+WIDTH, LATER, SIGMA = 0.002, 0.1, 0.01  # s; s per unit of x; of a blow of 1
+
+
+def blow(at: float) -> np.ndarray:
+    return np.asarray(np.exp(-(((TIME - 0.05 - at) / WIDTH) ** 2)))
+
+
+class Late:
+    """y = (1 + x + o) g(t - LATER (x + o/2) - tau): x and o make a blow larger and later."""
+
+    effort: Effort = RUNS
+
+    def marks(self) -> tuple[tuple[float, str], ...]:
+        return ()
+
+    def strays(self, changes: Mapping[str, Any] | None = None, shift: float = 0.0) -> list[dict[str, np.ndarray]]:
+        return []
+
+    def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+        x, o = (float(changes.get(f"effects.{name}", 0.0)) for name in ("slope.angle", "mass.added"))
+        return {CHANNEL: (1.0 + x + o) * blow(LATER * (x + 0.5 * o) + shift)}
+
+
+def evidence(values: np.ndarray, simulator: Any, effort: Effort = RUNS) -> Evidence:
+    simulator.effort = effort
+    signal = Signal(
+        channel=CHANNEL, rows=np.arange(TIME.size), values=values, sigma=SIGMA, noise=SIGMA, ar=(), span=1.0
+    )
+    return Evidence(
+        name="r", recording=Recording(title="r", time=TIME, channels={CHANNEL: values}),
+        simulator=cast(Any, simulator), signals=(signal,), shift_prior=1e-3, condition="r",
+        strays=tuple(s[CHANNEL] for s in simulator.strays()),
+    )  # fmt: skip
+
+
+def candidate(id: str, name: str) -> Candidate:
+    return Candidate(id=id, kind="parameter", family="any", search={name: Search(0.0, 1.0)})
+
+
+SLOPE, MASS = candidate("slope", "angle"), candidate("mass", "added")
+
+
+def test_what_a_clock_explains_tells_nothing_of_a_parameter() -> None:
+    """y = (1 + x) g(t - c x - tau): beside tau dy/dx is g alone, as g'g = 0 summed over a blow; c x goes to the clock.
+
+    Hence A = sum g^2/sigma^2, and (c/sd)^2 for what is known of the clock. Slopes over two blows that lie apart,
+    (y(h) - y(-h))/(2h), hold sum g^2 twice over (2h)^2.
+    """
+    x = 0.03  # what it is at 0 comes 3 ms earlier, at 0.06 3 ms later: a blow is 2 ms wide
+    expected = float(np.sum((blow(0.0) / SIGMA) ** 2)) + (LATER / 1e-3) ** 2
+    found = Judge([evidence((1.0 + x) * blow(LATER * x), Late())]).block(0, (SLOPE,), (x,), 0.0, RUNS.fine)
+    assert found is not None
+    assert found.normal()[0][0, 0] == pytest.approx(expected, rel=0.05)
+    g = float(found.slope @ found.J[:, 0]) / float(found.slope @ found.slope)
+    assert g == pytest.approx(LATER, rel=0.05)  # the clock goes along by as much as the blow comes later
+    plain = Judge([evidence(blow(LATER * x), Late(), replace(DROPS, nudges=(x,)))])
+    apart = plain.block(0, (SLOPE,), (x,), 0.0, x)
+    assert apart is not None
+    assert apart.normal()[0][0, 0] > 20.0 * expected
+
+
+def test_a_rival_is_measured_by_clocks_that_are_held_as_its_own_are() -> None:
+    """A base whose clock has eaten a blow that comes 3 ms late has nothing left to gain: beside it none is a rival."""
+    rng = np.random.default_rng(3)
+    measured = [1.03 * blow(LATER * 0.03) + SIGMA * rng.standard_normal(TIME.size) for _ in range(2)]
+    judge = Judge([evidence(values, Late()) for values in measured])
+    base = judge.fit((), (), shifts=[0.003, 0.003])
+    assert base is not None
+    assert all(b.shift > 0.002 for b in base.blocks)
+    looked = Gate(score=9.0, scores={SLOPE.key: 9.0, MASS.key: 8.0}, null=np.zeros(4), detectable={})
+    screened = [Screened(candidate=c, starts=((0.02,),), left=1.0, potential=1.0) for c in (SLOPE, MASS)]
+    with Crew() as crew:
+        _, leaders = _first_fits(judge, base, screened, (0, 1), (0.0, 0.0), lambda _: None, crew, looked)
+    assert {f.candidates[-1].key for f in leaders} == {SLOPE.key, MASS.key}
+
+
+def test_an_explanation_that_is_far_from_the_mean_goes_more_than_one_step() -> None:
+    """y = 20 x^2 sin(30 t) measured at x = 0.6, begun at 0.2: no step is longer than 0.15 of a coordinate."""
+
+    class Bent(Late):
+        def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+            x, k = float(changes.get("effects.slope.angle", 0.0)), round(changes.get("neighbour", 0))
+            chance = np.random.default_rng([k, round(1e9 * x)]).standard_normal(TIME.size)
+            return {CHANNEL: 20.0 * x**2 * np.sin(30.0 * (TIME - shift)) + 0.05 * chance}
+
+        def strays(self, changes: Mapping[str, Any] | None = None, shift: float = 0.0) -> list[dict[str, np.ndarray]]:
+            values = dict(changes or {})
+            there = self.predict(values, shift)[CHANNEL]
+            return [{CHANNEL: self.predict({**values, "neighbour": k}, shift)[CHANNEL] - there} for k in range(1, 7)]
+
+    judge = Judge([evidence(Bent().predict({"effects.slope.angle": 0.6}, 0.0)[CHANNEL], Bent()) for _ in range(2)])
+    base, far = judge.fit((), ()), judge.fit((SLOPE,), (0.2,), rounds=0)
+    assert base is not None
+    assert far is not None
+    found = settled(judge, Step(base=base, fitted=far, p_value=0.0, rivals=(far,)))
+    assert found.fitted.x[0] == pytest.approx(0.6, abs=0.01)
+    assert found.rivals == (found.fitted,)
