@@ -10,10 +10,13 @@ from numpy.typing import NDArray
 from rollover.diagnosis.blocks import WIDEST, Block, Fitted
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import NOISE_LEFT, Judge
+from rollover.diagnosis.gate import followed, freed, yardstick
 
 Array = NDArray[np.float64]
 TEETH, COMBED, BESIDE = 11, 0.05, 20  # places on a first coordinate, within so much of its fit; on the other, over all
 STARTS, APART = 3, 0.06  # of the best places, so far apart
+AFAR, NEAR = (np.arange(80) + 0.5) / 80, 0.002 * np.arange(-20, 21)  # places of a threshold, all along and about a fit
+VALLEYS = 4  # of these in which a fit begins
 SCANNED = (np.arange(40) + 0.5) / 40  # places of a shape
 TICK, SHORTEST, NARROWER = 8e-5, 5e-6, 0.4  # s, by which a time shift is tried to either side; then less, by a factor
 TRIED = 40  # at most so many
@@ -73,6 +76,46 @@ def combed(judge: Judge, fitted: Fitted) -> Fitted:
     best = min((f for f in found if f is not None), key=lambda f: f.left, default=fitted)
     best = timed(judge, polish(judge, best))
     return best if best.left < fitted.left else fitted
+
+
+def traced(judge: Judge, fitted: Fitted) -> Fitted:
+    """The fit begun anew where its last effect acts elsewhere, as strongly as recordings ask for there; never worse.
+
+    A threshold that moves past a sample leaves a misfit of many small valleys: each other parameter than the one that
+    says how strong an effect is (`yardstick`) is tried all along its range, and finely beside the fit.
+    """
+    last = fitted.candidates[-1]
+    at, shifts = len(fitted.x) - len(last.search), [b.shift for b in fitted.blocks]
+    strength = at + list(last.search).index(yardstick(last.id, last.search)[0])
+    before = (fitted.candidates[:-1], fitted.x[:at])
+    alone = [judge.block(r, *before, s, 0.0) for r, s in enumerate(shifts)]
+    blocks = [b for b in alone if b is not None]
+    best = fitted
+    for k in (k for k in range(at, len(fitted.x)) if k != strength and len(blocks) == len(shifts)):
+        met = []
+        for v in sorted(v for v in (*AFAR, *(fitted.x[k] + NEAR)) if 0.0 < v < 1.0):
+            x = (*fitted.x[:k], float(v), *fitted.x[k + 1 :])
+            ways = [judge.moved(r, before, (fitted.candidates, x), s) for r, s in enumerate(shifts)]
+            along, size = 0.0, 0.0
+            for way, b in zip(ways, blocks, strict=True):
+                if way is not None:
+                    d = freed(way[:, None], b)[:, 0]
+                    along, size = along + float(d @ b.residual), size + float(d @ d)
+            start = followed(last, x[at:], along / size) if size > 0.0 else None
+            left = None if start is None else left_at(judge, fitted.candidates, (*fitted.x[:at], *start), shifts)
+            if start is not None and left is not None:
+                met.append((left, (*fitted.x[:at], *start)))
+        for x in _valleys(met)[:VALLEYS]:
+            again = judge.fit(fitted.candidates, x, shifts=shifts, width=1)
+            best = again if again is not None and again.left < best.left else best
+    return best
+
+
+def _valleys(met: Sequence[tuple[float, tuple[float, ...]]]) -> list[tuple[float, ...]]:
+    """Places of a row, each with what it leaves, beside which none leaves less; the one that leaves least first."""
+    inside = [(np.inf, ()), *met, (np.inf, ())]
+    low = [b for a, b, c in zip(inside, inside[1:], inside[2:], strict=False) if b[0] <= min(a[0], c[0])]
+    return [x for _, x in sorted(low)]
 
 
 def scanned(judge: Judge, fitted: Fitted) -> Fitted | None:

@@ -16,7 +16,7 @@ from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate, gate
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.lasting import NEEDED, astray, backed, begun_anew, lasting, unbent
-from rollover.diagnosis.refine import polish, timed
+from rollover.diagnosis.refine import polish, timed, traced
 from rollover.diagnosis.screening import spread
 from rollover.diagnosis.verdict import Verdict
 
@@ -180,14 +180,17 @@ def followed(judge: Judge, found: Step, phases: Phases) -> tuple[Step, Mismatch]
     """A step and what it leaves; where that is little more than noise, its fit followed to the end; never worse.
 
     Beside a kink, or a sample that a clock carries over a leap, or in the valley that two effects share, a fit may end
-    too early. One effect's is followed only if what it leaves is in doubt.
+    too early. One effect's is followed only if what it leaves is in doubt, or if it is met better with its threshold
+    elsewhere.
     """
     old = found.fitted
     left = mismatch_of(judge.evidence, old.blocks, phases)
     is_near = old.left < NEARLY_NOISE**2 * sum(b.residual.size for b in old.blocks)
-    if judge.effort.thrifty or not is_near or (len(old.candidates) < 2 and left.p_value > MANY):
+    if judge.effort.thrifty or not is_near:
         return found, left
-    new = timed(judge, polish(judge, old))
+    new = traced(judge, old)
+    if new.left < old.left or len(old.candidates) > 1 or left.p_value < MANY:
+        new = timed(judge, polish(judge, new))
     if new.left >= old.left:
         return found, left
     return found.moved_to(new), mismatch_of(judge.evidence, new.blocks, phases)

@@ -55,7 +55,10 @@ def test_an_interval_reaches_as_far_as_the_misfit_stays_low(flatter: float, leas
         there = w - J / flatter * (x[0] - 0.5) * way
         return Block(residual=there, J=J * way[:, None], slope=np.zeros(n), shift=0.0, prior=1e-3)
 
-    judge: Any = SimpleNamespace(block=block, evidence=(), effort=DROPS, made_ahead=lambda _: None)
+    def clocked(r: int, c: object, x: list[float], s: float, _rounds: int) -> Block:
+        return block(r, c, x, s, 0.0)
+
+    judge: Any = SimpleNamespace(clocked=clocked, block=block, evidence=(), effort=DROPS, made_ahead=lambda _: None)
     candidate = Candidate(id="mass", kind="parameter", family="", search={"added": Search(0, 1)})
     fitted = Fitted(candidates=(candidate,), x=(0.5,), blocks=(block(0, None, [0.5], 0.0, 0.0),))
     found = stated.reaches(judge, fitted, np.array([1.0 / J]), 1.0)

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
+from rollover.diagnosis.candidates import coordinate
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.explain import Step
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.phases import phases_of
-from rollover.diagnosis.refine import combed
+from rollover.diagnosis.refine import combed, traced
 from rollover.diagnosis.screening import Screened
 from rollover.diagnosis.selection import _together
 from rollover.simulate import run
@@ -39,6 +40,23 @@ def test_a_damping_behind_a_cliff_is_found() -> None:
     assert found.left < 1.2 * count
     assert c.values(found.x)["stiffness"] == pytest.approx(true["stiffness"], rel=0.02)
     assert c.values(found.x)["damping"] == pytest.approx(true["damping"], rel=0.1)
+
+
+def test_a_threshold_is_found_though_a_fit_ended_at_another() -> None:
+    """A crust that is hardly stiffer: ends elsewhere are nearly as good, and no slope leads from one to the other."""
+    true = {"thickness": 0.065, "stiffness_ratio": 1.02}
+    hidden = {f"effects.soil-crust.{name}": value for name, value in true.items()}
+    judge = judge_of(recorded(hidden, 2, speeds=(1.2, 1.8, 2.4, 3.0), channels=CHANNELS, rate=1500.0, noise=0.004))
+    c = candidate(judge, "soil-crust")
+    begun = [coordinate(v, s) for v, s in zip((0.092, 1.01), c.search.values(), strict=True)]
+    ended = judge.fit((c,), begun, width=1)
+    assert ended is not None
+    assert abs(c.values(ended.x)["thickness"] - true["thickness"]) > 0.004
+    found = traced(judge, ended)
+    assert found.left < ended.left - 100.0
+    assert c.values(found.x)["thickness"] == pytest.approx(true["thickness"], rel=0.01)
+    assert c.values(found.x)["stiffness_ratio"] == pytest.approx(true["stiffness_ratio"], abs=0.001)
+    assert traced(judge, found).left <= found.left
 
 
 def test_a_pair_that_leaves_nothing_is_named_by_both() -> None:
