@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -95,12 +95,13 @@ def with_shapes(judge: Judge, fitted: Fitted) -> tuple[Fitted, Array, list[int]]
     return fitted, np.full(len(fitted.x), GENTLE), list(range(len(fitted.x)))
 
 
-def reaches(judge: Judge, fitted: Fitted, own: Array, phi: float) -> Array:
+def reaches(judge: Judge, fitted: Fitted, own: Array, phi: float, sides: Mapping[int, float] | None = None) -> Array:
     """How much further than by its slopes a misfit stays low, factors (p, 2) of `own` deviations down and up, >= 1.
 
     `TWO_SIDED` deviations off, the other parameters going along, it should have risen by `TWO_SIDED`^2 phi. Leaps and
     chance make slopes too steep: where it has clearly not, one goes on until it has, and back on a parabola. Of runs
-    that scatter it is the misfit of their mean, which is rough by itself.
+    that scatter it is the misfit of their mean, which is rough by itself. With `sides`, coordinates with -1.0 for down
+    or 1.0 for up, these alone are looked at.
     """
     inverse = np.linalg.inv(sum((b.normal()[0] for b in fitted.blocks), GENTLE * np.eye(len(fitted.x))))
     start = _misfit(judge, fitted, np.zeros(len(fitted.x)))
@@ -112,6 +113,8 @@ def reaches(judge: Judge, fitted: Fitted, own: Array, phi: float) -> Array:
     for k in range(own.size):
         way = TWO_SIDED * own[k] * inverse[:, k] / inverse[k, k]
         for side, sign in enumerate((-1.0, 1.0)):
+            if sides is not None and sides.get(k) != sign:
+                continue
             far = 1.0
             while far < FARTHEST:
                 x = np.array(fitted.x) + sign * far * way
@@ -152,14 +155,15 @@ def _noise(judge: Judge, fitted: Fitted) -> Array:
     return np.asarray(found)
 
 
-def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
+def intervals(judge: Judge, fitted: Fitted, sides: Mapping[int, float] | None = None) -> list[dict[str, Interval]]:
     """For each effect, its parameters with 95 % intervals.
 
     cov = phi A^-1, phi the misfit left per sample (at least 1); beside it, in quadrature, what a gain error of the
     model of `MODEL_ERROR` in any one channel would do, A^-1 J'(error): integrators differ, noise or not. Where runs
     that nobody could tell apart scatter and samples are weighed by that, cov = phi A^-1 N A^-1 with N the covariance
     that the noise alone gives J'w; beside it stand `scattered` and `unshaped`. Elsewhere shapes that were not fitted
-    are in A, see `with_shapes`; an end of a range is read off where samples pile up there.
+    are in A, see `with_shapes`; an end of a range is read off where samples pile up there. `sides` as in `reaches`: all
+    others are as wide as slopes say.
     """
     told = fitted
     fitted, prior, kept = with_shapes(judge, fitted)
@@ -189,7 +193,7 @@ def intervals(judge: Judge, fitted: Fitted) -> list[dict[str, Interval]]:
     moved += rest**2
     sd = np.sqrt(sd**2 + moved)[kept]
     own = np.sqrt(phi * np.diag(inverse))[kept]
-    wide = np.sqrt(sd[:, None] ** 2 + own[:, None] ** 2 * (reaches(judge, told, own, phi) ** 2 - 1.0))
+    wide = np.sqrt(sd[:, None] ** 2 + own[:, None] ** 2 * (reaches(judge, told, own, phi, sides) ** 2 - 1.0))
     found, at = [], 0
     for c in told.candidates:
         kind: Any = EFFECTS[c.id]

@@ -111,7 +111,10 @@ def is_there(judge: Judge, fitted: Fitted) -> bool:
     nulls: dict[str, Any] = dict(EFFECTS[last.id].null)
     for (name, search), at in zip(last.search.items(), last.neutral or (None,) * len(last.search), strict=True):
         nulls[name] = nulls.get(name) if at is None else physical(at, search)
-    known = {name: i for name, i in intervals(judge, fitted)[-1].items() if isinstance(nulls.get(name), (int, float))}
+    values, at = last.values(fitted.x[-len(last.search) :]), len(fitted.x) - len(last.search)
+    numbers = [name for name in last.search if isinstance(nulls.get(name), (int, float))]
+    sides = {at + k: -1.0 if values[n] > nulls[n] else 1.0 for k, n in enumerate(last.search) if n in numbers}
+    known = {name: i for name, i in intervals(judge, fitted, sides)[-1].items() if name in numbers}
     return not known or any(not i.low <= nulls[name] <= i.high for name, i in known.items())
 
 

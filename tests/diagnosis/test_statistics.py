@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -16,7 +17,7 @@ from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
-from rollover.diagnosis.fit import GENTLE, Block, Fitted
+from rollover.diagnosis.fit import GENTLE, Block, Fitted, Judge
 from rollover.diagnosis.gate import freed, null_of_the_best, p_value
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.intervals import intervals
@@ -132,9 +133,11 @@ def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
     judge = cast(
         Any,
         SimpleNamespace(
-            evidence=(bare, bare, bare), measured=(), per_error=1.0, effort=DROPS, made_ahead=lambda _: None
+            evidence=(bare, bare, bare), measured=(), per_error=1.0, effort=DROPS, made_ahead=lambda _: None,
+            _pinned=False,
         ),
-    )
+    )  # fmt: skip
+    judge.clocked = partial(Judge.clocked, judge)
     truth = np.array([0.02, -0.03])
     for _ in range(250):
         blocks = linear_blocks(rng, 3, 40, truth)
