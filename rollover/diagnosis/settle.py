@@ -56,10 +56,16 @@ def settled(judge: Judge, part: Step) -> Step:
         places.append(judge.again(there))
     if len(places) == 1:
         return part
-    best = min((judge.again(f) for f in places), key=lambda f: left_of_means(judge, f)[0])
+    best = min(places, key=lambda f: left_of_means(judge, _weighed_anew(judge, f))[0])
     if best.x != places[-1].x:
         rescattered(judge, best)
     return part.moved_to(best).again(judge)
+
+
+def _weighed_anew(judge: Judge, fitted: Fitted) -> Fitted:
+    """A fit where it stands under the noise as it is held now, without slopes: they cost runs."""
+    new = [judge.block(r, fitted.candidates, fitted.x, b.shift, 0.0) for r, b in enumerate(fitted.blocks)]
+    return replace(fitted, blocks=tuple(b or old for b, old in zip(new, fitted.blocks, strict=True)))
 
 
 def promised(blocks: Sequence[Block], dx: Array) -> float:
