@@ -335,11 +335,16 @@ def simplest(fits: Sequence[Fitted], groups: Sequence[Sequence[int]], shared: fl
 
 
 def confusion(step_: Step, groups: Sequence[Sequence[int]], shared: float = 1.0) -> list[Fitted]:
-    """Rivals that predict held-out recordings as well as the best does, the best first."""
+    """Rivals that predict held-out recordings as well as the best does, the best first.
+
+    And those of no more numbers that meet all recordings as well as it does: what hangs on a single one is hard to
+    predict without it, and not wrong for that.
+    """
     best, base = step_.fitted, step_.base
     found = [best]
     for rival in step_.rivals:
         explains = base.left - rival.left > 0.5 * (base.left - best.left)
-        if rival is not best and explains and min(worse(rival, best, groups, shared)) < APART:
+        as_well = len(rival.x) <= len(best.x) and rival.left < best.left + APART**2
+        if rival is not best and explains and (as_well or min(worse(rival, best, groups, shared)) < APART):
             found.append(rival)
     return found

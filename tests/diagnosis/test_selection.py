@@ -9,7 +9,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis import selection
+from rollover.diagnosis import explain, selection
+from rollover.diagnosis.blocks import Block
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.detect import Cell, Mismatch
 from rollover.diagnosis.explain import Step
@@ -107,3 +108,24 @@ def test_one_that_takes_nearly_all_is_named_with_what_it_leaves_itself(
     if named:
         assert found.fitted.label == "soil-crust"
         assert found.after.p_value == 1e-9  # and not that of both
+
+
+@pytest.mark.parametrize(("more", "numbers", "named"), [(3.0, 1, True), (3.0, 3, False), (5.0, 1, False)])
+def test_a_simpler_rival_that_meets_all_recordings_as_well_is_named_beside(
+    more: float, numbers: int, named: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Held out it does worse by far; to all recordings it leaves 3 (or 5) more than the best's 100, of 1000."""
+    monkeypatch.setattr(explain, "worse", lambda *_: (9.0, 9.0))
+
+    def fitted(id: str, left: float, many: int) -> Fitted:
+        search = {f"a{k}": Search(0, 1) for k in range(many)}
+        candidate = Candidate(id=id, kind="physics", family="", search=search)
+        block = Block(
+            residual=np.array([np.sqrt(left)]), J=np.zeros((1, many)), slope=np.zeros(1), shift=0.0, prior=1.0
+        )
+        return Fitted(candidates=(candidate,), x=(0.5,) * many, blocks=(block,))
+
+    base, best = fitted("none", 1000.0, 0), fitted("soil-viscous-damping", 100.0, 2)
+    rival = fitted("soil-inertial-drag", 100.0 + more, numbers)
+    found = explain.confusion(Step(base=base, fitted=best, p_value=0.0, rivals=(best, rival)), [])
+    assert found == ([best, rival] if named else [best])
