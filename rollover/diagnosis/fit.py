@@ -14,7 +14,7 @@ from rollover.diagnosis.chaos import course
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.overturn import full_runs, made_ahead
-from rollover.diagnosis.secant import Point, followed, secant
+from rollover.diagnosis.secant import Point, in_step, secant
 
 Array = NDArray[np.float64]
 FAR = 3.0  # misfit over the noise from which on a step may be lengthened
@@ -214,14 +214,14 @@ class Judge:
         """How the prediction of recording r differs between two points, whitened; nothing where either leaps.
 
         A leap that moves past a sample is no slope, and what is forgiven there follows the measurement. Full runs are
-        compared as clocks would have them, see `followed`.
+        compared as clocks would have them, see `in_step`.
         """
         first, last = self.raw(r, *before, shift), self.raw(r, *after, shift)
         if first is None or last is None:
             return None
         if self.effort.thrifty and not self._pinned:
             slope = self._slope(r, *before, shift, first, NONE)
-            last = followed(self.evidence[r], first, last, slope, lambda d: self.edged(r, *after, shift + d))
+            last = in_step(self.evidence[r], first, last, slope, lambda d: self.edged(r, *after, shift + d))
         d = last - first
         for point in (before, after):
             d[self._leaps.get(_key(r, *point, shift), NONE)] = 0.0

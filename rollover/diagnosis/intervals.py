@@ -14,6 +14,7 @@ from rollover.diagnosis.candidates import physical
 from rollover.diagnosis.crew import linearised
 from rollover.diagnosis.evidence import MODEL_ERROR, Evidence
 from rollover.diagnosis.fit import GENTLE, Fitted, Judge
+from rollover.diagnosis.secant import CLOCKED
 from rollover.diagnosis.settle import along, left_of_means, step_of_means
 from rollover.diagnosis.verdict import Interval
 from rollover.effects import EFFECTS, units_of
@@ -26,7 +27,6 @@ CLEARLY = 0.4  # of the rise that is due, and
 ROUGH = 8.0  # rise that is no chance: from place to place the misfit of a mean of runs differs by 3 (1 sd)
 FURTHER, FARTHEST = 2.0, 30.0  # factors by which one goes on at a time, and at most
 BEYOND = 1.2  # factor below which an interval that is too narrow is chance
-CLOCKED = 3  # times that a clock is moved along
 EVENLY = 12.0**-0.5  # standard deviation of what is spread evenly from 0 to 1
 
 

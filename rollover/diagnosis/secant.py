@@ -25,7 +25,7 @@ from rollover.diagnosis.evidence import Evidence
 Array = NDArray[np.float64]
 Point = tuple[Sequence[Candidate], Sequence[float]]
 EXACT = 5e-3  # of a coordinate, for differences that are free of chance
-CLOCKED = 3  # times that d is moved
+CLOCKED = 3  # times that a time shift is moved to where it fits
 CLEAR = 12.0  # times the squares that runs scatter by, that a difference should move
 
 
@@ -54,7 +54,7 @@ def secant(
         nudge *= 2.0
 
 
-def followed(e: Evidence, first: Array, last: Array, slope: Array, read: Callable[[float], Array | None]) -> Array:
+def in_step(e: Evidence, first: Array, last: Array, slope: Array, read: Callable[[float], Array | None]) -> Array:
     """y(d) - s d of (D13), (n,), SI; `last` is y(0), `first` y0, `slope` s, `read` gives y or None."""
     s = e.eased(e.whitened(slope))
     size, most = float(s @ s), WIDEST * e.shift_prior
