@@ -160,7 +160,7 @@ class Judge:
             J[:, : known.shape[1]] = known
 
         def across(a: Point, b: Point) -> Array | None:
-            ends = [self.moved(r, (candidates, x), end, shift) for end in (a, b)]
+            ends = [self.moved(r, (candidates, x), end, shift, clocked=not self._pinned) for end in (a, b)]
             return None if ends[0] is None or ends[1] is None else np.asarray(ends[1] - ends[0])
 
         for k in range(0 if known is None else known.shape[1], len(x) if nudge else 0):
@@ -210,16 +210,16 @@ class Judge:
         slope[e.leaps(after)] = 0.0
         return np.nan_to_num(slope)
 
-    def moved(self, r: int, before: Point, after: Point, shift: float) -> Array | None:
+    def moved(self, r: int, before: Point, after: Point, shift: float, *, clocked: bool = False) -> Array | None:
         """How the prediction of recording r differs between two points, whitened; nothing where either leaps.
 
-        A leap that moves past a sample is no slope, and what is forgiven there follows the measurement. Full runs are
-        compared as clocks would have them, see `in_step`.
+        A leap that moves past a sample is no slope, and what is forgiven there follows the measurement. With `clocked`
+        the two are compared as a clock would have them, see `in_step`.
         """
         first, last = self.raw(r, *before, shift), self.raw(r, *after, shift)
         if first is None or last is None:
             return None
-        if self.effort.thrifty and not self._pinned:
+        if clocked:
             slope = self._slope(r, *before, shift, first, NONE)
             last = in_step(self.evidence[r], first, last, slope, lambda d: self.edged(r, *after, shift + d))
         d = last - first

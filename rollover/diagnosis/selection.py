@@ -321,13 +321,14 @@ def _needed(
 def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) -> tuple[Explanation, Verdict]:
     """The verdict; what does not explain is not named.
 
-    Several effects are named only if together they leave nothing but noise, as many as may be, or two of one sensor,
-    more surely so, as they can be bent to more; one alone also where it takes nearly all.
+    Several effects are named only if together they leave nothing but noise, or what was said to be tolerated; as many
+    as may be, or two of one sensor, more surely so: they can be bent to more. One alone also where it takes nearly all.
     """
     if is_any_curve(found.fitted.candidates):
         return replace(found, parts=(), fitted=found.base), "unexplained"
     least = MANY if len(found.parts) == MOST or is_one_sensor(found.fitted.candidates) else SURE
-    if found.parts and (found.after.p_value > least or not matters(judge, found.fitted, found.after)):
+    is_whole = found.after.p_value > least or not matters(judge, found.fitted, found.after)
+    if found.parts and (is_whole or is_tolerated(judge, found.fitted)):
         return found, _kind(strongest(judge, found.base, found.fitted))
     start = held_out(found.base, groups).total
     if found.first is not None and found.parts:

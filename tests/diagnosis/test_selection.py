@@ -110,6 +110,17 @@ def test_one_that_takes_nearly_all_is_named_with_what_it_leaves_itself(
         assert found.after.p_value == 1e-9  # and not that of both
 
 
+def test_what_leaves_no_more_than_is_tolerated_is_named(
+    judged: dict[str, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Errors of a model are smooth, and so has structure what lies within them."""
+    monkeypatch.setattr(selection, "is_tolerated", lambda _, f: f.label == "soil-crust")
+    found, verdict = decided(cast(Judge, SimpleNamespace(evidence=())), explanation(1, 1e-9), [], [])
+    assert (len(found.parts), verdict) == (1, "missing-physics")
+    found, verdict = decided(cast(Judge, SimpleNamespace(evidence=())), explanation(2, 1e-9), [], [])
+    assert (len(found.parts), verdict) == (0, "unexplained")
+
+
 @pytest.mark.parametrize(("more", "numbers", "named"), [(3.0, 1, True), (3.0, 3, False), (5.0, 1, False)])
 def test_a_simpler_rival_that_meets_all_recordings_as_well_is_named_beside(
     more: float, numbers: int, named: bool, monkeypatch: pytest.MonkeyPatch
