@@ -27,6 +27,7 @@ PARTLY = 0.005  # of the excess over the noise that one effect may leave, were i
 MANY = 0.05  # p-value of what as many effects as may be leave, below which they are no explanation
 HOPELESS = 2.0  # misfit over the noise that two effects leave and a third is not looked for
 LEADING, FOLLOWING = 4, 2  # of the first effects, and of later ones each, that are tried two by two
+HARDLY_MORE = 1.2  # times a tolerance, that an explanation leaves of held-out recordings
 BETTER = 0.5  # of what is left, that another first effect must leave
 
 Groups = Sequence[Sequence[int]]
@@ -328,7 +329,9 @@ def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) ->
         return replace(found, parts=(), fitted=found.base), "unexplained"
     least = MANY if len(found.parts) == MOST or is_one_sensor(found.fitted.candidates) else SURE
     is_whole = found.after.p_value > least or not matters(judge, found.fitted, found.after)
-    if found.parts and (is_whole or is_tolerated(judge, found.fitted)):
+    if is_tolerated(judge, found.fitted):  # and to those that were held out hardly more
+        is_whole = is_whole or held_out(found.fitted, groups).total < HARDLY_MORE
+    if found.parts and is_whole:
         return found, _kind(strongest(judge, found.base, found.fitted))
     start = held_out(found.base, groups).total
     if found.first is not None and found.parts:

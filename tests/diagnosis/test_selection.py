@@ -115,10 +115,10 @@ def test_what_leaves_no_more_than_is_tolerated_is_named(
 ) -> None:
     """Errors of a model are smooth, and so has structure what lies within them."""
     monkeypatch.setattr(selection, "is_tolerated", lambda _, f: f.label == "soil-crust")
-    found, verdict = decided(cast(Judge, SimpleNamespace(evidence=())), explanation(1, 1e-9), [], [])
-    assert (len(found.parts), verdict) == (1, "missing-physics")
-    found, verdict = decided(cast(Judge, SimpleNamespace(evidence=())), explanation(2, 1e-9), [], [])
-    assert (len(found.parts), verdict) == (0, "unexplained")
+    for held_out, named, expected in ((1.1, 1, "missing-physics"), (3.5, 0, "unexplained")):
+        judged["soil-crust"] = held_out
+        found, verdict = decided(cast(Judge, SimpleNamespace(evidence=())), explanation(1, 1e-9), [], [])
+        assert (len(found.parts), verdict) == (named, expected)
 
 
 @pytest.mark.parametrize(("more", "numbers", "named"), [(3.0, 1, True), (3.0, 3, False), (5.0, 1, False)])
