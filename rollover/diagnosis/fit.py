@@ -159,8 +159,10 @@ class Judge:
         if known is not None:
             J[:, : known.shape[1]] = known
 
+        slope = self._slope(r, candidates, x, shift, raw)
+
         def across(a: Point, b: Point) -> Array | None:
-            ends = [self.moved(r, (candidates, x), end, shift, clocked=not self._pinned) for end in (a, b)]
+            ends = [self.moved(r, (candidates, x), end, shift, None if self._pinned else slope) for end in (a, b)]
             return None if ends[0] is None or ends[1] is None else np.asarray(ends[1] - ends[0])
 
         for k in range(0 if known is None else known.shape[1], len(x) if nudge else 0):
@@ -178,7 +180,8 @@ class Judge:
                 return None
             J[:, k] = moved / step
         worth = e.worth(leaps)
-        slope = e.eased(worth * e.whitened(self._slope(r, candidates, x, shift, raw, leaps)))
+        slope[leaps] = 0.0
+        slope = e.eased(worth * e.whitened(slope))
         if self._pinned and e.recording.clock.zero != "unknown":
             slope = np.zeros_like(slope)
         residual = e.eased(worth * (self.measured[r] - y))
@@ -196,7 +199,6 @@ class Judge:
         x: Sequence[float],
         shift: float,
         raw: Array,
-        leaps: NDArray[np.int64],
     ) -> Array:
         """dy/dtau of recording r, stacked, SI; none across a leap, on whichever side a sample was and is."""
         e, later = self.evidence[r], self.effort.later
@@ -206,21 +208,19 @@ class Judge:
         if self.effort.thrifty:  # to both sides, where that costs no run
             found = e.simulator.predict(self.changes(candidates, x), shift - later)
             slope = slope if found is None else (after - e.raw(found)) / (2.0 * later)
-        slope[leaps] = 0.0
         slope[e.leaps(after)] = 0.0
         return np.nan_to_num(slope)
 
-    def moved(self, r: int, before: Point, after: Point, shift: float, *, clocked: bool = False) -> Array | None:
+    def moved(self, r: int, before: Point, after: Point, shift: float, slope: Array | None = None) -> Array | None:
         """How the prediction of recording r differs between two points, whitened; nothing where either leaps.
 
-        A leap that moves past a sample is no slope, and what is forgiven there follows the measurement. With `clocked`
-        the two are compared as a clock would have them, see `in_step`.
+        A leap that moves past a sample is no slope, and what is forgiven there follows the measurement. With `slope`,
+        dy/dtau (n,) before, SI, the two are compared as a clock would have them, see `in_step`.
         """
         first, last = self.raw(r, *before, shift), self.raw(r, *after, shift)
         if first is None or last is None:
             return None
-        if clocked:
-            slope = self._slope(r, *before, shift, first, NONE)
+        if slope is not None:
             last = in_step(self.evidence[r], first, last, slope, lambda d: self.edged(r, *after, shift + d))
         d = last - first
         for point in (before, after):

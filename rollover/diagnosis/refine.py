@@ -84,31 +84,38 @@ def traced(judge: Judge, fitted: Fitted) -> Fitted:
     A threshold that moves past a sample leaves a misfit of many small valleys: each other parameter than the one that
     says how strong an effect is (`yardstick`) is tried all along its range, and finely beside the fit.
     """
-    last = fitted.candidates[-1]
-    at, shifts = len(fitted.x) - len(last.search), [b.shift for b in fitted.blocks]
+    last, shifts = fitted.candidates[-1], [b.shift for b in fitted.blocks]
+    at = len(fitted.x) - len(last.search)
     strength = at + list(last.search).index(yardstick(last.id, last.search)[0])
-    before = (fitted.candidates[:-1], fitted.x[:at])
-    alone = [judge.block(r, *before, s, 0.0) for r, s in enumerate(shifts)]
-    blocks = [b for b in alone if b is not None]
+    found = [judge.block(r, fitted.candidates[:-1], fitted.x[:at], s, 0.0) for r, s in enumerate(shifts)]
+    blocks = [b for b in found if b is not None]
     best = fitted
-    for k in (k for k in range(at, len(fitted.x)) if k != strength and len(blocks) == len(shifts)):
+    if len(blocks) < len(shifts):
+        return best
+    alone = Fitted(candidates=fitted.candidates[:-1], x=fitted.x[:at], blocks=tuple(blocks))
+    for k in (k for k in range(at, len(fitted.x)) if k != strength):
         met = []
         for v in sorted(v for v in (*AFAR, *(fitted.x[k] + NEAR)) if 0.0 < v < 1.0):
-            x = (*fitted.x[:k], float(v), *fitted.x[k + 1 :])
-            ways = [judge.moved(r, before, (fitted.candidates, x), s) for r, s in enumerate(shifts)]
-            along, size = 0.0, 0.0
-            for way, b in zip(ways, blocks, strict=True):
-                if way is not None:
-                    d = freed(way[:, None], b)[:, 0]
-                    along, size = along + float(d @ b.residual), size + float(d @ d)
-            start = followed(last, x[at:], along / size) if size > 0.0 else None
-            left = None if start is None else left_at(judge, fitted.candidates, (*fitted.x[:at], *start), shifts)
-            if start is not None and left is not None:
-                met.append((left, (*fitted.x[:at], *start)))
+            x = _as_strong(judge, alone, last, (*fitted.x[:k], float(v), *fitted.x[k + 1 :]))
+            left = None if x is None else left_at(judge, fitted.candidates, x, shifts)
+            if x is not None and left is not None:
+                met.append((left, x))
         for x in _valleys(met)[:VALLEYS]:
             again = judge.fit(fitted.candidates, x, shifts=shifts, width=1)
             best = again if again is not None and again.left < best.left else best
     return best
+
+
+def _as_strong(judge: Judge, alone: Fitted, last: Candidate, x: tuple[float, ...]) -> tuple[float, ...] | None:
+    """Coordinates x with the last effect as strong as recordings ask for beside the fit without it; None if none."""
+    along, size = 0.0, 0.0
+    for r, b in enumerate(alone.blocks):
+        way = judge.moved(r, (alone.candidates, alone.x), ((*alone.candidates, last), x), b.shift)
+        if way is not None:
+            d = freed(way[:, None], b)[:, 0]
+            along, size = along + float(d @ b.residual), size + float(d @ d)
+    start = followed(last, x[len(alone.x) :], along / size) if size > 0.0 else None
+    return None if start is None else (*alone.x, *start)
 
 
 def _valleys(met: Sequence[tuple[float, tuple[float, ...]]]) -> list[tuple[float, ...]]:

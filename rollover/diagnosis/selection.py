@@ -329,9 +329,10 @@ def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) ->
         return replace(found, parts=(), fitted=found.base), "unexplained"
     least = MANY if len(found.parts) == MOST or is_one_sensor(found.fitted.candidates) else SURE
     is_whole = found.after.p_value > least or not matters(judge, found.fitted, found.after)
-    if is_tolerated(judge, found.fitted):  # and to those that were held out hardly more
-        is_whole = is_whole or held_out(found.fitted, groups).total < HARDLY_MORE
-    if found.parts and is_whole:
+    # what a tolerance allows has structure too
+    if found.parts and (
+        is_whole or (is_tolerated(judge, found.fitted) and held_out(found.fitted, groups).total < HARDLY_MORE)
+    ):
         return found, _kind(strongest(judge, found.base, found.fitted))
     start = held_out(found.base, groups).total
     if found.first is not None and found.parts:

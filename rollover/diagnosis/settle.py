@@ -77,15 +77,15 @@ def _onward(judge: Judge, old: Fitted, dx: Array) -> Fitted | None:
     """A fit moved by dx, or by a share of that which leaves less; None where nothing can be simulated."""
     begun = [_moved(old, share * dx) for share in SHARES]
     judge.made_ahead((r, old.candidates, x) for x, _ in begun for r in range(len(old.blocks)))
-    places = [(x, _clocked(judge, old.candidates, x, shifts)) for x, shifts in begun]
-    lefts = [_left_at(judge, old.candidates, *place) for place in places]
+    met = [_met(judge, old.candidates, *place) for place in begun]
+    lefts = [left for left, _ in met]
     best = int(np.argmin(lefts))
     if lefts[0] < NEARLY * min(old.left, *lefts):
         best = 0  # the whole way: the mean of runs is worth more than the one that happens to be there
     elif lefts[best] >= old.left:
         return None
-    x, shifts = places[best]
-    return linearised(judge, old.candidates, x, range(len(shifts)), shifts)
+    shifts = met[best][1]
+    return linearised(judge, old.candidates, begun[best][0], range(len(shifts)), shifts)
 
 
 def _moved(old: Fitted, dx: Array) -> tuple[list[float], list[float]]:
@@ -94,17 +94,15 @@ def _moved(old: Fitted, dx: Array) -> tuple[list[float], list[float]]:
     return [float(v) for v in x], [b.shift + shift_of(b, x - np.array(old.x)) for b in old.blocks]
 
 
-def _clocked(judge: Judge, candidates: Sequence[Candidate], x: Sequence[float], shifts: Sequence[float]) -> list[float]:
-    """Time shifts (s) at which a place meets the recordings best; as they are where it cannot be simulated."""
-    rounds = judge.effort.clocked
-    blocks = [judge.clocked(r, candidates, x, shift, rounds) for r, shift in enumerate(shifts)]
-    return [shift if b is None else b.shift for b, shift in zip(blocks, shifts, strict=True)]
-
-
-def _left_at(judge: Judge, candidates: Sequence[Candidate], x: Sequence[float], shifts: Sequence[float]) -> float:
-    """What is left at a place, slopes aside; infinite if nothing can be simulated there."""
-    blocks = [judge.block(r, candidates, x, shift, 0.0) for r, shift in enumerate(shifts)]
-    return sum(np.inf if b is None else b.normal()[2] for b in blocks)
+def _met(
+    judge: Judge, candidates: Sequence[Candidate], x: Sequence[float], shifts: Sequence[float]
+) -> tuple[float, Sequence[float]]:
+    """What is left at a place, slopes aside, and its time shifts (s) moved to where they fit; infinite if it fails."""
+    found = [judge.clocked(r, candidates, x, shift, judge.effort.clocked) for r, shift in enumerate(shifts)]
+    blocks = [b for b in found if b is not None]
+    if len(blocks) < len(found):
+        return np.inf, shifts
+    return sum(b.normal()[2] for b in blocks), [b.shift for b in blocks]
 
 
 def rescattered(judge: Judge, fitted: Fitted) -> None:
