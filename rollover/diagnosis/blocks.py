@@ -93,11 +93,15 @@ class Block:
 
 @dataclass(frozen=True, kw_only=True)
 class Fitted:
-    """Effects fitted to recordings: coordinates, blocks there, and what is left, sum of squares over the noise."""
+    """Effects fitted to recordings: coordinates, blocks there, and what is left, sum of squares over the noise.
+
+    `foretold` is what runs leave of each recording where the fit to all other conditions would be, if they were made.
+    """
 
     candidates: tuple[Candidate, ...]
     x: tuple[float, ...]
     blocks: tuple[Block, ...]
+    foretold: tuple[float, ...] | None = None
 
     @property
     def left(self) -> float:

@@ -29,7 +29,6 @@ SHAPES = {
     "air-drag": ("crisis_speed",),
     "soil-adhesion": ("reach",),
     "tank-slosh": ("damping",),
-    "payload-shift": ("friction",),
     "axle-stop": ("stiffness",),
 }
 
@@ -42,6 +41,8 @@ SEVERAL = (8, 4, 3)  # places on the axes of an effect's parameters
 WIDE = 0.08  # of a coordinate: a step off what changes nothing, where each place costs a full run
 LIMITS = (0.12, 0.3)  # more places of what may be a limit
 SPREAD = (0.12, 0.3, 0.6)  # places of a depth, a length: where nothing is known to change nothing
+# what hits a wall does so at a moment that its travel sets: a tenth beside that, it explains nothing
+NARROW = {"payload-shift": tuple(0.1 + 0.06 * k for k in range(13))}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,6 +69,11 @@ class Candidate:
     def is_placed(self) -> bool:
         """Whether a parameter says where or when it acts: one that changes nothing nowhere."""
         return self.neutral is not None and len(self.search) > 1 and None in self.neutral
+
+    @property
+    def is_narrow(self) -> bool:
+        """Whether it tells only near its place: begun where a look says, and nowhere else."""
+        return self.neutral is not None and self.id in NARROW
 
     def changes(self, x: Sequence[float], number: int = 1) -> dict[str, Any]:
         """Values to exchange in the scenario for coordinates x, each from 0 (low) to 1 (high).
@@ -116,11 +122,12 @@ class Candidate:
         for n, (name, search) in zip(neutral, self.search.items(), strict=True):
             if n is not None:
                 axes.append([min(n + 2.0 * WIDE, 0.9)])
-            elif EFFECTS[self.id].null.get(name) == 0.0:  # a strength: what is usual shows the direction
+            elif EFFECTS[self.id].null.get(name) == 0.0 or any(len(a) > 1 for a in axes):
+                # a strength, or more than one place: what is usual shows the direction
                 usual = coordinate(getattr(EFFECTS[self.id](), name), search)
                 axes.append([min(max(usual, WIDE), 1.0 - WIDE)])
             else:
-                axes.append(list(SPREAD))
+                axes.append(list(NARROW.get(self.id, SPREAD)))
         return list(itertools.product(*axes))
 
     def whole(self) -> Candidate:
@@ -159,6 +166,11 @@ def akin(candidates: Iterable[Candidate], to: Iterable[Candidate]) -> list[Candi
     """
     families = {c.family for c in to if c.is_placed}
     return [c for c in candidates if c.is_placed and c.family in families]
+
+
+def is_one_sensor(candidates: Sequence[Candidate]) -> bool:
+    """Whether several effects are all of one sensor."""
+    return len(candidates) > 1 and len({c.channel for c in candidates}) == 1 and candidates[0].channel is not None
 
 
 def _begun(value: float | None, search: Search) -> float:

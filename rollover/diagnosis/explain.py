@@ -17,7 +17,7 @@ from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.effort import Effort
 from rollover.diagnosis.fit import NOISE_LEFT, Fitted, Judge
 from rollover.diagnosis.gate import Gate, p_value
-from rollover.diagnosis.holdout import held_out, worse
+from rollover.diagnosis.holdout import foretold, held_out, worse
 from rollover.diagnosis.screening import ELSEWHERE, Screened, begun, is_far, kin, promising, screen, spread
 
 Array = NDArray[np.float64]
@@ -57,6 +57,19 @@ class Step:
         rivals = tuple(judge.again(f) for f in self.rivals)
         best = next((new for new, old in zip(rivals, self.rivals, strict=True) if old is self.fitted), None)
         return replace(self, base=judge.again(self.base), fitted=best or judge.again(self.fitted), rivals=rivals)
+
+    def foretold(self, judge: Judge, groups: Sequence[Sequence[int]]) -> Step:
+        """The same with what its best and its rivals foretell by runs, where slopes do not hold for long."""
+        if not judge.effort.thrifty:
+            return self
+        rivals = tuple(foretold(judge, f, groups) for f in self.rivals)
+        best = next((new for new, old in zip(rivals, self.rivals, strict=True) if old is self.fitted), None)
+        return replace(
+            self,
+            base=foretold(judge, self.base, groups),
+            fitted=best or foretold(judge, self.fitted, groups),
+            rivals=rivals,
+        )
 
     def moved_to(self, new: Fitted) -> Step:
         """The same with another fit of its best, among the rivals too."""

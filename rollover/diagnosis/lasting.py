@@ -85,7 +85,8 @@ def lasting(judge: Judge, found: Step, groups: Groups) -> Step | None:
         if gains[id(rival)] < NEEDED:
             return None
         one = settled(judge, replace(found, fitted=rival, rivals=tuple(near)))
-        if (outlasts(one, groups) or outlasts(before_the_blow(judge, one), groups)) and is_there(judge, one.fitted):
+        ahead = replace(one, rivals=()).foretold(judge, groups)
+        if (outlasts(ahead, groups) or outlasts(before_the_blow(judge, one), groups)) and is_there(judge, one.fitted):
             return one
         judge.weigh(held)
     return None
@@ -100,7 +101,7 @@ def before_the_blow(judge: Judge, found: Step) -> Step:
             replace(b, residual=b.residual[k], J=b.J[k], slope=b.slope[k], course=None, expected=None)
             for b, k in zip(f.blocks, early, strict=True)
         ]
-        return replace(f, blocks=tuple(blocks))
+        return replace(f, blocks=tuple(blocks), foretold=None)
 
     return replace(found, base=cut(found.base), fitted=cut(found.fitted), rivals=())
 

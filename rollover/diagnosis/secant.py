@@ -1,7 +1,8 @@
 """Slopes among runs that differ by chance: over both sides of a point, and over as wide a step as shows clearly more.
 
 Between two runs lies what the parameter does and what chance does. Over a narrow step that is mostly chance, which
-squares make look like a strong slope: steps too short, and intervals too narrow.
+squares make look like a strong slope: steps too short, and intervals too narrow. Over a wide one a blow that moves may
+have left its place altogether: then both sides differ, and a narrower step that is clear tells more.
 
 So does a blow that comes some ms later: to a slope it is another blow, to a clock the same one. A prediction y(tau) of
 a recording with time shift tau is compared with another, y0(0), at the d where it is most like it,
@@ -27,6 +28,7 @@ Point = tuple[Sequence[Candidate], Sequence[float]]
 EXACT = 5e-3  # of a coordinate, for differences that are free of chance
 CLOCKED = 3  # times that a time shift is moved to where it fits
 CLEAR = 12.0  # times the squares that runs scatter by, that a difference should move
+CROOKED, NARROWEST = 0.5, 2.5e-3  # share of its squares by which its sides may differ; of a coordinate
 
 
 def secant(
@@ -34,24 +36,37 @@ def secant(
 ) -> Array | None:
     """dy/dx_k (n,) of a recording about a point, over `nudge` to either side and up to `widest`; None if it fails.
 
-    `moved` is what the prediction differs by, whitened, from one point to another.
+    `moved` is what the prediction differs by, whitened, from one point to another. A `widest` of 0 takes `nudge` as it
+    is.
     """
     candidates, x = at
     physical = is_physical(candidates, k)
     power = [float(np.sum(e.eased(e.whitened(stray)) ** 2)) for stray in e.strays]
     enough = CLEAR * float(np.mean(power)) if power else 0.0
     nudge = nudge if physical else min(nudge, EXACT)
+    clear: Array | None = None
     while True:
         low, high = max(x[k] - nudge, 0.0), min(x[k] + nudge, 1.0)
-        found = None
-        for a, b in ((low, high), (x[k], high), (low, x[k])):  # one side where the other fails
-            if found is None and b > a:
-                found, over = moved((candidates, _with(x, k, a)), (candidates, _with(x, k, b))), b - a
-        if found is None:
+        ends = [end for end in (low, high) if end != x[k]]
+        sides = [
+            (d, end - x[k]) for end in ends if (d := moved((candidates, x), (candidates, _with(x, k, end)))) is not None
+        ]
+        if not sides:
             return None
-        if float(found @ found) >= enough or 2.0 * nudge > widest or not physical:
-            return np.asarray(found / over)
-        nudge *= 2.0
+        whole = np.asarray(sum(np.sign(over) * d for d, over in sides))  # one side where the other fails
+        found = whole / sum(abs(over) for _, over in sides)
+        size, apart = float(whole @ whole), float(np.sum((sides[0][0] + sides[-1][0]) ** 2)) * (len(sides) - 1)
+        if not physical or not widest:
+            return found
+        if size >= enough:
+            clear = found
+            if apart <= CROOKED * size or 0.5 * nudge < NARROWEST:
+                return found
+            nudge *= 0.5
+        elif clear is not None or 2.0 * nudge > widest:
+            return found if clear is None else clear
+        else:
+            nudge *= 2.0
 
 
 def in_step(e: Evidence, first: Array, last: Array, slope: Array, read: Callable[[float], Array | None]) -> Array:

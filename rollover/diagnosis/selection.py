@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rollover.diagnosis.blocks import at_an_end, turned
-from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.candidates import Candidate, is_one_sensor
 from rollover.diagnosis.crew import Crew, Job
 from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Phases, Step, moves, step, weighed
@@ -22,6 +22,7 @@ from rollover.diagnosis.verdict import Verdict
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
 MOST = 3  # effects in one explanation
+SILENT = 0.5  # p-value of the best of all on few recordings, beyond which more are not asked
 NEGLIGIBLE = 0.001  # of a channel's range: what moves nothing by more is not worth a name
 PARTLY = 0.005  # of the excess over the noise that one effect may leave, were it structured, and still be named
 MANY = 0.05  # p-value of what as many effects as may be leave, below which they are no explanation
@@ -136,6 +137,7 @@ def explained(
         parts = _needed(judge, taken, candidates, groups, phases, say, crew)
         parts[-1], _ = followed(judge, parts[-1], phases)
     base = judge.again(base)
+    parts = [s.foretold(judge, groups) for s in parts]
     current = parts[-1].fitted if parts else base
     return Explanation(
         base=base,
@@ -145,7 +147,7 @@ def explained(
         detectable={**first_look.detectable, **looked.detectable},
         before=before,
         after=mismatch_of(judge.evidence, current.blocks, phases),
-        first=first.again(judge) if first is not None else None,
+        first=first.again(judge).foretold(judge, groups) if first is not None else None,
         refuted=refuted,
     )
 
@@ -154,7 +156,8 @@ def _look(judge: Judge, base: Fitted, candidates: Sequence[Candidate], groups: G
     """A gate by all recordings; where each look costs a run, of few and then of the best candidates by some more.
 
     The null stays that of the best of all candidates: what was passed over could only have raised the maximum. Clocks
-    are then taken where they say, or nearly so: far off they have eaten what is missing.
+    are then taken where they say, or nearly so: far off they have eaten what is missing. Few that say nothing at all
+    are enough.
     """
     effort = judge.effort
     if not effort.thrifty:
@@ -163,7 +166,7 @@ def _look(judge: Judge, base: Fitted, candidates: Sequence[Candidate], groups: G
         base = unbent(judge, base)
     few, more = spread(base, groups, effort.few), spread(base, groups, effort.looked_at)
     first = gate(judge, base, candidates, few)
-    if len(more) <= len(few):
+    if len(more) <= len(few) or first.p_value() > SILENT:
         return first
     moving = sorted((c for c in candidates if c.kind != "sensor"), key=lambda c: -first.scores.get(c.key, 0.0))
     able = [*moving[: effort.shortlist], *(c for c in candidates if c.kind == "sensor")]
@@ -353,11 +356,6 @@ def is_any_curve(candidates: Sequence[Candidate]) -> bool:
     """Whether there are as many effects as may be, all of one sensor or of the soil: they draw any curve."""
     subjects = {c.channel or ("soil" if c.id.startswith("soil-") else c.id) for c in candidates}
     return len(candidates) == MOST and len(subjects) == 1
-
-
-def is_one_sensor(candidates: Sequence[Candidate]) -> bool:
-    """Whether several effects are all of one sensor."""
-    return len(candidates) > 1 and len({c.channel for c in candidates}) == 1 and candidates[0].channel is not None
 
 
 def _kind(c: Candidate) -> Verdict:

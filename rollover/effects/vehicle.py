@@ -376,8 +376,8 @@ class PayloadShift(Effect):
     null: ClassVar[Mapping[str, float | None]] = {"mass": 0.0}
     search: ClassVar[Mapping[str, Search]] = {
         "mass": Search(10.0, 1500.0, "log"),
-        "friction": Search(0.0, 1.0),
         "travel": Search(0.02, 1.0, "log"),
+        "friction": Search(0.0, 1.0),
     }
 
 

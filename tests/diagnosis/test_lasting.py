@@ -18,6 +18,7 @@ from rollover.diagnosis.effort import RUNS
 from rollover.diagnosis.explain import Step, _chosen
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import Gate
+from rollover.diagnosis.holdout import foretold, held_out
 from rollover.diagnosis.lasting import astray, backed, before_the_blow, begun_anew, is_there, lasting, outlasts, unbent
 from rollover.diagnosis.screening import Screened, kin
 from rollover.diagnosis.settle import left_of_means
@@ -42,6 +43,26 @@ def test_what_gains_no_more_than_chance_on_held_out_recordings_is_not_taken() ->
     groups = [[k] for k in range(4)]
     assert not any(outlasts(step(0.0), groups) for _ in range(50))
     assert all(outlasts(step(0.6), groups) for _ in range(50))
+
+
+def test_runs_foretell_what_was_held_out_where_slopes_hold_only_near_the_fit() -> None:
+    """Four recordings, all w = J d off the fit by one step d; the fourth's slopes are eight times too steep.
+
+    Without it the others ask for d: its slopes foretell w - 8 J d = -7 w, its run nothing but noise.
+    """
+    judge, groups = Judge([evidence(r, 0.1, 8.0 * np.sin(30.0 * TIME)) for r in range(4)]), [[k] for k in range(4)]
+    right = judge.fit((SLOPE,), (0.3,))
+    assert right is not None
+    off = judge.fit((SLOPE,), (right.x[0] + 0.05,), rounds=0)
+    assert off is not None
+    steep = replace(off, blocks=(*off.blocks[:3], replace(off.blocks[3], J=8.0 * off.blocks[3].J)))
+    told, run = held_out(steep, groups), held_out(foretold(judge, steep, groups), groups)
+    noise, w = right.blocks[3].normal()[2], off.blocks[3].normal()[2]
+    assert told.left[3] == pytest.approx(49.0 * w, rel=0.2)
+    assert run.left[3] < 2.0 * noise < 0.5 * w
+    base = judge.fit((), ())
+    assert base is not None
+    assert foretold(judge, base, groups) is base
 
 
 def test_where_the_first_does_not_last_the_next_one_is_taken() -> None:

@@ -120,3 +120,26 @@ def test_an_explanation_that_is_far_from_the_mean_goes_more_than_one_step() -> N
     found = settled(judge, Step(base=base, fitted=far, p_value=0.0, rivals=(far,)))
     assert found.fitted.x[0] == pytest.approx(0.6, abs=0.01)
     assert found.rivals == (found.fitted,)
+
+
+def test_a_wide_step_over_a_blow_that_has_left_its_place_is_narrowed() -> None:
+    """y = g(t - c x), 8 ms off at a step's end where g is 2 ms wide: dy/dx = -c g', its square c^2 sum g'^2/sigma^2.
+
+    Over blows that lie apart the difference is as large as it can be, 2 sum g^2 over (2h)^2, h c = 8 ms: a sixteenth.
+    """
+
+    class Moving(Late):
+        def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+            return {CHANNEL: blow(LATER * (float(changes.get("effects.slope.angle", 0.0)) - 0.5))}
+
+        def strays(self, changes: Mapping[str, Any] | None = None, shift: float = 0.0) -> list[dict[str, np.ndarray]]:
+            one = np.random.default_rng(1).standard_normal((6, TIME.size))
+            return [{CHANNEL: 0.3 * SIGMA * v} for v in one]
+
+    judge = Judge([evidence(blow(0.0), Moving())])
+    found = judge.block(0, (SLOPE,), (0.5,), 0.0, 0.08)
+    assert found is not None
+    exact = LATER**2 * float(np.sum(np.gradient(blow(0.0), TIME) ** 2)) / SIGMA**2
+    assert float(found.J[:, 0] @ found.J[:, 0]) == pytest.approx(exact, rel=0.2)
+    wide = (Moving().predict({"effects.slope.angle": 0.58}, 0.0)[CHANNEL] - blow(-0.008)) / (0.16 * SIGMA)
+    assert float(wide @ wide) < 0.1 * exact
