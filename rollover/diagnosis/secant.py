@@ -1,8 +1,8 @@
 """Slopes among runs that differ by chance: over both sides of a point, and over as wide a step as shows clearly more.
 
 Between two runs lies what the parameter does and what chance does. Over a narrow step that is mostly chance, which
-squares make look like a strong slope: steps too short, and intervals too narrow. Over a wide one a blow that moves may
-have left its place altogether: then both sides differ, and a narrower step that is clear tells more.
+squares make look like a strong slope: steps too short, and intervals too narrow. Where a run leaps to another course on
+one side, the other side alone tells what the parameter does.
 
 So does a blow that comes some ms later: to a slope it is another blow, to a clock the same one. A prediction y(tau) of
 a recording with time shift tau is compared with another, y0(0), at the d where it is most like it,
@@ -28,7 +28,8 @@ Point = tuple[Sequence[Candidate], Sequence[float]]
 EXACT = 5e-3  # of a coordinate, for differences that are free of chance
 CLOCKED = 3  # times that a time shift is moved to where it fits
 CLEAR = 12.0  # times the squares that runs scatter by, that a difference should move
-CROOKED, NARROWEST = 0.5, 2.5e-3  # share of its squares by which its sides may differ; of a coordinate
+LEAP = 4.0  # times the squares of one side, that the other moves where a run leaps to another course
+NARROW = 0.25  # of a step, for what tells only near its place
 
 
 def secant(
@@ -40,11 +41,11 @@ def secant(
     is.
     """
     candidates, x = at
-    physical = is_physical(candidates, k)
+    owner = owner_of(candidates, k)
+    physical, part = owner.kind != "sensor", NARROW if owner.is_narrow else 1.0
     power = [float(np.sum(e.eased(e.whitened(stray)) ** 2)) for stray in e.strays]
     enough = CLEAR * float(np.mean(power)) if power else 0.0
-    nudge = nudge if physical else min(nudge, EXACT)
-    clear: Array | None = None
+    nudge = part * nudge if physical else min(nudge, EXACT)
     while True:
         low, high = max(x[k] - nudge, 0.0), min(x[k] + nudge, 1.0)
         ends = [end for end in (low, high) if end != x[k]]
@@ -54,19 +55,12 @@ def secant(
         if not sides:
             return None
         whole = np.asarray(sum(np.sign(over) * d for d, over in sides))  # one side where the other fails
-        found = whole / sum(abs(over) for _, over in sides)
-        size, apart = float(whole @ whole), float(np.sum((sides[0][0] + sides[-1][0]) ** 2)) * (len(sides) - 1)
-        if not physical or not widest:
-            return found
-        if size >= enough:
-            clear = found
-            if apart <= CROOKED * size or 0.5 * nudge < NARROWEST:
-                return found
-            nudge *= 0.5
-        elif clear is not None or 2.0 * nudge > widest:
-            return found if clear is None else clear
-        else:
-            nudge *= 2.0
+        if float(whole @ whole) >= enough or 2.0 * nudge > part * widest or not physical:
+            break
+        nudge *= 2.0
+    (quiet, over), (loud, _) = sorted((sides[0], sides[-1]), key=lambda side: float(side[0] @ side[0]))
+    leaps = physical and widest > 0.0 and float(loud @ loud) > LEAP * float(quiet @ quiet)
+    return np.asarray(quiet / over if leaps else whole / sum(abs(over) for _, over in sides))
 
 
 def in_step(e: Evidence, first: Array, last: Array, slope: Array, read: Callable[[float], Array | None]) -> Array:
@@ -86,14 +80,9 @@ def in_step(e: Evidence, first: Array, last: Array, slope: Array, read: Callable
     return found - slope * at
 
 
-def is_physical(candidates: Sequence[Candidate], k: int) -> bool:
-    """Whether the k-th coordinate changes the motion: what a sensor makes of it is free of chance."""
-    at = 0
-    for c in candidates:
-        at += len(c.search)
-        if k < at:
-            return c.kind != "sensor"
-    return False
+def owner_of(candidates: Sequence[Candidate], k: int) -> Candidate:
+    """The candidate whose parameter the k-th coordinate is."""
+    return [c for c in candidates for _ in c.search][k]
 
 
 def _with(x: Sequence[float], k: int, value: float) -> list[float]:

@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.candidates import Candidate, coordinate
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.effort import DROPS, RUNS, Effort
 from rollover.diagnosis.evidence import Evidence, Signal
@@ -63,6 +63,8 @@ def candidate(id: str, name: str) -> Candidate:
 
 
 SLOPE, MASS = candidate("slope", "angle"), candidate("mass", "added")
+TRAVEL = "payload-shift.travel"
+WALL = replace(candidate(*TRAVEL.split(".")), neutral=(None,))
 
 
 def test_what_a_clock_explains_tells_nothing_of_a_parameter() -> None:
@@ -122,24 +124,33 @@ def test_an_explanation_that_is_far_from_the_mean_goes_more_than_one_step() -> N
     assert found.rivals == (found.fitted,)
 
 
-def test_a_wide_step_over_a_blow_that_has_left_its_place_is_narrowed() -> None:
-    """y = g(t - c x), 8 ms off at a step's end where g is 2 ms wide: dy/dx = -c g', its square c^2 sum g'^2/sigma^2.
+def test_a_leap_to_another_course_on_one_side_is_no_slope() -> None:
+    """y = a x sin(wt), and for x > 0.52 another course besides: dy/dx = a sin(wt), as the side below tells."""
 
-    Over blows that lie apart the difference is as large as it can be, 2 sum g^2 over (2h)^2, h c = 8 ms: a sixteenth.
+    class Leaping(Late):
+        def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+            x = float(changes.get("effects.slope.angle", 0.0))
+            return {CHANNEL: x * np.sin(90.0 * TIME) + (x > 0.52) * np.sin(210.0 * TIME)}
+
+    judge = Judge([evidence(0.5 * np.sin(90.0 * TIME), Leaping())])
+    found = judge.block(0, (SLOPE,), (0.5,), 0.0, RUNS.fine)
+    assert found is not None
+    assert found.J[:, 0] == pytest.approx(np.sin(90.0 * TIME) / SIGMA, abs=0.02 / SIGMA)
+
+
+def test_what_tells_only_near_its_place_is_looked_at_over_less() -> None:
+    """y = g(t - c (x - x0)) of a blow 2 ms wide, c = 0.1 s: over 0.03 of a coordinate to either side it is gone.
+
+    |dy/dx|^2 = c^2 sum g'^2/sigma^2; over blows that lie apart 2 sum g^2 over (0.06 sigma)^2 is left of it, a third.
     """
 
     class Moving(Late):
         def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
-            return {CHANNEL: blow(LATER * (float(changes.get("effects.slope.angle", 0.0)) - 0.5))}
-
-        def strays(self, changes: Mapping[str, Any] | None = None, shift: float = 0.0) -> list[dict[str, np.ndarray]]:
-            one = np.random.default_rng(1).standard_normal((6, TIME.size))
-            return [{CHANNEL: 0.3 * SIGMA * v} for v in one]
+            x = max(coordinate(float(changes[f"effects.{TRAVEL}"]), WALL.search["travel"]), 0.0)
+            return {CHANNEL: blow(LATER * (x - 0.5))}
 
     judge = Judge([evidence(blow(0.0), Moving())])
-    found = judge.block(0, (SLOPE,), (0.5,), 0.0, 0.08)
+    found = judge.block(0, (WALL,), (0.5,), 0.0, RUNS.fine)
     assert found is not None
     exact = LATER**2 * float(np.sum(np.gradient(blow(0.0), TIME) ** 2)) / SIGMA**2
     assert float(found.J[:, 0] @ found.J[:, 0]) == pytest.approx(exact, rel=0.2)
-    wide = (Moving().predict({"effects.slope.angle": 0.58}, 0.0)[CHANNEL] - blow(-0.008)) / (0.16 * SIGMA)
-    assert float(wide @ wide) < 0.1 * exact
