@@ -11,7 +11,7 @@ class Effort:
 
     few: int = 3  # recordings that candidates are looked at on, and first fits are made to
     looked_at: int = 4  # recordings that decide whether there is anything, where each look costs a run
-    shortlist: int = 10  # candidates that are looked at on all of these
+    shortlist: int = 7  # candidates that are looked at on all of these
     scored: int | None = None  # candidates looked at closer; none: as many as for drops, and all of two parameters
     promising: int = 14  # candidates that get a first fit at each step
     short: int = 6  # rounds of a first fit

@@ -23,6 +23,7 @@ from rollover.diagnosis.screening import ELSEWHERE, Screened, begun, is_far, kin
 Array = NDArray[np.float64]
 WITHIN = 6.0  # times what the best leaves, up to which a first fit is followed up
 RIVALS = 0.4  # of the best's gain: a first fit that gains less is no rival, where fits cost much
+HOPEFUL = 0.05  # of the best score, below which none is fitted where fits cost much
 CROOKED = 100.0  # times what the best leaves, up to which a fit of two parameters is polished
 RUGGED = 2.0  # misfit over the noise that the best leaves, from which on there may be something behind a cliff
 LEADS = 1.5  # times what the best leaves, up to which it is looked for
@@ -285,7 +286,9 @@ def _chosen(screened: Sequence[Screened], effort: Effort, looked: Gate) -> list[
     by_start = sorted(screened, key=lambda s: s.left)[: effort.promising // 2]
     if not effort.thrifty:
         return [*by_start, *sorted(screened, key=lambda s: -s.potential)[: effort.promising]]
-    ranked = sorted(screened, key=lambda s: -looked.scores.get(s.candidate.key, 0.0))
+    able = [s for s in screened if looked.scores.get(s.candidate.key, 0.0) >= HOPEFUL * looked.score]
+    by_start = [s for s in by_start if s in able]
+    ranked = sorted(able, key=lambda s: -looked.scores.get(s.candidate.key, 0.0))
     moving = [s for s in ranked if s.candidate.kind != "sensor"]
     reading = [s for s in ranked if s.candidate.kind == "sensor"]
     related = kin([s.candidate for s in moving], effort.promising, effort.leaders)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -17,11 +17,13 @@ from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.intervals import intervals
 from rollover.diagnosis.screening import begun
 from rollover.diagnosis.settle import left_of_means, settled
+from rollover.diagnosis.verdict import Interval
 from rollover.effects import EFFECTS
 
 Groups = Sequence[Sequence[int]]
 SPOKEN = 0.05  # p-value of a candidate's own score, beyond which its fit to runs that scatter is one to chance
 RIVAL = 0.5  # of the best's gain, by the mean of its runs, that a rival must have
+SURELY = 4.0  # times an interval by slopes, beyond which no run is needed to tell a strength from none
 NEEDED = 25.0  # gain, over what is left per sample, that an effect must bring beside all the others
 
 
@@ -115,8 +117,18 @@ def is_there(judge: Judge, fitted: Fitted) -> bool:
     values, at = last.values(fitted.x[-len(last.search) :]), len(fitted.x) - len(last.search)
     numbers = [name for name in last.search if isinstance(nulls.get(name), (int, float))]
     sides = {at + k: -1.0 if values[n] > nulls[n] else 1.0 for k, n in enumerate(last.search) if n in numbers}
-    known = {name: i for name, i in intervals(judge, fitted, sides)[-1].items() if name in numbers}
-    return not known or any(not i.low <= nulls[name] <= i.high for name, i in known.items())
+    if not numbers:
+        return True
+
+    def apart(found: Mapping[str, Interval], times: float) -> bool:
+        """Whether the null of a number lies outside its interval, made wider about its value."""
+        known = [(found[n].value, found[n].low, found[n].high, nulls[n]) for n in numbers]
+        return any(null < v - times * (v - low) or null > v + times * (high - v) for v, low, high, null in known)
+
+    by_slopes = intervals(judge, fitted, {})[-1]
+    if apart(by_slopes, SURELY) or not apart(by_slopes, 1.0):
+        return apart(by_slopes, 1.0)
+    return apart(intervals(judge, fitted, sides)[-1], 1.0)
 
 
 def outlasts(found: Step, groups: Groups) -> bool:

@@ -90,8 +90,8 @@ def screen(
     for c in candidates:
         met: list[tuple[float, tuple[float, ...]]] = []
         potential = 0.0
-        ways = () if judge.effort.thrifty and not c.is_narrow else looked.starts.get(c.key, ())
-        for start in ways if (near or c.is_narrow) and ways else (*ways, *c.starts()):
+        ways = () if judge.effort.thrifty and not c.is_placed else looked.starts.get(c.key, ())
+        for start in ways if (near or c.is_placed) and ways else (*ways, *c.starts()):
             left, along, size, count = 0.0, 0.0, 0.0, 0
             for r, block in zip(few, blocks, strict=True):
                 there = judge.block(r, (*base.candidates, c), (*base.x, *start), shifts[r], 0.0)

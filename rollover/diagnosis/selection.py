@@ -22,7 +22,7 @@ from rollover.diagnosis.verdict import Verdict
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
 MOST = 3  # effects in one explanation
-SILENT = 0.5  # p-value of the best of all on few recordings, beyond which more are not asked
+SILENT = 0.3  # p-value of the best of all on few recordings, beyond which more are not asked
 NEGLIGIBLE = 0.001  # of a channel's range: what moves nothing by more is not worth a name
 PARTLY = 0.005  # of the excess over the noise that one effect may leave, were it structured, and still be named
 MANY = 0.05  # p-value of what as many effects as may be leave, below which they are no explanation
