@@ -280,20 +280,20 @@ def _first_fits(
 def _chosen(screened: Sequence[Screened], effort: Effort, looked: Gate) -> list[Screened]:
     """Those worth a first fit: that start well, and that have most to gain.
 
-    Of runs that scatter what is gained by chance is taken off; what a sensor makes of them costs none: as many more.
-    With a leader come its kin.
+    Of runs that scatter those whose score is a small part of the best one's are not; what a sensor makes of them costs
+    none: as many more. With a leader come its kin.
     """
     by_start = sorted(screened, key=lambda s: s.left)[: effort.promising // 2]
     if not effort.thrifty:
         return [*by_start, *sorted(screened, key=lambda s: -s.potential)[: effort.promising]]
-    able = [s for s in screened if looked.scores.get(s.candidate.key, 0.0) >= HOPEFUL * looked.score]
-    by_start = [s for s in by_start if s in able]
-    ranked = sorted(able, key=lambda s: -looked.scores.get(s.candidate.key, 0.0))
+    scores = {id(s): looked.scores.get(s.candidate.key, 0.0) for s in screened}
+    ranked = sorted(screened, key=lambda s: -scores[id(s)])
     moving = [s for s in ranked if s.candidate.kind != "sensor"]
     reading = [s for s in ranked if s.candidate.kind == "sensor"]
+    leading = [*by_start, *moving[: effort.promising], *reading[: effort.promising]]
     related = kin([s.candidate for s in moving], effort.promising, effort.leaders)
-    beside = [s for s in moving if s.candidate in related]
-    return [*by_start, *moving[: effort.promising], *beside, *reading[: effort.promising]]
+    able = [s for s in leading if scores[id(s)] >= HOPEFUL * looked.score]
+    return [*able, *(s for s in moving if s.candidate in related)]
 
 
 def _all_shifts(begun_with: Sequence[float], first: Fitted, few: Sequence[int]) -> list[float]:

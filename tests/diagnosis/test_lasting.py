@@ -113,6 +113,9 @@ def test_with_what_leads_its_kin_gets_a_first_fit() -> None:
     looked = Gate(score=9.0, scores={c.key: 9.0 - k for k, c in enumerate(every)}, null=np.zeros(9), detectable={})
     chosen = {s.candidate.key for s in _chosen(screened, RUNS, looked)}
     assert chosen == {"a", "b", "c", "d", "f", "g", "h", "i"}
+    hopeless = replace(looked, scores={**looked.scores, "c": 0.4, "f": 0.4})  # of 9; one is akin to the best
+    assert "c" not in (rest := {s.candidate.key for s in _chosen(screened, RUNS, hopeless)})
+    assert {"a", "b", "f"} < rest
     every[0] = replace(every[0], neutral=(0.5, 0.5))  # it acts everywhere
     assert kin(every, 4, 2) == []
 
@@ -208,7 +211,7 @@ def test_rivals_are_judged_by_the_mean_of_their_runs(monkeypatch: pytest.MonkeyP
 
 
 def test_a_strength_that_is_not_told_from_none_is_no_effect(monkeypatch: pytest.MonkeyPatch) -> None:
-    judge = Judge([evidence(0, 0.1, np.zeros(N))])
+    judge, asked = Judge([evidence(0, 0.1, np.zeros(N))]), list[Any]()
     layer = replace(
         candidate("soil-layer", "physics", "depth"),
         search={"depth": Search(0.0, 0.1), "stiffness_ratio": Search(0.1, 9.0, "log")},
@@ -217,12 +220,16 @@ def test_a_strength_that_is_not_told_from_none_is_no_effect(monkeypatch: pytest.
 
     def told(low: float, high: float) -> bool:
         found = [{"depth": Interval(value=0.02, low=0.01, high=0.03, unit="m"), "stiffness_ratio": _from(low, high)}]
-        monkeypatch.setattr(believed, "intervals", lambda *_: found)
+        monkeypatch.setattr(believed, "intervals", lambda *given: asked.append(given[2]) or found)
         return is_there(judge, fitted)
 
     assert not told(0.73, 1.37)
     assert told(1.1, 1.4)
     assert told(0.5, 0.9)
+    assert asked == [{}, {}, {1: 1.0}, {}, {1: 1.0}]  # by slopes, and by runs towards no effect where these decide
+    asked.clear()
+    assert told(7.9, 8.1)
+    assert asked == [{}]  # beyond doubt
     own = replace(candidate("ground-friction", "physics", "coefficient"), neutral=(0.5,))  # the scenario's is 0.5
     fitted = Fitted(candidates=(own,), x=(0.6,), blocks=())
     for low, high, there in ((0.4, 0.6, False), (0.55, 0.7, True)):
