@@ -22,7 +22,6 @@ from rollover.diagnosis.verdict import Verdict
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
 MOST = 3  # effects in one explanation
-SILENT = 0.3  # p-value of the best of all on few recordings, beyond which more are not asked
 NEGLIGIBLE = 0.001  # of a channel's range: what moves nothing by more is not worth a name
 PARTLY = 0.005  # of the excess over the noise that one effect may leave, were it structured, and still be named
 MANY = 0.05  # p-value of what as many effects as may be leave, below which they are no explanation
@@ -156,8 +155,7 @@ def _look(judge: Judge, base: Fitted, candidates: Sequence[Candidate], groups: G
     """A gate by all recordings; where each look costs a run, of few and then of the best candidates by some more.
 
     The null stays that of the best of all candidates: what was passed over could only have raised the maximum. Clocks
-    are then taken where they say, or nearly so: far off they have eaten what is missing. Few that say nothing at all
-    are enough.
+    are then taken where they say, or nearly so: far off they have eaten what is missing.
     """
     effort = judge.effort
     if not effort.thrifty:
@@ -166,7 +164,7 @@ def _look(judge: Judge, base: Fitted, candidates: Sequence[Candidate], groups: G
         base = unbent(judge, base)
     few, more = spread(base, groups, effort.few), spread(base, groups, effort.looked_at)
     first = gate(judge, base, candidates, few)
-    if len(more) <= len(few) or first.p_value() > SILENT:
+    if len(more) <= len(few):
         return first
     moving = sorted((c for c in candidates if c.kind != "sensor"), key=lambda c: -first.scores.get(c.key, 0.0))
     able = [*moving[: effort.shortlist], *(c for c in candidates if c.kind == "sensor")]

@@ -126,11 +126,6 @@ def test_few_recordings_choose_who_is_looked_at_on_more(monkeypatch: pytest.Monk
     assert found.scores["c29"] == 0.0  # passed over
     assert found.detectable["c29"] == 61.0
     assert found.null[0] == RUNS.looked_at
-    asked.clear()
-    quiet = lambda *_: Gate(score=1.0, scores={}, null=np.linspace(0.0, 2.0, 100), detectable={})  # noqa: E731
-    monkeypatch.setattr(selection, "gate", lambda *given: asked.append((len(given[3]), [])) or quiet())
-    selection._look(judge, base, every, [[r] for r in range(5)])
-    assert [n for n, _ in asked] == [RUNS.few]  # these say nothing
 
 
 def test_what_was_refuted_tells_nothing() -> None:
