@@ -14,7 +14,7 @@ from rollover.diagnosis.chaos import course
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.overturn import full_runs, made_ahead
-from rollover.diagnosis.secant import Point, in_step, secant
+from rollover.diagnosis.secant import Point, in_step, nudged, secant
 
 Array = NDArray[np.float64]
 FAR = 3.0  # misfit over the noise from which on a step may be lengthened
@@ -345,7 +345,8 @@ class Judge:
         for r in use:
             yield r, candidates, x
             for k, value in enumerate(x):
-                for there in (max(value - nudge, 0.0), min(value + nudge, 1.0)):
+                step = nudged(candidates, k, nudge)
+                for there in (max(value - step, 0.0), min(value + step, 1.0)):
                     yield r, candidates, [*x[:k], there, *x[k + 1 :]]
 
     def _further(

@@ -41,11 +41,10 @@ def secant(
     is.
     """
     candidates, x = at
-    owner = owner_of(candidates, k)
-    physical, part = owner.kind != "sensor", NARROW if owner.is_narrow else 1.0
+    physical, widest = owner_of(candidates, k).kind != "sensor", nudged(candidates, k, widest)
     power = [float(np.sum(e.eased(e.whitened(stray)) ** 2)) for stray in e.strays]
     enough = CLEAR * float(np.mean(power)) if power else 0.0
-    nudge = part * nudge if physical else min(nudge, EXACT)
+    nudge = nudged(candidates, k, nudge)
     while True:
         low, high = max(x[k] - nudge, 0.0), min(x[k] + nudge, 1.0)
         ends = [end for end in (low, high) if end != x[k]]
@@ -55,7 +54,7 @@ def secant(
         if not sides:
             return None
         whole = np.asarray(sum(np.sign(over) * d for d, over in sides))  # one side where the other fails
-        if float(whole @ whole) >= enough or 2.0 * nudge > part * widest or not physical:
+        if float(whole @ whole) >= enough or 2.0 * nudge > widest or not physical:
             break
         nudge *= 2.0
     (quiet, over), (loud, _) = sorted((sides[0], sides[-1]), key=lambda side: float(side[0] @ side[0]))
@@ -83,6 +82,12 @@ def in_step(e: Evidence, first: Array, last: Array, slope: Array, read: Callable
 def owner_of(candidates: Sequence[Candidate], k: int) -> Candidate:
     """The candidate whose parameter the k-th coordinate is."""
     return [c for c in candidates for _ in c.search][k]
+
+
+def nudged(candidates: Sequence[Candidate], k: int, nudge: float) -> float:
+    """How far the k-th coordinate is moved where others are by `nudge`."""
+    owner = owner_of(candidates, k)
+    return min(nudge, EXACT) if owner.kind == "sensor" else nudge * (NARROW if owner.is_narrow else 1.0)
 
 
 def _with(x: Sequence[float], k: int, value: float) -> list[float]:

@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 SHARES = (1.0, 0.5, 1.5)  # of the way: where a run leaps from one course to another beside it
 NEARLY = 1.15  # times the least misfit
 FARTHEST = 0.15  # of a coordinate, that a mean may move it at a time
-STEPS = 8  # at most
+STEPS = 5  # at most
 WORTH = 2.0  # gain that pays for one
 
 
