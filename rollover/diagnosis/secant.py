@@ -29,7 +29,7 @@ EXACT = 5e-3  # of a coordinate, for differences that are free of chance
 CLOCKED = 3  # times that a time shift is moved to where it fits
 CLEAR = 12.0  # times the squares that runs scatter by, that a difference should move
 LEAP = 4.0  # times the squares of one side, that the other moves where a run leaps to another course
-NARROW = 0.25  # of a step, for what tells only near its place
+FINER = 0.25  # of a step, for what tells only near its place
 
 
 def secant(
@@ -58,7 +58,8 @@ def secant(
             break
         nudge *= 2.0
     (quiet, over), (loud, _) = sorted((sides[0], sides[-1]), key=lambda side: float(side[0] @ side[0]))
-    leaps = physical and widest > 0.0 and float(loud @ loud) > LEAP * float(quiet @ quiet)
+    # nothing at all on one side is where an effect ends, and no leap
+    leaps = physical and widest > 0.0 and 0.0 < LEAP * float(quiet @ quiet) < float(loud @ loud)
     return np.asarray(quiet / over if leaps else whole / sum(abs(over) for _, over in sides))
 
 
@@ -87,7 +88,7 @@ def owner_of(candidates: Sequence[Candidate], k: int) -> Candidate:
 def nudged(candidates: Sequence[Candidate], k: int, nudge: float) -> float:
     """How far the k-th coordinate is moved where others are by `nudge`."""
     owner = owner_of(candidates, k)
-    return min(nudge, EXACT) if owner.kind == "sensor" else nudge * (NARROW if owner.is_narrow else 1.0)
+    return min(nudge, EXACT) if owner.kind == "sensor" else nudge * (FINER if owner.is_narrow else 1.0)
 
 
 def _with(x: Sequence[float], k: int, value: float) -> list[float]:

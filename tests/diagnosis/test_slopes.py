@@ -138,6 +138,18 @@ def test_a_leap_to_another_course_on_one_side_is_no_slope() -> None:
     assert found.J[:, 0] == pytest.approx(np.sin(90.0 * TIME) / SIGMA, abs=0.02 / SIGMA)
 
 
+def test_where_an_effect_ends_its_slope_is_that_of_both_sides() -> None:
+    """y = min(x, 0.5) sin(wt): nothing moves above; a fit that took that side's slope would stay there for ever."""
+
+    class Ends(Late):
+        def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+            return {CHANNEL: min(float(changes.get("effects.slope.angle", 0.0)), 0.5) * np.sin(90.0 * TIME)}
+
+    found = Judge([evidence(0.4 * np.sin(90.0 * TIME), Ends())]).block(0, (SLOPE,), (0.5,), 0.0, RUNS.fine)
+    assert found is not None
+    assert found.J[:, 0] == pytest.approx(0.5 * np.sin(90.0 * TIME) / SIGMA, abs=0.01 / SIGMA)
+
+
 def test_what_tells_only_near_its_place_is_looked_at_over_less() -> None:
     """y = g(t - c (x - x0)) of a blow 2 ms wide, c = 0.1 s: over 0.03 of a coordinate to either side it is gone.
 
