@@ -72,8 +72,8 @@ class Candidate:
 
     @property
     def is_narrow(self) -> bool:
-        """Whether it tells only near its place: begun where a look says, and nowhere else."""
-        return self.neutral is not None and self.id in NARROW
+        """Whether it tells only near its place: looked at in many, and over less about each."""
+        return self.id in NARROW
 
     def changes(self, x: Sequence[float], number: int = 1) -> dict[str, Any]:
         """Values to exchange in the scenario for coordinates x, each from 0 (low) to 1 (high).

@@ -55,22 +55,17 @@ class Step:
 
     def again(self, judge: Judge) -> Step:
         """The same under the noise as it is held now."""
-        rivals = tuple(judge.again(f) for f in self.rivals)
-        best = next((new for new, old in zip(rivals, self.rivals, strict=True) if old is self.fitted), None)
-        return replace(self, base=judge.again(self.base), fitted=best or judge.again(self.fitted), rivals=rivals)
+        return self._each(judge.again)
 
     def foretold(self, judge: Judge, groups: Sequence[Sequence[int]]) -> Step:
-        """The same with what its best and its rivals foretell by runs, where slopes do not hold for long."""
-        if not judge.effort.thrifty:
-            return self
-        rivals = tuple(foretold(judge, f, groups) for f in self.rivals)
+        """The same with what its fits foretell by runs, where slopes do not hold for long."""
+        return self._each(lambda f: foretold(judge, f, groups)) if judge.effort.thrifty else self
+
+    def _each(self, made: Callable[[Fitted], Fitted]) -> Step:
+        """The same with something made of each fit; its best stays one of its rivals."""
+        rivals = tuple(made(f) for f in self.rivals)
         best = next((new for new, old in zip(rivals, self.rivals, strict=True) if old is self.fitted), None)
-        return replace(
-            self,
-            base=foretold(judge, self.base, groups),
-            fitted=best or foretold(judge, self.fitted, groups),
-            rivals=rivals,
-        )
+        return replace(self, base=made(self.base), fitted=best or made(self.fitted), rivals=rivals)
 
     def moved_to(self, new: Fitted) -> Step:
         """The same with another fit of its best, among the rivals too."""

@@ -161,14 +161,13 @@ class Judge:
 
         slope = self._slope(r, candidates, x, shift, raw)
 
-        def across(a: Point, b: Point) -> Array | None:
-            ends = [self.moved(r, (candidates, x), end, shift, None if self._pinned else slope) for end in (a, b)]
-            return None if ends[0] is None or ends[1] is None else np.asarray(ends[1] - ends[0])
+        def off(end: Point) -> Array | None:
+            return self.moved(r, (candidates, x), end, shift, None if self._pinned else slope)
 
         for k in range(0 if known is None else known.shape[1], len(x) if nudge else 0):
             if self.effort.wide:
                 widest = 0.0 if self._pinned else self.effort.wide  # a first fit is short
-                column = secant(e, across, (candidates, x), k, nudge, widest)
+                column = secant(e, off, (candidates, x), k, nudge, widest)
                 if column is None:
                     return None
                 J[:, k] = column

@@ -114,9 +114,7 @@ def is_there(judge: Judge, fitted: Fitted) -> bool:
     nulls: dict[str, Any] = dict(EFFECTS[last.id].null)
     for (name, search), at in zip(last.search.items(), last.neutral or (None,) * len(last.search), strict=True):
         nulls[name] = nulls.get(name) if at is None else physical(at, search)
-    values, at = last.values(fitted.x[-len(last.search) :]), len(fitted.x) - len(last.search)
     numbers = [name for name in last.search if isinstance(nulls.get(name), (int, float))]
-    sides = {at + k: -1.0 if values[n] > nulls[n] else 1.0 for k, n in enumerate(last.search) if n in numbers}
     if not numbers:
         return True
 
@@ -126,9 +124,11 @@ def is_there(judge: Judge, fitted: Fitted) -> bool:
         return any(null < v - times * (v - low) or null > v + times * (high - v) for v, low, high, null in known)
 
     by_slopes = intervals(judge, fitted, {})[-1]
-    if apart(by_slopes, SURELY) or not apart(by_slopes, 1.0):
-        return apart(by_slopes, 1.0)
-    return apart(intervals(judge, fitted, sides)[-1], 1.0)
+    if not apart(by_slopes, 1.0):
+        return False  # runs only widen it
+    first, values = len(fitted.x) - len(last.search), last.values(fitted.x[-len(last.search) :])
+    sides = {first + k: -1.0 if values[n] > nulls[n] else 1.0 for k, n in enumerate(last.search) if n in numbers}
+    return apart(by_slopes, SURELY) or apart(intervals(judge, fitted, sides)[-1], 1.0)
 
 
 def outlasts(found: Step, groups: Groups) -> bool:

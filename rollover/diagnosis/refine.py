@@ -25,8 +25,17 @@ TWICE, LITTLE = 2, 1.0  # how often; a gain that is not worth another time
 
 def left_at(judge: Judge, candidates: Sequence[Candidate], x: Sequence[float], shifts: Sequence[float]) -> float | None:
     """What is left of all recordings at x and these time shifts (s); None where one cannot be simulated."""
-    blocks = [judge.block(r, candidates, x, s, 0.0) for r, s in enumerate(shifts)]
-    return None if any(b is None for b in blocks) else sum(b.normal()[2] for b in blocks if b is not None)
+    blocks = _blocks_at(judge, candidates, x, shifts)
+    return None if blocks is None else sum(b.normal()[2] for b in blocks)
+
+
+def _blocks_at(
+    judge: Judge, candidates: Sequence[Candidate], x: Sequence[float], shifts: Sequence[float]
+) -> list[Block] | None:
+    """All recordings at x and these time shifts (s), without slopes; None where one cannot be simulated."""
+    found = [judge.block(r, candidates, x, s, 0.0) for r, s in enumerate(shifts)]
+    blocks = [b for b in found if b is not None]
+    return blocks if len(blocks) == len(found) else None
 
 
 def _by_what_is_left(
@@ -87,10 +96,9 @@ def traced(judge: Judge, fitted: Fitted) -> Fitted:
     last, shifts = fitted.candidates[-1], [b.shift for b in fitted.blocks]
     at = len(fitted.x) - len(last.search)
     strength = at + list(last.search).index(yardstick(last.id, last.search)[0])
-    found = [judge.block(r, fitted.candidates[:-1], fitted.x[:at], s, 0.0) for r, s in enumerate(shifts)]
-    blocks = [b for b in found if b is not None]
+    blocks = _blocks_at(judge, fitted.candidates[:-1], fitted.x[:at], shifts)
     best = fitted
-    if len(blocks) < len(shifts):
+    if blocks is None:
         return best
     alone = Fitted(candidates=fitted.candidates[:-1], x=fitted.x[:at], blocks=tuple(blocks))
     for k in (k for k in range(at, len(fitted.x)) if k != strength):

@@ -33,11 +33,11 @@ FINER = 0.25  # of a step, for what tells only near its place
 
 
 def secant(
-    e: Evidence, moved: Callable[[Point, Point], Array | None], at: Point, k: int, nudge: float, widest: float
+    e: Evidence, moved: Callable[[Point], Array | None], at: Point, k: int, nudge: float, widest: float
 ) -> Array | None:
     """dy/dx_k (n,) of a recording about a point, over `nudge` to either side and up to `widest`; None if it fails.
 
-    `moved` is what the prediction differs by, whitened, from one point to another. A `widest` of 0 takes `nudge` as it
+    `moved` is what the prediction differs by, whitened, from the point to another. A `widest` of 0 takes `nudge` as it
     is.
     """
     candidates, x = at
@@ -48,9 +48,7 @@ def secant(
     while True:
         low, high = max(x[k] - nudge, 0.0), min(x[k] + nudge, 1.0)
         ends = [end for end in (low, high) if end != x[k]]
-        sides = [
-            (d, end - x[k]) for end in ends if (d := moved((candidates, x), (candidates, _with(x, k, end)))) is not None
-        ]
+        sides = [(d, end - x[k]) for end in ends if (d := moved((candidates, _with(x, k, end)))) is not None]
         if not sides:
             return None
         whole = np.asarray(sum(np.sign(over) * d for d, over in sides))  # one side where the other fails

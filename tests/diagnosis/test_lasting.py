@@ -48,7 +48,8 @@ def test_what_gains_no_more_than_chance_on_held_out_recordings_is_not_taken() ->
 def test_runs_foretell_what_was_held_out_where_slopes_hold_only_near_the_fit() -> None:
     """Four recordings, all w = J d off the fit by one step d; the fourth's slopes are eight times too steep.
 
-    Without it the others ask for d: its slopes foretell w - 8 J d = -7 w, its run nothing but noise.
+    Without it the others ask for d, or, as runs scatter, for a d: of what J d explains its slopes foretell (1 - 8 a)^2
+    times as much, some 49 times, its run nothing but noise.
     """
     judge, groups = Judge([evidence(r, 0.1, 8.0 * np.sin(30.0 * TIME)) for r in range(4)]), [[k] for k in range(4)]
     right = judge.fit((SLOPE,), (0.3,))
@@ -58,7 +59,11 @@ def test_runs_foretell_what_was_held_out_where_slopes_hold_only_near_the_fit() -
     steep = replace(off, blocks=(*off.blocks[:3], replace(off.blocks[3], J=8.0 * off.blocks[3].J)))
     told, run = held_out(steep, groups), held_out(foretold(judge, steep, groups), groups)
     noise, w = right.blocks[3].normal()[2], off.blocks[3].normal()[2]
-    assert told.left[3] == pytest.approx(49.0 * w, rel=0.2)
+    A, b = (np.array([block.normal()[k].item() for block in off.blocks]) for k in (0, 1))
+    own, asked = b[3] / A[3], b[:3].sum() / A[:3].sum()
+    explained = A[3] * own**2
+    assert told.left[3] == pytest.approx((1.0 - 8.0 * asked / own) ** 2 * explained + w - explained, rel=1e-6)
+    assert told.left[3] > 40.0 * w
     assert run.left[3] < 2.0 * noise < 0.5 * w
     base = judge.fit((), ())
     assert base is not None
