@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from mmap import mmap
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -70,7 +74,7 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         point_r=np.ascontiguousarray(np.concatenate([p[0] for p in points] or [np.zeros((0, 3))])),
         point_n=np.ascontiguousarray(np.concatenate([p[1] for p in points] or [np.zeros((0, 3))])),
         point_a=np.concatenate([p[2] for p in points] or [np.zeros(0)]),
-        point_body=np.array(owner, dtype=np.int64),
+        point_body=owner,
         member_f=np.array(members_f).reshape(-1, 9),
         member_i=np.array(members_i, dtype=np.int64).reshape(-1, 4),
         wheel_f=wheel_f,
@@ -102,12 +106,12 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         ),
         grid_i=np.array([nx, ny], dtype=np.int64),
         slot_of=np.full(nx * ny, -1, dtype=np.int32),
-        memory=np.zeros((capacity, COLUMNS)),
-        state=np.zeros((capacity, STATE_COLUMNS), dtype=np.int64),
-        s=np.zeros((capacity, hidden)),
-        active=np.zeros(capacity, dtype=np.int64),
-        trial=np.zeros((capacity, c.TRIAL_COLUMNS)),
-        found=np.zeros((capacity, 7)),
+        memory=_untouched(capacity, COLUMNS),
+        state=_untouched(capacity, STATE_COLUMNS, dtype=np.int64),
+        s=_untouched(capacity, hidden),
+        active=_untouched(capacity, dtype=np.int64),
+        trial=_untouched(capacity, c.TRIAL_COLUMNS),
+        found=_untouched(capacity, 7),
         touched=np.zeros(number + 1, dtype=np.int64),
         candidate_i=np.zeros((number + 1, 2), dtype=np.int64),
         candidate_f=np.zeros((number + 1, 2)),
@@ -131,12 +135,21 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
     )
 
 
+def _untouched(*shape: int, dtype: type = np.float64) -> NDArray[Any]:
+    """Zeros that take memory, and time, page by page as they are written to: most elements never are.
+
+    Those of numpy are so only until it is given memory back that was used.
+    """
+    return np.frombuffer(mmap(-1, math.prod(shape) * np.dtype(dtype).itemsize), dtype).reshape(shape)
+
+
 def _point_rows(
     bodies: tuple[Body, ...], uneven: bool
-) -> tuple[list[tuple[Array, Array, Array]], list[int], list[list[float]], list[tuple[int, int, int, int]]]:
+) -> tuple[list[tuple[Array, Array, Array]], NDArray[np.int64], list[list[float]], list[tuple[int, int, int, int]]]:
     """Points of the bodies' patches, whose they are, and the rows of their boxes; of pieces over uneven ground."""
     points: list[tuple[Array, Array, Array]] = []
-    owner: list[int] = []
+    owner: list[NDArray[np.int64]] = []
+    number = 0
     members_f: list[list[float]] = []
     members_i: list[tuple[int, int, int, int]] = []
     for b, body in enumerate(bodies):
@@ -144,19 +157,20 @@ def _point_rows(
             pieces = whole.pieces(PIECE) if uneven else ()
             if pieces:  # without points of its own: where it is far from the ground, so are its pieces
                 members_f.append(_box(whole, body.centre))
-                members_i.append((b, len(owner), len(owner), len(members_i) + 1 + len(pieces)))
+                members_i.append((b, number, number, len(members_i) + 1 + len(pieces)))
             for piece in pieces or (whole,):
                 members_f.append(_box(piece, body.centre))
-                members_i.append((b, len(owner), len(owner) + len(piece.area), len(members_i) + 1))
+                first, number = number, number + len(piece.area)
+                members_i.append((b, first, number, len(members_i) + 1))
                 points.append((piece.position - body.centre, piece.normal, piece.area))
-                owner += [b] * len(piece.area)
-    return points, owner, members_f, members_i
+                owner.append(np.full(len(piece.area), b, dtype=np.int64))
+    return points, np.concatenate(owner or [np.zeros(0, dtype=np.int64)]), members_f, members_i
 
 
 def _box(surface: SurfacePoints, centre: Array) -> list[float]:
     """Row of a patch in `member_f`."""
-    r = surface.position - centre
-    middle, half = 0.5 * (r.min(axis=0) + r.max(axis=0)), 0.5 * (r.max(axis=0) - r.min(axis=0)) + 1e-6
+    low, high = (corner - centre for corner in surface.corners)
+    middle, half = 0.5 * (low + high), 0.5 * (high - low) + 1e-6
     return [*middle, *half, *(surface.normal[0] if surface.is_flat else (0.0, 0.0, 0.0))]
 
 

@@ -11,8 +11,9 @@ from scipy.optimize import brentq
 
 from rollover.bodies import Body
 from rollover.forces import generalised_forces, tyre_point
-from rollover.frames import from_angles, rotation_vector
+from rollover.frames import from_angles
 from rollover.jacobian import stiffness
+from rollover.posture import AXLE, PARTS, PITCH, ROLL, SWINGS, WITH_CHASSIS, YAW, move, put
 from rollover.step import stand
 from rollover.tables import (
     E_DEPTH_NOW,
@@ -32,7 +33,6 @@ from rollover.tables import (
 )
 
 Array = NDArray[np.float64]
-ROLL, PITCH, AXLE, SLIDE, YAW, PARTS = 1, 2, 3, 4, 6, 7  # places in u; 0 is the height
 TOLERANCE = 1e-7  # of forces and moments over the weight
 FREE = 1.0  # m or rad: a play that no part of a ROPS leaves
 
@@ -60,7 +60,7 @@ class Equilibrium:
     """
 
     def __init__(self, bodies: tuple[Body, ...], t: Tables, heading: float, gravity: float, base: Array) -> None:
-        self.bodies, self.t, self.heading, self.base = bodies, t, heading, base
+        self.bodies, self.t, self.heading = bodies, t, heading
         self.handle = handle(t)
         self.weight = np.zeros(6 * len(bodies))
         self.weight[2::6] = [-gravity * b.inertia.mass for b in bodies]
@@ -68,10 +68,14 @@ class Equilibrium:
         self.level = -math.asin(n[1]), math.atan2(n[0], n[2])  # roll and pitch of a vehicle flat on the surface
         n = t.plane[:3]
         x = np.array([n[2], 0.0, -n[0]]) / math.hypot(n[0], n[2])
-        self.along = np.array([x, _cross(n, x)])  # two directions in the surface
+        self.place = np.array([n, x, _cross(n, x), base])
         frames = [b.name for b in bodies if b.name.startswith("rops")]
-        self.shift = {name: PARTS + 6 * i for i, name in enumerate(frames)}  # tilt stands three places on
         self.size = PARTS + 6 * len(frames)
+        begins = {name: PARTS + 6 * i for i, name in enumerate(frames)} | {"front_axle": SWINGS}
+        self.part = np.array([begins.get(b.name, WITH_CHASSIS) for b in bodies], dtype=np.int64)
+        self.centre = np.array([b.centre for b in bodies])
+        # of the axle, about its own centre of mass
+        self.pivot = t.joint_f[0, 3:6].copy() if "front_axle" in [b.name for b in bodies] else np.zeros(3)
         # in its play a part has no place of its own: it is found without, then put where it bears
         self.play = t.mount_f[:, T_PLAY : T_PLAY + 6].copy()
         t.mount_f[:, T_PLAY : T_PLAY + 6] = 0.0
@@ -100,62 +104,21 @@ class Equilibrium:
         u[0] += deepest - self.scale / float(self.t.wheel_f[:, W_KZ].sum())
         return u
 
-    def _origin(self, u: Array) -> Array:
-        return np.asarray(u[0] * self.t.plane[:3] + u[SLIDE : SLIDE + 2] @ self.along + self.base)
-
-    def _rotations(self, u: Array) -> list[Array]:
-        R = from_angles(u[ROLL], u[PITCH], self.heading + u[YAW])
-        found = []
-        for body in self.bodies:
-            if body.name == "front_axle":
-                found.append(R @ from_angles(u[AXLE], 0.0, 0.0))
-            elif body.name in self.shift:
-                at = self.shift[body.name] + 3
-                found.append(R @ from_angles(*u[at : at + 3]))
-            else:
-                found.append(R)
-        return found
+    def _put(self, u: Array) -> tuple[Array, Array]:
+        """Rotations (nb, 3, 3) and coordinates (6 nb,) of all bodies."""
+        turns, q = np.empty((len(self.bodies), 3, 3)), np.empty(self.weight.size)
+        put(u, self.heading, self.place, self.pivot, self.centre, self.part, turns, q)
+        return turns, q
 
     def coordinates(self, u: Array) -> Array:
         """Generalised coordinates (6 nb,) of all bodies."""
-        turns = self._rotations(u)
-        R, origin = turns[0], self._origin(u)
-        parts = []
-        for body, turn in zip(self.bodies, turns, strict=True):
-            x = origin + R @ body.centre
-            if body.name == "front_axle":
-                pivot = self.t.joint_f[0, 3:6]  # about the axle's centre of mass
-                x = x + R @ pivot - turn @ pivot
-            elif body.name in self.shift:
-                shift = self.shift[body.name]
-                x = x + R @ u[shift : shift + 3]
-            parts += [x, rotation_vector(turn)]
-        return np.concatenate(parts)
+        return self._put(u)[1]
 
-    def tangents(self, u: Array, q: Array) -> Array:
-        """Velocities (size, 6 nb) of all bodies (world; angular in body axes) for a unit rate of each u; q as of u."""
-        turns = self._rotations(u)
-        R, origin = turns[0], self._origin(u)
-        level = from_angles(0.0, 0.0, self.heading + u[YAW])
-        spins = {ROLL: R[:, 0], PITCH: level[:, 1], YAW: level[:, 2]}
-        rows = np.zeros((self.size, q.size))
-        for b in range(len(self.bodies)):
-            rows[0, 6 * b : 6 * b + 3] = self.t.plane[:3]
-            rows[SLIDE : SLIDE + 2, 6 * b : 6 * b + 3] = self.along
-        for b, (body, turn) in enumerate(zip(self.bodies, turns, strict=True)):
-            x, at = q[6 * b : 6 * b + 3], 6 * b
-            for k, spin in spins.items():
-                rows[k, at : at + 3] = _cross(spin, x - origin)
-                rows[k, at + 3 : at + 6] = turn.T @ spin
-            if body.name == "front_axle":
-                rows[AXLE, at : at + 3] = _cross(R[:, 0], -turn @ self.t.joint_f[0, 3:6])
-                rows[AXLE, at + 3 : at + 6] = turn.T @ R[:, 0]
-            elif body.name in self.shift:
-                shift = self.shift[body.name]
-                tilt = [turn[:, 0], R @ from_angles(0.0, 0.0, u[shift + 5])[:, 1], R[:, 2]]
-                for k in range(3):
-                    rows[shift + k, at : at + 3] = R[:, k]
-                    rows[shift + 3 + k, at + 3 : at + 6] = turn.T @ tilt[k]
+    def tangents(self, u: Array) -> Array:
+        """Velocities (size, 6 nb) of all bodies (world; angular in body axes) for a unit rate of each u."""
+        turns, q = self._put(u)
+        rows = np.empty((self.size, q.size))
+        move(u, self.heading, self.place, self.pivot, self.part, turns, q, rows)
         return rows
 
     def residual(self, u: Array) -> Array:
@@ -163,7 +126,7 @@ class Equilibrium:
         q = self.coordinates(u)
         Q = np.zeros_like(q)
         generalised_forces(self.handle, q, np.zeros_like(q), Q)
-        return np.asarray(self.tangents(u, q) @ (Q + self.weight) / self.scale)
+        return np.asarray(self.tangents(u) @ (Q + self.weight) / self.scale)
 
     def solve(self, guess: Array, fixed: tuple[int, ...] = ()) -> Array | None:
         """Equilibrium near a guess by a damped Newton iteration, some coordinates held, or None."""
@@ -246,7 +209,7 @@ class Equilibrium:
         K = np.zeros((self.weight.size, self.weight.size))
         self.residual(u)
         stiffness(self.handle, 1.0, 0.0, K)
-        T = self.tangents(u, self.coordinates(u))
+        T = self.tangents(u)
         A = (T @ K @ T.T / self.scale)[np.ix_(free, free)]
         return np.asarray(np.linalg.solve(A + 1e-3 * np.eye(len(free)), r))
 
@@ -312,7 +275,7 @@ class Equilibrium:
         """Velocities (6 nb,) while the vehicle rolls at `rate` about its most loaded tyre's contact."""
         if rate == 0.0:
             return np.zeros(6 * len(self.bodies))
-        v = self.tangents(u, self.coordinates(u))[ROLL] * rate
+        v = self.tangents(u)[ROLL] * rate
         self.residual(u)
         R = from_angles(u[ROLL], u[PITCH], self.heading + u[YAW])
         w = int(np.argmax(self.t.wheel_memory[:, E_FORCE_NOW]))

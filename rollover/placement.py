@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from ground.relief import element_plane
 from ground.surface import Surface, height, is_flat
 from rollover.bodies import Body
-from rollover.equilibrium import ROLL, Equilibrium, tread_point
+from rollover.equilibrium import Equilibrium, tread_point
 from rollover.faults import Fault, InputError
 from rollover.forces import generalised_forces
 from rollover.frames import from_angles, from_quaternion, rotation_vector
 from rollover.initiation import Driving, Drop, Release, Standing, Throw, TipOver
+from rollover.posture import ROLL
 from rollover.scenario import Scenario
 from rollover.step import stand
 from rollover.tables import W_RADIUS, Tables, handle

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -13,6 +14,7 @@ from ground.kinds import ByKind
 from ground.quantity import Label, Quantity, parameters
 
 Point = tuple[float, float, float]
+SHAPES = 256  # kept with their points: a study runs one vehicle again and again
 
 
 @parameters
@@ -83,10 +85,15 @@ class SurfacePoints:
     normal: NDArray[np.float64]
     area: NDArray[np.float64]
 
-    @property
+    @cached_property
     def is_flat(self) -> bool:
         """Whether all normals are the same: the whole patch faces the ground or none of it."""
         return bool(np.all(self.normal == self.normal[0]))
+
+    @cached_property
+    def corners(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Least and largest coordinates, (3,) each."""
+        return self.position.min(axis=0), self.position.max(axis=0)
 
     def at(self, chosen: Any) -> SurfacePoints:
         """Some of the points, by an index or a mask (n,)."""
@@ -99,6 +106,7 @@ class SurfacePoints:
         return tuple(self.at(piece.ravel() == k) for k in range(piece.max() + 1))
 
 
+@lru_cache(maxsize=SHAPES)
 def sample(shape: Shape, spacing: float) -> tuple[SurfacePoints, ...]:
     """Patches of points no further apart than `spacing` (m) on a shape, its edges and corners among them.
 

@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 from ground.surface import Plane
 from rollover.bodies import bodies_of
 from rollover.contact import tables_of
-from rollover.equilibrium import AXLE, PITCH, ROLL, SLIDE, Equilibrium
+from rollover.equilibrium import Equilibrium
 from rollover.faults import Fault, InputError
 from rollover.forces import generalised_forces
 from rollover.inertia import combined
 from rollover.initiation import Standing
 from rollover.jacobian import stiffness
+from rollover.posture import AXLE, PITCH, ROLL, SLIDE
 from rollover.scenario import Scenario
 from rollover.step import keep_strain, stand
 from rollover.tables import (
@@ -155,7 +156,7 @@ class _Tilt:
         statics.residual(u)
         K = np.zeros((statics.weight.size, statics.weight.size))
         stiffness(statics.handle, 1.0, 0.0, K)
-        T = statics.tangents(u, statics.coordinates(u))[self.free]
+        T = statics.tangents(u)[self.free]
         self.lower[:] = np.linalg.cholesky(T @ K @ T.T / statics.scale + 1e-3 * np.eye(len(self.free)))
         self.memory = t.wheel_memory.copy()
         stance = self._rest(0.0, u)
@@ -236,7 +237,7 @@ class _Tilt:
         memory[:, E_SHEAR : E_SHEAR + 3] *= (memory[:, E_FORCE_NOW] / self.loads)[:, None]
         generalised_forces(statics.handle, q, np.zeros_like(Q), Q)
         memory[:, E_SHEAR : E_SHEAR + 3] = strain
-        r = statics.tangents(u, q) @ (Q + statics.weight) / statics.scale
+        r = statics.tangents(u) @ (Q + statics.weight) / statics.scale
         return np.asarray(np.linalg.solve(self.lower, r[self.free]))
 
     def _stiffness(self, u: Array, r: Array) -> Array:

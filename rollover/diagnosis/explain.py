@@ -88,7 +88,9 @@ def step(
     what it leaves; the step is then under that noise. None if nothing could be fitted.
     """
     say(f"looking at {len(candidates)} candidates beside {base.label}")
-    few, shifts = spread(base, groups, judge.effort.few), begun(judge, base)
+    # of recordings that went another way together, two may be those that no explanation brings back
+    several = judge.effort.few if judge.straying else judge.effort.looked_at
+    few, shifts = spread(base, groups, several), begun(judge, base)
     screened = screen(judge, base, promising(candidates, looked, judge.effort), few, shifts, looked)
     count = sum(b.residual.size for b in base.blocks)
     screened, begun_with = _first_fits(judge, base, screened, few, shifts, say, crew, looked)

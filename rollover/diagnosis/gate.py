@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from rollover.diagnosis.candidates import Candidate, coordinate, physical
 from rollover.diagnosis.chaos import FEW, gained
 from rollover.diagnosis.fit import Block, Fitted, Judge
+from rollover.diagnosis.secant import Point
 from rollover.effects import EFFECTS
 
 Array = NDArray[np.float64]
@@ -42,7 +43,8 @@ class Gate:
     """The best score of all candidates, each one's own by key, the null (draws,), and the strength that would show.
 
     `starts` are the places where a fit may begin, by key, the best first: the directions that score most, followed as
-    far as the misfit goes along them. Thresholds have no such way and are not in it.
+    far as the misfit goes along them. Thresholds have no such way and are not in it. `only` are the recordings that all
+    candidates were looked at in; empty for all.
     """
 
     score: float
@@ -50,25 +52,35 @@ class Gate:
     null: Array
     detectable: Mapping[str, float]
     starts: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
+    only: tuple[int, ...] = ()
 
     def p_value(self, phi: float = 1.0) -> float:
         """p-value of the best score; `phi` is what is left per sample where not even an explanation leaves noise."""
         return p_value(self.score / max(phi, 1.0), self.null)
 
 
-def gate(judge: Judge, base: Fitted, candidates: Sequence[Candidate], only: Sequence[int] | None = None) -> Gate:
-    """Look at every candidate beside the base, in all recordings or `only` some, from the base's own time shifts."""
-    use = list(range(len(base.blocks))) if only is None else list(only)
+def gate(
+    judge: Judge,
+    base: Fitted,
+    candidates: Sequence[Candidate],
+    only: Sequence[int] | None = None,
+    beside: Fitted | None = None,
+) -> Gate:
+    """Look at every candidate beside the base, in all recordings or `only` some, from the base's own time shifts.
+
+    Directions are what candidates move `beside` another fit, where that is given: the null holds for any directions.
+    """
+    at, use = beside or base, list(range(len(base.blocks))) if only is None else list(only)
     blocks = [base.blocks[r] for r in use]
     misfit = np.concatenate([freed((b.residual + b.shift * b.slope)[:, None], b)[:, 0] for b in blocks])
     held = np.concatenate([freed(b.J, b) for b in blocks]) if base.x else np.zeros((misfit.size, 0))
     own, _ = np.linalg.qr(held)
     columns, looks, sizes = [], [], []
     quiet = _before_the_blow(judge, use)
-    judge.made_ahead((r, (*base.candidates, c), (*base.x, *x)) for c in candidates for x in c.probes() for r in use)
+    judge.made_ahead((r, (*at.candidates, c), (*at.x, *x)) for c in candidates for x in c.probes() for r in use)
     for c in candidates:
         for x in c.probes():
-            d = _direction(judge, base, c, x, use)
+            d = _direction(judge, (at.candidates, at.x), base.blocks, c, x, use)
             if d is None:
                 continue
             parts = [(d, SHOWS)]
@@ -107,6 +119,7 @@ def gate(judge: Judge, base: Fitted, candidates: Sequence[Candidate], only: Sequ
         null=null_of_the_best([D]),
         detectable=detectable,
         starts={key: tuple(each) for key, each in ways.items()},
+        only=tuple(only or ()),
     )
 
 
@@ -187,12 +200,14 @@ def _trust(judge: Judge, blocks: Sequence[Block], use: Sequence[int], D: Array) 
     return np.asarray(FEW * found / max(many, 1))
 
 
-def _direction(judge: Judge, base: Fitted, c: Candidate, x: Sequence[float], use: Sequence[int]) -> Array | None:
-    """What the candidate at x moves in the recordings `use`, without their time shifts; None if it fails."""
+def _direction(
+    judge: Judge, at: Point, blocks: Sequence[Block], c: Candidate, x: Sequence[float], use: Sequence[int]
+) -> Array | None:
+    """What the candidate at x moves beside a point in the recordings `use`, without time shifts; None if it fails."""
     found = []
     for r in use:
-        block = base.blocks[r]
-        d = judge.moved(r, (base.candidates, base.x), ((*base.candidates, c), (*base.x, *x)), block.shift)
+        block = blocks[r]
+        d = judge.moved(r, at, ((*at[0], c), (*at[1], *x)), block.shift)
         if d is None:
             return None
         found.append(freed(block.counted(d)[:, None], block)[:, 0])

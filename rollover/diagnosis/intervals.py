@@ -15,7 +15,7 @@ from rollover.diagnosis.crew import linearised
 from rollover.diagnosis.evidence import MODEL_ERROR, Evidence
 from rollover.diagnosis.fit import GENTLE, Fitted, Judge
 from rollover.diagnosis.secant import CLOCKED
-from rollover.diagnosis.settle import along, left_of_means, step_of_means
+from rollover.diagnosis.settle import along, left_of_means, pull_of_means, step_of_means
 from rollover.diagnosis.verdict import Interval
 from rollover.effects import EFFECTS, units_of
 
@@ -27,6 +27,7 @@ CLEARLY = 0.4  # of the rise that is due, and
 ROUGH = 8.0  # rise that is no chance: from place to place the misfit of a mean of runs differs by 3 (1 sd)
 FURTHER, FARTHEST = 2.0, 30.0  # factors by which one goes on at a time, and at most
 BEYOND = 1.2  # factor below which an interval that is too narrow is chance
+FEWEST = 3  # recordings that can disagree
 EVENLY = 12.0**-0.5  # standard deviation of what is spread evenly from 0 to 1
 
 
@@ -46,6 +47,22 @@ def scattered(evidence: Sequence[Evidence], blocks: Sequence[Block], inverse: Ar
         each = np.array([inverse @ along(block, e, stray) for stray in e.strays])
         found += (1.0 + 1.0 / k) * np.var(each, axis=0, ddof=1)
     return np.asarray(found * (float(t.ppf(0.975, free)) / TWO_SIDED) ** 2) if free else found
+
+
+def disagreeing(evidence: Sequence[Evidence], blocks: Sequence[Block], inverse: Array) -> Array:
+    """Variances (p,) by how far apart recordings pull parameters: what all models of the noise leave out shows there.
+
+    (t/1.96)^2 R/(R - 1) A^-1 [sum_r (g_r - g)(g_r - g)'] A^-1, g_r recording r's part of A dx of (D8), g their mean.
+    """
+    from scipy.stats import t
+
+    number = len(blocks)
+    if number < FEWEST:
+        return np.zeros(inverse.shape[0])
+    pulls = np.array([pull_of_means(e, block) for e, block in zip(evidence, blocks, strict=True)])
+    moved = (pulls - pulls.mean(axis=0)) @ inverse
+    wider = float(t.ppf(0.975, number - 1)) / TWO_SIDED
+    return np.asarray(wider**2 * number / (number - 1) * np.sum(moved**2, axis=0))
 
 
 def unshaped(judge: Judge, fitted: Fitted, inverse: Array) -> Array:
@@ -191,7 +208,10 @@ def intervals(judge: Judge, fitted: Fitted, sides: Mapping[int, float] | None = 
         moved += scattered(judge.evidence, fitted.blocks, inverse) + unshaped(judge, fitted, inverse)
         rest = step_of_means(judge.evidence, fitted.blocks)
     moved += rest**2
-    sd = np.sqrt(sd**2 + moved)[kept]
+    variance = sd**2 + moved
+    if strayed:
+        variance = np.maximum(variance, disagreeing(judge.evidence, fitted.blocks, inverse))
+    sd = np.sqrt(variance)[kept]
     own = np.sqrt(phi * np.diag(inverse))[kept]
     wide = np.sqrt(sd[:, None] ** 2 + own[:, None] ** 2 * (reaches(judge, told, own, phi, sides) ** 2 - 1.0))
     found, at = [], 0

@@ -10,7 +10,7 @@ import numpy as np
 
 from rollover.diagnosis.candidates import akin, physical
 from rollover.diagnosis.chaos import is_other, too_many
-from rollover.diagnosis.explain import SURE, Step
+from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate, p_value
 from rollover.diagnosis.holdout import held_out
@@ -21,6 +21,7 @@ from rollover.diagnosis.verdict import Interval
 from rollover.effects import EFFECTS
 
 Groups = Sequence[Sequence[int]]
+SENT = 0.02  # p-value of so many recordings on other courses, below which chance alone sends fewer there
 SPOKEN = 0.05  # p-value of a candidate's own score, beyond which its fit to runs that scatter is one to chance
 RIVAL = 0.5  # of the best's gain, by the mean of its runs, that a rival must have
 SURELY = 4.0  # times an interval by slopes, beyond which no run is needed to tell a strength from none
@@ -54,7 +55,7 @@ def astray(judge: Judge, fitted: Fitted) -> Fitted:
     """
     judge.straying = True
     found = judge.again(fitted)
-    if too_many(sum(is_other(b.course) for b in found.blocks), len(found.blocks)) > SURE:
+    if too_many(sum(is_other(b.course) for b in found.blocks), len(found.blocks)) > SENT:
         return found
     judge.straying = False
     return judge.again(fitted)

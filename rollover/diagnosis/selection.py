@@ -15,9 +15,9 @@ from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Phases, Step, moves, 
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate, gate
 from rollover.diagnosis.holdout import held_out
-from rollover.diagnosis.lasting import NEEDED, astray, backed, begun_anew, lasting, unbent
+from rollover.diagnosis.lasting import NEEDED, astray, backed, begun_anew, lasting
+from rollover.diagnosis.looks import look, look_again
 from rollover.diagnosis.refine import polish, timed, traced
-from rollover.diagnosis.screening import spread
 from rollover.diagnosis.verdict import Verdict
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
@@ -83,7 +83,7 @@ def explained(
     before = mismatch_of(judge.evidence, base.blocks, phases)
     base = astray(judge, base)
     say(f"looking at {len(candidates)} candidates, which of them could matter")
-    looked = first_look = _look(judge, base, candidates, groups)
+    looked = first_look = look(judge, base, candidates, groups)
     current, left = base, before
     taken: list[Step] = []
     first: Step | None = None
@@ -118,7 +118,8 @@ def explained(
                     current = other.fitted
         if len(taken) > 1 and current.left > HOPELESS**2 * count:
             break
-        looked = _look(judge, current, free(current, candidates), groups)
+        told = left.p_value > SURE or not matters(judge, current, left)
+        looked = look_again(judge, current, base if told else None, free(current, candidates), groups, first_look)
     if not judge.straying:
         judge.straying, current = True, judge.again(current)
         left = mismatch_of(judge.evidence, current.blocks, phases)
@@ -148,33 +149,6 @@ def explained(
         after=mismatch_of(judge.evidence, current.blocks, phases),
         first=first.again(judge).foretold(judge, groups) if first is not None else None,
         refuted=refuted,
-    )
-
-
-def _look(judge: Judge, base: Fitted, candidates: Sequence[Candidate], groups: Groups) -> Gate:
-    """A gate by all recordings; where each look costs a run, of few and then of the best candidates by some more.
-
-    The null stays that of the best of all candidates: what was passed over could only have raised the maximum. Clocks
-    are then taken where they say, or nearly so: far off they have eaten what is missing.
-    """
-    effort = judge.effort
-    if not effort.thrifty:
-        return gate(judge, base, candidates)
-    if judge.per_error == 1.0:  # beside a tolerance it cannot be told what a clock has eaten
-        base = unbent(judge, base)
-    few, more = spread(base, groups, effort.few), spread(base, groups, effort.looked_at)
-    first = gate(judge, base, candidates, few)
-    if len(more) <= len(few):
-        return first
-    moving = sorted((c for c in candidates if c.kind != "sensor"), key=lambda c: -first.scores.get(c.key, 0.0))
-    able = [*moving[: effort.shortlist], *(c for c in candidates if c.kind == "sensor")]
-    second = gate(judge, base, able, more)
-    return replace(
-        second,
-        scores={**dict.fromkeys(first.scores, 0.0), **second.scores},
-        null=np.maximum(first.null, second.null),
-        detectable={**first.detectable, **second.detectable},
-        starts={**first.starts, **second.starts},
     )
 
 

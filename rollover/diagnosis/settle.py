@@ -146,10 +146,12 @@ def along(block: Block, e: Evidence, stray: Array) -> Array:
 def step_of_means(evidence: Sequence[Evidence], blocks: Sequence[Block]) -> Array:
     """(D8), (p,)."""
     p = blocks[0].J.shape[1]
-    A, b = GENTLE * np.eye(p), np.zeros(p)
-    for e, block in zip(evidence, blocks, strict=True):
-        Ar, br, _ = block.normal()
-        A, b = A + Ar, b + br
-        if e.strays:
-            b = b - np.mean([along(block, e, stray) for stray in e.strays], axis=0)
+    A = sum((block.normal()[0] for block in blocks), GENTLE * np.eye(p))
+    b = sum((pull_of_means(e, block) for e, block in zip(evidence, blocks, strict=True)), np.zeros(p))
     return np.asarray(np.linalg.solve(A, b))
+
+
+def pull_of_means(e: Evidence, block: Block) -> Array:
+    """One recording's part of A dx of (D8), (p,)."""
+    pull = block.normal()[1]
+    return pull - np.mean([along(block, e, stray) for stray in e.strays], axis=0) if e.strays else pull

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.diagnosis import selection
+from rollover.diagnosis import looks, selection
 from rollover.diagnosis.blocks import Block, Fitted
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.chaos import STATE, Course
@@ -111,21 +111,60 @@ def test_what_an_effect_does_before_the_blow_is_looked_at_by_itself() -> None:
 def test_few_recordings_choose_who_is_looked_at_on_more(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[int, list[str]]] = []
 
-    def looks(_: Judge, base: Fitted, candidates: Any, only: Any = None) -> Gate:
+    def looked(_: Judge, base: Fitted, candidates: Any, only: Any, beside: Any) -> Gate:
         asked.append((len(only), [c.key for c in candidates]))
         scores = {c.key: 90.0 - int(c.key[1:]) for c in candidates}
         return Gate(score=max(scores.values()), scores=scores, null=np.full(10, float(len(only))), detectable=scores)
 
-    monkeypatch.setattr(selection, "gate", looks)
+    monkeypatch.setattr(looks, "gate", looked)
     judge, base = judge_of((0.0,) * 5, (0.0,) * 5)
     every = [replace(SLOPE, id=f"c{k}") for k in range(30)] + [replace(SLOPE, id="c77", kind="sensor")]
-    found = selection._look(judge, base, every, [[r] for r in range(5)])
+    found = looks.look(judge, base, every, [[r] for r in range(5)])
     assert [n for n, _ in asked] == [RUNS.few, RUNS.looked_at]
     assert len(asked[0][1]) == 31
     assert asked[1][1] == [f"c{k}" for k in range(RUNS.shortlist)] + ["c77"]
     assert found.scores["c29"] == 0.0  # passed over
     assert found.detectable["c29"] == 61.0
     assert found.null[0] == RUNS.looked_at
+
+
+def test_directions_may_be_those_beside_another_fit() -> None:
+    """The misfit of an explanation along what runs beside the base say, and no run is made but those that are known."""
+    judge, base = judge_of((0.0,) * 4, (2.0,) * 4)
+    wave = 2.0 * np.where(TIME < BLOW, np.sin(30.0 * TIME), 0.0)
+    left = tuple(replace(b, residual=b.residual - wave) for b in base.blocks)
+    fitted = Fitted(candidates=(replace(SLOPE, id="other"),), x=(0.51,), blocks=left)
+    known = gate(judge, base, [SLOPE], (0, 1))
+    made = sum(e.simulator.runs for e in judge.evidence if isinstance(e.simulator, Wave))
+    found = gate(judge, fitted, [SLOPE], known.only, base)
+    assert known.only == (0, 1)
+    assert sum(e.simulator.runs for e in judge.evidence if isinstance(e.simulator, Wave)) == made
+    assert 0.0 < found.score < 0.1 * known.score  # most is explained
+
+
+@pytest.mark.parametrize(("hint", "thrifty", "looks_made"), [(0.9, True, 1), (0.01, True, 2), (0.9, False, 1)])
+def test_no_look_is_made_beside_an_explanation_where_known_runs_tell_nothing(
+    hint: float, thrifty: bool, looks_made: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[Any, Any]] = []
+
+    def looked(_: Judge, base: Fitted, candidates: Any, groups: Any, beside: Any = None, few: Any = ()) -> Gate:
+        asked.append((beside, few))
+        null = np.sort(np.random.default_rng(0).chisquare(1, 1000))
+        return Gate(score=float(np.quantile(null, 1.0 - hint)), scores={}, null=null, detectable={})
+
+    monkeypatch.setattr(looks, "look", looked)
+    judge, base = judge_of((0.0,) * 4, (2.0,) * 4)
+    judge.effort = replace(judge.effort, thrifty=thrifty)
+    first = Gate(score=0.0, scores={}, null=np.zeros(10), detectable={}, only=(0, 2))
+    looks.look_again(judge, base, base, [SLOPE], [[r] for r in range(4)], first)
+    assert len(asked) == looks_made
+    assert asked[0] == ((base, (0, 2)) if thrifty else (None, ()))
+    if looks_made == 2:
+        assert asked[1] == (None, ())
+    asked.clear()
+    looks.look_again(judge, base, None, [SLOPE], [[r] for r in range(4)], first)  # where the rest is structured
+    assert asked == [(None, ())]
 
 
 def test_what_was_refuted_tells_nothing() -> None:

@@ -78,3 +78,12 @@ def test_pieces_are_all_of_a_patch() -> None:
     rows = [np.column_stack([p.position, p.normal, p.area]) for p in (whole, *pieces)]
     assert np.array_equal(np.unique(rows[0], axis=0), np.unique(np.concatenate(rows[1:]), axis=0))
     assert sum(len(p.area) for p in pieces) == len(whole.area)
+
+
+def test_a_shape_that_is_met_again_keeps_its_points() -> None:
+    one, again, finer = (sample(Box(name="b", low=(0, 0, 0), high=(1, 1, 1)), h) for h in (0.1, 0.1, 0.05))
+    assert again is one
+    assert len(finer[0].area) > len(one[0].area)
+    low, high = one[0].corners
+    np.testing.assert_array_equal(low, one[0].position.min(axis=0))
+    np.testing.assert_array_equal(high, one[0].position.max(axis=0))
