@@ -44,9 +44,12 @@ def look(
     moving = sorted((c for c in candidates if c.kind != "sensor"), key=lambda c: -first.scores.get(c.key, 0.0))
     able = [*moving[: effort.shortlist], *(c for c in candidates if c.kind == "sensor")]
     second = gate(judge, base, able, more, beside)
+    scores = {**dict.fromkeys(first.scores, 0.0), **second.scores}
+    if not judge.straying:  # in full, what one of them lacks hides what the others have
+        scores = {key: max(score, first.scores.get(key, 0.0)) for key, score in scores.items()}
     return replace(
         second,
-        scores={**dict.fromkeys(first.scores, 0.0), **second.scores},
+        scores=scores,
         null=np.maximum(first.null, second.null),
         detectable={**first.detectable, **second.detectable},
         starts={**first.starts, **second.starts},

@@ -128,6 +128,24 @@ def test_few_recordings_choose_who_is_looked_at_on_more(monkeypatch: pytest.Monk
     assert found.null[0] == RUNS.looked_at
 
 
+@pytest.mark.parametrize(("straying", "kept"), [(True, 5.0), (False, 40.0)])
+def test_what_led_on_few_recordings_is_tried_where_all_count_in_full(
+    straying: bool, kept: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """40 by two recordings, 5 by four: where each may take another course four tell more than two, else the better."""
+
+    def looked(_: Judge, base: Fitted, candidates: Any, only: Any, beside: Any) -> Gate:
+        scores = {c.key: 40.0 if len(only) == RUNS.few else 5.0 for c in candidates}
+        return Gate(score=max(scores.values()), scores=scores, null=np.ones(10), detectable={})
+
+    monkeypatch.setattr(looks, "gate", looked)
+    judge, base = judge_of((0.0,) * 4, (0.0,) * 4)
+    judge.straying = straying
+    found = looks.look(judge, base, [SLOPE], [[r] for r in range(4)])
+    assert found.scores["slope"] == kept
+    assert found.score == 5.0  # what is claimed is claimed by all
+
+
 def test_directions_may_be_those_beside_another_fit() -> None:
     """The misfit of an explanation along what runs beside the base say, and no run is made but those that are known."""
     judge, base = judge_of((0.0,) * 4, (2.0,) * 4)
