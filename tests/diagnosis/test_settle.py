@@ -261,7 +261,7 @@ def test_parameters_hold_though_runs_scatter() -> None:
         hits.append(interval.low <= 0.37 <= interval.high)
         widths.append(interval.high - interval.low)
     assert np.mean(hits) > 0.87
-    assert np.median(widths) < 0.03
+    assert 0.022 < np.median(widths) < 0.03  # 0.020 where recordings could not disagree
 
 
 def test_a_move_does_not_leap_to_another_course() -> None:
