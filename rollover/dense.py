@@ -72,3 +72,16 @@ def add_outer(A: Any, factor: float, x: Any, at: int) -> None:
 def norm(x: Any) -> float:
     """|x|."""
     return np.sqrt(dot(x, x))  # type: ignore[no-any-return]
+
+
+@compiled
+def largest(x: Any) -> float:
+    """Largest |x_k|; NaN where one is."""
+    most = 0.0
+    for k in range(x.shape[0]):
+        size = abs(x[k])
+        if not size <= most:
+            most = size  # of a NaN nothing is larger
+            if size != size:
+                break
+    return most

@@ -104,29 +104,31 @@ class Equilibrium:
         u[0] += deepest - self.scale / float(self.t.wheel_f[:, W_KZ].sum())
         return u
 
-    def _put(self, u: Array) -> tuple[Array, Array]:
-        """Rotations (nb, 3, 3) and coordinates (6 nb,) of all bodies."""
+    def placed(self, u: Array) -> tuple[Array, Array]:
+        """Generalised coordinates (6 nb,) of all bodies, and their velocities (size, 6 nb) for a unit rate of each u.
+
+        Velocities are in world axes, angular ones in body axes.
+        """
         turns, q = np.empty((len(self.bodies), 3, 3)), np.empty(self.weight.size)
         put(u, self.heading, self.place, self.pivot, self.centre, self.part, turns, q)
-        return turns, q
+        rows = np.empty((self.size, q.size))
+        move(u, self.heading, self.place, self.pivot, self.part, turns, q, rows)
+        return q, rows
 
     def coordinates(self, u: Array) -> Array:
         """Generalised coordinates (6 nb,) of all bodies."""
-        return self._put(u)[1]
+        return self.placed(u)[0]
 
     def tangents(self, u: Array) -> Array:
-        """Velocities (size, 6 nb) of all bodies (world; angular in body axes) for a unit rate of each u."""
-        turns, q = self._put(u)
-        rows = np.empty((self.size, q.size))
-        move(u, self.heading, self.place, self.pivot, self.part, turns, q, rows)
-        return rows
+        """Their velocities (size, 6 nb) for a unit rate of each u, as in `placed`."""
+        return self.placed(u)[1]
 
     def residual(self, u: Array) -> Array:
         """Virtual work for each coordinate over the weight, (size,)."""
-        q = self.coordinates(u)
+        q, rows = self.placed(u)
         Q = np.zeros_like(q)
         generalised_forces(self.handle, q, np.zeros_like(q), Q)
-        return np.asarray(self.tangents(u) @ (Q + self.weight) / self.scale)
+        return np.asarray(rows @ (Q + self.weight) / self.scale)
 
     def solve(self, guess: Array, fixed: tuple[int, ...] = ()) -> Array | None:
         """Equilibrium near a guess by a damped Newton iteration, some coordinates held, or None."""

@@ -112,7 +112,6 @@ def solve(
     views: list[Any] = []
 
     clock, zero = live.tables.clock, start.time
-    loaded = turns = bool(M.any())  # whether M holds anything, and always does
 
     def force(_mbs: Any, t: float, _item: int, _q: Any, _qd: Any) -> list[float]:
         clock[0], clock[1] = t - live.time, zero + t
@@ -128,16 +127,13 @@ def solve(
         return newton
 
     def after(_mbs: Any, t: float) -> bool:
-        nonlocal loaded
         try:
             goes_on = after_step(t, views[0], views[1], views[2])
             live.time = t
             # like the contact set, the soil's mass matrix is that of the step's start
-            touches = bool(live.tables.counts[ACTIVE] > 0)
-            if touches or loaded:
+            if live.tables.counts[ACTIVE] > 0 or M.any():
                 added_mass(live.handle, views[0], M)
                 added.SetWithDenseMatrix(M, useDenseMatrix=True)
-                loaded = turns or touches
             return goes_on
         except BaseException as error:
             live.error = error

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ground.compiled import compiled
+from rollover.vectors import cross
 
 ROLL, PITCH, AXLE, SLIDE, YAW, PARTS = 1, 2, 3, 4, 6, 7  # places in u; 0 is the height
 WITH_CHASSIS, SWINGS = 0, -1  # of a body that is no part with places in u of its own: rigid, or the axle
@@ -49,11 +50,17 @@ def vector_of(R: Any, v: Any) -> None:
 
 
 @compiled
-def product(A: Any, B: Any, C: Any) -> None:
+def _product(A: Any, B: Any, C: Any) -> None:
     """A B into C, (3, 3) each."""
     for i in range(3):
         for j in range(3):
             C[i, j] = A[i, 0] * B[0, j] + A[i, 1] * B[1, j] + A[i, 2] * B[2, j]
+
+
+@compiled
+def _origin(u: Any, place: Any, i: int) -> float:
+    """Coordinate i of the vehicle's origin."""
+    return place[3, i] + u[0] * place[0, i] + u[SLIDE] * place[1, i] + u[SLIDE + 1] * place[2, i]  # type: ignore[no-any-return]
 
 
 @compiled
@@ -70,14 +77,14 @@ def put(u: Any, heading: float, place: Any, pivot: Any, centre: Any, part: Any, 
         at = part[b]
         if at == SWINGS:
             turn_by_angles(u[AXLE], 0.0, 0.0, own)
-            product(R, own, turns[b])
+            _product(R, own, turns[b])
         elif at != WITH_CHASSIS:
             turn_by_angles(u[at + 3], u[at + 4], u[at + 5], own)
-            product(R, own, turns[b])
+            _product(R, own, turns[b])
         elif b > 0:
             turns[b] = R
         for i in range(3):
-            x = place[3, i] + u[0] * place[0, i] + u[SLIDE] * place[1, i] + u[SLIDE + 1] * place[2, i]
+            x = _origin(u, place, i)
             for j in range(3):
                 x += R[i, j] * centre[b, j]
                 if at == SWINGS:
@@ -91,9 +98,7 @@ def put(u: Any, heading: float, place: Any, pivot: Any, centre: Any, part: Any, 
 @compiled
 def _spin(axis: Any, x: Any, turn: Any, row: Any) -> None:
     """Velocity of a body at x (3,) that spins about an axis (3,) through the origin into row (6,)."""
-    row[0] = axis[1] * x[2] - axis[2] * x[1]
-    row[1] = axis[2] * x[0] - axis[0] * x[2]
-    row[2] = axis[0] * x[1] - axis[1] * x[0]
+    row[0], row[1], row[2] = cross(axis[0], axis[1], axis[2], x[0], x[1], x[2])
     for i in range(3):
         row[3 + i] = turn[0, i] * axis[0] + turn[1, i] * axis[1] + turn[2, i] * axis[2]
 
@@ -104,7 +109,8 @@ def move(u: Any, heading: float, place: Any, pivot: Any, part: Any, turns: Any, 
 
     `turns` and `q` are those that `put` writes for u.
     """
-    R, level, own, x, arm = turns[0], np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
+    R, x, arm = turns[0], np.empty(3), np.empty(3)
+    level, own, tilt = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     turn_by_angles(0.0, 0.0, heading + u[YAW], level)
     rows[:] = 0.0
     for b in range(part.size):
@@ -112,8 +118,7 @@ def move(u: Any, heading: float, place: Any, pivot: Any, part: Any, turns: Any, 
         for i in range(3):
             rows[0, first + i] = place[0, i]
             rows[SLIDE, first + i], rows[SLIDE + 1, first + i] = place[1, i], place[2, i]
-            origin = place[3, i] + u[0] * place[0, i] + u[SLIDE] * place[1, i] + u[SLIDE + 1] * place[2, i]
-            x[i] = q[first + i] - origin
+            x[i] = q[first + i] - _origin(u, place, i)
         _spin(R[:, 0], x, turns[b], rows[ROLL, first : first + 6])
         _spin(level[:, 1], x, turns[b], rows[PITCH, first : first + 6])
         _spin(level[:, 2], x, turns[b], rows[YAW, first : first + 6])
@@ -124,11 +129,10 @@ def move(u: Any, heading: float, place: Any, pivot: Any, part: Any, turns: Any, 
         elif at != WITH_CHASSIS:
             arm[:] = 0.0
             turn_by_angles(0.0, 0.0, u[at + 5], own)
-            product(R, own, level)  # axes of the part's pitch
+            _product(R, own, tilt)
             _spin(turns[b, :, 0], arm, turns[b], rows[at + 3, first : first + 6])
-            _spin(level[:, 1], arm, turns[b], rows[at + 4, first : first + 6])
+            _spin(tilt[:, 1], arm, turns[b], rows[at + 4, first : first + 6])
             _spin(R[:, 2], arm, turns[b], rows[at + 5, first : first + 6])
-            turn_by_angles(0.0, 0.0, heading + u[YAW], level)
             for k in range(3):
                 for i in range(3):
                     rows[at + k, first + i] = R[i, k]

@@ -230,14 +230,14 @@ class _Tilt:
         """
         statics, memory = self.statics, self.t.wheel_memory
         memory[:] = self.memory
-        q, Q = statics.coordinates(u), np.zeros(statics.weight.size)
+        (q, rows), Q = statics.placed(u), np.zeros(statics.weight.size)
         generalised_forces(statics.handle, q, np.zeros_like(Q), Q)
         keep_strain(statics.handle)
         strain = memory[:, E_SHEAR : E_SHEAR + 3].copy()
         memory[:, E_SHEAR : E_SHEAR + 3] *= (memory[:, E_FORCE_NOW] / self.loads)[:, None]
         generalised_forces(statics.handle, q, np.zeros_like(Q), Q)
         memory[:, E_SHEAR : E_SHEAR + 3] = strain
-        r = statics.tangents(u) @ (Q + statics.weight) / statics.scale
+        r = rows @ (Q + statics.weight) / statics.scale
         return np.asarray(np.linalg.solve(self.lower, r[self.free]))
 
     def _stiffness(self, u: Array, r: Array) -> Array:

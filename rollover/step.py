@@ -388,16 +388,3 @@ def kinetic_of_soil(t: Any) -> float:
             speed = m[NORMAL] * v[0] + m[NORMAL + 1] * v[1] + m[NORMAL + 2] * v[2]
             total += 0.5 * m[MASS_B] * speed * speed
     return total
-
-
-@compiled
-def paces(qd: Any, Q: Any, number: int) -> Any:
-    """Largest velocity (m/s or rad/s) of all coordinates and of the first `number`; NaN where one, or a force, is."""
-    most = own = 0.0
-    for k in range(qd.size):
-        if not (math.isfinite(qd[k]) and math.isfinite(Q[k])):
-            return math.nan, math.nan
-        most = max(most, abs(qd[k]))
-        if k < number:
-            own = most
-    return most, own

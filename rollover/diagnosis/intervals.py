@@ -31,13 +31,18 @@ FEWEST = 3  # recordings that can disagree
 EVENLY = 12.0**-0.5  # standard deviation of what is spread evenly from 0 to 1
 
 
+def by_student(free: int) -> float:
+    """(t/1.96)^2: how much wider squares are told by so few degrees of freedom."""
+    from scipy.stats import t
+
+    return (float(t.ppf(0.975, free)) / TWO_SIDED) ** 2
+
+
 def scattered(evidence: Sequence[Evidence], blocks: Sequence[Block], inverse: Array) -> Array:
     """Variances (p,) of parameters fitted to one run each, by what neighbours of the run scatter by.
 
     sum_r var_k(A^-1 J_r'd_rk) (1 + 1/k) (t/1.96)^2: what was measured is one run more, the model the mean of k.
     """
-    from scipy.stats import t
-
     found, free = np.zeros(inverse.shape[0]), 0
     for e, block in zip(evidence, blocks, strict=True):
         k = len(e.strays)
@@ -46,7 +51,7 @@ def scattered(evidence: Sequence[Evidence], blocks: Sequence[Block], inverse: Ar
         free += k - 1
         each = np.array([inverse @ along(block, e, stray) for stray in e.strays])
         found += (1.0 + 1.0 / k) * np.var(each, axis=0, ddof=1)
-    return np.asarray(found * (float(t.ppf(0.975, free)) / TWO_SIDED) ** 2) if free else found
+    return np.asarray(found * by_student(free)) if free else found
 
 
 def disagreeing(evidence: Sequence[Evidence], blocks: Sequence[Block], inverse: Array) -> Array:
@@ -54,15 +59,12 @@ def disagreeing(evidence: Sequence[Evidence], blocks: Sequence[Block], inverse: 
 
     (t/1.96)^2 R/(R - 1) A^-1 [sum_r (g_r - g)(g_r - g)'] A^-1, g_r recording r's part of A dx of (D8), g their mean.
     """
-    from scipy.stats import t
-
     number = len(blocks)
     if number < FEWEST:
         return np.zeros(inverse.shape[0])
     pulls = np.array([pull_of_means(e, block) for e, block in zip(evidence, blocks, strict=True)])
     moved = (pulls - pulls.mean(axis=0)) @ inverse
-    wider = float(t.ppf(0.975, number - 1)) / TWO_SIDED
-    return np.asarray(wider**2 * number / (number - 1) * np.sum(moved**2, axis=0))
+    return np.asarray(by_student(number - 1) * number / (number - 1) * np.sum(moved**2, axis=0))
 
 
 def unshaped(judge: Judge, fitted: Fitted, inverse: Array) -> Array:

@@ -91,7 +91,7 @@ def explained(
     for _ in range(MOST):
         if is_tolerated(judge, current):
             break
-        if looked.p_value() > CHANCE and (left.p_value > SURE or not matters(judge, current, left)):
+        if looked.p_value() > CHANCE and is_enough(judge, current, left):
             break
         found = step(judge, current, free(current, candidates), groups, phases, say, looked, crew)
         first = first or found
@@ -118,12 +118,12 @@ def explained(
                     current = other.fitted
         if len(taken) > 1 and current.left > HOPELESS**2 * count:
             break
-        told = left.p_value > SURE or not matters(judge, current, left)
-        looked = look_again(judge, current, base if told else None, free(current, candidates), groups, first_look)
+        known = base if is_enough(judge, current, left) else None
+        looked = look_again(judge, current, known, free(current, candidates), groups, first_look)
     if not judge.straying:
         judge.straying, current = True, judge.again(current)
         left = mismatch_of(judge.evidence, current.blocks, phases)
-    is_whole = left.p_value > SURE or not matters(judge, current, left)
+    is_whole = is_enough(judge, current, left)
     if first is not None and not judge.effort.thrifty and (not is_whole or len(taken) == MOST):
         both = _together(judge, first, taken, first_look, phases, say, crew)
         # two that leave what chance leaves are preferred to three that do
@@ -131,7 +131,7 @@ def explained(
             both[1].p_value > SURE if is_whole else is_better(both[0][-1].fitted, both[1], current)
         ):
             (taken, left), current = both, both[0][-1].fitted
-            is_whole = left.p_value > SURE or not matters(judge, current, left)
+            is_whole = is_enough(judge, current, left)
     parts = [s.again(judge) for s in taken]
     if is_whole and len(taken) > 1:
         parts = _needed(judge, taken, candidates, groups, phases, say, crew)
@@ -355,6 +355,11 @@ def is_tolerated(judge: Judge, fitted: Fitted) -> bool:
     rough = [e.is_rough(s) for e in judge.evidence for s in e.signals]
     most = 1.0 + 2.0 * np.sqrt(2.0 / len(rough))
     return all(rough) and bool(fitted.left < most * sum(b.residual.size for b in fitted.blocks))
+
+
+def is_enough(judge: Judge, fitted: Fitted, left: Mismatch) -> bool:
+    """Whether what a fit leaves is no more than chance, or not worth a word."""
+    return left.p_value > SURE or not matters(judge, fitted, left)
 
 
 def matters(judge: Judge, base: Fitted, before: Mismatch) -> bool:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from rollover.dense import largest
 from rollover.frames import from_angles
 from rollover.posture import AXLE, PARTS, PITCH, ROLL, SLIDE, SWINGS, WITH_CHASSIS, YAW, move, put, vector_of
-from rollover.step import paces
 
 HEADING = 0.4
 NORMAL = np.array([0.1, -0.2, 0.97]) / np.linalg.norm([0.1, -0.2, 0.97])
@@ -69,8 +69,9 @@ def test_a_rotation_vector_is_found_for_any_turn(axis: tuple[float, ...], angle:
 
 def test_the_pace_of_all_and_of_the_bodies_and_of_what_is_no_number() -> None:
     qd = np.array([0.5, -2.0, 1.0, 30.0])
-    assert paces(qd, np.zeros(4), 3) == (30.0, 2.0)
-    assert paces(qd, np.zeros(4), 4) == (30.0, 30.0)
-    for bad in (np.nan, np.inf):
-        assert np.isnan(paces(qd, np.array([0.0, bad, 0.0, 0.0]), 3)).all()
-        assert np.isnan(paces(np.array([0.0, bad]), np.zeros(2), 2)).all()
+    assert (largest(qd), largest(qd[:3])) == (30.0, 2.0)
+    assert (largest(qd), largest(qd[:4])) == (30.0, 30.0)
+    assert np.isnan(largest(np.array([0.0, np.nan, 5.0])))
+    for bad in (np.nan, np.inf, -np.inf):
+        assert not np.isfinite(largest(np.array([0.0, bad, 0.0, 0.0])))
+        assert not np.isfinite(largest(np.array([0.0, bad])))
