@@ -10,7 +10,7 @@ from typing import Any
 
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.diagnose import diagnose
-from rollover.diagnosis.verdict import Diagnosis, Law, Named, Place, Score
+from rollover.diagnosis.verdict import Diagnosis, Interval, Law, Named, Place, Score
 from rollover.document import dump
 from rollover.effects import nth
 from rollover.importers import read_recording
@@ -75,17 +75,21 @@ def _effect(effect: Named) -> dict[str, Any]:
         "kind": effect.kind,
         **({} if effect.channel is None else {"channel": effect.channel}),
         "statement": effect.statement,
-        "parameters": {name: asdict(i) for name, i in effect.parameters.items()},
+        "parameters": {name: _interval(i) for name, i in effect.parameters.items()},
         "p_value": effect.p_value,
         "indistinguishable_from": list(effect.indistinguishable_from),
         "discriminating_test": effect.discriminating_test,
     }
 
 
+def _interval(interval: Interval) -> dict[str, Any]:
+    return {k: v for k, v in asdict(interval).items() if v is not None}
+
+
 def _law(law: Law) -> dict[str, Any]:
     return {
         "law": law.law,
-        "terms": [{"term": t.term, "depends_on": t.depends_on, "coefficient": asdict(t.force)} for t in law.terms],
+        "terms": [{"term": t.term, "depends_on": t.depends_on, "coefficient": _interval(t.force)} for t in law.terms],
         "held_out_gain": law.held_out_gain,
         "standard_error": law.standard_error,
         "held_out": {"before": {"nrmse": law.before}, "after": {"nrmse": law.after}},

@@ -140,7 +140,7 @@ def work(judge: Judge, job: Job) -> Fitted | None:
             width=job.width,
             pinned=job.pinned,
         )
-    begun = linearised(judge, job.candidates, job.start, job.recordings, job.shifts)
+    begun = linearised(judge, job.candidates, job.start, job.shifts, job.recordings)
     if begun is None:
         return None
     ways: dict[str, Callable[[Judge, Fitted], Fitted | None]] = {
@@ -167,20 +167,21 @@ def _rebuilt(judge: Judge, job: Job, row: dict[str, Any] | None) -> Fitted | Non
     candidates = list(job.candidates)
     if len(row["x"]) > len(job.start):
         candidates[-1] = candidates[-1].whole()
-    return linearised(judge, candidates, row["x"], job.recordings, row["shifts"])
+    return linearised(judge, candidates, row["x"], row["shifts"], job.recordings)
 
 
 def linearised(
     judge: Judge,
     candidates: Sequence[Candidate],
     x: Sequence[float],
-    recordings: Sequence[int],
     shifts: Sequence[float],
+    recordings: Sequence[int] | None = None,
 ) -> Fitted | None:
-    """A fit as it stands at x and these time shifts (s); None where nothing can be simulated."""
+    """A fit to all recordings or some as it stands at x and these time shifts (s); None if nothing can be simulated."""
     blocks: list[Block] = []
-    judge.made_ahead(judge.about(recordings, candidates, x, judge.effort.fine))
-    for r, shift in zip(recordings, shifts, strict=True):
+    use = range(len(shifts)) if recordings is None else recordings
+    judge.made_ahead(judge.about(use, candidates, x, judge.effort.fine))
+    for r, shift in zip(use, shifts, strict=True):
         block = judge.block(r, candidates, x, shift, judge.effort.fine)
         if block is None:
             return None

@@ -33,7 +33,7 @@ from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing,
 from rollover.diagnosis.scores import judged
 from rollover.diagnosis.selection import Explanation, decided, explained, matters
 from rollover.diagnosis.simulator import blow_of, set_up
-from rollover.diagnosis.statements import closest, considered, named, noise, places, sentence
+from rollover.diagnosis.statements import by_steps, closest, considered, named, noise, places, sentence
 from rollover.diagnosis.verdict import Degree, Diagnosis
 from rollover.drop import unfit
 from rollover.effects import EFFECTS
@@ -116,7 +116,7 @@ def diagnose(
     effects = named(judge, explanation, groups) if verdict in ("parameter", "sensor", "missing-physics") else ()
     remains = after.p_value < SURE and matters(judge, explanation.fitted, after)
     training = tuple(e.name for e in found)
-    notes += [*(_felt(degrees[0]) for _ in degrees[:1] if is_mismatch), *_cost(found)]
+    notes += [*(_felt(degrees[0]) for _ in degrees[:1] if is_mismatch), *by_steps(effects), *_cost(found)]
     return Diagnosis(
         verdict=verdict,
         sentence=sentence(verdict, effects, explanation.p_value, h_before.held, h_after.held, found)

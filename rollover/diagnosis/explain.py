@@ -278,18 +278,23 @@ def _chosen(screened: Sequence[Screened], effort: Effort, looked: Gate) -> list[
     """Those worth a first fit: that start well, and that have most to gain.
 
     Of runs that scatter those whose score is a small part of the best one's are not; what a sensor makes of them costs
-    none: as many more. With a leader come its kin.
+    none: as many more. A part that gives way looks like several sensors at the end of their ranges, and scores less
+    than each: the two are compared with their own kind. With a leader come its kin.
     """
     by_start = sorted(screened, key=lambda s: s.left)[: effort.promising // 2]
     if not effort.thrifty:
         return [*by_start, *sorted(screened, key=lambda s: -s.potential)[: effort.promising]]
-    scores = {id(s): looked.scores.get(s.candidate.key, 0.0) for s in screened}
-    ranked = sorted(screened, key=lambda s: -scores[id(s)])
+    by_key = {s.candidate.key: s for s in screened}
+    ranked = [by_key[c.key] for c in looked.ranked([s.candidate for s in screened])]
     moving = [s for s in ranked if s.candidate.kind != "sensor"]
     reading = [s for s in ranked if s.candidate.kind == "sensor"]
-    leading = [*by_start, *moving[: effort.promising], *reading[: effort.promising]]
     related = kin([s.candidate for s in moving], effort.promising, effort.leaders)
-    able = [s for s in leading if scores[id(s)] >= HOPEFUL * looked.score]
+    able = []
+    for own in (moving, reading):
+        scores = {id(s): looked.scores.get(s.candidate.key, 0.0) for s in own}
+        least = HOPEFUL * max(scores.values(), default=0.0)
+        leading = [*(s for s in by_start if id(s) in scores), *own[: effort.promising]]
+        able += [s for s in leading if scores[id(s)] >= least or s.candidate.key in looked.leading]
     return [*able, *(s for s in moving if s.candidate in related)]
 
 

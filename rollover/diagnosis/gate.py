@@ -53,6 +53,14 @@ class Gate:
     detectable: Mapping[str, float]
     starts: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
     only: tuple[int, ...] = ()
+    leading: tuple[str, ...] = ()
+
+    def ranked(self, candidates: Sequence[Candidate]) -> list[Candidate]:
+        """Candidates by score, the best first; before each of the first ones the next of those that are `leading`."""
+        by_score = sorted(candidates, key=lambda c: -self.scores.get(c.key, 0.0))
+        leading = [c for key in self.leading for c in by_score if c.key == key]
+        joined = [c for both in zip(leading, by_score, strict=False) for c in both]
+        return list({c.key: c for c in (*joined, *by_score)}.values())
 
     def p_value(self, phi: float = 1.0) -> float:
         """p-value of the best score; `phi` is what is left per sample where not even an explanation leaves noise."""

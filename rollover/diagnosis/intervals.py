@@ -15,7 +15,7 @@ from rollover.diagnosis.crew import linearised
 from rollover.diagnosis.evidence import MODEL_ERROR, Evidence
 from rollover.diagnosis.fit import GENTLE, Fitted, Judge
 from rollover.diagnosis.secant import CLOCKED
-from rollover.diagnosis.settle import along, left_of_means, pull_of_means, step_of_means
+from rollover.diagnosis.settle import PARTS, along, left_of_means, pull_of_means, step_of_means
 from rollover.diagnosis.verdict import Interval
 from rollover.effects import EFFECTS, units_of
 
@@ -107,8 +107,7 @@ def with_shapes(judge: Judge, fitted: Fitted) -> tuple[Fitted, Array, list[int]]
         x += whole
         candidates.append(c.whole() if told else c)
     if len(x) > len(kept) and not judge.effort.thrifty:
-        every, shifts = range(len(fitted.blocks)), [b.shift for b in fitted.blocks]
-        found = linearised(judge, candidates, x, every, shifts)
+        found = linearised(judge, candidates, x, [b.shift for b in fitted.blocks])
         if found is not None:
             return found, np.array(prior), kept
     return fitted, np.full(len(fitted.x), GENTLE), list(range(len(fitted.x)))
@@ -174,7 +173,9 @@ def _noise(judge: Judge, fitted: Fitted) -> Array:
     return np.asarray(found)
 
 
-def intervals(judge: Judge, fitted: Fitted, sides: Mapping[int, float] | None = None) -> list[dict[str, Interval]]:
+def intervals(
+    judge: Judge, fitted: Fitted, sides: Mapping[int, float] | None = None, coarse: Fitted | None = None
+) -> list[dict[str, Interval]]:
     """For each effect, its parameters with 95 % intervals.
 
     cov = phi A^-1, phi the misfit left per sample (at least 1); beside it, in quadrature, what a gain error of the
@@ -182,9 +183,10 @@ def intervals(judge: Judge, fitted: Fitted, sides: Mapping[int, float] | None = 
     that nobody could tell apart scatter and samples are weighed by that, cov = phi A^-1 N A^-1 with N the covariance
     that the noise alone gives J'w; beside it stand `scattered` and `unshaped`. Elsewhere shapes that were not fitted
     are in A, see `with_shapes`; an end of a range is read off where samples pile up there. `sides` as in `reaches`: all
-    others are as wide as slopes say.
+    others are as wide as slopes say. `coarse` is the fit that was moved to this one `in_shorter_steps`: steps of no
+    length would move it by another 1/(PARTS - 1) of that.
     """
-    told = fitted
+    told, coarse = fitted, coarse or fitted
     fitted, prior, kept = with_shapes(judge, fitted)
     p = len(fitted.x)
     A = sum((b.normal()[0] for b in fitted.blocks), np.zeros((p, p))) + np.diag(prior)
@@ -210,12 +212,13 @@ def intervals(judge: Judge, fitted: Fitted, sides: Mapping[int, float] | None = 
         moved += scattered(judge.evidence, fitted.blocks, inverse) + unshaped(judge, fitted, inverse)
         rest = step_of_means(judge.evidence, fitted.blocks)
     moved += rest**2
+    moved[kept] += ((np.array(told.x) - np.array(coarse.x)) / (PARTS - 1)) ** 2
     variance = sd**2 + moved
     if strayed:
         variance = np.maximum(variance, disagreeing(judge.evidence, fitted.blocks, inverse))
     sd = np.sqrt(variance)[kept]
     own = np.sqrt(phi * np.diag(inverse))[kept]
-    wide = np.sqrt(sd[:, None] ** 2 + own[:, None] ** 2 * (reaches(judge, told, own, phi, sides) ** 2 - 1.0))
+    wide = np.sqrt(sd[:, None] ** 2 + own[:, None] ** 2 * (reaches(judge, coarse, own, phi, sides) ** 2 - 1.0))
     found, at = [], 0
     for c in told.candidates:
         kind: Any = EFFECTS[c.id]
@@ -229,6 +232,7 @@ def intervals(judge: Judge, fitted: Fitted, sides: Mapping[int, float] | None = 
                 high=physical(x + TWO_SIDED * wide[at, 1], search),
                 unit=units.get(name, ""),
                 at_bound=at_an_end(x),
+                as_simulated=physical(coarse.x[at], search) if coarse.x[at] != x else None,
             )
             at += 1
         if c.id == "sensor-clipping":

@@ -9,8 +9,8 @@ import numpy as np
 
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.gate import Gate, gate
-from rollover.diagnosis.lasting import unbent
+from rollover.diagnosis.gate import Gate, gate, p_value
+from rollover.diagnosis.lasting import SPOKEN, unbent
 from rollover.diagnosis.screening import spread
 
 HINTED = 0.2  # p-value beyond which what candidates move elsewhere tells that none is looked for here
@@ -38,18 +38,39 @@ def look(
     if judge.per_error == 1.0:  # beside a tolerance it cannot be told what a clock has eaten
         base = unbent(judge, base)
     few, more = few or spread(base, groups, effort.few), spread(base, groups, effort.looked_at)
+    if judge.straying:
+        return _narrowed(judge, base, candidates, few, more, beside)[-1]
+    first, last = _narrowed(judge, base, candidates, few, more, beside)
+    # in full, what one of them lacks hides what the others have
+    scores = {key: max(score, first.scores.get(key, 0.0)) for key, score in last.scores.items()}
+    moving = [c for c in candidates if c.kind != "sensor"]
+    judge.straying = True  # a part that gives way shows in how it does, not in where all else goes then
+    forgiven = _narrowed(judge, judge.again(base), moving, few, more, beside)[-1]
+    judge.straying = False
+    able = [c.key for c in forgiven.ranked(moving) if p_value(forgiven.scores.get(c.key, 0.0), forgiven.null) < SPOKEN]
+    scores = {key: max(score, forgiven.scores.get(key, 0.0)) for key, score in scores.items()}
+    return replace(last, scores=scores, leading=tuple(able[: effort.leaders]))
+
+
+def _narrowed(
+    judge: Judge,
+    base: Fitted,
+    candidates: Sequence[Candidate],
+    few: Sequence[int],
+    more: Sequence[int],
+    beside: Fitted | None,
+) -> tuple[Gate, Gate]:
+    """A gate by few recordings, and one by more of what moves the vehicle best there and of all sensors."""
+    effort = judge.effort
     first = gate(judge, base, candidates, few, beside)
     if len(more) <= len(few):
-        return first
+        return first, first
     moving = sorted((c for c in candidates if c.kind != "sensor"), key=lambda c: -first.scores.get(c.key, 0.0))
     able = [*moving[: effort.shortlist], *(c for c in candidates if c.kind == "sensor")]
     second = gate(judge, base, able, more, beside)
-    scores = {**dict.fromkeys(first.scores, 0.0), **second.scores}
-    if not judge.straying:  # in full, what one of them lacks hides what the others have
-        scores = {key: max(score, first.scores.get(key, 0.0)) for key, score in scores.items()}
-    return replace(
+    return first, replace(
         second,
-        scores=scores,
+        scores={**dict.fromkeys(first.scores, 0.0), **second.scores},
         null=np.maximum(first.null, second.null),
         detectable={**first.detectable, **second.detectable},
         starts={**first.starts, **second.starts},

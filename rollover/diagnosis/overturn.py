@@ -111,6 +111,7 @@ class RunSimulator:
         self._phases: dict[tuple[float, ...], tuple[tuple[float, str], ...]] = {}  # by where the grid lies
         self._centre: tuple[float, ...] = scenario.ground.elements.centre
         self._limit = np.inf
+        self.parts = 1  # of a step, in which neighbours are run; 1: as each has it
         self.children: Children | None = None  # make runs that are wanted next
         self._known: dict[tuple[Any, ...], tuple[Scenario, Recording] | None] = {}
         self._behind: dict[tuple[Any, ...], tuple[Recording, dict[str, Array]]] = {}
@@ -252,8 +253,9 @@ class RunSimulator:
             found["ground.elements.spacing"] = tuple(one.spacing * w for w in ground.spacing)
         if one.points != 1.0:
             found["vehicle.contact_spacing"] = one.points * own.vehicle.contact_spacing
-        if one.parts > 1:
-            found["simulation.step"] = own.simulation.step / one.parts
+        parts = self.parts if self.parts > 1 else one.parts
+        if parts > 1:
+            found["simulation.step"] = own.simulation.step / parts
         return found
 
     def _place(self, fraction: tuple[float, float]) -> tuple[float, ...]:

@@ -141,9 +141,11 @@ def _apart(met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float,
 def promising(candidates: Sequence[Candidate], looked: Gate, effort: Effort = DROPS) -> list[Candidate]:
     """Those that scored best, and of two parameters all: beside their thresholds a score tells little.
 
-    Where each costs runs, of these only the kin of what leads.
+    Where each costs runs, of these only the kin of what leads, and a few that move the vehicle in any case.
     """
-    ranked = sorted(candidates, key=lambda c: -looked.scores.get(c.key, 0.0))
+    ranked = looked.ranked(candidates)
     if effort.scored is not None:
-        return [*ranked[: effort.scored], *kin(ranked, effort.scored, effort.leaders)]
+        moving = [c for c in ranked if c.kind != "sensor"][: effort.promising]
+        related = kin(ranked, effort.scored, effort.leaders)
+        return list({c.key: c for c in (*ranked[: effort.scored], *moving, *related)}.values())
     return [c for k, c in enumerate(ranked) if k < SCORED or len(c.search) > 1]

@@ -6,6 +6,9 @@ neighbours y_k = y + d_k of the run at the fitted point, each recording's mean o
     dx = A^-1 sum_r J_r'(w_r - mean_k d_rk)                                                                    (D8)
 
 is the step to the least squares of the mean. A, J, w as in (D1).
+
+An integrator's error is no chance: where it is of first order, steps of one in `PARTS` have all of it but that share,
+and move parameters by what they had made up for it.
 """
 
 from __future__ import annotations
@@ -23,6 +26,7 @@ from rollover.diagnosis.crew import linearised
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Fitted, Judge
+from rollover.diagnosis.overturn import full_runs
 
 Array = NDArray[np.float64]
 SHARES = (1.0, 0.5, 1.5)  # of the way: where a run leaps from one course to another beside it
@@ -30,6 +34,8 @@ NEARLY = 1.15  # times the least misfit
 FARTHEST = 0.15  # of a coordinate, that a mean may move it at a time
 STEPS = 5  # at most
 WORTH = 2.0  # gain that pays for one
+PARTS = 4  # of the scenario's step
+SHORTER = 2  # steps by runs in shorter ones, each of which costs as many runs as `PARTS` of others
 
 
 def settled(judge: Judge, part: Step) -> Step:
@@ -68,6 +74,35 @@ def _weighed_anew(judge: Judge, fitted: Fitted) -> Fitted:
     return replace(fitted, blocks=tuple(b or old for b, old in zip(new, fitted.blocks, strict=True)))
 
 
+def in_shorter_steps(judge: Judge, fitted: Fitted) -> Fitted:
+    """A fit moved to where the mean of its neighbours in shorter steps is met best, under their scatter.
+
+    As it was where no full runs are made, where runs do not scatter, and where nothing can be simulated there.
+    """
+    runs = [own for own in (full_runs(e.simulator) for e in judge.evidence) if own is not None]
+    if len(runs) < len(judge.evidence) or not any(e.strays for e in judge.evidence):
+        return fitted
+    here = fitted
+    for own in runs:
+        own.parts = PARTS
+    try:
+        rescattered(judge, here)
+        here = judge.again(here)
+        for _ in range(SHORTER):
+            dx = np.clip(step_of_means(judge.evidence, here.blocks), -FARTHEST, FARTHEST)
+            if promised(here.blocks, dx) < WORTH:
+                break
+            there = linearised(judge, here.candidates, *_moved(here, dx))
+            if there is None:
+                break
+            rescattered(judge, there)
+            here = judge.again(there)
+    finally:
+        for own in runs:
+            own.parts = 1
+    return here
+
+
 def promised(blocks: Sequence[Block], dx: Array) -> float:
     """Gain dx'A dx of a step to a minimum, noise units."""
     return float(sum(dx @ b.normal()[0] @ dx for b in blocks))
@@ -85,7 +120,7 @@ def _onward(judge: Judge, old: Fitted, dx: Array) -> Fitted | None:
     elif lefts[best] >= old.left:
         return None
     shifts = met[best][1]
-    return linearised(judge, old.candidates, begun[best][0], range(len(shifts)), shifts)
+    return linearised(judge, old.candidates, begun[best][0], shifts)
 
 
 def _moved(old: Fitted, dx: Array) -> tuple[list[float], list[float]]:

@@ -15,14 +15,25 @@ from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.holdout import Held, held_out
 from rollover.diagnosis.intervals import intervals
 from rollover.diagnosis.selection import NEGLIGIBLE, Explanation, strongest
+from rollover.diagnosis.settle import PARTS, in_shorter_steps
 from rollover.diagnosis.verdict import Considered, Named, Place, Verdict
 from rollover.effects import EFFECTS
 
+NOTABLE = 0.1  # of an interval
+
 
 def named(judge: Judge, found: Explanation, groups: Sequence[Sequence[int]]) -> tuple[Named, ...]:
-    """Effects of an explanation with their intervals and look-alikes, the strongest first."""
-    fitted = found.fitted
-    settings = {c.key: s for c, s in zip(fitted.candidates, intervals(judge, fitted), strict=True)}
+    """Effects of an explanation with their intervals and look-alikes, the strongest first.
+
+    Values are those of shorter steps, where runs are integrated: what the scenario's steps take for it is no property
+    of what was recorded.
+    """
+    fitted, held = found.fitted, judge.evidence
+    fine = in_shorter_steps(judge, fitted)
+    told = intervals(judge, fine, coarse=fitted)
+    if fine is not fitted:
+        judge.weigh(held)
+    settings = {c.key: s for c, s in zip(fitted.candidates, told, strict=True)}
     by_key = {s.fitted.candidates[-1].key: s for s in found.parts}
     effects = []
     for c in fitted.candidates:
@@ -50,6 +61,17 @@ def named(judge: Judge, found: Explanation, groups: Sequence[Sequence[int]]) -> 
         )
     first = strongest(judge, found.base, fitted)
     return tuple(sorted(effects, key=lambda n: (n.id, n.channel) != (first.id, first.channel)))
+
+
+def by_steps(effects: Sequence[Named]) -> list[str]:
+    """What the scenario's own steps would have said of values, where that is far off beside their intervals."""
+    return [
+        f"{effect.id} {name}: {i.value:.4g} {i.unit}".rstrip()
+        + f" by steps of 1/{PARTS} of the scenario's, in its own {i.as_simulated:.4g}"
+        for effect in effects
+        for name, i in effect.parameters.items()
+        if i.as_simulated is not None and abs(i.as_simulated - i.value) > NOTABLE * (i.high - i.low)
+    ]
 
 
 def considered(

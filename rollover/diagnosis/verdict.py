@@ -38,13 +38,17 @@ class Degree:
 
 @dataclass(frozen=True, kw_only=True)
 class Interval:
-    """A fitted parameter with its 95 % interval, in SI; `at_bound` where the search ended at an end of its range."""
+    """A fitted parameter with its 95 % interval, in SI; `at_bound` where the search ended at an end of its range.
+
+    `as_simulated` is the value that the scenario's own steps ask for, where shorter ones ask for another.
+    """
 
     value: float
     low: float
     high: float
     unit: str
     at_bound: bool = False
+    as_simulated: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -121,6 +121,10 @@ def test_with_what_leads_its_kin_gets_a_first_fit() -> None:
     hopeless = replace(looked, scores={**looked.scores, "c": 0.4, "f": 0.4})  # of 9; one is akin to the best
     assert "c" not in (rest := {s.candidate.key for s in _chosen(screened, RUNS, hopeless)})
     assert {"a", "b", "f"} < rest
+    loud = replace(looked, scores={**looked.scores, "g": 500.0})  # a sensor: those that move the vehicle stay
+    assert {s.candidate.key for s in _chosen(screened, RUNS, loud)} == {"a", "b", "c", "d", "f", "g"}
+    forgiven = replace(hopeless, leading=("c",))
+    assert "c" in {s.candidate.key for s in _chosen(screened, RUNS, forgiven)}
     every[0] = replace(every[0], neutral=(0.5, 0.5))  # it acts everywhere
     assert kin(every, 4, 2) == []
 

@@ -17,6 +17,7 @@ from rollover.diagnosis.effort import RUNS
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import VISIBLE, Gate, _at_odds, _best_along, _visible, gate
+from rollover.diagnosis.screening import promising
 from rollover.effects import Search
 from rollover.recording import Recording
 from tests.diagnosis import test_fits
@@ -144,6 +145,47 @@ def test_what_led_on_few_recordings_is_tried_where_all_count_in_full(
     found = looks.look(judge, base, [SLOPE], [[r] for r in range(4)])
     assert found.scores["slope"] == kept
     assert found.score == 5.0  # what is claimed is claimed by all
+
+
+def test_what_leads_where_other_courses_are_forgiven_is_tried_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In full c0 to c9 score best in turn, forgiven c5 and then c7, and c8 by chance: these take turns."""
+    asked: list[tuple[bool, set[str]]] = []
+
+    def looked(judge: Judge, base: Fitted, candidates: Any, only: Any, beside: Any) -> Gate:
+        asked.append((judge.straying, {c.key for c in candidates}))
+        scores = {c.key: 90.0 - int(c.key[1:]) for c in candidates}
+        if judge.straying:
+            scores = {c.key: {"c5": 70.0, "c7": 400.0, "c8": 0.1}.get(c.key, 0.0) for c in candidates}
+        null = np.sort(np.random.default_rng(0).chisquare(1, 1000))
+        return Gate(score=max(scores.values()), scores=scores, null=null, detectable={})
+
+    monkeypatch.setattr(looks, "gate", looked)
+    judge, base = judge_of((0.0,) * 4, (0.0,) * 4)
+    judge.straying, judge.effort = False, replace(judge.effort, leaders=3)
+    every = [replace(SLOPE, id=f"c{k}", kind="sensor" if k == 9 else "parameter") for k in range(10)]
+    found = looks.look(judge, base, every, [[r] for r in range(4)])
+    assert not judge.straying
+    assert found.leading == ("c7", "c5")
+    assert [c.key for c in found.ranked(every)][:5] == ["c7", "c5", "c0", "c1", "c2"]  # c7 is first of both
+    late = replace(found, scores={**found.scores, "c7": 1.0})
+    assert [c.key for c in late.ranked(every)][:5] == ["c7", "c0", "c5", "c1", "c2"]
+    assert (found.scores["c7"], found.scores["c0"]) == (400.0, 90.0)
+    assert found.score == 90.0  # what is claimed is claimed in full
+    assert all("c9" not in keys for straying, keys in asked if straying)
+    judge.straying = True
+    asked.clear()
+    assert looks.look(judge, base, every, [[r] for r in range(4)]).leading == ()
+    assert len(asked) == 2
+
+
+def test_some_that_move_the_vehicle_are_always_looked_at_closer() -> None:
+    """Twenty sensors score more than what makes them all wrong at once."""
+    every = [replace(SLOPE, id=f"c{k}", kind="sensor" if k < 20 else "parameter", channel=None) for k in range(30)]
+    scores = {c.key: 90.0 - int(c.key[1:]) for c in every}
+    found = promising(every, Gate(score=90.0, scores=scores, null=np.zeros(10), detectable={}), RUNS)
+    assert RUNS.scored is not None
+    assert [c.key for c in found][: RUNS.scored] == [f"c{k}" for k in range(RUNS.scored)]
+    assert [c.key for c in found[RUNS.scored :]] == [f"c{k}" for k in range(20, 20 + RUNS.promising)]
 
 
 def test_directions_may_be_those_beside_another_fit() -> None:

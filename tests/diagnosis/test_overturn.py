@@ -207,6 +207,17 @@ def test_neighbours_stray_after_the_first_contact_only() -> None:
     assert max(np.max(np.abs(s[ROLL][time > touch])) for s in strays) > 1e-4
 
 
+def test_all_neighbours_may_be_run_in_shorter_steps() -> None:
+    simulator = RunSimulator(toss(), recording(Z))
+    own = simulator.scenario.simulation.step
+    simulator.parts = 4
+    steps = {simulator.scenario.replaced(simulator._beside(n)).simulation.step for n in overturn.NEIGHBOURS}
+    assert steps == {own / 4}
+    simulator.parts = 1
+    steps = {simulator.scenario.replaced(simulator._beside(n)).simulation.step for n in overturn.NEIGHBOURS}
+    assert steps == {own / n.parts for n in overturn.NEIGHBOURS}
+
+
 def test_the_motion_is_told_though_it_was_not_recorded() -> None:
     simulator = RunSimulator(toss(), recording(Z))
     state = simulator.state(0.002)

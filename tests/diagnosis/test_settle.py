@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from rollover.diagnosis import overturn
+from rollover.diagnosis import overturn, settle
 from rollover.diagnosis.blocks import GENTLE, Block, Fitted
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.effort import DROPS, RUNS, Effort
@@ -19,6 +20,7 @@ from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.intervals import intervals, scattered, unshaped
 from rollover.diagnosis.overturn import CENTRE, NEIGHBOURS, Made, Making, RunSimulator
 from rollover.diagnosis.settle import along, rescattered, settled, step_of_means
+from rollover.diagnosis.statements import by_steps
 from rollover.effects import Search
 from rollover.recording import Recording
 from tests.physics.scenes import shipped
@@ -238,6 +240,51 @@ def test_the_scatter_is_that_of_runs_with_the_explanation() -> None:
     weight = judge.evidence[0].signals[0].weight
     assert weight is not None
     assert np.all(weight < 0.6)
+
+
+class Stepped(Rough):
+    """y = 20 (x + LAG/parts) sin(t): an integrator of first order, whose steps are the scenario's in one part."""
+
+    parts = 1
+
+    def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+        parts = self.parts if "neighbour" in changes else 1
+        wave = 20.0 * LAG / parts * np.sin(30.0 * (TIME - shift))
+        return {CHANNEL: super().predict(changes, shift)[CHANNEL] + wave}
+
+
+LAG = 0.06
+
+
+@pytest.mark.parametrize("size", [0.05, 0.0])
+def test_a_value_is_that_of_shorter_steps(size: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Measured at 0.4: fitted 0.4 - LAG, 0.4 - LAG/4 by steps of a quarter; LAG/4 more is another standard error."""
+    monkeypatch.setattr(settle, "full_runs", lambda simulator: simulator)
+    every = []
+    for r in range(4):
+        e = evidence(30 + r, size, 8.0 * np.sin(30.0 * TIME))
+        every.append(replace(e, simulator=cast(Any, Stepped(30 + r, size))))
+    judge = Judge(every)
+    fitted = judge.fit((SLOPE,), (0.3,))
+    assert fitted is not None
+    assert fitted.x[0] == pytest.approx(0.4 - LAG, abs=3e-3)
+    fine = settle.in_shorter_steps(judge, fitted)
+    assert all(cast(Any, e.simulator).parts == 1 for e in every)
+    if not size:  # nothing scatters: nothing is known of what steps do
+        assert fine is fitted
+        return
+    assert fine.x[0] == pytest.approx(0.4 - LAG / settle.PARTS, abs=3e-3)
+    by_itself, whole = intervals(judge, fine, {})[0]["angle"], intervals(judge, fine, {}, fitted)[0]["angle"]
+    more = np.sqrt((whole.high - whole.value) ** 2 - (by_itself.high - by_itself.value) ** 2)
+    assert more == pytest.approx(1.96 * (fine.x[0] - fitted.x[0]) / (settle.PARTS - 1), rel=1e-6)
+    assert whole.low < 0.4 < whole.high
+    assert (by_itself.as_simulated, whole.as_simulated) == (None, fitted.x[0])
+    told = [cast(Any, SimpleNamespace(id="slope", parameters={"angle": i})) for i in (by_itself, whole)]
+    assert by_steps(told) == [
+        f"slope angle: {fine.x[0]:.4g} rad by steps of 1/4 of the scenario's, in its own {fitted.x[0]:.4g}"
+    ]
+    hardly = replace(whole, as_simulated=whole.value + 0.01 * (whole.high - whole.low))
+    assert by_steps([cast(Any, SimpleNamespace(id="slope", parameters={"angle": hardly}))]) == []
 
 
 def test_parameters_hold_though_runs_scatter() -> None:
