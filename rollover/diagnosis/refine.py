@@ -186,3 +186,14 @@ def shaped(judge: Judge, f: Fitted) -> Fitted | None:
     if again is not None and again.left > NOISE_LEFT**2 * sum(b.residual.size for b in again.blocks):
         again = polish(judge, again)
     return again
+
+
+def without(judge: Judge, fitted: Fitted, k: int, rounds: int = 8) -> Fitted | None:
+    """The explanation fitted again without its k-th effect."""
+    rest, x, at = [], [], 0
+    for j, c in enumerate(fitted.candidates):
+        if j != k:
+            rest.append(c)
+            x += list(fitted.x[at : at + len(c.search)])
+        at += len(c.search)
+    return judge.fit(rest, x, rounds=rounds, shifts=[b.shift for b in fitted.blocks])

@@ -9,6 +9,7 @@ import numpy as np
 
 from rollover.diagnosis.blocks import at_an_end, turned
 from rollover.diagnosis.candidates import Candidate, is_one_sensor
+from rollover.diagnosis.chaos import is_other
 from rollover.diagnosis.crew import Crew, Job
 from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Phases, Step, moves, step, weighed
@@ -17,7 +18,7 @@ from rollover.diagnosis.gate import Gate, gate
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.lasting import NEEDED, astray, backed, begun_anew, lasting
 from rollover.diagnosis.looks import look, look_again
-from rollover.diagnosis.refine import polish, timed, traced
+from rollover.diagnosis.refine import polish, timed, traced, without
 from rollover.diagnosis.verdict import Verdict
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
@@ -28,6 +29,7 @@ MANY = 0.05  # p-value of what as many effects as may be leave, below which they
 HOPELESS = 2.0  # misfit over the noise that two effects leave and a third is not looked for
 LEADING, FOLLOWING = 4, 2  # of the first effects, and of later ones each, that are tried two by two
 HARDLY_MORE = 1.2  # times a tolerance, that an explanation leaves of held-out recordings
+SEVERAL = 2  # recordings on another course, after which they are not forgiven if a candidate scores beyond chance
 BETTER = 0.5  # of what is left, that another first effect must leave
 
 Groups = Sequence[Sequence[int]]
@@ -99,6 +101,9 @@ def explained(
             break
         if judge.effort.thrifty:
             found = lasting(judge, backed(found, looked), groups)
+            if found is None and not taken:
+                found = in_full(judge, current, candidates, groups, phases, say, crew)
+                first = found or first
             if found is None:
                 refuted = not taken
                 break
@@ -152,6 +157,30 @@ def explained(
     )
 
 
+def in_full(
+    judge: Judge,
+    current: Fitted,
+    candidates: Sequence[Candidate],
+    groups: Groups,
+    phases: Phases,
+    say: Progress,
+    crew: Crew,
+) -> Step | None:
+    """A step with all samples counted in full where several recordings took another course; None if nothing lasts.
+
+    Chance could have sent them there, but so could what is missing; if nothing lasts they are forgiven again.
+    """
+    if not judge.straying or sum(is_other(b.course) for b in current.blocks) < SEVERAL:
+        return None
+    judge.straying = False
+    base = judge.again(current)
+    looked = look(judge, base, candidates, groups)
+    found = step(judge, base, candidates, groups, phases, say, looked, crew)
+    found = None if found is None else lasting(judge, backed(found, looked), groups)
+    judge.straying = found is None
+    return found
+
+
 def followed(judge: Judge, found: Step, phases: Phases) -> tuple[Step, Mismatch]:
     """A step and what it leaves; where that is little more than noise, its fit followed to the end; never worse.
 
@@ -176,17 +205,6 @@ def free(current: Fitted, candidates: Sequence[Candidate]) -> list[Candidate]:
     """Candidates that an explanation does not hold yet."""
     used = {c.key for c in current.candidates}
     return [c for c in candidates if c.key not in used]
-
-
-def without(judge: Judge, fitted: Fitted, k: int, rounds: int = 8) -> Fitted | None:
-    """The explanation fitted again without its k-th effect."""
-    rest, x, at = [], [], 0
-    for j, c in enumerate(fitted.candidates):
-        if j != k:
-            rest.append(c)
-            x += list(fitted.x[at : at + len(c.search)])
-        at += len(c.search)
-    return judge.fit(rest, x, rounds=rounds, shifts=[b.shift for b in fitted.blocks])
 
 
 def _instead(

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import lasting as believed
+from rollover.diagnosis import selection
 from rollover.diagnosis.blocks import Block, Fitted
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.chaos import Course
@@ -249,3 +250,31 @@ def test_a_strength_that_is_not_told_from_none_is_no_effect(monkeypatch: pytest.
 
 def _from(low: float, high: float) -> Interval:
     return Interval(value=0.5 * (low + high), low=low, high=high, unit="1")
+
+
+@pytest.mark.parametrize(("others", "lasts"), [(1, True), (2, True), (2, False)])
+def test_two_on_another_course_are_looked_at_in_full_where_nothing_else_lasts(
+    others: int, lasts: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One may be chance's; of two it is asked what could have sent them there, and they are forgiven if nothing has."""
+    far = Course(samples=np.full(N, 0.1), share=0.2, more=1.0)
+    bare = Block(residual=np.ones(N), J=np.zeros((N, 0)), slope=np.zeros(N), shift=0.0, prior=1.0)
+    current = Fitted(
+        candidates=(), x=(), blocks=tuple(replace(bare, course=far if k < others else None) for k in range(4))
+    )
+    seen: list[bool] = []
+    judge: Any = SimpleNamespace(straying=True, again=lambda f: f)
+    looked = Gate(score=0.0, scores={}, null=np.zeros(9), detectable={})
+    made = Step(base=current, fitted=current, p_value=0.0)
+
+    def looks(judge: Any, *_: Any) -> Gate:
+        seen.append(judge.straying)
+        return looked
+
+    monkeypatch.setattr(selection, "look", looks)
+    monkeypatch.setattr(selection, "step", lambda *_: made)
+    monkeypatch.setattr(selection, "lasting", lambda *_: made if lasts else None)
+    found = selection.in_full(judge, current, [], [], [], lambda _: None, cast(Any, None))
+    assert seen == [False] * (others - 1)
+    assert (found is not None) == (others > 1 and lasts)
+    assert judge.straying is (found is None)
