@@ -39,9 +39,11 @@ class Averaged:
     def _means(self, found: Mapping[str, Array]) -> dict[str, Array]:
         return {c: np.add.reduceat(v, self.starts) / self.counts for c, v in found.items()}
 
-    def strays(self, changes: Mapping[str, Any] | None = None, shift: float = 0.0) -> list[dict[str, Array]]:
+    def strays(
+        self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1
+    ) -> list[dict[str, Array]]:
         """See `Simulator`."""
-        return [self._means(d) for d in self.inner.strays(changes, shift)]
+        return [self._means(d) for d in self.inner.strays(changes, shift, parts)]
 
     def settle(self) -> None:
         """See `Simulator`."""

@@ -289,12 +289,17 @@ def _chosen(screened: Sequence[Screened], effort: Effort, looked: Gate) -> list[
     moving = [s for s in ranked if s.candidate.kind != "sensor"]
     reading = [s for s in ranked if s.candidate.kind == "sensor"]
     related = kin([s.candidate for s in moving], effort.promising, effort.leaders)
+
+    def score(s: Screened) -> float:
+        return looked.scores.get(s.candidate.key, 0.0)
+
     able = []
     for own in (moving, reading):
-        scores = {id(s): looked.scores.get(s.candidate.key, 0.0) for s in own}
-        least = HOPEFUL * max(scores.values(), default=0.0)
-        leading = [*(s for s in by_start if id(s) in scores), *own[: effort.promising]]
-        able += [s for s in leading if scores[id(s)] >= least or s.candidate.key in looked.leading]
+        least = HOPEFUL * max(map(score, own), default=0.0)
+        begun_well = [s for s in by_start if s in own]
+        able += [
+            s for s in (*begun_well, *own[: effort.promising]) if score(s) >= least or s.candidate.key in looked.leading
+        ]
     return [*able, *(s for s in moving if s.candidate in related)]
 
 

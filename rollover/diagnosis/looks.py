@@ -38,9 +38,9 @@ def look(
     if judge.per_error == 1.0:  # beside a tolerance it cannot be told what a clock has eaten
         base = unbent(judge, base)
     few, more = few or spread(base, groups, effort.few), spread(base, groups, effort.looked_at)
-    if judge.straying:
-        return _narrowed(judge, base, candidates, few, more, beside)[-1]
     first, last = _narrowed(judge, base, candidates, few, more, beside)
+    if judge.straying:
+        return last
     # in full, what one of them lacks hides what the others have
     scores = {key: max(score, first.scores.get(key, 0.0)) for key, score in last.scores.items()}
     moving = [c for c in candidates if c.kind != "sensor"]

@@ -111,7 +111,6 @@ class RunSimulator:
         self._phases: dict[tuple[float, ...], tuple[tuple[float, str], ...]] = {}  # by where the grid lies
         self._centre: tuple[float, ...] = scenario.ground.elements.centre
         self._limit = np.inf
-        self.parts = 1  # of a step, in which neighbours are run; 1: as each has it
         self.children: Children | None = None  # make runs that are wanted next
         self._known: dict[tuple[Any, ...], tuple[Scenario, Recording] | None] = {}
         self._behind: dict[tuple[Any, ...], tuple[Recording, dict[str, Array]]] = {}
@@ -171,18 +170,21 @@ class RunSimulator:
         run, at = known[1], self.recording.time - shift
         return {name: np.interp(at, run.time, values) for name, values in run.channels.items()}
 
-    def strays(self, changes: Mapping[str, Any] | None = None, shift: float = 0.0) -> list[dict[str, Array]]:
+    def strays(
+        self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1
+    ) -> list[dict[str, Array]]:
         """What neighbours differ by from the run with `changes`, channels (n,) at the stamps less `shift` (s).
 
         Neighbours lie elsewhere on the ground's grid, have finer elements, more points of contact, shorter steps:
-        nobody could say which of them is right. Those that fail are left out.
+        nobody could say which of them is right. Those that fail are left out. Each step of
+        theirs is one of at least `parts` of the scenario's.
         """
         values = dict(changes or {})
         base = self.predict(values, shift)
         if base is None:
             return []
         found = []
-        several = [{**values, **self._beside(one)} for one in NEIGHBOURS]
+        several = [{**values, **self._beside(one, parts)} for one in NEIGHBOURS]
         made_ahead(self.children, [(self, beside) for beside in several])
         for beside in several:
             there = self.predict(beside, shift)
@@ -244,8 +246,8 @@ class RunSimulator:
         """Where the grid may lie as well, where the scenario has it first."""
         return [self._place(fraction) for fraction in ((0.0, 0.0), *ELSEWHERE)]
 
-    def _beside(self, one: Neighbour) -> dict[str, Any]:
-        """Values of a neighbour."""
+    def _beside(self, one: Neighbour, parts: int = 1) -> dict[str, Any]:
+        """Values of a neighbour, its step parted in at least so many `parts`."""
         own, ground = self.scenario, self.scenario.ground.elements
         place = self._place(one.place)
         found: dict[str, Any] = {CENTRE: self._centre if place == ground.centre else place}
@@ -253,9 +255,8 @@ class RunSimulator:
             found["ground.elements.spacing"] = tuple(one.spacing * w for w in ground.spacing)
         if one.points != 1.0:
             found["vehicle.contact_spacing"] = one.points * own.vehicle.contact_spacing
-        parts = self.parts if self.parts > 1 else one.parts
-        if parts > 1:
-            found["simulation.step"] = own.simulation.step / parts
+        if max(parts, one.parts) > 1:
+            found["simulation.step"] = own.simulation.step / max(parts, one.parts)
         return found
 
     def _place(self, fraction: tuple[float, float]) -> tuple[float, ...]:

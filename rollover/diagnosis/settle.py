@@ -26,7 +26,6 @@ from rollover.diagnosis.crew import linearised
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.overturn import full_runs
 
 Array = NDArray[np.float64]
 SHARES = (1.0, 0.5, 1.5)  # of the way: where a run leaps from one course to another beside it
@@ -77,29 +76,21 @@ def _weighed_anew(judge: Judge, fitted: Fitted) -> Fitted:
 def in_shorter_steps(judge: Judge, fitted: Fitted) -> Fitted:
     """A fit moved to where the mean of its neighbours in shorter steps is met best, under their scatter.
 
-    As it was where no full runs are made, where runs do not scatter, and where nothing can be simulated there.
+    As it was where runs do not scatter, and as far as it came where nothing can be simulated further on.
     """
-    runs = [own for own in (full_runs(e.simulator) for e in judge.evidence) if own is not None]
-    if len(runs) < len(judge.evidence) or not any(e.strays for e in judge.evidence):
+    if not any(e.strays for e in judge.evidence):
         return fitted
-    here = fitted
-    for own in runs:
-        own.parts = PARTS
-    try:
-        rescattered(judge, here)
-        here = judge.again(here)
-        for _ in range(SHORTER):
-            dx = np.clip(step_of_means(judge.evidence, here.blocks), -FARTHEST, FARTHEST)
-            if promised(here.blocks, dx) < WORTH:
-                break
-            there = linearised(judge, here.candidates, *_moved(here, dx))
-            if there is None:
-                break
-            rescattered(judge, there)
-            here = judge.again(there)
-    finally:
-        for own in runs:
-            own.parts = 1
+    rescattered(judge, fitted, PARTS)
+    here = judge.again(fitted)
+    for _ in range(SHORTER):
+        dx = np.clip(step_of_means(judge.evidence, here.blocks), -FARTHEST, FARTHEST)
+        if promised(here.blocks, dx) < WORTH:
+            break
+        there = linearised(judge, here.candidates, *_moved(here, dx))
+        if there is None:
+            break
+        rescattered(judge, there, PARTS)
+        here = judge.again(there)
     return here
 
 
@@ -140,13 +131,13 @@ def _met(
     return sum(b.normal()[2] for b in blocks), [b.shift for b in blocks]
 
 
-def rescattered(judge: Judge, fitted: Fitted) -> None:
-    """Weigh the recordings by what runs at a fitted point scatter by."""
+def rescattered(judge: Judge, fitted: Fitted, parts: int = 1) -> None:
+    """Weigh the recordings by what runs at a fitted point scatter by, in `parts` of a step."""
     changes = judge.changes(fitted.candidates, fitted.x)
     evidence = []
     for e, block in zip(judge.evidence, fitted.blocks, strict=True):
         plain = replace(e, signals=tuple(replace(s, weight=None) for s in e.signals), strays=())
-        evidence.append(weighted(plain, e.simulator.strays(changes, block.shift)))
+        evidence.append(weighted(plain, e.simulator.strays(changes, block.shift, parts)))
     judge.weigh(evidence)
 
 

@@ -33,8 +33,13 @@ class Simulator(Protocol):
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """Channels (n,) at the recording's stamps less `shift` (s); None if the simulation fails."""
 
-    def strays(self, changes: Mapping[str, Any] | None = None, shift: float = 0.0) -> list[dict[str, Array]]:
-        """What runs with `changes` that nobody could tell apart differ by, (n,) at the stamps less `shift`, s."""
+    def strays(
+        self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1
+    ) -> list[dict[str, Array]]:
+        """What runs with `changes` that nobody could tell apart differ by, (n,) at the stamps less `shift`, s.
+
+        Each step of theirs is one of at least `parts` of the scenario's.
+        """
 
     def settle(self) -> None:
         """Of runs that nobody could tell apart take the one that is the most like all."""
@@ -90,9 +95,11 @@ class DropSimulator:
             return None
         return behind_filters(run.channels, self.recording)
 
-    def strays(self, changes: Mapping[str, Any] | None = None, shift: float = 0.0) -> list[dict[str, Array]]:
+    def strays(
+        self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1
+    ) -> list[dict[str, Array]]:
         """See `Simulator`: one striker on its guide has no neighbours."""
-        del changes, shift
+        del changes, shift, parts
         return []
 
     def settle(self) -> None:

@@ -210,10 +210,8 @@ def test_neighbours_stray_after_the_first_contact_only() -> None:
 def test_all_neighbours_may_be_run_in_shorter_steps() -> None:
     simulator = RunSimulator(toss(), recording(Z))
     own = simulator.scenario.simulation.step
-    simulator.parts = 4
-    steps = {simulator.scenario.replaced(simulator._beside(n)).simulation.step for n in overturn.NEIGHBOURS}
+    steps = {simulator.scenario.replaced(simulator._beside(n, 4)).simulation.step for n in overturn.NEIGHBOURS}
     assert steps == {own / 4}
-    simulator.parts = 1
     steps = {simulator.scenario.replaced(simulator._beside(n)).simulation.step for n in overturn.NEIGHBOURS}
     assert steps == {own / n.parts for n in overturn.NEIGHBOURS}
 

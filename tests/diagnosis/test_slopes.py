@@ -38,7 +38,9 @@ class Late:
     def marks(self) -> tuple[tuple[float, str], ...]:
         return ()
 
-    def strays(self, changes: Mapping[str, Any] | None = None, shift: float = 0.0) -> list[dict[str, np.ndarray]]:
+    def strays(
+        self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1
+    ) -> list[dict[str, np.ndarray]]:
         return []
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
@@ -110,7 +112,9 @@ def test_an_explanation_that_is_far_from_the_mean_goes_more_than_one_step() -> N
             chance = np.random.default_rng([k, round(1e9 * x)]).standard_normal(TIME.size)
             return {CHANNEL: 20.0 * x**2 * np.sin(30.0 * (TIME - shift)) + 0.05 * chance}
 
-        def strays(self, changes: Mapping[str, Any] | None = None, shift: float = 0.0) -> list[dict[str, np.ndarray]]:
+        def strays(
+            self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1
+        ) -> list[dict[str, np.ndarray]]:
             values = dict(changes or {})
             there = self.predict(values, shift)[CHANNEL]
             return [{CHANNEL: self.predict({**values, "neighbour": k}, shift)[CHANNEL] - there} for k in range(1, 7)]
