@@ -22,7 +22,7 @@ from rollover.diagnosis.dependence import Dependence, dependence
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.empirical import offered, proposed
 from rollover.diagnosis.evidence import Evidence, doubted, evidence_of, left_out
-from rollover.diagnosis.explain import SURE
+from rollover.diagnosis.explain import SURE, Inquiry
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import yardstick
 from rollover.diagnosis.loudness import with_loudness
@@ -89,7 +89,8 @@ def diagnose(
     phases = [phases_of(e) for e in found]
     acts = "rollover" if any(unfit(set_up(scenario, e.recording)) for e in found) else "drop"
     candidates = candidates_of(found, scenario.effects, acts, scenario, size_of(set_up(scenario, found[0].recording)))
-    explanation = explained(judge, base, candidates, groups, phases, say, crew)
+    inquiry = Inquiry(judge=judge, candidates=candidates, groups=groups, phases=phases, say=say, crew=crew)
+    explanation = explained(inquiry, base)
     explanation, verdict = decided(judge, explanation, groups, phases)
     explanation, kept = eased_beside(scenario, judge, explanation, kept, phases)
     found = list(judge.evidence)

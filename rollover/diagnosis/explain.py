@@ -39,8 +39,30 @@ NEARLY_NOISE = 1.3  # misfit over the noise up to which its own colour is believ
 LIKE_NOISE = 2.2  # misfit over the noise up to which it may be noise that was underrated
 SURE = 1e-3  # p-value below which there is a mismatch
 
+Groups = Sequence[Sequence[int]]
 Progress = Callable[[str], None]
 Phases = Sequence[Sequence[tuple[float, str]]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inquiry:
+    """What every step of a selection is made with: recordings, effects, what is held out in turn, and who works."""
+
+    judge: Judge
+    candidates: Sequence[Candidate]
+    groups: Groups
+    phases: Phases
+    say: Progress
+    crew: Crew
+
+    def free(self, current: Fitted) -> list[Candidate]:
+        """Candidates that an explanation does not hold yet."""
+        used = {c.key for c in current.candidates}
+        return [c for c in self.candidates if c.key not in used]
+
+    def fits(self, jobs: Sequence[Job]) -> list[Fitted | None]:
+        """What comes of jobs, in their order."""
+        return self.crew.fits(self.judge, jobs, self.say)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +79,7 @@ class Step:
         """The same under the noise as it is held now."""
         return self._each(judge.again)
 
-    def foretold(self, judge: Judge, groups: Sequence[Sequence[int]]) -> Step:
+    def foretold(self, judge: Judge, groups: Groups) -> Step:
         """The same with what its fits foretell by runs, where slopes do not hold for long."""
         return self._each(lambda f: foretold(judge, f, groups)) if judge.effort.thrifty else self
 
@@ -72,52 +94,44 @@ class Step:
         return replace(self, fitted=new, rivals=tuple(new if f is self.fitted else f for f in self.rivals))
 
 
-def step(
-    judge: Judge,
-    base: Fitted,
-    candidates: Sequence[Candidate],
-    groups: Sequence[Sequence[int]],
-    phases: Phases,
-    say: Progress,
-    looked: Gate,
-    crew: Crew,
-) -> Step | None:
+def step(inquiry: Inquiry, base: Fitted, looked: Gate) -> Step | None:
     """Fit the promising candidates beside the base and rank them by what they predict of held-out conditions.
 
     `looked` is what all of them scored beside the base. Where the best leaves nearly noise, that noise is weighed by
     what it leaves; the step is then under that noise. None if nothing could be fitted.
     """
-    say(f"looking at {len(candidates)} candidates beside {base.label}")
+    judge, groups, candidates = inquiry.judge, inquiry.groups, inquiry.free(base)
+    inquiry.say(f"looking at {len(candidates)} candidates beside {base.label}")
     # of recordings that went another way together, two may be those that no explanation brings back
     several = judge.effort.few if judge.straying else judge.effort.looked_at
     few, shifts = spread(base, groups, several), begun(judge, base)
     screened = screen(judge, base, promising(candidates, looked, judge.effort), few, shifts, looked)
     count = sum(b.residual.size for b in base.blocks)
-    screened, begun_with = _first_fits(judge, base, screened, few, shifts, say, crew, looked)
+    screened, begun_with = _first_fits(inquiry, base, screened, few, shifts, looked)
     jobs = [
         Job(candidates=f.candidates, start=f.x, shifts=tuple(_all_shifts(shifts, f, few)), width=1) for f in begun_with
     ]
-    fits = [f for f in crew.fits(judge, jobs, say) if f is not None]
+    fits = [f for f in inquiry.fits(jobs) if f is not None]
     if not fits:
         return None
     if base.candidates and not judge.effort.thrifty:
-        fits += _from_base(judge, base, fits, looked, crew, say)
+        fits += _from_base(inquiry, base, fits, looked)
     fits.sort(key=lambda f: f.left)
     if fits[0].left > RUGGED**2 * count and not judge.effort.thrifty:
-        fits = _combed(judge, fits, shifts, crew, say)
-        fits = _but_for_some(judge, base, fits, candidates, looked, shifts, crew, say)
+        fits = _combed(inquiry, fits, shifts)
+        fits = _but_for_some(inquiry, base, fits, looked, shifts)
     # where a threshold makes the way crooked, the nearer ones are followed to the end; of what explains the best alone
     able = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < CROOKED * fits[0].left]
     alone = [f for f in able[:1] if f is fits[0] and not base.candidates]
     near = able[: judge.effort.polishes] if fits[0].left > NOISE_LEFT**2 * count else alone
     if near and judge.effort.polishes:
-        polished = crew.fits(judge, [_from(f, "polish") for f in near], say)
+        polished = inquiry.fits([_from(f, "polish") for f in near])
         others = [f for f in fits if not any(f is one for one in near)]
         fits = others + [new or old for new, old in zip(polished, near, strict=True)]
-    fits = _one_each(fits) if judge.effort.thrifty else _shaped(judge, _one_each(fits), groups, crew, say)
+    fits = _one_each(fits) if judge.effort.thrifty else _shaped(inquiry, _one_each(fits))
     if not judge.effort.thrifty:
-        fits = _timed(judge, fits, crew, say)
-    if weighed(judge, fits[0], phases):
+        fits = _timed(inquiry, fits)
+    if weighed(judge, fits[0], inquiry.phases):
         base, fits = judge.again(base), [judge.again(f) for f in fits]
     fits.sort(key=lambda f: held_out(f, groups).left.sum())
     fits = simplest(fits, groups, judge.per_error)
@@ -131,24 +145,17 @@ def step(
     return Step(base=base, fitted=fits[0], p_value=p, rivals=tuple(fits), screened=tuple(screened))
 
 
-def _combed(judge: Judge, fits: Sequence[Fitted], shifts: Sequence[float], crew: Crew, say: Progress) -> list[Fitted]:
+def _combed(inquiry: Inquiry, fits: Sequence[Fitted], shifts: Sequence[float]) -> list[Fitted]:
     """The fits, best first, the best of two parameters begun anew along the second if it leads or nearly so."""
     able = [f for f in fits if len(f.candidates[-1].search) == 2 and f.left < LEADS * fits[0].left][:1]
     jobs = [Job(how="comb", candidates=f.candidates, start=f.x, shifts=tuple(shifts)) for f in able]
-    tried = zip(crew.fits(judge, jobs, say), able, strict=True)
+    tried = zip(inquiry.fits(jobs), able, strict=True)
     better = [new if new is not None and new.left < old.left else old for new, old in tried]
     return sorted([*better, *(f for f in fits if not any(f is one for one in able))], key=lambda f: f.left)
 
 
 def _but_for_some(
-    judge: Judge,
-    base: Fitted,
-    fits: Sequence[Fitted],
-    candidates: Sequence[Candidate],
-    looked: Gate,
-    shifts: Sequence[float],
-    crew: Crew,
-    say: Progress,
+    inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: Gate, shifts: Sequence[float]
 ) -> list[Fitted]:
     """The fits, best first, with those whose shape may be wrong for a few recordings alone, fitted together with it.
 
@@ -156,16 +163,16 @@ def _but_for_some(
     face that is held lets go or does not.
     """
     usual, jobs = _middle(fits[0].blocks), []
-    for c in (c for c in candidates if c.shapes):
+    for c in (c for c in inquiry.free(base) if c.shapes):
         met = []
         for start in (*looked.starts.get(c.key, ()), *c.starts()):
             x = (*base.x, *start)
-            blocks = [judge.block(r, (*base.candidates, c), x, s, 0.0) for r, s in enumerate(shifts)]
+            blocks = [inquiry.judge.block(r, (*base.candidates, c), x, s, 0.0) for r, s in enumerate(shifts)]
             if all(b is not None for b in blocks):
                 met.append((_middle([b for b in blocks if b is not None]), x))
         if met and min(met)[0] < MOSTLY * usual:
             jobs.append(Job(how="scan", candidates=(*base.candidates, c), start=min(met)[1], shifts=tuple(shifts)))
-    return sorted([*fits, *(f for f in crew.fits(judge, jobs, say) if f is not None)], key=lambda f: f.left)
+    return sorted([*fits, *(f for f in inquiry.fits(jobs) if f is not None)], key=lambda f: f.left)
 
 
 def _middle(blocks: Sequence[Block]) -> float:
@@ -173,9 +180,7 @@ def _middle(blocks: Sequence[Block]) -> float:
     return float(np.median([b.normal()[2] / b.residual.size for b in blocks]))
 
 
-def _from_base(
-    judge: Judge, base: Fitted, fits: Sequence[Fitted], looked: Gate, crew: Crew, say: Progress
-) -> list[Fitted]:
+def _from_base(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: Gate) -> list[Fitted]:
     """Fits anew, from the base itself, of candidates that were led astray: beside them more is left than without."""
     jobs = []
     for f in fits:
@@ -185,7 +190,7 @@ def _from_base(
             jobs.append(
                 Job(candidates=f.candidates, start=(*base.x, *begin), shifts=tuple(b.shift for b in base.blocks))
             )
-    return [f for f in crew.fits(judge, jobs, say) if f is not None]
+    return [f for f in inquiry.fits(jobs) if f is not None]
 
 
 def weighed(judge: Judge, fitted: Fitted, phases: Phases) -> bool:
@@ -203,11 +208,11 @@ def weighed(judge: Judge, fitted: Fitted, phases: Phases) -> bool:
     return False
 
 
-def _timed(judge: Judge, fits: Sequence[Fitted], crew: Crew, say: Progress) -> list[Fitted]:
+def _timed(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
     """The fits, the near ones with their time shifts tried out, best first."""
     least = min(f.left for f in fits)
     near = [f for f in fits if f.left < TIED * least]
-    timed = crew.fits(judge, [_from(f, "time") for f in near], say)
+    timed = inquiry.fits([_from(f, "time") for f in near])
     others = [f for f in fits if f.left >= TIED * least]
     return sorted([new or old for new, old in zip(timed, near, strict=True)] + others, key=lambda f: f.left)
 
@@ -216,39 +221,36 @@ def _from(f: Fitted, how: Literal["polish", "shape", "time"]) -> Job:
     return Job(how=how, candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks))
 
 
-def _shaped(
-    judge: Judge, fits: Sequence[Fitted], groups: Sequence[Sequence[int]], crew: Crew, say: Progress
-) -> list[Fitted]:
+def _shaped(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
     """The fits with shapes fitted too where that pays, best first."""
     best = min(f.left for f in fits)
     size = sum(b.residual.size for b in fits[0].blocks)
-    held = [held_out(f, groups).total ** 2 for f in fits]
+    held = [held_out(f, inquiry.groups).total ** 2 for f in fits]
     able = [
         f
         for f, ahead in zip(fits, held, strict=True)
         if f.candidates[-1].shapes and (f.left < SHAPED * best or ahead < SHAPED * min(held))
     ]
     found = list(fits)
-    for old, new in zip(able, crew.fits(judge, [_from(f, "shape") for f in able], say), strict=True):
+    for old, new in zip(able, inquiry.fits([_from(f, "shape") for f in able]), strict=True):
         if new is not None and new.left < old.left - WORTH * max(1.0, best / size):
             found[found.index(old)] = new
     return sorted(found, key=lambda f: f.left)
 
 
 def _first_fits(
-    judge: Judge,
+    inquiry: Inquiry,
     base: Fitted,
     screened: Sequence[Screened],
     few: Sequence[int],
     shifts: Sequence[float],
-    say: Progress,
-    crew: Crew,
     looked: Gate,
 ) -> tuple[list[Screened], list[Fitted]]:
     """Short fits to few recordings: the ones worth a full fit, best first, and what each leaves."""
+    judge = inquiry.judge
     chosen = {s.candidate.key: s for s in _chosen(screened, judge.effort, looked)}
     told: dict[str, float] = {}
-    say(f"first fits of {len(chosen)} candidates to {len(few)} recordings")
+    inquiry.say(f"first fits of {len(chosen)} candidates to {len(few)} recordings")
     at = tuple(shifts[r] for r in few)
     pinned = judge.effort.thrifty or is_far(judge, base)
     jobs = [
@@ -259,7 +261,7 @@ def _first_fits(
         for s in chosen.values()
         for start in s.starts
     ]  # fmt: skip
-    fits = [f for f in crew.fits(judge, jobs, say) if f is not None]
+    fits = [f for f in inquiry.fits(jobs) if f is not None]
     for one in fits:
         key, size = one.candidates[-1].key, sum(b.residual.size for b in one.blocks)
         told[key] = min(told.get(key, np.inf), float(np.sqrt(one.left / size)))
@@ -341,7 +343,7 @@ def moves(judge: Judge, base: Fitted, fitted: Fitted) -> float:
     return most
 
 
-def simplest(fits: Sequence[Fitted], groups: Sequence[Sequence[int]], shared: float) -> list[Fitted]:
+def simplest(fits: Sequence[Fitted], groups: Groups, shared: float) -> list[Fitted]:
     """Fits, best first, led by the one with the fewest numbers of those that are hardly worse than the best.
 
     Hardly worse: within a standard error, or within what leaps make the misfit rough by.
@@ -357,7 +359,7 @@ def simplest(fits: Sequence[Fitted], groups: Sequence[Sequence[int]], shared: fl
     return [first, *(f for f in fits if f is not first)]
 
 
-def confusion(step_: Step, groups: Sequence[Sequence[int]], shared: float = 1.0) -> list[Fitted]:
+def confusion(step_: Step, groups: Groups, shared: float = 1.0) -> list[Fitted]:
     """Rivals that predict held-out recordings as well as the best does, the best first.
 
     And those of no more numbers that meet all recordings as well as it does: what hangs on a single one is hard to

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeGuard
 
 import numpy as np
 
 from rollover.diagnosis.blocks import at_an_end, turned
 from rollover.diagnosis.candidates import Candidate, is_one_sensor
 from rollover.diagnosis.chaos import is_other
-from rollover.diagnosis.crew import Crew, Job
+from rollover.diagnosis.crew import Job
 from rollover.diagnosis.detect import Mismatch, mismatch_of
-from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Phases, Step, moves, step, weighed
+from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Groups, Inquiry, Phases, Step, moves, step, weighed
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate, gate
 from rollover.diagnosis.holdout import held_out
@@ -31,9 +32,6 @@ LEADING, FOLLOWING = 4, 2  # of the first effects, and of later ones each, that 
 HARDLY_MORE = 1.2  # times a tolerance, that an explanation leaves of held-out recordings
 SEVERAL = 2  # recordings on another course, after which they are not forgiven if a candidate scores beyond chance
 BETTER = 0.5  # of what is left, that another first effect must leave
-
-Groups = Sequence[Sequence[int]]
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,16 +64,9 @@ class Explanation:
         return float(1.0 - (1.0 - min(self.before.p_value, self.looked.p_value())) ** 2)
 
 
-def explained(
-    judge: Judge,
-    base: Fitted,
-    candidates: Sequence[Candidate],
-    groups: Groups,
-    phases: Phases,
-    say: Progress,
-    crew: Crew,
-) -> Explanation:
+def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     """Forward selection of up to three effects, each beyond chance, then each tried without and against its rivals."""
+    judge, candidates, groups, phases = inquiry.judge, inquiry.candidates, inquiry.groups, inquiry.phases
     count = sum(b.residual.size for b in base.blocks)
     clocked = begun_anew if judge.effort.thrifty else timed
     base = clocked(judge, base)  # what a clock leaves is no noise,
@@ -84,7 +75,7 @@ def explained(
     base = clocked(judge, base)  # and no effect's gain
     before = mismatch_of(judge.evidence, base.blocks, phases)
     base = astray(judge, base)
-    say(f"looking at {len(candidates)} candidates, which of them could matter")
+    inquiry.say(f"looking at {len(candidates)} candidates, which of them could matter")
     looked = first_look = look(judge, base, candidates, groups)
     current, left = base, before
     taken: list[Step] = []
@@ -95,18 +86,17 @@ def explained(
             break
         if looked.p_value() > CHANCE and is_enough(judge, current, left):
             break
-        found = step(judge, current, free(current, candidates), groups, phases, say, looked, crew)
-        first = first or found
-        if found is None or found.p_value > CHANCE or moves(judge, found.base, found.fitted) < NEGLIGIBLE:
+        tried = step(inquiry, current, looked)
+        first = first or tried
+        if not is_beyond_chance(tried, judge):
             break
-        if judge.effort.thrifty:
-            found = lasting(judge, backed(found, looked), groups)
-            if found is None and not taken:
-                found = in_full(judge, current, candidates, groups, phases, say, crew)
-                first = found or first
-            if found is None:
-                refuted = not taken
-                break
+        found = upheld(inquiry, tried, looked)
+        if found is None and not taken:
+            found = in_full(inquiry, current)
+            first = found or first
+        if found is None:
+            refuted = not taken
+            break
         found, left = followed(judge, found, phases)
         taken.append(found)
         current = found.fitted
@@ -115,7 +105,7 @@ def explained(
             left = mismatch_of(judge.evidence, current.blocks, phases)
         if len(taken) == 2 and left.p_value < SURE and matters(judge, current, left):
             # of two that are strong the first may have been taken for something else: is there a better one?
-            other = _instead(judge, current, candidates, groups, phases, say, crew)
+            other = _instead(inquiry, current)
             if other is not None and other.fitted.left < current.left:
                 other, beside = followed(judge, other, phases)
                 if is_better(other.fitted, beside, current):
@@ -124,13 +114,13 @@ def explained(
         if len(taken) > 1 and current.left > HOPELESS**2 * count:
             break
         known = base if is_enough(judge, current, left) else None
-        looked = look_again(judge, current, known, free(current, candidates), groups, first_look)
+        looked = look_again(judge, current, known, inquiry.free(current), groups, first_look)
     if not judge.straying:
         judge.straying, current = True, judge.again(current)
         left = mismatch_of(judge.evidence, current.blocks, phases)
     is_whole = is_enough(judge, current, left)
     if first is not None and not judge.effort.thrifty and (not is_whole or len(taken) == MOST):
-        both = _together(judge, first, taken, first_look, phases, say, crew)
+        both = _together(inquiry, first, taken, first_look)
         # two that leave what chance leaves are preferred to three that do
         if both is not None and (
             both[1].p_value > SURE if is_whole else is_better(both[0][-1].fitted, both[1], current)
@@ -139,7 +129,7 @@ def explained(
             is_whole = is_enough(judge, current, left)
     parts = [s.again(judge) for s in taken]
     if is_whole and len(taken) > 1:
-        parts = _needed(judge, taken, candidates, groups, phases, say, crew)
+        parts = _needed(inquiry, taken)
         parts[-1], _ = followed(judge, parts[-1], phases)
     base = judge.again(base)
     parts = [s.foretold(judge, groups) for s in parts]
@@ -157,26 +147,30 @@ def explained(
     )
 
 
-def in_full(
-    judge: Judge,
-    current: Fitted,
-    candidates: Sequence[Candidate],
-    groups: Groups,
-    phases: Phases,
-    say: Progress,
-    crew: Crew,
-) -> Step | None:
+def is_beyond_chance(found: Step | None, judge: Judge) -> TypeGuard[Step]:
+    """Whether a step gains more than the best of all candidates does by chance, and moves something by it."""
+    return found is not None and found.p_value <= CHANCE and moves(judge, found.base, found.fitted) >= NEGLIGIBLE
+
+
+def upheld(inquiry: Inquiry, found: Step, looked: Gate) -> Step | None:
+    """A step as it is to be taken; None where runs scatter and its gain does not outlast that."""
+    judge = inquiry.judge
+    return lasting(judge, backed(found, looked), inquiry.groups) if judge.effort.thrifty else found
+
+
+def in_full(inquiry: Inquiry, current: Fitted) -> Step | None:
     """A step with all samples counted in full where several recordings took another course; None if nothing lasts.
 
     Chance could have sent them there, but so could what is missing; if nothing lasts they are forgiven again.
     """
+    judge = inquiry.judge
     if not judge.straying or sum(is_other(b.course) for b in current.blocks) < SEVERAL:
         return None
     judge.straying = False
     base = judge.again(current)
-    looked = look(judge, base, candidates, groups)
-    found = step(judge, base, candidates, groups, phases, say, looked, crew)
-    found = None if found is None else lasting(judge, backed(found, looked), groups)
+    looked = look(judge, base, inquiry.candidates, inquiry.groups)
+    tried = step(inquiry, base, looked)
+    found = upheld(inquiry, tried, looked) if is_beyond_chance(tried, judge) else None
     judge.straying = found is None
     return found
 
@@ -201,28 +195,14 @@ def followed(judge: Judge, found: Step, phases: Phases) -> tuple[Step, Mismatch]
     return found.moved_to(new), mismatch_of(judge.evidence, new.blocks, phases)
 
 
-def free(current: Fitted, candidates: Sequence[Candidate]) -> list[Candidate]:
-    """Candidates that an explanation does not hold yet."""
-    used = {c.key for c in current.candidates}
-    return [c for c in candidates if c.key not in used]
-
-
-def _instead(
-    judge: Judge,
-    current: Fitted,
-    candidates: Sequence[Candidate],
-    groups: Groups,
-    phases: Phases,
-    say: Progress,
-    crew: Crew,
-) -> Step | None:
+def _instead(inquiry: Inquiry, current: Fitted) -> Step | None:
     """The first effect of an explanation taken out and looked for anew beside the rest: it comes back, or a better."""
+    judge = inquiry.judge
     rest = without(judge, current, 0)
     if rest is None:
         return None
-    others = free(rest, candidates)
-    looked = gate(judge, rest, others)
-    found = step(judge, rest, others, groups, phases, say, looked, crew)
+    looked = gate(judge, rest, inquiry.free(rest))
+    found = step(inquiry, rest, looked)
     held = judge.again(turned(current))
     if found is None or found.fitted.left > held.left + NEEDED:  # on the way back nothing came as far
         rivals = () if found is None else found.rivals
@@ -236,20 +216,13 @@ def is_better(other: Fitted, left: Mismatch, current: Fitted) -> bool:
     return other.left < current.left * (1.0 if left.p_value > SURE else BETTER)
 
 
-def _together(
-    judge: Judge,
-    first: Step,
-    taken: Sequence[Step],
-    looked: Gate,
-    phases: Phases,
-    say: Progress,
-    crew: Crew,
-) -> tuple[list[Step], Mismatch] | None:
+def _together(inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate) -> tuple[list[Step], Mismatch] | None:
     """The best pair of the first step's rivals, and of these with what led later, as steps, and what it leaves.
 
     Of two effects neither need come first alone: a third may be like both, and the second may leave much alone; so
     what scored most when first `looked` at is tried beside the rivals too.
     """
+    judge = inquiry.judge
     leading = sorted((judge.again(f) for f in first.rivals), key=lambda f: f.left)[:LEADING]
     later = [f for s in taken[1:] for f in sorted(s.rivals, key=lambda f: f.left)[:FOLLOWING]]
     partners: dict[str, tuple[Candidate, tuple[float, ...]]] = {}
@@ -260,30 +233,23 @@ def _together(
         partners.setdefault(s.candidate.key, (s.candidate, s.starts[0]))
     every, shifts = list(partners.values()), tuple(b.shift for b in leading[0].blocks)
     pairs = [(a, b) for k, a in enumerate(leading) for b in every[k + 1 :]]
-    say(f"{len(pairs)} pairs of effects")
+    inquiry.say(f"{len(pairs)} pairs of effects")
     jobs = [Job(candidates=(*a.candidates, c), start=(*a.x, *x), shifts=shifts, width=1) for a, (c, x) in pairs]
-    fits = [(f, a) for f, (a, _) in zip(crew.fits(judge, jobs, say), pairs, strict=True) if f is not None]
+    fits = [(f, a) for f, (a, _) in zip(inquiry.fits(jobs), pairs, strict=True) if f is not None]
     if not fits:
         return None
     best, alone = min(fits, key=lambda pair: pair[0].left)
     pair = Step(base=alone, fitted=best, p_value=first.p_value, rivals=(best,))
-    last_step, left = followed(judge, pair, phases)
+    last_step, left = followed(judge, pair, inquiry.phases)
     return [replace(first, fitted=alone), last_step], left
 
 
-def _needed(
-    judge: Judge,
-    taken: Sequence[Step],
-    candidates: Sequence[Candidate],
-    groups: Groups,
-    phases: Phases,
-    say: Progress,
-    crew: Crew,
-) -> list[Step]:
+def _needed(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step]:
     """Steps of the effects that are needed: each dropped if that costs no more than chance, or given to a better one.
 
     Returned in such an order that the last one's fit is the whole explanation; every step's fit is.
     """
+    judge = inquiry.judge
     current = judge.again(taken[-1].fitted)
     while len(current.candidates) > 1:
         losses = []
@@ -304,7 +270,7 @@ def _needed(
         if whole and {c.key for c in current.candidates} == {c.key for c in last.fitted.candidates}:
             parts.append(last)  # found beside just these others
             break
-        found = _instead(judge, current, candidates, groups, phases, say, crew)
+        found = _instead(inquiry, current)
         if found is None:
             break
         parts.append(found)

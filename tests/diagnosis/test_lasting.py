@@ -16,7 +16,7 @@ from rollover.diagnosis.blocks import Block, Fitted
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.chaos import Course
 from rollover.diagnosis.effort import RUNS
-from rollover.diagnosis.explain import Step, _chosen
+from rollover.diagnosis.explain import Inquiry, Step, _chosen
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import foretold, held_out
@@ -263,7 +263,7 @@ def test_two_on_another_course_are_looked_at_in_full_where_nothing_else_lasts(
         candidates=(), x=(), blocks=tuple(replace(bare, course=far if k < others else None) for k in range(4))
     )
     seen: list[bool] = []
-    judge: Any = SimpleNamespace(straying=True, again=lambda f: f)
+    judge: Any = SimpleNamespace(straying=True, again=lambda f: f, effort=RUNS)
     looked = Gate(score=0.0, scores={}, null=np.zeros(9), detectable={})
     made = Step(base=current, fitted=current, p_value=0.0)
 
@@ -274,7 +274,9 @@ def test_two_on_another_course_are_looked_at_in_full_where_nothing_else_lasts(
     monkeypatch.setattr(selection, "look", looks)
     monkeypatch.setattr(selection, "step", lambda *_: made)
     monkeypatch.setattr(selection, "lasting", lambda *_: made if lasts else None)
-    found = selection.in_full(judge, current, [], [], [], lambda _: None, cast(Any, None))
+    monkeypatch.setattr(selection, "moves", lambda *_: 1.0)
+    inquiry = Inquiry(judge=judge, candidates=[], groups=[], phases=[], say=lambda _: None, crew=cast(Any, None))
+    found = selection.in_full(inquiry, current)
     assert seen == [False] * (others - 1)
     assert (found is not None) == (others > 1 and lasts)
     assert judge.straying is (found is None)

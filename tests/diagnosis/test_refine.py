@@ -10,7 +10,7 @@ import pytest
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.candidates import coordinate
 from rollover.diagnosis.crew import Crew
-from rollover.diagnosis.explain import Step
+from rollover.diagnosis.explain import Inquiry, Step
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.refine import combed, traced
@@ -111,10 +111,11 @@ def test_two_effects_of_which_neither_comes_first_are_tried_together() -> None:
     looked = Gate(score=9.0, scores={"guide-friction": 9.0}, null=np.zeros(9), detectable={})
     guide = Screened(candidate=c["guide-friction"], starts=tuple(c["guide-friction"].starts()), left=9.0, potential=0.0)
     phases = [phases_of(e) for e in judge.evidence]
-    alone = _together(judge, replace(first, screened=(guide,)), [first], looked, phases, lambda _: None, Crew())
+    inquiry = Inquiry(judge=judge, candidates=[*c.values()], groups=[], phases=phases, say=lambda _: None, crew=Crew())
+    alone = _together(inquiry, replace(first, screened=(guide,)), [first], looked)
     assert alone is not None  # what scored most need not have led anything
     assert alone[0][-1].fitted.label == "mass + guide-friction"
-    found = _together(judge, first, [first, then], looked, phases, lambda _: None, Crew())
+    found = _together(inquiry, first, [first, then], looked)
     assert found is not None
     (one, both), left = found
     assert one.fitted.label == "mass"

@@ -13,7 +13,7 @@ from rollover.diagnosis.candidates import Candidate, coordinate
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.effort import DROPS, RUNS, Effort
 from rollover.diagnosis.evidence import Evidence, Signal
-from rollover.diagnosis.explain import Step, _first_fits
+from rollover.diagnosis.explain import Inquiry, Step, _first_fits
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.screening import Screened
@@ -99,7 +99,8 @@ def test_a_rival_is_measured_by_clocks_that_are_held_as_its_own_are() -> None:
     looked = Gate(score=9.0, scores={SLOPE.key: 9.0, MASS.key: 8.0}, null=np.zeros(4), detectable={})
     screened = [Screened(candidate=c, starts=((0.02,),), left=1.0, potential=1.0) for c in (SLOPE, MASS)]
     with Crew() as crew:
-        _, leaders = _first_fits(judge, base, screened, (0, 1), (0.0, 0.0), lambda _: None, crew, looked)
+        inquiry = Inquiry(judge=judge, candidates=(SLOPE, MASS), groups=[], phases=[], say=lambda _: None, crew=crew)
+        _, leaders = _first_fits(inquiry, base, screened, (0, 1), (0.0, 0.0), looked)
     assert {f.candidates[-1].key for f in leaders} == {SLOPE.key, MASS.key}
 
 
