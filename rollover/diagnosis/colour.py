@@ -13,8 +13,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.bursts import LOUDER, without_bursts
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.lines import lines, without
+from rollover.diagnosis.simulator import blow_of
 from rollover.noise import LENGTH, NoiseFloor, grown, noise_floor
 
 Array = NDArray[np.float64]
@@ -38,9 +40,10 @@ def quiet(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evid
     for members in alike(evidence):
         misfits, values = [], []
         for r, _, s, part in members:
+            told = _before_the_blow(evidence[r], s)
             without_hum = _cleaned(evidence[r], s, residuals[r][part], humming)
-            misfits.append(without_hum / s.loudness)
-            values.append((s.values - residuals[r][part] + without_hum) / s.loudness)
+            misfits.append((without_hum / s.loudness)[told])
+            values.append(((s.values - residuals[r][part] + without_hum) / s.loudness)[told])
         common = _quieter(misfits, values)
         if common is None:
             continue  # too short: what each says by itself stands
@@ -51,6 +54,12 @@ def quiet(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evid
             found[r][k] = replace(s, noise=best.sigma, ar=best.ar)
     found = [[with_noise(s, s.noise, s.ar, e.model_error) for s in f] for e, f in zip(evidence, found, strict=True)]
     return [replace(e, signals=tuple(s)) for e, s in zip(evidence, found, strict=True)]
+
+
+def _before_the_blow(e: Evidence, s: Signal) -> slice:
+    """Samples that tell a noise: after a blow what chance makes of a run is quiet nowhere; all if these are too few."""
+    n = int(np.searchsorted(e.recording.time[s.rows], blow_of(e.simulator)))
+    return slice(n if n >= LENGTH else None)
 
 
 def whole(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evidence]:
@@ -64,6 +73,10 @@ def whole(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evid
             continue
         parts = [_cleaned(evidence[r], s, residuals[r][part], humming) / s.loudness for r, _, s, part in members]
         levels = np.array([max(float(np.sqrt(np.mean(p * p))), 1e-300) for p in parts])
+        if any(
+            is_bursting(s, part, float(level)) for (_, _, s, _), part, level in zip(members, parts, levels, strict=True)
+        ):
+            continue  # what comes now and then is no noise
         # of one recorder unless they differ by more than so few samples can, each worth less for its memory
         _, ar = autoregression([p / level for p, level in zip(parts, levels, strict=True)])
         worth = np.array([p.size for p in parts]) * max(1.0 - sum(ar), 0.02) / (1.0 + max(sum(ar), 0.0))
@@ -114,6 +127,11 @@ def slower(told: Sequence[tuple[int, int, Signal, float, tuple[float, ...]]]) ->
         if np.average([m for m, *_ in each], weights=weights) > np.average([a for _, a, _ in each], weights=weights):
             slow.add(channel)
     return slow
+
+
+def is_bursting(s: Signal, misfit: Array, level: float) -> bool:
+    """Whether a misfit (n,) is much less beside its bursts; digits that leap are none."""
+    return s.step == 0.0 and level > LOUDER * float(np.sqrt(np.mean(without_bursts(misfit) ** 2)))
 
 
 def level_of(sigma: float, ar: tuple[float, ...]) -> float:
@@ -172,7 +190,9 @@ def _quieter(misfits: Sequence[Array], own: Sequence[Array]) -> NoiseFloor | Non
     if sum(v.size // LENGTH for v in misfits) < 1:
         return None
     best, other = _floor(misfits), _floor(own)
-    return other if other.sigma < CLEARLY * best.sigma else best
+    best = other if other.sigma < CLEARLY * best.sigma else best
+    beside = _floor([without_bursts(v) for v in misfits])
+    return beside if 0.0 < LOUDER * beside.sigma < best.sigma else best
 
 
 def _floor(values: Sequence[Array]) -> NoiseFloor:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.depend import ACCELERATION, DEPTH, SPEED, TIME, hats
+from rollover.diagnosis.detect import Mismatch
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.fit import Block, Fitted, Judge
 from rollover.diagnosis.response import WHERES, Descent, Where, channels_of, descent
@@ -28,11 +29,13 @@ KNOTS = (2, 3, 6, 12, 24, 48)
 FINE = (6, 24, 96, 192)  # of what a sensor does with its own values
 FADES = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16)  # s, of a force that fades
 WORTH = 0.3  # of the excess over the noise, that a quantity must explain to be named
+MOSTLY = 0.5  # and where one channel goes its own way: what it depends on would explain all
 STEADY = 1e-5  # prior of steps between knots: beyond what was seen a function stays as it ends
 ALONE = 0.1  # of the excess over the noise that channels beside a faulty one may have
 NEAR = 0.05  # of its prior: a time shift that is as good as another
 SHIFTS = 4  # that are tried
 RATHER = 0.5  # of what the best force leaves
+BY_CHANCE = 2.0  # standard deviations of a sum of squares, by which it exceeds what is expected
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +51,7 @@ class Dependence:
     @property
     def on(self) -> str | None:
         """The quantity, where it explains a good part; what a sensor does without any comes and goes in time."""
-        if self.shares and self.shares[0][1] > WORTH:
+        if self.shares and self.shares[0][1] > (WORTH if self.channel is None else MOSTLY):
             return self.shares[0][0]
         return None if self.channel is None else TIME
 
@@ -90,6 +93,19 @@ def dependence(judge: Judge, scenarios: Sequence[Scenario], base: Fitted) -> Dep
     if channel is not None:
         return Dependence(shares=_added(*_of_channel(channel, judge, base)), channel=channel)
     return Dependence(shares=_added(*_of_forces(found))) if found else Dependence()
+
+
+def dependence_of_one(judge: Judge, base: Fitted, before: Mismatch) -> Dependence | None:
+    """What the misfit of the one channel that goes its own way depends on; None where others miss as well."""
+    by: dict[str, float] = {}
+    for c in before.telling:
+        by[c.channel] = by.get(c.channel, 0.0) + c.excess
+    most = max(by, key=lambda channel: by[channel], default="")
+    others = [c for c in before.telling if c.channel != most]
+    chance = BY_CHANCE * float(np.sqrt(2.0 * sum(c.rows.size for c in others)))
+    if not others or sum(c.excess for c in others) > min(ALONE * by[most] + chance, RATHER * by[most]):
+        return None
+    return Dependence(shares=_added(*_of_channel(most, judge, base)), channel=most)
 
 
 def ways(judge: Judge, scenarios: Sequence[Scenario], base: Fitted) -> tuple[list[list[Block]], list[Descent]]:
@@ -196,15 +212,15 @@ def _of_channel(channel: str, judge: Judge, base: Fitted) -> tuple[list[Model], 
                 misfits.append(b.residual[part])
                 values.append(s.values - off[part])  # predicted: what is measured holds the fault
                 times.append(e.recording.time[s.rows])
-                slots.append((e, part))
+                slots.append((e, b, part))
     models: list[Model] = []
 
     def add(on: str, shapes: Sequence[Array]) -> None:
         columns = []
-        for (e, part), f in zip(slots, shapes, strict=True):
+        for (e, b, part), f in zip(slots, shapes, strict=True):
             raw = np.zeros((e.count, f.shape[1]))
             raw[part] = f
-            columns.append(e.whitened(raw)[part])
+            columns.append(np.stack([b.counted(column) for column in e.whitened(raw).T], axis=1)[part])
         models.append(Model(on=on, columns=tuple(columns)))
 
     size = max(float(np.abs(np.concatenate(values)).max()), 1e-300)

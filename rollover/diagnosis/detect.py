@@ -3,17 +3,26 @@
 For a cell (recording, channel, phase) the residual w, its time shift and a slow basis of K cosines Q (orthonormal, the
 shift's slope taken out): F = (|Q'w|^2/K)/((|w|^2 - |Q'w|^2)/(n - K - 1)) has an F distribution if w is nothing but
 noise, whatever the noise's level. Cells are judged together by the sum of all, and each by Holm's step-down rule.
+
+Where runs scatter, samples are weighed (D3), and of S = |Q'w|^2 noise and scatter d alone leave
+
+    M = tr(Q'W^2 Q) + mean_k |Q'd_k|^2                                                                          (D14)
+
+d_k what neighbours differ by, weighed alike. S/M then has nu = 2 M^2/var S degrees of freedom, var S from the noise,
+from noise and scatter together, and from how far the neighbours of a recording differ in all its cells at once; M is
+known as well as so few neighbours tell.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.chaos import is_other, too_many
+from rollover.diagnosis.bursts import too_often
+from rollover.diagnosis.chaos import FEW, is_other, too_many
 from rollover.diagnosis.colour import hums
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.fit import Block
@@ -39,20 +48,31 @@ class Cell:
     structured: float
     waves: int
     rough: float
+    noise: tuple[float, float]  # what noise alone leaves of `structured`, and of `rough`
+    strayed: Array = field(default_factory=lambda: np.zeros((0, 2)))  # (k, 2): and each neighbour
+
+    @property
+    def expected(self) -> float:
+        """(D14); as many as there are waves where runs do not scatter."""
+        return self.noise[0] + (float(self.strayed[:, 0].mean()) if len(self.strayed) else 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Mismatch:
-    """All cells, the p-value of "nothing but noise", and the familywise p-values of the cells."""
+    """All cells, the p-value of "nothing but noise", and the familywise p-values of the cells.
+
+    `telling` are the cells that it is judged by: not those after a blow of a recording that took another course.
+    """
 
     cells: tuple[Cell, ...]
+    telling: tuple[Cell, ...] = ()
     p_value: float
     adjusted: tuple[float, ...]
 
     @property
     def structure(self) -> float:
         """Sum of squares of what is slow, beyond what chance leaves of it."""
-        return sum(c.structured - c.waves for c in self.cells)
+        return sum(c.structured - c.expected for c in self.cells)
 
     def shares(self) -> list[tuple[Cell, float]]:
         """Cells with their share of all excess, largest first; shares add up to 1 (or there are none)."""
@@ -67,9 +87,8 @@ def mismatch_of(
     evidence: Sequence[Evidence], blocks: Sequence[Block], phases: Sequence[Sequence[tuple[float, str]]]
 ) -> Mismatch:
     """Judge the residuals at a fitted point; `phases` are (start, name) for each recording."""
-    from scipy.stats import f as f_distribution
-
     cells: list[Cell] = []
+    strays = [np.array([e.eased(e.whitened(stray)) for stray in e.strays]).reshape(-1, e.count) for e in evidence]
     humming = hums(evidence, [b.valued for b in blocks])
     for r, (e, block) in enumerate(zip(evidence, blocks, strict=True)):
         for signal, part in e.spans():
@@ -80,8 +99,11 @@ def mismatch_of(
                 if inside.size >= 4:
                     rows = inside + part.start
                     weight = None if signal.weight is None else signal.weight[inside]
+                    apart = strays[r][:, rows]
                     cells.append(
-                        _cell(r, signal.channel, name, time[inside], rows, block, humming[signal.channel], weight)
+                        _cell(
+                            r, signal.channel, name, time[inside], rows, block, humming[signal.channel], weight, apart
+                        )
                     )
     # after a blow a recording that took another course tells nothing by itself
     other = [is_other(b.course) for b in blocks]
@@ -89,16 +111,41 @@ def mismatch_of(
     # within half a step of its digits a channel tells nothing, however alike neighbouring samples err
     stepped = {(r, s.channel) for r, e in enumerate(evidence) for s in e.signals if s.step > 0.0}
     telling = [c for c in telling if c.excess > 0.0 or (c.recording, c.channel) not in stepped]
-    structured = sum(c.structured for c in telling)
-    waves = sum(c.waves for c in telling)
-    rough = sum(c.rough for c in telling)
-    count = sum(c.rows.size for c in telling) - waves - len(blocks)
-    p = 1.0
-    if waves and count > 0:
-        # noise may be underrated, but not by so much: what is rough and far beyond it is no noise either
-        p = float(f_distribution.sf((structured / waves) / min(max(rough / count, 1e-300), LOUD), waves, count))
+    by_channel: dict[str, list[Array]] = {}
+    for c in telling:
+        by_channel.setdefault(c.channel, []).append(blocks[c.recording].valued[c.rows])
+    p = min(_p_value(telling, len(blocks)), too_often(np.concatenate(w) for w in by_channel.values()))
     p = min(p, too_many(sum(other), len(other)))  # one may, not all of them
-    return Mismatch(cells=tuple(cells), p_value=p, adjusted=_holm([c.p_value for c in cells]))
+    return Mismatch(cells=tuple(cells), telling=tuple(telling), p_value=p, adjusted=_holm([c.p_value for c in cells]))
+
+
+def _p_value(cells: Sequence[Cell], clocks: int) -> float:
+    """p-value of what is slow in several cells together, beside as many `clocks` that were fitted."""
+    from scipy.stats import f as f_distribution
+
+    structured = sum(c.structured for c in cells)
+    waves = sum(c.waves for c in cells)
+    rough = sum(c.rough for c in cells)
+    count = sum(c.rows.size for c in cells) - waves - clocks
+    if not waves or count <= 0:
+        return 1.0
+    # noise may be underrated, but not by so much: what is rough and far beyond it is no noise either
+    if all(c.noise[0] == c.waves for c in cells):
+        return float(f_distribution.sf((structured / waves) / min(max(rough / count, 1e-300), LOUD), waves, count))
+    expected = sum(c.expected for c in cells)
+    rest = sum(c.noise[1] + (float(c.strayed[:, 1].mean()) if len(c.strayed) else 0.0) for c in cells)
+    variance = sum(2.0 * c.noise[0] * (1.0 + 2.0 * (c.expected - c.noise[0]) / c.waves) for c in cells)
+    unsure = 2.0 * expected**2 / count
+    for r in {c.recording for c in cells}:
+        each = [c.strayed[:, 0] for c in cells if c.recording == r and len(c.strayed)]
+        apart = np.sum(each, axis=0) if each else np.zeros(1)
+        if apart.size > 1:
+            scatter = FEW * float(np.var(apart, ddof=1))
+            variance += scatter
+            unsure += scatter / apart.size  # a mean is known as well as so many tell
+    level = min(max(rough / max(rest, 1e-300), 1.0), LOUD)
+    known = 2.0 * expected**2 / unsure
+    return float(f_distribution.sf(structured / expected / level, 2.0 * expected**2 / variance, known))
 
 
 def _cell(
@@ -110,6 +157,7 @@ def _cell(
     block: Block,
     humming: tuple[float, ...],
     weight: Array | None,
+    strays: Array,
 ) -> Cell:
     from scipy.stats import f as f_distribution
 
@@ -129,18 +177,24 @@ def _cell(
     inside = Q.T @ w
     structured, rough = float(inside @ inside), float(w @ w - inside @ inside)
     free = max(n - waves - 1, 1)
-    if weight is not None:
-        rough = max(rough, float(n - waves))  # where the model is not sure, what is rough says nothing of what is slow
-    p = (
-        float(f_distribution.sf((structured / waves) / max(rough / free, 1e-300), waves, free))
-        if n > waves + 1
-        else 1.0
-    )
-    noise = n if weight is None else float(weight @ weight)
-    return Cell(
-        recording=r, channel=channel, phase=phase, start=float(time[0]), end=float(time[-1]), rows=rows, p_value=p,
-        excess=float(w @ w) - noise, structured=structured, waves=waves, rough=max(rough, 0.0),
+    found = Cell(
+        recording=r, channel=channel, phase=phase, start=float(time[0]), end=float(time[-1]), rows=rows, p_value=1.0,
+        excess=float(w @ w) - n, structured=structured, waves=waves, rough=max(rough, 0.0),
+        noise=(float(waves), float(n - waves)),
     )  # fmt: skip
+    if weight is not None:
+        slow = float(np.sum((Q * weight[:, None]) ** 2))
+        along = np.sum((strays @ Q) ** 2, axis=1)
+        apart = np.stack([along, np.sum(strays**2, axis=1) - along], axis=1)
+        noise = float(weight @ weight)
+        excess = float(w @ w) - noise - (float(apart.sum(axis=1).mean()) if len(apart) else 0.0)
+        found = replace(found, excess=excess, noise=(slow, noise - slow), strayed=apart)
+        return replace(found, p_value=_p_value([found], 1))
+    if n <= waves + 1:
+        return found
+    return replace(
+        found, p_value=float(f_distribution.sf((structured / waves) / max(rough / free, 1e-300), waves, free))
+    )
 
 
 def _holm(p: Sequence[float]) -> tuple[float, ...]:

@@ -18,7 +18,7 @@ from rollover.diagnosis.chassis import degrees_of
 from rollover.diagnosis.clocks import align
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.depend import dependency
-from rollover.diagnosis.dependence import Dependence, dependence
+from rollover.diagnosis.dependence import Dependence, dependence, dependence_of_one
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.empirical import offered, proposed
 from rollover.diagnosis.evidence import Evidence, doubted, evidence_of, left_out
@@ -104,7 +104,8 @@ def diagnose(
         depends_on = dependence(judge, set_ups, explanation.base)
     elif acts != "drop":
         degrees, forces = degrees_of(set_ups, found, [b.shift for b in explanation.base.blocks])
-        depends_on = Dependence(shares=tuple(dependency(forces)))
+        of_one = dependence_of_one(judge, explanation.base, before) if is_mismatch else None
+        depends_on = of_one or Dependence(shares=tuple(dependency(forces)))
     law = None
     if verdict == "unexplained" and acts == "drop":
         say("a law for what no candidate explains")

@@ -182,7 +182,7 @@ class Evidence:
             rest = max(signal.sigma**2 - signal.noise**2, 0.0)
             x = (x.T * signal.sigma / np.sqrt((signal.noise * signal.level) ** 2 + rest)).T
         if signal.weight is not None:
-            return Evidence._coloured(signal, x) * signal.weight
+            return np.asarray((Evidence._coloured(signal, x).T * signal.weight).T)
         return Evidence._coloured(signal, x)
 
     @staticmethod

@@ -352,7 +352,7 @@ def matters(judge: Judge, base: Fitted, before: Mismatch) -> bool:
     for r, e in enumerate(judge.evidence[: len(base.blocks)]):
         for signal, _ in e.spans():
             cells = [c for c in before.cells if c.recording == r and c.channel == signal.channel]
-            chance = sum(c.rows.size if e.is_rough(signal) else c.waves for c in cells)
+            chance = sum(c.rows.size if e.is_rough(signal) else c.expected for c in cells)
             power = (sum(c.structured for c in cells) - chance) / max(sum(c.rows.size for c in cells), 1)
             most = max(most, float(np.sqrt(max(power, 0.0))) * signal.sigma / signal.span)
     return most > NEGLIGIBLE

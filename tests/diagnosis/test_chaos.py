@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import kstest
 
 from rollover.diagnosis import chaos
 from rollover.diagnosis.chaos import STATE, Course, alike, course, gained, is_other, memory, weighted
@@ -79,6 +80,8 @@ def test_a_weight_is_applied_behind_the_whitening() -> None:
     weight = w.signals[0].weight
     assert weight is not None
     np.testing.assert_allclose(w.whitened(values), weight * e.whitened(values), rtol=1e-12)
+    both = np.stack([values, 2.0 * values], axis=1)  # and of columns
+    np.testing.assert_array_equal(w.whitened(both)[:, 1], w.whitened(2.0 * values))
     assert w.strays[0].shape == (N,)
 
 
@@ -95,6 +98,33 @@ def test_what_neighbours_differ_by_is_no_mismatch_and_more_than_that_is_one() ->
     early = np.where(t < 0.4, 0.3 * np.sin(2.0 * np.pi * 3.0 * t), 0.0)  # where no neighbour strays
     assert p_value(sure, off + early) < 1e-3
     assert p_value(sure, off + 10.0 * wave) < 1e-3
+
+
+def test_p_values_are_uniform_where_runs_scatter() -> None:
+    """Four waves of random size and phase after 0.6 s, in four recordings and their six neighbours each, of one law."""
+    rng = np.random.default_rng(4)
+    t = STEP * np.arange(N)
+    phases = [((0.0, "tipping"), (0.5 * N * STEP, "impact"))] * 4
+
+    def strayed() -> np.ndarray:
+        found = np.zeros(N)
+        for f in (6.0, 11.0, 16.0, 21.0):
+            (a, b), w = rng.standard_normal(2), 2.0 * np.pi * f * (t - 0.6)
+            found += np.where(t > 0.6, 0.5 * (a * np.sin(w) + b * (1.0 - np.cos(w))), 0.0)
+        return found
+
+    found = []
+    for _ in range(120):
+        several, blocks = [], []
+        for _ in range(4):
+            e = weighted(evidence(np.zeros(N)), [{CHANNEL: strayed()} for _ in range(6)])
+            residual = e.whitened(strayed() + SIGMA * rng.standard_normal(N))
+            blocks.append(Block(residual=residual, J=np.zeros((N, 0)), slope=np.zeros(N), shift=0.0, prior=1e-3))
+            several.append(e)
+        found.append(mismatch_of(several, blocks, phases).p_value)
+    assert kstest(found, "uniform").statistic < 0.15
+    assert np.mean(np.array(found) < 0.05) < 0.1
+    assert min(found) > 1e-3
 
 
 def test_without_neighbours_all_is_as_it_was() -> None:
@@ -127,9 +157,9 @@ def blown(channels: tuple[str, ...] = CHANNELS) -> Evidence:
     )
 
 
-def misfit(e: Evidence, factors: list[float]) -> np.ndarray:
+def misfit(e: Evidence, factors: list[float], seed: int = 7) -> np.ndarray:
     """What channels leave: noise, after the blow so many times as much as expected."""
-    rng = np.random.default_rng(7)
+    rng = np.random.default_rng(seed)
     after = e.recording.time >= BLOW
     return np.concatenate([rng.standard_normal(N) * np.where(after, WEIGHT * f, 1.0) for f in factors])
 
@@ -213,7 +243,7 @@ def of_courses(others: int) -> float:
     blocks = []
     for k in range(4):
         e = blown()
-        w = misfit(e, [0.9] * 4)
+        w = misfit(e, [0.9] * 4, seed=k)
         if k < others:
             w += np.tile(np.where(e.recording.time < BLOW, 0.0, 4.0 * np.sin(9.0 * e.recording.time)), 4)
         counts = course(e, w)

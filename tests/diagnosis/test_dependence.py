@@ -14,7 +14,7 @@ from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.clocks import align
 from rollover.diagnosis.depend import ACCELERATION, DEPTH, SPEED, TIME
-from rollover.diagnosis.dependence import IMPACT, VALUE, Dependence, dependence, ways
+from rollover.diagnosis.dependence import IMPACT, VALUE, Dependence, dependence, dependence_of_one, ways
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.evidence import Evidence, evidence_of
 from rollover.diagnosis.fit import Fitted, Judge
@@ -108,6 +108,29 @@ def test_a_sensor_that_drops_out_is_told_from_a_force_and_comes_and_goes_in_time
     assert found.on == TIME
 
 
+def test_a_channel_that_goes_its_own_way_is_told_by_what_the_others_leave() -> None:
+    """y = x (1 + 0.3 x/x_max) of one channel; the same that drops out; and a force, which moves them all."""
+
+    def of_one(made: Sequence[tuple[str, Recording]]) -> Dependence | None:
+        judge, base = base_of(scenario(), made)
+        phases = [drop_phases(e) for e in judge.evidence]
+        return dependence_of_one(judge, base, mismatch_of(judge.evidence, base.blocks, phases))
+
+    rng, curved, loose = np.random.default_rng(3), [], []
+    for name, r in recorded({}, channels=THREE, rate=1000.0, noise=0.005):
+        x = r.channels[drops.FORCE]
+        bent = x * (1.0 + 0.3 * x / x.max())
+        gone = np.where(np.repeat(rng.random(x.size // 5 + 1) < 0.1, 5)[: x.size], 0.0, x)
+        curved.append((name, replace(r, channels={**r.channels, drops.FORCE: bent})))
+        loose.append((name, replace(r, channels={**r.channels, drops.FORCE: gone})))
+    for made, on in ((curved, VALUE), (loose, TIME)):
+        found = of_one(made)
+        assert found is not None
+        assert (found.channel, found.on) == (drops.FORCE, on)
+    damped = {"effects.soil-viscous-damping.damping": 400.0}
+    assert of_one(recorded(damped, channels=THREE, rate=1000.0, noise=0.005)) is None
+
+
 @pytest.mark.parametrize("memory", [0.0, 0.9])
 def test_a_line_is_found_in_coloured_noise_and_nothing_where_there_is_none(memory: float) -> None:
     rng, alarms = np.random.default_rng(4), 0
@@ -182,5 +205,6 @@ def test_three_effects_of_one_sensor_or_of_the_soil_are_any_curve_and_two_are_no
 
 def test_what_explains_little_is_not_named_and_a_sensor_without_a_quantity_goes_by_time() -> None:
     assert Dependence(shares=((SPEED, 0.2),)).on is None
-    assert Dependence(shares=((VALUE, 0.2),), channel=drops.FORCE).on == TIME
+    assert Dependence(shares=((SPEED, 0.4),)).on == SPEED
+    assert Dependence(shares=((VALUE, 0.4),), channel=drops.FORCE).on == TIME
     assert Dependence(shares=((VALUE, 0.9),), channel=drops.FORCE).on == VALUE

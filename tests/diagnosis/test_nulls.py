@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -128,6 +129,26 @@ def test_hum_is_not_taken_for_the_memory_of_noise() -> None:
     _, ar = colour.autoregression(series)
     roots = np.roots([1.0, *(-a for a in ar)])
     assert not np.any((np.abs(roots) > 0.9) & (np.abs(roots.imag) > 0.0))
+
+
+def test_after_a_blow_nothing_is_quiet() -> None:
+    """Where a run depends on chance, from 0.1 s on, it is off by three times the noise."""
+    rng = np.random.default_rng(29)
+
+    class Blown:
+        def marks(self) -> tuple[tuple[float, str], ...]:
+            return ((-0.04, "tipping"), (0.1, "impact"))
+
+    blown: Any = Blown()
+    evidence = [replace(e, simulator=blown) for e in noisy(silent(), rng, 0.0)]
+    spans = {s.channel: 0.01 * s.span for s in evidence[0].signals}
+    misfit = []
+    for e in evidence:
+        each = [np.where(e.recording.time[s.rows] < 0.1, 1.0, 3.0) * spans[s.channel] for s in e.signals]
+        misfit.append(np.concatenate([size * rng.standard_normal(size.size) for size in each]))
+    for e in colour.quiet(evidence, misfit):
+        for s in e.signals:
+            assert s.noise == pytest.approx(spans[s.channel], rel=0.15), s.channel
 
 
 def test_quiet_noise_is_found_beneath_a_misfit_many_times_as_large() -> None:
