@@ -89,7 +89,8 @@ def lasting(judge: Judge, found: Step, groups: Groups) -> Step | None:
             return None
         one = settled(judge, replace(found, fitted=rival, rivals=tuple(near)))
         ahead = replace(one, rivals=()).foretold(judge, groups)
-        if (outlasts(ahead, groups) or outlasts(before_the_blow(judge, one), groups)) and is_there(judge, one.fitted):
+        gains_on = outlasts(ahead, groups) or outlasts(before_the_blow(judge, one), groups)
+        if gains_on and is_there_as_held(judge, one.fitted):
             return one
         judge.weigh(held)
     return None
@@ -107,6 +108,18 @@ def before_the_blow(judge: Judge, found: Step) -> Step:
         return replace(f, blocks=tuple(blocks), foretold=None)
 
     return replace(found, base=cut(found.base), fitted=cut(found.fitted), rivals=())
+
+
+def is_there_as_held(judge: Judge, fitted: Fitted) -> bool:
+    """`is_there` with other courses forgiven if that is how the effect will be held, though it was found in full.
+
+    What one recording on another course asks for is not what the others do.
+    """
+    if judge.straying:
+        return is_there(judge, fitted)
+    found = is_there(judge, astray(judge, fitted))
+    judge.straying = False
+    return found
 
 
 def is_there(judge: Judge, fitted: Fitted) -> bool:

@@ -280,3 +280,20 @@ def test_two_on_another_course_are_looked_at_in_full_where_nothing_else_lasts(
     assert seen == [False] * (others - 1)
     assert (found is not None) == (others > 1 and lasts)
     assert judge.straying is (found is None)
+
+
+@pytest.mark.parametrize(("straying", "forgiven"), [(True, True), (False, True), (False, False)])
+def test_a_strength_is_told_under_the_courses_that_will_be_forgiven(
+    straying: bool, forgiven: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Found in full, one recording on another course asks for another strength; all samples count again afterwards."""
+    judge: Any = SimpleNamespace(straying=straying)
+
+    def astray(judge: Any, fitted: Fitted) -> Fitted:
+        judge.straying = forgiven
+        return fitted
+
+    monkeypatch.setattr(believed, "astray", astray)
+    monkeypatch.setattr(believed, "is_there", lambda judge, _: judge.straying)
+    assert believed.is_there_as_held(judge, Fitted(candidates=(), x=(), blocks=())) is forgiven
+    assert judge.straying is straying
