@@ -21,7 +21,7 @@ RARE = 0.01  # of a channel's samples, that may lie far off by any noise
 def without_bursts(values: Array) -> Array:
     """Evenly spaced values (n,), those far from their neighbours replaced by the middle one of these.
 
-    As they are where that is more than chance can be of a process with rare bursts: too few would lie beside them.
+    As they are where so many lie far off that these are the rule.
     """
     from scipy.ndimage import median_filter
 

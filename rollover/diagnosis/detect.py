@@ -56,6 +56,11 @@ class Cell:
         """(D14); as many as there are waves where runs do not scatter."""
         return self.noise[0] + (float(self.strayed[:, 0].mean()) if len(self.strayed) else 0.0)
 
+    @property
+    def rest(self) -> float:
+        """The same of what is rough."""
+        return self.noise[1] + (float(self.strayed[:, 1].mean()) if len(self.strayed) else 0.0)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Mismatch:
@@ -129,11 +134,10 @@ def _p_value(cells: Sequence[Cell], clocks: int) -> float:
     count = sum(c.rows.size for c in cells) - waves - clocks
     if not waves or count <= 0:
         return 1.0
-    # noise may be underrated, but not by so much: what is rough and far beyond it is no noise either
     if all(c.noise[0] == c.waves for c in cells):
+        # noise may be underrated, but not by so much: what is rough and far beyond it is no noise either
         return float(f_distribution.sf((structured / waves) / min(max(rough / count, 1e-300), LOUD), waves, count))
     expected = sum(c.expected for c in cells)
-    rest = sum(c.noise[1] + (float(c.strayed[:, 1].mean()) if len(c.strayed) else 0.0) for c in cells)
     variance = sum(2.0 * c.noise[0] * (1.0 + 2.0 * (c.expected - c.noise[0]) / c.waves) for c in cells)
     unsure = 2.0 * expected**2 / count
     for r in {c.recording for c in cells}:
@@ -143,7 +147,7 @@ def _p_value(cells: Sequence[Cell], clocks: int) -> float:
             scatter = FEW * float(np.var(apart, ddof=1))
             variance += scatter
             unsure += scatter / apart.size  # a mean is known as well as so many tell
-    level = min(max(rough / max(rest, 1e-300), 1.0), LOUD)
+    level = min(max(rough / max(sum(c.rest for c in cells), 1e-300), 1.0), LOUD)
     known = 2.0 * expected**2 / unsure
     return float(f_distribution.sf(structured / expected / level, 2.0 * expected**2 / variance, known))
 
@@ -187,9 +191,9 @@ def _cell(
         along = np.sum((strays @ Q) ** 2, axis=1)
         apart = np.stack([along, np.sum(strays**2, axis=1) - along], axis=1)
         noise = float(weight @ weight)
-        excess = float(w @ w) - noise - (float(apart.sum(axis=1).mean()) if len(apart) else 0.0)
-        found = replace(found, excess=excess, noise=(slow, noise - slow), strayed=apart)
-        return replace(found, p_value=_p_value([found], 1))
+        found = replace(found, noise=(slow, noise - slow), strayed=apart)
+        excess = float(w @ w) - found.expected - found.rest
+        return replace(found, excess=excess, p_value=_p_value([found], 1))
     if n <= waves + 1:
         return found
     return replace(
