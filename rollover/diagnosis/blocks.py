@@ -46,8 +46,8 @@ class Block:
         return float(self.residual.size) if self.expected is None else self.expected
 
     def counted(self, values: Array) -> Array:
-        """Other whitened samples (n,) for what they count here."""
-        return values if self.course is None else values * self.course.samples
+        """Other whitened samples (n,), or columns of them, for what they count here."""
+        return values if self.course is None else np.asarray((values.T * self.course.samples).T)
 
     @property
     def plain_residual(self) -> Array:

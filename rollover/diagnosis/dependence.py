@@ -220,7 +220,7 @@ def _of_channel(channel: str, judge: Judge, base: Fitted) -> tuple[list[Model], 
         for (e, b, part), f in zip(slots, shapes, strict=True):
             raw = np.zeros((e.count, f.shape[1]))
             raw[part] = f
-            columns.append(np.stack([b.counted(column) for column in e.whitened(raw).T], axis=1)[part])
+            columns.append(b.counted(e.whitened(raw))[part])
         models.append(Model(on=on, columns=tuple(columns)))
 
     size = max(float(np.abs(np.concatenate(values)).max()), 1e-300)

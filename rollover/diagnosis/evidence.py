@@ -90,6 +90,11 @@ class Evidence:
         scatter = [float(np.sum(self.whitened(stray) ** 2)) for stray in self.strays]
         return noise + (float(np.mean(scatter)) if scatter else 0.0)
 
+    @cached_property
+    def early(self) -> NDArray[np.bool_]:
+        """Samples (n,) before the blow: what is left there is no matter of the course that a run took."""
+        return np.concatenate([self.recording.time[s.rows] < self.blow for s in self.signals])
+
     def is_rough(self, s: Signal) -> bool:
         """Whether a scatter between runs, or a tolerance that was asked for, has a large part in the error.
 

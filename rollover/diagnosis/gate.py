@@ -136,10 +136,7 @@ def _before_the_blow(judge: Judge, use: Sequence[int]) -> Array | None:
 
     What an effect does there is the effect's alone; beyond, one run's difference is chance to a large part.
     """
-    found = []
-    for e in (judge.evidence[r] for r in use):
-        found += [(e.recording.time[s.rows] < e.blow).astype(float) for s in e.signals]
-    stacked = np.concatenate(found)
+    stacked = np.concatenate([judge.evidence[r].early for r in use]).astype(float)
     return None if stacked.all() or not stacked.any() else stacked
 
 

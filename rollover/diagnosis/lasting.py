@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from rollover.diagnosis.candidates import akin, physical
 from rollover.diagnosis.chaos import is_other, too_many
-from rollover.diagnosis.explain import Step
+from rollover.diagnosis.explain import Groups, Step
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate, p_value
 from rollover.diagnosis.holdout import held_out
@@ -20,7 +18,6 @@ from rollover.diagnosis.settle import left_of_means, settled
 from rollover.diagnosis.verdict import Interval
 from rollover.effects import EFFECTS
 
-Groups = Sequence[Sequence[int]]
 SENT = 0.02  # p-value of so many recordings on other courses, below which chance alone sends fewer there
 SPOKEN = 0.05  # p-value of a candidate's own score, beyond which its fit to runs that scatter is one to chance
 RIVAL = 0.5  # of the best's gain, by the mean of its runs, that a rival must have
@@ -98,12 +95,11 @@ def lasting(judge: Judge, found: Step, groups: Groups) -> Step | None:
 
 def before_the_blow(judge: Judge, found: Step) -> Step:
     """A step judged by samples alone that no course a run may take has touched."""
-    early = [np.concatenate([e.recording.time[s.rows] < e.blow for s in e.signals]) for e in judge.evidence]
 
     def cut(f: Fitted) -> Fitted:
         blocks = [
             replace(b, residual=b.residual[k], J=b.J[k], slope=b.slope[k], course=None, expected=None)
-            for b, k in zip(f.blocks, early, strict=True)
+            for b, k in zip(f.blocks, (e.early for e in judge.evidence), strict=True)
         ]
         return replace(f, blocks=tuple(blocks), foretold=None)
 

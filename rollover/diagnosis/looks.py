@@ -8,14 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.explain import Groups
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate, gate, p_value
 from rollover.diagnosis.lasting import SPOKEN, unbent
 from rollover.diagnosis.screening import spread
 
 HINTED = 0.2  # p-value beyond which what candidates move elsewhere tells that none is looked for here
-
-Groups = Sequence[Sequence[int]]
 
 
 def look(

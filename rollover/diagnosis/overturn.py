@@ -176,8 +176,8 @@ class RunSimulator:
         """What neighbours differ by from the run with `changes`, channels (n,) at the stamps less `shift` (s).
 
         Neighbours lie elsewhere on the ground's grid, have finer elements, more points of contact, shorter steps:
-        nobody could say which of them is right. Those that fail are left out. Each step of
-        theirs is one of at least `parts` of the scenario's.
+        nobody could say which of them is right. Those that fail are left out. Each step of theirs is one of at least
+        `parts` of the scenario's.
         """
         values = dict(changes or {})
         base = self.predict(values, shift)

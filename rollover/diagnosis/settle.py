@@ -157,9 +157,8 @@ def left_of_means(judge: Judge, fitted: Fitted) -> tuple[float, float]:
             w = w - e.eased(e.whitened(np.sum(raw, axis=0) / (1.0 + len(raw))))
         counts = course(e, w) if judge.straying else None
         more, w = (0.0, w) if counts is None else (counts.more, counts.samples * w)
-        early = np.concatenate([e.recording.time[s.rows] < e.blow for s in e.signals])
         total += float(w @ w) + more + (block.shift / block.prior) ** 2
-        before += float(w[early] @ w[early]) + (block.shift / block.prior) ** 2
+        before += float(w[e.early] @ w[e.early]) + (block.shift / block.prior) ** 2
     return total, before
 
 
