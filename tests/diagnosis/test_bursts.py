@@ -35,7 +35,8 @@ def test_noise_is_that_beside_the_bursts() -> None:
     rng = np.random.default_rng(2)
     several = [evidence(loose(rng)) for _ in range(4)]
     for e in colour.quiet(several, [e.signals[0].values for e in several]):
-        assert e.signals[0].noise == pytest.approx(SIGMA, rel=0.3)
+        # 15 % of the samples are the middle of their neighbours, which is quieter: 6 % low, and 3 % of so few samples
+        assert e.signals[0].noise == pytest.approx(SIGMA, rel=0.1)
     for e in colour.whole(several, [loose(rng, lasting=1) for _ in several]):
         assert e.signals[0].noise == SIGMA  # as it was held
 
