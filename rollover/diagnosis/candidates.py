@@ -40,6 +40,7 @@ ONE = (5,)
 SEVERAL = (8, 4, 3)  # places on the axes of an effect's parameters
 WIDE = 0.08  # of a coordinate: a step off what changes nothing, where each place costs a full run
 LIMITS = (0.12, 0.3)  # more places of what may be a limit
+STRONG, ENDS = (0.35, 0.9), (0.0, 1.0)  # of the way from what changes nothing to an end
 SPREAD = (0.12, 0.3, 0.6)  # places of a depth, a length: where nothing is known to change nothing
 # what hits a wall does so at a moment that its travel sets: a tenth beside that, it explains nothing
 NARROW = {"payload-shift": tuple(0.1 + 0.06 * k for k in range(13))}
@@ -129,6 +130,24 @@ class Candidate:
             else:
                 axes.append(list(NARROW.get(self.id, SPREAD)))
         return list(itertools.product(*axes))
+
+    def strong(self) -> list[tuple[float, ...]]:
+        """Coordinates where the effect is strong, one parameter at a time, and its `probes`; none where runs are cheap.
+
+        Where it acts, if that is a parameter, is spread as in `probes`; what begins at no strength at all has one end.
+        """
+        if self.neutral is None:
+            return []
+        beside = self._beside(self.neutral)
+        ways = [(k, end, way, n) for k, n in enumerate(self.neutral) if n is not None for end in ENDS for way in STRONG]
+        if not ways:
+            nulls = EFFECTS[self.id].null
+            ways = [(k, 1.0, STRONG[-1], 0.0) for k, name in enumerate(self.search) if nulls.get(name) == 0.0][:1]
+        found = list(beside)
+        for place in beside:
+            usual = [p if n is None else n for p, n in zip(place, self.neutral, strict=True)]
+            found += [(*usual[:k], n + way * (end - n), *usual[k + 1 :]) for k, end, way, n in ways]
+        return list(dict.fromkeys(found))
 
     def whole(self) -> Candidate:
         """The same effect with its shape fitted too."""

@@ -48,6 +48,7 @@ STATE = 14  # d
 ALONE = 3  # channels below which none is told from a course
 OTHER = 0.5  # of what it would count, below which a recording took another course
 OFTEN = 0.15  # of recordings that may
+SENT = 0.02  # p-value of so many recordings on other courses, below which chance alone sends fewer there
 FAR = 9.0  # times the middle power of neighbours, beyond which one took another course
 
 

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.bursts import too_often
-from rollover.diagnosis.chaos import FEW, is_other, too_many
+from rollover.diagnosis.chaos import FEW, SENT, is_other, too_many
 from rollover.diagnosis.colour import hums
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.fit import Block
@@ -120,7 +120,8 @@ def mismatch_of(
     for c in telling:
         by_channel.setdefault(c.channel, []).append(blocks[c.recording].valued[c.rows])
     p = min(_p_value(telling, len(blocks)), too_often(np.concatenate(w) for w in by_channel.values()))
-    p = min(p, too_many(sum(other), len(other)))  # one may, not all of them
+    sent = too_many(sum(other), len(other))
+    p = min(p, sent) if sent <= SENT else p  # one may, not all of them: whole numbers, and no p-value until they tell
     return Mismatch(cells=tuple(cells), telling=tuple(telling), p_value=p, adjusted=_holm([c.p_value for c in cells]))
 
 

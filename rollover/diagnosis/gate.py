@@ -44,7 +44,8 @@ class Gate:
 
     `starts` are the places where a fit may begin, by key, the best first: the directions that score most, followed as
     far as the misfit goes along them. Thresholds have no such way and are not in it. `only` are the recordings that all
-    candidates were looked at in; empty for all.
+    candidates were looked at in; empty for all. `leading` are candidates to be tried whatever they score, and `far`
+    where some of them begin that have to be strong.
     """
 
     score: float
@@ -54,6 +55,7 @@ class Gate:
     starts: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
     only: tuple[int, ...] = ()
     leading: tuple[str, ...] = ()
+    far: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     def ranked(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """Candidates by score, the best first; before each of the first ones the next of those that are `leading`."""

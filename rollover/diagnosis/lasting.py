@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from rollover.diagnosis.candidates import akin, physical
-from rollover.diagnosis.chaos import is_other, too_many
+from rollover.diagnosis.chaos import SENT, is_other, too_many
 from rollover.diagnosis.explain import Groups, Step
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate, p_value
@@ -18,7 +18,6 @@ from rollover.diagnosis.settle import left_of_means, settled
 from rollover.diagnosis.verdict import Interval
 from rollover.effects import EFFECTS
 
-SENT = 0.02  # p-value of so many recordings on other courses, below which chance alone sends fewer there
 SPOKEN = 0.05  # p-value of a candidate's own score, beyond which its fit to runs that scatter is one to chance
 RIVAL = 0.5  # of the best's gain, by the mean of its runs, that a rival must have
 SURELY = 4.0  # times an interval by slopes, beyond which no run is needed to tell a strength from none
@@ -61,10 +60,10 @@ def astray(judge: Judge, fitted: Fitted) -> Fitted:
 def backed(found: Step, looked: Gate) -> Step:
     """A step without rivals that nothing spoke for when looked at: their runs met the recordings by chance.
 
-    What speaks for one that acts somewhere speaks for its kin.
+    What speaks for one that acts somewhere speaks for its kin; for a strong one its runs did.
     """
     last = [f.candidates[-1] for f in found.rivals]
-    told = [c for c in last if p_value(looked.scores.get(c.key, 0.0), looked.null) < SPOKEN]
+    told = [c for c in last if c.key in looked.far or p_value(looked.scores.get(c.key, 0.0), looked.null) < SPOKEN]
     kept = [*told, *akin(last, told)]
     return replace(found, rivals=tuple(f for f in found.rivals if f.candidates[-1] in kept))
 
@@ -113,9 +112,8 @@ def is_there_as_held(judge: Judge, fitted: Fitted) -> bool:
     """
     if judge.straying:
         return is_there(judge, fitted)
-    found = is_there(judge, astray(judge, fitted))
-    judge.straying = False
-    return found
+    with judge.forgiven():
+        return is_there(judge, astray(judge, fitted))
 
 
 def is_there(judge: Judge, fitted: Fitted) -> bool:

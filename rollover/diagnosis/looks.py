@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import zip_longest
 
 import numpy as np
 
@@ -12,9 +13,11 @@ from rollover.diagnosis.explain import Groups
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate, gate, p_value
 from rollover.diagnosis.lasting import SPOKEN, unbent
-from rollover.diagnosis.screening import spread
+from rollover.diagnosis.refine import left_at
+from rollover.diagnosis.screening import begun, spread
 
 HINTED = 0.2  # p-value beyond which what candidates move elsewhere tells that none is looked for here
+CLEARLY = 0.7  # of what is left without it, up to which a strong effect is followed
 
 
 def look(
@@ -43,12 +46,33 @@ def look(
     # in full, what one of them lacks hides what the others have
     scores = {key: max(score, first.scores.get(key, 0.0)) for key, score in last.scores.items()}
     moving = [c for c in candidates if c.kind != "sensor"]
-    judge.straying = True  # a part that gives way shows in how it does, not in where all else goes then
-    forgiven = _narrowed(judge, judge.again(base), moving, few, more, beside)[-1]
-    judge.straying = False
+    with judge.forgiven():  # a part that gives way shows in how it does, not in where all else goes then
+        forgiven = _narrowed(judge, judge.again(base), moving, few, more, beside)[-1]
     able = [c.key for c in forgiven.ranked(moving) if p_value(forgiven.scores.get(c.key, 0.0), forgiven.null) < SPOKEN]
     scores = {key: max(score, forgiven.scores.get(key, 0.0)) for key, score in scores.items()}
-    return replace(last, scores=scores, leading=tuple(able[: effort.leaders]))
+    far = strongly(judge, base, moving, few)
+    leading = [key for both in zip_longest(far, able[: effort.leaders]) for key in both if key is not None]
+    return replace(last, scores=scores, leading=tuple(dict.fromkeys(leading)), far=far)
+
+
+def strongly(
+    judge: Judge, base: Fitted, candidates: Sequence[Candidate], few: Sequence[int]
+) -> dict[str, tuple[float, ...]]:
+    """Where those candidates act that leave least of `few` recordings where they act strongly, by key, the best first.
+
+    What so strong an effect does is no multiple of what a little of it does: a vehicle rolls on, or no more.
+    """
+    shifts = begun(judge, base)
+    judge.made_ahead((r, (*base.candidates, c), (*base.x, *x)) for c in candidates for x in c.strong() for r in few)
+    met: dict[str, tuple[float, tuple[float, ...]]] = {}
+    for c in candidates:
+        for x in c.strong():
+            left = left_at(judge, (*base.candidates, c), (*base.x, *x), shifts, few)
+            if left is not None:
+                met[c.key] = min(met.get(c.key, (left, x)), (left, x))
+    usual = left_at(judge, base.candidates, base.x, shifts, few) or 0.0
+    ranked = sorted((left, key, x) for key, (left, x) in met.items() if left < CLEARLY * usual)
+    return {key: x for _, key, x in ranked[: judge.effort.leaders]}
 
 
 def _narrowed(

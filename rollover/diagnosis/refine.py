@@ -23,17 +23,28 @@ TRIED = 40  # at most so many
 TWICE, LITTLE = 2, 1.0  # how often; a gain that is not worth another time
 
 
-def left_at(judge: Judge, candidates: Sequence[Candidate], x: Sequence[float], shifts: Sequence[float]) -> float | None:
-    """What is left of all recordings at x and these time shifts (s); None where one cannot be simulated."""
-    blocks = _blocks_at(judge, candidates, x, shifts)
+def left_at(
+    judge: Judge,
+    candidates: Sequence[Candidate],
+    x: Sequence[float],
+    shifts: Sequence[float],
+    only: Sequence[int] | None = None,
+) -> float | None:
+    """What is left of all recordings or `only` some at x, with time shifts (s) of all; None if a run fails."""
+    blocks = _blocks_at(judge, candidates, x, shifts, only)
     return None if blocks is None else sum(b.normal()[2] for b in blocks)
 
 
 def _blocks_at(
-    judge: Judge, candidates: Sequence[Candidate], x: Sequence[float], shifts: Sequence[float]
+    judge: Judge,
+    candidates: Sequence[Candidate],
+    x: Sequence[float],
+    shifts: Sequence[float],
+    only: Sequence[int] | None = None,
 ) -> list[Block] | None:
-    """All recordings at x and these time shifts (s), without slopes; None where one cannot be simulated."""
-    found = [judge.block(r, candidates, x, s, 0.0) for r, s in enumerate(shifts)]
+    """Recordings at x and these time shifts (s), without slopes; None where one cannot be simulated."""
+    use = range(len(shifts)) if only is None else only
+    found = [judge.block(r, candidates, x, shifts[r], 0.0) for r in use]
     blocks = [b for b in found if b is not None]
     return blocks if len(blocks) == len(found) else None
 

@@ -91,6 +91,7 @@ def screen(
         met: list[tuple[float, tuple[float, ...]]] = []
         potential = 0.0
         ways = () if judge.effort.thrifty and not c.is_placed else looked.starts.get(c.key, ())
+        ways = (*ways, *([looked.far[c.key]] if c.key in looked.far else []))
         for start in ways if (near or c.is_placed) and ways else (*ways, *c.starts()):
             left, along, size, count = 0.0, 0.0, 0.0, 0
             for r, block in zip(few, blocks, strict=True):

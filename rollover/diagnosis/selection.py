@@ -23,6 +23,8 @@ from rollover.diagnosis.refine import polish, timed, traced, without
 from rollover.diagnosis.verdict import Verdict
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
+SCATTERED = 0.05  # share of all errors that the look at candidates may make where runs scatter
+CERTAIN = 1.0 - 1e-12  # largest p-value whose logarithm is taken
 MOST = 3  # effects in one explanation
 NEGLIGIBLE = 0.001  # of a channel's range: what moves nothing by more is not worth a name
 PARTLY = 0.005  # of the excess over the noise that one effect may leave, were it structured, and still be named
@@ -55,13 +57,17 @@ class Explanation:
 
     @property
     def p_value(self) -> float:
-        """Of "nothing but noise": the smaller of the omnibus test's and of the best candidate's, for two tests.
+        """Of "nothing but noise": min over two tests of 1 - (1 - p)^(1/a), a their shares of all errors (Sidak).
 
-        A candidate that was looked at closer and refuted tells nothing.
+        The omnibus test's p and the best candidate's, half each; where runs scatter nearly all is the first one's: the
+        second is rarely small by chance there, as weights and neighbours lower every score. A candidate that was looked
+        at closer and refuted tells nothing.
         """
         if self.refuted:
             return self.before.p_value
-        return float(1.0 - (1.0 - min(self.before.p_value, self.looked.p_value())) ** 2)
+        share = SCATTERED if any(b.expected is not None for b in self.base.blocks) else 0.5
+        tests = ((self.before.p_value, 1.0 - share), (self.looked.p_value(), share))
+        return float(min(-np.expm1(np.log1p(-min(p, CERTAIN)) / a) for p, a in tests))
 
 
 def explained(inquiry: Inquiry, base: Fitted) -> Explanation:

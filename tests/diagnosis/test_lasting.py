@@ -287,7 +287,8 @@ def test_a_strength_is_told_under_the_courses_that_will_be_forgiven(
     straying: bool, forgiven: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Found in full, one recording on another course asks for another strength; all samples count again afterwards."""
-    judge: Any = SimpleNamespace(straying=straying)
+    judge = Judge([])
+    judge.straying = straying
 
     def astray(judge: Any, fitted: Fitted) -> Fitted:
         judge.straying = forgiven

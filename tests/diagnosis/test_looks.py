@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from rollover.diagnosis.effort import RUNS
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import VISIBLE, Gate, _at_odds, _best_along, _visible, gate
-from rollover.diagnosis.screening import promising
+from rollover.diagnosis.screening import promising, screen
 from rollover.effects import Search
 from rollover.recording import Recording
 from tests.diagnosis import test_fits
@@ -160,6 +161,7 @@ def test_what_leads_where_other_courses_are_forgiven_is_tried_first(monkeypatch:
         return Gate(score=max(scores.values()), scores=scores, null=null, detectable={})
 
     monkeypatch.setattr(looks, "gate", looked)
+    monkeypatch.setattr(looks, "strongly", lambda *_: {})
     judge, base = judge_of((0.0,) * 4, (0.0,) * 4)
     judge.straying, judge.effort = False, replace(judge.effort, leaders=3)
     every = [replace(SLOPE, id=f"c{k}", kind="sensor" if k == 9 else "parameter") for k in range(10)]
@@ -238,6 +240,34 @@ def test_what_was_refuted_tells_nothing() -> None:
     assert replace(found, refuted=True).p_value == 0.3
 
 
+@pytest.mark.parametrize("expected", [None, 1.0])
+def test_of_two_tests_the_smaller_p_value_is_uniform_for_the_shares_of_errors_they_may_make(
+    expected: float | None,
+) -> None:
+    """Kolmogorov's statistic of 2000 draws of two uniform p-values, at most 1.63/sqrt(n) in 99 of 100 cases.
+
+    Where runs scatter (an expected sum of squares is known) the look is nearly always 1, and then nothing is added.
+    """
+    rng, draws = np.random.default_rng(3), 2000
+    base = judge_of((0.0,) * 4, (0.0,) * 4)[1]
+    base = replace(base, blocks=tuple(replace(b, expected=expected) for b in base.blocks))
+
+    def told(before: float, look: float) -> float:
+        one: Any = SimpleNamespace(p_value=before)
+        other: Any = SimpleNamespace(p_value=lambda: look)
+        found = selection.Explanation(
+            base=base, fitted=base, parts=(), looked=other, detectable={}, before=one, after=one
+        )
+        return found.p_value
+
+    p = np.sort([told(*pair) for pair in rng.random((draws, 2))])
+    assert np.max(np.abs(p - (np.arange(draws) + 0.5) / draws)) < 1.63 / np.sqrt(draws)
+    assert told(0.3, 1.0) == pytest.approx(0.51 if expected is None else 1.0 - 0.7 ** (1.0 / 0.95))
+    assert told(1.0, 1e-9) < (2.1e-9 if expected is None else 2.1e-8)
+    assert told(1.0, 1.0) == pytest.approx(1.0)
+    assert told(0.0, 1.0) == 0.0
+
+
 def test_a_limit_shows_up_to_the_largest_that_was_tried_and_shows() -> None:
     """A force cell that ends at three quarters of its range shows, at more than the range it does not."""
     judge = test_fits.judge_of(recorded({}, noise=0.01, speeds=(1.5, 2.5)))
@@ -288,3 +318,47 @@ def test_a_look_goes_as_far_along_a_direction_as_gains_most() -> None:
     assert gains[0] == pytest.approx(gain(float(along[0]) / size), rel=1e-9)
     assert gains[0] > 0.9 * best
     assert gains[0] > 3.0 * float(misfit @ D[:, 0] / size) ** 2  # which the slopes alone would have said
+
+
+class Tipping(Wave):
+    """A slope moves a wave of its own, until at 60 the vehicle tips; mass moves a little of what tipping does."""
+
+    def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+        self.runs += 1
+        x, m = changes.get("effects.slope.angle", 0.0), changes.get("effects.mass.factor", 0.0)
+        tipped = 20.0 * np.sin(30.0 * TIME)
+        return {CHANNEL: tipped * (x > 60.0) + 0.1 * x * np.sin(200.0 * TIME) + 0.05 * m * tipped}
+
+
+def test_what_only_a_strong_effect_does_is_found_though_a_little_of_it_tells_nothing() -> None:
+    judge, base = judge_of((0.0,) * 4, (20.0,) * 4)
+    for e in judge.evidence:
+        object.__setattr__(e, "simulator", Tipping(0.0))
+    judge.measured = [20.0 * np.sin(30.0 * TIME) + w for w in np.random.default_rng(1).standard_normal((4, N))]
+    base = replace(base, blocks=tuple(replace(b, residual=w) for b, w in zip(base.blocks, judge.measured, strict=True)))
+    mass = replace(SLOPE, id="mass", search={"factor": Search(-2.0, 2.0)})
+    groups = [[r] for r in range(4)]
+    judge.straying = False
+    found = looks.look(judge, base, [mass, SLOPE], groups)
+    assert found.scores["mass"] > 100.0 * found.scores["slope"]
+    assert found.far == {"slope": (0.95,)}  # a mass leaves 0.91^2 of it, more than is followed
+    assert found.leading[0] == "slope"
+    assert [c.key for c in found.ranked([mass, SLOPE])] == ["slope", "mass"]
+    begun = screen(judge, base, [SLOPE], [0, 1], [0.0] * 4, found)[0]
+    assert (0.95,) in begun.starts
+    assert begun.left < 0.25 * sum(b.squares for b in base.blocks[:2])
+    judge.straying = True
+    assert looks.look(judge, base, [mass, SLOPE], groups).far == {}  # of what strays so far, chance may be all
+
+
+def test_an_effect_is_strong_at_both_ends_or_at_the_one_that_it_has() -> None:
+    assert SLOPE.strong() == [(0.58,), (0.42,), (0.5 - 0.175,), (0.5 - 0.45,), (0.5 + 0.175,), (0.5 + 0.45,)]
+    assert replace(SLOPE, neutral=None).strong() == []
+    tank = Candidate(
+        id="tank-slosh", kind="physics", family="x", neutral=(None, None),
+        search={"mass": Search(1.0, 1000.0, "log"), "length": Search(0.1, 1.0)},
+    )  # fmt: skip
+    places = tank.strong()
+    assert set(tank.probes()) < set(places)
+    assert {x for x, _ in set(places) - set(tank.probes())} == {0.9}
+    assert {y for _, y in places} == {y for _, y in tank.probes()}
