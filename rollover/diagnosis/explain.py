@@ -262,6 +262,8 @@ def _first_fits(
         for start in s.starts
     ]  # fmt: skip
     fits = [f for f in inquiry.fits(jobs) if f is not None]
+    if not judge.straying:
+        fits += _smoothly(inquiry, [job for job in jobs if job.candidates[-1].key in looked.far], few)
     for one in fits:
         key, size = one.candidates[-1].key, sum(b.residual.size for b in one.blocks)
         told[key] = min(told.get(key, np.inf), float(np.sqrt(one.left / size)))
@@ -274,6 +276,20 @@ def _first_fits(
         worth = [f for f in worth if as_it_is - f.left >= RIVALS * (as_it_is - fits[0].left)]
     worth = worth[: judge.effort.most_leaders]
     return [replace(s, nrmse=told.get(s.candidate.key, 0.0)) for s in screened], worth
+
+
+def _smoothly(inquiry: Inquiry, jobs: Sequence[Job], few: Sequence[int]) -> list[Fitted]:
+    """Fits to few recordings with other courses forgiven, as they stand in full.
+
+    Where runs part ways what is left in full leaps from place to place, and a fit ends at the first dip.
+    """
+    judge, found = inquiry.judge, []
+    with judge.forgiven():
+        fits = [f for f in inquiry.fits(jobs) if f is not None]
+    for f in fits:
+        blocks = [judge.block(r, f.candidates, f.x, b.shift, 0.0) for r, b in zip(few, f.blocks, strict=True)]
+        found.append(replace(f, blocks=tuple(b for b in blocks if b is not None)))
+    return [f for f in found if len(f.blocks) == len(few)]
 
 
 def _chosen(screened: Sequence[Screened], effort: Effort, looked: Gate) -> list[Screened]:

@@ -53,8 +53,8 @@ class Judge:
         return other
 
     def fingerprint(self) -> str:
-        """Hash of the recordings as they are held: their samples and their noise."""
-        total = hashlib.sha256()
+        """Hash of the recordings as they are held: their samples, their noise, and whether they may have strayed."""
+        total = hashlib.sha256(repr(self.straying).encode())
         for e in self.evidence:
             total.update(repr((e.name, e.shift_prior)).encode())
             for s in e.signals:

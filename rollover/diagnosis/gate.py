@@ -55,7 +55,7 @@ class Gate:
     starts: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
     only: tuple[int, ...] = ()
     leading: tuple[str, ...] = ()
-    far: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    far: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
 
     def ranked(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """Candidates by score, the best first; before each of the first ones the next of those that are `leading`."""

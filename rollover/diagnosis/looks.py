@@ -17,7 +17,7 @@ from rollover.diagnosis.refine import left_at
 from rollover.diagnosis.screening import begun, spread
 
 HINTED = 0.2  # p-value beyond which what candidates move elsewhere tells that none is looked for here
-CLEARLY = 0.7  # of what is left without it, up to which a strong effect is followed
+CLEARLY = 0.8  # of what is left without it, up to which a strong effect is followed
 
 
 def look(
@@ -57,22 +57,30 @@ def look(
 
 def strongly(
     judge: Judge, base: Fitted, candidates: Sequence[Candidate], few: Sequence[int]
-) -> dict[str, tuple[float, ...]]:
+) -> dict[str, tuple[tuple[float, ...], ...]]:
     """Where those candidates act that leave least of `few` recordings where they act strongly, by key, the best first.
 
-    What so strong an effect does is no multiple of what a little of it does: a vehicle rolls on, or no more.
+    What so strong an effect does is no multiple of what a little of it does: a vehicle rolls on, or no more. Where all
+    samples count in full what comes near is told best, with other courses forgiven what is still far off.
     """
     shifts = begun(judge, base)
     judge.made_ahead((r, (*base.candidates, c), (*base.x, *x)) for c in candidates for x in c.strong() for r in few)
-    met: dict[str, tuple[float, tuple[float, ...]]] = {}
-    for c in candidates:
-        for x in c.strong():
-            left = left_at(judge, (*base.candidates, c), (*base.x, *x), shifts, few)
-            if left is not None:
-                met[c.key] = min(met.get(c.key, (left, x)), (left, x))
-    usual = left_at(judge, base.candidates, base.x, shifts, few) or 0.0
-    ranked = sorted((left, key, x) for key, (left, x) in met.items() if left < CLEARLY * usual)
-    return {key: x for _, key, x in ranked[: judge.effort.leaders]}
+
+    def ranked() -> list[tuple[str, tuple[float, ...]]]:
+        usual = left_at(judge, base.candidates, base.x, shifts, few)
+        met = []
+        for c in candidates:
+            tried = [(left_at(judge, (*base.candidates, c), (*base.x, *x), shifts, few), x) for x in c.strong()]
+            met += sorted((left, c.key, x) for left, x in tried if left is not None)[:1]
+        best = sorted(one for one in met if usual is not None and one[0] < CLEARLY * usual)
+        return [(key, x) for _, key, x in best[: judge.effort.leaders]]
+
+    with judge.forgiven():
+        forgiven = ranked()
+    found: dict[str, tuple[tuple[float, ...], ...]] = {}
+    for key, x in (one for both in zip_longest(ranked(), forgiven) for one in both if one is not None):
+        found[key] = tuple(dict.fromkeys((*found.get(key, ()), x)))
+    return found
 
 
 def _narrowed(

@@ -91,7 +91,6 @@ def screen(
         met: list[tuple[float, tuple[float, ...]]] = []
         potential = 0.0
         ways = () if judge.effort.thrifty and not c.is_placed else looked.starts.get(c.key, ())
-        ways = (*ways, *([looked.far[c.key]] if c.key in looked.far else []))
         for start in ways if (near or c.is_placed) and ways else (*ways, *c.starts()):
             left, along, size, count = 0.0, 0.0, 0.0, 0
             for r, block in zip(few, blocks, strict=True):
@@ -111,7 +110,8 @@ def screen(
             met.append((left, start))
         if met:
             met.sort()
-            found.append(Screened(candidate=c, starts=_begun_at(c, met), left=met[0][0], potential=potential))
+            starts = tuple(dict.fromkeys((*looked.far.get(c.key, ()), *_begun_at(c, met))))
+            found.append(Screened(candidate=c, starts=starts, left=met[0][0], potential=potential))
     return found
 
 

@@ -138,6 +138,7 @@ def test_a_rival_that_nothing_spoke_for_is_none() -> None:
     looked = Gate(score=60.0, scores={"slope": 60.0, "mass": 4.0}, null=null, detectable={})
     step = Step(base=fits[0], fitted=fits[1], p_value=0.0, rivals=tuple(fits))
     assert backed(step, looked).rivals == (fits[0],)
+    assert backed(step, replace(looked, far={"inertia": ((0.9,),)})).rivals == (fits[0], fits[2])  # its runs did
     two = {"depth": Search(0, 1), "ratio": Search(0, 1)}
     placed = [Candidate(id=i, kind="physics", family="f", search=two, neutral=(None, 0.5)) for i in ("slope", "mass")]
     akin = [Fitted(candidates=(c,), x=(0.5, 0.5), blocks=()) for c in placed]
