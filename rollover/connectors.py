@@ -37,18 +37,7 @@ from rollover.tables import (
     T_YIELD,
     X,
 )
-from rollover.vectors import add_force, cross, place, spin, to_body, to_world, velocity
-
-
-@compiled
-def relative_angle(a: Any, b: Any, k: int) -> float:
-    """Component k of the rotation of body b against body a, in a's axes; exact to second order in the angle."""
-    i, j = (k + 1) % 3, (k + 2) % 3
-    ji, ij = 0.0, 0.0
-    for m in range(3):
-        ji += a[ROT + 3 * m + j] * b[ROT + 3 * m + i]
-        ij += a[ROT + 3 * m + i] * b[ROT + 3 * m + j]
-    return 0.5 * (ji - ij)
+from rollover.vectors import add_force, cross, place, relative_angle, spin, to_body, to_world, velocity
 
 
 @compiled

@@ -22,12 +22,12 @@ from numpy.typing import NDArray
 from ground.compiled import compiled
 from rollover import model, simulate
 from rollover.contact import grown
-from rollover.forces import added_mass, generalised_forces, relative_angle
+from rollover.forces import added_mass, generalised_forces
 from rollover.impact import constraints
 from rollover.scenario import Scenario
 from rollover.step import end_of_step
 from rollover.tables import ACTIVE, EVENTS, OMEGA, OUTSIDE, SLOTS, Tables, handle
-from rollover.vectors import cross, to_body, to_world
+from rollover.vectors import cross, relative_angle, to_body, to_world
 from rollover.vectors import place as place_of
 
 Array = NDArray[np.float64]
