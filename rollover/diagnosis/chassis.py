@@ -16,7 +16,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.depend import ResidualForce
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.verdict import Degree
 from rollover.scenario import Scenario
@@ -26,25 +25,22 @@ Array = NDArray[np.float64]
 AXES = "xyz"
 ALONG, ABOUT = "chassis/acceleration_", "chassis/angular_velocity_"
 SMOOTHED = 0.012  # s, over which a gyroscope is differentiated
-STATE = ("chassis/roll", "chassis/pitch", "chassis/velocity_y", "chassis/velocity_z", "chassis/angular_velocity_x")
-FURTHER = ("ground/sinkage", "axle/front/angle")  # where there is ground to sink into, and an axle
 
 
 def degrees_of(
     scenarios: Sequence[Scenario], evidence: Sequence[Evidence], shifts: Sequence[float]
-) -> tuple[tuple[Degree, ...], list[ResidualForce]]:
-    """Degrees of freedom of the chassis by their share of the misfit, largest first; and the first one's force.
+) -> tuple[Degree, ...]:
+    """Degrees of freedom of the chassis by their share of the misfit, largest first.
 
     Empty where no instrument sits at the chassis' centre of mass. `scenarios` are those of the recordings.
     """
-    forces: dict[str, list[ResidualForce]] = {}
+    forces: dict[str, list[Array]] = {}
     worth: dict[str, float] = {}
     for scenario, e, shift in zip(scenarios, evidence, shifts, strict=True):
         predicted = e.simulator.predict({}, shift)
         if predicted is None or isinstance(scenario.vehicle, Striker):
             continue
         body = chassis_of(scenario.vehicle)
-        state = e.simulator.state(shift)
         for s in e.signals:
             axis = s.channel[-1]
             if s.channel in e.recording.sensors or s.channel[:-1] not in (ALONG, ABOUT):
@@ -53,20 +49,18 @@ def degrees_of(
             name = f"{'along' if s.channel.startswith(ALONG) else 'about'} {axis}"
             k = AXES.index(axis)
             force = body.mass * off if name.startswith("along") else body.inertia[k] * _rate(off, time)
-            of = {"time": time, **{c: state[c][s.rows] for c in (*STATE, *FURTHER) if c in state}}
-            one = ResidualForce(recording=e.name, condition=e.condition or e.name, force=force, of=of)
-            forces.setdefault(name, []).append(one)
+            forces.setdefault(name, []).append(force)
             worth[name] = worth.get(name, 0.0) + _worth(s, off)
     total = sum(worth.values())
     if total <= 0.0:
-        return (), []
+        return ()
     found = []
     for name in sorted(worth, key=lambda n: -worth[n]):
-        all_ = np.concatenate([f.force for f in forces[name]])
+        all_ = np.concatenate(forces[name])
         unit = "N" if name.startswith("along") else "N m"
         rms = float(np.sqrt(np.mean(all_**2)))
         found.append(Degree(body="chassis", axis=name, unit=unit, rms=rms, share=worth[name] / total))
-    return tuple(found), forces[found[0].axis]
+    return tuple(found)
 
 
 def _worth(s: Signal, off: Array) -> float:

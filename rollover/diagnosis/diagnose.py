@@ -17,7 +17,6 @@ from rollover.diagnosis.chaos import weighted
 from rollover.diagnosis.chassis import degrees_of
 from rollover.diagnosis.clocks import align
 from rollover.diagnosis.crew import Crew
-from rollover.diagnosis.depend import dependency
 from rollover.diagnosis.dependence import Dependence, dependence, dependence_of_one
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.empirical import offered, proposed
@@ -28,6 +27,7 @@ from rollover.diagnosis.gate import yardstick
 from rollover.diagnosis.loudness import with_loudness
 from rollover.diagnosis.overturn import full_runs
 from rollover.diagnosis.phases import phases_of
+from rollover.diagnosis.quantities import dependency
 from rollover.diagnosis.readings import digitised, without_spikes
 from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing, with_scatter
 from rollover.diagnosis.scores import judged
@@ -103,9 +103,9 @@ def diagnose(
     if acts == "drop" and is_mismatch:
         depends_on = dependence(judge, set_ups, explanation.base)
     elif acts != "drop":
-        degrees, forces = degrees_of(set_ups, found, [b.shift for b in explanation.base.blocks])
+        degrees = degrees_of(set_ups, found, [b.shift for b in explanation.base.blocks])
         of_one = dependence_of_one(judge, explanation.base, before) if is_mismatch else None
-        depends_on = of_one or Dependence(shares=tuple(dependency(forces)))
+        depends_on = of_one or Dependence(shares=dependency(judge, explanation.base))
     law = None
     if verdict == "unexplained" and acts == "drop":
         say("a law for what no candidate explains")

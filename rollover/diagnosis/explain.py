@@ -261,9 +261,9 @@ def _first_fits(
         for s in chosen.values()
         for start in s.starts
     ]  # fmt: skip
-    fits = [f for f in inquiry.fits(jobs) if f is not None]
-    if not judge.straying:
-        fits += _smoothly(inquiry, [job for job in jobs if job.candidates[-1].key in looked.far], few)
+    far = [] if judge.straying else [job for job in jobs if job.candidates[-1].key in looked.far]
+    fits = [f for f in inquiry.fits([job for job in jobs if job not in far]) if f is not None]
+    fits += _smoothly(inquiry, far, few)
     for one in fits:
         key, size = one.candidates[-1].key, sum(b.residual.size for b in one.blocks)
         told[key] = min(told.get(key, np.inf), float(np.sqrt(one.left / size)))

@@ -15,24 +15,27 @@ STIFF = {"front_left": 220e3, "front_right": 220e3, "rear_left": 350e3, "rear_ri
 
 
 def _flat(random: Random, _: Mapping[str, float]) -> Change:
-    """One tyre is nearly flat."""
+    """One tyre is nearly flat: its force is a function of how far it is pressed in, which goes with the attitude."""
     wheel, share = str(random.choice(TYRES[2:])), log_uniform(random, 0.15, 0.5)
     return Change(
         id="outside:flat-tyre",
         kind="outside",
         told={"share": share},
         values={f"vehicle.wheels.{wheel}.tyre.vertical_stiffness": share * STIFF[wheel]},
-        depends_on="time",
+        depends_on="attitude",
         near=("centre-of-mass", "slope", "tyre-lateral-stiffness"),
     )
 
 
 def _pushed(random: Random, _: Mapping[str, float]) -> Change:
-    """Tests began with another roll rate than was written down, all by one factor."""
+    """Tests began with another roll rate than was written down, all by one factor.
+
+    Of what tips over, energy tells the rate from the angle: omega^2 = omega_0^2 + 2 (U_0 - U(phi))/J.
+    """
     factor = math.exp(log_uniform(random, 0.05, 0.3) * float(random.choice((-1.0, 1.0))))
     near = ("slope", "inertia", "centre-of-mass")
     return Change(
-        id="outside:pushed", kind="outside", told={"factor": factor}, pushed=factor, depends_on="speed", near=near
+        id="outside:pushed", kind="outside", told={"factor": factor}, pushed=factor, depends_on="attitude", near=near
     )
 
 

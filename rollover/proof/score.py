@@ -9,7 +9,12 @@ from typing import Any
 NOTHING = ("no-mismatch", "cannot-tell")
 VERDICTS = ("no-mismatch", "cannot-tell", "parameter", "sensor", "missing-physics", "unexplained")
 FELT = 0.05  # share of an effect's evidence from which on a channel is one that feels it
-SAME_AS = {"depth": ("sinkage", "position"), "speed": ("velocity",), "impact-speed": ("initiation.speed", "speed")}
+SAME_AS = {
+    "depth": ("sinkage", "position"),
+    "speed": ("velocity",),
+    "impact-speed": ("initiation.speed", "speed"),
+    "attitude": ("roll", "pitch", "axle/front/angle"),
+}
 
 
 def score(truth: Mapping[str, Any], diagnosis: Mapping[str, Any] | None, seconds: float = 0.0) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The residual generalised force on a chassis: which degree of freedom, how large, and what it depends on."""
+"""The residual generalised force on a chassis: which degree of freedom, and how large."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.chassis import degrees_of
-from rollover.diagnosis.depend import dependency
 from rollover.diagnosis.evidence import Evidence, evidence_of
 from rollover.diagnosis.overturn import RunSimulator
 from rollover.recording import Recording
@@ -43,7 +42,7 @@ def thrown(speed: float, off: dict[str, str]) -> tuple[Scenario, Evidence]:
 
 def test_a_force_along_one_axis_is_found_with_its_size() -> None:
     tosses = [thrown(v, {ALONG[1]: "2.0 * np.sin(30.0 * t)"}) for v in (0.5, 1.0)]
-    degrees, forces = degrees_of([s for s, _ in tosses], [e for _, e in tosses], [0.0, 0.0])
+    degrees = degrees_of([s for s, _ in tosses], [e for _, e in tosses], [0.0, 0.0])
     first = degrees[0]
     assert (first.body, first.axis, first.unit) == ("chassis", "along y", "N")
     assert first.share > 0.95
@@ -51,25 +50,15 @@ def test_a_force_along_one_axis_is_found_with_its_size() -> None:
     mass = chassis_of(tosses[0][0].vehicle).mass  # type: ignore[arg-type]
     expected = mass * np.sqrt(np.mean((2.0 * np.sin(30.0 * np.arange(0.0, 0.16, 0.001))) ** 2))
     assert first.rms == pytest.approx(expected, rel=0.02)
-    assert len(forces) == 2
 
 
 def test_a_moment_is_the_inertia_times_what_the_turn_speeds_up_by() -> None:
     own, e = thrown(0.7, {ABOUT[2]: "6.0 * t"})
-    degrees, forces = degrees_of([own], [e], [0.0])
+    degrees = degrees_of([own], [e], [0.0])
     assert degrees[0].axis == "about z"
     assert degrees[0].unit == "N m"
     inertia = chassis_of(own.vehicle).inertia[2]  # type: ignore[arg-type]
-    assert np.median(forces[0].force) == pytest.approx(6.0 * inertia, rel=0.05)
-
-
-def test_what_the_force_depends_on_is_told_from_the_run() -> None:
-    tosses = [thrown(v, {ALONG[1]: "4.0 * np.abs(state['chassis/velocity_z'])"}) for v in (0.4, 0.8, 1.2)]
-    _, forces = degrees_of([s for s, _ in tosses], [e for _, e in tosses], [0.0] * 3)
-    shares = dict(dependency(forces))
-    assert shares["chassis/velocity_z"] > 0.95
-    assert max(shares, key=lambda name: shares[name]) == "chassis/velocity_z"
-    assert shares["time"] < 0.93
+    assert degrees[0].rms == pytest.approx(6.0 * inertia, rel=0.2)  # a derivative of noise beside it
 
 
 def test_instruments_elsewhere_are_no_forces_on_the_chassis() -> None:
@@ -81,4 +70,4 @@ def test_instruments_elsewhere_are_no_forces_on_the_chassis() -> None:
         RunSimulator(own, bare),
     )
     assert there is not None
-    assert degrees_of([own], [there], [0.0]) == ((), [])
+    assert degrees_of([own], [there], [0.0]) == ()

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
 from rollover.diagnosis.candidates import candidates_of, coordinate, physical
-from rollover.diagnosis.depend import ACCELERATION, DEPTH, SPEED, TIME, ResidualForce, dependency
 from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.phases import drop_phases
 from rollover.diagnosis.simulator import simulator_of
@@ -62,27 +59,3 @@ def test_phases_are_in_order_and_the_peak_is_the_deepest_point() -> None:
     z, t = recording.channels[drops.DEPTH], recording.time
     begin, end = (next(at for at, n in phases if n == wanted) for wanted in ("peak", "unloading"))
     assert begin < t[np.argmax(z)] < end
-
-
-LAWS: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]] = {
-    TIME: lambda t, z, v: 300.0 * np.sin(60.0 * t),
-    DEPTH: lambda t, z, v: np.where(z > 0.05, 400.0, 0.0),
-    SPEED: lambda t, z, v: 120.0 * v,
-}
-
-
-@pytest.mark.parametrize("wanted", LAWS)
-def test_a_residual_force_is_put_down_to_what_it_was_made_from(wanted: str) -> None:
-    forces = []
-    for k, speed in enumerate((1.5, 2.5, 3.5)):
-        t = np.linspace(0.0, 0.05, 80)
-        # decelerations that differ in their course, so that depth, speed and time are not functions of one another
-        a = -speed * (10.0 + 4.0 * k) * (1.0 + 0.3 * np.sin(40.0 * t * (k + 1)))
-        v = speed + np.cumsum(a) * (t[1] - t[0])
-        z = np.cumsum(v) * (t[1] - t[0])
-        of = {TIME: t, DEPTH: z, SPEED: v, ACCELERATION: a}
-        forces.append(ResidualForce(recording=str(k), condition=str(k), force=LAWS[wanted](t, z, v), of=of))
-    scores = dependency(forces)
-    assert scores[0][0] == wanted
-    assert scores[0][1] > 0.8
-    assert scores[0][1] > scores[1][1] + 0.03

@@ -1,0 +1,73 @@
+"""What the misfit of a motion depends on: functions of one quantity, held against conditions left out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis.evidence import Evidence
+from rollover.diagnosis.fit import Fitted, Judge
+from rollover.diagnosis.quantities import dependency
+from tests.diagnosis.test_chassis import ABOUT, ALONG, thrown
+
+SPEEDS = (0.4, 0.8, 1.2)
+FALLING = "np.abs(state['chassis/velocity_z'])"
+
+
+def told(off: dict[str, str], speeds: tuple[float, ...] = SPEEDS) -> list[tuple[str, float]]:
+    """What tosses depend on that were recorded with `off` added."""
+    judge, base = judged([thrown(v, off)[1] for v in speeds])
+    found = dependency(judge, base)
+    assert sum(share for _, share in found) <= 1.0
+    return list(found)
+
+
+def judged(evidence: list[Evidence]) -> tuple[Judge, Fitted]:
+    judge = Judge(evidence)
+    base = judge.fit((), (), shifts=[0.0] * len(evidence), rounds=0)
+    assert base is not None
+    return judge, base
+
+
+def test_what_a_force_is_a_function_of_predicts_it_in_conditions_left_out() -> None:
+    found = told({ALONG[1]: f"4.0 * {FALLING}"})
+    assert found[0][0] == "chassis/velocity_z"
+    assert found[0][1] > 0.95
+    assert len(found) == 1  # another adds nothing to it
+
+
+def test_a_moment_shows_in_what_the_turn_has_grown_by() -> None:
+    """d omega/dt = c v_z: omega is no function of v_z, as it begins at nought in every toss, whatever v_z is then."""
+    found = told({ABOUT[2]: f"0.002 * np.cumsum(10.0 * {FALLING})"})
+    assert found[0][0] == "chassis/velocity_z"
+    assert found[0][1] > 0.95
+    rough = told({ALONG[2]: f"0.002 * np.cumsum(100.0 * {FALLING})"})  # what is no rate has not grown by anything
+    assert dict(rough).get("chassis/velocity_z", 0.0) < 0.95
+
+
+def test_a_second_quantity_has_what_it_adds() -> None:
+    (first, most), (second, added) = told({ALONG[1]: f"4.0 * {FALLING} + 3.0 * np.sin(30.0 * t)"})
+    assert first in ("time", "chassis/roll", "chassis/pitch")  # which all go on alike in every toss
+    assert second == "chassis/velocity_z"
+    assert 0.05 < added < 0.2
+    assert most + added > 0.95
+
+
+def test_nothing_depends_on_anything_where_there_is_only_noise() -> None:
+    found = told({})
+    assert not found or found[0][1] < 0.3
+
+
+@pytest.mark.parametrize("weight", [0.0, 1.0])
+def test_samples_count_for_what_they_count_in_the_fit(weight: float) -> None:
+    """The second half of each recording goes its own way: where it counts nothing the first half tells."""
+    gone = f"4.0 * {FALLING} + 6.0 * (t > 0.08) * np.sin(40.0 * t * {{v}} + 3.0 * {{v}})"
+    evidence = []
+    for v in SPEEDS:
+        e = thrown(v, {ALONG[1]: gone.format(v=v)})[1]
+        counts = np.where(e.recording.time > 0.08, weight, 1.0)
+        evidence.append(replace(e, signals=tuple(replace(s, weight=counts[s.rows]) for s in e.signals)))
+    found = dict(dependency(*judged(evidence)))
+    assert (found.get("chassis/velocity_z", 0.0) > 0.9) == (weight == 0.0)
