@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rollover.diagnosis.chaos import Course
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.quantities import dependency
@@ -58,6 +59,9 @@ def test_a_second_quantity_has_what_it_adds() -> None:
 def test_nothing_depends_on_anything_where_there_is_only_noise() -> None:
     found = told({})
     assert not found or found[0][1] < 0.3
+    judge, base = judged([thrown(v, {})[1] for v in SPEEDS])
+    less = tuple(replace(b, residual=0.5 * b.residual) for b in base.blocks)
+    assert dependency(judge, replace(base, blocks=less)) == ()  # less than noise leaves
 
 
 @pytest.mark.parametrize("weight", [0.0, 1.0])
@@ -71,3 +75,15 @@ def test_samples_count_for_what_they_count_in_the_fit(weight: float) -> None:
         evidence.append(replace(e, signals=tuple(replace(s, weight=counts[s.rows]) for s in e.signals)))
     found = dict(dependency(*judged(evidence)))
     assert (found.get("chassis/velocity_z", 0.0) > 0.9) == (weight == 0.0)
+
+
+def test_columns_count_after_another_course_as_the_misfit_does() -> None:
+    judge, base = judged([thrown(v, {ALONG[1]: f"4.0 * {FALLING}"})[1] for v in SPEEDS])
+    blocks = []
+    for e, b in zip(judge.evidence, base.blocks, strict=True):
+        late = np.concatenate([e.recording.time[s.rows] > 0.05 for s in e.signals])
+        counts = np.where(late, 0.3, 1.0)
+        blocks.append(replace(b, residual=counts * b.residual, course=Course(samples=counts, share=0.1, more=0.0)))
+    found = dependency(judge, replace(base, blocks=tuple(blocks)))
+    assert found[0][0] == "chassis/velocity_z"
+    assert found[0][1] > 0.95

@@ -117,6 +117,10 @@ def test_what_is_in_no_library() -> None:
     row = score(told, fine)
     assert (row["claim"], row["dependence_right"], row["verdict_right"]) == ("unexplained", True, True)
     assert score(told, said(verdict="unexplained"))["dependence_right"] is False
+    flat = truth(effect("outside:flat-tyre", "outside", depends_on="attitude"), kind="outside", verdict="unexplained")
+    for quantity, right in (("axle/front/angle", True), ("chassis/roll", True), ("chassis/angular_velocity_x", False)):
+        there = [{"channel": "chassis/angular_velocity_z", "depends_on": quantity}]
+        assert score(flat, said(verdict="unexplained", where=there))["dependence_right"] is right
     assert score(told, said("soil-layer"))["claim"] == "near"
     assert score(told, said("mass", remaining={"significant": True}))["claim"] == "wrong, rest unexplained"
     assert score(told, said(verdict="no-mismatch"))["claim"] == "missed"
