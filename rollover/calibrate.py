@@ -15,6 +15,7 @@ from rollover.determined import Determination, determine
 from rollover.document import exchanged
 from rollover.execute import map_cases
 from rollover.misfit import as_measured
+from rollover.noise import USUAL
 from rollover.objective import Case, Noise, Objective, Parameter, Simulate, case, check_free
 from rollover.rating import Iso18571, Rating, rate
 from rollover.recording import Recording
@@ -222,7 +223,7 @@ def _without_outliers(objective: Objective, u: Array) -> tuple[Objective, int]:
     weights, count = [], 0
     for k in range(len(objective.cases)):
         for r in objective.parts(k, u)[0]:
-            scatter = 1.4826 * float(np.median(np.abs(r))) if r.size > 8 else np.inf
+            scatter = USUAL * float(np.median(np.abs(r))) if r.size > 8 else np.inf
             away = np.abs(r) > OUTLIER * scatter if scatter > 0.0 else np.zeros(r.size, dtype=bool)
             z = (r / (CAP * scatter)) ** 2 if scatter > 0.0 else np.zeros(r.size)
             weights.append(np.where(away, (1.0 + z) ** -0.25, 1.0))

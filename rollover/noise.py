@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 
 LAGS, LENGTH, DEGREE = 8, 48, 3
 STRIDES = (1, 2, 4, 8, 16, 32, 64, 128)
+USUAL = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
 QUIET = 2.5  # of the energy of the quiet windows, what still counts as quiet
 ORDER = 12  # of the longest autoregression tried
 

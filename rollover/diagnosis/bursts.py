@@ -7,12 +7,11 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.noise import LENGTH
+from rollover.noise import LENGTH, USUAL
 
 Array = NDArray[np.float64]
 ABOUT = 13  # samples, that a value is compared with the middle one of
 FAR = 5.0  # times the usual distance from it, beyond which a sample is in a burst
-USUAL = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
 LOUDER = 1.5  # times the noise beside bursts, from which on they are no noise
 FEWEST = 0.7  # of the samples, that lie beside the bursts
 RARE = 0.01  # of a channel's samples, that may lie far off by any noise

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.nuisance import Eased, doubts, eased
 from rollover.diagnosis.simulator import Simulator
-from rollover.noise import LENGTH, NoiseFloor, grown, noise_floor
+from rollover.noise import LENGTH, USUAL, NoiseFloor, grown, noise_floor
 from rollover.recording import Recording
 from rollover.scenario import Scenario
 
@@ -281,7 +281,7 @@ def _by_differences(values: Array) -> float:
     if values.size < 5:
         return 0.0
     d = np.diff(values, 2)
-    return float(1.4826 * np.median(np.abs(d - np.median(d))) / np.sqrt(6.0))
+    return float(USUAL * np.median(np.abs(d - np.median(d))) / np.sqrt(6.0))
 
 
 def condition_of(conditions: Mapping[str, Any]) -> str:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from rollover.diagnosis.colour import alike
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.simulator import blow_of
-from rollover.noise import LENGTH
+from rollover.noise import LENGTH, USUAL
 
 Array = NDArray[np.float64]
 BINS = 12
@@ -62,14 +62,14 @@ def _sizes(told: Sequence[tuple[Array, Array]], by: Array) -> tuple[Array, Array
     """Median value and size in bins of equally many samples, sorted `by`; samples of one."""
     values, sizes = (np.concatenate(each) for each in zip(*told, strict=True))
     parts = np.array_split(np.argsort(by, kind="stable"), BINS)
-    found = np.array([[np.median(values[p]), 1.4826 * np.median(sizes[p])] for p in parts])
+    found = np.array([[np.median(values[p]), USUAL * np.median(sizes[p])] for p in parts])
     return found[:, 0], found[:, 1], parts[0].size
 
 
 def _varies(values: Array, sizes: Array) -> bool:
     """Whether values (n,) are more than noise of `sizes` (n,): sorted by itself, noise seems to grow with its size."""
     low, high = np.quantile(np.abs(values), (0.125, 0.875))
-    return bool(high - low > FAR * 1.4826 * np.median(sizes))
+    return bool(high - low > FAR * USUAL * np.median(sizes))
 
 
 def _grows(told: Sequence[tuple[Array, Array]]) -> bool:
