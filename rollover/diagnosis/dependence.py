@@ -55,6 +55,14 @@ class Dependence:
             return self.shares[0][0]
         return None if self.channel is None else TIME
 
+    def yields_to(self, motion: Dependence) -> bool:
+        """Whether what comes and goes in time in one channel is rather put down to a quantity of the `motion`.
+
+        In tests that begin alike all goes in time, what the vehicle does too; a sensor's fault goes with no attitude.
+        """
+        tells = bool(motion.shares) and motion.shares[0][0] != TIME and motion.shares[0][1] > MOSTLY
+        return self.on == TIME and tells
+
 
 @dataclass(frozen=True, kw_only=True)
 class Model:

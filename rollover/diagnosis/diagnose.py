@@ -105,7 +105,8 @@ def diagnose(
     elif acts != "drop":
         degrees = degrees_of(set_ups, found, [b.shift for b in explanation.base.blocks])
         of_one = dependence_of_one(judge, explanation.base, before) if is_mismatch else None
-        depends_on = of_one or Dependence(shares=dependency(judge, explanation.base))
+        of_motion = Dependence(shares=dependency(judge, explanation.base))
+        depends_on = of_motion if of_one is None or of_one.yields_to(of_motion) else of_one
     law = None
     if verdict == "unexplained" and acts == "drop":
         say("a law for what no candidate explains")

@@ -208,3 +208,20 @@ def test_what_explains_little_is_not_named_and_a_sensor_without_a_quantity_goes_
     assert Dependence(shares=((SPEED, 0.4),)).on == SPEED
     assert Dependence(shares=((VALUE, 0.4),), channel=drops.FORCE).on == TIME
     assert Dependence(shares=((VALUE, 0.9),), channel=drops.FORCE).on == VALUE
+
+
+@pytest.mark.parametrize(
+    ("one", "motion", "yields"),
+    [
+        ("time", ("chassis/roll", 0.9), True),
+        ("time", ("chassis/roll", 0.3), False),  # a hum goes with no attitude
+        ("time", ("time", 0.9), False),
+        (VALUE, ("chassis/roll", 0.9), False),  # of what tips over a rate goes with the angle: so does its error
+    ],
+)
+def test_what_the_vehicle_does_goes_in_time_too_where_tests_begin_alike(
+    one: str, motion: tuple[str, float], yields: bool
+) -> None:
+    of_one = Dependence(shares=((one, 0.99),), channel="chassis/angular_velocity_x")
+    assert of_one.yields_to(Dependence(shares=(motion,))) is yields
+    assert not of_one.yields_to(Dependence())
