@@ -39,7 +39,7 @@ class Effect:
     family: ClassVar[str] = ""  # what a report names before the member: "a resistance that grows with speed"
     equation: ClassVar[str] = ""
     source: ClassVar[str] = ""  # with its confidence: seen, or recalled with high, medium or low confidence
-    sentence: ClassVar[str] = ""  # for a test engineer; {parameter} stands for a value
+    sentence: ClassVar[str] = ""  # for a test engineer; {parameter} or {parameter:more|less} stands for a value
     rivals: ClassVar[Mapping[str, str]] = {}  # look-alike -> the test that tells them apart
     acts: ClassVar[tuple[str, ...]] = ("drop", "rollover")
     channels: ClassVar[tuple[str, ...]] = ()  # that feel it first
@@ -84,12 +84,23 @@ class Effect:
         units = units_of(type(self), getattr(self, "channel", None))
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         spoken = {
-            name: f"{value:.3g} {units[name] if units[name] != '1' else ''}".strip()
-            if isinstance(value, float) and name in units
-            else value
+            name: _Spoken(value, units[name]) if isinstance(value, float) and name in units else value
             for name, value in values.items()
         }
         return self.sentence.format(**spoken)
+
+
+class _Spoken:
+    """A number with its unit in a sentence; {name:more|less} is its size and what it is above and below nought."""
+
+    def __init__(self, value: float, unit: str) -> None:
+        self.value, self.unit = value, "" if unit == "1" else f" {unit}"
+
+    def __format__(self, ways: str) -> str:
+        above, either, below = ways.partition("|")
+        if not either:
+            return f"{self.value:.3g}{self.unit}"
+        return f"{abs(self.value):.3g}{self.unit} {above if self.value >= 0.0 else below}"
 
 
 def units_of(effect: type[Effect], channel: str | None = None) -> dict[str, str]:

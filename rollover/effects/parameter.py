@@ -25,7 +25,7 @@ class Mass(Effect):
     family = "a wrong inertia"
     equation = "m -> m + added"
     source = "driver 75-100 kg (M)"
-    sentence = "The mass is {added} more than was written down."
+    sentence = "The mass is {added:more|less} than was written down."
     rivals: ClassVar[Mapping[str, str]] = {
         "sensor-gain": "the level at rest, which is m g, against a weighed mass",
         "guide-friction": "the free fall before contact",
@@ -54,7 +54,7 @@ class CentreOfMass(Effect):
     family = "a wrong inertia"
     equation = "(y, z) -> (y + lateral, z + height)"
     source = "loading, tyres, measurement by axle loads (M)"
-    sentence = "The centre of mass lies {height} higher and {lateral} further to the left."
+    sentence = "The centre of mass lies {height:higher|lower} and {lateral:further to the left|further to the right}."
     rivals: ClassVar[Mapping[str, str]] = {
         "inertia": "a static tilt test",
         "slope": "the same test downhill the other way",
@@ -113,7 +113,7 @@ class SlopeError(Effect):
     family = "a wrong direction of gravity"
     equation = "inclination -> inclination + angle, towards y on level ground"
     source = "1 deg is 0.17 m/s2 (computed)"
-    sentence = "The ground is inclined by {angle} more than was written down."
+    sentence = "The ground is inclined by {angle:more|less} than was written down."
     rivals: ClassVar[Mapping[str, str]] = {
         "sensor-bias": "turn the vehicle round: gravity stays, a bias turns",
         "centre-of-mass": "the same test downhill the other way",

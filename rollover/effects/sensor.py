@@ -188,7 +188,7 @@ class SensorClockOffset(Effect):
     family = "a channel that comes late"
     equation = "y(t) = x(t - offset)"
     source = "recorders that were started by hand or by a trigger of their own (M)"
-    sentence = "{channel} comes {offset} late."
+    sentence = "{channel} comes {offset:late|early}."
     rivals: ClassVar[Mapping[str, str]] = {
         "sensor-lag": "a sharp edge: a lag rounds it, a clock only moves it",
         "sensor-clock-drift": "two events far apart in time",
@@ -249,7 +249,7 @@ class SensorBias(Effect):
     family = "a channel read with an offset"
     equation = "y = x + bias"
     source = "definition"
-    sentence = "{channel} reads {bias} too much throughout."
+    sentence = "{channel} reads {bias:too much|too little} throughout."
     rivals: ClassVar[Mapping[str, str]] = {
         "sensor-gain": "the level before contact, where a gain reads nothing",
         "soil-adhesion": "the level before contact, where nothing holds",
