@@ -17,6 +17,7 @@ from typing import Any, Literal
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Block, Fitted, Judge
 from rollover.diagnosis.refine import combed, polish, scanned, shaped, timed
+from rollover.diagnosis.secant import beside
 from rollover.execute import Children, map_cases
 
 Progress = Callable[[str], None]
@@ -27,6 +28,7 @@ PATIENCE = 3.0  # s of fits in this process, after which children are worth what
 class Job:
     """A fit to be made: `only` some recordings, from time `shifts` (s) of these; see `Judge.fit`.
 
+    One of few `rounds` is a first look: it ends without slopes.
     "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too, "time" tries out
     the time shifts, "comb" begins anew all along the second parameter of the last effect, "scan" all along its shape.
     """
@@ -101,6 +103,13 @@ class Crew:
 
         # full runs are made side by side for each fit in turn, and kept here
         shared = self.workers > 1 and not judge.effort.thrifty
+        if judge.effort.thrifty:
+            nudges, begun = judge.effort.nudges, [job for k, job in enumerate(jobs) if k in todo and job.how == "fit"]
+            judge.made_ahead(
+                point
+                for job in begun
+                for point in beside(job.recordings, job.candidates, job.start, nudges[min(job.width, len(nudges) - 1)])
+            )
         while done < len(todo) and not (shared and self._worked > PATIENCE and len(todo) - done > 1):
             k, began = todo[done], perf_counter()
             fitted = work(judge, jobs[k])
@@ -139,6 +148,7 @@ def work(judge: Judge, job: Job) -> Fitted | None:
             shifts=job.shifts,
             width=job.width,
             pinned=job.pinned,
+            bare=job.rounds is not None,
         )
     begun = linearised(judge, job.candidates, job.start, job.shifts, job.recordings)
     if begun is None:
@@ -180,7 +190,7 @@ def linearised(
     """A fit to all recordings or some as it stands at x and these time shifts (s); None if nothing can be simulated."""
     blocks: list[Block] = []
     use = range(len(shifts)) if recordings is None else recordings
-    judge.made_ahead(judge.about(use, candidates, x, judge.effort.fine))
+    judge.made_ahead(beside(use, candidates, x, judge.effort.fine))
     for r, shift in zip(use, shifts, strict=True):
         block = judge.block(r, candidates, x, shift, judge.effort.fine)
         if block is None:

@@ -30,7 +30,7 @@ from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.quantities import dependency
 from rollover.diagnosis.readings import digitised, without_spikes
 from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing, with_scatter
-from rollover.diagnosis.scores import judged
+from rollover.diagnosis.scores import before_a_blow, judged
 from rollover.diagnosis.selection import Explanation, decided, explained, matters
 from rollover.diagnosis.simulator import blow_of, set_up
 from rollover.diagnosis.statements import by_steps, closest, considered, named, noise, places, sentence
@@ -117,12 +117,13 @@ def diagnose(
         verdict = "cannot-tell"
     h_before, h_after = (judged(judge, f, kept, groups) for f in (explanation.base, explanation.fitted))
     effects = named(judge, explanation, groups) if verdict in ("parameter", "sensor", "missing-physics") else ()
+    early = before_a_blow(judge.evidence, explanation.base), before_a_blow(judge.evidence, explanation.fitted)
     remains = after.p_value < SURE and matters(judge, explanation.fitted, after)
     training = tuple(e.name for e in found)
     notes += [*(_felt(degrees[0]) for _ in degrees[:1] if is_mismatch), *by_steps(effects), *_cost(found)]
     return Diagnosis(
         verdict=verdict,
-        sentence=sentence(verdict, effects, explanation.p_value, h_before.held, h_after.held, found)
+        sentence=sentence(verdict, effects, explanation.p_value, h_before.held, h_after.held, found, early)
         + (closest(explanation, groups) if verdict == "unexplained" else "")
         + offered(law)
         + against_itself(verdict, contrary),

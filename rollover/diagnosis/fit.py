@@ -15,7 +15,7 @@ from rollover.diagnosis.chaos import course
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.overturn import full_runs, made_ahead
-from rollover.diagnosis.secant import Point, in_step, nudged, secant
+from rollover.diagnosis.secant import Point, beside, in_step, secant
 
 Array = NDArray[np.float64]
 FAR = 3.0  # misfit over the noise from which on a step may be lengthened
@@ -81,6 +81,7 @@ class Judge:
     def again(self, fitted: Fitted) -> Fitted:
         """A fit where it stands, linearised anew under the noise as it is held now."""
         fine = self.effort.fine
+        self.made_ahead(beside(range(len(fitted.blocks)), fitted.candidates, fitted.x, fine))
         blocks = [self.block(r, fitted.candidates, fitted.x, b.shift, fine) for r, b in enumerate(fitted.blocks)]
         kept = [new if new is not None else old for new, old in zip(blocks, fitted.blocks, strict=True)]
         return Fitted(candidates=fitted.candidates, x=fitted.x, blocks=tuple(kept))
@@ -261,14 +262,16 @@ class Judge:
         shifts: Sequence[float] | None = None,
         width: int = 0,
         pinned: bool = False,
+        bare: bool = False,
     ) -> Fitted | None:
         """Levenberg-Marquardt on (D1) from a start within the unit box; None if nothing can be simulated there.
 
         `pinned` keeps clocks whose zero is known where they say: far from an explanation a shift eats what is missing.
+        A `bare` one ends without slopes, where only what it leaves is asked for.
         """
         self._pinned = pinned
         try:
-            return self._fit(candidates, start, rounds, only, shifts, width)
+            return self._fit(candidates, start, rounds, only, shifts, width, bare)
         finally:
             self._pinned = False
 
@@ -280,20 +283,21 @@ class Judge:
         only: Sequence[int] | None,
         shifts: Sequence[float] | None,
         width: int,
+        bare: bool,
     ) -> Fitted | None:
         use = list(range(len(self.evidence))) if only is None else list(only)
         nudges = self.effort.nudges
         rounds, width = self.effort.rounds if rounds is None else rounds, min(width, len(nudges) - 1)
         x = [float(v) for v in start]
         shifts = [self.shifts[r] for r in use] if shifts is None else list(shifts)
-        self.made_ahead(self.about(use, candidates, x, nudges[width]))
+        self.made_ahead(beside(use, candidates, x, nudges[width]))
         found = [self.block(r, candidates, x, s, nudges[width]) for r, s in zip(use, shifts, strict=True)]
         if any(b is None for b in found):
             return None
         blocks: list[Block] = [b for b in found if b is not None]
-        best, damping = self._total(blocks), 1e-3
+        best, damping, accepted = self._total(blocks), 1e-3, blocks
         fixed = len(x) - len(candidates[-1].search) if candidates else 0
-        for _ in range(rounds):
+        for turn in range(rounds):
             A, b = np.zeros((len(x), len(x))), np.zeros(len(x))
             for block in blocks:
                 Ar, br, _ = block.normal()
@@ -321,15 +325,19 @@ class Judge:
                 damping = max(30.0 * damping, 1e-2)
             gain = best - total if improved else 0.0
             if improved:
-                x, best, damping, shifts = trial, total, 0.1 * damping, [a.shift for a in after if a is not None]
+                x, best, damping = trial, total, 0.1 * damping
+                accepted = [a for a in after if a is not None]
+                shifts = [a.shift for a in accepted]
             fresh = gain < enough
             if fresh:
                 width, damping = width + 1, 1e-3
             last = width >= len(nudges)
             if last and not improved and len(nudges) == 1:
                 break
+            if bare and (last or turn + 1 == rounds):
+                return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=tuple(accepted))
             nudge = self.effort.fine if last else nudges[width]
-            self.made_ahead(self.about(use, candidates, x, nudge))
+            self.made_ahead(beside(use, candidates, x, nudge))
             # what is held already moves little: its slopes are worked out anew only where the search narrows
             again = [
                 self.block(r, candidates, x, s, nudge, None if fresh else block.plain_J[:, :fixed])
@@ -346,18 +354,6 @@ class Judge:
                 blocks = [b for b in ended if b is not None]
         return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=tuple(blocks))
 
-    @staticmethod
-    def about(
-        use: Sequence[int], candidates: Sequence[Candidate], x: Sequence[float], nudge: float
-    ) -> Iterable[tuple[int, Sequence[Candidate], Sequence[float]]]:
-        """A place and those a nudge to either side of it."""
-        for r in use:
-            yield r, candidates, x
-            for k, value in enumerate(x):
-                step = nudged(candidates, k, nudge)
-                for there in (max(value - step, 0.0), min(value + step, 1.0)):
-                    yield r, candidates, [*x[:k], there, *x[k + 1 :]]
-
     def _further(
         self,
         use: Sequence[int],
@@ -372,6 +368,7 @@ class Judge:
         for _ in range(STRIDES):
             dx = STRIDE * dx
             there = [float(v) for v in np.clip(np.array(x) + dx, 0.0, 1.0)]
+            self.made_ahead((r, candidates, there) for r in use)
             found = [
                 self.clocked(r, candidates, there, b.shift, self.effort.clocked)
                 for r, b in zip(use, after, strict=True)

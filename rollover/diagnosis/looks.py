@@ -32,7 +32,7 @@ def look(
 
     The null stays that of the best of all candidates: what was passed over could only have raised the maximum. Clocks
     are then taken where they say, or nearly so: far off they have eaten what is missing. `beside` as in `gate`, in
-    `few` recordings that are given with it.
+    `few` recordings that are given with it; then only what is known already is looked at, and nothing strong is tried.
     """
     effort = judge.effort
     if not effort.thrifty:
@@ -50,7 +50,7 @@ def look(
         forgiven = _narrowed(judge, judge.again(base), moving, few, more, beside)[-1]
     able = [c.key for c in forgiven.ranked(moving) if p_value(forgiven.scores.get(c.key, 0.0), forgiven.null) < SPOKEN]
     scores = {key: max(score, forgiven.scores.get(key, 0.0)) for key, score in scores.items()}
-    far = strongly(judge, base, moving, few)
+    far = strongly(judge, base, moving, few) if beside is None else {}
     leading = [key for both in zip_longest(far, able[: effort.leaders]) for key in both if key is not None]
     return replace(last, scores=scores, leading=tuple(dict.fromkeys(leading)), far=far)
 

@@ -48,6 +48,17 @@ def judged(judge: Judge, fitted: Fitted, kept: Sequence[Evidence], groups: Seque
     return Judged(scores={"training": train, "held_out": score}, held=held, by_recording=tuple(rows))
 
 
+def before_a_blow(evidence: Sequence[Evidence], fitted: Fitted) -> float | None:
+    """Misfit over the noise of all samples before the first blow, where no run scatters; None where none does after.
+
+    Samples beyond a blow count for less the more runs scatter there, and less is left of what they miss, too.
+    """
+    if all(e.expected is None for e in evidence):
+        return None
+    early = np.concatenate([b.plain_residual[e.early] for e, b in zip(evidence, fitted.blocks, strict=True)])
+    return float(np.sqrt(np.mean(early**2))) if early.size else None
+
+
 def predicted(judge: Judge, fitted: Fitted, rounds: int = 5) -> Fitted | None:
     """An explanation carried over to other recordings: only their own time shifts are fitted."""
     blocks = []

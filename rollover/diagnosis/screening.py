@@ -87,11 +87,16 @@ def screen(
     if len(blocks) < len(few):
         return found
     near = not is_far(judge, base) and not judge.effort.thrifty
+
+    def places(c: Candidate) -> tuple[tuple[float, ...], ...]:
+        ways = () if judge.effort.thrifty and not c.is_placed else looked.starts.get(c.key, ())
+        return tuple(ways if (near or c.is_placed) and ways else (*ways, *c.starts()))
+
+    judge.made_ahead((r, (*base.candidates, c), (*base.x, *x)) for c in candidates for x in places(c) for r in few)
     for c in candidates:
         met: list[tuple[float, tuple[float, ...]]] = []
         potential = 0.0
-        ways = () if judge.effort.thrifty and not c.is_placed else looked.starts.get(c.key, ())
-        for start in ways if (near or c.is_placed) and ways else (*ways, *c.starts()):
+        for start in places(c):
             left, along, size, count = 0.0, 0.0, 0.0, 0
             for r, block in zip(few, blocks, strict=True):
                 there = judge.block(r, (*base.candidates, c), (*base.x, *start), shifts[r], 0.0)

@@ -14,7 +14,7 @@ which a clock explains as far as ever, and no less where s d is far from a blow 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,6 +87,18 @@ def nudged(candidates: Sequence[Candidate], k: int, nudge: float) -> float:
     """How far the k-th coordinate is moved where others are by `nudge`."""
     owner = owner_of(candidates, k)
     return min(nudge, EXACT) if owner.kind == "sensor" else nudge * (FINER if owner.is_narrow else 1.0)
+
+
+def beside(
+    use: Sequence[int], candidates: Sequence[Candidate], x: Sequence[float], nudge: float
+) -> Iterator[tuple[int, Sequence[Candidate], Sequence[float]]]:
+    """(recording, candidates, x) of a place and of those a nudge to either side of it, of the recordings in `use`."""
+    for r in use:
+        yield r, candidates, x
+        for k, value in enumerate(x):
+            step = nudged(candidates, k, nudge)
+            for there in (max(value - step, 0.0), min(value + step, 1.0)):
+                yield r, candidates, _with(x, k, there)
 
 
 def _with(x: Sequence[float], k: int, value: float) -> list[float]:

@@ -157,8 +157,9 @@ def sentence(
     first: Held,
     last: Held,
     evidence: Sequence[Evidence],
+    early: tuple[float | None, float | None] = (None, None),
 ) -> str:
-    """The verdict in one sentence or two."""
+    """The verdict in one sentence or two; `early` is the misfit before the first blow without and with the effects."""
     if verdict == "no-mismatch" and p_value < SURE:
         return (
             f"Simulation and {len(evidence)} recordings differ by more than noise (p = {p_value:.2g}), but by less "
@@ -176,4 +177,9 @@ def sentence(
     said = " ".join(e.statement for e in effects)
     rivals = sorted({r for e in effects for r in e.indistinguishable_from})
     also = f" Not told apart by these recordings: {', '.join(rivals)}." if rivals else ""
-    return f"{said} With it the held-out misfit falls from {first.total:.1f} to {last.total:.2f} times the noise.{also}"
+    falls = f"{said} With it the held-out misfit falls from {first.total:.1f} to {last.total:.2f} times the noise"
+    without, with_ = early
+    if without is None or with_ is None:
+        return f"{falls}.{also}"
+    blow = f"before the first blow, where none scatters, the misfit is {with_:.2f} times the noise for {without:.1f}"
+    return f"{falls} and the scatter of runs; {blow}.{also}"

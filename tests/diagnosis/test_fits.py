@@ -12,7 +12,7 @@ import pytest
 from rollover.diagnosis import crew, diagnose, diagnosed_text
 from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import Candidate, candidates_of
-from rollover.diagnosis.crew import Crew, Job
+from rollover.diagnosis.crew import Crew, Job, work
 from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.fit import Block, Judge, shift_of
 from rollover.diagnosis.simulator import simulator_of
@@ -76,6 +76,22 @@ def test_a_stiffness_far_off_is_found_from_every_start() -> None:
         fitted = judge.fit((c,), start)
         assert fitted is not None
         assert c.values(fitted.x)["scale"] == pytest.approx(1.4, rel=0.01), start
+
+
+def test_a_first_fit_ends_without_slopes_and_where_it_would_with_them() -> None:
+    """Central or not, each slope at its end is a simulation of each recording."""
+    recordings = recorded({"effects.soil-stiffness.scale": 1.4}, speeds=(1.2, 3.2), noise=5e-3)
+    c = candidate(judge_of(recordings), "soil-stiffness")
+    whole, first = judge_of(recordings), judge_of(recordings)
+    a = whole.fit((c,), c.starts()[0], rounds=2, shifts=(0.0, 0.0))
+    b = work(first, Job(candidates=(c,), start=c.starts()[0], shifts=(0.0, 0.0), rounds=2))
+    assert a is not None
+    assert b is not None
+    assert (b.x, [one.shift for one in b.blocks]) == (a.x, [one.shift for one in a.blocks])
+    assert b.left == a.left
+    assert all(np.any(one.J) for one in a.blocks)
+    assert not any(np.any(one.J) for one in b.blocks)
+    assert first.simulations <= whole.simulations - 2 * len(recordings)
 
 
 @pytest.mark.parametrize("workers", [2])

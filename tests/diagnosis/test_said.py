@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
+from rollover.diagnosis.blocks import Block, Fitted
+from rollover.diagnosis.chaos import Course
 from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.holdout import Held
 from rollover.diagnosis.phases import drop_phases
+from rollover.diagnosis.scores import before_a_blow
 from rollover.diagnosis.simulator import simulator_of
 from rollover.diagnosis.statements import sentence
+from rollover.diagnosis.verdict import Named
 from rollover.effects import EFFECTS, units_of
 from rollover.effects.sensor import SensorBias, SensorClipping
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
@@ -37,3 +44,34 @@ def test_phases_need_no_depth_gauge() -> None:
 def test_what_is_sure_and_too_small_to_matter_is_not_called_noise(p: float, said: str) -> None:
     nothing = Held(left=np.ones(1), count=np.ones(1))
     assert said in sentence("no-mismatch", (), p, nothing, nothing, [])
+
+
+def test_what_runs_that_scatter_miss_is_told_before_the_blow_too() -> None:
+    """3 and 4 times the noise before the blow, nearly nothing behind it: sqrt((9 + 16)/2), whatever counts how much."""
+    early = np.arange(80) < 40
+    none: Any = {"J": np.zeros((80, 0)), "slope": np.zeros(80), "shift": 0.0, "prior": 1e-3}
+    samples = np.where(early, 0.5, 0.1)
+    other = Course(samples=samples, share=0.1, more=0.0)
+    blocks = (
+        Block(residual=np.where(early, 3.0, 0.01), **none),
+        Block(residual=np.where(early, 4.0, 0.01) * samples, course=other, **none),
+    )
+    fitted = Fitted(candidates=(), x=(), blocks=blocks)
+    scattering: Any = [SimpleNamespace(expected=50.0, early=early), SimpleNamespace(expected=None, early=early)]
+    assert before_a_blow(scattering, fitted) == pytest.approx(np.sqrt(12.5))
+    assert before_a_blow(scattering[1:], fitted) is None  # a drop
+    at_once: Any = [SimpleNamespace(expected=50.0, early=~(early | ~early))] * 2
+    assert before_a_blow(at_once, fitted) is None
+
+
+def test_a_misfit_that_scatter_takes_part_in_is_said_to_be_one() -> None:
+    first, last = (Held(left=np.array([left]), count=np.ones(1)) for left in (1.44, 0.64))
+    tilted = Named(
+        id="slope", kind="parameter", statement="The ground is inclined.", parameters={}, settings={}, channel=None,
+        p_value=0.0, indistinguishable_from=(), discriminating_test="",
+    )  # fmt: skip
+    plain = sentence("parameter", [tilted], 0.0, first, last, [])
+    assert plain == "The ground is inclined. With it the held-out misfit falls from 1.2 to 0.80 times the noise."
+    said = sentence("parameter", [tilted], 0.0, first, last, [], (6.94, 1.02))
+    assert said.startswith(plain[:-1] + " and the scatter of runs; before the first blow")
+    assert said.endswith("the misfit is 1.02 times the noise for 6.9.")

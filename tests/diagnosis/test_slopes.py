@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.candidates import Candidate, coordinate
-from rollover.diagnosis.crew import Crew
+from rollover.diagnosis.crew import Crew, Job
 from rollover.diagnosis.effort import DROPS, RUNS, Effort
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.explain import Inquiry, Step, _first_fits
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import Gate
-from rollover.diagnosis.screening import Screened
+from rollover.diagnosis.screening import Screened, screen
 from rollover.diagnosis.settle import settled
 from rollover.effects import Search
 from rollover.recording import Recording
@@ -102,6 +102,42 @@ def test_a_rival_is_measured_by_clocks_that_are_held_as_its_own_are() -> None:
         inquiry = Inquiry(judge=judge, candidates=(SLOPE, MASS), groups=[], phases=[], say=lambda _: None, crew=crew)
         _, leaders = _first_fits(inquiry, base, screened, (0, 1), (0.0, 0.0), looked)
     assert {f.candidates[-1].key for f in leaders} == {SLOPE.key, MASS.key}
+
+
+def test_runs_are_announced_before_they_are_needed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that they can be made side by side; where nothing scatters no slope asks for a wider step than was said."""
+    rng, announced, needed = np.random.default_rng(3), set[tuple[int, float, float]](), []
+    measured = [1.09 * blow(LATER * 0.09) + SIGMA * rng.standard_normal(TIME.size) for _ in range(2)]
+    judge = Judge([evidence(values, Late()) for values in measured])
+    edged = Judge.edged
+
+    def point(r: int, changes: Mapping[str, Any]) -> tuple[int, float, float]:
+        return r, changes.get("effects.slope.angle", 0.0), changes.get("effects.mass.added", 0.0)
+
+    def made_ahead(own: Judge, wanted: Any) -> None:
+        announced.update(point(r, own.changes(c, x)) for r, c, x in wanted)
+
+    def asked(own: Judge, r: int, c: Any, x: Any, shift: float) -> Any:
+        if any(x):  # the scenario as it is has been run
+            needed.append(point(r, own.changes(c, x)) in announced)
+        return edged(own, r, c, x, shift)
+
+    monkeypatch.setattr(Judge, "made_ahead", made_ahead)
+    monkeypatch.setattr(Judge, "edged", asked)
+    base = judge.fit((), (), shifts=[0.0, 0.0])
+    assert base is not None
+    looked = Gate(score=9.0, scores={SLOPE.key: 9.0, MASS.key: 8.0}, null=np.zeros(4), detectable={})
+    screened = screen(judge, base, (SLOPE, MASS), (0, 1), (0.0, 0.0), looked)
+    with Crew() as crew:
+        inquiry = Inquiry(judge=judge, candidates=(SLOPE, MASS), groups=[], phases=[], say=lambda _: None, crew=crew)
+        leaders = _first_fits(inquiry, base, screened, (0, 1), (0.0, 0.0), looked)[1]
+        monkeypatch.setattr(Judge, "_fit", lambda *_: None)
+        before = len(announced)
+        inquiry.fits([Job(candidates=(SLOPE,), start=(at,), shifts=(0.0, 0.0)) for at in (0.311, 0.713)])
+    assert len(announced) == before + 2 * 2 * 3  # of two fits and recordings each, a place and both its sides
+    judge.again(replace(leaders[0], x=(0.77,)))
+    assert all(needed)
+    assert len(needed) > 40
 
 
 def test_an_explanation_that_is_far_from_the_mean_goes_more_than_one_step() -> None:

@@ -1,0 +1,126 @@
+"""Strong effects: what no multiple of a little of them does, where it is tried, and how it is fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis import looks
+from rollover.diagnosis.blocks import Fitted
+from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.crew import Crew, Job
+from rollover.diagnosis.effort import RUNS
+from rollover.diagnosis.explain import Inquiry, _smoothly
+from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.screening import screen
+from rollover.effects import Search
+from tests.diagnosis import test_chaos
+from tests.diagnosis.test_chaos import STEP
+from tests.diagnosis.test_looks import CHANNEL, SLOPE, TIME, N, Wave, judge_of
+
+
+class Tipping(Wave):
+    """A slope moves a wave of its own, until at 60 the vehicle tips, `after`; mass moves a little of what that does."""
+
+    def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+        self.runs += 1
+        x, m = changes.get("effects.slope.angle", 0.0), changes.get("effects.mass.factor", 0.0)
+        tipped = self.after * np.sin(30.0 * TIME)
+        return {CHANNEL: tipped * (x > 60.0) + 0.002 * self.after * x * np.sin(200.0 * TIME) + 0.05 * m * tipped}
+
+
+MASS = replace(SLOPE, id="mass", search={"factor": Search(-2.0, 2.0)})
+
+
+def tipped(size: float) -> tuple[Judge, Fitted]:
+    """Four recordings of a vehicle that tipped, which moves them by so many times their noise, and the base."""
+    judge, base = judge_of((0.0,) * 4, (size,) * 4)
+    for e in judge.evidence:
+        object.__setattr__(e, "simulator", Tipping(size))
+    judge.measured = [size * np.sin(30.0 * TIME) + w for w in np.random.default_rng(1).standard_normal((4, N))]
+    judge.straying = False
+    blocks = [replace(b, residual=w) for b, w in zip(base.blocks, judge.measured, strict=True)]
+    return judge, replace(base, blocks=tuple(blocks))
+
+
+def test_what_only_a_strong_effect_does_is_found_though_a_little_of_it_tells_nothing() -> None:
+    judge, base = tipped(20.0)
+    mass, groups = MASS, [[r] for r in range(4)]
+    found = looks.look(judge, base, [mass, SLOPE], groups)
+    assert found.scores["mass"] > 100.0 * found.scores["slope"]
+    assert found.far == {"slope": ((0.95,),)}  # a mass leaves 0.91^2 of it, more than is followed
+    assert found.leading[0] == "slope"
+    assert [c.key for c in found.ranked([mass, SLOPE])] == ["slope", "mass"]
+    begun = screen(judge, base, [SLOPE], [0, 1], [0.0] * 4, found)[0]
+    assert (0.95,) in begun.starts
+    assert screen(judge, base, [SLOPE], [0, 1], [0.0] * 4, replace(found, far={}))[0].starts != begun.starts
+    judge.straying = True
+    assert looks.look(judge, base, [mass, SLOPE], groups).far == {}  # of what strays so far, chance may be all
+
+
+def test_where_known_runs_must_do_no_strong_effect_is_tried() -> None:
+    judge, base = tipped(20.0)
+    groups = [[r] for r in range(4)]
+    looks.look(judge, base, [MASS, SLOPE], groups, base, [0, 1])
+    known = judge.simulations
+    assert looks.look(judge, base, [MASS, SLOPE], groups, base, [0, 1]).far == {}
+    assert judge.simulations == known
+    assert list(looks.look(judge, base, [MASS, SLOPE], groups).far) == ["slope"]
+    assert judge.simulations > known
+
+
+def test_a_strong_effect_is_fitted_with_other_courses_forgiven_and_compared_in_full() -> None:
+    """Before the blow x sets a wave, after it which of many courses is taken: in full the nearest dip ends a fit."""
+
+    class Parting:
+        effort = RUNS
+
+        def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+            x, time = changes.get("effects.slope.angle", 0.0), STEP * np.arange(test_chaos.N)
+            early = x * np.sin(9.0 * time)
+            return {
+                c: np.where(time < test_chaos.BLOW, early, 4.0 * np.sin(150.0 * x + k) * np.cos(20.0 * time))
+                for k, c in enumerate(test_chaos.CHANNELS)
+            }
+
+    truth, rng, simulator = 0.7, np.random.default_rng(2), Parting()
+    quiet = replace(test_chaos.blown(), simulator=cast(Any, simulator))
+    evidence = []
+    for _ in range(2):
+        signals = []
+        for s, values in zip(
+            quiet.signals, simulator.predict({"effects.slope.angle": truth}, 0.0).values(), strict=True
+        ):
+            there = values + 0.2 * rng.standard_normal(values.size)
+            there[quiet.early[: values.size] == 0.0] *= -1.0  # it went another way, whatever x is
+            signals.append(replace(s, values=there))
+        evidence.append(replace(quiet, signals=tuple(signals)))
+    judge = Judge(evidence)
+    judge.straying = False
+    strength = replace(SLOPE, search={"angle": Search(0.0, 1.0)}, neutral=(0.0,))
+    job = Job(candidates=(strength,), start=(0.3,), shifts=(0.0, 0.0), only=(0, 1))
+    with Crew() as crew:
+        inquiry = Inquiry(judge=judge, candidates=(strength,), groups=[], phases=[], say=lambda _: None, crew=crew)
+        plain, smooth = inquiry.fits([job])[0], _smoothly(inquiry, [job], (0, 1))[0]
+    assert plain is not None
+    assert abs(plain.x[0] - truth) > 0.1
+    assert smooth.x[0] == pytest.approx(truth, abs=0.02)
+    assert all(b.course is None for b in smooth.blocks)  # it stands in full
+    assert not judge.straying
+
+
+def test_an_effect_is_strong_at_both_ends_or_at_the_one_that_it_has() -> None:
+    assert SLOPE.strong() == [(0.58,), (0.42,), (0.5 - 0.175,), (0.5 - 0.45,), (0.5 + 0.175,), (0.5 + 0.45,)]
+    assert replace(SLOPE, neutral=None).strong() == []
+    tank = Candidate(
+        id="tank-slosh", kind="physics", family="x", neutral=(None, None),
+        search={"mass": Search(1.0, 1000.0, "log"), "length": Search(0.1, 1.0)},
+    )  # fmt: skip
+    places = tank.strong()
+    assert set(tank.probes()) < set(places)
+    assert {x for x, _ in set(places) - set(tank.probes())} == {0.9}
+    assert {y for _, y in places} == {y for _, y in tank.probes()}
