@@ -29,7 +29,7 @@ class Block:
 
     `course` is what samples count where the run went another course than the recording; None where it did not.
     Residual, Jacobian and slope have it in them already. `expected` is the sum of squares that noise and scatter alone
-    leave, where that is not one for each sample.
+    leave, where that is not one for each sample; `forgiven` says that another course would have counted for less.
     """
 
     residual: Array
@@ -39,6 +39,7 @@ class Block:
     prior: float
     course: Course | None = None
     expected: float | None = None
+    forgiven: bool = False
 
     @property
     def size(self) -> float:

@@ -49,6 +49,7 @@ ALONE = 3  # channels below which none is told from a course
 OTHER = 0.5  # of what it would count, below which a recording took another course
 OFTEN = 0.15  # of recordings that may
 SENT = 0.02  # p-value of so many recordings on other courses, below which chance alone sends fewer there
+OTHERS = 2  # neighbours at least that tell how far one more may go
 FAR = 9.0  # times the middle power of neighbours, beyond which one took another course
 
 
@@ -125,26 +126,59 @@ class Course:
 
 def course(e: Evidence, residual: Array) -> Course | None:
     """How a whitened misfit (n,) counts by (D9); None where all samples count in full."""
+    found = _beyond(e, residual**2)
+    if found is None:
+        return None
+    expected, beyond, inside = found
+    share = _share(expected, beyond)
+    slope = STATE / (STATE + beyond)
+    left = float(np.sum(residual[inside] ** 2))
+    return Course(samples=np.where(inside, np.sqrt(slope), 1.0), share=share, more=(share - slope) * left)
+
+
+def unseen(e: Evidence) -> Array:
+    """Neighbours (k, n), whitened, each weighed by what the others scatter: the recording is none of them either."""
+    found = []
+    for k, stray in enumerate(e.strays):
+        others = [d for j, d in enumerate(e.strays) if j != k]
+        alone = tuple(
+            _weighted(e, replace(s, weight=None), np.stack([d[part] for d in others])) if len(others) >= OTHERS else s
+            for s, part in e.spans()
+        )
+        found.append(e.eased(replace(e, signals=alone).whitened(stray)))
+    return np.array(found).reshape(-1, e.count)
+
+
+def shares(e: Evidence, strays: Array) -> Array:
+    """(k,): what a recording that differs as neighbours (k, n) do would count after the blow, of its sum of squares."""
+    noise = np.concatenate([np.ones(s.rows.size) if s.weight is None else s.weight**2 for s in e.signals])
+    found = [_beyond(e, noise + stray**2) for stray in strays]
+    return np.array([1.0 if f is None else _share(f[0], f[1]) for f in found])
+
+
+def _share(expected: float, beyond: float) -> float:
+    """(D9) over the plain sum of squares."""
+    return float((expected + STATE * np.log1p(beyond / STATE)) / (expected + beyond))
+
+
+def _beyond(e: Evidence, squares: Array) -> tuple[float, float, NDArray[np.bool_]] | None:
+    """E and x of (D9), and the samples after the blow, of squares (n,) of a misfit; None where x is not above 0."""
     if len(e.signals) < ALONE or not any(s.weight is not None for s in e.signals):
         return None
-    over, expected, inside = [], 0.0, np.zeros(residual.size, dtype=bool)
+    over, expected, inside = [], 0.0, np.zeros(squares.size, dtype=bool)
     for s, part in e.spans():
         later = e.recording.time[s.rows] >= e.blow
         if not later.any():
             continue
         inside[part] = later
         own = float(np.sum(s.weight[later] ** 2)) if s.weight is not None else float(later.sum())
-        over.append(float(np.sum(residual[part][later] ** 2)) / max(own, 1.0))
+        over.append(float(np.sum(squares[part][later])) / max(own, 1.0))
         expected += max(own, 1.0)
     if len(over) < ALONE:
         return None
-    left = float(np.sum(residual[inside] ** 2))
+    left = float(np.sum(squares[inside]))
     beyond = min(float(np.median(over)) * expected, left) - expected  # never more than there is
-    if beyond <= 0.0:
-        return None
-    share = (expected + STATE * np.log1p(beyond / STATE)) / (expected + beyond)
-    slope = STATE / (STATE + beyond)
-    return Course(samples=np.where(inside, np.sqrt(slope), 1.0), share=share, more=(share - slope) * left)
+    return (expected, beyond, inside) if beyond > 0.0 else None
 
 
 def gained(less: Array, slope: float) -> Array:

@@ -8,24 +8,27 @@ Where runs scatter, samples are weighed (D3), and of S = |Q'w|^2 noise and scatt
 
     M = tr(Q'W^2 Q) + mean_k |Q'd_k|^2                                                                          (D14)
 
-d_k what neighbours differ by, weighed alike. S/M then has nu = 2 M^2/var S degrees of freedom, var S from the noise,
-from noise and scatter together, and from how far the neighbours of a recording differ in all its cells at once; M is
-known as well as so few neighbours tell.
+d_k what neighbours differ by, each weighed by what the others scatter, as the recording is; the first term times what
+whitening leaves of slow noise (`colour.Rest`). Where another course is forgiven, both count after the blow for what
+they would in a recording that differs by d_k (D9). S/M then has nu = 2 M^2/var S degrees of freedom, var S from the
+noise, from noise and scatter together, and from how far the neighbours of a recording differ in all its cells at once;
+M is known as well as so few neighbours tell.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.blocks import Block
 from rollover.diagnosis.bursts import too_often
-from rollover.diagnosis.chaos import FEW, SENT, is_other, too_many
-from rollover.diagnosis.colour import hums
+from rollover.diagnosis.chaos import FEW, SENT, is_other, shares, too_many, unseen
+from rollover.diagnosis.colour import Rest, hums, rests
 from rollover.diagnosis.evidence import Evidence
-from rollover.diagnosis.fit import Block
 from rollover.diagnosis.lines import basis as line
 
 Array = NDArray[np.float64]
@@ -93,8 +96,9 @@ def mismatch_of(
 ) -> Mismatch:
     """Judge the residuals at a fitted point; `phases` are (start, name) for each recording."""
     cells: list[Cell] = []
-    strays = [np.array([e.eased(e.whitened(stray)) for stray in e.strays]).reshape(-1, e.count) for e in evidence]
-    humming = hums(evidence, [b.valued for b in blocks])
+    strays = [unseen(e) for e in evidence]
+    worth = [_worth(e, block, apart) for e, block, apart in zip(evidence, blocks, strays, strict=True)]
+    humming, colours = hums(evidence, [b.valued for b in blocks]), rests(evidence)
     for r, (e, block) in enumerate(zip(evidence, blocks, strict=True)):
         for signal, part in e.spans():
             time = e.recording.time[signal.rows]
@@ -104,12 +108,9 @@ def mismatch_of(
                 if inside.size >= 4:
                     rows = inside + part.start
                     weight = None if signal.weight is None else signal.weight[inside]
-                    apart = strays[r][:, rows]
-                    cells.append(
-                        _cell(
-                            r, signal.channel, name, time[inside], rows, block, humming[signal.channel], weight, apart
-                        )
-                    )
+                    hum, rest = humming[signal.channel], colours[r][signal.channel]
+                    expected = Expected(weight, rest, strays[r][:, rows], worth[r][:, rows])
+                    cells.append(_cell(r, signal.channel, name, time[inside], rows, block, hum, expected))
     # after a blow a recording that took another course tells nothing by itself
     other = [is_other(b.course) for b in blocks]
     telling = [c for c in cells if not (other[c.recording] and c.start >= evidence[c.recording].blow)]
@@ -123,6 +124,34 @@ def mismatch_of(
     sent = too_many(sum(other), len(other))
     p = min(p, sent) if sent <= SENT else p  # one may, not all of them: whole numbers, and no p-value until they tell
     return Mismatch(cells=tuple(cells), telling=tuple(telling), p_value=p, adjusted=_holm([c.p_value for c in cells]))
+
+
+class Expected(NamedTuple):
+    """What a cell's misfit is held against: weights (n,), the noise's spectrum, and the neighbours.
+
+    By what these differ, whitened, (k, n), and what samples count with each, its root (k, n).
+    """
+
+    weight: Array | None
+    rest: Rest
+    strays: Array
+    worth: Array
+
+    def left(self, Q: Array, weight: Array, waves: int) -> tuple[tuple[float, float], Array]:
+        """What noise leaves in the columns of `Q` (n, m) and beside them, and what each neighbour adds, (k, 2)."""
+        slow, noise = float(np.sum((Q * weight[:, None]) ** 2)), float(weight @ weight)
+        shape = float(np.mean(self.rest.at(np.arange(waves) / (2.0 * weight.size))))
+        apart, fewer = self.worth * self.strays, (self.worth**2 - 1.0) * weight**2
+        along = np.sum((apart @ Q) ** 2, axis=1) + shape * fewer @ np.sum(Q**2, axis=1)
+        beside = np.sum(apart**2, axis=1) + np.sum(fewer, axis=1) - along
+        return (shape * slow, noise - shape * slow), np.stack([along, beside], axis=1)
+
+
+def _worth(e: Evidence, block: Block, strays: Array) -> Array:
+    """(k, n): roots of what samples count where a recording goes as one of the `strays` does."""
+    if not block.forgiven:
+        return np.ones(strays.shape)
+    return np.where(e.early, 1.0, np.sqrt(shares(e, strays))[:, None])
 
 
 def _p_value(cells: Sequence[Cell], clocks: int) -> float:
@@ -161,8 +190,7 @@ def _cell(
     rows: NDArray[np.int64],
     block: Block,
     humming: tuple[float, ...],
-    weight: Array | None,
-    strays: Array,
+    due: Expected,
 ) -> Cell:
     from scipy.stats import f as f_distribution
 
@@ -187,12 +215,9 @@ def _cell(
         excess=float(w @ w) - n, structured=structured, waves=waves, rough=max(rough, 0.0),
         noise=(float(waves), float(n - waves)),
     )  # fmt: skip
-    if weight is not None:
-        slow = float(np.sum((Q * weight[:, None]) ** 2))
-        along = np.sum((strays @ Q) ** 2, axis=1)
-        apart = np.stack([along, np.sum(strays**2, axis=1) - along], axis=1)
-        noise = float(weight @ weight)
-        found = replace(found, noise=(slow, noise - slow), strayed=apart)
+    if due.weight is not None:
+        noise, strayed = due.left(Q, due.weight, waves)
+        found = replace(found, noise=noise, strayed=strayed)
         excess = float(w @ w) - found.expected - found.rest
         return replace(found, excess=excess, p_value=_p_value([found], 1))
     if n <= waves + 1:

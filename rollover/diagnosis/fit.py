@@ -199,8 +199,9 @@ class Judge:
         if counts is not None:
             residual, J, slope = counts.samples * residual, counts.samples[:, None] * J, counts.samples * slope
         return Block(
-            residual=residual, J=J, slope=slope, shift=shift, prior=e.shift_prior, course=counts, expected=e.expected
-        )
+            residual=residual, J=J, slope=slope, shift=shift, prior=e.shift_prior, course=counts, expected=e.expected,
+            forgiven=self.straying,
+        )  # fmt: skip
 
     def _slope(
         self,

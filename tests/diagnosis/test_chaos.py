@@ -10,7 +10,19 @@ import pytest
 from scipy.stats import kstest
 
 from rollover.diagnosis import chaos
-from rollover.diagnosis.chaos import STATE, Course, alike, course, gained, is_other, memory, too_many, weighted
+from rollover.diagnosis.chaos import (
+    STATE,
+    Course,
+    alike,
+    course,
+    gained,
+    is_other,
+    memory,
+    shares,
+    too_many,
+    unseen,
+    weighted,
+)  # fmt: skip
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.fit import Block
@@ -236,6 +248,74 @@ def test_what_one_channel_leaves_alone_is_not_forgiven() -> None:
     assert course(e, misfit(e, [20.0, 0.9, 0.9, 0.9])) is None
     few = blown(CHANNELS[:2])
     assert course(few, misfit(few, [20.0, 20.0])) is None
+
+
+def test_p_values_are_uniform_where_another_course_is_forgiven() -> None:
+    """Four waves in each of four channels, of recordings and neighbours of one law.
+
+    What counts less in a recording that goes a little further than expected must count less in what it is held against;
+    and a recording is none of those that tell its weights, so a neighbour must be none of those that tell its own.
+    """
+    rng = np.random.default_rng(11)
+    t, plain = STEP * np.arange(N), bare()
+
+    def strayed() -> dict[str, np.ndarray]:
+        angle, found = 2.0 * np.pi * (t - BLOW), {c: np.zeros(N) for c in CHANNELS}
+        for c in CHANNELS:
+            for f in (6.0, 11.0, 16.0, 21.0):
+                a, b = 2.0 * rng.standard_normal(2)
+                found[c] += np.where(t > BLOW, a * np.sin(f * angle) + b * (1.0 - np.cos(f * angle)), 0.0)
+        return found
+
+    def p_value() -> float:
+        several, blocks = [], []
+        for _ in range(4):
+            e = weighted(plain, [strayed() for _ in range(6)])
+            w = e.whitened(e.raw(strayed()) + SIGMA * rng.standard_normal(4 * N))
+            counts = course(e, w)
+            w = w if counts is None else counts.samples * w
+            none = np.zeros((w.size, 0))
+            blocks.append(Block(residual=w, J=none, slope=0.0 * w, shift=0.0, prior=1e-3, course=counts, forgiven=True))
+            several.append(e)
+        return mismatch_of(several, blocks, [((0.0, "tipping"), (BLOW, "impact"))] * 4).p_value
+
+    found = [p_value() for _ in range(240)]
+    assert kstest(found, "uniform").statistic < 0.12
+    assert np.mean(np.array(found) < 0.05) < 0.1
+
+
+def bare() -> Evidence:
+    """The channels of `blown` before anything is known of how runs scatter."""
+    e = blown()
+    return replace(e, signals=tuple(replace(s, weight=None) for s in e.signals))
+
+
+def test_a_neighbour_is_weighed_by_the_others() -> None:
+    t, plain = STEP * np.arange(N), bare()
+    late = np.where(t > BLOW, np.sin(40.0 * t), 0.0)
+    strays = [dict.fromkeys(CHANNELS, a * late) for a in (0.3, -0.5, 0.9)]
+    e = weighted(plain, strays)
+    found = unseen(e)
+    for k, stray in enumerate(strays):
+        others = weighted(plain, [d for d in strays if d is not stray])
+        np.testing.assert_array_equal(found[k], others.whitened(e.raw(stray)))
+    largest = e.whitened(e.raw(strays[2]))
+    assert np.sum(found[2] ** 2) > 1.5 * np.sum(largest**2)
+    assert unseen(plain).shape == (0, plain.count)
+
+
+def test_a_neighbour_counts_as_a_recording_that_goes_like_it() -> None:
+    e = blown()
+    noise = np.concatenate([s.weight for s in e.signals if s.weight is not None])
+    strays = np.stack([misfit(e, [f] * 4, seed=k) for k, f in enumerate((0.1, 3.0, 6.0))])
+    strays[:, np.tile(e.recording.time < BLOW, 4)] = 0.0
+    found = shares(e, strays)
+    for share, stray in zip(found, strays, strict=True):
+        like = course(e, np.sqrt(noise**2 + stray**2))
+        assert like is not None
+        assert share == like.share
+    assert found[0] > 0.97
+    assert found[2] < 0.1
 
 
 def of_courses(others: int) -> float:

@@ -60,6 +60,15 @@ def test_a_leap_is_forgiven_within_a_sample_and_not_beyond() -> None:
     assert np.max(np.abs(left)) == pytest.approx(signal.span)
 
 
+def test_a_block_says_whether_another_course_would_have_counted_for_less() -> None:
+    judge = judge_of(recorded({}, speeds=(2.0,), noise=1e-3))
+    for straying in (True, False):
+        judge.straying = straying
+        found = judge.block(0, (), (), 0.0, judge.effort.fine)
+        assert found is not None
+        assert found.forgiven is straying
+
+
 @pytest.mark.parametrize("late", [-50.0, 50.0])
 def test_time_shifts_stay_where_their_clock_can_be(late: float) -> None:
     slope = np.linspace(-1.0, 1.0, 40)

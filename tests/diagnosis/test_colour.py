@@ -1,0 +1,102 @@
+"""What whitening leaves of the noise behind a filter: less of what is slow than of all."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis import colour
+from rollover.diagnosis.blocks import Block
+from rollover.diagnosis.colour import Rest, quiet, rests
+from rollover.diagnosis.detect import mismatch_of
+from rollover.diagnosis.evidence import Evidence, Signal
+from rollover.filters import filtered
+from rollover.recording import Recording
+
+CHANNEL = "chassis/acceleration_y"
+RATE, N, EVERY = 1000.0, 2048, 4  # Hz, samples, and of how many one tells something new behind CFC 60
+DRAWS = 60
+
+
+class Still:
+    """A simulation of nothing."""
+
+    def marks(self) -> list[tuple[float, str]]:
+        return []
+
+
+def recorded(values: np.ndarray) -> Evidence:
+    """A recording at `RATE`, said to be behind CFC 60, whose noise is told as diagnoses tell it."""
+    time = np.arange(values.size) / RATE
+    recording = Recording(title="r", time=time, channels={CHANNEL: values}, cfc={CHANNEL: 60})
+    rows = np.arange(0, values.size, EVERY)
+    signal = Signal(channel=CHANNEL, rows=rows, values=values[rows], sigma=1.0, noise=1.0, ar=(), span=100.0)
+    simulator: Any = Still()
+    e = Evidence(name="r", recording=recording, simulator=simulator, signals=(signal,), shift_prior=1e-3, condition="r")
+    [e] = quiet([e], [signal.values])
+    # runs of it scatter somewhere, so that its level is known and not asked of its own roughness
+    return replace(e, signals=tuple(replace(s, weight=np.full(s.rows.size, 0.98)) for s in e.signals))
+
+
+def behind(random: np.random.Generator) -> np.ndarray:
+    """White noise behind CFC 60, of any level."""
+    return filtered(random.standard_normal(N + 400), 1.0 / RATE, 60)[200 : N + 200]
+
+
+def slow(e: Evidence) -> tuple[float, float]:
+    """What is slow in a recording of nothing but noise, and what is expected of it."""
+    w = e.whitened(e.signals[0].values)
+    block = Block(residual=w, J=np.zeros((w.size, 0)), slope=np.zeros(w.size), shift=0.0, prior=1e-3)
+    starts = tuple((float(t), f"part {k}") for k, t in enumerate(np.arange(0.0, e.recording.time[-1], 0.256)))
+    cells = mismatch_of([e], [block], [starts]).cells
+    return sum(c.structured for c in cells), sum(c.expected for c in cells)
+
+
+def test_as_much_is_slow_in_noise_behind_a_filter_as_is_expected() -> None:
+    """Of 60 recordings with 96 waves each, so that chance is off by 2 %; an even spectrum would be by 10 %."""
+    random = np.random.default_rng(3)
+    each = np.array([slow(recorded(behind(random))) for _ in range(DRAWS)])
+    assert each[:, 0].sum() / each[:, 1].sum() == pytest.approx(1.0, abs=0.04)
+
+
+def test_noise_that_no_filter_made_is_taken_for_even() -> None:
+    """White noise that joins behind the filter: with 2048 samples its memory of 0 is not the filter's 0.15."""
+    random = np.random.default_rng(4)
+    even = [recorded(random.standard_normal(4 * N)) for _ in range(DRAWS // 3)]
+    taken = [rests([e])[0][CHANNEL].correlation is not None for e in even]
+    assert not any(taken)
+    each = np.array([slow(e) for e in even])
+    assert each[:, 0].sum() / each[:, 1].sum() == pytest.approx(1.0, abs=0.04)
+
+
+def test_without_a_filter_that_can_be_the_noise_s_own_it_is_taken_for_even(monkeypatch: pytest.MonkeyPatch) -> None:
+    """None declared, one that the rate is too low for, samples averaged, a longer memory; whatever the memory says."""
+    monkeypatch.setattr(colour, "AGREES", 1e3)
+    e = recorded(behind(np.random.default_rng(5)))
+    assert rests([e])[0][CHANNEL].correlation is not None
+    others = [
+        replace(e, recording=replace(e.recording, cfc={})),
+        replace(e, recording=replace(e.recording, cfc={CHANNEL: 600})),
+        replace(e, averaged=2),
+        replace(e, signals=(replace(e.signals[0], ar=(0.1, 0.1)),)),
+    ]
+    for other in others:
+        assert rests([other]) == [{CHANNEL: Rest()}]
+    np.testing.assert_array_equal(Rest().at(np.array([0.0, 0.2])), 1.0)
+
+
+def test_the_spectrum_of_what_is_left_is_one_on_average() -> None:
+    """An autoregression whitened by itself leaves 1 everywhere; another memory leaves as much in all."""
+    lags = np.arange(200)
+    own = Rest(correlation=0.6**lags, ar=(0.6,))
+    frequencies = np.linspace(0.0, 0.5, 4001)
+    np.testing.assert_allclose(own.at(frequencies), 1.0, atol=1e-9)
+    other = Rest(correlation=0.6**lags, ar=(0.3,)).at(frequencies)
+    # (1 - 2 b cos w + b^2)/(1 - 2 a cos w + a^2), over its mean: the power of x_t - b x_(t-1) over that of e_t
+    a, b, w = 0.6, 0.3, 2.0 * np.pi * frequencies
+    mean = (1.0 + b * b - 2.0 * a * b) / (1.0 - a * a)
+    np.testing.assert_allclose(other, (1.0 - 2.0 * b * np.cos(w) + b * b) / (1.0 - 2.0 * a * np.cos(w) + a * a) / mean,
+                               rtol=1e-3)  # fmt: skip
