@@ -5,16 +5,21 @@ depends on that: an error of the model grows with the force, so that samples aft
 they have changed since the start, and none later than `SOON`.
 
 It is sought before by what hardly asks for a model: until then a body falls, then it does something else (`onset`).
+
+A clock that is off by far more than it is said to be leaves a recording that nothing explains, and that meets the
+simulation at another time altogether (`mistimed`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.blocks import Fitted
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.fit import Judge
@@ -27,6 +32,12 @@ QUIET = 2.0  # noise units, that the middle sample of a fall may miss
 SOON, LEAST = 8e-3, 4  # s after the first contact, and samples, that tell of it
 TRUSTED = 0.1  # of a change of a channel, by which the model may be off
 BELIEVED = 2.0  # times its prior: a shift beyond is the model's fault, where the clock's zero is known
+
+FURTHEST = 0.25  # s, that a clock may be off where it should not be
+MOST = 0.5  # of a recording that must be left to compare
+MEETS, BEFORE = 2.0, 4.0  # times the noise's power, that is left there at most, and of that, at least where it stands
+FALLS = 30.0  # times less than where it stands: as good, for rows that are means about another contact
+UNKNOWN = 1e30  # power of what cannot be compared
 
 Made = Callable[[float], Array | None]
 Cost = Callable[[Array, float], float]
@@ -62,6 +73,55 @@ def _first_contact(judge: Judge, r: int, made: Made) -> float | None:
         return None
     at = _best(judge, r, made, partial(_early, judge, r), about + NEAR * np.linspace(-1.0, 1.0, PLACES))
     return about if at is None or abs(at - about) > AT_THE_END * NEAR else at  # the model leads away from it
+
+
+def mistimed(judge: Judge, fitted: Fitted) -> list[tuple[str, float]]:
+    """Recordings that would meet a fit if they came later by a shift (s) far beyond what their clocks may be off by."""
+    from scipy.optimize import minimize_scalar
+
+    found = []
+    for r, (e, block) in enumerate(zip(judge.evidence, fitted.blocks, strict=True)):
+        made = partial(judge.raw, r, fitted.candidates, fitted.x)
+        about = _best(judge, r, made, partial(_left, e), np.arange(-FURTHEST, FURTHEST, e.shift_prior))
+        if about is None:
+            continue
+        left = partial(_left_by, e, made)
+        at = float(minimize_scalar(left, bounds=about + e.shift_prior * np.array([-1.0, 1.0]), method="bounded").x)
+        here = left(block.shift)
+        if left(at) < max(min(MEETS, here / BEFORE), here / FALLS):
+            found.append((e.name, at))
+    return found
+
+
+def _left_by(e: Evidence, made: Made, shift: float) -> float:
+    raw = made(float(shift))
+    return UNKNOWN if raw is None else _left(e, raw, float(shift))
+
+
+def by_clock(found: Sequence[tuple[str, float]]) -> str:
+    """What of `mistimed` stands behind the verdict."""
+    each = [f"{abs(s) * 1e3:.3g} ms {'late' if s > 0.0 else 'early'} ({name})" for name, s in found]
+    if not each:
+        return ""
+    return (
+        " The simulation would meet these recordings if their clocks were off by far more than they are said to be: "
+        f"{', '.join(each)}. Check what started them; `clock: {{within: SECONDS}}` in a sidecar allows for it."
+    )
+
+
+def _left(e: Evidence, raw: Array, shift: float) -> float:
+    """Power over the noise of what a run leaves that comes `shift` (s) late; `UNKNOWN` where most of it is."""
+    signals, known = [], np.zeros(raw.size, dtype=bool)
+    for s, part in e.spans():
+        time = e.recording.time[s.rows]
+        known[part] = (time - shift >= time[0]) & (time - shift <= time[-1])
+        signals.append(s if s.weight is None else replace(s, weight=np.interp(time - shift, time, s.weight)))
+    if known.mean() < MOST or not np.all(np.isfinite(raw[known])):
+        return UNKNOWN
+    misfit = np.where(known, np.concatenate([s.values for s in signals]) - e.forgiven(raw, e.leaps(raw)), 0.0)
+    due = np.concatenate([np.ones(s.rows.size) if s.weight is None else s.weight**2 for s in signals])
+    left = replace(e, signals=tuple(signals)).whitened(misfit)[known]
+    return float(left @ left / np.sum(due[known]))
 
 
 def _places(e: Evidence) -> Array:

@@ -15,7 +15,7 @@ from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import candidates_of, size_of
 from rollover.diagnosis.chaos import weighted
 from rollover.diagnosis.chassis import degrees_of
-from rollover.diagnosis.clocks import align
+from rollover.diagnosis.clocks import align, by_clock, mistimed
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.dependence import Dependence, dependence, dependence_of_one
 from rollover.diagnosis.detect import mismatch_of
@@ -125,6 +125,7 @@ def diagnose(
         verdict=verdict,
         sentence=sentence(verdict, effects, explanation.p_value, h_before.held, h_after.held, found, early)
         + (closest(explanation, groups) if verdict == "unexplained" else "")
+        + (by_clock(mistimed(judge, explanation.fitted)) if verdict == "unexplained" or (effects and remains) else "")
         + offered(law)
         + against_itself(verdict, contrary),
         p_value=explanation.p_value,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.candidates import candidates_of, coordinate
-from rollover.diagnosis.clocks import BELIEVED, align, by_first_contact
+from rollover.diagnosis.clocks import BELIEVED, align, by_clock, by_first_contact, mistimed
 from rollover.diagnosis.evidence import Evidence, evidence_of
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import followed, gate
@@ -164,3 +164,54 @@ def test_a_way_from_no_effect_is_followed_in_the_parameter_itself() -> None:
     assert after["depth"] == before["depth"]
     clip = by_id[f"sensor-clipping:{FORCE}"]
     assert followed(clip, clip.probes()[0], 3.0) is None
+
+
+def one_late(judge: Judge, late: float) -> Judge:
+    """The same, with the clock of the second recording off by `late` (s) more, and said to be right."""
+    second = judge.evidence[1]
+    moved = replace(second.recording, time=second.recording.time + late)
+    one = evidence_of(second.name, moved, simulator_of(scenario(), moved))
+    assert one is not None
+    return Judge([judge.evidence[0], one, *judge.evidence[2:]])
+
+
+@pytest.mark.parametrize("late", [0.05, -0.03])
+def test_a_clock_that_is_far_off_is_told_by_where_the_simulation_meets_the_recording(late: float) -> None:
+    judge = one_late(judge_of({}), late)
+    base = judge.fit((), (), rounds=3)
+    assert base is not None
+    [(name, found)] = mistimed(judge, base)
+    assert name == judge.evidence[1].name
+    assert found == pytest.approx(late, abs=2e-3)  # what `recorded` makes it late by itself is up to 1.5 ms
+    said = by_clock([(name, found)])
+    assert f"{abs(found) * 1e3:.3g} ms {'late' if late > 0 else 'early'} ({name})" in said
+
+
+@pytest.mark.parametrize("missing", [{}, HARDPAN, {"effects.soil-stiffness.scale": 2.0}])
+def test_no_clock_is_blamed_for_what_the_simulation_misses(missing: dict[str, object]) -> None:
+    judge = judge_of(missing)
+    base = judge.fit((), (), rounds=3)
+    assert base is not None
+    assert mistimed(judge, base) == []
+    assert by_clock([]) == ""
+
+
+def test_a_shift_that_leaves_little_to_compare_blames_no_clock() -> None:
+    """Of what ends 30 ms after a contact 150 ms late, most of the samples come before all that was simulated."""
+    judge = one_late(judge_of({}), 0.15)
+    base = judge.fit((), (), rounds=3)
+    assert base is not None
+    assert [round(s, 2) for _, s in mistimed(judge, base)] == [0.15]
+    e = judge.evidence[1]
+    rows = np.flatnonzero(e.recording.time < 0.18)
+    cut = replace(
+        e.recording,
+        time=e.recording.time[rows],
+        channels={c: v[rows] for c, v in e.recording.channels.items()},
+    )
+    one = evidence_of(e.name, cut, simulator_of(scenario(), cut))
+    assert one is not None
+    short = Judge([one])
+    base = short.fit((), (), rounds=3)
+    assert base is not None
+    assert mistimed(short, base) == []

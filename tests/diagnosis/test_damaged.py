@@ -93,6 +93,8 @@ def test_clocks_that_are_wrong_are_no_physics() -> None:
     found = diagnose(scenario(), misaligned(recorded({}, 22, speeds=SPEEDS)))
     assert all(e.kind == "sensor" for e in found.effects), found.sentence
     assert found.verdict in ("sensor", "unexplained")
+    assert "ms late (v1.5)" in found.sentence
+    assert "ms early (v2.5)" in found.sentence
 
 
 def test_recordings_that_contradict_each_other_are_not_explained() -> None:
