@@ -198,7 +198,7 @@ def rests(evidence: Sequence[Evidence]) -> list[dict[str, Rest]]:
             if cfc is None or e.averaged > 1 or len(s.ar) != 1 or 1.0 / step < least_rate(cfc):
                 continue
             filtered = _correlation(step, float(np.median(np.diff(s.rows))), cfc)
-            if abs(s.ar[0] - filtered[1]) < AGREES / np.sqrt(told):
+            if abs(s.ar[0] - filtered[1]) * np.sqrt(told) < AGREES:
                 found[r][s.channel] = Rest(correlation=filtered, ar=s.ar)
     return found
 
