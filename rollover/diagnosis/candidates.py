@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ground.law import REFERENCE_AREA, REFERENCE_MASS
 from rollover.channels import describe
 from rollover.diagnosis.evidence import Evidence
-from rollover.diagnosis.simulator import set_up
+from rollover.diagnosis.simulator import EDGES, set_up
 from rollover.document import value_at
 from rollover.effects import EFFECTS, Search, effects, nth
 from rollover.scenario import Scenario
@@ -35,6 +35,7 @@ SHAPES = {
 PLACES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of a shape, at which a fit of it begins
 FAINT = 20.0  # times weaker than an effect usually is, and still looked for
 BESIDE = 0.01  # of a coordinate: how far from its zero an effect is looked at
+FURTHER = (0.08, 0.16, 0.3)  # of a coordinate: how far a clock is looked at
 THRESHOLDS = 10  # places at which something that has no zero is looked at
 ONE = (5,)
 SEVERAL = (8, 4, 3)  # places on the axes of an effect's parameters
@@ -176,6 +177,17 @@ class Candidate:
                 many = (THRESHOLDS if len(self.search) > 1 else 4) if not axes else 1
                 axes.append([(k + 0.5) / many for k in range(many)])
         return list(itertools.product(*axes))
+
+    def further(self) -> list[tuple[float, ...]]:
+        """Coordinates of a clock that is far off: an edge moved by more than it is wide is no multiple of a small move.
+
+        None of what else there is. Where runs are dear these cost none.
+        """
+        zeros = [(EFFECTS[self.id].null.get(name), s) for name, s in self.search.items()]
+        at = [coordinate(null, s) for null, s in zeros if isinstance(null, (int, float)) and s.low < null < s.high]
+        if self.id not in EDGES or len(at) != 1 or len(zeros) != 1:
+            return []
+        return [(at[0] + sign * f,) for f in FURTHER for sign in (1.0, -1.0)]
 
 
 def akin(candidates: Iterable[Candidate], to: Iterable[Candidate]) -> list[Candidate]:

@@ -89,7 +89,7 @@ def gate(
     quiet = _before_the_blow(judge, use)
     judge.made_ahead((r, (*at.candidates, c), (*at.x, *x)) for c in candidates for x in c.probes() for r in use)
     for c in candidates:
-        for x in c.probes():
+        for x in (*c.probes(), *(c.further() if judge.effort.thrifty else ())):
             d = _direction(judge, (at.candidates, at.x), base.blocks, c, x, use)
             if d is None:
                 continue

@@ -215,3 +215,20 @@ def test_a_shift_that_leaves_little_to_compare_blames_no_clock() -> None:
     base = short.fit((), (), rounds=3)
     assert base is not None
     assert mistimed(short, base) == []
+
+
+def test_a_channel_that_comes_far_too_early_is_looked_at_there_where_runs_are_dear() -> None:
+    """A blow of 20 ms that one channel shows 30 ms early: what a millisecond would do has nothing to do with it."""
+    judge = judge_of({"effects.sensor-clock-offset.channel": ACCELERATION, "effects.sensor-clock-offset.offset": -0.03})
+    base = judge.fit((), (), rounds=3)
+    assert base is not None
+    every = candidates_of(judge.evidence, (), "drop")
+    [c] = [c for c in every if c.key == f"sensor-clock-offset:{ACCELERATION}"]
+    near = gate(judge, base, [c])
+    judge.effort = replace(judge.effort, thrifty=True)
+    far = gate(judge, base, [c])
+    truth = coordinate(-0.03, c.search["offset"])
+    assert far.score > 5.0 * near.score
+    assert far.starts[c.key][0][0] == pytest.approx(truth, abs=0.05)
+    assert near.starts[c.key][0][0] != pytest.approx(truth, abs=0.15)
+    assert {c.id for c in every if c.further()} == {"sensor-clock-offset", "sensor-clock-drift"}
