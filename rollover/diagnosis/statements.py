@@ -42,9 +42,8 @@ def named(judge: Judge, found: Explanation, groups: Sequence[Sequence[int]]) -> 
         values: dict[str, Any] = {name: i.value for name, i in parameters.items()}
         if c.channel is not None:
             values["channel"] = c.channel
-        rivals = [
-            f.candidates[-1] for f in confusion(by_key[c.key], groups, judge.per_error) if f.candidates[-1].key != c.key
-        ]
+        alike = (f.candidates[-1] for f in confusion(by_key[c.key], groups, judge.per_error))
+        rivals = [r for r in alike if r.key not in settings]  # what was named too is told apart by being beside it
         tests = [kind.rivals[r.id] for r in rivals if r.id in kind.rivals]
         effects.append(
             Named(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rollover.diagnosis import statements
 from rollover.diagnosis.blocks import Block, Fitted
 from rollover.diagnosis.chaos import Course
 from rollover.diagnosis.evidence import evidence_of
@@ -75,3 +76,27 @@ def test_a_misfit_that_scatter_takes_part_in_is_said_to_be_one() -> None:
     said = sentence("parameter", [tilted], 0.0, first, last, [], (6.94, 1.02))
     assert said.startswith(plain[:-1] + " and the scatter of runs; before the first blow")
     assert said.endswith("the misfit is 1.02 times the noise for 6.9.")
+
+
+def test_an_effect_that_is_named_is_no_look_alike_of_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    def one(id: str) -> Any:
+        return SimpleNamespace(id=id, key=id, kind="parameter", channel=None)
+
+    def fit(*ids: str) -> Any:
+        return SimpleNamespace(candidates=tuple(one(i) for i in ids))
+
+    both = fit("soil-stiffness", "inertia")
+    told = [{"scale": SimpleNamespace(value=1.2)}, {"scale": SimpleNamespace(value=0.9)}]
+    judge: Any = SimpleNamespace(per_error=1.0, weigh=lambda _: None, evidence=())
+    found: Any = SimpleNamespace(
+        fitted=both,
+        base=None,
+        parts=[SimpleNamespace(fitted=fit(i), p_value=0.0) for i in ("soil-stiffness", "inertia")],
+    )
+    monkeypatch.setattr(statements, "in_shorter_steps", lambda _, fitted: fitted)
+    monkeypatch.setattr(statements, "intervals", lambda *_, **__: told)
+    monkeypatch.setattr(statements, "confusion", lambda *_: [fit("soil-stiffness"), fit("inertia"), fit("soil-crust")])
+    monkeypatch.setattr(statements, "strongest", lambda *_: one("soil-stiffness"))
+    each = statements.named(judge, found, ())
+    assert [e.id for e in each] == ["soil-stiffness", "inertia"]
+    assert all(e.indistinguishable_from == ("soil-crust",) for e in each)
