@@ -183,11 +183,13 @@ class Candidate:
 
         None of what else there is. Where runs are dear these cost none.
         """
-        zeros = [(EFFECTS[self.id].null.get(name), s) for name, s in self.search.items()]
-        at = [coordinate(null, s) for null, s in zeros if isinstance(null, (int, float)) and s.low < null < s.high]
-        if self.id not in EDGES or len(at) != 1 or len(zeros) != 1:
+        if self.id not in EDGES:
             return []
-        return [(at[0] + sign * f,) for f in FURTHER for sign in (1.0, -1.0)]
+        [(name, s)] = self.search.items()
+        null = EFFECTS[self.id].null[name]
+        if null is None or not s.low < null < s.high:
+            return []
+        return [(coordinate(null, s) + sign * f,) for f in FURTHER for sign in (1.0, -1.0)]
 
 
 def akin(candidates: Iterable[Candidate], to: Iterable[Candidate]) -> list[Candidate]:

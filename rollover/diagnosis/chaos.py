@@ -151,8 +151,7 @@ def unseen(e: Evidence) -> Array:
 
 def shares(e: Evidence, strays: Array) -> Array:
     """(k,): what a recording that differs as neighbours (k, n) do would count after the blow, of its sum of squares."""
-    noise = np.concatenate([np.ones(s.rows.size) if s.weight is None else s.weight**2 for s in e.signals])
-    found = [_beyond(e, noise + stray**2) for stray in strays]
+    found = [_beyond(e, e.due + stray**2) for stray in strays]
     return np.array([1.0 if f is None else _share(f[0], f[1]) for f in found])
 
 
@@ -171,9 +170,9 @@ def _beyond(e: Evidence, squares: Array) -> tuple[float, float, NDArray[np.bool_
         if not later.any():
             continue
         inside[part] = later
-        own = float(np.sum(s.weight[later] ** 2)) if s.weight is not None else float(later.sum())
-        over.append(float(np.sum(squares[part][later])) / max(own, 1.0))
-        expected += max(own, 1.0)
+        own = max(float(np.sum(e.due[part][later])), 1.0)
+        over.append(float(np.sum(squares[part][later])) / own)
+        expected += own
     if len(over) < ALONE:
         return None
     left = float(np.sum(squares[inside]))

@@ -32,7 +32,6 @@ QUIET = 2.0  # noise units, that the middle sample of a fall may miss
 SOON, LEAST = 8e-3, 4  # s after the first contact, and samples, that tell of it
 TRUSTED = 0.1  # of a change of a channel, by which the model may be off
 BELIEVED = 2.0  # times its prior: a shift beyond is the model's fault, where the clock's zero is known
-
 FURTHEST = 0.25  # s, that a clock may be off where it should not be
 MOST = 0.5  # of a recording that must be left to compare
 MEETS, BEFORE = 2.0, 4.0  # times the noise's power, that is left there at most, and of that, at least where it stands
@@ -77,25 +76,8 @@ def _first_contact(judge: Judge, r: int, made: Made) -> float | None:
 
 def mistimed(judge: Judge, fitted: Fitted) -> list[tuple[str, float]]:
     """Recordings that would meet a fit if they came later by a shift (s) far beyond what their clocks may be off by."""
-    from scipy.optimize import minimize_scalar
-
-    found = []
-    for r, (e, block) in enumerate(zip(judge.evidence, fitted.blocks, strict=True)):
-        made = partial(judge.raw, r, fitted.candidates, fitted.x)
-        about = _best(judge, r, made, partial(_left, e), np.arange(-FURTHEST, FURTHEST, e.shift_prior))
-        if about is None:
-            continue
-        left = partial(_left_by, e, made)
-        at = float(minimize_scalar(left, bounds=about + e.shift_prior * np.array([-1.0, 1.0]), method="bounded").x)
-        here = left(block.shift)
-        if left(at) < max(min(MEETS, here / BEFORE), here / FALLS):
-            found.append((e.name, at))
-    return found
-
-
-def _left_by(e: Evidence, made: Made, shift: float) -> float:
-    raw = made(float(shift))
-    return UNKNOWN if raw is None else _left(e, raw, float(shift))
+    found = [(e.name, _elsewhere(judge, fitted, r)) for r, e in enumerate(judge.evidence)]
+    return [(name, at) for name, at in found if at is not None]
 
 
 def by_clock(found: Sequence[tuple[str, float]]) -> str:
@@ -109,6 +91,24 @@ def by_clock(found: Sequence[tuple[str, float]]) -> str:
     )
 
 
+def _elsewhere(judge: Judge, fitted: Fitted, r: int) -> float | None:
+    """Time shift (s), however large, at which recording r meets a fit far better than where it stands; None if none."""
+    from scipy.optimize import minimize_scalar
+
+    e, made = judge.evidence[r], partial(judge.raw, r, fitted.candidates, fitted.x)
+
+    def left(shift: float) -> float:
+        raw = made(float(shift))
+        return UNKNOWN if raw is None else _left(e, raw, float(shift))
+
+    about = _best(judge, r, made, partial(_left, e), np.arange(-FURTHEST, FURTHEST, e.shift_prior))
+    if about is None:
+        return None
+    there = minimize_scalar(left, bounds=about + e.shift_prior * np.array([-1.0, 1.0]), method="bounded")
+    here = left(fitted.blocks[r].shift)
+    return float(there.x) if there.fun < max(min(MEETS, here / BEFORE), here / FALLS) else None
+
+
 def _left(e: Evidence, raw: Array, shift: float) -> float:
     """Power over the noise of what a run leaves that comes `shift` (s) late; `UNKNOWN` where most of it is."""
     signals, known = [], np.zeros(raw.size, dtype=bool)
@@ -118,10 +118,10 @@ def _left(e: Evidence, raw: Array, shift: float) -> float:
         signals.append(s if s.weight is None else replace(s, weight=np.interp(time - shift, time, s.weight)))
     if known.mean() < MOST or not np.all(np.isfinite(raw[known])):
         return UNKNOWN
+    moved = replace(e, signals=tuple(signals))
     misfit = np.where(known, np.concatenate([s.values for s in signals]) - e.forgiven(raw, e.leaps(raw)), 0.0)
-    due = np.concatenate([np.ones(s.rows.size) if s.weight is None else s.weight**2 for s in signals])
-    left = replace(e, signals=tuple(signals)).whitened(misfit)[known]
-    return float(left @ left / np.sum(due[known]))
+    left = moved.whitened(misfit)[known]
+    return float(left @ left / np.sum(moved.due[known]))
 
 
 def _places(e: Evidence) -> Array:

@@ -177,25 +177,29 @@ class Rest:
         """Power at frequencies (m,), cycles per sample, over its mean at all of them."""
         if self.correlation is None:
             return np.ones(frequencies.size)
-        return np.asarray(self._power(frequencies) / self._power(np.linspace(0.0, 0.5, BANDS)).mean())
-
-    def _power(self, frequencies: Array) -> Array:
-        assert self.correlation is not None
-        lags = np.arange(1, self.correlation.size)
-        density = 1.0 + 2.0 * np.cos(2.0 * np.pi * np.outer(frequencies, lags)) @ self.correlation[1:]
-        turns = np.exp(-2j * np.pi * np.outer(frequencies, np.arange(1, len(self.ar) + 1)))
-        return np.asarray(density * np.abs(1.0 - turns @ np.array(self.ar)) ** 2)
+        both = np.concatenate([self.correlation[:0:-1], self.correlation])
+        whitening = np.array([1.0, *(-a for a in self.ar)])
+        left = np.convolve(both, np.convolve(whitening, whitening[::-1]))[both.size // 2 + len(self.ar) :]
+        return np.asarray(
+            1.0 + 2.0 * np.cos(2.0 * np.pi * np.outer(frequencies, np.arange(1, left.size))) @ (left[1:] / left[0])
+        )
 
 
 def rests(evidence: Sequence[Evidence]) -> list[dict[str, Rest]]:
-    """What is left of each recording's noises by channel: of white noise behind the filter class that is declared."""
+    """What is left of each recording's noises by channel: of white noise behind the filter class that is declared.
+
+    Only where samples are weighed: elsewhere noise is held against its own roughness, not against what is expected.
+    """
     found: list[dict[str, Rest]] = [{s.channel: Rest() for s in e.signals} for e in evidence]
     for members in alike(evidence):
         told = sum(int(evidence[r].early[part].sum()) for r, _, _, part in members)
         for r, _, s, _ in members:
             e = evidence[r]
-            step, cfc = float(np.median(np.diff(e.recording.time))), e.recording.cfc.get(s.channel)
-            if cfc is None or e.averaged > 1 or len(s.ar) != 1 or 1.0 / step < least_rate(cfc):
+            cfc = e.recording.cfc.get(s.channel)
+            if s.weight is None or cfc is None or e.averaged > 1 or len(s.ar) != 1:
+                continue
+            step = float(np.median(np.diff(e.recording.time)))
+            if 1.0 / step < least_rate(cfc):
                 continue
             filtered = _correlation(step, float(np.median(np.diff(s.rows))), cfc)
             if abs(s.ar[0] - filtered[1]) * np.sqrt(told) < AGREES:

@@ -107,10 +107,10 @@ def mismatch_of(
                 inside = np.flatnonzero((time >= start) & (time < end))
                 if inside.size >= 4:
                     rows = inside + part.start
-                    weight = None if signal.weight is None else signal.weight[inside]
-                    hum, rest = humming[signal.channel], colours[r][signal.channel]
-                    expected = Expected(weight, rest, strays[r][:, rows], worth[r][:, rows])
-                    cells.append(_cell(r, signal.channel, name, time[inside], rows, block, hum, expected))
+                    hum, rest, due = humming[signal.channel], colours[r][signal.channel], None
+                    if signal.weight is not None:
+                        due = Expected(signal.weight[inside], rest, strays[r][:, rows], worth[r][:, rows])
+                    cells.append(_cell(r, signal.channel, name, time[inside], rows, block, hum, due))
     # after a blow a recording that took another course tells nothing by itself
     other = [is_other(b.course) for b in blocks]
     telling = [c for c in cells if not (other[c.recording] and c.start >= evidence[c.recording].blow)]
@@ -127,21 +127,21 @@ def mismatch_of(
 
 
 class Expected(NamedTuple):
-    """What a cell's misfit is held against: weights (n,), the noise's spectrum, and the neighbours.
+    """What a cell's misfit is held against where samples are weighed: weights (n,), the noise's spectrum, neighbours.
 
     By what these differ, whitened, (k, n), and what samples count with each, its root (k, n).
     """
 
-    weight: Array | None
+    weight: Array
     rest: Rest
     strays: Array
     worth: Array
 
-    def left(self, Q: Array, weight: Array, waves: int) -> tuple[tuple[float, float], Array]:
+    def left(self, Q: Array, waves: int) -> tuple[tuple[float, float], Array]:
         """What noise leaves in the columns of `Q` (n, m) and beside them, and what each neighbour adds, (k, 2)."""
-        slow, noise = float(np.sum((Q * weight[:, None]) ** 2)), float(weight @ weight)
-        shape = float(np.mean(self.rest.at(np.arange(waves) / (2.0 * weight.size))))
-        apart, fewer = self.worth * self.strays, (self.worth**2 - 1.0) * weight**2
+        slow, noise = float(np.sum((Q * self.weight[:, None]) ** 2)), float(self.weight @ self.weight)
+        shape = float(np.mean(self.rest.at(np.arange(waves) / (2.0 * self.weight.size))))
+        apart, fewer = self.worth * self.strays, (self.worth**2 - 1.0) * self.weight**2
         along = np.sum((apart @ Q) ** 2, axis=1) + shape * fewer @ np.sum(Q**2, axis=1)
         beside = np.sum(apart**2, axis=1) + np.sum(fewer, axis=1) - along
         return (shape * slow, noise - shape * slow), np.stack([along, beside], axis=1)
@@ -190,7 +190,7 @@ def _cell(
     rows: NDArray[np.int64],
     block: Block,
     humming: tuple[float, ...],
-    due: Expected,
+    due: Expected | None,
 ) -> Cell:
     from scipy.stats import f as f_distribution
 
@@ -215,8 +215,8 @@ def _cell(
         excess=float(w @ w) - n, structured=structured, waves=waves, rough=max(rough, 0.0),
         noise=(float(waves), float(n - waves)),
     )  # fmt: skip
-    if due.weight is not None:
-        noise, strayed = due.left(Q, due.weight, waves)
+    if due is not None:
+        noise, strayed = due.left(Q, waves)
         found = replace(found, noise=noise, strayed=strayed)
         excess = float(w @ w) - found.expected - found.rest
         return replace(found, excess=excess, p_value=_p_value([found], 1))

@@ -86,9 +86,13 @@ class Evidence:
         """Sum of squares that noise and scatter alone leave of the weighed samples; None where none is weighed."""
         if all(s.weight is None for s in self.signals):
             return None
-        noise = sum(s.rows.size if s.weight is None else float(s.weight @ s.weight) for s in self.signals)
         scatter = [float(np.sum(self.whitened(stray) ** 2)) for stray in self.strays]
-        return noise + (float(np.mean(scatter)) if scatter else 0.0)
+        return float(np.sum(self.due)) + (float(np.mean(scatter)) if scatter else 0.0)
+
+    @cached_property
+    def due(self) -> Array:
+        """Squares (n,) that noise alone leaves of the weighed samples: 1 where they count in full."""
+        return np.concatenate([np.ones(s.rows.size) if s.weight is None else s.weight**2 for s in self.signals])
 
     @cached_property
     def early(self) -> NDArray[np.bool_]:

@@ -229,6 +229,7 @@ def test_a_channel_that_comes_far_too_early_is_looked_at_there_where_runs_are_de
     far = gate(judge, base, [c])
     truth = coordinate(-0.03, c.search["offset"])
     assert far.score > 5.0 * near.score
+    # 5 ms, a quarter of the blow: from there a fit goes to it
     assert far.starts[c.key][0][0] == pytest.approx(truth, abs=0.05)
     assert near.starts[c.key][0][0] != pytest.approx(truth, abs=0.15)
     assert {c.id for c in every if c.further()} == {"sensor-clock-offset", "sensor-clock-drift"}

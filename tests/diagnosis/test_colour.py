@@ -73,7 +73,7 @@ def test_noise_that_no_filter_made_is_taken_for_even() -> None:
 
 
 def test_without_a_filter_that_can_be_the_noise_s_own_it_is_taken_for_even(monkeypatch: pytest.MonkeyPatch) -> None:
-    """None declared, one that the rate is too low for, samples averaged, a longer memory; whatever the memory says."""
+    """None declared, one too wide for the rate, averages, a longer memory, none weighed; whatever the memory says."""
     monkeypatch.setattr(colour, "AGREES", 1e3)
     e = recorded(behind(np.random.default_rng(5)))
     assert rests([e])[0][CHANNEL].correlation is not None
@@ -82,6 +82,7 @@ def test_without_a_filter_that_can_be_the_noise_s_own_it_is_taken_for_even(monke
         replace(e, recording=replace(e.recording, cfc={CHANNEL: 600})),
         replace(e, averaged=2),
         replace(e, signals=(replace(e.signals[0], ar=(0.1, 0.1)),)),
+        replace(e, signals=(replace(e.signals[0], weight=None),)),
     ]
     for other in others:
         assert rests([other]) == [{CHANNEL: Rest()}]
@@ -99,4 +100,4 @@ def test_the_spectrum_of_what_is_left_is_one_on_average() -> None:
     a, b, w = 0.6, 0.3, 2.0 * np.pi * frequencies
     mean = (1.0 + b * b - 2.0 * a * b) / (1.0 - a * a)
     np.testing.assert_allclose(other, (1.0 - 2.0 * b * np.cos(w) + b * b) / (1.0 - 2.0 * a * np.cos(w) + a * a) / mean,
-                               rtol=1e-3)  # fmt: skip
+                               rtol=1e-9)  # fmt: skip
