@@ -44,7 +44,8 @@ LIMITS = (0.12, 0.3)  # more places of what may be a limit
 STRONG, ENDS = (0.35, 0.9), (0.0, 1.0)  # of the way from what changes nothing to an end
 SPREAD = (0.12, 0.3, 0.6)  # places of a depth, a length: where nothing is known to change nothing
 # what hits a wall does so at a moment that its travel sets: a tenth beside that, it explains nothing
-NARROW = {"payload-shift": tuple(0.1 + 0.06 * k for k in range(13))}
+NARROW = {"payload-shift": {"travel": tuple(0.1 + 0.022 * k for k in range(36)), "friction": (0.25, 0.5)}}
+STEEP = 2.0  # tangent of the tilt at which a load slides
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,6 +61,7 @@ class Candidate:
     shapes: Mapping[str, Search] = field(default_factory=dict)  # fitted only where what is left asks for them
     fixed: Mapping[str, Any] = field(default_factory=dict)  # parameters that are not fitted
     own: Mapping[str, float] = field(default_factory=dict)  # the scenario's values, where no number is an effect's null
+    places: tuple[tuple[float, ...], ...] = ()  # where it is looked at, if not wherever its `probes` are
 
     @property
     def key(self) -> str:
@@ -74,8 +76,25 @@ class Candidate:
 
     @property
     def is_narrow(self) -> bool:
-        """Whether it tells only near its place: looked at in many, and over less about each."""
+        """Whether it tells only near its place."""
         return self.id in NARROW
+
+    def is_fine(self, k: int) -> bool:
+        """Whether the k-th parameter is that place: looked at in many, and over less about each."""
+        return self.is_narrow and list(self.search)[k] == "travel"
+
+    def valley(self, x: Sequence[float], k: int) -> tuple[int, float] | None:
+        """Which coordinate follows the k-th one along the valley of a narrow effect at x, and how fast; else None.
+
+        At a tilt theta a load slides by s, proportional to tan theta - mu, until a given moment:
+        d ln s / d mu = -1/(tan theta - mu). Along that it meets its wall no sooner and no later.
+        """
+        names = list(self.search)
+        if not self.is_narrow or names[k] != "friction":
+            return None
+        travel, friction = self.search["travel"], self.search["friction"]
+        slope = -(friction.high - friction.low) / (STEEP - physical(x[k], friction))
+        return names.index("travel"), slope / math.log(travel.high / travel.low)
 
     def changes(self, x: Sequence[float], number: int = 1) -> dict[str, Any]:
         """Values to exchange in the scenario for coordinates x, each from 0 (low) to 1 (high).
@@ -120,16 +139,18 @@ class Candidate:
             # what the scenario has may be far above what ever acts: a yield force, a stop
             is_limit = len(at) == 1 and None in EFFECTS[self.id].null.values()
             return [*beside, *((x,) for x in LIMITS if is_limit)]
-        axes = []
+        axes, narrow = [], NARROW.get(self.id, {})
         for n, (name, search) in zip(neutral, self.search.items(), strict=True):
             if n is not None:
                 axes.append([min(n + 2.0 * WIDE, 0.9)])
+            elif name in narrow:
+                axes.append(list(narrow[name]))
             elif EFFECTS[self.id].null.get(name) == 0.0 or any(len(a) > 1 for a in axes):
                 # a strength, or more than one place: what is usual shows the direction
                 usual = coordinate(getattr(EFFECTS[self.id](), name), search)
                 axes.append([min(max(usual, WIDE), 1.0 - WIDE)])
             else:
-                axes.append(list(NARROW.get(self.id, SPREAD)))
+                axes.append(list(SPREAD))
         return list(itertools.product(*axes))
 
     def strong(self) -> list[tuple[float, ...]]:
@@ -162,7 +183,9 @@ class Candidate:
         return [(*x, *place) for place in places]
 
     def probes(self) -> list[tuple[float, ...]]:
-        """Coordinates that span the directions in which the effect begins: small where it has a zero, else spread."""
+        """Coordinates to span the directions in which it begins: small where it has a zero, or spread, or `places`."""
+        if self.places:
+            return list(self.places)
         if self.neutral is not None:
             return self._beside(self.neutral)
         axes: list[list[float]] = []

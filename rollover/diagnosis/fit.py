@@ -15,7 +15,7 @@ from rollover.diagnosis.chaos import course
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.overturn import full_runs, made_ahead
-from rollover.diagnosis.secant import Point, beside, in_step, secant
+from rollover.diagnosis.secant import Point, beside, in_step, secant, valley_at
 
 Array = NDArray[np.float64]
 FAR = 3.0  # misfit over the noise from which on a step may be lengthened
@@ -181,7 +181,8 @@ class Judge:
                 column = secant(e, off, (candidates, x), k, nudge, widest)
                 if column is None:
                     return None
-                J[:, k] = column
+                valley = valley_at((candidates, x), k)
+                J[:, k] = column if valley is None else column - valley[1] * J[:, valley[0]]
                 continue
             step = nudge if x[k] < 0.5 else -nudge
             there = [*x[:k], x[k] + step, *x[k + 1 :]]

@@ -28,6 +28,7 @@ VISIBLE = 5.0  # standard errors of the noise at which an effect shows
 JITTER = 1e-9
 LIMITS = ("limit", "yield_force", "stiffness", "angle")  # what acts the more the lower it is
 WAYS = 2  # places of one effect at which fits begin
+CLOSER = 8  # places of one effect that are looked at closer
 EDGE = 0.01  # of a coordinate, that they keep from its ends
 
 
@@ -56,6 +57,7 @@ class Gate:
     only: tuple[int, ...] = ()
     leading: tuple[str, ...] = ()
     far: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
+    places: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
 
     def ranked(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """Candidates by score, the best first; before each of the first ones the next of those that are `leading`."""
@@ -114,12 +116,15 @@ def gate(
     detectable: dict[str, float] = {}
     own_best: dict[str, float] = {}
     ways: dict[str, list[tuple[float, ...]]] = {}
+    places: dict[str, list[tuple[float, ...]]] = {}
     for k in np.argsort(-scores, kind="stable"):
         c, x = looks[k]
         shows = _visible(c, x, sizes[k])
         if shows is not None:
             detectable[c.key] = (max if is_limit(c) else min)(shows, detectable.get(c.key, shows))
         own_best.setdefault(c.key, float(scores[k]))
+        if x not in (seen := places.setdefault(c.key, [])):
+            seen.append(x)
         start = followed(c, x, float(along[k]) / sizes[k])
         if start is not None and len(ways.setdefault(c.key, [])) < WAYS:
             ways[c.key].append(start)
@@ -130,6 +135,7 @@ def gate(
         detectable=detectable,
         starts={key: tuple(each) for key, each in ways.items()},
         only=tuple(only or ()),
+        places={key: tuple(each[:CLOSER]) for key, each in places.items()},
     )
 
 

@@ -17,7 +17,7 @@ from rollover.diagnosis.fit import GENTLE, Fitted, Judge
 from rollover.diagnosis.secant import CLOCKED
 from rollover.diagnosis.settle import PARTS, along, left_of_means, pull_of_means, step_of_means
 from rollover.diagnosis.verdict import Interval
-from rollover.effects import EFFECTS, units_of
+from rollover.effects import EFFECTS, possible, units_of
 
 Array = NDArray[np.float64]
 TWO_SIDED = 1.96
@@ -110,7 +110,9 @@ def with_shapes(judge: Judge, fitted: Fitted) -> tuple[Fitted, Array, list[int]]
         found = linearised(judge, candidates, x, [b.shift for b in fitted.blocks])
         if found is not None:
             return found, np.array(prior), kept
-    return fitted, np.full(len(fitted.x), GENTLE), list(range(len(fitted.x)))
+    # what may tell nothing at all of a parameter leaves it evenly in its range
+    own_prior = [EVENLY**-2 if c.is_narrow else GENTLE for c in fitted.candidates for _ in c.search]
+    return fitted, np.array(own_prior), list(range(len(fitted.x)))
 
 
 def reaches(judge: Judge, fitted: Fitted, own: Array, phi: float, sides: Mapping[int, float] | None = None) -> Array:
@@ -162,9 +164,9 @@ def _misfit(judge: Judge, fitted: Fitted, way: Array) -> float | None:
     return left_of_means(judge, moved)[0] if any(e.strays for e in judge.evidence) else moved.left
 
 
-def _noise(judge: Judge, fitted: Fitted) -> Array:
-    """Covariance (p, p) of J'w that comes of the noise alone: a weighed sample's noise is below 1."""
-    found = GENTLE * np.eye(len(fitted.x))
+def _noise(judge: Judge, fitted: Fitted, prior: Array) -> Array:
+    """Covariance (p, p) of J'w that comes of the noise alone, and `prior`: a weighed sample's noise is below 1."""
+    found = np.diag(prior)
     for e, block in zip(judge.evidence, fitted.blocks, strict=True):
         J = block.J - np.outer(block.slope, block.slope @ block.J) / block.weight
         weights = [np.ones(s.rows.size) if s.weight is None else s.weight for s in e.signals]
@@ -194,7 +196,7 @@ def intervals(
     count = sum(b.residual.size for b in fitted.blocks)
     phi = max(1.0, fitted.left / count) * judge.per_error
     strayed = any(e.strays for e in judge.evidence)
-    noise = inverse @ _noise(judge, fitted) @ inverse if strayed else inverse
+    noise = inverse @ _noise(judge, fitted, prior) @ inverse if strayed else inverse
     sd = np.sqrt(np.maximum(phi * np.diag(noise), 0.0))
     moved = np.zeros(p)
     channels = {s.channel for e in judge.evidence for s in e.signals}
@@ -228,8 +230,8 @@ def intervals(
             x = told.x[at]
             values[name] = Interval(
                 value=physical(x, search),
-                low=physical(x - TWO_SIDED * wide[at, 0], search),
-                high=physical(x + TWO_SIDED * wide[at, 1], search),
+                low=possible(kind, name, physical(x - TWO_SIDED * wide[at, 0], search)),
+                high=possible(kind, name, physical(x + TWO_SIDED * wide[at, 1], search)),
                 unit=units.get(name, ""),
                 at_bound=at_an_end(x),
                 as_simulated=physical(coarse.x[at], search) if coarse.x[at] != x else None,

@@ -91,20 +91,21 @@ def _narrowed(
     more: Sequence[int],
     beside: Fitted | None,
 ) -> tuple[Gate, Gate]:
-    """A gate by few recordings, and one by more of what moves the vehicle best there and of all sensors."""
+    """A gate by few recordings, and one by more: of what moves the vehicle best there, where it did, and of sensors."""
     effort = judge.effort
     first = gate(judge, base, candidates, few, beside)
     if len(more) <= len(few):
         return first, first
     moving = sorted((c for c in candidates if c.kind != "sensor"), key=lambda c: -first.scores.get(c.key, 0.0))
-    able = [*moving[: effort.shortlist], *(c for c in candidates if c.kind == "sensor")]
-    second = gate(judge, base, able, more, beside)
+    closer = [replace(c, places=first.places.get(c.key, ())) for c in moving[: effort.shortlist]]
+    second = gate(judge, base, [*closer, *(c for c in candidates if c.kind == "sensor")], more, beside)
+    both = {key: tuple(dict.fromkeys((*second.starts.get(key, ()), *way))) for key, way in first.starts.items()}
     return first, replace(
         second,
         scores={**dict.fromkeys(first.scores, 0.0), **second.scores},
         null=np.maximum(first.null, second.null),
         detectable={**first.detectable, **second.detectable},
-        starts={**first.starts, **second.starts},
+        starts={**second.starts, **both},
         only=first.only,
     )
 

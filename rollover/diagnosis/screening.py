@@ -11,7 +11,7 @@ from rollover.diagnosis.candidates import BESIDE, Candidate, akin
 from rollover.diagnosis.clocks import by_first_contact
 from rollover.diagnosis.effort import DROPS, Effort
 from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.gate import Gate, freed
+from rollover.diagnosis.gate import WAYS, Gate, freed
 
 SCORED = 18  # candidates looked at closer, by their score
 BENT = 1.2  # misfit over the noise from which on time shifts fitted to it are bent by what is missing
@@ -126,12 +126,12 @@ def kin(ranked: Sequence[Candidate], taken: int, leaders: int) -> list[Candidate
 
 
 def _begun_at(c: Candidate, met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float, ...], ...]:
-    """Where fits begin: the best starts; of few and far ones all, or the best and beside what changes nothing."""
+    """Where fits begin: the best starts; of few and far ones the first, or the best and beside what changes nothing."""
     if c.neutral is None:
         return _apart(met)
     neutral = [n + BESIDE for n in c.neutral if n is not None]
     if len(neutral) < len(c.neutral):
-        return tuple(start for _, start in met)
+        return tuple(start for _, start in met[:WAYS])
     return (tuple(neutral), met[0][1])
 
 

@@ -41,14 +41,16 @@ def secant(
     is.
     """
     candidates, x = at
-    physical, widest = owner_of(candidates, k).kind != "sensor", nudged(candidates, k, widest)
+    owner, widest = owner_of(candidates, k)[0], nudged(candidates, k, widest)
+    physical = owner.kind != "sensor"
     power = [float(np.sum(e.eased(e.whitened(stray)) ** 2)) for stray in e.strays]
-    enough = CLEAR * float(np.mean(power)) if power else 0.0
+    chance = float(np.mean(power)) if power else 0.0
+    enough = CLEAR * chance
     nudge = nudged(candidates, k, nudge)
     while True:
         low, high = max(x[k] - nudge, 0.0), min(x[k] + nudge, 1.0)
         ends = [end for end in (low, high) if end != x[k]]
-        sides = [(d, end - x[k]) for end in ends if (d := moved((candidates, _with(x, k, end)))) is not None]
+        sides = [(d, end - x[k]) for end in ends if (d := moved((candidates, moved_to(at, k, end)))) is not None]
         if not sides:
             return None
         whole = np.asarray(sum(np.sign(over) * d for d, over in sides))  # one side where the other fails
@@ -58,7 +60,20 @@ def secant(
     (quiet, over), (loud, _) = sorted((sides[0], sides[-1]), key=lambda side: float(side[0] @ side[0]))
     # nothing at all on one side is where an effect ends, and no leap
     leaps = physical and widest > 0.0 and 0.0 < LEAP * float(quiet @ quiet) < float(loud @ loud)
-    return np.asarray(quiet / over if leaps else whole / sum(abs(over) for _, over in sides))
+    difference, over = (quiet, over) if leaps else (whole, sum(abs(over) for _, over in sides))
+    return (but_chance(e, difference, chance) if owner.is_narrow and widest > 0.0 else difference) / over
+
+
+def but_chance(e: Evidence, d: Array, chance: float) -> Array:
+    """d sqrt(1 - chance/|d|^2) of samples after the blow: a difference (n,) of runs without what `chance` adds to it.
+
+    Two runs that nobody could tell apart differ by so much; over the small steps of a narrow effect it is most of the
+    square, and counted as slope would tell a parameter better than it can be told. Before the blow none adds any.
+    """
+    found, late = d.copy(), ~e.early
+    power = float(d[late] @ d[late])
+    found[late] *= np.sqrt(max(1.0 - chance / power, 0.0)) if power > 0.0 else 1.0
+    return found
 
 
 def in_step(e: Evidence, first: Array, last: Array, slope: Array, read: Callable[[float], Array | None]) -> Array:
@@ -78,15 +93,27 @@ def in_step(e: Evidence, first: Array, last: Array, slope: Array, read: Callable
     return found - slope * at
 
 
-def owner_of(candidates: Sequence[Candidate], k: int) -> Candidate:
-    """The candidate whose parameter the k-th coordinate is."""
-    return [c for c in candidates for _ in c.search][k]
+def owner_of(candidates: Sequence[Candidate], k: int) -> tuple[Candidate, int]:
+    """The candidate whose parameter the k-th coordinate is, and where its first one is."""
+    first = 0
+    for c in candidates:
+        if k < first + len(c.search):
+            return c, first
+        first += len(c.search)
+    raise IndexError(k)
+
+
+def valley_at(at: Point, k: int) -> tuple[int, float] | None:
+    """`Candidate.valley` of a point, by coordinates of all candidates."""
+    owner, first = owner_of(at[0], k)
+    found = owner.valley(at[1][first:], k - first)
+    return None if found is None else (first + found[0], found[1])
 
 
 def nudged(candidates: Sequence[Candidate], k: int, nudge: float) -> float:
     """How far the k-th coordinate is moved where others are by `nudge`."""
-    owner = owner_of(candidates, k)
-    return min(nudge, EXACT) if owner.kind == "sensor" else nudge * (FINER if owner.is_narrow else 1.0)
+    owner, first = owner_of(candidates, k)
+    return min(nudge, EXACT) if owner.kind == "sensor" else nudge * (FINER if owner.is_fine(k - first) else 1.0)
 
 
 def beside(
@@ -98,8 +125,14 @@ def beside(
         for k, value in enumerate(x):
             step = nudged(candidates, k, nudge)
             for there in (max(value - step, 0.0), min(value + step, 1.0)):
-                yield r, candidates, _with(x, k, there)
+                yield r, candidates, moved_to((candidates, x), k, there)
 
 
-def _with(x: Sequence[float], k: int, value: float) -> list[float]:
-    return [*x[:k], value, *x[k + 1 :]]
+def moved_to(at: Point, k: int, value: float) -> list[float]:
+    """Coordinates with the k-th one elsewhere, and what follows it along a valley."""
+    x, valley = [float(v) for v in at[1]], valley_at(at, k)
+    if valley is not None:
+        follows, slope = valley
+        x[follows] = min(max(x[follows] + slope * (value - x[k]), 0.0), 1.0)
+    x[k] = value
+    return x

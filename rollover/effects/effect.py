@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any, ClassVar, Literal, NamedTuple
 
-from ground.quantity import parameters, quantities
+from ground.quantity import Quantity, parameters, quantities
 from ground.settings import ForceTerm
 from rollover.channels import describe, is_known
 from rollover.recording import Recording
@@ -109,6 +110,15 @@ def units_of(effect: type[Effect], channel: str | None = None) -> dict[str, str]
     found = {name: q.unit for name, q in quantities(kind).items()}
     own = describe(channel).unit if channel is not None and is_known(channel) else CHANNELS_OWN
     return {name: own if unit == CHANNELS_OWN else unit for name, unit in found.items()}
+
+
+def possible(effect: type[Effect], name: str, value: float) -> float:
+    """The value that a number of an effect can have nearest to `value`: no friction is below none."""
+    kind: Any = effect
+    q = quantities(kind).get(name, Quantity("1"))
+    low = max((b for b in (q.least, q.above) if b is not None), default=-math.inf)
+    high = min((b for b in (q.most, q.below) if b is not None), default=math.inf)
+    return min(max(value, low), high)
 
 
 def nothing(effect: type[Effect]) -> Effect:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -15,10 +16,11 @@ from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.readings import digitised
-from rollover.effects import Search
+from rollover.effects import EFFECTS, Search, possible
 from rollover.recording import Recording
 from tests.diagnosis.drops import FORCE, recorded
 from tests.diagnosis.test_fits import candidate, judge_of
+from tests.diagnosis.test_slopes import CHANNEL, LOAD, Late, blow, evidence
 
 
 def fit(judge: Judge, c: Candidate) -> Fitted:
@@ -78,6 +80,31 @@ def test_recordings_that_disagree_widen_an_interval_as_student_says() -> None:
         inside.append(abs(each.mean()) < stated.TWO_SIDED * sd)
     assert np.mean(inside) == pytest.approx(0.95, abs=0.014)  # 4 standard errors
     assert np.all(stated.disagreeing([own] * 2, blocks[:2], inverse) == 0.0)  # two are too few
+
+
+def test_what_full_runs_do_not_tell_lies_in_its_range_and_is_possible() -> None:
+    """y = g(t - c ln s) tells no friction: a half, give or take 1.96/sqrt(12) of 0 to 1, and none below 0."""
+
+    class Indifferent(Late):
+        def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+            return {CHANNEL: blow(0.01 * np.log(float(changes["effects.payload-shift.travel"]) / 0.15) + shift)}
+
+    judge = Judge(
+        [evidence(blow(0.0) + 0.01 * np.random.default_rng(1).standard_normal(blow(0.0).size), Indifferent())]
+    )
+    fitted = judge.fit((LOAD,), (np.log(0.15 / 0.02) / np.log(50.0), 0.5), rounds=0)
+    assert fitted is not None
+    (found,) = stated.intervals(judge, fitted)
+    assert found["friction"].low == 0.0
+    assert found["friction"].high == pytest.approx(0.5 + 1.96 * 12.0**-0.5, rel=0.01)
+    assert found["travel"].low < 0.15 < found["travel"].high
+
+
+def test_a_number_of_an_effect_stays_where_it_can_be() -> None:
+    load = EFFECTS["payload-shift"]
+    assert [possible(load, "friction", v) for v in (-0.5, 0.3, 2.5)] == [0.0, 0.3, 2.0]
+    assert possible(EFFECTS["rops-plasticity"], "yield_force", -3.0) == 0.0
+    assert possible(EFFECTS["slope"], "angle", -0.1) == -0.1
 
 
 def read(recordings: list[tuple[str, Recording]]) -> Judge:

@@ -112,11 +112,17 @@ def test_what_an_effect_does_before_the_blow_is_looked_at_by_itself() -> None:
 
 def test_few_recordings_choose_who_is_looked_at_on_more(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[int, list[str]]] = []
+    at: dict[str, Any] = {}
+    begun = {RUNS.few: {"c3": ((0.3,),)}, RUNS.looked_at: {"c3": ((0.4,),), "c4": ((0.6,),)}}
 
     def looked(_: Judge, base: Fitted, candidates: Any, only: Any, beside: Any) -> Gate:
         asked.append((len(only), [c.key for c in candidates]))
+        at.update({c.key: c.places for c in candidates})
         scores = {c.key: 90.0 - int(c.key[1:]) for c in candidates}
-        return Gate(score=max(scores.values()), scores=scores, null=np.full(10, float(len(only))), detectable=scores)
+        return Gate(
+            score=max(scores.values()), scores=scores, null=np.full(10, float(len(only))), detectable=scores,
+            places={"c2": ((0.7,), (0.1,))}, starts=begun[len(only)],
+        )  # fmt: skip
 
     monkeypatch.setattr(looks, "gate", looked)
     judge, base = judge_of((0.0,) * 5, (0.0,) * 5)
@@ -128,6 +134,9 @@ def test_few_recordings_choose_who_is_looked_at_on_more(monkeypatch: pytest.Monk
     assert found.scores["c29"] == 0.0  # passed over
     assert found.detectable["c29"] == 61.0
     assert found.null[0] == RUNS.looked_at
+    assert at["c2"] == ((0.7,), (0.1,))  # where it told most, not wherever it could act
+    assert at["c5"] == ()
+    assert found.starts == {"c3": ((0.4,), (0.3,)), "c4": ((0.6,),)}  # of more recordings first
 
 
 @pytest.mark.parametrize(("straying", "kept"), [(True, 5.0), (False, 40.0)])

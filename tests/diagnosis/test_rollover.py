@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -92,11 +93,16 @@ def test_candidates_begin_at_what_the_scenario_has() -> None:
     assert by_id["centre-of-mass"].neutral == (0.5, 0.5)
     assert by_id["tank-slosh"].neutral == (None, None)
     assert len(by_id["tank-slosh"].starts()) <= 6
-    load = by_id["payload-shift"]  # tells only near its travel: looked at in many, with the usual friction
-    travels = [physical(x[1], load.search["travel"]) for x in load.starts()]
-    assert all(b / a < 1.3 for a, b in pairwise(travels))
-    assert (min(travels), max(travels)) == (pytest.approx(0.03, rel=0.1), pytest.approx(0.5, rel=0.1))
-    assert [physical(x[2], load.search["friction"]) for x in load.starts()] == pytest.approx([0.3] * len(travels))
+    load = by_id["payload-shift"]  # tells only near its travel: looked at in many, beside little and much friction
+    by_friction = {
+        mu: [physical(x[1], load.search["travel"]) for x in load.starts() if x[2] == mu] for mu in (0.25, 0.5)
+    }
+    assert sum(map(len, by_friction.values())) == len(load.starts())
+    for travels in by_friction.values():
+        assert all(b / a < 1.1 for a, b in pairwise(travels))
+        assert (min(travels), max(travels)) == (pytest.approx(0.03, rel=0.1), pytest.approx(0.6, rel=0.1))
+    some = replace(load, places=tuple(load.starts()[:3]))
+    assert some.probes() == load.starts()[:3]
     assert by_id["ground-friction"].probes() == by_id["ground-friction"].starts()
 
 

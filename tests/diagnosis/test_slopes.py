@@ -210,3 +210,67 @@ def test_what_tells_only_near_its_place_is_looked_at_over_less() -> None:
     expected = (1.0 - np.exp(-2.0 * (LATER * h / WIDTH) ** 2)) * power / (2.0 * h**2)
     assert float(found.J[:, 0] @ found.J[:, 0]) == pytest.approx(expected, rel=1e-6)
     assert expected == pytest.approx(0.872 * (LATER / WIDTH) ** 2 * power, rel=1e-3)
+
+
+LOAD = replace(WALL, search={"travel": Search(0.02, 1.0, "log"), "friction": Search(0.0, 1.0)})
+
+
+def test_a_slope_is_told_along_the_valley_in_which_a_wall_is_met_at_one_moment() -> None:
+    """y = g(t - c u), u = ln s - ln(2 - mu): what slides late and not far meets its wall when what slides far does.
+
+    dy/dmu = dy/ds' ds'/du / (2 - mu) with s' the coordinate of ln s. Over 0.06 of mu alone the blow moves by 0.7 of its
+    width; along u as it is not at all, but for the bend of the valley, (0.06/1.5)^2/2.
+    """
+
+    class Sliding(Late):
+        def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+            s, mu = float(changes[f"effects.{TRAVEL}"]), float(changes["effects.payload-shift.friction"])
+            return {CHANNEL: blow(0.03 * (np.log(s / 0.15) - np.log((2.0 - mu) / 1.5)))}
+
+    at = (coordinate(0.15, LOAD.search["travel"]), 0.5)
+    found = Judge([evidence(blow(0.0), Sliding())]).block(0, (SLOPE, LOAD), (0.5, *at), 0.0, RUNS.nudges[0])
+    assert found is not None
+    by_travel, by_friction = found.J[:, 1], found.J[:, 2]
+    expected = by_travel / (1.5 * np.log(50.0))
+    assert float(np.linalg.norm(by_friction - expected)) < 0.05 * float(np.linalg.norm(expected))
+
+
+FLAT = replace(WALL, search={"travel": Search(0.0, 1.0)})
+
+
+@pytest.mark.parametrize("early", [False, True])
+def test_what_two_runs_differ_by_anyway_is_no_slope(early: bool) -> None:
+    """y = x sin(wt) + n, n another for each run: over h to either side |y(x+h) - y(x-h)|^2 = (2h)^2|sin|^2 + 2 |n|^2.
+
+    Runs that nobody could tell apart differ by 2 |n|^2 too: what is left of the slope's square, on average over forty
+    recordings, is |sin|^2. With |n|^2 = 0.4 (2h)^2|sin|^2 it would come out 1.8 times as large. Before the blow a run
+    has no chance in it, and nothing is taken off there.
+    """
+    h, wave = 0.03, np.sin(90.0 * TIME)  # a quarter of what others are widened to
+    size = np.sqrt(0.4 * (2.0 * h) ** 2 * np.mean(wave**2))
+    blown = TIME[100] if early else 0.0
+    since = np.clip((TIME - blown) / (TIME[-1] - blown), 0.0, 1.0)
+    modes = np.sin(np.pi * np.outer(since, np.arange(1, 21))) / np.sqrt(10.0)  # a mean square of 1 after the blow
+
+    class Chancy(Late):
+        def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+            x, seed = float(changes.get(f"effects.{TRAVEL}", 0.0)), round(changes.get("neighbour", 0))
+            chance = np.random.default_rng([seed, self.number, round(1e9 * x)]).standard_normal(20)
+            return {CHANNEL: x * wave + size * modes @ chance}
+
+        def strays(
+            self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1
+        ) -> list[dict[str, np.ndarray]]:
+            here = self.predict({f"effects.{TRAVEL}": 0.5}, 0.0)[CHANNEL]
+            each = [self.predict({f"effects.{TRAVEL}": 0.5, "neighbour": k}, 0.0)[CHANNEL] for k in range(1, 7)]
+            return [{CHANNEL: y - here} for y in each]
+
+        def __init__(self, number: int) -> None:
+            self.number = number
+
+    judge = Judge([replace(evidence(0.5 * wave, Chancy(number)), blow=blown) for number in range(40)])
+    found = [judge.block(r, (FLAT,), (0.5,), 0.0, RUNS.fine) for r in range(40)]
+    J = np.array([b.plain_J[:, 0] for b in found if b is not None]) * SIGMA
+    late = blown <= TIME
+    assert float(np.mean(np.sum(J[:, late] ** 2, axis=1))) == pytest.approx(float(np.sum(wave[late] ** 2)), rel=0.1)
+    assert J[:, ~late] == pytest.approx(np.tile(wave[~late], (40, 1)), abs=1e-6)
