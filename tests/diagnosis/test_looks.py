@@ -17,8 +17,8 @@ from rollover.diagnosis.chaos import STATE, Course
 from rollover.diagnosis.effort import RUNS
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.fit import Judge
-from rollover.diagnosis.gate import VISIBLE, Gate, _at_odds, _best_along, _visible, gate
-from rollover.diagnosis.screening import promising
+from rollover.diagnosis.gate import CLOSER, VISIBLE, Gate, _at_odds, _best_along, _visible, gate
+from rollover.diagnosis.screening import _begun_at, promising
 from rollover.effects import Search
 from rollover.recording import Recording
 from tests.diagnosis import test_fits
@@ -137,6 +137,31 @@ def test_few_recordings_choose_who_is_looked_at_on_more(monkeypatch: pytest.Monk
     assert at["c2"] == ((0.7,), (0.1,))  # where it told most, not wherever it could act
     assert at["c5"] == ()
     assert found.starts == {"c3": ((0.4,), (0.3,)), "c4": ((0.6,),)}  # of more recordings first
+
+
+def test_a_look_says_where_an_effect_told_most() -> None:
+    """d = sin(30 t + 6 x) of place x, measured sin(30 t + 6 x0): the gain falls with |x - x0|, up to a quarter turn."""
+
+    class Turned(Wave):
+        def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+            x = changes.get("effects.slope.angle")
+            return {CHANNEL: np.zeros(N) if x is None else 9.0 * np.sin(30.0 * TIME + 6.0 * x)}
+
+    every = tuple((round(0.02 * k, 2),) for k in range(12))
+    judge, base = judge_of((0.0, 0.0), (0.0, 0.0), blow=np.inf)
+    simulator: Any = Turned(0.0)
+    judge = Judge([replace(e, simulator=simulator) for e in judge.evidence])
+    block = replace(base.blocks[0], residual=50.0 * np.sin(30.0 * TIME + 6.0 * 0.145))
+    turned = replace(SLOPE, search={"angle": Search(0.0, 1.0)}, places=every)
+    found = gate(judge, replace(base, blocks=(block, block)), [turned])
+    nearest = sorted(every, key=lambda x: abs(x[0] - 0.145))
+    assert found.places[turned.key] == tuple(nearest[:CLOSER])
+
+
+def test_of_places_where_an_effect_may_act_the_best_two_begin_fits() -> None:
+    placed = replace(SLOPE, neutral=(None,))
+    met = [(3.0, (0.1,)), (4.0, (0.9,)), (5.0, (0.5,)), (6.0, (0.3,))]
+    assert _begun_at(placed, met) == ((0.1,), (0.9,))
 
 
 @pytest.mark.parametrize(("straying", "kept"), [(True, 5.0), (False, 40.0)])
