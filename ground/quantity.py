@@ -63,6 +63,12 @@ class Quantity:
             and (self.below is None or value < self.below)
         )
 
+    def nearest(self, value: float) -> float:
+        """The bound that `value` is beyond, else itself."""
+        low = max((b for b in (self.least, self.above) if b is not None), default=-math.inf)
+        high = min((b for b in (self.most, self.below) if b is not None), default=math.inf)
+        return min(max(value, low), high)
+
 
 @dataclass(frozen=True)
 class Grid:

@@ -23,9 +23,8 @@ def shortened(e: Evidence, *, alone: bool = False) -> Evidence:
     time, end = e.recording.time, e.blow + (0.0 if alone else LASTING)
     if not time[-1] > end + SHORT:
         return e
-    late = [(s, time[s.rows] > end) for s in e.signals]
-    worth = [np.ones(inside.sum()) if s.weight is None else s.weight[inside] ** 2 for s, inside in late]
-    if not alone and float(np.mean(np.concatenate(worth))) > COUNTS:
+    late = np.concatenate([time[s.rows] > end for s in e.signals])
+    if not alone and float(np.mean(e.due[late])) > COUNTS:
         return e
     n = int(np.searchsorted(time, end, side="right"))
     simulator = e.simulator.until(n)

@@ -110,7 +110,7 @@ def with_shapes(judge: Judge, fitted: Fitted) -> tuple[Fitted, Array, list[int]]
         found = linearised(judge, candidates, x, [b.shift for b in fitted.blocks])
         if found is not None:
             return found, np.array(prior), kept
-    # what may tell nothing at all of a parameter leaves it evenly in its range
+    # of a parameter of a narrow effect recordings may tell nothing at all: it lies evenly in its range
     own_prior = [EVENLY**-2 if c.is_narrow else GENTLE for c in fitted.candidates for _ in c.search]
     return fitted, np.array(own_prior), list(range(len(fitted.x)))
 
@@ -169,8 +169,7 @@ def _noise(judge: Judge, fitted: Fitted, prior: Array) -> Array:
     found = np.diag(prior)
     for e, block in zip(judge.evidence, fitted.blocks, strict=True):
         J = block.J - np.outer(block.slope, block.slope @ block.J) / block.weight
-        weights = [np.ones(s.rows.size) if s.weight is None else s.weight for s in e.signals]
-        J = J * block.counted(np.concatenate(weights))[:, None]
+        J = J * block.counted(np.sqrt(e.due))[:, None]
         found = found + J.T @ J
     return np.asarray(found)
 

@@ -99,13 +99,15 @@ def _narrowed(
     moving = sorted((c for c in candidates if c.kind != "sensor"), key=lambda c: -first.scores.get(c.key, 0.0))
     closer = [replace(c, places=first.places.get(c.key, ())) for c in moving[: effort.shortlist]]
     second = gate(judge, base, [*closer, *(c for c in candidates if c.kind == "sensor")], more, beside)
-    both = {key: tuple(dict.fromkeys((*second.starts.get(key, ()), *way))) for key, way in first.starts.items()}
     return first, replace(
         second,
         scores={**dict.fromkeys(first.scores, 0.0), **second.scores},
         null=np.maximum(first.null, second.null),
         detectable={**first.detectable, **second.detectable},
-        starts={**second.starts, **both},
+        starts={
+            key: tuple(dict.fromkeys((*second.starts.get(key, ()), *first.starts.get(key, ()))))
+            for key in {**first.starts, **second.starts}
+        },
         only=first.only,
     )
 

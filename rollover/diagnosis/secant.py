@@ -94,26 +94,21 @@ def in_step(e: Evidence, first: Array, last: Array, slope: Array, read: Callable
 
 
 def owner_of(candidates: Sequence[Candidate], k: int) -> tuple[Candidate, int]:
-    """The candidate whose parameter the k-th coordinate is, and where its first one is."""
-    first = 0
-    for c in candidates:
-        if k < first + len(c.search):
-            return c, first
-        first += len(c.search)
-    raise IndexError(k)
+    """The candidate whose parameter the k-th coordinate is, and which of its own that is."""
+    return [(c, own) for c in candidates for own in range(len(c.search))][k]
 
 
 def valley_at(at: Point, k: int) -> tuple[int, float] | None:
     """`Candidate.valley` of a point, by coordinates of all candidates."""
-    owner, first = owner_of(at[0], k)
-    found = owner.valley(at[1][first:], k - first)
-    return None if found is None else (first + found[0], found[1])
+    owner, own = owner_of(at[0], k)
+    found = owner.valley(at[1][k - own :], own)
+    return None if found is None else (k - own + found[0], found[1])
 
 
 def nudged(candidates: Sequence[Candidate], k: int, nudge: float) -> float:
     """How far the k-th coordinate is moved where others are by `nudge`."""
-    owner, first = owner_of(candidates, k)
-    return min(nudge, EXACT) if owner.kind == "sensor" else nudge * (FINER if owner.is_fine(k - first) else 1.0)
+    owner, own = owner_of(candidates, k)
+    return min(nudge, EXACT) if owner.kind == "sensor" else nudge * (FINER if owner.is_fine(own) else 1.0)
 
 
 def beside(

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any, ClassVar, Literal, NamedTuple
 
-from ground.quantity import Quantity, parameters, quantities
+from ground.quantity import parameters, quantities
 from ground.settings import ForceTerm
 from rollover.channels import describe, is_known
 from rollover.recording import Recording
@@ -115,10 +114,8 @@ def units_of(effect: type[Effect], channel: str | None = None) -> dict[str, str]
 def possible(effect: type[Effect], name: str, value: float) -> float:
     """The value that a number of an effect can have nearest to `value`: no friction is below none."""
     kind: Any = effect
-    q = quantities(kind).get(name, Quantity("1"))
-    low = max((b for b in (q.least, q.above) if b is not None), default=-math.inf)
-    high = min((b for b in (q.most, q.below) if b is not None), default=math.inf)
-    return min(max(value, low), high)
+    bounds = quantities(kind).get(name)
+    return value if bounds is None else bounds.nearest(value)
 
 
 def nothing(effect: type[Effect]) -> Effect:

@@ -232,7 +232,8 @@ def test_a_slope_is_told_along_the_valley_in_which_a_wall_is_met_at_one_moment()
     assert found is not None
     by_travel, by_friction = found.J[:, 1], found.J[:, 2]
     expected = by_travel / (1.5 * np.log(50.0))
-    assert float(np.linalg.norm(by_friction - expected)) < 0.05 * float(np.linalg.norm(expected))
+    # 7e-4 by the bend; 0.26 by friction alone
+    assert float(np.linalg.norm(by_friction - expected)) < 0.005 * float(np.linalg.norm(expected))
 
 
 FLAT = replace(WALL, search={"travel": Search(0.0, 1.0)})
@@ -272,5 +273,6 @@ def test_what_two_runs_differ_by_anyway_is_no_slope(early: bool) -> None:
     found = [judge.block(r, (FLAT,), (0.5,), 0.0, RUNS.fine) for r in range(40)]
     J = np.array([b.plain_J[:, 0] for b in found if b is not None]) * SIGMA
     late = blown <= TIME
+    # twenty waves, six neighbours and one difference tell it to 50 % in a recording, to 8 % in forty
     assert float(np.mean(np.sum(J[:, late] ** 2, axis=1))) == pytest.approx(float(np.sum(wave[late] ** 2)), rel=0.1)
-    assert J[:, ~late] == pytest.approx(np.tile(wave[~late], (40, 1)), abs=1e-6)
+    assert J[:, ~late] == pytest.approx(np.tile(wave[~late], (40, 1)), abs=1e-12)
