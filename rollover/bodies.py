@@ -64,7 +64,7 @@ def bodies_of(
             inertia = MassProperties(mass=share * m, centre_of_mass=(0.0, 0.0, 0.5 * height), inertia=j)
             return Body(name=name, inertia=inertia, surfaces=surfaces)
 
-        nose = nose_share(effects)
+        nose = nose_share(vehicle, effects)
         whole = part("striker", nose, (("face", face),))
         return (whole,) if nose == 1.0 else (whole, part("striker_body", 1.0 - nose, ()))
 
@@ -144,10 +144,12 @@ def without(whole: MassProperties, part: MassProperties) -> MassProperties:
     )
 
 
-def nose_share(effects: Mapping[str, Any] | None) -> float:
-    """Share of a striker's mass in its nose: all of it, unless it gives way."""
+def nose_share(vehicle: Vehicle | RigidBody | Striker, effects: Mapping[str, Any] | None) -> float:
+    """Share of a striker's mass in its nose: all of it, unless it gives way. Nothing else has a nose."""
     gives = (effects or {}).get("structural-compliance")
-    return 1.0 if gives is None or gives.stiffness is None else float(gives.nose_share)
+    if gives is None or gives.stiffness is None or not isinstance(vehicle, Striker):
+        return 1.0
+    return float(gives.nose_share)
 
 
 def side_walls(wheel: Wheel) -> tuple[Disc, Disc]:

@@ -91,7 +91,9 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         term_f=term_f,
         law=integers,
         p=numbers,
-        soil=np.array([_soil(ground, law, place, nose_share(scenario.effects)) for law, place in rows]),
+        soil=np.array(
+            [_soil(ground, law, place, nose_share(scenario.vehicle, scenario.effects)) for law, place in rows]
+        ),
         domain=np.array([law.domain.vector for law, _ in rows]),
         patch_f=np.array([[p.low[0], p.high[0], p.low[1], p.high[1]] for p in ground.patches]).reshape(-1, 4),
         plane=np.array([*n, 0.0]),

@@ -73,7 +73,7 @@ class DropModel:
         assert isinstance(vehicle, Striker)
         assert isinstance(start, (Drop, Release))
         f = np.zeros(fall.NUMBERS)
-        share = nose_share(s.effects)
+        share = nose_share(vehicle, s.effects)
         is_cone = vehicle.nose == "cone"
         face = math.pi * vehicle.nose_radius**2 if is_cone else vehicle.face_length * vehicle.face_width
         f[fall.MASS], f[fall.NOSE], f[fall.FACE] = vehicle.mass, vehicle.mass * share, face

@@ -14,7 +14,7 @@ from ground.law import GroundLaw, laws
 from ground.quantity import Quantity, parameters
 from ground.surface import Plane, Surface
 from rollover import document
-from rollover.effects import entries
+from rollover.effects import entries, nothing
 from rollover.excitation import Excitation
 from rollover.filters import least_rate
 from rollover.initiation import Driving, Drop, Initiation, Release, Standing, Throw, TipOver
@@ -134,6 +134,14 @@ class Scenario:
         list by name or place, a new `kind` starts its part afresh. Raises `InputError`.
         """
         return document.replaced(self, changes, origin)
+
+    @property
+    def idle(self) -> tuple[str, ...]:
+        """A line for each effect that is switched on, though nothing here need feel it: a striker has no tyres."""
+        kind = "drop" if isinstance(self.vehicle, Striker) else "rollover"
+        found = [e for e in self.effects.values() if kind not in e.acts and e != nothing(type(e))]
+        which = "overturns" if kind == "drop" else "drop tests"
+        return tuple(f"effects.{e.id}: made for {which}; nothing need feel it here" for e in found)
 
     def applied(self) -> Scenario:
         """Return this scenario with the values that its effects replace; the effects stay, for their other terms."""

@@ -11,6 +11,30 @@ from rollover.faults import hint
 from rollover.filters import filtered
 from rollover.recording import Recording
 
+DROP = ("ground/force_normal", "ground/sinkage", "striker/acceleration_z")
+SIDEWAYS = (
+    "chassis/roll",
+    "chassis/angular_velocity_x",
+    "chassis/acceleration_y",
+    "chassis/acceleration_z",
+    "rops/force",
+)
+BACKWARD = (
+    "chassis/pitch",
+    "chassis/angular_velocity_y",
+    "chassis/acceleration_x",
+    "chassis/acceleration_z",
+    "rops/force",
+)
+
+
+def usual(simulated: Recording) -> tuple[str, ...]:
+    """Channels that such a test usually records: of a vehicle those of the axis it turns about, x or y."""
+    if DROP[-1] in simulated.channels:
+        return DROP
+    x, y = (float(np.ptp(simulated[kind[1]])) for kind in (SIDEWAYS, BACKWARD))
+    return tuple(c for c in (BACKWARD if y > x else SIDEWAYS) if c in simulated.channels)
+
 
 def synthetic(
     simulated: Recording,

@@ -70,6 +70,8 @@ def run(
     chosen = scenarios.load(path)
     if set_:
         chosen = chosen.replaced(settings(set_), origin="--set")
+    for line in chosen.idle:
+        console.say(f"{path}: {line}")
     if not is_warm():
         console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
     from rollover import loads, store

@@ -12,9 +12,6 @@ import typer
 from rollover.commands.door import BROKE, FAILED, AsJson, Force, Setting, answering, app, manual, settings
 from rollover.faults import Fault, InputError
 
-DROP = ("ground/force_normal", "ground/sinkage", "striker/acceleration_z")
-ROLL = ("chassis/roll", "chassis/angular_velocity_x", "chassis/acceleration_y", "chassis/acceleration_z", "rops/force")
-
 
 @app.command(
     epilog=manual(
@@ -57,23 +54,23 @@ def synthesize(
     from rollover import console, document, simulate
     from rollover import scenario as scenarios
     from rollover.importers import write_recording
-    from rollover.synthesis import synthetic
-    from rollover.vehicle import Striker
+    from rollover.synthesis import synthetic, usual
 
     path = document.find(scenario)
     stated, unstated = settings(set_ or []), settings(hidden or [])
     chosen = scenarios.load(path).replaced(stated, origin="--set").replaced(unstated, origin="--hide")
+    for line in chosen.idle:
+        console.say(f"{path}: {line}")
     target = out / f"{name or path.stem}.csv"
     share, sigmas = _noise(noise or [])
     done = simulate.run(chosen)
     if done.status == "failed":
         console.say(f"{path}: the simulation failed: {done.sentence}")
         raise typer.Exit(FAILED)
-    usual = DROP if isinstance(chosen.vehicle, Striker) else ROLL
     try:
         made = synthetic(
             done.recording,
-            channels=tuple(channel) if channel else tuple(c for c in usual if c in done.recording.channels),
+            channels=tuple(channel) if channel else usual(done.recording),
             rate=rate,
             share=share,
             sigmas=sigmas,

@@ -291,6 +291,8 @@ def candidates_of(
         wide = {p: s if p in of_shape else _widened(s, kind.null.get(p)) for p, s in sized.items()}
         there = {p: own for p, w in wide.items() if (own := kind.looked_for(p, w, tried)) is not None}
         search = {p: s for p, s in there.items() if p not in of_shape}
+        if not search:
+            continue
         shapes = {p: there[p] for p in of_shape if p in there}
         unlike = {} if scenario is None else {p: _neutral(kind, p, s, scenario) for p, s in search.items()}
         neutral = None if acts == "drop" else tuple(unlike.get(p) for p in search)

@@ -149,10 +149,14 @@ class ImpactSpeed(Effect):
         "soil-viscous-damping": "the integral of the acceleration before contact",
         "sensor-scale": "the double integral of the acceleration against the displacement",
     }
-    acts = ("drop",)
     channels = ("striker/velocity_z", "ground/sinkage", "ground/force_normal")
     null: ClassVar[Mapping[str, float | None]] = {"scale": 1.0}
     search: ClassVar[Mapping[str, Search]] = {"scale": Search(0.8, 1.25, "log")}
+
+    @classmethod
+    def looked_for(cls, parameter: str, search: Search, scenario: Any) -> Search | None:
+        """Of what drops, striker or vehicle."""
+        return search if scenario is None or isinstance(scenario.initiation, Drop) else None
 
     def changes(self, scenario: Any) -> Mapping[str, Any]:
         """The speed of a drop."""
@@ -196,7 +200,7 @@ class CoMovingMassFraction(Effect):
     family = "a wrong mass of the soil"
     equation = "m_b1 = fraction m_s"
     source = "Ye 2006, Table 1: 0.10 to 0.33, Lorenz 4 to 10"
-    sentence = "The soil that moves along is {fraction} of the striker's mass."
+    sentence = "The soil that moves along is {fraction} of the mass that hits it."
     rivals: ClassVar[Mapping[str, str]] = {
         "soil-added-mass-growth": "the impulse of the first contact at a high sampling rate",
         "sensor-scale": "the double integral of the acceleration against the displacement",

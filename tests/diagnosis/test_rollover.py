@@ -118,3 +118,11 @@ def test_full_runs_are_looked_at_sparingly() -> None:
     assert RUNS.thrifty
     assert RUNS.few < 3
     assert min(RUNS.nudges) > 0.005  # below, chance decides
+
+
+def test_a_wrong_speed_is_looked_for_in_what_drops_alone() -> None:
+    def ids(name: str) -> set[str]:
+        return {c.id for c in candidates_of((), {}, "rollover", shipped(name))}
+
+    assert "impact-speed" in ids("rops_drop")
+    assert "impact-speed" not in ids("side_overturn")

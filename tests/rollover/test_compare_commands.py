@@ -13,7 +13,7 @@ from rollover.cli import app
 from rollover.importers import read_recording
 from rollover.recording import Recording
 from rollover.scenario import load
-from rollover.synthesis import synthetic
+from rollover.synthesis import synthetic, usual
 
 
 def rollover(*words: object) -> Result:
@@ -167,3 +167,19 @@ def test_synthetic_noise_is_what_is_stated_and_repeats() -> None:
     assert not np.array_equal(made["ground/sinkage"], other["ground/sinkage"])
     with pytest.raises(ValueError, match="channel: not simulated, got 'rops/force'"):
         synthetic(quiet, channels=["rops/force"], rate=1000.0)
+
+
+def test_a_test_records_the_axis_that_the_vehicle_turns_about() -> None:
+    t = np.linspace(0.0, 1.0, 11)
+    still = {f"chassis/{c}": 0.0 * t for c in ("roll", "pitch", "acceleration_x", "acceleration_y", "acceleration_z")}
+
+    def made(x: float, y: float) -> tuple[str, ...]:
+        turning = {"chassis/angular_velocity_x": x * t, "chassis/angular_velocity_y": y * t}
+        return usual(Recording(title="turned", time=t, channels=still | turning))
+
+    assert made(-2.0, 1.0) == tuple(
+        f"chassis/{c}" for c in ("roll", "angular_velocity_x", "acceleration_y", "acceleration_z")
+    )
+    assert made(1.0, -2.0) == tuple(
+        f"chassis/{c}" for c in ("pitch", "angular_velocity_y", "acceleration_x", "acceleration_z")
+    )

@@ -281,3 +281,13 @@ def test_the_listing_shows_what_each_effect_is() -> None:
 )
 def test_a_sentence_says_which_way_and_by_how_much(id: str, values: dict[str, Any], said: str) -> None:
     assert TABLE[id](**values).says().endswith(said)
+
+
+@pytest.mark.parametrize("effect", [e for e in TABLE.values() if "rollover" not in e.acts], ids=lambda e: e.id)
+def test_an_effect_on_what_a_vehicle_has_not_changes_no_bit_of_its_landing_and_says_so(effect: type[Effect]) -> None:
+    landed = shipped("rops_drop").replaced({"simulation.duration": 0.03})
+    with_it = with_effect(landed, effect())
+    assert float(np.max(run(landed).recording["ground/force_normal"])) > 1e4
+    assert same(run(with_it).recording, run(landed).recording)
+    assert with_it.idle == (f"effects.{effect.id}: made for drop tests; nothing need feel it here",)
+    assert not with_effect(landed, nothing(effect)).idle
