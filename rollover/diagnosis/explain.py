@@ -284,11 +284,12 @@ def _smoothly(inquiry: Inquiry, jobs: Sequence[Job], few: Sequence[int]) -> list
     Where runs part ways what is left in full leaps from place to place, and a fit ends at the first dip.
     """
     judge, found = inquiry.judge, []
-    with judge.forgiven():
+    with judge.held(straying=True):
         fits = [f for f in inquiry.fits(jobs) if f is not None]
-    for f in fits:
-        blocks = [judge.block(r, f.candidates, f.x, b.shift, 0.0) for r, b in zip(few, f.blocks, strict=True)]
-        found.append(replace(f, blocks=tuple(b for b in blocks if b is not None)))
+    with judge.held(pinned=True):  # as other first fits are
+        for f in fits:
+            blocks = [judge.block(r, f.candidates, f.x, b.shift, 0.0) for r, b in zip(few, f.blocks, strict=True)]
+            found.append(replace(f, blocks=tuple(b for b in blocks if b is not None)))
     return [f for f in found if len(f.blocks) == len(few)]
 
 

@@ -70,13 +70,17 @@ class Judge:
         self._known = {}
 
     @contextmanager
-    def forgiven(self) -> Iterator[None]:
-        """Within it a recording may have taken another course than its run, whatever holds outside."""
-        before, self.straying = self.straying, True
+    def held(self, *, straying: bool | None = None, pinned: bool | None = None) -> Iterator[None]:
+        """Within it recordings may or may not have taken another course, clocks whose zero is known stay or do not.
+
+        Far from an explanation a shift eats what is missing.
+        """
+        before = self.straying, self._pinned
+        self.straying, self._pinned = (b if v is None else v for v, b in zip((straying, pinned), before, strict=True))
         try:
             yield
         finally:
-            self.straying = before
+            self.straying, self._pinned = before
 
     def again(self, fitted: Fitted) -> Fitted:
         """A fit where it stands, linearised anew under the noise as it is held now."""
@@ -268,14 +272,10 @@ class Judge:
     ) -> Fitted | None:
         """Levenberg-Marquardt on (D1) from a start within the unit box; None if nothing can be simulated there.
 
-        `pinned` keeps clocks whose zero is known where they say: far from an explanation a shift eats what is missing.
-        A `bare` one ends without slopes, where only what it leaves is asked for.
+        `pinned` as in `held`. A `bare` one ends without slopes, where only what it leaves is asked for.
         """
-        self._pinned = pinned
-        try:
+        with self.held(pinned=pinned):
             return self._fit(candidates, start, rounds, only, shifts, width, bare)
-        finally:
-            self._pinned = False
 
     def _fit(
         self,

@@ -112,7 +112,7 @@ def is_there_as_held(judge: Judge, fitted: Fitted) -> bool:
     """
     if judge.straying:
         return is_there(judge, fitted)
-    with judge.forgiven():
+    with judge.held(straying=True):
         return is_there(judge, astray(judge, fitted))
 
 

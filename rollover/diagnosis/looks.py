@@ -46,7 +46,7 @@ def look(
     # in full, what one of them lacks hides what the others have
     scores = {key: max(score, first.scores.get(key, 0.0)) for key, score in last.scores.items()}
     moving = [c for c in candidates if c.kind != "sensor"]
-    with judge.forgiven():  # a part that gives way shows in how it does, not in where all else goes then
+    with judge.held(straying=True):  # a part that gives way shows in how it does, not in where all else goes then
         forgiven = _narrowed(judge, judge.again(base), moving, few, more, beside)[-1]
     able = [c.key for c in forgiven.ranked(moving) if p_value(forgiven.scores.get(c.key, 0.0), forgiven.null) < SPOKEN]
     scores = {key: max(score, forgiven.scores.get(key, 0.0)) for key, score in scores.items()}
@@ -75,7 +75,7 @@ def strongly(
         best = sorted(one for one in met if usual is not None and one[0] < CLEARLY * usual)
         return [(key, x) for _, key, x in best[: judge.effort.leaders]]
 
-    with judge.forgiven():
+    with judge.held(straying=True):
         forgiven = ranked()
     found: dict[str, tuple[tuple[float, ...], ...]] = {}
     for key, x in (one for both in zip_longest(ranked(), forgiven) for one in both if one is not None):

@@ -80,7 +80,7 @@ def test_a_strong_effect_is_fitted_with_other_courses_forgiven_and_compared_in_f
         effort = RUNS
 
         def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
-            x, time = changes.get("effects.slope.angle", 0.0), STEP * np.arange(test_chaos.N)
+            x, time = changes.get("effects.slope.angle", 0.0), STEP * np.arange(test_chaos.N) - shift
             early = x * np.sin(9.0 * time)
             return {
                 c: np.where(time < test_chaos.BLOW, early, 4.0 * np.sin(150.0 * x + k) * np.cos(20.0 * time))
@@ -102,7 +102,7 @@ def test_a_strong_effect_is_fitted_with_other_courses_forgiven_and_compared_in_f
     judge = Judge(evidence)
     judge.straying = False
     strength = replace(SLOPE, search={"angle": Search(0.0, 1.0)}, neutral=(0.0,))
-    job = Job(candidates=(strength,), start=(0.3,), shifts=(0.0, 0.0), only=(0, 1))
+    job = Job(candidates=(strength,), start=(0.3,), shifts=(0.0, 0.0), only=(0, 1), pinned=True)
     with Crew() as crew:
         inquiry = Inquiry(judge=judge, candidates=(strength,), groups=[], phases=[], say=lambda _: None, crew=crew)
         plain, smooth = inquiry.fits([job])[0], _smoothly(inquiry, [job], (0, 1))[0]
@@ -110,6 +110,7 @@ def test_a_strong_effect_is_fitted_with_other_courses_forgiven_and_compared_in_f
     assert abs(plain.x[0] - truth) > 0.1
     assert smooth.x[0] == pytest.approx(truth, abs=0.02)
     assert all(b.course is None for b in smooth.blocks)  # it stands in full
+    assert not any(b.slope.any() for b in smooth.blocks)  # with clocks where they say, as other first fits
     assert not judge.straying
 
 
