@@ -14,6 +14,7 @@ from rollover.diagnosis.gate import followed, freed, yardstick
 
 Array = NDArray[np.float64]
 TEETH, COMBED, BESIDE = 11, 0.05, 20  # places on a first coordinate, within so much of its fit; on the other, over all
+SHORT = 4  # rounds of a fit that tells where to begin
 STARTS, APART = 3, 0.06  # of the best places, so far apart
 AFAR, NEAR = (np.arange(80) + 0.5) / 80, 0.002 * np.arange(-20, 21)  # places of a threshold, all along and about a fit
 VALLEYS = 4  # of these in which a fit begins
@@ -186,17 +187,20 @@ def _tried(judge: Judge, r: int, fitted: Fitted, block: Block) -> Block:
 
 
 def shaped(judge: Judge, f: Fitted) -> Fitted | None:
-    """The fit with the shape of its last effect fitted too, from the best of some places."""
+    """The fit with the shape of its last effect fitted too, begun where short fits from some places leave least."""
     last, shifts = f.candidates[-1], [b.shift for b in f.blocks]
     candidates, at = (*f.candidates[:-1], last.whole()), len(f.x) - len(last.search)
     places = [(*f.x[:at], *start) for start in last.with_shapes(f.x[at:])]
-    begun = _by_what_is_left(judge, candidates, places, shifts)
-    if not begun:
-        return None
-    again = judge.fit(candidates, begun[0], shifts=shifts)
-    if again is not None and again.left > NOISE_LEFT**2 * sum(b.residual.size for b in again.blocks):
-        again = polish(judge, again)
-    return again
+    found: Fitted | None = None
+    short = [judge.fit(candidates, x, rounds=SHORT, shifts=shifts) for x in places]
+    for begun in sorted((f for f in short if f is not None), key=lambda f: f.left)[:STARTS]:
+        again = judge.fit(candidates, begun.x, shifts=[b.shift for b in begun.blocks])
+        if again is not None and again.left > NOISE_LEFT**2 * sum(b.residual.size for b in again.blocks):
+            again = polish(judge, again)
+        elif again is not None:
+            return again
+        found = min((f for f in (found, again) if f is not None), key=lambda f: f.left, default=None)
+    return found
 
 
 def without(judge: Judge, fitted: Fitted, k: int, rounds: int = 8) -> Fitted | None:

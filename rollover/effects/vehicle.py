@@ -117,8 +117,18 @@ class StructuralCompliance(Effect):
     acts = ("drop",)
     channels = ("striker/acceleration_z", "ground/force_normal")
     null: ClassVar[Mapping[str, float | None]] = {"stiffness": None}
-    search: ClassVar[Mapping[str, Search]] = {"stiffness": Search(1e4, 1e8, "log"), "damping": Search(10.0, 1e4, "log")}
+    search: ClassVar[Mapping[str, Search]] = {
+        "stiffness": Search(1e4, 1e8, "log"),
+        "damping": Search(10.0, 1e4, "log"),
+        "nose_share": Search(0.02, 0.6, "log"),
+    }
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {"stiffness": (1.0, 0.0), "damping": (1.0, 0.0)}
+
+    @classmethod
+    def looked_for(cls, parameter: str, search: Search, scenario: Any) -> Search | None:
+        """Of a nose that was weighed its share is known."""
+        is_known = scenario is not None and cls.id in scenario.effects
+        return None if parameter == "nose_share" and is_known else search
 
 
 @parameters

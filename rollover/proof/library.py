@@ -112,8 +112,8 @@ def _crust(random: Random, s: Setting) -> Change:
 
 def _compliance(random: Random, s: Setting) -> Change:
     k, c = log_uniform(random, 1e5, 5e6), log_uniform(random, 60.0, 2000.0)
-    share = float(random.uniform(0.07, 0.14)) if s.other_forms else 0.1
-    told = {"stiffness": k, "damping": c}
+    share = log_uniform(random, 0.05, 0.3)
+    told = {"stiffness": k, "damping": c, "nose_share": share}
     return _physics("structural-compliance", told, "acceleration", spring=k, dashpot=c, nose_share=share)
 
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.candidates import coordinate
+from rollover.diagnosis.candidates import candidates_of, coordinate
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.explain import Inquiry, Step
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.phases import phases_of
-from rollover.diagnosis.refine import combed, traced
+from rollover.diagnosis.refine import combed, shaped, traced
 from rollover.diagnosis.screening import Screened
 from rollover.diagnosis.selection import _together
 from rollover.simulate import run
@@ -40,6 +40,26 @@ def test_a_damping_behind_a_cliff_is_found() -> None:
     assert found.left < 1.2 * count
     assert c.values(found.x)["stiffness"] == pytest.approx(true["stiffness"], rel=0.02)
     assert c.values(found.x)["damping"] == pytest.approx(true["damping"], rel=0.1)
+
+
+def test_how_much_of_a_striker_its_nose_is_is_found_where_nobody_weighed_it() -> None:
+    true = {"stiffness": 1e6, "damping": 500.0, "nose_share": 0.2}
+    hidden = {f"effects.structural-compliance.{name}": value for name, value in true.items()}
+    judge = judge_of(recorded(hidden, 3, speeds=(1.2, 2.0, 2.8), channels=CHANNELS, rate=1500.0, noise=0.005))
+    c = candidate(judge, "structural-compliance")
+    count = sum(e.count for e in judge.evidence)
+    begun = [coordinate(true[name], s) for name, s in c.search.items()]
+    plain = judge.fit((c,), begun, shifts=[0.0] * 3)
+    assert plain is not None
+    assert plain.left > 2.0 * count
+    found = shaped(judge, plain)
+    assert found is not None
+    assert found.left < 1.1 * count
+    told = found.candidates[-1].values(found.x)
+    assert told == {name: pytest.approx(value, rel=0.05) for name, value in true.items()}
+    weighed = scenario().replaced({"effects.structural-compliance": {"nose_share": 0.2, "stiffness": None}})
+    by_key = {c.key: c for c in candidates_of(judge.evidence, (), "drop", weighed)}
+    assert by_key["structural-compliance"].shapes == {}
 
 
 def test_a_threshold_is_found_though_a_fit_ended_at_another() -> None:
