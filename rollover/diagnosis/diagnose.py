@@ -36,7 +36,7 @@ from rollover.diagnosis.simulator import blow_of, set_up
 from rollover.diagnosis.statements import by_steps, closest, considered, named, noise, places, sentence
 from rollover.diagnosis.verdict import Degree, Diagnosis
 from rollover.drop import unfit
-from rollover.effects import EFFECTS
+from rollover.effects import EFFECTS, spoken
 from rollover.recording import Recording
 from rollover.scenario import Scenario
 
@@ -248,7 +248,9 @@ def _grids(evidence: Sequence[Evidence]) -> dict[str, tuple[float, ...]]:
 def _felt(d: Degree) -> str:
     """The degree of freedom that misses most, in a sentence."""
     what = "force" if d.unit == "N" else "moment"
-    return f"on the {d.body}, {d.share:.0%} of the misfit is a {what} {d.axis}, {d.rms:.3g} {d.unit} root mean square"
+    return (
+        f"on the {d.body}, {d.share:.0%} of the misfit is a {what} {d.axis}, {spoken(d.rms)} {d.unit} root mean square"
+    )
 
 
 def _cost(found: Sequence[Evidence]) -> list[str]:

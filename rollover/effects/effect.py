@@ -99,8 +99,14 @@ class _Spoken:
     def __format__(self, ways: str) -> str:
         above, either, below = ways.partition("|")
         if not either:
-            return f"{self.value:.3g}{self.unit}"
-        return f"{abs(self.value):.3g}{self.unit} {above if self.value >= 0.0 else below}"
+            return f"{spoken(self.value)}{self.unit}"
+        return f"{spoken(abs(self.value))}{self.unit} {above if self.value >= 0.0 else below}"
+
+
+def spoken(value: float) -> str:
+    """Three digits; 95,700 rather than 9.57e+04."""
+    digits = float(f"{value:.3g}")
+    return f"{digits:,.0f}" if 1e3 <= abs(digits) < 1e9 else f"{digits:.3g}"
 
 
 def units_of(effect: type[Effect], channel: str | None = None) -> dict[str, str]:

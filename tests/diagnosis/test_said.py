@@ -24,8 +24,9 @@ from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
 
 def test_a_limit_and_an_offset_are_in_the_unit_of_their_channel() -> None:
-    assert "2.84e+03 N:" in SensorClipping(channel=FORCE, limit=2840.0).says()
+    assert "2,840 N:" in SensorClipping(channel=FORCE, limit=2840.0).says()
     assert "0.01 m" in SensorBias(channel=DEPTH, bias=0.01).says()
+    assert "1,000 N:" in SensorClipping(channel=FORCE, limit=999.7).says()
     assert units_of(EFFECTS["sensor-bias"], ACCELERATION)["bias"] == "m/s2"
     assert units_of(EFFECTS["soil-layer"])["depth"] == "m"
 
