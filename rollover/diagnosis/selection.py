@@ -15,7 +15,7 @@ from rollover.diagnosis.crew import Job
 from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Groups, Inquiry, Phases, Step, moves, step, weighed
 from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.gate import Gate, gate
+from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.lasting import NEEDED, astray, backed, begun_anew, lasting
 from rollover.diagnosis.looks import look, look_again
@@ -207,7 +207,7 @@ def _instead(inquiry: Inquiry, current: Fitted) -> Step | None:
     rest = without(judge, current, 0)
     if rest is None:
         return None
-    looked = gate(judge, rest, inquiry.free(rest))
+    looked = look(judge, rest, inquiry.free(rest), inquiry.groups)
     found = step(inquiry, rest, looked)
     held = judge.again(turned(current))
     if found is None or found.fitted.left > held.left + NEEDED:  # on the way back nothing came as far

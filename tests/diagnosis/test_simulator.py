@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from rollover.diagnosis.simulator import DropSimulator
 from rollover.drop import DropModel
+from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
 ENOUGH = 1e-4  # of the range, root mean square: half of what counts as an error of the model
@@ -38,3 +40,14 @@ def test_a_drop_of_a_diagnosis_is_that_of_a_hundredth_of_its_step(changes: dict[
     for channel in (FORCE, DEPTH, ACCELERATION):
         off = np.sqrt(np.mean((made[channel] - exact[channel]) ** 2)) / np.ptp(exact[channel])
         assert off < ENOUGH, channel
+
+
+def test_stamps_may_lie_as_far_apart_as_a_clock_is_moved_for_its_slope() -> None:
+    stamps = np.arange(200) * 2.0**-14  # exact in binary: each, a step less, is the one before
+    recording = Recording(title="drop", time=stamps, channels={FORCE: 0.0 * stamps})
+    simulator = DropSimulator(scenario(), recording)
+    simulator.effort = replace(simulator.effort, later=2.0**-14)
+    now, later = simulator.predict({}, 0.0), simulator.predict({}, 2.0**-14)
+    assert now is not None
+    assert later is not None
+    np.testing.assert_array_equal(later[FORCE][1:], now[FORCE][:-1])
