@@ -14,6 +14,9 @@ from rollover.prechecks.finding import Finding, Trace
 CHANCE = 0.001  # that a clean channel shows a spike or a stuck run
 FEWEST = 300  # samples, to know what is usual
 FLAT = 3  # samples exactly alike at the very top: what a peak that is measured does not do
+TURNS = (
+    6  # times as long as beside it, that a digitised signal stays at the level where it turns: 2/(sqrt 2 - 1), and some
+)
 APART = 60  # samples within which a disturbance stands alone
 AROUND = 6  # samples on either side that say what a sample should be
 
@@ -26,6 +29,7 @@ def clipping(t: Trace, unit: str) -> Iterator[Finding]:
         starts, lengths = _runs(t.values, np.abs(t.values - extreme) <= 1e-9 * abs(extreme))
         inside = (starts > 0) & (starts + lengths < t.values.size)
         flat = inside & (lengths >= max(FLAT, _usual_run(t.values, extreme)))
+        flat &= ~_creeping(t.values, starts, lengths) | (lengths > TURNS * _beside(t.values, starts))
         if not flat.any():
             continue
         first, last = int(starts[flat][0]), int((starts + lengths)[flat][-1]) - 1
@@ -57,6 +61,22 @@ def _usual_run(values: NDArray[np.float64], extreme: float) -> int:
     return 3 * (int(np.quantile(inner, 0.9)) + 1) + 1 if inner.size > 3 else FLAT + 1
 
 
+def _creeping(values: NDArray[np.float64], starts: NDArray[np.int64], lengths: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether runs of one value are entered and left by a digit at most, as those of a slow digitised signal are."""
+    steps = np.abs(np.diff(values))
+    digit = np.min(steps[steps > 0.0], initial=np.inf)
+    into, out = steps[np.maximum(starts - 1, 0)], steps[np.minimum(starts + lengths, steps.size) - 1]
+    return np.asarray(np.maximum(into, out) < 1.5 * digit)
+
+
+def _beside(values: NDArray[np.float64], starts: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Samples of the longer one of the runs before and after the runs of one value that begin at `starts`."""
+    begun = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
+    sizes = np.concatenate([[0], np.diff(begun, append=values.size), [0]])
+    at = np.searchsorted(begun, starts)
+    return np.asarray(np.maximum(sizes[at], sizes[at + 2]))
+
+
 def stuck(t: Trace, unit: str) -> Iterator[Finding]:
     """Interior runs of one repeated value, away from the extremes, longer than the digitising explains."""
     if t.floor.sigma == 0.0:
@@ -69,6 +89,7 @@ def stuck(t: Trace, unit: str) -> Iterator[Finding]:
     away = (level != t.values.max()) & (level != t.values.min()) & (level != 0.0)
     away &= (starts > 0) & (starts + lengths < same.size)
     usual = (same.sum() - lengths.max()) / max(1, same.size - lengths.max())  # chance that a sample repeats
+    away &= ~_creeping(t.values, starts, lengths + 1)
     most = 2.0 if usual <= 0.0 else max(2.0, math.log(t.values.size / CHANCE) / -math.log(min(0.99, usual)))
     for start, length in zip(starts[away & (lengths > most)], lengths[away & (lengths > most)], strict=True):
         yield Finding(

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter, sosfilt
 
 from rollover.prechecks import noise_floors, prechecks
 from rollover.recording import Recording
@@ -141,6 +141,40 @@ def test_a_planted_fault_is_found(fault: Fault, check: str, channel: str) -> Non
         seen += any((f.check, f.channel) == (check, channel) for f in found)
         assert all(f.sentence and f.start <= f.end for f in found)
     assert seen >= 4
+
+
+def digitised(seed: int) -> np.ndarray:
+    """A pulse with noise below a hundredth of the sampling rate, in steps of 0.4 of it: levels last for long."""
+    white = np.random.default_rng(seed).standard_normal(N + 2000)
+    slow = sosfilt(butter(2, 0.01, output="sos"), white)[2000:]
+    return np.round((TRUE[A] + 0.05 * slow / slow.std()) / 0.02) * 0.02
+
+
+def test_levels_of_a_slow_digitised_signal_are_no_repeated_samples() -> None:
+    clean = drop(0)
+    stuck = [seed for seed in range(20) if prechecks(replace(clean, channels={A: digitised(seed)}))]
+    assert len(stuck) < 2
+
+
+def test_where_a_slow_digitised_signal_turns_is_no_end_of_a_range() -> None:
+    """Flanks of 0.6 digits a sample, a parabola of 0.02 digits a sample squared between them: 20 samples at the top."""
+    away = np.abs(np.arange(N) - 0.5 * N)
+    turn = np.round(np.where(away < 30.0, 1009.3 - 0.01 * away**2, 1018.3 - 0.6 * away))
+    assert np.sum(turn == turn.max()) > 15
+    assert not [f for f in prechecks(replace(drop(0), channels={F: turn})) if f.check == "clipping"]
+    cut = np.minimum(turn, turn.max() - 8.0)
+    assert [f.value for f in prechecks(replace(drop(0), channels={F: cut})) if f.check == "clipping"] == [cut.max()]
+
+
+@pytest.mark.parametrize(("fault", "check"), [("held", "stuck"), ("cut", "clipping")])
+def test_what_a_digitised_signal_loses_is_found(fault: str, check: str) -> None:
+    for seed in range(5):
+        values = digitised(seed)
+        if fault == "held":
+            values[850:1250] = values[850]  # over the rise of the pulse
+        else:
+            values = np.minimum(values, 0.5 * values.max())
+        assert check in {f.check for f in prechecks(replace(drop(0), channels={A: values}))}, seed
 
 
 def test_what_a_finding_says() -> None:
