@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from rollover.prechecks import Finding
     from rollover.recording import Recording
     from rollover.scenario import Scenario
+
+SPELT_OUT = 3  # findings alike of one channel
 
 
 @app.command(
@@ -91,8 +93,7 @@ def diagnose(
         found = diagnosed(
             chosen, list(measured.items()), hold_out=held, tolerance=tolerance, say=console.say, crew=crew
         )
-    sensors = tuple(f"{name}: {f.channel}: {f.sentence}" for name, f in findings)
-    found = replace(found, notes=(*sensors, *found.notes))
+    found = replace(found, notes=(*in_words(findings), *found.notes))
     told = series(chosen, list(measured.items()), found)
     answer = account(found, about, [{"recording": name, **_plain(f)} for name, f in findings])
     words = ["rollover", "diagnose", scenario, *recordings, *_options(hold_out, set_, tolerance)]
@@ -183,6 +184,17 @@ def _held_out(names: list[str], given: list[str]) -> list[str]:
     if set(names) <= set(given):
         raise InputError(Fault(file="--hold-out", message=f"nothing left to fit, got all of {', '.join(names)}"))
     return sorted(set(given))
+
+
+def in_words(findings: Sequence[tuple[str, Finding]]) -> Iterator[str]:
+    """A line for each finding; of many alike in one channel of one recording the first ones, and how many more."""
+    alike: dict[tuple[str, str, str], list[str]] = {}
+    for name, f in findings:
+        alike.setdefault((name, f.channel, f.check), []).append(f.sentence)
+    for (name, channel, check), sentences in alike.items():
+        yield from (f"{name}: {channel}: {s}" for s in sentences[:SPELT_OUT])
+        if len(sentences) > SPELT_OUT:
+            yield f"{name}: {channel}: {len(sentences) - SPELT_OUT} more such findings ({check})"
 
 
 def _prechecks(scenario: Scenario, measured: Mapping[str, Recording]) -> list[tuple[str, Finding]]:

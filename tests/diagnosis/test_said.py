@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rollover.commands.diagnose import in_words
 from rollover.diagnosis import statements
 from rollover.diagnosis.blocks import Block, Fitted
 from rollover.diagnosis.chaos import Course
@@ -20,6 +21,7 @@ from rollover.diagnosis.statements import sentence
 from rollover.diagnosis.verdict import Named
 from rollover.effects import EFFECTS, units_of
 from rollover.effects.sensor import SensorBias, SensorClipping
+from rollover.prechecks import Finding
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
 
@@ -101,3 +103,13 @@ def test_an_effect_that_is_named_is_no_look_alike_of_another(monkeypatch: pytest
     each = statements.named(judge, found, ())
     assert [e.id for e in each] == ["soil-stiffness", "inertia"]
     assert all(e.indistinguishable_from == ("soil-crust",) for e in each)
+
+
+def test_many_findings_alike_are_counted() -> None:
+    def found(check: str, k: int) -> tuple[str, Finding]:
+        about = {"channel": FORCE, "start": 0.0, "end": 1.0, "value": 2.0, "unit": "N", "error": None}
+        return "d1", Finding(check=check, sentence=f"{check} {k}", **about)
+
+    said = list(in_words([*(found("stuck", k) for k in range(9)), found("spike", 0)]))
+    first = [f"d1: {FORCE}: stuck {k}" for k in range(3)]
+    assert said == [*first, f"d1: {FORCE}: 6 more such findings (stuck)", f"d1: {FORCE}: spike 0"]
