@@ -19,6 +19,7 @@ from rollover.diagnosis.clocks import align, by_clock, mistimed
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.dependence import Dependence, dependence, dependence_of_one
 from rollover.diagnosis.detect import mismatch_of
+from rollover.diagnosis.digits import to_the_last_digit
 from rollover.diagnosis.empirical import offered, proposed
 from rollover.diagnosis.evidence import Evidence, doubted, evidence_of, left_out
 from rollover.diagnosis.explain import SURE, Inquiry
@@ -39,6 +40,7 @@ from rollover.drop import unfit
 from rollover.effects import EFFECTS, spoken
 from rollover.recording import Recording
 from rollover.scenario import Scenario
+from rollover.vehicle import Striker
 
 ROUNDS = 3  # of an explanation with the errors of the conditions as they act beside it
 MOSTLY = 0.6  # of the effects of the ground that would not have shown: then nothing can be told
@@ -70,7 +72,11 @@ def diagnose(
     if not 0.0 <= tolerance < 1.0:
         raise ValueError(f"tolerance: not a share of a range, got {tolerance:g}; at least 0 and below 1")
     crew = crew or Crew()
+    rounded: list[str] = []
+    if isinstance(scenario.vehicle, Striker):  # what little errors of a start do to an overturn is chance, see `chaos`
+        recordings, rounded = to_the_last_digit(recordings)
     every, notes = _evidence(scenario, recordings, crew)
+    notes += rounded
     every = [replace(e, model_error=float(np.hypot(e.model_error, tolerance))) for e in every]
     found = _trusted(scenario, [e for e in every if e.name not in hold_out])
     kept = [e for e in _trusted(scenario, every) if e.name in hold_out] if hold_out else []

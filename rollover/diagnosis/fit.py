@@ -57,6 +57,7 @@ class Judge:
         total = hashlib.sha256(repr(self.straying).encode())
         for e in self.evidence:
             total.update(repr((e.name, e.shift_prior)).encode())
+            total.update(b"" if e.doubts is None else e.doubts.tobytes())
             for s in e.signals:
                 total.update(repr((s.channel, s.sigma, s.ar)).encode() + s.values.tobytes() + s.rows.tobytes())
                 if s.weight is not None:
