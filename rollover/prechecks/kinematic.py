@@ -29,6 +29,7 @@ PAIRS = (
 DRAWS = 50
 LEAST = {"gain": 0.005, "bias": 0.02, "lag": 0.0, "drift": 1e-3}  # what sampling and quadrature may do by themselves
 MOST_SAMPLES = 20_000
+INSTANTS = 100  # at which a collision is looked for at first
 
 
 def disagreements(traces: Mapping[str, Trace], *, seed: int = 0) -> Iterator[Finding]:
@@ -48,8 +49,10 @@ def _pair(p: Trace, a: Trace, order: int, random: np.random.Generator) -> Iterat
     if float(np.std(values)) < 10.0 * a.floor.sigma:
         return  # nothing happens
     higher = np.interp(time, p.time, p.values)
-    effects, nuisance = _columns(time, values, order)
+    effects, always = _columns(time, values, order)
     left = higher - effects["gain"]
+    nuisance = _with_collision(time, np.column_stack([always, *effects.values()]), left, order)
+    nuisance = np.column_stack([always, nuisance])
     noise = _noise(p, a, time, order, random)
     unit = "m/s2" if order == 2 or "velocity" in p.channel else "m/s"
     size = float(np.abs(values).max())
@@ -112,13 +115,35 @@ def _columns(time: Array, a: Array, order: int) -> tuple[dict[str, Array], Array
     """Right-hand sides of (K1) or (K2): each effect, (n,), and what is always fitted, (n, k)."""
     t = time - time[0]
     v = _integral(t, a)
-    contact = float(t[int(np.argmax(np.abs(np.diff(a))))])
-    late = np.maximum(t - contact, 0.0)
     ones = np.ones_like(t)
     if order == 2:
         x = _integral(t, v)
-        return {"gain": x, "bias": 0.5 * t * t, "lag": -v, "drift": -t * v}, np.column_stack([ones, t, late])
-    return {"gain": v, "bias": t, "lag": -a, "drift": -t * a}, np.column_stack([ones, (late > 0.0).astype(float)])
+        return {"gain": x, "bias": 0.5 * t * t, "lag": -v, "drift": -t * v}, np.column_stack([ones, t])
+    return {"gain": v, "bias": t, "lag": -a, "drift": -t * a}, ones[:, None]
+
+
+def _with_collision(time: Array, columns: Array, left: Array, order: int) -> Array:
+    """What a collision at the instant that explains most beside all `columns` (n, k) adds, (n,): c_2's in (K1), (K2).
+
+    The largest leap of an acceleration may as well be its noise, or the way back of the ground.
+    """
+    Q, _ = np.linalg.qr(columns / np.linalg.norm(columns, axis=0))
+    rest = left - Q @ (Q.T @ left)
+
+    def kink(k: int) -> Array:
+        late = np.maximum(time - time[k], 0.0)
+        return np.asarray(late if order == 2 else (late > 0.0).astype(float))
+
+    def gain(k: int) -> float:
+        e = kink(k) - Q @ (Q.T @ kink(k))
+        return float((e @ rest) ** 2 / max(float(e @ e), 1e-300))
+
+    step = max(1, time.size // INSTANTS)
+    near = max(range(step, time.size - step, step), key=gain)
+    while step > 1:
+        step = max(1, step // 4)
+        near = max(range(max(1, near - 4 * step), min(time.size - 1, near + 4 * step + 1), step), key=gain)
+    return kink(near)
 
 
 def _integral(t: Array, y: Array) -> Array:
