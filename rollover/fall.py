@@ -50,7 +50,7 @@ from ground.kernel import (
     rut_depth,
 )
 from ground.law import BRANCH, REFERENCE_AREA
-from rollover.terms import CREEP, fall_back, free
+from rollover.terms import INCHING, fall_back, free
 
 # numbers of a drop: kg, kg, N/m, N s/m (no spring: rigid), -, m2, kg, N s, m/s2, m/s, s, N, N s2/m2,
 # m (height of a cone whose base is the face, 0: flat), m (above the ground at t = 0 with the speed, 0: first contact)
@@ -67,6 +67,7 @@ CORRECTIONS = 4  # of a step that ends at such a place
 CLOSE = 1e-7  # m: how near a step ends to a jump of the force
 PAST = 2e-10  # m: how far beyond the end or the beginning of contact a step ends
 SAME_SPEED = 1e-7  # m/s: how near a step begins to where friction turns into a dashpot
+SOFTLY = 0.5  # of the time in which a guide alone would stop what slides on it
 AT_REST = 1e-8  # m/s, and m/s2 over a millisecond: what is slower on its line of unloading stays where it is
 
 
@@ -236,6 +237,17 @@ def at_rest(y: Any, a: Any) -> bool:
 
 
 @compiled
+def is_stuck(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, now: Any) -> bool:
+    """Whether the guide holds what hardly moves on its line of unloading: its friction is more than what pulls."""
+    if f[GUIDE] <= 0.0 or f[SPRING] > 0.0 or state[MODE] != UNLOADING or abs(y[1]) >= INCHING:
+        return False
+    speed, y[1] = y[1], 0.0
+    accelerate(law, p, s, row, state, f, y, now)
+    y[1] = speed
+    return abs(now[0]) * (f[NOSE] + row[MASS_B]) <= f[GUIDE]  # type: ignore[no-any-return]
+
+
+@compiled
 def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
     """Fall on the ground at t = 0 with SPEED, or from HEIGHT at t = 0 with it.
 
@@ -267,7 +279,10 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
     most = 10_000 + 200 * int(max(times[n - 1], 0.0) / whole[STEP]) if n > 0 else 0
     while i < n:
         steps += 1
-        h = min(f[STEP], RESOLVED * math.sqrt((f[NOSE] + row[MASS_B]) / max(steepness(law, p, s, row, state), 1e-9)))
+        h = f[STEP]
+        if guide > 0.0:  # near rest its friction is a stiff dashpot, and before, a step must not reach through that
+            h = min(h, SOFTLY * m * max(min(abs(y[1]), abs(y[3])), INCHING) / guide)
+        h = min(h, RESOLVED * math.sqrt((f[NOSE] + row[MASS_B]) / max(steepness(law, p, s, row, state), 1e-9)))
         advance(law, p, s, row, state, f, y, h, a, end)
         if steps > most or not (abs(end[1]) < 1e4 and abs(end[3]) < 1e4):
             return -1
@@ -289,20 +304,25 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
             turning = theta <= share
             if turning:
                 share, jump = theta, 0.0
-        creeping = False  # the friction of the guide begins or ceases to be a dashpot
-        if guide > 0.0 and f[SPRING] <= 0.0 and (abs(y[1]) < CREEP or abs(end[1]) < CREEP):
+        creeping, bend = False, 0.0  # the friction of the guide begins or ceases to be a dashpot
+        if guide > 0.0 and f[SPRING] <= 0.0 and (abs(y[1]) < INCHING or abs(end[1]) < INCHING):
             accelerate(law, p, s, row, state, f, end, now)
-            for side in (-CREEP, CREEP):
+            for side in (-INCHING, INCHING):
                 if abs(y[1] - side) > SAME_SPEED and (y[1] - side) * (end[1] - side) < 0.0:
                     theta = crossing(side, h, y[1], a[0, 0], end[1], now[0])
                     if theta < share:
-                        share, jump, turning, creeping = theta, 0.0, False, True
+                        share, jump, turning, creeping, bend = theta, 0.0, False, True, side
         if share < 1.0:
             h = max(share, 1e-9) * h
             advance(law, p, s, row, state, f, y, h, a, end)
             for _ in range(CORRECTIONS):  # what lies beyond bent the first guess
                 miss = end[0] - goal
-                if turning or creeping or abs(miss) < slack or abs(miss) > 0.5 * h * abs(end[1]):
+                if creeping:
+                    accelerate(law, p, s, row, state, f, end, now)
+                    h = max(h - (end[1] - bend) / now[0], 1e-9 * f[STEP]) if now[0] != 0.0 else h
+                    advance(law, p, s, row, state, f, y, h, a, end)
+                    continue
+                if turning or abs(miss) < slack or abs(miss) > 0.5 * h * abs(end[1]):
                     break
                 h -= miss / end[1]
                 advance(law, p, s, row, state, f, y, h, a, end)
@@ -367,7 +387,10 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
                 if law[PLASTIC] == 0:
                     row[LINE_Z] = 0.0  # no rut stays
         settle_one(law, p, row, state, f[NOSE])
-        if state[MODE] == UNLOADING and i < n and at_rest(y, a):
+        stuck = is_stuck(law, p, s, row, state, f, y, now)
+        if stuck:
+            y[1], y[3] = 0.0, 0.0
+        if state[MODE] == UNLOADING and i < n and (stuck or at_rest(y, a)):
             force = accelerate(law, p, s, row, state, f, y, now)
             for k in range(i, n):
                 out[k, OUT_FORCE], out[k, OUT_SINKAGE], out[k, OUT_IMPULSE] = force, y[0], impulse

@@ -24,7 +24,9 @@ TERM_NUMBERS = 11
 WEIGHT = 10.0  # N/kg, what presses a load on its bed as far as Newton's matrix is concerned
 WALL = 0.005  # m, in a wall, over which its dashpot grows to its whole
 CRISIS_WIDTH = 0.1  # of the critical speed, over which the drag falls
-CREEP = 0.005  # m/s: below it the friction of the guide is a dashpot, so that it has a value at rest
+CREEP = 0.005  # m/s: below it the friction of a bed is a dashpot, so that it has a value at rest
+INCHING = 1e-4  # m/s: the same of a guide in a drop by itself, which then holds, see `fall.is_stuck`
+STANDING = 2e-5  # m/s: the same of a guide in a full run: what stands on stiff ground gives way over seconds
 
 
 @compiled
@@ -41,7 +43,7 @@ def free(g: float, mass: float, guide: float, air: float, crisis: float, thin: f
     """Downward acceleration of a body that falls with v on a guide through air, m/s2."""
     if guide == 0.0 and air == 0.0:
         return g
-    return g - (guide * min(max(v / CREEP, -1.0), 1.0) + drag(air, crisis, thin, abs(v)) * v * abs(v)) / mass
+    return g - (guide * min(max(v / INCHING, -1.0), 1.0) + drag(air, crisis, thin, abs(v)) * v * abs(v)) / mass
 
 
 @compiled
@@ -72,7 +74,7 @@ def try_terms(t: Any, Q: Any) -> None:
         held, power = 0.0, 0.0
         if kind == GUIDE_BRAKE:
             v = row[VEL + 2]
-            force = -f[0] * min(max(v / CREEP, -1.0), 1.0)
+            force = -f[0] * min(max(v / STANDING, -1.0), 1.0)
             Q[6 * b + 2] += force
             power = -force * v
         elif kind == AIR_DRAG:
@@ -166,8 +168,8 @@ def stiffen_terms(t: Any, f: float, fd: float, K: Any) -> None:
     for i in range(t.term_i.shape[0]):
         kind, b, other = t.term_i[i]
         a = 6 * b + 2
-        if kind == GUIDE_BRAKE and abs(t.pose[b, VEL + 2]) < CREEP:
-            K[a, a] += fd * t.term_f[i, 0] / CREEP
+        if kind == GUIDE_BRAKE and abs(t.pose[b, VEL + 2]) < STANDING:
+            K[a, a] += fd * t.term_f[i, 0] / STANDING
         elif kind == BETWEEN:
             both, c = f * t.term_f[i, 0] + fd * t.term_f[i, 1], 6 * other + 2
             K[a, a] += both

@@ -9,7 +9,7 @@ from dataclasses import replace
 from rollover.recording import Recording
 
 MEASURED = ("initiation.speed", "vehicle.mass")  # what is read off an instrument
-FINE, COARSE = 3e-4, 5e-3  # of a value: a finer rounding tells nothing, behind a coarser one it may be nominal
+FINE, COARSE = 3e-4, 1e-2  # of a value: a finer rounding tells nothing, behind a coarser one it may be nominal
 ANY = 15  # decimals: what has as many was not rounded
 
 

@@ -21,6 +21,7 @@ from rollover.effects import EFFECTS, possible, units_of
 
 Array = NDArray[np.float64]
 TWO_SIDED = 1.96
+OUTSIDE = 1.0  # ranges beyond an end, where an interval ends at the latest: what tells nothing has no end of its own
 NEAR = 0.1  # of a value, by which the end of a range may lie beside the fit
 KNOWN = 1e-3  # of such an end, by which it is known
 CLEARLY = 0.4  # of the rise that is due, and
@@ -229,8 +230,8 @@ def intervals(
             x = told.x[at]
             values[name] = Interval(
                 value=physical(x, search),
-                low=possible(kind, name, physical(x - TWO_SIDED * wide[at, 0], search)),
-                high=possible(kind, name, physical(x + TWO_SIDED * wide[at, 1], search)),
+                low=possible(kind, name, physical(max(x - TWO_SIDED * wide[at, 0], -OUTSIDE), search)),
+                high=possible(kind, name, physical(min(x + TWO_SIDED * wide[at, 1], 1.0 + OUTSIDE), search)),
                 unit=units.get(name, ""),
                 at_bound=at_an_end(x),
                 as_simulated=physical(coarse.x[at], search) if coarse.x[at] != x else None,

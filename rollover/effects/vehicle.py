@@ -25,7 +25,7 @@ class GuideFriction(Effect):
 
     id = "guide-friction"
     family = "a drag on the falling body"
-    equation = "F = -F_c min(max(v/v_c, -1), 1) along the guide, v_c = 5 mm/s"
+    equation = "F = -F_c sign(v) along the guide; at rest as much of it as holds"
     source = "20-200 N in drop rigs (M)"
     sentence = "The guide brakes the striker with {force}."
     rivals: ClassVar[Mapping[str, str]] = {

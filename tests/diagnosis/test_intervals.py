@@ -12,7 +12,7 @@ import pytest
 
 from rollover.diagnosis import intervals as stated
 from rollover.diagnosis.blocks import Block
-from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.candidates import Candidate, coordinate
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.readings import digitised
@@ -98,6 +98,25 @@ def test_what_full_runs_do_not_tell_lies_in_its_range_and_is_possible() -> None:
     assert found["friction"].low == 0.0
     assert found["friction"].high == pytest.approx(0.5 + 1.96 * 12.0**-0.5, rel=0.01)
     assert found["travel"].low < 0.15 < found["travel"].high
+
+
+def test_what_tells_nothing_of_a_depth_ends_a_range_beyond_where_it_is_looked_for() -> None:
+    """y = g(t - c ln ratio) tells no depth: 1.96 times a deviation of 100 ranges would be no number."""
+
+    class Deep(Late):
+        def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+            return {CHANNEL: blow(0.01 * np.log(float(changes["effects.soil-layer.stiffness_ratio"])) + shift)}
+
+    layer = candidate(Judge([evidence(blow(0.0), Deep())]), "soil-layer")
+    judge = Judge([evidence(blow(0.01 * np.log(2.0)), Deep())])
+    begun = [coordinate(v, s) for v, s in zip((0.1, 2.0), layer.search.values(), strict=True)]
+    fitted = judge.fit((layer,), begun, rounds=0)
+    assert fitted is not None
+    (found,) = stated.intervals(judge, fitted)
+    search = layer.search["depth"]
+    assert found["depth"].low == pytest.approx(search.low**2 / search.high)
+    assert found["depth"].high == pytest.approx(search.high**2 / search.low)
+    assert found["stiffness_ratio"].low < 2.0 < found["stiffness_ratio"].high < 2.0**1.5
 
 
 def test_a_number_of_an_effect_stays_where_it_can_be() -> None:

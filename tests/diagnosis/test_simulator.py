@@ -37,8 +37,12 @@ def test_a_drop_of_a_diagnosis_is_that_of_a_hundredth_of_its_step(changes: dict[
     exact = model.run(recording.time - shift)
     made = DropSimulator(scenario().replaced({"initiation.speed": speed}), recording).predict(changes, shift)
     assert made is not None
+    # a guide's friction turns from one instant to the next: a stamp within 0.2 ms of that may be on either side
+    before, after = (np.sign(model.run(recording.time - shift + d)["striker/velocity_z"]) for d in (-2e-4, 2e-4))
+    there = (before == after) | ("effects.guide-friction.force" not in changes)
+    assert there.sum() > there.size - 5
     for channel in (FORCE, DEPTH, ACCELERATION):
-        off = np.sqrt(np.mean((made[channel] - exact[channel]) ** 2)) / np.ptp(exact[channel])
+        off = np.sqrt(np.mean((made[channel] - exact[channel])[there] ** 2)) / np.ptp(exact[channel])
         assert off < ENOUGH, channel
 
 

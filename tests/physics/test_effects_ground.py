@@ -199,9 +199,14 @@ def test_guide_friction_slows_the_free_fall() -> None:
     assert r["striker/velocity_z"] == pytest.approx(-(3.0 + a * t), rel=1e-12)
     assert r["striker/position_z"] == pytest.approx(-(3.0 * t + 0.5 * a * t**2), rel=1e-9)
     assert np.all(r["ground/force_normal"] == 0.0)
-    # at rest the guide carries nothing: the settled striker lies on the ground with its weight
-    rest = linear(2e4).with_({"effects.guide-friction.force": force}).run(np.array([8.0]))
-    assert rest["ground/force_normal"][0] == pytest.approx(m * g, rel=1e-3)
+
+
+def test_a_guide_holds_what_has_come_to_rest() -> None:
+    """On its way up the striker is pressed back by F_c: it stops where the ground carries m g + F_c."""
+    force = 150.0
+    rest = linear(2e4).with_({"effects.guide-friction.force": force}).run(np.array([7.0, 8.0]))
+    assert rest["ground/force_normal"] == pytest.approx(m * g + force, rel=1e-3)
+    assert rest["striker/velocity_z"] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_air_brakes_towards_the_terminal_speed() -> None:
