@@ -52,7 +52,9 @@ CHANNELS: dict[str, Channel] = {
         Channel(name="ground/force_normal", unit="N", meaning="ground on striker or vehicle, without the impulse"),
         Channel(name="ground/force_tangential", unit="N", meaning="ground on striker or vehicle, along the surface"),
         Channel(name="ground/impulse_normal", unit="N s", meaning="collision impulse, accumulated"),
-        Channel(name="ground/sinkage", unit="m", meaning="of the deepest element, positive down"),
+        Channel(
+            name="ground/sinkage", unit="m", meaning="of the deepest element in contact, positive down; 0 where none is"
+        ),
         Channel(name="ground/contact_area", unit="m2", meaning="of the elements that are in contact"),
         Channel(name="striker/position_z", unit="m", meaning="of the striker's face, world"),
         Channel(name="striker/velocity_z", unit="m/s", meaning="world"),

@@ -31,7 +31,7 @@ class SoilViscousDamping(Effect):
     family = SPEED
     equation = "F += d v^zeta, v > 0, on the loading curve"
     source = "Ye 2006 eq (1); half-space c = 3.4 r0^2 sqrt(rho G)/(1 - nu) gives 1.1-3.0 kN s/m for G 5-40 MPa (M)"
-    sentence = "The ground resists in proportion to the speed: {damping} on the face, with exponent {exponent}."
+    sentence = "The ground resists in proportion to the speed: {damping} on 63 cm2, with exponent {exponent}."
     rivals: ClassVar[Mapping[str, str]] = {
         "soil-inertial-drag": "drops over a range of speeds of 4 to 1 or more: v against v^2",
         "soil-rate-hardening": "a slow press test: damping vanishes with v, hardening scales with the force",
