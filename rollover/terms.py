@@ -26,7 +26,7 @@ WALL = 0.005  # m, in a wall, over which its dashpot grows to its whole
 CRISIS_WIDTH = 0.1  # of the critical speed, over which the drag falls
 CREEP = 0.005  # m/s: below it the friction of a bed is a dashpot, so that it has a value at rest
 INCHING = 1e-4  # m/s: the same of a guide in a drop by itself, which then holds, see `fall.is_stuck`
-STANDING = 2e-5  # m/s: the same of a guide in a full run: what stands on stiff ground gives way over seconds
+STANDING = 2e-6  # m/s: the same of a guide in a full run: what stands on stiff ground gives way over seconds
 
 
 @compiled
