@@ -51,8 +51,8 @@ def _pair(p: Trace, a: Trace, order: int, random: np.random.Generator) -> Iterat
     higher = np.interp(time, p.time, p.values)
     effects, always = _columns(time, values, order)
     left = higher - effects["gain"]
-    nuisance = _with_collision(time, np.column_stack([always, *effects.values()]), left, order)
-    nuisance = np.column_stack([always, nuisance])
+    collision = _collision(time, np.column_stack([always, *effects.values()]), left, order)
+    nuisance = np.column_stack([always, collision])
     noise = _noise(p, a, time, order, random)
     unit = "m/s2" if order == 2 or "velocity" in p.channel else "m/s"
     size = float(np.abs(values).max())
@@ -122,7 +122,7 @@ def _columns(time: Array, a: Array, order: int) -> tuple[dict[str, Array], Array
     return {"gain": v, "bias": t, "lag": -a, "drift": -t * a}, ones[:, None]
 
 
-def _with_collision(time: Array, columns: Array, left: Array, order: int) -> Array:
+def _collision(time: Array, columns: Array, left: Array, order: int) -> Array:
     """What a collision at the instant that explains most beside all `columns` (n, k) adds, (n,): c_2's in (K1), (K2).
 
     The largest leap of an acceleration may as well be its noise, or the way back of the ground.

@@ -14,9 +14,7 @@ from rollover.prechecks.finding import Finding, Trace
 CHANCE = 0.001  # that a clean channel shows a spike or a stuck run
 FEWEST = 300  # samples, to know what is usual
 FLAT = 3  # samples exactly alike at the very top: what a peak that is measured does not do
-TURNS = (
-    6  # times as long as beside it, that a digitised signal stays at the level where it turns: 2/(sqrt 2 - 1), and some
-)
+TURNS = 6  # times as long as beside it, that a digitised signal stays where it turns: 2/(sqrt 2 - 1), and some
 APART = 60  # samples within which a disturbance stands alone
 AROUND = 6  # samples on either side that say what a sample should be
 

@@ -1,4 +1,4 @@
-"""Conditions are no surer than the digits in which they are written, where nothing else explains what is left."""
+"""Conditions are no surer than the digits in which they are written."""
 
 from __future__ import annotations
 
