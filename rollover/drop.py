@@ -96,7 +96,8 @@ class DropModel:
                 f[fall.STEP], RESOLVED / max(math.sqrt(gives.stiffness / reduced), 2.0 * gives.damping / reduced)
             )
         if "guide-friction" in s.effects:
-            f[fall.GUIDE] = s.effects["guide-friction"].force
+            guide = s.effects["guide-friction"]
+            f[fall.GUIDE], f[fall.CREEP] = guide.force, guide.creep
         f[fall.CRISIS], f[fall.THIN] = math.inf, 1.0
         if "air-drag" in s.effects:
             air = s.effects["air-drag"]

@@ -50,13 +50,15 @@ from ground.kernel import (
     rut_depth,
 )
 from ground.law import BRANCH, REFERENCE_AREA
+from rollover.cubic import between_ends, crossing
 from rollover.terms import INCHING, fall_back, free
 
 # numbers of a drop: kg, kg, N/m, N s/m (no spring: rigid), -, m2, kg, N s, m/s2, m/s, s, N, N s2/m2,
 # m (height of a cone whose base is the face, 0: flat), m (above the ground at t = 0 with the speed, 0: first contact)
 MASS, NOSE, SPRING, DASHPOT, FRACTION, FACE, LAW_MASS, MOMENTUM_MOST, GRAVITY, SPEED, STEP, GUIDE, AIR = range(13)
-# m/s (critical speed of the air, inf: none), - (its drag above over that below)
-CONE, HEIGHT, CRISIS, THIN, NUMBERS = 13, 14, 15, 16, 17
+# m/s (critical speed of the air, inf: none), - (its drag above over that below), m/s (at which the guide creeps, 0: it
+# holds)
+CONE, HEIGHT, CRISIS, THIN, CREEP, NUMBERS = 13, 14, 15, 16, 17, 18
 # columns of what comes out
 OUT_FORCE, OUT_SINKAGE, OUT_X, OUT_V, OUT_A, OUT_IMPULSE, OUT_COLUMNS = 0, 1, 2, 3, 4, 5, 6
 
@@ -104,11 +106,12 @@ def accelerate(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, a
     if state[MODE] != IDLE:
         cover(f, row, y[0])
         force, soil = normal_force(law, p, s, row, y[0], y[1]), along(law, p, row, f, y[0])
-    nose = f[NOSE] * free(f[GRAVITY], f[MASS], f[GUIDE], f[AIR], f[CRISIS], f[THIN], y[1]) - force
+    nose = f[NOSE] * free(f[GRAVITY], f[MASS], f[GUIDE], f[CREEP], f[AIR], f[CRISIS], f[THIN], y[1]) - force
     if f[SPRING] > 0.0:
         between = f[SPRING] * (y[2] - y[0]) + f[DASHPOT] * (y[3] - y[1])
         nose += between
-        a[1] = free(f[GRAVITY], f[MASS], f[GUIDE], f[AIR], f[CRISIS], f[THIN], y[3]) - between / (f[MASS] - f[NOSE])
+        a[1] = free(f[GRAVITY], f[MASS], f[GUIDE], f[CREEP], f[AIR], f[CRISIS], f[THIN], y[3])
+        a[1] -= between / (f[MASS] - f[NOSE])
     a[0] = nose / (f[NOSE] + soil)
     if f[SPRING] <= 0.0:
         a[1] = a[0]
@@ -133,30 +136,6 @@ def advance(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, h: f
     for k in range(2):
         end[2 * k] = y[2 * k] + h * (y[2 * k + 1] + h * (a[0, k] + a[1, k] + a[2, k]) / 6.0)
         end[2 * k + 1] = y[2 * k + 1] + h * (a[0, k] + 2.0 * a[1, k] + 2.0 * a[2, k] + a[3, k]) / 6.0
-
-
-@compiled
-def between_ends(theta: float, h: float, u0: float, d0: float, u1: float, d1: float) -> float:
-    """Cubic through values u and rates d at both ends of a step."""
-    w = 1.0 - theta
-    return (
-        w * w * (1.0 + 2.0 * theta) * u0
-        + theta * theta * (3.0 - 2.0 * theta) * u1
-        + h * theta * w * (w * d0 - theta * d1)
-    )
-
-
-@compiled
-def crossing(level: float, h: float, u0: float, d0: float, u1: float, d1: float) -> float:
-    """Share of the step at which the cubic passes `level`, which lies between its ends."""
-    low, high = 0.0, 1.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        if (between_ends(middle, h, u0, d0, u1, d1) - level) * (u0 - level) > 0.0:
-            low = middle
-        else:
-            high = middle
-    return high
 
 
 @compiled
@@ -237,9 +216,15 @@ def at_rest(y: Any, a: Any) -> bool:
 
 
 @compiled
+def holds(f: Any) -> bool:
+    """Whether the guide is one whose friction holds what is at rest."""
+    return f[GUIDE] > 0.0 and f[CREEP] == 0.0 and f[SPRING] <= 0.0  # type: ignore[no-any-return]
+
+
+@compiled
 def is_stuck(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, now: Any) -> bool:
     """Whether the guide holds what hardly moves on its line of unloading: its friction is more than what pulls."""
-    if f[GUIDE] <= 0.0 or f[SPRING] > 0.0 or state[MODE] != UNLOADING or abs(y[1]) >= INCHING:
+    if not holds(f) or state[MODE] != UNLOADING or abs(y[1]) >= INCHING:
         return False
     speed, y[1] = y[1], 0.0
     accelerate(law, p, s, row, state, f, y, now)
@@ -262,11 +247,11 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
         f = f.copy()  # gravity and air pull at nose and body alike: nothing bends until something is hit
         f[SPRING], f[STEP] = 0.0, max(f[STEP], FALLING)
     i, n = 0, times.size
-    g, m, guide, air, crisis, thin = f[GRAVITY], f[MASS], f[GUIDE], f[AIR], f[CRISIS], f[THIN]
+    g, m, guide, creep, air, crisis, thin = f[GRAVITY], f[MASS], f[GUIDE], f[CREEP], f[AIR], f[CRISIS], f[THIN]
     while i < n and times[i] < 0.0:
-        x, v = fall_back(g, m, guide, air, crisis, thin, f[SPEED], -times[i])
+        x, v = fall_back(g, m, guide, creep, air, crisis, thin, f[SPEED], -times[i])
         out[i, OUT_FORCE], out[i, OUT_SINKAGE], out[i, OUT_IMPULSE] = 0.0, 0.0, 0.0
-        out[i, OUT_X], out[i, OUT_V], out[i, OUT_A] = x - f[HEIGHT], v, free(g, m, guide, air, crisis, thin, v)
+        out[i, OUT_X], out[i, OUT_V], out[i, OUT_A] = x - f[HEIGHT], v, free(g, m, guide, creep, air, crisis, thin, v)
         i += 1
     row[AREA] = f[FACE]
     y[1], y[3], impulse = f[SPEED], f[SPEED], 0.0
@@ -281,7 +266,7 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
         steps += 1
         h = f[STEP]
         if guide > 0.0:  # near rest its friction is a stiff dashpot, and before, a step must not reach through that
-            h = min(h, SOFTLY * m * max(min(abs(y[1]), abs(y[3])), INCHING) / guide)
+            h = min(h, SOFTLY * m * max(min(abs(y[1]), abs(y[3])), creep, INCHING) / guide)
         h = min(h, RESOLVED * math.sqrt((f[NOSE] + row[MASS_B]) / max(steepness(law, p, s, row, state), 1e-9)))
         advance(law, p, s, row, state, f, y, h, a, end)
         if steps > most or not (abs(end[1]) < 1e4 and abs(end[3]) < 1e4):
@@ -305,7 +290,7 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
             if turning:
                 share, jump = theta, 0.0
         creeping, bend = False, 0.0  # the friction of the guide begins or ceases to be a dashpot
-        if guide > 0.0 and f[SPRING] <= 0.0 and (abs(y[1]) < INCHING or abs(end[1]) < INCHING):
+        if holds(f) and (abs(y[1]) < INCHING or abs(end[1]) < INCHING):
             accelerate(law, p, s, row, state, f, end, now)
             for side in (-INCHING, INCHING):
                 if abs(y[1] - side) > SAME_SPEED and (y[1] - side) * (end[1] - side) < 0.0:

@@ -102,13 +102,15 @@ def _thrown(throw: Throw, scenario: Scenario, bodies: tuple[Body, ...], t: Table
 def _fallen(scenario: Scenario, bodies: tuple[Body, ...], drop: Drop, lowest: float) -> tuple[float, float]:
     """How far a drop begins above its place at first contact, and its downward speed there; `lowest` is added."""
     guide, air = scenario.effects.get("guide-friction"), scenario.effects.get("air-drag")
-    brake = guide.force if guide is not None and isinstance(scenario.vehicle, Striker) else 0.0
+    brake, creep = 0.0, 0.0
+    if guide is not None and isinstance(scenario.vehicle, Striker):
+        brake, creep = guide.force, guide.creep
     drag, critical, ratio = (air.factor, air.critical, air.crisis_ratio) if air is not None else (0.0, math.inf, 1.0)
     if brake == 0.0 and drag == 0.0:
         rise = lowest + drop.speed * drop.lead_time - 0.5 * scenario.gravity * drop.lead_time**2
         return rise, drop.speed - scenario.gravity * drop.lead_time
     mass = sum(b.inertia.mass for b in bodies)
-    depth, speed = fall_back(scenario.gravity, mass, brake, drag, critical, ratio, drop.speed, drop.lead_time)
+    depth, speed = fall_back(scenario.gravity, mass, brake, creep, drag, critical, ratio, drop.speed, drop.lead_time)
     return lowest - float(depth), float(speed)
 
 

@@ -52,7 +52,8 @@ def term_rows(scenario: Scenario, bodies: tuple[Body, ...]) -> tuple[Index, Arra
     for b in falling:
         share = bodies[b].inertia.mass / mass
         if "guide-friction" in effects and isinstance(scenario.vehicle, Striker):
-            rows.append(((terms.GUIDE_BRAKE, b, b), [share * effects["guide-friction"].force]))
+            guide = effects["guide-friction"]
+            rows.append(((terms.GUIDE_BRAKE, b, b), [share * guide.force, guide.creep]))
         if "air-drag" in effects:
             air = effects["air-drag"]
             rows.append(((terms.AIR_DRAG, b, b), [share * air.factor, air.critical, air.crisis_ratio]))

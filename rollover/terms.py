@@ -39,16 +39,24 @@ def drag(factor: float, crisis: float, ratio: float, speed: float) -> float:
 
 
 @compiled
-def free(g: float, mass: float, guide: float, air: float, crisis: float, thin: float, v: float) -> float:
+def rub(force: float, creep: float, zone: float, v: float) -> float:
+    """Friction of a guide against a speed v, N: F_c tanh(v/v_c) of one that creeps, else F_c beyond a narrow zone."""
+    if creep > 0.0:
+        return force * math.tanh(v / creep)
+    return force * min(max(v / zone, -1.0), 1.0)
+
+
+@compiled
+def free(g: float, mass: float, guide: float, creep: float, air: float, crisis: float, thin: float, v: float) -> float:
     """Downward acceleration of a body that falls with v on a guide through air, m/s2."""
     if guide == 0.0 and air == 0.0:
         return g
-    return g - (guide * min(max(v / INCHING, -1.0), 1.0) + drag(air, crisis, thin, abs(v)) * v * abs(v)) / mass
+    return g - (rub(guide, creep, INCHING, v) + drag(air, crisis, thin, abs(v)) * v * abs(v)) / mass
 
 
 @compiled
 def fall_back(
-    g: float, mass: float, guide: float, air: float, crisis: float, thin: float, v: float, time: float
+    g: float, mass: float, guide: float, creep: float, air: float, crisis: float, thin: float, v: float, time: float
 ) -> Any:
     """Depth (m) and speed (m/s) `time` seconds before a body that falls freely has depth 0 and speed v."""
     if guide == 0.0 and air == 0.0:
@@ -56,10 +64,10 @@ def fall_back(
     x, count = 0.0, max(math.ceil(time / 1e-3), 1)
     h = -time / count
     for _ in range(count):
-        k1 = free(g, mass, guide, air, crisis, thin, v)
-        k2 = free(g, mass, guide, air, crisis, thin, v + 0.5 * h * k1)
-        k3 = free(g, mass, guide, air, crisis, thin, v + 0.5 * h * k2)
-        k4 = free(g, mass, guide, air, crisis, thin, v + h * k3)
+        k1 = free(g, mass, guide, creep, air, crisis, thin, v)
+        k2 = free(g, mass, guide, creep, air, crisis, thin, v + 0.5 * h * k1)
+        k3 = free(g, mass, guide, creep, air, crisis, thin, v + 0.5 * h * k2)
+        k4 = free(g, mass, guide, creep, air, crisis, thin, v + h * k3)
         x += h * (v + h * (k1 + k2 + k3) / 6.0)
         v += h * (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0
     return x, v
@@ -74,7 +82,7 @@ def try_terms(t: Any, Q: Any) -> None:
         held, power = 0.0, 0.0
         if kind == GUIDE_BRAKE:
             v = row[VEL + 2]
-            force = -f[0] * min(max(v / STANDING, -1.0), 1.0)
+            force = -rub(f[0], f[1], STANDING, v)
             Q[6 * b + 2] += force
             power = -force * v
         elif kind == AIR_DRAG:
@@ -168,8 +176,8 @@ def stiffen_terms(t: Any, f: float, fd: float, K: Any) -> None:
     for i in range(t.term_i.shape[0]):
         kind, b, other = t.term_i[i]
         a = 6 * b + 2
-        if kind == GUIDE_BRAKE and abs(t.pose[b, VEL + 2]) < STANDING:
-            K[a, a] += fd * t.term_f[i, 0] / STANDING
+        if kind == GUIDE_BRAKE and abs(t.pose[b, VEL + 2]) < max(t.term_f[i, 1], STANDING):
+            K[a, a] += fd * t.term_f[i, 0] / max(t.term_f[i, 1], STANDING)
         elif kind == BETWEEN:
             both, c = f * t.term_f[i, 0] + fd * t.term_f[i, 1], 6 * other + 2
             K[a, a] += both

@@ -31,6 +31,7 @@ SHAPES = {
     "tank-slosh": ("damping",),
     "axle-stop": ("stiffness",),
     "structural-compliance": ("nose_share",),
+    "guide-friction": ("creep",),
 }
 
 PLACES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of a shape, at which a fit of it begins

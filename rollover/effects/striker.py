@@ -18,13 +18,17 @@ CRITICAL = (1e5, 4e5)  # Reynolds numbers of the drag crisis of a sphere, rough 
 
 @parameters
 class GuideFriction(Effect):
-    """F = -F_c sign(v): Coulomb friction of the guide that a striker falls on."""
+    """F = -F_c sign(v): Coulomb friction of the guide that a striker falls on.
+
+    A guide that is oiled or shakes creeps under less than F_c: F = -F_c tanh(v/v_c).
+    """
 
     force: Annotated[float, Quantity("N", "F_c", least=0)] = 80.0
+    creep: Annotated[float, Quantity("m/s", "v_c below which it gives way; 0: it holds", least=0)] = 0.0
 
     id = "guide-friction"
     family = "a drag on the falling body"
-    equation = "F = -F_c sign(v) along the guide; at rest as much of it as holds"
+    equation = "F = -F_c sign(v) along the guide, at rest as much of it as holds; with creep F = -F_c tanh(v/v_c)"
     source = "20-200 N in drop rigs (M)"
     sentence = "The guide brakes the striker with {force}."
     rivals: ClassVar[Mapping[str, str]] = {
@@ -35,7 +39,10 @@ class GuideFriction(Effect):
     acts = ("drop",)
     channels = ("striker/acceleration_z", "striker/velocity_z")
     null: ClassVar[Mapping[str, float | None]] = {"force": 0.0}
-    search: ClassVar[Mapping[str, Search]] = {"force": Search(5.0, 600.0, "log")}
+    search: ClassVar[Mapping[str, Search]] = {
+        "force": Search(5.0, 600.0, "log"),
+        "creep": Search(5e-4, 0.05, "log"),
+    }
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {"force": (1.0, 0.0)}
 
 

@@ -171,7 +171,8 @@ def _sign(v: float) -> float:
 
 
 def _resistance(rig: Rig, v: float) -> float:
-    return rig.guide * _sign(v) + rig.air * v * abs(v)
+    rubs = math.tanh(v / rig.guide_creep) if rig.guide_creep > 0.0 else _sign(v)
+    return rig.guide * rubs + rig.air * v * abs(v)
 
 
 def descend(rig: Rig, start: float, end: float) -> Descent:

@@ -119,7 +119,9 @@ def _compliance(random: Random, s: Setting) -> Change:
 
 def _guide(random: Random, s: Setting) -> Change:
     force = log_uniform(random, 1.0, 300.0)
-    return _physics("guide-friction", {"force": force}, "speed", guide=force)
+    creep = log_uniform(random, 1e-3, 1e-2) if random.random() < 0.5 else 0.0
+    told = {"force": force, **({"creep": creep} if creep else {})}
+    return _physics("guide-friction", told, "speed", guide=force, guide_creep=creep)
 
 
 def _air(random: Random, s: Setting) -> Change:

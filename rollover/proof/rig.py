@@ -49,6 +49,7 @@ class Rig:
     spring: float = 0.0  # N/m between nose and body; 0: one rigid block
     dashpot: float = 0.0
     guide: float = 0.0  # N
+    guide_creep: float = 0.0  # m/s: F tanh(v/this); 0: it holds what is at rest
     air: float = 0.0  # 1/2 rho C_d A, N s2/m2
     side_load: float = 0.0  # friction of the guide over the force that accelerates the striker
     relaxing: float = 0.0  # N/m, spring of a Maxwell branch of the soil

@@ -40,6 +40,7 @@ CHANGES: dict[str, dict[str, Any]] = {
     "speed": {"effects.impact-speed.scale": 1.1},
     "co-moving": {"effects.co-moving-mass.fraction": 0.3},
     "guide": {"effects.guide-friction.force": 150.0, "initiation.lead_time": 0.1},
+    "creeping guide": {"effects.guide-friction.force": 150.0, "effects.guide-friction.creep": 0.005},
     "air": {"effects.air-drag.area": 3.0, "initiation.lead_time": 0.1},
     "thin air": {
         "effects.air-drag.area": 3.0,

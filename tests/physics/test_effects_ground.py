@@ -209,6 +209,18 @@ def test_a_guide_holds_what_has_come_to_rest() -> None:
     assert rest["striker/velocity_z"] == pytest.approx(0.0, abs=1e-12)
 
 
+def test_a_guide_that_creeps_lets_the_striker_settle() -> None:
+    """m a = m g - F_c tanh(v/v_c) - F_s in every row, (1) with m_b1 in F_s; in the end the ground carries m g alone."""
+    force, creep = 150.0, 0.004
+    changed = {"effects.guide-friction.force": force, "effects.guide-friction.creep": creep}
+    r = linear(2e4).with_(changed).run(np.array([-0.05, 0.02, 0.1, 0.3, 0.31, 0.33, 0.4, 12.0]))
+    v, a = -r["striker/velocity_z"], -r["striker/acceleration_z"]
+    rubbed = m * (g - a) - r["ground/force_normal"]
+    assert rubbed == pytest.approx(force * np.tanh(v / creep), abs=1e-3 * force)
+    assert np.min(np.abs(rubbed)) < 0.5 * force < np.max(np.abs(rubbed)), "rows on both sides of v_c"
+    assert r["ground/force_normal"][-1] == pytest.approx(m * g, rel=1e-3)
+
+
 def test_air_brakes_towards_the_terminal_speed() -> None:
     """m v' = m g - c v^2: v(t) = v_t tanh(artanh(v_s/v_t) + g t/v_t), x = v_t^2/g ln cosh of it, less its start."""
     area, cd, rho = 3.0, 1.1, 1.204

@@ -24,6 +24,7 @@ SAME: dict[str, tuple[dict[str, float], dict[str, Any]]] = {
     "soil-crust": ({"thickness": 0.03, "stiffness_ratio": 2.0}, {"crust_depth": 0.03, "crust_ratio": 2.0}),
     "structural-compliance": ({"stiffness": 5e5, "damping": 300.0}, {"spring": 5e5, "dashpot": 300.0}),
     "guide-friction": ({"force": 100.0}, {"guide": 100.0}),
+    "guide-friction, creeping": ({"force": 200.0, "creep": 0.005}, {"guide": 200.0, "guide_creep": 0.005}),
     "air-drag": ({"area": 0.5}, {"air": 0.5 * 1.204 * 0.5}),
     "mass": ({"added": 10.0}, {"mass": 142.0}),
     "impact-speed": ({"scale": 1.05}, {"speed": 3.15}),
@@ -36,7 +37,8 @@ SAME: dict[str, tuple[dict[str, float], dict[str, Any]]] = {
 def test_two_solvers_one_drop(name: str) -> None:
     theirs, ours = SAME[name]
     model = DropModel(scenario=scenario.load("drop_test"))
-    run = model.with_({f"effects.{name}.{key}": value for key, value in theirs.items()}).run(T)
+    id = name.split(",")[0]
+    run = model.with_({f"effects.{id}.{key}": value for key, value in theirs.items()}).run(T)
     made = descend(Rig(**ours), -0.06, 0.62).channels(T)
     for channel, values in made.items():
         apart = np.abs(values - run[channel]) / np.ptp(values)
