@@ -309,7 +309,7 @@ def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) ->
         if is_nearly_all and inside:
             return replace(found, parts=(one,), fitted=one.fitted, after=after), _kind(one.fitted.candidates[-1])
     significant = found.before.p_value < SURE and matters(judge, found.base, found.before)
-    significant = significant and not is_tolerated(judge, found.base)
+    significant = significant and not is_tolerated(judge, found.base) and not is_slight(judge, found.first, phases)
     verdict: Verdict = "unexplained" if significant or found.parts else "no-mismatch"
     return replace(found, parts=(), fitted=found.base), verdict
 
@@ -345,6 +345,13 @@ def is_tolerated(judge: Judge, fitted: Fitted) -> bool:
     rough = [e.is_rough(s) for e in judge.evidence for s in e.signals]
     most = 1.0 + 2.0 * np.sqrt(2.0 / len(rough))
     return all(rough) and bool(fitted.left < most * sum(b.residual.size for b in fitted.blocks))
+
+
+def is_slight(judge: Judge, first: Step | None, phases: Phases) -> bool:
+    """Whether all that separates simulation and recordings is the work of an effect that moves nothing worth a name."""
+    if first is None or moves(judge, first.base, first.fitted) >= NEGLIGIBLE:
+        return False
+    return mismatch_of(judge.evidence, first.fitted.blocks, phases).p_value > SURE
 
 
 def is_enough(judge: Judge, fitted: Fitted, left: Mismatch) -> bool:
