@@ -21,7 +21,7 @@ from rollover.diagnosis.dependence import Dependence, dependence, dependence_of_
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.digits import to_the_last_digit
 from rollover.diagnosis.empirical import offered, proposed
-from rollover.diagnosis.evidence import Evidence, doubted, evidence_of, left_out
+from rollover.diagnosis.evidence import Evidence, doubted, doubted_beside, evidence_of, left_out
 from rollover.diagnosis.explain import SURE, Inquiry
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import yardstick
@@ -30,6 +30,7 @@ from rollover.diagnosis.overturn import full_runs
 from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.quantities import dependency
 from rollover.diagnosis.readings import digitised, without_spikes
+from rollover.diagnosis.refine import conditioned, is_doubtful
 from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing, with_scatter
 from rollover.diagnosis.scores import before_a_blow, judged
 from rollover.diagnosis.selection import Explanation, decided, explained, matters
@@ -42,7 +43,6 @@ from rollover.recording import Recording
 from rollover.scenario import Scenario
 from rollover.vehicle import Striker
 
-ROUNDS = 3  # of an explanation with the errors of the conditions as they act beside it
 MOSTLY = 0.6  # of the effects of the ground that would not have shown: then nothing can be told
 FEWEST = 24  # samples in all, below which nothing is said
 
@@ -98,7 +98,7 @@ def diagnose(
     inquiry = Inquiry(judge=judge, candidates=candidates, groups=groups, phases=phases, say=say, crew=crew)
     explanation = explained(inquiry, base)
     explanation, verdict = decided(judge, explanation, groups, phases)
-    explanation, kept = eased_beside(scenario, judge, explanation, kept, phases)
+    explanation, kept = eased_beside(judge, explanation, kept, phases)
     found = list(judge.evidence)
     before, after = explanation.before, explanation.after if explanation.parts else explanation.before
     set_ups = [set_up(scenario, e.recording) for e in found]
@@ -171,32 +171,15 @@ def _weighed(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:
 
 
 def eased_beside(
-    scenario: Scenario,
-    judge: Judge,
-    explanation: Explanation,
-    kept: Sequence[Evidence],
-    phases: Sequence[Sequence[tuple[float, str]]],
+    judge: Judge, explanation: Explanation, kept: Sequence[Evidence], phases: Sequence[Sequence[tuple[float, str]]]
 ) -> tuple[Explanation, list[Evidence]]:
-    """The explanation fitted again with what the conditions leave uncertain as it acts beside it; kept ones too.
-
-    What an error of a condition does was seen on the scenario as it is: a mass in doubt moves a spike there, and
-    beside a spring that was found its frequency. Only where a run costs little.
-    """
-    fitted, doubtful = explanation.fitted, any(e.doubts is not None for e in judge.evidence)
-    if not explanation.parts or not doubtful or judge.effort.thrifty:
+    """The explanation fitted again with what the conditions leave uncertain as it acts beside it; kept ones too."""
+    if not explanation.parts or not is_doubtful(judge):
         return explanation, list(kept)
-    for _ in range(ROUNDS):
-        beside = judge.changes(fitted.candidates, fitted.x)
-        shifts = [b.shift for b in fitted.blocks]
-        judge.weigh(
-            [doubted(e, set_up(scenario, e.recording), beside, s) for e, s in zip(judge.evidence, shifts, strict=True)]
-        )
-        again = judge.fit(fitted.candidates, fitted.x, shifts=shifts, width=1)
-        fitted = again or judge.again(fitted)
+    fitted = conditioned(judge, explanation.fitted)
     beside = judge.changes(fitted.candidates, fitted.x)
     after = mismatch_of(judge.evidence, fitted.blocks, phases)
-    others = [doubted(e, set_up(scenario, e.recording), beside) for e in kept]
-    return replace(explanation, fitted=fitted, after=after), others
+    return replace(explanation, fitted=fitted, after=after), [doubted_beside(e, beside) for e in kept]
 
 
 def _trusted(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:

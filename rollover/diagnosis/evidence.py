@@ -72,7 +72,8 @@ class Evidence:
     model_error: float = MODEL_ERROR  # of a channel's range
     averaged: int = 1  # samples in one
     blow: float = np.inf  # s, after which a run may take another course
-    doubts: Array | None = None  # what 1 sigma of each uncertain condition does to the stack, SI, (n, q)
+    doubtful: tuple[Mapping[str, Any], ...] = ()  # values exchanged for 1 sigma of each uncertain condition
+    doubts: Array | None = None  # what that does to the stack, SI, (n, q)
 
     @cached_property
     def eased(self) -> Eased:
@@ -205,14 +206,18 @@ class Evidence:
         return y * grown(signal.ar)
 
 
-def doubted(e: Evidence, scenario: Scenario, beside: Mapping[str, Any] | None = None, shift: float = 0.0) -> Evidence:
-    """The evidence with what its conditions leave uncertain; `scenario` is under them. Raises `InputError`.
+def doubted(e: Evidence, scenario: Scenario) -> Evidence:
+    """The evidence with what its conditions leave uncertain; `scenario` is under them. Raises `InputError`."""
+    return doubted_beside(replace(e, doubtful=tuple(doubts(scenario, e.recording.uncertainty, e.name))), {})
 
-    `beside` are values that are exchanged too: where an effect acts, an error of the conditions does something else.
+
+def doubted_beside(e: Evidence, beside: Mapping[str, Any], shift: float = 0.0) -> Evidence:
+    """The same with that as it is beside values that are exchanged: there an error of a condition does something else.
+
+    `shift` is the recording's time shift there, s.
     """
-    changes, beside = doubts(scenario, e.recording.uncertainty, e.name), dict(beside or {})
     base = e.simulator.predict(beside, shift)
-    moved = [e.simulator.predict({**beside, **one}, shift) for one in changes]
+    moved = [e.simulator.predict({**beside, **one}, shift) for one in e.doubtful]
     columns = [e.raw(m) - e.raw(base) for m in moved if m is not None and base is not None]
     return replace(e, doubts=np.stack(columns, axis=1)) if columns else e
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.blocks import WIDEST, Block, Fitted
 from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.evidence import doubted_beside
 from rollover.diagnosis.fit import NOISE_LEFT, Judge
 from rollover.diagnosis.gate import followed, freed, yardstick
 
@@ -21,6 +22,7 @@ VALLEYS = 4  # of these in which a fit begins
 SCANNED = (np.arange(40) + 0.5) / 40  # places of a shape
 TICK, SHORTEST, NARROWER = 8e-5, 5e-6, 0.4  # s, by which a time shift is tried to either side; then less, by a factor
 TRIED = 40  # at most so many
+ROUNDS = 3  # of a fit with the errors of the conditions as they act beside it
 TWICE, LITTLE = 2, 1.0  # how often; a gain that is not worth another time
 
 
@@ -184,6 +186,26 @@ def _tried(judge: Judge, r: int, fitted: Fitted, block: Block) -> Block:
         else:
             step *= NARROWER
     return block
+
+
+def is_doubtful(judge: Judge) -> bool:
+    """Whether conditions leave something uncertain whose work beside an effect is worth its runs."""
+    return not judge.effort.thrifty and any(e.doubts is not None for e in judge.evidence)
+
+
+def conditioned(judge: Judge, fitted: Fitted) -> Fitted:
+    """The fit again with what the conditions leave uncertain as it acts beside it, recordings weighed by that.
+
+    What an error of a condition does was seen on the scenario as it is: a mass in doubt moves a spike there, and
+    beside a spring that was found its frequency.
+    """
+    for _ in range(ROUNDS):
+        beside = judge.changes(fitted.candidates, fitted.x)
+        shifts = [b.shift for b in fitted.blocks]
+        judge.weigh([doubted_beside(e, beside, s) for e, s in zip(judge.evidence, shifts, strict=True)])
+        again = judge.fit(fitted.candidates, fitted.x, shifts=shifts, width=1)
+        fitted = again or judge.again(fitted)
+    return fitted
 
 
 def shaped(judge: Judge, f: Fitted) -> Fitted | None:

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from ground.law import REFERENCE_AREA, evaluate
 from rollover.diagnosis.depend import hats
 from rollover.diagnosis.evidence import Evidence
+from rollover.diagnosis.filtering import behind_filters, rows_of
 from rollover.diagnosis.fit import Block
-from rollover.diagnosis.simulator import behind_filters
 from rollover.drop import DropModel
 from rollover.initiation import Drop
 from rollover.scenario import Scenario
@@ -96,7 +96,8 @@ def channels_of(way: Way, moves: Moves, e: Evidence, shift: float) -> Array:
         "striker/acceleration_z": -a,
         "ground/force_normal": felt,
     }
-    stamps = e.recording.time - shift
+    rows = rows_of(e.recording)
+    stamps = rows.times - shift
     at = np.clip(np.searchsorted(way.time, stamps) - 1, 0, way.time.size - 2)
     ahead = np.clip((stamps - way.time[at]) / STEP, 0.0, 1.0)[:, None]
     begun = (stamps >= 0.0)[:, None]
@@ -105,10 +106,7 @@ def channels_of(way: Way, moves: Moves, e: Evidence, shift: float) -> Array:
     for channel in e.recording.channels:
         y = shown.get(channel)
         found[channel] = nothing if y is None else begun * ((1.0 - ahead) * y[at] + ahead * y[at + 1])
-        if channel in e.recording.cfc:
-            columns = [behind_filters({channel: c}, e.recording)[channel] for c in found[channel].T]
-            found[channel] = np.stack(columns, axis=1)
-    return np.asarray(e.eased(e.whitened(e.raw(found))))
+    return np.asarray(e.eased(e.whitened(e.raw(behind_filters(found, e.recording, rows)))))
 
 
 @dataclass(frozen=True, kw_only=True)

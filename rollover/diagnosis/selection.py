@@ -19,7 +19,7 @@ from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.lasting import NEEDED, astray, backed, begun_anew, lasting
 from rollover.diagnosis.looks import look, look_again
-from rollover.diagnosis.refine import polish, timed, traced, without
+from rollover.diagnosis.refine import conditioned, is_doubtful, polish, timed, traced, without
 from rollover.diagnosis.verdict import Verdict
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
@@ -103,7 +103,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
         if found is None:
             refuted = not taken
             break
-        found, left = followed(judge, found, phases)
+        found, left = as_conditioned(judge, *followed(judge, found, phases), phases)
         taken.append(found)
         current = found.fitted
         if not judge.straying:
@@ -199,6 +199,22 @@ def followed(judge: Judge, found: Step, phases: Phases) -> tuple[Step, Mismatch]
     if new.left >= old.left:
         return found, left
     return found.moved_to(new), mismatch_of(judge.evidence, new.blocks, phases)
+
+
+def as_conditioned(judge: Judge, found: Step, left: Mismatch, phases: Phases) -> tuple[Step, Mismatch]:
+    """A step and what it leaves; with the errors of the conditions as they act beside it if that leaves chance alone.
+
+    Else these stay as they act on the scenario as it is: a wrong effect would bend them too.
+    """
+    if is_enough(judge, found.fitted, left) or not is_doubtful(judge):
+        return found, left
+    before = judge.evidence
+    new = conditioned(judge, found.fitted)
+    there = mismatch_of(judge.evidence, new.blocks, phases)
+    if is_enough(judge, new, there):
+        return found.moved_to(new), there
+    judge.weigh(before)
+    return found, left
 
 
 def _instead(inquiry: Inquiry, current: Fitted) -> Step | None:

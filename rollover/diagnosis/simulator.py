@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.effort import DROPS, Effort
+from rollover.diagnosis.filtering import Rows, behind_filters, rows_of
 from rollover.diagnosis.overturn import RunSimulator
 from rollover.drop import DropFailedError, DropModel, unfit
 from rollover.effects import every, read
-from rollover.filters import filtered
 from rollover.initiation import Drop
 from rollover.recording import Recording
 from rollover.scenario import Scenario
@@ -85,16 +85,17 @@ class DropSimulator:
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """See `Simulator`; ``ValueError`` for a value out of bounds passes."""
         physical = {path: value for path, value in changes.items() if not path.startswith(SENSORS)}
-        stamps = self.recording.time
         try:
             run = self._at(physical, shift)
             if len(physical) < len(changes):
                 read_by = self.model.with_({p: v for p, v in changes.items() if p not in physical}).scenario.effects
-                run = replace(run, time=stamps, channels={**run.channels, **self._edges(physical, shift, read_by)})
+                run = replace(
+                    run, time=self.rows.times, channels={**run.channels, **self._edges(physical, shift, read_by)}
+                )
                 run = read({n: e for n, e in read_by.items() if e.id not in EDGES}, run)
         except DropFailedError:
             return None
-        return behind_filters(run.channels, self.recording)
+        return behind_filters(run.channels, self.recording, self.rows)
 
     def strays(
         self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1
@@ -116,13 +117,13 @@ class DropSimulator:
     def state(self, shift: float) -> Mapping[str, Array]:
         """See `Simulator`."""
         try:
-            return self._at({}, shift).channels
+            return {name: values[self.rows.stamps] for name, values in self._at({}, shift).channels.items()}
         except DropFailedError:
             return {}
 
     def _edges(self, physical: Mapping[str, Any], shift: float, read_by: Mapping[str, Any]) -> dict[str, Array]:
-        """Channels behind a lag or with a clock of their own: what these make of a leap lies between the stamps."""
-        stamps = self.recording.time
+        """Channels behind a lag or with a clock of their own: what these make of a leap lies between the rows."""
+        stamps = self.rows.times
         lags, offsets, drifts = ({e.channel: e for e in every(read_by, name)} for name in EDGES)
         found = {}
         for channel in {*lags, *offsets, *drifts} & set(self.recording.channels):
@@ -143,6 +144,11 @@ class DropSimulator:
         return found
 
     @cached_property
+    def rows(self) -> Rows:
+        """Times at which the drop is made."""
+        return rows_of(self.recording)
+
+    @cached_property
     def contact(self) -> float:
         """See `Simulator`."""
         start = self.model.scenario.initiation
@@ -153,10 +159,10 @@ class DropSimulator:
         return float(times[np.argmax(below)]) if below.any() else np.inf
 
     def _at(self, physical: Mapping[str, Any], shift: float) -> Recording:
-        """The drop at the stamps less `shift`; what it is a little later is made along with it, for slopes."""
+        """The drop at its rows less `shift`; what it is a little later is made along with it, for slopes."""
         values, later = tuple(sorted(physical.items())), shift + self.effort.later
         if (*values, shift) not in self._raw:
-            stamps = self.recording.time
+            stamps = self.rows.times
             # at 20 kHz one row's little later is the next row
             times, back = np.unique(np.concatenate([stamps - shift, stamps - later]), return_inverse=True)
             run = self._made(physical, times)
@@ -184,19 +190,6 @@ class DropSimulator:
         self._raw[key] = run
 
 
-def behind_filters(channels: Mapping[str, Array], recording: Recording) -> dict[str, Array]:
-    """Simulated channels that the recording has, each through the filter class that the recording says was applied."""
-    step = float(np.median(np.diff(recording.time)))
-    found = {}
-    for name in recording.channels:
-        if name in channels:
-            values = channels[name]
-            if name in recording.cfc:
-                values = filtered(values, step, recording.cfc[name])
-            found[name] = values
-    return found
-
-
 def simulator_of(scenario: Scenario, recording: Recording) -> Simulator:
     """The quickest simulator that a scenario admits; the recording's conditions are put in by path.
 
@@ -211,4 +204,4 @@ def set_up(scenario: Scenario, recording: Recording) -> Scenario:
     return scenario.replaced(dict(recording.conditions), origin=recording.title) if recording.conditions else scenario
 
 
-__all__ = ["DropSimulator", "RunSimulator", "Simulator", "behind_filters", "blow_of", "set_up", "simulator_of"]
+__all__ = ["DropSimulator", "RunSimulator", "Simulator", "blow_of", "set_up", "simulator_of"]

@@ -74,6 +74,20 @@ def test_as_many_effects_as_may_be_must_leave_what_chance_leaves(
     assert verdict == ("missing-physics" if named else "unexplained")
 
 
+@pytest.mark.parametrize(
+    ("moved", "remaining", "verdict"),
+    [(1e-4, 0.4, "no-mismatch"), (1e-4, 1e-9, "unexplained"), (0.1, 0.4, "unexplained")],
+)
+def test_what_an_effect_too_slight_for_a_name_explains_whole_is_no_mismatch(
+    moved: float, remaining: float, verdict: str, judged: dict[str, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(selection, "moves", lambda *_: moved)
+    monkeypatch.setattr(selection, "mismatch_of", lambda *_: left(remaining))
+    one = explanation(1, 1e-9)
+    found = decided(cast(Judge, SimpleNamespace(evidence=())), replace(one, parts=(), fitted=one.base), [], [])
+    assert (found[0].parts, found[1]) == ((), verdict)
+
+
 @pytest.mark.parametrize(("channels", "named"), [(("a", "a"), 0), (("a", "b"), 2), ((None, None), 2), ((None, "a"), 2)])
 def test_two_of_one_sensor_must_leave_what_chance_leaves(
     channels: tuple[str | None, ...], named: int, judged: dict[str, float]

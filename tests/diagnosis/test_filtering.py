@@ -1,0 +1,64 @@
+"""Filters of a test see the even rows that a rig sampled, whatever a recording keeps of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rollover import scenario
+from rollover.diagnosis.filtering import rows_of
+from rollover.diagnosis.simulator import DropSimulator
+from rollover.recording import Recording
+
+FAST = np.arange(-1000, 4001) * 1e-4  # 10 kHz
+CHANNELS = ("ground/force_normal", "striker/acceleration_z", "ground/sinkage")
+
+
+def recorded(stamps: NDArray[np.float64]) -> Recording:
+    """A recording of three channels of which two went through a filter; what is in them is no matter here."""
+    channels = {name: np.zeros(stamps.size) for name in CHANNELS}
+    return Recording(time=stamps, channels=channels, title="r", cfc=dict.fromkeys(CHANNELS[:2], 180))
+
+
+def predicted(stamps: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    found = DropSimulator(scenario.load("drop_test"), recorded(stamps)).predict({"effects.mass.added": 3.0}, 2e-4)
+    assert found is not None
+    return found
+
+
+@pytest.fixture(scope="module")
+def whole() -> dict[str, NDArray[np.float64]]:
+    return predicted(FAST)
+
+
+KEPT = {
+    "slow for the class": np.arange(FAST.size) % 10 == 0,
+    "a gap at the contact": (np.arange(FAST.size) < 900) | (np.arange(FAST.size) > 1250),
+    "uneven": np.random.default_rng(3).random(FAST.size) < 0.7,
+}
+
+
+@pytest.mark.parametrize("kept", KEPT.values(), ids=KEPT.keys())
+def test_what_is_kept_of_fast_rows_reads_as_these_do(
+    kept: NDArray[np.bool_], whole: dict[str, NDArray[np.float64]]
+) -> None:
+    """1 kHz asks for ten times the rows, of which CFC 180 needs two: its filter's own error is that of its rate."""
+    found = predicted(FAST[kept])
+    for name, values in whole.items():
+        off = np.abs(found[name] - values[kept]) / np.ptp(values)
+        if name == "ground/sinkage":
+            assert np.max(off) == 0.0, "no filter, no other rows"
+        else:
+            assert np.quantile(off, 0.98) < 2e-3
+            assert np.max(off) < 0.03, "beside the leap at the contact"
+
+
+def test_even_rows_that_are_fast_enough_are_as_they_are() -> None:
+    rows = rows_of(recorded(FAST))
+    assert rows.times is FAST
+    assert np.array_equal(rows.even, np.arange(FAST.size))
+    unfiltered = replace(recorded(FAST[KEPT["uneven"]]), cfc={})
+    assert rows_of(unfiltered).times.size == unfiltered.time.size
