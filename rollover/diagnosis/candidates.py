@@ -47,6 +47,7 @@ STRONG, ENDS = (0.35, 0.9), (0.0, 1.0)  # of the way from what changes nothing t
 SPREAD = (0.12, 0.3, 0.6)  # places of a depth, a length: where nothing is known to change nothing
 # what hits a wall does so at a moment that its travel sets: a tenth beside that, it explains nothing
 NARROW = {"payload-shift": {"travel": tuple(0.1 + 0.022 * k for k in range(36)), "friction": (0.25, 0.5)}}
+OTHER_UNIT = 5.0  # times as far as is simulated, from which on a channel may be in another unit than it says
 STEEP = 2.0  # tangent of the tilt at which a load slides
 
 
@@ -253,15 +254,12 @@ def coordinate(value: float, search: Search) -> float:
 
 
 def size_of(scenario: Scenario) -> tuple[float, float]:
-    """Mass and face over those of the reference striker, at most 1: what falls may be smaller than the ranges are for.
-
-    A vehicle has no face: 1.
-    """
+    """Mass and face over those of the reference striker, for which the ranges are; a vehicle has no face: 1."""
     vehicle = scenario.vehicle
     if not isinstance(vehicle, Striker):
         return min(vehicle.whole.mass / REFERENCE_MASS, 1.0), 1.0
     face = math.pi * vehicle.nose_radius**2 if vehicle.nose == "cone" else vehicle.face_length * vehicle.face_width
-    return min(vehicle.mass / REFERENCE_MASS, 1.0), min(face / REFERENCE_AREA, 1.0)
+    return vehicle.mass / REFERENCE_MASS, face / REFERENCE_AREA
 
 
 def candidates_of(
@@ -280,13 +278,13 @@ def candidates_of(
     for e in evidence:
         for s in e.signals:
             spans[s.channel] = max(spans.get(s.channel, 0.0), s.span)
-    found = []
+    found, times = [], _times(evidence)
     tried = set_up(scenario, evidence[0].recording) if scenario is not None and evidence else scenario
     for name, kind in EFFECTS.items():
         if name in switched_on or acts not in kind.acts or not kind.competes:
             continue
         if kind.kind == "sensor":
-            found += [c for channel in spans if (c := _sensor(name, kind, channel, spans))]
+            found += [c for channel in spans if (c := _sensor(name, kind, channel, spans, times))]
             continue
         sized = {p: _sized(s, kind.grows.get(p), size) for p, s in kind.search.items()}
         of_shape = SHAPES.get(name, ())
@@ -343,11 +341,12 @@ def _apart(value: Any, other: Any) -> list[float]:
 
 
 def _sized(search: Search, powers: tuple[float, float] | None, size: tuple[float, float]) -> Search:
-    """The range for what falls; a range at the reference stays itself to the last bit."""
-    if powers is None or size == (1.0, 1.0):
-        return search
-    factor = size[0] ** powers[0] * size[1] ** powers[1]
-    return Search(factor * search.low, factor * search.high, search.scale)
+    """The range for what falls: all of it smaller with what is smaller, and wider with what is larger in any way."""
+    mass, face = (0.0, 0.0) if powers is None else powers
+    whole = size[0] ** mass * size[1] ** face
+    smaller = min(size[0], 1.0) ** mass * min(size[1], 1.0) ** face
+    ends = (search.low * f for f in (whole, smaller)), (search.high * f for f in (whole, smaller))
+    return Search(min(ends[0]), max(ends[1]), search.scale)
 
 
 def _widened(search: Search, null: float | None) -> Search:
@@ -355,7 +354,21 @@ def _widened(search: Search, null: float | None) -> Search:
     return search._replace(low=search.low / FAINT) if search.scale == "log" and null == 0.0 else search
 
 
-def _sensor(name: str, kind: Any, channel: str, spans: Mapping[str, float]) -> Candidate | None:
+def _times(evidence: Sequence[Evidence]) -> dict[str, float]:
+    """How many times as far as the scenario has it each channel moves, the middle recording's."""
+    found: dict[str, list[float]] = {}
+    for e in evidence:
+        predicted = e.simulator.predict({}, 0.0) or {}
+        for s in e.signals:
+            simulated = float(np.ptp(predicted[s.channel][s.rows])) if s.channel in predicted else 0.0
+            if simulated > 0.0 and math.isfinite(simulated):
+                found.setdefault(s.channel, []).append(s.span / simulated)
+    return {channel: float(np.median(each)) for channel, each in found.items()}
+
+
+def _sensor(
+    name: str, kind: Any, channel: str, spans: Mapping[str, float], times: Mapping[str, float]
+) -> Candidate | None:
     search = dict(kind.search)
     span = spans[channel]
     length = describe(channel).unit in ("m", "rad")
@@ -363,6 +376,9 @@ def _sensor(name: str, kind: Any, channel: str, spans: Mapping[str, float]) -> C
         return None  # a scale is that of a position or a length, a gain that of all else
     if name == "sensor-misalignment" and not _across(channel, spans):
         return None
+    if name in ("sensor-scale", "sensor-gain") and not 1.0 / OTHER_UNIT < times.get(channel, 1.0) < OTHER_UNIT:
+        far = times[channel]  # millimetres read as metres, g as m/s2
+        search = {p: Search(s.low * min(far, 1.0), s.high * max(far, 1.0), s.scale) for p, s in search.items()}
     if name == "sensor-bias":
         search = {"bias": Search(-0.5 * span, 0.5 * span)}
     if name == "sensor-clipping":

@@ -17,6 +17,7 @@ from rollover.filters import filtered, least_rate
 from rollover.recording import Recording
 
 Array = NDArray[np.float64]
+CLOSE = 1e-3  # of a row's distance, within which an even row is a stamp
 UNEVEN = 0.02  # of the usual distance of two stamps, up to which they are even
 
 
@@ -53,6 +54,8 @@ def rows_of(recording: Recording) -> Rows:
         return Rows(times=stamps, stamps=all_of_them, even=all_of_them, step=step)
     fine = step / parts
     even = stamps[0] + fine * np.arange(math.ceil((stamps[-1] - stamps[0]) / fine - 1e-6) + 1)
+    beside = stamps[np.clip(np.searchsorted(stamps, even - CLOSE * fine), 0, stamps.size - 1)]
+    even = np.where(np.abs(even - beside) <= CLOSE * fine, beside, even)
     times, back = np.unique(np.concatenate([stamps, even]), return_inverse=True)
     return Rows(times=times, stamps=back[: stamps.size], even=back[stamps.size :], step=fine)
 

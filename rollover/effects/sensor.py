@@ -119,7 +119,7 @@ class SensorScale(Effect):
     """y = scale x: a position or length channel with a wrong scale."""
 
     channel: Annotated[str, "that is misread; a position or a length"] = "ground/sinkage"
-    scale: Annotated[float, Quantity("1", "what is read over what is", above=0, most=10)] = 1.02
+    scale: Annotated[float, Quantity("1", "what is read over what is", above=0, most=1e6)] = 1.02
 
     id = "sensor-scale"
     kind: ClassVar[Kind] = "sensor"
@@ -150,7 +150,7 @@ class SensorGain(Effect):
     """y = gain x: an amplifier that is not what its calibration says."""
 
     channel: Annotated[str, "that is misread"] = "ground/force_normal"
-    gain: Annotated[float, Quantity("1", "what is read over what is", least=-10, most=10)] = 1.03
+    gain: Annotated[float, Quantity("1", "what is read over what is", least=-1e6, most=1e6)] = 1.03
 
     id = "sensor-gain"
     kind: ClassVar[Kind] = "sensor"
