@@ -22,9 +22,10 @@ from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.digits import to_the_last_digit
 from rollover.diagnosis.empirical import offered, proposed
 from rollover.diagnosis.evidence import Evidence, doubted, doubted_beside, evidence_of, left_out
-from rollover.diagnosis.explain import SURE, Inquiry
+from rollover.diagnosis.explain import SURE
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import yardstick
+from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.loudness import with_loudness
 from rollover.diagnosis.overturn import full_runs
 from rollover.diagnosis.phases import phases_of

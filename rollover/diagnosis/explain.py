@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis import colour
-from rollover.diagnosis.blocks import Block
-from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.crew import Crew, Job
+from rollover.diagnosis.crew import Job
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.effort import Effort
 from rollover.diagnosis.fit import NOISE_LEFT, Fitted, Judge
 from rollover.diagnosis.gate import Gate, p_value
 from rollover.diagnosis.holdout import foretold, held_out, worse
+from rollover.diagnosis.inquiry import Groups, Inquiry, Phases
+from rollover.diagnosis.otherwise import begun_otherwise, from_there, one_each, shaped_too, timed_too
 from rollover.diagnosis.screening import ELSEWHERE, Screened, begun, is_far, kin, promising, screen, spread
 
 Array = NDArray[np.float64]
@@ -25,12 +24,6 @@ WITHIN = 6.0  # times what the best leaves, up to which a first fit is followed 
 RIVALS = 0.4  # of the best's gain: a first fit that gains less is no rival, where fits cost much
 HOPEFUL = 0.05  # of the best score, below which none is fitted where fits cost much
 CROOKED = 100.0  # times what the best leaves, up to which a fit of two parameters is polished
-RUGGED = 2.0  # misfit over the noise that the best leaves, from which on there may be something behind a cliff
-LEADS = 1.5  # times what the best leaves, up to which it is looked for
-MOSTLY = 0.25  # of what the middle recording is left with by the best, below which an effect is the better one there
-TIED = 1.2  # times what the best leaves, up to which time shifts are tried out
-SHAPED = 4.0  # times what the best leaves, up to which an effect's shape is fitted too
-WORTH = 12.0  # gain that pays for a shape
 ROUGHNESS = 0.002  # of the misfit
 WITHIN_ONE = 1.0  # standard errors within which the simpler one is preferred
 APART = 2.0  # standard errors beyond which a rival is excluded
@@ -38,31 +31,6 @@ NEARLY_NOISE = 1.3  # misfit over the noise up to which its own colour is believ
 
 LIKE_NOISE = 2.2  # misfit over the noise up to which it may be noise that was underrated
 SURE = 1e-3  # p-value below which there is a mismatch
-
-Groups = Sequence[Sequence[int]]
-Progress = Callable[[str], None]
-Phases = Sequence[Sequence[tuple[float, str]]]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Inquiry:
-    """What every step of a selection is made with: recordings, effects, what is held out in turn, and who works."""
-
-    judge: Judge
-    candidates: Sequence[Candidate]
-    groups: Groups
-    phases: Phases
-    say: Progress
-    crew: Crew
-
-    def free(self, current: Fitted) -> list[Candidate]:
-        """Candidates that an explanation does not hold yet."""
-        used = {c.key for c in current.candidates}
-        return [c for c in self.candidates if c.key not in used]
-
-    def fits(self, jobs: Sequence[Job]) -> list[Fitted | None]:
-        """What comes of jobs, in their order."""
-        return self.crew.fits(self.judge, jobs, self.say)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,20 +85,19 @@ def step(inquiry: Inquiry, base: Fitted, looked: Gate) -> Step | None:
     if base.candidates and not judge.effort.thrifty:
         fits += _from_base(inquiry, base, fits, looked)
     fits.sort(key=lambda f: f.left)
-    if fits[0].left > RUGGED**2 * count and not judge.effort.thrifty:
-        fits = _combed(inquiry, fits, shifts)
-        fits = _but_for_some(inquiry, base, fits, looked, shifts)
+    if not judge.effort.thrifty:
+        fits = begun_otherwise(inquiry, base, fits, looked, shifts)
     # where a threshold makes the way crooked, the nearer ones are followed to the end; of what explains the best alone
     able = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < CROOKED * fits[0].left]
     alone = [f for f in able[:1] if f is fits[0] and not base.candidates]
     near = able[: judge.effort.polishes] if fits[0].left > NOISE_LEFT**2 * count else alone
     if near and judge.effort.polishes:
-        polished = inquiry.fits([_from(f, "polish") for f in near])
+        polished = inquiry.fits([from_there(f, "polish") for f in near])
         others = [f for f in fits if not any(f is one for one in near)]
         fits = others + [new or old for new, old in zip(polished, near, strict=True)]
-    fits = _one_each(fits) if judge.effort.thrifty else _shaped(inquiry, _one_each(fits))
+    fits = one_each(fits) if judge.effort.thrifty else shaped_too(inquiry, one_each(fits))
     if not judge.effort.thrifty:
-        fits = _timed(inquiry, fits)
+        fits = timed_too(inquiry, fits)
     if weighed(judge, fits[0], inquiry.phases):
         base, fits = judge.again(base), [judge.again(f) for f in fits]
     fits.sort(key=lambda f: held_out(f, groups).left.sum())
@@ -143,41 +110,6 @@ def step(inquiry: Inquiry, base: Fitted, looked: Gate) -> Step | None:
         phi, score = phi * judge.per_error, max(score, base.left - least)
     p = p_value(score / phi, looked.null)
     return Step(base=base, fitted=fits[0], p_value=p, rivals=tuple(fits), screened=tuple(screened))
-
-
-def _combed(inquiry: Inquiry, fits: Sequence[Fitted], shifts: Sequence[float]) -> list[Fitted]:
-    """The fits, best first, the best of two parameters begun anew along the second if it leads or nearly so."""
-    able = [f for f in fits if len(f.candidates[-1].search) == 2 and f.left < LEADS * fits[0].left][:1]
-    jobs = [Job(how="comb", candidates=f.candidates, start=f.x, shifts=tuple(shifts)) for f in able]
-    tried = zip(inquiry.fits(jobs), able, strict=True)
-    better = [new if new is not None and new.left < old.left else old for new, old in tried]
-    return sorted([*better, *(f for f in fits if not any(f is one for one in able))], key=lambda f: f.left)
-
-
-def _but_for_some(
-    inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: Gate, shifts: Sequence[float]
-) -> list[Fitted]:
-    """The fits, best first, with those whose shape may be wrong for a few recordings alone, fitted together with it.
-
-    Such a one meets most recordings far better than the best does, by the middle one, and leaves a few altogether: a
-    face that is held lets go or does not.
-    """
-    usual, jobs = _middle(fits[0].blocks), []
-    for c in (c for c in inquiry.free(base) if c.shapes):
-        met = []
-        for start in (*looked.starts.get(c.key, ()), *c.starts()):
-            x = (*base.x, *start)
-            blocks = [inquiry.judge.block(r, (*base.candidates, c), x, s, 0.0) for r, s in enumerate(shifts)]
-            if all(b is not None for b in blocks):
-                met.append((_middle([b for b in blocks if b is not None]), x))
-        if met and min(met)[0] < MOSTLY * usual:
-            jobs.append(Job(how="scan", candidates=(*base.candidates, c), start=min(met)[1], shifts=tuple(shifts)))
-    return sorted([*fits, *(f for f in inquiry.fits(jobs) if f is not None)], key=lambda f: f.left)
-
-
-def _middle(blocks: Sequence[Block]) -> float:
-    """What the middle one of several recordings leaves per sample."""
-    return float(np.median([b.normal()[2] / b.residual.size for b in blocks]))
 
 
 def _from_base(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: Gate) -> list[Fitted]:
@@ -206,36 +138,6 @@ def weighed(judge: Judge, fitted: Fitted, phases: Phases) -> bool:
         return True
     judge.weigh(before)
     return False
-
-
-def _timed(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
-    """The fits, the near ones with their time shifts tried out, best first."""
-    least = min(f.left for f in fits)
-    near = [f for f in fits if f.left < TIED * least]
-    timed = inquiry.fits([_from(f, "time") for f in near])
-    others = [f for f in fits if f.left >= TIED * least]
-    return sorted([new or old for new, old in zip(timed, near, strict=True)] + others, key=lambda f: f.left)
-
-
-def _from(f: Fitted, how: Literal["polish", "shape", "time"]) -> Job:
-    return Job(how=how, candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks))
-
-
-def _shaped(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
-    """The fits with shapes fitted too where that pays, best first."""
-    best = min(f.left for f in fits)
-    size = sum(b.residual.size for b in fits[0].blocks)
-    held = [held_out(f, inquiry.groups).total ** 2 for f in fits]
-    able = [
-        f
-        for f, ahead in zip(fits, held, strict=True)
-        if f.candidates[-1].shapes and (f.left < SHAPED * best or ahead < SHAPED * min(held))
-    ]
-    found = list(fits)
-    for old, new in zip(able, inquiry.fits([_from(f, "shape") for f in able]), strict=True):
-        if new is not None and new.left < old.left - WORTH * max(1.0, best / size):
-            found[found.index(old)] = new
-    return sorted(found, key=lambda f: f.left)
 
 
 def _first_fits(
@@ -270,7 +172,7 @@ def _first_fits(
     fits.sort(key=lambda f: f.left)
     worth = [f for k, f in enumerate(fits) if k < judge.effort.leaders or f.left < WITHIN * fits[0].left]
     if judge.effort.thrifty and fits:
-        worth = _one_each(worth) + _elsewhere(worth)
+        worth = one_each(worth) + _elsewhere(worth)
         before = [judge.block(r, base.candidates, base.x, shifts[r], 0.0) for r in few]  # clocks where they are held
         as_it_is = sum(b.total for b in before if b is not None)
         worth = [f for f in worth if as_it_is - f.left >= RIVALS * (as_it_is - fits[0].left)]
@@ -335,14 +237,6 @@ def _elsewhere(fits: Sequence[Fitted]) -> list[Fitted]:
     lead = fits[0]
     same = [f for f in fits[1:] if f.candidates[-1].key == lead.candidates[-1].key]
     return [f for f in same if max(abs(a - b) for a, b in zip(f.x, lead.x, strict=True)) > 0.5 * ELSEWHERE][:1]
-
-
-def _one_each(fits: Sequence[Fitted]) -> list[Fitted]:
-    """The best fit of each candidate."""
-    best: dict[str, Fitted] = {}
-    for f in sorted(fits, key=lambda f: f.left):
-        best.setdefault(f.candidates[-1].key, f)
-    return list(best.values())
 
 
 def moves(judge: Judge, base: Fitted, fitted: Fitted) -> float:

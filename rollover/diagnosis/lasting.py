@@ -8,10 +8,11 @@ from typing import Any
 
 from rollover.diagnosis.candidates import akin, physical
 from rollover.diagnosis.chaos import SENT, is_other, too_many
-from rollover.diagnosis.explain import Groups, Step
+from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate, p_value
 from rollover.diagnosis.holdout import held_out
+from rollover.diagnosis.inquiry import Groups
 from rollover.diagnosis.intervals import intervals
 from rollover.diagnosis.screening import begun
 from rollover.diagnosis.settle import left_of_means, settled

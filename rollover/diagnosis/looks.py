@@ -9,9 +9,9 @@ from itertools import zip_longest
 import numpy as np
 
 from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.explain import Groups
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate, gate, p_value
+from rollover.diagnosis.inquiry import Groups
 from rollover.diagnosis.lasting import SPOKEN, unbent
 from rollover.diagnosis.refine import left_at
 from rollover.diagnosis.screening import begun, spread

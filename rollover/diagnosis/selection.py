@@ -13,10 +13,11 @@ from rollover.diagnosis.candidates import Candidate, is_one_sensor
 from rollover.diagnosis.chaos import is_other
 from rollover.diagnosis.crew import Job
 from rollover.diagnosis.detect import Mismatch, mismatch_of
-from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Groups, Inquiry, Phases, Step, moves, step, weighed
+from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Step, moves, step, weighed
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import held_out
+from rollover.diagnosis.inquiry import Groups, Inquiry, Phases
 from rollover.diagnosis.lasting import NEEDED, astray, backed, begun_anew, lasting
 from rollover.diagnosis.looks import look, look_again
 from rollover.diagnosis.refine import conditioned, is_doubtful, polish, timed, traced, without

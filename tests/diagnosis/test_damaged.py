@@ -105,3 +105,11 @@ def test_recordings_that_contradict_each_other_are_not_explained() -> None:
     assert not found.effects, found.sentence
     assert found.verdict == "cannot-tell"
     assert "They contradict each other: v1.5, v1.5 again: one condition" in found.sentence
+
+
+def test_millimetres_that_say_they_are_metres_are_the_scale_of_their_channel() -> None:
+    made = recorded({}, 25, speeds=(1.0, 2.0, 3.0))
+    found = diagnose(scenario(), [(n, replace(r, channels={**r.channels, DEPTH: 1e3 * r[DEPTH]})) for n, r in made])
+    assert [(e.id, e.channel) for e in found.effects] == [("sensor-scale", DEPTH)], found.sentence
+    scale = found.effects[0].parameters["scale"]
+    assert scale.low < 1e3 < scale.high

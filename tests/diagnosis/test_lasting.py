@@ -16,10 +16,11 @@ from rollover.diagnosis.blocks import Block, Fitted
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.chaos import Course
 from rollover.diagnosis.effort import RUNS
-from rollover.diagnosis.explain import Inquiry, Step, _chosen
+from rollover.diagnosis.explain import Step, _chosen
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import foretold, held_out
+from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.lasting import astray, backed, before_the_blow, begun_anew, is_there, lasting, outlasts, unbent
 from rollover.diagnosis.screening import Screened, kin
 from rollover.diagnosis.settle import left_of_means

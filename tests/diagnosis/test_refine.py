@@ -10,8 +10,9 @@ import pytest
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.candidates import candidates_of, coordinate
 from rollover.diagnosis.crew import Crew
-from rollover.diagnosis.explain import Inquiry, Step
+from rollover.diagnosis.explain import Step
 from rollover.diagnosis.gate import Gate
+from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.refine import combed, shaped, traced
 from rollover.diagnosis.screening import Screened

@@ -13,9 +13,10 @@ from rollover.diagnosis.candidates import Candidate, coordinate
 from rollover.diagnosis.crew import Crew, Job
 from rollover.diagnosis.effort import DROPS, RUNS, Effort
 from rollover.diagnosis.evidence import Evidence, Signal
-from rollover.diagnosis.explain import Inquiry, Step, _first_fits
+from rollover.diagnosis.explain import Step, _first_fits
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import Gate
+from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.screening import Screened, screen
 from rollover.diagnosis.settle import settled
 from rollover.effects import Search

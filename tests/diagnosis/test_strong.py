@@ -14,8 +14,9 @@ from rollover.diagnosis.blocks import Fitted
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.crew import Crew, Job
 from rollover.diagnosis.effort import RUNS
-from rollover.diagnosis.explain import Inquiry, _smoothly
+from rollover.diagnosis.explain import _smoothly
 from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.screening import screen
 from rollover.effects import Search
 from tests.diagnosis import test_chaos

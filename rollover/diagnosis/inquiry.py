@@ -1,0 +1,35 @@
+"""What every step of a selection is made with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.crew import Crew, Job
+from rollover.diagnosis.fit import Fitted, Judge
+
+Groups = Sequence[Sequence[int]]
+Progress = Callable[[str], None]
+Phases = Sequence[Sequence[tuple[float, str]]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inquiry:
+    """What every step of a selection is made with: recordings, effects, what is held out in turn, and who works."""
+
+    judge: Judge
+    candidates: Sequence[Candidate]
+    groups: Groups
+    phases: Phases
+    say: Progress
+    crew: Crew
+
+    def free(self, current: Fitted) -> list[Candidate]:
+        """Candidates that an explanation does not hold yet."""
+        used = {c.key for c in current.candidates}
+        return [c for c in self.candidates if c.key not in used]
+
+    def fits(self, jobs: Sequence[Job]) -> list[Fitted | None]:
+        """What comes of jobs, in their order."""
+        return self.crew.fits(self.judge, jobs, self.say)
