@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from rollover.diagnosis.evidence import Evidence, groups_of
 
 Array = NDArray[np.float64]
-PLACES = 121  # time shifts that are tried; then a quarter as many, so much more finely, beside the best
-FINER = 2
-LEAPS = 3  # samples beside a leap
+TICK, FINER, PLACES = 1e-3, (1e-4, 1e-5), 21  # s, by which time shifts are tried; then, so many, beside the best
+LATE = 0.1  # s that a clock may be late which says that it is right: then it is the clock that is to be named
 WIDTH = 3.0  # times its prior that a time shift may be
+LEAPS = 3  # samples beside a leap
 SHOWS = 1.2  # times the noise, from which on there is scatter
 WORTH_SAYING, CONTRADICTING = 0.02, 0.1  # of the range
 LEAST = 16  # samples in common, below which nothing is said
@@ -100,11 +100,9 @@ def _difference(a: Evidence, b: Evidence, channel: str) -> float | None:
         # a leap lies between two samples of each, and not at the same place
         return float(np.mean(np.sort(apart)[: apart.size - LEAPS]))
 
-    wide = WIDTH * float(np.hypot(a.shift_prior, b.shift_prior))
-    shifts = np.linspace(-wide, wide, PLACES)
-    for _ in range(FINER):
-        best = min(shifts, key=left)
-        wide = 2.0 * wide / (PLACES - 1)
-        shifts = best + np.linspace(-wide, wide, PLACES // 4)
+    wide = max(WIDTH * float(np.hypot(a.shift_prior, b.shift_prior)), LATE)
+    shifts = np.arange(-wide, wide + TICK, TICK)
+    for finer in FINER:
+        shifts = min(shifts, key=left) + finer * (np.arange(PLACES) - PLACES // 2)
     power = min(map(left, shifts))
     return 0.5 * power if np.isfinite(power) else None

@@ -115,6 +115,14 @@ def test_repeats_that_differ_are_scatter_and_what_was_done_once_is_given_it() ->
     assert all(s.scatter == 0.0 for e in with_scatter(evidence(one)) for s in e.signals)
 
 
+def test_repeats_whose_clocks_are_apart_do_not_differ_by_their_leaps() -> None:
+    """Accelerations that jump between two samples, 60 ms apart in time: neither is scatter."""
+    channels = (DEPTH, "striker/acceleration_z")
+    one, two = (recorded({}, seed, speeds=(3.0,), channels=channels, noise=0.003)[0][1] for seed in (1, 2))
+    found = with_scatter(evidence([("one", one), ("late", replace(two, time=two.time + 0.06))]))
+    assert [s.scatter for e in found for s in e.signals] == [0.0] * 4
+
+
 def test_recordings_of_one_condition_are_left_out_one_by_one() -> None:
     found = evidence([*recorded({}, 1, speeds=(2.0,)), *recorded({}, 2, speeds=(2.0,))])
     assert groups_of(found) == [[0, 1]]
