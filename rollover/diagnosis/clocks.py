@@ -80,6 +80,13 @@ def mistimed(judge: Judge, fitted: Fitted) -> list[tuple[str, float]]:
     return [(name, at) for name, at in found if at is not None]
 
 
+def is_all_by_clocks(judge: Judge, fitted: Fitted) -> bool:
+    """Whether such shifts are all that separates the recordings from a fit: each else is met as it stands."""
+    late = {name for name, _ in mistimed(judge, fitted)}
+    others = [b for e, b in zip(judge.evidence, fitted.blocks, strict=True) if e.name not in late]
+    return bool(late) and all(b.normal()[2] < MEETS * b.residual.size for b in others)
+
+
 def by_clock(found: Sequence[tuple[str, float]]) -> str:
     """What of `mistimed` stands behind the verdict."""
     each = [f"{abs(s) * 1e3:.3g} ms {'late' if s > 0.0 else 'early'} ({name})" for name, s in found]

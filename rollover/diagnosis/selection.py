@@ -11,6 +11,7 @@ import numpy as np
 from rollover.diagnosis.blocks import at_an_end, turned
 from rollover.diagnosis.candidates import Candidate, is_one_sensor
 from rollover.diagnosis.chaos import is_other
+from rollover.diagnosis.clocks import is_all_by_clocks
 from rollover.diagnosis.crew import Job
 from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Step, moves, step, weighed
@@ -89,7 +90,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     first: Step | None = None
     refuted = False
     for _ in range(MOST):
-        if is_tolerated(judge, current):
+        if is_tolerated(judge, current) or (not taken and not judge.effort.thrifty and is_all_by_clocks(judge, base)):
             break
         if looked.p_value() > CHANCE and is_enough(judge, current, left):
             break
