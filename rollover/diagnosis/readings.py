@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 WHOLE = 0.02  # of a step, by which a level may stray from a whole number of them
 LEVELS = 3  # that a digitised channel has at least
 ALIKE, PILE = 1e-9, 5  # of a value: equal; so often: the end of a range
+DITHERED = 0.03  # of half a step: less in common is none
 REPEATED = 0.5  # of the samples: with so many levels, or more, a channel has no steps that matter
 
 
@@ -39,16 +40,18 @@ def pile(values: Array) -> float:
 
 
 def digitised(e: Evidence, recording: Recording) -> Evidence:
-    """The evidence with half a step of its channels, as recorded, as an error that neighbouring samples share.
+    """The evidence with what rounding to the steps of its channels, as recorded, makes neighbouring samples share.
 
-    Noise larger than the step makes the error of each sample its own, and part of the noise. Where values pile up at
-    the end of a range is kept too: samples that are averaged no longer show it.
+    Noise makes the error of each sample its own, and part of the noise: with s of it before a step d, Widrow's theorem
+    leaves exp(-2 pi^2 s^2/d^2) of half a step in common. Where values pile up at the end of a range is kept too:
+    samples that are averaged no longer show it.
     """
     signals = []
     for s in e.signals:
         step = resolution(recording.channels[s.channel])
-        dithered = s.noise * np.sqrt(e.averaged) > step
-        error, end = 0.0 if dithered else 0.5 * step, pile(recording.channels[s.channel])
+        own = max(s.noise**2 * e.averaged - step**2 / 12.0, 0.0)
+        share = np.exp(-2.0 * np.pi**2 * own / step**2) if step > 0.0 else 0.0
+        error, end = (0.5 * step * share if share > DITHERED else 0.0), pile(recording.channels[s.channel])
         signals.append(replace(s, step=2.0 * error, scatter=error, sigma=float(np.hypot(s.sigma, error)), end=end))
     return replace(e, signals=tuple(signals))
 
