@@ -36,7 +36,7 @@ from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing,
 from rollover.diagnosis.scores import before_a_blow, judged
 from rollover.diagnosis.selection import Explanation, decided, explained, matters
 from rollover.diagnosis.simulator import blow_of, set_up
-from rollover.diagnosis.statements import by_steps, closest, considered, named, noise, places, sentence
+from rollover.diagnosis.statements import by_steps, closest, considered, is_none, named, noise, places, sentence
 from rollover.diagnosis.verdict import Degree, Diagnosis
 from rollover.drop import unfit
 from rollover.effects import EFFECTS, spoken
@@ -99,7 +99,13 @@ def diagnose(
     inquiry = Inquiry(judge=judge, candidates=candidates, groups=groups, phases=phases, say=say, crew=crew)
     explanation = explained(inquiry, base)
     explanation, verdict = decided(judge, explanation, groups, phases)
-    explanation, kept = eased_beside(judge, explanation, kept, phases)
+    held, (explanation, there) = judge.evidence, eased_beside(judge, explanation, kept, phases)
+    effects = named(judge, explanation, groups) if verdict in ("parameter", "sensor", "missing-physics") else ()
+    if len(effects) > 1 and any(is_none(e) for e in effects):
+        # one of them may as well be nothing, and without it the others do not explain what there is
+        explanation, verdict, effects, there = explanation.refused(), "unexplained", (), kept
+        judge.weigh(held)
+    kept = there
     found = list(judge.evidence)
     before, after = explanation.before, explanation.after if explanation.parts else explanation.before
     set_ups = [set_up(scenario, e.recording) for e in found]
@@ -123,7 +129,6 @@ def diagnose(
     if verdict == "no-mismatch" and (contrary or _is_weak(detectable)):
         verdict = "cannot-tell"
     h_before, h_after = (judged(judge, f, kept, groups) for f in (explanation.base, explanation.fitted))
-    effects = named(judge, explanation, groups) if verdict in ("parameter", "sensor", "missing-physics") else ()
     early = before_a_blow(judge.evidence, explanation.base), before_a_blow(judge.evidence, explanation.fitted)
     remains = after.p_value < SURE and matters(judge, explanation.fitted, after)
     training = tuple(e.name for e in found)

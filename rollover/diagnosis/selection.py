@@ -57,6 +57,10 @@ class Explanation:
     first: Step | None = None
     refuted: bool = False  # whether the best candidate's gain did not outlast the scatter of its own runs
 
+    def refused(self) -> Explanation:
+        """The same with nothing held to be found."""
+        return replace(self, parts=(), fitted=self.base, after=self.before)
+
     @property
     def p_value(self) -> float:
         """Of "nothing but noise": min over two tests of 1 - (1 - p)^(1/a), a their shares of all errors (Sidak).
@@ -309,7 +313,7 @@ def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) ->
     as may be, or two of one sensor, more surely so: they can be bent to more. One alone also where it takes nearly all.
     """
     if is_any_curve(found.fitted.candidates):
-        return replace(found, parts=(), fitted=found.base), "unexplained"
+        return found.refused(), "unexplained"
     least = MANY if len(found.parts) == MOST or is_one_sensor(found.fitted.candidates) else SURE
     is_whole = found.after.p_value > least or not matters(judge, found.fitted, found.after)
     # what a tolerance allows has structure too
@@ -329,7 +333,7 @@ def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) ->
     significant = found.before.p_value < SURE and matters(judge, found.base, found.before)
     significant = significant and not is_tolerated(judge, found.base) and not is_slight(judge, found.first, phases)
     verdict: Verdict = "unexplained" if significant or found.parts else "no-mismatch"
-    return replace(found, parts=(), fitted=found.base), verdict
+    return found.refused(), verdict
 
 
 def is_any_curve(candidates: Sequence[Candidate]) -> bool:

@@ -62,6 +62,15 @@ def named(judge: Judge, found: Explanation, groups: Sequence[Sequence[int]]) -> 
     return tuple(sorted(effects, key=lambda n: (n.id, n.channel) != (first.id, first.channel)))
 
 
+def is_none(effect: Named) -> bool:
+    """Whether all that an effect is may be none of it: the interval of each number that has a null holds that."""
+    nulls = {p: EFFECTS[effect.id].null.get(p) for p in effect.parameters}
+    known = {p: null for p, null in nulls.items() if isinstance(null, (int, float))}
+    return bool(known) and all(
+        effect.parameters[p].low <= null <= effect.parameters[p].high for p, null in known.items()
+    )
+
+
 def by_steps(effects: Sequence[Named]) -> list[str]:
     """What the scenario's own steps would have said of values, where that is far off beside their intervals."""
     return [
