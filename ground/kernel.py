@@ -60,6 +60,7 @@ GROWTH_END, FADE = 15, 16  # sinkage at which the growth ends, and over which it
 EFFECT_PLACES = 17  # numbers of the compiled terms follow, TERM_PLACES for each
 TERM_PLACES = 8
 
+DOUBLED, HALVED = 12, 50  # times, of the way from a rut to where its line meets another curve
 SAME = 1e-10  # m: sinkages closer than this are one, so that rounding does not switch a loaded element to its line
 
 # outcomes of a commit, as bits
@@ -167,6 +168,30 @@ def set_line(law: Any, p: Any, s: Any, row: Any, z: float) -> None:
 
 
 @compiled
+def meet_again(law: Any, p: Any, s: Any, row: Any) -> None:
+    """Let the line of a rut end where it meets the loading curve of another hit: K_u (z - z_r) = F(z).
+
+    The ground learns of the new hit's speed where it yields anew, not before.
+    """
+    if row[LINE_K] <= 0.0:
+        set_line(law, p, s, row, row[LINE_Z])
+        return
+    rut = rut_depth(row)
+    low, high = rut, row[LINE_Z]
+    for _ in range(DOUBLED):
+        if row[LINE_K] * (high - rut) >= loading_force(law, p, s, max(high - row[SPREAD], 0.0), 0.0):
+            break
+        low, high = high, rut + 2.0 * (high - rut)
+    for _ in range(HALVED):
+        middle = 0.5 * (low + high)
+        if row[LINE_K] * (middle - rut) >= loading_force(law, p, s, max(middle - row[SPREAD], 0.0), 0.0):
+            high = middle
+        else:
+            low = middle
+    row[LINE_Z], row[LINE_F] = high, row[LINE_K] * (high - rut)
+
+
+@compiled
 def set_rest_line(row: Any, mass: float) -> None:
     """(6) read literally, K_b3 = 9.81 m_s / z_p,max: a secant through the origin, so the force drops to the weight."""
     if row[LINE_Z] > 0.0:
@@ -244,8 +269,7 @@ def begin(law: Any, p: Any, s: Any, row: Any, state: Any, mass: float, start: fl
     row[GROWING] = 1.0 if p[law[EFFECTS] + GROWTH] > 0.0 else 0.0
     if law[PLASTIC] != 0:
         if row[LINE_Z] > 0.0 and law[REST_STIFFNESS] == 0:
-            # a second hit starts from the rut, on a reloading line that meets this hit's loading curve
-            set_line(law, p, s, row, row[LINE_Z])
+            meet_again(law, p, s, row)
         if start > rut_depth(row) + 1e-6 and start > row[LINE_Z] * (1.0 - 1e-9):
             enter_from_the_side(law, p, s, row, start, 0.0)
         if row[SINKAGE] < row[LINE_Z]:

@@ -56,7 +56,11 @@ CHANNELS: dict[str, Channel] = {
             name="ground/sinkage", unit="m", meaning="of the deepest element in contact, positive down; 0 where none is"
         ),
         Channel(name="ground/contact_area", unit="m2", meaning="of the elements that are in contact"),
-        Channel(name="striker/position_z", unit="m", meaning="of the striker's face, world"),
+        Channel(
+            name="striker/position_z",
+            unit="m",
+            meaning="of the striker's face, world, 0 on the ground; travel of its body, if its nose gives way",
+        ),
         Channel(name="striker/velocity_z", unit="m/s", meaning="world"),
         Channel(name="striker/acceleration_z", unit="m/s2", meaning="world, coordinate acceleration"),
         *_axes("chassis/position", "m", "centre of mass, world"),

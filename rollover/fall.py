@@ -182,10 +182,10 @@ def hit(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any) -> float
 
 
 @compiled
-def settle_one(law: Any, p: Any, row: Any, state: Any, nose: float) -> None:
-    """Give an arrested element its dashpot, 2 K_u/omega of what stands on it (see `rollover.step.settle`)."""
+def settle_one(law: Any, p: Any, row: Any, state: Any, mass: float) -> None:
+    """Give an arrested element its dashpot, 2 K_u/omega of all that stands on it (see `rollover.step.settle`)."""
     if state[MODE] == UNLOADING and row[LINE_C] == 0.0 and row[LINE_K] > 0.0:
-        omega = math.sqrt(row[LINE_K] * row[AREA] / REFERENCE_AREA / (nose + row[MASS_B]))
+        omega = math.sqrt(row[LINE_K] * row[AREA] / REFERENCE_AREA / (mass + row[MASS_B]))
         row[LINE_C] = 2.0 * p[law[EFFECTS] + REBOUND_DAMPING] * row[LINE_K] / omega
 
 
@@ -371,7 +371,7 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
                 row[MASS_B], row[GROWING] = 0.0, 0.0
                 if law[PLASTIC] == 0:
                     row[LINE_Z] = 0.0  # no rut stays
-        settle_one(law, p, row, state, f[NOSE])
+        settle_one(law, p, row, state, f[MASS])
         stuck = is_stuck(law, p, s, row, state, f, y, now)
         if stuck:
             y[1], y[3] = 0.0, 0.0

@@ -114,7 +114,7 @@ from rollover.tables import (
     ZDOT,
     Z,
 )
-from rollover.terms import finish_terms
+from rollover.terms import BETWEEN, finish_terms
 from rollover.touch import drop_mass, note_event, touch
 from rollover.vectors import depth_acceleration, depth_row, place, to_world, velocity
 
@@ -207,7 +207,7 @@ def settle(t: Any) -> None:
 
     c = 2 K_u / omega with omega^2 the Rayleigh quotient of the unloading stiffnesses of all elements under the
     body against mass and co-moving masses, for the motion that a push through them gives; for one element this
-    is c = 2 sqrt(K_u (m_s + m_b1)).
+    is c = 2 sqrt(K_u (m_s + m_b1)). What stands on a nose that gives way moves along with it here.
     """
     nb6 = t.mass.shape[0]
     for body in range(t.pose.shape[0]):
@@ -228,6 +228,10 @@ def settle(t: Any) -> None:
                 for k in range(6):
                     g[6 * body + k] += m[LINE_K] * m[AREA] / REFERENCE_AREA * J[k]
         motion = times(mobility(t), g)
+        for i in range(t.term_i.shape[0]):
+            kind, nose, behind = t.term_i[i]
+            if kind == BETWEEN and nose == body:
+                motion[6 * behind : 6 * behind + 6] = motion[6 * body : 6 * body + 6]
         inertia, stiffness = dot(motion, times(t.mass, motion)), 0.0
         for a in range(t.counts[ACTIVE]):
             i = t.active[a]

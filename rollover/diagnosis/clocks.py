@@ -202,7 +202,7 @@ def _early(judge: Judge, r: int, raw: Array, shift: float) -> float:
     for s, part in e.spans():
         time = e.recording.time[s.rows] - shift - e.simulator.contact
         after = time[time > 0.0][LEAST - 1 : LEAST]
-        inside = time < max(SOON, *after)
+        inside = time < max([SOON, *after])  # a record may end before
         sigma = np.hypot(s.sigma, TRUSTED * (raw[part] - raw[part][0]))
         total += _worth(s) * float(np.sum((((s.values - raw[part]) / sigma)[inside]) ** 2))
     return total

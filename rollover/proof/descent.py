@@ -199,7 +199,7 @@ def descend(rig: Rig, start: float, end: float) -> Descent:
             vb = v if rig.spring <= 0.0 else vb
             origin, mode = x, LOADING
             if line is not None:
-                line = _line(rig, curve, t, line.depth, line.dashpot)
+                line = _met_again(line, curve, t)
                 mode, x = LINE, max(x, line.rut)
         growth = rig.growth if growing and mode == LOADING else 0.0
         stage, happened = _stage(rig, mode, t, end, (x, v, xb, vb, memory), soil, growth, origin, curve, line)
@@ -211,7 +211,7 @@ def descend(rig: Rig, start: float, end: float) -> Descent:
         if happened == "deepest":
             assert curve is not None
             line = _line(rig, curve, t, x, 0.0)
-            critical = 2.0 * math.sqrt(line.stiffness * (rig.nose + soil))
+            critical = 2.0 * math.sqrt(line.stiffness * (rig.mass + soil))
             line = _line(rig, curve, t, x, rig.unloading_ratio * critical)
             mode, x, v = LINE, x - NUDGE, 0.0
         elif happened == "deeper":
@@ -233,6 +233,20 @@ def descend(rig: Rig, start: float, end: float) -> Descent:
 def _line(rig: Rig, curve: Curve, t: float, depth: float, dashpot: float) -> Line:
     force = curve(t, depth, 0.0)
     return Line(depth=depth, force=force, stiffness=force / (rig.recovery * depth), dashpot=dashpot)
+
+
+def _met_again(line: Line, curve: Curve, t: float) -> Line:
+    """The line of a rut up to where it meets another hit's loading curve."""
+    from scipy.optimize import brentq
+
+    def over(depth: float) -> float:
+        return line.stiffness * (depth - line.rut) - curve(t, depth, 0.0)
+
+    far = line.depth
+    while over(far) < 0.0:
+        far += line.depth - line.rut
+    depth = float(brentq(over, line.rut, far, xtol=1e-13))
+    return replace(line, depth=depth, force=line.stiffness * (depth - line.rut))
 
 
 def _approach(rig: Rig, start: float) -> Stage:

@@ -103,3 +103,31 @@ def test_second_hit_starts_from_the_rut() -> None:
     assert halfway == pytest.approx(0.5 * top, rel=1e-9)
     row[LINE_C] = 1e5
     assert normal_force(told, p, s, row, 0.099, -1.0) == 0.0  # never a pull, however fast it leaves
+
+
+@pytest.mark.parametrize("speed", [0.5, 2.0, 3.4])
+def test_a_second_hit_climbs_the_line_of_the_first_to_its_own_curve(speed: float) -> None:
+    """Below, the ground does not know the new speed: K_u (z - z_r) up to where it meets z K'(z, v_s) of this hit."""
+    from ground.kernel import LINE_K, LINE_Z, MODE, STATE_COLUMNS, TOUCH_SPEED, begin, commit, normal_force
+    from ground.law import touched
+    from ground.settings import settings
+    from ground.ye import Ye2006
+
+    law, row, state = Ye2006(), np.zeros(COLUMNS), np.zeros(STATE_COLUMNS, dtype=np.int64)
+    row[5] = 0.14 * 0.045
+    state[MODE] = 1
+    s = touched(law, speed=2.0)
+    told, p = settings(law)
+    for z in np.linspace(0.001, 0.1, 100):
+        commit(told, p, s, row, state, z, 1.0, 1e-3, 132.0)
+    commit(told, p, s, row, state, 0.0999, -0.1, 1e-3, 132.0)
+    slope, first = row[LINE_K], normal_force(told, p, s, row, 0.0985, 0.0)
+    row[TOUCH_SPEED] = speed
+    begin(told, p, s, row, state, 132.0, 0.098)
+    assert row[LINE_K] == slope
+    assert normal_force(told, p, s, row, 0.0985, 0.0) == pytest.approx(first, rel=1e-12)
+    end, fresh = row[LINE_Z], touched(law, speed=speed)
+    virgin = np.zeros(COLUMNS)
+    virgin[5] = row[5]
+    assert slope * (end - 0.098) == pytest.approx(normal_force(told, p, fresh, virgin, end, 0.0), rel=1e-9)
+    assert (end > 0.1) == (speed < 2.0) or speed == 2.0
