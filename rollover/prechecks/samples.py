@@ -17,6 +17,7 @@ FLAT = 3  # samples exactly alike at the very top: what a peak that is measured 
 TURNS = 6  # times as long as beside it, that a digitised signal stays where it turns: 2/(sqrt 2 - 1), and some
 APART = 60  # samples within which a disturbance stands alone
 AROUND = 6  # samples on either side that say what a sample should be
+ALONE = 0.5  # of what a spike is off both sides, at least, that it is off each
 
 
 def clipping(t: Trace, unit: str) -> Iterator[Finding]:
@@ -124,7 +125,10 @@ def gaps(t: Trace) -> Iterator[Finding]:
 
 
 def spikes(t: Trace, unit: str) -> Iterator[Finding]:
-    """Single samples far from what a cubic through their neighbours says, where these agree."""
+    """Single samples far from what a cubic through their neighbours says, where these agree.
+
+    And from what those before and those after say, each by themselves: at a corner or a leap one side is right.
+    """
     if not t.regular or t.floor.sigma == 0.0 or t.values.size < FEWEST:
         return
     offsets = np.array([k for k in range(-AROUND, AROUND + 1) if k != 0])
@@ -137,6 +141,7 @@ def spikes(t: Trace, unit: str) -> Iterator[Finding]:
     quiet = inner[inner <= np.median(inner) * 6.0]
     scale = float(np.median(quiet)) / 0.6745
     limit = float(norm.isf(0.5 * CHANCE / t.values.size))
+    before, after = (np.linalg.pinv(np.vander(side, 3))[-1] for side in (offsets[:AROUND], offsets[AROUND:]))
     spread = np.eye(2 * AROUND) - basis @ np.linalg.pinv(basis)
     likely = t.floor.sigma * math.sqrt(2 * AROUND - 4)
     beyond = np.abs(error) > limit * scale
@@ -149,6 +154,9 @@ def spikes(t: Trace, unit: str) -> Iterator[Finding]:
         left = spread @ t.values[i + offsets]
         if np.linalg.norm(left) > 1.6 * likely or abs(error[i]) < np.abs(error[i + offsets[[5, 6]]]).max():
             continue  # something quick happens here, or the neighbour is the spike
+        sides = t.values[i] - np.array([before @ t.values[i - AROUND : i], after @ t.values[i + 1 : i + AROUND + 1]])
+        if np.min(sides * np.sign(error[i])) < ALONE * abs(error[i]):
+            continue  # the motion's own, on the way up or down from here
         yield Finding(
             check="spike",
             channel=t.channel,
