@@ -233,3 +233,13 @@ def test_a_channel_that_comes_far_too_early_is_looked_at_there_where_runs_are_de
     assert far.starts[c.key][0][0] == pytest.approx(truth, abs=0.05)
     assert near.starts[c.key][0][0] != pytest.approx(truth, abs=0.15)
     assert {c.id for c in every if c.further()} == {"sensor-clock-offset", "sensor-clock-drift"}
+
+
+def test_a_record_that_ends_at_the_contact_tells_no_first_contact_and_is_no_crash() -> None:
+    ended = [
+        evidence_of(n, r, simulator_of(scenario(), r))
+        for n, r in recorded({}, 3, channels=(ACCELERATION, "striker/position_z"), rate=1000.0, until=0.001)
+    ]
+    judge = Judge([e for e in ended if e is not None])
+    assert len(judge.evidence) == 3
+    assert all(at is None or abs(at) < 0.03 for at in by_first_contact(judge, (), ()))

@@ -13,9 +13,11 @@ import pytest
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.blocks import Block, Fitted, turned
 from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.explain import moves
 from rollover.diagnosis.holdout import held_out
-from rollover.diagnosis.readings import resolution, without_spikes
+from rollover.diagnosis.readings import digitised, resolution, without_spikes
+from rollover.diagnosis.simulator import simulator_of
 from rollover.effects import Search
 from rollover.recording import Recording
 from tests.diagnosis.drops import DEPTH, FORCE, linear_blocks, recorded, scenario, signal
@@ -48,6 +50,21 @@ def test_coarse_digits_are_no_mismatch_and_hide_no_large_one() -> None:
     found = diagnose(scenario(), each(heavier, coarse))
     assert [e.id for e in found.effects] == ["mass"]
     assert found.effects[0].parameters["added"].value == pytest.approx(25.0, rel=0.05)
+
+
+@pytest.mark.parametrize(("noise", "shared"), [(0.0, 0.5), (0.2, 0.5 * np.exp(-0.08 * np.pi**2)), (0.6, 0.0)])
+def test_noise_makes_the_rounding_of_each_sample_its_own(noise: float, shared: float) -> None:
+    """Widrow: with s of noise before a step d, exp(-2 pi^2 s^2/d^2) of what rounding does is left on the average."""
+    name, r = recorded({}, speeds=(2.0,), noise=0.0, rate=1000.0)[0]
+    one = evidence_of(name, r, simulator_of(scenario(), r))
+    assert one is not None
+    step = 0.02 * float(np.ptp(r[FORCE]))
+    noisy = r[FORCE] + noise * step * np.random.default_rng(5).standard_normal(r.time.size)
+    rough = replace(r, channels={**r.channels, FORCE: np.round(noisy / step) * step})
+    total = step * float(np.sqrt(noise**2 + 1.0 / 12.0))
+    told = replace(one, signals=tuple(replace(s, noise=total) for s in one.signals))
+    force = next(s for s in digitised(told, rough).signals if s.channel == FORCE)
+    assert force.scatter == pytest.approx(shared * step, rel=1e-6)
 
 
 def test_noise_within_coarse_digits_is_no_structure() -> None:

@@ -18,7 +18,7 @@ from rollover.diagnosis.phases import drop_phases
 from rollover.diagnosis.scores import before_a_blow
 from rollover.diagnosis.simulator import simulator_of
 from rollover.diagnosis.statements import sentence
-from rollover.diagnosis.verdict import Named
+from rollover.diagnosis.verdict import Interval, Named
 from rollover.effects import EFFECTS, units_of
 from rollover.effects.sensor import SensorBias, SensorClipping
 from rollover.prechecks import Finding
@@ -79,6 +79,21 @@ def test_a_misfit_that_scatter_takes_part_in_is_said_to_be_one() -> None:
     said = sentence("parameter", [tilted], 0.0, first, last, [], (6.94, 1.02))
     assert said.startswith(plain[:-1] + " and the scatter of runs; before the first blow")
     assert said.endswith("the misfit is 1.02 times the noise for 6.9.")
+
+
+def test_an_effect_whose_numbers_may_all_be_null_may_be_nothing() -> None:
+    def effect(id: str, **ends: tuple[float, float]) -> Named:
+        told = {p: Interval(value=0.5 * (a + b), low=a, high=b, unit="") for p, (a, b) in ends.items()}
+        return Named(
+            id=id, kind="parameter", statement="", parameters=told, settings={}, channel=None, p_value=0.0,
+            indistinguishable_from=(), discriminating_test="",
+        )  # fmt: skip
+
+    assert statements.is_none(effect("impact-speed", scale=(0.98, 1.09)))
+    assert not statements.is_none(effect("impact-speed", scale=(1.01, 1.09)))
+    assert statements.is_none(effect("centre-of-mass", height=(-0.1, 0.1), lateral=(-0.2, 0.1)))
+    assert not statements.is_none(effect("centre-of-mass", height=(-0.1, 0.1), lateral=(0.02, 0.1)))
+    assert not statements.is_none(effect("rops-plasticity", yield_force=(-1.0, 1e6)))  # a limit has no null
 
 
 def test_an_effect_that_is_named_is_no_look_alike_of_another(monkeypatch: pytest.MonkeyPatch) -> None:

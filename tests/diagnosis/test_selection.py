@@ -154,3 +154,22 @@ def test_a_simpler_rival_that_meets_all_recordings_as_well_is_named_beside(
     rival = fitted("soil-inertial-drag", 100.0 + more, numbers)
     found = explain.confusion(Step(base=base, fitted=best, p_value=0.0, rivals=(best, rival)), [])
     assert found == ([best, rival] if named else [best])
+
+
+@pytest.mark.parametrize(("beside", "taken"), [(0.4, True), (1e-9, False)])
+def test_errors_of_conditions_beside_an_effect_count_where_they_leave_chance_alone(
+    beside: float, taken: bool, judged: dict[str, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A wrong effect would bend them too: then they stay as they act on the scenario as it is."""
+    weighed: list[str] = []
+    found, again = step(1), step(2).fitted
+    judge = cast(Judge, SimpleNamespace(evidence="as it is", weigh=weighed.append))
+    monkeypatch.setattr(selection, "is_doubtful", lambda _: True)
+    monkeypatch.setattr(selection, "conditioned", lambda *_: again)
+    monkeypatch.setattr(selection, "mismatch_of", lambda *_: left(beside))
+    after, remaining = selection.as_conditioned(judge, found, left(1e-9), [])
+    assert (after.fitted is again) == taken
+    assert remaining.p_value == (beside if taken else 1e-9)
+    assert weighed == ([] if taken else ["as it is"])
+    same, _ = selection.as_conditioned(judge, found, left(0.4), [])
+    assert same is found, "nothing is left to be eased"
