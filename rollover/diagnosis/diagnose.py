@@ -32,9 +32,10 @@ from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.quantities import dependency
 from rollover.diagnosis.readings import digitised, without_spikes
 from rollover.diagnosis.refine import conditioned, is_doubtful
+from rollover.diagnosis.remainder import matters
 from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing, with_scatter
 from rollover.diagnosis.scores import before_a_blow, judged
-from rollover.diagnosis.selection import Explanation, decided, explained, matters
+from rollover.diagnosis.selection import Explanation, decided, explained
 from rollover.diagnosis.simulator import blow_of, set_up
 from rollover.diagnosis.statements import by_steps, closest, considered, is_none, named, noise, places, sentence
 from rollover.diagnosis.verdict import Degree, Diagnosis

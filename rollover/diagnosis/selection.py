@@ -22,13 +22,13 @@ from rollover.diagnosis.inquiry import Groups, Inquiry, Phases
 from rollover.diagnosis.lasting import NEEDED, astray, backed, begun_anew, lasting
 from rollover.diagnosis.looks import look, look_again
 from rollover.diagnosis.refine import conditioned, is_doubtful, polish, timed, traced, without
+from rollover.diagnosis.remainder import NEGLIGIBLE, is_enough, is_tolerated, matters
 from rollover.diagnosis.verdict import Verdict
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
 SCATTERED = 0.05  # share of all errors that the look at candidates may make where runs scatter
 CERTAIN = 1.0 - 1e-12  # largest p-value whose logarithm is taken
 MOST = 3  # effects in one explanation
-NEGLIGIBLE = 0.001  # of a channel's range: what moves nothing by more is not worth a name
 PARTLY = 0.005  # of the excess over the noise that one effect may leave, were it structured, and still be named
 MANY = 0.05  # p-value of what as many effects as may be leave, below which they are no explanation
 HOPELESS = 2.0  # misfit over the noise that two effects leave and a third is not looked for
@@ -204,7 +204,21 @@ def followed(judge: Judge, found: Step, phases: Phases) -> tuple[Step, Mismatch]
         new = timed(judge, polish(judge, new))
     if new.left >= old.left:
         return found, left
-    return found.moved_to(new), mismatch_of(judge.evidence, new.blocks, phases)
+    return _with_rivals(judge, found.moved_to(new)), mismatch_of(judge.evidence, new.blocks, phases)
+
+
+def _with_rivals(judge: Judge, found: Step) -> Step:
+    """A step with its nearest rivals begun anew beside what they share with its best, which was followed alone."""
+    best, shared = found.fitted, len(found.base.x)
+    if shared == 0:
+        return found
+    shifts, near = [b.shift for b in best.blocks], sorted(found.rivals, key=lambda f: f.left)[: FOLLOWING + 1]
+    rivals = []
+    for f in found.rivals:
+        begun = f is not best and any(f is one for one in near)
+        again = judge.fit(f.candidates, (*best.x[:shared], *f.x[shared:]), shifts=shifts, width=1) if begun else None
+        rivals.append(again if again is not None and again.left < f.left else f)
+    return replace(found, rivals=tuple(rivals))
 
 
 def as_conditioned(judge: Judge, found: Step, left: Mismatch, phases: Phases) -> tuple[Step, Mismatch]:
@@ -359,35 +373,8 @@ def strongest(judge: Judge, base: Fitted, fitted: Fitted) -> Candidate:
     return best
 
 
-def is_tolerated(judge: Judge, fitted: Fitted) -> bool:
-    """Whether what is left is no more than a scatter between runs, or a tolerance that was asked for, leaves by chance.
-
-    One error of unit size for each of k signals: a mean square of 1 with a standard deviation of sqrt(2/k).
-    """
-    rough = [e.is_rough(s) for e in judge.evidence for s in e.signals]
-    most = 1.0 + 2.0 * np.sqrt(2.0 / len(rough))
-    return all(rough) and bool(fitted.left < most * sum(b.residual.size for b in fitted.blocks))
-
-
 def is_slight(judge: Judge, first: Step | None, phases: Phases) -> bool:
     """Whether all that separates simulation and recordings is the work of an effect that moves nothing worth a name."""
     if first is None or moves(judge, first.base, first.fitted) >= NEGLIGIBLE:
         return False
     return mismatch_of(judge.evidence, first.fitted.blocks, phases).p_value > SURE
-
-
-def is_enough(judge: Judge, fitted: Fitted, left: Mismatch) -> bool:
-    """Whether what a fit leaves is no more than chance, or not worth a word."""
-    return left.p_value > SURE or not matters(judge, fitted, left)
-
-
-def matters(judge: Judge, base: Fitted, before: Mismatch) -> bool:
-    """Whether the structure of the misfit is worth a word: beyond a share of a channel's range."""
-    most = 0.0
-    for r, e in enumerate(judge.evidence[: len(base.blocks)]):
-        for signal, _ in e.spans():
-            cells = [c for c in before.cells if c.recording == r and c.channel == signal.channel]
-            chance = sum(c.rows.size if e.is_rough(signal) else c.expected for c in cells)
-            power = (sum(c.structured for c in cells) - chance) / max(sum(c.rows.size for c in cells), 1)
-            most = max(most, float(np.sqrt(max(power, 0.0))) * signal.sigma / signal.span)
-    return most > NEGLIGIBLE

@@ -14,7 +14,8 @@ from rollover.diagnosis.explain import SURE, confusion
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.holdout import Held, held_out
 from rollover.diagnosis.intervals import intervals
-from rollover.diagnosis.selection import NEGLIGIBLE, Explanation, strongest
+from rollover.diagnosis.remainder import NEGLIGIBLE
+from rollover.diagnosis.selection import Explanation, strongest
 from rollover.diagnosis.settle import PARTS, in_shorter_steps
 from rollover.diagnosis.verdict import Considered, Named, Place, Verdict
 from rollover.effects import EFFECTS

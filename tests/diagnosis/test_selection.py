@@ -165,6 +165,7 @@ def test_errors_of_conditions_beside_an_effect_count_where_they_leave_chance_alo
     found, again = step(1), step(2).fitted
     judge = cast(Judge, SimpleNamespace(evidence="as it is", weigh=weighed.append))
     monkeypatch.setattr(selection, "is_doubtful", lambda _: True)
+    monkeypatch.setattr(selection, "is_enough", lambda _judge, _fit, what: what.p_value > 0.001)
     monkeypatch.setattr(selection, "conditioned", lambda *_: again)
     monkeypatch.setattr(selection, "mismatch_of", lambda *_: left(beside))
     after, remaining = selection.as_conditioned(judge, found, left(1e-9), [])
@@ -173,3 +174,27 @@ def test_errors_of_conditions_beside_an_effect_count_where_they_leave_chance_alo
     assert weighed == ([] if taken else ["as it is"])
     same, _ = selection.as_conditioned(judge, found, left(0.4), [])
     assert same is found, "nothing is left to be eased"
+
+
+def test_rivals_are_begun_anew_beside_what_the_best_was_followed_to() -> None:
+    """A threshold that was followed beside the best alone leaves its rivals where they were."""
+    asked: list[tuple[str, tuple[float, ...]]] = []
+
+    def fitted(last: str, left: float, x: tuple[float, ...]) -> Fitted:
+        candidates = tuple(
+            Candidate(id=i, kind="physics", family="", search={"a": Search(0, 1)}) for i in (IDS[0], last)
+        )
+        zero = np.zeros(4)
+        block = Block(residual=zero + np.sqrt(left / 4.0), J=np.zeros((4, 2)), slope=zero, shift=0.0, prior=1.0)
+        return Fitted(candidates=candidates, x=x, blocks=(block,))
+
+    def fit(candidates: tuple[Candidate, ...], x: tuple[float, ...], **_: Any) -> Fitted:
+        asked.append((candidates[-1].id, x))
+        return fitted(candidates[-1].id, 2.0, x)
+
+    best, rival = fitted("mass", 1.0, (0.7, 0.3)), fitted("guide-friction", 9.0, (0.2, 0.4))
+    base = Fitted(candidates=best.candidates[:1], x=(0.2,), blocks=best.blocks)
+    found = Step(base=base, fitted=best, p_value=0.0, rivals=(best, rival))
+    after = selection._with_rivals(cast(Judge, SimpleNamespace(fit=fit)), found)
+    assert asked == [("guide-friction", (0.7, 0.4))]
+    assert [f.left for f in after.rivals] == pytest.approx([1.0, 2.0])
