@@ -35,7 +35,7 @@ from rollover.diagnosis.refine import conditioned, is_doubtful
 from rollover.diagnosis.remainder import matters
 from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing, with_scatter
 from rollover.diagnosis.scores import before_a_blow, judged
-from rollover.diagnosis.selection import Explanation, decided, explained
+from rollover.diagnosis.selection import Explanation, by_the_first, decided, explained
 from rollover.diagnosis.simulator import blow_of, set_up
 from rollover.diagnosis.statements import by_steps, closest, considered, is_none, named, noise, places, sentence
 from rollover.diagnosis.verdict import Degree, Diagnosis
@@ -45,6 +45,7 @@ from rollover.recording import Recording
 from rollover.scenario import Scenario
 from rollover.vehicle import Striker
 
+NAMING = ("parameter", "sensor", "missing-physics")  # verdicts that name effects
 MOSTLY = 0.6  # of the effects of the ground that would not have shown: then nothing can be told
 FEWEST = 24  # samples in all, below which nothing is said
 
@@ -100,12 +101,16 @@ def diagnose(
     inquiry = Inquiry(judge=judge, candidates=candidates, groups=groups, phases=phases, say=say, crew=crew)
     explanation = explained(inquiry, base)
     explanation, verdict = decided(judge, explanation, groups, phases)
-    held, (explanation, there) = judge.evidence, eased_beside(judge, explanation, kept, phases)
-    effects = named(judge, explanation, groups) if verdict in ("parameter", "sensor", "missing-physics") else ()
+    held, (whole, there) = judge.evidence, eased_beside(judge, explanation, kept, phases)
+    effects = named(judge, whole, groups) if verdict in NAMING else ()
     if len(effects) > 1 and any(is_none(e) for e in effects):
-        # one of them may as well be nothing, and without it the others do not explain what there is
-        explanation, verdict, effects, there = explanation.refused(), "unexplained", (), kept
+        # one of them may as well be nothing: what came first explains what there is alone, or nothing does
         judge.weigh(held)
+        alone = by_the_first(judge, explanation, {e.id for e in effects if is_none(e)}, phases)
+        explanation, verdict = decided(judge, alone, groups, phases)
+        whole, there = eased_beside(judge, explanation, kept, phases)
+        effects = named(judge, whole, groups) if verdict in NAMING else ()
+    explanation = whole
     kept = there
     found = list(judge.evidence)
     before, after = explanation.before, explanation.after if explanation.parts else explanation.before

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeGuard
 
@@ -348,6 +348,16 @@ def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) ->
     significant = significant and not is_tolerated(judge, found.base) and not is_slight(judge, found.first, phases)
     verdict: Verdict = "unexplained" if significant or found.parts else "no-mismatch"
     return found.refused(), verdict
+
+
+def by_the_first(judge: Judge, found: Explanation, nothing: Collection[str], phases: Phases) -> Explanation:
+    """The explanation by its first effect alone, where that is none of those that may be `nothing`; else refused."""
+    one = found.first
+    if one is None or one.fitted.candidates[-1].id in nothing:
+        return found.refused()
+    one = one.again(judge)
+    one, after = as_conditioned(judge, one, mismatch_of(judge.evidence, one.fitted.blocks, phases), phases)
+    return replace(found, parts=(one,), fitted=one.fitted, after=after)
 
 
 def is_any_curve(candidates: Sequence[Candidate]) -> bool:

@@ -105,7 +105,7 @@ def test_what_tells_nothing_of_a_depth_ends_a_range_beyond_where_it_is_looked_fo
 
     class Deep(Late):
         def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
-            return {CHANNEL: blow(0.01 * np.log(float(changes["effects.soil-layer.stiffness_ratio"])) + shift)}
+            return {CHANNEL: blow(0.01 * np.log(float(changes.get("effects.soil-layer.stiffness_ratio", 1.0))) + shift)}
 
     layer = candidate(Judge([evidence(blow(0.0), Deep())]), "soil-layer")
     judge = Judge([evidence(blow(0.01 * np.log(2.0)), Deep())])
