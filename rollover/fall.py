@@ -56,8 +56,7 @@ from rollover.terms import INCHING, fall_back, free
 # numbers of a drop: kg, kg, N/m, N s/m (no spring: rigid), -, m2, kg, N s, m/s2, m/s, s, N, N s2/m2,
 # m (height of a cone whose base is the face, 0: flat), m (above the ground at t = 0 with the speed, 0: first contact)
 MASS, NOSE, SPRING, DASHPOT, FRACTION, FACE, LAW_MASS, MOMENTUM_MOST, GRAVITY, SPEED, STEP, GUIDE, AIR = range(13)
-# m/s (critical speed of the air, inf: none), - (its drag above over that below), m/s (at which the guide creeps, 0: it
-# holds)
+# m/s (critical speed of the air, inf: none), - (its drag above over that below), m/s (the guide's creep, 0: it holds)
 CONE, HEIGHT, CRISIS, THIN, CREEP, NUMBERS = 13, 14, 15, 16, 17, 18
 # columns of what comes out
 OUT_FORCE, OUT_SINKAGE, OUT_X, OUT_V, OUT_A, OUT_IMPULSE, OUT_COLUMNS = 0, 1, 2, 3, 4, 5, 6

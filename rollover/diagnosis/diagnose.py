@@ -38,7 +38,7 @@ from rollover.diagnosis.scores import before_a_blow, judged
 from rollover.diagnosis.selection import Explanation, by_the_first, decided, explained
 from rollover.diagnosis.simulator import blow_of, set_up
 from rollover.diagnosis.statements import by_steps, closest, considered, is_none, named, noise, places, sentence
-from rollover.diagnosis.verdict import Degree, Diagnosis
+from rollover.diagnosis.verdict import Degree, Diagnosis, Named
 from rollover.drop import unfit
 from rollover.effects import EFFECTS, spoken
 from rollover.recording import Recording
@@ -101,19 +101,16 @@ def diagnose(
     inquiry = Inquiry(judge=judge, candidates=candidates, groups=groups, phases=phases, say=say, crew=crew)
     explanation = explained(inquiry, base)
     explanation, verdict = decided(judge, explanation, groups, phases)
-    held, (whole, there) = judge.evidence, eased_beside(judge, explanation, kept, phases)
-    effects = named(judge, whole, groups) if verdict in NAMING else ()
-    if len(effects) > 1 and any(is_none(e) for e in effects):
+    held, named_so = judge.evidence, _named_beside(judge, explanation, verdict, kept, groups, phases)
+    if len(named_so[1]) > 1 and any(is_none(e) for e in named_so[1]):
         # one of them may as well be nothing: what came first explains what there is alone, or nothing does
         judge.weigh(held)
-        alone = by_the_first(judge, explanation, {e.id for e in effects if is_none(e)}, phases)
+        alone = by_the_first(judge, explanation, {e.id for e in named_so[1] if is_none(e)}, phases)
         explanation, verdict = decided(judge, alone, groups, phases)
-        whole, there = eased_beside(judge, explanation, kept, phases)
-        effects = named(judge, whole, groups) if verdict in NAMING else ()
-    explanation = whole
-    kept = there
+        named_so = _named_beside(judge, explanation, verdict, kept, groups, phases)
+    explanation, effects, kept = named_so
     found = list(judge.evidence)
-    before, after = explanation.before, explanation.after if explanation.parts else explanation.before
+    before, after = explanation.before, explanation.after
     set_ups = [set_up(scenario, e.recording) for e in found]
     is_mismatch = verdict not in ("no-mismatch", "cannot-tell")
     say("what the mismatch depends on")
@@ -180,6 +177,19 @@ def _weighed(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:
     align(judge)
     base = judge.fit((), (), rounds=2)
     return list(every) if base is None else colour.quiet(every, judge.residuals(base))
+
+
+def _named_beside(
+    judge: Judge,
+    explanation: Explanation,
+    verdict: str,
+    kept: Sequence[Evidence],
+    groups: Sequence[Sequence[int]],
+    phases: Sequence[Sequence[tuple[float, str]]],
+) -> tuple[Explanation, tuple[Named, ...], list[Evidence]]:
+    """An explanation eased beside its effects, these with their numbers if the verdict names any, and the kept ones."""
+    whole, kept = eased_beside(judge, explanation, kept, phases)
+    return whole, named(judge, whole, groups) if verdict in NAMING else (), kept
 
 
 def eased_beside(

@@ -47,7 +47,7 @@ def rows_of(recording: Recording) -> Rows:
     step = float(np.median(apart)) if apart.size else 1.0
     if not recording.cfc:
         return Rows(times=stamps, stamps=all_of_them, even=all_of_them, step=step)
-    least = max((least_rate(cfc) for cfc in recording.cfc.values()), default=0.0)
+    least = max(least_rate(cfc) for cfc in recording.cfc.values())
     parts = max(1, math.ceil(least * step * (1.0 - 1e-9)))
     is_even = apart.size == 0 or bool(np.max(np.abs(apart - step)) <= UNEVEN * step)
     if is_even and parts == 1:

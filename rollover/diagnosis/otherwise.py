@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from rollover.diagnosis.blocks import Block
+from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.crew import Job
 from rollover.diagnosis.fit import Fitted
 from rollover.diagnosis.gate import Gate
@@ -37,18 +38,13 @@ def _as_promised(
     inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: Gate, shifts: Sequence[float]
 ) -> list[Fitted]:
     """The fits, best first, with those whose slopes lead and whose usual shape does not bear them out."""
-    gains: dict[str, float] = {}
-    for f in fits:
-        gains.setdefault(f.candidates[-1].key, base.left - f.left)
-    jobs = []
+    gains = {f.candidates[-1].key: base.left - f.left for f in one_each(fits)}
+    places = []
     for c in (c for c in inquiry.free(base) if c.shapes):
         score = looked.scores.get(c.key, 0.0)
         if score > max(PROMISED * looked.score, WORTH) and gains.get(c.key, 0.0) < PROMISED * score:
-            start = looked.starts.get(c.key, c.starts())[0]
-            jobs.append(
-                Job(how="scan", candidates=(*base.candidates, c), start=(*base.x, *start), shifts=tuple(shifts))
-            )
-    return sorted([*fits, *(f for f in inquiry.fits(jobs) if f is not None)], key=lambda f: f.left)
+            places.append((c, (*base.x, *looked.starts.get(c.key, c.starts())[0])))
+    return _with_shapes(inquiry, base, fits, places, shifts)
 
 
 def _combed(inquiry: Inquiry, fits: Sequence[Fitted], shifts: Sequence[float]) -> list[Fitted]:
@@ -68,7 +64,7 @@ def _but_for_some(
     Such a one meets most recordings far better than the best does, by the middle one, and leaves a few altogether: a
     face that is held lets go or does not.
     """
-    usual, jobs = _middle(fits[0].blocks), []
+    usual, places = _middle(fits[0].blocks), []
     for c in (c for c in inquiry.free(base) if c.shapes):
         met = []
         for start in (*looked.starts.get(c.key, ()), *c.starts()):
@@ -77,7 +73,19 @@ def _but_for_some(
             if all(b is not None for b in blocks):
                 met.append((_middle([b for b in blocks if b is not None]), x))
         if met and min(met)[0] < MOSTLY * usual:
-            jobs.append(Job(how="scan", candidates=(*base.candidates, c), start=min(met)[1], shifts=tuple(shifts)))
+            places.append((c, min(met)[1]))
+    return _with_shapes(inquiry, base, fits, places, shifts)
+
+
+def _with_shapes(
+    inquiry: Inquiry,
+    base: Fitted,
+    fits: Sequence[Fitted],
+    places: Sequence[tuple[Candidate, tuple[float, ...]]],
+    shifts: Sequence[float],
+) -> list[Fitted]:
+    """The fits, best first, with those of candidates fitted together with their shapes from places beside the base."""
+    jobs = [Job(how="scan", candidates=(*base.candidates, c), start=x, shifts=tuple(shifts)) for c, x in places]
     return sorted([*fits, *(f for f in inquiry.fits(jobs) if f is not None)], key=lambda f: f.left)
 
 

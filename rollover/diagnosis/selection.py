@@ -94,9 +94,11 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     first: Step | None = None
     refuted = False
     for _ in range(MOST):
-        if is_tolerated(judge, current) or (not taken and not judge.effort.thrifty and is_all_by_clocks(judge, base)):
+        if is_tolerated(judge, current):
             break
         if looked.p_value() > CHANCE and is_enough(judge, current, left):
+            break
+        if not taken and not judge.effort.thrifty and is_all_by_clocks(judge, base):
             break
         tried = step(inquiry, current, looked)
         first = first or tried

@@ -190,11 +190,11 @@ def test_rivals_are_begun_anew_beside_what_the_best_was_followed_to() -> None:
 
     def fit(candidates: tuple[Candidate, ...], x: tuple[float, ...], **_: Any) -> Fitted:
         asked.append((candidates[-1].id, x))
-        return fitted(candidates[-1].id, 2.0, x)
+        return fitted(candidates[-1].id, 4.0, x)
 
     best, rival = fitted("mass", 1.0, (0.7, 0.3)), fitted("guide-friction", 9.0, (0.2, 0.4))
     base = Fitted(candidates=best.candidates[:1], x=(0.2,), blocks=best.blocks)
     found = Step(base=base, fitted=best, p_value=0.0, rivals=(best, rival))
     after = selection._with_rivals(cast(Judge, SimpleNamespace(fit=fit)), found)
     assert asked == [("guide-friction", (0.7, 0.4))]
-    assert [f.left for f in after.rivals] == pytest.approx([1.0, 2.0])
+    assert [f.left for f in after.rivals] == [1.0, 4.0]
