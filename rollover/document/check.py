@@ -175,7 +175,11 @@ class _Where:
         if match is None or match[1].split(".")[0] not in known:
             return self.fault(sentence)
         node = self.node
-        for key in match[1].split("."):
+        keys = match[1].split(".")
+        for i, key in enumerate(keys):
+            if isinstance(node.value, Mapping) and (whole := node.value.get(".".join(keys[i:]))):
+                node = whole  # a scenario path is one key
+                break
             child = node.value.get(key) if isinstance(node.value, Mapping) else None
             if isinstance(node.value, tuple) and key.isdecimal() and int(key) < len(node.value):
                 child = node.value[int(key)]

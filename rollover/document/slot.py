@@ -98,6 +98,8 @@ class Slot:
             return f"a mapping ({inside}) or the name of a .yaml file"
         if typing.get_origin(self.type) is Literal:
             return " or ".join(repr(choice) for choice in typing.get_args(self.type))
+        if typing.get_origin(self.type) is Mapping:
+            return "a mapping"
         if self.type is float:
             quantity = self.quantity or Quantity("1")
             bounds = quantity.allowed.removeprefix("any finite number").strip()

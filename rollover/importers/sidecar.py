@@ -86,7 +86,7 @@ class Sidecar:
     title: str = ""
     source: Annotated[str, "who measured it, licence, citation"] = ""
     conditions: Annotated[Mapping[str, Any], "scenario path -> value this was run with"] = field(default_factory=dict)
-    uncertainty: Annotated[Mapping[str, Doubt], "scenario path -> 1 sigma, a list's of each number"] = field(
+    uncertainty: Annotated[Mapping[str, Any], "scenario path -> 1 sigma, a list's of each number"] = field(
         default_factory=dict
     )
     clock: Clock = field(default_factory=Clock)
@@ -95,7 +95,7 @@ class Sidecar:
 
     def validate(self) -> None:
         """Refuse an uncertainty that is none."""
-        _check_doubts(self.uncertainty)
+        doubts_of(self.uncertainty)
 
 
 @parameters
@@ -106,7 +106,7 @@ class Profile:
     title: str = ""
     source: Annotated[str, "who measured it, licence, citation"] = ""
     conditions: Annotated[Mapping[str, Any], "scenario path -> value this was run with"] = field(default_factory=dict)
-    uncertainty: Annotated[Mapping[str, Doubt], "scenario path -> 1 sigma, a list's of each number"] = field(
+    uncertainty: Annotated[Mapping[str, Any], "scenario path -> 1 sigma, a list's of each number"] = field(
         default_factory=dict
     )
     clock: Clock = field(default_factory=Clock)
@@ -118,14 +118,20 @@ class Profile:
 
     def validate(self) -> None:
         """Refuse an uncertainty that is none."""
-        _check_doubts(self.uncertainty)
+        doubts_of(self.uncertainty)
 
 
-def _check_doubts(uncertainty: Mapping[str, Doubt]) -> None:
-    for path, sigma in uncertainty.items():
-        for value in sigma if isinstance(sigma, tuple) else (sigma,):
-            if not 0.0 < value < math.inf:
-                raise ValueError(f"uncertainty: {path}: not one standard deviation, got {value:g}; above 0")
+def doubts_of(uncertainty: Mapping[str, Any]) -> dict[str, Doubt]:
+    """Standard deviation by scenario path. Raises ``ValueError`` for what is none."""
+    found: dict[str, Doubt] = {}
+    for path, given in uncertainty.items():
+        numbers = tuple(given) if isinstance(given, (list, tuple)) else (given,)
+        for value in numbers:
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
+                message = f"not one standard deviation, got {value!r}; a number above 0, or a list of such, is allowed"
+                raise ValueError(f"uncertainty.{path}: {message}")
+        found[path] = numbers if isinstance(given, (list, tuple)) else given
+    return found
 
 
 @dataclass(frozen=True, kw_only=True)

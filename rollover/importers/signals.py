@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rollover.channels import factor, is_known
 from rollover.faults import Fault, InputError, hint
-from rollover.importers.sidecar import Column, Described, Profile
+from rollover.importers.sidecar import Column, Described, Profile, doubts_of
 from rollover.recording import Recording
 
 Array = NDArray[np.float64]
@@ -87,7 +87,7 @@ def assemble(
         channels=table,
         source=about.source,
         conditions=dict(about.conditions),
-        uncertainty=dict(about.uncertainty),
+        uncertainty=doubts_of(about.uncertainty),
         clock=about.clock,
         notes=about.notes,
         noise={

@@ -154,13 +154,18 @@ def test_a_recording_says_what_it_leaves_uncertain(suffix: str, tmp_path: Path) 
     assert e.shift_prior == 0.004
 
 
-def test_an_uncertainty_that_is_none_is_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize("given", ["0.0", "small", "[0.1, x]", "true"])
+def test_an_uncertainty_that_is_none_is_refused_in_one_line(given: str, tmp_path: Path) -> None:
     _, r = recorded({}, 1, speeds=(2.0,))[0]
-    write_recording(replace(r, uncertainty={"initiation.speed": 0.05}), tmp_path / "one.csv")
+    write_recording(replace(r, uncertainty={"vehicle.mass": 1.0, "initiation.speed": 0.05}), tmp_path / "one.csv")
     sidecar = tmp_path / "one.yaml"
-    sidecar.write_text(sidecar.read_text().replace("0.05", "0.0", 1))
-    with pytest.raises(InputError, match=r"uncertainty: initiation.speed: not one standard deviation, got 0"):
+    sidecar.write_text(sidecar.read_text().replace("0.05", given, 1))
+    line = next(i for i, text in enumerate(sidecar.read_text().splitlines(), 1) if "initiation.speed: " + given in text)
+    with pytest.raises(InputError) as refused:
         read_recording(tmp_path / "one.csv")
+    (fault,) = refused.value.faults
+    assert (fault.path, fault.line) == ("uncertainty.initiation.speed", line)
+    assert fault.message.startswith("not one standard deviation, got ")
 
 
 def test_a_doubt_acts_beside_what_was_found_as_it_does_there() -> None:
