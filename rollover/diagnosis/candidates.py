@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ground.law import REFERENCE_AREA, REFERENCE_MASS
-from rollover.channels import describe
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.simulator import EDGES, set_up
 from rollover.document import value_at
@@ -21,18 +20,6 @@ from rollover.scenario import Scenario
 from rollover.vehicle import Striker
 
 Array = NDArray[np.float64]
-
-# shape parameters that stay at their default: few recordings tell them apart from the strength
-SHAPES = {
-    "soil-viscous-damping": ("exponent",),
-    "soil-added-mass-growth": ("fade",),
-    "air-drag": ("crisis_speed",),
-    "soil-adhesion": ("reach",),
-    "tank-slosh": ("damping",),
-    "axle-stop": ("stiffness",),
-    "structural-compliance": ("nose_share",),
-    "guide-friction": ("creep",),
-}
 
 PLACES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of a shape, at which a fit of it begins
 FAINT = 20.0  # times weaker than an effect usually is, and still looked for
@@ -45,9 +32,6 @@ WIDE = 0.08  # of a coordinate: a step off what changes nothing, where each plac
 LIMITS = (0.12, 0.3)  # more places of what may be a limit
 STRONG, ENDS = (0.35, 0.9), (0.0, 1.0)  # of the way from what changes nothing to an end
 SPREAD = (0.12, 0.3, 0.6)  # places of a depth, a length: where nothing is known to change nothing
-# what hits a wall does so at a moment that its travel sets: a tenth beside that, it explains nothing
-NARROW = {"payload-shift": {"travel": tuple(0.1 + 0.022 * k for k in range(36)), "friction": (0.25, 0.5)}}
-OTHER_UNIT = 5.0  # times as far as is simulated, from which on a channel may be in another unit than it says
 STEEP = 2.0  # tangent of the tilt at which a load slides
 
 
@@ -80,7 +64,7 @@ class Candidate:
     @property
     def is_narrow(self) -> bool:
         """Whether it tells only near its place."""
-        return self.id in NARROW
+        return bool(EFFECTS[self.id].narrow)
 
     def is_fine(self, k: int) -> bool:
         """Whether the k-th parameter is that place: looked at in many, and over less about each."""
@@ -142,7 +126,7 @@ class Candidate:
             # what the scenario has may be far above what ever acts: a yield force, a stop
             is_limit = len(at) == 1 and None in EFFECTS[self.id].null.values()
             return [*beside, *((x,) for x in LIMITS if is_limit)]
-        axes, narrow = [], NARROW.get(self.id, {})
+        axes, narrow = [], EFFECTS[self.id].narrow
         for n, (name, search) in zip(neutral, self.search.items(), strict=True):
             if n is not None:
                 axes.append([min(n + 2.0 * WIDE, 0.9)])
@@ -284,16 +268,20 @@ def candidates_of(
         if name in switched_on or acts not in kind.acts or not kind.competes:
             continue
         if kind.kind == "sensor":
-            found += [c for channel in spans if (c := _sensor(name, kind, channel, spans, times))]
+            ranges = ((channel, kind.looked_for_on(channel, spans, times.get(channel, 1.0))) for channel in spans)
+            found += [
+                Candidate(id=name, kind=kind.kind, family=kind.family, search=dict(search), channel=channel)
+                for channel, search in ranges
+                if search is not None
+            ]
             continue
         sized = {p: _sized(s, kind.grows.get(p), size) for p, s in kind.search.items()}
-        of_shape = SHAPES.get(name, ())
-        wide = {p: s if p in of_shape else _widened(s, kind.null.get(p)) for p, s in sized.items()}
+        wide = {p: s if p in kind.shapes else _widened(s, kind.null.get(p)) for p, s in sized.items()}
         there = {p: own for p, w in wide.items() if (own := kind.looked_for(p, w, tried)) is not None}
-        search = {p: s for p, s in there.items() if p not in of_shape}
+        search = {p: s for p, s in there.items() if p not in kind.shapes}
         if not search:
             continue
-        shapes = {p: there[p] for p in of_shape if p in there}
+        shapes = {p: there[p] for p in kind.shapes if p in there}
         unlike = {} if scenario is None else {p: _neutral(kind, p, s, scenario) for p, s in search.items()}
         neutral = None if acts == "drop" else tuple(unlike.get(p) for p in search)
         held = {p: physical(x, search[p]) for p, x in unlike.items() if x is not None and kind.null.get(p) is None}
@@ -364,29 +352,3 @@ def _times(evidence: Sequence[Evidence]) -> dict[str, float]:
             if simulated > 0.0 and math.isfinite(simulated):
                 found.setdefault(s.channel, []).append(s.span / simulated)
     return {channel: float(np.median(each)) for channel, each in found.items()}
-
-
-def _sensor(
-    name: str, kind: Any, channel: str, spans: Mapping[str, float], times: Mapping[str, float]
-) -> Candidate | None:
-    search = dict(kind.search)
-    span = spans[channel]
-    length = describe(channel).unit in ("m", "rad")
-    if (name == "sensor-scale") != length and name in ("sensor-scale", "sensor-gain"):
-        return None  # a scale is that of a position or a length, a gain that of all else
-    if name == "sensor-misalignment" and not _across(channel, spans):
-        return None
-    if name in ("sensor-scale", "sensor-gain") and not 1.0 / OTHER_UNIT < times.get(channel, 1.0) < OTHER_UNIT:
-        far = times[channel]  # millimetres read as metres, g as m/s2
-        search = {p: Search(s.low * min(far, 1.0), s.high * max(far, 1.0), s.scale) for p, s in search.items()}
-    if name == "sensor-bias":
-        search = {"bias": Search(-0.5 * span, 0.5 * span)}
-    if name == "sensor-clipping":
-        search = {"limit": Search(0.1 * span, 1.05 * span)}
-    return Candidate(id=name, kind="sensor", family=kind.family, search=search, channel=channel)
-
-
-def _across(channel: str, spans: Mapping[str, float]) -> bool:
-    stem, axis = channel[:-1], channel[-1:]
-    turned = stem + {"x": "y", "y": "z", "z": "x"}.get(axis, "?") if stem.endswith("_") else ""
-    return turned in spans or channel.replace("force_normal", "force_tangential") in (set(spans) - {channel})

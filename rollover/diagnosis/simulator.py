@@ -22,8 +22,7 @@ from rollover.scenario import Scenario
 Array = NDArray[np.float64]
 SENSORS = "effects.sensor-"
 EDGES = ("sensor-lag", "sensor-clock-offset", "sensor-clock-drift")
-CROOKED = ("structural-compliance", "guide-friction")  # what rings, and what turns from one instant to the next
-STEPS = (1e-3, 4e-4, 1e-4)  # s: step of a drop with none of them, with one, with both; within 7e-5 of the range
+STEPS = (1e-3, 4e-4, 1e-4)  # s: step of a drop without, with one, with more abrupt effects; within 7e-5 of the range
 BESIDE = 1e-9  # s: on either side of the first contact
 KEPT = 128  # runs of one recording
 
@@ -180,8 +179,8 @@ class DropSimulator:
 
     def _made(self, physical: Mapping[str, Any], times: Array) -> Recording:
         model = self.model.with_(physical) if physical else self.model
-        crooked = sum(name in model.scenario.effects for name in CROOKED)
-        return replace(model, step=STEPS[crooked]).run(times)
+        abrupt = sum(effect.is_abrupt for effect in model.scenario.effects.values())
+        return replace(model, step=STEPS[min(abrupt, len(STEPS) - 1)]).run(times)
 
     def _keep(self, key: tuple[Any, ...], run: Recording) -> None:
         """What sensors alone change needs no second run."""

@@ -46,6 +46,11 @@ class Effect:
     competes: ClassVar[bool] = True  # as an explanation of what a scenario misses
     null: ClassVar[Mapping[str, float | None]] = {}
     search: ClassVar[Mapping[str, Search]] = {}
+    shapes: ClassVar[tuple[str, ...]] = ()  # parameters that few recordings tell from the strength: mostly at default
+    narrow: ClassVar[
+        Mapping[str, tuple[float, ...]]
+    ] = {}  # parameter -> places in its range, near which alone it tells
+    is_abrupt: ClassVar[bool] = False  # it rings, or turns from one instant to the next: drops take shorter steps
     # parameter -> powers of mass and of face with which its range grows, from a striker of 132 kg on the reference face
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {}
 
@@ -74,6 +79,14 @@ class Effect:
     def looked_for(cls, parameter: str, search: Search, scenario: Any) -> Search | None:
         """Range of a fitted parameter in a scenario (if known), from its usual one; None where it has no part."""
         return search
+
+    @classmethod
+    def looked_for_on(cls, channel: str, spans: Mapping[str, float], times: float) -> Mapping[str, Search] | None:
+        """Ranges of a sensor's effect on a channel recorded, with spans of all (SI); None where it has no part.
+
+        `times` is how many times as far as simulated the channel moves: 1,000 of millimetres read as metres.
+        """
+        return cls.search
 
     def read(self, recording: Recording) -> Recording:
         """What the sensors make of a recording."""

@@ -40,6 +40,7 @@ class SoilViscousDamping(Effect):
     channels = FORCE
     null: ClassVar[Mapping[str, float | None]] = {"damping": 0.0}
     search: ClassVar[Mapping[str, Search]] = {"damping": Search(30.0, 1e4, "log"), "exponent": Search(0.5, 2.0)}
+    shapes = ("exponent",)
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {"damping": (1.0, -1.0)}
 
     def places(self) -> Mapping[int, float]:
@@ -130,6 +131,7 @@ class SoilAddedMassGrowth(Effect):
     channels = FORCE
     null: ClassVar[Mapping[str, float | None]] = {"rate": 0.0}
     search: ClassVar[Mapping[str, Search]] = {"rate": Search(1.0, 300.0, "log"), "fade": Search(3e-4, 0.03, "log")}
+    shapes = ("fade",)
 
     @classmethod
     def looked_for(cls, parameter: str, search: Search, scenario: Any) -> Search | None:
@@ -204,6 +206,7 @@ class SoilAdhesion(Effect):
     channels = ("ground/force_normal",)
     null: ClassVar[Mapping[str, float | None]] = {"stress": 0.0}
     search: ClassVar[Mapping[str, Search]] = {"stress": Search(500.0, 1e5, "log"), "reach": Search(5e-4, 0.05, "log")}
+    shapes = ("reach",)
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {"stress": (1.0, -1.0)}
 
     def places(self) -> Mapping[int, float]:

@@ -12,17 +12,37 @@ from numpy.typing import NDArray
 
 from ground.compiled import compiled
 from ground.quantity import Quantity, parameters
-from rollover.channels import is_known
+from rollover.channels import describe, is_known
 from rollover.effects.effect import CHANNELS_OWN, Effect, Kind, Search
 from rollover.recording import Recording
 
 Array = NDArray[np.float64]
+OTHER_UNIT = 5.0  # times as far as is simulated, from which on a channel may be in another unit than it says
 READ = "one channel and no other: a missing force acts on all that feel it"
 
 
 def _checked(channel: str) -> None:
     if not is_known(channel) or channel == "time":
         raise ValueError(f"channel: unknown channel, got {channel!r}; see `rollover list channels`")
+
+
+def _across(channel: str) -> str:
+    """The channel across one: y of x, z of y, x of z, tangential of normal; nothing where there is none."""
+    if channel.endswith("force_normal"):
+        return channel.replace("force_normal", "force_tangential")
+    stem, axis = channel[:-1], channel[-1:]
+    return stem + {"x": "y", "y": "z", "z": "x"}.get(axis, "") if stem.endswith("_") else ""
+
+
+def _other_unit(search: Mapping[str, Search], times: float) -> dict[str, Search]:
+    """Ranges that reach what a channel in another unit than it says would need."""
+    if 1.0 / OTHER_UNIT < times < OTHER_UNIT:
+        return dict(search)
+    return {p: Search(s.low * min(times, 1.0), s.high * max(times, 1.0), s.scale) for p, s in search.items()}
+
+
+def _is_length(channel: str) -> bool:
+    return describe(channel).unit in ("m", "rad")
 
 
 def _with(recording: Recording, channel: str, values: Array) -> Recording:
@@ -59,14 +79,16 @@ class SensorMisalignment(Effect):
         """Refuse a channel that does not exist."""
         _checked(self.channel)
 
+    @classmethod
+    def looked_for_on(cls, channel: str, spans: Mapping[str, float], times: float) -> Mapping[str, Search] | None:
+        """Only where the channel across was recorded too."""
+        return cls.search if _across(channel) in spans else None
+
     def read(self, recording: Recording) -> Recording:
         """Mix in the channel across, where there is one."""
         if self.angle == 0.0 or self.channel not in recording.channels:
             return recording
-        stem, axis = self.channel[:-1], self.channel[-1:]
-        across = stem + {"x": "y", "y": "z", "z": "x"}.get(axis, "") if stem.endswith("_") else ""
-        if self.channel.endswith("force_normal"):
-            across = self.channel.replace("force_normal", "force_tangential")
+        across = _across(self.channel)
         read = math.cos(self.angle) * recording[self.channel]
         if across in recording.channels:
             read = read + math.sin(self.angle) * recording[across]
@@ -138,6 +160,11 @@ class SensorScale(Effect):
         """Refuse a channel that does not exist."""
         _checked(self.channel)
 
+    @classmethod
+    def looked_for_on(cls, channel: str, spans: Mapping[str, float], times: float) -> Mapping[str, Search] | None:
+        """A scale is that of a position or a length."""
+        return _other_unit(cls.search, times) if _is_length(channel) else None
+
     def read(self, recording: Recording) -> Recording:
         """Scale the channel."""
         if self.channel not in recording.channels:
@@ -168,6 +195,11 @@ class SensorGain(Effect):
     def validate(self) -> None:
         """Refuse a channel that does not exist."""
         _checked(self.channel)
+
+    @classmethod
+    def looked_for_on(cls, channel: str, spans: Mapping[str, float], times: float) -> Mapping[str, Search] | None:
+        """A gain is that of all but positions and lengths."""
+        return None if _is_length(channel) else _other_unit(cls.search, times)
 
     def read(self, recording: Recording) -> Recording:
         """Scale the channel."""
@@ -261,6 +293,11 @@ class SensorBias(Effect):
         """Refuse a channel that does not exist."""
         _checked(self.channel)
 
+    @classmethod
+    def looked_for_on(cls, channel: str, spans: Mapping[str, float], times: float) -> Mapping[str, Search] | None:
+        """Half of what the channel moves over, to either side."""
+        return {"bias": Search(-0.5 * spans[channel], 0.5 * spans[channel])}
+
     def read(self, recording: Recording) -> Recording:
         """Shift the channel's values."""
         if self.bias == 0.0 or self.channel not in recording.channels:
@@ -290,6 +327,11 @@ class SensorClipping(Effect):
     def validate(self) -> None:
         """Refuse a channel that does not exist."""
         _checked(self.channel)
+
+    @classmethod
+    def looked_for_on(cls, channel: str, spans: Mapping[str, float], times: float) -> Mapping[str, Search] | None:
+        """Up to a little above all that the channel moves over."""
+        return {"limit": Search(0.1 * spans[channel], 1.05 * spans[channel])}
 
     def read(self, recording: Recording) -> Recording:
         """Cut the channel off."""

@@ -43,6 +43,8 @@ class GuideFriction(Effect):
         "force": Search(5.0, 600.0, "log"),
         "creep": Search(5e-4, 0.05, "log"),
     }
+    shapes = ("creep",)
+    is_abrupt = True
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {"force": (1.0, 0.0)}
 
 
@@ -78,6 +80,7 @@ class AirDrag(Effect):
         "area": Search(1e-3, 10.0, "log"),
         "crisis_speed": Search(5.0, 40.0, "log"),
     }
+    shapes = ("crisis_speed",)
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {"area": (2.0 / 3.0, 0.0)}
 
     @classmethod
@@ -128,6 +131,8 @@ class StructuralCompliance(Effect):
         "damping": Search(10.0, 1e4, "log"),
         "nose_share": Search(0.02, 0.6, "log"),
     }
+    shapes = ("nose_share",)
+    is_abrupt = True
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {"stiffness": (1.0, 0.0), "damping": (1.0, 0.0)}
 
     @classmethod

@@ -147,6 +147,7 @@ class AxleStop(Effect):
     channels = ("axle/front/angle", "chassis/angular_velocity_x")
     null: ClassVar[Mapping[str, float | None]] = {"angle": None, "stiffness": None}
     search: ClassVar[Mapping[str, Search]] = {"angle": Search(0.02, 0.5), "stiffness": Search(1e4, 1e7, "log")}
+    shapes = ("stiffness",)
 
     def changes(self, scenario: Any) -> Mapping[str, Any]:
         """Swing and stiffness of the stops."""
@@ -242,6 +243,7 @@ class TankSlosh(Effect):
         "length": Search(0.05, 3.0, "log"),
         "damping": Search(0.0, 0.3),
     }
+    shapes = ("damping",)
 
 
 @parameters
@@ -269,6 +271,10 @@ class PayloadShift(Effect):
         "mass": Search(10.0, 1500.0, "log"),
         "travel": Search(0.02, 1.0, "log"),
         "friction": Search(0.0, 1.0),
+    }
+    narrow: ClassVar[Mapping[str, tuple[float, ...]]] = {  # it meets its wall at a moment that its travel sets
+        "travel": tuple(0.1 + 0.022 * k for k in range(36)),
+        "friction": (0.25, 0.5),
     }
 
 

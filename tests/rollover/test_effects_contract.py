@@ -177,6 +177,19 @@ def test_the_numbers_of_an_effect_have_units_bounds_and_ranges_to_search(effect:
 
 
 @each
+def test_what_an_effect_says_of_its_fit_is_of_parameters_that_are_fitted(effect: type[Effect]) -> None:
+    assert set(effect.shapes) < set(effect.search), "a strength is left to fit"
+    assert set(effect.narrow) <= set(effect.search)
+    assert all(0.0 <= place <= 1.0 for places in effect.narrow.values() for place in places)
+    assert set(effect.grows) <= set(effect.search)
+    if effect.kind == "sensor":
+        spans = {"ground/force_normal": 4e3, "ground/force_tangential": 1e3, "ground/sinkage": 0.1}
+        on = {c: effect.looked_for_on(c, spans, 1.0) for c in spans}
+        assert any(on.values())
+        assert all(set(search) == set(effect.search) for search in on.values() if search is not None)
+
+
+@each
 def test_naming_one_parameter_switches_an_effect_on(effect: type[Effect]) -> None:
     for name in effect.search:
         value = float(effect.search[name].high)
