@@ -6,6 +6,7 @@ environment variable ROLLOVER_EFFECTS (several files as in PATH); it then stands
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import importlib.util
 import os
@@ -65,9 +66,13 @@ def entries() -> dict[str, type[Effect]]:
 
     A sensor effect is one channel's; with its number the same one acts on a second and a third channel.
     """
-    found = effects()
-    more = {nth(id, n): kind for id, kind in found.items() if kind.kind == "sensor" for n in range(2, MOST + 1)}
-    return found | more
+    return _entries(tuple(effects().items()))
+
+
+@functools.lru_cache(maxsize=4)  # asked for with every value that is exchanged
+def _entries(found: tuple[tuple[str, type[Effect]], ...]) -> dict[str, type[Effect]]:
+    more = {nth(id, n): kind for id, kind in found if kind.kind == "sensor" for n in range(2, MOST + 1)}
+    return dict(found) | more
 
 
 def nth(id: str, n: int) -> str:

@@ -81,8 +81,10 @@ class SensorMisalignment(Effect):
 
     @classmethod
     def looked_for_on(cls, channel: str, spans: Mapping[str, float], times: float) -> Mapping[str, Search] | None:
-        """Only where the channel across was recorded too."""
-        return cls.search if _across(channel) in spans else None
+        """Where the channel across was recorded too; an accelerometer alone reads cos(angle), as a low gain would."""
+        if _across(channel) in spans:
+            return cls.search
+        return {"angle": Search(0.0, cls.search["angle"].high)} if "/acceleration_" in channel else None
 
     def read(self, recording: Recording) -> Recording:
         """Mix in the channel across, where there is one."""

@@ -169,6 +169,15 @@ def test_one_sensor_effect_on_two_channels_stands_twice_in_the_scenario(tmp_path
     }
 
 
+def test_an_accelerometer_alone_on_its_axis_may_be_turned_or_read_low() -> None:
+    """cos(0.25) = 0.969: without the channel across both read the same."""
+    turned = {"effects.sensor-misalignment.channel": ACCELERATION, "effects.sensor-misalignment.angle": 0.25}
+    found = diagnose(scenario(), recorded(turned, 10, speeds=(1.2, 2.2, 3.2), channels=(FORCE, ACCELERATION)))
+    (named,) = found.effects
+    assert {named.id, *named.indistinguishable_from} == {"sensor-gain", "sensor-misalignment"}
+    assert "a motion across the channel" in named.discriminating_test
+
+
 def test_what_is_held_out_has_no_part_in_the_fit() -> None:
     good = recorded(GAIN, speeds=(1.2, 2.2, 3.2))
     other = recorded({**GAIN, "effects.sensor-gain.gain": 1.4}, seed=3, speeds=(2.7,))
