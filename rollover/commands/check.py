@@ -17,7 +17,10 @@ from rollover.faults import Fault, InputError
 )
 @answering
 def check(
-    files: Annotated[list[str], typer.Argument(help="Scenarios, vehicles, soils or recordings.", metavar="FILE...")],
+    files: Annotated[
+        list[str],
+        typer.Argument(help="Scenarios, vehicles, soils, recordings or folders of recordings.", metavar="FILE..."),
+    ],
     profile: Annotated[Path | None, typer.Option(help="What the columns of foreign recordings are.")] = None,
     scenario: Annotated[str | None, typer.Option(help="Whose values the recordings' conditions must be.")] = None,
     as_json: AsJson = False,
@@ -25,7 +28,7 @@ def check(
     """Validate files and run nothing; recordings are searched for faults of their sensors."""
     rows: list[dict[str, Any]] = []
     faults: list[Fault] = []
-    for name in files:
+    for name in (one for given in files for one in _each(given)):
         found: list[Fault] = []
         row: dict[str, Any] = {"file": name, "is": ""}
         try:
@@ -40,6 +43,16 @@ def check(
         print(json.dumps({"ok": not faults, "files": rows}, indent=2))
     if faults:
         raise InputError(*faults)
+
+
+def _each(name: str) -> list[str]:
+    """A file, or the recordings of a folder one by one; a folder without any is left to be refused."""
+    from rollover.importers import recordings_at
+
+    try:
+        return [str(p) for p in recordings_at(Path(name))] if Path(name).is_dir() else [name]
+    except InputError:
+        return [name]
 
 
 def _document(name: str) -> dict[str, Any]:

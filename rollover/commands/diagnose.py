@@ -124,13 +124,13 @@ def diagnose(
 
 def read(paths: Sequence[str]) -> dict[str, Recording]:
     """Recordings by their file's stem, those in folders too. Raises `InputError` for all faults at once."""
-    from rollover.importers import read_recording
+    from rollover.importers import read_recording, recordings_at
 
     found: dict[str, Recording] = {}
     faults: list[Fault] = []
     for text in paths:
         try:
-            files = _files(Path(text))
+            files = recordings_at(Path(text))
         except InputError as e:
             faults += e.faults
             continue
@@ -146,19 +146,6 @@ def read(paths: Sequence[str]) -> dict[str, Recording]:
     if faults:
         raise InputError(*faults)
     return found
-
-
-def _files(path: Path) -> list[Path]:
-    """A recording's own path, or those of all in a folder that is none itself."""
-    from rollover.diagnosis.account import NOT_RECORDINGS
-    from rollover.importers import importers
-
-    if not path.is_dir() or (path / "channels.parquet").is_file() or any(i.sniff(path) for i in importers().values()):
-        return [path]
-    files = [p for p in sorted(path.iterdir()) if p.is_file() and p.suffix not in NOT_RECORDINGS]
-    if not files:
-        raise InputError(Fault(file=str(path), message="no recordings in this folder; tables such as NAME.csv are"))
-    return files
 
 
 def _check(scenario: Scenario, measured: Mapping[str, Recording]) -> None:

@@ -13,7 +13,7 @@ from rollover.diagnosis.diagnose import diagnose
 from rollover.diagnosis.verdict import Diagnosis, Interval, Law, Named, Place, Score
 from rollover.document import dump
 from rollover.effects import nth
-from rollover.importers import read_recording
+from rollover.importers import read_recording, recordings_at
 from rollover.recording import Recording
 from rollover.scenario import Scenario, load
 from rollover.store import plain, versions
@@ -21,7 +21,6 @@ from rollover.store import plain, versions
 FORMAT = "rollover-diagnosis/1"
 JSON, SCENARIO, PAGE, PICTURE = "diagnosis.json", "scenario-diagnosed.yaml", "report.html", "diagnosis.rrd"
 FILES = (JSON, SCENARIO, PAGE, PICTURE)
-NOT_RECORDINGS = (".yaml", ".yml", ".json", ".md", ".txt")
 
 
 def account(
@@ -120,8 +119,7 @@ def diagnosed_text(scenario: Scenario, found: Diagnosis) -> str:
 
 def recordings_in(folder: Path) -> list[tuple[str, Recording]]:
     """Name and recording of each table in a folder, by name. Raises `InputError`."""
-    paths = [p for p in sorted(folder.iterdir()) if p.is_file() and p.suffix not in NOT_RECORDINGS]
-    return [(p.stem, read_recording(p)) for p in paths]
+    return [(p.stem, read_recording(p)) for p in recordings_at(folder)]
 
 
 def diagnose_folder(folder: Path, out: Path | None = None, workers: int = 1) -> dict[str, Any]:

@@ -22,7 +22,10 @@ from rollover.importers.soil_penetrometer import SOIL_PENETROMETER
 from rollover.importers.tdms import TDMS
 from rollover.recording import Recording
 
-__all__ = ["COLLECTIONS", "Collection", "Importer", "importers", "read_profile", "read_recording", "write_recording"]
+__all__ = ["COLLECTIONS", "Collection", "Importer", "importers", "read_profile", "read_recording", "recordings_at"]
+__all__ += ["write_recording"]
+
+NOT_RECORDINGS = (".yaml", ".yml", ".json", ".md", ".txt")
 
 PLAIN = Importer(name="plain", meaning="CSV or Parquet with a sidecar", sniff=plain.sniff, read=plain.read)
 _OWN = {i.name: i for i in (PLAIN, iso_mme.ISO_MME, MAT, TDMS, MDF, HDF5, MCAP, CSV)}
@@ -71,6 +74,16 @@ def write_recording(recording: Recording, path: str | Path, *, force: bool = Fal
     path = Path(path)
     is_mme = path.name.endswith((".mme.zip", ".mme"))
     (iso_mme.write if is_mme else plain.write)(recording, path, force=force)
+
+
+def recordings_at(path: Path) -> list[Path]:
+    """A recording's own path, or those of all in a folder that is none itself. Raises `InputError`."""
+    if not path.is_dir() or (path / "channels.parquet").is_file() or any(i.sniff(path) for i in importers().values()):
+        return [path]
+    files = [p for p in sorted(path.iterdir()) if p.is_file() and p.suffix not in NOT_RECORDINGS]
+    if not files:
+        raise InputError(Fault(file=str(path), message="no recordings in this folder; tables such as NAME.csv are"))
+    return files
 
 
 def read_profile(path: str | Path) -> Described:

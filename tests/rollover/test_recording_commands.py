@@ -44,6 +44,25 @@ def test_import_by_profile_and_check(tmp_path: Path) -> None:
     assert said.startswith(f"{out / 'raw.csv'}: recording, in order: Bench, 2 samples, 0 to 0.1 s\n")
 
 
+def test_check_takes_a_folder_of_recordings_one_by_one(tmp_path: Path) -> None:
+    time = np.arange(10) * 0.1
+    for name in ("a", "b"):
+        write_recording(Recording(title=name, time=time, channels={"ground/sinkage": time}), tmp_path / f"{name}.csv")
+    (tmp_path / "scenario.yaml").write_text("what is simulated stands beside its recordings\n")
+    code, said, _ = ask("check", tmp_path, "--json")
+    assert code == 0
+    assert [f["file"] for f in json.loads(said)["files"]] == [str(tmp_path / "a.csv"), str(tmp_path / "b.csv")]
+    (tmp_path / "b.csv").write_text("nothing\n")
+    code, said, faults = ask("check", tmp_path)
+    assert code == 2
+    assert said.startswith(f"{tmp_path / 'a.csv'}: recording, in order")
+    assert faults.startswith(f"{tmp_path / 'b.csv'}")
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    code, _, faults = ask("check", empty)
+    assert (code, faults.count("\n")) == (2, 1)
+
+
 def test_check_tells_findings_as_json(tmp_path: Path) -> None:
     random = np.random.default_rng(0)
     time = np.arange(1000) * 1e-3
