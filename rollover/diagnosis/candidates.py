@@ -15,7 +15,7 @@ from ground.law import REFERENCE_AREA, REFERENCE_MASS
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.simulator import EDGES, set_up
 from rollover.document import value_at
-from rollover.effects import EFFECTS, Search, effects, nth
+from rollover.effects import EFFECTS, Heard, Search, effects, nth
 from rollover.scenario import Scenario
 from rollover.vehicle import Striker
 
@@ -185,7 +185,8 @@ class Candidate:
                 axes.append([0.1, 0.6])
             else:
                 many = (THRESHOLDS if len(self.search) > 1 else 4) if not axes else 1
-                axes.append([(k + 0.5) / many for k in range(many)])
+                told = [] if s.told is None else [coordinate(s.told, s)]
+                axes.append([(k + 0.5) / many for k in range(many)] + told)
         return list(itertools.product(*axes))
 
     def further(self) -> list[tuple[float, ...]]:
@@ -259,20 +260,22 @@ def candidates_of(
     """
     effects()
     spans: dict[str, float] = {}
+    ends: dict[str, float] = {}
     for e in evidence:
         for s in e.signals:
             spans[s.channel] = max(spans.get(s.channel, 0.0), s.span)
+            ends[s.channel] = max(ends.get(s.channel, 0.0), s.end)
     found, times = [], _times(evidence)
     tried = set_up(scenario, evidence[0].recording) if scenario is not None and evidence else scenario
     for name, kind in EFFECTS.items():
         if name in switched_on or acts not in kind.acts or not kind.competes:
             continue
         if kind.kind == "sensor":
-            ranges = ((channel, kind.looked_for_on(channel, spans, times.get(channel, 1.0))) for channel in spans)
+            heard = [Heard(channel, spans, times.get(channel, 1.0), ends[channel]) for channel in spans]
             found += [
-                Candidate(id=name, kind=kind.kind, family=kind.family, search=dict(search), channel=channel)
-                for channel, search in ranges
-                if search is not None
+                Candidate(id=name, kind=kind.kind, family=kind.family, search=dict(search), channel=of.channel)
+                for of in heard
+                if (search := kind.looked_for_on(of)) is not None
             ]
             continue
         sized = {p: _sized(s, kind.grows.get(p), size) for p, s in kind.search.items()}

@@ -24,6 +24,7 @@ from rollover.diagnosis.empirical import offered, proposed
 from rollover.diagnosis.evidence import Evidence, doubted, doubted_beside, evidence_of, left_out
 from rollover.diagnosis.explain import SURE
 from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.flat_tops import cut_off
 from rollover.diagnosis.gate import yardstick
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.loudness import with_loudness
@@ -37,8 +38,18 @@ from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing,
 from rollover.diagnosis.scores import before_a_blow, judged
 from rollover.diagnosis.selection import Explanation, by_the_first, decided, explained
 from rollover.diagnosis.simulator import blow_of, set_up
-from rollover.diagnosis.statements import by_steps, closest, considered, is_none, named, noise, places, sentence
-from rollover.diagnosis.verdict import Degree, Diagnosis, Named
+from rollover.diagnosis.statements import (
+    agreeing_but,
+    by_steps,
+    closest,
+    considered,
+    is_none,
+    named,
+    noise,
+    places,
+    sentence,
+)
+from rollover.diagnosis.verdict import Degree, Diagnosis, Named, Place
 from rollover.drop import unfit
 from rollover.effects import EFFECTS, spoken
 from rollover.recording import Recording
@@ -110,9 +121,13 @@ def diagnose(
         named_so = _named_beside(judge, explanation, verdict, kept, groups, phases)
     explanation, effects, kept = named_so
     found = list(judge.evidence)
+    cut: tuple[Place, ...] = ()
+    if verdict == "no-mismatch":
+        effects, cut = cut_off([e.name for e in found], [dict(recordings)[e.name] for e in found], phases)
+        verdict = "sensor" if effects else verdict
     before, after = explanation.before, explanation.after
     set_ups = [set_up(scenario, e.recording) for e in found]
-    is_mismatch = verdict not in ("no-mismatch", "cannot-tell")
+    is_mismatch = verdict not in ("no-mismatch", "cannot-tell") and not cut
     say("what the mismatch depends on")
     depends_on = Dependence()
     degrees: tuple[Degree, ...] = ()
@@ -138,14 +153,18 @@ def diagnose(
     notes += [*(_felt(degrees[0]) for _ in degrees[:1] if is_mismatch), *by_steps(effects), *_cost(found)]
     return Diagnosis(
         verdict=verdict,
-        sentence=sentence(verdict, effects, explanation.p_value, h_before.held, h_after.held, found, early)
+        sentence=(
+            agreeing_but(effects, len(found), explanation.p_value)
+            if cut
+            else sentence(verdict, effects, explanation.p_value, h_before.held, h_after.held, found, early)
+        )
         + (closest(explanation, groups) if verdict == "unexplained" else "")
         + (by_clock(mistimed(judge, explanation.fitted)) if verdict == "unexplained" or (effects and remains) else "")
         + offered(law)
         + against_itself(verdict, contrary),
-        p_value=explanation.p_value,
+        p_value=min([explanation.p_value, *(e.p_value for e in effects if cut)]),
         noise=noise(found),
-        where=places(before, found, depends_on.on) if is_mismatch else (),
+        where=places(before, found, depends_on.on) if is_mismatch else cut,
         effects=effects,
         remaining_significant=verdict == "unexplained" or (bool(effects) and remains),
         remaining_p_value=after.p_value,

@@ -17,12 +17,12 @@ from typing import Any
 
 from ground.settings import ForceTerm
 from rollover.effects import empirical, ground, parameter, sensor, striker, vehicle
-from rollover.effects.effect import EFFECTS, Effect, Search, nothing, possible, spoken, units_of
+from rollover.effects.effect import EFFECTS, Effect, Heard, Search, nothing, possible, spoken, units_of
 from rollover.faults import Fault, InputError
 from rollover.recording import Recording
 
-__all__ = ["EFFECTS", "Effect", "Search", "acting", "effects", "ground", "nothing", "parameter", "read", "sensor"]
-__all__ += ["empirical", "entries", "every", "nth", "possible", "spoken", "striker", "units_of", "vehicle"]
+__all__ = ["EFFECTS", "Effect", "Heard", "Search", "acting", "effects", "ground", "nothing", "parameter", "read"]
+__all__ += ["empirical", "entries", "every", "nth", "possible", "sensor", "spoken", "striker", "units_of", "vehicle"]
 
 VARIABLE = "ROLLOVER_EFFECTS"
 MOST = 3  # sensor effects of one id in a scenario, each on its own channel

@@ -18,11 +18,28 @@ Kind = Literal["physics", "parameter", "sensor"]
 
 
 class Search(NamedTuple):
-    """Where to look for a parameter: from `low` to `high`, in even steps of the value or of its logarithm."""
+    """Where to look for a parameter: from `low` to `high`, in even steps of the value or of its logarithm.
+
+    `told` is a value that recordings show by themselves, and that is looked at beside others.
+    """
 
     low: float
     high: float
     scale: Literal["log", "linear"] = "linear"
+    told: float | None = None
+
+
+class Heard(NamedTuple):
+    """What recordings say of one of their channels, SI: `spans` of all by channel, and its `end`, see below.
+
+    `times` is how many times as far as simulated it moves: 1,000 of millimetres read as metres. `end` is the size of
+    its largest value if that is met again and again to the last digit, else 0.
+    """
+
+    channel: str
+    spans: Mapping[str, float]
+    times: float = 1.0
+    end: float = 0.0
 
 
 @parameters
@@ -81,11 +98,8 @@ class Effect:
         return search
 
     @classmethod
-    def looked_for_on(cls, channel: str, spans: Mapping[str, float], times: float) -> Mapping[str, Search] | None:
-        """Ranges of a sensor's effect on a channel recorded, with spans of all (SI); None where it has no part.
-
-        `times` is how many times as far as simulated the channel moves: 1,000 of millimetres read as metres.
-        """
+    def looked_for_on(cls, heard: Heard) -> Mapping[str, Search] | None:
+        """Ranges of a sensor's effect on a channel that was recorded; None where it has no part."""
         return cls.search
 
     def read(self, recording: Recording) -> Recording:

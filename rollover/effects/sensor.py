@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ground.compiled import compiled
 from ground.quantity import Quantity, parameters
 from rollover.channels import describe, is_known
-from rollover.effects.effect import CHANNELS_OWN, Effect, Kind, Search
+from rollover.effects.effect import CHANNELS_OWN, Effect, Heard, Kind, Search
 from rollover.recording import Recording
 
 Array = NDArray[np.float64]
@@ -80,11 +80,11 @@ class SensorMisalignment(Effect):
         _checked(self.channel)
 
     @classmethod
-    def looked_for_on(cls, channel: str, spans: Mapping[str, float], times: float) -> Mapping[str, Search] | None:
+    def looked_for_on(cls, heard: Heard) -> Mapping[str, Search] | None:
         """Where the channel across was recorded too; an accelerometer alone reads cos(angle), as a low gain would."""
-        if _across(channel) in spans:
+        if _across(heard.channel) in heard.spans:
             return cls.search
-        return {"angle": Search(0.0, cls.search["angle"].high)} if "/acceleration_" in channel else None
+        return {"angle": Search(0.0, cls.search["angle"].high)} if "/acceleration_" in heard.channel else None
 
     def read(self, recording: Recording) -> Recording:
         """Mix in the channel across, where there is one."""
@@ -163,9 +163,9 @@ class SensorScale(Effect):
         _checked(self.channel)
 
     @classmethod
-    def looked_for_on(cls, channel: str, spans: Mapping[str, float], times: float) -> Mapping[str, Search] | None:
+    def looked_for_on(cls, heard: Heard) -> Mapping[str, Search] | None:
         """A scale is that of a position or a length."""
-        return _other_unit(cls.search, times) if _is_length(channel) else None
+        return _other_unit(cls.search, heard.times) if _is_length(heard.channel) else None
 
     def read(self, recording: Recording) -> Recording:
         """Scale the channel."""
@@ -199,9 +199,9 @@ class SensorGain(Effect):
         _checked(self.channel)
 
     @classmethod
-    def looked_for_on(cls, channel: str, spans: Mapping[str, float], times: float) -> Mapping[str, Search] | None:
+    def looked_for_on(cls, heard: Heard) -> Mapping[str, Search] | None:
         """A gain is that of all but positions and lengths."""
-        return None if _is_length(channel) else _other_unit(cls.search, times)
+        return None if _is_length(heard.channel) else _other_unit(cls.search, heard.times)
 
     def read(self, recording: Recording) -> Recording:
         """Scale the channel."""
@@ -296,9 +296,10 @@ class SensorBias(Effect):
         _checked(self.channel)
 
     @classmethod
-    def looked_for_on(cls, channel: str, spans: Mapping[str, float], times: float) -> Mapping[str, Search] | None:
+    def looked_for_on(cls, heard: Heard) -> Mapping[str, Search] | None:
         """Half of what the channel moves over, to either side."""
-        return {"bias": Search(-0.5 * spans[channel], 0.5 * spans[channel])}
+        half = 0.5 * heard.spans[heard.channel]
+        return {"bias": Search(-half, half)}
 
     def read(self, recording: Recording) -> Recording:
         """Shift the channel's values."""
@@ -331,9 +332,10 @@ class SensorClipping(Effect):
         _checked(self.channel)
 
     @classmethod
-    def looked_for_on(cls, channel: str, spans: Mapping[str, float], times: float) -> Mapping[str, Search] | None:
-        """Up to a little above all that the channel moves over."""
-        return {"limit": Search(0.1 * spans[channel], 1.05 * spans[channel])}
+    def looked_for_on(cls, heard: Heard) -> Mapping[str, Search] | None:
+        """Up to a little above all that the channel moves over; where its values end, if they do."""
+        low, high = 0.1 * heard.spans[heard.channel], 1.05 * heard.spans[heard.channel]
+        return {"limit": Search(low, high, told=heard.end if low < heard.end < high else None)}
 
     def read(self, recording: Recording) -> Recording:
         """Cut the channel off."""

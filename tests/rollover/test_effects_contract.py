@@ -18,7 +18,7 @@ import pytest
 from ground.quantity import quantities
 from rollover.channels import is_known
 from rollover.drop import DropModel, simulate_drop
-from rollover.effects import Effect, effects, nothing
+from rollover.effects import Effect, Heard, effects, nothing
 from rollover.faults import InputError
 from rollover.recording import Recording
 from rollover.scenario import Scenario
@@ -161,7 +161,7 @@ def test_the_numbers_of_an_effect_have_units_bounds_and_ranges_to_search(effect:
     assert effect.null
     assert set(effect.null) <= set(declared)
     assert set(effect.search) >= {n for n in effect.null if n != "damping_ratio"} - {"stiffness_ratio"}
-    for name, (low, high, scale) in effect.search.items():
+    for name, (low, high, scale, _) in effect.search.items():
         assert declared[name].unit, name
         assert declared[name].meaning, name
         assert declared[name].admits(low), (name, low)
@@ -184,7 +184,7 @@ def test_what_an_effect_says_of_its_fit_is_of_parameters_that_are_fitted(effect:
     assert set(effect.grows) <= set(effect.search)
     if effect.kind == "sensor":
         spans = {"ground/force_normal": 4e3, "ground/force_tangential": 1e3, "ground/sinkage": 0.1}
-        on = {c: effect.looked_for_on(c, spans, 1.0) for c in spans}
+        on = {c: effect.looked_for_on(Heard(c, spans)) for c in spans}
         assert any(on.values())
         assert all(set(search) == set(effect.search) for search in on.values() if search is not None)
 
