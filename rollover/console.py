@@ -96,16 +96,23 @@ def readable(value: float | None, unit: str) -> str:
 
 
 def report(
-    run: Run, peaks: Sequence[PeakLoad], rows: Sequence[Criterion], answer: Mapping[str, Any], folder: str
+    run: Run,
+    peaks: Sequence[PeakLoad],
+    rows: Sequence[Criterion],
+    answer: Mapping[str, Any],
+    folder: str,
+    *,
+    compiled: bool = False,
 ) -> None:
-    """The answer of a run on standard output."""
+    """The answer of a run on standard output; what took part of its time to compile tells no speed."""
     from rollover.loads import unconverged
 
     out = Console(highlight=False, markup=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
     out.print(run.scenario.title, style="bold")
     if run.status == "done":
         speed = (run.stop_time - float(run.recording.time[0])) / run.wall_time if run.wall_time > 0.0 else 0.0
-        out.print(f"{run.stop_time:g} s simulated in {run.wall_time:.2g} s ({speed:.2g} x real time)")
+        pace = "most of it compiling, once" if compiled else f"{speed:.2g} x real time"
+        out.print(f"{run.stop_time:g} s simulated in {run.wall_time:.2g} s ({pace})")
     else:
         out.print(f"FAILED: {run.sentence}", style="bold red")
     if run.tests:

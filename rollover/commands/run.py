@@ -72,7 +72,8 @@ def run(
         chosen = chosen.replaced(settings(set_), origin="--set")
     for line in chosen.idle:
         console.say(f"{path}: {line}")
-    if not is_warm():
+    compiles = not is_warm()
+    if compiles:
         console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
     from rollover import loads, store
 
@@ -98,7 +99,7 @@ def run(
     if as_json:
         print(json.dumps(answer, indent=2))
     else:
-        console.report(done, peaks, rows, answer, str(folder))
+        console.report(done, peaks, rows, answer, str(folder), compiled=compiles)
     if done.status == "failed":
         console.say(f"{path}: the simulation failed: {done.sentence}")
         raise typer.Exit(FAILED)

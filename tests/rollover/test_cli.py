@@ -249,6 +249,9 @@ def test_the_first_run_says_that_it_compiles(bench: Bench, monkeypatch: pytest.M
     done = rollover("run", "drop_test")
     assert done.stderr.startswith("Compiling the contact kernels, once per installation: about ")
     assert done.stderr.count("\n") == 1
+    assert "(most of it compiling, once)" in done.stdout, "its time tells no speed"
+    monkeypatch.setattr("ground.compiled.is_warm", lambda: True)
+    assert "x real time)" in rollover("run", "drop_test", "--force").stdout
 
 
 def test_progress_in_lines_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
