@@ -105,6 +105,11 @@ class Fitted:
     foretold: tuple[float, ...] | None = None
 
     @property
+    def own(self) -> tuple[float, ...]:
+        """Coordinates of the last effect."""
+        return self.x[len(self.x) - len(self.candidates[-1].search) :]
+
+    @property
     def left(self) -> float:
         """Sum over the recordings of (D1) at its minimum."""
         return sum(b.normal()[2] for b in self.blocks)

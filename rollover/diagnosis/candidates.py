@@ -99,6 +99,16 @@ class Candidate:
         """Parameters by name for coordinates x."""
         return {name: physical(v, s) for v, (name, s) in zip(x, self.search.items(), strict=True)}
 
+    def strength(self, x: Sequence[float]) -> float:
+        """How many times as strong as it usually is, by the parameter that is furthest from changing nothing."""
+        usual, nulls = EFFECTS[self.id](), EFFECTS[self.id].null
+        found = []
+        for name, value in self.values(x).items():
+            null, own = nulls.get(name), getattr(usual, name)
+            if null is not None and own is not None and own != null:
+                found.append(abs((value - null) / (own - null)))
+        return max(found, default=1.0)
+
     def starts(self) -> list[tuple[float, ...]]:
         """Coordinates to look at first; the first of two parameters, a depth or a frequency, in the finer steps."""
         if self.neutral is not None:

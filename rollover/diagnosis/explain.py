@@ -27,6 +27,7 @@ CROOKED = 100.0  # times what the best leaves, up to which a fit of two paramete
 ROUGHNESS = 0.002  # of the misfit
 WITHIN_ONE = 1.0  # standard errors within which the simpler one is preferred
 APART = 2.0  # standard errors beyond which a rival is excluded
+ALIKE = 0.01  # of the summed misfit in noise units, within which two are one and the same to these recordings
 NEARLY_NOISE = 1.3  # misfit over the noise up to which its own colour is believed
 
 LIKE_NOISE = 2.2  # misfit over the noise up to which it may be noise that was underrated
@@ -117,8 +118,7 @@ def _from_base(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: G
     jobs = []
     for f in fits:
         if f.left > base.left:
-            own = f.x[len(base.x) :]
-            begin = looked.starts.get(f.candidates[-1].key, (own,))[0]
+            begin = looked.starts.get(f.candidates[-1].key, (f.own,))[0]
             jobs.append(
                 Job(candidates=f.candidates, start=(*base.x, *begin), shifts=tuple(b.shift for b in base.blocks))
             )
@@ -257,7 +257,8 @@ def moves(judge: Judge, base: Fitted, fitted: Fitted) -> float:
 def simplest(fits: Sequence[Fitted], groups: Groups, shared: float) -> list[Fitted]:
     """Fits, best first, led by the one with the fewest numbers of those that are hardly worse than the best.
 
-    Hardly worse: within a standard error, or within what leaps make the misfit rough by.
+    Hardly worse: within a standard error, or within what leaps make the misfit rough by. Of those that are one and the
+    same to these recordings the one leads that asks for the more usual strength.
     """
     least = held_out(fits[0], groups).left.sum()
     near = [
@@ -267,6 +268,8 @@ def simplest(fits: Sequence[Fitted], groups: Groups, shared: float) -> list[Fitt
         or held_out(f, groups).left.sum() < (1.0 + ROUGHNESS) * least
     ]
     first = min(near, key=lambda f: len(f.x))
+    twins = [f for f in near if len(f.x) == len(first.x) and abs(f.left - first.left) < ALIKE]
+    first = min(twins, key=lambda f: f.candidates[-1].strength(f.own))
     return [first, *(f for f in fits if f is not first)]
 
 

@@ -272,7 +272,7 @@ def _together(inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate
     partners: dict[str, tuple[Candidate, tuple[float, ...]]] = {}
     for f in (*leading, *later):
         last = f.candidates[-1]
-        partners.setdefault(last.key, (last, f.x[len(f.x) - len(last.search) :]))
+        partners.setdefault(last.key, (last, f.own))
     for s in sorted(first.screened, key=lambda s: -looked.scores.get(s.candidate.key, 0.0))[:LEADING]:
         partners.setdefault(s.candidate.key, (s.candidate, s.starts[0]))
     every, shifts = list(partners.values()), tuple(b.shift for b in leading[0].blocks)

@@ -189,6 +189,7 @@ class SensorGain(Effect):
     sentence = "{channel} reads {gain} times what is."
     rivals: ClassVar[Mapping[str, str]] = {
         "sensor-bias": "the level before contact, where a gain reads nothing",
+        "sensor-misalignment": "a motion across the channel: a gain reads nothing of it",
         "mass": "the level at rest against a weighed mass",
     }
     null: ClassVar[Mapping[str, float | None]] = {"gain": 1.0}
