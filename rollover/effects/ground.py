@@ -24,7 +24,7 @@ DEPTH = "a resistance of the ground that changes with depth"
 class SoilViscousDamping(Effect):
     """F += d v^zeta while the ground is pushed deeper: viscous and radiation damping."""
 
-    damping: Annotated[float, Quantity("N (s/m)^zeta", "d on the reference face", least=0)] = 1500.0
+    damping: Annotated[float, Quantity("N s/m", "d on the reference face; N (s/m)^zeta", least=0)] = 1500.0
     exponent: Annotated[float, Quantity("1", "zeta", above=0, most=3)] = 1.0
 
     id = "soil-viscous-damping"
