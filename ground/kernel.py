@@ -57,7 +57,8 @@ ADHESION, REACH = 8, 9  # pull-off force, N; gap over which it fades, m
 LAYER_DEPTH, LAYER_RATIO, CRUST_DEPTH, CRUST_RATIO = 10, 11, 12, 13
 STIFFNESS = 14  # factor on the law
 GROWTH_END, FADE = 15, 16  # sinkage at which the growth ends, and over which it dies out behind, m
-EFFECT_PLACES = 17  # numbers of the compiled terms follow, TERM_PLACES for each
+LAYER_ONSET = 17  # 0: a layer's force leaps at its top; 1: it sets in there with nothing
+EFFECT_PLACES = 18  # numbers of the compiled terms follow, TERM_PLACES for each
 TERM_PLACES = 8
 
 DOUBLED, HALVED = 12, 50  # times, of the way from a rut to where its line meets another curve
@@ -78,7 +79,10 @@ def loading_force(law: Any, p: Any, s: Any, z: float, v: float) -> float:
     if z < p[e + CRUST_DEPTH]:
         f *= p[e + CRUST_RATIO]
     if z > p[e + LAYER_DEPTH]:
-        f *= p[e + LAYER_RATIO]
+        if p[e + LAYER_ONSET] == 0.0:
+            f *= p[e + LAYER_RATIO]
+        else:
+            f *= 1.0 + (p[e + LAYER_RATIO] - 1.0) * (1.0 - p[e + LAYER_ONSET] * p[e + LAYER_DEPTH] / z)
     if v > 0.0:
         if v > p[e + SLOW] and p[e + PER_DECADE] != 0.0:
             f *= 1.0 + p[e + PER_DECADE] * math.log10(v / p[e + SLOW])

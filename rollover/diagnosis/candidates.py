@@ -206,7 +206,7 @@ class Candidate:
         """
         if self.id not in EDGES:
             return []
-        [(name, s)] = self.search.items()
+        name, s = next(iter(self.search.items()))
         null = EFFECTS[self.id].null[name]
         if null is None or not s.low < null < s.high:
             return []
@@ -283,9 +283,16 @@ def candidates_of(
         if kind.kind == "sensor":
             heard = [Heard(channel, spans, times.get(channel, 1.0), ends[channel]) for channel in spans]
             found += [
-                Candidate(id=name, kind=kind.kind, family=kind.family, search=dict(search), channel=of.channel)
+                Candidate(
+                    id=name,
+                    kind=kind.kind,
+                    family=kind.family,
+                    search={p: s for p, s in ranges.items() if p not in kind.shapes},
+                    shapes={p: s for p, s in ranges.items() if p in kind.shapes},
+                    channel=of.channel,
+                )
                 for of in heard
-                if (search := kind.looked_for_on(of)) is not None
+                if (ranges := kind.looked_for_on(of)) is not None
             ]
             continue
         sized = {p: _sized(s, kind.grows.get(p), size) for p, s in kind.search.items()}

@@ -31,7 +31,9 @@ LONGEST = 8  # samples of memory
 NOT_COLOURED = 0.7  # of the whole error that is noise: below, the model's own error prevails, which is no process
 RINGING = 0.9  # largest complex root
 SLOWER = 0.4  # of the logarithm of the slow noise's level, by which a misfit may exceed what is quiet
-UNSURE = 0.8  # of that, for each sample of memory: a long one is told badly from short windows
+CHANCE = 4.0  # standard errors that come to that
+LONG = 0.7  # memory that windows of 48 samples tell too short: by this
+UNSURE = 0.8  # of what a misfit may exceed it by, for each sample of such a memory
 STEADY = 0.995  # largest root of a memory
 AGREES = 2.0  # standard errors within which a memory is that of a filter
 BANDS = 2048  # frequencies that the noise behind a filter is summed over
@@ -56,7 +58,10 @@ def quiet(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evid
             loud = own is not None and own.windows >= SURELY and own.sigma > OWN * common.sigma
             best = own if own is not None and loud else common
             found[r][k] = replace(s, noise=best.sigma, ar=best.ar)
-    found = [[with_noise(s, s.noise, s.ar, e.model_error) for s in f] for e, f in zip(evidence, found, strict=True)]
+    found = [
+        [replace(with_noise(s, s.noise, s.ar, e.model_error), at_rest=(s.noise, s.ar)) for s in f]
+        for e, f in zip(evidence, found, strict=True)
+    ]
     return [replace(e, signals=tuple(s)) for e, s in zip(evidence, found, strict=True)]
 
 
@@ -118,19 +123,28 @@ def slower(told: Sequence[tuple[int, int, Signal, float, tuple[float, ...]]]) ->
     """Channels whose misfits are so much slower than their quiet stretches that they are no noise."""
     by: dict[str, list[tuple[float, float, int]]] = {}
     for _, _, s, sigma, ar in told:
-        if s.noise > 0.0 and sigma > 0.0:
-            memory = min(max(sum(s.ar), 0.0), STEADY)
-            more = np.log(level_of(sigma, ar) / level_of(s.noise, s.ar))
-            more -= max(np.log(sigma / s.noise), 0.0)  # what is only louder was not quiet there
-            by.setdefault(s.channel, []).append(
-                (float(more), SLOWER * (1.0 + UNSURE * memory / (1.0 - memory)), s.rows.size)
-            )
+        noise, own = s.at_rest or (s.noise, s.ar)
+        if noise > 0.0 and sigma > 0.0:
+            more = np.log(level_of(sigma, ar) / level_of(noise, own))
+            more -= max(np.log(sigma / noise), 0.0)  # what is only louder was not quiet there
+            by.setdefault(s.channel, []).append((float(more), min(max(sum(own), 0.0), STEADY), s.rows.size))
     slow = set()
     for channel, each in by.items():
         weights = [float(n) for *_, n in each]
-        if np.average([m for m, *_ in each], weights=weights) > np.average([a for _, a, _ in each], weights=weights):
+        allowed = [tolerated(memory, sum(weights)) for _, memory, _ in each]
+        if np.average([m for m, *_ in each], weights=weights) > np.average(allowed, weights=weights):
             slow.add(channel)
     return slow
+
+
+def tolerated(memory: float, count: float) -> float:
+    """Logarithm by which slow noise may exceed what quiet stretches say of it: sigma sqrt((1 + a)/(1 - a)).
+
+    A memory a, told by `count` samples with a standard error of sqrt((1 - a^2)/count), moves that by its (1 - a)th.
+    """
+    if memory > LONG:
+        return SLOWER * (1.0 + UNSURE * memory / (1.0 - memory))
+    return SLOWER + CHANCE * float(np.sqrt((1.0 + memory) / ((1.0 - memory) * max(count, 1.0))))
 
 
 def is_bursting(s: Signal, misfit: Array, level: float) -> bool:

@@ -46,6 +46,7 @@ class Signal:
     end: float = 0.0  # of its range, where values pile up, SI; 0: none is seen
     weight: Array | None = None  # (n,), below 1 where the model itself is not sure
     level: Array | None = None  # (n,), noise over `noise` where it grows with the value
+    at_rest: tuple[float, tuple[float, ...]] | None = None  # noise and colour of its quiet stretches, once told
 
     def cut(self, inside: NDArray[np.bool_]) -> Signal:
         """The samples that are `inside` (n,)."""

@@ -66,7 +66,11 @@ class SoilRateHardening(Effect):
     }
     channels = FORCE
     null: ClassVar[Mapping[str, float | None]] = {"per_decade": 0.0}
-    search: ClassVar[Mapping[str, Search]] = {"per_decade": Search(0.01, 0.5, "log")}
+    search: ClassVar[Mapping[str, Search]] = {
+        "per_decade": Search(0.01, 0.5, "log"),
+        "reference_speed": Search(1e-3, 2.0, "log"),
+    }
+    shapes = ("reference_speed",)
 
     def places(self) -> Mapping[int, float]:
         """Lambda and v_0."""
@@ -220,10 +224,11 @@ class SoilLayer(Effect):
 
     depth: Annotated[float, Quantity("m", "of the layer's top; sinkage", above=0)] = 0.25
     stiffness_ratio: Annotated[float, Quantity("1", "of K' below to K' above", above=0)] = 3.0
+    onset: Annotated[float, Quantity("1", "0: the force leaps at the top; 1: it sets in there", least=0, most=1)] = 0.0
 
     id = "soil-layer"
     family = DEPTH
-    equation = "F = ratio K'(z) z for z > depth"
+    equation = "F = K'(z) (z + (ratio - 1) (z - onset depth)) for z > depth; onset 0: F = ratio K'(z) z"
     source = "hardpan at 0.2-0.35 m, cone index ratio 2-4 (M)"
     sentence = "Below {depth} the ground is {stiffness_ratio} times as stiff."
     rivals: ClassVar[Mapping[str, str]] = {
@@ -235,11 +240,13 @@ class SoilLayer(Effect):
     search: ClassVar[Mapping[str, Search]] = {
         "depth": Search(0.005, 0.6, "log"),
         "stiffness_ratio": Search(0.2, 8.0, "log"),
+        "onset": Search(0.0, 1.0),
     }
+    shapes = ("onset",)
 
     def places(self) -> Mapping[int, float]:
-        """Depth and ratio."""
-        return {k.LAYER_DEPTH: self.depth, k.LAYER_RATIO: self.stiffness_ratio}
+        """Depth, ratio, and how it sets in."""
+        return {k.LAYER_DEPTH: self.depth, k.LAYER_RATIO: self.stiffness_ratio, k.LAYER_ONSET: self.onset}
 
 
 @parameters

@@ -55,6 +55,28 @@ def _follow(fade: Any, drive: Any, y: Any) -> None:
         y[i + 1] = fade[i] * y[i] + drive[i]
 
 
+@compiled
+def _swing(x: Any, h: Any, rise: Any, tau: float, beta: float, y: Any) -> None:
+    """Solve y + tau y' + beta tau^2 y'' = x for x of slopes `rise` over steps h, from y[0] and rise[0] on.
+
+    Beside x - tau x' stands e: with a = 1/(2 beta tau), w^2 = 1/(beta tau^2) - a^2,
+    e(h) = exp(-a h) (e_0 cos wh + (e'_0 + a e_0) sin(wh)/w), two fadings where w^2 < 0; w is kept from 0.
+    """
+    a, stiffness = 0.5 / (beta * tau), 1.0 / (beta * tau * tau)
+    w = max(math.sqrt(abs(stiffness - a * a)), 1e-6 * a)
+    rate = rise[0]
+    for i in range(h.size):
+        e, turning = y[i] - (x[i] - tau * rise[i]), rate - rise[i]
+        if stiffness > a * a:
+            fade = math.exp(-a * h[i])
+            c, s = fade * math.cos(w * h[i]), fade * math.sin(w * h[i]) / w
+        else:
+            slow, fast = math.exp((w - a) * h[i]), math.exp(-(w + a) * h[i])
+            c, s = 0.5 * (slow + fast), 0.5 * (slow - fast) / w
+        y[i + 1] = x[i + 1] - tau * rise[i] + c * e + s * (turning + a * e)
+        rate = rise[i] + c * turning - s * (a * turning + stiffness * e)
+
+
 @parameters
 class SensorMisalignment(Effect):
     """y = cos(angle) x + sin(angle) x_across: a sensor whose axis is turned towards the next one."""
@@ -99,22 +121,26 @@ class SensorMisalignment(Effect):
 
 @parameters
 class SensorLag(Effect):
-    """tau dy/dt = x - y: a slow sensor or a filter of first order that nobody wrote down."""
+    """y + tau y' + beta tau^2 y'' = x: a slow sensor or a filter of first or second order that nobody wrote down."""
 
     channel: Annotated[str, "that is misread"] = "ground/force_normal"
-    time: Annotated[float, Quantity("s", "tau", least=0)] = 0.002
+    time: Annotated[float, Quantity("s", "tau, by which a steady rise is read late", least=0)] = 0.002
+    second_order: Annotated[
+        float, Quantity("1", "beta: 0 first order, 0.5 Butterworth, 1/(4 zeta^2) of damping zeta", least=0, most=1)
+    ] = 0.0
 
     id = "sensor-lag"
     kind: ClassVar[Kind] = "sensor"
     family = "a channel that comes late"
-    equation = "tau dy/dt = x - y"
+    equation = "y + tau y' + beta tau^2 y'' = x"
     source = "CFC 60 cuts at 100 Hz, about 2 ms (M+)"
     sentence = "{channel} lags by {time}: its edges are round."
     rivals: ClassVar[Mapping[str, str]] = {
         "sensor-clock-offset": "a sharp edge: a lag rounds it, a clock only moves it",
     }
     null: ClassVar[Mapping[str, float | None]] = {"time": 0.0}
-    search: ClassVar[Mapping[str, Search]] = {"time": Search(1e-4, 0.05, "log")}
+    search: ClassVar[Mapping[str, Search]] = {"time": Search(1e-4, 0.05, "log"), "second_order": Search(0.0, 1.0)}
+    shapes = ("second_order",)
 
     def validate(self) -> None:
         """Refuse a channel that does not exist."""
@@ -128,6 +154,11 @@ class SensorLag(Effect):
         if self.time == 0.0 or self.channel not in recording.channels or recording.time.size < 2:
             return recording
         x, h = recording[self.channel], np.diff(recording.time)
+        if self.second_order > 0.0:
+            rise, y = np.diff(x) / h, np.empty_like(x)
+            y[0] = x[0] - self.time * rise[0]
+            _swing(x, h, rise, self.time, self.second_order, y)
+            return _with(recording, self.channel, y)
         ratio = h / self.time
         fade = np.exp(-ratio)
         rest = -np.expm1(-ratio) / ratio  # mean of the fading over the step
