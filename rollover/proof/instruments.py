@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ class Fault:
     """What is wrong with one channel; the defaults: nothing. The second part is in no table of effects."""
 
     lag: float = 0.0  # s
+    second_order: float = 0.0  # beta of y + lag y' + beta lag^2 y'' = x
     gain: float = 1.0
     offset: float = 0.0  # s late
     drift: float = 0.0  # s late per s
@@ -98,8 +100,8 @@ class Instruments:
             grid = np.arange(at.min() - PAD, at.max() + 1e-4, min(1e-4, fault.lag / 4.0))
             # the steepest edge is the first contact: a point on either side of it
             grid = np.union1d(grid, [-1e-9, 1e-9])
-            x = _lagged(descent.channels(np.clip(grid, descent.stages[0].start, None))[channel], grid, fault.lag)
-            values = np.interp(at, grid, x)
+            x = descent.channels(np.clip(grid, descent.stages[0].start, None))[channel]
+            values = np.interp(at, grid, _late(x, grid, fault.lag, fault.second_order))
         else:
             values = descent.channels(at)[channel]
         warmth = fault.warming / (1.0 + np.exp(-(times - fault.middle) / fault.width)) if fault.warming else 0.0
@@ -120,14 +122,25 @@ class Instruments:
         return np.clip(values, -fault.limit, fault.limit) if math.isfinite(fault.limit) else values
 
 
-def _lagged(x: Array, t: Array, tau: float) -> Array:
+def _late(x: Array, t: Array, tau: float, beta: float) -> Array:
+    """Solve y + tau y' + beta tau^2 y'' = x: partial fractions, two lags of first order at the poles p and q.
+
+    1/(beta tau^2 (s - p)(s - q)) = (q/(1 - s/p) - p/(1 - s/q))/(q - p), as beta tau^2 p q = 1.
+    """
+    if beta == 0.0:
+        return np.asarray(_lagged(x, t, tau))
+    p, q = np.roots([beta * tau * tau, tau, 1.0]).astype(complex)
+    return np.asarray(np.real((q * _lagged(x, t, -1.0 / p) - p * _lagged(x, t, -1.0 / q)) / (q - p)))
+
+
+def _lagged(x: Array, t: Array, tau: complex) -> NDArray[Any]:
     """Solve tau dy/dt = x - y for x that is straight between its samples; settled at the start."""
     h = np.diff(t)
     fade = np.exp(-h / tau)
     slope = np.diff(x) / h
-    y = np.empty_like(x)
+    y = np.empty(x.size, dtype=np.result_type(x, tau))
     y[0] = x[0] - tau * slope[0]
-    value = float(y[0])
+    value = y[0].item()
     for i, (f, old, new, s) in enumerate(
         zip(fade.tolist(), x[:-1].tolist(), x[1:].tolist(), slope.tolist(), strict=True)
     ):

@@ -99,8 +99,10 @@ def _layer(random: Random, s: Setting) -> Change:
     reached = sorted(s.depths)[-2]
     depth, ratio = float(random.uniform(0.15, 0.8)) * reached, _either(random, 0.006, 1.2)
     width = float(random.uniform(0.001, 0.004)) if s.other_forms else 0.0
+    onset = float(random.choice((0.0, 1.0))) if s.other_forms else 0.0
     told = {"depth": depth, "stiffness_ratio": ratio}
-    return _physics("soil-layer", told, "depth", layer_depth=depth, layer_ratio=ratio, layer_width=width)
+    own = {"layer_depth": depth, "layer_ratio": ratio, "layer_width": width if onset == 0.0 else 0.0}
+    return _physics("soil-layer", told, "depth", layer_onset=onset, **own)
 
 
 def _crust(random: Random, s: Setting) -> Change:
@@ -166,6 +168,12 @@ def _pair(name: str, field_name: str, value: float) -> tuple[dict[str, float], d
     return {name: value}, {field_name: value}
 
 
+def _lag(random: Random, s: Setting, channel: str) -> tuple[dict[str, float], dict[str, float]]:
+    """Of first order; where it may differ, half of them of second, as by Butterworth."""
+    told, fault = _pair("time", "lag", log_uniform(random, 3e-4, 1.2e-2))
+    return told, {**fault, "second_order": 0.5} if s.other_forms and random.random() < 0.5 else fault
+
+
 # gains act on amplifiers, scales on lengths: the same law, another instrument
 EFFECTS: dict[str, Draw] = {
     "soil-viscous-damping": _viscous,
@@ -197,9 +205,7 @@ EFFECTS: dict[str, Draw] = {
         (FORCE, ACCELERATION, DEPTH),
         lambda r, s, c: _pair("limit", "limit", s.peaks[c] * float(r.uniform(0.5, 0.97))),
     ),
-    "sensor-lag": _sensor(
-        "sensor-lag", MOST_CHANNELS, lambda r, s, c: _pair("time", "lag", log_uniform(r, 3e-4, 1.2e-2))
-    ),
+    "sensor-lag": _sensor("sensor-lag", MOST_CHANNELS, _lag),
     "sensor-clock-offset": _sensor(
         "sensor-clock-offset", MOST_CHANNELS, lambda r, s, c: _pair("offset", "offset", _signed(r, 1e-4, 1.2e-2))
     ),

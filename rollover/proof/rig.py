@@ -42,6 +42,7 @@ class Rig:
     layer_depth: float = math.inf
     layer_ratio: float = 1.0
     layer_width: float = 0.0
+    layer_onset: float = 0.0  # of what the layer would add at its top, how much it leaves out from there on
     crust_depth: float = 0.0
     crust_ratio: float = 1.0
     crust_width: float = 0.0
@@ -97,7 +98,8 @@ def loading_curve(rig: Rig, touch_speed: float) -> Curve:
         if rig.crust_ratio != 1.0:
             force *= rig.crust_ratio + (1.0 - rig.crust_ratio) * _below(z, rig.crust_depth, rig.crust_width)
         if rig.layer_ratio != 1.0:
-            force *= 1.0 + (rig.layer_ratio - 1.0) * _below(z, rig.layer_depth, rig.layer_width)
+            spared = rig.layer_onset * rig.layer_depth / max(z, rig.layer_depth)
+            force *= 1.0 + (rig.layer_ratio - 1.0) * (1.0 - spared) * _below(z, rig.layer_depth, rig.layer_width)
         if v > 0.0:
             if rig.per_decade != 0.0 and v > rig.slow:
                 force *= 1.0 + rig.per_decade * math.log10(v / rig.slow)

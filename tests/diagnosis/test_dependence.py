@@ -175,6 +175,22 @@ def test_noise_with_a_memory_is_weighed_by_all_that_is_left_and_a_drift_is_not()
     )
 
 
+def test_levels_that_are_off_are_no_memory_of_the_noise_however_often_it_is_weighed() -> None:
+    """What two effects of one sensor leave of a curved one: 1.4 sigma too little at first, 0.8 too much later on."""
+    rng, n = np.random.default_rng(6), 800
+    still = noise(rng, 3 * n, 0.6)
+    off = still + np.tile(np.where(np.arange(n) < 200, -1.4, 0.8), 3)
+    for misfit, kept in ((still, False), (off, True)):
+        before = [
+            replace(e, signals=(replace(e.signals[0], at_rest=(1.0, (0.6,))),)) for e in held(misfit, 1.0, (0.6,))
+        ]
+        # weighed once before, by what one effect had left
+        again = [replace(e, signals=(replace(e.signals[0], noise=1.4, ar=(0.85,)),)) for e in before]
+        for evidence in (before, again):
+            after = colour.whole(evidence, list(misfit.reshape(3, n)))
+            assert (after[0].signals[0] is evidence[0].signals[0]) == kept
+
+
 def test_a_hum_is_a_mismatch_however_fast_and_its_channel_is_named() -> None:
     """At 130 Hz it is beyond the slow waves of every phase."""
     made = []

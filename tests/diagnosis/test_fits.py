@@ -179,6 +179,25 @@ def test_an_accelerometer_alone_on_its_axis_may_be_turned_or_read_low() -> None:
     assert "a motion across the channel" in named.discriminating_test
 
 
+@pytest.mark.parametrize(
+    ("id", "hidden", "shape"),
+    [
+        ("soil-layer", {"depth": 0.1, "stiffness_ratio": 1.6, "onset": 1.0}, "onset"),
+        ("sensor-lag", {"channel": FORCE, "time": 0.006, "second_order": 0.5}, "second_order"),
+        ("soil-rate-hardening", {"per_decade": 0.1, "reference_speed": 0.3}, "reference_speed"),
+    ],
+)
+def test_the_form_of_an_effect_is_found_with_it(id: str, hidden: dict[str, Any], shape: str) -> None:
+    changes = {f"effects.{id}.{name}": value for name, value in hidden.items()}
+    found = diagnose(scenario(), recorded(changes, 11, speeds=(1.0, 1.7, 2.6, 3.4), rate=1000.0))
+    (named,) = found.effects
+    assert named.id == id
+    for name in (n for n in hidden if n != "channel"):
+        told = named.parameters[name]
+        assert told.low - 1e-9 <= hidden[name] <= told.high + 1e-9, (name, told)
+    assert named.parameters[shape].high - named.parameters[shape].low < 0.3 * max(hidden[shape], 0.5)
+
+
 def test_a_strength_is_told_in_what_is_usual() -> None:
     """A gain's usual error is 3 %, an axis is turned by 0.05 rad; a threshold that nothing is null of says nothing."""
     judge = judge_of(recorded({}, speeds=(2.0,), channels=(FORCE, ACCELERATION)))

@@ -96,6 +96,18 @@ def test_rate_hardening_is_a_factor_on_the_law() -> None:
     assert F[down] == pytest.approx(K * z[down] * factor, rel=1e-12)
 
 
+@pytest.mark.parametrize("onset", [0.0, 0.4, 1.0])
+def test_layer_leaps_or_sets_in(onset: float) -> None:
+    """F = K z above h, K (z + (r - 1)(z - onset h)) below: at the top it leaps by K h (r - 1)(1 - onset)."""
+    K, h, r = 2e4, 0.05, 2.5
+    layer = {f"effects.soil-layer.{n}": v for n, v in {"depth": h, "stiffness_ratio": r, "onset": onset}.items()}
+    z, v, _, F = motion(linear(K).with_(layer), np.linspace(0.001, 0.19, 400))
+    down = v > 0.0
+    expected = K * (z + np.where(z > h, (r - 1.0) * (z - onset * h), 0.0))
+    assert np.any(z[down] > 2.0 * h)
+    assert F[down] == pytest.approx(expected[down], rel=1e-12)
+
+
 def test_growing_added_mass_keeps_the_momentum() -> None:
     """p = (M + r z) v, dp/dt = m g: p^2 = p_0^2 + 2 m g (M z + r z^2/2), as p dp = m g (M + r z) dz."""
     r, v0 = 60.0, 3.0 / 1.1

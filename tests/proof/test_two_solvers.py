@@ -21,6 +21,10 @@ SAME: dict[str, tuple[dict[str, float], dict[str, Any]]] = {
     "soil-added-mass-growth": ({"rate": 30.0}, {"growth": 30.0}),
     "soil-elastic-rebound": ({"recovery": 0.1, "damping_ratio": 0.1}, {"recovery": 0.1, "unloading_ratio": 0.1}),
     "soil-layer": ({"depth": 0.1, "stiffness_ratio": 2.0}, {"layer_depth": 0.1, "layer_ratio": 2.0}),
+    "soil-layer, setting in": (
+        {"depth": 0.1, "stiffness_ratio": 2.0, "onset": 1.0},
+        {"layer_depth": 0.1, "layer_ratio": 2.0, "layer_onset": 1.0},
+    ),
     "soil-crust": ({"thickness": 0.03, "stiffness_ratio": 2.0}, {"crust_depth": 0.03, "crust_ratio": 2.0}),
     "structural-compliance": ({"stiffness": 5e5, "damping": 300.0}, {"spring": 5e5, "dashpot": 300.0}),
     "guide-friction": ({"force": 100.0}, {"guide": 100.0}),

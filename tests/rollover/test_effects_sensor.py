@@ -46,6 +46,33 @@ def test_lag_is_the_first_order_answer() -> None:
     assert wave[settled] == pytest.approx((gain * np.sin(9 * t - math.atan(9 * tau)))[settled], abs=1e-3)
 
 
+@pytest.mark.parametrize("beta", [0.1, 0.25, 0.5, 1.0])
+def test_lag_of_second_order_is_that_of_two_poles(beta: float) -> None:
+    """Ramp t: y = (q L_p - p L_q)/(q - p) of the poles p, q.
+
+    L_p t = t + 1/p - e^(pt)/p is the first-order answer at the pole p; beta tau^2 p q = 1. At beta = 1/4 the poles are
+    one, at -2/tau: t - tau + (t + tau) e^(-2t/tau).
+    """
+    tau = 0.2
+    ramp = SensorLag(time=tau, second_order=beta).read(recorded(ground__force_normal=np.maximum(t, 0.0)))[FORCE]
+    late = t >= 0
+    s = t[late]
+    if beta == 0.25:
+        expected = s - tau + (s + tau) * np.exp(-2.0 * s / tau)
+    else:
+        p, q = np.roots([beta * tau * tau, tau, 1.0]).astype(complex)
+        one, other = s + (1.0 - np.exp(p * s)) / p, s + (1.0 - np.exp(q * s)) / q
+        expected = np.real((q * one - p * other) / (q - p))
+    assert ramp[late] == pytest.approx(expected, abs=1e-9)
+    assert np.all(ramp[~late] == 0.0)
+
+
+def test_lag_of_hardly_any_second_order_is_one_of_first() -> None:
+    wave = recorded(ground__force_normal=np.sin(9 * t))
+    first, second = (SensorLag(time=0.2, second_order=beta).read(wave)[FORCE] for beta in (0.0, 1e-7))
+    assert second == pytest.approx(first, abs=1e-5)
+
+
 def test_lag_of_what_moves_from_the_start() -> None:
     """A body that falls before it is recorded: a ramp of slope v is read tau v behind from the first sample on."""
     falling = SensorLag(time=0.2, channel="striker/position_z").read(recorded(striker__position_z=5.0 - 3.0 * t))
