@@ -72,7 +72,8 @@ BRANCHED, ARRESTED, RELEASED = 1, 2, 4
 def loading_force(law: Any, p: Any, s: Any, z: float, v: float) -> float:
     """The law's loading curve with the effects that act on it, N per reference area; rates count on the way down.
 
-    F = r(z) F_law (1 + lambda log10(v/v_0)) + d v^zeta + 1/2 C rho A v^2 + terms, r the ratio of crust and layer.
+    F = r(z) F_law (1 + lambda log10(v/v_0)) + d v^zeta + 1/2 C rho A v^2 + terms, r the ratio of crust and layer;
+    that of a layer counts for the sinkage beyond its onset alone.
     """
     e = law[EFFECTS]
     f = p[e + STIFFNESS] * call_force(law[ADDRESS_FORCE], (p.ctypes, s.ctypes, z, v))

@@ -1,7 +1,8 @@
 """Effects with names, at a random strength: what each changes of the rig, the instruments or the scenario's numbers.
 
 Strengths reach from the barely visible to the strong and are even in their logarithm. `other_forms` lets each differ
-from the law that a diagnosis fits where physics leaves it open: soft edges of layers, exponents that are not round.
+from the law that a diagnosis fits where physics leaves it open: soft edges of layers, layers that set in where others
+leap, exponents that are not round, lags of second order.
 """
 
 from __future__ import annotations
