@@ -27,6 +27,7 @@ KNOWN = 1e-3  # of such an end, by which it is known
 CLEARLY = 0.4  # of the rise that is due, and
 ROUGH = 8.0  # rise that is no chance: from place to place the misfit of a mean of runs differs by 3 (1 sd)
 FURTHER, FARTHEST = 2.0, 30.0  # factors by which one goes on at a time, and at most
+RIPPLES = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)  # factors at which one looks behind a rise
 BEYOND = 1.2  # factor below which an interval that is too narrow is chance
 FEWEST = 3  # recordings that can disagree
 EVENLY = 12.0**-0.5  # standard deviation of what is spread evenly from 0 to 1
@@ -131,10 +132,14 @@ def reaches(judge: Judge, fitted: Fitted, own: Array, phi: float, sides: Mapping
     found = np.ones((own.size, 2))
     if start is None:
         return found
+    rippled = _rippled(fitted) if not judge.effort.thrifty else set()
     for k in range(own.size):
         way = TWO_SIDED * own[k] * inverse[:, k] / inverse[k, k]
         for side, sign in enumerate((-1.0, 1.0)):
             if sides is not None and sides.get(k) != sign:
+                continue
+            if k in rippled:
+                found[k, side] = _over_ripples(judge, fitted, sign * way, k, start + due)
                 continue
             far = 1.0
             while far < FARTHEST:
@@ -148,6 +153,33 @@ def reaches(judge: Judge, fitted: Fitted, own: Array, phi: float, sides: Mapping
                 far *= FURTHER
             found[k, side] = far if far > BEYOND else 1.0
     return found
+
+
+def _rippled(fitted: Fitted) -> set[int]:
+    """Coordinates of effects that were fitted with their shape: a threshold and its form make up for each other.
+
+    From sample to sample that a threshold passes the misfit rises and falls again, along a valley longer than one wave.
+    """
+    found, at = set[int](), 0
+    for c in fitted.candidates:
+        if not set(c.search).isdisjoint(EFFECTS[c.id].shapes):
+            found |= set(range(at, at + len(c.search)))
+        at += len(c.search)
+    return found
+
+
+def _over_ripples(judge: Judge, fitted: Fitted, way: Array, k: int, most: float) -> float:
+    """The furthest factor on the k-th coordinate's `way` (p,) with no more than `most` left, at least 1.
+
+    It ends at the end of its range, and what goes along at the ends of theirs.
+    """
+    reached, begun = 1.0, np.array(fitted.x)
+    end = ((1.0 if way[k] > 0.0 else 0.0) - begun[k]) / way[k]
+    for far in sorted({*(f for f in RIPPLES if f < end), min(max(end, RIPPLES[0]), RIPPLES[-1])}):
+        there = _misfit(judge, fitted, np.clip(begun + far * way, 0.0, 1.0) - begun)
+        if there is not None and there <= most:
+            reached = far
+    return reached if reached > BEYOND else 1.0
 
 
 def _misfit(judge: Judge, fitted: Fitted, way: Array) -> float | None:

@@ -67,6 +67,42 @@ def test_an_interval_reaches_as_far_as_the_misfit_stays_low(flatter: float) -> N
     assert found == pytest.approx(np.full((1, 2), flatter), rel=1e-12)  # rounding: the misfit is a parabola
 
 
+@pytest.mark.parametrize(("start", "reached"), [(0.5, 4.0), (0.9, 2.5), (0.99, 1.0)])
+def test_an_interval_looks_behind_the_ripples_of_a_threshold(
+    start: float, reached: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A misfit that rises by 5 at 1 and 2 deviations and comes down to 1 between and behind them, up to 4 of 0.04.
+
+    From 0.9 on the range ends 2.5 deviations off, from 0.99 on a quarter of one; what goes along ends at its own end.
+    """
+    seen = []
+
+    def misfit(judge: Any, fitted: Fitted, way: np.ndarray) -> float:
+        x = np.array(fitted.x) + way
+        seen.append(x)
+        far = way[0] / 0.04
+        return 100.0 + (5.0 if far > 4.5 or min(abs(far - 1.0), abs(far - 2.0)) < 0.1 else 1.0)
+
+    monkeypatch.setattr(stated, "_misfit", misfit)
+    fitted: Any = SimpleNamespace(x=(start, 0.95))
+    way = np.array([0.04, 0.03])
+    assert stated._over_ripples(SimpleNamespace(), fitted, way, 0, 103.84) == pytest.approx(reached)  # type: ignore[arg-type]
+    assert all(np.all((x >= 0.0) & (x <= 1.0 + 1e-12)) for x in seen if x[0] <= 1.0)
+
+
+def test_the_thresholds_of_effects_with_their_shape_are_looked_behind() -> None:
+    judge = judge_of(recorded({}, speeds=(2.0,)))
+    layer, mass = candidate(judge, "soil-layer"), candidate(judge, "mass")
+    for candidates, expected in (
+        ((layer,), set()),
+        ((layer.whole(),), {0, 1, 2}),
+        ((mass, layer.whole()), {1, 2, 3}),
+        ((layer, mass), set()),
+    ):
+        x = (0.5,) * sum(len(c.search) for c in candidates)
+        assert stated._rippled(Fitted(candidates=candidates, x=x, blocks=())) == expected
+
+
 def test_recordings_that_disagree_widen_an_interval_as_student_says() -> None:
     """w_r = J x_r, x_r normal about the truth: the mean of R over its own scatter is t of R - 1, 95 % of it inside."""
     rng = np.random.default_rng(6)
