@@ -138,9 +138,6 @@ def reaches(judge: Judge, fitted: Fitted, own: Array, phi: float, sides: Mapping
         for side, sign in enumerate((-1.0, 1.0)):
             if sides is not None and sides.get(k) != sign:
                 continue
-            if k in rippled:
-                found[k, side] = _over_ripples(judge, fitted, sign * way, k, start + due)
-                continue
             far = 1.0
             while far < FARTHEST:
                 x = np.array(fitted.x) + sign * far * way
@@ -151,6 +148,8 @@ def reaches(judge: Judge, fitted: Fitted, own: Array, phi: float, sides: Mapping
                     far *= float(np.sqrt(due / (there - start)))
                     break
                 far *= FURTHER
+            if k in rippled:
+                far = max(far, _over_ripples(judge, fitted, sign * way, k, start + due))
             found[k, side] = far if far > BEYOND else 1.0
     return found
 
@@ -179,7 +178,7 @@ def _over_ripples(judge: Judge, fitted: Fitted, way: Array, k: int, most: float)
         there = _misfit(judge, fitted, np.clip(begun + far * way, 0.0, 1.0) - begun)
         if there is not None and there <= most:
             reached = far
-    return reached if reached > BEYOND else 1.0
+    return reached
 
 
 def _misfit(judge: Judge, fitted: Fitted, way: Array) -> float | None:
