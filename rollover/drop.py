@@ -131,15 +131,18 @@ class DropModel:
             raise DropFailedError("the drop diverged: a velocity beyond 10 km/s, or steps without end")
         return out
 
+    def motion(self, times: Array) -> dict[str, Array]:
+        """Channels of the drop at `times` (s, rising), before its sensors. Raises `DropFailedError`."""
+        out = self.rows(times)
+        return {name: sign * out[:, column] for name, (column, sign) in COLUMNS.items()}
+
     def run(self, times: Array | None = None) -> Recording:
         """Channels of the drop at `times` (s, rising; default: rows of the full run), as its sensors read them.
 
         Raises `DropFailedError`.
         """
         at = self.times if times is None else np.ascontiguousarray(times, dtype=np.float64)
-        out = self.rows(at)
-        channels = {name: sign * out[:, column] for name, (column, sign) in COLUMNS.items()}
-        recording = Recording(title=self.scenario.title, time=at, channels=channels, source="simulation")
+        recording = Recording(title=self.scenario.title, time=at, channels=self.motion(at), source="simulation")
         return read(self.scenario.effects, recording)
 
 

@@ -60,6 +60,16 @@ class Signal:
 
 
 @dataclass(frozen=True, kw_only=True)
+class _Inside:
+    """Samples (n,) of a stack: the first and the last of the signal of each, and the least leap from each, (n - 2,)."""
+
+    first: NDArray[np.int64]
+    last: NDArray[np.int64]
+    least: Array
+    starts: NDArray[np.int64]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Evidence:
     """One recording made ready: signals, their simulator, and the prior of its time shift (s)."""
 
@@ -132,24 +142,33 @@ class Evidence:
 
     def leaps(self, raw: Array) -> NDArray[np.int64]:
         """Samples (stacked) about which a prediction leaps."""
-        rows = []
-        for s, part in self.spans():
-            x = raw[part]
-            if x.size < 5:
-                continue
-            step = np.abs(np.diff(x))
-            beside = np.zeros(x.size - 2)
-            beside[:-1] = step[2:]
-            beside[1:] = np.maximum(beside[1:], step[:-2])
-            leap = np.abs(x[2:] - x[:-2])
-            first = np.flatnonzero((leap > LEAP * beside) & (leap > 3.0 * s.sigma))
-            if not first.size:
-                continue
-            rows += [part.start + first + k for k in range(3)]
-            # when a body lifts off again hangs on little
-            large = first[leap[first] > LARGE * s.sigma]
-            rows += [np.clip(part.start + large + k, part.start, part.stop - 1) for k in (-2, -1, 3, 4)]
-        return np.unique(np.concatenate(rows)) if rows else np.zeros(0, dtype=np.int64)
+        own = self._inside
+        leap = np.abs(raw[2:] - raw[:-2])
+        first = np.flatnonzero(leap > own.least)
+        if first.size:
+            step = np.zeros(raw.size + 2)  # nothing before a signal and nothing behind it
+            step[1:-2] = np.abs(raw[1:] - raw[:-1])
+            step[own.starts] = 0.0
+            first = first[leap[first] > LEAP * np.maximum(step[first + 3], step[first])]
+        if not first.size:
+            return np.zeros(0, dtype=np.int64)
+        # when a body lifts off again hangs on little
+        large = first[leap[first] > LARGE / 3.0 * own.least[first]]
+        around = np.clip(large[:, None] + np.array([-2, -1, 3, 4]), own.first[large, None], own.last[large, None])
+        found = np.zeros(raw.size, dtype=np.bool_)
+        found[(first[:, None] + np.arange(3)).ravel()] = True
+        found[around.ravel()] = True
+        return np.flatnonzero(found)
+
+    @cached_property
+    def _inside(self) -> _Inside:
+        """Where the signals of the stack begin and end, and what is a leap in each."""
+        spans = self.spans()
+        first = np.concatenate([np.full(p.stop - p.start, p.start) for _, p in spans])
+        last = np.concatenate([np.full(p.stop - p.start, p.stop - 1) for _, p in spans])
+        sigma = np.concatenate([np.full(p.stop - p.start, s.sigma if s.rows.size >= 5 else np.inf) for s, p in spans])
+        least = np.where(first[2:] == first[:-2], 3.0 * sigma[:-2], np.inf)
+        return _Inside(first=first, last=last, least=least, starts=np.unique(first))
 
     def forgiven(self, raw: Array, leaps: NDArray[np.int64]) -> Array:
         """Predicted samples (stacked, SI) about a leap, moved towards the measured ones within their neighbours.
@@ -170,11 +189,12 @@ class Evidence:
         found = np.ones(self.count)
         if not leaps.size:
             return found
+        leaping = np.zeros(self.count, dtype=np.bool_)
+        leaping[leaps] = True
         for s, part in self.spans():
-            inside = leaps[(leaps >= part.start) & (leaps < part.stop)]
+            there = leaping[part]
             for k in range(1, len(s.ar) + 1):
-                later = np.setdiff1d(inside + k, inside)
-                found[later[later < part.stop]] = 1.0 / grown(s.ar)
+                found[part][k:][there[:-k] & ~there[k:]] = 1.0 / grown(s.ar)
         return found
 
     def spans(self) -> list[tuple[Signal, slice]]:

@@ -392,7 +392,7 @@ class Judge:
 
 def _key(r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> tuple[object, ...]:
     names = tuple((c.key, len(c.search)) for c in candidates)
-    return (r, names, tuple(np.round(np.asarray(x, dtype=float), 12)), round(shift, 9))
+    return (r, names, tuple([round(float(v), 12) for v in x]), round(shift, 9))
 
 
 __all__ = ["GENTLE", "Block", "Fitted", "Judge", "shift_of"]

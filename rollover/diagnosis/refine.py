@@ -213,16 +213,14 @@ def shaped(judge: Judge, f: Fitted) -> Fitted | None:
     last, shifts = f.candidates[-1], [b.shift for b in f.blocks]
     candidates, at = (*f.candidates[:-1], last.whole()), len(f.x) - len(last.search)
     places = [(*f.x[:at], *start) for start in last.with_shapes(f.x[at:])]
-    found: Fitted | None = None
+    best: Fitted | None = None
     short = [judge.fit(candidates, x, rounds=SHORT, shifts=shifts) for x in places]
     for begun in sorted((f for f in short if f is not None), key=lambda f: f.left)[:STARTS]:
         again = judge.fit(candidates, begun.x, shifts=[b.shift for b in begun.blocks])
-        if again is not None and again.left > NOISE_LEFT**2 * sum(b.residual.size for b in again.blocks):
-            again = polish(judge, again)
-        elif again is not None:
-            return again
-        found = min((f for f in (found, again) if f is not None), key=lambda f: f.left, default=None)
-    return found
+        best = min((f for f in (best, again) if f is not None), key=lambda f: f.left, default=None)
+        if best is not None and best.left < NOISE_LEFT**2 * sum(b.residual.size for b in best.blocks):
+            return best
+    return None if best is None else polish(judge, best)
 
 
 def without(judge: Judge, fitted: Fitted, k: int, rounds: int = 8) -> Fitted | None:

@@ -75,7 +75,7 @@ class DropSimulator:
     def __init__(self, scenario: Scenario, recording: Recording) -> None:
         self.model = DropModel(scenario=scenario)
         self.recording = recording
-        self._raw: dict[tuple[Any, ...], Recording] = {}
+        self._raw: dict[tuple[Any, ...], dict[str, Array]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         """What is sent to another process: not the runs."""
@@ -84,17 +84,19 @@ class DropSimulator:
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """See `Simulator`; ``ValueError`` for a value out of bounds passes."""
         physical = {path: value for path, value in changes.items() if not path.startswith(SENSORS)}
+        model = self.model
+        if len(physical) < len(changes):
+            model = model.with_({path: value for path, value in changes.items() if path not in physical})
+        sensors = {name: e for name, e in model.scenario.effects.items() if name.startswith("sensor-")}
         try:
-            run = self._at(physical, shift)
-            if len(physical) < len(changes):
-                read_by = self.model.with_({p: v for p, v in changes.items() if p not in physical}).scenario.effects
-                run = replace(
-                    run, time=self.rows.times, channels={**run.channels, **self._edges(physical, shift, read_by)}
-                )
-                run = read({n: e for n, e in read_by.items() if e.id not in EDGES}, run)
+            channels = self._at(physical, shift)
+            if sensors:
+                channels = {**channels, **self._edges(physical, shift, sensors)}
+                run = Recording(title=self.recording.title, time=self.rows.times, channels=channels)
+                channels = dict(read({n: e for n, e in sensors.items() if e.id not in EDGES}, run).channels)
         except DropFailedError:
             return None
-        return behind_filters(run.channels, self.recording, self.rows)
+        return behind_filters(channels, self.recording, self.rows)
 
     def strays(
         self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1
@@ -116,14 +118,14 @@ class DropSimulator:
     def state(self, shift: float) -> Mapping[str, Array]:
         """See `Simulator`."""
         try:
-            return {name: values[self.rows.stamps] for name, values in self._at({}, shift).channels.items()}
+            return {name: values[self.rows.stamps] for name, values in self._at({}, shift).items()}
         except DropFailedError:
             return {}
 
-    def _edges(self, physical: Mapping[str, Any], shift: float, read_by: Mapping[str, Any]) -> dict[str, Array]:
+    def _edges(self, physical: Mapping[str, Any], shift: float, sensors: Mapping[str, Any]) -> dict[str, Array]:
         """Channels behind a lag or with a clock of their own: what these make of a leap lies between the rows."""
         stamps = self.rows.times
-        lags, offsets, drifts = ({e.channel: e for e in every(read_by, name)} for name in EDGES)
+        lags, offsets, drifts = ({e.channel: e for e in every(sensors, name)} for name in EDGES)
         found = {}
         for channel in {*lags, *offsets, *drifts} & set(self.recording.channels):
             own, lag = stamps, lags.get(channel)
@@ -138,8 +140,9 @@ class DropSimulator:
             beside = self.contact + np.array([-BESIDE, BESIDE])
             fine = np.concatenate([own, 0.5 * (own[1:] + own[:-1]), beside[(beside > own[0]) & (beside < own[-1])]])
             dense, where = np.unique(fine, return_inverse=True)
-            raw = replace(self._run(physical, dense, (*key, "dense")), time=dense)
-            found[channel] = lag.read(raw)[channel][where[: own.size]]
+            raw = {channel: self._run(physical, dense, (*key, "dense"))[channel]}
+            late = lag.read(Recording(title=self.recording.title, time=dense, channels=raw))
+            found[channel] = late[channel][where[: own.size]]
         return found
 
     @cached_property
@@ -154,35 +157,40 @@ class DropSimulator:
         if isinstance(start, Drop):
             return 0.0
         times = np.arange(0.0, self.model.scenario.simulation.duration, 1e-4)
-        below = self.model.run(times)["ground/sinkage"] > 0.0
+        below = self.model.motion(times)["ground/sinkage"] > 0.0
         return float(times[np.argmax(below)]) if below.any() else np.inf
 
-    def _at(self, physical: Mapping[str, Any], shift: float) -> Recording:
-        """The drop at its rows less `shift`; what it is a little later is made along with it, for slopes."""
-        values, later = tuple(sorted(physical.items())), shift + self.effort.later
+    @cached_property
+    def _twice(self) -> tuple[Array, NDArray[np.int64]]:
+        """The rows and what each is a little later, in order, and where each is among these."""
+        stamps = self.rows.times
+        # at 20 kHz one row's little later is the next row
+        times, back = np.unique(np.concatenate([stamps, stamps - self.effort.later]), return_inverse=True)
+        return times, back
+
+    def _at(self, physical: Mapping[str, Any], shift: float) -> dict[str, Array]:
+        """The drop at its rows less `shift`, before instruments; what it is a little later is made along with it."""
+        values = tuple(sorted(physical.items()))
         if (*values, shift) not in self._raw:
-            stamps = self.rows.times
-            # at 20 kHz one row's little later is the next row
-            times, back = np.unique(np.concatenate([stamps - shift, stamps - later]), return_inverse=True)
-            run = self._made(physical, times)
-            for key, part in ((shift, back[: stamps.size]), (later, back[stamps.size :])):
-                channels = {name: v[part] for name, v in run.channels.items()}
-                self._keep((*values, key), replace(run, time=run.time[part], channels=channels))
+            times, back = self._twice
+            run, many = self._made(physical, times - shift), self.rows.times.size
+            for key, part in ((shift, back[:many]), (shift + self.effort.later, back[many:])):
+                self._keep((*values, key), {name: v[part] for name, v in run.items()})
         return self._raw[(*values, shift)]
 
-    def _run(self, physical: Mapping[str, Any], times: Array, key: tuple[Any, ...]) -> Recording:
+    def _run(self, physical: Mapping[str, Any], times: Array, key: tuple[Any, ...]) -> dict[str, Array]:
         """The drop before instruments at `times`, which `key` stands for."""
         key = (*sorted(physical.items()), *key)
         if key not in self._raw:
             self._keep(key, self._made(physical, times))
         return self._raw[key]
 
-    def _made(self, physical: Mapping[str, Any], times: Array) -> Recording:
+    def _made(self, physical: Mapping[str, Any], times: Array) -> dict[str, Array]:
         model = self.model.with_(physical) if physical else self.model
         abrupt = sum(effect.is_abrupt for effect in model.scenario.effects.values())
-        return replace(model, step=STEPS[min(abrupt, len(STEPS) - 1)]).run(times)
+        return replace(model, step=STEPS[min(abrupt, len(STEPS) - 1)]).motion(times)
 
-    def _keep(self, key: tuple[Any, ...], run: Recording) -> None:
+    def _keep(self, key: tuple[Any, ...], run: dict[str, Array]) -> None:
         """What sensors alone change needs no second run."""
         if len(self._raw) >= KEPT:
             self._raw.pop(next(iter(self._raw)))

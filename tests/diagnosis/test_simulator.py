@@ -55,3 +55,15 @@ def test_stamps_may_lie_as_far_apart_as_a_clock_is_moved_for_its_slope() -> None
     assert now is not None
     assert later is not None
     np.testing.assert_array_equal(later[FORCE][1:], now[FORCE][:-1])
+
+
+def test_what_a_scenario_has_of_sensors_itself_is_read_once_beside_another() -> None:
+    stamps = np.arange(-20, 900) * 1e-3
+    recording = Recording(title="drop", time=stamps, channels={FORCE: 0.0 * stamps})
+    own = scenario().replaced({"effects.sensor-gain.gain": 1.5, "effects.sensor-lag.time": 0.004})
+    bias = {"effects.sensor-bias.bias": 100.0, "effects.sensor-bias.channel": FORCE}
+    alone, beside = (DropSimulator(own, recording).predict(changes, 0.0) for changes in ({}, bias))
+    assert alone is not None
+    assert beside is not None
+    assert alone[FORCE][-1] == pytest.approx(1.5 * 132.0 * 9.81, rel=1e-3)
+    np.testing.assert_allclose(beside[FORCE], alone[FORCE] + 100.0, rtol=1e-12)
