@@ -58,7 +58,8 @@ LAYER_DEPTH, LAYER_RATIO, CRUST_DEPTH, CRUST_RATIO = 10, 11, 12, 13
 STIFFNESS = 14  # factor on the law
 GROWTH_END, FADE = 15, 16  # sinkage at which the growth ends, and over which it dies out behind, m
 LAYER_ONSET = 17  # 0: a layer's force leaps at its top; 1: it sets in there with nothing
-EFFECT_PLACES = 18  # numbers of the compiled terms follow, TERM_PLACES for each
+LAYER_WIDTH, CRUST_WIDTH = 18, 19  # over which the ratio changes at their edge, m; 0: at once
+EFFECT_PLACES = 20  # numbers of the compiled terms follow, TERM_PLACES for each
 TERM_PLACES = 8
 
 DOUBLED, HALVED = 12, 50  # times, of the way from a rut to where its line meets another curve
@@ -69,17 +70,29 @@ BRANCHED, ARRESTED, RELEASED = 1, 2, 4
 
 
 @compiled
+def passed(z: float, edge: float, width: float) -> float:
+    """How far sinkage z has passed an edge of some width, 0 before to 1 behind: u^2 (3 - 2 u)."""
+    u = min(max((z - edge) / width + 0.5, 0.0), 1.0)
+    return u * u * (3.0 - 2.0 * u)
+
+
+@compiled
 def loading_force(law: Any, p: Any, s: Any, z: float, v: float) -> float:
     """The law's loading curve with the effects that act on it, N per reference area; rates count on the way down.
 
     F = r(z) F_law (1 + lambda log10(v/v_0)) + d v^zeta + 1/2 C rho A v^2 + terms, r the ratio of crust and layer;
-    that of a layer counts for the sinkage beyond its onset alone.
+    that of a layer counts for the sinkage beyond its onset alone. Where an edge has a width, r changes over that.
     """
     e = law[EFFECTS]
     f = p[e + STIFFNESS] * call_force(law[ADDRESS_FORCE], (p.ctypes, s.ctypes, z, v))
-    if z < p[e + CRUST_DEPTH]:
+    if p[e + CRUST_WIDTH] > 0.0:
+        f *= 1.0 + (p[e + CRUST_RATIO] - 1.0) * (1.0 - passed(z, p[e + CRUST_DEPTH], p[e + CRUST_WIDTH]))
+    elif z < p[e + CRUST_DEPTH]:
         f *= p[e + CRUST_RATIO]
-    if z > p[e + LAYER_DEPTH]:
+    if p[e + LAYER_WIDTH] > 0.0:
+        spared = p[e + LAYER_ONSET] * p[e + LAYER_DEPTH] / max(z, p[e + LAYER_DEPTH])
+        f *= 1.0 + (p[e + LAYER_RATIO] - 1.0) * (1.0 - spared) * passed(z, p[e + LAYER_DEPTH], p[e + LAYER_WIDTH])
+    elif z > p[e + LAYER_DEPTH]:
         if p[e + LAYER_ONSET] == 0.0:
             f *= p[e + LAYER_RATIO]
         else:

@@ -19,6 +19,7 @@ from ground.kernel import (
     COLUMNS,
     CRUST_DEPTH,
     CRUST_RATIO,
+    CRUST_WIDTH,
     EFFECTS,
     GROWING,
     GROWTH,
@@ -26,6 +27,7 @@ from ground.kernel import (
     IDLE,
     LAYER_DEPTH,
     LAYER_RATIO,
+    LAYER_WIDTH,
     LINE_C,
     LINE_K,
     LINE_Z,
@@ -138,8 +140,18 @@ def advance(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, h: f
 
 
 @compiled
+def edges(depth: float, width: float, out: Any, count: int) -> int:
+    """Where the edge of a layer begins and ends, into out from `count` on; returns how many there are then."""
+    out[count] = depth - 0.5 * width
+    if width <= 0.0:
+        return count + 1
+    out[count + 1] = depth + 0.5 * width
+    return count + 2
+
+
+@compiled
 def levels(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, out: Any) -> int:
-    """Depths at which the force may have a kink or a jump, or the contact begin or end, into out (8,)."""
+    """Depths at which the force may have a kink or a jump, or the contact begin or end, into out (12,)."""
     if state[MODE] == IDLE:
         out[0] = rut_depth(row)
         return 1
@@ -149,11 +161,9 @@ def levels(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, out: Any) -> 
     out[2] = s[BRANCH]
     count = 3
     if p[e + LAYER_RATIO] != 1.0:
-        out[count] = p[e + LAYER_DEPTH]
-        count += 1
+        count = edges(p[e + LAYER_DEPTH], p[e + LAYER_WIDTH], out, count)
     if p[e + CRUST_RATIO] != 1.0:
-        out[count] = p[e + CRUST_DEPTH]
-        count += 1
+        count = edges(p[e + CRUST_DEPTH], p[e + CRUST_WIDTH], out, count)
     if row[GROWING] != 0.0 and p[e + GROWTH_END] < math.inf:
         out[count] = p[e + GROWTH_END]
         count += 1
@@ -240,7 +250,7 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
     Returns the number of steps, or -1 if the state left what can be.
     """
     row, state, s = np.zeros(COLUMNS), np.zeros(STATE_COLUMNS, np.int64), np.zeros(memory)
-    y, end, a, now, stops = np.zeros(4), np.zeros(4), np.zeros((4, 2)), np.zeros(2), np.zeros(8)
+    y, end, a, now, stops = np.zeros(4), np.zeros(4), np.zeros((4, 2)), np.zeros(2), np.zeros(12)
     at, whole = np.zeros(4), f
     if f[HEIGHT] > 0.0 and f[SPRING] > 0.0:
         f = f.copy()  # gravity and air pull at nose and body alike: nothing bends until something is hit

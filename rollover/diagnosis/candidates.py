@@ -47,6 +47,7 @@ class Candidate:
     neutral: tuple[float | None, ...] | None = None  # coordinates that change nothing; given where a place costs a run
     shapes: Mapping[str, Search] = field(default_factory=dict)  # fitted only where what is left asks for them
     fixed: Mapping[str, Any] = field(default_factory=dict)  # parameters that are not fitted
+    form: Mapping[str, float] = field(default_factory=dict)  # those of them that make another form of the same effect
     own: Mapping[str, float] = field(default_factory=dict)  # the scenario's values, where no number is an effect's null
     places: tuple[tuple[float, ...], ...] = ()  # where it is looked at, if not wherever its `probes` are
 
@@ -90,7 +91,7 @@ class Candidate:
         """
         key = nth(self.id, number)
         found: dict[str, Any] = {} if self.channel is None else {f"effects.{key}.channel": self.channel}
-        found |= {f"effects.{key}.{name}": value for name, value in self.fixed.items()}
+        found |= {f"effects.{key}.{name}": value for name, value in (*self.fixed.items(), *self.form.items())}
         for value, (name, search) in zip(x, self.search.items(), strict=True):
             found[f"effects.{key}.{name}"] = physical(value, search)
         return found
@@ -171,6 +172,12 @@ class Candidate:
     def whole(self) -> Candidate:
         """The same effect with its shape fitted too."""
         return replace(self, search={**self.search, **self.shapes}, shapes={})
+
+    def forms(self) -> list[Candidate]:
+        """The same effect in its other forms, which are not fitted; none where it has a form or its shape is fitted."""
+        if self.form or not self.shapes:
+            return []
+        return [replace(self, form={name: value}, shapes={}) for name, value in EFFECTS[self.id].forms.items()]
 
     def with_shapes(self, x: Sequence[float]) -> list[tuple[float, ...]]:
         """Coordinates of `whole` at which its fit may begin: the shape's default, and others."""

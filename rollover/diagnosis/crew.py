@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Literal
@@ -44,7 +44,7 @@ class Job:
 
     def key(self, about: str) -> str:
         """Hash of what is fitted and from where, with `about` for all else that it depends on."""
-        names = [(c.key, sorted(c.search.items())) for c in self.candidates]
+        names = [(c.key, sorted(c.search.items()), sorted(c.form.items())) for c in self.candidates]
         told = repr((about, self.how, names, self.start, self.shifts, self.only, self.rounds, self.width, self.pinned))
         return hashlib.sha256(told.encode()).hexdigest()
 
@@ -129,7 +129,10 @@ class Crew:
         return found
 
     def _note(self, key: str, fitted: Fitted | None) -> None:
-        row = None if fitted is None else {"x": list(fitted.x), "shifts": [b.shift for b in fitted.blocks]}
+        row: dict[str, Any] | None = None
+        if fitted is not None:
+            form = dict(fitted.candidates[-1].form) if fitted.candidates else {}
+            row = {"x": list(fitted.x), "shifts": [b.shift for b in fitted.blocks], "form": form}
         self._done[key] = row
         if self.notebook is not None:
             self.notebook.parent.mkdir(parents=True, exist_ok=True)
@@ -177,6 +180,8 @@ def _rebuilt(judge: Judge, job: Job, row: dict[str, Any] | None) -> Fitted | Non
     candidates = list(job.candidates)
     if len(row["x"]) > len(job.start):
         candidates[-1] = candidates[-1].whole()
+    if candidates and row["form"] != candidates[-1].form:
+        candidates[-1] = replace(candidates[-1], form=row["form"], shapes={})
     return linearised(judge, candidates, row["x"], row["shifts"], job.recordings)
 
 

@@ -391,7 +391,7 @@ class Judge:
 
 
 def _key(r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> tuple[object, ...]:
-    names = tuple((c.key, len(c.search)) for c in candidates)
+    names = tuple((c.key, len(c.search), *c.form.values()) for c in candidates)
     return (r, names, tuple([round(float(v), 12) for v in x]), round(shift, 9))
 
 

@@ -155,13 +155,13 @@ def reaches(judge: Judge, fitted: Fitted, own: Array, phi: float, sides: Mapping
 
 
 def _rippled(fitted: Fitted) -> set[int]:
-    """Coordinates of effects that were fitted with their shape: a threshold and its form make up for each other.
+    """Coordinates of effects in another shape or form than their usual one, which a threshold may make up for.
 
     From sample to sample that a threshold passes the misfit rises and falls again, along a valley longer than one wave.
     """
     found, at = set[int](), 0
     for c in fitted.candidates:
-        if not set(c.search).isdisjoint(EFFECTS[c.id].shapes):
+        if c.form or not set(c.search).isdisjoint(EFFECTS[c.id].shapes):
             found |= set(range(at, at + len(c.search)))
         at += len(c.search)
     return found
@@ -270,6 +270,7 @@ def intervals(
             at += 1
         if c.id == "sensor-clipping":
             values = {name: read_off(one, end_of(judge.evidence, c.channel)) for name, one in values.items()}
+        values |= {n: Interval(value=v, low=v, high=v, unit=units.get(n, "")) for n, v in c.form.items()}
         found.append(values)
     return found
 

@@ -14,6 +14,7 @@ from rollover.diagnosis.fit import Fitted
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.inquiry import Inquiry
+from rollover.diagnosis.refine import WORTH
 
 RUGGED = 2.0  # misfit over the noise that the best leaves, from which on there may be something behind a cliff
 LEADS = 1.5  # times what the best leaves, up to which it is looked for
@@ -21,7 +22,6 @@ MOSTLY = 0.25  # of what the middle recording is left with by the best, below wh
 PROMISED = 0.5  # of the best score: what has it, and gains less than half of its own, may have another shape
 TIED = 1.2  # times what the best leaves, up to which time shifts are tried out
 SHAPED = 4.0  # times what the best leaves, up to which an effect's shape is fitted too
-WORTH = 12.0  # gain that pays for a shape
 
 
 def begun_otherwise(

@@ -19,6 +19,8 @@ SHORT = 4  # rounds of a fit that tells where to begin
 STARTS, APART = 3, 0.06  # of the best places, so far apart
 AFAR, NEAR = (np.arange(80) + 0.5) / 80, 0.002 * np.arange(-20, 21)  # places of a threshold, all along and about a fit
 VALLEYS = 4  # of these in which a fit begins
+BESIDE_FORM = np.linspace(-0.1, 0.05, 13)  # of a coordinate: where a threshold of another form may lie
+WORTH = 12.0  # gain that pays for a shape
 SCANNED = (np.arange(40) + 0.5) / 40  # places of a shape
 TICK, SHORTEST, NARROWER = 8e-5, 5e-6, 0.4  # s, by which a time shift is tried to either side; then less, by a factor
 TRIED = 40  # at most so many
@@ -209,14 +211,38 @@ def conditioned(judge: Judge, fitted: Fitted) -> Fitted:
 
 
 def shaped(judge: Judge, f: Fitted) -> Fitted | None:
-    """The fit with the shape of its last effect fitted too, begun where short fits from some places leave least."""
+    """The fit with the shape of its last effect fitted too, or in another of its forms if that meets all as well."""
+    found = [one for one in (_with_shape(judge, f), *(_in_form(judge, f, c) for c in f.candidates[-1].forms())) if one]
+    if not found:
+        return None
+    least = min(one.left for one in found)
+    enough = WORTH * max(1.0, least / sum(b.residual.size for b in f.blocks))
+    return min((one for one in found if one.left < least + enough), key=lambda one: (len(one.x), one.left))
+
+
+def _with_shape(judge: Judge, f: Fitted) -> Fitted | None:
+    """The fit with the shape of its last effect, begun where short fits from some places leave least."""
     last, shifts = f.candidates[-1], [b.shift for b in f.blocks]
     candidates, at = (*f.candidates[:-1], last.whole()), len(f.x) - len(last.search)
     places = [(*f.x[:at], *start) for start in last.with_shapes(f.x[at:])]
-    best: Fitted | None = None
     short = [judge.fit(candidates, x, rounds=SHORT, shifts=shifts) for x in places]
-    for begun in sorted((f for f in short if f is not None), key=lambda f: f.left)[:STARTS]:
-        again = judge.fit(candidates, begun.x, shifts=[b.shift for b in begun.blocks])
+    return _best_of(judge, sorted((f for f in short if f is not None), key=lambda f: f.left)[:STARTS])
+
+
+def _in_form(judge: Judge, f: Fitted, last: Candidate) -> Fitted | None:
+    """The fit with its last effect in another form, begun where it leaves least: its first number lies elsewhere."""
+    candidates, at, shifts = (*f.candidates[:-1], last), len(f.x) - len(last.search), [b.shift for b in f.blocks]
+    places = [(*f.x[:at], f.x[at] + float(d), *f.x[at + 1 :]) for d in BESIDE_FORM if 0.0 < f.x[at] + d < 1.0]
+    met = _by_what_is_left(judge, candidates, places, shifts)
+    short = [judge.fit(candidates, x, rounds=SHORT, shifts=shifts) for x in met[: 2 * STARTS]]
+    return _best_of(judge, sorted((f for f in short if f is not None), key=lambda f: f.left)[:STARTS])
+
+
+def _best_of(judge: Judge, begun: Sequence[Fitted]) -> Fitted | None:
+    """The best that becomes of short fits, followed on if it leaves more than noise; None if there are none."""
+    best: Fitted | None = None
+    for one in begun:
+        again = judge.fit(one.candidates, one.x, shifts=[b.shift for b in one.blocks])
         best = min((f for f in (best, again) if f is not None), key=lambda f: f.left, default=None)
         if best is not None and best.left < NOISE_LEFT**2 * sum(b.residual.size for b in best.blocks):
             return best

@@ -64,6 +64,7 @@ class Effect:
     null: ClassVar[Mapping[str, float | None]] = {}
     search: ClassVar[Mapping[str, Search]] = {}
     shapes: ClassVar[tuple[str, ...]] = ()  # parameters that few recordings tell from the strength: mostly at default
+    forms: ClassVar[Mapping[str, float]] = {}  # parameters that are no matter of degree, and what they are otherwise
     narrow: ClassVar[
         Mapping[str, tuple[float, ...]]
     ] = {}  # parameter -> places in its range, near which alone it tells

@@ -225,6 +225,7 @@ class SoilLayer(Effect):
     depth: Annotated[float, Quantity("m", "of the layer's top; sinkage", above=0)] = 0.25
     stiffness_ratio: Annotated[float, Quantity("1", "of K' below to K' above", above=0)] = 3.0
     onset: Annotated[float, Quantity("1", "0: the force leaps at the top; 1: it sets in there", least=0, most=1)] = 0.0
+    width: Annotated[float, Quantity("m", "over which K' changes, about the top; 0: at once", least=0)] = 0.0
 
     id = "soil-layer"
     family = DEPTH
@@ -240,13 +241,15 @@ class SoilLayer(Effect):
     search: ClassVar[Mapping[str, Search]] = {
         "depth": Search(0.005, 0.6, "log"),
         "stiffness_ratio": Search(0.2, 8.0, "log"),
-        "onset": Search(0.0, 1.0),
+        "width": Search(1e-3, 0.1, "log"),
     }
-    shapes = ("onset",)
+    shapes = ("width",)
+    forms: ClassVar[Mapping[str, float]] = {"onset": 1.0}
 
     def places(self) -> Mapping[int, float]:
         """Depth, ratio, and how it sets in."""
-        return {k.LAYER_DEPTH: self.depth, k.LAYER_RATIO: self.stiffness_ratio, k.LAYER_ONSET: self.onset}
+        whole = {k.LAYER_DEPTH: self.depth, k.LAYER_RATIO: self.stiffness_ratio}
+        return {**whole, k.LAYER_ONSET: self.onset, k.LAYER_WIDTH: self.width}
 
 
 @parameters
@@ -255,6 +258,7 @@ class SoilCrust(Effect):
 
     thickness: Annotated[float, Quantity("m", "of the crust; sinkage", above=0)] = 0.04
     stiffness_ratio: Annotated[float, Quantity("1", "of K' in the crust to K' below", above=0)] = 2.0
+    width: Annotated[float, Quantity("m", "over which K' changes, about the crust's end; 0: at once", least=0)] = 0.0
 
     id = "soil-crust"
     family = DEPTH
@@ -270,11 +274,13 @@ class SoilCrust(Effect):
     search: ClassVar[Mapping[str, Search]] = {
         "thickness": Search(0.005, 0.2, "log"),
         "stiffness_ratio": Search(0.2, 8.0, "log"),
+        "width": Search(1e-3, 0.1, "log"),
     }
+    shapes = ("width",)
 
     def places(self) -> Mapping[int, float]:
-        """Depth and ratio."""
-        return {k.CRUST_DEPTH: self.thickness, k.CRUST_RATIO: self.stiffness_ratio}
+        """Depth, ratio, and how sharply it ends."""
+        return {k.CRUST_DEPTH: self.thickness, k.CRUST_RATIO: self.stiffness_ratio, k.CRUST_WIDTH: self.width}
 
 
 @parameters

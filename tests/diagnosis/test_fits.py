@@ -183,6 +183,8 @@ def test_an_accelerometer_alone_on_its_axis_may_be_turned_or_read_low() -> None:
     ("id", "hidden", "shape"),
     [
         ("soil-layer", {"depth": 0.1, "stiffness_ratio": 1.6, "onset": 1.0}, "onset"),
+        ("soil-layer", {"depth": 0.1, "stiffness_ratio": 1.6, "width": 0.03}, "width"),
+        ("soil-crust", {"thickness": 0.06, "stiffness_ratio": 1.6, "width": 0.05}, "width"),
         ("sensor-lag", {"channel": FORCE, "time": 0.006, "second_order": 0.5}, "second_order"),
         ("soil-rate-hardening", {"per_decade": 0.1, "reference_speed": 0.3}, "reference_speed"),
     ],
@@ -195,7 +197,7 @@ def test_the_form_of_an_effect_is_found_with_it(id: str, hidden: dict[str, Any],
     for name in (n for n in hidden if n != "channel"):
         told = named.parameters[name]
         assert told.low - 1e-9 <= hidden[name] <= told.high + 1e-9, (name, told)
-    assert named.parameters[shape].high - named.parameters[shape].low < 0.3 * max(hidden[shape], 0.5)
+    assert named.parameters[shape].high - named.parameters[shape].low < 0.5 * hidden[shape]
 
 
 def test_a_strength_is_told_in_what_is_usual() -> None:

@@ -21,6 +21,8 @@ ENOUGH = 1e-4  # of the range, root mean square: half of what counts as an error
     [
         {},
         {"effects.soil-crust.thickness": 0.03},
+        {"effects.soil-crust.thickness": 0.03, "effects.soil-crust.width": 0.05},
+        {"effects.soil-layer.depth": 0.1, "effects.soil-layer.width": 0.002},
         {"effects.guide-friction.force": 40.0},
         {"effects.guide-friction.force": 400.0, "effects.soil-elastic-rebound.recovery": 0.15},
         {"effects.structural-compliance.stiffness": 2e6},

@@ -96,6 +96,9 @@ def test_rate_hardening_is_a_factor_on_the_law() -> None:
     assert F[down] == pytest.approx(K * z[down] * factor, rel=1e-12)
 
 
+T_WIDE = np.linspace(0.001, 0.19, 400)
+
+
 @pytest.mark.parametrize("onset", [0.0, 0.4, 1.0])
 def test_layer_leaps_or_sets_in(onset: float) -> None:
     """F = K z above h, K (z + (r - 1)(z - onset h)) below: at the top it leaps by K h (r - 1)(1 - onset)."""
@@ -106,6 +109,21 @@ def test_layer_leaps_or_sets_in(onset: float) -> None:
     expected = K * (z + np.where(z > h, (r - 1.0) * (z - onset * h), 0.0))
     assert np.any(z[down] > 2.0 * h)
     assert F[down] == pytest.approx(expected[down], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("effect", "edge", "sign"), [("soil-layer", "depth", 1.0), ("soil-crust", "thickness", -1.0)], ids=str
+)
+def test_an_edge_of_some_width_is_passed_smoothly(effect: str, edge: str, sign: float) -> None:
+    """F = K z (1 + (r - 1) b), b = u^2 (3 - 2 u) below and 1 - b above, u = (z - h)/w + 1/2 from 0 to 1."""
+    K, h, r, w = 2e4, 0.05, 2.5, 0.03
+    numbers = {edge: h, "stiffness_ratio": r, "width": w}
+    z, v, _, F = motion(linear(K).with_({f"effects.{effect}.{n}": x for n, x in numbers.items()}), T_WIDE)
+    down = v > 0.0
+    u = np.clip((z[down] - h) / w + 0.5, 0.0, 1.0)
+    assert np.sum((u > 0.0) & (u < 1.0)) > 5
+    below = u**2 * (3.0 - 2.0 * u)
+    assert F[down] == pytest.approx(K * z[down] * (1.0 + (r - 1.0) * (below if sign > 0.0 else 1.0 - below)), rel=1e-12)
 
 
 def test_growing_added_mass_keeps_the_momentum() -> None:

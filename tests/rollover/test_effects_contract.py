@@ -278,7 +278,7 @@ def test_the_listing_shows_what_each_effect_is() -> None:
     assert set(rows) == set(TABLE)
     layer = rows["soil-layer"]
     assert layer["kind"] == "physics"
-    assert layer["parameters"] == "depth 0.25 m, stiffness_ratio 3, onset 0"
+    assert layer["parameters"] == "depth 0.25 m, stiffness_ratio 3, onset 0, width 0 m"
     assert np.all([len(row["is"]) > 10 for row in rows.values()])
 
 
