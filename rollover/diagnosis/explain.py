@@ -14,7 +14,7 @@ from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.effort import Effort
 from rollover.diagnosis.fit import NOISE_LEFT, Fitted, Judge
 from rollover.diagnosis.gate import Gate, p_value
-from rollover.diagnosis.holdout import foretold, held_out, worse
+from rollover.diagnosis.holdout import foretold, held_out, refitted, worse
 from rollover.diagnosis.inquiry import Groups, Inquiry, Phases
 from rollover.diagnosis.otherwise import begun_otherwise, from_there, one_each, shaped_too, timed_too
 from rollover.diagnosis.screening import ELSEWHERE, Screened, begun, is_far, kin, promising, screen, spread
@@ -27,7 +27,9 @@ CROOKED = 100.0  # times what the best leaves, up to which a fit of two paramete
 ROUGHNESS = 0.002  # of the misfit
 WITHIN_ONE = 1.0  # standard errors within which the simpler one is preferred
 APART = 2.0  # standard errors beyond which a rival is excluded
-ALIKE = 0.01  # of the summed misfit in noise units, within which two are one and the same to these recordings
+ALIKE = (
+    0.3  # of the summed misfit in noise units, to which fits end: two that are no further apart are one and the same
+)
 NEARLY_NOISE = 1.3  # misfit over the noise up to which its own colour is believed
 
 LIKE_NOISE = 2.2  # misfit over the noise up to which it may be noise that was underrated
@@ -49,8 +51,10 @@ class Step:
         return self._each(judge.again)
 
     def foretold(self, judge: Judge, groups: Groups) -> Step:
-        """The same with what its fits foretell by runs, where slopes do not hold for long."""
-        return self._each(lambda f: foretold(judge, f, groups)) if judge.effort.thrifty else self
+        """The same with what its fits foretell by runs, where slopes do not hold for long; of drops its best alone."""
+        if judge.effort.thrifty:
+            return self._each(lambda f: foretold(judge, f, groups))
+        return self.moved_to(refitted(judge, self.fitted, groups))
 
     def _each(self, made: Callable[[Fitted], Fitted]) -> Step:
         """The same with something made of each fit; its best stays one of its rivals."""
@@ -175,7 +179,13 @@ def _first_fits(
         worth = one_each(worth) + _elsewhere(worth)
         before = [judge.block(r, base.candidates, base.x, shifts[r], 0.0) for r in few]  # clocks where they are held
         as_it_is = sum(b.total for b in before if b is not None)
-        worth = [f for f in worth if as_it_is - f.left >= RIVALS * (as_it_is - fits[0].left)]
+        # and what leads by its score: the gain of one that others are measured by may be chance of its runs
+        leader = max(looked.scores, key=lambda key: looked.scores[key], default="")
+        worth = [
+            f
+            for f in worth
+            if as_it_is - f.left >= RIVALS * (as_it_is - fits[0].left) or f.candidates[-1].key == leader
+        ]
     worth = worth[: judge.effort.most_leaders]
     return [replace(s, nrmse=told.get(s.candidate.key, 0.0)) for s in screened], worth
 

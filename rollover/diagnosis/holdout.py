@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from rollover.diagnosis.fit import GENTLE, Fitted, Judge, shift_of
 
 Array = NDArray[np.float64]
+CROOKED = 1.2  # times what a fit leaves, from which on what slopes foretell of held-out recordings is doubted
+ROUNDS = 3  # of a held-out recording's time shift
 NOISE_ALONE = 1.5  # misfit over the noise up to which the noise's own statistics decide
 
 
@@ -67,6 +69,29 @@ def foretold(judge: Judge, fitted: Fitted, groups: Sequence[Sequence[int]]) -> F
         if there is None:
             return fitted
         left[r] = there.normal()[2]
+    return replace(fitted, foretold=tuple(left))
+
+
+def refitted(judge: Judge, fitted: Fitted, groups: Sequence[Sequence[int]]) -> Fitted:
+    """A fit with what it foretells by fits to the other groups, where slopes foretell far worse than it meets them.
+
+    As it was where one fails, and where a single group is all there is.
+    """
+    count = sum(b.size for b in fitted.blocks)
+    if not fitted.x or len(groups) < 2 or held_out(fitted, groups).total < CROOKED * np.sqrt(fitted.left / count):
+        return fitted
+    left = [b.normal()[2] for b in fitted.blocks]
+    for group in groups:
+        rest = [r for r in range(len(fitted.blocks)) if r not in group]
+        shifts = [fitted.blocks[r].shift for r in rest]
+        other = judge.fit(fitted.candidates, fitted.x, only=rest, shifts=shifts, width=1)
+        if other is None:
+            return fitted
+        for r in group:
+            there = judge.clocked(r, other.candidates, other.x, fitted.blocks[r].shift, ROUNDS)
+            if there is None:
+                return fitted
+            left[r] = there.normal()[2]
     return replace(fitted, foretold=tuple(left))
 
 

@@ -332,12 +332,11 @@ def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) ->
         return found.refused(), "unexplained"
     least = MANY if len(found.parts) == MOST or is_one_sensor(found.fitted.candidates) else SURE
     is_whole = found.after.p_value > least or not matters(judge, found.fitted, found.after)
+    start, ahead = held_out(found.base, groups).total, held_out(found.fitted, groups).total
     # what a tolerance allows has structure too
-    if found.parts and (
-        is_whole or (is_tolerated(judge, found.fitted) and held_out(found.fitted, groups).total < HARDLY_MORE)
-    ):
+    is_whole = is_whole or (is_tolerated(judge, found.fitted) and ahead < HARDLY_MORE)
+    if found.parts and is_whole and ahead < start:
         return found, _kind(strongest(judge, found.base, found.fitted))
-    start = held_out(found.base, groups).total
     if found.first is not None and found.parts:
         one = found.first
         end = held_out(one.fitted, groups).total
