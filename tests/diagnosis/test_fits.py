@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from rollover.diagnosis.candidates import Candidate, candidates_of, coordinate
 from rollover.diagnosis.crew import Crew, Job, work
 from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.fit import Block, Judge, shift_of
+from rollover.diagnosis.holdout import held_out, refitted
 from rollover.diagnosis.simulator import simulator_of
 from rollover.scenario import load
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
@@ -45,7 +47,6 @@ def test_a_leap_is_forgiven_within_a_sample_and_not_beyond() -> None:
     moved = [s.values for s in e.signals]
     k = list(e.signals).index(signal)
     moved[k] = measured[part]
-    from dataclasses import replace
 
     other = replace(e, signals=tuple(replace(s, values=v) for s, v in zip(e.signals, moved, strict=True)))
     leaps = other.leaps(stepped)
@@ -198,6 +199,23 @@ def test_the_form_of_an_effect_is_found_with_it(id: str, hidden: dict[str, Any],
         told = named.parameters[name]
         assert told.low - 1e-9 <= hidden[name] <= told.high + 1e-9, (name, told)
     assert named.parameters[shape].high - named.parameters[shape].low < 0.5 * hidden[shape]
+
+
+def test_held_out_recordings_are_foretold_by_fits_where_slopes_mislead() -> None:
+    """Slopes a hundred times too flat send the fit without a recording far off: by 0.01 J'w/(0.01 |J|)^2."""
+    judge = judge_of(recorded(GAIN, 12, speeds=(1.2, 2.2, 3.2)))
+    fitted = judge.fit((candidate(judge, "sensor-gain:" + FORCE),), (0.5,))
+    assert fitted is not None
+    groups = [[0], [1], [2]]
+    assert refitted(judge, fitted, groups) is fitted
+    pulled = [b.residual + 3.0 * b.J[:, 0] / np.linalg.norm(b.J) for b in fitted.blocks[1:]]
+    misled = [replace(b, J=0.01 * b.J, residual=w) for b, w in zip(fitted.blocks[1:], pulled, strict=True)]
+    flat = replace(fitted, blocks=(fitted.blocks[0], *misled))
+    assert held_out(flat, groups).total > 2.0
+    foretold = refitted(judge, flat, groups)
+    assert foretold.x == fitted.x
+    assert held_out(foretold, groups).total == pytest.approx(held_out(fitted, groups).total, rel=0.01)
+    assert refitted(judge, flat, groups[:1]) is flat
 
 
 def test_a_strength_is_told_in_what_is_usual() -> None:

@@ -58,7 +58,7 @@ def judged(monkeypatch: pytest.MonkeyPatch) -> dict[str, float]:
     monkeypatch.setattr(selection, "matters", lambda *_: True)
     monkeypatch.setattr(selection, "is_tolerated", lambda *_: False)
     monkeypatch.setattr(selection, "strongest", lambda *one: one[-1].candidates[0])
-    monkeypatch.setattr(selection, "held_out", lambda f, _: SimpleNamespace(total=misfits[f.label]))
+    monkeypatch.setattr(selection, "held_out", lambda f, _: SimpleNamespace(total=misfits.get(f.label, 1.0)))
     monkeypatch.setattr(selection, "mismatch_of", lambda *_: left(1e-9))
     return misfits
 
@@ -122,6 +122,16 @@ def test_one_that_takes_nearly_all_is_named_with_what_it_leaves_itself(
     if named:
         assert found.fitted.label == "soil-crust"
         assert found.after.p_value == 1e-9  # and not that of both
+
+
+@pytest.mark.parametrize(("ahead", "named"), [(1.0, 1), (19.9, 1), (20.0, 0), (30.0, 0)])
+def test_what_predicts_held_out_recordings_no_better_is_not_named(
+    ahead: float, named: int, judged: dict[str, float]
+) -> None:
+    """Whatever it leaves of those that it was fitted to: they leave 20 times the noise without it."""
+    judged["soil-crust"] = ahead
+    found, verdict = decided(cast(Judge, SimpleNamespace(evidence=())), explanation(1, 0.4), [], [])
+    assert (len(found.parts), verdict) == (named, "missing-physics" if named else "unexplained")
 
 
 def test_what_leaves_no_more_than_is_tolerated_is_named(

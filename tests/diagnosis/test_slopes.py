@@ -105,6 +105,22 @@ def test_a_rival_is_measured_by_clocks_that_are_held_as_its_own_are() -> None:
     assert {f.candidates[-1].key for f in leaders} == {SLOPE.key, MASS.key}
 
 
+def test_what_leads_by_its_score_is_fitted_whatever_another_gains() -> None:
+    """The blow is 9 % too strong, which by its slope a mass has hardly anything of; only its score may speak for it."""
+    rng = np.random.default_rng(4)
+    measured = [1.09 * blow(LATER * 0.09) + SIGMA * rng.standard_normal(TIME.size) for _ in range(2)]
+    judge = Judge([evidence(values, Late()) for values in measured])
+    base = judge.fit((), (), shifts=[0.0, 0.0])
+    assert base is not None
+    screened = [Screened(candidate=c, starts=((0.02,),), left=1.0, potential=1.0) for c in (SLOPE, MASS)]
+    for scores, leading in (({SLOPE.key: 9.0, MASS.key: 2.0}, {SLOPE.key}), ({SLOPE.key: 8.0, MASS.key: 9.0}, None)):
+        looked = Gate(score=9.0, scores=scores, null=np.zeros(4), detectable={})
+        with Crew() as crew:
+            inquiry = Inquiry(judge=judge, candidates=(SLOPE, MASS), groups=[], phases=[], say=str, crew=crew)
+            _, leaders = _first_fits(inquiry, base, screened, (0, 1), (0.0, 0.0), looked)
+        assert {f.candidates[-1].key for f in leaders} == (leading or {SLOPE.key, MASS.key})
+
+
 def test_runs_are_announced_before_they_are_needed(monkeypatch: pytest.MonkeyPatch) -> None:
     """So that they can be made side by side; where nothing scatters no slope asks for a wider step than was said."""
     rng, announced, needed = np.random.default_rng(3), set[tuple[int, float, float]](), []
