@@ -67,6 +67,11 @@ class Candidate:
         """Whether it tells only near its place."""
         return bool(EFFECTS[self.id].narrow)
 
+    @property
+    def is_bent(self) -> bool:
+        """Whether it is fitted in another shape or form than its usual one."""
+        return bool(self.form) or not set(self.search).isdisjoint(EFFECTS[self.id].shapes)
+
     def is_fine(self, k: int) -> bool:
         """Whether the k-th parameter is that place: looked at in many, and over less about each."""
         return self.is_narrow and list(self.search)[k] == "travel"

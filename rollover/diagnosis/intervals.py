@@ -161,7 +161,7 @@ def _rippled(fitted: Fitted) -> set[int]:
     """
     found, at = set[int](), 0
     for c in fitted.candidates:
-        if c.form or not set(c.search).isdisjoint(EFFECTS[c.id].shapes):
+        if c.is_bent:
             found |= set(range(at, at + len(c.search)))
         at += len(c.search)
     return found

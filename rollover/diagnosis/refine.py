@@ -18,6 +18,7 @@ TEETH, COMBED, BESIDE = 11, 0.05, 20  # places on a first coordinate, within so 
 SHORT = 4  # rounds of a fit that tells where to begin
 STARTS, APART = 3, 0.06  # of the best places, so far apart
 AFAR, NEAR = (np.arange(80) + 0.5) / 80, 0.002 * np.arange(-20, 21)  # places of a threshold, all along and about a fit
+ABREAST = 1.5  # times what the best of short fits leaves, up to which others are followed
 VALLEYS = 4  # of these in which a fit begins
 BESIDE_FORM = np.linspace(-0.1, 0.05, 13)  # of a coordinate: where a threshold of another form may lie
 WORTH = 12.0  # gain that pays for a shape
@@ -222,31 +223,49 @@ def shaped(judge: Judge, f: Fitted) -> Fitted | None:
 
 def _with_shape(judge: Judge, f: Fitted) -> Fitted | None:
     """The fit with the shape of its last effect, begun where short fits from some places leave least."""
-    last, shifts = f.candidates[-1], [b.shift for b in f.blocks]
-    candidates, at = (*f.candidates[:-1], last.whole()), len(f.x) - len(last.search)
+    last, at = f.candidates[-1], len(f.x) - len(f.candidates[-1].search)
     places = [(*f.x[:at], *start) for start in last.with_shapes(f.x[at:])]
-    short = [judge.fit(candidates, x, rounds=SHORT, shifts=shifts) for x in places]
-    return _best_of(judge, sorted((f for f in short if f is not None), key=lambda f: f.left)[:STARTS])
+    return _best_of(judge, f, last.whole(), places)
 
 
 def _in_form(judge: Judge, f: Fitted, last: Candidate) -> Fitted | None:
     """The fit with its last effect in another form, begun where it leaves least: its first number lies elsewhere."""
-    candidates, at, shifts = (*f.candidates[:-1], last), len(f.x) - len(last.search), [b.shift for b in f.blocks]
+    at, shifts = len(f.x) - len(last.search), [b.shift for b in f.blocks]
     places = [(*f.x[:at], f.x[at] + float(d), *f.x[at + 1 :]) for d in BESIDE_FORM if 0.0 < f.x[at] + d < 1.0]
-    met = _by_what_is_left(judge, candidates, places, shifts)
-    short = [judge.fit(candidates, x, rounds=SHORT, shifts=shifts) for x in met[: 2 * STARTS]]
-    return _best_of(judge, sorted((f for f in short if f is not None), key=lambda f: f.left)[:STARTS])
+    met = _by_what_is_left(judge, (*f.candidates[:-1], last), places, shifts)
+    return _best_of(judge, f, last, met[: 2 * STARTS])
 
 
-def _best_of(judge: Judge, begun: Sequence[Fitted]) -> Fitted | None:
-    """The best that becomes of short fits, followed on if it leaves more than noise; None if there are none."""
+def _best_of(judge: Judge, f: Fitted, last: Candidate, places: Sequence[tuple[float, ...]]) -> Fitted | None:
+    """The best fit with another last effect from some places, followed on if it leaves more than noise.
+
+    Short fits to the recordings that are met worst, best and in the middle tell where to begin; None if none can be
+    made.
+    """
+    candidates, ranked = (*f.candidates[:-1], last), sorted(range(len(f.blocks)), key=lambda r: _each(f.blocks[r]))
+    few = sorted({ranked[0], ranked[len(ranked) // 2], ranked[-1]})
+    at = [f.blocks[r].shift for r in few]
+    short = [judge.fit(candidates, x, rounds=SHORT, shifts=at, only=few, bare=True) for x in places]
+    begun = sorted((one for one in short if one is not None), key=_total)[:STARTS]
     best: Fitted | None = None
-    for one in begun:
-        again = judge.fit(one.candidates, one.x, shifts=[b.shift for b in one.blocks])
+    for one in (one for one in begun if _total(one) < ABREAST * _total(begun[0])):
+        told = dict(zip(few, one.blocks, strict=True))
+        shifts = [told.get(r, b).shift for r, b in enumerate(f.blocks)]
+        again = judge.fit(candidates, one.x, shifts=shifts)
         best = min((f for f in (best, again) if f is not None), key=lambda f: f.left, default=None)
         if best is not None and best.left < NOISE_LEFT**2 * sum(b.residual.size for b in best.blocks):
             return best
     return None if best is None else polish(judge, best)
+
+
+def _each(block: Block) -> float:
+    """What a block leaves per sample."""
+    return block.normal()[2] / block.residual.size
+
+
+def _total(f: Fitted) -> float:
+    """What a fit without slopes leaves."""
+    return sum(b.total for b in f.blocks)
 
 
 def without(judge: Judge, fitted: Fitted, k: int, rounds: int = 8) -> Fitted | None:

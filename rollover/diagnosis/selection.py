@@ -306,8 +306,8 @@ def _needed(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step]:
             break
         current = rest
     kept, last = len(current.candidates), taken[-1]
-    if judge.effort.thrifty and kept == len(taken):
-        return [s.again(judge) for s in taken]
+    if (judge.effort.thrifty or is_any_curve(current.candidates)) and kept == len(taken):
+        return [s.again(judge) for s in taken]  # the second will be refused, whichever came first
     parts: list[Step] = []
     for turn in range(kept):
         whole = turn == kept - 1 and current.candidates[0].key == last.fitted.candidates[-1].key
@@ -362,9 +362,14 @@ def by_the_first(judge: Judge, found: Explanation, nothing: Collection[str], pha
 
 
 def is_any_curve(candidates: Sequence[Candidate]) -> bool:
-    """Whether there are as many effects as may be, all of one sensor or of the soil: they draw any curve."""
+    """Whether they draw any curve: as many effects as may be, all of one sensor or of the soil, or two bent ones.
+
+    Two effects of the soil that both take another form than their usual one are curves enough.
+    """
     subjects = {c.channel or ("soil" if c.id.startswith("soil-") else c.id) for c in candidates}
-    return len(candidates) == MOST and len(subjects) == 1
+    return len(subjects) == 1 and (
+        len(candidates) == MOST or (len(candidates) > 1 and all(c.is_bent for c in candidates))
+    )
 
 
 def _kind(c: Candidate) -> Verdict:

@@ -23,6 +23,7 @@ from rollover.diagnosis.phases import drop_phases
 from rollover.diagnosis.response import channels_of
 from rollover.diagnosis.selection import is_any_curve
 from rollover.diagnosis.simulator import set_up
+from rollover.effects import Search
 from rollover.proof.generator import Order, make
 from rollover.recording import Recording
 from rollover.scenario import Scenario, load
@@ -217,6 +218,10 @@ def test_three_effects_of_one_sensor_or_of_the_soil_are_any_curve_and_two_are_no
     soil = [on("soil-layer", None), on("soil-rate-hardening", None), on("soil-stiffness", None)]
     assert is_any_curve(soil)
     assert not is_any_curve([*soil[:2], on("mass", None)])
+    shaped = replace(soil[1], search={"per_decade": Search(0.01, 0.5), "reference_speed": Search(0.01, 1.0)})
+    assert not is_any_curve([soil[0], shaped])
+    assert is_any_curve([replace(soil[0], form={"onset": 1.0}), shaped])
+    assert not is_any_curve([shaped])
 
 
 def test_what_explains_little_is_not_named_and_a_sensor_without_a_quantity_goes_by_time() -> None:
