@@ -59,7 +59,10 @@ STIFFNESS = 14  # factor on the law
 GROWTH_END, FADE = 15, 16  # sinkage at which the growth ends, and over which it dies out behind, m
 LAYER_ONSET = 17  # 0: a layer's force leaps at its top; 1: it sets in there with nothing
 LAYER_WIDTH, CRUST_WIDTH = 18, 19  # over which the ratio changes at their edge, m; 0: at once
-EFFECT_PLACES = 20  # numbers of the compiled terms follow, TERM_PLACES for each
+LAYER_SPRING = 20  # a layer's own stiffness, added from its top on, N/m
+PROPORTION, POWER = 21, 22  # J of a resistance that adds J v times itself, s/m; beta of one that goes by (v/v_0)^beta
+SLOWEST = 23  # rate below which that power goes no further, m/s
+EFFECT_PLACES = 24  # numbers of the compiled terms follow, TERM_PLACES for each
 TERM_PLACES = 8
 
 DOUBLED, HALVED = 12, 50  # times, of the way from a rut to where its line meets another curve
@@ -80,8 +83,9 @@ def passed(z: float, edge: float, width: float) -> float:
 def loading_force(law: Any, p: Any, s: Any, z: float, v: float) -> float:
     """The law's loading curve with the effects that act on it, N per reference area; rates count on the way down.
 
-    F = r(z) F_law (1 + lambda log10(v/v_0)) + d v^zeta + 1/2 C rho A v^2 + terms, r the ratio of crust and layer;
-    that of a layer counts for the sinkage beyond its onset alone. Where an edge has a width, r changes over that.
+    F = (r(z) F_law + k_h (z - h)) (1 + lambda log10(v/v_0)) (v/v_0)^beta (1 + J v) + d v^zeta + 1/2 C rho A v^2
+    + terms, r the ratio of crust and layer, k_h what a layer below h has of its own; the ratio of a layer counts for
+    the sinkage beyond its onset alone. Where an edge has a width, r changes over that.
     """
     e = law[EFFECTS]
     f = p[e + STIFFNESS] * call_force(law[ADDRESS_FORCE], (p.ctypes, s.ctypes, z, v))
@@ -97,9 +101,15 @@ def loading_force(law: Any, p: Any, s: Any, z: float, v: float) -> float:
             f *= p[e + LAYER_RATIO]
         else:
             f *= 1.0 + (p[e + LAYER_RATIO] - 1.0) * (1.0 - p[e + LAYER_ONSET] * p[e + LAYER_DEPTH] / z)
+    if p[e + LAYER_SPRING] != 0.0 and z > p[e + LAYER_DEPTH]:
+        f += p[e + LAYER_SPRING] * (z - p[e + LAYER_DEPTH])
+    if p[e + POWER] != 0.0:
+        f *= (max(v, p[e + SLOWEST]) / p[e + SLOW]) ** p[e + POWER]
     if v > 0.0:
         if v > p[e + SLOW] and p[e + PER_DECADE] != 0.0:
             f *= 1.0 + p[e + PER_DECADE] * math.log10(v / p[e + SLOW])
+        if p[e + PROPORTION] != 0.0:
+            f *= 1.0 + p[e + PROPORTION] * v
         if p[e + DAMPING] != 0.0:
             f += p[e + DAMPING] * v ** p[e + DAMPING_EXPONENT]
         f += p[e + DRAG] * v * v

@@ -13,7 +13,9 @@ from ground.law import GroundLaw
 
 # numbers at which no effect changes a force by one bit
 NULL = np.zeros(k.EFFECT_PLACES)
-NULL[[k.DAMPING_EXPONENT, k.SLOW, k.REBOUND_DAMPING, k.REACH, k.LAYER_RATIO, k.CRUST_RATIO, k.STIFFNESS]] = 1.0
+NULL[[k.DAMPING_EXPONENT, k.SLOW, k.SLOWEST, k.REBOUND_DAMPING, k.REACH, k.LAYER_RATIO, k.CRUST_RATIO, k.STIFFNESS]] = (
+    1.0
+)
 NULL[[k.LAYER_DEPTH, k.GROWTH_END]] = np.inf
 
 

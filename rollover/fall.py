@@ -27,6 +27,7 @@ from ground.kernel import (
     IDLE,
     LAYER_DEPTH,
     LAYER_RATIO,
+    LAYER_SPRING,
     LAYER_WIDTH,
     LINE_C,
     LINE_K,
@@ -160,7 +161,7 @@ def levels(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, out: Any) -> 
     out[1] = row[LINE_Z]
     out[2] = s[BRANCH]
     count = 3
-    if p[e + LAYER_RATIO] != 1.0:
+    if p[e + LAYER_RATIO] != 1.0 or p[e + LAYER_SPRING] != 0.0:
         count = edges(p[e + LAYER_DEPTH], p[e + LAYER_WIDTH], out, count)
     if p[e + CRUST_RATIO] != 1.0:
         count = edges(p[e + CRUST_DEPTH], p[e + CRUST_WIDTH], out, count)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -182,7 +182,11 @@ class Candidate:
         """The same effect in its other forms, which are not fitted; none where it has a form or its shape is fitted."""
         if self.form or not self.shapes:
             return []
-        return [replace(self, form={name: value}, shapes={}) for name, value in EFFECTS[self.id].forms.items()]
+        found = []
+        for form in EFFECTS[self.id].forms:
+            search = {name: s for name, s in self.search.items() if name not in form.fixed}
+            found.append(replace(self, form=form.fixed, search={**search, **form.search}, shapes={}))
+        return found
 
     def with_shapes(self, x: Sequence[float]) -> list[tuple[float, ...]]:
         """Coordinates of `whole` at which its fit may begin: the shape's default, and others."""
@@ -223,6 +227,14 @@ class Candidate:
         if null is None or not s.low < null < s.high:
             return []
         return [(coordinate(null, s) + sign * f,) for f in FURTHER for sign in (1.0, -1.0)]
+
+
+def each_with_own(candidates: Sequence[Candidate]) -> Iterator[tuple[Candidate, slice]]:
+    """Each of several candidates with where its own coordinates lie among those of all."""
+    at = 0
+    for c in candidates:
+        yield c, slice(at, at + len(c.search))
+        at += len(c.search)
 
 
 def akin(candidates: Iterable[Candidate], to: Iterable[Candidate]) -> list[Candidate]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Literal
@@ -178,10 +178,10 @@ def _rebuilt(judge: Judge, job: Job, row: dict[str, Any] | None) -> Fitted | Non
     if row is None:
         return None
     candidates = list(job.candidates)
-    if len(row["x"]) > len(job.start):
-        candidates[-1] = candidates[-1].whole()
     if candidates and row["form"] != candidates[-1].form:
-        candidates[-1] = replace(candidates[-1], form=row["form"], shapes={})
+        candidates[-1] = next(c for c in candidates[-1].forms() if c.form == row["form"])
+    elif len(row["x"]) > len(job.start):
+        candidates[-1] = candidates[-1].whole()
     return linearised(judge, candidates, row["x"], row["shifts"], job.recordings)
 
 

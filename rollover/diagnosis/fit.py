@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.blocks import GENTLE, Block, Fitted, bounded, shift_of
-from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.candidates import Candidate, each_with_own
 from rollover.diagnosis.chaos import course
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
@@ -146,10 +146,9 @@ class Judge:
     def changes(candidates: Sequence[Candidate], x: Sequence[float]) -> dict[str, object]:
         """Values to exchange in the scenario."""
         found: dict[str, object] = {}
-        at, ids = 0, [c.id for c in candidates]
-        for k, c in enumerate(candidates):
-            found |= c.changes(x[at : at + len(c.search)], 1 + ids[:k].count(c.id))
-            at += len(c.search)
+        ids = [c.id for c in candidates]
+        for k, (c, own) in enumerate(each_with_own(candidates)):
+            found |= c.changes(x[own], 1 + ids[:k].count(c.id))
         return found
 
     def block(
@@ -391,7 +390,7 @@ class Judge:
 
 
 def _key(r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> tuple[object, ...]:
-    names = tuple((c.key, len(c.search), *c.form.values()) for c in candidates)
+    names = tuple((c.key, len(c.search), *c.form.items()) for c in candidates)
     return (r, names, tuple([round(float(v), 12) for v in x]), round(shift, 9))
 
 

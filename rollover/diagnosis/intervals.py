@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.blocks import Block, at_an_end, shift_of
-from rollover.diagnosis.candidates import physical
+from rollover.diagnosis.candidates import each_with_own, physical
 from rollover.diagnosis.crew import linearised
 from rollover.diagnosis.evidence import MODEL_ERROR, Evidence
 from rollover.diagnosis.fit import GENTLE, Fitted, Judge
@@ -97,10 +97,9 @@ def with_shapes(judge: Judge, fitted: Fitted) -> tuple[Fitted, Array, list[int]]
     Such a shape is where it is usual, spread evenly over its range as far as the recordings do not tell; one that is
     usually not there is left out, and where a look costs a run all are: see `unshaped`.
     """
-    candidates, x, kept, prior, at = [], list[float](), list[int](), list[float](), 0
-    for c in fitted.candidates:
-        own = fitted.x[at : at + len(c.search)]
-        at += len(c.search)
+    candidates, x, kept, prior = [], list[float](), list[int](), list[float]()
+    for c, place in each_with_own(fitted.candidates):
+        own = fitted.x[place]
         kept += range(len(x), len(x) + len(own))
         usual = {name: getattr(EFFECTS[c.id](), name) for name in c.shapes}
         told = all(v is not None and c.shapes[name].low <= v <= c.shapes[name].high for name, v in usual.items())
@@ -159,12 +158,8 @@ def _rippled(fitted: Fitted) -> set[int]:
 
     From sample to sample that a threshold passes the misfit rises and falls again, along a valley longer than one wave.
     """
-    found, at = set[int](), 0
-    for c in fitted.candidates:
-        if c.is_bent:
-            found |= set(range(at, at + len(c.search)))
-        at += len(c.search)
-    return found
+    bent = (own for c, own in each_with_own(fitted.candidates) if c.is_bent)
+    return {k for own in bent for k in range(own.start, own.stop)}
 
 
 def _over_ripples(judge: Judge, fitted: Fitted, way: Array, k: int, most: float) -> float:

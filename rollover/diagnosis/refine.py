@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.blocks import WIDEST, Block, Fitted
-from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.candidates import Candidate, coordinate, each_with_own
 from rollover.diagnosis.evidence import doubted_beside
 from rollover.diagnosis.fit import NOISE_LEFT, Judge
 from rollover.diagnosis.gate import followed, freed, yardstick
@@ -21,6 +22,7 @@ AFAR, NEAR = (np.arange(80) + 0.5) / 80, 0.002 * np.arange(-20, 21)  # places of
 ABREAST = 1.5  # times what the best of short fits leaves, up to which others are followed
 VALLEYS = 4  # of these in which a fit begins
 BESIDE_FORM = np.linspace(-0.1, 0.05, 13)  # of a coordinate: where a threshold of another form may lie
+ELSEWHERE = (0.2, 0.35, 0.5, 0.65, 0.8)  # coordinates of a number that only this form has
 WORTH = 12.0  # gain that pays for a shape
 SCANNED = (np.arange(40) + 0.5) / 40  # places of a shape
 TICK, SHORTEST, NARROWER = 8e-5, 5e-6, 0.4  # s, by which a time shift is tried to either side; then less, by a factor
@@ -229,9 +231,17 @@ def _with_shape(judge: Judge, f: Fitted) -> Fitted | None:
 
 
 def _in_form(judge: Judge, f: Fitted, last: Candidate) -> Fitted | None:
-    """The fit with its last effect in another form, begun where it leaves least: its first number lies elsewhere."""
-    at, shifts = len(f.x) - len(last.search), [b.shift for b in f.blocks]
-    places = [(*f.x[:at], f.x[at] + float(d), *f.x[at + 1 :]) for d in BESIDE_FORM if 0.0 < f.x[at] + d < 1.0]
+    """The fit with its last effect in another form, begun where it leaves least.
+
+    A threshold lies elsewhere in another form; what is fitted instead of another number is looked for over its range.
+    """
+    known, at, shifts = f.candidates[-1].values(f.own), len(f.x) - len(f.own), [b.shift for b in f.blocks]
+    axes: list[list[float]] = []
+    for name, search in last.search.items():
+        there = coordinate(known[name], search) if name in known else None
+        several = [there + float(d) for d in BESIDE_FORM] if there is not None and not axes else [there]
+        axes.append(list(ELSEWHERE) if there is None else [v for v in several if v is not None and 0.0 < v < 1.0])
+    places = [(*f.x[:at], *own) for own in itertools.product(*axes)]
     met = _by_what_is_left(judge, (*f.candidates[:-1], last), places, shifts)
     return _best_of(judge, f, last, met[: 2 * STARTS])
 
@@ -270,10 +280,6 @@ def _total(f: Fitted) -> float:
 
 def without(judge: Judge, fitted: Fitted, k: int, rounds: int = 8) -> Fitted | None:
     """The explanation fitted again without its k-th effect."""
-    rest, x, at = [], [], 0
-    for j, c in enumerate(fitted.candidates):
-        if j != k:
-            rest.append(c)
-            x += list(fitted.x[at : at + len(c.search)])
-        at += len(c.search)
+    others = [(c, fitted.x[own]) for j, (c, own) in enumerate(each_with_own(fitted.candidates)) if j != k]
+    rest, x = [c for c, _ in others], [v for _, own in others for v in own]
     return judge.fit(rest, x, rounds=rounds, shifts=[b.shift for b in fitted.blocks])

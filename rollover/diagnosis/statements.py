@@ -21,6 +21,7 @@ from rollover.diagnosis.verdict import Considered, Named, Place, Verdict
 from rollover.effects import EFFECTS
 
 NOTABLE = 0.1  # of an interval
+SMALL = 0.05  # of a strength, below which it is hardly any
 
 
 def named(judge: Judge, found: Explanation, groups: Sequence[Sequence[int]]) -> tuple[Named, ...]:
@@ -64,12 +65,21 @@ def named(judge: Judge, found: Explanation, groups: Sequence[Sequence[int]]) -> 
 
 
 def is_none(effect: Named) -> bool:
-    """Whether all that an effect is may be none of it: the interval of each number that has a null holds that."""
-    nulls = {p: EFFECTS[effect.id].null.get(p) for p in effect.parameters}
+    """Whether all that an effect is may be none of it: the interval of each number that has a null holds that.
+
+    A range of logarithms holds no nought: there an interval that goes down to a small part of the value does.
+    """
+    kind = EFFECTS[effect.id]
+    nulls = {p: kind.null.get(p) for p in effect.parameters}
+    logarithmic = {p for p, s in kind.search.items() if s.scale == "log"}
+
+    def may_be(name: str, null: float) -> bool:
+        i = effect.parameters[name]
+        least = i.low - (SMALL * i.value if null == 0.0 and name in logarithmic else 0.0)
+        return least <= null <= i.high
+
     known = {p: null for p, null in nulls.items() if isinstance(null, (int, float))}
-    return bool(known) and all(
-        effect.parameters[p].low <= null <= effect.parameters[p].high for p, null in known.items()
-    )
+    return bool(known) and all(may_be(p, null) for p, null in known.items())
 
 
 def by_steps(effects: Sequence[Named]) -> list[str]:

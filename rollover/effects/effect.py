@@ -42,6 +42,14 @@ class Heard(NamedTuple):
     end: float = 0.0
 
 
+class Form(NamedTuple):
+    """Another form of an effect: what is `fixed` in it, ranges of what is fitted instead, and how it is said, if so."""
+
+    fixed: Mapping[str, float]
+    search: Mapping[str, Search]
+    sentence: str = ""
+
+
 @parameters
 class Effect:
     """A term beyond the basic model; the numbers that a class declares default to a typical strength.
@@ -64,7 +72,7 @@ class Effect:
     null: ClassVar[Mapping[str, float | None]] = {}
     search: ClassVar[Mapping[str, Search]] = {}
     shapes: ClassVar[tuple[str, ...]] = ()  # parameters that few recordings tell from the strength: mostly at default
-    forms: ClassVar[Mapping[str, float]] = {}  # parameters that are no matter of degree, and what they are otherwise
+    forms: ClassVar[tuple[Form, ...]] = ()  # what else goes by its name, no matter of degree
     narrow: ClassVar[
         Mapping[str, tuple[float, ...]]
     ] = {}  # parameter -> places in its range, near which alone it tells
@@ -108,14 +116,16 @@ class Effect:
         return recording
 
     def says(self) -> str:
-        """The sentence, with the values in it."""
+        """The sentence, with the values in it; that of its form, if it is in one that has a sentence of its own."""
+        own = (f for f in self.forms if f.sentence and all(getattr(self, n) == v for n, v in f.fixed.items()))
+        sentence = next((f.sentence for f in own), self.sentence)
         units = units_of(type(self), getattr(self, "channel", None))
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         spoken = {
             name: _Spoken(value, units[name]) if isinstance(value, float) and name in units else value
             for name, value in values.items()
         }
-        return self.sentence.format(**spoken)
+        return sentence.format(**spoken)
 
 
 class _Spoken:

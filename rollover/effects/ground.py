@@ -12,25 +12,31 @@ from typing import Annotated, Any, ClassVar
 from ground import kernel as k
 from ground.law import REFERENCE_AREA
 from ground.quantity import Quantity, parameters
-from rollover.effects.effect import Effect, Search
+from rollover.effects.effect import Effect, Form, Search
 from rollover.vehicle import Striker
 
 FORCE = ("ground/force_normal", "striker/acceleration_z")
 SPEED = "a resistance of the ground that grows with speed"
 DEPTH = "a resistance of the ground that changes with depth"
+POWERS = Search(2e-3, 0.5, "log")
+BY_POWER = "The ground is stronger by the power {power} of the speed over {reference_speed}."
 
 
 @parameters
 class SoilViscousDamping(Effect):
     """F += d v^zeta while the ground is pushed deeper: viscous and radiation damping."""
 
-    damping: Annotated[float, Quantity("N s/m", "d on the reference face; N (s/m)^zeta", least=0)] = 1500.0
+    damping: Annotated[float, Quantity("N s/m", "d on the reference face, at zeta 1", least=0)] = 1500.0
     exponent: Annotated[float, Quantity("1", "zeta", above=0, most=3)] = 1.0
+    proportion: Annotated[float, Quantity("s/m", "J, of the soil's force that it adds for each m/s", least=0)] = 0.0
 
     id = "soil-viscous-damping"
     family = SPEED
-    equation = "F += d v^zeta, v > 0, on the loading curve"
-    source = "Ye 2006 eq (1); half-space c = 3.4 r0^2 sqrt(rho G)/(1 - nu) gives 1.1-3.0 kN s/m for G 5-40 MPa (M)"
+    equation = "F = F (1 + J v) + d v^zeta, v > 0, on the loading curve"
+    source = (
+        "Ye 2006 eq (1); half-space c = 3.4 r0^2 sqrt(rho G)/(1 - nu) gives 1.1-3.0 kN s/m for G 5-40 MPa (M); "
+        "J of Smith's law 0.5-0.65 s/m (M+)"
+    )
     sentence = "The ground resists in proportion to the speed: {damping} on 63 cm2, with exponent {exponent}."
     rivals: ClassVar[Mapping[str, str]] = {
         "soil-inertial-drag": "drops over a range of speeds of 4 to 1 or more: v against v^2",
@@ -38,14 +44,21 @@ class SoilViscousDamping(Effect):
         "soil-stiffness": "the force as v goes to zero at the deepest point: damping leaves it alone",
     }
     channels = FORCE
-    null: ClassVar[Mapping[str, float | None]] = {"damping": 0.0}
+    null: ClassVar[Mapping[str, float | None]] = {"damping": 0.0, "proportion": 0.0}
     search: ClassVar[Mapping[str, Search]] = {"damping": Search(30.0, 1e4, "log"), "exponent": Search(0.5, 2.0)}
     shapes = ("exponent",)
+    forms = (
+        Form(
+            {"damping": 0.0},
+            {"proportion": Search(1e-3, 5.0, "log")},
+            "The ground resists the more the faster it is pushed: by {proportion} of what it does at rest.",
+        ),
+    )
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {"damping": (1.0, -1.0)}
 
     def places(self) -> Mapping[int, float]:
-        """D and zeta."""
-        return {k.DAMPING: self.damping, k.DAMPING_EXPONENT: self.exponent}
+        """D and zeta, J."""
+        return {k.DAMPING: self.damping, k.DAMPING_EXPONENT: self.exponent, k.PROPORTION: self.proportion}
 
 
 @parameters
@@ -54,27 +67,46 @@ class SoilRateHardening(Effect):
 
     per_decade: Annotated[float, Quantity("1", "lambda, gain of strength per decade of rate", least=-0.5, most=1)] = 0.1
     reference_speed: Annotated[float, Quantity("m/s", "v_0, below it the strength is that of the law", above=0)] = 0.01
+    power: Annotated[
+        float, Quantity("1", "beta, of a strength that goes by a power of the rate", least=-0.5, most=1)
+    ] = 0.0
+    slowest: Annotated[float | None, Quantity("m/s", "rate below which that power goes no further; v_0", above=0)] = (
+        None
+    )
 
     id = "soil-rate-hardening"
     family = SPEED
-    equation = "F *= 1 + lambda log10(max(v, v_0)/v_0)"
-    source = "s_u = s_u0 (1 + lambda log10(rate/rate_0)), lambda 0.05-0.20 (M+); eq (5) of Ye 2006 softens instead"
+    equation = "F *= 1 + lambda log10(max(v, v_0)/v_0), or (max(v, v_least)/v_0)^beta"
+    source = (
+        "s_u = s_u0 (1 + lambda log10(rate/rate_0)), lambda 0.05-0.20; a power of the rate, 0.05-0.1 (M+); "
+        "eq (5) of Ye 2006 softens instead"
+    )
     sentence = "The ground is {per_decade} stronger for each tenfold speed."
     rivals: ClassVar[Mapping[str, str]] = {
         "soil-viscous-damping": "a slow press test and drops at small speed",
         "soil-stiffness": "two speeds a decade apart",
     }
     channels = FORCE
-    null: ClassVar[Mapping[str, float | None]] = {"per_decade": 0.0}
+    null: ClassVar[Mapping[str, float | None]] = {"per_decade": 0.0, "power": 0.0}
     search: ClassVar[Mapping[str, Search]] = {
         "per_decade": Search(0.01, 0.5, "log"),
         "reference_speed": Search(1e-3, 2.0, "log"),
     }
     shapes = ("reference_speed",)
+    forms = (
+        Form({"per_decade": 0.0}, {"power": POWERS, "reference_speed": Search(1e-3, 2.0, "log")}, BY_POWER),
+        Form(
+            {"per_decade": 0.0, "slowest": 1e-3},
+            {"power": POWERS, "reference_speed": Search(0.02, 5.0, "log")},
+            BY_POWER,
+        ),
+    )
 
     def places(self) -> Mapping[int, float]:
-        """Lambda and v_0."""
-        return {k.PER_DECADE: self.per_decade, k.SLOW: self.reference_speed}
+        """Lambda, v_0, beta, and where that ends."""
+        slowest = self.reference_speed if self.slowest is None else self.slowest
+        by_power = {k.POWER: self.power, k.SLOWEST: slowest}
+        return {k.PER_DECADE: self.per_decade, k.SLOW: self.reference_speed, **by_power}
 
 
 @parameters
@@ -226,10 +258,13 @@ class SoilLayer(Effect):
     stiffness_ratio: Annotated[float, Quantity("1", "of K' below to K' above", above=0)] = 3.0
     onset: Annotated[float, Quantity("1", "0: the force leaps at the top; 1: it sets in there", least=0, most=1)] = 0.0
     width: Annotated[float, Quantity("m", "over which K' changes, about the top; 0: at once", least=0)] = 0.0
+    stiffness: Annotated[float, Quantity("N/m", "k_h that the layer adds of its own; reference face", least=0)] = 0.0
 
     id = "soil-layer"
     family = DEPTH
-    equation = "F = K'(z) (z + (ratio - 1) (z - onset depth)) for z > depth; onset 0: F = ratio K'(z) z"
+    equation = (
+        "F = K'(z) (z + (ratio - 1) (z - onset depth)) + k_h (z - depth) for z > depth; onset 0: F = ratio K'(z) z"
+    )
     source = "hardpan at 0.2-0.35 m, cone index ratio 2-4 (M)"
     sentence = "Below {depth} the ground is {stiffness_ratio} times as stiff."
     rivals: ClassVar[Mapping[str, str]] = {
@@ -237,18 +272,25 @@ class SoilLayer(Effect):
         "soil-crust": "a drop that ends above the step in depth",
     }
     channels = FORCE
-    null: ClassVar[Mapping[str, float | None]] = {"stiffness_ratio": 1.0}
+    null: ClassVar[Mapping[str, float | None]] = {"stiffness_ratio": 1.0, "stiffness": 0.0}
     search: ClassVar[Mapping[str, Search]] = {
         "depth": Search(0.005, 0.6, "log"),
         "stiffness_ratio": Search(0.2, 8.0, "log"),
         "width": Search(1e-3, 0.1, "log"),
     }
     shapes = ("width",)
-    forms: ClassVar[Mapping[str, float]] = {"onset": 1.0}
+    forms = (
+        Form({"onset": 1.0}, {}),
+        Form(
+            {"stiffness_ratio": 1.0},
+            {"stiffness": Search(50.0, 2e6, "log")},
+            "Below {depth} the ground pushes back with another {stiffness}.",
+        ),
+    )
 
     def places(self) -> Mapping[int, float]:
-        """Depth, ratio, and how it sets in."""
-        whole = {k.LAYER_DEPTH: self.depth, k.LAYER_RATIO: self.stiffness_ratio}
+        """Depth, ratio, how it sets in, and what stiffness it has of its own."""
+        whole = {k.LAYER_DEPTH: self.depth, k.LAYER_RATIO: self.stiffness_ratio, k.LAYER_SPRING: self.stiffness}
         return {**whole, k.LAYER_ONSET: self.onset, k.LAYER_WIDTH: self.width}
 
 

@@ -154,17 +154,16 @@ class SensorLag(Effect):
         if self.time == 0.0 or self.channel not in recording.channels or recording.time.size < 2:
             return recording
         x, h = recording[self.channel], np.diff(recording.time)
+        y = x.copy()
+        y[0] -= self.time * (x[1] - x[0]) / h[0]
         if self.second_order > 0.0:
-            rise, y = np.diff(x) / h, np.empty_like(x)
-            y[0] = x[0] - self.time * rise[0]
+            rise = np.diff(x) / h
             _swing(x, h, rise, self.time, self.second_order, y)
             return _with(recording, self.channel, y)
         ratio = h / self.time
         fade = np.exp(-ratio)
         rest = -np.expm1(-ratio) / ratio  # mean of the fading over the step
         gain_old, gain_new = rest - fade, 1.0 - rest
-        y = x.copy()
-        y[0] -= self.time * (x[1] - x[0]) / h[0]
         _follow(fade, gain_old * x[:-1] + gain_new * x[1:], y)
         return _with(recording, self.channel, y)
 

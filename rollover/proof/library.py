@@ -18,6 +18,7 @@ from rollover.proof.campaign import ACCELERATION, DEPTH, FORCE, PLACE, SPEED, lo
 from rollover.proof.rig import FACE
 
 Random = np.random.Generator
+ANOTHER = 0.35  # of effects in other forms, those by another law of the same name
 MOST_CHANNELS = (FORCE, DEPTH, ACCELERATION, SPEED, PLACE)
 
 
@@ -61,6 +62,9 @@ def _physics(id: str, told: Mapping[str, float], depends_on: str, **rig: Any) ->
 
 
 def _viscous(random: Random, s: Setting) -> Change:
+    if s.other_forms and random.random() < ANOTHER:
+        proportion = log_uniform(random, 0.002, 0.6)
+        return _physics("soil-viscous-damping", {"proportion": proportion}, "speed", proportion=proportion)
     exponent = 1.0 if random.random() < 0.6 and not s.other_forms else float(random.uniform(0.85, 1.2))
     d = log_uniform(random, 6.0, 3000.0)
     told = {"damping": d, "exponent": exponent}
@@ -68,6 +72,9 @@ def _viscous(random: Random, s: Setting) -> Change:
 
 
 def _rate(random: Random, s: Setting) -> Change:
+    if s.other_forms and random.random() < ANOTHER:
+        power, slow = log_uniform(random, 0.001, 0.1), log_uniform(random, 0.007, 0.2)
+        return _physics("soil-rate-hardening", {"power": power}, "speed", power=power, slow=slow)
     gain = log_uniform(random, 0.002, 0.2)
     slow = log_uniform(random, 0.007, 0.014) if s.other_forms else 0.01
     return _physics("soil-rate-hardening", {"per_decade": gain}, "speed", per_decade=gain, slow=slow)
@@ -99,7 +106,11 @@ def _adhesion(random: Random, s: Setting) -> Change:
 def _layer(random: Random, s: Setting) -> Change:
     reached = sorted(s.depths)[-2]
     depth, ratio = float(random.uniform(0.15, 0.8)) * reached, _either(random, 0.006, 1.2)
-    width = float(random.uniform(0.001, 0.004)) if s.other_forms else 0.0
+    if s.other_forms and random.random() < ANOTHER:
+        spring = log_uniform(random, 100.0, 4e4)
+        told = {"depth": depth, "stiffness": spring}
+        return _physics("soil-layer", told, "depth", layer_depth=depth, layer_spring=spring)
+    width = float(random.uniform(0.001, 0.02)) if s.other_forms else 0.0
     onset = float(random.choice((0.0, 1.0))) if s.other_forms else 0.0
     told = {"depth": depth, "stiffness_ratio": ratio}
     own = {"layer_depth": depth, "layer_ratio": ratio, "layer_width": width if onset == 0.0 else 0.0}

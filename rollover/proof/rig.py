@@ -30,7 +30,9 @@ class Rig:
     stiffness: float = 1.0
     damping: float = 0.0  # N (s/m)^exponent
     exponent: float = 1.0
+    proportion: float = 0.0  # s/m, of the force itself that each m/s adds
     per_decade: float = 0.0
+    power: float = 0.0  # of v over `slow`, in place of its logarithm
     slow: float = 0.01  # m/s
     drag: float = 0.0  # N (s/m)^drag_exponent
     drag_exponent: float = 2.0
@@ -42,6 +44,7 @@ class Rig:
     layer_depth: float = math.inf
     layer_ratio: float = 1.0
     layer_width: float = 0.0
+    layer_spring: float = 0.0  # N/m, what the layer adds of its own from its top on
     layer_onset: float = 0.0  # of what the layer would add at its top, how much it leaves out from there on
     crust_depth: float = 0.0
     crust_ratio: float = 1.0
@@ -100,7 +103,9 @@ def loading_curve(rig: Rig, touch_speed: float) -> Curve:
         if rig.layer_ratio != 1.0:
             spared = rig.layer_onset * rig.layer_depth / max(z, rig.layer_depth)
             force *= 1.0 + (rig.layer_ratio - 1.0) * (1.0 - spared) * _below(z, rig.layer_depth, rig.layer_width)
+        force += rig.layer_spring * max(z - rig.layer_depth, 0.0) if rig.layer_spring != 0.0 else 0.0
         if v > 0.0:
+            force *= (max(v, rig.slow) / rig.slow) ** rig.power * (1.0 + rig.proportion * v)
             if rig.per_decade != 0.0 and v > rig.slow:
                 force *= 1.0 + rig.per_decade * math.log10(v / rig.slow)
             if rig.damping != 0.0:

@@ -185,6 +185,13 @@ def test_an_accelerometer_alone_on_its_axis_may_be_turned_or_read_low() -> None:
     [
         ("soil-layer", {"depth": 0.1, "stiffness_ratio": 1.6, "onset": 1.0}, "onset"),
         ("soil-layer", {"depth": 0.1, "stiffness_ratio": 1.6, "width": 0.03}, "width"),
+        ("soil-layer", {"depth": 0.1, "stiffness_ratio": 1.0, "stiffness": 8e3}, "stiffness"),
+        ("soil-viscous-damping", {"damping": 0.0, "proportion": 0.1}, "proportion"),
+        (
+            "soil-rate-hardening",
+            {"per_decade": 0.0, "power": 0.06, "reference_speed": 0.5, "slowest": 1e-3},
+            "reference_speed",
+        ),
         ("soil-crust", {"thickness": 0.06, "stiffness_ratio": 1.6, "width": 0.05}, "width"),
         ("sensor-lag", {"channel": FORCE, "time": 0.006, "second_order": 0.5}, "second_order"),
         ("soil-rate-hardening", {"per_decade": 0.1, "reference_speed": 0.3}, "reference_speed"),
@@ -199,6 +206,29 @@ def test_the_form_of_an_effect_is_found_with_it(id: str, hidden: dict[str, Any],
         told = named.parameters[name]
         assert told.low - 1e-9 <= hidden[name] <= told.high + 1e-9, (name, told)
     assert named.parameters[shape].high - named.parameters[shape].low < 0.5 * hidden[shape]
+
+
+def test_a_fit_in_another_form_is_taken_up_from_the_notebook(tmp_path: Path) -> None:
+    """A power has two numbers where a logarithm has one: what was fitted is told by its form, not by how many."""
+    power = {"effects.soil-rate-hardening." + n: v for n, v in (("per_decade", 0.0), ("power", 0.08))}
+    judge = judge_of(recorded(power, 13, speeds=(1.2, 2.4, 3.4), noise=0.002))
+    rate = candidate(judge, "soil-rate-hardening")
+    begun = judge.fit((rate,), (0.5,))
+    assert begun is not None
+    job = Job(how="shape", candidates=(rate,), start=begun.x, shifts=tuple(b.shift for b in begun.blocks))
+    found = []
+    for _ in range(2):
+        with Crew(notebook=tmp_path / "notes") as one:
+            before = judge.simulations
+            found += one.fits(judge, [job])
+            made = judge.simulations - before
+    first, again = found
+    assert first is not None
+    assert again is not None
+    assert first.candidates[-1].form["per_decade"] == 0.0
+    assert again.candidates[-1] == first.candidates[-1]
+    assert again.x == pytest.approx(first.x, rel=1e-12)
+    assert made < 20
 
 
 def test_held_out_recordings_are_foretold_by_fits_where_slopes_mislead() -> None:

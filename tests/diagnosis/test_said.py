@@ -92,6 +92,8 @@ def test_an_effect_whose_numbers_may_all_be_null_may_be_nothing() -> None:
     assert statements.is_none(effect("impact-speed", scale=(0.98, 1.09)))
     assert not statements.is_none(effect("impact-speed", scale=(1.01, 1.09)))
     assert statements.is_none(effect("centre-of-mass", height=(-0.1, 0.1), lateral=(-0.2, 0.1)))
+    assert statements.is_none(effect("soil-adhesion", stress=(0.8, 8800.0), reach=(1e-3, 0.1)))  # a hundredth of it
+    assert not statements.is_none(effect("soil-adhesion", stress=(30.0, 240.0), reach=(1e-3, 0.1)))
     assert not statements.is_none(effect("centre-of-mass", height=(-0.1, 0.1), lateral=(0.02, 0.1)))
     assert not statements.is_none(effect("rops-plasticity", yield_force=(-1.0, 1e6)))  # a limit has no null
 

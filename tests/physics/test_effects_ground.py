@@ -84,6 +84,9 @@ def test_inertial_drag_takes_speed_with_depth() -> None:
     assert z[-1] > 0.4
 
 
+T_WIDE = np.linspace(0.001, 0.19, 400)
+
+
 def test_rate_hardening_is_a_factor_on_the_law() -> None:
     """F = K z (1 + lambda log10(v/v_0)) above v_0, K z below."""
     K, lam, slow = 2e4, 0.12, 0.5
@@ -96,7 +99,35 @@ def test_rate_hardening_is_a_factor_on_the_law() -> None:
     assert F[down] == pytest.approx(K * z[down] * factor, rel=1e-12)
 
 
-T_WIDE = np.linspace(0.001, 0.19, 400)
+@pytest.mark.parametrize("slowest", [None, 0.02])
+def test_strength_may_go_by_a_power_of_the_rate(slowest: float | None) -> None:
+    """F = K z (max(v, least)/v_0)^beta; without a least rate of its own v_0 is the least."""
+    K, power, v0 = 2e4, 0.08, 0.5
+    numbers = {"per_decade": 0.0, "power": power, "reference_speed": v0, "slowest": slowest}
+    z, v, _, F = motion(linear(K).with_({f"effects.soil-rate-hardening.{n}": x for n, x in numbers.items()}), T_WIDE)
+    down = v > 0.0
+    least = v0 if slowest is None else slowest
+    assert np.any(v[down] < v0)
+    assert F[down] == pytest.approx(K * z[down] * (np.maximum(v[down], least) / v0) ** power, rel=1e-12)
+
+
+def test_damping_may_be_in_proportion_to_the_force() -> None:
+    """F = K z (1 + J v) on the way down (Smith)."""
+    K, J = 2e4, 0.4
+    numbers = {"damping": 0.0, "proportion": J}
+    z, v, _, F = motion(linear(K).with_({f"effects.soil-viscous-damping.{n}": x for n, x in numbers.items()}), T_WIDE)
+    down = v > 0.0
+    assert F[down] == pytest.approx(K * z[down] * (1.0 + J * v[down]), rel=1e-12)
+
+
+def test_a_layer_may_have_a_stiffness_of_its_own() -> None:
+    """F = K z + k_h (z - h) below h, whatever the law's K there."""
+    K, h, own = 2e4, 0.05, 3e4
+    numbers = {"depth": h, "stiffness_ratio": 1.0, "stiffness": own}
+    z, v, _, F = motion(linear(K).with_({f"effects.soil-layer.{n}": x for n, x in numbers.items()}), T_WIDE)
+    down = v > 0.0
+    assert np.any(z[down] > 2.0 * h)
+    assert F[down] == pytest.approx(K * z[down] + own * np.maximum(z[down] - h, 0.0), rel=1e-12)
 
 
 @pytest.mark.parametrize("onset", [0.0, 0.4, 1.0])

@@ -25,6 +25,12 @@ SAME: dict[str, tuple[dict[str, float], dict[str, Any]]] = {
         {"depth": 0.1, "stiffness_ratio": 2.0, "onset": 1.0},
         {"layer_depth": 0.1, "layer_ratio": 2.0, "layer_onset": 1.0},
     ),
+    "soil-layer, a spring": (
+        {"depth": 0.1, "stiffness_ratio": 1.0, "stiffness": 9e3},
+        {"layer_depth": 0.1, "layer_spring": 9e3},
+    ),
+    "soil-viscous-damping, proportional": ({"damping": 0.0, "proportion": 0.2}, {"proportion": 0.2}),
+    "soil-rate-hardening, by a power": ({"per_decade": 0.0, "power": 0.07}, {"power": 0.07}),
     "soil-crust": ({"thickness": 0.03, "stiffness_ratio": 2.0}, {"crust_depth": 0.03, "crust_ratio": 2.0}),
     "structural-compliance": ({"stiffness": 5e5, "damping": 300.0}, {"spring": 5e5, "dashpot": 300.0}),
     "guide-friction": ({"force": 100.0}, {"guide": 100.0}),

@@ -160,7 +160,9 @@ def test_the_numbers_of_an_effect_have_units_bounds_and_ranges_to_search(effect:
     declared = quantities(kind)
     assert effect.null
     assert set(effect.null) <= set(declared)
-    assert set(effect.search) >= {n for n in effect.null if n != "damping_ratio"} - {"stiffness_ratio"}
+    searched = {*effect.search, *(name for form in effect.forms for name in form.search)}
+    assert searched >= {n for n in effect.null if n != "damping_ratio"} - {"stiffness_ratio"}
+    assert {name for form in effect.forms for name in (*form.fixed, *form.search)} <= set(declared)
     for name, (low, high, scale, _) in effect.search.items():
         assert declared[name].unit, name
         assert declared[name].meaning, name
@@ -278,7 +280,7 @@ def test_the_listing_shows_what_each_effect_is() -> None:
     assert set(rows) == set(TABLE)
     layer = rows["soil-layer"]
     assert layer["kind"] == "physics"
-    assert layer["parameters"] == "depth 0.25 m, stiffness_ratio 3, onset 0, width 0 m"
+    assert layer["parameters"] == "depth 0.25 m, stiffness_ratio 3, onset 0, width 0 m, stiffness 0 N/m"
     assert np.all([len(row["is"]) > 10 for row in rows.values()])
 
 
