@@ -62,7 +62,8 @@ LAYER_WIDTH, CRUST_WIDTH = 18, 19  # over which the ratio changes at their edge,
 LAYER_SPRING = 20  # a layer's own stiffness, added from its top on, N/m
 PROPORTION, POWER = 21, 22  # J of a resistance that adds J v times itself, s/m; beta of one that goes by (v/v_0)^beta
 SLOWEST = 23  # rate below which that power goes no further, m/s
-EFFECT_PLACES = 24  # numbers of the compiled terms follow, TERM_PLACES for each
+CLINGS = 24  # 1: the soil that moves along stays on the face when it lifts off, and is not hit anew
+EFFECT_PLACES = 25  # numbers of the compiled terms follow, TERM_PLACES for each
 TERM_PLACES = 8
 
 DOUBLED, HALVED = 12, 50  # times, of the way from a rut to where its line meets another curve
@@ -161,7 +162,7 @@ def normal_force(law: Any, p: Any, s: Any, row: Any, z: float, v: float) -> floa
     else:
         f = min(row[LINE_F] - row[LINE_K] * (row[LINE_Z] - z) + row[LINE_C] * v, row[LINE_F])
         pull = p[law[EFFECTS] + ADHESION]
-        if pull > 0.0:
+        if pull > 0.0 or p[law[EFFECTS] + CLINGS] != 0.0:
             gap = rut_depth(row) - z
             if gap > 0.0:
                 f = min(f, 0.0)
@@ -172,7 +173,9 @@ def normal_force(law: Any, p: Any, s: Any, row: Any, z: float, v: float) -> floa
 
 @compiled
 def lets_go(law: Any, p: Any, row: Any) -> float:
-    """Sinkage at which an unloaded element lets go: its rut, less the reach of adhesion, m."""
+    """Sinkage at which an unloaded element lets go, m: its rut less adhesion's reach; the surface if soil clings."""
+    if p[law[EFFECTS] + CLINGS] != 0.0:
+        return 0.0
     if p[law[EFFECTS] + ADHESION] > 0.0:
         return max(rut_depth(row) - p[law[EFFECTS] + REACH], 0.0)  # type: ignore[no-any-return]
     return rut_depth(row)

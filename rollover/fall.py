@@ -16,6 +16,7 @@ from ground.compiled import compiled
 from ground.kernel import (
     ADHESION,
     AREA,
+    CLINGS,
     COLUMNS,
     CRUST_DEPTH,
     CRUST_RATIO,
@@ -171,7 +172,7 @@ def levels(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, out: Any) -> 
     if f[CONE] > 0.0:
         out[count] = f[CONE]
         count += 1
-    if state[MODE] == UNLOADING and p[e + ADHESION] > 0.0:
+    if state[MODE] == UNLOADING and (p[e + ADHESION] > 0.0 or p[e + CLINGS] != 0.0):
         out[count] = rut_depth(row)  # what clings to the striker is pressed again, by the line's dashpot at once
         count += 1
     return count
@@ -270,6 +271,8 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
     else:
         impulse = hit(law, p, s, row, state, f, y)
     pull = p[law[EFFECTS] + ADHESION] * f[FACE] / REFERENCE_AREA
+    if p[law[EFFECTS] + CLINGS] != 0.0:
+        pull = math.inf
     t, steps = 0.0, 0
     most = 10_000 + 200 * int(max(times[n - 1], 0.0) / whole[STEP]) if n > 0 else 0
     while i < n:

@@ -17,6 +17,7 @@ from ground.kernel import (
     ARRESTED,
     BODY,
     BRANCHED,
+    CLINGS,
     EFFECTS,
     FLAGS,
     FORCE,
@@ -164,7 +165,8 @@ def finish_elements(t: Any, h: float) -> None:
         contact = trial[FN]
         if m[MASS_B] > 0.0:
             contact += m[MASS_B] * depth_acceleration(t.pose[b], m[OWNER_R : OWNER_R + 3], m[NORMAL : NORMAL + 3])
-            if contact < -t.p[row, t.law[row, EFFECTS] + ADHESION] * m[AREA] / REFERENCE_AREA:
+            e = t.law[row, EFFECTS]
+            if t.p[row, e + CLINGS] == 0.0 and contact < -t.p[row, e + ADHESION] * m[AREA] / REFERENCE_AREA:
                 # the mass would have to be pulled along: it leaves, and stays in the soil
                 drop_mass(t, i)
                 contact = trial[FN]

@@ -180,7 +180,7 @@ class Candidate:
 
     def forms(self) -> list[Candidate]:
         """The same effect in its other forms, which are not fitted; none where it has a form or its shape is fitted."""
-        if self.form or not self.shapes:
+        if self.is_bent:
             return []
         found = []
         for form in EFFECTS[self.id].forms:

@@ -102,7 +102,8 @@ def shaped_too(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
     able = [
         f
         for f, ahead in zip(fits, held, strict=True)
-        if f.candidates[-1].shapes and (f.left < SHAPED * best or ahead < SHAPED * min(held))
+        if (f.candidates[-1].shapes or f.candidates[-1].forms())
+        and (f.left < SHAPED * best or ahead < SHAPED * min(held))
     ]
     found = list(fits)
     for old, new in zip(able, inquiry.fits([from_there(f, "shape") for f in able]), strict=True):

@@ -224,7 +224,9 @@ def shaped(judge: Judge, f: Fitted) -> Fitted | None:
 
 
 def _with_shape(judge: Judge, f: Fitted) -> Fitted | None:
-    """The fit with the shape of its last effect, begun where short fits from some places leave least."""
+    """The fit with the shape of its last effect, begun where short fits from some places leave least; None if none."""
+    if not f.candidates[-1].shapes:
+        return None
     last, at = f.candidates[-1], len(f.x) - len(f.candidates[-1].search)
     places = [(*f.x[:at], *start) for start in last.with_shapes(f.x[at:])]
     return _best_of(judge, f, last.whole(), places)

@@ -21,7 +21,7 @@ from rollover.diagnosis.verdict import Considered, Named, Place, Verdict
 from rollover.effects import EFFECTS
 
 NOTABLE = 0.1  # of an interval
-SMALL = 0.05  # of a strength, below which it is hardly any
+SMALL = 0.2  # of a strength: an interval of its logarithm that goes down so far is one of a few times chance
 
 
 def named(judge: Judge, found: Explanation, groups: Sequence[Sequence[int]]) -> tuple[Named, ...]:

@@ -18,8 +18,14 @@ from rollover.vehicle import Striker
 FORCE = ("ground/force_normal", "striker/acceleration_z")
 SPEED = "a resistance of the ground that grows with speed"
 DEPTH = "a resistance of the ground that changes with depth"
+CLINGS = "1: soil that moves along stays on the face that lifts off, and is not hit anew; 0: it stays behind"
 POWERS = Search(2e-3, 0.5, "log")
 BY_POWER = "The ground is stronger by the power {power} of the speed over {reference_speed}."
+
+
+def clinging(clings: float) -> dict[int, float]:
+    """What the kernel is told of soil that stays on the face; nothing where it stays behind, for another may cling."""
+    return {k.CLINGS: 1.0} if clings > 0.0 else {}
 
 
 @parameters
@@ -199,6 +205,7 @@ class SoilElasticRebound(Effect):
     damping_ratio: Annotated[float, Quantity("1", "dashpot of the way back over the critical one", least=0, most=2)] = (
         0.1
     )
+    clings: Annotated[float, Quantity("1", CLINGS, least=0, most=1)] = 0.0
 
     id = "soil-elastic-rebound"
     family = "a way back that is not the plastic one"
@@ -209,6 +216,7 @@ class SoilElasticRebound(Effect):
     channels = ("ground/sinkage", "striker/velocity_z", "ground/force_normal")
     null: ClassVar[Mapping[str, float | None]] = {"recovery": 0.0, "damping_ratio": 1.0}
     search: ClassVar[Mapping[str, Search]] = {"recovery": Search(0.02, 0.6, "log"), "damping_ratio": Search(0.0, 1.0)}
+    forms = (Form({"clings": 1.0}, {}),)
 
     @classmethod
     def looked_for(cls, parameter: str, search: Search, scenario: Any) -> Search | None:
@@ -219,8 +227,8 @@ class SoilElasticRebound(Effect):
         return search._replace(low=least) if search.low < least < search.high else search
 
     def places(self) -> Mapping[int, float]:
-        """The least share that springs back, and the dashpot over the critical one."""
-        return {k.RECOVERY: self.recovery, k.REBOUND_DAMPING: self.damping_ratio}
+        """The least share that springs back, the dashpot over the critical one, and whether soil clings."""
+        return {k.RECOVERY: self.recovery, k.REBOUND_DAMPING: self.damping_ratio, **clinging(self.clings)}
 
 
 @parameters

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar
 
 from ground.quantity import Quantity, parameters
-from rollover.effects.effect import Effect, Search
+from rollover.effects.effect import Effect, Form, Search
+from rollover.effects.ground import CLINGS, clinging
 from rollover.initiation import Release
 from rollover.vehicle import Striker
 
@@ -113,6 +114,7 @@ class StructuralCompliance(Effect):
     stiffness: Annotated[float | None, Quantity("N/m", "between nose and body", above=0)] = 2e6
     damping: Annotated[float, Quantity("N s/m", "between nose and body", least=0)] = 500.0
     nose_share: Annotated[float, Quantity("1", "of the mass in the nose", above=0, below=1)] = 0.1
+    clings: Annotated[float, Quantity("1", CLINGS, least=0, most=1)] = 0.0
 
     id = "structural-compliance"
     family = "a body that is not rigid"
@@ -132,6 +134,7 @@ class StructuralCompliance(Effect):
         "nose_share": Search(0.02, 0.6, "log"),
     }
     shapes = ("nose_share",)
+    forms = (Form({"clings": 1.0}, {}),)
     is_abrupt = True
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {"stiffness": (1.0, 0.0), "damping": (1.0, 0.0)}
 
@@ -140,3 +143,7 @@ class StructuralCompliance(Effect):
         """Of a nose that was weighed its share is known."""
         is_known = scenario is not None and cls.id in scenario.effects
         return None if parameter == "nose_share" and is_known else search
+
+    def places(self) -> Mapping[int, float]:
+        """Whether soil clings to the nose that lifts off."""
+        return clinging(self.clings)

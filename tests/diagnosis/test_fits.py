@@ -187,6 +187,7 @@ def test_an_accelerometer_alone_on_its_axis_may_be_turned_or_read_low() -> None:
         ("soil-layer", {"depth": 0.1, "stiffness_ratio": 1.6, "width": 0.03}, "width"),
         ("soil-layer", {"depth": 0.1, "stiffness_ratio": 1.0, "stiffness": 8e3}, "stiffness"),
         ("soil-viscous-damping", {"damping": 0.0, "proportion": 0.1}, "proportion"),
+        ("soil-elastic-rebound", {"recovery": 0.08, "damping_ratio": 0.03, "clings": 1.0}, "clings"),
         (
             "soil-rate-hardening",
             {"per_decade": 0.0, "power": 0.06, "reference_speed": 0.5, "slowest": 1e-3},

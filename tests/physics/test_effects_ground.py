@@ -120,6 +120,23 @@ def test_damping_may_be_in_proportion_to_the_force() -> None:
     assert F[down] == pytest.approx(K * z[down] * (1.0 + J * v[down]), rel=1e-12)
 
 
+def test_what_clings_keeps_its_momentum_over_a_bounce() -> None:
+    """In the air all of m + m_b moves along and m alone is pulled: a = m g/(m + m_b); no landing takes a share again."""
+    K = 2e4
+    numbers = {"recovery": 0.3, "damping_ratio": 0.0, "clings": 1.0}
+    t = np.linspace(0.0, 1.2, 2401)
+    model = linear(K).with_({f"effects.soil-elastic-rebound.{n}": x for n, x in numbers.items()})
+    z, v, a, F = motion(model, t)
+    run = model.run(t)
+    aloft = (F == 0.0) & (t > 0.01) & (np.abs(a - m / M * g) < 1e-9)
+    assert np.sum(aloft) > 50
+    assert np.ptp(run["ground/impulse_normal"][1:]) == 0.0  # but the first
+    E = 0.5 * M * v**2 - m * g * z  # without a dashpot each flight has what the one before had
+    assert np.ptp(E[aloft]) < 2e-3 * np.max(np.abs(E[aloft]))
+    stays = linear(K).with_({f"effects.soil-elastic-rebound.{n}": x for n, x in {**numbers, "clings": 0.0}.items()})
+    assert np.ptp(stays.run(t)["ground/impulse_normal"][1:]) > 1.0
+
+
 def test_a_layer_may_have_a_stiffness_of_its_own() -> None:
     """F = K z + k_h (z - h) below h, whatever the law's K there."""
     K, h, own = 2e4, 0.05, 3e4
