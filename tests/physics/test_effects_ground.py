@@ -121,7 +121,7 @@ def test_damping_may_be_in_proportion_to_the_force() -> None:
 
 
 def test_what_clings_keeps_its_momentum_over_a_bounce() -> None:
-    """In the air all of m + m_b moves along and m alone is pulled: a = m g/(m + m_b); no landing takes a share again."""
+    """In the air m + m_b moves along and m alone is pulled: a = m g/(m + m_b); no landing takes a share again."""
     K = 2e4
     numbers = {"recovery": 0.3, "damping_ratio": 0.0, "clings": 1.0}
     t = np.linspace(0.0, 1.2, 2401)
