@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Block, Fitted, Judge
-from rollover.diagnosis.refine import combed, polish, scanned, shaped, timed
+from rollover.diagnosis.refine import combed, formed, polish, scanned, shaped, timed
 from rollover.diagnosis.secant import beside
 from rollover.execute import Children, map_cases
 
@@ -29,11 +29,12 @@ class Job:
     """A fit to be made: `only` some recordings, from time `shifts` (s) of these; see `Judge.fit`.
 
     One of few `rounds` is a first look: it ends without slopes.
-    "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too, "time" tries out
-    the time shifts, "comb" begins anew all along the second parameter of the last effect, "scan" all along its shape.
+    "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too, "form" its forms as
+    well, "time" tries out the time shifts, "comb" begins anew all along the second parameter of the last effect,
+    "scan" all along its shape.
     """
 
-    how: Literal["fit", "polish", "shape", "time", "comb", "scan"] = "fit"
+    how: Literal["fit", "polish", "shape", "form", "time", "comb", "scan"] = "fit"
     candidates: tuple[Candidate, ...]
     start: tuple[float, ...]
     shifts: tuple[float, ...]
@@ -157,7 +158,7 @@ def work(judge: Judge, job: Job) -> Fitted | None:
     if begun is None:
         return None
     ways: dict[str, Callable[[Judge, Fitted], Fitted | None]] = {
-        "polish": polish, "shape": shaped, "time": timed, "comb": combed, "scan": scanned,
+        "polish": polish, "shape": shaped, "form": formed, "time": timed, "comb": combed, "scan": scanned,
     }  # fmt: skip
     return ways[job.how](judge, begun)
 

@@ -10,6 +10,7 @@ import numpy as np
 from rollover.diagnosis.blocks import Block
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.crew import Job
+from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.fit import Fitted
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import held_out
@@ -21,6 +22,7 @@ LEADS = 1.5  # times what the best leaves, up to which it is looked for
 MOSTLY = 0.25  # of what the middle recording is left with by the best, below which an effect is the better one there
 PROMISED = 0.5  # of the best score: what has it, and gains less than half of its own, may have another shape
 TIED = 1.2  # times what the best leaves, up to which time shifts are tried out
+BY_CHANCE = 0.01  # p-value of what is left, above which no other form of an effect is looked for
 SHAPED = 4.0  # times what the best leaves, up to which an effect's shape is fitted too
 
 
@@ -95,18 +97,20 @@ def _middle(blocks: Sequence[Block]) -> float:
 
 
 def shaped_too(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
-    """The fits with shapes fitted too where that pays, best first."""
-    best = min(f.left for f in fits)
-    size = sum(b.residual.size for b in fits[0].blocks)
+    """The fits with shapes fitted too where that pays, best first; other forms if the best leaves more than chance."""
+    lead = min(fits, key=lambda f: f.left)
+    best, size = lead.left, sum(b.residual.size for b in fits[0].blocks)
     held = [held_out(f, inquiry.groups).total ** 2 for f in fits]
+    is_whole = mismatch_of(inquiry.judge.evidence, lead.blocks, inquiry.phases).p_value > BY_CHANCE
     able = [
         f
         for f, ahead in zip(fits, held, strict=True)
-        if (f.candidates[-1].shapes or f.candidates[-1].forms())
+        if (f.candidates[-1].shapes or (f.candidates[-1].forms() and not is_whole))
         and (f.left < SHAPED * best or ahead < SHAPED * min(held))
     ]
     found = list(fits)
-    for old, new in zip(able, inquiry.fits([from_there(f, "shape") for f in able]), strict=True):
+    jobs = [from_there(f, "shape" if is_whole else "form") for f in able]
+    for old, new in zip(able, inquiry.fits(jobs), strict=True):
         if new is not None and new.left < old.left - WORTH * max(1.0, best / size):
             found[found.index(old)] = new
     return sorted(found, key=lambda f: f.left)
@@ -121,7 +125,7 @@ def timed_too(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
     return sorted([new or old for new, old in zip(timed, near, strict=True)] + others, key=lambda f: f.left)
 
 
-def from_there(f: Fitted, how: Literal["polish", "shape", "time"]) -> Job:
+def from_there(f: Fitted, how: Literal["polish", "shape", "form", "time"]) -> Job:
     """What is made of a fit where it stands."""
     return Job(how=how, candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks))
 

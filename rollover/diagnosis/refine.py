@@ -58,10 +58,14 @@ def _blocks_at(
 
 
 def _by_what_is_left(
-    judge: Judge, candidates: Sequence[Candidate], places: Sequence[tuple[float, ...]], shifts: Sequence[float]
+    judge: Judge,
+    candidates: Sequence[Candidate],
+    places: Sequence[tuple[float, ...]],
+    shifts: Sequence[float],
+    only: Sequence[int] | None = None,
 ) -> list[tuple[float, ...]]:
-    """Those places that can be simulated, the one that leaves least first."""
-    met = [(there, x) for x in places if (there := left_at(judge, candidates, x, shifts)) is not None]
+    """Those places that can be simulated, the one that leaves least of all recordings or `only` some first."""
+    met = [(there, x) for x in places if (there := left_at(judge, candidates, x, shifts, only)) is not None]
     return [x for _, x in sorted(met)]
 
 
@@ -213,17 +217,20 @@ def conditioned(judge: Judge, fitted: Fitted) -> Fitted:
     return fitted
 
 
-def shaped(judge: Judge, f: Fitted) -> Fitted | None:
-    """The fit with the shape of its last effect fitted too, or in another of its forms if that meets all as well."""
-    found = [one for one in (_with_shape(judge, f), *(_in_form(judge, f, c) for c in f.candidates[-1].forms())) if one]
+def formed(judge: Judge, f: Fitted) -> Fitted | None:
+    """The fit with the shape of its last effect fitted too, or in a form that asks for less or meets all better."""
+    found = [one for one in (shaped(judge, f), *(_in_form(judge, f, c) for c in f.candidates[-1].forms())) if one]
     if not found:
         return None
     least = min(one.left for one in found)
     enough = WORTH * max(1.0, least / sum(b.residual.size for b in f.blocks))
-    return min((one for one in found if one.left < least + enough), key=lambda one: (len(one.x), one.left))
+    return min(
+        (one for one in found if one.left < least + enough),
+        key=lambda one: (len(one.x), bool(one.candidates[-1].form), one.left),
+    )
 
 
-def _with_shape(judge: Judge, f: Fitted) -> Fitted | None:
+def shaped(judge: Judge, f: Fitted) -> Fitted | None:
     """The fit with the shape of its last effect, begun where short fits from some places leave least; None if none."""
     if not f.candidates[-1].shapes:
         return None
@@ -244,7 +251,7 @@ def _in_form(judge: Judge, f: Fitted, last: Candidate) -> Fitted | None:
         several = [there + float(d) for d in BESIDE_FORM] if there is not None and not axes else [there]
         axes.append(list(ELSEWHERE) if there is None else [v for v in several if v is not None and 0.0 < v < 1.0])
     places = [(*f.x[:at], *own) for own in itertools.product(*axes)]
-    met = _by_what_is_left(judge, (*f.candidates[:-1], last), places, shifts)
+    met = _by_what_is_left(judge, (*f.candidates[:-1], last), places, shifts, _few(f))
     return _best_of(judge, f, last, met[: 2 * STARTS])
 
 
@@ -254,8 +261,7 @@ def _best_of(judge: Judge, f: Fitted, last: Candidate, places: Sequence[tuple[fl
     Short fits to the recordings that are met worst, best and in the middle tell where to begin; None if none can be
     made.
     """
-    candidates, ranked = (*f.candidates[:-1], last), sorted(range(len(f.blocks)), key=lambda r: _each(f.blocks[r]))
-    few = sorted({ranked[0], ranked[len(ranked) // 2], ranked[-1]})
+    candidates, few = (*f.candidates[:-1], last), _few(f)
     at = [f.blocks[r].shift for r in few]
     short = [judge.fit(candidates, x, rounds=SHORT, shifts=at, only=few, bare=True) for x in places]
     begun = sorted((one for one in short if one is not None), key=_total)[:STARTS]
@@ -270,9 +276,10 @@ def _best_of(judge: Judge, f: Fitted, last: Candidate, places: Sequence[tuple[fl
     return None if best is None else polish(judge, best)
 
 
-def _each(block: Block) -> float:
-    """What a block leaves per sample."""
-    return block.normal()[2] / block.residual.size
+def _few(f: Fitted) -> list[int]:
+    """The recordings that a fit meets worst, best and in the middle."""
+    ranked = sorted(range(len(f.blocks)), key=lambda r: f.blocks[r].normal()[2] / f.blocks[r].residual.size)
+    return sorted({ranked[0], ranked[len(ranked) // 2], ranked[-1]})
 
 
 def _total(f: Fitted) -> float:

@@ -211,12 +211,12 @@ def test_the_form_of_an_effect_is_found_with_it(id: str, hidden: dict[str, Any],
 
 def test_a_fit_in_another_form_is_taken_up_from_the_notebook(tmp_path: Path) -> None:
     """A power has two numbers where a logarithm has one: what was fitted is told by its form, not by how many."""
-    power = {"effects.soil-rate-hardening." + n: v for n, v in (("per_decade", 0.0), ("power", 0.08))}
+    power = {"effects.soil-rate-hardening." + n: v for n, v in (("per_decade", 0.0), ("power", 0.3))}
     judge = judge_of(recorded(power, 13, speeds=(1.2, 2.4, 3.4), noise=0.002))
     rate = candidate(judge, "soil-rate-hardening")
     begun = judge.fit((rate,), (0.5,))
     assert begun is not None
-    job = Job(how="shape", candidates=(rate,), start=begun.x, shifts=tuple(b.shift for b in begun.blocks))
+    job = Job(how="form", candidates=(rate,), start=begun.x, shifts=tuple(b.shift for b in begun.blocks))
     found = []
     for _ in range(2):
         with Crew(notebook=tmp_path / "notes") as one:
