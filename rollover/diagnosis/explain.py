@@ -27,9 +27,7 @@ CROOKED = 100.0  # times what the best leaves, up to which a fit of two paramete
 ROUGHNESS = 0.002  # of the misfit
 WITHIN_ONE = 1.0  # standard errors within which the simpler one is preferred
 APART = 2.0  # standard errors beyond which a rival is excluded
-ALIKE = (
-    0.3  # of the summed misfit in noise units, to which fits end: two that are no further apart are one and the same
-)
+ALIKE = 0.3  # of the summed misfit, which fits end short of: two no further apart are one and the same
 NEARLY_NOISE = 1.3  # misfit over the noise up to which its own colour is believed
 
 LIKE_NOISE = 2.2  # misfit over the noise up to which it may be noise that was underrated
