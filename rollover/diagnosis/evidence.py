@@ -25,6 +25,7 @@ MANY = 10  # quiet windows from which on a memory of two samples is told
 ROUGH = 0.5  # times the noise, from which on another error has a large part
 CORNER = 2.0775  # corner frequency over the filter class, forward and backward, Hz
 LEAP = 4.0  # times the steps beside it
+SHOWS = 3.0  # times the noise, from which on a step may be a leap
 LARGE = 50.0  # times the noise: a leap whose instant is not believed to the sample
 BESIDE = 3  # samples to either side, between whose values one about a leap may be
 SHIFT = 1e-3  # s, prior of the time shift of a recording whose zero is known
@@ -153,7 +154,7 @@ class Evidence:
         if not first.size:
             return np.zeros(0, dtype=np.int64)
         # when a body lifts off again hangs on little
-        large = first[leap[first] > LARGE / 3.0 * own.least[first]]
+        large = first[leap[first] > LARGE / SHOWS * own.least[first]]
         around = np.clip(large[:, None] + np.array([-2, -1, 3, 4]), own.first[large, None], own.last[large, None])
         found = np.zeros(raw.size, dtype=np.bool_)
         found[(first[:, None] + np.arange(3)).ravel()] = True
@@ -167,7 +168,7 @@ class Evidence:
         first = np.concatenate([np.full(p.stop - p.start, p.start) for _, p in spans])
         last = np.concatenate([np.full(p.stop - p.start, p.stop - 1) for _, p in spans])
         sigma = np.concatenate([np.full(p.stop - p.start, s.sigma if s.rows.size >= 5 else np.inf) for s, p in spans])
-        least = np.where(first[2:] == first[:-2], 3.0 * sigma[:-2], np.inf)
+        least = np.where(first[2:] == first[:-2], SHOWS * sigma[:-2], np.inf)
         return _Inside(first=first, last=last, least=least, starts=np.unique(first))
 
     def forgiven(self, raw: Array, leaps: NDArray[np.int64]) -> Array:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.effort import DROPS, Effort
 from rollover.diagnosis.filtering import Rows, behind_filters, rows_of
-from rollover.diagnosis.overturn import RunSimulator
+from rollover.diagnosis.overturn import SENSORS, RunSimulator
 from rollover.drop import DropFailedError, DropModel, unfit
 from rollover.effects import every, read
 from rollover.initiation import Drop
@@ -20,7 +20,6 @@ from rollover.recording import Recording
 from rollover.scenario import Scenario
 
 Array = NDArray[np.float64]
-SENSORS = "effects.sensor-"
 EDGES = ("sensor-lag", "sensor-clock-offset", "sensor-clock-drift")
 STEPS = (1e-3, 4e-4, 1e-4)  # s: step of a drop without, with one, with more abrupt effects; within 7e-5 of the range
 BESIDE = 1e-9  # s: on either side of the first contact
@@ -83,11 +82,11 @@ class DropSimulator:
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """See `Simulator`; ``ValueError`` for a value out of bounds passes."""
-        physical = {path: value for path, value in changes.items() if not path.startswith(SENSORS)}
+        physical = {path: value for path, value in changes.items() if not path.startswith(f"effects.{SENSORS}")}
         model = self.model
         if len(physical) < len(changes):
             model = model.with_({path: value for path, value in changes.items() if path not in physical})
-        sensors = {name: e for name, e in model.scenario.effects.items() if name.startswith("sensor-")}
+        sensors = {name: e for name, e in model.scenario.effects.items() if name.startswith(SENSORS)}
         try:
             channels = self._at(physical, shift)
             if sensors:

@@ -14,7 +14,7 @@ from rollover.diagnosis.crew import Crew, Job
 from rollover.diagnosis.effort import DROPS, RUNS, Effort
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.explain import Step, _first_fits
-from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.screening import Screened, screen
@@ -97,12 +97,17 @@ def test_a_rival_is_measured_by_clocks_that_are_held_as_its_own_are() -> None:
     base = judge.fit((), (), shifts=[0.003, 0.003])
     assert base is not None
     assert all(b.shift > 0.002 for b in base.blocks)
-    looked = Gate(score=9.0, scores={SLOPE.key: 9.0, MASS.key: 8.0}, null=np.zeros(4), detectable={})
+    assert leading(judge, base, {SLOPE.key: 9.0, MASS.key: 8.0}) == {SLOPE.key, MASS.key}
+
+
+def leading(judge: Judge, base: Fitted, scores: Mapping[str, float]) -> set[str]:
+    """Keys of what is worth a whole fit after first ones, for some scores."""
+    looked = Gate(score=9.0, scores=scores, null=np.zeros(4), detectable={})
     screened = [Screened(candidate=c, starts=((0.02,),), left=1.0, potential=1.0) for c in (SLOPE, MASS)]
     with Crew() as crew:
         inquiry = Inquiry(judge=judge, candidates=(SLOPE, MASS), groups=[], phases=[], say=lambda _: None, crew=crew)
         _, leaders = _first_fits(inquiry, base, screened, (0, 1), (0.0, 0.0), looked)
-    assert {f.candidates[-1].key for f in leaders} == {SLOPE.key, MASS.key}
+    return {f.candidates[-1].key for f in leaders}
 
 
 def test_what_leads_by_its_score_is_fitted_whatever_another_gains() -> None:
@@ -112,13 +117,8 @@ def test_what_leads_by_its_score_is_fitted_whatever_another_gains() -> None:
     judge = Judge([evidence(values, Late()) for values in measured])
     base = judge.fit((), (), shifts=[0.0, 0.0])
     assert base is not None
-    screened = [Screened(candidate=c, starts=((0.02,),), left=1.0, potential=1.0) for c in (SLOPE, MASS)]
-    for scores, leading in (({SLOPE.key: 9.0, MASS.key: 2.0}, {SLOPE.key}), ({SLOPE.key: 8.0, MASS.key: 9.0}, None)):
-        looked = Gate(score=9.0, scores=scores, null=np.zeros(4), detectable={})
-        with Crew() as crew:
-            inquiry = Inquiry(judge=judge, candidates=(SLOPE, MASS), groups=[], phases=[], say=str, crew=crew)
-            _, leaders = _first_fits(inquiry, base, screened, (0, 1), (0.0, 0.0), looked)
-        assert {f.candidates[-1].key for f in leaders} == (leading or {SLOPE.key, MASS.key})
+    assert leading(judge, base, {SLOPE.key: 9.0, MASS.key: 2.0}) == {SLOPE.key}
+    assert leading(judge, base, {SLOPE.key: 8.0, MASS.key: 9.0}) == {SLOPE.key, MASS.key}
 
 
 def test_runs_are_announced_before_they_are_needed(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -84,7 +84,7 @@ def test_inertial_drag_takes_speed_with_depth() -> None:
     assert z[-1] > 0.4
 
 
-T_WIDE = np.linspace(0.001, 0.19, 400)
+STAMPS = np.linspace(0.001, 0.19, 400)
 
 
 def test_rate_hardening_is_a_factor_on_the_law() -> None:
@@ -104,7 +104,7 @@ def test_strength_may_go_by_a_power_of_the_rate(slowest: float | None) -> None:
     """F = K z (max(v, least)/v_0)^beta; without a least rate of its own v_0 is the least."""
     K, power, v0 = 2e4, 0.08, 0.5
     numbers = {"per_decade": 0.0, "power": power, "reference_speed": v0, "slowest": slowest}
-    z, v, _, F = motion(linear(K).with_({f"effects.soil-rate-hardening.{n}": x for n, x in numbers.items()}), T_WIDE)
+    z, v, _, F = motion(linear(K).with_({f"effects.soil-rate-hardening.{n}": x for n, x in numbers.items()}), STAMPS)
     down = v > 0.0
     least = v0 if slowest is None else slowest
     assert np.any(v[down] < v0)
@@ -115,7 +115,7 @@ def test_damping_may_be_in_proportion_to_the_force() -> None:
     """F = K z (1 + J v) on the way down (Smith)."""
     K, J = 2e4, 0.4
     numbers = {"damping": 0.0, "proportion": J}
-    z, v, _, F = motion(linear(K).with_({f"effects.soil-viscous-damping.{n}": x for n, x in numbers.items()}), T_WIDE)
+    z, v, _, F = motion(linear(K).with_({f"effects.soil-viscous-damping.{n}": x for n, x in numbers.items()}), STAMPS)
     down = v > 0.0
     assert F[down] == pytest.approx(K * z[down] * (1.0 + J * v[down]), rel=1e-12)
 
@@ -141,7 +141,7 @@ def test_a_layer_may_have_a_stiffness_of_its_own() -> None:
     """F = K z + k_h (z - h) below h, whatever the law's K there."""
     K, h, own = 2e4, 0.05, 3e4
     numbers = {"depth": h, "stiffness_ratio": 1.0, "stiffness": own}
-    z, v, _, F = motion(linear(K).with_({f"effects.soil-layer.{n}": x for n, x in numbers.items()}), T_WIDE)
+    z, v, _, F = motion(linear(K).with_({f"effects.soil-layer.{n}": x for n, x in numbers.items()}), STAMPS)
     down = v > 0.0
     assert np.any(z[down] > 2.0 * h)
     assert F[down] == pytest.approx(K * z[down] + own * np.maximum(z[down] - h, 0.0), rel=1e-12)
@@ -152,7 +152,7 @@ def test_layer_leaps_or_sets_in(onset: float) -> None:
     """F = K z above h, K (z + (r - 1)(z - onset h)) below: at the top it leaps by K h (r - 1)(1 - onset)."""
     K, h, r = 2e4, 0.05, 2.5
     layer = {f"effects.soil-layer.{n}": v for n, v in {"depth": h, "stiffness_ratio": r, "onset": onset}.items()}
-    z, v, _, F = motion(linear(K).with_(layer), np.linspace(0.001, 0.19, 400))
+    z, v, _, F = motion(linear(K).with_(layer), STAMPS)
     down = v > 0.0
     expected = K * (z + np.where(z > h, (r - 1.0) * (z - onset * h), 0.0))
     assert np.any(z[down] > 2.0 * h)
@@ -166,7 +166,7 @@ def test_an_edge_of_some_width_is_passed_smoothly(effect: str, edge: str, sign: 
     """F = K z (1 + (r - 1) b), b = u^2 (3 - 2 u) below and 1 - b above, u = (z - h)/w + 1/2 from 0 to 1."""
     K, h, r, w = 2e4, 0.05, 2.5, 0.03
     numbers = {edge: h, "stiffness_ratio": r, "width": w}
-    z, v, _, F = motion(linear(K).with_({f"effects.{effect}.{n}": x for n, x in numbers.items()}), T_WIDE)
+    z, v, _, F = motion(linear(K).with_({f"effects.{effect}.{n}": x for n, x in numbers.items()}), STAMPS)
     down = v > 0.0
     u = np.clip((z[down] - h) / w + 0.5, 0.0, 1.0)
     assert np.sum((u > 0.0) & (u < 1.0)) > 5
