@@ -68,6 +68,11 @@ class Candidate:
         return bool(EFFECTS[self.id].narrow)
 
     @property
+    def rings(self) -> bool:
+        """Whether it rings, by a frequency and a damping."""
+        return EFFECTS[self.id].is_abrupt and len(self.search) == 2
+
+    @property
     def is_bent(self) -> bool:
         """Whether it is fitted in another shape or form than its usual one."""
         return bool(self.form) or not set(self.search).isdisjoint(EFFECTS[self.id].shapes)

@@ -11,17 +11,15 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from time import perf_counter
 from typing import Any, Literal
 
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Block, Fitted, Judge
-from rollover.diagnosis.refine import combed, formed, polish, scanned, shaped, timed
+from rollover.diagnosis.refine import combed, in_form, polish, scanned, shaped, timed
 from rollover.diagnosis.secant import beside
 from rollover.execute import Children, map_cases
 
 Progress = Callable[[str], None]
-PATIENCE = 3.0  # s of fits in this process, after which children are worth what it takes to begin them
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,9 +27,9 @@ class Job:
     """A fit to be made: `only` some recordings, from time `shifts` (s) of these; see `Judge.fit`.
 
     One of few `rounds` is a first look: it ends without slopes.
-    "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too, "form" its forms as
-    well, "time" tries out the time shifts, "comb" begins anew all along the second parameter of the last effect,
-    "scan" all along its shape.
+    "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too, "form" takes it in
+    another `form`, "time" tries out the time shifts, "comb" begins anew all along the second parameter of the last
+    effect, "scan" all along its shape.
     """
 
     how: Literal["fit", "polish", "shape", "form", "time", "comb", "scan"] = "fit"
@@ -42,10 +40,12 @@ class Job:
     rounds: int | None = None  # as many as a whole fit may take
     width: int = 0
     pinned: bool = False
+    form: Candidate | None = None
 
     def key(self, about: str) -> str:
         """Hash of what is fitted and from where, with `about` for all else that it depends on."""
-        names = [(c.key, sorted(c.search.items()), sorted(c.form.items())) for c in self.candidates]
+        every = (*self.candidates, *(() if self.form is None else (self.form,)))
+        names = [(c.key, sorted(c.search.items()), sorted(c.form.items())) for c in every]
         told = repr((about, self.how, names, self.start, self.shifts, self.only, self.rounds, self.width, self.pinned))
         return hashlib.sha256(told.encode()).hexdigest()
 
@@ -64,7 +64,7 @@ class Crew:
     def __init__(self, workers: int = 1, notebook: Path | None = None, about: str = "") -> None:
         self.workers, self.notebook, self.about = workers, notebook, about
         self.children = Children(workers)
-        self._worked = 0.0  # s, on fits in this process
+        self._beginning: list[Any] = []  # what tells that the children are there
         self._done: dict[str, dict[str, Any] | None] = {}
         if notebook is not None and notebook.exists():
             for line in notebook.read_text(encoding="utf-8").splitlines():
@@ -79,6 +79,16 @@ class Crew:
 
     def __exit__(self, *_: object) -> None:
         self.children.stop()
+
+    def begin(self, judge: Judge) -> None:
+        """Begin the children, if any, while this process goes on: each makes a run, so that it has all it needs."""
+        if self.workers > 1 and not judge.effort.thrifty:
+            bare = judge.bare()
+            self._beginning = [self.children.pool.schedule(_begun, args=(bare,)) for _ in range(self.workers)]
+
+    def is_there(self) -> bool:
+        """Whether the children have begun."""
+        return bool(self._beginning) and all(b.done() for b in self._beginning)
 
     def close(self) -> None:
         """All is done: nothing needs to be taken up again."""
@@ -111,11 +121,9 @@ class Crew:
                 for job in begun
                 for point in beside(job.recordings, job.candidates, job.start, nudges[min(job.width, len(nudges) - 1)])
             )
-        while done < len(todo) and not (shared and self._worked > PATIENCE and len(todo) - done > 1):
-            k, began = todo[done], perf_counter()
-            fitted = work(judge, jobs[k])
-            self._worked += perf_counter() - began
-            ended(k, fitted)
+        while done < len(todo) and not (shared and len(todo) - done > 1 and self.is_there()):
+            k = todo[done]
+            ended(k, work(judge, jobs[k]))
         if done == len(todo):
             return found
         bare, rest, about = judge.bare(), todo[done:], f"{about} {judge.shifts}"
@@ -157,13 +165,19 @@ def work(judge: Judge, job: Job) -> Fitted | None:
     begun = linearised(judge, job.candidates, job.start, job.shifts, job.recordings)
     if begun is None:
         return None
+    if job.form is not None:
+        return in_form(judge, begun, job.form)
     ways: dict[str, Callable[[Judge, Fitted], Fitted | None]] = {
-        "polish": polish, "shape": shaped, "form": formed, "time": timed, "comb": combed, "scan": scanned,
+        "polish": polish, "shape": shaped, "time": timed, "comb": combed, "scan": scanned,
     }  # fmt: skip
     return ways[job.how](judge, begun)
 
 
 _held: dict[str, Judge] = {}  # in a child: what it simulated for the job before
+
+
+def _begun(judge: Judge) -> None:
+    judge.fit((), (), rounds=1)
 
 
 def _worked(case: tuple[str, Judge, Job]) -> tuple[Fitted | None, int]:

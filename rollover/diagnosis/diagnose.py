@@ -102,6 +102,7 @@ def diagnose(
     if len(groups) == 1 and not kept:
         notes.append("one condition only: what stands as held out is predicted by the fit to it")
     judge = Judge(found)
+    crew.begin(judge)
     align(judge)
     base = judge.fit((), ())
     if base is None:

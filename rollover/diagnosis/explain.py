@@ -98,7 +98,7 @@ def step(inquiry: Inquiry, base: Fitted, looked: Gate) -> Step | None:
         polished = inquiry.fits([from_there(f, "polish") for f in near])
         others = [f for f in fits if not any(f is one for one in near)]
         fits = others + [new or old for new, old in zip(polished, near, strict=True)]
-    fits = one_each(fits) if judge.effort.thrifty else shaped_too(inquiry, one_each(fits))
+    fits = one_each(fits) if judge.effort.thrifty else shaped_too(inquiry, base, one_each(fits))
     if not judge.effort.thrifty:
         fits = timed_too(inquiry, fits)
     if weighed(judge, fits[0], inquiry.phases):

@@ -15,14 +15,15 @@ from rollover.diagnosis.fit import Fitted
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.refine import WORTH
 
 RUGGED = 2.0  # misfit over the noise that the best leaves, from which on there may be something behind a cliff
 LEADS = 1.5  # times what the best leaves, up to which it is looked for
+WORTH = 12.0  # gain that pays for a shape
 MOSTLY = 0.25  # of what the middle recording is left with by the best, below which an effect is the better one there
 PROMISED = 0.5  # of the best score: what has it, and gains less than half of its own, may have another shape
 TIED = 1.2  # times what the best leaves, up to which time shifts are tried out
 BY_CHANCE = 0.01  # p-value of what is left, above which no other form of an effect is looked for
+LEAST = 0.1  # of what the base leaves beyond the noise, that an effect must take before its shape is fitted too
 SHAPED = 4.0  # times what the best leaves, up to which an effect's shape is fitted too
 
 
@@ -50,8 +51,8 @@ def _as_promised(
 
 
 def _combed(inquiry: Inquiry, fits: Sequence[Fitted], shifts: Sequence[float]) -> list[Fitted]:
-    """The fits, best first, the best of two parameters begun anew along the second if it leads or nearly so."""
-    able = [f for f in fits if len(f.candidates[-1].search) == 2 and f.left < LEADS * fits[0].left][:1]
+    """The fits, best first, the best that rings begun anew along its second parameter if it leads or nearly so."""
+    able = [f for f in fits if f.candidates[-1].rings and f.left < LEADS * fits[0].left][:1]
     jobs = [Job(how="comb", candidates=f.candidates, start=f.x, shifts=tuple(shifts)) for f in able]
     tried = zip(inquiry.fits(jobs), able, strict=True)
     better = [new if new is not None and new.left < old.left else old for new, old in tried]
@@ -96,24 +97,46 @@ def _middle(blocks: Sequence[Block]) -> float:
     return float(np.median([b.normal()[2] / b.residual.size for b in blocks]))
 
 
-def shaped_too(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
-    """The fits with shapes fitted too where that pays, best first; other forms if the best leaves more than chance."""
+def shaped_too(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
+    """The fits with shapes fitted too where that pays, best first; other forms if the best leaves more than chance.
+
+    Of an effect that takes next to nothing from what the base leaves no shape or form will take it all.
+    """
     lead = min(fits, key=lambda f: f.left)
     best, size = lead.left, sum(b.residual.size for b in fits[0].blocks)
     held = [held_out(f, inquiry.groups).total ** 2 for f in fits]
     is_whole = mismatch_of(inquiry.judge.evidence, lead.blocks, inquiry.phases).p_value > BY_CHANCE
-    able = [
-        f
-        for f, ahead in zip(fits, held, strict=True)
-        if (f.candidates[-1].shapes or (f.candidates[-1].forms() and not is_whole))
-        and (f.left < SHAPED * best or ahead < SHAPED * min(held))
-    ]
+    ways: list[tuple[int, Job]] = []
+    for k, (f, ahead) in enumerate(zip(fits, held, strict=True)):
+        is_near = f.left < SHAPED * best or ahead < SHAPED * min(held)
+        if not is_near or base.left - f.left < LEAST * (base.left - size):
+            continue
+        if f.candidates[-1].shapes:
+            ways.append((k, from_there(f, "shape")))
+        if not is_whole:
+            ways += [(k, from_there(f, "form", c)) for c in f.candidates[-1].forms()]
+    made: dict[int, list[Fitted]] = {}
+    for (k, _), new in zip(ways, inquiry.fits([job for _, job in ways]), strict=True):
+        if new is not None:
+            made.setdefault(k, []).append(new)
     found = list(fits)
-    jobs = [from_there(f, "shape" if is_whole else "form") for f in able]
-    for old, new in zip(able, inquiry.fits(jobs), strict=True):
-        if new is not None and new.left < old.left - WORTH * max(1.0, best / size):
-            found[found.index(old)] = new
+    for k, several in made.items():
+        new = _plainest(several, size)
+        if new.left < fits[k].left - _enough(best, size):
+            found[k] = new
     return sorted(found, key=lambda f: f.left)
+
+
+def _plainest(fits: Sequence[Fitted], size: int) -> Fitted:
+    """Of an effect in several forms the one that asks for least, of those that meet all as well."""
+    least = min(f.left for f in fits)
+    near = [f for f in fits if f.left < least + _enough(least, size)]
+    return min(near, key=lambda f: (len(f.x), bool(f.candidates[-1].form), f.left))
+
+
+def _enough(left: float, size: int) -> float:
+    """The gain that pays for a shape where so much is left of so many samples."""
+    return WORTH * max(1.0, left / size)
 
 
 def timed_too(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
@@ -125,9 +148,9 @@ def timed_too(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
     return sorted([new or old for new, old in zip(timed, near, strict=True)] + others, key=lambda f: f.left)
 
 
-def from_there(f: Fitted, how: Literal["polish", "shape", "form", "time"]) -> Job:
+def from_there(f: Fitted, how: Literal["polish", "shape", "form", "time"], form: Candidate | None = None) -> Job:
     """What is made of a fit where it stands."""
-    return Job(how=how, candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks))
+    return Job(how=how, candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks), form=form)
 
 
 def one_each(fits: Sequence[Fitted]) -> list[Fitted]:

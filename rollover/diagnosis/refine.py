@@ -20,10 +20,10 @@ SHORT = 4  # rounds of a fit that tells where to begin
 STARTS, APART = 3, 0.06  # of the best places, so far apart
 AFAR, NEAR = (np.arange(80) + 0.5) / 80, 0.002 * np.arange(-20, 21)  # places of a threshold, all along and about a fit
 ABREAST = 1.5  # times what the best of short fits leaves, up to which others are followed
+THERE = 0.003  # of a coordinate, within which two short fits came to one place
 VALLEYS = 4  # of these in which a fit begins
 BESIDE_FORM = np.linspace(-0.1, 0.05, 13)  # of a coordinate: where a threshold of another form may lie
 ELSEWHERE = (0.2, 0.35, 0.5, 0.65, 0.8)  # coordinates of a number that only this form has
-WORTH = 12.0  # gain that pays for a shape
 SCANNED = (np.arange(40) + 0.5) / 40  # places of a shape
 TICK, SHORTEST, NARROWER = 8e-5, 5e-6, 0.4  # s, by which a time shift is tried to either side; then less, by a factor
 TRIED = 40  # at most so many
@@ -101,7 +101,7 @@ def combed(judge: Judge, fitted: Fitted) -> Fitted:
     firsts = np.clip(fitted.x[at] + COMBED * np.linspace(-1.0, 1.0, TEETH), 0.0, 1.0)
     places = [(*fitted.x[:at], float(a), float(b)) for a in firsts for b in (np.arange(BESIDE) + 0.5) / BESIDE]
     chosen: list[tuple[float, ...]] = []
-    for x in _by_what_is_left(judge, fitted.candidates, places, shifts):
+    for x in _by_what_is_left(judge, fitted.candidates, places, shifts, _few(fitted)):
         if len(chosen) < STARTS and all(max(abs(a - b) for a, b in zip(x, c, strict=True)) > APART for c in chosen):
             chosen.append(x)
     found = [judge.fit(fitted.candidates, x, shifts=shifts, width=1) for x in chosen]
@@ -217,19 +217,6 @@ def conditioned(judge: Judge, fitted: Fitted) -> Fitted:
     return fitted
 
 
-def formed(judge: Judge, f: Fitted) -> Fitted | None:
-    """The fit with the shape of its last effect fitted too, or in a form that asks for less or meets all better."""
-    found = [one for one in (shaped(judge, f), *(_in_form(judge, f, c) for c in f.candidates[-1].forms())) if one]
-    if not found:
-        return None
-    least = min(one.left for one in found)
-    enough = WORTH * max(1.0, least / sum(b.residual.size for b in f.blocks))
-    return min(
-        (one for one in found if one.left < least + enough),
-        key=lambda one: (len(one.x), bool(one.candidates[-1].form), one.left),
-    )
-
-
 def shaped(judge: Judge, f: Fitted) -> Fitted | None:
     """The fit with the shape of its last effect, begun where short fits from some places leave least; None if none."""
     if not f.candidates[-1].shapes:
@@ -239,7 +226,7 @@ def shaped(judge: Judge, f: Fitted) -> Fitted | None:
     return _best_of(judge, f, last.whole(), places)
 
 
-def _in_form(judge: Judge, f: Fitted, last: Candidate) -> Fitted | None:
+def in_form(judge: Judge, f: Fitted, last: Candidate) -> Fitted | None:
     """The fit with its last effect in another form, begun where it leaves least.
 
     A threshold lies elsewhere in another form; what is fitted instead of another number is looked for over its range.
@@ -264,7 +251,11 @@ def _best_of(judge: Judge, f: Fitted, last: Candidate, places: Sequence[tuple[fl
     candidates, few = (*f.candidates[:-1], last), _few(f)
     at = [f.blocks[r].shift for r in few]
     short = [judge.fit(candidates, x, rounds=SHORT, shifts=at, only=few, bare=True) for x in places]
-    begun = sorted((one for one in short if one is not None), key=_total)[:STARTS]
+    most = ABREAST * sum(f.blocks[r].total for r in few)  # fitted alone these soon leave less than beside all others
+    begun: list[Fitted] = []
+    for one in sorted((one for one in short if one is not None and _total(one) < most), key=_total):
+        if len(begun) < STARTS and not any(_is_there(one, other) for other in begun):
+            begun.append(one)
     best: Fitted | None = None
     for one in (one for one in begun if _total(one) < ABREAST * _total(begun[0])):
         told = dict(zip(few, one.blocks, strict=True))
@@ -274,6 +265,11 @@ def _best_of(judge: Judge, f: Fitted, last: Candidate, places: Sequence[tuple[fl
         if best is not None and best.left < NOISE_LEFT**2 * sum(b.residual.size for b in best.blocks):
             return best
     return None if best is None else polish(judge, best)
+
+
+def _is_there(one: Fitted, other: Fitted) -> bool:
+    """Whether two fits ended in one place."""
+    return max(abs(a - b) for a, b in zip(one.x, other.x, strict=True)) < THERE
 
 
 def _few(f: Fitted) -> list[int]:

@@ -35,6 +35,7 @@ HOPELESS = 2.0  # misfit over the noise that two effects leave and a third is no
 LEADING, FOLLOWING = 4, 2  # of the first effects, and of later ones each, that are tried two by two
 HARDLY_MORE = 1.2  # times a tolerance, that an explanation leaves of held-out recordings
 SEVERAL = 2  # recordings on another course, after which they are not forgiven if a candidate scores beyond chance
+ABLE = 0.7  # of what there was beyond the noise, above which two leave so much that no exchange of one will end it
 BETTER = 0.5  # of what is left, that another first effect must leave
 
 
@@ -117,7 +118,8 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
         if not judge.straying:
             current = astray(judge, current)
             left = mismatch_of(judge.evidence, current.blocks, phases)
-        if len(taken) == 2 and left.p_value < SURE and matters(judge, current, left):
+        able = current.left - count < ABLE * (base.left - count)
+        if len(taken) == 2 and able and left.p_value < SURE and matters(judge, current, left):
             # of two that are strong the first may have been taken for something else: is there a better one?
             other = _instead(inquiry, current)
             if other is not None and other.fitted.left < current.left:

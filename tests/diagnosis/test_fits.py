@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.diagnosis import crew, diagnose, diagnosed_text
+from rollover.diagnosis import diagnose, diagnosed_text
 from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import Candidate, candidates_of, coordinate
 from rollover.diagnosis.crew import Crew, Job, work
@@ -105,7 +106,7 @@ def test_a_first_fit_ends_without_slopes_and_where_it_would_with_them() -> None:
 
 
 @pytest.mark.parametrize("workers", [2])
-def test_any_number_of_workers_gives_the_same_fits(workers: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_any_number_of_workers_gives_the_same_fits(workers: int) -> None:
     recordings = recorded(GAIN, speeds=(1.2, 3.2))
     jobs = []
     for key in (f"sensor-gain:{FORCE}", "soil-stiffness"):
@@ -113,11 +114,15 @@ def test_any_number_of_workers_gives_the_same_fits(workers: int, monkeypatch: py
         jobs.append(Job(candidates=(c,), start=c.starts()[0], shifts=(0.0, 0.0), rounds=3))
     alone = Crew().fits(judge_of(recordings), jobs)
     with Crew(workers) as many:
-        assert many.fits(judge_of(recordings), jobs[:1])[0] is not None  # in this process: it took no time yet
+        assert many.fits(judge_of(recordings), jobs)[0] is not None  # in this process: none has begun
         assert many.children._pool is None
-    monkeypatch.setattr(crew, "PATIENCE", -1.0)
     with Crew(workers) as many:
-        together = many.fits(judge_of(recordings), jobs)
+        many.begin(judge_of(recordings))
+        while not many.is_there():
+            time.sleep(0.1)
+        judge = judge_of(recordings)
+        together = many.fits(judge, jobs)
+        assert not judge._raw  # nothing was simulated here
         assert many.children._pool is not None
     assert many.children._pool is None
     for a, b in zip(alone, together, strict=True):
@@ -216,7 +221,8 @@ def test_a_fit_in_another_form_is_taken_up_from_the_notebook(tmp_path: Path) -> 
     rate = candidate(judge, "soil-rate-hardening")
     begun = judge.fit((rate,), (0.5,))
     assert begun is not None
-    job = Job(how="form", candidates=(rate,), start=begun.x, shifts=tuple(b.shift for b in begun.blocks))
+    shifts, form = tuple(b.shift for b in begun.blocks), rate.forms()[0]
+    job = Job(how="form", candidates=(rate,), start=begun.x, shifts=shifts, form=form)
     found = []
     for _ in range(2):
         with Crew(notebook=tmp_path / "notes") as one:
