@@ -63,7 +63,8 @@ LAYER_SPRING = 20  # a layer's own stiffness, added from its top on, N/m
 PROPORTION, POWER = 21, 22  # J of a resistance that adds J v times itself, s/m; beta of one that goes by (v/v_0)^beta
 SLOWEST = 23  # rate below which that power goes no further, m/s
 CLINGS = 24  # 1: the soil that moves along stays on the face when it lifts off, and is not hit anew
-EFFECT_PLACES = 25  # numbers of the compiled terms follow, TERM_PLACES for each
+CRUST_REMAINS = 25  # share of what a crust adds at its end that stays below it
+EFFECT_PLACES = 26  # numbers of the compiled terms follow, TERM_PLACES for each
 TERM_PLACES = 8
 
 DOUBLED, HALVED = 12, 50  # times, of the way from a rut to where its line meets another curve
@@ -86,14 +87,18 @@ def loading_force(law: Any, p: Any, s: Any, z: float, v: float) -> float:
 
     F = (r(z) F_law + k_h (z - h)) (1 + lambda log10(v/v_0)) (v/v_0)^beta (1 + J v) + d v^zeta + 1/2 C rho A v^2
     + terms, r the ratio of crust and layer, k_h what a layer below h has of its own; the ratio of a layer counts for
-    the sinkage beyond its onset alone. Where an edge has a width, r changes over that.
+    the sinkage beyond its onset alone, that of a crust, below it, for what of its thickness remains. Where an edge has a width, r changes over that.
     """
     e = law[EFFECTS]
     f = p[e + STIFFNESS] * call_force(law[ADDRESS_FORCE], (p.ctypes, s.ctypes, z, v))
     if p[e + CRUST_WIDTH] > 0.0:
-        f *= 1.0 + (p[e + CRUST_RATIO] - 1.0) * (1.0 - passed(z, p[e + CRUST_DEPTH], p[e + CRUST_WIDTH]))
+        gone = passed(z, p[e + CRUST_DEPTH], p[e + CRUST_WIDTH])
+        gone *= 1.0 - p[e + CRUST_REMAINS] * p[e + CRUST_DEPTH] / max(z, p[e + CRUST_DEPTH])
+        f *= 1.0 + (p[e + CRUST_RATIO] - 1.0) * (1.0 - gone)
     elif z < p[e + CRUST_DEPTH]:
         f *= p[e + CRUST_RATIO]
+    elif p[e + CRUST_REMAINS] != 0.0:
+        f *= 1.0 + (p[e + CRUST_RATIO] - 1.0) * p[e + CRUST_REMAINS] * p[e + CRUST_DEPTH] / z
     if p[e + LAYER_WIDTH] > 0.0:
         spared = p[e + LAYER_ONSET] * p[e + LAYER_DEPTH] / max(z, p[e + LAYER_DEPTH])
         f *= 1.0 + (p[e + LAYER_RATIO] - 1.0) * (1.0 - spared) * passed(z, p[e + LAYER_DEPTH], p[e + LAYER_WIDTH])

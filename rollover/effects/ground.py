@@ -309,10 +309,11 @@ class SoilCrust(Effect):
     thickness: Annotated[float, Quantity("m", "of the crust; sinkage", above=0)] = 0.04
     stiffness_ratio: Annotated[float, Quantity("1", "of K' in the crust to K' below", above=0)] = 2.0
     width: Annotated[float, Quantity("m", "over which K' changes, about the crust's end; 0: at once", least=0)] = 0.0
+    remains: Annotated[float, Quantity("1", "of what it adds at its end, share that stays below", least=0, most=1)] = 0.0
 
     id = "soil-crust"
     family = DEPTH
-    equation = "F = ratio K'(z) z for z < thickness"
+    equation = "F = ratio K'(z) z for z < thickness; K'(z) (z + (ratio - 1) remains thickness) below"
     source = "20-80 mm (M)"
     sentence = "The upper {thickness} of the ground are {stiffness_ratio} times as stiff as what lies below."
     rivals: ClassVar[Mapping[str, str]] = {
@@ -327,10 +328,12 @@ class SoilCrust(Effect):
         "width": Search(1e-3, 0.1, "log"),
     }
     shapes = ("width",)
+    forms = (Form({"remains": 1.0}, {}),)
 
     def places(self) -> Mapping[int, float]:
-        """Depth, ratio, and how sharply it ends."""
-        return {k.CRUST_DEPTH: self.thickness, k.CRUST_RATIO: self.stiffness_ratio, k.CRUST_WIDTH: self.width}
+        """Depth, ratio, how sharply it ends, and what of it stays below."""
+        whole = {k.CRUST_DEPTH: self.thickness, k.CRUST_RATIO: self.stiffness_ratio, k.CRUST_WIDTH: self.width}
+        return {**whole, k.CRUST_REMAINS: self.remains}
 
 
 @parameters

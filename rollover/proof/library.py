@@ -120,8 +120,10 @@ def _layer(random: Random, s: Setting) -> Change:
 def _crust(random: Random, s: Setting) -> Change:
     depth, ratio = float(random.uniform(0.012, 0.08)), _either(random, 0.012, 1.2)
     width = float(random.uniform(0.001, 0.003)) if s.other_forms else 0.0
+    remains = float(random.choice((0.0, 1.0))) if s.other_forms else 0.0
     told = {"thickness": depth, "stiffness_ratio": ratio}
-    return _physics("soil-crust", told, "depth", crust_depth=depth, crust_ratio=ratio, crust_width=width)
+    own = {"crust_depth": depth, "crust_ratio": ratio, "crust_width": width if remains == 0.0 else 0.0}
+    return _physics("soil-crust", told, "depth", crust_remains=remains, **own)
 
 
 def _compliance(random: Random, s: Setting) -> Change:

@@ -49,6 +49,7 @@ class Rig:
     crust_depth: float = 0.0
     crust_ratio: float = 1.0
     crust_width: float = 0.0
+    crust_remains: float = 0.0  # of what the crust adds at its end, how much stays below
     nose_share: float = 0.1
     spring: float = 0.0  # N/m between nose and body; 0: one rigid block
     dashpot: float = 0.0
@@ -71,7 +72,7 @@ class Rig:
         found = []
         if self.layer_ratio != 1.0 and self.layer_width == 0.0:
             found.append(self.layer_depth)
-        if self.crust_ratio != 1.0 and self.crust_width == 0.0:
+        if self.crust_ratio != 1.0 and self.crust_width == 0.0 and self.crust_remains < 1.0:
             found.append(self.crust_depth)
         return tuple(found)
 
@@ -99,7 +100,9 @@ def loading_curve(rig: Rig, touch_speed: float) -> Curve:
         z = max(z, 0.0)
         force = rig.stiffness * (first * z if z <= change else factor * z**0.264)  # (3): F = K' z
         if rig.crust_ratio != 1.0:
-            force *= rig.crust_ratio + (1.0 - rig.crust_ratio) * _below(z, rig.crust_depth, rig.crust_width)
+            stays = rig.crust_remains * rig.crust_depth / max(z, rig.crust_depth)
+            lost = (1.0 - stays) * _below(z, rig.crust_depth, rig.crust_width)
+            force *= rig.crust_ratio + (1.0 - rig.crust_ratio) * lost
         if rig.layer_ratio != 1.0:
             spared = rig.layer_onset * rig.layer_depth / max(z, rig.layer_depth)
             force *= 1.0 + (rig.layer_ratio - 1.0) * (1.0 - spared) * _below(z, rig.layer_depth, rig.layer_width)

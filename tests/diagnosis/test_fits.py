@@ -199,6 +199,7 @@ def test_an_accelerometer_alone_on_its_axis_may_be_turned_or_read_low() -> None:
             "reference_speed",
         ),
         ("soil-crust", {"thickness": 0.06, "stiffness_ratio": 1.6, "width": 0.05}, "width"),
+        ("soil-crust", {"thickness": 0.06, "stiffness_ratio": 1.6, "remains": 1.0}, "remains"),
         ("sensor-lag", {"channel": FORCE, "time": 0.006, "second_order": 0.5}, "second_order"),
         ("soil-rate-hardening", {"per_decade": 0.1, "reference_speed": 0.3}, "reference_speed"),
     ],

@@ -159,6 +159,19 @@ def test_layer_leaps_or_sets_in(onset: float) -> None:
     assert F[down] == pytest.approx(expected[down], rel=1e-12)
 
 
+@pytest.mark.parametrize(("remains", "width"), [(1.0, 0.0), (0.3, 0.0), (1.0, 0.02)])
+def test_what_a_crust_adds_may_stay_below_it(remains: float, width: float) -> None:
+    """F = K (z + (r - 1) z) in the crust, K (z + (r - 1) s h) below, s what remains; b passes from one to the other."""
+    K, h, r = 2e4, 0.05, 2.5
+    numbers = {"thickness": h, "stiffness_ratio": r, "remains": remains, "width": width}
+    z, v, _, F = motion(linear(K).with_({f"effects.soil-crust.{n}": x for n, x in numbers.items()}), STAMPS)
+    z, F = z[v > 0.0], F[v > 0.0]
+    u = np.clip((z - h) / width + 0.5, 0.0, 1.0) if width > 0.0 else np.where(z > h, 1.0, 0.0)
+    b = u**2 * (3.0 - 2.0 * u)
+    assert np.any(z > 2.0 * h)
+    assert F == pytest.approx(K * (z + (r - 1.0) * ((1.0 - b) * z + b * remains * np.minimum(z, h))), rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("effect", "edge", "sign"), [("soil-layer", "depth", 1.0), ("soil-crust", "thickness", -1.0)], ids=str
 )

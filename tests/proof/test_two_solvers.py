@@ -32,6 +32,10 @@ SAME: dict[str, tuple[dict[str, float], dict[str, Any]]] = {
     "soil-viscous-damping, proportional": ({"damping": 0.0, "proportion": 0.2}, {"proportion": 0.2}),
     "soil-rate-hardening, by a power": ({"per_decade": 0.0, "power": 0.07}, {"power": 0.07}),
     "soil-crust": ({"thickness": 0.03, "stiffness_ratio": 2.0}, {"crust_depth": 0.03, "crust_ratio": 2.0}),
+    "soil-crust, staying": (
+        {"thickness": 0.03, "stiffness_ratio": 2.0, "remains": 1.0},
+        {"crust_depth": 0.03, "crust_ratio": 2.0, "crust_remains": 1.0},
+    ),
     "structural-compliance": ({"stiffness": 5e5, "damping": 300.0}, {"spring": 5e5, "dashpot": 300.0}),
     "guide-friction": ({"force": 100.0}, {"guide": 100.0}),
     "guide-friction, creeping": ({"force": 200.0, "creep": 0.005}, {"guide": 200.0, "guide_creep": 0.005}),
