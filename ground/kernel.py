@@ -87,7 +87,8 @@ def loading_force(law: Any, p: Any, s: Any, z: float, v: float) -> float:
 
     F = (r(z) F_law + k_h (z - h)) (1 + lambda log10(v/v_0)) (v/v_0)^beta (1 + J v) + d v^zeta + 1/2 C rho A v^2
     + terms, r the ratio of crust and layer, k_h what a layer below h has of its own; the ratio of a layer counts for
-    the sinkage beyond its onset alone, that of a crust, below it, for what of its thickness remains. Where an edge has a width, r changes over that.
+    the sinkage beyond its onset alone, that of a crust, below it, for what of its thickness remains. Where an edge has
+    a width, r changes over that.
     """
     e = law[EFFECTS]
     f = p[e + STIFFNESS] * call_force(law[ADDRESS_FORCE], (p.ctypes, s.ctypes, z, v))

@@ -17,11 +17,23 @@ from typing import Any
 
 from ground.settings import ForceTerm
 from rollover.effects import empirical, ground, parameter, sensor, striker, vehicle
-from rollover.effects.effect import EFFECTS, Effect, Heard, Search, nothing, possible, spoken, units_of
+from rollover.effects.effect import EFFECTS, Effect, Form, Heard, Search, nothing, possible, spoken, units_of
 from rollover.faults import Fault, InputError
 from rollover.recording import Recording
 
-__all__ = ["EFFECTS", "Effect", "Heard", "Search", "acting", "effects", "ground", "nothing", "parameter", "read"]
+__all__ = [
+    "EFFECTS",
+    "Effect",
+    "Form",
+    "Heard",
+    "Search",
+    "acting",
+    "effects",
+    "ground",
+    "nothing",
+    "parameter",
+    "read",
+]
 __all__ += ["empirical", "entries", "every", "nth", "possible", "sensor", "spoken", "striker", "units_of", "vehicle"]
 
 VARIABLE = "ROLLOVER_EFFECTS"

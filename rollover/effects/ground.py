@@ -309,7 +309,7 @@ class SoilCrust(Effect):
     thickness: Annotated[float, Quantity("m", "of the crust; sinkage", above=0)] = 0.04
     stiffness_ratio: Annotated[float, Quantity("1", "of K' in the crust to K' below", above=0)] = 2.0
     width: Annotated[float, Quantity("m", "over which K' changes, about the crust's end; 0: at once", least=0)] = 0.0
-    remains: Annotated[float, Quantity("1", "of what it adds at its end, share that stays below", least=0, most=1)] = 0.0
+    remains: Annotated[float, Quantity("1", "share of what it adds that stays below it", least=0, most=1)] = 0.0
 
     id = "soil-crust"
     family = DEPTH

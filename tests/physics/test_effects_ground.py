@@ -169,7 +169,8 @@ def test_what_a_crust_adds_may_stay_below_it(remains: float, width: float) -> No
     u = np.clip((z - h) / width + 0.5, 0.0, 1.0) if width > 0.0 else np.where(z > h, 1.0, 0.0)
     b = u**2 * (3.0 - 2.0 * u)
     assert np.any(z > 2.0 * h)
-    assert F == pytest.approx(K * (z + (r - 1.0) * ((1.0 - b) * z + b * remains * np.minimum(z, h))), rel=1e-12)
+    expected = K * (z + (r - 1.0) * ((1.0 - b) * z + b * remains * np.minimum(z, h)))
+    assert F == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize(
