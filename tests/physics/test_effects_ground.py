@@ -165,12 +165,12 @@ def test_what_a_crust_adds_may_stay_below_it(remains: float, width: float) -> No
     K, h, r = 2e4, 0.05, 2.5
     numbers = {"thickness": h, "stiffness_ratio": r, "remains": remains, "width": width}
     z, v, _, F = motion(linear(K).with_({f"effects.soil-crust.{n}": x for n, x in numbers.items()}), STAMPS)
-    z, F = z[v > 0.0], F[v > 0.0]
+    z, force = z[v > 0.0], F[v > 0.0]
     u = np.clip((z - h) / width + 0.5, 0.0, 1.0) if width > 0.0 else np.where(z > h, 1.0, 0.0)
     b = u**2 * (3.0 - 2.0 * u)
     assert np.any(z > 2.0 * h)
     expected = K * (z + (r - 1.0) * ((1.0 - b) * z + b * remains * np.minimum(z, h)))
-    assert F == pytest.approx(expected, rel=1e-12)
+    assert force == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize(
