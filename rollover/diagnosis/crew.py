@@ -27,12 +27,12 @@ class Job:
     """A fit to be made: `only` some recordings, from time `shifts` (s) of these; see `Judge.fit`.
 
     One of few `rounds` is a first look: it ends without slopes.
-    "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too, "form" takes it in
-    another `form`, "time" tries out the time shifts, "comb" begins anew all along the second parameter of the last
-    effect, "scan" all along its shape.
+    "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too or takes it in another
+    `form`, "time" tries out the time shifts, "comb" begins anew all along the second parameter of the last effect,
+    "scan" all along its shape.
     """
 
-    how: Literal["fit", "polish", "shape", "form", "time", "comb", "scan"] = "fit"
+    how: Literal["fit", "polish", "shape", "time", "comb", "scan"] = "fit"
     candidates: tuple[Candidate, ...]
     start: tuple[float, ...]
     shifts: tuple[float, ...]

@@ -114,7 +114,7 @@ def shaped_too(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[F
         if f.candidates[-1].shapes:
             ways.append((k, from_there(f, "shape")))
         if not is_whole:
-            ways += [(k, from_there(f, "form", c)) for c in f.candidates[-1].forms()]
+            ways += [(k, from_there(f, "shape", c)) for c in f.candidates[-1].forms()]
     made: dict[int, list[Fitted]] = {}
     for (k, _), new in zip(ways, inquiry.fits([job for _, job in ways]), strict=True):
         if new is not None:
@@ -148,7 +148,7 @@ def timed_too(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
     return sorted([new or old for new, old in zip(timed, near, strict=True)] + others, key=lambda f: f.left)
 
 
-def from_there(f: Fitted, how: Literal["polish", "shape", "form", "time"], form: Candidate | None = None) -> Job:
+def from_there(f: Fitted, how: Literal["polish", "shape", "time"], form: Candidate | None = None) -> Job:
     """What is made of a fit where it stands."""
     return Job(how=how, candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks), form=form)
 

@@ -223,7 +223,7 @@ def test_a_fit_in_another_form_is_taken_up_from_the_notebook(tmp_path: Path) -> 
     begun = judge.fit((rate,), (0.5,))
     assert begun is not None
     shifts, form = tuple(b.shift for b in begun.blocks), rate.forms()[0]
-    job = Job(how="form", candidates=(rate,), start=begun.x, shifts=shifts, form=form)
+    job = Job(how="shape", candidates=(rate,), start=begun.x, shifts=shifts, form=form)
     found = []
     for _ in range(2):
         with Crew(notebook=tmp_path / "notes") as one:
