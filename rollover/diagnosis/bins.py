@@ -19,7 +19,7 @@ from rollover.scenario import Scenario
 Array = NDArray[np.float64]
 
 MOST_ROWS = 500  # of a recording that are looked at
-FEW = 4  # stamps in a mean that are all simulated; of more, two away from the first contact
+FEW = 4  # stamps in a mean that are all simulated; for more, two times away from the first contact
 KNOWN, UNKNOWN = 4e-3, 30e-3  # s, by which a clock's zero may be off
 
 
@@ -83,17 +83,19 @@ def simulated(scenario: Scenario, recording: Recording) -> tuple[Recording, Simu
     if inside is None:
         return recording, simulator_of(scenario, recording), 1
     many = inside.shape[1]
-    first = round(0.25 * many - 0.5)
-    few = np.array([first, many - 1 - first])  # mean and about the spread of all of them
     # a filter needs all stamps, and so does the kink of the force at the first contact
     near = UNKNOWN if recording.clock.zero == "unknown" else KNOWN
     whole = np.abs(thin.time) < near + many * float(np.median(np.diff(recording.time)))
     if recording.cfc or many <= FEW or not isinstance(scenario.initiation, Drop):
         whole[:] = True
-    rows = [part if all_ else part[few] for part, all_ in zip(inside, whole, strict=True)]
-    counts = np.array([r.size for r in rows])
-    at = np.concatenate(rows)
-    part = replace(recording, time=recording.time[at], channels={c: v[at] for c, v in recording.channels.items()})
+    # two times at the standard deviation about the mean have the mean of any cubic
+    times = recording.time[inside]
+    beside = thin.time[:, None] + times.std(axis=1)[:, None] * np.array([-1.0, 1.0])
+    stamps = [t if all_ else b for t, b, all_ in zip(times, beside, whole, strict=True)]
+    counts = np.array([t.size for t in stamps])
+    at = np.concatenate([rows[:n] for rows, n in zip(inside, counts, strict=True)])
+    channels = {c: v[at] for c, v in recording.channels.items()}  # which there are is all that is asked of them
+    part = replace(recording, time=np.concatenate(stamps), channels=channels)
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
     return thin, Averaged(inner=simulator_of(scenario, part), starts=starts, counts=counts), many
 

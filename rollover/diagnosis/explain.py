@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis import colour
+from rollover.diagnosis.blocks import at_an_end
 from rollover.diagnosis.crew import Job
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.effort import Effort
@@ -285,13 +286,22 @@ def confusion(step_: Step, groups: Groups, shared: float = 1.0) -> list[Fitted]:
     """Rivals that predict held-out recordings as well as the best does, the best first.
 
     And those of no more numbers that meet all recordings as well as it does: what hangs on a single one is hard to
-    predict without it, and not wrong for that.
+    predict without it, and not wrong for that. None that becomes the best itself at the end of its range, as a layer
+    whose top is the ground's.
     """
     best, base = step_.fitted, step_.base
     found = [best]
     for rival in step_.rivals:
         explains = base.left - rival.left > 0.5 * (base.left - best.left)
         as_well = len(rival.x) <= len(best.x) and rival.left < best.left + APART**2
-        if rival is not best and explains and (as_well or min(worse(rival, best, groups, shared)) < APART):
+        becomes_best = len(rival.x) > len(best.x) and rival.left > best.left - APART**2 and _is_at_an_end(rival)
+        if rival is best or becomes_best or not explains:
+            continue
+        if as_well or min(worse(rival, best, groups, shared)) < APART:
             found.append(rival)
     return found
+
+
+def _is_at_an_end(fitted: Fitted) -> bool:
+    """Whether a number of the last effect stands at an end of its range."""
+    return any(at_an_end(v) for v in fitted.own)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.blocks import WIDEST, Block, Fitted
-from rollover.diagnosis.candidates import Candidate, coordinate, each_with_own
+from rollover.diagnosis.candidates import Candidate, coordinate, each_with_own, physical
 from rollover.diagnosis.evidence import doubted_beside
 from rollover.diagnosis.fit import NOISE_LEFT, Judge
 from rollover.diagnosis.gate import followed, freed, yardstick
@@ -171,24 +171,65 @@ def scanned(judge: Judge, fitted: Fitted) -> Fitted | None:
 
 
 def timed(judge: Judge, fitted: Fitted) -> Fitted:
-    """The fit with each time shift tried out to either side: edges make its slope crooked; never worse."""
+    """The fit with each time shift tried out to either side: edges make its slope crooked; never worse.
+
+    Where one channel has a clock of its own all shifts are tried against that first: the edges of the channel stay.
+    """
     best = fitted
     for _ in range(TWICE):
-        blocks = [_tried(judge, r, best, b) for r, b in enumerate(best.blocks)]
-        again = judge.fit(best.candidates, best.x, rounds=3, shifts=[b.shift for b in blocks], width=2)
+        x, shifts = _against(judge, best)
+        moved = [judge.block(r, best.candidates, x, s, 0.0) for r, s in enumerate(shifts)]
+        blocks = [b if b is None else _tried(judge, r, best.candidates, x, b) for r, b in enumerate(moved)]
+        shifts = [s if b is None else b.shift for s, b in zip(shifts, blocks, strict=True)]
+        again = judge.fit(best.candidates, x, rounds=3, shifts=shifts, width=2)
         if again is None or again.left > best.left - LITTLE:
             break
         best = again
     return best
 
 
-def _tried(judge: Judge, r: int, fitted: Fitted, block: Block) -> Block:
+def ended(judge: Judge, fitted: Fitted) -> Fitted:
+    """The fit gone on with over narrow steps as long as that gains: its rounds may have been too few; never worse."""
+    best = fitted
+    for _ in range(TWICE):
+        again = judge.fit(best.candidates, best.x, shifts=[b.shift for b in best.blocks], width=2)
+        if again is None or again.left > best.left:
+            break
+        is_there = again.left > best.left - LITTLE
+        best = again
+        if is_there:
+            break
+    return best
+
+
+def _against(judge: Judge, fitted: Fitted) -> tuple[tuple[float, ...], list[float]]:
+    """Coordinates, and time shifts (s) of all, moved against the clock of each channel that has one of its own."""
+    best, left = (fitted.x, [b.shift for b in fitted.blocks]), _total(fitted)
+    for c, own in each_with_own(fitted.candidates):
+        if c.id != "sensor-clock-offset":
+            continue
+        k, step, search = own.start, TICK, c.search["offset"]
+        while step > SHORTEST:
+            for d in (step, -step):
+                moved = coordinate(physical(best[0][k], search) - d, search)
+                x, shifts = (*best[0][:k], moved, *best[0][k + 1 :]), [s + d for s in best[1]]
+                blocks = _blocks_at(judge, fitted.candidates, x, shifts) if 0.0 < moved < 1.0 else None
+                there = np.inf if blocks is None else sum(b.total for b in blocks)
+                if there < left:
+                    best, left = (x, shifts), there
+                    break
+            else:
+                step *= NARROWER
+    return best
+
+
+def _tried(judge: Judge, r: int, candidates: Sequence[Candidate], x: Sequence[float], block: Block) -> Block:
     """Recording r at a time shift beside which none is better."""
     step, tried = TICK, 0
     while step > SHORTEST and tried < TRIED:
         for there in (block.shift + step, block.shift - step):
             tried += 1
-            other = judge.block(r, fitted.candidates, fitted.x, there, 0.0)
+            other = judge.block(r, candidates, x, there, 0.0)
             if other is not None and other.total < block.total and abs(there) < WIDEST * other.prior:
                 block = other
                 break

@@ -21,8 +21,9 @@ from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.inquiry import Groups, Inquiry, Phases
 from rollover.diagnosis.lasting import NEEDED, astray, backed, begun_anew, lasting
 from rollover.diagnosis.looks import look, look_again
-from rollover.diagnosis.refine import conditioned, is_doubtful, polish, timed, traced, without
+from rollover.diagnosis.refine import conditioned, ended, is_doubtful, polish, timed, traced, without
 from rollover.diagnosis.remainder import NEGLIGIBLE, is_enough, is_tolerated, matters
+from rollover.diagnosis.straight import is_a_curve
 from rollover.diagnosis.verdict import Verdict
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
@@ -127,7 +128,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
                 if is_better(other.fitted, beside, current):
                     taken, left = [taken[1], other], beside
                     current = other.fitted
-        if len(taken) > 1 and current.left > HOPELESS**2 * count:
+        if (len(taken) > 1 and current.left > HOPELESS**2 * count) or is_any_curve(current.candidates):
             break
         known = base if is_enough(judge, current, left) else None
         looked = look_again(judge, current, known, inquiry.free(current), groups, first_look)
@@ -206,6 +207,7 @@ def followed(judge: Judge, found: Step, phases: Phases) -> tuple[Step, Mismatch]
     new = traced(judge, old)
     if new.left < old.left or len(old.candidates) > 1 or left.p_value < MANY:
         new = timed(judge, polish(judge, new))
+    new = ended(judge, new)
     if new.left >= old.left:
         return found, left
     return _with_rivals(judge, found.moved_to(new)), mismatch_of(judge.evidence, new.blocks, phases)
@@ -330,7 +332,7 @@ def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) ->
     Several effects are named only if together they leave nothing but noise, or what was said to be tolerated; as many
     as may be, or two of one sensor, more surely so: they can be bent to more. One alone also where it takes nearly all.
     """
-    if is_any_curve(found.fitted.candidates):
+    if is_any_curve(found.fitted.candidates) or is_a_curve(judge, found.fitted):
         return found.refused(), "unexplained"
     least = MANY if len(found.parts) == MOST or is_one_sensor(found.fitted.candidates) else SURE
     is_whole = found.after.p_value > least or not matters(judge, found.fitted, found.after)
@@ -366,12 +368,11 @@ def by_the_first(judge: Judge, found: Explanation, nothing: Collection[str], pha
 def is_any_curve(candidates: Sequence[Candidate]) -> bool:
     """Whether they draw any curve: as many effects as may be, all of one sensor or of the soil, or two bent ones.
 
-    Two effects of the soil that both take another form than their usual one are curves enough.
+    Two effects of the soil that both take another form than their usual one are curves enough, whatever joins them.
     """
-    subjects = {c.channel or ("soil" if c.id.startswith("soil-") else c.id) for c in candidates}
-    return len(subjects) == 1 and (
-        len(candidates) == MOST or (len(candidates) > 1 and all(c.is_bent for c in candidates))
-    )
+    subjects = [c.channel or ("soil" if c.id.startswith("soil-") else c.id) for c in candidates]
+    bent = [s for s, c in zip(subjects, candidates, strict=True) if c.is_bent]
+    return (len(candidates) == MOST and len(set(subjects)) == 1) or len(set(bent)) < len(bent)
 
 
 def _kind(c: Candidate) -> Verdict:

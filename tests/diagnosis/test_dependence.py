@@ -220,7 +220,9 @@ def test_three_effects_of_one_sensor_or_of_the_soil_are_any_curve_and_two_are_no
     assert not is_any_curve([*soil[:2], on("mass", None)])
     shaped = replace(soil[1], search={"per_decade": Search(0.01, 0.5), "reference_speed": Search(0.01, 1.0)})
     assert not is_any_curve([soil[0], shaped])
-    assert is_any_curve([replace(soil[0], form={"onset": 1.0}), shaped])
+    bent = [replace(soil[0], form={"onset": 1.0}), shaped]
+    assert is_any_curve(bent)
+    assert is_any_curve([*bent, on("sensor-clipping", drops.FORCE)])
     assert not is_any_curve([shaped])
 
 

@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
+from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import candidates_of, coordinate
 from rollover.diagnosis.crew import Crew
+from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.explain import Step
+from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.phases import phases_of
-from rollover.diagnosis.refine import combed, shaped, traced
+from rollover.diagnosis.refine import combed, ended, shaped, timed, traced
 from rollover.diagnosis.screening import Screened
 from rollover.diagnosis.selection import _together
+from rollover.proof.generator import make, plan
+from rollover.scenario import load
 from rollover.simulate import run
 from rollover.synthesis import synthetic
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
@@ -41,6 +47,37 @@ def test_a_damping_behind_a_cliff_is_found() -> None:
     assert found.left < 1.2 * count
     assert c.values(found.x)["stiffness"] == pytest.approx(true["stiffness"], rel=0.02)
     assert c.values(found.x)["damping"] == pytest.approx(true["damping"], rel=0.1)
+
+
+def test_the_clock_of_a_channel_is_followed_against_all_others(tmp_path: Path) -> None:
+    """Its edges hold the sum of its offset and the time shifts; what else there is moves as little as noise allows."""
+    case = make(next(order for order in plan(63, 20262911, ["single"]) if order.index == 45))
+    (truth,) = case.truth["effects"]
+    assert (truth["id"], truth["channel"]) == ("sensor-clock-offset", FORCE)
+    path = tmp_path / "scenario.yaml"
+    path.write_text(case.scenario, encoding="utf-8")
+    judge = Judge([evidence_of(str(k), *simulated(load(path), r)) for k, r in enumerate(case.recordings)])
+    c = candidate(judge, f"sensor-clock-offset:{FORCE}")
+    begun = (coordinate(0.006138, c.search["offset"]),)
+    stopped = judge.fit((c,), begun, shifts=[1.43e-4] * len(case.recordings), width=2)
+    assert stopped is not None
+    found = timed(judge, stopped)
+    right = judge.fit((c,), (coordinate(truth["parameters"]["offset"], c.search["offset"]),), width=2)
+    assert right is not None
+    assert found.left < right.left + 5.0 < stopped.left - 40.0
+    assert c.values(found.x)["offset"] == pytest.approx(truth["parameters"]["offset"], abs=3e-5)
+
+
+def test_a_fit_whose_rounds_were_too_few_is_gone_on_with() -> None:
+    judge = judge_of(recorded({"effects.soil-layer.stiffness_ratio": 1.3, "effects.soil-layer.depth": 0.12}, 6))
+    c = candidate(judge, "soil-layer")
+    short = judge.fit((c,), (0.62, 0.4), rounds=2)
+    whole = judge.fit((c,), (0.62, 0.4), width=1)
+    assert short is not None
+    assert whole is not None
+    assert short.left > whole.left + 20.0
+    assert ended(judge, short).left < whole.left + 2.0
+    assert ended(judge, whole).left <= whole.left
 
 
 def test_how_much_of_a_striker_its_nose_is_is_found_where_nobody_weighed_it() -> None:

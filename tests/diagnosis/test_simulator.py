@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.simulator import DropSimulator
 from rollover.drop import DropModel
 from rollover.recording import Recording
@@ -46,6 +47,27 @@ def test_a_drop_of_a_diagnosis_is_that_of_a_hundredth_of_its_step(changes: dict[
     for channel in (FORCE, DEPTH, ACCELERATION):
         off = np.sqrt(np.mean((made[channel] - exact[channel])[there] ** 2)) / np.ptp(exact[channel])
         assert off < ENOUGH, channel
+
+
+def test_the_mean_of_many_stamps_is_that_of_two_times() -> None:
+    """A tone of frequency w: over n stamps dt apart cos has the mean sin(n w dt/2)/(n sin(w dt/2)) of its middle.
+
+    Two times at the standard deviation s = dt sqrt((n^2 - 1)/12) give cos(w s): apart by (w n dt)^4/4320.
+    """
+    changes = {"effects.structural-compliance.stiffness": 2e6, "effects.structural-compliance.damping": 100.0}
+    ((_, recording),) = recorded({}, speeds=(2.2,), rate=9000.0, channels=(FORCE, DEPTH, ACCELERATION), noise=0.0)
+    own = scenario().replaced({"initiation.speed": 2.2})
+    thin, simulator, many = simulated(own, recording)
+    assert many > 4
+    made = simulator.predict(changes, 0.0)
+    whole = DropSimulator(own, recording).predict(changes, 0.0)
+    assert made is not None
+    assert whole is not None
+    bins = thin.time.size
+    away = np.abs(thin.time) > 0.02
+    exact = whole[ACCELERATION][: many * bins].reshape(bins, many).mean(axis=1)
+    off = np.abs(made[ACCELERATION] - exact)[away & (thin.time < 0.1)]
+    assert np.sqrt(np.mean(off**2)) < 1e-4 * np.ptp(exact)
 
 
 def test_stamps_may_lie_as_far_apart_as_a_clock_is_moved_for_its_slope() -> None:
