@@ -50,6 +50,9 @@ class Candidate:
     form: Mapping[str, float] = field(default_factory=dict)  # those of them that make another form of the same effect
     own: Mapping[str, float] = field(default_factory=dict)  # the scenario's values, where no number is an effect's null
     places: tuple[tuple[float, ...], ...] = ()  # where it is looked at, if not wherever its `probes` are
+    along: tuple[
+        str, ...
+    ] = ()  # of a fitted shape: coordinates of all else are those at its default, see `Effect.bent`
 
     @property
     def key(self) -> str:
@@ -102,13 +105,14 @@ class Candidate:
         key = nth(self.id, number)
         found: dict[str, Any] = {} if self.channel is None else {f"effects.{key}.channel": self.channel}
         found |= {f"effects.{key}.{name}": value for name, value in (*self.fixed.items(), *self.form.items())}
-        for value, (name, search) in zip(x, self.search.items(), strict=True):
-            found[f"effects.{key}.{name}"] = physical(value, search)
-        return found
+        return found | {f"effects.{key}.{name}": value for name, value in self.values(x).items()}
 
     def values(self, x: Sequence[float]) -> dict[str, float]:
         """Parameters by name for coordinates x."""
-        return {name: physical(v, s) for v, (name, s) in zip(x, self.search.items(), strict=True)}
+        found: Mapping[str, float] = {n: physical(v, s) for v, (n, s) in zip(x, self.search.items(), strict=True)}
+        for name in self.along:
+            found = EFFECTS[self.id].bent({**found, name: getattr(EFFECTS[self.id](), name)}, name, found[name])
+        return dict(found)
 
     def strength(self, x: Sequence[float]) -> float:
         """How many times as strong as it usually is, by the parameter that is furthest from changing nothing."""
@@ -178,6 +182,12 @@ class Candidate:
             usual = [p if n is None else n for p, n in zip(place, self.neutral, strict=True)]
             found += [(*usual[:k], n + way * (end - n), *usual[k + 1 :]) for k, end, way, n in ways]
         return list(dict.fromkeys(found))
+
+    def plain(self, x: Sequence[float]) -> tuple[Candidate, tuple[float, ...]]:
+        """The same with nothing `along` its shape, and the coordinates at which that is what this one is at x."""
+        values = self.values(x)
+        at = (coordinate(values[name], s) for name, s in self.search.items())
+        return replace(self, along=()), tuple(min(max(v, 0.0), 1.0) for v in at)
 
     def whole(self) -> Candidate:
         """The same effect with its shape fitted too."""

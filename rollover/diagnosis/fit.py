@@ -390,7 +390,7 @@ class Judge:
 
 
 def _key(r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> tuple[object, ...]:
-    names = tuple((c.key, len(c.search), *c.form.items()) for c in candidates)
+    names = tuple((c.key, len(c.search), c.along, *c.form.items()) for c in candidates)
     return (r, names, tuple([round(float(v), 12) for v in x]), round(shift, 9))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -264,7 +265,12 @@ def shaped(judge: Judge, f: Fitted) -> Fitted | None:
         return None
     last, at = f.candidates[-1], len(f.x) - len(f.candidates[-1].search)
     places = [(*f.x[:at], *start) for start in last.with_shapes(f.x[at:])]
-    return _best_of(judge, f, last.whole(), places)
+    found = _best_of(judge, f, replace(last.whole(), along=tuple(last.shapes)), places)
+    if found is None:
+        return None
+    whole, x = found.candidates[-1].plain(found.own)
+    shifts = [b.shift for b in found.blocks]
+    return judge.fit((*f.candidates[:-1], whole), (*found.x[:at], *x), shifts=shifts, width=2)
 
 
 def in_form(judge: Judge, f: Fitted, last: Candidate) -> Fitted | None:

@@ -107,6 +107,11 @@ class Effect:
         return search
 
     @classmethod
+    def bent(cls, numbers: Mapping[str, float], shape: str, value: float) -> Mapping[str, float]:
+        """Numbers with another value of a shape, and what goes along with it so that what shows most stays as it is."""
+        return {**numbers, shape: value}
+
+    @classmethod
     def looked_for_on(cls, heard: Heard) -> Mapping[str, Search] | None:
         """Ranges of a sensor's effect on a channel that was recorded; None where it has no part."""
         return cls.search

@@ -144,6 +144,12 @@ class StructuralCompliance(Effect):
         is_known = scenario is not None and cls.id in scenario.effects
         return None if parameter == "nose_share" and is_known else search
 
+    @classmethod
+    def bent(cls, numbers: Mapping[str, float], shape: str, value: float) -> Mapping[str, float]:
+        """Frequency and damping stay, k and c in proportion to the reduced mass M s (1 - s) of nose and body."""
+        more = value * (1.0 - value) / (numbers[shape] * (1.0 - numbers[shape]))
+        return {**{name: more * v for name, v in numbers.items() if name != shape}, shape: value}
+
     def places(self) -> Mapping[int, float]:
         """Whether soil clings to the nose that lifts off."""
         return clinging(self.clings)

@@ -21,7 +21,8 @@ from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.refine import combed, ended, shaped, timed, traced
 from rollover.diagnosis.screening import Screened
 from rollover.diagnosis.selection import _together
-from rollover.proof.generator import make, plan
+from rollover.effects import EFFECTS
+from rollover.proof.generator import Case, make, plan
 from rollover.scenario import load
 from rollover.simulate import run
 from rollover.synthesis import synthetic
@@ -30,6 +31,12 @@ from tests.diagnosis.test_fits import candidate, judge_of
 from tests.physics.scenes import shipped
 
 CHANNELS = (FORCE, DEPTH, ACCELERATION)
+
+
+def judge_of_case(case: Case, folder: Path) -> Judge:
+    path = folder / "scenario.yaml"
+    path.write_text(case.scenario, encoding="utf-8")
+    return Judge([evidence_of(str(k), *simulated(load(path), r)) for k, r in enumerate(case.recordings)])
 
 
 def test_a_damping_behind_a_cliff_is_found() -> None:
@@ -54,9 +61,7 @@ def test_the_clock_of_a_channel_is_followed_against_all_others(tmp_path: Path) -
     case = make(next(order for order in plan(63, 20262911, ["single"]) if order.index == 45))
     (truth,) = case.truth["effects"]
     assert (truth["id"], truth["channel"]) == ("sensor-clock-offset", FORCE)
-    path = tmp_path / "scenario.yaml"
-    path.write_text(case.scenario, encoding="utf-8")
-    judge = Judge([evidence_of(str(k), *simulated(load(path), r)) for k, r in enumerate(case.recordings)])
+    judge = judge_of_case(case, tmp_path)
     c = candidate(judge, f"sensor-clock-offset:{FORCE}")
     begun = (coordinate(0.006138, c.search["offset"]),)
     stopped = judge.fit((c,), begun, shifts=[1.43e-4] * len(case.recordings), width=2)
@@ -78,6 +83,43 @@ def test_a_fit_whose_rounds_were_too_few_is_gone_on_with() -> None:
     assert short.left > whole.left + 20.0
     assert ended(judge, short).left < whole.left + 2.0
     assert ended(judge, whole).left <= whole.left
+
+
+def test_a_nose_is_found_along_the_valley_of_its_frequency(tmp_path: Path) -> None:
+    """Little damping: hundreds of radians of ringing know k/(s (1 - s)) long before they know either."""
+    case = make(next(order for order in plan(63, 20262913, ["single"]) if order.index == 7))
+    true = case.truth["effects"][0]["parameters"]
+    judge = judge_of_case(case, tmp_path)
+    c = candidate(judge, "structural-compliance")
+    share = EFFECTS[c.id].bent(true, "nose_share", 0.1)
+    plain = judge.fit((c,), [coordinate(share[name], s) for name, s in c.search.items()])
+    assert plain is not None
+    assert plain.left > 4.0 * sum(e.count for e in judge.evidence)
+    found = shaped(judge, plain)
+    assert found is not None
+    assert found.left < 1.1 * sum(e.count for e in judge.evidence)
+    assert found.candidates[-1].along == ()
+    for name, value in found.candidates[-1].values(found.own).items():
+        assert value == pytest.approx(true[name], rel=0.01)
+
+
+def test_what_goes_along_with_the_share_of_a_nose_keeps_frequency_and_damping() -> None:
+    """w^2 = k/(M s (1 - s)), 2 zeta w = c/(M s (1 - s)): what rings freely moves the reduced mass."""
+    effect = EFFECTS["structural-compliance"]
+    before = {"stiffness": 2e6, "damping": 300.0, "nose_share": 0.1}
+    after = effect.bent(before, "nose_share", 0.3)
+    for name in ("stiffness", "damping"):
+        w = [n[name] / (n["nose_share"] * (1.0 - n["nose_share"])) for n in (before, after)]
+        assert w[1] == pytest.approx(w[0], rel=1e-12)
+    judge = judge_of(recorded({}, speeds=(2.0,)))
+    whole = replace(candidate(judge, "structural-compliance").whole(), along=("nose_share",))
+    x = (0.4, 0.5, 0.6)
+    plain, there = whole.plain(x)
+    assert plain.changes(there) == pytest.approx(whole.changes(x), rel=1e-12)
+    other = whole.changes((0.4, 0.5, 0.3))
+    k, s = "effects.structural-compliance.stiffness", "effects.structural-compliance.nose_share"
+    w = [n[k] / (n[s] * (1.0 - n[s])) for n in (whole.changes(x), other)]
+    assert w[1] == pytest.approx(w[0], rel=1e-12)
 
 
 def test_how_much_of_a_striker_its_nose_is_is_found_where_nobody_weighed_it() -> None:
