@@ -50,9 +50,7 @@ class Candidate:
     form: Mapping[str, float] = field(default_factory=dict)  # those of them that make another form of the same effect
     own: Mapping[str, float] = field(default_factory=dict)  # the scenario's values, where no number is an effect's null
     places: tuple[tuple[float, ...], ...] = ()  # where it is looked at, if not wherever its `probes` are
-    along: tuple[
-        str, ...
-    ] = ()  # of a fitted shape: coordinates of all else are those at its default, see `Effect.bent`
+    along: tuple[str, ...] = ()  # of a fitted shape, at whose default all other coordinates are held: `Effect.bent`
 
     @property
     def key(self) -> str:

@@ -113,7 +113,6 @@ class Crew:
             say(f"fitted {jobs[k].candidates[-1].key}, {done} of {len(todo)}")
 
         # full runs are made side by side for each fit in turn, and kept here
-        shared = self.workers > 1 and not judge.effort.thrifty
         if judge.effort.thrifty:
             nudges, begun = judge.effort.nudges, [job for k, job in enumerate(jobs) if k in todo and job.how == "fit"]
             judge.made_ahead(
@@ -121,7 +120,7 @@ class Crew:
                 for job in begun
                 for point in beside(job.recordings, job.candidates, job.start, nudges[min(job.width, len(nudges) - 1)])
             )
-        while done < len(todo) and not (shared and len(todo) - done > 1 and self.is_there()):
+        while done < len(todo) and not (len(todo) - done > 1 and self.is_there()):
             k = todo[done]
             ended(k, work(judge, jobs[k]))
         if done == len(todo):
