@@ -35,11 +35,11 @@ def without_bursts(values: Array) -> Array:
 
 def too_often(channels: Iterable[Array]) -> float:
     """p-value of as many samples far off, of noise units (n,) of each channel, were one in a hundred so by chance."""
-    from scipy.stats import binom
+    from scipy.special import bdtrc
 
     found = []
     for w in channels:
         if w.size:
             far = np.abs(w) > FAR * max(1.0, USUAL * float(np.median(np.abs(w))))
-            found.append(float(binom.sf(far.sum() - 1, w.size, RARE)))
+            found.append(float(bdtrc(far.sum() - 1, w.size, RARE)))
     return min([1.0, *(len(found) * p for p in found)])

@@ -196,6 +196,6 @@ def is_other(found: Course | None) -> bool:
 
 def too_many(others: int, of: int) -> float:
     """p-value of so many recordings that took another course, where each may in `OFTEN` of all cases."""
-    from scipy.stats import binom
+    from scipy.special import bdtrc
 
-    return float(binom.sf(others - 1, of, OFTEN)) if others else 1.0
+    return float(bdtrc(others - 1, of, OFTEN)) if others else 1.0

@@ -15,8 +15,10 @@ from typing import Any, Literal
 
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Block, Fitted, Judge
-from rollover.diagnosis.refine import combed, in_form, polish, scanned, shaped, timed
+from rollover.diagnosis.forms import in_form, shaped
+from rollover.diagnosis.refine import combed, polish, scanned, timed
 from rollover.diagnosis.secant import beside
+from rollover.diagnosis.thresholds import Stretch, traced
 from rollover.execute import Children, map_cases
 
 Progress = Callable[[str], None]
@@ -29,10 +31,11 @@ class Job:
     One of few `rounds` is a first look: it ends without slopes.
     "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too or takes it in another
     `form`, "time" tries out the time shifts, "comb" begins anew all along the second parameter of the last effect,
-    "scan" all along its shape.
+    "scan" all along its shape, "trace" where it sets in, over a `stretch`. A shape or form that comes nowhere near what
+    the best fit `leaves` of each recording is not gone on with.
     """
 
-    how: Literal["fit", "polish", "shape", "time", "comb", "scan"] = "fit"
+    how: Literal["fit", "polish", "shape", "time", "comb", "scan", "trace"] = "fit"
     candidates: tuple[Candidate, ...]
     start: tuple[float, ...]
     shifts: tuple[float, ...]
@@ -41,12 +44,15 @@ class Job:
     width: int = 0
     pinned: bool = False
     form: Candidate | None = None
+    stretch: Stretch | None = None
+    leaves: tuple[float, ...] | None = None
 
     def key(self, about: str) -> str:
         """Hash of what is fitted and from where, with `about` for all else that it depends on."""
         every = (*self.candidates, *(() if self.form is None else (self.form,)))
         names = [(c.key, sorted(c.search.items()), sorted(c.form.items())) for c in every]
-        told = repr((about, self.how, names, self.start, self.shifts, self.only, self.rounds, self.width, self.pinned))
+        ways = self.how, self.only, self.rounds, self.width, self.pinned, self.stretch, self.leaves
+        told = repr((about, names, self.start, self.shifts, ways))
         return hashlib.sha256(told.encode()).hexdigest()
 
     @property
@@ -164,10 +170,13 @@ def work(judge: Judge, job: Job) -> Fitted | None:
     begun = linearised(judge, job.candidates, job.start, job.shifts, job.recordings)
     if begun is None:
         return None
-    if job.form is not None:
-        return in_form(judge, begun, job.form)
+    if job.how == "shape":
+        leaves = [b.total for b in begun.blocks] if job.leaves is None else job.leaves
+        return shaped(judge, begun, leaves) if job.form is None else in_form(judge, begun, job.form, leaves)
+    if job.stretch is not None:
+        return traced(judge, begun, job.stretch)
     ways: dict[str, Callable[[Judge, Fitted], Fitted | None]] = {
-        "polish": polish, "shape": shaped, "time": timed, "comb": combed, "scan": scanned,
+        "polish": polish, "time": timed, "comb": combed, "scan": scanned,
     }  # fmt: skip
     return ways[job.how](judge, begun)
 

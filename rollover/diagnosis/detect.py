@@ -156,7 +156,7 @@ def _worth(e: Evidence, block: Block, strays: Array) -> Array:
 
 def _p_value(cells: Sequence[Cell], clocks: int) -> float:
     """p-value of what is slow in several cells together, beside as many `clocks` that were fitted."""
-    from scipy.stats import f as f_distribution
+    from scipy.special import fdtrc
 
     structured = sum(c.structured for c in cells)
     waves = sum(c.waves for c in cells)
@@ -166,7 +166,7 @@ def _p_value(cells: Sequence[Cell], clocks: int) -> float:
         return 1.0
     if all(c.noise[0] == c.waves for c in cells):
         # noise may be underrated, but not by so much: what is rough and far beyond it is no noise either
-        return float(f_distribution.sf((structured / waves) / min(max(rough / count, 1e-300), LOUD), waves, count))
+        return float(fdtrc(waves, count, (structured / waves) / min(max(rough / count, 1e-300), LOUD)))
     expected = sum(c.expected for c in cells)
     variance = sum(2.0 * c.noise[0] * (1.0 + 2.0 * (c.expected - c.noise[0]) / c.waves) for c in cells)
     unsure = 2.0 * expected**2 / count
@@ -179,7 +179,7 @@ def _p_value(cells: Sequence[Cell], clocks: int) -> float:
             unsure += scatter / apart.size  # a mean is known as well as so many tell
     level = min(max(rough / max(sum(c.rest for c in cells), 1e-300), 1.0), LOUD)
     known = 2.0 * expected**2 / unsure
-    return float(f_distribution.sf(structured / expected / level, 2.0 * expected**2 / variance, known))
+    return float(fdtrc(2.0 * expected**2 / variance, known, structured / expected / level))
 
 
 def _cell(
@@ -192,7 +192,7 @@ def _cell(
     humming: tuple[float, ...],
     due: Expected | None,
 ) -> Cell:
-    from scipy.stats import f as f_distribution
+    from scipy.special import fdtrc
 
     w, s = block.valued[rows], block.slope[rows]
     n = rows.size
@@ -222,9 +222,7 @@ def _cell(
         return replace(found, excess=excess, p_value=_p_value([found], 1))
     if n <= waves + 1:
         return found
-    return replace(
-        found, p_value=float(f_distribution.sf((structured / waves) / max(rough / free, 1e-300), waves, free))
-    )
+    return replace(found, p_value=float(fdtrc(waves, free, (structured / waves) / max(rough / free, 1e-300))))
 
 
 def _holm(p: Sequence[float]) -> tuple[float, ...]:

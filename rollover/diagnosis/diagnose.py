@@ -233,7 +233,7 @@ def _trusted(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:
 def _evidence(
     scenario: Scenario, recordings: Sequence[tuple[str, Recording]], crew: Crew
 ) -> tuple[list[Evidence], list[str]]:
-    found, notes = [], []
+    found, read, notes = [], [], []
     for name, whole in recordings:
         recording, spiked = without_spikes(whole)
         thin, simulator, averaged = simulated(scenario, recording)
@@ -251,8 +251,9 @@ def _evidence(
         if one is None:
             notes.append(f"{name}: shares no usable channel with the simulation and was left aside")
         else:
-            found.append(digitised(one, recording))
-    found = with_loudness(found)
+            found.append(one)
+            read.append(recording)
+    found = with_loudness(digitised(found, read))
     louder = {s.channel: float(s.level.max()) for e in found for s in e.signals if s.level is not None}
     notes += [f"{c}: the noise grows with the value, to {most:.1f} times its least" for c, most in louder.items()]
     steps = {s.channel: s.step for e in found for s in e.signals if s.step > 0.0}

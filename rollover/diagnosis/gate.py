@@ -279,7 +279,7 @@ def p_value(gain: float, null: Array) -> float:
     above = int(null.size - np.searchsorted(null, gain))
     if above >= 10:
         return (above + 1) / (null.size + 1)
-    from scipy.stats import chi2
+    from scipy.special import chdtrc
 
     anchor = float(null[-10])
-    return float(10.0 / null.size * chi2.sf(gain, 1) / max(chi2.sf(anchor, 1), 1e-300))
+    return float(10.0 / null.size * chdtrc(1, gain) / max(chdtrc(1, anchor), 1e-300))

@@ -35,9 +35,9 @@ EVENLY = 12.0**-0.5  # standard deviation of what is spread evenly from 0 to 1
 
 def by_student(free: int) -> float:
     """(t/1.96)^2: how much wider squares are told by so few degrees of freedom."""
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
-    return (float(t.ppf(0.975, free)) / TWO_SIDED) ** 2
+    return (float(stdtrit(free, 0.975)) / TWO_SIDED) ** 2
 
 
 def scattered(evidence: Sequence[Evidence], blocks: Sequence[Block], inverse: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -12,6 +13,7 @@ from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.crew import Job
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.fit import Fitted
+from rollover.diagnosis.forms import is_noise
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.inquiry import Inquiry
@@ -111,12 +113,11 @@ def shaped_too(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[F
         is_near = f.left < SHAPED * best or ahead < SHAPED * min(held)
         if not is_near or base.left - f.left < LEAST * (base.left - size):
             continue
-        if f.candidates[-1].shapes:
-            ways.append((k, from_there(f, "shape")))
-        if not is_whole:
-            ways += [(k, from_there(f, "shape", c)) for c in f.candidates[-1].forms()]
+        jobs = [from_there(f, "shape")] if f.candidates[-1].shapes else []
+        jobs += [] if is_whole else [replace(from_there(f, "shape"), form=c) for c in f.candidates[-1].forms()]
+        ways += [(k, replace(job, leaves=tuple(b.total for b in lead.blocks))) for job in jobs]
     made: dict[int, list[Fitted]] = {}
-    for (k, _), new in zip(ways, inquiry.fits([job for _, job in ways]), strict=True):
+    for (k, _), new in zip(ways, _polished(inquiry, inquiry.fits([job for _, job in ways]), best), strict=True):
         if new is not None:
             made.setdefault(k, []).append(new)
     found = list(fits)
@@ -125,6 +126,15 @@ def shaped_too(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[F
         if new.left < fits[k].left - _enough(best, size):
             found[k] = new
     return sorted(found, key=lambda f: f.left)
+
+
+def _polished(inquiry: Inquiry, fits: Sequence[Fitted | None], best: float) -> list[Fitted | None]:
+    """Fits, those in another form that come near the best of all and leave more than noise followed on."""
+    least = min([best, *(f.left for f in fits if f is not None)])
+    near = [f for f in fits if f is not None and f.candidates[-1].form and f.left < LEADS * least and not is_noise(f)]
+    followed = inquiry.fits([from_there(f, "polish") for f in near])
+    better = {id(old): new for old, new in zip(near, followed, strict=True)}
+    return [better.get(id(f)) or f for f in fits]
 
 
 def _plainest(fits: Sequence[Fitted], size: int) -> Fitted:
@@ -148,9 +158,9 @@ def timed_too(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
     return sorted([new or old for new, old in zip(timed, near, strict=True)] + others, key=lambda f: f.left)
 
 
-def from_there(f: Fitted, how: Literal["polish", "shape", "time"], form: Candidate | None = None) -> Job:
+def from_there(f: Fitted, how: Literal["polish", "shape", "time", "trace"]) -> Job:
     """What is made of a fit where it stands."""
-    return Job(how=how, candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks), form=form)
+    return Job(how=how, candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks))
 
 
 def one_each(fits: Sequence[Fitted]) -> list[Fitted]:

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover import simulate
 from rollover.diagnosis.effort import RUNS
 from rollover.document import exchanged
 from rollover.effects import read
@@ -83,6 +82,7 @@ class Made(NamedTuple):
 
 def make(making: Making) -> Made:
     """Run a scenario; one that takes too long has failed."""
+    from rollover import simulate  # slow to import, and drops do without
 
     def watch(_simulated: float, wall: float) -> None:
         if wall > making.limit:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -39,21 +40,34 @@ def pile(values: Array) -> float:
     return most if most > 0.0 and np.count_nonzero(sizes >= most * (1.0 - ALIKE)) >= PILE else 0.0
 
 
-def digitised(e: Evidence, recording: Recording) -> Evidence:
+def digitised(evidence: Sequence[Evidence], recordings: Sequence[Recording]) -> list[Evidence]:
     """The evidence with what rounding to the steps of its channels, as recorded, makes neighbouring samples share.
 
     Noise makes the error of each sample its own, and part of the noise: with s of it before a step d, Widrow's theorem
-    leaves exp(-2 pi^2 s^2/d^2) of half a step in common. Where values pile up at the end of a range is kept too:
-    samples that are averaged no longer show it.
+    leaves exp(-2 pi^2 s^2/d^2) of half a step in common. s is the least that any recording of a channel shows: beside
+    the edge of a step a digit flips to and fro, and looks like noise of its size. Where values pile up at the end of a
+    range is kept too: samples that are averaged no longer show it.
     """
-    signals = []
-    for s in e.signals:
-        step = resolution(recording.channels[s.channel])
-        own = max(s.noise**2 * e.averaged - step**2 / 12.0, 0.0)
-        share = np.exp(-2.0 * np.pi**2 * own / step**2) if step > 0.0 else 0.0
-        error, end = (0.5 * step * share if share > DITHERED else 0.0), pile(recording.channels[s.channel])
-        signals.append(replace(s, step=2.0 * error, scatter=error, sigma=float(np.hypot(s.sigma, error)), end=end))
-    return replace(e, signals=tuple(signals))
+    steps = [
+        {s.channel: resolution(r.channels[s.channel]) for s in e.signals}
+        for e, r in zip(evidence, recordings, strict=True)
+    ]
+    least: dict[str, float] = {}
+    for e, step in zip(evidence, steps, strict=True):
+        for s in e.signals:
+            if step[s.channel] > 0.0:
+                own = max(s.noise**2 * e.averaged - step[s.channel] ** 2 / 12.0, 0.0)
+                least[s.channel] = min(own, least.get(s.channel, np.inf))
+    found = []
+    for e, r, step in zip(evidence, recordings, steps, strict=True):
+        signals = []
+        for s in e.signals:
+            d = step[s.channel]
+            share = np.exp(-2.0 * np.pi**2 * least[s.channel] / d**2) if d > 0.0 else 0.0
+            error, end = (0.5 * d * share if share > DITHERED else 0.0), pile(r.channels[s.channel])
+            signals.append(replace(s, step=2.0 * error, scatter=error, sigma=float(np.hypot(s.sigma, error)), end=end))
+        found.append(replace(e, signals=tuple(signals)))
+    return found
 
 
 def without_spikes(recording: Recording, before: float = np.inf) -> tuple[Recording, list[str]]:

@@ -1,10 +1,8 @@
-"""Fits followed on where differences mislead: along crooked valleys, over edges in time, into an effect's shape."""
+"""Fits followed on where differences mislead: along crooked valleys, over edges in time, behind cliffs."""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,19 +10,11 @@ from numpy.typing import NDArray
 from rollover.diagnosis.blocks import WIDEST, Block, Fitted
 from rollover.diagnosis.candidates import Candidate, coordinate, each_with_own, physical
 from rollover.diagnosis.evidence import doubted_beside
-from rollover.diagnosis.fit import NOISE_LEFT, Judge
-from rollover.diagnosis.gate import followed, freed, yardstick
+from rollover.diagnosis.fit import Judge
 
 Array = NDArray[np.float64]
 TEETH, COMBED, BESIDE = 11, 0.05, 20  # places on a first coordinate, within so much of its fit; on the other, over all
-SHORT = 4  # rounds of a fit that tells where to begin
 STARTS, APART = 3, 0.06  # of the best places, so far apart
-AFAR, NEAR = (np.arange(80) + 0.5) / 80, 0.002 * np.arange(-20, 21)  # places of a threshold, all along and about a fit
-ABREAST = 1.5  # times what the best of short fits leaves, up to which others are followed
-THERE = 0.003  # of a coordinate, within which two short fits came to one place
-VALLEYS = 4  # of these in which a fit begins
-BESIDE_FORM = np.linspace(-0.1, 0.05, 13)  # of a coordinate: where a threshold of another form may lie
-ELSEWHERE = (0.2, 0.35, 0.5, 0.65, 0.8)  # coordinates of a number that only this form has
 SCANNED = (np.arange(40) + 0.5) / 40  # places of a shape
 TICK, SHORTEST, NARROWER = 8e-5, 5e-6, 0.4  # s, by which a time shift is tried to either side; then less, by a factor
 TRIED = 40  # at most so many
@@ -40,11 +30,11 @@ def left_at(
     only: Sequence[int] | None = None,
 ) -> float | None:
     """What is left of all recordings or `only` some at x, with time shifts (s) of all; None if a run fails."""
-    blocks = _blocks_at(judge, candidates, x, shifts, only)
+    blocks = blocks_at(judge, candidates, x, shifts, only)
     return None if blocks is None else sum(b.normal()[2] for b in blocks)
 
 
-def _blocks_at(
+def blocks_at(
     judge: Judge,
     candidates: Sequence[Candidate],
     x: Sequence[float],
@@ -58,7 +48,7 @@ def _blocks_at(
     return blocks if len(blocks) == len(found) else None
 
 
-def _by_what_is_left(
+def by_what_is_left(
     judge: Judge,
     candidates: Sequence[Candidate],
     places: Sequence[tuple[float, ...]],
@@ -102,59 +92,13 @@ def combed(judge: Judge, fitted: Fitted) -> Fitted:
     firsts = np.clip(fitted.x[at] + COMBED * np.linspace(-1.0, 1.0, TEETH), 0.0, 1.0)
     places = [(*fitted.x[:at], float(a), float(b)) for a in firsts for b in (np.arange(BESIDE) + 0.5) / BESIDE]
     chosen: list[tuple[float, ...]] = []
-    for x in _by_what_is_left(judge, fitted.candidates, places, shifts, _few(fitted)):
+    for x in by_what_is_left(judge, fitted.candidates, places, shifts, few_of(fitted)):
         if len(chosen) < STARTS and all(max(abs(a - b) for a, b in zip(x, c, strict=True)) > APART for c in chosen):
             chosen.append(x)
     found = [judge.fit(fitted.candidates, x, shifts=shifts, width=1) for x in chosen]
     best = min((f for f in found if f is not None), key=lambda f: f.left, default=fitted)
     best = timed(judge, polish(judge, best))
     return best if best.left < fitted.left else fitted
-
-
-def traced(judge: Judge, fitted: Fitted) -> Fitted:
-    """The fit begun anew where its last effect acts elsewhere, as strongly as recordings ask for there; never worse.
-
-    A threshold that moves past a sample leaves a misfit of many small valleys: each other parameter than the one that
-    says how strong an effect is (`yardstick`) is tried all along its range, and finely beside the fit.
-    """
-    last, shifts = fitted.candidates[-1], [b.shift for b in fitted.blocks]
-    at = len(fitted.x) - len(last.search)
-    strength = at + list(last.search).index(yardstick(last.id, last.search)[0])
-    blocks = _blocks_at(judge, fitted.candidates[:-1], fitted.x[:at], shifts)
-    best = fitted
-    if blocks is None:
-        return best
-    alone = Fitted(candidates=fitted.candidates[:-1], x=fitted.x[:at], blocks=tuple(blocks))
-    for k in (k for k in range(at, len(fitted.x)) if k != strength):
-        met = []
-        for v in sorted(v for v in (*AFAR, *(fitted.x[k] + NEAR)) if 0.0 < v < 1.0):
-            x = _as_strong(judge, alone, last, (*fitted.x[:k], float(v), *fitted.x[k + 1 :]))
-            left = None if x is None else left_at(judge, fitted.candidates, x, shifts)
-            if x is not None and left is not None:
-                met.append((left, x))
-        for x in _valleys(met)[:VALLEYS]:
-            again = judge.fit(fitted.candidates, x, shifts=shifts, width=1)
-            best = again if again is not None and again.left < best.left else best
-    return best
-
-
-def _as_strong(judge: Judge, alone: Fitted, last: Candidate, x: tuple[float, ...]) -> tuple[float, ...] | None:
-    """Coordinates x with the last effect as strong as recordings ask for beside the fit without it; None if none."""
-    along, size = 0.0, 0.0
-    for r, b in enumerate(alone.blocks):
-        way = judge.moved(r, (alone.candidates, alone.x), ((*alone.candidates, last), x), b.shift)
-        if way is not None:
-            d = freed(way[:, None], b)[:, 0]
-            along, size = along + float(d @ b.residual), size + float(d @ d)
-    start = followed(last, x[len(alone.x) :], along / size) if size > 0.0 else None
-    return None if start is None else (*alone.x, *start)
-
-
-def _valleys(met: Sequence[tuple[float, tuple[float, ...]]]) -> list[tuple[float, ...]]:
-    """Places of a row, each with what it leaves, beside which none leaves less; the one that leaves least first."""
-    inside = [(np.inf, ()), *met, (np.inf, ())]
-    low = [b for a, b, c in zip(inside, inside[1:], inside[2:], strict=False) if b[0] <= min(a[0], c[0])]
-    return [x for _, x in sorted(low)]
 
 
 def scanned(judge: Judge, fitted: Fitted) -> Fitted | None:
@@ -166,7 +110,7 @@ def scanned(judge: Judge, fitted: Fitted) -> Fitted | None:
     candidates, usual = (*fitted.candidates[:-1], last.whole()), last.with_shapes(fitted.x[-len(last.search) :])[0]
     begun = (*fitted.x[: at - len(last.search)], *usual)
     places = [(*begun[:k], float(v), *begun[k + 1 :]) for k in range(at, len(begun)) for v in SCANNED]
-    met = _by_what_is_left(judge, candidates, places, shifts)
+    met = by_what_is_left(judge, candidates, places, shifts)
     again = judge.fit(candidates, met[0], shifts=shifts, width=1) if met else None
     return None if again is None else polish(judge, again)
 
@@ -205,7 +149,7 @@ def ended(judge: Judge, fitted: Fitted) -> Fitted:
 
 def _against(judge: Judge, fitted: Fitted) -> tuple[tuple[float, ...], list[float]]:
     """Coordinates, and time shifts (s) of all, moved against the clock of each channel that has one of its own."""
-    best, left = (fitted.x, [b.shift for b in fitted.blocks]), _total(fitted)
+    best, left = (fitted.x, [b.shift for b in fitted.blocks]), total_of(fitted)
     for c, own in each_with_own(fitted.candidates):
         if c.id != "sensor-clock-offset":
             continue
@@ -214,7 +158,7 @@ def _against(judge: Judge, fitted: Fitted) -> tuple[tuple[float, ...], list[floa
             for d in (step, -step):
                 moved = coordinate(physical(best[0][k], search) - d, search)
                 x, shifts = (*best[0][:k], moved, *best[0][k + 1 :]), [s + d for s in best[1]]
-                blocks = _blocks_at(judge, fitted.candidates, x, shifts) if 0.0 < moved < 1.0 else None
+                blocks = blocks_at(judge, fitted.candidates, x, shifts) if 0.0 < moved < 1.0 else None
                 there = np.inf if blocks is None else sum(b.total for b in blocks)
                 if there < left:
                     best, left = (x, shifts), there
@@ -259,73 +203,13 @@ def conditioned(judge: Judge, fitted: Fitted) -> Fitted:
     return fitted
 
 
-def shaped(judge: Judge, f: Fitted) -> Fitted | None:
-    """The fit with the shape of its last effect, begun where short fits from some places leave least; None if none."""
-    if not f.candidates[-1].shapes:
-        return None
-    last, at = f.candidates[-1], len(f.x) - len(f.candidates[-1].search)
-    places = [(*f.x[:at], *start) for start in last.with_shapes(f.x[at:])]
-    found = _best_of(judge, f, replace(last.whole(), along=tuple(last.shapes)), places)
-    if found is None:
-        return None
-    whole, x = found.candidates[-1].plain(found.own)
-    shifts = [b.shift for b in found.blocks]
-    return judge.fit((*f.candidates[:-1], whole), (*found.x[:at], *x), shifts=shifts, width=2)
-
-
-def in_form(judge: Judge, f: Fitted, last: Candidate) -> Fitted | None:
-    """The fit with its last effect in another form, begun where it leaves least.
-
-    A threshold lies elsewhere in another form; what is fitted instead of another number is looked for over its range.
-    """
-    known, at, shifts = f.candidates[-1].values(f.own), len(f.x) - len(f.own), [b.shift for b in f.blocks]
-    axes: list[list[float]] = []
-    for name, search in last.search.items():
-        there = coordinate(known[name], search) if name in known else None
-        several = [there + float(d) for d in BESIDE_FORM] if there is not None and not axes else [there]
-        axes.append(list(ELSEWHERE) if there is None else [v for v in several if v is not None and 0.0 < v < 1.0])
-    places = [(*f.x[:at], *own) for own in itertools.product(*axes)]
-    met = _by_what_is_left(judge, (*f.candidates[:-1], last), places, shifts, _few(f))
-    return _best_of(judge, f, last, met[: 2 * STARTS])
-
-
-def _best_of(judge: Judge, f: Fitted, last: Candidate, places: Sequence[tuple[float, ...]]) -> Fitted | None:
-    """The best fit with another last effect from some places, followed on if it leaves more than noise.
-
-    Short fits to the recordings that are met worst, best and in the middle tell where to begin; None if none can be
-    made.
-    """
-    candidates, few = (*f.candidates[:-1], last), _few(f)
-    at = [f.blocks[r].shift for r in few]
-    short = [judge.fit(candidates, x, rounds=SHORT, shifts=at, only=few, bare=True) for x in places]
-    most = ABREAST * sum(f.blocks[r].total for r in few)  # fitted alone these soon leave less than beside all others
-    begun: list[Fitted] = []
-    for one in sorted((one for one in short if one is not None and _total(one) < most), key=_total):
-        if len(begun) < STARTS and not any(_is_there(one, other) for other in begun):
-            begun.append(one)
-    best: Fitted | None = None
-    for one in (one for one in begun if _total(one) < ABREAST * _total(begun[0])):
-        told = dict(zip(few, one.blocks, strict=True))
-        shifts = [told.get(r, b).shift for r, b in enumerate(f.blocks)]
-        again = judge.fit(candidates, one.x, shifts=shifts)
-        best = min((f for f in (best, again) if f is not None), key=lambda f: f.left, default=None)
-        if best is not None and best.left < NOISE_LEFT**2 * sum(b.residual.size for b in best.blocks):
-            return best
-    return None if best is None else polish(judge, best)
-
-
-def _is_there(one: Fitted, other: Fitted) -> bool:
-    """Whether two fits ended in one place."""
-    return max(abs(a - b) for a, b in zip(one.x, other.x, strict=True)) < THERE
-
-
-def _few(f: Fitted) -> list[int]:
+def few_of(f: Fitted) -> list[int]:
     """The recordings that a fit meets worst, best and in the middle."""
     ranked = sorted(range(len(f.blocks)), key=lambda r: f.blocks[r].normal()[2] / f.blocks[r].residual.size)
     return sorted({ranked[0], ranked[len(ranked) // 2], ranked[-1]})
 
 
-def _total(f: Fitted) -> float:
+def total_of(f: Fitted) -> float:
     """What a fit without slopes leaves."""
     return sum(b.total for b in f.blocks)
 

@@ -21,9 +21,11 @@ from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.inquiry import Groups, Inquiry, Phases
 from rollover.diagnosis.lasting import NEEDED, astray, backed, begun_anew, lasting
 from rollover.diagnosis.looks import look, look_again
-from rollover.diagnosis.refine import conditioned, ended, is_doubtful, polish, timed, traced, without
+from rollover.diagnosis.otherwise import from_there
+from rollover.diagnosis.refine import conditioned, ended, is_doubtful, polish, timed, without
 from rollover.diagnosis.remainder import NEGLIGIBLE, is_enough, is_tolerated, matters
 from rollover.diagnosis.straight import is_a_curve
+from rollover.diagnosis.thresholds import stretches
 from rollover.diagnosis.verdict import Verdict
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
@@ -113,7 +115,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
         if found is None:
             refuted = not taken
             break
-        found, left = as_conditioned(judge, *followed(judge, found, phases), phases)
+        found, left = as_conditioned(judge, *followed(inquiry, found), phases)
         taken.append(found)
         current = found.fitted
         if not judge.straying:
@@ -124,7 +126,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
             # of two that are strong the first may have been taken for something else: is there a better one?
             other = _instead(inquiry, current)
             if other is not None and other.fitted.left < current.left:
-                other, beside = followed(judge, other, phases)
+                other, beside = followed(inquiry, other)
                 if is_better(other.fitted, beside, current):
                     taken, left = [taken[1], other], beside
                     current = other.fitted
@@ -147,7 +149,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     parts = [s.again(judge) for s in taken]
     if is_whole and len(taken) > 1:
         parts = _needed(inquiry, taken)
-        parts[-1], _ = followed(judge, parts[-1], phases)
+        parts[-1], _ = followed(inquiry, parts[-1])
     base = judge.again(base)
     parts = [s.foretold(judge, groups) for s in parts]
     current = parts[-1].fitted if parts else base
@@ -192,19 +194,20 @@ def in_full(inquiry: Inquiry, current: Fitted) -> Step | None:
     return found
 
 
-def followed(judge: Judge, found: Step, phases: Phases) -> tuple[Step, Mismatch]:
+def followed(inquiry: Inquiry, found: Step) -> tuple[Step, Mismatch]:
     """A step and what it leaves; where that is little more than noise, its fit followed to the end; never worse.
 
     Beside a kink, or a sample that a clock carries over a leap, or in the valley that two effects share, a fit may end
     too early. One effect's is followed only if what it leaves is in doubt, or if it is met better with its threshold
     elsewhere.
     """
-    old = found.fitted
+    judge, phases, old = inquiry.judge, inquiry.phases, found.fitted
     left = mismatch_of(judge.evidence, old.blocks, phases)
     is_near = old.left < NEARLY_NOISE**2 * sum(b.residual.size for b in old.blocks)
     if judge.effort.thrifty or not is_near:
         return found, left
-    new = traced(judge, old)
+    begun_elsewhere = inquiry.fits([replace(from_there(old, "trace"), stretch=s) for s in stretches(old)])
+    new = min([old, *(f for f in begun_elsewhere if f is not None)], key=lambda f: f.left)
     if new.left < old.left or len(old.candidates) > 1 or left.p_value < MANY:
         new = timed(judge, polish(judge, new))
     new = ended(judge, new)
@@ -288,42 +291,48 @@ def _together(inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate
         return None
     best, alone = min(fits, key=lambda pair: pair[0].left)
     pair = Step(base=alone, fitted=best, p_value=first.p_value, rivals=(best,))
-    last_step, left = followed(judge, pair, inquiry.phases)
+    last_step, left = followed(inquiry, pair)
     return [replace(first, fitted=alone), last_step], left
 
 
 def _needed(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step]:
     """Steps of the effects that are needed: each dropped if that costs no more than chance, or given to a better one.
 
-    Returned in such an order that the last one's fit is the whole explanation; every step's fit is.
+    Beside a better one others may not be needed any more. Returned in such an order that the last one's fit is the
+    whole explanation; every step's fit is.
     """
     judge = inquiry.judge
-    current = judge.again(taken[-1].fitted)
-    while len(current.candidates) > 1:
-        losses = []
-        for k in range(len(current.candidates)):
-            rest = without(judge, current, k)
-            losses.append((rest.left - current.left if rest is not None else np.inf, k, rest))
-        loss, _, rest = min(losses, key=lambda one: one[0])
-        phi = max(1.0, current.left / sum(b.residual.size for b in current.blocks))
-        if rest is None or loss / phi > NEEDED:
-            break
-        current = rest
-    kept, last = len(current.candidates), taken[-1]
-    if (judge.effort.thrifty or is_any_curve(current.candidates)) and kept == len(taken):
+    current, last = without_needless(judge, judge.again(taken[-1].fitted)), taken[-1]
+    if (judge.effort.thrifty or is_any_curve(current.candidates)) and len(current.candidates) == len(taken):
         return [s.again(judge) for s in taken]  # the second will be refused, whichever came first
     parts: list[Step] = []
-    for turn in range(kept):
-        whole = turn == kept - 1 and current.candidates[0].key == last.fitted.candidates[-1].key
+    while len(parts) < len(current.candidates):
+        whole = len(parts) == len(current.candidates) - 1
+        whole = whole and current.candidates[0].key == last.fitted.candidates[-1].key
         if whole and {c.key for c in current.candidates} == {c.key for c in last.fitted.candidates}:
             parts.append(last)  # found beside just these others
             break
         found = _instead(inquiry, current)
         if found is None:
+            return [s.again(judge) for s in taken]
+        current = without_needless(judge, found.fitted)
+        parts = [*parts, found] if len(current.candidates) == len(found.fitted.candidates) else []
+    return [s.again(judge) for s in parts]
+
+
+def without_needless(judge: Judge, fitted: Fitted) -> Fitted:
+    """The explanation without those of its effects that may be dropped for no more than chance."""
+    while len(fitted.candidates) > 1:
+        losses = []
+        for k in range(len(fitted.candidates)):
+            rest = without(judge, fitted, k)
+            losses.append((rest.left - fitted.left if rest is not None else np.inf, k, rest))
+        loss, _, rest = min(losses, key=lambda one: one[0])
+        phi = max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks))
+        if rest is None or loss / phi > NEEDED:
             break
-        parts.append(found)
-        current = found.fitted
-    return [s.again(judge) for s in parts] if len(parts) == kept else [s.again(judge) for s in taken]
+        fitted = rest
+    return fitted
 
 
 def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) -> tuple[Explanation, Verdict]:

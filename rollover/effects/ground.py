@@ -249,7 +249,7 @@ class SoilAdhesion(Effect):
     }
     channels = ("ground/force_normal",)
     null: ClassVar[Mapping[str, float | None]] = {"stress": 0.0}
-    search: ClassVar[Mapping[str, Search]] = {"stress": Search(500.0, 1e5, "log"), "reach": Search(5e-4, 0.05, "log")}
+    search: ClassVar[Mapping[str, Search]] = {"stress": Search(500.0, 2e5, "log"), "reach": Search(5e-4, 0.05, "log")}
     shapes = ("reach",)
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {"stress": (1.0, -1.0)}
 

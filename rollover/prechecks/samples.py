@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from rollover.prechecks.finding import Finding, Trace
 
@@ -140,7 +140,7 @@ def spikes(t: Trace, unit: str) -> Iterator[Finding]:
     inner = np.abs(error[AROUND:-AROUND])
     quiet = inner[inner <= np.median(inner) * 6.0]
     scale = float(np.median(quiet)) / 0.6745
-    limit = float(norm.isf(0.5 * CHANCE / t.values.size))
+    limit = -float(ndtri(0.5 * CHANCE / t.values.size))
     before, after = (np.linalg.pinv(np.vander(side, 3))[-1] for side in (offsets[:AROUND], offsets[AROUND:]))
     spread = np.eye(2 * AROUND) - basis @ np.linalg.pinv(basis)
     likely = t.floor.sigma * math.sqrt(2 * AROUND - 4)

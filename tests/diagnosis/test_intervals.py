@@ -165,7 +165,7 @@ def test_a_number_of_an_effect_stays_where_it_can_be() -> None:
 def read(recordings: list[tuple[str, Recording]]) -> Judge:
     """Recordings made ready as a diagnosis does: many samples averaged, what the recorder makes of each kept."""
     made = judge_of(recordings).evidence
-    return Judge([digitised(e, r) for e, (_, r) in zip(made, recordings, strict=True)])
+    return Judge(digitised(made, [r for _, r in recordings]))
 
 
 @pytest.mark.parametrize("rate", [300.0, 9000.0])  # of the faster several samples are averaged into one

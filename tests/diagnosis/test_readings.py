@@ -13,7 +13,7 @@ import pytest
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.blocks import Block, Fitted, turned
 from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.evidence import evidence_of
+from rollover.diagnosis.evidence import Evidence, evidence_of
 from rollover.diagnosis.explain import moves
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.readings import digitised, resolution, without_spikes
@@ -63,8 +63,25 @@ def test_noise_makes_the_rounding_of_each_sample_its_own(noise: float, shared: f
     rough = replace(r, channels={**r.channels, FORCE: np.round(noisy / step) * step})
     total = step * float(np.sqrt(noise**2 + 1.0 / 12.0))
     told = replace(one, signals=tuple(replace(s, noise=total) for s in one.signals))
-    force = next(s for s in digitised(told, rough).signals if s.channel == FORCE)
+    force = next(s for s in digitised([told], [rough])[0].signals if s.channel == FORCE)
     assert force.scatter == pytest.approx(shared * step, rel=1e-6)
+
+
+def test_a_digit_that_flips_beside_an_edge_is_no_noise_of_its_own() -> None:
+    """Of two recordings of one channel the quieter one tells how much noise there is before the steps."""
+    name, r = recorded({}, speeds=(2.0,), noise=0.0, rate=1000.0)[0]
+    one = evidence_of(name, r, simulator_of(scenario(), r))
+    assert one is not None
+    step = 0.02 * float(np.ptp(r[FORCE]))
+    rough = replace(r, channels={**r.channels, FORCE: np.round(r[FORCE] / step) * step})
+
+    def seen(noise: float) -> Evidence:
+        return replace(one, signals=tuple(replace(s, noise=noise * step) for s in one.signals))
+
+    both = digitised([seen(0.0), seen(0.5)], [rough, rough])
+    assert [s.scatter for e in both for s in e.signals if s.channel == FORCE] == pytest.approx([0.5 * step] * 2)
+    (alone,) = digitised([seen(0.5)], [rough])
+    assert next(s for s in alone.signals if s.channel == FORCE).scatter < 0.1 * step
 
 
 def test_noise_within_coarse_digits_is_no_structure() -> None:

@@ -15,12 +15,14 @@ from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.forms import shaped
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.phases import phases_of
-from rollover.diagnosis.refine import combed, ended, shaped, timed, traced
+from rollover.diagnosis.refine import combed, ended, timed
 from rollover.diagnosis.screening import Screened
 from rollover.diagnosis.selection import _together
+from rollover.diagnosis.thresholds import stretches, traced
 from rollover.effects import EFFECTS
 from rollover.proof.generator import Case, make, plan
 from rollover.scenario import load
@@ -95,7 +97,7 @@ def test_a_nose_is_found_along_the_valley_of_its_frequency(tmp_path: Path) -> No
     plain = judge.fit((c,), [coordinate(share[name], s) for name, s in c.search.items()])
     assert plain is not None
     assert plain.left > 4.0 * sum(e.count for e in judge.evidence)
-    found = shaped(judge, plain)
+    found = shaped(judge, plain, [b.total for b in plain.blocks])
     assert found is not None
     assert found.left < 1.1 * sum(e.count for e in judge.evidence)
     assert found.candidates[-1].along == ()
@@ -132,7 +134,7 @@ def test_how_much_of_a_striker_its_nose_is_is_found_where_nobody_weighed_it() ->
     plain = judge.fit((c,), begun, shifts=[0.0] * 3)
     assert plain is not None
     assert plain.left > 2.0 * count
-    found = shaped(judge, plain)
+    found = shaped(judge, plain, [b.total for b in plain.blocks])
     assert found is not None
     assert found.left < 1.1 * count
     told = found.candidates[-1].values(found.x)
@@ -152,11 +154,11 @@ def test_a_threshold_is_found_though_a_fit_ended_at_another() -> None:
     ended = judge.fit((c,), begun, width=1)
     assert ended is not None
     assert abs(c.values(ended.x)["thickness"] - true["thickness"]) > 0.004
-    found = traced(judge, ended)
+    found = min((traced(judge, ended, s) for s in stretches(ended)), key=lambda f: f.left)
     assert found.left < ended.left - 100.0
     assert c.values(found.x)["thickness"] == pytest.approx(true["thickness"], rel=0.01)
     assert c.values(found.x)["stiffness_ratio"] == pytest.approx(true["stiffness_ratio"], abs=0.001)
-    assert traced(judge, found).left <= found.left
+    assert all(traced(judge, found, s).left <= found.left for s in stretches(found))
 
 
 def test_a_pair_that_leaves_nothing_is_named_by_both() -> None:

@@ -1,0 +1,93 @@
+"""An effect's shape and its other forms: fits of what is usually held, and of another law in its place."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rollover.diagnosis.blocks import Fitted
+from rollover.diagnosis.candidates import Candidate, coordinate
+from rollover.diagnosis.fit import NOISE_LEFT, Judge
+from rollover.diagnosis.refine import STARTS, by_what_is_left, few_of, polish, total_of
+
+SHORT = 4  # rounds of a fit that tells where to begin
+ABREAST = 1.5  # times what the best of short fits leaves, up to which others are followed
+BEHIND = 2.0  # times what another explanation leaves, beyond which none is gone on with
+THERE = 0.003  # of a coordinate, within which two short fits came to one place
+BESIDE_FORM = np.linspace(-0.1, 0.05, 13)  # of a coordinate: where a threshold of another form may lie
+ELSEWHERE = (0.2, 0.35, 0.5, 0.65, 0.8)  # coordinates of a number that only this form has
+
+
+def shaped(judge: Judge, f: Fitted, leaves: Sequence[float]) -> Fitted | None:
+    """The fit with the shape of its last effect, begun where short fits from some places leave least; None if none.
+
+    None too where these come nowhere near what another explanation `leaves` of each recording; so in another form.
+    """
+    if not f.candidates[-1].shapes:
+        return None
+    last, at = f.candidates[-1], len(f.x) - len(f.candidates[-1].search)
+    places = [(*f.x[:at], *start) for start in last.with_shapes(f.x[at:])]
+    found = _best_of(judge, f, replace(last.whole(), along=tuple(last.shapes)), places, leaves)
+    if found is None:
+        return None
+    found = found if is_noise(found) else polish(judge, found)
+    whole, x = found.candidates[-1].plain(found.own)
+    shifts = [b.shift for b in found.blocks]
+    return judge.fit((*f.candidates[:-1], whole), (*found.x[:at], *x), shifts=shifts, width=2)
+
+
+def in_form(judge: Judge, f: Fitted, last: Candidate, leaves: Sequence[float]) -> Fitted | None:
+    """The fit with its last effect in another form, begun where it leaves least.
+
+    A threshold lies elsewhere in another form; what is fitted instead of another number is looked for over its range.
+    """
+    known, at, shifts = f.candidates[-1].values(f.own), len(f.x) - len(f.own), [b.shift for b in f.blocks]
+    axes: list[list[float]] = []
+    for name, search in last.search.items():
+        there = coordinate(known[name], search) if name in known else None
+        several = [there + float(d) for d in BESIDE_FORM] if there is not None and not axes else [there]
+        axes.append(list(ELSEWHERE) if there is None else [v for v in several if v is not None and 0.0 < v < 1.0])
+    places = [(*f.x[:at], *own) for own in itertools.product(*axes)]
+    met = by_what_is_left(judge, (*f.candidates[:-1], last), places, shifts, few_of(f))
+    return _best_of(judge, f, last, met[: 2 * STARTS], leaves)
+
+
+def is_noise(fitted: Fitted) -> bool:
+    """Whether a fit needs no further search."""
+    return fitted.left < NOISE_LEFT**2 * sum(b.residual.size for b in fitted.blocks)
+
+
+def _best_of(
+    judge: Judge, f: Fitted, last: Candidate, places: Sequence[tuple[float, ...]], leaves: Sequence[float]
+) -> Fitted | None:
+    """The best fit with another last effect from some places.
+
+    Short fits to the recordings that are met worst, best and in the middle tell where to begin; None if none can be
+    made.
+    """
+    candidates, few = (*f.candidates[:-1], last), few_of(f)
+    at = [f.blocks[r].shift for r in few]
+    short = [judge.fit(candidates, x, rounds=SHORT, shifts=at, only=few, bare=True) for x in places]
+    # fitted alone these soon leave less than beside all others
+    most = min(ABREAST * sum(f.blocks[r].total for r in few), BEHIND * sum(leaves[r] for r in few))
+    begun: list[Fitted] = []
+    for one in sorted((one for one in short if one is not None and total_of(one) < most), key=total_of):
+        if len(begun) < STARTS and not any(_is_there(one, other) for other in begun):
+            begun.append(one)
+    best: Fitted | None = None
+    for one in (one for one in begun if total_of(one) < ABREAST * total_of(begun[0])):
+        told = dict(zip(few, one.blocks, strict=True))
+        shifts = [told.get(r, b).shift for r, b in enumerate(f.blocks)]
+        again = judge.fit(candidates, one.x, shifts=shifts)
+        best = min((f for f in (best, again) if f is not None), key=lambda f: f.left, default=None)
+        if best is not None and is_noise(best):
+            break
+    return best
+
+
+def _is_there(one: Fitted, other: Fitted) -> bool:
+    """Whether two fits ended in one place."""
+    return max(abs(a - b) for a, b in zip(one.x, other.x, strict=True)) < THERE

@@ -1,0 +1,75 @@
+"""Where an effect sets in: thresholds tried along their range, for what recordings ask for there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rollover.diagnosis.blocks import Fitted
+from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.gate import followed, freed, yardstick
+from rollover.diagnosis.refine import blocks_at, left_at
+
+AFAR, NEAR = (np.arange(80) + 0.5) / 80, 0.002 * np.arange(-20, 21)  # places of a threshold, all along and about a fit
+VALLEYS = 3  # of these to either side in which a fit begins
+
+Stretch = tuple[int, float, float]  # a coordinate of a fit, and from where to where it is tried
+
+
+def stretches(fitted: Fitted) -> list[Stretch]:
+    """Where each threshold of the last effect may be tried: below where it was fitted, and above.
+
+    That is each other parameter than the one that says how strong the effect is (`yardstick`).
+    """
+    last = fitted.candidates[-1]
+    at = len(fitted.x) - len(last.search)
+    strength = at + list(last.search).index(yardstick(last.id, last.search)[0])
+    others = [k for k in range(at, len(fitted.x)) if k != strength]
+    return [s for k in others for s in ((k, 0.0, fitted.x[k]), (k, fitted.x[k], 1.0))]
+
+
+def traced(judge: Judge, fitted: Fitted, stretch: Stretch) -> Fitted:
+    """The fit begun anew where its last effect acts elsewhere, as strongly as recordings ask for there; never worse.
+
+    A threshold that moves past a sample leaves a misfit of many small valleys: it is tried all along its stretch, and
+    finely beside the fit.
+    """
+    last, shifts = fitted.candidates[-1], [b.shift for b in fitted.blocks]
+    k, low, high = stretch
+    at = len(fitted.x) - len(last.search)
+    blocks = blocks_at(judge, fitted.candidates[:-1], fitted.x[:at], shifts)
+    best = fitted
+    if blocks is None:
+        return best
+    alone = Fitted(candidates=fitted.candidates[:-1], x=fitted.x[:at], blocks=tuple(blocks))
+    met = []
+    for v in sorted(v for v in (*AFAR, *(fitted.x[k] + NEAR)) if low <= v <= high and 0.0 < v < 1.0):
+        x = _as_strong(judge, alone, last, (*fitted.x[:k], float(v), *fitted.x[k + 1 :]))
+        left = None if x is None else left_at(judge, fitted.candidates, x, shifts)
+        if x is not None and left is not None:
+            met.append((left, x))
+    for x in _valleys(met)[:VALLEYS]:
+        again = judge.fit(fitted.candidates, x, shifts=shifts, width=1)
+        best = again if again is not None and again.left < best.left else best
+    return best
+
+
+def _as_strong(judge: Judge, alone: Fitted, last: Candidate, x: tuple[float, ...]) -> tuple[float, ...] | None:
+    """Coordinates x with the last effect as strong as recordings ask for beside the fit without it; None if none."""
+    along, size = 0.0, 0.0
+    for r, b in enumerate(alone.blocks):
+        way = judge.moved(r, (alone.candidates, alone.x), ((*alone.candidates, last), x), b.shift)
+        if way is not None:
+            d = freed(way[:, None], b)[:, 0]
+            along, size = along + float(d @ b.residual), size + float(d @ d)
+    start = followed(last, x[len(alone.x) :], along / size) if size > 0.0 else None
+    return None if start is None else (*alone.x, *start)
+
+
+def _valleys(met: Sequence[tuple[float, tuple[float, ...]]]) -> list[tuple[float, ...]]:
+    """Places of a row, each with what it leaves, beside which none leaves less; the one that leaves least first."""
+    inside = [(np.inf, ()), *met, (np.inf, ())]
+    low = [b for a, b, c in zip(inside, inside[1:], inside[2:], strict=False) if b[0] <= min(a[0], c[0])]
+    return [x for _, x in sorted(low)]
