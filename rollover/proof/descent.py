@@ -5,11 +5,13 @@ State: x and P of the nose with the soil that moves along, x and v of the body, 
     dP/dt = sum of forces on nose and soil,   v = P/(m + m_b1(x)),   F_s = F + d(m_b1 v)/dt        (1) without impulse
 
 A stage ends at an event (the deepest point, a change of branch, a step in depth, lift-off, a new touch) and the next
-starts there, so that no step lies across a kink.
+starts there, so that no step lies across a kink. Whether soil stays behind is asked within the steps too: a nose that
+rings pulls at it for less than a step.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -31,6 +33,7 @@ CHANNELS = (
 FREE, LOADING, LINE = "free", "loading", "line"
 RTOL, ATOL = 1e-9, 1e-11
 MOST_STAGES = 4000
+WITHIN = 12  # places of a step at which it is asked whether the soil would have to be pulled
 NUDGE = 1e-11  # m: past an event, so that it does not answer again
 
 
@@ -307,6 +310,7 @@ def _stage(
     else:
         depth = line.rut if line is not None else 0.0
         watch("touch", lambda t, y: y[0] - depth, 1.0)
+    clinging: Callable[[float, Array], float] | None = None
     if mode != FREE and soil > 0.0 and rig.spring > 0.0:
 
         def held(t: float, y: Array) -> float:
@@ -317,6 +321,7 @@ def _stage(
             bare = Stage(**common, end=end, state=bare.state)
             state[1] = v * rig.nose
         else:
+            clinging = held
             watch("soil stays", held, -1.0)
     solved = solve_ivp(
         bare.rates, (t, end), state, method="DOP853", rtol=RTOL, atol=ATOL, dense_output=True, events=events,
@@ -324,6 +329,23 @@ def _stage(
     )  # fmt: skip
     if solved.status < 0:
         raise DescentError(f"at {t:.6g} s: {solved.message}")
+    if clinging is not None and (let_go := _dips(clinging, solved)) is not None:
+        return Stage(**common, end=let_go, state=solved.sol), "soil stays"
     stage = Stage(**common, end=float(solved.t[-1]), state=solved.sol)
     happened = next((n for n, found in zip(names, solved.t_events, strict=True) if found.size), "end")
     return stage, happened
+
+
+def _dips(value: Callable[[float, Array], float], solved: Any) -> float | None:
+    """When a value first falls below zero within a step, s: it may have risen again before the step was over."""
+    from scipy.optimize import brentq
+
+    def at(t: float) -> float:
+        return value(t, solved.sol(t))
+
+    for a, b in itertools.pairwise(solved.t.tolist()):
+        fine = np.linspace(a, b, WITHIN)
+        below = np.flatnonzero([at(t) < 0.0 for t in fine[:-1]])
+        if below.size and below[0] > 0:
+            return float(brentq(at, fine[below[0] - 1], fine[below[0]], xtol=1e-12))
+    return None
