@@ -356,7 +356,9 @@ class _Svg:
 
 
 @contextmanager
-def _canvas(width: float, height: float, layout: Literal["constrained"] | None = "constrained") -> Iterator[tuple[Any, _Svg]]:
+def _canvas(
+    width: float, height: float, layout: Literal["constrained"] | None = "constrained"
+) -> Iterator[tuple[Any, _Svg]]:
     import matplotlib as mpl
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
