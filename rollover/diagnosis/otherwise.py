@@ -17,6 +17,7 @@ from rollover.diagnosis.forms import is_noise
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.inquiry import Inquiry
+from rollover.diagnosis.thresholds import is_clock, stretches
 
 RUGGED = 2.0  # misfit over the noise that the best leaves, from which on there may be something behind a cliff
 LEADS = 1.5  # times what the best leaves, up to which it is looked for
@@ -150,12 +151,18 @@ def _enough(left: float, size: int) -> float:
 
 
 def timed_too(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
-    """The fits, the near ones with their time shifts tried out, best first."""
+    """The fits, the near ones with their time shifts tried out, and clocks all along their range, best first."""
     least = min(f.left for f in fits)
-    near = [f for f in fits if f.left < TIED * least]
+    near = [traced_too(inquiry, f) if is_clock(f) else f for f in fits if f.left < TIED * least]
     timed = inquiry.fits([from_there(f, "time") for f in near])
     others = [f for f in fits if f.left >= TIED * least]
     return sorted([new or old for new, old in zip(timed, near, strict=True)] + others, key=lambda f: f.left)
+
+
+def traced_too(inquiry: Inquiry, fitted: Fitted) -> Fitted:
+    """The fit, or a better one begun where a threshold of its last effect lies elsewhere."""
+    begun = inquiry.fits([replace(from_there(fitted, "trace"), stretch=s) for s in stretches(fitted)])
+    return min([fitted, *(f for f in begun if f is not None)], key=lambda f: f.left)
 
 
 def from_there(f: Fitted, how: Literal["polish", "shape", "time", "trace"]) -> Job:

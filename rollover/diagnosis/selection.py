@@ -21,11 +21,10 @@ from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.inquiry import Groups, Inquiry, Phases
 from rollover.diagnosis.lasting import NEEDED, astray, backed, begun_anew, lasting
 from rollover.diagnosis.looks import look, look_again
-from rollover.diagnosis.otherwise import from_there
+from rollover.diagnosis.otherwise import traced_too
 from rollover.diagnosis.refine import conditioned, ended, is_doubtful, polish, timed, without
 from rollover.diagnosis.remainder import NEGLIGIBLE, is_enough, is_tolerated, matters
 from rollover.diagnosis.straight import is_a_curve
-from rollover.diagnosis.thresholds import stretches
 from rollover.diagnosis.verdict import Verdict
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
@@ -206,8 +205,7 @@ def followed(inquiry: Inquiry, found: Step) -> tuple[Step, Mismatch]:
     is_near = old.left < NEARLY_NOISE**2 * sum(b.residual.size for b in old.blocks)
     if judge.effort.thrifty or not is_near:
         return found, left
-    begun_elsewhere = inquiry.fits([replace(from_there(old, "trace"), stretch=s) for s in stretches(old)])
-    new = min([old, *(f for f in begun_elsewhere if f is not None)], key=lambda f: f.left)
+    new = traced_too(inquiry, old)
     if new.left < old.left or len(old.candidates) > 1 or left.p_value < MANY:
         new = timed(judge, polish(judge, new))
     new = ended(judge, new)

@@ -14,6 +14,7 @@ from rollover.diagnosis.refine import blocks_at, left_at
 
 AFAR, NEAR = (np.arange(80) + 0.5) / 80, 0.002 * np.arange(-20, 21)  # places of a threshold, all along and about a fit
 VALLEYS = 3  # of these to either side in which a fit begins
+CLOCKS = ("sensor-clock-offset", "sensor-clock-drift")
 
 Stretch = tuple[int, float, float]  # a coordinate of a fit, and from where to where it is tried
 
@@ -21,13 +22,23 @@ Stretch = tuple[int, float, float]  # a coordinate of a fit, and from where to w
 def stretches(fitted: Fitted) -> list[Stretch]:
     """Where each threshold of the last effect may be tried: below where it was fitted, and above.
 
-    That is each other parameter than the one that says how strong the effect is (`yardstick`).
+    That is each other parameter than the one that says how strong the effect is (`yardstick`); of a clock, which moves
+    edges past samples, that one.
     """
-    last = fitted.candidates[-1]
-    at = len(fitted.x) - len(last.search)
-    strength = at + list(last.search).index(yardstick(last.id, last.search)[0])
-    others = [k for k in range(at, len(fitted.x)) if k != strength]
+    strength = _strength(fitted)
+    others = [k for k in range(len(fitted.x) - len(fitted.own), len(fitted.x)) if (k == strength) == is_clock(fitted)]
     return [s for k in others for s in ((k, 0.0, fitted.x[k]), (k, fitted.x[k], 1.0))]
+
+
+def is_clock(fitted: Fitted) -> bool:
+    """Whether the last effect is the clock of a channel."""
+    return fitted.candidates[-1].id in CLOCKS
+
+
+def _strength(fitted: Fitted) -> int:
+    """The coordinate that says how strong the last effect is."""
+    last = fitted.candidates[-1]
+    return len(fitted.x) - len(fitted.own) + list(last.search).index(yardstick(last.id, last.search)[0])
 
 
 def traced(judge: Judge, fitted: Fitted, stretch: Stretch) -> Fitted:
@@ -46,7 +57,8 @@ def traced(judge: Judge, fitted: Fitted, stretch: Stretch) -> Fitted:
     alone = Fitted(candidates=fitted.candidates[:-1], x=fitted.x[:at], blocks=tuple(blocks))
     met = []
     for v in sorted(v for v in (*AFAR, *(fitted.x[k] + NEAR)) if low <= v <= high and 0.0 < v < 1.0):
-        x = _as_strong(judge, alone, last, (*fitted.x[:k], float(v), *fitted.x[k + 1 :]))
+        there = (*fitted.x[:k], float(v), *fitted.x[k + 1 :])
+        x = there if is_clock(fitted) else _as_strong(judge, alone, last, there)
         left = None if x is None else left_at(judge, fitted.candidates, x, shifts)
         if x is not None and left is not None:
             met.append((left, x))

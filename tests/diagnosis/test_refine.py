@@ -161,6 +161,20 @@ def test_a_threshold_is_found_though_a_fit_ended_at_another() -> None:
     assert all(traced(judge, found, s).left <= found.left for s in stretches(found))
 
 
+def test_a_clock_is_tried_all_along_its_range(tmp_path: Path) -> None:
+    """Each edge that a drift moves past a sample leaves a valley of its own; fits had ended in the sixth part of it."""
+    case = make(next(order for order in plan(63, 20263014, ["single"]) if order.index == 1))
+    (truth,) = case.truth["effects"]
+    assert (truth["id"], truth["channel"]) == ("sensor-clock-drift", FORCE)
+    judge = judge_of_case(case, tmp_path)
+    c = candidate(judge, f"sensor-clock-drift:{FORCE}")
+    stopped = judge.fit((c,), (coordinate(truth["parameters"]["drift"] / 6.0, c.search["drift"]),), rounds=0)
+    assert stopped is not None
+    found = min((traced(judge, stopped, s) for s in stretches(stopped)), key=lambda f: f.left)
+    assert found.left < 0.9 * stopped.left
+    assert c.values(found.x)["drift"] == pytest.approx(truth["parameters"]["drift"], rel=0.02)
+
+
 def test_a_pair_that_leaves_nothing_is_named_by_both() -> None:
     """A crust and a guide that rubs, recorded from full runs: these meet the crust's end a step late."""
     hidden = {"effects.soil-crust.thickness": 0.03, "effects.guide-friction.force": 40.0}
