@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ from rollover.scenario import Scenario
 
 Array = NDArray[np.float64]
 
+LEAP_IN = "leap in "  # before the name of a channel: how far it leaps within each mean, SI
+LEAP, WITHIN = 4.0, 2.5  # times the steps beside it: of means, and within one
 MOST_ROWS = 500  # of a recording that are looked at
 FEW = 4  # stamps in a mean that are all simulated; for more, two times away from the first contact
 KNOWN, UNKNOWN = 4e-3, 30e-3  # s, by which a clock's zero may be off
@@ -25,16 +28,39 @@ KNOWN, UNKNOWN = 4e-3, 30e-3  # s, by which a clock's zero may be off
 
 @dataclass(frozen=True, kw_only=True)
 class Averaged:
-    """A simulator at several stamps for each mean, `starts` (bins,) where those of each begin; predicts the means."""
+    """A simulator at several stamps for each mean, `starts` (bins,) where those of each begin; predicts the means.
+
+    Where fewer than all that are in a mean are simulated, it also says under `LEAP_IN` and the channel's name how far
+    that leaps within or beside each mean: of how many of its samples it has leapt already is not known then.
+    """
 
     inner: Simulator
     starts: NDArray[np.int64]
     counts: NDArray[np.int64]
+    many: int
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """See `Simulator`."""
         found = self.inner.predict(changes, shift)
-        return None if found is None else self._means(found)
+        return None if found is None else {**self._means(found), **self._leaps(found)}
+
+    def _leaps(self, found: Mapping[str, Array]) -> dict[str, Array]:
+        if np.all(self.counts == self.many):
+            return {}
+        sizes = {}
+        for channel, values in found.items():
+            step, sizes[channel] = np.abs(np.diff(values)), np.zeros(self.starts.size)
+            beside = np.maximum(np.append(step[1:], 0.0), np.concatenate([[0.0], step[:-1]]))
+            for k in np.flatnonzero(step > WITHIN * beside):
+                for there in (self._of[k], self._of[k + 1]):
+                    sizes[channel][there] = max(sizes[channel][there], step[k])
+            sizes[channel][self.counts == self.many] = 0.0
+        return {LEAP_IN + channel: size for channel, size in sizes.items()}
+
+    @cached_property
+    def _of(self) -> NDArray[np.int64]:
+        """The mean of each stamp."""
+        return np.repeat(np.arange(self.starts.size), self.counts)
 
     def _means(self, found: Mapping[str, Array]) -> dict[str, Array]:
         return {c: np.add.reduceat(v, self.starts) / self.counts for c, v in found.items()}
@@ -53,7 +79,9 @@ class Averaged:
         """See `Simulator`."""
         last = int(self.starts[n]) if n < self.starts.size else int(self.counts.sum())
         inner = self.inner.until(last)
-        return None if inner is None else Averaged(inner=inner, starts=self.starts[:n], counts=self.counts[:n])
+        if inner is None:
+            return None
+        return Averaged(inner=inner, starts=self.starts[:n], counts=self.counts[:n], many=self.many)
 
     def marks(self) -> tuple[tuple[float, str], ...]:
         """See `Simulator`."""
@@ -97,7 +125,7 @@ def simulated(scenario: Scenario, recording: Recording) -> tuple[Recording, Simu
     channels = {c: v[at] for c, v in recording.channels.items()}  # which there are is all that is asked of them
     part = replace(recording, time=np.concatenate(stamps), channels=channels)
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    return thin, Averaged(inner=simulator_of(scenario, part), starts=starts, counts=counts), many
+    return thin, Averaged(inner=simulator_of(scenario, part), starts=starts, counts=counts, many=many), many
 
 
 def binned(recording: Recording) -> Recording:

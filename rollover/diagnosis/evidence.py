@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.bins import LEAP, LEAP_IN
 from rollover.diagnosis.nuisance import Eased, doubts, eased
 from rollover.diagnosis.simulator import Simulator
 from rollover.noise import LENGTH, USUAL, NoiseFloor, grown, noise_floor
@@ -24,7 +25,6 @@ CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is belie
 MANY = 10  # quiet windows from which on a memory of two samples is told
 ROUGH = 0.5  # times the noise, from which on another error has a large part
 CORNER = 2.0775  # corner frequency over the filter class, forward and backward, Hz
-LEAP = 4.0  # times the steps beside it
 SHOWS = 3.0  # times the noise, from which on a step may be a leap
 LARGE = 50.0  # times the noise: a leap whose instant is not believed to the sample
 BESIDE = 3  # samples to either side, between whose values one about a leap may be
@@ -141,8 +141,17 @@ class Evidence:
         """The same of the measurement."""
         return np.concatenate([self._whitened(s, s.values) for s in self.signals])
 
-    def leaps(self, raw: Array) -> NDArray[np.int64]:
-        """Samples (stacked) about which a prediction leaps."""
+    def leaps(self, predicted: Mapping[str, Array]) -> NDArray[np.int64]:
+        """Samples (stacked) about which a prediction leaps, and means within which it does."""
+        found, within = self.about_leaps(self.raw(predicted)), []
+        for s, part in self.spans():
+            size = predicted.get(LEAP_IN + s.channel)
+            if size is not None:
+                within.append(part.start + np.flatnonzero(size[s.rows] > SHOWS * s.sigma))
+        return np.unique(np.concatenate([found, *within])) if any(w.size for w in within) else found
+
+    def about_leaps(self, raw: Array) -> NDArray[np.int64]:
+        """Samples (stacked) about which a stacked prediction leaps."""
         own = self._inside
         leap = np.abs(raw[2:] - raw[:-2])
         first = np.flatnonzero(leap > own.least)

@@ -125,22 +125,28 @@ class Judge:
 
     def _simulated(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
         self.simulations += 1
-        y = self.edged(r, candidates, x, shift)
-        if y is None:
+        found = self._made(r, candidates, x, shift)
+        if found is None:
             return None
-        leaps = self.evidence[r].leaps(y)
+        y, leaps = self.evidence[r].raw(found), self.evidence[r].leaps(found)
         if leaps.size:
             self._leaps[_key(r, candidates, x, shift)] = leaps
         return self.evidence[r].forgiven(y, leaps)
 
     def edged(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
         """Stacked prediction of recording r, SI, with its leaps as they are; not remembered. None if it fails."""
+        found = self._made(r, candidates, x, shift)
+        return None if found is None else self.evidence[r].raw(found)
+
+    def _made(
+        self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float
+    ) -> dict[str, Array] | None:
+        """What recording r is predicted to be; None if that fails."""
         try:
             found = self.evidence[r].simulator.predict(self.changes(candidates, x), shift)
         except ValueError:
             return None
-        y = None if found is None else self.evidence[r].raw(found)
-        return y if y is not None and np.all(np.isfinite(y)) else None
+        return found if found is not None and np.all(np.isfinite(self.evidence[r].raw(found))) else None
 
     @staticmethod
     def changes(candidates: Sequence[Candidate], x: Sequence[float]) -> dict[str, object]:
@@ -219,12 +225,12 @@ class Judge:
         """dy/dtau of recording r, stacked, SI; none across a leap, on whichever side a sample was and is."""
         e, later = self.evidence[r], self.effort.later
         found = e.simulator.predict(self.changes(candidates, x), shift + later)
-        after = raw if found is None else e.raw(found)
+        after, leaps = (raw, NONE) if found is None else (e.raw(found), e.leaps(found))
         slope = (after - raw) / later
         if self.effort.thrifty:  # to both sides, where that costs no run
             found = e.simulator.predict(self.changes(candidates, x), shift - later)
             slope = slope if found is None else (after - e.raw(found)) / (2.0 * later)
-        slope[e.leaps(after)] = 0.0
+        slope[leaps] = 0.0
         return np.nan_to_num(slope)
 
     def moved(self, r: int, before: Point, after: Point, shift: float, slope: Array | None = None) -> Array | None:
