@@ -71,7 +71,7 @@ class Candidate:
     @property
     def rings(self) -> bool:
         """Whether it rings, by a frequency and a damping."""
-        return EFFECTS[self.id].is_abrupt and len(self.search) == 2
+        return EFFECTS[self.id].is_abrupt and {"stiffness", "damping"} <= self.search.keys()
 
     @property
     def is_bent(self) -> bool:
@@ -186,6 +186,15 @@ class Candidate:
         values = self.values(x)
         at = (coordinate(values[name], s) for name, s in self.search.items())
         return replace(self, along=()), tuple(min(max(v, 0.0), 1.0) for v in at)
+
+    def bent(self, x: Sequence[float]) -> tuple[Candidate, tuple[float, ...]]:
+        """The same along its shape as far as that is fitted, and its coordinates there: the way back from `plain`."""
+        kind, values = EFFECTS[self.id], self.values(x)
+        names = tuple(name for name in self.search if name in kind.shapes)
+        for name in names:
+            values = {**kind.bent(values, name, getattr(kind(), name)), name: values[name]}
+        at = (coordinate(values[name], s) for name, s in self.search.items())
+        return replace(self, along=names), tuple(min(max(v, 0.0), 1.0) for v in at)
 
     def whole(self) -> Candidate:
         """The same effect with its shape fitted too."""

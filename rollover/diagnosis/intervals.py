@@ -30,6 +30,7 @@ FURTHER, FARTHEST = 2.0, 30.0  # factors by which one goes on at a time, and at 
 RIPPLES = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)  # factors at which one looks behind a rise
 BEYOND = 1.2  # factor below which an interval that is too narrow is chance
 FEWEST = 3  # recordings that can disagree
+TUNED, LEAST_STEP = 3, 1e-6  # times that what rings is linearised anew; of a coordinate
 EVENLY = 12.0**-0.5  # standard deviation of what is spread evenly from 0 to 1
 
 
@@ -38,6 +39,27 @@ def by_student(free: int) -> float:
     from scipy.special import stdtrit
 
     return (float(stdtrit(free, 0.975)) / TWO_SIDED) ** 2
+
+
+def in_tune(judge: Judge, fitted: Fitted) -> Fitted:
+    """The fit linearised anew where something rings, its numbers moved by no more than shows: A_kk^-1/2 of each.
+
+    A frequency that is off by a percent is out of step after some periods: no slope over that tells how far stiffness
+    and mass go along.
+    """
+    ringing = [k for c, own in each_with_own(fitted.candidates) if c.rings for k in range(own.start, own.stop)]
+    if judge.effort.thrifty or not ringing:
+        return fitted
+    nudges = [judge.effort.fine] * len(fitted.x)
+    for _ in range(TUNED):
+        A = sum((b.normal()[0] for b in fitted.blocks), GENTLE * np.eye(len(fitted.x)))
+        for k in ringing:
+            nudges[k] = float(np.clip(A[k, k] ** -0.5, LEAST_STEP, judge.effort.fine))
+        blocks = [
+            judge.block(r, fitted.candidates, fitted.x, b.shift, nudges) or b for r, b in enumerate(fitted.blocks)
+        ]
+        fitted = replace(fitted, blocks=tuple(blocks))
+    return fitted
 
 
 def scattered(evidence: Sequence[Evidence], blocks: Sequence[Block], inverse: Array) -> Array:
@@ -214,8 +236,9 @@ def intervals(
     others are as wide as slopes say. `coarse` is the fit that was moved to this one `in_shorter_steps`: steps of no
     length would move it by another 1/(PARTS - 1) of that.
     """
-    told, coarse = fitted, coarse or fitted
+    told, coarse = fitted, in_tune(judge, coarse or fitted)
     fitted, prior, kept = with_shapes(judge, fitted)
+    fitted = in_tune(judge, fitted)
     p = len(fitted.x)
     A = sum((b.normal()[0] for b in fitted.blocks), np.zeros((p, p))) + np.diag(prior)
     inverse: Array = np.asarray(np.linalg.inv(A), dtype=np.float64)

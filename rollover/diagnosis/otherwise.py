@@ -55,7 +55,7 @@ def _as_promised(
 
 def _combed(inquiry: Inquiry, fits: Sequence[Fitted], shifts: Sequence[float]) -> list[Fitted]:
     """The fits, best first, the best that rings begun anew along its second parameter if it leads or nearly so."""
-    able = [f for f in fits if f.candidates[-1].rings and f.left < LEADS * fits[0].left][:1]
+    able = [f for f in fits if f.candidates[-1].rings and len(f.own) == 2 and f.left < LEADS * fits[0].left][:1]
     jobs = [Job(how="comb", candidates=f.candidates, start=f.x, shifts=tuple(shifts)) for f in able]
     tried = zip(inquiry.fits(jobs), able, strict=True)
     better = [new if new is not None and new.left < old.left else old for new, old in tried]

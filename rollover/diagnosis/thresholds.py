@@ -11,6 +11,7 @@ from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import followed, freed, yardstick
 from rollover.diagnosis.refine import blocks_at, left_at
+from rollover.effects import EFFECTS
 
 AFAR, NEAR = (np.arange(80) + 0.5) / 80, 0.002 * np.arange(-20, 21)  # places of a threshold, all along and about a fit
 VALLEYS = 3  # of these to either side in which a fit begins
@@ -23,11 +24,16 @@ def stretches(fitted: Fitted) -> list[Stretch]:
     """Where each threshold of the last effect may be tried: below where it was fitted, and above.
 
     That is each other parameter than the one that says how strong the effect is (`yardstick`); of a clock, which moves
-    edges past samples, that one.
+    edges past samples, that one; of what rings its shape alone.
     """
-    strength = _strength(fitted)
-    others = [k for k in range(len(fitted.x) - len(fitted.own), len(fitted.x)) if (k == strength) == is_clock(fitted)]
-    return [s for k in others for s in ((k, 0.0, fitted.x[k]), (k, fitted.x[k], 1.0))]
+    last, at = fitted.candidates[-1], len(fitted.x) - len(fitted.own)
+    strength = yardstick(last.id, last.search)[0]
+    if last.rings:
+        names = [name for name in last.search if name in EFFECTS[last.id].shapes]
+    else:
+        names = [name for name in last.search if (name == strength) == is_clock(fitted)]
+    places = [at + list(last.search).index(name) for name in names]
+    return [s for k in places for s in ((k, 0.0, fitted.x[k]), (k, fitted.x[k], 1.0))]
 
 
 def is_clock(fitted: Fitted) -> bool:
@@ -35,28 +41,23 @@ def is_clock(fitted: Fitted) -> bool:
     return fitted.candidates[-1].id in CLOCKS
 
 
-def _strength(fitted: Fitted) -> int:
-    """The coordinate that says how strong the last effect is."""
-    last = fitted.candidates[-1]
-    return len(fitted.x) - len(fitted.own) + list(last.search).index(yardstick(last.id, last.search)[0])
-
-
 def traced(judge: Judge, fitted: Fitted, stretch: Stretch) -> Fitted:
     """The fit begun anew where its last effect acts elsewhere, as strongly as recordings ask for there; never worse.
 
     A threshold that moves past a sample leaves a misfit of many small valleys: it is tried all along its stretch, and
-    finely beside the fit.
+    finely beside the fit. What rings keeps its frequency meanwhile.
     """
+    if fitted.candidates[-1].rings:
+        return _in_tune(judge, fitted, stretch)
     last, shifts = fitted.candidates[-1], [b.shift for b in fitted.blocks]
-    k, low, high = stretch
-    at = len(fitted.x) - len(last.search)
+    k, at = stretch[0], len(fitted.x) - len(fitted.own)
     blocks = blocks_at(judge, fitted.candidates[:-1], fitted.x[:at], shifts)
     best = fitted
     if blocks is None:
         return best
     alone = Fitted(candidates=fitted.candidates[:-1], x=fitted.x[:at], blocks=tuple(blocks))
     met = []
-    for v in sorted(v for v in (*AFAR, *(fitted.x[k] + NEAR)) if low <= v <= high and 0.0 < v < 1.0):
+    for v in _places(fitted, stretch):
         there = (*fitted.x[:k], float(v), *fitted.x[k + 1 :])
         x = there if is_clock(fitted) else _as_strong(judge, alone, last, there)
         left = None if x is None else left_at(judge, fitted.candidates, x, shifts)
@@ -66,6 +67,29 @@ def traced(judge: Judge, fitted: Fitted, stretch: Stretch) -> Fitted:
         again = judge.fit(fitted.candidates, x, shifts=shifts, width=1)
         best = again if again is not None and again.left < best.left else best
     return best
+
+
+def _in_tune(judge: Judge, fitted: Fitted, stretch: Stretch) -> Fitted:
+    """The fit of what rings begun anew with another shape, along the valley of its frequency; never worse."""
+    shifts, at = [b.shift for b in fitted.blocks], len(fitted.x) - len(fitted.own)
+    bent, own = fitted.candidates[-1].bent(fitted.own)
+    candidates, x = (*fitted.candidates[:-1], bent), (*fitted.x[:at], *own)
+    there = [(*x[: stretch[0]], v, *x[stretch[0] + 1 :]) for v in _places(fitted, stretch)]
+    met = [(left, y) for y in there if (left := left_at(judge, candidates, y, shifts)) is not None]
+    best = fitted
+    for y in _valleys(met)[:VALLEYS]:
+        new = judge.fit(candidates, y, shifts=shifts, width=1)
+        if new is not None:
+            plain = (*new.x[:at], *bent.plain(new.own)[1])
+            again = judge.fit(fitted.candidates, plain, shifts=[b.shift for b in new.blocks], width=2)
+            best = again if again is not None and again.left < best.left else best
+    return best
+
+
+def _places(fitted: Fitted, stretch: Stretch) -> list[float]:
+    """Where on its stretch a coordinate is tried."""
+    k, low, high = stretch
+    return sorted(float(v) for v in (*AFAR, *(fitted.x[k] + NEAR)) if low <= v <= high and 0.0 < v < 1.0)
 
 
 def _as_strong(judge: Judge, alone: Fitted, last: Candidate, x: tuple[float, ...]) -> tuple[float, ...] | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,9 +18,11 @@ from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.readings import digitised
 from rollover.effects import EFFECTS, Search, possible
+from rollover.proof.generator import make, plan
 from rollover.recording import Recording
 from tests.diagnosis.drops import FORCE, recorded
 from tests.diagnosis.test_fits import candidate, judge_of
+from tests.diagnosis.test_refine import judge_of_case
 from tests.diagnosis.test_slopes import CHANNEL, LOAD, Late, blow, evidence
 
 
@@ -101,6 +104,25 @@ def test_the_thresholds_of_effects_with_their_shape_are_looked_behind() -> None:
     ):
         x = (0.5,) * sum(len(c.search) for c in candidates)
         assert stated._rippled(Fitted(candidates=candidates, x=x, blocks=())) == expected
+
+
+def test_what_rings_is_linearised_by_steps_that_stay_in_tune(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stiffness and the share of the nose lie in a long valley of one frequency, which slopes over 0.5 % cut short."""
+    case = make(next(order for order in plan(63, 20263016, ["single"]) if order.index == 25))
+    true = case.truth["effects"][0]["parameters"]
+    judge = judge_of_case(case, tmp_path)
+    c = candidate(judge, "structural-compliance").whole()
+    ended = {"stiffness": 3.72118e6, "damping": 75.34, "nose_share": 0.18632}
+    fitted = judge.fit((c,), [coordinate(ended[name], s) for name, s in c.search.items()], width=2)
+    assert fitted is not None
+
+    def holds() -> bool:
+        found = stated.intervals(judge, fitted)[0]
+        return all(found[name].low <= true[name] <= found[name].high for name in ("stiffness", "nose_share"))
+
+    assert holds()
+    monkeypatch.setattr(stated, "in_tune", lambda _, f: f)
+    assert not holds()
 
 
 def test_recordings_that_disagree_widen_an_interval_as_student_says() -> None:

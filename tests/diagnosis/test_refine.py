@@ -175,6 +175,23 @@ def test_a_clock_is_tried_all_along_its_range(tmp_path: Path) -> None:
     assert c.values(found.x)["drift"] == pytest.approx(truth["parameters"]["drift"], rel=0.02)
 
 
+def test_what_rings_is_traced_along_the_valley_of_its_frequency(tmp_path: Path) -> None:
+    case = make(next(order for order in plan(63, 20263016, ["single"]) if order.index == 25))
+    judge = judge_of_case(case, tmp_path)
+    c = candidate(judge, "structural-compliance").whole()
+    ended = {"stiffness": 3.68794e6, "damping": 75.98, "nose_share": 0.184108}
+    x = [coordinate(ended[name], s) for name, s in c.search.items()]
+    stopped = judge.fit((c,), x, rounds=0, shifts=[0.0] * len(case.recordings))
+    assert stopped is not None
+    bent, own = c.bent(x)
+    assert bent.plain(own)[1] == pytest.approx(x)
+    assert [k for k, _, _ in stretches(stopped)] == [2, 2]
+    found = min((traced(judge, stopped, s) for s in stretches(stopped)), key=lambda f: f.left)
+    assert found.left < stopped.left - 20.0
+    share = case.truth["effects"][0]["parameters"]["nose_share"]
+    assert c.values(found.x)["nose_share"] == pytest.approx(share, rel=0.006)
+
+
 def test_a_pair_that_leaves_nothing_is_named_by_both() -> None:
     """A crust and a guide that rubs, recorded from full runs: these meet the crust's end a step late."""
     hidden = {"effects.soil-crust.thickness": 0.03, "effects.guide-friction.force": 40.0}
