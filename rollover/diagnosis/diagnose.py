@@ -12,7 +12,6 @@ from rollover.channels import describe
 from rollover.diagnosis import colour
 from rollover.diagnosis.aftermath import shortened
 from rollover.diagnosis.bins import simulated
-from rollover.diagnosis.candidates import candidates_of, size_of
 from rollover.diagnosis.chaos import weighted
 from rollover.diagnosis.chassis import degrees_of
 from rollover.diagnosis.clocks import align, by_clock, mistimed
@@ -31,6 +30,7 @@ from rollover.diagnosis.loudness import with_loudness
 from rollover.diagnosis.overturn import full_runs
 from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.quantities import dependency
+from rollover.diagnosis.ranges import candidates_of, size_of
 from rollover.diagnosis.readings import digitised, without_spikes
 from rollover.diagnosis.refine import conditioned, is_doubtful
 from rollover.diagnosis.remainder import matters

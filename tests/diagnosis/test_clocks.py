@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollover.diagnosis.candidates import candidates_of, coordinate
+from rollover.diagnosis.candidates import coordinate
 from rollover.diagnosis.clocks import BELIEVED, align, by_clock, by_first_contact, mistimed
 from rollover.diagnosis.evidence import Evidence, evidence_of
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import followed, gate
+from rollover.diagnosis.ranges import candidates_of
 from rollover.diagnosis.simulator import DropSimulator, simulator_of
 from rollover.drop import DropModel
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario

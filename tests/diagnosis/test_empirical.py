@@ -12,11 +12,11 @@ from ground.empirical import TERMS, shape
 from ground.law import REFERENCE_AREA
 from rollover.diagnosis import account, diagnose, diagnosed_text
 from rollover.diagnosis.account import diagnosed_scenario
-from rollover.diagnosis.candidates import candidates_of
 from rollover.diagnosis.clocks import align
 from rollover.diagnosis.empirical import best_subsets, proposed
 from rollover.diagnosis.evidence import evidence_of, left_out
 from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.ranges import candidates_of
 from rollover.diagnosis.simulator import set_up, simulator_of
 from rollover.diagnosis.weak import Balance, _tests, balances
 from rollover.drop import DropModel

@@ -13,11 +13,12 @@ import pytest
 
 from rollover.diagnosis import diagnose, diagnosed_text
 from rollover.diagnosis.bins import simulated
-from rollover.diagnosis.candidates import Candidate, candidates_of, coordinate
+from rollover.diagnosis.candidates import Candidate, coordinate
 from rollover.diagnosis.crew import Crew, Job, work
 from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.fit import Block, Judge, shift_of
 from rollover.diagnosis.holdout import held_out, refitted
+from rollover.diagnosis.ranges import candidates_of
 from rollover.diagnosis.simulator import simulator_of
 from rollover.scenario import load
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario

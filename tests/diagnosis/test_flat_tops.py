@@ -9,9 +9,9 @@ import pytest
 
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.bins import simulated
-from rollover.diagnosis.candidates import candidates_of
 from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.flat_tops import cut_off
+from rollover.diagnosis.ranges import candidates_of
 from rollover.diagnosis.readings import digitised
 from rollover.recording import Recording
 from tests.diagnosis.drops import FORCE, recorded, scenario

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.candidates import candidates_of, coordinate, size_of
+from rollover.diagnosis.candidates import coordinate
 from rollover.diagnosis.clocks import align
 from rollover.diagnosis.evidence import Evidence, doubted, evidence_of, groups_of, left_out
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.nuisance import doubts, eased
+from rollover.diagnosis.ranges import candidates_of, size_of
 from rollover.diagnosis.repeats import with_scatter
 from rollover.diagnosis.simulator import set_up, simulator_of
 from rollover.drop import DropModel

@@ -12,12 +12,12 @@ from scipy.signal import lfilter
 from scipy.stats import kstest
 
 from rollover.diagnosis import colour
-from rollover.diagnosis.candidates import candidates_of
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.evidence import Evidence, evidence_of
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import gate
 from rollover.diagnosis.phases import drop_phases
+from rollover.diagnosis.ranges import candidates_of
 from rollover.diagnosis.simulator import Simulator, simulator_of
 from rollover.filters import filtered
 from rollover.recording import Recording

@@ -10,7 +10,7 @@ import pytest
 
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.bins import simulated
-from rollover.diagnosis.candidates import candidates_of, coordinate
+from rollover.diagnosis.candidates import coordinate
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.explain import Step
@@ -19,6 +19,7 @@ from rollover.diagnosis.forms import shaped
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.phases import phases_of
+from rollover.diagnosis.ranges import candidates_of
 from rollover.diagnosis.refine import combed, ended, timed
 from rollover.diagnosis.screening import Screened
 from rollover.diagnosis.selection import _together

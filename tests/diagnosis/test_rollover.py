@@ -13,8 +13,9 @@ import pytest
 
 from rollover import simulate
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.candidates import Candidate, candidates_of, physical
+from rollover.diagnosis.candidates import Candidate, physical
 from rollover.diagnosis.effort import RUNS
+from rollover.diagnosis.ranges import candidates_of
 from rollover.document import value_at
 from rollover.recording import Recording
 from rollover.scenario import Scenario
