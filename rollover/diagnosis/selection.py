@@ -12,7 +12,6 @@ from rollover.diagnosis.blocks import at_an_end, turned
 from rollover.diagnosis.candidates import Candidate, is_one_sensor
 from rollover.diagnosis.chaos import is_other
 from rollover.diagnosis.clocks import is_all_by_clocks
-from rollover.diagnosis.crew import Job
 from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Step, moves, step, weighed
 from rollover.diagnosis.fit import Fitted, Judge
@@ -22,6 +21,7 @@ from rollover.diagnosis.inquiry import Groups, Inquiry, Phases
 from rollover.diagnosis.lasting import NEEDED, astray, backed, begun_anew, lasting
 from rollover.diagnosis.looks import look, look_again
 from rollover.diagnosis.otherwise import traced_too
+from rollover.diagnosis.pairs import best_pair
 from rollover.diagnosis.refine import conditioned, ended, is_doubtful, polish, timed, without
 from rollover.diagnosis.remainder import NEGLIGIBLE, is_enough, is_tolerated, matters
 from rollover.diagnosis.straight import is_a_curve
@@ -34,7 +34,7 @@ MOST = 3  # effects in one explanation
 PARTLY = 0.005  # of the excess over the noise that one effect may leave, were it structured, and still be named
 MANY = 0.05  # p-value of what as many effects as may be leave, below which they are no explanation
 HOPELESS = 2.0  # misfit over the noise that two effects leave and a third is not looked for
-LEADING, FOLLOWING = 4, 2  # of the first effects, and of later ones each, that are tried two by two
+BESIDE = 3  # rivals of a step that are begun anew beside a better fit of what came before
 HARDLY_MORE = 1.2  # times a tolerance, that an explanation leaves of held-out recordings
 SEVERAL = 2  # recordings on another course, after which they are not forgiven if a candidate scores beyond chance
 ABLE = 0.7  # of what there was beyond the noise, above which two leave so much that no exchange of one will end it
@@ -219,7 +219,7 @@ def _with_rivals(judge: Judge, found: Step) -> Step:
     best, shared = found.fitted, len(found.base.x)
     if shared == 0:
         return found
-    shifts, near = [b.shift for b in best.blocks], sorted(found.rivals, key=lambda f: f.left)[: FOLLOWING + 1]
+    shifts, near = [b.shift for b in best.blocks], sorted(found.rivals, key=lambda f: f.left)[:BESIDE]
     rivals = []
     for f in found.rivals:
         begun = f is not best and any(f is one for one in near)
@@ -266,31 +266,12 @@ def is_better(other: Fitted, left: Mismatch, current: Fitted) -> bool:
 
 
 def _together(inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate) -> tuple[list[Step], Mismatch] | None:
-    """The best pair of the first step's rivals, and of these with what led later, as steps, and what it leaves.
-
-    Of two effects neither need come first alone: a third may be like both, and the second may leave much alone; so
-    what scored most when first `looked` at is tried beside the rivals too.
-    """
-    judge = inquiry.judge
-    leading = sorted((judge.again(f) for f in first.rivals), key=lambda f: f.left)[:LEADING]
-    later = [f for s in taken[1:] for f in sorted(s.rivals, key=lambda f: f.left)[:FOLLOWING]]
-    partners: dict[str, tuple[Candidate, tuple[float, ...]]] = {}
-    for f in (*leading, *later):
-        last = f.candidates[-1]
-        partners.setdefault(last.key, (last, f.own))
-    for s in sorted(first.screened, key=lambda s: -looked.scores.get(s.candidate.key, 0.0))[:LEADING]:
-        partners.setdefault(s.candidate.key, (s.candidate, s.starts[0]))
-    every, shifts = list(partners.values()), tuple(b.shift for b in leading[0].blocks)
-    pairs = [(a, b) for k, a in enumerate(leading) for b in every[k + 1 :]]
-    inquiry.say(f"{len(pairs)} pairs of effects")
-    jobs = [Job(candidates=(*a.candidates, c), start=(*a.x, *x), shifts=shifts, width=1) for a, (c, x) in pairs]
-    fits = [(f, a) for f, (a, _) in zip(inquiry.fits(jobs), pairs, strict=True) if f is not None]
-    if not fits:
+    """The best pair of effects, as steps, and what it leaves; see `best_pair`."""
+    pair = best_pair(inquiry, first, taken, looked)
+    if pair is None:
         return None
-    best, alone = min(fits, key=lambda pair: pair[0].left)
-    pair = Step(base=alone, fitted=best, p_value=first.p_value, rivals=(best,))
     last_step, left = followed(inquiry, pair)
-    return [replace(first, fitted=alone), last_step], left
+    return [replace(first, fitted=pair.base), last_step], left
 
 
 def _needed(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step]:
