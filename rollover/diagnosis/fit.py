@@ -163,10 +163,10 @@ class Judge:
         candidates: Sequence[Candidate],
         x: Sequence[float],
         shift: float,
-        nudge: float | Sequence[float],
+        nudge: float,
         known: Array | None = None,
     ) -> Block | None:
-        """Recording r linearised at x by differences over `nudge`, or over one for each coordinate; no Jacobian for 0.
+        """Recording r linearised at x by differences over `nudge`; no Jacobian for 0.
 
         `known` (n, k) are the first k columns of the Jacobian where those of an earlier place will do.
         """
@@ -185,17 +185,16 @@ class Judge:
         def off(end: Point) -> Array | None:
             return self.moved(r, (candidates, x), end, shift, None if self._pinned else slope)
 
-        nudges = [nudge] * len(x) if isinstance(nudge, (int, float)) else list(nudge)
-        for k in range(0 if known is None else known.shape[1], len(x) if any(nudges) else 0):
+        for k in range(0 if known is None else known.shape[1], len(x) if nudge else 0):
             if self.effort.wide:
                 widest = 0.0 if self._pinned else self.effort.wide  # a first fit is short
-                column = secant(e, off, (candidates, x), k, nudges[k], widest)
+                column = secant(e, off, (candidates, x), k, nudge, widest)
                 if column is None:
                     return None
                 valley = valley_at((candidates, x), k)
                 J[:, k] = column if valley is None else column - valley[1] * J[:, valley[0]]
                 continue
-            step = nudges[k] if x[k] < 0.5 else -nudges[k]
+            step = nudge if x[k] < 0.5 else -nudge
             there = [*x[:k], x[k] + step, *x[k + 1 :]]
             moved = self.moved(r, (candidates, x), (candidates, there), shift)
             if moved is None:

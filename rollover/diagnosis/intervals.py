@@ -30,7 +30,7 @@ FURTHER, FARTHEST = 2.0, 30.0  # factors by which one goes on at a time, and at 
 RIPPLES = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)  # factors at which one looks behind a rise
 BEYOND = 1.2  # factor below which an interval that is too narrow is chance
 FEWEST = 3  # recordings that can disagree
-TUNED, LEAST_STEP = 3, 1e-6  # times that what rings is linearised anew; of a coordinate
+ALONG, VALLEY, FEW_ROUNDS = 1.3, 9, 8  # a factor, how often, and rounds of a fit with one coordinate held
 EVENLY = 12.0**-0.5  # standard deviation of what is spread evenly from 0 to 1
 
 
@@ -39,27 +39,6 @@ def by_student(free: int) -> float:
     from scipy.special import stdtrit
 
     return (float(stdtrit(free, 0.975)) / TWO_SIDED) ** 2
-
-
-def in_tune(judge: Judge, fitted: Fitted) -> Fitted:
-    """The fit linearised anew where something rings, its numbers moved by no more than shows: A_kk^-1/2 of each.
-
-    A frequency that is off by a percent is out of step after some periods: no slope over that tells how far stiffness
-    and mass go along.
-    """
-    ringing = [k for c, own in each_with_own(fitted.candidates) if c.rings for k in range(own.start, own.stop)]
-    if judge.effort.thrifty or not ringing:
-        return fitted
-    nudges = [judge.effort.fine] * len(fitted.x)
-    for _ in range(TUNED):
-        A = sum((b.normal()[0] for b in fitted.blocks), GENTLE * np.eye(len(fitted.x)))
-        for k in ringing:
-            nudges[k] = float(np.clip(A[k, k] ** -0.5, LEAST_STEP, judge.effort.fine))
-        blocks = [
-            judge.block(r, fitted.candidates, fitted.x, b.shift, nudges) or b for r, b in enumerate(fitted.blocks)
-        ]
-        fitted = replace(fitted, blocks=tuple(blocks))
-    return fitted
 
 
 def scattered(evidence: Sequence[Evidence], blocks: Sequence[Block], inverse: Array) -> Array:
@@ -171,6 +150,7 @@ def reaches(judge: Judge, fitted: Fitted, own: Array, phi: float, sides: Mapping
                 far *= FURTHER
             if k in rippled:
                 far = max(far, _over_ripples(judge, fitted, sign * way, k, start + due))
+                far = _along_valley(judge, fitted, k, sign * TWO_SIDED * own[k], (start, due), far)
             found[k, side] = far if far > BEYOND else 1.0
     return found
 
@@ -196,6 +176,39 @@ def _over_ripples(judge: Judge, fitted: Fitted, way: Array, k: int, most: float)
         if there is not None and there <= most:
             reached = far
     return reached
+
+
+def _along_valley(judge: Judge, fitted: Fitted, k: int, way: float, rise: tuple[float, float], begun: float) -> float:
+    """The factor on the `way` of coordinate k at which the misfit has risen by what is due, all others fitted anew.
+
+    `rise` is what is left at the fit and what is due. A straight way leaves a crooked valley early: from `begun` on it
+    is followed as far as it is that low.
+    """
+    (start, due), far = rise, begun
+    c, place = next((c, place) for c, place in each_with_own(fitted.candidates) if place.start <= k < place.stop)
+    name = list(c.search)[k - place.start]
+    rest = {n: s for n, s in c.search.items() if n != name}
+    x, shifts = [v for j, v in enumerate(fitted.x) if j != k], [b.shift for b in fitted.blocks]
+    if not rest:
+        return far
+    inside, beyond = (far, due), far
+    for _ in range(VALLEY):
+        beyond = beyond * ALONG
+        at = fitted.x[k] + beyond * way
+        if not 0.0 < at < 1.0:
+            break
+        held = replace(c, search=rest, fixed={**c.fixed, name: physical(at, c.search[name])})
+        found = judge.fit(
+            [held if one is c else one for one in fitted.candidates], x, rounds=FEW_ROUNDS, shifts=shifts, width=1
+        )
+        if found is None:
+            break
+        if found.left - start > due:
+            low = min(max(inside[1], 0.0), due)
+            share = (np.sqrt(due) - np.sqrt(low)) / max(np.sqrt(found.left - start) - np.sqrt(low), 1e-9)
+            return float(inside[0] + share * (beyond - inside[0])) if low < due else inside[0]
+        inside, x, shifts = (beyond, found.left - start), list(found.x), [b.shift for b in found.blocks]
+    return inside[0]
 
 
 def _misfit(judge: Judge, fitted: Fitted, way: Array) -> float | None:
@@ -236,9 +249,8 @@ def intervals(
     others are as wide as slopes say. `coarse` is the fit that was moved to this one `in_shorter_steps`: steps of no
     length would move it by another 1/(PARTS - 1) of that.
     """
-    told, coarse = fitted, in_tune(judge, coarse or fitted)
+    told, coarse = fitted, coarse or fitted
     fitted, prior, kept = with_shapes(judge, fitted)
-    fitted = in_tune(judge, fitted)
     p = len(fitted.x)
     A = sum((b.normal()[0] for b in fitted.blocks), np.zeros((p, p))) + np.diag(prior)
     inverse: Array = np.asarray(np.linalg.inv(A), dtype=np.float64)
