@@ -8,7 +8,7 @@ from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import freed
 
 LINES = ("sensor-gain", "sensor-scale", "sensor-bias")
-BENT = 25.0  # gain of a curve beside a line, of five standard errors
+BENT = 16.0  # gain of a curve beside a line, of four standard errors
 
 
 def is_a_curve(judge: Judge, fitted: Fitted) -> bool:
