@@ -95,7 +95,7 @@ def test_means_of_samples_are_shortened_too() -> None:
     whole = evidence(0.3)
     assert isinstance(whole.simulator, RunSimulator)
     starts = np.arange(0, whole.recording.time.size, 2)
-    means = Averaged(inner=whole.simulator, starts=starts, counts=np.full(starts.size, 2))
+    means = Averaged(inner=whole.simulator, starts=starts, counts=np.full(starts.size, 2), many=2)
     thin = replace(whole.recording, time=whole.recording.time[::2], channels={CHANNEL: whole.recording[CHANNEL][::2]})
     signal = replace(whole.signals[0], rows=np.arange(starts.size))
     found = shortened(replace(whole, recording=thin, simulator=means, signals=(signal,)))

@@ -126,7 +126,7 @@ def test_runs_are_announced_before_they_are_needed(monkeypatch: pytest.MonkeyPat
     rng, announced, needed = np.random.default_rng(3), set[tuple[int, float, float]](), []
     measured = [1.09 * blow(LATER * 0.09) + SIGMA * rng.standard_normal(TIME.size) for _ in range(2)]
     judge = Judge([evidence(values, Late()) for values in measured])
-    edged = Judge.edged
+    made = Judge._made
 
     def point(r: int, changes: Mapping[str, Any]) -> tuple[int, float, float]:
         return r, changes.get("effects.slope.angle", 0.0), changes.get("effects.mass.added", 0.0)
@@ -137,10 +137,10 @@ def test_runs_are_announced_before_they_are_needed(monkeypatch: pytest.MonkeyPat
     def asked(own: Judge, r: int, c: Any, x: Any, shift: float) -> Any:
         if any(x):  # the scenario as it is has been run
             needed.append(point(r, own.changes(c, x)) in announced)
-        return edged(own, r, c, x, shift)
+        return made(own, r, c, x, shift)
 
     monkeypatch.setattr(Judge, "made_ahead", made_ahead)
-    monkeypatch.setattr(Judge, "edged", asked)
+    monkeypatch.setattr(Judge, "_made", asked)
     base = judge.fit((), (), shifts=[0.0, 0.0])
     assert base is not None
     looked = Gate(score=9.0, scores={SLOPE.key: 9.0, MASS.key: 8.0}, null=np.zeros(4), detectable={})
