@@ -51,9 +51,9 @@ class Averaged:
         for channel, values in found.items():
             step, sizes[channel] = np.abs(np.diff(values)), np.zeros(self.starts.size)
             beside = np.maximum(np.append(step[1:], 0.0), np.concatenate([[0.0], step[:-1]]))
-            for k in np.flatnonzero(step > WITHIN * beside):
-                for there in (self._of[k], self._of[k + 1]):
-                    sizes[channel][there] = max(sizes[channel][there], step[k])
+            k = np.flatnonzero(step > WITHIN * beside)
+            for there in (self._of[k], self._of[k + 1]):
+                np.maximum.at(sizes[channel], there, step[k])
             sizes[channel][self.counts == self.many] = 0.0
         return {LEAP_IN + channel: size for channel, size in sizes.items()}
 

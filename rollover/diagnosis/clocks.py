@@ -126,7 +126,7 @@ def _left(e: Evidence, raw: Array, shift: float) -> float:
     if known.mean() < MOST or not np.all(np.isfinite(raw[known])):
         return UNKNOWN
     moved = replace(e, signals=tuple(signals))
-    misfit = np.where(known, np.concatenate([s.values for s in signals]) - e.forgiven(raw, e.about_leaps(raw)), 0.0)
+    misfit = np.where(known, np.concatenate([s.values for s in signals]) - e.forgiven(raw, e.leaps(raw)), 0.0)
     left = moved.whitened(misfit)[known]
     return float(left @ left / np.sum(moved.due[known]))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is belie
 MANY = 10  # quiet windows from which on a memory of two samples is told
 ROUGH = 0.5  # times the noise, from which on another error has a large part
 CORNER = 2.0775  # corner frequency over the filter class, forward and backward, Hz
+NOTHING: Mapping[str, Array] = MappingProxyType({})
 SHOWS = 3.0  # times the noise, from which on a step may be a leap
 LARGE = 50.0  # times the noise: a leap whose instant is not believed to the sample
 BESIDE = 3  # samples to either side, between whose values one about a leap may be
@@ -141,16 +143,16 @@ class Evidence:
         """The same of the measurement."""
         return np.concatenate([self._whitened(s, s.values) for s in self.signals])
 
-    def leaps(self, predicted: Mapping[str, Array]) -> NDArray[np.int64]:
-        """Samples (stacked) about which a prediction leaps, and means within which it does."""
-        found, within = self.about_leaps(self.raw(predicted)), []
+    def leaps(self, raw: Array, predicted: Mapping[str, Array] = NOTHING) -> NDArray[np.int64]:
+        """Samples (stacked) about which a prediction leaps, and means within which it is `predicted` to."""
+        found, within = self._about_leaps(raw), []
         for s, part in self.spans():
             size = predicted.get(LEAP_IN + s.channel)
             if size is not None:
                 within.append(part.start + np.flatnonzero(size[s.rows] > SHOWS * s.sigma))
         return np.unique(np.concatenate([found, *within])) if any(w.size for w in within) else found
 
-    def about_leaps(self, raw: Array) -> NDArray[np.int64]:
+    def _about_leaps(self, raw: Array) -> NDArray[np.int64]:
         """Samples (stacked) about which a stacked prediction leaps."""
         own = self._inside
         leap = np.abs(raw[2:] - raw[:-2])

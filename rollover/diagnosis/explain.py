@@ -18,6 +18,7 @@ from rollover.diagnosis.gate import Gate, p_value
 from rollover.diagnosis.holdout import foretold, held_out, refitted, worse
 from rollover.diagnosis.inquiry import Groups, Inquiry, Phases
 from rollover.diagnosis.otherwise import begun_otherwise, from_there, one_each, shaped_too, timed_too
+from rollover.diagnosis.refine import shifts_told
 from rollover.diagnosis.screening import ELSEWHERE, Screened, begun, is_far, kin, promising, screen, spread
 
 Array = NDArray[np.float64]
@@ -80,9 +81,7 @@ def step(inquiry: Inquiry, base: Fitted, looked: Gate) -> Step | None:
     screened = screen(judge, base, promising(candidates, looked, judge.effort), few, shifts, looked)
     count = sum(b.residual.size for b in base.blocks)
     screened, begun_with = _first_fits(inquiry, base, screened, few, shifts, looked)
-    jobs = [
-        Job(candidates=f.candidates, start=f.x, shifts=tuple(_all_shifts(shifts, f, few)), width=1) for f in begun_with
-    ]
+    jobs = [Job(candidates=f.candidates, start=f.x, shifts=shifts_told(shifts, f, few), width=1) for f in begun_with]
     fits = [f for f in inquiry.fits(jobs) if f is not None]
     if not fits:
         return None
@@ -231,14 +230,6 @@ def _chosen(screened: Sequence[Screened], effort: Effort, looked: Gate) -> list[
             s for s in (*begun_well, *own[: effort.promising]) if score(s) >= least or s.candidate.key in looked.leading
         ]
     return [*able, *(s for s in moving if s.candidate in related)]
-
-
-def _all_shifts(begun_with: Sequence[float], first: Fitted, few: Sequence[int]) -> list[float]:
-    """Time shifts of all recordings: as fitted where they are, elsewhere as begun with."""
-    shifts = list(begun_with)
-    for r, block in zip(few, first.blocks, strict=True):
-        shifts[r] = block.shift
-    return shifts
 
 
 def _elsewhere(fits: Sequence[Fitted]) -> list[Fitted]:

@@ -128,7 +128,8 @@ class Judge:
         found = self._made(r, candidates, x, shift)
         if found is None:
             return None
-        y, leaps = self.evidence[r].raw(found), self.evidence[r].leaps(found)
+        y, predicted = found
+        leaps = self.evidence[r].leaps(y, predicted)
         if leaps.size:
             self._leaps[_key(r, candidates, x, shift)] = leaps
         return self.evidence[r].forgiven(y, leaps)
@@ -136,17 +137,20 @@ class Judge:
     def edged(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
         """Stacked prediction of recording r, SI, with its leaps as they are; not remembered. None if it fails."""
         found = self._made(r, candidates, x, shift)
-        return None if found is None else self.evidence[r].raw(found)
+        return None if found is None else found[0]
 
     def _made(
         self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float
-    ) -> dict[str, Array] | None:
-        """What recording r is predicted to be; None if that fails."""
+    ) -> tuple[Array, dict[str, Array]] | None:
+        """What recording r is predicted to be, stacked (SI) and by channel; None if that fails."""
         try:
             found = self.evidence[r].simulator.predict(self.changes(candidates, x), shift)
         except ValueError:
             return None
-        return found if found is not None and np.all(np.isfinite(self.evidence[r].raw(found))) else None
+        if found is None:
+            return None
+        y = self.evidence[r].raw(found)
+        return (y, found) if np.all(np.isfinite(y)) else None
 
     @staticmethod
     def changes(candidates: Sequence[Candidate], x: Sequence[float]) -> dict[str, object]:
@@ -225,7 +229,8 @@ class Judge:
         """dy/dtau of recording r, stacked, SI; none across a leap, on whichever side a sample was and is."""
         e, later = self.evidence[r], self.effort.later
         found = e.simulator.predict(self.changes(candidates, x), shift + later)
-        after, leaps = (raw, NONE) if found is None else (e.raw(found), e.leaps(found))
+        after = raw if found is None else e.raw(found)
+        leaps = e.leaps(after, found or {})
         slope = (after - raw) / later
         if self.effort.thrifty:  # to both sides, where that costs no run
             found = e.simulator.predict(self.changes(candidates, x), shift - later)

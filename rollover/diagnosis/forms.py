@@ -11,7 +11,7 @@ import numpy as np
 from rollover.diagnosis.blocks import Fitted
 from rollover.diagnosis.candidates import Candidate, coordinate
 from rollover.diagnosis.fit import NOISE_LEFT, Judge
-from rollover.diagnosis.refine import STARTS, by_what_is_left, few_of, polish, total_of
+from rollover.diagnosis.refine import STARTS, by_what_is_left, few_of, polish, shifts_told, total_of
 
 SHORT = 4  # rounds of a fit that tells where to begin
 ABREAST = 1.5  # times what the best of short fits leaves, up to which others are followed
@@ -79,8 +79,7 @@ def _best_of(
             begun.append(one)
     best: Fitted | None = None
     for one in (one for one in begun if total_of(one) < ABREAST * total_of(begun[0])):
-        told = dict(zip(few, one.blocks, strict=True))
-        shifts = [told.get(r, b).shift for r, b in enumerate(f.blocks)]
+        shifts = shifts_told([b.shift for b in f.blocks], one, few)
         again = judge.fit(candidates, one.x, shifts=shifts)
         best = min((f for f in (best, again) if f is not None), key=lambda f: f.left, default=None)
         if best is not None and is_noise(best):

@@ -5,14 +5,14 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 
-from rollover.diagnosis.blocks import Fitted, turned
+from rollover.diagnosis.blocks import turned
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.crew import Job
 from rollover.diagnosis.explain import Step
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.otherwise import shaped_too
-from rollover.diagnosis.refine import few_of
+from rollover.diagnosis.refine import few_of, shifts_told
 from rollover.diagnosis.screening import is_far
 
 LEADING, FOLLOWING = 4, 2  # of the first effects, and of later ones each, that are tried two by two
@@ -27,29 +27,26 @@ def best_pair(inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate
     Of two effects neither need come first alone: a third may be like both, and the second may leave much alone. Short
     fits tell which pairs are worth whole ones, and the best takes the shapes that pay.
     """
-    judge, base = inquiry.judge, first.base
+    judge = inquiry.judge
     partners = _partners(inquiry, first, taken, looked)
     lead = min(first.rivals, key=lambda f: f.left)
     few, shifts = few_of(lead), tuple(b.shift for b in lead.blocks)
-    at, pinned = tuple(shifts[r] for r in few), is_far(judge, base)
+    at, pinned = tuple(shifts[r] for r in few), is_far(judge, first.base)
     pairs = list(itertools.combinations(partners, 2))
     inquiry.say(f"{len(pairs)} pairs of effects")
     jobs = [
-        Job(
-            candidates=(*base.candidates, a, b), start=(*base.x, *x, *y), shifts=at, only=tuple(few), rounds=ROUNDS,
-            pinned=pinned,
-        )
+        Job(candidates=(a, b), start=(*x, *y), shifts=at, only=tuple(few), rounds=ROUNDS, pinned=pinned)
         for (a, x), (b, y) in pairs
-    ]  # fmt: skip
+    ]
     short = sorted((f for f in inquiry.fits(jobs) if f is not None), key=lambda f: f.left)
-    jobs = [Job(candidates=f.candidates, start=f.x, shifts=_told(shifts, f, few), width=1) for f in short[:WHOLE]]
+    jobs = [Job(candidates=f.candidates, start=f.x, shifts=shifts_told(shifts, f, few), width=1) for f in short[:WHOLE]]
     fits = [f for f in inquiry.fits(jobs) if f is not None]
     if not fits:
         return None
     best = min(fits, key=lambda f: f.left)
     for pair in (best, judge.again(turned(best))):
         alone = judge.fit(pair.candidates[:-1], pair.x[: -len(pair.own)], shifts=shifts)
-        if alone is not None and not base.candidates:
+        if alone is not None:
             best = min(best, *shaped_too(inquiry, alone, [pair]), key=lambda f: f.left)
     alone = judge.fit(best.candidates[:-1], best.x[: -len(best.own)], shifts=[b.shift for b in best.blocks])
     return None if alone is None else Step(base=alone, fitted=best, p_value=first.p_value, rivals=(best,))
@@ -67,9 +64,3 @@ def _partners(
     for s in sorted(first.screened, key=lambda s: -looked.scores.get(s.candidate.key, 0.0))[:SCORED]:
         found.setdefault(s.candidate.key, (s.candidate, s.starts[0]))
     return list(found.values())
-
-
-def _told(shifts: Sequence[float], short: Fitted, few: Sequence[int]) -> tuple[float, ...]:
-    """Time shifts of all recordings: those of a short fit where it was made, elsewhere as given."""
-    told = dict(zip(few, short.blocks, strict=True))
-    return tuple(told[r].shift if r in told else s for r, s in enumerate(shifts))

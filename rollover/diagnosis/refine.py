@@ -209,6 +209,12 @@ def few_of(f: Fitted) -> list[int]:
     return sorted({ranked[0], ranked[len(ranked) // 2], ranked[-1]})
 
 
+def shifts_told(shifts: Sequence[float], short: Fitted, few: Sequence[int]) -> tuple[float, ...]:
+    """Time shifts (s) of all recordings: as fitted to the few that a short fit was made to, elsewhere as given."""
+    told = {r: block.shift for r, block in zip(few, short.blocks, strict=True)}
+    return tuple(told.get(r, s) for r, s in enumerate(shifts))
+
+
 def total_of(f: Fitted) -> float:
     """What a fit without slopes leaves."""
     return sum(b.total for b in f.blocks)

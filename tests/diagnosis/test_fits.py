@@ -51,7 +51,7 @@ def test_a_leap_is_forgiven_within_a_sample_and_not_beyond() -> None:
     moved[k] = measured[part]
 
     other = replace(e, signals=tuple(replace(s, values=v) for s, v in zip(e.signals, moved, strict=True)))
-    leaps = other.about_leaps(stepped)
+    leaps = other.leaps(stepped)
     assert {at - 1, at} <= set(leaps.tolist())
     left = (measured - other.forgiven(stepped, leaps))[part]
     assert np.max(np.abs(left)) < 1e-12
