@@ -30,7 +30,7 @@ from rollover.vehicle import Striker
 Array = NDArray[np.float64]
 LONGEST_STEP = 5e-4  # s, of the integration
 ENTRY = 0.02  # longest step over the time in which a cone goes in
-RESOLVED = 0.25  # longest step times the frequency of a striker that gives way
+RESOLVED = 0.15  # longest step times the frequency of a striker that gives way
 
 COLUMNS = {
     "ground/force_normal": (fall.OUT_FORCE, 1.0),
@@ -93,7 +93,7 @@ class DropModel:
             f[fall.SPRING], f[fall.DASHPOT] = gives.stiffness, gives.damping
             reduced = vehicle.mass * share * (1.0 - share)
             f[fall.STEP] = min(
-                f[fall.STEP], RESOLVED / max(math.sqrt(gives.stiffness / reduced), 2.0 * gives.damping / reduced)
+                f[fall.STEP], RESOLVED / max(math.sqrt(gives.stiffness / reduced), gives.damping / reduced)
             )
         if "guide-friction" in s.effects:
             guide = s.effects["guide-friction"]

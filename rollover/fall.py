@@ -72,6 +72,8 @@ CORRECTIONS = 4  # of a step that ends at such a place
 CLOSE = 1e-7  # m: how near a step ends to a jump of the force
 PAST = 2e-10  # m: how far beyond the end or the beginning of contact a step ends
 SAME_SPEED = 1e-7  # m/s: how near a step begins to where friction turns into a dashpot
+HALFWAY, LEAST = 0.5, 0.125  # of the time left until the motion turns, and of the longest step
+FAINT, LONGEST = 0.02, 4.0  # of the speed of impact, below which a ringing admits longer steps; how many times as long
 SOFTLY = 0.5  # of the time in which a guide alone would stop what slides on it
 AT_REST = 1e-8  # m/s, and m/s2 over a millisecond: what is slower on its line of unloading stays where it is
 
@@ -244,6 +246,19 @@ def is_stuck(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, now
 
 
 @compiled
+def longer(f: Any, y: Any, a: Any) -> float:
+    """Times its usual step that a striker which gives way may take as its ringing dies out; 1 of a rigid one.
+
+    What a step misses of a ringing goes by its amplitude and the fourth power of the step. `a` (4, 2) as in `advance`.
+    """
+    if f[SPRING] <= 0.0 or f[SPEED] <= 0.0:
+        return 1.0
+    omega = math.sqrt(f[SPRING] * f[MASS] / (f[NOSE] * (f[MASS] - f[NOSE])))
+    ringing = math.hypot(y[1] - y[3], (a[3, 0] - a[3, 1]) / omega)
+    return min(max((FAINT * f[SPEED] / max(ringing, 1e-12)) ** 0.25, 1.0), LONGEST)  # type: ignore[no-any-return]
+
+
+@compiled
 def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
     """Fall on the ground at t = 0 with SPEED, or from HEIGHT at t = 0 with it.
 
@@ -277,9 +292,11 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
     most = 10_000 + 200 * int(max(times[n - 1], 0.0) / whole[STEP]) if n > 0 else 0
     while i < n:
         steps += 1
-        h = f[STEP]
+        h = f[STEP] * longer(f, y, a)
         if guide > 0.0:  # near rest its friction is a stiff dashpot, and before, a step must not reach through that
             h = min(h, SOFTLY * m * max(min(abs(y[1]), abs(y[3])), creep, INCHING) / guide)
+        if guide > 0.0 or (state[MODE] == LOADING and y[1] > 0.0):  # what depends on the rate turns over near rest
+            h = min(h, max(HALFWAY * abs(y[1]) / max(abs(a[3, 0]), 1e-9), LEAST * f[STEP]))
         h = min(h, RESOLVED * math.sqrt((f[NOSE] + row[MASS_B]) / max(steepness(law, p, s, row, state), 1e-9)))
         advance(law, p, s, row, state, f, y, h, a, end)
         if steps > most or not (abs(end[1]) < 1e4 and abs(end[3]) < 1e4):
@@ -290,7 +307,7 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
             way = 1.0 if end[0] > y[0] else -1.0
             # up to a jump of the force, just past where contact begins or ends, to a kink
             near = level - way * CLOSE if k > 2 else level + way * PAST if k == 0 else level
-            if abs(y[0] - level) > 2.0 * CLOSE and (y[0] - near) * (end[0] - near) < 0.0:
+            if abs(y[0] - level) > 1.5 * CLOSE and (y[0] - near) * (end[0] - near) < 0.0:
                 theta = crossing(near, h, y[0], y[1], end[0], end[1])
                 if theta < share:
                     share, jump, goal = theta, way * 2.0 * CLOSE if k > 2 else 0.0, near
@@ -315,6 +332,9 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
             advance(law, p, s, row, state, f, y, h, a, end)
             for _ in range(CORRECTIONS):  # what lies beyond bent the first guess
                 miss = end[0] - goal
+                if jump != 0.0:  # no stage may look beyond it
+                    last_stage = y[0] + h * (y[1] + 0.5 * h * a[1, 0])
+                    miss = (max(end[0], last_stage) if end[1] > 0.0 else min(end[0], last_stage)) - goal
                 if creeping:
                     accelerate(law, p, s, row, state, f, end, now)
                     h = max(h - (end[1] - bend) / now[0], 1e-9 * f[STEP]) if now[0] != 0.0 else h
@@ -324,6 +344,8 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
                     break
                 h -= miss / end[1]
                 advance(law, p, s, row, state, f, y, h, a, end)
+            if abs(end[0] - goal) > 0.9 * CLOSE:
+                jump = 0.0  # the next step goes there
         if row[MASS_B] > 0.0 and f[SPRING] > 0.0 and held(law, p, s, row, state, f, end, now) < -pull:
             low, high = 0.0, h  # the step ends where the soil stays behind
             for _ in range(HALVINGS):
@@ -384,6 +406,8 @@ def drop(law: Any, p: Any, memory: int, f: Any, times: Any, out: Any) -> int:
                 row[MASS_B], row[GROWING] = 0.0, 0.0
                 if law[PLASTIC] == 0:
                     row[LINE_Z] = 0.0  # no rut stays
+        if jump != 0.0:
+            accelerate(law, p, s, row, state, f, y, a[3])  # behind the jump
         settle_one(law, p, row, state, f[MASS])
         stuck = is_stuck(law, p, s, row, state, f, y, now)
         if stuck:

@@ -15,6 +15,7 @@ from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.chaos import weighted
 from rollover.diagnosis.chassis import degrees_of
 from rollover.diagnosis.clocks import align, by_clock, mistimed
+from rollover.diagnosis.coarse import by_digits, coarse
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.dependence import Dependence, dependence, dependence_of_one
 from rollover.diagnosis.detect import mismatch_of
@@ -123,7 +124,10 @@ def diagnose(
     explanation, effects, kept = named_so
     found = list(judge.evidence)
     cut: tuple[Place, ...] = ()
-    if verdict == "no-mismatch":
+    digits = coarse(found, phases) if verdict == "no-mismatch" else ()
+    if digits:  # in coarse steps any top is flat
+        cut, verdict = digits, "unexplained"
+    elif verdict == "no-mismatch":
         effects, cut = cut_off([e.name for e in found], [dict(recordings)[e.name] for e in found], phases)
         verdict = "sensor" if effects else verdict
     before, after = explanation.before, explanation.after
@@ -140,7 +144,7 @@ def diagnose(
         of_motion = Dependence(shares=dependency(judge, explanation.base))
         depends_on = of_motion if of_one is None or of_one.yields_to(of_motion) else of_one
     law = None
-    if verdict == "unexplained" and acts == "drop":
+    if verdict == "unexplained" and acts == "drop" and not digits:
         say("a law for what no candidate explains")
         law = proposed(judge, explanation.base, set_ups, found, groups)
     detectable = dict(explanation.detectable)
@@ -150,26 +154,29 @@ def diagnose(
     h_before, h_after = (judged(judge, f, kept, groups) for f in (explanation.base, explanation.fitted))
     early = before_a_blow(judge.evidence, explanation.base), before_a_blow(judge.evidence, explanation.fitted)
     remains = after.p_value < SURE and matters(judge, explanation.fitted, after)
+    is_left = (verdict == "unexplained" and not digits) or (bool(effects) and remains)
     training = tuple(e.name for e in found)
     notes += [*(_felt(degrees[0]) for _ in degrees[:1] if is_mismatch), *by_steps(effects), *_cost(found)]
     return Diagnosis(
         verdict=verdict,
         sentence=(
-            agreeing_but(effects, len(found), explanation.p_value)
+            by_digits(digits, found, explanation.p_value)
+            if digits
+            else agreeing_but(effects, len(found), explanation.p_value)
             if cut
             else sentence(verdict, effects, explanation.p_value, h_before.held, h_after.held, found, early)
         )
-        + (closest(explanation, groups) if verdict == "unexplained" else "")
-        + (by_clock(mistimed(judge, explanation.fitted)) if verdict == "unexplained" or (effects and remains) else "")
+        + (closest(explanation, groups) if verdict == "unexplained" and not digits else "")
+        + (by_clock(mistimed(judge, explanation.fitted)) if is_left else "")
         + offered(law)
         + against_itself(verdict, contrary),
-        p_value=min([explanation.p_value, *(e.p_value for e in effects if cut)]),
+        p_value=0.0 if digits else min([explanation.p_value, *(e.p_value for e in effects if cut)]),
         noise=noise(found),
         where=places(before, found, depends_on.on) if is_mismatch else cut,
         effects=effects,
-        remaining_significant=verdict == "unexplained" or (bool(effects) and remains),
+        remaining_significant=is_left or bool(digits),
         remaining_p_value=after.p_value,
-        remaining_where=places(after, found, None) if verdict == "unexplained" or (effects and remains) else (),
+        remaining_where=digits or (places(after, found, None) if is_left else ()),
         depends_on=depends_on.on if is_mismatch else None,
         dependencies=depends_on.shares,
         degrees=degrees if is_mismatch else (),

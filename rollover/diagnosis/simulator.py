@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,10 @@ from rollover.recording import Recording
 from rollover.scenario import Scenario
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 EDGES = ("sensor-lag", "sensor-clock-offset", "sensor-clock-drift")
-STEPS = (1e-3, 4e-4, 1e-4)  # s: step of a drop without, with one, with more abrupt effects; within 7e-5 of the range
+# s: longest step of a drop, within 6e-5 of the range; and of one with abrupt effects, within 8e-4 where it rings
+STEP, SHORT = 2e-3, 1e-3
 BESIDE = 1e-9  # s: on either side of the first contact
 KEPT = 128  # runs of one recording
 
@@ -75,20 +77,20 @@ class DropSimulator:
         self.model = DropModel(scenario=scenario)
         self.recording = recording
         self._raw: dict[tuple[Any, ...], dict[str, Array]] = {}
+        self._models: dict[tuple[Any, ...], DropModel] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         """What is sent to another process: not the runs."""
-        return {"model": DropModel(scenario=self.model.scenario), "recording": self.recording, "_raw": {}}
+        bare = DropModel(scenario=self.model.scenario)
+        return {"model": bare, "recording": self.recording, "_raw": {}, "_models": {}}
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """See `Simulator`; ``ValueError`` for a value out of bounds passes."""
         physical = {path: value for path, value in changes.items() if not path.startswith(f"effects.{SENSORS}")}
-        model = self.model
-        if len(physical) < len(changes):
-            model = model.with_({path: value for path, value in changes.items() if path not in physical})
-        sensors = {name: e for name, e in model.scenario.effects.items() if name.startswith(SENSORS)}
+        read_by = self._model({path: value for path, value in changes.items() if path not in physical})
+        sensors = {name: e for name, e in read_by.scenario.effects.items() if name.startswith(SENSORS)}
         try:
-            channels = self._at(physical, shift)
+            channels = self._run(physical, self.rows.times, shift)
             if sensors:
                 channels = {**channels, **self._edges(physical, shift, sensors)}
                 run = Recording(title=self.recording.title, time=self.rows.times, channels=channels)
@@ -117,30 +119,29 @@ class DropSimulator:
     def state(self, shift: float) -> Mapping[str, Array]:
         """See `Simulator`."""
         try:
-            return {name: values[self.rows.stamps] for name, values in self._at({}, shift).items()}
+            return {name: values[self.rows.stamps] for name, values in self._run({}, self.rows.times, shift).items()}
         except DropFailedError:
             return {}
 
     def _edges(self, physical: Mapping[str, Any], shift: float, sensors: Mapping[str, Any]) -> dict[str, Array]:
         """Channels behind a lag or with a clock of their own: what these make of a leap lies between the rows."""
-        stamps = self.rows.times
         lags, offsets, drifts = ({e.channel: e for e in every(sensors, name)} for name in EDGES)
         found = {}
         for channel in {*lags, *offsets, *drifts} & set(self.recording.channels):
-            own, lag = stamps, lags.get(channel)
+            own = self.rows.times
             if channel in offsets:
                 own = own - offsets[channel].offset
             if channel in drifts:
                 own = (1.0 - drifts[channel].drift) * own
-            own, key = own - shift, (shift, channel, offsets.get(channel), drifts.get(channel))
-            if lag is None:
-                found[channel] = self._run(physical, own, key)[channel]
+            key = channel, offsets.get(channel), drifts.get(channel)
+            if channel not in lags:
+                found[channel] = self._run(physical, own, shift, key)[channel]
                 continue
-            beside = self.contact + np.array([-BESIDE, BESIDE])
+            beside = self.contact + shift + np.array([-BESIDE, BESIDE])
             fine = np.concatenate([own, 0.5 * (own[1:] + own[:-1]), beside[(beside > own[0]) & (beside < own[-1])]])
             dense, where = np.unique(fine, return_inverse=True)
-            raw = {channel: self._run(physical, dense, (*key, "dense"))[channel]}
-            late = lag.read(Recording(title=self.recording.title, time=dense, channels=raw))
+            raw = {channel: self._run(physical, dense, shift, (*key, "dense"), ahead=False)[channel]}
+            late = lags[channel].read(Recording(title=self.recording.title, time=dense, channels=raw))
             found[channel] = late[channel][where[: own.size]]
         return found
 
@@ -159,41 +160,52 @@ class DropSimulator:
         below = self.model.motion(times)["ground/sinkage"] > 0.0
         return float(times[np.argmax(below)]) if below.any() else np.inf
 
-    @cached_property
-    def _twice(self) -> tuple[Array, NDArray[np.int64]]:
-        """The rows and what each is a little later, in order, and where each is among these."""
-        stamps = self.rows.times
-        # at 20 kHz one row's little later is the next row
-        times, back = np.unique(np.concatenate([stamps, stamps - self.effort.later]), return_inverse=True)
-        return times, back
+    def _run(
+        self,
+        physical: Mapping[str, Any],
+        times: Array,
+        shift: float,
+        key: tuple[Any, ...] = (),
+        *,
+        ahead: bool = True,
+    ) -> dict[str, Array]:
+        """The drop before instruments at `times` less `shift`, which `key` stands for beside it.
 
-    def _at(self, physical: Mapping[str, Any], shift: float) -> dict[str, Array]:
-        """The drop at its rows less `shift`, before instruments; what it is a little later is made along with it."""
-        values = tuple(sorted(physical.items()))
+        What it is a little later is asked for next: it is made along with it where these are the same `ahead`.
+        """
+        values = (*sorted(physical.items()), *key)
         if (*values, shift) not in self._raw:
-            times, back = self._twice
-            run, many = self._made(physical, times - shift), self.rows.times.size
-            for key, part in ((shift, back[:many]), (shift + self.effort.later, back[many:])):
-                self._keep((*values, key), {name: v[part] for name, v in run.items()})
+            if not ahead:
+                self._keep(self._raw, (*values, shift), self._made(physical, times - shift))
+                return self._raw[(*values, shift)]
+            both = np.concatenate([times, times - self.effort.later]) - shift
+            order = np.argsort(both, kind="stable")
+            back = np.empty_like(order)
+            back[order] = np.arange(order.size)
+            run = self._made(physical, both[order])
+            for at, part in ((shift, back[: times.size]), (shift + self.effort.later, back[times.size :])):
+                self._keep(self._raw, (*values, at), {name: v[part] for name, v in run.items()})
         return self._raw[(*values, shift)]
 
-    def _run(self, physical: Mapping[str, Any], times: Array, key: tuple[Any, ...]) -> dict[str, Array]:
-        """The drop before instruments at `times`, which `key` stands for."""
-        key = (*sorted(physical.items()), *key)
-        if key not in self._raw:
-            self._keep(key, self._made(physical, times))
-        return self._raw[key]
+    def _model(self, changes: Mapping[str, Any]) -> DropModel:
+        """The drop with values exchanged, its steps as short as it asks for."""
+        key = tuple(sorted(changes.items()))
+        if key not in self._models:
+            model = self.model.with_(changes) if changes else self.model
+            has_own = model.scenario.ground.law.advance is not None  # states of its own are second order in the step
+            is_abrupt = has_own or any(effect.is_abrupt for effect in model.scenario.effects.values())
+            self._keep(self._models, key, replace(model, step=SHORT if is_abrupt else STEP))
+        return self._models[key]
 
     def _made(self, physical: Mapping[str, Any], times: Array) -> dict[str, Array]:
-        model = self.model.with_(physical) if physical else self.model
-        abrupt = sum(effect.is_abrupt for effect in model.scenario.effects.values())
-        return replace(model, step=STEPS[min(abrupt, len(STEPS) - 1)]).motion(times)
+        return self._model(physical).motion(times)
 
-    def _keep(self, key: tuple[Any, ...], run: dict[str, Array]) -> None:
+    @staticmethod
+    def _keep(store: dict[tuple[Any, ...], T], key: tuple[Any, ...], value: T) -> None:
         """What sensors alone change needs no second run."""
-        if len(self._raw) >= KEPT:
-            self._raw.pop(next(iter(self._raw)))
-        self._raw[key] = run
+        if len(store) >= KEPT:
+            store.pop(next(iter(store)))
+        store[key] = value
 
 
 def simulator_of(scenario: Scenario, recording: Recording) -> Simulator:

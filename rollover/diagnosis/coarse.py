@@ -1,0 +1,54 @@
+"""Digits so coarse that a channel does not show what was measured: no model is wrong, and none makes up for it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rollover.channels import describe
+from rollover.diagnosis.evidence import Evidence, Signal
+from rollover.diagnosis.verdict import Place
+from rollover.effects import spoken
+
+FINEST = 0.05  # of a channel's range in all recordings: steps of its digits that are worth a verdict
+
+
+def coarse(evidence: Sequence[Evidence], phases: Sequence[Sequence[tuple[float, str]]]) -> tuple[Place, ...]:
+    """Where channels are recorded in steps of more than `FINEST` of their range and more than their noise."""
+    ends: dict[str, list[float]] = {}
+    for s in (s for e in evidence for s in e.signals):
+        ends.setdefault(s.channel, []).extend((float(s.values.min()), float(s.values.max())))
+    rough = [
+        (r, e, s) for r, e in enumerate(evidence) for s in e.signals if s.step > FINEST * _between(ends[s.channel])
+    ]
+    return tuple(_place(e, s, phases[r], 1.0 / len(rough)) for r, e, s in rough)
+
+
+def by_digits(places: Sequence[Place], evidence: Sequence[Evidence], p_value: float) -> str:
+    """The sentence on recordings that agree with the simulation but for what their digits make of them."""
+    steps = {s.channel: s.step for e in evidence for s in e.signals if s.channel in {p.channel for p in places}}
+    said = " and ".join(f"{c} in steps of {spoken(step)} {describe(c).unit}" for c, step in steps.items())
+    return (
+        f"Recorded is {said}, far more than the noise: what was measured and what was recorded differ by half of that, "
+        f"which no candidate explains. Otherwise simulation and {len(evidence)} recordings agree within the noise "
+        f"(p = {p_value:.2g})."
+    )
+
+
+def _between(values: Sequence[float]) -> float:
+    return max(values) - min(values)
+
+
+def _place(e: Evidence, s: Signal, phases: Sequence[tuple[float, str]], share: float) -> Place:
+    """The whole of a signal, with the phase in which it reaches furthest."""
+    times = e.recording.time[s.rows]
+    peak = float(times[int(abs(s.values - s.values[0]).argmax())])
+    phase = [name for start, name in phases if start <= peak] or [phases[0][1]]
+    return Place(
+        recording=e.name,
+        channel=s.channel,
+        phase=phase[-1],
+        start=float(times[0]),
+        end=float(times[-1]),
+        share=share,
+        depends_on="value",
+    )
