@@ -7,7 +7,7 @@ thousand drops in the time of a hundred full runs. Where both can be asked they 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -133,8 +133,7 @@ class DropModel:
 
     def motion(self, times: Array) -> dict[str, Array]:
         """Channels of the drop at `times` (s, rising), before its sensors. Raises `DropFailedError`."""
-        out = self.rows(times)
-        return {name: sign * out[:, column] for name, (column, sign) in COLUMNS.items()}
+        return channels_of(self.rows(times), COLUMNS)
 
     def run(self, times: Array | None = None) -> Recording:
         """Channels of the drop at `times` (s, rising; default: rows of the full run), as its sensors read them.
@@ -144,6 +143,11 @@ class DropModel:
         at = self.times if times is None else np.ascontiguousarray(times, dtype=np.float64)
         recording = Recording(title=self.scenario.title, time=at, channels=self.motion(at), source="simulation")
         return read(self.scenario.effects, recording)
+
+
+def channels_of(rows: Array, names: Collection[str]) -> dict[str, Array]:
+    """Those of the channels `names` that a drop has, from `DropModel.rows`."""
+    return {name: sign * rows[:, column] for name, (column, sign) in COLUMNS.items() if name in names}
 
 
 def landing_speed(start: Drop | Release, gravity: float) -> float:

@@ -10,8 +10,9 @@ import hashlib
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Block, Fitted, Judge
@@ -22,6 +23,8 @@ from rollover.diagnosis.thresholds import Stretch, traced
 from rollover.execute import Children, map_cases
 
 Progress = Callable[[str], None]
+T = TypeVar("T")
+R = TypeVar("R")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +35,7 @@ class Job:
     "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too or takes it in another
     `form`, "time" tries out the time shifts, "comb" begins anew all along the second parameter of the last effect,
     "scan" all along its shape, "trace" where it sets in, over a `stretch`. A shape or form that comes nowhere near what
-    the best fit `leaves` of each recording is not gone on with.
+    the best fit `leaves` of each recording is not gone on with, in a scan either.
     """
 
     how: Literal["fit", "polish", "shape", "time", "comb", "scan", "trace"] = "fit"
@@ -142,6 +145,25 @@ class Crew:
             ended(k, fitted)
         return found
 
+    def looks(self, judge: Judge, look: Callable[[Judge, T], R], things: Sequence[T]) -> list[R]:
+        """What a `look` at each thing tells, in their order: here, or spread over the children once they are there.
+
+        `look` and what it returns are sent to them: a function of a module, or a partial of one.
+        """
+        if judge.effort.thrifty or len(things) < 2 or not self.is_there():
+            return [look(judge, thing) for thing in things]
+        about, bare = f"{self.about} {judge.fingerprint()} {judge.shifts}", judge.bare()
+        shares = [list(things)[k :: 2 * self.workers] for k in range(2 * self.workers)]
+        found: dict[int, R] = {}
+        tasks = [(about, bare, look, share) for share in shares if share]
+        for outcome in map_cases(_looked, tasks, children=self.children):
+            if outcome.value is None:
+                raise RuntimeError(f"a look: {outcome.failure.sentence if outcome.failure else 'no reason given'}")
+            told, made = outcome.value
+            judge.simulations += made
+            found |= {outcome.index + 2 * self.workers * k: one for k, one in enumerate(told)}
+        return [found[k] for k in range(len(things))]
+
     def _note(self, key: str, fitted: Fitted | None) -> None:
         row: dict[str, Any] | None = None
         if fitted is not None:
@@ -170,13 +192,14 @@ def work(judge: Judge, job: Job) -> Fitted | None:
     begun = linearised(judge, job.candidates, job.start, job.shifts, job.recordings)
     if begun is None:
         return None
+    leaves = [b.total for b in begun.blocks] if job.leaves is None else job.leaves
     if job.how == "shape":
-        leaves = [b.total for b in begun.blocks] if job.leaves is None else job.leaves
         return shaped(judge, begun, leaves) if job.form is None else in_form(judge, begun, job.form, leaves)
     if job.stretch is not None:
         return traced(judge, begun, job.stretch)
     ways: dict[str, Callable[[Judge, Fitted], Fitted | None]] = {
-        "polish": polish, "time": timed, "comb": combed, "scan": scanned,
+        "polish": polish, "time": timed, "comb": combed,
+        "scan": partial(scanned, leaves=leaves),
     }  # fmt: skip
     return ways[job.how](judge, begun)
 
@@ -190,11 +213,23 @@ def _begun(judge: Judge) -> None:
 
 def _worked(case: tuple[str, Judge, Job]) -> tuple[Fitted | None, int]:
     about, sent, job = case
-    if about not in _held:
-        _held.clear()
-    judge = _held.setdefault(about, sent)
+    judge = _kept(about, sent)
     before = judge.simulations
     return work(judge, job), judge.simulations - before
+
+
+def _looked(case: tuple[str, Judge, Callable[[Judge, Any], Any], list[Any]]) -> tuple[list[Any], int]:
+    about, sent, look, things = case
+    judge = _kept(about, sent)
+    before = judge.simulations
+    return [look(judge, thing) for thing in things], judge.simulations - before
+
+
+def _kept(about: str, sent: Judge) -> Judge:
+    """The judge that was sent, with what it simulated before."""
+    if about not in _held:
+        _held.clear()
+    return _held.setdefault(about, sent)
 
 
 def _rebuilt(judge: Judge, job: Job, row: dict[str, Any] | None) -> Fitted | None:

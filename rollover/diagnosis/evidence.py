@@ -189,7 +189,7 @@ class Evidence:
         """
         if not leaps.size:
             return raw
-        y, measured = raw.copy(), np.concatenate([s.values for s in self.signals])
+        y, measured = raw.copy(), self._values
         for _, part in self.spans():
             inside = leaps[(leaps >= part.start) & (leaps < part.stop)]
             near = raw[np.clip(inside[:, None] + np.arange(-BESIDE, BESIDE + 1), part.start, part.stop - 1)]
@@ -211,11 +211,20 @@ class Evidence:
 
     def spans(self) -> list[tuple[Signal, slice]]:
         """Each signal with its place in the stack."""
+        return self._spans
+
+    @cached_property
+    def _spans(self) -> list[tuple[Signal, slice]]:
         found, at = [], 0
         for s in self.signals:
             found.append((s, slice(at, at + s.rows.size)))
             at += s.rows.size
         return found
+
+    @cached_property
+    def _values(self) -> Array:
+        """The measured samples, one signal after another, SI."""
+        return np.concatenate([s.values for s in self.signals])
 
     @staticmethod
     def _whitened(signal: Signal, values: Array) -> Array:

@@ -78,7 +78,7 @@ def step(inquiry: Inquiry, base: Fitted, looked: Gate) -> Step | None:
     # of recordings that went another way together, two may be those that no explanation brings back
     several = judge.effort.few if judge.straying else judge.effort.looked_at
     few, shifts = spread(base, groups, several), begun(judge, base)
-    screened = screen(judge, base, promising(candidates, looked, judge.effort), few, shifts, looked)
+    screened = screen(inquiry, base, promising(candidates, looked, judge.effort), few, shifts, looked)
     count = sum(b.residual.size for b in base.blocks)
     screened, begun_with = _first_fits(inquiry, base, screened, few, shifts, looked)
     jobs = [Job(candidates=f.candidates, start=f.x, shifts=shifts_told(shifts, f, few), width=1) for f in begun_with]

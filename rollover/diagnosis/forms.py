@@ -11,11 +11,10 @@ import numpy as np
 from rollover.diagnosis.blocks import Fitted
 from rollover.diagnosis.candidates import Candidate, coordinate
 from rollover.diagnosis.fit import NOISE_LEFT, Judge
-from rollover.diagnosis.refine import STARTS, by_what_is_left, few_of, polish, shifts_told, total_of
+from rollover.diagnosis.refine import BEHIND, STARTS, by_what_is_left, few_of, polish, shifts_told, total_of
 
 SHORT = 4  # rounds of a fit that tells where to begin
 ABREAST = 1.5  # times what the best of short fits leaves, up to which others are followed
-BEHIND = 2.0  # times what another explanation leaves, beyond which none is gone on with
 THERE = 0.003  # of a coordinate, within which two short fits came to one place
 BESIDE_FORM = np.linspace(-0.1, 0.05, 13)  # of a coordinate: where a threshold of another form may lie
 ELSEWHERE = (0.2, 0.35, 0.5, 0.65, 0.8)  # coordinates of a number that only this form has

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.crew import Crew, Job
+from rollover.diagnosis.crew import Crew, Job, R, T
 from rollover.diagnosis.fit import Fitted, Judge
 
 Groups = Sequence[Sequence[int]]
@@ -33,3 +33,7 @@ class Inquiry:
     def fits(self, jobs: Sequence[Job]) -> list[Fitted | None]:
         """What comes of jobs, in their order."""
         return self.crew.fits(self.judge, jobs, self.say)
+
+    def looks(self, look: Callable[[Judge, T], R], things: Sequence[T]) -> list[R]:
+        """What a look at each thing tells, in their order; see `Crew.looks`."""
+        return self.crew.looks(self.judge, look, things)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -12,7 +13,7 @@ from rollover.diagnosis.blocks import Block
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.crew import Job
 from rollover.diagnosis.detect import mismatch_of
-from rollover.diagnosis.fit import Fitted
+from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.forms import is_noise
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import held_out
@@ -70,16 +71,12 @@ def _but_for_some(
     Such a one meets most recordings far better than the best does, by the middle one, and leaves a few altogether: a
     face that is held lets go or does not.
     """
-    usual, places = _middle(fits[0].blocks), []
-    for c in (c for c in inquiry.free(base) if c.shapes):
-        met = []
-        for start in (*looked.starts.get(c.key, ()), *c.starts()):
-            x = (*base.x, *start)
-            blocks = [inquiry.judge.block(r, (*base.candidates, c), x, s, 0.0) for r, s in enumerate(shifts)]
-            if all(b is not None for b in blocks):
-                met.append((_middle([b for b in blocks if b is not None]), x))
-        if met and min(met)[0] < MOSTLY * usual:
-            places.append((c, min(met)[1]))
+    able = [c for c in inquiry.free(base) if c.shapes]
+    begun = [tuple((*base.x, *start) for start in (*looked.starts.get(c.key, ()), *c.starts())) for c in able]
+    most = MOSTLY * _middle(fits[0].blocks)
+    look = partial(_best_middle, beside=base.candidates, shifts=tuple(shifts), most=most)
+    met = zip(able, inquiry.looks(look, list(zip(able, begun, strict=True))), strict=True)
+    places = [(c, x) for c, x in met if x is not None]
     return _with_shapes(inquiry, base, fits, places, shifts)
 
 
@@ -91,8 +88,43 @@ def _with_shapes(
     shifts: Sequence[float],
 ) -> list[Fitted]:
     """The fits, best first, with those of candidates fitted together with their shapes from places beside the base."""
-    jobs = [Job(how="scan", candidates=(*base.candidates, c), start=x, shifts=tuple(shifts)) for c, x in places]
+    leaves = tuple(b.total for b in fits[0].blocks)
+    jobs = [
+        Job(how="scan", candidates=(*base.candidates, c), start=x, shifts=tuple(shifts), leaves=leaves)
+        for c, x in places
+    ]
     return sorted([*fits, *(f for f in inquiry.fits(jobs) if f is not None)], key=lambda f: f.left)
+
+
+def _best_middle(
+    judge: Judge,
+    begun: tuple[Candidate, tuple[tuple[float, ...], ...]],
+    *,
+    beside: tuple[Candidate, ...],
+    shifts: tuple[float, ...],
+    most: float,
+) -> tuple[float, ...] | None:
+    """Where a candidate leaves least of the middle recording of those places; None if nowhere less than `most`."""
+    c, places = begun
+    met = [(left, x) for x in places if (left := _middle_at(judge, (*beside, c), x, shifts, most)) is not None]
+    return min(met)[1] if met else None
+
+
+def _middle_at(
+    judge: Judge, candidates: Sequence[Candidate], x: tuple[float, ...], shifts: Sequence[float], most: float
+) -> float | None:
+    """What the middle recording leaves per sample at x; None from `most` on, or where one cannot be simulated."""
+    blocks: list[Block] = []
+    for r, shift in enumerate(shifts):
+        block = judge.block(r, candidates, x, shift, 0.0)
+        if block is None:
+            return None
+        blocks.append(block)
+        # with so many beyond twice the most the middle one, or the mean of two, is beyond it
+        if 2 * sum(_middle([b]) >= 2.0 * most for b in blocks) >= len(shifts):
+            return None
+    left = _middle(blocks)
+    return left if left < most else None
 
 
 def _middle(blocks: Sequence[Block]) -> float:

@@ -17,6 +17,7 @@ TEETH, COMBED, BESIDE = 11, 0.05, 20  # places on a first coordinate, within so 
 STARTS, APART = 3, 0.06  # of the best places, so far apart
 SCANNED = (np.arange(40) + 0.5) / 40  # places of a shape
 TICK, SHORTEST, NARROWER = 8e-5, 5e-6, 0.4  # s, by which a time shift is tried to either side; then less, by a factor
+BEHIND = 2.0  # times what another explanation leaves, beyond which none is gone on with
 TRIED = 40  # at most so many
 ROUNDS = 3  # of a fit with the errors of the conditions as they act beside it
 TWICE, LITTLE = 2, 1.0  # how often; a gain that is not worth another time
@@ -101,10 +102,11 @@ def combed(judge: Judge, fitted: Fitted) -> Fitted:
     return best if best.left < fitted.left else fitted
 
 
-def scanned(judge: Judge, fitted: Fitted) -> Fitted | None:
+def scanned(judge: Judge, fitted: Fitted, leaves: Sequence[float]) -> Fitted | None:
     """A fit of the last effect with its shape, begun where least is left all along each parameter of the shape.
 
-    A recording in which a face lets go, or does not, is met within a narrow stretch alone.
+    A recording in which a face lets go, or does not, is met within a narrow stretch alone. One that comes nowhere near
+    what another explanation `leaves` of the recordings is not gone on with.
     """
     last, at, shifts = fitted.candidates[-1], len(fitted.x), [b.shift for b in fitted.blocks]
     candidates, usual = (*fitted.candidates[:-1], last.whole()), last.with_shapes(fitted.x[-len(last.search) :])[0]
@@ -112,7 +114,9 @@ def scanned(judge: Judge, fitted: Fitted) -> Fitted | None:
     places = [(*begun[:k], float(v), *begun[k + 1 :]) for k in range(at, len(begun)) for v in SCANNED]
     met = by_what_is_left(judge, candidates, places, shifts)
     again = judge.fit(candidates, met[0], shifts=shifts, width=1) if met else None
-    return None if again is None else polish(judge, again)
+    if again is None or again.left > BEHIND * sum(leaves):
+        return again
+    return polish(judge, again)
 
 
 def timed(judge: Judge, fitted: Fitted) -> Fitted:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from rollover.diagnosis.candidates import BESIDE, Candidate, akin
 from rollover.diagnosis.clocks import by_first_contact
 from rollover.diagnosis.effort import DROPS, Effort
-from rollover.diagnosis.fit import Fitted, Judge
+from rollover.diagnosis.fit import Block, Fitted, Judge
 from rollover.diagnosis.gate import WAYS, Gate, freed
+from rollover.diagnosis.inquiry import Inquiry
+from rollover.diagnosis.secant import Point
 
 SCORED = 18  # candidates looked at closer, by their score
 BENT = 1.2  # misfit over the noise from which on time shifts fitted to it are bent by what is missing
@@ -70,7 +73,7 @@ def begun(judge: Judge, base: Fitted) -> list[float]:
 
 
 def screen(
-    judge: Judge,
+    inquiry: Inquiry,
     base: Fitted,
     candidates: Sequence[Candidate],
     few: Sequence[int],
@@ -81,11 +84,11 @@ def screen(
 
     Not far from an explanation the places to which `looked` leads are enough.
     """
-    found: list[Screened] = []
+    judge = inquiry.judge
     beside = [judge.block(r, base.candidates, base.x, shifts[r], 0.0) for r in few]
-    blocks = [b for b in beside if b is not None]
+    blocks = tuple(b for b in beside if b is not None)
     if len(blocks) < len(few):
-        return found
+        return []
     near = not is_far(judge, base) and not judge.effort.thrifty
 
     def places(c: Candidate) -> tuple[tuple[float, ...], ...]:
@@ -93,31 +96,55 @@ def screen(
         return tuple(ways if (near or c.is_placed) and ways else (*ways, *c.starts()))
 
     judge.made_ahead((r, (*base.candidates, c), (*base.x, *x)) for c in candidates for x in places(c) for r in few)
-    for c in candidates:
-        met: list[tuple[float, tuple[float, ...]]] = []
-        potential = 0.0
-        for start in places(c):
-            left, along, size, count = 0.0, 0.0, 0.0, 0
-            for r, block in zip(few, blocks, strict=True):
-                there = judge.block(r, (*base.candidates, c), (*base.x, *start), shifts[r], 0.0)
-                if there is None:
-                    break
-                count += 1
-                left += there.normal()[2]
-                way = block.counted(block.plain_residual - there.plain_residual)
-                free = freed(np.column_stack([way, block.residual]), block)
-                along += float(free[:, 0] @ free[:, 1])
-                size += float(free[:, 0] @ free[:, 0])
-            if count < len(blocks):
-                continue
-            if size > 1e-12:
-                potential = max(potential, along * along / size)
-            met.append((left, start))
-        if met:
-            met.sort()
-            starts = tuple(dict.fromkeys((*looked.far.get(c.key, ()), *_begun_at(c, met))))
-            found.append(Screened(candidate=c, starts=starts, left=met[0][0], potential=potential))
-    return found
+    things = [_Look(candidate=c, places=places(c), far=looked.far.get(c.key, ())) for c in candidates]
+    look = partial(
+        _screened, base=(base.candidates, base.x), few=tuple(few), shifts=tuple(shifts[r] for r in few), blocks=blocks
+    )
+    return [s for s in inquiry.looks(look, things) if s is not None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Look:
+    """A candidate, where it is looked at, and where it may begin in any case."""
+
+    candidate: Candidate
+    places: tuple[tuple[float, ...], ...]
+    far: tuple[tuple[float, ...], ...]
+
+
+def _screened(
+    judge: Judge,
+    thing: _Look,
+    *,
+    base: Point,
+    few: tuple[int, ...],
+    shifts: tuple[float, ...],
+    blocks: tuple[Block, ...],
+) -> Screened | None:
+    """One candidate looked at beside a base, which few recordings meet by these blocks; None if nothing can be made."""
+    c, met, potential = thing.candidate, [], 0.0
+    for start in thing.places:
+        left, along, size, count = 0.0, 0.0, 0.0, 0
+        for r, shift, block in zip(few, shifts, blocks, strict=True):
+            there = judge.block(r, (*base[0], c), (*base[1], *start), shift, 0.0)
+            if there is None:
+                break
+            count += 1
+            left += there.normal()[2]
+            way = block.counted(block.plain_residual - there.plain_residual)
+            free = freed(np.column_stack([way, block.residual]), block)
+            along += float(free[:, 0] @ free[:, 1])
+            size += float(free[:, 0] @ free[:, 0])
+        if count < len(blocks):
+            continue
+        if size > 1e-12:
+            potential = max(potential, along * along / size)
+        met.append((left, start))
+    if not met:
+        return None
+    met.sort()
+    starts = tuple(dict.fromkeys((*thing.far, *_begun_at(c, met))))
+    return Screened(candidate=c, starts=starts, left=met[0][0], potential=potential)
 
 
 def kin(ranked: Sequence[Candidate], taken: int, leaders: int) -> list[Candidate]:

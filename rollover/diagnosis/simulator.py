@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rollover.diagnosis.effort import DROPS, Effort
 from rollover.diagnosis.filtering import Rows, behind_filters, rows_of
 from rollover.diagnosis.overturn import SENSORS, RunSimulator
-from rollover.drop import DropFailedError, DropModel, unfit
+from rollover.drop import DropFailedError, DropModel, channels_of, unfit
 from rollover.effects import every, read
 from rollover.initiation import Drop
 from rollover.recording import Recording
@@ -119,7 +119,7 @@ class DropSimulator:
     def state(self, shift: float) -> Mapping[str, Array]:
         """See `Simulator`."""
         try:
-            return {name: values[self.rows.stamps] for name, values in self._run({}, self.rows.times, shift).items()}
+            return self._model({}).motion(self.recording.time - shift)
         except DropFailedError:
             return {}
 
@@ -176,15 +176,15 @@ class DropSimulator:
         values = (*sorted(physical.items()), *key)
         if (*values, shift) not in self._raw:
             if not ahead:
-                self._keep(self._raw, (*values, shift), self._made(physical, times - shift))
+                self._keep(self._raw, (*values, shift), self._recorded(self._model(physical).rows(times - shift)))
                 return self._raw[(*values, shift)]
             both = np.concatenate([times, times - self.effort.later]) - shift
             order = np.argsort(both, kind="stable")
             back = np.empty_like(order)
             back[order] = np.arange(order.size)
-            run = self._made(physical, both[order])
+            rows = self._model(physical).rows(both[order])
             for at, part in ((shift, back[: times.size]), (shift + self.effort.later, back[times.size :])):
-                self._keep(self._raw, (*values, at), {name: v[part] for name, v in run.items()})
+                self._keep(self._raw, (*values, at), self._recorded(rows[part]))
         return self._raw[(*values, shift)]
 
     def _model(self, changes: Mapping[str, Any]) -> DropModel:
@@ -197,8 +197,9 @@ class DropSimulator:
             self._keep(self._models, key, replace(model, step=SHORT if is_abrupt else STEP))
         return self._models[key]
 
-    def _made(self, physical: Mapping[str, Any], times: Array) -> dict[str, Array]:
-        return self._model(physical).motion(times)
+    def _recorded(self, rows: Array) -> dict[str, Array]:
+        """Channels of a drop that the recording has."""
+        return channels_of(rows, self.recording.channels)
 
     @staticmethod
     def _keep(store: dict[tuple[Any, ...], T], key: tuple[Any, ...], value: T) -> None:

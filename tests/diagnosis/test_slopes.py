@@ -144,9 +144,9 @@ def test_runs_are_announced_before_they_are_needed(monkeypatch: pytest.MonkeyPat
     base = judge.fit((), (), shifts=[0.0, 0.0])
     assert base is not None
     looked = Gate(score=9.0, scores={SLOPE.key: 9.0, MASS.key: 8.0}, null=np.zeros(4), detectable={})
-    screened = screen(judge, base, (SLOPE, MASS), (0, 1), (0.0, 0.0), looked)
     with Crew() as crew:
         inquiry = Inquiry(judge=judge, candidates=(SLOPE, MASS), groups=[], phases=[], say=lambda _: None, crew=crew)
+        screened = screen(inquiry, base, (SLOPE, MASS), (0, 1), (0.0, 0.0), looked)
         leaders = _first_fits(inquiry, base, screened, (0, 1), (0.0, 0.0), looked)[1]
         monkeypatch.setattr(Judge, "_fit", lambda *_: None)
         before = len(announced)

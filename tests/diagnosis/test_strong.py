@@ -56,9 +56,10 @@ def test_what_only_a_strong_effect_does_is_found_though_a_little_of_it_tells_not
     assert found.far == {"slope": ((0.95,),)}  # a mass leaves 0.91^2 of it, more than is followed
     assert found.leading[0] == "slope"
     assert [c.key for c in found.ranked([mass, SLOPE])] == ["slope", "mass"]
-    begun = screen(judge, base, [SLOPE], [0, 1], [0.0] * 4, found)[0]
+    inquiry = Inquiry(judge=judge, candidates=(SLOPE,), groups=[], phases=[], say=lambda _: None, crew=Crew())
+    begun = screen(inquiry, base, [SLOPE], [0, 1], [0.0] * 4, found)[0]
     assert (0.95,) in begun.starts
-    assert screen(judge, base, [SLOPE], [0, 1], [0.0] * 4, replace(found, far={}))[0].starts != begun.starts
+    assert screen(inquiry, base, [SLOPE], [0, 1], [0.0] * 4, replace(found, far={}))[0].starts != begun.starts
     judge.straying = True
     assert looks.look(judge, base, [mass, SLOPE], groups).far == {}  # of what strays so far, chance may be all
 
