@@ -99,7 +99,7 @@ def test_noise_within_coarse_digits_is_no_structure() -> None:
     found = diagnose(scenario(), coarse)
     assert "in steps of" in found.sentence  # and no more than that, see test_coarse
     assert found.remaining_p_value > 0.01, found.sentence
-    finer = [(n, replace(r, channels={**r.channels, FORCE: np.round(r[FORCE] / 200.0) * 200.0})) for n, r in made]
+    finer = [(n, replace(r, channels={**r.channels, FORCE: np.round(r[FORCE] / 150.0) * 150.0})) for n, r in made]
     found = diagnose(scenario(), finer)
     assert found.verdict == "no-mismatch"
     assert found.p_value > 0.01, found.sentence
