@@ -85,22 +85,17 @@ def test_a_digit_that_flips_beside_an_edge_is_no_noise_of_its_own() -> None:
 
 
 def test_noise_within_coarse_digits_is_no_structure() -> None:
-    """A sixteenth of the range, on a channel with noise below that: its error is one for many samples."""
+    """A share of the range, on a channel with noise below that: its error is one for many samples."""
     made = recorded({}, speeds=(1.2, 2.0, 3.0), rate=1000.0)
-    coarse = [
-        (
-            n,
-            replace(
-                r, channels={**r.channels, FORCE: np.round(r[FORCE] / np.ptp(r[FORCE]) * 16) * np.ptp(r[FORCE]) / 16}
-            ),
-        )
-        for n, r in made
-    ]
-    found = diagnose(scenario(), coarse)
+
+    def in_steps(many: int) -> list[tuple[str, Recording]]:
+        own = [(n, r, np.ptp(r[FORCE]) / many) for n, r in made]
+        return [(n, replace(r, channels={**r.channels, FORCE: np.round(r[FORCE] / d) * d})) for n, r, d in own]
+
+    found = diagnose(scenario(), in_steps(16))
     assert "in steps of" in found.sentence  # and no more than that, see test_coarse
     assert found.remaining_p_value > 0.01, found.sentence
-    finer = [(n, replace(r, channels={**r.channels, FORCE: np.round(r[FORCE] / 150.0) * 150.0})) for n, r in made]
-    found = diagnose(scenario(), finer)
+    found = diagnose(scenario(), in_steps(25))
     assert found.verdict == "no-mismatch"
     assert found.p_value > 0.01, found.sentence
 
