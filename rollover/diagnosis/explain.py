@@ -100,7 +100,7 @@ def step(inquiry: Inquiry, base: Fitted, looked: Gate) -> Step | None:
         fits = others + [new or old for new, old in zip(polished, near, strict=True)]
     fits = one_each(fits) if judge.effort.thrifty else shaped_too(inquiry, base, one_each(fits))
     if not judge.effort.thrifty:
-        fits = timed_too(inquiry, fits)
+        fits = timed_too(inquiry, base, fits)
     if weighed(judge, fits[0], inquiry.phases):
         base, fits = judge.again(base), [judge.again(f) for f in fits]
     fits.sort(key=lambda f: held_out(f, groups).left.sum())

@@ -27,7 +27,9 @@ MOSTLY = 0.25  # of what the middle recording is left with by the best, below wh
 PROMISED = 0.5  # of the best score: what has it, and gains less than half of its own, may have another shape
 TIED = 1.2  # times what the best leaves, up to which time shifts are tried out
 BY_CHANCE = 0.01  # p-value of what is left, above which no other form of an effect is looked for
-LEAST = 0.1  # of what the base leaves beyond the noise, that an effect must take before its shape is fitted too
+# of what the base leaves beyond the noise, that an effect must take before its shape is fitted too; of what the best
+# takes, before its time shifts are tried out
+LEAST = 0.1
 SHAPED = 4.0  # times what the best leaves, up to which an effect's shape is fitted too
 
 
@@ -182,13 +184,17 @@ def _enough(left: float, size: int) -> float:
     return WORTH * max(1.0, left / size)
 
 
-def timed_too(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
-    """The fits, the near ones with their time shifts tried out, and clocks all along their range, best first."""
+def timed_too(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
+    """The fits, the near ones with their time shifts tried out, and clocks all along their range, best first.
+
+    Beside what is hardly met at all everything is near: an effect must gain a share of what the best does.
+    """
     least = min(f.left for f in fits)
-    near = [traced_too(inquiry, f) if is_clock(f) else f for f in fits if f.left < TIED * least]
-    timed = inquiry.fits([from_there(f, "time") for f in near])
-    others = [f for f in fits if f.left >= TIED * least]
-    return sorted([new or old for new, old in zip(timed, near, strict=True)] + others, key=lambda f: f.left)
+    near = [f for f in fits if f.left < TIED * least and base.left - f.left >= LEAST * (base.left - least)]
+    others = [f for f in fits if not any(f is one for one in near)]
+    traced = [traced_too(inquiry, f) if is_clock(f) else f for f in near]
+    timed = inquiry.fits([from_there(f, "time") for f in traced])
+    return sorted([new or old for new, old in zip(timed, traced, strict=True)] + others, key=lambda f: f.left)
 
 
 def traced_too(inquiry: Inquiry, fitted: Fitted) -> Fitted:

@@ -12,7 +12,7 @@ from rollover.diagnosis.explain import Step
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.otherwise import shaped_too
-from rollover.diagnosis.refine import few_of, shifts_told
+from rollover.diagnosis.refine import BEHIND, few_of, shifts_told
 from rollover.diagnosis.screening import is_far
 
 LEADING, FOLLOWING = 4, 2  # of the first effects, and of later ones each, that are tried two by two
@@ -25,7 +25,7 @@ def best_pair(inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate
     """The best pair of the first step's rivals, of what led later, and of what scored most, as a step of its second.
 
     Of two effects neither need come first alone: a third may be like both, and the second may leave much alone. Short
-    fits tell which pairs are worth whole ones, and the best takes the shapes that pay.
+    fits tell which pairs are worth whole ones; the best takes the shapes that pay if it comes near what others leave.
     """
     judge = inquiry.judge
     partners = _partners(inquiry, first, taken, looked)
@@ -44,10 +44,12 @@ def best_pair(inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate
     if not fits:
         return None
     best = min(fits, key=lambda f: f.left)
-    for pair in (best, judge.again(turned(best))):
-        alone = judge.fit(pair.candidates[:-1], pair.x[: -len(pair.own)], shifts=shifts)
-        if alone is not None:
-            best = min(best, *shaped_too(inquiry, alone, [pair]), key=lambda f: f.left)
+    if best.left < BEHIND * (taken[-1] if taken else first).fitted.left:
+        ways = (best, judge.again(turned(best)))
+        jobs = [Job(candidates=p.candidates[:-1], start=p.x[: -len(p.own)], shifts=shifts) for p in ways]
+        for pair, alone in zip(ways, inquiry.fits(jobs), strict=True):
+            if alone is not None:
+                best = min(best, *shaped_too(inquiry, alone, [pair]), key=lambda f: f.left)
     alone = judge.fit(best.candidates[:-1], best.x[: -len(best.own)], shifts=[b.shift for b in best.blocks])
     return None if alone is None else Step(base=alone, fitted=best, p_value=first.p_value, rivals=(best,))
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,7 @@ from rollover.diagnosis.crew import Crew, Job, work
 from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.fit import Block, Judge, shift_of
 from rollover.diagnosis.holdout import held_out, refitted
+from rollover.diagnosis.otherwise import _best_middle
 from rollover.diagnosis.ranges import candidates_of
 from rollover.diagnosis.simulator import simulator_of
 from rollover.scenario import load
@@ -114,6 +117,9 @@ def test_any_number_of_workers_gives_the_same_fits(workers: int) -> None:
         c = candidate(judge_of(recordings), key)
         jobs.append(Job(candidates=(c,), start=c.starts()[0], shifts=(0.0, 0.0), rounds=3))
     alone = Crew().fits(judge_of(recordings), jobs)
+    look = partial(_best_middle, beside=(), shifts=(0.0, 0.0), most=math.inf)
+    things = [(job.candidates[0], job.candidates[0].starts()) for job in (*jobs, jobs[0])]
+    seen = Crew().looks(judge_of(recordings), look, things)
     with Crew(workers) as many:
         assert many.fits(judge_of(recordings), jobs)[0] is not None  # in this process: none has begun
         assert many.children._pool is None
@@ -123,6 +129,7 @@ def test_any_number_of_workers_gives_the_same_fits(workers: int) -> None:
             time.sleep(0.1)
         judge = judge_of(recordings)
         together = many.fits(judge, jobs)
+        assert many.looks(judge, look, things) == seen
         assert not judge._raw  # nothing was simulated here
         assert many.children._pool is not None
     assert many.children._pool is None
