@@ -63,6 +63,11 @@ class Candidate:
         return bool(EFFECTS[self.id].narrow)
 
     @property
+    def is_sudden(self) -> bool:
+        """Whether it does something at the least of its strength already."""
+        return EFFECTS[self.id].is_sudden
+
+    @property
     def rings(self) -> bool:
         """Whether it rings, by a frequency and a damping."""
         return EFFECTS[self.id].is_abrupt and {"stiffness", "damping"} <= self.search.keys()

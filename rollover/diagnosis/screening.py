@@ -93,7 +93,8 @@ def screen(
 
     def places(c: Candidate) -> tuple[tuple[float, ...], ...]:
         ways = () if judge.effort.thrifty and not c.is_placed else looked.starts.get(c.key, ())
-        return tuple(ways if (near or c.is_placed) and ways else (*ways, *c.starts()))
+        is_led = (near or c.is_placed) and ways and not c.is_sudden
+        return tuple(ways if is_led else (*ways, *c.starts()))
 
     judge.made_ahead((r, (*base.candidates, c), (*base.x, *x)) for c in candidates for x in places(c) for r in few)
     things = [_Look(candidate=c, places=places(c), far=looked.far.get(c.key, ())) for c in candidates]
