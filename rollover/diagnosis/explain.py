@@ -178,13 +178,15 @@ def _first_fits(
         before = [judge.block(r, base.candidates, base.x, shifts[r], 0.0) for r in few]  # clocks where they are held
         as_it_is = sum(b.total for b in before if b is not None)
         # and what leads by its score: the gain of one that others are measured by may be chance of its runs
-        leader = max(looked.scores, key=lambda key: looked.scores[key], default="")
         worth = [
             f
             for f in worth
-            if as_it_is - f.left >= RIVALS * (as_it_is - fits[0].left) or f.candidates[-1].key == leader
+            if as_it_is - f.left >= RIVALS * (as_it_is - fits[0].left) or f.candidates[-1].key == looked.best
         ]
     worth = worth[: judge.effort.most_leaders]
+    # a first fit may lead astray what scored most
+    if not judge.effort.thrifty and all(f.candidates[-1].key != looked.best for f in worth):
+        worth += [f for f in fits if f.candidates[-1].key == looked.best][:1]
     return [replace(s, nrmse=told.get(s.candidate.key, 0.0)) for s in screened], worth
 
 

@@ -59,6 +59,11 @@ class Gate:
     far: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
     places: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
 
+    @property
+    def best(self) -> str:
+        """Key of what scored most, or nothing."""
+        return max(self.scores, key=lambda key: self.scores[key], default="")
+
     def ranked(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """Candidates by score, the best first; before each of the first ones the next of those that are `leading`."""
         by_score = sorted(candidates, key=lambda c: -self.scores.get(c.key, 0.0))

@@ -39,7 +39,7 @@ def begun_otherwise(
     """The fits, best first, with those that another beginning or another shape makes of what did not come far."""
     count = sum(b.residual.size for b in base.blocks)
     if fits[0].left > RUGGED**2 * count:
-        return _but_for_some(inquiry, base, _combed(inquiry, fits, shifts), looked, shifts)
+        return _but_for_some(inquiry, base, _combed(inquiry, fits, looked, shifts), looked, shifts)
     return _as_promised(inquiry, base, fits, looked, shifts)
 
 
@@ -56,9 +56,13 @@ def _as_promised(
     return _with_shapes(inquiry, base, fits, places, shifts)
 
 
-def _combed(inquiry: Inquiry, fits: Sequence[Fitted], shifts: Sequence[float]) -> list[Fitted]:
-    """The fits, best first, the best that rings begun anew along its second parameter if it leads or nearly so."""
-    able = [f for f in fits if f.candidates[-1].rings and len(f.own) == 2 and f.left < LEADS * fits[0].left][:1]
+def _combed(inquiry: Inquiry, fits: Sequence[Fitted], looked: Gate, shifts: Sequence[float]) -> list[Fitted]:
+    """The fits, best first, the best that rings begun anew along its second parameter if it leads or nearly so.
+
+    It leads by what it leaves, or by its score: its frequency may have been found beside a wrong damping.
+    """
+    near = [f for f in fits if f.left < LEADS * fits[0].left or f.candidates[-1].key == looked.best]
+    able = [f for f in near if f.candidates[-1].rings and len(f.own) == 2][:1]
     jobs = [Job(how="comb", candidates=f.candidates, start=f.x, shifts=tuple(shifts)) for f in able]
     tried = zip(inquiry.fits(jobs), able, strict=True)
     better = [new if new is not None and new.left < old.left else old for new, old in tried]
