@@ -20,7 +20,7 @@ from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.inquiry import Groups, Inquiry, Phases
 from rollover.diagnosis.lasting import NEEDED, astray, backed, begun_anew, lasting
 from rollover.diagnosis.looks import look, look_again
-from rollover.diagnosis.otherwise import traced_too
+from rollover.diagnosis.otherwise import traced_too, tuned
 from rollover.diagnosis.pairs import best_pair
 from rollover.diagnosis.refine import conditioned, ended, is_doubtful, polish, timed, without
 from rollover.diagnosis.remainder import NEGLIGIBLE, is_enough, is_tolerated, matters
@@ -125,7 +125,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
             # of two that are strong the first may have been taken for something else: is there a better one?
             other = _instead(inquiry, current)
             if other is not None and other.fitted.left < current.left:
-                other, beside = followed(inquiry, other)
+                other, beside = followed(inquiry, other.moved_to(tuned(inquiry, other.fitted)))
                 if is_better(other.fitted, beside, current):
                     taken, left = [taken[1], other], beside
                     current = other.fitted
