@@ -318,11 +318,13 @@ def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) ->
     """The verdict; what does not explain is not named.
 
     Several effects are named only if together they leave nothing but noise, or what was said to be tolerated; as many
-    as may be, or two of one sensor, more surely so: they can be bent to more. One alone also where it takes nearly all.
+    as may be, or two of one sensor, or of a soil that is bent, more surely so: they can be bent to more. One alone also
+    where it takes nearly all.
     """
     if is_any_curve(found.fitted.candidates) or is_a_curve(judge, found.fitted):
         return found.refused(), "unexplained"
-    least = MANY if len(found.parts) == MOST or is_one_sensor(found.fitted.candidates) else SURE
+    held = found.fitted.candidates
+    least = MANY if len(found.parts) == MOST or is_one_sensor(held) or is_pliant(held) else SURE
     is_whole = found.after.p_value > least or not matters(judge, found.fitted, found.after)
     start, ahead = held_out(found.base, groups).total, held_out(found.fitted, groups).total
     # what a tolerance allows has structure too
@@ -361,6 +363,12 @@ def is_any_curve(candidates: Sequence[Candidate]) -> bool:
     subjects = [c.channel or ("soil" if c.id.startswith("soil-") else c.id) for c in candidates]
     bent = [s for s, c in zip(subjects, candidates, strict=True) if c.is_bent]
     return (len(candidates) == MOST and len(set(subjects)) == 1) or len(set(bent)) < len(bent)
+
+
+def is_pliant(candidates: Sequence[Candidate]) -> bool:
+    """Whether several are of the soil, and one of these takes another shape or form than its usual one."""
+    soil = [c for c in candidates if c.id.startswith("soil-")]
+    return len(soil) > 1 and any(c.is_bent for c in soil)
 
 
 def _kind(c: Candidate) -> Verdict:

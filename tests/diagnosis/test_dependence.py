@@ -21,7 +21,7 @@ from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.lines import lines, without
 from rollover.diagnosis.phases import drop_phases
 from rollover.diagnosis.response import channels_of
-from rollover.diagnosis.selection import is_any_curve
+from rollover.diagnosis.selection import is_any_curve, is_pliant
 from rollover.diagnosis.simulator import set_up
 from rollover.effects import Search
 from rollover.proof.generator import Order, make
@@ -224,6 +224,9 @@ def test_three_effects_of_one_sensor_or_of_the_soil_are_any_curve_and_two_are_no
     assert is_any_curve(bent)
     assert is_any_curve([*bent, on("sensor-clipping", drops.FORCE)])
     assert not is_any_curve([shaped])
+    assert is_pliant([soil[0], shaped])
+    assert not is_pliant(soil)
+    assert not is_pliant([shaped, on("mass", None)])
 
 
 def test_what_explains_little_is_not_named_and_a_sensor_without_a_quantity_goes_by_time() -> None:
