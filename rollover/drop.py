@@ -48,7 +48,10 @@ class DropFailedError(Exception):
 
 @dataclass(frozen=True, kw_only=True)
 class DropModel:
-    """A drop test made ready to be run many times; `step` (s) is the longest step of the integration."""
+    """A drop test made ready to be run many times; `step` (s) is the longest step of the integration.
+
+    Near a turn steps are shorter, and of a nose that rings as short as its frequency asks for until that has died out.
+    """
 
     scenario: Scenario
     step: float = LONGEST_STEP

@@ -9,13 +9,19 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.fit import Fitted
+from rollover.diagnosis.clocks import align
+from rollover.diagnosis.crew import Crew
+from rollover.diagnosis.evidence import evidence_of
+from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.otherwise import begun_otherwise
+from rollover.diagnosis.otherwise import begun_otherwise, tuned
+from rollover.diagnosis.ranges import candidates_of
+from rollover.diagnosis.screening import screen
 from rollover.effects import Search
-from tests.diagnosis.drops import linear_blocks
+from tests.diagnosis.drops import linear_blocks, recorded, scenario
 
 PLAIN = Candidate(id="mass", kind="parameter", family="", search={"added": Search(-1, 1)})
 SHAPED = replace(PLAIN, id="soil-adhesion", search={"stress": Search(1, 2)}, shapes={"reach": Search(1, 2)})
@@ -52,3 +58,76 @@ def test_what_promised_much_and_gained_little_is_fitted_with_its_shape(
     promised: float, gained: float, scanned: int
 ) -> None:
     assert begun(promised, gained) == ["scan soil-adhesion (0.7,)"] * scanned
+
+
+def test_what_is_sudden_is_looked_at_in_all_its_places_and_not_where_its_slopes_lead() -> None:
+    """The least of adhesion does something already: what moves along stays on the face."""
+    known = {"effects.soil-elastic-rebound.recovery": 0.1, "effects.soil-elastic-rebound.damping_ratio": 0.1}
+    made = recorded({**known, "effects.soil-adhesion.stress": 4.6e4}, speeds=(1.5, 2.5), rate=1000.0, noise=5e-3)
+    found = [evidence_of(name, *simulated(scenario().replaced(known), r)) for name, r in made]
+    judge = Judge([e for e in found if e is not None])
+    align(judge)
+    base = judge.fit((), ())
+    assert base is not None
+    c = next(c for c in candidates_of(judge.evidence, (), "drop") if c.id == "soil-adhesion")
+    led = replace(c, id="soil-crust")  # any that is not
+    assert (c.is_sudden, led.is_sudden) == (True, False)
+    looked = Gate(score=9.0, scores={c.key: 9.0}, null=np.zeros(9), detectable={}, starts={c.key: ((0.01,),)})
+    inquiry = Inquiry(judge=judge, candidates=(c,), groups=[[0], [1]], phases=[], say=lambda _: None, crew=Crew())
+    (seen,) = screen(inquiry, base, [c], [0, 1], [b.shift for b in base.blocks], looked)
+    assert seen.starts[0] != (0.01,)
+    assert c.values(seen.starts[0])["stress"] == pytest.approx(4.6e4, rel=0.9)
+
+
+@pytest.mark.parametrize(("score", "combed"), [(50.0, True), (30.0, False)])
+def test_what_rings_and_scored_most_is_combed_though_its_fit_went_astray(score: float, combed: bool) -> None:
+    rings = replace(
+        PLAIN, id="structural-compliance", search={"stiffness": Search(1e4, 1e7, "log"), "damping": Search(1.0, 1e4)}
+    )
+    blocks = tuple(
+        replace(b, residual=9.0 * b.residual) for b in linear_blocks(np.random.default_rng(4), 2, 40, np.zeros(1))
+    )
+    best = Fitted(candidates=(PLAIN,), x=(0.5,), blocks=blocks)
+    astray = Fitted(
+        candidates=(rings,), x=(0.5, 0.5), blocks=tuple(replace(b, residual=2.0 * b.residual) for b in blocks)
+    )
+    asked: list[str] = []
+
+    def fits(jobs: list[Any]) -> list[None]:
+        asked.extend(f"{j.how} {j.candidates[-1].id}" for j in jobs)
+        return [None] * len(jobs)
+
+    inquiry = SimpleNamespace(free=lambda _: [PLAIN, rings], fits=fits, looks=lambda look, things: [None] * len(things))
+    looked = Gate(score=50.0, scores={"mass": 40.0, rings.key: score}, null=np.zeros(9), detectable={})
+    assert begun_otherwise(cast(Inquiry, inquiry), best, [best, astray], looked, (0.0, 0.0)) == [best, astray]
+    assert asked == ["comb structural-compliance"] * combed
+
+
+@pytest.mark.parametrize(("gains", "turns"), [((0.6, 0.5, 0.99), 3), ((0.95,), 1)])
+def test_what_rings_is_followed_in_turns_as_long_as_that_pays(gains: tuple[float, ...], turns: int) -> None:
+    shape = {"nose_share": Search(0.02, 0.5)}
+    rings = replace(
+        PLAIN, id="structural-compliance",
+        search={"stiffness": Search(1e4, 1e7, "log"), "damping": Search(1.0, 1e4), **shape},
+    )  # fmt: skip
+    fitted = Fitted(
+        candidates=(rings,),
+        x=(0.5, 0.5, 0.5),
+        blocks=tuple(linear_blocks(np.random.default_rng(4), 2, 40, np.zeros(1))),
+    )
+    asked: list[str] = []
+    left = [fitted]
+
+    def fits(jobs: list[Any]) -> list[Fitted | None]:
+        asked.extend(j.how for j in jobs)
+        if jobs[0].how == "trace":
+            return [None] * len(jobs)
+        gain = np.sqrt(gains[asked.count("polish") - 1])
+        left.append(replace(left[-1], blocks=tuple(replace(b, residual=gain * b.residual) for b in left[-1].blocks)))
+        return [left[-1]]
+
+    inquiry = cast(Inquiry, SimpleNamespace(fits=fits))
+    found = tuned(inquiry, fitted)
+    assert asked.count("polish") == turns
+    assert found is left[-2]
+    assert tuned(inquiry, replace(fitted, candidates=(PLAIN,), x=(0.5,))).candidates == (PLAIN,)
