@@ -19,7 +19,7 @@ from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.otherwise import begun_otherwise, tuned
 from rollover.diagnosis.ranges import candidates_of
-from rollover.diagnosis.screening import screen
+from rollover.diagnosis.screening import is_far, screen
 from rollover.effects import Search
 from tests.diagnosis.drops import linear_blocks, recorded, scenario
 
@@ -63,12 +63,13 @@ def test_what_promised_much_and_gained_little_is_fitted_with_its_shape(
 def test_what_is_sudden_is_looked_at_in_all_its_places_and_not_where_its_slopes_lead() -> None:
     """The least of adhesion does something already: what moves along stays on the face."""
     known = {"effects.soil-elastic-rebound.recovery": 0.1, "effects.soil-elastic-rebound.damping_ratio": 0.1}
-    made = recorded({**known, "effects.soil-adhesion.stress": 4.6e4}, speeds=(1.5, 2.5), rate=1000.0, noise=5e-3)
+    made = recorded({**known, "effects.soil-adhesion.stress": 4.6e4}, speeds=(1.5, 2.5), rate=1000.0, noise=0.1)
     found = [evidence_of(name, *simulated(scenario().replaced(known), r)) for name, r in made]
     judge = Judge([e for e in found if e is not None])
     align(judge)
     base = judge.fit((), ())
     assert base is not None
+    assert not is_far(judge, base)  # from there all places are looked at
     c = next(c for c in candidates_of(judge.evidence, (), "drop") if c.id == "soil-adhesion")
     led = replace(c, id="soil-crust")  # any that is not
     assert (c.is_sudden, led.is_sudden) == (True, False)
