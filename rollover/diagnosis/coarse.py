@@ -4,23 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rollover.channels import describe
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.explain import SURE
+from rollover.diagnosis.phases import phase_at
 from rollover.diagnosis.verdict import Place
 from rollover.effects import spoken
 
+Array = NDArray[np.float64]
 FINEST = 0.05  # of a channel's range in all recordings: steps of its digits that are worth a verdict
 
 
 def coarse(evidence: Sequence[Evidence], phases: Sequence[Sequence[tuple[float, str]]]) -> tuple[Place, ...]:
     """Where channels are recorded in steps of more than `FINEST` of their range and more than their noise."""
-    ends: dict[str, list[float]] = {}
+    values: dict[str, list[Array]] = {}
     for s in (s for e in evidence for s in e.signals):
-        ends.setdefault(s.channel, []).extend((float(s.values.min()), float(s.values.max())))
-    rough = [
-        (r, e, s) for r, e in enumerate(evidence) for s in e.signals if s.step > FINEST * _between(ends[s.channel])
-    ]
+        values.setdefault(s.channel, []).append(s.values)
+    least = {channel: FINEST * float(np.ptp(np.concatenate(v))) for channel, v in values.items()}
+    rough = [(r, e, s) for r, e in enumerate(evidence) for s in e.signals if s.step > least[s.channel]]
     return tuple(_place(e, s, phases[r], 1.0 / len(rough)) for r, e, s in rough)
 
 
@@ -35,19 +39,14 @@ def by_digits(places: Sequence[Place], evidence: Sequence[Evidence], p_value: fl
     )
 
 
-def _between(values: Sequence[float]) -> float:
-    return max(values) - min(values)
-
-
 def _place(e: Evidence, s: Signal, phases: Sequence[tuple[float, str]], share: float) -> Place:
     """The whole of a signal, with the phase in which it reaches furthest."""
     times = e.recording.time[s.rows]
-    peak = float(times[int(abs(s.values - s.values[0]).argmax())])
-    phase = [name for start, name in phases if start <= peak] or [phases[0][1]]
+    peak = float(times[int(np.abs(s.values - s.values[0]).argmax())])
     return Place(
         recording=e.name,
         channel=s.channel,
-        phase=phase[-1],
+        phase=phase_at(phases, peak),
         start=float(times[0]),
         end=float(times[-1]),
         share=share,

@@ -7,13 +7,13 @@ the last digit, and recordings of different tests do not end at the same digit u
 
 from __future__ import annotations
 
-import bisect
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from rollover.diagnosis.intervals import KNOWN
+from rollover.diagnosis.phases import phase_at
 from rollover.diagnosis.verdict import Interval, Named, Place
 from rollover.effects import EFFECTS, MOST, units_of
 from rollover.prechecks.finding import Finding, trace
@@ -38,7 +38,7 @@ def cut_off(
         Place(
             recording=names[r],
             channel=channel,
-            phase=_phase(phases[r], top.start),
+            phase=phase_at(phases[r], top.start),
             start=top.start,
             end=top.end,
             share=1.0 / total,
@@ -82,7 +82,3 @@ def _named(channel: str, tops: Sequence[tuple[int, Finding]]) -> Named:
         indistinguishable_from=(),
         discriminating_test=next(iter(kind.rivals.values())),
     )
-
-
-def _phase(phases: Sequence[tuple[float, str]], at: float) -> str:
-    return phases[max(bisect.bisect_right([start for start, _ in phases], at) - 1, 0)][1]

@@ -121,22 +121,27 @@ def _middle_at(
     judge: Judge, candidates: Sequence[Candidate], x: tuple[float, ...], shifts: Sequence[float], most: float
 ) -> float | None:
     """What the middle recording leaves per sample at x; None from `most` on, or where one cannot be simulated."""
-    blocks: list[Block] = []
+    left: list[float] = []
     for r, shift in enumerate(shifts):
         block = judge.block(r, candidates, x, shift, 0.0)
         if block is None:
             return None
-        blocks.append(block)
+        left.append(_per_sample(block))
         # with so many beyond twice the most the middle one, or the mean of two, is beyond it
-        if 2 * sum(_middle([b]) >= 2.0 * most for b in blocks) >= len(shifts):
+        if 2 * sum(v >= 2.0 * most for v in left) >= len(shifts):
             return None
-    left = _middle(blocks)
-    return left if left < most else None
+    middle = float(np.median(left))
+    return middle if middle < most else None
 
 
 def _middle(blocks: Sequence[Block]) -> float:
     """What the middle one of several recordings leaves per sample."""
-    return float(np.median([b.normal()[2] / b.residual.size for b in blocks]))
+    return float(np.median([_per_sample(b) for b in blocks]))
+
+
+def _per_sample(block: Block) -> float:
+    """What is left of a recording per sample."""
+    return block.normal()[2] / block.residual.size
 
 
 def shaped_too(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import bisect
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -49,3 +52,8 @@ def drop_phases(evidence: Evidence) -> tuple[tuple[float, str], ...]:
     ]
     marks = [m for k, m in enumerate(marks) if k == 0 or m[0] > marks[k - 1][0]]
     return tuple(m for k, m in enumerate(marks) if k + 1 == len(marks) or marks[k + 1][0] > start)
+
+
+def phase_at(phases: Sequence[tuple[float, str]], at: float) -> str:
+    """Name of the phase at a time (s); the first before all begin."""
+    return phases[max(bisect.bisect_right([start for start, _ in phases], at) - 1, 0)][1]

@@ -203,7 +203,7 @@ class DropSimulator:
 
     @staticmethod
     def _keep(store: dict[tuple[Any, ...], T], key: tuple[Any, ...], value: T) -> None:
-        """What sensors alone change needs no second run."""
+        """Put into a store of the last `KEPT`: what sensors alone change needs no second run."""
         if len(store) >= KEPT:
             store.pop(next(iter(store)))
         store[key] = value
