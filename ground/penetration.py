@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from ground.bearing import REFERENCE_DEPTH, Bearing
 from ground.drops import Drop, Loading, UnusableDrop, correlated, covered_area, loading, mean_depth
@@ -244,7 +244,7 @@ def _judged(form: Form, loads: Sequence[Loading], value: Array, contact: Array, 
     variance = 1e4 * sum(float(part @ part) for part in left) / max(count - k - len(left), 1) * alike
     data, stated = J[:count], J[count:]  # the contact errors are known as well as they are, whatever the misfit
     V = np.linalg.pinv(data.T @ data / variance + stated.T @ stated)[:k, :k]
-    quantile = float(student.ppf(0.975, max(count / alike - k - len(left), 1.0)))
+    quantile = float(stdtrit(max(count / alike - k - len(left), 1.0), 0.975))
     half = quantile * np.sqrt(np.diag(V))
     ratios = []
     for load, off in zip(loads, contact, strict=True):

@@ -9,8 +9,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
-from scipy.stats import t as student
+from scipy.special import chdtri, stdtrit
 
 from ground.branches import Branches, inverse
 from ground.drops import UnusableDrop
@@ -108,14 +107,14 @@ class Regression:
         def misfit() -> float:
             return min(self.solve(p, free, held)[2] for p in _EXPONENTS[::4])
 
-        if self.freedom < 1 or misfit() <= chi2.ppf(0.95, self.freedom):
+        if self.freedom < 1 or misfit() <= chdtri(self.freedom, 0.05):
             return
         low, high = 0.0, 2.0
         for _ in range(25):
             self.between = 0.5 * (low + high)
             self.weights = self._weights(self.between)
             low, high = (self.between, high) if misfit() > self.freedom else (low, self.between)
-        self.quantile = float(student.ppf(0.975, self.freedom))
+        self.quantile = float(stdtrit(self.freedom, 0.975))
 
     def _free(self) -> tuple[list[int], Array]:
         """Columns that the conditions of the drops can tell apart at all."""

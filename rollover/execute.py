@@ -10,7 +10,6 @@ import os
 import pickle
 import sys
 import threading
-import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -26,7 +25,6 @@ V = TypeVar("V")
 
 AHEAD = 2  # cases handed out per worker: none idles, and an interrupt has little to throw away
 TASKS = 1000  # cases after which a worker is replaced, so that what a case leaks does not grow for ever
-LOOK = 2.0  # s between two looks of a child for its parent
 BROKEN = 3  # pools in a row that may break before a case has gone through
 KILLED = -9  # exit code of a process that was ended from outside, as the operating system does when memory runs out
 # one thread for each child: cores are shared out among cases, and a sum does not depend on how many there are
@@ -116,27 +114,55 @@ def child_pool(workers: int, warm_up: Callable[[], None] | None = None) -> Any:
     """A pool of child processes that takes tasks by ``schedule(packed, ...)``."""
     from pebble import ProcessPool
 
-    # a fork would copy the locks of threads that it does not copy
-    context = multiprocessing.get_context("spawn")
     return ProcessPool(
-        max_workers=workers, max_tasks=TASKS, context=context, initializer=_begin_child, initargs=(warm_up,)
+        max_workers=workers, max_tasks=TASKS, context=_context(), initializer=_begin_child, initargs=(warm_up,)
     )
+
+
+def begin_server(*modules: str) -> None:
+    """Begin to import `modules` in a process of its own, of which children are forked, while this one goes on.
+
+    Children then have them at once. Only the first call counts; nothing happens where children are not forked.
+    """
+    context = _context()
+    if context.get_start_method() != "forkserver":
+        return
+    from multiprocessing import forkserver
+
+    context.set_forkserver_preload(list(modules))
+    missing = [name for name in THREADS if name not in os.environ]
+    os.environ.update(dict.fromkeys(missing, "1"))  # what is imported before the fork reads them then
+    try:
+        forkserver.ensure_running()
+    finally:
+        for name in missing:
+            del os.environ[name]
+
+
+def _context() -> Any:
+    """How children begin: forked of a server with one thread, as a fork of this process copies locks that threads hold.
+
+    Where there is none, as new processes.
+    """
+    method = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+    return multiprocessing.get_context(method)
 
 
 def _begin_child(warm_up: Callable[[], None] | None) -> None:
     for name in THREADS:
         os.environ.setdefault(name, "1")
-    threading.Thread(target=_leave_with, args=(os.getppid(),), daemon=True).start()
+    threading.Thread(target=_leave_with_parent, daemon=True).start()
     if warm_up is not None:
         with suppress(Exception):  # the first case will say what is wrong
             warm_up()
 
 
-def _leave_with(parent: int) -> None:
-    """End this process once its parent is gone: a case that hangs would go on for ever."""
-    while os.getppid() == parent:
-        time.sleep(LOOK)
-    os._exit(1)
+def _leave_with_parent() -> None:
+    """End this process once the one that has the cases is gone: a case that hangs would go on for ever."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _in_children(

@@ -60,6 +60,11 @@ def diagnose(
     """Say what separates a scenario from recordings: which physics, value or sensor, where, and how sure that is."""
     from dataclasses import replace
 
+    from rollover.execute import begin_server, cores
+
+    if workers != 1 and cores() > 1:
+        begin_server("rollover.diagnosis.warm")  # beside all that is imported and read here
+
     from rollover import console, document, store
     from rollover import scenario as scenarios
     from rollover.diagnosis import account, diagnosed_text
@@ -67,7 +72,6 @@ def diagnose(
     from rollover.diagnosis.account import FILES, FORMAT, JSON, PAGE, PICTURE, SCENARIO
     from rollover.diagnosis.crew import Crew
     from rollover.diagnosis.series import series
-    from rollover.execute import cores
 
     path = document.find(scenario)
     chosen = scenarios.load(path)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.effort import Effort
+from rollover.diagnosis.leaps import within_means
 from rollover.diagnosis.simulator import Simulator, simulator_of
 from rollover.filters import least_rate
 from rollover.initiation import Drop
@@ -20,7 +21,6 @@ from rollover.scenario import Scenario
 Array = NDArray[np.float64]
 
 LEAP_IN = "leap in "  # before the name of a channel: how far it leaps within each mean, SI
-LEAP, WITHIN = 4.0, 2.5  # times the steps beside it: of means, and within one
 MOST_ROWS = 500  # of a recording that are looked at
 FEW = 4  # stamps in a mean that are all simulated; for more, two times away from the first contact
 KNOWN, UNKNOWN = 4e-3, 30e-3  # s, by which a clock's zero may be off
@@ -49,11 +49,8 @@ class Averaged:
             return {}
         sizes = {}
         for channel, values in found.items():
-            step, sizes[channel] = np.abs(np.diff(values)), np.zeros(self.starts.size)
-            beside = np.maximum(np.append(step[1:], 0.0), np.concatenate([[0.0], step[:-1]]))
-            k = np.flatnonzero(step > WITHIN * beside)
-            for there in (self._of[k], self._of[k + 1]):
-                np.maximum.at(sizes[channel], there, step[k])
+            sizes[channel] = np.empty(self.starts.size)
+            within_means(values, self._of, sizes[channel])
             sizes[channel][self.counts == self.many] = 0.0
         return {LEAP_IN + channel: size for channel, size in sizes.items()}
 

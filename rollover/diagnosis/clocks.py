@@ -21,8 +21,10 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.blocks import Fitted
 from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.secant import Point
 
 Array = NDArray[np.float64]
 WIDTH = 3.0  # times its prior, within which a time shift is sought
@@ -49,15 +51,20 @@ def align(judge: Judge) -> None:
         judge.shifts[r] = judge.shifts[r] if found is None else found
 
 
-def by_first_contact(judge: Judge, candidates: Sequence[Candidate], x: Sequence[float]) -> list[float | None]:
-    """Time shift (s) of each recording by its first contact; None where nothing comes of it."""
-    found: list[float | None] = []
-    for r, e in enumerate(judge.evidence):
-        # leaps as they are: these are what tells the time
-        at = _first_contact(judge, r, partial(judge.edged, r, candidates, x))
-        known = e.recording.clock.zero != "unknown"
-        found.append(None if at is None or (known and abs(at) > BELIEVED * e.shift_prior) else at)
-    return found
+def by_first_contact(
+    judge: Judge, candidates: Sequence[Candidate], x: Sequence[float], crew: Crew | None = None
+) -> list[float | None]:
+    """Time shift (s) of each recording by its first contact; None where nothing comes of it. `crew` looks for it."""
+    look = partial(_by_contact, beside=(candidates, x))
+    return (crew or Crew()).looks(judge, look, range(len(judge.evidence)))
+
+
+def _by_contact(judge: Judge, r: int, *, beside: Point) -> float | None:
+    # leaps as they are: these are what tells the time
+    e = judge.evidence[r]
+    at = _first_contact(judge, r, partial(judge.edged, r, *beside))
+    known = e.recording.clock.zero != "unknown"
+    return None if at is None or (known and abs(at) > BELIEVED * e.shift_prior) else at
 
 
 def _first_contact(judge: Judge, r: int, made: Made) -> float | None:
@@ -74,15 +81,18 @@ def _first_contact(judge: Judge, r: int, made: Made) -> float | None:
     return about if at is None or abs(at - about) > AT_THE_END * NEAR else at  # the model leads away from it
 
 
-def mistimed(judge: Judge, fitted: Fitted) -> list[tuple[str, float]]:
-    """Recordings that would meet a fit if they came later by a shift (s) far beyond what their clocks may be off by."""
-    found = [(e.name, _elsewhere(judge, fitted, r)) for r, e in enumerate(judge.evidence)]
-    return [(name, at) for name, at in found if at is not None]
+def mistimed(judge: Judge, fitted: Fitted, crew: Crew | None = None) -> list[tuple[str, float]]:
+    """Recordings that would meet a fit if they came later by a shift (s) far beyond what their clocks may be off by.
+
+    `crew` looks for them.
+    """
+    found = (crew or Crew()).looks(judge, partial(_elsewhere, fitted=fitted), range(len(judge.evidence)))
+    return [(e.name, at) for e, at in zip(judge.evidence, found, strict=True) if at is not None]
 
 
-def is_all_by_clocks(judge: Judge, fitted: Fitted) -> bool:
+def is_all_by_clocks(judge: Judge, fitted: Fitted, crew: Crew) -> bool:
     """Whether such shifts are all that separates the recordings from a fit: each else is met as it stands."""
-    late = {name for name, _ in mistimed(judge, fitted)}
+    late = {name for name, _ in mistimed(judge, fitted, crew)}
     others = [b for e, b in zip(judge.evidence, fitted.blocks, strict=True) if e.name not in late]
     return bool(late) and all(b.normal()[2] < MEETS * b.residual.size for b in others)
 
@@ -98,7 +108,7 @@ def by_clock(found: Sequence[tuple[str, float]]) -> str:
     )
 
 
-def _elsewhere(judge: Judge, fitted: Fitted, r: int) -> float | None:
+def _elsewhere(judge: Judge, r: int, *, fitted: Fitted) -> float | None:
     """Time shift (s), however large, at which recording r meets a fit far better than where it stands; None if none."""
     from scipy.optimize import minimize_scalar
 

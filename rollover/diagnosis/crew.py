@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import pickle
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -20,8 +21,9 @@ from rollover.diagnosis.forms import in_form, shaped
 from rollover.diagnosis.refine import combed, polish, scanned, timed
 from rollover.diagnosis.secant import beside
 from rollover.diagnosis.thresholds import Stretch, traced
-from rollover.execute import Children, map_cases
+from rollover.execute import Children, begin_server, map_cases
 
+WARM = "rollover.diagnosis.warm"
 Progress = Callable[[str], None]
 T = TypeVar("T")
 R = TypeVar("R")
@@ -73,6 +75,8 @@ class Crew:
     def __init__(self, workers: int = 1, notebook: Path | None = None, about: str = "") -> None:
         self.workers, self.notebook, self.about = workers, notebook, about
         self.children = Children(workers)
+        if workers > 1:
+            begin_server(WARM)
         self._beginning: list[Any] = []  # what tells that the children are there
         self._done: dict[str, dict[str, Any] | None] = {}
         if notebook is not None and notebook.exists():
@@ -92,7 +96,7 @@ class Crew:
     def begin(self, judge: Judge) -> None:
         """Begin the children, if any, while this process goes on: each makes a run, so that it has all it needs."""
         if self.workers > 1 and not judge.effort.thrifty:
-            bare = judge.bare()
+            bare = pickle.dumps(judge.bare())  # here: what goes on changes what another thread would pickle
             self._beginning = [self.children.pool.schedule(_begun, args=(bare,)) for _ in range(self.workers)]
 
     def is_there(self) -> bool:
@@ -134,7 +138,7 @@ class Crew:
             ended(k, work(judge, jobs[k]))
         if done == len(todo):
             return found
-        bare, rest, about = judge.bare(), todo[done:], f"{about} {judge.shifts}"
+        bare, rest, about = pickle.dumps(judge.bare()), todo[done:], f"{about} {judge.shifts}"
         outcomes = map_cases(_worked, [(about, bare, jobs[k]) for k in rest], children=self.children)
         for outcome in outcomes:
             k = rest[outcome.index]
@@ -152,7 +156,7 @@ class Crew:
         """
         if judge.effort.thrifty or len(things) < 2 or not self.is_there():
             return [look(judge, thing) for thing in things]
-        about, bare = f"{self.about} {judge.fingerprint()} {judge.shifts}", judge.bare()
+        about, bare = f"{self.about} {judge.fingerprint()} {judge.shifts}", pickle.dumps(judge.bare())
         shares = [list(things)[k :: 2 * self.workers] for k in range(2 * self.workers)]
         found: dict[int, R] = {}
         tasks = [(about, bare, look, share) for share in shares if share]
@@ -207,29 +211,31 @@ def work(judge: Judge, job: Job) -> Fitted | None:
 _held: dict[str, Judge] = {}  # in a child: what it simulated for the job before
 
 
-def _begun(judge: Judge) -> None:
+def _begun(sent: bytes) -> None:
+    judge: Judge = pickle.loads(sent)
     judge.fit((), (), rounds=1)
 
 
-def _worked(case: tuple[str, Judge, Job]) -> tuple[Fitted | None, int]:
+def _worked(case: tuple[str, bytes, Job]) -> tuple[Fitted | None, int]:
     about, sent, job = case
     judge = _kept(about, sent)
     before = judge.simulations
     return work(judge, job), judge.simulations - before
 
 
-def _looked(case: tuple[str, Judge, Callable[[Judge, Any], Any], list[Any]]) -> tuple[list[Any], int]:
+def _looked(case: tuple[str, bytes, Callable[[Judge, Any], Any], list[Any]]) -> tuple[list[Any], int]:
     about, sent, look, things = case
     judge = _kept(about, sent)
     before = judge.simulations
     return [look(judge, thing) for thing in things], judge.simulations - before
 
 
-def _kept(about: str, sent: Judge) -> Judge:
+def _kept(about: str, sent: bytes) -> Judge:
     """The judge that was sent, with what it simulated before."""
     if about not in _held:
         _held.clear()
-    return _held.setdefault(about, sent)
+        _held[about] = pickle.loads(sent)
+    return _held[about]
 
 
 def _rebuilt(judge: Judge, job: Job, row: dict[str, Any] | None) -> Fitted | None:

@@ -12,10 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.depend import ACCELERATION, DEPTH, SPEED, TIME, hats
 from rollover.diagnosis.detect import Mismatch
 from rollover.diagnosis.evidence import Evidence
@@ -93,14 +95,17 @@ def _steady(N: Array) -> Array:
     return np.asarray(STEADY * size * (D.T @ D) + 1e-10 * max(size, 1e-300) * np.eye(k))
 
 
-def dependence(judge: Judge, scenarios: Sequence[Scenario], base: Fitted) -> Dependence:
-    """What is left beside a fit depends on what; `scenarios` under the conditions of the recordings."""
-    evidence = judge.evidence
-    blocks, found = ways(judge, scenarios, base)
+def dependence(judge: Judge, scenarios: Sequence[Scenario], base: Fitted, crew: Crew | None = None) -> Dependence:
+    """What is left beside a fit depends on what; `scenarios` under the conditions of the recordings.
+
+    `crew` looks at them, in children if it has any.
+    """
+    evidence, crew = judge.evidence, crew or Crew()
+    blocks, found = ways(judge, scenarios, base, crew)
     channel = alone(evidence, blocks, found)
     if channel is not None:
         return Dependence(shares=_added(*_of_channel(channel, judge, base)), channel=channel)
-    return Dependence(shares=_added(*_of_forces(found))) if found else Dependence()
+    return Dependence(shares=_added(*_of_forces(judge, found, crew))) if found else Dependence()
 
 
 def dependence_of_one(judge: Judge, base: Fitted, before: Mismatch) -> Dependence | None:
@@ -116,28 +121,34 @@ def dependence_of_one(judge: Judge, base: Fitted, before: Mismatch) -> Dependenc
     return Dependence(shares=_added(*_of_channel(most, judge, base)), channel=most)
 
 
-def ways(judge: Judge, scenarios: Sequence[Scenario], base: Fitted) -> tuple[list[list[Block]], list[Descent]]:
-    """Each recording at some time shifts, and its way down at the best of them.
+def ways(
+    judge: Judge, scenarios: Sequence[Scenario], base: Fitted, crew: Crew
+) -> tuple[list[list[Block]], list[Descent]]:
+    """Each recording at some time shifts, and its way down at the best of them."""
+    found = crew.looks(judge, partial(_way, base=base), list(enumerate(scenarios)))
+    return [blocks for blocks, _ in found], [best for _, best in found if best is not None]
+
+
+def _way(judge: Judge, one: tuple[int, Scenario], *, base: Fitted) -> tuple[list[Block], Descent | None]:
+    """A recording's blocks at some time shifts, and its way down at the best of them.
 
     Far from an explanation a shift eats what is missing: tried are the base's, what a clock says, and the one that
     goes with a force that may be anything.
     """
-    blocks, found = [], []
-    for r, (e, scenario, b) in enumerate(zip(judge.evidence, scenarios, base.blocks, strict=True)):
-        here, best = [b], descent(scenario, e, b)
-        tried = [b.shift]
-        shift = 0.0 if e.recording.clock.zero != "unknown" else b.shift
-        for _ in range(SHIFTS):
-            if min(abs(shift - other) for other in tried) > NEAR * b.prior:
-                told = judge.block(r, base.candidates, base.x, shift, 0.0)
-                other = None if told is None else descent(scenario, e, told)
-                tried.append(shift)
-                here += [] if told is None else [told]
-                best = other if best is None or (other is not None and other.score < best.score) else best
-            shift = shift if best is None else best.better
-        blocks.append(here)
-        found += [] if best is None else [best]
-    return blocks, found
+    (r, scenario), b = one, base.blocks[one[0]]
+    e = judge.evidence[r]
+    blocks, best = [b], descent(scenario, e, b)
+    tried = [b.shift]
+    shift = 0.0 if e.recording.clock.zero != "unknown" else b.shift
+    for _ in range(SHIFTS):
+        if min(abs(shift - other) for other in tried) > NEAR * b.prior:
+            told = judge.block(r, base.candidates, base.x, shift, 0.0)
+            other = None if told is None else descent(scenario, e, told)
+            tried.append(shift)
+            blocks += [] if told is None else [told]
+            best = other if best is None or (other is not None and other.score < best.score) else best
+        shift = shift if best is None else best.better
+    return blocks, best
 
 
 def alone(evidence: Sequence[Evidence], blocks: Sequence[Sequence[Block]], found: Sequence[Descent]) -> str | None:
@@ -169,7 +180,7 @@ def shiftless(w: Array, slope: Array, prior: float) -> Array:
     return np.asarray(w - np.outer(s, s @ w) if w.ndim > 1 else w - s * float(s @ w))
 
 
-def _of_forces(found: Sequence[Descent]) -> tuple[list[Model], list[Array], float, float]:
+def _of_forces(judge: Judge, found: Sequence[Descent], crew: Crew) -> tuple[list[Model], list[Array], float, float]:
     """Every model of a force, the misfits, the noise's part of them, and phi."""
     misfits = [shiftless(d.residual[d.rows], d.slope[d.rows], d.prior) for d in found]
     strength = [(d.way.force / float(d.way.force.max()))[:, None] for d in found]
@@ -192,23 +203,23 @@ def _of_forces(found: Sequence[Descent]) -> tuple[list[Model], list[Array], floa
         if where == "ground":
             by_touch = [np.array([[1.0, np.log(d.way.touch)]]) for d in found]
             functions.append((IMPACT, [s * row for s, row in zip(strength, by_touch, strict=True)]))
-        models += _felt(found, functions, where)
+        ends = np.cumsum([basis[0].shape[1] for _, basis in functions])[:-1]
+        forces = [np.hstack([basis[k] for _, basis in functions]) for k in range(len(found))]
+        felt = crew.looks(judge, partial(_felt, where=where), list(zip(found, forces, strict=True)))
+        each = zip(*(np.split(J, ends, axis=1) for J in felt), strict=True)
+        models += [Model(on=on, columns=columns) for (on, _), columns in zip(functions, each, strict=True)]
     n = float(sum(w.size for w in misfits))
     free = sum(d.free for d in found)
     phi = min(sum(d.left[where] for d in found) for where in WHERES) / max(n - free, 1.0)
     return models, misfits, n, max(phi, 1.0)
 
 
-def _felt(found: Sequence[Descent], functions: Sequence[tuple[str, list[Array]]], where: Where) -> list[Model]:
-    """What forces, (n, k) each over the largest on the way, do to the recordings: all of them in one go."""
-    ends = np.cumsum([basis[0].shape[1] for _, basis in functions])[:-1]
-    parts = []
-    for k, d in enumerate(found):
-        forces = np.hstack([basis[k] for _, basis in functions]) * float(d.way.force.max())
-        J = channels_of(d.way, d.way.moved(forces, where), d.evidence, d.shift)[d.rows]
-        parts.append(np.split(shiftless(J, d.slope[d.rows], d.prior), ends, axis=1))
-    columns = zip(*parts, strict=True)
-    return [Model(on=on, columns=tuple(c)) for (on, _), c in zip(functions, columns, strict=True)]
+def _felt(judge: Judge, forced: tuple[Descent, Array], *, where: Where) -> Array:
+    """What forces (n, k), over the largest on the way, do to a recording, its time shift left out: all in one go."""
+    del judge
+    d, forces = forced
+    J = channels_of(d.way, d.way.moved(forces * float(d.way.force.max()), where), d.evidence, d.shift)[d.rows]
+    return shiftless(J, d.slope[d.rows], d.prior)
 
 
 def _of_channel(channel: str, judge: Judge, base: Fitted) -> tuple[list[Model], list[Array], float, float]:

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.bins import LEAP, LEAP_IN
+from rollover.diagnosis.bins import LEAP_IN
+from rollover.diagnosis.leaps import SHOWS, about_leaps, forgiven
 from rollover.diagnosis.nuisance import Eased, doubts, eased
 from rollover.diagnosis.simulator import Simulator
 from rollover.noise import LENGTH, USUAL, NoiseFloor, grown, noise_floor
@@ -27,9 +28,6 @@ MANY = 10  # quiet windows from which on a memory of two samples is told
 ROUGH = 0.5  # times the noise, from which on another error has a large part
 CORNER = 2.0775  # corner frequency over the filter class, forward and backward, Hz
 NOTHING: Mapping[str, Array] = MappingProxyType({})
-SHOWS = 3.0  # times the noise, from which on a step may be a leap
-LARGE = 50.0  # times the noise: a leap whose instant is not believed to the sample
-BESIDE = 3  # samples to either side, between whose values one about a leap may be
 SHIFT = 1e-3  # s, prior of the time shift of a recording whose zero is known
 
 
@@ -64,12 +62,11 @@ class Signal:
 
 @dataclass(frozen=True, kw_only=True)
 class _Inside:
-    """Samples (n,) of a stack: the first and the last of the signal of each, and the least leap from each, (n - 2,)."""
+    """Samples (n,) of a stack: the first and the last of the signal of each, and the least leap from each."""
 
     first: NDArray[np.int64]
     last: NDArray[np.int64]
     least: Array
-    starts: NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,32 +142,13 @@ class Evidence:
 
     def leaps(self, raw: Array, predicted: Mapping[str, Array] = NOTHING) -> NDArray[np.int64]:
         """Samples (stacked) about which a prediction leaps, and means within which it is `predicted` to."""
-        found, within = self._about_leaps(raw), []
+        own, within = self._inside, []
+        found: NDArray[np.int64] = about_leaps(raw, own.least, own.first, own.last)
         for s, part in self.spans():
             size = predicted.get(LEAP_IN + s.channel)
             if size is not None:
                 within.append(part.start + np.flatnonzero(size[s.rows] > SHOWS * s.sigma))
         return np.unique(np.concatenate([found, *within])) if any(w.size for w in within) else found
-
-    def _about_leaps(self, raw: Array) -> NDArray[np.int64]:
-        """Samples (stacked) about which a stacked prediction leaps."""
-        own = self._inside
-        leap = np.abs(raw[2:] - raw[:-2])
-        first = np.flatnonzero(leap > own.least)
-        if first.size:
-            step = np.zeros(raw.size + 2)  # nothing before a signal and nothing behind it
-            step[1:-2] = np.abs(raw[1:] - raw[:-1])
-            step[own.starts] = 0.0
-            first = first[leap[first] > LEAP * np.maximum(step[first + 3], step[first])]
-        if not first.size:
-            return np.zeros(0, dtype=np.int64)
-        # when a body lifts off again hangs on little
-        large = first[leap[first] > LARGE / SHOWS * own.least[first]]
-        around = np.clip(large[:, None] + np.array([-2, -1, 3, 4]), own.first[large, None], own.last[large, None])
-        found = np.zeros(raw.size, dtype=np.bool_)
-        found[(first[:, None] + np.arange(3)).ravel()] = True
-        found[around.ravel()] = True
-        return np.flatnonzero(found)
 
     @cached_property
     def _inside(self) -> _Inside:
@@ -179,8 +157,8 @@ class Evidence:
         first = np.concatenate([np.full(p.stop - p.start, p.start) for _, p in spans])
         last = np.concatenate([np.full(p.stop - p.start, p.stop - 1) for _, p in spans])
         sigma = np.concatenate([np.full(p.stop - p.start, s.sigma if s.rows.size >= 5 else np.inf) for s, p in spans])
-        least = np.where(first[2:] == first[:-2], SHOWS * sigma[:-2], np.inf)
-        return _Inside(first=first, last=last, least=least, starts=np.unique(first))
+        least = np.where(np.arange(first.size) + 2 <= last, SHOWS * sigma, np.inf)
+        return _Inside(first=first, last=last, least=least)
 
     def forgiven(self, raw: Array, leaps: NDArray[np.int64]) -> Array:
         """Predicted samples (stacked, SI) about a leap, moved towards the measured ones within their neighbours.
@@ -189,12 +167,8 @@ class Evidence:
         """
         if not leaps.size:
             return raw
-        y, measured = raw.copy(), self._values
-        for _, part in self.spans():
-            inside = leaps[(leaps >= part.start) & (leaps < part.stop)]
-            near = raw[np.clip(inside[:, None] + np.arange(-BESIDE, BESIDE + 1), part.start, part.stop - 1)]
-            y[inside] = np.clip(measured[inside], near.min(axis=1), near.max(axis=1))
-        return y
+        moved: Array = forgiven(raw, leaps, self._values, self._inside.first, self._inside.last)
+        return moved
 
     def worth(self, leaps: NDArray[np.int64]) -> Array:
         """Weights (n,) of whitened samples: those whose past was forgiven are as wide as the noise itself."""

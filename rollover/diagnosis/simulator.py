@@ -182,9 +182,9 @@ class DropSimulator:
             order = np.argsort(both, kind="stable")
             back = np.empty_like(order)
             back[order] = np.arange(order.size)
-            rows = self._model(physical).rows(both[order])
+            channels = self._recorded(self._model(physical).rows(both[order]))
             for at, part in ((shift, back[: times.size]), (shift + self.effort.later, back[times.size :])):
-                self._keep(self._raw, (*values, at), self._recorded(rows[part]))
+                self._keep(self._raw, (*values, at), {c: v[part] for c, v in channels.items()})
         return self._raw[(*values, shift)]
 
     def _model(self, changes: Mapping[str, Any]) -> DropModel:

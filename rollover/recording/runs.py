@@ -9,6 +9,7 @@ from pathlib import Path
 from rollover.channels import describe
 from rollover.faults import Fault, InputError
 from rollover.recording.record import Clock, Recording, Sensor
+from rollover.recording.tables import numbers
 
 FORMAT = "rollover-channels/1"
 
@@ -65,7 +66,7 @@ def read_parquet(path: Path) -> Recording:
         about = json.loads((table.schema.metadata or {}).get(b"rollover", b"{}"))
         if about.pop("format", None) != FORMAT:
             raise InputError(not_a_run)
-        columns = {name: table[name].to_numpy() for name in table.column_names}
+        columns = {name: numbers(table[name]) for name in table.column_names}
         about["clock"] = Clock(**about.get("clock", {}))
         about["uncertainty"] = {path: _tuples(sigma) for path, sigma in about.get("uncertainty", {}).items()}
         about["sensors"] = {name: _sensor(values) for name, values in about.get("sensors", {}).items()}

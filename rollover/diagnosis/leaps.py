@@ -1,0 +1,60 @@
+"""Compiled: leaps of a prediction from one sample to the next, and what is forgiven about them.
+
+On which side of a leap a sample lies is decided by clocks, not by physics.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ground.compiled import compiled
+
+LEAP, WITHIN = 4.0, 2.5  # times the steps beside it: of samples, and within a mean of some
+SHOWS = 3.0  # times the noise, from which on a step may be a leap
+LARGE = 50.0  # times the noise: a leap whose instant is not believed to the sample
+BESIDE = 3  # samples to either side, between whose values one about a leap may be
+
+
+@compiled
+def about_leaps(y: Any, least: Any, first: Any, last: Any) -> Any:
+    """Places in a stack y (n,) about which it leaps over two samples by more than `least` (n,) from each.
+
+    `first` and `last` (n,) are the ends of the signal of each sample.
+    """
+    found = np.zeros(y.size, dtype=np.bool_)
+    for i in range(y.size - 2):
+        leap = abs(y[i + 2] - y[i])
+        if leap > least[i]:
+            before = abs(y[i] - y[i - 1]) if i > first[i] else 0.0
+            after = abs(y[i + 3] - y[i + 2]) if i + 2 < last[i] else 0.0
+            if leap > LEAP * max(before, after):
+                # when a body lifts off again hangs on little
+                more = 2 if leap > LARGE / SHOWS * least[i] else 0
+                found[max(i - more, first[i]) : min(i + 2 + more, last[i]) + 1] = True
+    return np.flatnonzero(found)
+
+
+@compiled
+def within_means(values: Any, mean: Any, sizes: Any) -> None:
+    """How far values (n,) leap within or beside each mean, into sizes (m,); `mean` (n,) is that of each value."""
+    sizes[:] = 0.0
+    last = values.size - 1
+    for k in range(last):
+        step = abs(values[k + 1] - values[k])
+        before = abs(values[k] - values[k - 1]) if k > 0 else 0.0
+        after = abs(values[k + 2] - values[k + 1]) if k + 1 < last else 0.0
+        if step > WITHIN * max(before, after):
+            sizes[mean[k]] = max(sizes[mean[k]], step)
+            sizes[mean[k + 1]] = max(sizes[mean[k + 1]], step)
+
+
+@compiled
+def forgiven(y: Any, leaps: Any, measured: Any, first: Any, last: Any) -> Any:
+    """A stack y (n,) whose samples about `leaps` are moved towards the measured ones within their neighbours."""
+    found = y.copy()
+    for i in leaps:
+        near = y[max(i - BESIDE, first[i]) : min(i + BESIDE, last[i]) + 1]
+        found[i] = min(max(measured[i], near.min()), near.max())
+    return found

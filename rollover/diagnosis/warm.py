@@ -1,0 +1,7 @@
+"""What children of a drop's diagnosis need, imported and called once, for `execute.begin_server`."""
+
+from rollover.diagnosis import crew as crew
+from rollover.drop import DropModel
+from rollover.scenario import load
+
+DropModel(scenario=load("drop_test")).run()  # its kernels are loaded
