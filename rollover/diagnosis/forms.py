@@ -13,6 +13,7 @@ from rollover.diagnosis.candidates import Candidate, coordinate
 from rollover.diagnosis.fit import NOISE_LEFT, Judge
 from rollover.diagnosis.refine import BEHIND, STARTS, by_what_is_left, few_of, polish, shifts_told, total_of
 
+WORTH = 12.0  # gain that pays for a shape
 SHORT = 4  # rounds of a fit that tells where to begin
 ABREAST = 1.5  # times what the best of short fits leaves, up to which others are followed
 THERE = 0.003  # of a coordinate, within which two short fits came to one place
@@ -23,7 +24,9 @@ ELSEWHERE = (0.2, 0.35, 0.5, 0.65, 0.8)  # coordinates of a number that only thi
 def shaped(judge: Judge, f: Fitted, leaves: Sequence[float]) -> Fitted | None:
     """The fit with the shape of its last effect, begun where short fits from some places leave least; None if none.
 
-    None too where these come nowhere near what another explanation `leaves` of each recording; so in another form.
+    None too where these come nowhere near what another explanation `leaves` of each recording; so in another form. On
+    the way the usual shape may be met better than before: what is abrupt is a cliff that a smooth one leads around. It
+    is returned where the other does not pay.
     """
     if not f.candidates[-1].shapes:
         return None
@@ -33,9 +36,13 @@ def shaped(judge: Judge, f: Fitted, leaves: Sequence[float]) -> Fitted | None:
     if found is None:
         return None
     found = found if is_noise(found) else polish(judge, found)
-    whole, x = found.candidates[-1].plain(found.own)
-    shifts = [b.shift for b in found.blocks]
-    return judge.fit((*f.candidates[:-1], whole), (*found.x[:at], *x), shifts=shifts, width=2)
+    (whole, x), shifts = found.candidates[-1].plain(found.own), [b.shift for b in found.blocks]
+    bent = judge.fit((*f.candidates[:-1], whole), (*found.x[:at], *x), shifts=shifts, width=2)
+    own = dict(zip(found.candidates[-1].search, found.own, strict=True))
+    usual = judge.fit(f.candidates, (*found.x[:at], *(own[name] for name in last.search)), shifts=shifts, width=2)
+    if bent is None or usual is None:
+        return bent or usual
+    return usual if usual.left < bent.left + enough(bent.left, sum(b.residual.size for b in bent.blocks)) else bent
 
 
 def in_form(judge: Judge, f: Fitted, last: Candidate, leaves: Sequence[float]) -> Fitted | None:
@@ -52,6 +59,11 @@ def in_form(judge: Judge, f: Fitted, last: Candidate, leaves: Sequence[float]) -
     places = [(*f.x[:at], *own) for own in itertools.product(*axes)]
     met = by_what_is_left(judge, (*f.candidates[:-1], last), places, shifts, few_of(f))
     return _best_of(judge, f, last, met[: 2 * STARTS], leaves)
+
+
+def enough(left: float, size: int) -> float:
+    """The gain that pays for a shape where so much is left of so many samples."""
+    return WORTH * max(1.0, left / size)
 
 
 def is_noise(fitted: Fitted) -> bool:

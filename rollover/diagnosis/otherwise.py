@@ -14,7 +14,7 @@ from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.crew import Job
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.forms import is_noise
+from rollover.diagnosis.forms import WORTH, enough, is_noise
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.inquiry import Inquiry
@@ -22,7 +22,6 @@ from rollover.diagnosis.thresholds import is_clock, stretches
 
 RUGGED = 2.0  # misfit over the noise that the best leaves, from which on there may be something behind a cliff
 LEADS = 1.5  # times what the best leaves, up to which it is looked for
-WORTH = 12.0  # gain that pays for a shape
 MOSTLY = 0.25  # of what the middle recording is left with by the best, below which an effect is the better one there
 PROMISED = 0.5  # of the best score: what has it, and gains less than half of its own, may have another shape
 TIED = 1.2  # times what the best leaves, up to which time shifts are tried out
@@ -168,7 +167,7 @@ def shaped_too(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[F
     found = list(fits)
     for k, several in made.items():
         new = _plainest(several, size)
-        if new.left < fits[k].left - _enough(best, size):
+        if new.left < fits[k].left - enough(best, size):
             found[k] = new
     return sorted(found, key=lambda f: f.left)
 
@@ -185,13 +184,8 @@ def _polished(inquiry: Inquiry, fits: Sequence[Fitted | None], best: float) -> l
 def _plainest(fits: Sequence[Fitted], size: int) -> Fitted:
     """Of an effect in several forms the one that asks for least, of those that meet all as well."""
     least = min(f.left for f in fits)
-    near = [f for f in fits if f.left < least + _enough(least, size)]
+    near = [f for f in fits if f.left < least + enough(least, size)]
     return min(near, key=lambda f: (len(f.x), bool(f.candidates[-1].form), f.left))
-
-
-def _enough(left: float, size: int) -> float:
-    """The gain that pays for a shape where so much is left of so many samples."""
-    return WORTH * max(1.0, left / size)
 
 
 def timed_too(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
