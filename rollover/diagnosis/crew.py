@@ -18,6 +18,7 @@ from typing import Any, Literal, TypeVar
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Block, Fitted, Judge
 from rollover.diagnosis.forms import in_form, shaped
+from rollover.diagnosis.gate import at_each
 from rollover.diagnosis.refine import combed, polish, scanned, timed
 from rollover.diagnosis.secant import beside
 from rollover.diagnosis.thresholds import Stretch, traced
@@ -155,7 +156,7 @@ class Crew:
         `look` and what it returns are sent to them: a function of a module, or a partial of one.
         """
         if judge.effort.thrifty or len(things) < 2 or not self.is_there():
-            return [look(judge, thing) for thing in things]
+            return at_each(judge, look, things)
         about, bare = f"{self.about} {judge.fingerprint()} {judge.shifts}", pickle.dumps(judge.bare())
         shares = [list(things)[k :: 2 * self.workers] for k in range(2 * self.workers)]
         found: dict[int, R] = {}
@@ -227,7 +228,7 @@ def _looked(case: tuple[str, bytes, Callable[[Judge, Any], Any], list[Any]]) -> 
     about, sent, look, things = case
     judge = _kept(about, sent)
     before = judge.simulations
-    return [look(judge, thing) for thing in things], judge.simulations - before
+    return at_each(judge, look, things), judge.simulations - before
 
 
 def _kept(about: str, sent: bytes) -> Judge:

@@ -9,8 +9,10 @@ single simulation. What is compared with it is the same maximum for the misfit.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +32,20 @@ LIMITS = ("limit", "yield_force", "stiffness", "angle")  # what acts the more th
 WAYS = 2  # places of one effect at which fits begin
 CLOSER = 8  # places of one effect that are looked at closer
 EDGE = 0.01  # of a coordinate, that they keep from its ends
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+class Looks(Protocol):
+    """Who looks at each of several things, see `Crew.looks`."""
+
+    def __call__(self, judge: Judge, look: Callable[[Judge, T], R], things: Sequence[T], /) -> list[R]:
+        """What a look at each tells, in their order."""
+
+
+def at_each(judge: Judge, look: Callable[[Judge, T], R], things: Sequence[T]) -> list[R]:
+    """What a look at each thing tells, one after another."""
+    return [look(judge, thing) for thing in things]
 
 
 def freed(vectors: Array, block: Block) -> Array:
@@ -82,24 +98,24 @@ def gate(
     candidates: Sequence[Candidate],
     only: Sequence[int] | None = None,
     beside: Fitted | None = None,
+    looks: Looks = at_each,
 ) -> Gate:
     """Look at every candidate beside the base, in all recordings or `only` some, from the base's own time shifts.
 
     Directions are what candidates move `beside` another fit, where that is given: the null holds for any directions.
+    `looks` works them off.
     """
     at, use = beside or base, list(range(len(base.blocks))) if only is None else list(only)
     blocks = [base.blocks[r] for r in use]
     misfit = np.concatenate([freed((b.residual + b.shift * b.slope)[:, None], b)[:, 0] for b in blocks])
     held = np.concatenate([freed(b.J, b) for b in blocks]) if base.x else np.zeros((misfit.size, 0))
     own, _ = np.linalg.qr(held)
-    columns, looks, sizes = [], [], []
+    columns, seen_at, sizes = [], [], []
     quiet = _before_the_blow(judge, use)
     judge.made_ahead((r, (*at.candidates, c), (*at.x, *x)) for c in candidates for x in c.probes() for r in use)
-    for c in candidates:
-        for x in (*c.probes(), *(c.further() if judge.effort.thrifty else ())):
-            d = _direction(judge, (at.candidates, at.x), base.blocks, c, x, use)
-            if d is None:
-                continue
+    look = partial(_directions, at=(at.candidates, at.x), blocks=base.blocks, use=tuple(use))
+    for c, found in zip(candidates, looks(judge, look, candidates), strict=True):
+        for x, d in found:
             parts = [(d, SHOWS)]
             if c.kind != "sensor" and quiet is not None:
                 parts.append((d * quiet, VISIBLE))
@@ -108,7 +124,7 @@ def gate(
                 size = float(np.sqrt(way @ way))
                 if size > least:
                     columns.append(way / size)
-                    looks.append((c, x))
+                    seen_at.append((c, x))
                     sizes.append(size)
     if not columns:
         return Gate(score=0.0, scores={}, null=np.zeros(DRAWS), detectable={})
@@ -123,7 +139,7 @@ def gate(
     ways: dict[str, list[tuple[float, ...]]] = {}
     places: dict[str, list[tuple[float, ...]]] = {}
     for k in np.argsort(-scores, kind="stable"):
-        c, x = looks[k]
+        c, x = seen_at[k]
         shows = _visible(c, x, sizes[k])
         if shows is not None:
             detectable[c.key] = (max if is_limit(c) else min)(shows, detectable.get(c.key, shows))
@@ -216,6 +232,15 @@ def _trust(judge: Judge, blocks: Sequence[Block], use: Sequence[int], D: Array) 
         ]
         found += (D.T @ np.concatenate(strays)) ** 2
     return np.asarray(FEW * found / max(many, 1))
+
+
+def _directions(
+    judge: Judge, c: Candidate, *, at: Point, blocks: Sequence[Block], use: Sequence[int]
+) -> list[tuple[tuple[float, ...], Array]]:
+    """Where a candidate is looked at beside a point, and what it moves there in the recordings `use`."""
+    places = (*c.probes(), *(c.further() if judge.effort.thrifty else ()))
+    found = [(x, _direction(judge, at, blocks, c, x, use)) for x in places]
+    return [(x, d) for x, d in found if d is not None]
 
 
 def _direction(

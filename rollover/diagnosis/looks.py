@@ -10,7 +10,7 @@ import numpy as np
 
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.gate import Gate, gate, p_value
+from rollover.diagnosis.gate import Gate, Looks, at_each, gate, p_value
 from rollover.diagnosis.inquiry import Groups
 from rollover.diagnosis.lasting import SPOKEN, unbent
 from rollover.diagnosis.refine import left_at
@@ -27,16 +27,18 @@ def look(
     groups: Groups,
     beside: Fitted | None = None,
     few: Sequence[int] = (),
+    looks: Looks = at_each,
 ) -> Gate:
     """A gate by all recordings; where each look costs a run, of few and then of the best candidates by some more.
 
     The null stays that of the best of all candidates: what was passed over could only have raised the maximum. Clocks
     are then taken where they say, or nearly so: far off they have eaten what is missing. `beside` as in `gate`, in
     `few` recordings that are given with it; then only what is known already is looked at, and nothing strong is tried.
+    `looks` works off what costs no full run.
     """
     effort = judge.effort
     if not effort.thrifty:
-        return gate(judge, base, candidates)
+        return gate(judge, base, candidates, looks=looks)
     if judge.per_error == 1.0:  # beside a tolerance it cannot be told what a clock has eaten
         base = unbent(judge, base)
     few, more = few or spread(base, groups, effort.few), spread(base, groups, effort.looked_at)
@@ -113,7 +115,13 @@ def _narrowed(
 
 
 def look_again(
-    judge: Judge, current: Fitted, base: Fitted | None, candidates: Sequence[Candidate], groups: Groups, first: Gate
+    judge: Judge,
+    current: Fitted,
+    base: Fitted | None,
+    candidates: Sequence[Candidate],
+    groups: Groups,
+    first: Gate,
+    looks: Looks = at_each,
 ) -> Gate:
     """A look beside an explanation; where looks cost runs, by what candidates move beside the `base`, if that is given.
 
@@ -123,4 +131,4 @@ def look_again(
         hinted = look(judge, current, candidates, groups, base, first.only)
         if hinted.p_value() > HINTED:
             return hinted
-    return look(judge, current, candidates, groups)
+    return look(judge, current, candidates, groups, looks=looks)

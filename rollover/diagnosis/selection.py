@@ -91,7 +91,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     before = mismatch_of(judge.evidence, base.blocks, phases)
     base = astray(judge, base)
     inquiry.say(f"looking at {len(candidates)} candidates, which of them could matter")
-    looked = first_look = look(judge, base, candidates, groups)
+    looked = first_look = look(judge, base, candidates, groups, looks=inquiry.crew.looks)
     current, left = base, before
     taken: list[Step] = []
     first: Step | None = None
@@ -132,7 +132,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
         if (len(taken) > 1 and current.left > HOPELESS**2 * count) or is_any_curve(current.candidates):
             break
         known = base if is_enough(judge, current, left) else None
-        looked = look_again(judge, current, known, inquiry.free(current), groups, first_look)
+        looked = look_again(judge, current, known, inquiry.free(current), groups, first_look, inquiry.crew.looks)
     if not judge.straying:
         judge.straying, current = True, judge.again(current)
         left = mismatch_of(judge.evidence, current.blocks, phases)
@@ -250,7 +250,7 @@ def _instead(inquiry: Inquiry, current: Fitted) -> Step | None:
     rest = without(judge, current, 0)
     if rest is None:
         return None
-    looked = look(judge, rest, inquiry.free(rest), inquiry.groups)
+    looked = look(judge, rest, inquiry.free(rest), inquiry.groups, looks=inquiry.crew.looks)
     found = step(inquiry, rest, looked)
     held = judge.again(turned(current))
     if found is None or found.fitted.left > held.left + NEEDED:  # on the way back nothing came as far

@@ -244,7 +244,9 @@ def test_no_look_is_made_beside_an_explanation_where_known_runs_tell_nothing(
 ) -> None:
     asked: list[tuple[Any, Any]] = []
 
-    def looked(_: Judge, base: Fitted, candidates: Any, groups: Any, beside: Any = None, few: Any = ()) -> Gate:
+    def looked(
+        _: Judge, base: Fitted, found: Any, groups: Any, beside: Any = None, few: Any = (), looks: Any = ()
+    ) -> Gate:
         asked.append((beside, few))
         null = np.sort(np.random.default_rng(0).chisquare(1, 1000))
         return Gate(score=float(np.quantile(null, 1.0 - hint)), scores={}, null=null, detectable={})
