@@ -51,7 +51,7 @@ def named(judge: Judge, found: Explanation, groups: Sequence[Sequence[int]]) -> 
             Named(
                 id=c.id,
                 kind=c.kind,
-                statement=kind(**values).says(),
+                statement=f"{kind(**values).says()} {kind(**values).same_as()}".strip(),
                 parameters=parameters,
                 settings=values,
                 channel=c.channel,

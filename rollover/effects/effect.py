@@ -121,6 +121,10 @@ class Effect:
         """What the sensors make of a recording."""
         return recording
 
+    def same_as(self) -> str:
+        """The sentence that says which other effects, at which values, do the very same; or nothing."""
+        return ""
+
     def says(self) -> str:
         """The sentence, with the values in it; that of its form, if it is in one that has a sentence of its own."""
         own = (f for f in self.forms if f.sentence and all(getattr(self, n) == v for n, v in f.fixed.items()))

@@ -6,6 +6,7 @@ not seen, with high (+), medium or low (-) confidence; a number of that kind is 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar
 
@@ -107,6 +108,18 @@ class SoilRateHardening(Effect):
             BY_POWER,
         ),
     )
+
+    def same_as(self) -> str:
+        """With another v_0: 1 + a log(v/v_1) = (1 - a log(v_1/v_0)) (1 + b log(v/v_0)), b = a/(1 - a log(v_1/v_0))."""
+        usual = type(self)().reference_speed
+        factor = 1.0 - self.per_decade * math.log10(self.reference_speed / usual)
+        if self.power or self.reference_speed == usual or factor <= 0.0:
+            return ""
+        again = self.per_decade / factor
+        return (
+            f"In drops that is the same as ground that is {factor:.3g} times as stiff, and {again:.3g} stronger for "
+            f"each tenfold speed beyond {usual:g} m/s."
+        )
 
     def places(self) -> Mapping[int, float]:
         """Lambda, v_0, beta, and where that ends."""

@@ -306,3 +306,24 @@ def test_an_effect_on_what_a_vehicle_has_not_changes_no_bit_of_its_landing_and_s
     assert same(run(with_it).recording, run(landed).recording)
     assert with_it.idle == (f"effects.{effect.id}: made for drop tests; nothing need feel it here",)
     assert not with_effect(landed, nothing(effect)).idle
+
+
+def test_a_rate_of_another_reference_speed_is_a_stiffness_and_a_rate_of_the_usual_one() -> None:
+    """1 + a log(v/v_1) = (1 - a log(v_1/v_0)) (1 + b log(v/v_0)): the very same way down while v > v_1."""
+    rate, slow = TABLE["soil-rate-hardening"], 0.3
+    factor = 1.0 - 0.2 * math.log10(slow / 0.01)
+    assert rate(per_decade=0.2, reference_speed=slow).same_as() == (
+        "In drops that is the same as ground that is 0.705 times as stiff, and 0.284 stronger for each tenfold speed "
+        "beyond 0.01 m/s."
+    )
+    assert rate(per_decade=0.2).same_as() == rate(per_decade=0.0, power=0.1, reference_speed=slow).same_as() == ""
+    drop = DropModel(scenario=shipped("drop_test"))
+    own = "effects.soil-rate-hardening"
+    one = drop.with_({f"{own}.per_decade": 0.2, f"{own}.reference_speed": slow})
+    two = drop.with_({f"{own}.per_decade": 0.2 / factor, "effects.soil-stiffness.scale": factor})
+    times = np.linspace(0.0, 0.2, 401)
+    a, b = one.motion(times), two.motion(times)
+    fast = -a["striker/velocity_z"] > slow
+    assert 20 < fast.sum() < 380
+    np.testing.assert_allclose(b["ground/force_normal"][fast], a["ground/force_normal"][fast], rtol=1e-6)
+    assert np.abs(b["ground/force_normal"] - a["ground/force_normal"])[~fast].max() > 1.0
