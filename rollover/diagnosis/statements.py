@@ -46,17 +46,18 @@ def named(judge: Judge, found: Explanation, groups: Sequence[Sequence[int]]) -> 
             values["channel"] = c.channel
         alike = (f.candidates[-1] for f in confusion(by_key[c.key], groups, judge.per_error))
         rivals = [r for r in alike if r.key not in settings]  # what was named too is told apart by being beside it
-        tests = [kind.rivals[r.id] for r in rivals if r.id in kind.rivals]
+        same = {id: said for id, said in kind(**values).same_as().items() if id not in settings}
+        tests = [kind.rivals[id] for id in (*(r.id for r in rivals), *same) if id in kind.rivals]
         effects.append(
             Named(
                 id=c.id,
                 kind=c.kind,
-                statement=f"{kind(**values).says()} {kind(**values).same_as()}".strip(),
+                statement=" ".join([kind(**values).says(), *same.values()]),
                 parameters=parameters,
                 settings=values,
                 channel=c.channel,
                 p_value=by_key[c.key].p_value,
-                indistinguishable_from=tuple(dict.fromkeys(r.id for r in rivals if r.id != c.id)),
+                indistinguishable_from=tuple(dict.fromkeys([*(r.id for r in rivals if r.id != c.id), *same])),
                 discriminating_test=tests[0] if tests else next(iter(kind.rivals.values()), ""),
             )
         )

@@ -121,9 +121,9 @@ class Effect:
         """What the sensors make of a recording."""
         return recording
 
-    def same_as(self) -> str:
-        """The sentence that says which other effects, at which values, do the very same; or nothing."""
-        return ""
+    def same_as(self) -> Mapping[str, str]:
+        """Ids of other effects beside which it does the very same at other values, and the sentence that says so."""
+        return {}
 
     def says(self) -> str:
         """The sentence, with the values in it; that of its form, if it is in one that has a sentence of its own."""

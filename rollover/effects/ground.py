@@ -109,17 +109,18 @@ class SoilRateHardening(Effect):
         ),
     )
 
-    def same_as(self) -> str:
-        """With another v_0: 1 + a log(v/v_1) = (1 - a log(v_1/v_0)) (1 + b log(v/v_0)), b = a/(1 - a log(v_1/v_0))."""
+    def same_as(self) -> Mapping[str, str]:
+        """With another v_0 a stiffness: 1 + a log(v/v_1) = c (1 + b log(v/v_0)), c = 1 - a log(v_1/v_0), b = a/c."""
         usual = type(self)().reference_speed
         factor = 1.0 - self.per_decade * math.log10(self.reference_speed / usual)
         if self.power or self.reference_speed == usual or factor <= 0.0:
-            return ""
+            return {}
         again = self.per_decade / factor
-        return (
+        said = (
             f"In drops that is the same as ground that is {factor:.3g} times as stiff, and {again:.3g} stronger for "
             f"each tenfold speed beyond {usual:g} m/s."
         )
+        return {"soil-stiffness": said}
 
     def places(self) -> Mapping[int, float]:
         """Lambda, v_0, beta, and where that ends."""

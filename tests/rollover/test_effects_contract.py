@@ -312,11 +312,11 @@ def test_a_rate_of_another_reference_speed_is_a_stiffness_and_a_rate_of_the_usua
     """1 + a log(v/v_1) = (1 - a log(v_1/v_0)) (1 + b log(v/v_0)): the very same way down while v > v_1."""
     rate, slow = TABLE["soil-rate-hardening"], 0.3
     factor = 1.0 - 0.2 * math.log10(slow / 0.01)
-    assert rate(per_decade=0.2, reference_speed=slow).same_as() == (
-        "In drops that is the same as ground that is 0.705 times as stiff, and 0.284 stronger for each tenfold speed "
-        "beyond 0.01 m/s."
-    )
-    assert rate(per_decade=0.2).same_as() == rate(per_decade=0.0, power=0.1, reference_speed=slow).same_as() == ""
+    assert rate(per_decade=0.2, reference_speed=slow).same_as() == {
+        "soil-stiffness": "In drops that is the same as ground that is 0.705 times as stiff, and 0.284 stronger for "
+        "each tenfold speed beyond 0.01 m/s."
+    }
+    assert rate(per_decade=0.2).same_as() == rate(per_decade=0.0, power=0.1, reference_speed=slow).same_as() == {}
     drop = DropModel(scenario=shipped("drop_test"))
     own = "effects.soil-rate-hardening"
     one = drop.with_({f"{own}.per_decade": 0.2, f"{own}.reference_speed": slow})
