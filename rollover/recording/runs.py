@@ -58,7 +58,7 @@ def read_parquet(path: Path) -> Recording:
     import pyarrow.parquet as pq
 
     try:
-        table = pq.read_table(path)
+        table = pq.ParquetFile(path).read()
     except (OSError, pa.ArrowInvalid) as e:
         raise InputError(Fault(file=str(path), message=f"cannot be read: {str(e).splitlines()[0]}")) from None
     not_a_run = Fault(file=str(path), message=f"not channels of a run; a file of format {FORMAT} is needed")

@@ -11,6 +11,7 @@ import pytest
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import coordinate
+from rollover.diagnosis.clocks import align
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.explain import Step
@@ -226,6 +227,24 @@ def test_a_shape_that_one_recording_alone_hangs_on_is_found() -> None:
     for name, value in true.items():
         assert by[name].value == pytest.approx(value, rel=0.05), name
     assert found.after["held_out"].nrmse == pytest.approx(1.0, abs=0.03)
+
+
+def test_what_is_abrupt_is_led_around_its_cliffs_by_its_smooth_shape(tmp_path: Path) -> None:
+    """A crust whose end leaps past samples: a fit that is stuck beside the truth, or far from it, comes there."""
+    case = make(plan(63, 20263301, ("single",))[43])
+    [true] = [e["parameters"] for e in case.truth["effects"]]
+    judge = judge_of_case(case, tmp_path)
+    align(judge)
+    c = candidate(judge, "soil-crust")
+    for begun in ((0.8125, 0.875), (0.0625, 0.125)):
+        stuck = judge.fit((c,), begun)
+        assert stuck is not None
+        found = shaped(judge, stuck, [b.total for b in stuck.blocks])
+        assert found is not None
+        assert found.candidates == (c,), "its usual shape"
+        assert found.left < stuck.left - 4000.0
+        for name, value in c.values(found.x).items():
+            assert value == pytest.approx(true[name], rel=2e-3), name
 
 
 def test_two_effects_of_which_neither_comes_first_are_tried_together() -> None:

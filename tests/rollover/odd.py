@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 from pathlib import Path
 from typing import Any
+
+
+def imported(name: str) -> bool:
+    """Whether a child has a module that it was not asked for."""
+    return name in sys.modules
 
 
 def odd(case: Any) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -93,6 +94,31 @@ def test_a_case_that_hangs_ends_with_its_parent(tmp_path: Path) -> None:
     while child.exists() and time.monotonic() < until:
         time.sleep(0.1)
     assert not child.exists()
+
+
+SERVED = """
+import os
+from rollover.execute import THREADS, begin_server, map_cases
+from tests.rollover.odd import imported
+if __name__ == "__main__":
+    begin_server("colorsys")
+    begin_server("stringprep")
+    print({o.case: o.value for o in map_cases(imported, ["colorsys"], workers=1)})
+    print({o.case: o.value for o in map_cases(imported, ["stringprep"], workers=1)})
+    print([name for name in THREADS if name in os.environ])
+"""
+
+
+@pytest.mark.skipif("forkserver" not in multiprocessing.get_all_start_methods(), reason="children are not forked here")
+def test_children_have_what_their_server_imported_beside(tmp_path: Path) -> None:
+    script = tmp_path / "served.py"
+    script.write_text(SERVED)
+    usual = {name: value for name, value in os.environ.items() if name not in execute.THREADS}
+    env = {**usual, "PYTHONPATH": str(Path(__file__).resolve().parents[2])}
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, env=env, check=True)
+    assert done.stdout.splitlines() == ["{'colorsys': True}", "{'stringprep': False}", "[]"], (
+        "the first call alone counts, and the environment is as it was"
+    )
 
 
 def warm() -> None:

@@ -11,6 +11,9 @@ from pathlib import Path
 import pytest
 
 from rollover import store
+from rollover.recording import runs
+from rollover.scenario import load
+from tests.rollover.example import run_of
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -28,6 +31,19 @@ def test_help_imports_nothing_heavy() -> None:
     heavy = {"exudyn", "matplotlib", "numba", "numpy", "pyarrow", "pydantic_core", "rerun", "scipy"}
     done = python(f"{code}\nprint(sorted({heavy} & set(sys.modules)))")
     assert done.stdout.splitlines()[-1] == "[]", done.stderr
+
+
+def test_a_diagnosis_reads_its_recordings_without_what_it_does_not_need(tmp_path: Path) -> None:
+    """pyarrow's own way to NumPy imports pandas: a second for each process."""
+    recording = run_of(load("drop_test")).recording
+    runs.write_parquet(recording, tmp_path / "run.parquet")
+    code = (
+        "import sys, rollover.diagnosis.warm\nfrom pathlib import Path\nfrom rollover.importers import read_recording\n"
+        f"found = read_recording(Path({str(tmp_path / 'run.parquet')!r}))\n"
+        "print(found.time.size, sorted({'exudyn', 'matplotlib', 'pandas', 'rerun', 'scipy.stats'} & set(sys.modules)))"
+    )
+    done = python(code)
+    assert done.stdout.splitlines() == [f"{recording.time.size} []"], done.stderr
 
 
 def test_a_bug_shows_its_traceback_and_is_neither_of_the_answers() -> None:
@@ -50,6 +66,9 @@ SLOW = """
 import signal, sys, time
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that runs tests in the background ignores it
 from rollover import store
+from rollover.recording import runs
+from rollover.scenario import load
+from tests.rollover.example import run_of
 from rollover.scenario import load
 from tests.rollover.example import run_of
 
