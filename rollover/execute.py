@@ -9,6 +9,7 @@ import multiprocessing
 import os
 import pickle
 import sys
+import tempfile
 import threading
 import traceback
 from collections import deque
@@ -24,6 +25,7 @@ C = TypeVar("C")
 V = TypeVar("V")
 
 AHEAD = 2  # cases handed out per worker: none idles, and an interrupt has little to throw away
+LONGEST_PATH = 60  # of the folder of temporary files, bytes: that of a socket in it may have a hundred
 TASKS = 1000  # cases after which a worker is replaced, so that what a case leaks does not grow for ever
 BROKEN = 3  # pools in a row that may break before a case has gone through
 KILLED = -9  # exit code of a process that was ended from outside, as the operating system does when memory runs out
@@ -142,10 +144,10 @@ def begin_server(*modules: str) -> None:
 def _context() -> Any:
     """How children begin: forked of a server with one thread, as a fork of this process copies locks that threads hold.
 
-    Where there is none, as new processes.
+    Where there is none, or its socket's path would be too long, as new processes.
     """
-    method = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
-    return multiprocessing.get_context(method)
+    able = "forkserver" in multiprocessing.get_all_start_methods() and len(tempfile.gettempdir()) <= LONGEST_PATH
+    return multiprocessing.get_context("forkserver" if able else "spawn")
 
 
 def _begin_child(warm_up: Callable[[], None] | None) -> None:

@@ -110,15 +110,18 @@ if __name__ == "__main__":
 
 
 @pytest.mark.skipif("forkserver" not in multiprocessing.get_all_start_methods(), reason="children are not forked here")
-def test_children_have_what_their_server_imported_beside(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("folder", "has"), [("", True), ("deep/" * 20, False)])
+def test_children_have_what_their_server_imported_beside(tmp_path: Path, folder: str, has: bool) -> None:
+    """The first call alone counts, and the environment is as it was; a socket has no place at so long a path."""
     script = tmp_path / "served.py"
     script.write_text(SERVED)
+    if folder:
+        (tmp_path / folder).mkdir(parents=True)
     usual = {name: value for name, value in os.environ.items() if name not in execute.THREADS}
     env = {**usual, "PYTHONPATH": str(Path(__file__).resolve().parents[2])}
+    env |= {"TMPDIR": str(tmp_path / folder)} if folder else {}
     done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, env=env, check=True)
-    assert done.stdout.splitlines() == ["{'colorsys': True}", "{'stringprep': False}", "[]"], (
-        "the first call alone counts, and the environment is as it was"
-    )
+    assert done.stdout.splitlines() == [f"{{'colorsys': {has}}}", "{'stringprep': False}", "[]"]
 
 
 def warm() -> None:
