@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 import sys
@@ -28,6 +29,9 @@ def odd(case: Any) -> Any:
         case "hang":
             threading.Event().wait()
         case "worker":
-            os.kill(os.getppid(), signal.SIGKILL)
+            worker = multiprocessing.parent_process()  # not who forked it
+            assert worker is not None
+            assert worker.pid is not None
+            os.kill(worker.pid, signal.SIGKILL)
             threading.Event().wait()
     return case * case
