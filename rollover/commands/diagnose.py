@@ -62,8 +62,9 @@ def diagnose(
 
     from rollover.execute import begin_server, cores
 
-    if workers != 1 and cores() > 1:
-        begin_server("rollover.diagnosis.warm")  # beside all that is imported and read here
+    workers = cores() if workers is None else workers
+    if workers > 1:
+        begin_server("rollover.diagnosis.warm")  # as `Crew` does, but beside all that is imported and read here
 
     from rollover import console, document, store
     from rollover import scenario as scenarios
@@ -93,7 +94,7 @@ def diagnose(
     # beside the results folder, which is written whole or not at all: what an interrupted diagnosis had fitted
     notebook = folder.parent / f".{folder.name}.fits"
     about_fits = json.dumps([about, store.versions()], sort_keys=True)
-    with Crew(cores() if workers is None else workers, notebook, about_fits) as crew:
+    with Crew(workers, notebook, about_fits) as crew:
         found = diagnosed(
             chosen, list(measured.items()), hold_out=held, tolerance=tolerance, say=console.say, crew=crew
         )

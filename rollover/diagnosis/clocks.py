@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.blocks import Fitted
 from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.lookout import Looks, at_each
 from rollover.diagnosis.secant import Point
 
 Array = NDArray[np.float64]
@@ -52,11 +52,10 @@ def align(judge: Judge) -> None:
 
 
 def by_first_contact(
-    judge: Judge, candidates: Sequence[Candidate], x: Sequence[float], crew: Crew | None = None
+    judge: Judge, candidates: Sequence[Candidate], x: Sequence[float], looks: Looks = at_each
 ) -> list[float | None]:
-    """Time shift (s) of each recording by its first contact; None where nothing comes of it. `crew` looks for it."""
-    look = partial(_by_contact, beside=(candidates, x))
-    return (crew or Crew()).looks(judge, look, range(len(judge.evidence)))
+    """Time shift (s) of each recording by its first contact; None where nothing comes of it."""
+    return looks(judge, partial(_by_contact, beside=(candidates, x)), range(len(judge.evidence)))
 
 
 def _by_contact(judge: Judge, r: int, *, beside: Point) -> float | None:
@@ -81,18 +80,15 @@ def _first_contact(judge: Judge, r: int, made: Made) -> float | None:
     return about if at is None or abs(at - about) > AT_THE_END * NEAR else at  # the model leads away from it
 
 
-def mistimed(judge: Judge, fitted: Fitted, crew: Crew | None = None) -> list[tuple[str, float]]:
-    """Recordings that would meet a fit if they came later by a shift (s) far beyond what their clocks may be off by.
-
-    `crew` looks for them.
-    """
-    found = (crew or Crew()).looks(judge, partial(_elsewhere, fitted=fitted), range(len(judge.evidence)))
+def mistimed(judge: Judge, fitted: Fitted, looks: Looks = at_each) -> list[tuple[str, float]]:
+    """Recordings that would meet a fit if they came later by a shift (s) far beyond what their clocks may be off by."""
+    found = looks(judge, partial(_elsewhere, fitted=fitted), range(len(judge.evidence)))
     return [(e.name, at) for e, at in zip(judge.evidence, found, strict=True) if at is not None]
 
 
-def is_all_by_clocks(judge: Judge, fitted: Fitted, crew: Crew) -> bool:
+def is_all_by_clocks(judge: Judge, fitted: Fitted, looks: Looks = at_each) -> bool:
     """Whether such shifts are all that separates the recordings from a fit: each else is met as it stands."""
-    late = {name for name, _ in mistimed(judge, fitted, crew)}
+    late = {name for name, _ in mistimed(judge, fitted, looks)}
     others = [b for e, b in zip(judge.evidence, fitted.blocks, strict=True) if e.name not in late]
     return bool(late) and all(b.normal()[2] < MEETS * b.residual.size for b in others)
 

@@ -18,7 +18,7 @@ from typing import Any, Literal, TypeVar
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Block, Fitted, Judge
 from rollover.diagnosis.forms import in_form, shaped
-from rollover.diagnosis.gate import at_each
+from rollover.diagnosis.lookout import at_each
 from rollover.diagnosis.refine import combed, polish, scanned, timed
 from rollover.diagnosis.secant import beside
 from rollover.diagnosis.thresholds import Stretch, traced
@@ -111,7 +111,7 @@ class Crew:
 
     def fits(self, judge: Judge, jobs: Sequence[Job], say: Progress = lambda _: None) -> list[Fitted | None]:
         """Fits in the order of the jobs; None where nothing could be simulated."""
-        about = f"{self.about} {judge.fingerprint()}"
+        about = f"{self.about} {_fingerprint(judge)}"
         found: list[Fitted | None] = [None] * len(jobs)
         keys = [job.key(about) for job in jobs]
         todo = [k for k, key in enumerate(keys) if key not in self._done]
@@ -157,7 +157,7 @@ class Crew:
         """
         if judge.effort.thrifty or len(things) < 2 or not self.is_there():
             return at_each(judge, look, things)
-        about, bare = f"{self.about} {judge.fingerprint()} {judge.shifts}", pickle.dumps(judge.bare())
+        about, bare = f"{self.about} {_fingerprint(judge)} {judge.shifts}", pickle.dumps(judge.bare())
         shares = [list(things)[k :: 2 * self.workers] for k in range(2 * self.workers)]
         found: dict[int, R] = {}
         tasks = [(about, bare, look, share) for share in shares if share]
@@ -207,6 +207,19 @@ def work(judge: Judge, job: Job) -> Fitted | None:
         "scan": partial(scanned, leaves=leaves),
     }  # fmt: skip
     return ways[job.how](judge, begun)
+
+
+def _fingerprint(judge: Judge) -> str:
+    """Hash of the recordings as they are held: their samples, their noise, and whether they may have strayed."""
+    total = hashlib.sha256(repr(judge.straying).encode())
+    for e in judge.evidence:
+        total.update(repr((e.name, e.shift_prior)).encode())
+        total.update(b"" if e.doubts is None else e.doubts.tobytes())
+        for s in e.signals:
+            total.update(repr((s.channel, s.sigma, s.ar)).encode() + s.values.tobytes() + s.rows.tobytes())
+            if s.weight is not None:
+                total.update(s.weight.tobytes())
+    return total.hexdigest()
 
 
 _held: dict[str, Judge] = {}  # in a child: what it simulated for the job before

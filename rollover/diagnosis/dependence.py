@@ -17,11 +17,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.depend import ACCELERATION, DEPTH, SPEED, TIME, hats
 from rollover.diagnosis.detect import Mismatch
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.fit import Block, Fitted, Judge
+from rollover.diagnosis.lookout import Looks, at_each
 from rollover.diagnosis.response import WHERES, Descent, Where, channels_of, descent
 from rollover.scenario import Scenario
 
@@ -95,17 +95,14 @@ def _steady(N: Array) -> Array:
     return np.asarray(STEADY * size * (D.T @ D) + 1e-10 * max(size, 1e-300) * np.eye(k))
 
 
-def dependence(judge: Judge, scenarios: Sequence[Scenario], base: Fitted, crew: Crew | None = None) -> Dependence:
-    """What is left beside a fit depends on what; `scenarios` under the conditions of the recordings.
-
-    `crew` looks at them, in children if it has any.
-    """
-    evidence, crew = judge.evidence, crew or Crew()
-    blocks, found = ways(judge, scenarios, base, crew)
+def dependence(judge: Judge, scenarios: Sequence[Scenario], base: Fitted, looks: Looks = at_each) -> Dependence:
+    """What is left beside a fit depends on what; `scenarios` under the conditions of the recordings."""
+    evidence = judge.evidence
+    blocks, found = ways(judge, scenarios, base, looks)
     channel = alone(evidence, blocks, found)
     if channel is not None:
         return Dependence(shares=_added(*_of_channel(channel, judge, base)), channel=channel)
-    return Dependence(shares=_added(*_of_forces(judge, found, crew))) if found else Dependence()
+    return Dependence(shares=_added(*_of_forces(judge, found, looks))) if found else Dependence()
 
 
 def dependence_of_one(judge: Judge, base: Fitted, before: Mismatch) -> Dependence | None:
@@ -122,10 +119,10 @@ def dependence_of_one(judge: Judge, base: Fitted, before: Mismatch) -> Dependenc
 
 
 def ways(
-    judge: Judge, scenarios: Sequence[Scenario], base: Fitted, crew: Crew
+    judge: Judge, scenarios: Sequence[Scenario], base: Fitted, looks: Looks = at_each
 ) -> tuple[list[list[Block]], list[Descent]]:
     """Each recording at some time shifts, and its way down at the best of them."""
-    found = crew.looks(judge, partial(_way, base=base), list(enumerate(scenarios)))
+    found = looks(judge, partial(_way, base=base), list(enumerate(scenarios)))
     return [blocks for blocks, _ in found], [best for _, best in found if best is not None]
 
 
@@ -135,8 +132,8 @@ def _way(judge: Judge, one: tuple[int, Scenario], *, base: Fitted) -> tuple[list
     Far from an explanation a shift eats what is missing: tried are the base's, what a clock says, and the one that
     goes with a force that may be anything.
     """
-    (r, scenario), b = one, base.blocks[one[0]]
-    e = judge.evidence[r]
+    r, scenario = one
+    e, b = judge.evidence[r], base.blocks[r]
     blocks, best = [b], descent(scenario, e, b)
     tried = [b.shift]
     shift = 0.0 if e.recording.clock.zero != "unknown" else b.shift
@@ -180,7 +177,7 @@ def shiftless(w: Array, slope: Array, prior: float) -> Array:
     return np.asarray(w - np.outer(s, s @ w) if w.ndim > 1 else w - s * float(s @ w))
 
 
-def _of_forces(judge: Judge, found: Sequence[Descent], crew: Crew) -> tuple[list[Model], list[Array], float, float]:
+def _of_forces(judge: Judge, found: Sequence[Descent], looks: Looks) -> tuple[list[Model], list[Array], float, float]:
     """Every model of a force, the misfits, the noise's part of them, and phi."""
     misfits = [shiftless(d.residual[d.rows], d.slope[d.rows], d.prior) for d in found]
     strength = [(d.way.force / float(d.way.force.max()))[:, None] for d in found]
@@ -205,7 +202,7 @@ def _of_forces(judge: Judge, found: Sequence[Descent], crew: Crew) -> tuple[list
             functions.append((IMPACT, [s * row for s, row in zip(strength, by_touch, strict=True)]))
         ends = np.cumsum([basis[0].shape[1] for _, basis in functions])[:-1]
         forces = [np.hstack([basis[k] for _, basis in functions]) for k in range(len(found))]
-        felt = crew.looks(judge, partial(_felt, where=where), list(zip(found, forces, strict=True)))
+        felt = looks(judge, partial(_felt, where=where), list(zip(found, forces, strict=True)))
         each = zip(*(np.split(J, ends, axis=1) for J in felt), strict=True)
         models += [Model(on=on, columns=columns) for (on, _), columns in zip(functions, each, strict=True)]
     n = float(sum(w.size for w in misfits))

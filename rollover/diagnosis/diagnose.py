@@ -137,7 +137,7 @@ def diagnose(
     depends_on = Dependence()
     degrees: tuple[Degree, ...] = ()
     if acts == "drop" and is_mismatch:
-        depends_on = dependence(judge, set_ups, explanation.base, crew)
+        depends_on = dependence(judge, set_ups, explanation.base, crew.looks)
     elif acts != "drop":
         degrees = degrees_of(set_ups, found, [b.shift for b in explanation.base.blocks])
         of_one = dependence_of_one(judge, explanation.base, before) if is_mismatch else None
@@ -167,7 +167,7 @@ def diagnose(
             else sentence(verdict, effects, explanation.p_value, h_before.held, h_after.held, found, early)
         )
         + (closest(explanation, groups) if verdict == "unexplained" and not digits else "")
-        + (by_clock(mistimed(judge, explanation.fitted, crew)) if is_left else "")
+        + (by_clock(mistimed(judge, explanation.fitted, crew.looks)) if is_left else "")
         + offered(law)
         + against_itself(verdict, contrary),
         p_value=0.0 if digits else min([explanation.p_value, *(e.p_value for e in effects if cut)]),

@@ -77,7 +77,7 @@ def step(inquiry: Inquiry, base: Fitted, looked: Gate) -> Step | None:
     inquiry.say(f"looking at {len(candidates)} candidates beside {base.label}")
     # of recordings that went another way together, two may be those that no explanation brings back
     several = judge.effort.few if judge.straying else judge.effort.looked_at
-    few, shifts = spread(base, groups, several), begun(judge, base, inquiry.crew)
+    few, shifts = spread(base, groups, several), begun(judge, base, inquiry.crew.looks)
     screened = screen(inquiry, base, promising(candidates, looked, judge.effort), few, shifts, looked)
     count = sum(b.residual.size for b in base.blocks)
     screened, begun_with = _first_fits(inquiry, base, screened, few, shifts, looked)

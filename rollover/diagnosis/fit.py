@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
@@ -51,18 +50,6 @@ class Judge:
         other = Judge(self.evidence)
         other.shifts = list(self.shifts)
         return other
-
-    def fingerprint(self) -> str:
-        """Hash of the recordings as they are held: their samples, their noise, and whether they may have strayed."""
-        total = hashlib.sha256(repr(self.straying).encode())
-        for e in self.evidence:
-            total.update(repr((e.name, e.shift_prior)).encode())
-            total.update(b"" if e.doubts is None else e.doubts.tobytes())
-            for s in e.signals:
-                total.update(repr((s.channel, s.sigma, s.ar)).encode() + s.values.tobytes() + s.rows.tobytes())
-                if s.weight is not None:
-                    total.update(s.weight.tobytes())
-        return total.hexdigest()
 
     def weigh(self, evidence: Sequence[Evidence]) -> None:
         """Take the same recordings with another noise: nothing is simulated again, fits must be made anew."""

@@ -9,10 +9,9 @@ single simulation. What is compared with it is the same maximum for the misfit.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 from rollover.diagnosis.candidates import Candidate, coordinate, physical
 from rollover.diagnosis.chaos import FEW, gained
 from rollover.diagnosis.fit import Block, Fitted, Judge
+from rollover.diagnosis.lookout import Looks, at_each
 from rollover.diagnosis.secant import Point
 from rollover.effects import EFFECTS
 
@@ -32,20 +32,6 @@ LIMITS = ("limit", "yield_force", "stiffness", "angle")  # what acts the more th
 WAYS = 2  # places of one effect at which fits begin
 CLOSER = 8  # places of one effect that are looked at closer
 EDGE = 0.01  # of a coordinate, that they keep from its ends
-T = TypeVar("T")
-R = TypeVar("R")
-
-
-class Looks(Protocol):
-    """Who looks at each of several things, see `Crew.looks`."""
-
-    def __call__(self, judge: Judge, look: Callable[[Judge, T], R], things: Sequence[T], /) -> list[R]:
-        """What a look at each tells, in their order."""
-
-
-def at_each(judge: Judge, look: Callable[[Judge, T], R], things: Sequence[T]) -> list[R]:
-    """What a look at each thing tells, one after another."""
-    return [look(judge, thing) for thing in things]
 
 
 def freed(vectors: Array, block: Block) -> Array:

@@ -10,9 +10,10 @@ import numpy as np
 
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.gate import Gate, Looks, at_each, gate, p_value
+from rollover.diagnosis.gate import Gate, gate, p_value
 from rollover.diagnosis.inquiry import Groups
 from rollover.diagnosis.lasting import SPOKEN, unbent
+from rollover.diagnosis.lookout import Looks, at_each
 from rollover.diagnosis.refine import left_at
 from rollover.diagnosis.screening import begun, spread
 

@@ -10,11 +10,11 @@ import numpy as np
 
 from rollover.diagnosis.candidates import BESIDE, Candidate, akin
 from rollover.diagnosis.clocks import by_first_contact
-from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.effort import DROPS, Effort
 from rollover.diagnosis.fit import Block, Fitted, Judge
 from rollover.diagnosis.gate import WAYS, Gate, freed
 from rollover.diagnosis.inquiry import Inquiry
+from rollover.diagnosis.lookout import Looks, at_each
 from rollover.diagnosis.secant import Point
 
 SCORED = 18  # candidates looked at closer, by their score
@@ -53,11 +53,10 @@ def is_far(judge: Judge, base: Fitted) -> bool:
     return base.left > far**2 * sum(b.residual.size for b in base.blocks)
 
 
-def begun(judge: Judge, base: Fitted, crew: Crew | None = None) -> list[float]:
+def begun(judge: Judge, base: Fitted, looks: Looks = at_each) -> list[float]:
     """Time shifts (s) to begin with: where the base is off its own are bent by what is missing, the contact's hardly.
 
-    Where samples are weighed by what neighbours scatter by, how far off it is cannot be told from what is left. `crew`
-    looks for the contacts.
+    Where samples are weighed by what neighbours scatter by, how far off it is cannot be told from what is left.
     """
     count = sum(b.residual.size for b in base.blocks)
     if judge.effort.thrifty or judge.per_error > 1.0:
@@ -67,7 +66,7 @@ def begun(judge: Judge, base: Fitted, crew: Crew | None = None) -> list[float]:
     elif base.left < BENT**2 * count:
         return [b.shift for b in base.blocks]
     else:
-        told = by_first_contact(judge, base.candidates, base.x, crew)
+        told = by_first_contact(judge, base.candidates, base.x, looks)
     return [
         at if at is not None else b.shift if e.recording.clock.zero == "unknown" else 0.0
         for at, b, e in zip(told, base.blocks, judge.evidence, strict=True)

@@ -101,7 +101,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
             break
         if looked.p_value() > CHANCE and is_enough(judge, current, left):
             break
-        if not taken and not judge.effort.thrifty and is_all_by_clocks(judge, base, inquiry.crew):
+        if not taken and not judge.effort.thrifty and is_all_by_clocks(judge, base, inquiry.crew.looks):
             break
         tried = step(inquiry, current, looked)
         first = first or tried

@@ -46,13 +46,14 @@ def named(judge: Judge, found: Explanation, groups: Sequence[Sequence[int]]) -> 
             values["channel"] = c.channel
         alike = (f.candidates[-1] for f in confusion(by_key[c.key], groups, judge.per_error))
         rivals = [r for r in alike if r.key not in settings]  # what was named too is told apart by being beside it
-        same = {id: said for id, said in kind(**values).same_as().items() if id not in settings}
+        effect = kind(**values)
+        same = {id: said for id, said in effect.same_as().items() if id not in settings}
         tests = [kind.rivals[id] for id in (*(r.id for r in rivals), *same) if id in kind.rivals]
         effects.append(
             Named(
                 id=c.id,
                 kind=c.kind,
-                statement=" ".join([kind(**values).says(), *same.values()]),
+                statement=" ".join([effect.says(), *same.values()]),
                 parameters=parameters,
                 settings=values,
                 channel=c.channel,

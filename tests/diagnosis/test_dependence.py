@@ -13,7 +13,6 @@ from rollover.diagnosis import colour
 from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.clocks import align
-from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.depend import ACCELERATION, DEPTH, SPEED, TIME
 from rollover.diagnosis.dependence import IMPACT, VALUE, Dependence, dependence, dependence_of_one, ways
 from rollover.diagnosis.detect import mismatch_of
@@ -59,7 +58,7 @@ def test_a_force_does_to_every_channel_what_the_simulation_says() -> None:
     own, damping = scenario(), 400.0
     made = recorded({"effects.soil-viscous-damping.damping": damping}, channels=THREE, rate=2000.0, noise=1e-3)
     judge, base = base_of(own, made)
-    for d in ways(judge, [set_up(own, r) for _, r in made], base, Crew())[1]:
+    for d in ways(judge, [set_up(own, r) for _, r in made], base)[1]:
         moved = channels_of(d.way, d.way.moved(damping * d.way.speed[:, None], "ground"), d.evidence, d.shift)[d.rows]
         s, w = d.slope[d.rows], d.residual[d.rows]
         left = w - moved[:, 0]

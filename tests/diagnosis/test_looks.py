@@ -245,7 +245,7 @@ def test_no_look_is_made_beside_an_explanation_where_known_runs_tell_nothing(
     asked: list[tuple[Any, Any]] = []
 
     def looked(
-        _: Judge, base: Fitted, found: Any, groups: Any, beside: Any = None, few: Any = (), looks: Any = ()
+        _: Judge, base: Fitted, candidates: Any, groups: Any, beside: Any = None, few: Any = (), looks: Any = ()
     ) -> Gate:
         asked.append((beside, few))
         null = np.sort(np.random.default_rng(0).chisquare(1, 1000))

@@ -66,9 +66,6 @@ SLOW = """
 import signal, sys, time
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that runs tests in the background ignores it
 from rollover import store
-from rollover.recording import runs
-from rollover.scenario import load
-from tests.rollover.example import run_of
 from rollover.scenario import load
 from tests.rollover.example import run_of
 
