@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ground.law import HIDDEN, REFERENCE_AREA, REFERENCE_MASS
 from ground.settings import settings
 from ground.surface import normal
-from rollover import fall
+from rollover import fall, nose
 from rollover.bodies import nose_share
 from rollover.document import exchanged
 from rollover.effects import acting, read
@@ -47,6 +47,26 @@ class DropFailedError(Exception):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Track:
+    """A fall that was integrated up to `until` (s): step by step, and the element each time that it had changed."""
+
+    law: NDArray[np.int64]
+    p: Array
+    numbers: Array
+    until: float
+    steps: Array
+    elements: Array
+
+    def rows(self, times: Array) -> Array:
+        """Columns of `fall` at `times` (s, rising), (n, fall.OUT_COLUMNS). Raises ``ValueError`` for one too late."""
+        if len(times) and times[-1] > max(self.until, 0.0):
+            raise ValueError(f"times: beyond the track, got {times[-1]:g} s; it ends at {self.until:g} s")
+        out = np.empty((len(times), fall.OUT_COLUMNS))
+        fall.read_off(self.law, self.p, self.numbers, self.steps, self.elements, times, out)
+        return out
+
+
+@dataclass(frozen=True, kw_only=True)
 class DropModel:
     """A drop test made ready to be run many times; `step` (s) is the longest step of the integration.
 
@@ -70,41 +90,41 @@ class DropModel:
 
     @cached_property
     def numbers(self) -> Array:
-        """What `fall.drop` reads, (fall.NUMBERS,)."""
+        """What `fall` reads, (nose.NUMBERS,)."""
         s = self.scenario.applied()
         vehicle, ground, start = s.vehicle, s.ground, s.initiation
         assert isinstance(vehicle, Striker)
         assert isinstance(start, (Drop, Release))
-        f = np.zeros(fall.NUMBERS)
+        f = np.zeros(nose.NUMBERS)
         share = nose_share(vehicle, s.effects)
         is_cone = vehicle.nose == "cone"
         face = math.pi * vehicle.nose_radius**2 if is_cone else vehicle.face_length * vehicle.face_width
-        f[fall.MASS], f[fall.NOSE], f[fall.FACE] = vehicle.mass, vehicle.mass * share, face
-        f[fall.GRAVITY], f[fall.SPEED], f[fall.STEP] = s.gravity, start.speed, self.step
+        f[nose.MASS], f[nose.NOSE], f[nose.FACE] = vehicle.mass, vehicle.mass * share, face
+        f[nose.GRAVITY], f[nose.SPEED], f[nose.STEP] = s.gravity, start.speed, self.step
         if is_cone:
-            f[fall.CONE] = vehicle.nose_height
-            f[fall.STEP] = min(self.step, ENTRY * vehicle.nose_height / max(landing_speed(start, s.gravity), 1e-3))
+            f[nose.CONE] = vehicle.nose_height
+            f[nose.STEP] = min(self.step, ENTRY * vehicle.nose_height / max(landing_speed(start, s.gravity), 1e-3))
         if isinstance(start, Release):
-            f[fall.HEIGHT] = start.height
-        f[fall.FRACTION] = ground.co_moving_mass.share / share  # of the whole striker, though its nose alone hits
-        f[fall.LAW_MASS], f[fall.MOMENTUM_MOST] = REFERENCE_MASS, np.inf
+            f[nose.HEIGHT] = start.height
+        f[nose.FRACTION] = ground.co_moving_mass.share / share  # of the whole striker, though its nose alone hits
+        f[nose.LAW_MASS], f[nose.MOMENTUM_MOST] = REFERENCE_MASS, np.inf
         if ground.striker_mass != "reference":
-            f[fall.LAW_MASS] = f[fall.NOSE] * REFERENCE_AREA / face
-            f[fall.MOMENTUM_MOST] = ground.law.domain.momentum_most if ground.striker_mass == "clamped" else np.inf
+            f[nose.LAW_MASS] = f[nose.NOSE] * REFERENCE_AREA / face
+            f[nose.MOMENTUM_MOST] = ground.law.domain.momentum_most if ground.striker_mass == "clamped" else np.inf
         if share < 1.0:
             gives = s.effects["structural-compliance"]
-            f[fall.SPRING], f[fall.DASHPOT] = gives.stiffness, gives.damping
+            f[nose.SPRING], f[nose.DASHPOT] = gives.stiffness, gives.damping
             reduced = vehicle.mass * share * (1.0 - share)
-            f[fall.STEP] = min(
-                f[fall.STEP], RESOLVED / max(math.sqrt(gives.stiffness / reduced), gives.damping / reduced)
+            f[nose.STEP] = min(
+                f[nose.STEP], RESOLVED / max(math.sqrt(gives.stiffness / reduced), gives.damping / reduced)
             )
         if "guide-friction" in s.effects:
             guide = s.effects["guide-friction"]
-            f[fall.GUIDE], f[fall.CREEP] = guide.force, guide.creep
-        f[fall.CRISIS], f[fall.THIN] = math.inf, 1.0
+            f[nose.GUIDE], f[nose.CREEP] = guide.force, guide.creep
+        f[nose.CRISIS], f[nose.THIN] = math.inf, 1.0
         if "air-drag" in s.effects:
             air = s.effects["air-drag"]
-            f[fall.AIR], f[fall.CRISIS], f[fall.THIN] = air.factor, air.critical, air.crisis_ratio
+            f[nose.AIR], f[nose.CRISIS], f[nose.THIN] = air.factor, air.critical, air.crisis_ratio
         return f
 
     @cached_property
@@ -122,17 +142,21 @@ class DropModel:
         count = round((settings.duration + lead) / every) + 1
         return np.asarray(np.round(np.arange(count) * every - lead, 9), dtype=np.float64)
 
+    def track(self, until: float) -> Track:
+        """The fall up to a time (s), or to rest if that comes first. Raises `DropFailedError`."""
+        law, p = self.told
+        memory = HIDDEN + self.scenario.ground.law.hidden
+        steps, elements, stayed = fall.fall(law, p, memory, self.numbers, until)
+        if not stayed:
+            raise DropFailedError("the drop diverged: a velocity beyond 10 km/s, or steps without end")
+        return Track(law=law, p=p, numbers=self.numbers, until=until, steps=steps, elements=elements)
+
     def rows(self, times: Array) -> Array:
         """Columns of `fall` at `times` (s, rising), (n, fall.OUT_COLUMNS), without what sensors make of them.
 
         Raises `DropFailedError`.
         """
-        law, p = self.told
-        out = np.empty((len(times), fall.OUT_COLUMNS))
-        kind = self.scenario.ground.law
-        if fall.drop(law, p, HIDDEN + kind.hidden, self.numbers, times, out) < 0:
-            raise DropFailedError("the drop diverged: a velocity beyond 10 km/s, or steps without end")
-        return out
+        return self.track(float(times[-1]) if len(times) else 0.0).rows(times)
 
     def motion(self, times: Array) -> dict[str, Array]:
         """Channels of the drop at `times` (s, rising), before its sensors. Raises `DropFailedError`."""

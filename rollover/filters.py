@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ground.compiled import compiled
 
 CFC = Literal[60, 180, 600, 1000]
 J211, ISO_6487 = 2.0775, 1.25 / 0.6
@@ -36,21 +38,35 @@ def filtered(values: NDArray[np.float64], step: float, cfc: int, *, constant: fl
         )
     if values.size < 2:
         return np.array(values, dtype=float)
-    from scipy.signal import lfilter  # slow to import, and a scenario's check needs only the rates
-
     b, a, steady = _coefficients(cfc * constant, step)
     pad = min(max(round(0.01 / step), 100), values.size - 1)
-    # SciPy's filtfilt works the steady state out anew each time, which takes longer than the filter
     smooth = np.concatenate([2.0 * values[0] - values[pad:0:-1], values, 2.0 * values[-1] - values[-2 : -pad - 2 : -1]])
-    for _ in range(2):
-        smooth = lfilter(b, a, smooth, zi=steady * smooth[0])[0][::-1]
-    return np.array(smooth[pad : pad + values.size])
+    # SciPy's filtfilt works the steady state out anew each time, and its lfilter looks at its arguments for longer than
+    # a pass takes
+    run_through(b, a, steady, smooth)
+    run_through(b, a, steady, smooth[::-1])
+    return smooth[pad : pad + values.size].copy()
+
+
+@compiled
+def run_through(b: Any, a: Any, steady: Any, values: Any) -> None:
+    """Values (n,) through a second-order filter in place, begun as if the first had stood there for ever.
+
+    y = b_0 x + z_0, z_0' = b_1 x - a_1 y + z_1, z_1' = b_2 x - a_2 y (direct form II, transposed).
+    """
+    z0, z1 = steady[0] * values[0], steady[1] * values[0]
+    for i in range(values.size):
+        x = values[i]
+        y = z0 + b[0] * x
+        z0 = z1 + x * b[1] - y * a[1]
+        z1 = x * b[2] - y * a[2]
+        values[i] = y
 
 
 @lru_cache(maxsize=64)
 def _coefficients(frequency: float, step: float) -> tuple[NDArray[np.float64], ...]:
     """Numerator, denominator, and the filter's state behind a constant 1."""
-    from scipy.signal import butter, lfilter_zi
+    from scipy.signal import butter, lfilter_zi  # slow to import, and a scenario's check needs only the rates
 
     b, a = butter(2, frequency, fs=1.0 / step)
     return b, a, lfilter_zi(b, a)

@@ -11,7 +11,6 @@ import json
 import pickle
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -19,7 +18,7 @@ from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Block, Fitted, Judge
 from rollover.diagnosis.forms import in_form, shaped
 from rollover.diagnosis.lookout import at_each
-from rollover.diagnosis.refine import combed, polish, scanned, timed
+from rollover.diagnosis.refine import combed, polish, timed
 from rollover.diagnosis.secant import beside
 from rollover.diagnosis.thresholds import Stretch, traced
 from rollover.execute import Children, begin_server, map_cases
@@ -37,11 +36,11 @@ class Job:
     One of few `rounds` is a first look: it ends without slopes.
     "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too or takes it in another
     `form`, "time" tries out the time shifts, "comb" begins anew all along the second parameter of the last effect,
-    "scan" all along its shape, "trace" where it sets in, over a `stretch`. A shape or form that comes nowhere near what
-    the best fit `leaves` of each recording is not gone on with, in a scan either.
+    "trace" where it sets in, over a `stretch`. A shape or form that comes nowhere near what the best fit `leaves` of
+    each recording is not gone on with.
     """
 
-    how: Literal["fit", "polish", "shape", "time", "comb", "scan", "trace"] = "fit"
+    how: Literal["fit", "polish", "shape", "time", "comb", "trace"] = "fit"
     candidates: tuple[Candidate, ...]
     start: tuple[float, ...]
     shifts: tuple[float, ...]
@@ -202,10 +201,7 @@ def work(judge: Judge, job: Job) -> Fitted | None:
         return shaped(judge, begun, leaves) if job.form is None else in_form(judge, begun, job.form, leaves)
     if job.stretch is not None:
         return traced(judge, begun, job.stretch)
-    ways: dict[str, Callable[[Judge, Fitted], Fitted | None]] = {
-        "polish": polish, "time": timed, "comb": combed,
-        "scan": partial(scanned, leaves=leaves),
-    }  # fmt: skip
+    ways: dict[str, Callable[[Judge, Fitted], Fitted | None]] = {"polish": polish, "time": timed, "comb": combed}
     return ways[job.how](judge, begun)
 
 

@@ -156,8 +156,10 @@ class Judge:
         shift: float,
         nudge: float,
         known: Array | None = None,
+        *,
+        clock: bool = True,
     ) -> Block | None:
-        """Recording r linearised at x by differences over `nudge`; no Jacobian for 0.
+        """Recording r linearised at x by differences over `nudge`: no Jacobian for 0, no slope in time without `clock`.
 
         `known` (n, k) are the first k columns of the Jacobian where those of an earlier place will do.
         """
@@ -171,7 +173,8 @@ class Judge:
         if known is not None:
             J[:, : known.shape[1]] = known
 
-        slope = self._slope(r, candidates, x, shift, raw)
+        clock = clock and not (self._pinned and e.recording.clock.zero != "unknown")
+        slope = self._slope(r, candidates, x, shift, raw) if clock else np.zeros_like(raw)
 
         def off(end: Point) -> Array | None:
             return self.moved(r, (candidates, x), end, shift, None if self._pinned else slope)
@@ -193,9 +196,7 @@ class Judge:
             J[:, k] = moved / step
         worth = e.worth(leaps)
         slope[leaps] = 0.0
-        slope = e.eased(worth * e.whitened(slope))
-        if self._pinned and e.recording.clock.zero != "unknown":
-            slope = np.zeros_like(slope)
+        slope = e.eased(worth * e.whitened(slope)) if clock else slope
         residual = e.eased(worth * (self.measured[r] - y))
         counts = course(e, residual) if self.straying else None
         if counts is not None:
@@ -256,6 +257,12 @@ class Judge:
             found = new
         return found
 
+    def _on_trial(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Block | None:
+        """Recording r where a step leads: what is left there is all that is asked for, unless its clock moves on."""
+        if self.effort.clocked:
+            return self.clocked(r, candidates, x, shift, self.effort.clocked)
+        return self.block(r, candidates, x, shift, 0.0, clock=False)
+
     def fit(
         self,
         candidates: Sequence[Candidate],
@@ -295,7 +302,7 @@ class Judge:
         if any(b is None for b in found):
             return None
         blocks: list[Block] = [b for b in found if b is not None]
-        best, damping, accepted = self._total(blocks), 1e-3, blocks
+        best, damping = self._total(blocks), 1e-3
         fixed = len(x) - len(candidates[-1].search) if candidates else 0
         for turn in range(rounds):
             A, b = np.zeros((len(x), len(x))), np.zeros(len(x))
@@ -312,7 +319,7 @@ class Judge:
                 steps = [shift_of(block, moved) for block in blocks]
                 self.made_ahead((r, candidates, trial) for r in use)
                 after = [
-                    self.clocked(r, candidates, trial, block.shift + d, self.effort.clocked)
+                    self._on_trial(r, candidates, trial, block.shift + d)
                     for r, block, d in zip(use, blocks, steps, strict=True)
                 ]
                 if all(a is not None for a in after):
@@ -326,26 +333,26 @@ class Judge:
             gain = best - total if improved else 0.0
             if improved:
                 x, best, damping = trial, total, 0.1 * damping
-                accepted = [a for a in after if a is not None]
-                shifts = [a.shift for a in accepted]
+                shifts = [a.shift for a in after if a is not None]
             fresh = gain < enough
             if fresh:
                 width, damping = width + 1, 1e-3
             last = width >= len(nudges)
             if last and not improved and len(nudges) == 1:
                 break
-            if bare and (last or turn + 1 == rounds):
-                return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=tuple(accepted))
-            nudge = self.effort.fine if last else nudges[width]
-            self.made_ahead(beside(use, candidates, x, nudge))
+            is_bare = bare and (last or turn + 1 == rounds)
+            nudge = 0.0 if is_bare else self.effort.fine if last else nudges[width]
+            self.made_ahead(() if is_bare else beside(use, candidates, x, nudge))
             # what is held already moves little: its slopes are worked out anew only where the search narrows
             again = [
-                self.block(r, candidates, x, s, nudge, None if fresh else block.plain_J[:, :fixed])
+                self.block(r, candidates, x, s, nudge, None if fresh or is_bare else block.plain_J[:, :fixed])
                 for r, s, block in zip(use, shifts, blocks, strict=True)
             ]
             if any(b is None for b in again):
                 return None
             blocks = [b for b in again if b is not None]
+            if is_bare:
+                return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=tuple(blocks))
             if last:
                 break
         if width < len(nudges) and nudges[width] != self.effort.fine:
@@ -370,9 +377,7 @@ class Judge:
             there = [float(v) for v in np.clip(np.array(x) + dx, 0.0, 1.0)]
             self.made_ahead((r, candidates, there) for r in use)
             found = [
-                self.clocked(r, candidates, there, b.shift, self.effort.clocked)
-                for r, b in zip(use, after, strict=True)
-                if b is not None
+                self._on_trial(r, candidates, there, b.shift) for r, b in zip(use, after, strict=True) if b is not None
             ]
             if there == trial or any(b is None for b in found):
                 break

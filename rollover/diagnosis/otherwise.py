@@ -18,6 +18,7 @@ from rollover.diagnosis.forms import WORTH, enough, is_noise
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.inquiry import Inquiry
+from rollover.diagnosis.refine import BEHIND, along_shapes, least_of
 from rollover.diagnosis.thresholds import is_clock, stretches
 
 RUGGED = 2.0  # misfit over the noise that the best leaves, from which on there may be something behind a cliff
@@ -26,6 +27,7 @@ MOSTLY = 0.25  # of what the middle recording is left with by the best, below wh
 PROMISED = 0.5  # of the best score: what has it, and gains less than half of its own, may have another shape
 TIED = 1.2  # times what the best leaves, up to which time shifts are tried out
 BY_CHANCE = 0.01  # p-value of what is left, above which no other form of an effect is looked for
+PARTS = 4  # into which places are split for those who look
 TURNS, PAYS = 4, 0.9  # how often, and to what share of what it leaves, a fit of what rings is followed
 # of what the base leaves beyond the noise, that an effect must take before its shape is fitted too; of what the best
 # takes, before its time shifts are tried out
@@ -93,13 +95,24 @@ def _with_shapes(
     places: Sequence[tuple[Candidate, tuple[float, ...]]],
     shifts: Sequence[float],
 ) -> list[Fitted]:
-    """The fits, best first, with those of candidates fitted together with their shapes from places beside the base."""
-    leaves = tuple(b.total for b in fits[0].blocks)
-    jobs = [
-        Job(how="scan", candidates=(*base.candidates, c), start=x, shifts=tuple(shifts), leaves=leaves)
-        for c, x in places
-    ]
-    return sorted([*fits, *(f for f in inquiry.fits(jobs) if f is not None)], key=lambda f: f.left)
+    """The fits, best first, with those of candidates fitted together with their shapes from places beside the base.
+
+    They are begun where least is left all along each parameter of the shape. One that comes nowhere near what the best
+    fit leaves is not gone on with.
+    """
+    sets = [((*base.candidates, c.whole()), along_shapes(c, x)) for c, x in places]
+    parts = [(candidates, tuple(every[k::PARTS])) for candidates, every in sets for k in range(PARTS)]
+    met = inquiry.looks(partial(least_of, shifts=tuple(shifts)), parts)
+    jobs = []
+    for k, (candidates, _) in enumerate(sets):
+        least = min((one for one in met[k * PARTS : (k + 1) * PARTS] if one is not None), default=None)
+        if least is not None:
+            jobs.append(Job(candidates=candidates, start=least[1], shifts=tuple(shifts), width=1))
+    begun = [f for f in inquiry.fits(jobs) if f is not None]
+    near = [f for f in begun if f.left <= BEHIND * fits[0].left]
+    followed = zip(inquiry.fits([from_there(f, "polish") for f in near]), near, strict=True)
+    others = [f for f in begun if not any(f is one for one in near)]
+    return sorted([*fits, *others, *(new or old for new, old in followed)], key=lambda f: f.left)
 
 
 def _best_middle(

@@ -41,10 +41,12 @@ def blocks_at(
     x: Sequence[float],
     shifts: Sequence[float],
     only: Sequence[int] | None = None,
+    *,
+    clock: bool = True,
 ) -> list[Block] | None:
-    """Recordings at x and these time shifts (s), without slopes; None where one cannot be simulated."""
+    """Recordings at x and these time shifts (s), without slopes but a clock's; None where one cannot be simulated."""
     use = range(len(shifts)) if only is None else only
-    found = [judge.block(r, candidates, x, shifts[r], 0.0) for r in use]
+    found = [judge.block(r, candidates, x, shifts[r], 0.0, clock=clock) for r in use]
     blocks = [b for b in found if b is not None]
     return blocks if len(blocks) == len(found) else None
 
@@ -102,21 +104,32 @@ def combed(judge: Judge, fitted: Fitted) -> Fitted:
     return best if best.left < fitted.left else fitted
 
 
-def scanned(judge: Judge, fitted: Fitted, leaves: Sequence[float]) -> Fitted | None:
-    """A fit of the last effect with its shape, begun where least is left all along each parameter of the shape.
+def along_shapes(last: Candidate, x: Sequence[float]) -> list[tuple[float, ...]]:
+    """Places beside x all along each parameter of the shape of its last effect, the others as they usually are.
 
-    A recording in which a face lets go, or does not, is met within a narrow stretch alone. One that comes nowhere near
-    what another explanation `leaves` of the recordings is not gone on with.
+    A recording in which a face lets go, or does not, is met within a narrow stretch alone.
     """
-    last, at, shifts = fitted.candidates[-1], len(fitted.x), [b.shift for b in fitted.blocks]
-    candidates, usual = (*fitted.candidates[:-1], last.whole()), last.with_shapes(fitted.x[-len(last.search) :])[0]
-    begun = (*fitted.x[: at - len(last.search)], *usual)
-    places = [(*begun[:k], float(v), *begun[k + 1 :]) for k in range(at, len(begun)) for v in SCANNED]
-    met = by_what_is_left(judge, candidates, places, shifts)
-    again = judge.fit(candidates, met[0], shifts=shifts, width=1) if met else None
-    if again is None or again.left > BEHIND * sum(leaves):
-        return again
-    return polish(judge, again)
+    at = len(x)
+    begun = (*x[: at - len(last.search)], *last.with_shapes(x[-len(last.search) :])[0])
+    return [(*begun[:k], float(v), *begun[k + 1 :]) for k in range(at, len(begun)) for v in SCANNED]
+
+
+def least_of(
+    judge: Judge, thing: tuple[Sequence[Candidate], Sequence[tuple[float, ...]]], *, shifts: Sequence[float]
+) -> tuple[float, tuple[float, ...]] | None:
+    """What is left of all recordings at that of some places where it is least, and this; None if all runs fail."""
+    candidates, places = thing
+    least, best = np.inf, None
+    for x in places:
+        left = 0.0
+        for r, shift in enumerate(shifts):
+            block = judge.block(r, candidates, x, shift, 0.0)
+            left += np.inf if block is None else block.normal()[2]
+            if left >= least:
+                break
+        else:
+            least, best = left, x
+    return None if best is None else (least, best)
 
 
 def timed(judge: Judge, fitted: Fitted) -> Fitted:
@@ -127,7 +140,7 @@ def timed(judge: Judge, fitted: Fitted) -> Fitted:
     best = fitted
     for _ in range(TWICE):
         x, shifts = _against(judge, best)
-        moved = [judge.block(r, best.candidates, x, s, 0.0) for r, s in enumerate(shifts)]
+        moved = [judge.block(r, best.candidates, x, s, 0.0, clock=False) for r, s in enumerate(shifts)]
         blocks = [b if b is None else _tried(judge, r, best.candidates, x, b) for r, b in enumerate(moved)]
         shifts = [s if b is None else b.shift for s, b in zip(shifts, blocks, strict=True)]
         again = judge.fit(best.candidates, x, rounds=3, shifts=shifts, width=2)
@@ -162,7 +175,7 @@ def _against(judge: Judge, fitted: Fitted) -> tuple[tuple[float, ...], list[floa
             for d in (step, -step):
                 moved = coordinate(physical(best[0][k], search) - d, search)
                 x, shifts = (*best[0][:k], moved, *best[0][k + 1 :]), [s + d for s in best[1]]
-                blocks = blocks_at(judge, fitted.candidates, x, shifts) if 0.0 < moved < 1.0 else None
+                blocks = blocks_at(judge, fitted.candidates, x, shifts, clock=False) if 0.0 < moved < 1.0 else None
                 there = np.inf if blocks is None else sum(b.total for b in blocks)
                 if there < left:
                     best, left = (x, shifts), there
@@ -178,7 +191,7 @@ def _tried(judge: Judge, r: int, candidates: Sequence[Candidate], x: Sequence[fl
     while step > SHORTEST and tried < TRIED:
         for there in (block.shift + step, block.shift - step):
             tried += 1
-            other = judge.block(r, candidates, x, there, 0.0)
+            other = judge.block(r, candidates, x, there, 0.0, clock=False)
             if other is not None and other.total < block.total and abs(there) < WIDEST * other.prior:
                 block = other
                 break

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rollover.diagnosis.effort import DROPS, Effort
 from rollover.diagnosis.filtering import Rows, behind_filters, rows_of
 from rollover.diagnosis.overturn import SENSORS, RunSimulator
-from rollover.drop import DropFailedError, DropModel, channels_of, unfit
+from rollover.drop import DropFailedError, DropModel, Track, channels_of, unfit
 from rollover.effects import every, read
 from rollover.initiation import Drop
 from rollover.recording import Recording
@@ -25,7 +25,8 @@ EDGES = ("sensor-lag", "sensor-clock-offset", "sensor-clock-drift")
 # s: longest step of a drop, within 6e-5 of the range; and of one with abrupt effects, within 8e-4 where it rings
 STEP, SHORT = 2e-3, 1e-3
 BESIDE = 1e-9  # s: on either side of the first contact
-KEPT = 128  # runs of one recording
+KEPT, TRACKS = 128, 16  # of one recording: what it is predicted to be, and falls that this is read from
+MARGIN = 0.02  # s, by which a fall is longer than it is asked for: clocks move on
 
 
 class Simulator(Protocol):
@@ -78,11 +79,12 @@ class DropSimulator:
         self.recording = recording
         self._raw: dict[tuple[Any, ...], dict[str, Array]] = {}
         self._models: dict[tuple[Any, ...], DropModel] = {}
+        self._tracks: dict[tuple[Any, ...], Track] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         """What is sent to another process: not the runs."""
         bare = DropModel(scenario=self.model.scenario)
-        return {"model": bare, "recording": self.recording, "_raw": {}, "_models": {}}
+        return {"model": bare, "recording": self.recording, "_raw": {}, "_models": {}, "_tracks": {}}
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """See `Simulator`; ``ValueError`` for a value out of bounds passes."""
@@ -140,7 +142,7 @@ class DropSimulator:
             beside = self.contact + shift + np.array([-BESIDE, BESIDE])
             fine = np.concatenate([own, 0.5 * (own[1:] + own[:-1]), beside[(beside > own[0]) & (beside < own[-1])]])
             dense, where = np.unique(fine, return_inverse=True)
-            raw = {channel: self._run(physical, dense, shift, (*key, "dense"), ahead=False)[channel]}
+            raw = {channel: self._run(physical, dense, shift, (*key, "dense"))[channel]}
             late = lags[channel].read(Recording(title=self.recording.title, time=dense, channels=raw))
             found[channel] = late[channel][where[: own.size]]
         return found
@@ -161,31 +163,24 @@ class DropSimulator:
         return float(times[np.argmax(below)]) if below.any() else np.inf
 
     def _run(
-        self,
-        physical: Mapping[str, Any],
-        times: Array,
-        shift: float,
-        key: tuple[Any, ...] = (),
-        *,
-        ahead: bool = True,
+        self, physical: Mapping[str, Any], times: Array, shift: float, key: tuple[Any, ...] = ()
     ) -> dict[str, Array]:
-        """The drop before instruments at `times` less `shift`, which `key` stands for beside it.
+        """The drop before instruments at `times` less `shift`, which `key` stands for beside it."""
+        values = (*sorted(physical.items()), *key, shift)
+        if values not in self._raw:
+            at = times - shift
+            rows = self._track(physical, float(at[-1]) if at.size else 0.0).rows(at)
+            self._keep(self._raw, values, channels_of(rows, self.recording.channels), KEPT)
+        return self._raw[values]
 
-        What it is a little later is asked for next: it is made along with it where these are the same `ahead`.
-        """
-        values = (*sorted(physical.items()), *key)
-        if (*values, shift) not in self._raw:
-            if not ahead:
-                self._keep(self._raw, (*values, shift), self._recorded(self._model(physical).rows(times - shift)))
-                return self._raw[(*values, shift)]
-            both = np.concatenate([times, times - self.effort.later]) - shift
-            order = np.argsort(both, kind="stable")
-            back = np.empty_like(order)
-            back[order] = np.arange(order.size)
-            channels = self._recorded(self._model(physical).rows(both[order]))
-            for at, part in ((shift, back[: times.size]), (shift + self.effort.later, back[times.size :])):
-                self._keep(self._raw, (*values, at), {c: v[part] for c, v in channels.items()})
-        return self._raw[(*values, shift)]
+    def _track(self, physical: Mapping[str, Any], until: float) -> Track:
+        """The fall with values exchanged, at least up to a time (s): neither a clock nor a sensor asks for another."""
+        key = tuple(sorted(physical.items()))
+        found = self._tracks.pop(key, None)
+        if found is None or found.until < until:
+            found = self._model(physical).track(until + MARGIN)
+        self._keep(self._tracks, key, found, TRACKS)
+        return found
 
     def _model(self, changes: Mapping[str, Any]) -> DropModel:
         """The drop with values exchanged, its steps as short as it asks for."""
@@ -194,17 +189,13 @@ class DropSimulator:
             model = self.model.with_(changes) if changes else self.model
             has_own = model.scenario.ground.law.advance is not None  # states of its own are second order in the step
             is_abrupt = has_own or any(effect.is_abrupt for effect in model.scenario.effects.values())
-            self._keep(self._models, key, replace(model, step=SHORT if is_abrupt else STEP))
+            self._keep(self._models, key, replace(model, step=SHORT if is_abrupt else STEP), KEPT)
         return self._models[key]
 
-    def _recorded(self, rows: Array) -> dict[str, Array]:
-        """Channels of a drop that the recording has."""
-        return channels_of(rows, self.recording.channels)
-
     @staticmethod
-    def _keep(store: dict[tuple[Any, ...], T], key: tuple[Any, ...], value: T) -> None:
-        """Put into a store of the last `KEPT`: what sensors alone change needs no second run."""
-        if len(store) >= KEPT:
+    def _keep(store: dict[tuple[Any, ...], T], key: tuple[Any, ...], value: T, most: int) -> None:
+        """Put into a store of the last so many."""
+        if len(store) >= most:
             store.pop(next(iter(store)))
         store[key] = value
 

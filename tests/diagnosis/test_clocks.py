@@ -114,21 +114,29 @@ def test_the_slope_of_a_clock_is_that_of_the_simulation() -> None:
     assert block.slope[smooth] == pytest.approx(wanted[smooth], rel=0.02, abs=2e-3 * np.abs(wanted).max())
 
 
-def test_one_run_serves_a_place_and_its_slope() -> None:
+def test_one_fall_serves_every_clock() -> None:
+    """A shift, or a channel with a clock of its own, reads the same fall again; one far off makes it longer."""
     e = judge_of({}).evidence[0]
     assert isinstance(e.simulator, DropSimulator)
-    first = e.simulator.predict({"effects.soil-stiffness.scale": 1.1}, 0.0)
-    runs = len(e.simulator._raw)
-    later = e.simulator.predict({"effects.soil-stiffness.scale": 1.1}, e.simulator.effort.later)
-    assert len(e.simulator._raw) == runs
-    alone = DropSimulator(e.simulator.model.scenario, e.recording).predict(
-        {"effects.soil-stiffness.scale": 1.1}, e.simulator.effort.later
-    )
-    assert first is not None
-    assert later is not None
-    assert alone is not None
-    assert all(np.array_equal(later[c], alone[c]) for c in alone)
-    assert not np.array_equal(first[DEPTH], later[DEPTH])
+    stiffer, scenario = {"effects.soil-stiffness.scale": 1.1}, e.simulator.model.scenario
+    simulator = DropSimulator(scenario, e.recording)
+    first = simulator.predict(stiffer, 0.0)
+    (fall,) = simulator._tracks.values()
+    late = {"effects.sensor-clock-offset.channel": DEPTH, "effects.sensor-clock-offset.offset": 0.002}
+    for shift in (simulator.effort.later, 0.01, -0.01):
+        moved = simulator.predict({**stiffer, **late}, shift)
+        assert list(simulator._tracks.values()) == [fall]
+        alone = DropSimulator(scenario, e.recording).predict({**stiffer, **late}, shift)
+        assert first is not None
+        assert moved is not None
+        assert alone is not None
+        assert all(np.array_equal(moved[c], alone[c]) for c in alone)
+        assert not np.array_equal(first[DEPTH], moved[DEPTH])
+    assert simulator.predict(stiffer, -0.1) is not None
+    (longer,) = simulator._tracks.values()
+    assert longer.until == pytest.approx(fall.until + 0.1)
+    with pytest.raises(ValueError, match=r"times: beyond the track, got 9 s; it ends at "):
+        longer.rows(np.array([0.0, 9.0]))
 
 
 def test_fits_from_two_places_end_at_one() -> None:

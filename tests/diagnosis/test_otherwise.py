@@ -39,11 +39,16 @@ def begun(promised: float, gained: float) -> list[str]:
 
     asked: list[str] = []
 
+    def looks(look: Any, things: list[Any]) -> list[Any]:
+        """Least is left at the last of the places."""
+        assert sum(len(places) for _, places in things) == (40 if things else 0)
+        return [(1.0 if x[1] > 0.98 else 2.0, x) for _, (*_, x) in things]
+
     def fits(jobs: list[Any]) -> list[None]:
-        asked.extend(f"{j.how} {j.candidates[-1].id} {j.start}" for j in jobs)
+        asked.extend(f"{j.how} {j.candidates[-1].id} {sorted(j.candidates[-1].search)} {j.start}" for j in jobs)
         return [None] * len(jobs)
 
-    inquiry = SimpleNamespace(free=lambda _: [PLAIN, SHAPED], fits=fits)
+    inquiry = SimpleNamespace(free=lambda _: [PLAIN, SHAPED], fits=fits, looks=looks)
     looked = Gate(
         score=40.0, scores={"mass": 40.0, "soil-adhesion": promised}, null=np.zeros(9), detectable={},
         starts={"soil-adhesion": ((0.7,),)},
@@ -57,7 +62,7 @@ def begun(promised: float, gained: float) -> list[str]:
 def test_what_promised_much_and_gained_little_is_fitted_with_its_shape(
     promised: float, gained: float, scanned: int
 ) -> None:
-    assert begun(promised, gained) == ["scan soil-adhesion (0.7,)"] * scanned
+    assert begun(promised, gained) == ["fit soil-adhesion ['reach', 'stress'] (0.7, 0.9875)"] * scanned
 
 
 def test_what_is_sudden_is_looked_at_in_all_its_places_and_not_where_its_slopes_lead() -> None:
