@@ -44,7 +44,7 @@ from rollover.diagnosis.statements import (
     by_steps,
     closest,
     considered,
-    is_none,
+    may_be_nothing,
     named,
     noise,
     places,
@@ -115,10 +115,12 @@ def diagnose(
     explanation = explained(inquiry, base)
     explanation, verdict = decided(judge, explanation, groups, phases)
     held, named_so = judge.evidence, _named_beside(judge, explanation, verdict, kept, groups, phases)
-    if len(named_so[1]) > 1 and any(is_none(e) for e in named_so[1]):
-        # one of them may as well be nothing: what came first explains what there is alone, or nothing does
+    nothing: set[str] = set()
+    while more := may_be_nothing(named_so[1]) - nothing:
+        # what may as well be nothing is none of it: what came first explains what there is alone, or nothing does
+        nothing |= more
         judge.weigh(held)
-        alone = by_the_first(judge, explanation, {e.id for e in named_so[1] if is_none(e)}, phases)
+        alone = by_the_first(judge, explanation, nothing, phases)
         explanation, verdict = decided(judge, alone, groups, phases)
         named_so = _named_beside(judge, explanation, verdict, kept, groups, phases)
     explanation, effects, kept = named_so

@@ -346,10 +346,13 @@ def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) ->
 
 
 def by_the_first(judge: Judge, found: Explanation, nothing: Collection[str], phases: Phases) -> Explanation:
-    """The explanation by its first effect alone, where that is none of those that may be `nothing`; else refused."""
+    """The explanation by its first effect alone, where that is none of those that may be `nothing`; else refused.
+
+    Of one that was all there is, its gain is refuted with it.
+    """
     one = found.first
     if one is None or one.fitted.candidates[-1].id in nothing:
-        return found.refused()
+        return replace(found.refused(), refuted=found.refuted or len(found.parts) == 1)
     one = one.again(judge)
     one, after = as_conditioned(judge, one, mismatch_of(judge.evidence, one.fitted.blocks, phases), phases)
     return replace(found, parts=(one,), fitted=one.fitted, after=after)

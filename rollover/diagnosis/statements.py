@@ -84,6 +84,15 @@ def is_none(effect: Named) -> bool:
     return bool(known) and all(may_be(p, null) for p, null in known.items())
 
 
+def may_be_nothing(effects: Sequence[Named]) -> set[str]:
+    """Ids of those that may be none of what they are said to be: their gain is another's, or chance of the runs.
+
+    What does something at its least is no doubt there if it is alone: only how strong it is cannot be told.
+    """
+    sudden = len(effects) == 1 and EFFECTS[effects[0].id].is_sudden
+    return set() if sudden else {e.id for e in effects if is_none(e)}
+
+
 def by_steps(effects: Sequence[Named]) -> list[str]:
     """What the scenario's own steps would have said of values, where that is far off beside their intervals."""
     return [

@@ -16,7 +16,7 @@ from rollover.diagnosis.detect import Cell, Mismatch
 from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
-from rollover.diagnosis.selection import MOST, Explanation, decided, is_better
+from rollover.diagnosis.selection import MOST, Explanation, by_the_first, decided, is_better
 from rollover.effects import Search
 
 IDS = ("soil-crust", "guide-friction", "mass")
@@ -86,6 +86,16 @@ def test_what_an_effect_too_slight_for_a_name_explains_whole_is_no_mismatch(
     one = explanation(1, 1e-9)
     found = decided(cast(Judge, SimpleNamespace(evidence=())), replace(one, parts=(), fitted=one.base), [], [])
     assert (found[0].parts, found[1]) == ((), verdict)
+
+
+def test_the_gain_of_one_effect_that_may_be_nothing_tells_nothing_either() -> None:
+    """The p-value is that of the misfit then; of several, others may have gained what it seemed to."""
+    judge = cast(Judge, SimpleNamespace(evidence=()))
+    one, two = (replace(explanation(count, 0.4), before=left(0.2)) for count in (1, 2))
+    assert one.p_value < 1e-6  # of 99 that the best candidate scores
+    refused = by_the_first(judge, one, {IDS[0]}, [])
+    assert (refused.parts, refused.fitted, refused.p_value) == ((), one.base, 0.2)
+    assert by_the_first(judge, two, {IDS[0]}, []).p_value == two.p_value
 
 
 @pytest.mark.parametrize(("channels", "named"), [(("a", "a"), 0), (("a", "b"), 2), ((None, None), 2), ((None, "a"), 2)])
