@@ -116,7 +116,7 @@ def diagnose(
     explanation, verdict = decided(judge, explanation, groups, phases)
     held, named_so = judge.evidence, _named_beside(judge, explanation, verdict, kept, groups, phases)
     nothing: set[str] = set()
-    while more := may_be_nothing(named_so[1]) - nothing:
+    while more := may_be_nothing(named_so[1], judge.effort.thrifty) - nothing:
         # what may as well be nothing is none of it: what came first explains what there is alone, or nothing does
         nothing |= more
         judge.weigh(held)

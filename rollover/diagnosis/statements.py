@@ -84,13 +84,15 @@ def is_none(effect: Named) -> bool:
     return bool(known) and all(may_be(p, null) for p, null in known.items())
 
 
-def may_be_nothing(effects: Sequence[Named]) -> set[str]:
+def may_be_nothing(effects: Sequence[Named], scattering: bool) -> set[str]:
     """Ids of those that may be none of what they are said to be: their gain is another's, or chance of the runs.
 
-    What does something at its least is no doubt there if it is alone: only how strong it is cannot be told.
+    One alone has no other's gain: where runs are not `scattering` it is there, only how strong it is cannot be told. So
+    it is with what does something at its least.
     """
-    sudden = len(effects) == 1 and EFFECTS[effects[0].id].is_sudden
-    return set() if sudden else {e.id for e in effects if is_none(e)}
+    if len(effects) == 1 and (not scattering or EFFECTS[effects[0].id].is_sudden):
+        return set()
+    return {e.id for e in effects if is_none(e)}
 
 
 def by_steps(effects: Sequence[Named]) -> list[str]:

@@ -98,12 +98,13 @@ def test_an_effect_whose_numbers_may_all_be_null_may_be_nothing() -> None:
     assert not statements.is_none(effect("rops-plasticity", yield_force=(-1.0, 1e6)))  # a limit has no null
     # an overturn without anything in it had named this, on what its runs make of chance
     growth, faster = effect("soil-added-mass-growth", rate=(0.12, 2118.0)), effect("impact-speed", scale=(1.01, 1.09))
-    assert statements.may_be_nothing([growth]) == {"soil-added-mass-growth"}
-    assert statements.may_be_nothing([faster, growth]) == {"soil-added-mass-growth"}
-    assert statements.may_be_nothing([faster]) == set()
+    assert statements.may_be_nothing([growth], True) == {"soil-added-mass-growth"}
+    assert statements.may_be_nothing([growth], False) == set()  # a drop has no neighbours to be one of
+    assert statements.may_be_nothing([faster, growth], False) == {"soil-added-mass-growth"}
+    assert statements.may_be_nothing([faster], True) == set()
     adhesion = effect("soil-adhesion", stress=(0.003, 1.6e9))  # that it acts is sure, how strongly is not
-    assert statements.may_be_nothing([adhesion]) == set()
-    assert statements.may_be_nothing([faster, adhesion]) == {"soil-adhesion"}
+    assert statements.may_be_nothing([adhesion], True) == set()
+    assert statements.may_be_nothing([faster, adhesion], True) == {"soil-adhesion"}
 
 
 def test_an_effect_that_is_named_is_no_look_alike_of_another(monkeypatch: pytest.MonkeyPatch) -> None:
