@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ground.law import HIDDEN, REFERENCE_AREA, REFERENCE_MASS
 from ground.settings import settings
 from ground.surface import normal
-from rollover import fall, nose
+from rollover import fall, nose, track
 from rollover.bodies import nose_share
 from rollover.document import exchanged
 from rollover.effects import acting, read
@@ -33,12 +33,12 @@ ENTRY = 0.02  # longest step over the time in which a cone goes in
 RESOLVED = 0.15  # longest step times the frequency of a striker that gives way
 
 COLUMNS = {
-    "ground/force_normal": (fall.OUT_FORCE, 1.0),
-    "ground/impulse_normal": (fall.OUT_IMPULSE, 1.0),
-    "ground/sinkage": (fall.OUT_SINKAGE, 1.0),
-    "striker/position_z": (fall.OUT_X, -1.0),
-    "striker/velocity_z": (fall.OUT_V, -1.0),
-    "striker/acceleration_z": (fall.OUT_A, -1.0),
+    "ground/force_normal": (track.OUT_FORCE, 1.0),
+    "ground/impulse_normal": (track.OUT_IMPULSE, 1.0),
+    "ground/sinkage": (track.OUT_SINKAGE, 1.0),
+    "striker/position_z": (track.OUT_X, -1.0),
+    "striker/velocity_z": (track.OUT_V, -1.0),
+    "striker/acceleration_z": (track.OUT_A, -1.0),
 }
 
 
@@ -58,11 +58,11 @@ class Track:
     elements: Array
 
     def rows(self, times: Array) -> Array:
-        """Columns of `fall` at `times` (s, rising), (n, fall.OUT_COLUMNS). Raises ``ValueError`` for one too late."""
+        """Columns of `track` at `times` (s, rising), (n, track.OUT_COLUMNS). Raises ``ValueError`` for one too late."""
         if len(times) and times[-1] > max(self.until, 0.0):
             raise ValueError(f"times: beyond the track, got {times[-1]:g} s; it ends at {self.until:g} s")
-        out = np.empty((len(times), fall.OUT_COLUMNS))
-        fall.read_off(self.law, self.p, self.numbers, self.steps, self.elements, times, out)
+        out = np.empty((len(times), track.OUT_COLUMNS))
+        track.read_off(self.law, self.p, self.numbers, self.steps, self.elements, times, out)
         return out
 
 
@@ -152,7 +152,7 @@ class DropModel:
         return Track(law=law, p=p, numbers=self.numbers, until=until, steps=steps, elements=elements)
 
     def rows(self, times: Array) -> Array:
-        """Columns of `fall` at `times` (s, rising), (n, fall.OUT_COLUMNS), without what sensors make of them.
+        """Columns of `track` at `times` (s, rising), (n, track.OUT_COLUMNS), without what sensors make of them.
 
         Raises `DropFailedError`.
         """

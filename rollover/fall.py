@@ -1,8 +1,7 @@
 """Compiled: a striker that falls on level ground, integrated by itself with the kernels of the full run.
 
 Within a step the classical Runge-Kutta formula is used; steps end where the force has a kink or a jump, where the
-motion turns, and where the contact begins or ends, so that no step lies across one of these. What comes out is a track,
-from which rows are read at any times: a clock that is moved asks for no second integration.
+motion turns, and where the contact begins or ends, so that no step lies across one of these. What comes out is a track.
 """
 
 from __future__ import annotations
@@ -28,20 +27,16 @@ from ground.kernel import (
     PLASTIC,
     RELEASED,
     SAME,
-    SINKAGE,
     STATE_COLUMNS,
     UNLOADING,
     commit,
     rut_depth,
 )
 from ground.law import REFERENCE_AREA
-from rollover.cubic import between_ends, crossing
+from rollover.cubic import crossing
 from rollover.nose import (
-    AIR,
     CREEP,
-    CRISIS,
     FACE,
-    GRAVITY,
     GUIDE,
     HEIGHT,
     LAW_MASS,
@@ -50,7 +45,6 @@ from rollover.nose import (
     SPEED,
     SPRING,
     STEP,
-    THIN,
     accelerate,
     along,
     cover,
@@ -62,14 +56,24 @@ from rollover.nose import (
     settle_one,
     steepness,
 )
-from rollover.terms import INCHING, fall_back, free
-
-# columns of what comes out
-OUT_FORCE, OUT_SINKAGE, OUT_X, OUT_V, OUT_A, OUT_IMPULSE, OUT_COLUMNS = 0, 1, 2, 3, 4, 5, 6
-# columns of a track, a row a step: from (s), how long (s), mode (`RESTS` at last), whether nothing gives way yet,
-# impulse (N s), force at rest (N), which element, state at both ends (4 each), accelerations at the first (2)
-FROM, LONG, HOW, BOUND, HIT, PRESSED, ELEMENT, START, END, FIRST, TRACK_COLUMNS = 0, 1, 2, 3, 4, 5, 6, 7, 11, 15, 17
-RESTS = -1.0  # mode of the last step of a track that has come to rest
+from rollover.terms import INCHING
+from rollover.track import (
+    BOUND,
+    ELEMENT,
+    END,
+    FIRST,
+    FROM,
+    HIT,
+    HOW,
+    LONG,
+    PRESSED,
+    RESTS,
+    ROOM,
+    START,
+    TRACK_COLUMNS,
+    is_another,
+    wider,
+)
 
 RESOLVED = 0.25  # longest step times the frequency on the ground
 FALLING = 5e-4  # s, step of a fall before the first contact
@@ -82,7 +86,6 @@ HALFWAY, LEAST = 0.5, 0.125  # of the time left until the motion turns, and of t
 FAINT, LONGEST = 0.02, 4.0  # of the speed of impact, below which a ringing admits longer steps; how many times as long
 SOFTLY = 0.5  # of the time in which a guide alone would stop what slides on it
 STILL = 1e-8  # m/s, and m/s2 over a millisecond: what is slower on its line of unloading stays where it is
-ROOM = 256  # steps that a track has room for at first; of an element that changes less often a quarter
 NOTHING, LEVEL, TURN, BEND = 0, 1, 2, 3  # what ends a step before its time
 
 
@@ -242,30 +245,6 @@ def committed(
 
 
 @compiled
-def wider(table: Any) -> Any:
-    """The same table with room for twice as many rows."""
-    found = np.empty((2 * table.shape[0], table.shape[1]))
-    for i in range(table.shape[0]):
-        for k in range(table.shape[1]):
-            found[i, k] = table[i, k]
-    return found
-
-
-@compiled
-def is_another(elements: Any, last: int, row: Any, s: Any) -> bool:
-    """Whether an element is another than the last one noted, by more than how deep it was pressed."""
-    if last < 0:
-        return True
-    for k in range(COLUMNS):
-        if elements[last, k] != row[k] and k != SINKAGE:
-            return True
-    for k in range(s.size):  # noqa: SIM110, compiled
-        if elements[last, COLUMNS + k] != s[k]:
-            return True
-    return False
-
-
-@compiled
 def fall(law: Any, p: Any, memory: int, f: Any, until: float) -> Any:
     """Fall on the ground at t = 0 with SPEED, or from HEIGHT at t = 0 with it, up to a time or to rest.
 
@@ -352,56 +331,3 @@ def fall(law: Any, p: Any, memory: int, f: Any, until: float) -> Any:
             steps += 1
             break
     return track[:steps].copy(), elements[: last + 1].copy(), True
-
-
-@compiled
-def read_off(law: Any, p: Any, f: Any, track: Any, elements: Any, times: Any, out: Any) -> None:
-    """Rows (OUT_COLUMNS) of a track at `times` (s, rising, none after its end) into `out`."""
-    at, now, end, last = np.zeros(4), np.zeros(2), np.zeros(4), np.zeros(2)
-    row, state, s = np.zeros(COLUMNS), np.zeros(STATE_COLUMNS, np.int64), np.zeros(elements.shape[1] - COLUMNS)
-    i, n, held_now = 0, times.size, -1
-    g, m, guide, creep, air, crisis, thin = f[GRAVITY], f[MASS], f[GUIDE], f[CREEP], f[AIR], f[CRISIS], f[THIN]
-    while i < n and times[i] < 0.0:
-        x, v = fall_back(g, m, guide, creep, air, crisis, thin, f[SPEED], -times[i])
-        out[i, OUT_FORCE], out[i, OUT_SINKAGE], out[i, OUT_IMPULSE] = 0.0, 0.0, 0.0
-        out[i, OUT_X], out[i, OUT_V], out[i, OUT_A] = x - f[HEIGHT], v, free(g, m, guide, creep, air, crisis, thin, v)
-        i += 1
-    bound = f.copy()
-    bound[SPRING] = 0.0
-    for j in range(track.shape[0]):
-        step = track[j]
-        t, h = step[FROM], step[LONG]
-        if i >= n:
-            break
-        if times[i] > t + h:
-            continue
-        if step[HOW] == RESTS:
-            for k in range(i, n):
-                out[k, OUT_FORCE], out[k, OUT_SINKAGE], out[k, OUT_IMPULSE] = step[PRESSED], step[START], step[HIT]
-                out[k, OUT_X], out[k, OUT_V], out[k, OUT_A] = step[START + 2], 0.0, 0.0
-            break
-        if held_now != int(step[ELEMENT]):
-            held_now = int(step[ELEMENT])
-            for k in range(COLUMNS):
-                row[k] = elements[held_now, k]
-            for k in range(s.size):
-                s[k] = elements[held_now, COLUMNS + k]
-        state[MODE] = int(step[HOW])
-        for k in range(4):
-            end[k] = step[END + k]
-        own = bound if step[BOUND] != 0.0 else f
-        accelerate(law, p, s, row, state, own, end, last)
-        while i < n and times[i] <= t + h:
-            theta = max((times[i] - t) / h, 0.0)
-            for k in range(2):
-                x, v = 2 * k, 2 * k + 1
-                at[x] = between_ends(theta, h, step[START + x], step[START + v], end[x], end[v])
-                at[v] = between_ends(theta, h, step[START + v], step[FIRST + k], end[v], last[k])
-            force = accelerate(law, p, s, row, state, own, at, now)
-            touching = state[MODE] != IDLE
-            # (1) without the collision: F_s = F + m_b1 a
-            out[i, OUT_FORCE] = force + along(law, p, row, own, at[0]) * now[0] if touching else 0.0
-            out[i, OUT_SINKAGE] = at[0] if touching else 0.0
-            out[i, OUT_X], out[i, OUT_V], out[i, OUT_A] = at[2], at[3], now[1]
-            out[i, OUT_IMPULSE] = step[HIT]
-            i += 1
