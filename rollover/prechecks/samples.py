@@ -7,17 +7,23 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
+from scipy.special import ndtri, pdtrc
 
 from rollover.prechecks.finding import Finding, Trace
 
 CHANCE = 0.001  # that a clean channel shows a spike or a stuck run
-FEWEST = 300  # samples, to know what is usual
+FEWEST = 120  # samples, to know what is usual
 FLAT = 3  # samples exactly alike at the very top: what a peak that is measured does not do
 TURNS = 6  # times as long as beside it, that a digitised signal stays where it turns: 2/(sqrt 2 - 1), and some
 APART = 60  # samples within which a disturbance stands alone
 AROUND = 6  # samples on either side that say what a sample should be
 ALONE = 0.5  # of what a spike is off both sides, at least, that it is off each
+MOST = 0.05  # of the samples, that lie far off what their neighbours say
+CROWDED = 0.05  # chance below which spikes that lie together are something quick
+OFFSETS = np.array([k for k in range(-AROUND, AROUND + 1) if k != 0])
+CUBIC = np.linalg.pinv(np.vander(OFFSETS / AROUND, 4))[-1]  # weights of the neighbours of a sample for its value
+SPREAD = np.eye(2 * AROUND) - np.vander(OFFSETS / AROUND, 4) @ np.linalg.pinv(np.vander(OFFSETS / AROUND, 4))
+BEFORE, AFTER = (np.linalg.pinv(np.vander(side, 3))[-1] for side in (OFFSETS[:AROUND], OFFSETS[AROUND:]))
 
 
 def clipping(t: Trace, unit: str) -> Iterator[Finding]:
@@ -127,47 +133,65 @@ def gaps(t: Trace) -> Iterator[Finding]:
 def spikes(t: Trace, unit: str) -> Iterator[Finding]:
     """Single samples far from what a cubic through their neighbours says, where these agree.
 
-    And from what those before and those after say, each by themselves: at a corner or a leap one side is right.
+    And from what those before and those after say, each by themselves: at a corner or a leap one side is right. The
+    largest first, each put where its neighbours say before the next is looked for, as it spoils what is said of these.
     """
     if not t.regular or t.floor.sigma == 0.0 or t.values.size < FEWEST:
         return
-    offsets = np.array([k for k in range(-AROUND, AROUND + 1) if k != 0])
-    basis = np.vander(offsets / AROUND, 4)
-    weights = np.linalg.pinv(basis)[-1]  # value of the cubic at 0
-    taps = np.insert(weights, AROUND, 0.0)
-    error = t.values - np.convolve(t.values, taps[::-1], mode="same")
-    error[:AROUND] = error[-AROUND:] = 0.0
+    values = t.values.copy()
+    error = _beside_a_cubic(values)
     inner = np.abs(error[AROUND:-AROUND])
-    quiet = inner[inner <= np.median(inner) * 6.0]
-    scale = float(np.median(quiet)) / 0.6745
-    limit = -float(ndtri(0.5 * CHANCE / t.values.size))
-    before, after = (np.linalg.pinv(np.vander(side, 3))[-1] for side in (offsets[:AROUND], offsets[AROUND:]))
-    spread = np.eye(2 * AROUND) - basis @ np.linalg.pinv(basis)
-    likely = t.floor.sigma * math.sqrt(2 * AROUND - 4)
-    beyond = np.abs(error) > limit * scale
-    if np.mean(np.abs(error) > 3.0 * scale) > 0.05:
-        return  # sampled too slowly for what happens: a neighbour says little
-    for i in np.flatnonzero(beyond):
-        near = slice(max(0, i - APART), i + APART + 1)
-        if beyond[near].sum() > beyond[max(0, i - AROUND) : i + AROUND + 1].sum():
-            continue  # one of several: something quick happens
-        left = spread @ t.values[i + offsets]
-        if np.linalg.norm(left) > 1.6 * likely or abs(error[i]) < np.abs(error[i + offsets[[5, 6]]]).max():
-            continue  # something quick happens here, or the neighbour is the spike
-        sides = t.values[i] - np.array([before @ t.values[i - AROUND : i], after @ t.values[i + 1 : i + AROUND + 1]])
-        if np.min(sides * np.sign(error[i])) < ALONE * abs(error[i]):
-            continue  # the motion's own, on the way up or down from here
+    scale = float(np.median(inner[inner <= np.median(inner) * 6.0])) / 0.6745
+    beyond = -float(ndtri(0.5 * CHANCE / values.size)) * scale
+    left, found = np.ones(values.size, dtype=bool), dict[int, float]()
+    while abs(error[i := int(np.argmax(np.abs(error) * left))]) > beyond and left[i]:
+        left[i] = False
+        if np.mean(left) < 1.0 - MOST:
+            return  # sampled too slowly for what happens: a neighbour says little
+        if _stands_alone(values, i, error, t.floor.sigma):
+            found[i] = float(error[i])
+            values[i] -= error[i]
+            error = _beside_a_cubic(values)
+    if np.mean(np.abs(error) > 3.0 * scale) > MOST:
+        return  # so here
+    quick = np.flatnonzero(np.abs(error) > beyond)
+    events = np.array([*found, *quick[np.diff(quick, prepend=-AROUND - 1) > AROUND]], dtype=np.int64)
+    for i in sorted(found):
+        if _crowded(events, i, values.size):
+            continue  # something quick happens
         yield Finding(
             check="spike",
             channel=t.channel,
             start=float(t.time[i]),
             end=float(t.time[i]),
-            value=float(error[i]),
+            value=found[i],
             unit=unit,
             error=scale,
-            sentence=f"one sample lies {error[i]:.4g} {unit} off its neighbours, {abs(error[i]) / scale:.1f} sigma: "
+            sentence=f"one sample lies {found[i]:.4g} {unit} off its neighbours, {abs(found[i]) / scale:.1f} sigma: "
             "a disturbance, or a contact of no more than a sample",
         )
+
+
+def _beside_a_cubic(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far each sample (n,) is off a cubic through those around it; 0 at the ends."""
+    error = values - np.convolve(values, np.insert(CUBIC, AROUND, 0.0)[::-1], mode="same")
+    error[:AROUND] = error[-AROUND:] = 0.0
+    return np.asarray(error)
+
+
+def _stands_alone(values: NDArray[np.float64], i: int, error: NDArray[np.float64], sigma: float) -> bool:
+    """Whether the samples around i agree, with one another and from either side of it, that it is off."""
+    if np.linalg.norm(SPREAD @ values[i + OFFSETS]) > 1.6 * sigma * math.sqrt(2 * AROUND - 4):
+        return False  # something quick happens here
+    sides = values[i] - np.array([BEFORE @ values[i - AROUND : i], AFTER @ values[i + 1 : i + AROUND + 1]])
+    # else the motion's own, on the way up or down from here
+    return bool(np.min(sides * np.sign(error[i])) >= ALONE * abs(error[i]))
+
+
+def _crowded(at: NDArray[np.int64], i: int, n: int) -> bool:
+    """Whether so many of the spikes `at` among n samples lie near i as chance would hardly put there: Poisson."""
+    near = int(np.sum(np.abs(at - i) <= APART)) - 1
+    return near > 0 and float(pdtrc(near - 1, (at.size - 1) * (2 * APART + 1) / n)) < CROWDED
 
 
 def _runs(values: NDArray[np.float64], where: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

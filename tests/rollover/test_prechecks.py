@@ -167,6 +167,29 @@ def test_a_corner_and_a_leap_are_no_spikes(corner: float, leap: float) -> None:
         assert not [f for f in prechecks(replace(drop(0), channels={A: values})) if f.check == "spike"], seed
 
 
+def spiked(at: list[int], seed: int) -> list[int]:
+    """Where spikes are found in 500 samples of a pulse that has some `at`."""
+    clean = drop(seed)
+    keep = slice(900, 1400)
+    values = clean.channels[A][keep].copy()
+    values[at] += 30.0 * SIGMA[A] * np.where(np.arange(len(at)) % 2, -1.0, 1.0)
+    few = replace(clean, time=clean.time[keep], channels={A: values})
+    return [int(np.argmin(np.abs(few.time - f.start))) for f in prechecks(few) if f.check == "spike"]
+
+
+@pytest.mark.parametrize("at", [[120, 160, 380], [90, 128, 166, 420], [70, 79, 300, 400]])
+def test_spikes_beside_each_other_are_found_one_by_one(at: list[int]) -> None:
+    """Each spoils what is said of the twelve samples around it: four of them more than a twentieth of these."""
+    for seed in range(6):
+        assert spiked(at, seed) == at, seed
+
+
+def test_contacts_that_follow_one_another_are_no_spikes() -> None:
+    """Six within 60 of 500 samples, where chance puts one or two."""
+    for seed in range(6):
+        assert spiked([300, 309, 320, 331, 343, 354], seed) == []
+
+
 def digitised(seed: int) -> np.ndarray:
     """A pulse with noise below a hundredth of the sampling rate, in steps of 0.4 of it: levels last for long."""
     white = np.random.default_rng(seed).standard_normal(N + 2000)
