@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rollover.diagnosis.candidates import akin, physical
 from rollover.diagnosis.chaos import SENT, is_other, too_many
 from rollover.diagnosis.explain import Step
@@ -19,10 +22,12 @@ from rollover.diagnosis.settle import left_of_means, settled
 from rollover.diagnosis.verdict import Interval
 from rollover.effects import EFFECTS
 
+Array = NDArray[np.float64]
 SPOKEN = 0.05  # p-value of a candidate's own score, beyond which its fit to runs that scatter is one to chance
 RIVAL = 0.5  # of the best's gain, by the mean of its runs, that a rival must have
 SURELY = 4.0  # times an interval by slopes, beyond which no run is needed to tell a strength from none
 NEEDED = 25.0  # gain, over what is left per sample, that an effect must bring beside all the others
+SHARED = 9.0  # of that, what all recordings but one must bring together
 
 
 def begun_anew(judge: Judge, base: Fitted) -> Fitted:
@@ -86,7 +91,9 @@ def lasting(judge: Judge, found: Step, groups: Groups) -> Step | None:
             return None
         one = settled(judge, replace(found, fitted=rival, rivals=tuple(near)))
         ahead = replace(one, rivals=()).foretold(judge, groups)
-        gains_on = outlasts(ahead, groups) or outlasts(before_the_blow(judge, one), groups)
+        gains_on = (outlasts(ahead, groups) and is_shared(ahead, groups)) or outlasts(
+            before_the_blow(judge, one), groups
+        )
         if gains_on and is_there_as_held(judge, one.fitted):
             return one
         judge.weigh(held)
@@ -142,6 +149,19 @@ def is_there(judge: Judge, fitted: Fitted) -> bool:
 
 def outlasts(found: Step, groups: Groups) -> bool:
     """Whether an effect predicts what was held out better by more than chance, under the scatter of its own runs."""
+    return bool(_gains(found, groups).sum() > NEEDED)
+
+
+def is_shared(found: Step, groups: Groups) -> bool:
+    """Whether recordings gain without the one that gains most: what is one's alone may be the course that its run took.
+
+    Of a single recording nobody can tell.
+    """
+    gains = _gains(found, groups)
+    return gains.size == 1 or bool(gains.sum() - gains.max() > SHARED)
+
+
+def _gains(found: Step, groups: Groups) -> Array:
+    """What each recording gains (k,) where it is held out, over what is left per sample."""
     with_, without_ = held_out(found.fitted, groups), held_out(found.base, groups)
-    phi = max(1.0, float(with_.left.sum() / with_.count.sum()))
-    return bool(float(without_.left.sum() - with_.left.sum()) > NEEDED * phi)
+    return np.asarray((without_.left - with_.left) / max(1.0, float(with_.left.sum() / with_.count.sum())))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
@@ -21,7 +21,17 @@ from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import foretold, held_out
 from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.lasting import astray, backed, before_the_blow, begun_anew, is_there, lasting, outlasts, unbent
+from rollover.diagnosis.lasting import (
+    astray,
+    backed,
+    before_the_blow,
+    begun_anew,
+    is_shared,
+    is_there,
+    lasting,
+    outlasts,
+    unbent,
+)
 from rollover.diagnosis.screening import Screened, kin
 from rollover.diagnosis.settle import left_of_means
 from rollover.diagnosis.verdict import Interval
@@ -29,22 +39,43 @@ from rollover.effects import Search
 from tests.diagnosis.test_settle import CHANNEL, SLOPE, TIME, N, Rough, candidate, evidence
 
 
+def in_four(rng: np.random.Generator, sizes: Sequence[float]) -> Step:
+    """Four recordings with an effect of so many noise units along J in each, fitted to all."""
+    J = [rng.standard_normal((N, 1)) for _ in range(4)]
+    w = [size * j[:, 0] + rng.standard_normal(N) for size, j in zip(sizes, J, strict=True)]
+    dx = sum(float(j[:, 0] @ y) for j, y in zip(J, w, strict=True)) / sum(float(j[:, 0] @ j[:, 0]) for j in J)
+    base = [Block(residual=y, J=np.zeros((N, 0)), slope=np.zeros(N), shift=0.0, prior=1.0) for y in w]
+    ends = [replace(b, residual=y - j[:, 0] * dx, J=j) for b, y, j in zip(base, w, J, strict=True)]
+    as_it_is = Fitted(candidates=(), x=(), blocks=tuple(base))
+    return Step(base=as_it_is, fitted=Fitted(candidates=(SLOPE,), x=(0.5,), blocks=tuple(ends)), p_value=0.0)
+
+
 def test_what_gains_no_more_than_chance_on_held_out_recordings_is_not_taken() -> None:
-    rng = np.random.default_rng(2)
+    rng, groups = np.random.default_rng(2), [[k] for k in range(4)]
+    assert not any(outlasts(in_four(rng, 4 * [0.0]), groups) for _ in range(50))
+    assert all(outlasts(in_four(rng, 4 * [0.6]), groups) for _ in range(50))
 
-    def step(size: float) -> Step:
-        """Four recordings with an effect of `size` noise units along J, fitted."""
-        J = [rng.standard_normal((N, 1)) for _ in range(4)]
-        w = [size * j[:, 0] + rng.standard_normal(N) for j in J]
-        dx = sum(float(j[:, 0] @ y) for j, y in zip(J, w, strict=True)) / sum(float(j[:, 0] @ j[:, 0]) for j in J)
-        base = [Block(residual=y, J=np.zeros((N, 0)), slope=np.zeros(N), shift=0.0, prior=1.0) for y in w]
-        ends = [replace(b, residual=y - j[:, 0] * dx, J=j) for b, y, j in zip(base, w, J, strict=True)]
-        as_it_is = Fitted(candidates=(), x=(), blocks=tuple(base))
-        return Step(base=as_it_is, fitted=Fitted(candidates=(SLOPE,), x=(0.5,), blocks=tuple(ends)), p_value=0.0)
 
-    groups = [[k] for k in range(4)]
-    assert not any(outlasts(step(0.0), groups) for _ in range(50))
-    assert all(outlasts(step(0.6), groups) for _ in range(50))
+def test_what_one_recording_asks_for_alone_may_be_the_course_that_its_run_took() -> None:
+    """An effect of 3 noise units in one of four, foretold by a fit to all of them, or in each."""
+    rng, groups = np.random.default_rng(4), [[k] for k in range(4)]
+
+    def told(sizes: Sequence[float]) -> Step:
+        found = in_four(rng, sizes)
+        left = tuple(float(b.residual @ b.residual) for b in found.fitted.blocks)
+        return replace(found, fitted=replace(found.fitted, foretold=left))
+
+    alone = [told([3.0, 0.0, 0.0, 0.0]) for _ in range(50)]
+    assert all(outlasts(s, groups) and not is_shared(s, groups) for s in alone)
+    assert all(is_shared(told(4 * [0.6]), groups) for _ in range(50))
+    assert all(is_shared(told([1.2, 0.6, 0.6, 0.6]), groups) for _ in range(50))
+    one = told([3.0, 0.0, 0.0, 0.0])
+    single = replace(one, base=_first(one.base), fitted=_first(one.fitted))
+    assert is_shared(single, [[0]])
+
+
+def _first(fitted: Fitted) -> Fitted:
+    return replace(fitted, blocks=fitted.blocks[:1], foretold=None if fitted.foretold is None else fitted.foretold[:1])
 
 
 def test_runs_foretell_what_was_held_out_where_slopes_hold_only_near_the_fit() -> None:
@@ -211,6 +242,12 @@ def test_rivals_are_judged_by_the_mean_of_their_runs(monkeypatch: pytest.MonkeyP
     found = lasting(judge, Step(base=base, fitted=lucky, p_value=0.0, rivals=(lucky, right)), [[k] for k in range(4)])
     assert found is not None
     assert [f.candidates[-1].key for f in found.rivals] == ["slope"]
+    monkeypatch.setattr(believed, "is_shared", lambda *_: False)
+    monkeypatch.setattr(believed, "before_the_blow", lambda _, s: replace(s, fitted=s.base))
+    judge.weigh(every)
+    step = Step(base=base, fitted=lucky, p_value=0.0, rivals=(lucky, right))
+    assert lasting(judge, step, [[k] for k in range(4)]) is None
+    monkeypatch.undo()
     judge.weigh(every)
     weaker = judge.fit((candidate("mass", "parameter", "share"),), (0.5,), rounds=0)
     assert weaker is not None
