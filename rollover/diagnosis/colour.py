@@ -8,12 +8,13 @@ Neither takes a line in the spectrum for noise, nor a misfit that is much slower
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.approach import is_recorders
 from rollover.diagnosis.bursts import LOUDER, without_bursts
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.lines import lines, without
@@ -22,12 +23,17 @@ from rollover.filters import attenuation, least_rate
 from rollover.noise import LENGTH, NoiseFloor, grown, noise_floor
 
 Array = NDArray[np.float64]
+Member = tuple[int, int, Signal, slice]  # a recording, the place of a signal of it, that, and its part of the stack
+Told = tuple[int, int, Signal, float, tuple[float, ...]]  # the same with a noise and its memory
+Memory = Callable[[Sequence[Array]], tuple[float, tuple[float, ...]]]
 ALIKE = 0.05  # of the logarithm of the rate: recordings so close were taken alike
 CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is believed
 OWN = 1.5  # times the common noise: beyond, a recording has its own
 UNLIKE = 4.0  # standard errors by which levels differ that are not one recorder's
 SURELY = 4  # quiet windows from which on that is believed
 LONGEST = 8  # samples of memory
+AKAIKE = 2.0  # what a coefficient costs by Akaike: octaves far off say little each, and count
+OCTAVES = (1, 2, 4, 8, 16, 32, 64)  # samples that the memory of a noise of 1/f reaches back
 NOT_COLOURED = 0.7  # of the whole error that is noise: below, the model's own error prevails, which is no process
 RINGING = 0.9  # largest complex root
 SLOWER = 0.4  # of the logarithm of the slow noise's level, by which a misfit may exceed what is quiet
@@ -75,32 +81,46 @@ def whole(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evid
     """The evidence with its noise from all of the misfits: an autoregression by least squares, recordings together."""
     found = [list(e.signals) for e in evidence]
     humming = hums(evidence, residuals)
-    told: list[tuple[int, int, Signal, float, tuple[float, ...]]] = []
+    shared: list[tuple[list[Member], list[Array]]] = []
     for members in alike(evidence):
         members = [m for m in members if not evidence[m[0]].is_rough(m[2])]
-        if not members:
-            continue
         parts = [_cleaned(evidence[r], s, residuals[r][part], humming) / s.loudness for r, _, s, part in members]
-        levels = np.array([max(float(np.sqrt(np.mean(p * p))), 1e-300) for p in parts])
-        if any(
-            is_bursting(s, part, float(level)) for (_, _, s, _), part, level in zip(members, parts, levels, strict=True)
-        ):
-            continue  # what comes now and then is no noise
-        # of one recorder unless they differ by more than so few samples can, each worth less for its memory
-        _, ar = autoregression([p / level for p, level in zip(parts, levels, strict=True)])
-        worth = np.array([p.size for p in parts]) * max(1.0 - sum(ar), 0.02) / (1.0 + max(sum(ar), 0.0))
-        common = float(np.sqrt(np.sum(levels**2 * worth) / worth.sum()))
-        if not np.any(np.abs(np.log(levels / common)) > UNLIKE / np.sqrt(2.0 * worth)):
-            levels = np.full(levels.size, common)  # a level of each by itself would make the memory too short
-        sigma, ar = autoregression([p / level for p, level in zip(parts, levels, strict=True)])
-        for (r, k, s, _), level in zip(members, levels, strict=True):
-            if s.weight is None:  # else what is left is the model's error as well
-                told.append((r, k, s, sigma * float(level), ar))
+        if members and not any(is_bursting(m[2], part, _level(part)) for m, part in zip(members, parts, strict=True)):
+            shared.append((members, parts))  # what comes now and then is no noise
+    told = [one for both in shared for one in _told(*both, autoregression)]
     slow = slower(told)
+    misfits: dict[str, list[tuple[Evidence, Signal, Array]]] = {}
+    for members, parts in shared:
+        each = ((evidence[r], s, p) for (r, _, s, _), p in zip(members, parts, strict=True))
+        misfits.setdefault(members[0][2].channel, []).extend(each)
+    far = {channel for channel, every in misfits.items() if is_recorders(every)}
+    if slow <= far:
+        told = [one for one in told if one[2].channel not in far]
+        told += [one for both in shared if both[0][0][2].channel in far for one in _told(*both, long_memory)]
+        slow = set()
     for r, k, s, sigma, ar in told:
         if s.channel not in slow:
             found[r][k] = with_noise(s, sigma, ar, evidence[r].model_error)
     return [replace(e, signals=tuple(s)) for e, s in zip(evidence, found, strict=True)]
+
+
+def _told(members: Sequence[Member], parts: Sequence[Array], memory: Memory) -> list[Told]:
+    """Noise of recordings alike by what each leaves: one colour of all, and one level unless they clearly differ."""
+    levels = np.array([_level(p) for p in parts])
+    _, ar = memory([p / level for p, level in zip(parts, levels, strict=True)])
+    # of one recorder unless they differ by more than so few samples can, each worth less for its memory
+    worth = np.array([p.size for p in parts]) * max(1.0 - sum(ar), 0.02) / (1.0 + max(sum(ar), 0.0))
+    common = float(np.sqrt(np.sum(levels**2 * worth) / worth.sum()))
+    if not np.any(np.abs(np.log(levels / common)) > UNLIKE / np.sqrt(2.0 * worth)):
+        levels = np.full(levels.size, common)  # a level of each by itself would make the memory too short
+    sigma, ar = memory([p / level for p, level in zip(parts, levels, strict=True)])
+    # where samples are weighed what is left is the model's error as well
+    each = zip(members, levels, strict=True)
+    return [(r, k, s, sigma * float(level), ar) for (r, k, s, _), level in each if s.weight is None]
+
+
+def _level(misfit: Array) -> float:
+    return max(float(np.sqrt(np.mean(misfit**2))), 1e-300)
 
 
 def hums(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> dict[str, tuple[float, ...]]:
@@ -119,7 +139,7 @@ def _cleaned(e: Evidence, s: Signal, misfit: Array, humming: Mapping[str, tuple[
     return without(e.recording.time[s.rows], misfit, humming[s.channel])
 
 
-def slower(told: Sequence[tuple[int, int, Signal, float, tuple[float, ...]]]) -> set[str]:
+def slower(told: Sequence[Told]) -> set[str]:
     """Channels whose misfits are so much slower than their quiet stretches that they are no noise."""
     by: dict[str, list[tuple[float, float, int]]] = {}
     for _, _, s, sigma, ar in told:
@@ -135,6 +155,11 @@ def slower(told: Sequence[tuple[int, int, Signal, float, tuple[float, ...]]]) ->
         if np.average([m for m, *_ in each], weights=weights) > np.average(allowed, weights=weights):
             slow.add(channel)
     return slow
+
+
+def is_slow(evidence: Sequence[Evidence]) -> bool:
+    """Whether any noise is held to be slower than the quiet stretches of its channel let expect: the recorder's own."""
+    return bool(slower([(r, k, s, s.noise, s.ar) for r, e in enumerate(evidence) for k, s in enumerate(e.signals)]))
 
 
 def tolerated(memory: float, count: float) -> float:
@@ -157,12 +182,12 @@ def level_of(sigma: float, ar: tuple[float, ...]) -> float:
     return sigma / grown(ar) / max(1.0 - sum(ar), 1.0 - STEADY)
 
 
-def alike(evidence: Sequence[Evidence]) -> list[list[tuple[int, int, Signal, slice]]]:
+def alike(evidence: Sequence[Evidence]) -> list[list[Member]]:
     """Signals (recording, place, signal, its part of the stack) of one channel that share a recorder.
 
     The same rate, as many samples averaged, the same filter class.
     """
-    groups: list[tuple[tuple[str, int | None, int], float, list[tuple[int, int, Signal, slice]]]] = []
+    groups: list[tuple[tuple[str, int | None, int], float, list[Member]]] = []
     for r, e in enumerate(evidence):
         for k, (s, part) in enumerate(e.spans()):
             what = (s.channel, e.recording.cfc.get(s.channel), e.averaged)
@@ -233,17 +258,46 @@ def _correlation(step: float, every: float, cfc: int) -> Array:
 def autoregression(series: Sequence[Array], most: int = LONGEST) -> tuple[float, tuple[float, ...]]:
     """Standard deviation and coefficients of one autoregression behind several series; its order by BIC."""
     most = min(most, max(0, min(v.size for v in series) // 8))
-    X = np.concatenate([np.stack([v[most - k : v.size - k] for k in range(most + 1)], axis=1) for v in series])
-    n = X.shape[0]
+    return _driven(series, [(k, k) for k in range(1, most + 1)])
+
+
+def long_memory(series: Sequence[Array]) -> tuple[float, tuple[float, ...]]:
+    """The same of a noise of 1/f: one coefficient for lag 1, for 2, for 3 and 4, for 5 to 8 and on, twice as far each.
+
+    Heterogeneous autoregression, Corsi (2009), in octaves.
+    """
+    most = min(v.size for v in series) // 8
+    return _driven(series, [(k // 2 + 1, k) for k in OCTAVES if k <= most], AKAIKE)
+
+
+def _driven(
+    series: Sequence[Array], lags: Sequence[tuple[int, int]], dear: float | None = None
+) -> tuple[float, tuple[float, ...]]:
+    """An autoregression on means of the past over `lags` (first, last), on so many of the first as BIC asks for.
+
+    Or as a criterion in which each costs as `dear`.
+    """
+    most = lags[-1][1] if lags else 0
+    sums = [np.concatenate([[0.0], np.cumsum(v)]) for v in series]
+    past = [
+        np.concatenate([v[most - last : v.size - last] for v in series])
+        if first == last
+        else np.concatenate([c[most - first + 1 : c.size - first] - c[most - last : c.size - last - 1] for c in sums])
+        / (last - first + 1)
+        for first, last in lags
+    ]
+    y = np.concatenate([v[most:] for v in series])
+    n = y.size
     best: tuple[float, float, tuple[float, ...]] | None = None
-    for order in range(most + 1):
-        past = X[:, 1 : order + 1]
-        a = np.linalg.lstsq(past, X[:, 0], rcond=None)[0] if order else np.zeros(0)
+    for order in range(len(lags) + 1):
+        X = np.stack(past[:order], axis=1) if order else np.zeros((n, 0))
+        b = np.linalg.lstsq(X, y, rcond=None)[0] if order else np.zeros(0)
+        a = np.concatenate([np.full(k - j + 1, v / (k - j + 1)) for v, (j, k) in zip(b, lags, strict=False)] or [b])
         roots = np.roots([1.0, *(-a)])
         if order and (np.max(np.abs(roots)) > STEADY or np.any((np.abs(roots) > RINGING) & (np.abs(roots.imag) > 0.0))):
             continue  # no process, or one that rings at one frequency: hum is no noise
-        power = float(np.mean((X[:, 0] - past @ a) ** 2)) * n / max(n - order, 1)
-        score = n * np.log(max(power, 1e-300)) + order * np.log(n)
+        power = float(np.mean((y - X @ b) ** 2)) * n / max(n - order, 1)
+        score = n * np.log(max(power, 1e-300)) + order * (np.log(n) if dear is None else dear)
         if best is None or score < best[0]:
             fair = 1.0 + 2.0 / n if order == 1 else 1.0  # least squares makes the memory too short by 2/n of itself
             best = (score, power, tuple(float(v) for v in fair * a))

@@ -15,7 +15,6 @@ from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.chaos import weighted
 from rollover.diagnosis.chassis import degrees_of
 from rollover.diagnosis.clocks import align, by_clock, mistimed
-from rollover.diagnosis.coarse import by_digits, coarse
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.dependence import Dependence, dependence, dependence_of_one
 from rollover.diagnosis.detect import mismatch_of
@@ -24,7 +23,6 @@ from rollover.diagnosis.empirical import offered, proposed
 from rollover.diagnosis.evidence import Evidence, doubted, doubted_beside, evidence_of, left_out
 from rollover.diagnosis.explain import SURE
 from rollover.diagnosis.fit import Judge
-from rollover.diagnosis.flat_tops import cut_off
 from rollover.diagnosis.gate import yardstick
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.loudness import with_loudness
@@ -38,9 +36,9 @@ from rollover.diagnosis.remainder import matters
 from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing, with_scatter
 from rollover.diagnosis.scores import before_a_blow, judged
 from rollover.diagnosis.selection import Explanation, by_the_first, decided, explained
+from rollover.diagnosis.shown import by_themselves
 from rollover.diagnosis.simulator import blow_of, set_up
 from rollover.diagnosis.statements import (
-    agreeing_but,
     by_steps,
     closest,
     considered,
@@ -50,7 +48,7 @@ from rollover.diagnosis.statements import (
     places,
     sentence,
 )
-from rollover.diagnosis.verdict import Degree, Diagnosis, Named, Place
+from rollover.diagnosis.verdict import Degree, Diagnosis, Named
 from rollover.drop import unfit
 from rollover.effects import EFFECTS, spoken
 from rollover.recording import Recording
@@ -125,16 +123,12 @@ def diagnose(
         named_so = _named_beside(judge, explanation, verdict, kept, groups, phases)
     explanation, effects, kept = named_so
     found = list(judge.evidence)
-    cut: tuple[Place, ...] = ()
-    digits = coarse(found, phases) if verdict == "no-mismatch" else ()
-    if digits:  # in coarse steps any top is flat
-        cut, verdict = digits, "unexplained"
-    elif verdict == "no-mismatch":
-        effects, cut = cut_off([e.name for e in found], [dict(recordings)[e.name] for e in found], phases)
-        verdict = "sensor" if effects else verdict
+    shown = by_themselves(found, dict(recordings), phases, explanation.p_value) if verdict == "no-mismatch" else None
+    if shown is not None:
+        verdict, effects = shown.verdict, shown.effects
     before, after = explanation.before, explanation.after
     set_ups = [set_up(scenario, e.recording) for e in found]
-    is_mismatch = verdict not in ("no-mismatch", "cannot-tell") and not cut
+    is_mismatch = verdict not in ("no-mismatch", "cannot-tell") and shown is None
     say("what the mismatch depends on")
     depends_on = Dependence()
     degrees: tuple[Degree, ...] = ()
@@ -146,7 +140,7 @@ def diagnose(
         of_motion = Dependence(shares=dependency(judge, explanation.base))
         depends_on = of_motion if of_one is None or of_one.yields_to(of_motion) else of_one
     law = None
-    if verdict == "unexplained" and acts == "drop" and not digits:
+    if verdict == "unexplained" and acts == "drop" and shown is None:
         say("a law for what no candidate explains")
         law = proposed(judge, explanation.base, set_ups, found, groups)
     detectable = dict(explanation.detectable)
@@ -156,30 +150,29 @@ def diagnose(
     h_before, h_after = (judged(judge, f, kept, groups) for f in (explanation.base, explanation.fitted))
     early = before_a_blow(judge.evidence, explanation.base), before_a_blow(judge.evidence, explanation.fitted)
     remains = after.p_value < SURE and matters(judge, explanation.fitted, after)
-    is_left = (verdict == "unexplained" and not digits) or (bool(effects) and remains)
+    lost = shown.places if shown is not None and shown.verdict == "unexplained" else ()
+    is_left = (verdict == "unexplained" and shown is None) or (bool(effects) and remains)
     training = tuple(e.name for e in found)
     notes += [*(_felt(degrees[0]) for _ in degrees[:1] if is_mismatch), *by_steps(effects), *_cost(found)]
     return Diagnosis(
         verdict=verdict,
         sentence=(
-            by_digits(digits, found, explanation.p_value)
-            if digits
-            else agreeing_but(effects, len(found), explanation.p_value)
-            if cut
+            shown.sentence
+            if shown is not None
             else sentence(verdict, effects, explanation.p_value, h_before.held, h_after.held, found, early)
         )
-        + (closest(explanation, groups) if verdict == "unexplained" and not digits else "")
+        + (closest(explanation, groups) if verdict == "unexplained" and shown is None else "")
         + (by_clock(mistimed(judge, explanation.fitted, crew.looks)) if is_left else "")
         + offered(law)
         + against_itself(verdict, contrary),
-        p_value=0.0 if digits else min([explanation.p_value, *(e.p_value for e in effects if cut)]),
+        p_value=explanation.p_value if shown is None else shown.p_value,
         noise=noise(found),
-        where=places(before, found, depends_on.on) if is_mismatch else cut,
+        where=places(before, found, depends_on.on) if is_mismatch else () if shown is None else shown.places,
         effects=effects,
-        remaining_significant=is_left or bool(digits),
+        remaining_significant=is_left or bool(lost),
         remaining_p_value=after.p_value,
-        remaining_where=digits or (places(after, found, None) if is_left else ()),
-        depends_on=depends_on.on if is_mismatch else None,
+        remaining_where=places(after, found, None) if is_left else lost,
+        depends_on=depends_on.on if is_mismatch else next((p.depends_on for p in lost), None),
         dependencies=depends_on.shares,
         degrees=degrees if is_mismatch else (),
         smallest_detectable=detectable,

@@ -63,6 +63,16 @@ def astray(judge: Judge, fitted: Fitted) -> Fitted:
     return judge.again(fitted)
 
 
+def unforgiven(judge: Judge, base: Fitted) -> Fitted:
+    """A base as an explanation is held against it: in full where its recordings took other courses by more than chance.
+
+    Those were forgiven for want of an explanation alone; forgiven they leave no more than the best there is.
+    """
+    found = astray(judge, base)
+    judge.straying = True
+    return found
+
+
 def backed(found: Step, looked: Gate) -> Step:
     """A step without rivals that nothing spoke for when looked at: their runs met the recordings by chance.
 

@@ -8,6 +8,7 @@ from typing import TypeGuard
 
 import numpy as np
 
+from rollover.diagnosis import colour
 from rollover.diagnosis.blocks import at_an_end, turned
 from rollover.diagnosis.candidates import Candidate, is_one_sensor
 from rollover.diagnosis.chaos import is_other
@@ -18,19 +19,18 @@ from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.inquiry import Groups, Inquiry, Phases
-from rollover.diagnosis.lasting import NEEDED, astray, backed, begun_anew, lasting
+from rollover.diagnosis.lasting import NEEDED, astray, backed, begun_anew, lasting, unforgiven
 from rollover.diagnosis.looks import look, look_again
 from rollover.diagnosis.otherwise import traced_too, tuned
 from rollover.diagnosis.pairs import best_pair
 from rollover.diagnosis.refine import conditioned, ended, is_doubtful, polish, timed, without
 from rollover.diagnosis.remainder import NEGLIGIBLE, is_enough, is_tolerated, matters
-from rollover.diagnosis.straight import is_a_curve
+from rollover.diagnosis.straight import MOST, is_a_curve, is_any_curve, is_pliant
 from rollover.diagnosis.verdict import Verdict
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
 SCATTERED = 0.05  # share of all errors that the look at candidates may make where runs scatter
 CERTAIN = 1.0 - 1e-12  # largest p-value whose logarithm is taken
-MOST = 3  # effects in one explanation
 PARTLY = 0.005  # of the excess over the noise that one effect may leave, were it structured, and still be named
 MANY = 0.05  # p-value of what as many effects as may be leave, below which they are no explanation
 HOPELESS = 2.0  # misfit over the noise that two effects leave and a third is not looked for
@@ -88,7 +88,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     if weighed(judge, base, phases):
         base = judge.again(base)
     base = clocked(judge, base)  # and no effect's gain
-    before = mismatch_of(judge.evidence, base.blocks, phases)
+    before, was_slow = mismatch_of(judge.evidence, base.blocks, phases), colour.is_slow(judge.evidence)
     base = astray(judge, base)
     inquiry.say(f"looking at {len(candidates)} candidates, which of them could matter")
     looked = first_look = look(judge, base, candidates, groups, looks=inquiry.crew.looks)
@@ -149,7 +149,10 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     if is_whole and len(taken) > 1:
         parts = _needed(inquiry, taken)
         parts[-1], _ = followed(inquiry, parts[-1])
-    base = judge.again(base)
+    base = unforgiven(judge, base) if taken and judge.effort.thrifty else judge.again(base)
+    if not taken and not was_slow and colour.is_slow(judge.evidence):
+        # by the noise that the best of all led to it gains nothing: what it was of the quiet one's is told by none
+        before, refuted = mismatch_of(judge.evidence, base.blocks, phases), True
     parts = [s.foretold(judge, groups) for s in parts]
     current = parts[-1].fitted if parts else base
     return Explanation(
@@ -356,22 +359,6 @@ def by_the_first(judge: Judge, found: Explanation, nothing: Collection[str], pha
     one = one.again(judge)
     one, after = as_conditioned(judge, one, mismatch_of(judge.evidence, one.fitted.blocks, phases), phases)
     return replace(found, parts=(one,), fitted=one.fitted, after=after)
-
-
-def is_any_curve(candidates: Sequence[Candidate]) -> bool:
-    """Whether they draw any curve: as many effects as may be, all of one sensor or of the soil, or two bent ones.
-
-    Two effects of the soil that both take another form than their usual one are curves enough, whatever joins them.
-    """
-    subjects = [c.channel or ("soil" if c.id.startswith("soil-") else c.id) for c in candidates]
-    bent = [s for s, c in zip(subjects, candidates, strict=True) if c.is_bent]
-    return (len(candidates) == MOST and len(set(subjects)) == 1) or len(set(bent)) < len(bent)
-
-
-def is_pliant(candidates: Sequence[Candidate]) -> bool:
-    """Whether several are of the soil, and one of these takes another shape or form than its usual one."""
-    soil = [c for c in candidates if c.id.startswith("soil-")]
-    return len(soil) > 1 and any(c.is_bent for c in soil)
 
 
 def _kind(c: Candidate) -> Verdict:

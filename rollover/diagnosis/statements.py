@@ -182,12 +182,6 @@ def noise(evidence: Sequence[Evidence]) -> dict[str, float]:
     return {name: float(np.median(values)) for name, values in found.items()}
 
 
-def agreeing_but(effects: Sequence[Named], recordings: int, p_value: float) -> str:
-    """The sentence on recordings that agree with the simulation but for what they show by themselves."""
-    said = " ".join(e.statement for e in effects)
-    return f"{said} Otherwise simulation and {recordings} recordings agree within the noise (p = {p_value:.2g})."
-
-
 def sentence(
     verdict: Verdict,
     effects: Sequence[Named],

@@ -1,13 +1,17 @@
-"""Whether one sensor reads a straight line of what is, as gain and offset say, or a curve."""
+"""Curves that effects can be bent to: of one sensor, that gain and offset make a straight line of, and of the soil."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import freed
 
 LINES = ("sensor-gain", "sensor-scale", "sensor-bias")
+MOST = 3  # effects in one explanation
 BENT = 16.0  # gain of a curve beside a line, of four standard errors
 
 
@@ -42,3 +46,19 @@ def bow(judge: Judge, fitted: Fitted, channel: str) -> float:
     basis, _ = np.linalg.qr(np.concatenate(held))
     q, misfit = q - basis @ (basis.T @ q), misfit - basis @ (basis.T @ misfit)
     return float((q @ misfit) ** 2 / max(float(q @ q), 1e-300))
+
+
+def is_any_curve(candidates: Sequence[Candidate]) -> bool:
+    """Whether they draw any curve: as many effects as may be, all of one sensor or of the soil, or two bent ones.
+
+    Two effects of the soil that both take another form than their usual one are curves enough, whatever joins them.
+    """
+    subjects = [c.channel or ("soil" if c.id.startswith("soil-") else c.id) for c in candidates]
+    bent = [s for s, c in zip(subjects, candidates, strict=True) if c.is_bent]
+    return (len(candidates) == MOST and len(set(subjects)) == 1) or len(set(bent)) < len(bent)
+
+
+def is_pliant(candidates: Sequence[Candidate]) -> bool:
+    """Whether several are of the soil, and one of these takes another shape or form than its usual one."""
+    soil = [c for c in candidates if c.id.startswith("soil-")]
+    return len(soil) > 1 and any(c.is_bent for c in soil)

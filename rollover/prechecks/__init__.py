@@ -8,6 +8,7 @@ from rollover.channels import describe
 from rollover.noise import NoiseFloor
 from rollover.prechecks.finding import Finding, Trace, trace
 from rollover.prechecks.kinematic import disagreements
+from rollover.prechecks.leaps import leaps
 from rollover.prechecks.levels import free_fall, rest
 from rollover.prechecks.samples import clipping, gaps, spikes, stuck
 from rollover.recording import Recording
@@ -38,7 +39,13 @@ def prechecks(
     found = [*free_fall(traces, gravity), *rest(traces, mass, gravity), *disagreements(traces, seed=seed)]
     for name, t in traces.items():
         unit = describe(name).unit
-        found += [*clipping(t, unit), *stuck(t, unit), *gaps(t), *spikes(t, unit)]
+        found += [
+            *clipping(t, unit),
+            *stuck(t, unit),
+            *gaps(t),
+            *spikes(t, unit),
+            *leaps(t, unit, recording.cfc.get(name)),
+        ]
     found += _stated(recording, traces)
     return tuple(sorted(found, key=lambda f: (f.start, f.channel, f.check)))
 

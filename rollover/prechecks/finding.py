@@ -22,7 +22,8 @@ SHORTEST = 0.05  # s of a level that is one
 class Finding:
     """Something wrong with a channel that needs no model to be seen.
 
-    `check` free-fall | rest | double-integral | clipping | stuck | gap | clock-drift | lag | spike | stated-noise;
+    `check` free-fall | rest | double-integral | clipping | stuck | gap | clock-drift | lag | spike | leap |
+    stated-noise;
     `start`, `end` s; `value` in `unit`, `error` its standard error where it has one; `sentence` says what it means.
     """
 

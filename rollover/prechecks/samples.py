@@ -91,7 +91,7 @@ def stuck(t: Trace, unit: str) -> Iterator[Finding]:
     if not starts.size:
         return
     level = t.values[starts]
-    away = (level != t.values.max()) & (level != t.values.min()) & (level != 0.0)
+    away = (level != t.values.max()) & (level != t.values.min())
     away &= (starts > 0) & (starts + lengths < same.size)
     usual = (same.sum() - lengths.max()) / max(1, same.size - lengths.max())  # chance that a sample repeats
     away &= ~_creeping(t.values, starts, lengths + 1)

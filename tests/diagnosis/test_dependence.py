@@ -21,8 +21,8 @@ from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.lines import lines, without
 from rollover.diagnosis.phases import drop_phases
 from rollover.diagnosis.response import channels_of
-from rollover.diagnosis.selection import is_any_curve, is_pliant
 from rollover.diagnosis.simulator import set_up
+from rollover.diagnosis.straight import is_any_curve, is_pliant
 from rollover.effects import Search
 from rollover.proof.generator import Order, make
 from rollover.recording import Recording

@@ -31,6 +31,7 @@ from rollover.diagnosis.lasting import (
     lasting,
     outlasts,
     unbent,
+    unforgiven,
 )
 from rollover.diagnosis.screening import Screened, kin
 from rollover.diagnosis.settle import left_of_means
@@ -139,6 +140,9 @@ def test_what_all_recordings_do_after_a_blow_is_no_chance(others: int, in_full: 
     found = astray(judge, Fitted(candidates=(), x=(), blocks=(bare,) * 4))
     assert judge.straying is not in_full
     assert sum(b.course is not None for b in found.blocks) == (0 if in_full else others)
+    held = unforgiven(judge, Fitted(candidates=(), x=(), blocks=(bare,) * 4))
+    assert judge.straying  # for what explains it
+    assert sum(b.course is not None for b in held.blocks) == (0 if in_full else others)
 
 
 def test_with_what_leads_its_kin_gets_a_first_fit() -> None:

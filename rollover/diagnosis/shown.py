@@ -1,0 +1,53 @@
+"""What recordings show by themselves, where simulation and recordings do not differ by more than noise and scatter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from rollover.diagnosis.coarse import by_digits, coarse
+from rollover.diagnosis.evidence import Evidence
+from rollover.diagnosis.flat_tops import cut_off
+from rollover.diagnosis.inquiry import Phases
+from rollover.diagnosis.lost import by_loss, lost
+from rollover.diagnosis.verdict import Named, Place, Verdict
+from rollover.recording import Recording
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shown:
+    """A verdict on what recordings show by themselves: where, by which effects if any, in one sentence."""
+
+    verdict: Verdict
+    effects: tuple[Named, ...]
+    places: tuple[Place, ...]
+    sentence: str
+    p_value: float
+
+
+def by_themselves(
+    evidence: Sequence[Evidence], recordings: Mapping[str, Recording], phases: Phases, p_value: float
+) -> Shown | None:
+    """What recordings show by themselves, that differ from their simulation with `p_value`; None if they are sound."""
+    names = [e.name for e in evidence]
+    if places := coarse(evidence, phases):  # in coarse steps any top is flat
+        return _unexplained(places, by_digits(places, evidence, p_value))
+    whole = [recordings[name] for name in names]
+    effects, places = cut_off(names, whole, phases)
+    if effects:
+        said = agreeing_but(effects, len(evidence), p_value)
+        least = min(p_value, *(e.p_value for e in effects))
+        return Shown(verdict="sensor", effects=effects, places=places, sentence=said, p_value=least)
+    if places := lost(names, whole, phases):
+        return _unexplained(places, by_loss(places, len(evidence), p_value))
+    return None
+
+
+def agreeing_but(effects: Sequence[Named], recordings: int, p_value: float) -> str:
+    """The sentence on recordings that agree with the simulation but for what they show by themselves."""
+    said = " ".join(e.statement for e in effects)
+    return f"{said} Otherwise simulation and {recordings} recordings agree within the noise (p = {p_value:.2g})."
+
+
+def _unexplained(places: tuple[Place, ...], said: str) -> Shown:
+    return Shown(verdict="unexplained", effects=(), places=places, sentence=said, p_value=0.0)

@@ -1,0 +1,95 @@
+"""Leaps that a channel's filter class lets no signal make: they come behind it, of an open contact or of lost samples.
+
+A sample is held against the cubic through three neighbours on either side: about a leap two of them lie off theirs, one
+to either side, by nearly half of it. Behind the filter even a blow of no duration stays smooth, and what two of it lie
+off is a known part of its height, whatever the motion. Clips, gaps and single digits have reasons of their own.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.filters import filtered, least_rate
+from rollover.prechecks.finding import Finding, Trace
+
+Array = NDArray[np.float64]
+BESIDE = np.array([-3, -2, -1, 1, 2, 3])
+CUBIC = np.linalg.pinv(np.vander(BESIDE, 4))[-1]  # weights of the neighbours of a sample for its value
+REACH = 3  # samples to either side
+PHASES = 8  # at which a blow may fall between two samples
+SURELY = 1.5  # times what a blow of no duration leaves
+TELLING = 0.3  # of a leap: not told where blows lie nearly as far off
+NOISY = 4.0  # standard deviations of the noise of such a difference
+DIGITS = 1.5  # steps of a digitised channel
+LASTING = 2.0  # periods of the filter's -3 dB frequency within which it is done with a blow
+AGAIN = 2  # leaps, at least: one alone is a disturbance
+
+
+def leaping(t: Trace, cfc: int | None) -> NDArray[np.int64]:
+    """Samples before which a channel leaps as its filter class `cfc` lets none; none where that cannot be told."""
+    rate = 1.0 / t.step
+    if cfc is None or not t.regular or t.values.size < 8 * REACH or rate < least_rate(cfc):
+        return np.zeros(0, dtype=np.int64)
+    most = SURELY * of_a_blow(round(rate, 3), cfc)
+    if most > TELLING:
+        return np.zeros(0, dtype=np.int64)
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    width = 2 * max(REACH, round(LASTING * 0.6 / cfc / t.step)) + 1
+    about = maximum_filter1d(t.values, width) - minimum_filter1d(t.values, width)
+    steps = np.abs(np.diff(t.values))
+    digit = float(np.min(steps[steps > 0.0], initial=np.inf))
+    noise = t.floor.sigma * float(np.hypot(1.0, np.linalg.norm(CUBIC)))
+    off = across(t.values)
+    even = np.concatenate([np.abs(np.diff(t.time) - t.step) < 0.5 * t.step, np.ones(1, dtype=bool)])
+    ends = np.isin(t.values, [t.values.max(), t.values.min()])  # a clip has corners
+    sound = minimum_filter1d((even & ~ends).astype(np.int8), 2 * REACH + 1) > 0
+    return np.flatnonzero((off > most * about + NOISY * noise + (DIGITS * digit if digit < np.inf else 0.0)) & sound)
+
+
+def leaps(t: Trace, unit: str, cfc: int | None) -> Iterator[Finding]:
+    """Leaps that the filter class of a channel lets no signal make, if there are several."""
+    found = leaping(t, cfc)
+    many = int(np.sum(np.diff(found, prepend=-REACH - 1) > REACH))
+    if many < AGAIN:
+        return
+    off = across(t.values)[found]
+    yield Finding(
+        check="leap",
+        channel=t.channel,
+        start=float(t.time[found[0]]),
+        end=float(t.time[found[-1]]),
+        value=float(many),
+        unit="",
+        error=None,
+        sentence=f"{many} leaps of up to {2.0 * float(off.max()):.4g} {unit} from one sample to the next, which "
+        f"CFC {cfc} lets no signal make: a contact that opens behind the filter, or samples that were lost",
+    )
+
+
+def off_a_cubic(values: Array) -> Array:
+    """How far each sample (n,) is off the cubic through three on either side; 0 at the ends."""
+    found = values - np.convolve(values, np.insert(CUBIC, REACH, 0.0)[::-1], mode="same")
+    found[:REACH] = found[-REACH:] = 0.0
+    return np.asarray(found)
+
+
+def across(values: Array) -> Array:
+    """How far each sample (n,) and the one before it lie off such cubics to either side, the less of both; else 0."""
+    off = off_a_cubic(values)
+    before = np.concatenate([[0.0], off[:-1]])
+    return np.where(off * before < 0.0, np.minimum(np.abs(off), np.abs(before)), 0.0)
+
+
+@functools.lru_cache(maxsize=64)
+def of_a_blow(rate: float, cfc: int) -> float:
+    """How far a blow of no duration behind a filter class lies off cubics, over its height, at a rate (Hz)."""
+    fine = 1.0 / (PHASES * rate)
+    blow = np.zeros(2 * PHASES * max(200, round(4.0 * rate * 0.6 / cfc)))
+    blow[blow.size // 2] = 1.0
+    behind = filtered(blow, fine, cfc)
+    return max(float(across(behind[k::PHASES]).max()) for k in range(PHASES)) / float(np.ptp(behind))

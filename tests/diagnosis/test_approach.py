@@ -1,0 +1,134 @@
+"""Noise of 1/f: slow before anything is hit, no louder after, another in each recording; what physics leaves is not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis import colour, diagnose
+from rollover.diagnosis.approach import cosines, is_louder, is_recorders, is_shared, is_slow, stretches
+from rollover.diagnosis.evidence import Evidence, Signal
+from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario, signal
+
+N, BEFORE = 400, 60
+TIME = (np.arange(N) - BEFORE) * 1e-3
+LATER = np.where(TIME > 0.0, np.sin(np.pi * np.clip(TIME / 0.2, 0.0, 1.0)), 0.0)  # as what is missing after a contact
+
+
+def pink(rng: np.random.Generator, n: int = N) -> np.ndarray:
+    """A stretch of noise whose power goes as 1/f down to an eighth of its length, of unit size."""
+    f = np.fft.rfftfreq(8 * n)
+    f[0] = f[1]
+    phases = rng.standard_normal(f.size) + 1j * rng.standard_normal(f.size)
+    found = np.fft.irfft(phases / np.sqrt(f), 8 * n)
+    at = int(rng.integers(0, 7 * n))
+    return np.asarray((found / found.std())[at : at + n])
+
+
+Told = list[tuple[Evidence, Signal, np.ndarray]]
+
+
+def told(misfits: Sequence[np.ndarray], sigma: float = 1.0) -> Told:
+    e: Any = SimpleNamespace(recording=SimpleNamespace(time=TIME), simulator=SimpleNamespace(contact=0.0))
+    return [(e, signal(w, sigma), w) for w in misfits]
+
+
+def share(of: float, make: Any) -> float:
+    """How often what is made is taken for a recorder's noise, of 100."""
+    return sum(is_recorders(make(np.random.default_rng(seed))) for seed in range(100)) / 100.0 - of
+
+
+def test_cosines_are_orthonormal_and_expected_of_noise() -> None:
+    """White noise leaves 1 of each; with a memory of 0.6 its slowest tend to (1 + 0.6)/(1 - 0.6) = 4 in squares."""
+    np.testing.assert_allclose(cosines(30, 8) @ cosines(30, 8).T, np.eye(8), atol=1e-12)
+    rng, found = np.random.default_rng(0), []
+    for _ in range(400):
+        white = rng.standard_normal(N + 50)
+        for k in range(1, white.size):
+            white[k] = 0.6 * white[k - 1] + 0.8 * white[k]
+        w = white[50:]
+        e: Any = told([w])[0][0]
+        s = stretches(e, signal(w, 1.0, (0.6,)), w)
+        assert s is not None
+        found.append((float(np.mean(s.before**2)), float(np.mean(s.whole**2)), float(np.mean(s.after**2))))
+    np.testing.assert_allclose(np.mean(found, axis=0), 1.0, atol=0.05)
+
+
+def test_noise_of_one_over_f_is_its_recorder_s() -> None:
+    assert abs(share(0.9, lambda rng: told([pink(rng) for _ in range(6)], 0.6))) < 0.1
+
+
+def test_white_noise_is_not_slow_whatever_comes_after() -> None:
+    """A1 errs in one of a hundred: physics on quiet noise is never taken for noise, nor is an offset of all."""
+
+    def noise(rng: np.random.Generator, of: float, offset: float) -> Told:
+        return told([rng.standard_normal(N) + of * LATER + offset for _ in range(6)])
+
+    assert share(0.0, lambda rng: noise(rng, 0.0, 0.0)) <= 0.03
+    assert share(0.0, lambda rng: noise(rng, 1.0, 0.0)) <= 0.03
+    assert share(0.0, lambda rng: noise(rng, 0.0, 0.5)) <= 0.03
+
+
+def test_what_is_louder_after_the_contact_or_shared_is_missing() -> None:
+    def of(rng: np.random.Generator, sizes: Sequence[float]) -> Told:
+        return told([pink(rng) + size * LATER for size in sizes], 0.6)
+
+    assert share(0.0, lambda rng: of(rng, 6 * [3.0])) <= 0.05
+    assert share(0.0, lambda rng: of(rng, [4.0, -4.0, 5.0, -5.0, 6.0, -6.0])) <= 0.05
+    quiet = [s for one in of(np.random.default_rng(1), 6 * [0.0]) if (s := stretches(*one)) is not None]
+    loud = [s for one in of(np.random.default_rng(1), [4.0, -4.0, 5.0, -5.0, 6.0, -6.0]) if (s := stretches(*one))]
+    alike = [s for one in of(np.random.default_rng(1), 6 * [3.0]) if (s := stretches(*one))]
+    assert [is_slow(f) for f in (quiet, loud, alike)] == [True, True, True]
+    assert [is_louder(f) for f in (quiet, loud)] == [False, True]
+    assert [is_shared(f) for f in (quiet, loud, alike)] == [False, False, True]
+
+
+def test_nothing_is_told_of_two_recordings_or_of_a_short_approach() -> None:
+    rng = np.random.default_rng(2)
+    every = told([pink(rng) for _ in range(6)], 0.6)
+    assert is_recorders(every)
+    assert not is_recorders(every[:2])
+    late: Any = SimpleNamespace(recording=SimpleNamespace(time=TIME + 0.045), simulator=SimpleNamespace(contact=0.0))
+    assert not is_recorders([(late, s, w) for _, s, w in every])
+    never: Any = SimpleNamespace(recording=SimpleNamespace(time=TIME), simulator=SimpleNamespace(contact=np.inf))
+    assert not is_recorders([(never, s, w) for _, s, w in every])
+
+
+def test_a_long_memory_reaches_where_a_short_one_does_not() -> None:
+    """The level at no frequency of what six stretches of 400 samples scatter by in the mean, 10 or so of this noise."""
+    rng, levels = np.random.default_rng(3), []
+    for _ in range(20):
+        series = [pink(rng) + 0.5 * rng.standard_normal(N) for _ in range(6)]
+        short, long = colour.autoregression(series), colour.long_memory(series)
+        levels.append((colour.level_of(*short), colour.level_of(*long), len(long[1])))
+    low, high, reach = np.mean(levels, axis=0)
+    assert reach > 1.5 * colour.LONGEST
+    assert high > 1.3 * low
+    for a in (0.0, 0.5, 0.9):
+        white = [np.zeros(N) for _ in range(6)]
+        for w in white:
+            for k in range(1, N):
+                w[k] = a * w[k - 1] + rng.standard_normal()
+        sigma, ar = colour.long_memory(white)
+        assert colour.level_of(sigma, ar) == pytest.approx(1.0 / (1.0 - a), rel=0.25)
+
+
+@pytest.mark.parametrize(("of", "seed"), [(0.7, 0), (1.0, 1)])
+def test_drops_with_noise_of_one_over_f_lack_nothing(of: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    clean = recorded(
+        {}, seed, speeds=(1.0, 1.5, 2.0, 2.5, 3.0, 3.5), channels=(FORCE, DEPTH, ACCELERATION), noise=0.0, rate=2000.0
+    )
+    made = []
+    for name, r in clean:
+        channels = {}
+        for c, values in r.channels.items():
+            noise = np.sqrt(1.0 - of**2) * rng.standard_normal(values.size) + of * pink(rng, values.size)
+            channels[c] = values + 0.01 * np.ptp(values) * noise
+        made.append((name, type(r)(title=name, time=r.time, channels=channels, conditions=r.conditions)))
+    found = diagnose(scenario(), made)
+    assert found.verdict == "no-mismatch", found.sentence
