@@ -157,11 +157,6 @@ def slower(told: Sequence[Told]) -> set[str]:
     return slow
 
 
-def is_slow(evidence: Sequence[Evidence]) -> bool:
-    """Whether any noise is held to be slower than the quiet stretches of its channel let expect: the recorder's own."""
-    return bool(slower([(r, k, s, s.noise, s.ar) for r, e in enumerate(evidence) for k, s in enumerate(e.signals)]))
-
-
 def tolerated(memory: float, count: float) -> float:
     """Logarithm by which slow noise may exceed what quiet stretches say of it: sigma sqrt((1 + a)/(1 - a)).
 

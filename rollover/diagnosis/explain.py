@@ -101,10 +101,8 @@ def step(inquiry: Inquiry, base: Fitted, looked: Gate) -> Step | None:
     fits = one_each(fits) if judge.effort.thrifty else shaped_too(inquiry, base, one_each(fits))
     if not judge.effort.thrifty:
         fits = timed_too(inquiry, base, fits)
-    slow = False
     if weighed(judge, fits[0], inquiry.phases):
         base, fits = judge.again(base), [judge.again(f) for f in fits]
-        slow = colour.is_slow(judge.evidence)
     fits.sort(key=lambda f: held_out(f, groups).left.sum())
     fits = simplest(fits, groups, judge.per_error)
     least = min(f.left for f in fits)
@@ -113,8 +111,6 @@ def step(inquiry: Inquiry, base: Fitted, looked: Gate) -> Step | None:
     if judge.per_error > 1.0:
         # beside a tolerance what is missing is large, and a fit finds more of it than its slope where it is not
         phi, score = phi * judge.per_error, max(score, base.left - least)
-    if slow:  # what scored by the quiet noise may be what the recorder's slow one is made of
-        score = min(score, base.left - least)
     p = p_value(score / phi, looked.null)
     return Step(base=base, fitted=fits[0], p_value=p, rivals=tuple(fits), screened=tuple(screened))
 

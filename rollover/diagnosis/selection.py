@@ -8,7 +8,6 @@ from typing import TypeGuard
 
 import numpy as np
 
-from rollover.diagnosis import colour
 from rollover.diagnosis.blocks import at_an_end, turned
 from rollover.diagnosis.candidates import Candidate, is_one_sensor
 from rollover.diagnosis.chaos import is_other
@@ -88,7 +87,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     if weighed(judge, base, phases):
         base = judge.again(base)
     base = clocked(judge, base)  # and no effect's gain
-    before, was_slow = mismatch_of(judge.evidence, base.blocks, phases), colour.is_slow(judge.evidence)
+    before = mismatch_of(judge.evidence, base.blocks, phases)
     base = astray(judge, base)
     inquiry.say(f"looking at {len(candidates)} candidates, which of them could matter")
     looked = first_look = look(judge, base, candidates, groups, looks=inquiry.crew.looks)
@@ -150,9 +149,6 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
         parts = _needed(inquiry, taken)
         parts[-1], _ = followed(inquiry, parts[-1])
     base = unforgiven(judge, base) if taken and judge.effort.thrifty else judge.again(base)
-    if not taken and not was_slow and colour.is_slow(judge.evidence):
-        # by the noise that the best of all led to it gains nothing: what it was of the quiet one's is told by none
-        before, refuted = mismatch_of(judge.evidence, base.blocks, phases), True
     parts = [s.foretold(judge, groups) for s in parts]
     current = parts[-1].fitted if parts else base
     return Explanation(
