@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,41 +28,40 @@ LEAST = 24  # samples of an approach
 FEWEST = 3  # recordings, to tell what they share
 MORE = 1.5  # times what is expected, at least
 SLOW, LOUDER, ALIKE = 0.01, 0.01, 0.02  # p-values of (A1), below, of (A2) and (A3), above
-
-
-@dataclass(frozen=True, kw_only=True)
-class Stretches:
-    """One recording's misfit in cosines over their expectation: before (k,), after (m, k), all after at once (j,)."""
-
-    before: Array
-    after: Array
-    whole: Array
+STEADY = 0.99  # memory of a quiet noise, at most
 
 
 def is_recorders(told: Sequence[tuple[Evidence, Signal, Array]]) -> bool:
     """Whether slow misfits (n,) of a channel, one of each recording, are its recorder's noise; not if none can tell."""
-    if len(told) < FEWEST:
+    ends = [int(np.searchsorted(e.recording.time[s.rows], e.simulator.contact)) for e, s, _ in told]
+    if len(told) < FEWEST or any(n < LEAST or w.size < 2 * n for n, (_, _, w) in zip(ends, told, strict=True)):
         return False
-    found = [s for one in told if (s := stretches(*one)) is not None]
-    if len(found) < len(told):
+    before = np.array([along(s, w[:n], TERMS) for n, (_, s, w) in zip(ends, told, strict=True)])
+    if not is_slow(before):
         return False
-    return is_slow(found) and not is_louder(found) and not is_shared(found)
+    after = [along(s, part, TERMS) for n, (_, s, w) in zip(ends, told, strict=True) for part in _windows(w[n:], n)]
+    whole = [along(s, w[n:], SHARED) for n, (_, s, w) in zip(ends, told, strict=True)]
+    return not is_louder(before, np.array(after)) and not is_shared(np.array(whole))
 
 
-def stretches(e: Evidence, s: Signal, misfit: Array) -> Stretches | None:
-    """See `Stretches`; None where the approach is too short, or what comes after is shorter than it."""
-    n = int(np.searchsorted(e.recording.time[s.rows], e.simulator.contact))
-    many = (misfit.size - n) // n if n else 0
-    if n < LEAST or many < 1:
-        return None
-    before, later = cosines(n, TERMS), misfit[n:]
-    expected = _expected(s, before)
-    every = cosines(later.size, SHARED)
-    return Stretches(
-        before=before @ misfit[:n] / expected,
-        after=later[: many * n].reshape(many, n) @ before.T / expected,
-        whole=every @ later / _expected(s, every),
-    )
+def _windows(values: Array, n: int) -> Array:
+    """Values in rows of n; what is left over at the end is left aside."""
+    many = values.size // n
+    return values[: many * n].reshape(many, n)
+
+
+def along(s: Signal, misfit: Array, terms: int) -> Array:
+    """The first cosines of a stretch of a misfit, (terms,), over what the noise of quiet stretches lets expect of each.
+
+    Of a memory a a direction d has the variance d' C d, C of a^|i - j|: sum_i d_i (2 y_i - d_i), y_i = d_i + a y_(i-1)
+    """
+    from scipy.signal import lfilter
+
+    ways = cosines(misfit.size, terms)
+    noise, ar = s.at_rest or (s.noise, s.ar)
+    past = lfilter([1.0], [1.0, -min(max(sum(ar), 0.0), STEADY)], ways, axis=1)
+    power = np.sum(ways * (2.0 * past - ways), axis=1)
+    return np.asarray(ways @ misfit / (noise * np.sqrt(np.maximum(power, 1e-12))))
 
 
 def cosines(n: int, terms: int) -> Array:
@@ -73,40 +71,24 @@ def cosines(n: int, terms: int) -> Array:
     return np.asarray(found)
 
 
-def _expected(s: Signal, along: Array) -> Array:
-    """Standard deviation (k,) along directions (k, n) of the noise of quiet stretches, of one memory a.
-
-    d' C d with C of a^|i - j|: sum_i d_i (2 y_i - d_i), y_i = d_i + a y_(i-1).
-    """
-    noise, ar = s.at_rest or (s.noise, s.ar)
-    past = np.zeros(along.shape[0])
-    power = np.zeros(along.shape[0])
-    a = min(max(sum(ar), 0.0), 0.99)
-    for d in along.T:
-        past = d + a * past
-        power += d * (2.0 * past - d)
-    return np.asarray(noise * np.sqrt(np.maximum(power, 1e-12)))
-
-
-def is_slow(found: Sequence[Stretches]) -> bool:
-    """(A1): whether the approaches are slower than what is quiet."""
+def is_slow(before: Array) -> bool:
+    """(A1): whether approaches (recordings, cosines) are slower than what is quiet."""
     from scipy.special import chdtrc
 
-    c = _beside_an_offset(np.array([s.before for s in found]))
+    c = _beside_an_offset(before)
     total, freedom = float(np.sum(c * c)), c.size - 1
     return total > MORE * freedom and float(chdtrc(freedom, total)) < SLOW
 
 
-def is_louder(found: Sequence[Stretches]) -> bool:
+def is_louder(before: Array, after: Array) -> bool:
     """(A2): whether what is slow is clearly more after the contact; of so many numbers as carry it."""
     from scipy.special import fdtrc
 
-    before = _beside_an_offset(np.array([s.before for s in found])) ** 2
-    after = _beside_an_offset(np.concatenate([s.after for s in found])) ** 2
-    powers = np.concatenate([before, after]).mean(axis=0)
+    first, then = _beside_an_offset(before) ** 2, _beside_an_offset(after) ** 2
+    powers = np.concatenate([first, then]).mean(axis=0)
     carry = float(powers.sum() ** 2 / np.sum(powers**2))
-    ratio = float(after.mean() / before.mean())
-    return float(fdtrc(carry * len(after), carry * len(before), ratio)) < LOUDER
+    ratio = float(then.mean() / first.mean())
+    return float(fdtrc(carry * len(then), carry * len(first), ratio)) < LOUDER
 
 
 def _beside_an_offset(c: Array) -> Array:
@@ -114,10 +96,9 @@ def _beside_an_offset(c: Array) -> Array:
     return np.asarray(c - np.eye(1, c.shape[1]) * c[:, 0].mean())
 
 
-def is_shared(found: Sequence[Stretches]) -> bool:
+def is_shared(whole: Array) -> bool:
     """(A3): whether a cosine of what comes after the contact differs from nothing in all recordings together."""
     from scipy.special import fdtrc
 
-    c = np.array([s.whole for s in found])
-    t = c.mean(axis=0) ** 2 * len(c) / np.maximum(c.var(axis=0, ddof=1), 1e-300)
-    return bool(c.shape[1] * float(fdtrc(1, len(c) - 1, t.max())) < ALIKE)
+    t = whole.mean(axis=0) ** 2 * len(whole) / np.maximum(whole.var(axis=0, ddof=1), 1e-300)
+    return bool(whole.shape[1] * float(fdtrc(1, len(whole) - 1, t.max())) < ALIKE)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import colour, diagnose
-from rollover.diagnosis.approach import cosines, is_louder, is_recorders, is_shared, is_slow, stretches
+from rollover.diagnosis.approach import along, cosines, is_louder, is_recorders, is_shared, is_slow
 from rollover.diagnosis.evidence import Evidence, Signal
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario, signal
 
@@ -51,10 +51,8 @@ def test_cosines_are_orthonormal_and_expected_of_noise() -> None:
         for k in range(1, white.size):
             white[k] = 0.6 * white[k - 1] + 0.8 * white[k]
         w = white[50:]
-        e: Any = told([w])[0][0]
-        s = stretches(e, signal(w, 1.0, (0.6,)), w)
-        assert s is not None
-        found.append((float(np.mean(s.before**2)), float(np.mean(s.whole**2)), float(np.mean(s.after**2))))
+        one = signal(w, 1.0, (0.6,))
+        found.append([float(np.mean(along(one, part, k) ** 2)) for part, k in ((w[:60], 5), (w[60:], 8))])
     np.testing.assert_allclose(np.mean(found, axis=0), 1.0, atol=0.05)
 
 
@@ -79,12 +77,15 @@ def test_what_is_louder_after_the_contact_or_shared_is_missing() -> None:
 
     assert share(0.0, lambda rng: of(rng, 6 * [3.0])) <= 0.05
     assert share(0.0, lambda rng: of(rng, [4.0, -4.0, 5.0, -5.0, 6.0, -6.0])) <= 0.05
-    quiet = [s for one in of(np.random.default_rng(1), 6 * [0.0]) if (s := stretches(*one)) is not None]
-    loud = [s for one in of(np.random.default_rng(1), [4.0, -4.0, 5.0, -5.0, 6.0, -6.0]) if (s := stretches(*one))]
-    alike = [s for one in of(np.random.default_rng(1), 6 * [3.0]) if (s := stretches(*one))]
-    assert [is_slow(f) for f in (quiet, loud, alike)] == [True, True, True]
-    assert [is_louder(f) for f in (quiet, loud)] == [False, True]
-    assert [is_shared(f) for f in (quiet, loud, alike)] == [False, False, True]
+    both = [4.0, -4.0, 5.0, -5.0, 6.0, -6.0]
+    quiet, loud, alike = (of(np.random.default_rng(1), sizes) for sizes in (6 * [0.0], both, 6 * [3.0]))
+    before = np.array([along(s, w[:BEFORE], 5) for _, s, w in quiet])
+    assert is_slow(before)
+    for every, louder in ((quiet, False), (loud, True)):
+        after = [along(s, part, 5) for _, s, w in every for part in w[BEFORE : 6 * BEFORE].reshape(5, BEFORE)]
+        assert is_louder(before, np.array(after)) is louder
+    shared = [is_shared(np.array([along(s, w[BEFORE:], 8) for _, s, w in every])) for every in (quiet, loud, alike)]
+    assert shared == [False, False, True]
 
 
 def test_nothing_is_told_of_two_recordings_or_of_a_short_approach() -> None:
