@@ -46,7 +46,8 @@ def leaping(t: Trace, cfc: int | None) -> NDArray[np.int64]:
     noise = t.floor.sigma * float(np.hypot(1.0, np.linalg.norm(CUBIC)))
     off = across(t.values)
     even = np.concatenate([np.abs(np.diff(t.time) - t.step) < 0.5 * t.step, np.ones(1, dtype=bool)])
-    ends = np.isin(t.values, [t.values.max(), t.values.min()])  # a clip has corners
+    same = np.concatenate([[False], steps == 0.0, [False]])
+    ends = np.isin(t.values, [t.values.max(), t.values.min()]) & (same[1:] | same[:-1])  # a clip has corners
     sound = minimum_filter1d((even & ~ends).astype(np.int8), 2 * REACH + 1) > 0
     return np.flatnonzero((off > most * about + NOISY * noise + (DIGITS * digit if digit < np.inf else 0.0)) & sound)
 
