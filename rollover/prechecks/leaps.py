@@ -2,7 +2,7 @@
 
 A sample is held against the cubic through three neighbours on either side: about a leap two of them lie off theirs, one
 to either side, by nearly half of it. Behind the filter even a blow of no duration stays smooth, and what two of it lie
-off is a known part of its height, whatever the motion. Clips, gaps and single digits have reasons of their own.
+off is a known part of its height, whatever the motion. Clips, gaps, spikes and digits have reasons of their own.
 """
 
 from __future__ import annotations
@@ -49,7 +49,9 @@ def leaping(t: Trace, cfc: int | None) -> NDArray[np.int64]:
     same = np.concatenate([[False], steps == 0.0, [False]])
     ends = np.isin(t.values, [t.values.max(), t.values.min()]) & (same[1:] | same[:-1])  # a clip has corners
     sound = minimum_filter1d((even & ~ends).astype(np.int8), 2 * REACH + 1) > 0
-    return np.flatnonzero((off > most * about + NOISY * noise + (DIGITS * digit if digit < np.inf else 0.0)) & sound)
+    least = most * about + NOISY * noise + (DIGITS * digit if digit < np.inf else 0.0)
+    beyond = np.concatenate([[False], (off > least) & sound, [False]])
+    return np.flatnonzero(beyond[1:-1] & ~beyond[:-2] & ~beyond[2:])  # to and at once back again: a spike
 
 
 def leaps(t: Trace, unit: str, cfc: int | None) -> Iterator[Finding]:

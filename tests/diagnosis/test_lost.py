@@ -47,9 +47,15 @@ def digits(v: np.ndarray) -> np.ndarray:
     return np.round(v / 2.0) * 2.0
 
 
-@pytest.mark.parametrize("done", [lambda v: v, clipped, digits])
+def spiked(v: np.ndarray) -> np.ndarray:
+    v = v.copy()
+    v[[120, 350, 500]] += 5.0
+    return v
+
+
+@pytest.mark.parametrize("done", [lambda v: v, clipped, digits, spiked])
 def test_no_signal_behind_a_filter_leaps(done: Callable[[np.ndarray], np.ndarray]) -> None:
-    """A blow of no duration, a step, a push; with a range that ends, or in steps of twenty times the noise."""
+    """A blow of no duration, a step, a push; at the end of a range, in steps of twenty times the noise, with spikes."""
     for seed in range(20):
         told = trace(made(done(behind(blow(), seed))), ACCELERATION)
         assert told is not None
