@@ -24,6 +24,7 @@ PHASES = 8  # at which a blow may fall between two samples
 SURELY = 1.5  # times what a blow of no duration leaves
 TELLING = 0.3  # of a leap: not told where blows lie nearly as far off
 NOISY = 4.0  # standard deviations of the noise of such a difference
+BACK = 0.5  # of a leap, that comes back at the next sample: a spike
 DIGITS = 1.5  # steps of a digitised channel
 LASTING = 2.0  # periods of the filter's -3 dB frequency within which it is done with a blow
 AGAIN = 2  # leaps, at least: one alone is a disturbance
@@ -50,15 +51,17 @@ def leaping(t: Trace, cfc: int | None) -> NDArray[np.int64]:
     ends = np.isin(t.values, [t.values.max(), t.values.min()]) & (same[1:] | same[:-1])  # a clip has corners
     sound = minimum_filter1d((even & ~ends).astype(np.int8), 2 * REACH + 1) > 0
     least = most * about + NOISY * noise + (DIGITS * digit if digit < np.inf else 0.0)
-    beyond = np.concatenate([[False], (off > least) & sound, [False]])
-    return np.flatnonzero(beyond[1:-1] & ~beyond[:-2] & ~beyond[2:])  # to and at once back again: a spike
+    beyond = np.flatnonzero((off > least) & sound)
+    together = np.split(beyond, np.flatnonzero(np.diff(beyond) > REACH) + 1)
+    most_off = np.array([k[np.argmax(off[k])] for k in together if k.size], dtype=np.int64)
+    again = np.maximum(off[most_off - 1], off[most_off + 1])
+    return most_off[again < BACK * off[most_off]]
 
 
 def leaps(t: Trace, unit: str, cfc: int | None) -> Iterator[Finding]:
     """Leaps that the filter class of a channel lets no signal make, if there are several."""
     found = leaping(t, cfc)
-    many = int(np.sum(np.diff(found, prepend=-REACH - 1) > REACH))
-    if many < AGAIN:
+    if found.size < AGAIN:
         return
     off = across(t.values)[found]
     yield Finding(
@@ -66,10 +69,10 @@ def leaps(t: Trace, unit: str, cfc: int | None) -> Iterator[Finding]:
         channel=t.channel,
         start=float(t.time[found[0]]),
         end=float(t.time[found[-1]]),
-        value=float(many),
+        value=float(found.size),
         unit="",
         error=None,
-        sentence=f"{many} leaps of up to {2.0 * float(off.max()):.4g} {unit} from one sample to the next, which "
+        sentence=f"{found.size} leaps of up to {2.0 * float(off.max()):.4g} {unit} from one sample to the next, which "
         f"CFC {cfc} lets no signal make: a contact that opens behind the filter, or samples that were lost",
     )
 
