@@ -31,6 +31,7 @@ CHANCE = 0.005  # p-value of the best of all candidates that admits one
 SCATTERED = 0.05  # share of all errors that the look at candidates may make where runs scatter
 CERTAIN = 1.0 - 1e-12  # largest p-value whose logarithm is taken
 PARTLY = 0.005  # of the excess over the noise that one effect may leave, were it structured, and still be named
+LITTLE = 0.1  # of the excess over the noise, that effects must take which leave far more than noise
 MANY = 0.05  # p-value of what as many effects as may be leave, below which they are no explanation
 HOPELESS = 2.0  # misfit over the noise that two effects leave and a third is not looked for
 BESIDE = 3  # rivals of a step that are begun anew beside a better fit of what came before
@@ -326,6 +327,7 @@ def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) ->
     least = MANY if len(found.parts) == MOST or is_one_sensor(held) or is_pliant(held) else SURE
     is_whole = found.after.p_value > least or not matters(judge, found.fitted, found.after)
     start, ahead = held_out(found.base, groups).total, held_out(found.fitted, groups).total
+    is_whole = is_whole and not (ahead > NEARLY_NOISE and start**2 - ahead**2 < LITTLE * (start**2 - 1.0))
     # what a tolerance allows has structure too
     is_whole = is_whole or (is_tolerated(judge, found.fitted) and ahead < HARDLY_MORE)
     if found.parts and is_whole and ahead < start:
