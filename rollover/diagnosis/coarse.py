@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from rollover.channels import describe
 from rollover.diagnosis.evidence import Evidence, Signal
-from rollover.diagnosis.explain import SURE
 from rollover.diagnosis.phases import phase_at
 from rollover.diagnosis.verdict import Place
 from rollover.effects import spoken
@@ -28,14 +27,13 @@ def coarse(evidence: Sequence[Evidence], phases: Sequence[Sequence[tuple[float, 
     return tuple(_place(e, s, phases[r], 1.0 / len(rough)) for r, e, s in rough)
 
 
-def by_digits(places: Sequence[Place], evidence: Sequence[Evidence], p_value: float) -> str:
-    """The sentence on recordings that agree with the simulation but for what their digits make of them."""
-    agree = f"agree within the noise (p = {p_value:.2g})" if p_value > SURE else "hardly differ"
+def by_digits(places: Sequence[Place], evidence: Sequence[Evidence]) -> str:
+    """The sentence on what digits make of recordings."""
     steps = {s.channel: s.step for e in evidence for s in e.signals if s.channel in {p.channel for p in places}}
     said = " and ".join(f"{c} in steps of {spoken(step)} {describe(c).unit}" for c, step in steps.items())
     return (
         f"Recorded is {said}, far more than the noise: what was measured and what was recorded differ by half of that, "
-        f"which no candidate explains. Otherwise simulation and {len(evidence)} recordings {agree}."
+        "which no candidate explains."
     )
 
 

@@ -85,8 +85,9 @@ def whole(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evid
     for members in alike(evidence):
         members = [m for m in members if not evidence[m[0]].is_rough(m[2])]
         parts = [_cleaned(evidence[r], s, residuals[r][part], humming) / s.loudness for r, _, s, part in members]
+        # what comes now and then is no noise
         if members and not any(is_bursting(m[2], part, _level(part)) for m, part in zip(members, parts, strict=True)):
-            shared.append((members, parts))  # what comes now and then is no noise
+            shared.append((members, parts))
     told = [one for both in shared for one in _told(*both, autoregression)]
     slow = slower(told)
     misfits: dict[str, list[tuple[Evidence, Signal, Array]]] = {}

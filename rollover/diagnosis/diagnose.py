@@ -150,7 +150,8 @@ def diagnose(
     h_before, h_after = (judged(judge, f, kept, groups) for f in (explanation.base, explanation.fitted))
     early = before_a_blow(judge.evidence, explanation.base), before_a_blow(judge.evidence, explanation.fitted)
     remains = after.p_value < SURE and matters(judge, explanation.fitted, after)
-    lost = shown.places if shown is not None and shown.verdict == "unexplained" else ()
+    by_itself = () if shown is None else shown.places
+    lost = by_itself if verdict == "unexplained" else ()
     is_left = (verdict == "unexplained" and shown is None) or (bool(effects) and remains)
     training = tuple(e.name for e in found)
     notes += [*(_felt(degrees[0]) for _ in degrees[:1] if is_mismatch), *by_steps(effects), *_cost(found)]
@@ -167,7 +168,7 @@ def diagnose(
         + against_itself(verdict, contrary),
         p_value=explanation.p_value if shown is None else shown.p_value,
         noise=noise(found),
-        where=places(before, found, depends_on.on) if is_mismatch else () if shown is None else shown.places,
+        where=places(before, found, depends_on.on) if is_mismatch else by_itself,
         effects=effects,
         remaining_significant=is_left or bool(lost),
         remaining_p_value=after.p_value,

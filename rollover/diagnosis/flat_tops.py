@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from rollover.diagnosis.intervals import KNOWN
-from rollover.diagnosis.phases import phase_at
+from rollover.diagnosis.phases import placed
 from rollover.diagnosis.verdict import Interval, Named, Place
 from rollover.effects import EFFECTS, MOST, units_of
 from rollover.prechecks.finding import Finding, trace
@@ -33,20 +33,7 @@ def cut_off(
     """Channels that end at one value in two recordings or more, that most show first, and where they do."""
     found = {channel: tops for channel, tops in _tops(recordings).items() if len({r for r, _ in tops}) > 1}
     channels = sorted(found, key=lambda channel: -len(found[channel]))[:MOST]
-    total = sum(len(found[channel]) for channel in channels)
-    places = tuple(
-        Place(
-            recording=names[r],
-            channel=channel,
-            phase=phase_at(phases[r], top.start),
-            start=top.start,
-            end=top.end,
-            share=1.0 / total,
-            depends_on=channel,
-        )
-        for channel in channels
-        for r, top in found[channel]
-    )
+    places = placed(names, phases, ((c, r, top.start, top.end, c) for c in channels for r, top in found[c]))
     return tuple(_named(channel, found[channel]) for channel in channels), places
 
 

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from rollover.diagnosis.explain import SURE
-from rollover.diagnosis.phases import phase_at
+from rollover.diagnosis.phases import placed
 from rollover.diagnosis.verdict import Place
 from rollover.prechecks.finding import trace
 from rollover.prechecks.leaps import leaping
@@ -28,20 +27,7 @@ def lost(
         for channel in recording.channels:
             found.setdefault(channel, []).extend((r, *where) for where in _breaks(recording, channel))
     often = {channel: breaks for channel, breaks in found.items() if len(breaks) >= AGAIN}
-    total = sum(map(len, often.values()))
-    return tuple(
-        Place(
-            recording=names[r],
-            channel=channel,
-            phase=phase_at(phases[r], start),
-            start=start,
-            end=end,
-            share=1.0 / total,
-            depends_on="time",
-        )
-        for channel, breaks in often.items()
-        for r, start, end in breaks
-    )
+    return placed(names, phases, ((c, *where, "time") for c, breaks in often.items() for where in breaks))
 
 
 def _breaks(recording: Recording, channel: str) -> Iterator[tuple[float, float]]:
@@ -53,12 +39,11 @@ def _breaks(recording: Recording, channel: str) -> Iterator[tuple[float, float]]
     yield from ((float(told.time[k - 1]), float(told.time[k])) for k in leaping(told, recording.cfc.get(channel)))
 
 
-def by_loss(places: Sequence[Place], recordings: int, p_value: float) -> str:
-    """The sentence on recordings that agree with the simulation but for what they lost."""
-    agree = f"agree within the noise (p = {p_value:.2g})" if p_value > SURE else "hardly differ"
+def by_loss(places: Sequence[Place]) -> str:
+    """The sentence on what recordings lost."""
     channels = dict.fromkeys(p.channel for p in places)
     said = " and ".join(f"{c} breaks off in {sum(p.channel == c for p in places)} places" for c in channels)
     return (
         f"{said}: it reads exactly 0, or leaps as its filter lets no signal. A contact opens, or samples were lost, "
-        f"which no candidate explains. Otherwise simulation and {recordings} recordings {agree}."
+        "which no candidate explains."
     )

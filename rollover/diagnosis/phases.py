@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import bisect
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.evidence import Evidence
+from rollover.diagnosis.verdict import Place
 
 Array = NDArray[np.float64]
 FIRST_CONTACT = 0.005  # s, after the impact
@@ -57,3 +58,24 @@ def drop_phases(evidence: Evidence) -> tuple[tuple[float, str], ...]:
 def phase_at(phases: Sequence[tuple[float, str]], at: float) -> str:
     """Name of the phase at a time (s); the first before all begin."""
     return phases[max(bisect.bisect_right([start for start, _ in phases], at) - 1, 0)][1]
+
+
+def placed(
+    names: Sequence[str],
+    phases: Sequence[Sequence[tuple[float, str]]],
+    found: Iterable[tuple[str, int, float, float, str]],
+) -> tuple[Place, ...]:
+    """Places of equal share, of (channel, which recording, start s, end s, what it depends on)."""
+    every = list(found)
+    return tuple(
+        Place(
+            recording=names[r],
+            channel=channel,
+            phase=phase_at(phases[r], start),
+            start=start,
+            end=end,
+            share=1.0 / len(every),
+            depends_on=on,
+        )
+        for channel, r, start, end, on in every
+    )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from rollover.diagnosis.coarse import by_digits, coarse
 from rollover.diagnosis.evidence import Evidence
+from rollover.diagnosis.explain import SURE
 from rollover.diagnosis.flat_tops import cut_off
 from rollover.diagnosis.inquiry import Phases
 from rollover.diagnosis.lost import by_loss, lost
@@ -31,7 +32,7 @@ def by_themselves(
     """What recordings show by themselves, that differ from their simulation with `p_value`; None if they are sound."""
     names = [e.name for e in evidence]
     if places := coarse(evidence, phases):  # in coarse steps any top is flat
-        return _unexplained(places, by_digits(places, evidence, p_value))
+        return _unexplained(places, by_digits(places, evidence), len(evidence), p_value)
     whole = [recordings[name] for name in names]
     effects, places = cut_off(names, whole, phases)
     if effects:
@@ -39,15 +40,24 @@ def by_themselves(
         least = min(p_value, *(e.p_value for e in effects))
         return Shown(verdict="sensor", effects=effects, places=places, sentence=said, p_value=least)
     if places := lost(names, whole, phases):
-        return _unexplained(places, by_loss(places, len(evidence), p_value))
+        return _unexplained(places, by_loss(places), len(evidence), p_value)
     return None
 
 
 def agreeing_but(effects: Sequence[Named], recordings: int, p_value: float) -> str:
     """The sentence on recordings that agree with the simulation but for what they show by themselves."""
-    said = " ".join(e.statement for e in effects)
-    return f"{said} Otherwise simulation and {recordings} recordings agree within the noise (p = {p_value:.2g})."
+    return _otherwise(" ".join(e.statement for e in effects), recordings, _within(p_value))
 
 
-def _unexplained(places: tuple[Place, ...], said: str) -> Shown:
+def _unexplained(places: tuple[Place, ...], said: str, recordings: int, p_value: float) -> Shown:
+    agree = _within(p_value) if p_value > SURE else "hardly differ"
+    said = _otherwise(said, recordings, agree)
     return Shown(verdict="unexplained", effects=(), places=places, sentence=said, p_value=0.0)
+
+
+def _otherwise(said: str, recordings: int, agree: str) -> str:
+    return f"{said} Otherwise simulation and {recordings} recordings {agree}."
+
+
+def _within(p_value: float) -> str:
+    return f"agree within the noise (p = {p_value:.2g})"

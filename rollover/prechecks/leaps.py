@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from rollover.filters import filtered, least_rate
 from rollover.prechecks.finding import Finding, Trace
+from rollover.prechecks.neighbours import off_a_cubic
 
 Array = NDArray[np.float64]
-BESIDE = np.array([-3, -2, -1, 1, 2, 3])
-CUBIC = np.linalg.pinv(np.vander(BESIDE, 4))[-1]  # weights of the neighbours of a sample for its value
 REACH = 3  # samples to either side
+ONE = np.eye(1, 4 * REACH + 1, 2 * REACH)[0]  # a sample among those that it touches
 PHASES = 8  # at which a blow may fall between two samples
 SURELY = 1.5  # times what a blow of no duration leaves
 TELLING = 0.3  # of a leap: not told where blows lie nearly as far off
@@ -44,7 +44,7 @@ def leaping(t: Trace, cfc: int | None) -> NDArray[np.int64]:
     about = maximum_filter1d(t.values, width) - minimum_filter1d(t.values, width)
     steps = np.abs(np.diff(t.values))
     digit = float(np.min(steps[steps > 0.0], initial=np.inf))
-    noise = t.floor.sigma * float(np.hypot(1.0, np.linalg.norm(CUBIC)))
+    noise = t.floor.sigma * float(np.linalg.norm(off_a_cubic(ONE, REACH)))
     off = across(t.values)
     even = np.concatenate([np.abs(np.diff(t.time) - t.step) < 0.5 * t.step, np.ones(1, dtype=bool)])
     same = np.concatenate([[False], steps == 0.0, [False]])
@@ -77,16 +77,9 @@ def leaps(t: Trace, unit: str, cfc: int | None) -> Iterator[Finding]:
     )
 
 
-def off_a_cubic(values: Array) -> Array:
-    """How far each sample (n,) is off the cubic through three on either side; 0 at the ends."""
-    found = values - np.convolve(values, np.insert(CUBIC, REACH, 0.0)[::-1], mode="same")
-    found[:REACH] = found[-REACH:] = 0.0
-    return np.asarray(found)
-
-
 def across(values: Array) -> Array:
     """How far each sample (n,) and the one before it lie off such cubics to either side, the less of both; else 0."""
-    off = off_a_cubic(values)
+    off = off_a_cubic(values, REACH)
     before = np.concatenate([[0.0], off[:-1]])
     return np.where(off * before < 0.0, np.minimum(np.abs(off), np.abs(before)), 0.0)
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri, pdtrc
 
 from rollover.prechecks.finding import Finding, Trace
+from rollover.prechecks.neighbours import beside, off_a_cubic
 
 CHANCE = 0.001  # that a clean channel shows a spike or a stuck run
 FEWEST = 120  # samples, to know what is usual
@@ -20,8 +21,7 @@ AROUND = 6  # samples on either side that say what a sample should be
 ALONE = 0.5  # of what a spike is off both sides, at least, that it is off each
 MOST = 0.05  # of the samples, that lie far off what their neighbours say
 CROWDED = 0.05  # chance below which spikes that lie together are something quick
-OFFSETS = np.array([k for k in range(-AROUND, AROUND + 1) if k != 0])
-CUBIC = np.linalg.pinv(np.vander(OFFSETS / AROUND, 4))[-1]  # weights of the neighbours of a sample for its value
+OFFSETS = beside(AROUND)
 SPREAD = np.eye(2 * AROUND) - np.vander(OFFSETS / AROUND, 4) @ np.linalg.pinv(np.vander(OFFSETS / AROUND, 4))
 BEFORE, AFTER = (np.linalg.pinv(np.vander(side, 3))[-1] for side in (OFFSETS[:AROUND], OFFSETS[AROUND:]))
 
@@ -139,7 +139,7 @@ def spikes(t: Trace, unit: str) -> Iterator[Finding]:
     if not t.regular or t.floor.sigma == 0.0 or t.values.size < FEWEST:
         return
     values = t.values.copy()
-    error = _beside_a_cubic(values)
+    error = off_a_cubic(values, AROUND)
     inner = np.abs(error[AROUND:-AROUND])
     scale = float(np.median(inner[inner <= np.median(inner) * 6.0])) / 0.6745
     beyond = -float(ndtri(0.5 * CHANCE / values.size)) * scale
@@ -151,7 +151,7 @@ def spikes(t: Trace, unit: str) -> Iterator[Finding]:
         if _stands_alone(values, i, error, t.floor.sigma):
             found[i] = float(error[i])
             values[i] -= error[i]
-            error = _beside_a_cubic(values)
+            error = off_a_cubic(values, AROUND)
     if np.mean(np.abs(error) > 3.0 * scale) > MOST:
         return  # so here
     quick = np.flatnonzero(np.abs(error) > beyond)
@@ -170,13 +170,6 @@ def spikes(t: Trace, unit: str) -> Iterator[Finding]:
             sentence=f"one sample lies {found[i]:.4g} {unit} off its neighbours, {abs(found[i]) / scale:.1f} sigma: "
             "a disturbance, or a contact of no more than a sample",
         )
-
-
-def _beside_a_cubic(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far each sample (n,) is off a cubic through those around it; 0 at the ends."""
-    error = values - np.convolve(values, np.insert(CUBIC, AROUND, 0.0)[::-1], mode="same")
-    error[:AROUND] = error[-AROUND:] = 0.0
-    return np.asarray(error)
 
 
 def _stands_alone(values: NDArray[np.float64], i: int, error: NDArray[np.float64], sigma: float) -> bool:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from rollover.diagnosis import colour, diagnose
 from rollover.diagnosis.approach import along, cosines, is_louder, is_recorders, is_shared, is_slow
@@ -37,9 +39,9 @@ def told(misfits: Sequence[np.ndarray], sigma: float = 1.0) -> Told:
     return [(e, signal(w, sigma), w) for w in misfits]
 
 
-def share(of: float, make: Any) -> float:
+def share(make: Callable[[np.random.Generator], Told]) -> float:
     """How often what is made is taken for a recorder's noise, of 100."""
-    return sum(is_recorders(make(np.random.default_rng(seed))) for seed in range(100)) / 100.0 - of
+    return sum(is_recorders(make(np.random.default_rng(seed))) for seed in range(100)) / 100.0
 
 
 def test_cosines_are_orthonormal_and_expected_of_noise() -> None:
@@ -47,17 +49,15 @@ def test_cosines_are_orthonormal_and_expected_of_noise() -> None:
     np.testing.assert_allclose(cosines(30, 8) @ cosines(30, 8).T, np.eye(8), atol=1e-12)
     rng, found = np.random.default_rng(0), []
     for _ in range(400):
-        white = rng.standard_normal(N + 50)
-        for k in range(1, white.size):
-            white[k] = 0.6 * white[k - 1] + 0.8 * white[k]
-        w = white[50:]
+        w = lfilter([0.8], [1.0, -0.6], rng.standard_normal(N + 50))[50:]
         one = signal(w, 1.0, (0.6,))
         found.append([float(np.mean(along(one, part, k) ** 2)) for part, k in ((w[:60], 5), (w[60:], 8))])
     np.testing.assert_allclose(np.mean(found, axis=0), 1.0, atol=0.05)
 
 
 def test_noise_of_one_over_f_is_its_recorder_s() -> None:
-    assert abs(share(0.9, lambda rng: told([pink(rng) for _ in range(6)], 0.6))) < 0.1
+    """(A2) errs in one of a hundred, (A3) in two: 97, of 100 drawn with a standard deviation of 1.7."""
+    assert 0.92 < share(lambda rng: told([pink(rng) for _ in range(6)], 0.6)) < 1.0
 
 
 def test_white_noise_is_not_slow_whatever_comes_after() -> None:
@@ -66,17 +66,17 @@ def test_white_noise_is_not_slow_whatever_comes_after() -> None:
     def noise(rng: np.random.Generator, of: float, offset: float) -> Told:
         return told([rng.standard_normal(N) + of * LATER + offset for _ in range(6)])
 
-    assert share(0.0, lambda rng: noise(rng, 0.0, 0.0)) <= 0.03
-    assert share(0.0, lambda rng: noise(rng, 1.0, 0.0)) <= 0.03
-    assert share(0.0, lambda rng: noise(rng, 0.0, 0.5)) <= 0.03
+    assert share(lambda rng: noise(rng, 0.0, 0.0)) <= 0.03
+    assert share(lambda rng: noise(rng, 1.0, 0.0)) <= 0.03
+    assert share(lambda rng: noise(rng, 0.0, 0.5)) <= 0.03
 
 
 def test_what_is_louder_after_the_contact_or_shared_is_missing() -> None:
     def of(rng: np.random.Generator, sizes: Sequence[float]) -> Told:
         return told([pink(rng) + size * LATER for size in sizes], 0.6)
 
-    assert share(0.0, lambda rng: of(rng, 6 * [3.0])) <= 0.05
-    assert share(0.0, lambda rng: of(rng, [4.0, -4.0, 5.0, -5.0, 6.0, -6.0])) <= 0.05
+    assert share(lambda rng: of(rng, 6 * [3.0])) <= 0.05
+    assert share(lambda rng: of(rng, [4.0, -4.0, 5.0, -5.0, 6.0, -6.0])) <= 0.05
     both = [4.0, -4.0, 5.0, -5.0, 6.0, -6.0]
     quiet, loud, alike = (of(np.random.default_rng(1), sizes) for sizes in (6 * [0.0], both, 6 * [3.0]))
     before = np.array([along(s, w[:BEFORE], 5) for _, s, w in quiet])
@@ -110,12 +110,10 @@ def test_a_long_memory_reaches_where_a_short_one_does_not() -> None:
     assert reach > 1.5 * colour.LONGEST
     assert high > 1.3 * low
     for a in (0.0, 0.5, 0.9):
-        white = [np.zeros(N) for _ in range(6)]
-        for w in white:
-            for k in range(1, N):
-                w[k] = a * w[k - 1] + rng.standard_normal()
-        sigma, ar = colour.long_memory(white)
-        assert colour.level_of(sigma, ar) == pytest.approx(1.0 / (1.0 - a), rel=0.25)
+        series = [lfilter([1.0], [1.0, -a], rng.standard_normal(N)) for _ in range(6)]
+        # its standard error by the memory's, sqrt((1 - a^2)/n)/(1 - a): 2, 4 and 9 %; within 2.5 of these
+        error = np.sqrt((1.0 + a) / ((1.0 - a) * 6 * N))
+        assert colour.level_of(*colour.long_memory(series)) == pytest.approx(1.0 / (1.0 - a), rel=2.5 * error)
 
 
 @pytest.mark.parametrize(("of", "seed"), [(0.7, 0), (1.0, 1)])
@@ -130,6 +128,6 @@ def test_drops_with_noise_of_one_over_f_lack_nothing(of: float, seed: int) -> No
         for c, values in r.channels.items():
             noise = np.sqrt(1.0 - of**2) * rng.standard_normal(values.size) + of * pink(rng, values.size)
             channels[c] = values + 0.01 * np.ptp(values) * noise
-        made.append((name, type(r)(title=name, time=r.time, channels=channels, conditions=r.conditions)))
+        made.append((name, replace(r, channels=channels)))
     found = diagnose(scenario(), made)
     assert found.verdict == "no-mismatch", found.sentence
