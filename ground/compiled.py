@@ -18,9 +18,12 @@ from typing import Any, TypeVar
 import numba
 from llvmlite import ir
 from numba import types
-from numba.core import config
-from numba.experimental.structref import StructRefProxy, define_proxy, register
-from numba.extending import intrinsic
+from numba.core import cgutils, config
+from numba.core.imputils import impl_ret_borrowed
+from numba.core.runtime.nrtdynmod import _meminfo_struct_type
+from numba.experimental import structref
+from numba.experimental.structref import StructRefProxy, define_proxy
+from numba.extending import intrinsic, lower_getattr_generic
 
 __all__ = [
     "ADVANCE",
@@ -37,7 +40,9 @@ __all__ = [
     "compiled",
     "define_proxy",
     "force_law",
+    "inlined",
     "is_warm",
+    "leaf",
     "mark_warm",
     "register",
 ]
@@ -45,6 +50,7 @@ __all__ = [
 F = TypeVar("F", bound=Callable[..., Any])
 
 _POINTER = types.CPointer(types.float64)
+_DATA = 3  # which member of what holds a bundle points to it
 # force(p, s, z, v): parameters, memory, sinkage, sinkage rate -> force on the reference face
 FORCE = types.float64(_POINTER, _POINTER, types.float64, types.float64)
 # begin(p, s): at first touch, once s[SPEED] and s[MASS] are latched
@@ -59,6 +65,25 @@ class StructType(types.StructRef):  # type: ignore[misc]
     def preprocess_fields(self, fields: Any) -> Any:
         """Forget literal values, as the compiler asks."""
         return tuple((name, types.unliteral(kind)) for name, kind in fields)
+
+
+def register(kind: Any) -> Any:
+    """Let kernels read the arrays of a bundle of this type by name, also those that do not count who holds them.
+
+    Numba's own way asks what holds the bundle for its data by a call that only counting kernels may make.
+    """
+
+    @lower_getattr_generic(structref.register(kind))  # type: ignore[untyped-decorator]
+    def read(context: Any, builder: Any, bundle: Any, value: Any, name: str) -> Any:
+        info = cgutils.create_struct_proxy(bundle)(context, builder, value=value).meminfo
+        place = builder.bitcast(info, _meminfo_struct_type.as_pointer())
+        held = bundle.get_data_type()
+        kept = context.data_model_manager[held].get_value_type().as_pointer()
+        data = builder.bitcast(builder.load(cgutils.gep(builder, place, 0, _DATA)), kept)
+        member = getattr(cgutils.create_struct_proxy(held)(context, builder, ref=data), name)
+        return impl_ret_borrowed(context, builder, bundle.field_dict[name], member)
+
+    return kind
 
 
 def _sources_hash() -> str:
@@ -98,6 +123,21 @@ def compiled(function: F) -> F:
     """Compile at the first call and keep the machine code on disk."""
     with _own_cache():
         return numba.njit(cache=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+
+
+def leaf(function: F) -> F:
+    """Compile a kernel without counting who holds its arrays, which costs more than most kernels do.
+
+    It reads and writes arrays and bundles that it is handed, makes and returns none, and calls nothing that does.
+    """
+    with _own_cache():
+        return numba.njit(cache=True, error_model="numpy", _nrt=False)(function)  # type: ignore[no-any-return]
+
+
+def inlined(function: F) -> F:
+    """The same as `leaf`, laid out in each of its callers: for what is short, or asked again and again."""
+    with _own_cache():
+        return numba.njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)(function)  # type: ignore
 
 
 def force_law(function: Callable[..., float]) -> Any:

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ground.compiled import compiled, force_law
+from ground.compiled import force_law, leaf
 from ground.law import SPEED
 
 Array = NDArray[np.float64]
@@ -75,7 +75,7 @@ def shape(name: str, x: Array, u: Array, w: Array) -> Array:
     return np.array([_shape(NUMBERS[number], *one) for one in zip(x, u, w, strict=True)])
 
 
-@compiled
+@leaf
 def _shape(number: Any, x: float, u: float, w: float) -> float:
     a, b, c, at = number[0], number[1], number[2], number[3]
     if x <= 0.0:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ground.compiled import call_advance, call_begin, call_force, compiled
+from ground.compiled import call_advance, call_begin, call_force, inlined, leaf
 from ground.law import BRANCH, MASS, REFERENCE_AREA, SPEED
 
 # columns of memory (float)
@@ -74,14 +74,14 @@ SAME = 1e-10  # m: sinkages closer than this are one, so that rounding does not 
 BRANCHED, ARRESTED, RELEASED = 1, 2, 4
 
 
-@compiled
+@inlined
 def passed(z: float, edge: float, width: float) -> float:
     """How far sinkage z has passed an edge of some width, 0 before to 1 behind: u^2 (3 - 2 u)."""
     u = min(max((z - edge) / width + 0.5, 0.0), 1.0)
     return u * u * (3.0 - 2.0 * u)
 
 
-@compiled
+@inlined
 def loading_force(law: Any, p: Any, s: Any, z: float, v: float) -> float:
     """The law's loading curve with the effects that act on it, N per reference area; rates count on the way down.
 
@@ -126,13 +126,13 @@ def loading_force(law: Any, p: Any, s: Any, z: float, v: float) -> float:
     return f  # type: ignore[no-any-return]
 
 
-@compiled
+@inlined
 def springs_back(law: Any, p: Any) -> float:
     """Share of the deepest sinkage that springs back: the law's own, or that of the rebound effect if it is more."""
     return max(p[0], p[law[EFFECTS] + RECOVERY])  # type: ignore[no-any-return]
 
 
-@compiled
+@inlined
 def growth(law: Any, p: Any, z: float) -> float:
     """How fast the co-moving mass grows at sinkage z, over how it grows before the end: exp(-(z - end)/fade) behind."""
     beyond, fade = z - p[law[EFFECTS] + GROWTH_END], p[law[EFFECTS] + FADE]
@@ -141,7 +141,7 @@ def growth(law: Any, p: Any, z: float) -> float:
     return math.exp(-beyond / fade) if fade > 0.0 else 0.0
 
 
-@compiled
+@inlined
 def grown(law: Any, p: Any, z: float) -> float:
     """Sinkage at which the mass would be as large, had it grown evenly: the integral of `growth`, m."""
     end, fade = p[law[EFFECTS] + GROWTH_END], p[law[EFFECTS] + FADE]
@@ -150,7 +150,7 @@ def grown(law: Any, p: Any, z: float) -> float:
     return end - fade * math.expm1((end - z) / fade) if fade > 0.0 else end  # type: ignore[no-any-return]
 
 
-@compiled
+@inlined
 def normal_force(law: Any, p: Any, s: Any, row: Any, z: float, v: float) -> float:
     """Spring force of one element at sinkage z and rate v, N: a pull only from adhesion; memory is only read.
 
@@ -177,7 +177,7 @@ def normal_force(law: Any, p: Any, s: Any, row: Any, z: float, v: float) -> floa
     return f * row[AREA] / REFERENCE_AREA  # type: ignore[no-any-return]
 
 
-@compiled
+@inlined
 def lets_go(law: Any, p: Any, row: Any) -> float:
     """Sinkage at which an unloaded element lets go, m: its rut less adhesion's reach; the surface if soil clings."""
     if p[law[EFFECTS] + CLINGS] != 0.0:
@@ -187,7 +187,7 @@ def lets_go(law: Any, p: Any, row: Any) -> float:
     return rut_depth(row)
 
 
-@compiled
+@inlined
 def rut_depth(row: Any) -> float:
     """Sinkage below which the unloaded element gives no force: the rut that stays, m."""
     if row[LINE_K] <= 0.0:
@@ -195,7 +195,7 @@ def rut_depth(row: Any) -> float:
     return max(row[LINE_Z] - row[LINE_F] / row[LINE_K], 0.0)  # type: ignore[no-any-return]
 
 
-@compiled
+@leaf
 def set_line(law: Any, p: Any, s: Any, row: Any, z: float) -> None:
     """Start the unloading line at (z, F(z)) with K_u = K'(z)/recovery."""
     f = loading_force(law, p, s, max(z - row[SPREAD], 0.0), 0.0)
@@ -204,7 +204,7 @@ def set_line(law: Any, p: Any, s: Any, row: Any, z: float) -> None:
     row[LINE_K] = f / (springs_back(law, p) * z) if z > 0.0 else 0.0
 
 
-@compiled
+@leaf
 def meet_again(law: Any, p: Any, s: Any, row: Any) -> None:
     """Let the line of a rut end where it meets the loading curve of another hit: K_u (z - z_r) = F(z).
 
@@ -228,7 +228,7 @@ def meet_again(law: Any, p: Any, s: Any, row: Any) -> None:
     row[LINE_Z], row[LINE_F] = high, row[LINE_K] * (high - rut)
 
 
-@compiled
+@leaf
 def set_rest_line(row: Any, mass: float) -> None:
     """(6) read literally, K_b3 = 9.81 m_s / z_p,max: a secant through the origin, so the force drops to the weight."""
     if row[LINE_Z] > 0.0:
@@ -236,7 +236,7 @@ def set_rest_line(row: Any, mass: float) -> None:
         row[LINE_F] = row[LINE_K] * row[LINE_Z]
 
 
-@compiled
+@leaf
 def enter_from_the_side(law: Any, p: Any, s: Any, row: Any, z: float, force: float) -> None:
     """Let a sinkage that was not swept by normal motion begin on the reloading line with `force` (N).
 
@@ -253,7 +253,7 @@ def enter_from_the_side(law: Any, p: Any, s: Any, row: Any, z: float, force: flo
     row[LINE_C] = 0.0
 
 
-@compiled
+@leaf
 def commit(law: Any, p: Any, s: Any, row: Any, state: Any, z: float, v: float, h: float, mass: float) -> int:
     """Accept a step that ended at (z, v): move the deepest point, turn round, or let go. Returns outcome bits.
 
@@ -290,7 +290,7 @@ def commit(law: Any, p: Any, s: Any, row: Any, state: Any, z: float, v: float, h
     return outcome
 
 
-@compiled
+@leaf
 def begin(law: Any, p: Any, s: Any, row: Any, state: Any, mass: float, start: float) -> None:
     """Start an element's memory for a touch at TOUCH_SPEED: latched terms, and where the unloading line starts.
 
@@ -313,7 +313,7 @@ def begin(law: Any, p: Any, s: Any, row: Any, state: Any, mass: float, start: fl
             state[MODE] = UNLOADING
 
 
-@compiled
+@leaf
 def friction_force(
     mu: float, stick: float, relaxation: float, force: float, shear: Any, moved: Any, v: Any, n: Any
 ) -> Any:
@@ -332,7 +332,7 @@ def friction_force(
     return factor * x, factor * y, factor * z
 
 
-@compiled
+@leaf
 def commit_friction(stick: float, shear: Any, moved: Any, n: Any) -> None:
     """Add what has moved to the shear displacement and cut it at d_s: the rest was slip."""
     x, y, z = shear[0] + moved[0], shear[1] + moved[1], shear[2] + moved[2]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ground.compiled import compiled
+from ground.compiled import leaf
 
 # columns of a part: kind, a point, the unit vector across its edge (towards which u grows; v stands to its left),
 # and numbers of its own as named in `profile`
@@ -20,7 +20,7 @@ STEEPEST = 75.0  # deg: beyond it an element of a grid in the horizontal plane s
 _STEEPEST_TAN = math.tan(math.radians(STEEPEST))
 
 
-@compiled
+@leaf
 def node(parts: Any, nodes: Any, k: int, ix: int, iy: int) -> float:
     """Height at a node of a map; beyond its rim that of the rim."""
     nx, ny = int(parts[k, C]), int(parts[k, D])
@@ -28,7 +28,7 @@ def node(parts: Any, nodes: Any, k: int, ix: int, iy: int) -> float:
     return nodes[int(parts[k, E]) + ix * ny + iy]  # type: ignore[no-any-return]
 
 
-@compiled
+@leaf
 def on_map(parts: Any, nodes: Any, k: int, x: float, y: float) -> Any:
     """Height and gradient of a map, bilinear between its nodes, level beyond its rim."""
     u, v = (x - parts[k, PX]) / parts[k, A], (y - parts[k, PY]) / parts[k, B]
@@ -41,7 +41,7 @@ def on_map(parts: Any, nodes: Any, k: int, x: float, y: float) -> Any:
     return low + b * (high - low), gx, (high - low) / parts[k, B]
 
 
-@compiled
+@leaf
 def profile(parts: Any, k: int, u: float, v: float) -> Any:
     """Height of part k over u and v, and its derivatives along both."""
     kind, a, b = int(parts[k, KIND]), parts[k, A], parts[k, B]
@@ -71,7 +71,7 @@ def profile(parts: Any, k: int, u: float, v: float) -> Any:
     return (z, -d, 0.0) if z == end else (z, 0.0, -math.copysign(d, v))
 
 
-@compiled
+@leaf
 def height_and_gradient(parts: Any, nodes: Any, x: float, y: float) -> Any:
     """z(x, y), dz/dx and dz/dy of all parts together."""
     z, gx, gy = 0.0, 0.0, 0.0
@@ -94,7 +94,7 @@ def height_and_gradient(parts: Any, nodes: Any, x: float, y: float) -> Any:
     return z, gx, gy
 
 
-@compiled
+@leaf
 def highest(parts: Any, nodes: Any, x: float, y: float, reach: float) -> float:
     """No point of the surface within `reach` of (x, y) is higher than this, m; nor of planes, see `overshoots`."""
     z = 0.0
@@ -129,7 +129,7 @@ def highest(parts: Any, nodes: Any, x: float, y: float, reach: float) -> float:
 BLOCK = 16  # nodes along the edge of a block whose highest node is kept
 
 
-@compiled
+@leaf
 def highest_node(part: Any, nodes: Any, x: float, y: float, reach: float) -> float:
     """Highest node of the blocks that lie within `reach`; they stand behind the map's own nodes."""
     nx, ny = int(part[C]), int(part[D])
@@ -147,7 +147,7 @@ def highest_node(part: Any, nodes: Any, x: float, y: float, reach: float) -> flo
     return z
 
 
-@compiled
+@leaf
 def element_plane(parts: Any, nodes: Any, x0: float, y0: float, dx: float, dy: float, plane: Any) -> None:
     """Plane of the element with its lowest corner at (x0, y0): unit normal and offset into `plane` (4,).
 
@@ -167,14 +167,14 @@ def element_plane(parts: Any, nodes: Any, x0: float, y0: float, dx: float, dy: f
     plane[3] = plane[0] * (x0 + 0.5 * dx) + plane[1] * (y0 + 0.5 * dy) + plane[2] * 0.25 * (a + b + c + d)
 
 
-@compiled
+@leaf
 def heights(parts: Any, nodes: Any, x: Any, y: Any, z: Any) -> None:
     """Heights at many places (n,), into z (n,)."""
     for k in range(x.shape[0]):
         z[k], _, _ = height_and_gradient(parts, nodes, x[k], y[k])
 
 
-@compiled
+@leaf
 def normals(parts: Any, nodes: Any, x: Any, y: Any, n: Any) -> None:
     """Unit normals at many places (k,), into n (k, 3)."""
     for k in range(x.shape[0]):

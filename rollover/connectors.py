@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ground.compiled import compiled
+from ground.compiled import compiled, inlined, leaf
 from rollover.tables import (
     OMEGA,
     ROT,
@@ -40,7 +40,7 @@ from rollover.tables import (
 from rollover.vectors import add_force, cross, place, relative_angle, spin, to_body, to_world, velocity
 
 
-@compiled
+@inlined
 def relative_turn(a: Any, b: Any, turn: Any) -> float:
     """Rotation vector of body b against body a in a's axes, below a half turn, into turn (3,).
 
@@ -61,7 +61,7 @@ def relative_turn(a: Any, b: Any, turn: Any) -> float:
     return (1.0 - 0.5 * angle / math.tan(0.5 * angle)) / (angle * angle)
 
 
-@compiled
+@inlined
 def turned(turn: Any, beta: float, sign: float, x: Any, y: Any) -> None:
     """y = x + sign/2 turn x x + beta turn x (turn x x).
 
@@ -75,7 +75,7 @@ def turned(turn: Any, beta: float, sign: float, x: Any, y: Any) -> None:
     y[2] = x[2] + 0.5 * sign * c + beta * f
 
 
-@compiled
+@leaf
 def overstress(k: float, strength: float, speed: float, q: float, over: float, h: float) -> float:
     """Relative overstress x = (w'/speed)^(1/q) of a step of length h whose elastic trial lies `over` the yield.
 
@@ -91,7 +91,7 @@ def overstress(k: float, strength: float, speed: float, q: float, over: float, h
     return max(x, 0.0)
 
 
-@compiled
+@leaf
 def try_axis(f: Any, g: Any, j: int, delta: float, rate: float, h: float) -> None:
     """Axis j of a connector at deflection `delta`: force on body b, with the set and plastic way it would leave."""
     k, gap, hardening = f[T_K + j], f[T_PLAY + j], f[T_HARD + j]
@@ -120,42 +120,48 @@ def try_axis(f: Any, g: Any, j: int, delta: float, rate: float, h: float) -> Non
 @compiled
 def try_mounts(t: Any, Q: Any) -> None:
     """Loads through mounts and hinges: on body b, and their reaction on body a at the same point."""
-    h = t.clock[0]
-    local, torque = np.empty(3), np.empty(3)
-    turn, rates, moved = np.empty(3), np.empty(3), np.empty(3)
+    room = np.empty((5, 3))
     for i in range(t.mount_f.shape[0]):
-        f, g = t.mount_f[i], t.mount_memory[i]
-        a, b = t.mount_i[i, 0], t.mount_i[i, 1]
-        under, upper = t.pose[a], t.pose[b]
-        x, y, z = spin(upper)
-        spun = to_body(under, x, y, z)
-        r = f[T_B : T_B + 3]
-        x, y, z = place(upper, r[0], r[1], r[2])
-        # the point of body b, in a's axes about a's centre of mass
-        local[0], local[1], local[2] = to_body(under, x - under[X], y - under[X + 1], z - under[X + 2])
-        v, w = velocity(upper, r[0], r[1], r[2]), velocity(under, local[0], local[1], local[2])
-        rate = to_body(under, v[0] - w[0], v[1] - w[1], v[2] - w[2])
-        beta = 0.0
+        try_mount(t, i, room, Q)
+
+
+@leaf
+def try_mount(t: Any, i: int, room: Any, Q: Any) -> None:
+    """Loads through one of them; `room` (5, 3) is written over."""
+    local, torque, turn, rates, moved = room[0], room[1], room[2], room[3], room[4]
+    h = t.clock[0]
+    f, g = t.mount_f[i], t.mount_memory[i]
+    a, b = t.mount_i[i, 0], t.mount_i[i, 1]
+    under, upper = t.pose[a], t.pose[b]
+    x, y, z = spin(upper)
+    spun = to_body(under, x, y, z)
+    r = f[T_B : T_B + 3]
+    x, y, z = place(upper, r[0], r[1], r[2])
+    # the point of body b, in a's axes about a's centre of mass
+    local[0], local[1], local[2] = to_body(under, x - under[X], y - under[X + 1], z - under[X + 2])
+    v, w = velocity(upper, r[0], r[1], r[2]), velocity(under, local[0], local[1], local[2])
+    rate = to_body(under, v[0] - w[0], v[1] - w[1], v[2] - w[2])
+    beta = 0.0
+    for k in range(3):
+        turn[k], rates[k] = relative_angle(under, upper, k), spun[k] - under[OMEGA + k]
+    if f[T_FAR] > 0.0:
+        beta = relative_turn(under, upper, turn)
+        turned(turn, beta, -1.0, rates, moved)
         for k in range(3):
-            turn[k], rates[k] = relative_angle(under, upper, k), spun[k] - under[OMEGA + k]
-        if f[T_FAR] > 0.0:
-            beta = relative_turn(under, upper, turn)
-            turned(turn, beta, -1.0, rates, moved)
-            for k in range(3):
-                rates[k] = moved[k]
+            rates[k] = moved[k]
+    for k in range(3):
+        try_axis(f, g, k, local[k] - f[T_A + k], rate[k], h)
+        try_axis(f, g, 3 + k, turn[k], rates[k], h)
+        torque[k] = g[S_FORCE_NOW + 3 + k]
+    if f[T_FAR] > 0.0:
+        turned(turn, beta, 1.0, torque, moved)
         for k in range(3):
-            try_axis(f, g, k, local[k] - f[T_A + k], rate[k], h)
-            try_axis(f, g, 3 + k, turn[k], rates[k], h)
-            torque[k] = g[S_FORCE_NOW + 3 + k]
-        if f[T_FAR] > 0.0:
-            turned(turn, beta, 1.0, torque, moved)
-            for k in range(3):
-                torque[k] = moved[k]
-        x, y, z = to_world(under, g[S_FORCE_NOW], g[S_FORCE_NOW + 1], g[S_FORCE_NOW + 2])
-        add_force(upper, b, r, x, y, z, Q)
-        add_force(under, a, local, -x, -y, -z, Q)
-        x, y, z = to_world(under, torque[0], torque[1], torque[2])
-        on_upper = to_body(upper, x, y, z)
-        for k in range(3):
-            Q[6 * b + 3 + k] += on_upper[k]
-            Q[6 * a + 3 + k] -= torque[k]
+            torque[k] = moved[k]
+    x, y, z = to_world(under, g[S_FORCE_NOW], g[S_FORCE_NOW + 1], g[S_FORCE_NOW + 2])
+    add_force(upper, b, r, x, y, z, Q)
+    add_force(under, a, local, -x, -y, -z, Q)
+    x, y, z = to_world(under, torque[0], torque[1], torque[2])
+    on_upper = to_body(upper, x, y, z)
+    for k in range(3):
+        Q[6 * b + 3 + k] += on_upper[k]
+        Q[6 * a + 3 + k] -= torque[k]

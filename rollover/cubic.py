@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from ground.compiled import compiled
+from ground.compiled import inlined
 
 
-@compiled
+@inlined
 def between_ends(theta: float, h: float, u0: float, d0: float, u1: float, d1: float) -> float:
     """Cubic through values u and rates d at both ends of a step."""
     w = 1.0 - theta
@@ -16,7 +16,7 @@ def between_ends(theta: float, h: float, u0: float, d0: float, u1: float, d1: fl
     )
 
 
-@compiled
+@inlined
 def crossing(level: float, h: float, u0: float, d0: float, u1: float, d1: float) -> float:
     """Share of the step at which the cubic passes `level`, which lies between its ends."""
     low, high = 0.0, 1.0

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ground.compiled import compiled
+from ground.compiled import compiled, inlined, leaf
 
 
-@compiled
+@leaf
 def solve_in_place(K: Any, B: Any) -> None:
     """B <- K^-1 B by Gaussian elimination with partial pivoting; K (n, n) is destroyed, B is (n, m)."""
     n, m = K.shape[0], B.shape[1]
@@ -51,7 +51,7 @@ def times(A: Any, x: Any) -> Any:
     return y
 
 
-@compiled
+@inlined
 def dot(x: Any, y: Any) -> float:
     """x' y."""
     total = 0.0
@@ -60,7 +60,7 @@ def dot(x: Any, y: Any) -> float:
     return total
 
 
-@compiled
+@leaf
 def add_outer(A: Any, factor: float, x: Any, at: int) -> None:
     """A += factor x x' on the block that starts at row and column `at`; x is (6,)."""
     for j in range(6):
@@ -68,13 +68,13 @@ def add_outer(A: Any, factor: float, x: Any, at: int) -> None:
             A[at + j, at + k] += factor * x[j] * x[k]
 
 
-@compiled
+@inlined
 def norm(x: Any) -> float:
     """|x|."""
     return np.sqrt(dot(x, x))  # type: ignore[no-any-return]
 
 
-@compiled
+@leaf
 def largest(x: Any) -> float:
     """Largest |x_k|; NaN where one is."""
     most = 0.0

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ground.compiled import compiled
+from ground.compiled import leaf
 from rollover.tables import OMEGA, X
 from rollover.vectors import add_force, place, to_body, to_world, velocity
 
@@ -41,14 +41,14 @@ K_FORCE, K_ALONG, K_WORK, K_FORCE_NOW, K_ALONG_NOW, DEVICE_MEMORY = 0, 1, 2, 3, 
 BY_DEVICE, BY_LASHING, ACCOUNTS = 0, 1, 2
 
 
-@compiled
+@leaf
 def level(f: Any, clock: float) -> float:
     """What a row prescribes at an instant: place of a beam (m), force (N) or angle of a table (rad)."""
     t = clock - f[D_T0]
     return min(f[D_START] + f[D_RATE] * t, f[D_MOST]) + f[D_SWING] * math.sin(f[D_TURN] * t)  # type: ignore[no-any-return]
 
 
-@compiled
+@leaf
 def try_devices(t: Any, Q: Any) -> None:
     """Forces of all devices at the state in `pose` and the instant in `clock`, added to Q (6 nb,)."""
     if t.device_i.shape[0] == 0:
@@ -70,7 +70,7 @@ def try_devices(t: Any, Q: Any) -> None:
             Q[k] += t.device_q[a, k]
 
 
-@compiled
+@leaf
 def try_point(t: Any, i: int, kind: int, Q: Any) -> None:
     """A beam on its guide, a given force, or a rope, on one point of a body."""
     f, m, b = t.device_f[i], t.device_memory[i], t.device_i[i, D_BODY]
@@ -99,7 +99,7 @@ def try_point(t: Any, i: int, kind: int, Q: Any) -> None:
     add_force(row, b, r, force * ex, force * ey, force * ez, Q)
 
 
-@compiled
+@leaf
 def try_face(t: Any, i: int, Q: Any) -> None:
     """A square face on one body presses on the contact points of another that have passed it: k a (depth + c rate)."""
     f, b, o = t.device_f[i], t.device_i[i, D_BODY], t.device_i[i, D_CARRIER]
@@ -136,7 +136,7 @@ def try_face(t: Any, i: int, Q: Any) -> None:
     t.device_memory[i, K_FORCE_NOW] = total
 
 
-@compiled
+@leaf
 def try_tilt(t: Any, i: int, Q: Any) -> None:
     """Gravity of a table that is tilted by an angle a: m g (sin a downhill + (1 - cos a) up) besides the weight."""
     f = t.device_f[i]
@@ -150,7 +150,7 @@ def try_tilt(t: Any, i: int, Q: Any) -> None:
         Q[6 * b + 2] += mass * up
 
 
-@compiled
+@leaf
 def finish_devices(t: Any, h: float, first: int) -> None:
     """Work of the devices on the bodies over a step; `first` is the place of their accounts in `work`."""
     if t.device_i.shape[0] == 0:
@@ -172,7 +172,7 @@ def finish_devices(t: Any, h: float, first: int) -> None:
         m[K_FORCE], m[K_ALONG] = m[K_FORCE_NOW], m[K_ALONG_NOW]
 
 
-@compiled
+@leaf
 def keep_poses(t: Any) -> None:
     """Remember where the next step starts, after all that changes velocities."""
     if t.device_i.shape[0] == 0:

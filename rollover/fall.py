@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ground.compiled import compiled
+from ground.compiled import compiled, leaf
 from ground.kernel import (
     ADHESION,
     AREA,
@@ -89,7 +89,7 @@ STILL = 1e-8  # m/s, and m/s2 over a millisecond: what is slower on its line of 
 NOTHING, LEVEL, TURN, BEND = 0, 1, 2, 3  # what ends a step before its time
 
 
-@compiled
+@leaf
 def advance(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, h: float, a: Any, end: Any) -> None:
     """One step of the classical Runge-Kutta formula from y to `end`; a (4, 2) holds the stages' accelerations."""
     for stage in range(4):
@@ -109,7 +109,7 @@ def advance(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, h: f
         end[2 * k + 1] = y[2 * k + 1] + h * (a[0, k] + 2.0 * a[1, k] + 2.0 * a[2, k] + a[3, k]) / 6.0
 
 
-@compiled
+@leaf
 def at_rest(y: Any, a: Any) -> bool:
     """Whether nose and body have come to rest, by their speeds and by the accelerations of the last step's stages."""
     still = max(abs(y[1]), abs(y[3])) < STILL
@@ -118,7 +118,7 @@ def at_rest(y: Any, a: Any) -> bool:
     return still  # type: ignore[no-any-return]
 
 
-@compiled
+@leaf
 def longer(f: Any, y: Any, a: Any) -> float:
     """Times its usual step that a striker which gives way may take as its ringing dies out; 1 of a rigid one.
 
@@ -131,7 +131,7 @@ def longer(f: Any, y: Any, a: Any) -> float:
     return min(max((FAINT * f[SPEED] / max(ringing, 1e-12)) ** 0.25, 1.0), LONGEST)  # type: ignore[no-any-return]
 
 
-@compiled
+@leaf
 def longest(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, a: Any) -> float:
     """Longest step from here, s."""
     h = f[STEP] * longer(f, y, a)
@@ -144,7 +144,7 @@ def longest(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, a: A
     return min(h, RESOLVED * math.sqrt((f[NOSE] + row[MASS_B]) / stiff))  # type: ignore[no-any-return]
 
 
-@compiled
+@leaf
 def passed(
     law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, h: float, a: Any, end: Any, now: Any, stops: Any
 ) -> Any:
@@ -179,7 +179,7 @@ def passed(
     return share, what, jump, goal, slack
 
 
-@compiled
+@leaf
 def ended(
     law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, h: float, a: Any, end: Any, now: Any,
     what: int, jump: float, goal: float, slack: float,
@@ -205,7 +205,7 @@ def ended(
     return h
 
 
-@compiled
+@leaf
 def left_behind(
     law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, h: float, a: Any, end: Any, now: Any, pull: float
 ) -> float:
@@ -222,7 +222,7 @@ def left_behind(
     return high
 
 
-@compiled
+@leaf
 def committed(
     law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, h: float, now: Any, pull: float, is_turn: bool
 ) -> None:

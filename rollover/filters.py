@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ground.compiled import compiled
+from ground.compiled import leaf
 
 CFC = Literal[60, 180, 600, 1000]
 J211, ISO_6487 = 2.0775, 1.25 / 0.6
@@ -48,7 +48,7 @@ def filtered(values: NDArray[np.float64], step: float, cfc: int, *, constant: fl
     return smooth[pad : pad + values.size].copy()
 
 
-@compiled
+@leaf
 def run_through(b: Any, a: Any, steady: Any, values: Any) -> None:
     """Values (n,) through a second-order filter in place, begun as if the first had stood there for ever.
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ground.compiled import compiled
+from ground.compiled import compiled, leaf
 from ground.kernel import BODY, MASS_B, NORMAL, OFFSET, OWNER_R, PLACE, ROW, SHEAR, SPREAD, friction_force, normal_force
 from rollover.connectors import try_mounts
 from rollover.devices import try_devices
@@ -82,7 +82,7 @@ FLAT = 0.12  # cos^2 of the camber, 70 degrees, from which a tyre begins to lie 
 TYRE_RELAXATION = 0.002  # s, dashpot over stick spring of a tyre
 
 
-@compiled
+@leaf
 def read_poses(pose: Any, q: Any, qd: Any) -> None:
     """Positions, rotation matrices and velocities of all bodies from the generalised coordinates."""
     for b in range(pose.shape[0]):
@@ -93,7 +93,7 @@ def read_poses(pose: Any, q: Any, qd: Any) -> None:
         set_rotation(pose[b], q[6 * b + 3], q[6 * b + 4], q[6 * b + 5])
 
 
-@compiled
+@leaf
 def try_elements(t: Any, Q: Any) -> None:
     """Forces of the elements in contact, with what was found for each in `trial`."""
     for a in range(t.counts[ACTIVE]):
@@ -118,7 +118,7 @@ def try_elements(t: Any, Q: Any) -> None:
         add_force(row, b, r, force * n[0] + f[0], force * n[1] + f[1], force * n[2] + f[2], Q)
 
 
-@compiled
+@leaf
 def tyre_point(row: Any, wheel: Any, n: Any, e: Any, x: Any) -> float:
     """Lowest point of a crowned tread: its place about the carrier's centre of mass (world axes) into x (3,).
 
@@ -138,7 +138,7 @@ def tyre_point(row: Any, wheel: Any, n: Any, e: Any, x: Any) -> float:
     return lean  # type: ignore[no-any-return]
 
 
-@compiled
+@leaf
 def lying(lean: float) -> Any:
     """Share of the tread's springs that is left when a tyre lies down, 1 up to a camber of 70 degrees, and its slope.
 
@@ -148,7 +148,7 @@ def lying(lean: float) -> Any:
     return ((1.0 - s2) / FLAT, -1.0 / FLAT) if 1.0 - s2 < FLAT else (1.0, 0.0)
 
 
-@compiled
+@leaf
 def tyre_stiffness(wheel: Any, lean: float) -> Any:
     """k(lean^2) and its derivative: radial and lateral springs in series, faded out over the last 20 degrees.
 
@@ -161,7 +161,7 @@ def tyre_stiffness(wheel: Any, lean: float) -> Any:
     return fade / series, fall / series - fade * slope / (series * series)
 
 
-@compiled
+@leaf
 def along_axle(e: Any, n: Any, lean: float, v: Any) -> Any:
     """Part of a world vector along the axle's direction in the surface."""
     a, b, c = e[0] - lean * n[0], e[1] - lean * n[1], e[2] - lean * n[2]
@@ -250,7 +250,7 @@ def try_wheels(t: Any, Q: Any) -> None:
             Q[6 * b + 5] += ez
 
 
-@compiled
+@leaf
 def try_axle(t: Any, Q: Any) -> None:
     """Torque of the front axle's stops about the pivot (chassis x)."""
     if t.axle_f.size == 0:

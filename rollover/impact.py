@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ground.compiled import compiled
+from ground.compiled import compiled, leaf
 from ground.kernel import (
     AREA,
     BODY,
@@ -199,7 +199,7 @@ def share_mass(t: Any, new: Any, total: int, share: Any) -> None:
             t.memory[t.active[new[k]], MASS_B] *= factor
 
 
-@compiled
+@leaf
 def contact_row(t: Any, slot: int, J: Any) -> None:
     """Row of an element's contact: dz/dt = J [v, omega] of its body."""
     m = t.memory[slot]

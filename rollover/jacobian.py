@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ground.compiled import compiled
+from ground.compiled import compiled, leaf
 from ground.kernel import AREA, BODY, LINE_C, LINE_K, LINE_Z, NORMAL, OWNER_R, PLASTIC, ROW, SPREAD, loading_force
 from ground.law import REFERENCE_AREA
 from rollover.forces import TYRE_RELAXATION, tyre_stiffness
@@ -48,7 +48,7 @@ from rollover.terms import stiffen_terms
 from rollover.vectors import direction_row, place, to_body
 
 
-@compiled
+@leaf
 def add_block(K: Any, factor: float, a: Any, at: int, b: Any, bt: int) -> None:
     """K += factor a b' on the block at rows `at`, columns `bt`."""
     for j in range(6):
@@ -70,7 +70,7 @@ def add_point(K: Any, row: Any, b: int, r: Any, n: Any, normal: float, tangentia
             add_block(K, tangential, J, 6 * b, J, 6 * b)
 
 
-@compiled
+@leaf
 def add_pair(K: Any, factor: float, a: Any, at: int, b: Any, bt: int) -> None:
     """A spring between two bodies: K += factor (a - b)(a - b)'."""
     add_block(K, factor, a, at, a, at)
@@ -161,7 +161,7 @@ def add_mounts(t: Any, f: float, fd: float, K: Any) -> None:
                 add_pair(K, factor, spin_row(t, c, b, k), 6 * b, spin_row(t, c, c, k), 6 * c)
 
 
-@compiled
+@leaf
 def loose(f: Any, g: Any, j: int) -> bool:
     """Whether axis j of a connector moves inside its play."""
     return f[T_PLAY + j] > 0.0 and abs(g[S_DELTA_NOW + j] - g[S_SET + j]) <= f[T_PLAY + j]  # type: ignore[no-any-return]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ground.compiled import compiled
+from ground.compiled import inlined, leaf
 from ground.kernel import (
     ADHESION,
     AREA,
@@ -54,7 +54,7 @@ MASS, NOSE, SPRING, DASHPOT, FRACTION, FACE, LAW_MASS, MOMENTUM_MOST, GRAVITY, S
 CONE, HEIGHT, CRISIS, THIN, CREEP, NUMBERS = 13, 14, 15, 16, 17, 18
 
 
-@compiled
+@inlined
 def cover(f: Any, row: Any, z: float) -> None:
     """Covered area of a cone at sinkage z, pi (R z/h)^2 up to its base, and the mean of it above the tip, 2/3 z."""
     if f[CONE] > 0.0:
@@ -62,7 +62,7 @@ def cover(f: Any, row: Any, z: float) -> None:
         row[AREA], row[SPREAD] = f[FACE] * (wet / f[CONE]) ** 2, 2.0 / 3.0 * wet
 
 
-@compiled
+@inlined
 def swept(f: Any, z: float) -> float:
     """Volume that the nose has swept at sinkage z, m3: the integral of the covered area."""
     if f[CONE] > 0.0:
@@ -71,7 +71,7 @@ def swept(f: Any, z: float) -> float:
     return f[FACE] * z  # type: ignore[no-any-return]
 
 
-@compiled
+@inlined
 def along(law: Any, p: Any, row: Any, f: Any, z: float) -> float:
     """Co-moving mass at sinkage z: what there was at the last commit and what has grown since, kg."""
     if row[GROWING] == 0.0 or z <= row[LINE_Z]:
@@ -80,7 +80,7 @@ def along(law: Any, p: Any, row: Any, f: Any, z: float) -> float:
     return row[MASS_B] + p[law[EFFECTS] + GROWTH] / REFERENCE_AREA * more  # type: ignore[no-any-return]
 
 
-@compiled
+@inlined
 def accelerate(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, a: Any) -> float:
     """Accelerations of nose and body into a (2,); returns the ground's spring force, N. y: x, v of both."""
     force, soil = 0.0, row[MASS_B]
@@ -99,7 +99,7 @@ def accelerate(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, a
     return force
 
 
-@compiled
+@inlined
 def edges(depth: float, width: float, out: Any, count: int) -> int:
     """Where the edge of a layer begins and ends, into out from `count` on; returns how many there are then."""
     out[count] = depth - 0.5 * width
@@ -109,7 +109,7 @@ def edges(depth: float, width: float, out: Any, count: int) -> int:
     return count + 2
 
 
-@compiled
+@leaf
 def levels(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, out: Any) -> int:
     """Depths at which the force may have a kink or a jump, or the contact begin or end, into out (12,)."""
     if state[MODE] == IDLE:
@@ -136,7 +136,7 @@ def levels(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, out: Any) -> 
     return count
 
 
-@compiled
+@leaf
 def hit(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any) -> float:
     """Begin a contact: latch the speed, share momentum with the co-moving mass; returns the impulse, N s."""
     row[TOUCH_SPEED], row[SINKAGE] = y[1], y[0]
@@ -150,7 +150,7 @@ def hit(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any) -> float
     return row[MASS_B] * y[1]  # type: ignore[no-any-return]
 
 
-@compiled
+@leaf
 def settle_one(law: Any, p: Any, row: Any, state: Any, mass: float) -> None:
     """Give an arrested element its dashpot, 2 K_u/omega of all that stands on it (see `rollover.step.settle`)."""
     if state[MODE] == UNLOADING and row[LINE_C] == 0.0 and row[LINE_K] > 0.0:
@@ -158,7 +158,7 @@ def settle_one(law: Any, p: Any, row: Any, state: Any, mass: float) -> None:
         row[LINE_C] = 2.0 * p[law[EFFECTS] + REBOUND_DAMPING] * row[LINE_K] / omega
 
 
-@compiled
+@leaf
 def steepness(law: Any, p: Any, s: Any, row: Any, state: Any) -> float:
     """Stiffness of the ground as it is met now, N/m: of the line, or the secant of the loading curve."""
     if state[MODE] == IDLE:
@@ -169,19 +169,19 @@ def steepness(law: Any, p: Any, s: Any, row: Any, state: Any) -> float:
     return loading_force(law, p, s, z, 0.0) / z * row[AREA] / REFERENCE_AREA  # type: ignore[no-any-return]
 
 
-@compiled
+@inlined
 def held(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, now: Any) -> float:
     """What presses the soil that moves along against the striker, N: below nothing it would have to be pulled."""
     return accelerate(law, p, s, row, state, f, y, now) + row[MASS_B] * now[0]  # type: ignore[no-any-return]
 
 
-@compiled
+@inlined
 def holds(f: Any) -> bool:
     """Whether the guide is one whose friction holds what is at rest."""
     return f[GUIDE] > 0.0 and f[CREEP] == 0.0 and f[SPRING] <= 0.0  # type: ignore[no-any-return]
 
 
-@compiled
+@leaf
 def is_stuck(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, now: Any) -> bool:
     """Whether the guide holds what hardly moves on its line of unloading: its friction is more than what pulls."""
     if not holds(f) or state[MODE] != UNLOADING or abs(y[1]) >= INCHING:

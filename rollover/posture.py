@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ground.compiled import compiled
+from ground.compiled import compiled, leaf
 from rollover.vectors import cross
 
 ROLL, PITCH, AXLE, SLIDE, YAW, PARTS = 1, 2, 3, 4, 6, 7  # places in u; 0 is the height
@@ -19,7 +19,7 @@ WITH_CHASSIS, SWINGS = 0, -1  # of a body that is no part with places in u of it
 SHORT = 1e-7  # sine of an angle below which a turn is none, or half a one
 
 
-@compiled
+@leaf
 def turn_by_angles(roll: float, pitch: float, yaw: float, R: Any) -> None:
     """R_WV of ISO 8855 angles (rad) into R (3, 3)."""
     cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
@@ -29,7 +29,7 @@ def turn_by_angles(roll: float, pitch: float, yaw: float, R: Any) -> None:
     R[2, 0], R[2, 1], R[2, 2] = -sp, cp * sr, cp * cr
 
 
-@compiled
+@leaf
 def vector_of(R: Any, v: Any) -> None:
     """Rotation vector of R (3, 3) into v (3,), rad, no longer than pi."""
     v[0], v[1], v[2] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
@@ -49,7 +49,7 @@ def vector_of(R: Any, v: Any) -> None:
         v[j] *= factor
 
 
-@compiled
+@leaf
 def _product(A: Any, B: Any, C: Any) -> None:
     """A B into C, (3, 3) each."""
     for i in range(3):
@@ -57,7 +57,7 @@ def _product(A: Any, B: Any, C: Any) -> None:
             C[i, j] = A[i, 0] * B[0, j] + A[i, 1] * B[1, j] + A[i, 2] * B[2, j]
 
 
-@compiled
+@leaf
 def _origin(u: Any, place: Any, i: int) -> float:
     """Coordinate i of the vehicle's origin."""
     return place[3, i] + u[0] * place[0, i] + u[SLIDE] * place[1, i] + u[SLIDE + 1] * place[2, i]  # type: ignore[no-any-return]
@@ -95,7 +95,7 @@ def put(u: Any, heading: float, place: Any, pivot: Any, centre: Any, part: Any, 
         vector_of(turns[b], q[6 * b + 3 : 6 * b + 6])
 
 
-@compiled
+@leaf
 def _spin(axis: Any, x: Any, turn: Any, row: Any) -> None:
     """Velocity of a body at x (3,) that spins about an axis (3,) through the origin into row (6,)."""
     row[0], row[1], row[2] = cross(axis[0], axis[1], axis[2], x[0], x[1], x[2])

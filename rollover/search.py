@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ground.compiled import compiled
+from ground.compiled import compiled, inlined, leaf
 from ground.kernel import (
     CELL,
     IDLE,
@@ -33,9 +33,16 @@ def search(t: Any) -> int:
     points of the same body.
     """
     if t.relief.shape[0] > 0:
-        candidates, count = on_relief(t)
+        candidates, count = on_relief(t, np.empty(4))
     else:
         candidates, count = on_plane(t)
+    gather(t, candidates, count)
+    return count  # type: ignore[no-any-return]
+
+
+@leaf
+def gather(t: Any, candidates: int, count: int) -> None:
+    """Area, mean sinkage and centroid of the points of one body over each element, from the candidates."""
     for c in range(candidates):
         slot, i = t.candidate_i[c, 0], t.candidate_i[c, 1]
         f = t.found[slot]
@@ -49,10 +56,9 @@ def search(t: Any) -> int:
         f = t.found[t.touched[c]]
         for k in range(3, 7):
             f[k] /= f[1]
-    return count  # type: ignore[no-any-return]
 
 
-@compiled
+@leaf
 def on_plane(t: Any) -> Any:
     """Points below a flat surface, as candidates; returns how many, and of how many elements."""
     n, offset = t.plane[:3], t.plane[3]
@@ -97,7 +103,7 @@ def on_plane(t: Any) -> Any:
     return candidates, count
 
 
-@compiled
+@leaf
 def note_candidate(t: Any, candidates: int, count: int, slot: int, i: int, facing: float, depth: float) -> int:
     """Keep a point that is deep enough; returns 1 where it is the first of its element."""
     t.candidate_i[candidates, 0], t.candidate_i[candidates, 1] = slot, i
@@ -113,11 +119,10 @@ def note_candidate(t: Any, candidates: int, count: int, slot: int, i: int, facin
     return first
 
 
-@compiled
-def on_relief(t: Any) -> Any:
+@leaf
+def on_relief(t: Any, plane: Any) -> Any:
     """Points below the planes of their elements on an uneven surface; returns as `on_plane` does."""
     candidates, count = 0, 0
-    plane = np.empty(4)
     member, following = 0, 0
     while following < t.member_i.shape[0]:
         member, following = following, following + 1
@@ -152,7 +157,8 @@ def on_relief(t: Any) -> Any:
             if slot < 0:
                 plane_of(t, cell, plane)
             else:
-                plane[:] = t.memory[slot, NORMAL : NORMAL + 4]
+                for k in range(4):
+                    plane[k] = t.memory[slot, NORMAL + k]
             depth = plane[3] - (plane[0] * x + plane[1] * y + plane[2] * z)
             if depth <= 0.0:
                 continue
@@ -168,18 +174,19 @@ def on_relief(t: Any) -> Any:
     return candidates, count
 
 
-@compiled
+@inlined
 def plane_of(t: Any, cell: int, plane: Any) -> None:
     """Normal and offset of an untouched element into `plane` (4,)."""
     if t.relief.shape[0] == 0:
-        plane[:] = t.plane
+        for k in range(4):
+            plane[k] = t.plane[k]
         return
     ix, iy = cell // t.grid_i[1], cell % t.grid_i[1]
     dx, dy = t.grid_f[2], t.grid_f[3]
     element_plane(t.relief, t.nodes, t.grid_f[0] + ix * dx, t.grid_f[1] + iy * dy, dx, dy, plane)
 
 
-@compiled
+@inlined
 def law_of(t: Any, cell: int) -> int:
     """Row of an element's law and friction: that of the last patch over its centre, or 0."""
     x = t.grid_f[0] + (cell // t.grid_i[1] + 0.5) * t.grid_f[2]
@@ -192,7 +199,7 @@ def law_of(t: Any, cell: int) -> int:
     return found
 
 
-@compiled
+@inlined
 def slot_at(t: Any, cell: int) -> int:
     """Memory row of an element; made at its first touch, so that untouched elements cost nothing."""
     slot = t.slot_of[cell]

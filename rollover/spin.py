@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ground.compiled import compiled
+from ground.compiled import leaf
 from rollover.tables import (
     D_DAMPING,
     D_RATE,
@@ -45,7 +45,7 @@ BRAKE_RELAXATION = 0.002  # s, dashpot over that spring
 DROOP = 0.1  # share of the rate limit over which a governor takes the torque back
 
 
-@compiled
+@leaf
 def read_spins(t: Any, q: Any, qd: Any) -> None:
     """Angles and rates of turning wheels from the generalised coordinates, where there are any."""
     for w in range(t.spin_i.size):
@@ -54,7 +54,7 @@ def read_spins(t: Any, q: Any, qd: Any) -> None:
             t.spin_memory[w, P_ANGLE_NOW], t.spin_memory[w, P_RATE_NOW] = q[at], qd[at]
 
 
-@compiled
+@leaf
 def try_spins(t: Any, Q: Any) -> None:
     """Torques of drive, locked axle and brakes on the wheels; the wheels' gyroscopic moments on their carriers."""
     driven, angle, rate = 0, 0.0, 0.0
@@ -98,7 +98,7 @@ def try_spins(t: Any, Q: Any) -> None:
         Q[6 * b + 5] -= z
 
 
-@compiled
+@leaf
 def finish_spins(t: Any, h: float) -> None:
     """Work of drive and brakes; the brakes' slip."""
     for w in range(t.spin_i.size):
@@ -115,7 +115,7 @@ def finish_spins(t: Any, h: float) -> None:
         s[P_ANGLE], s[P_TORQUE] = s[P_ANGLE_NOW], s[P_TORQUE_NOW]
 
 
-@compiled
+@leaf
 def keep_spins(t: Any, before: Any, qd: Any) -> None:
     """An impact on a carrier does not turn its wheels: spin + omega . e stays."""
     for w in range(t.spin_i.size):
@@ -127,7 +127,7 @@ def keep_spins(t: Any, before: Any, qd: Any) -> None:
             qd[at] -= t.wheel_f[w, W_AXIS + k] * (qd[j] - before[j])
 
 
-@compiled
+@leaf
 def tread_motion(t: Any, w: int, a: Any, x: Any) -> Any:
     """Way and speed, in the carrier's axes, of the tread's point at `a` (3,) through turning since the step began.
 
@@ -143,7 +143,7 @@ def tread_motion(t: Any, w: int, a: Any, x: Any) -> Any:
     return rate * u, rate * v, rate * z
 
 
-@compiled
+@leaf
 def turn_by_friction(t: Any, w: int, hold: Any, f: Any, Q: Any) -> None:
     """Moment of the tread's friction about a turning wheel's own axle."""
     row, c = t.pose[t.wheel_i[w]], t.wheel_f[w]

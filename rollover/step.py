@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ground.compiled import compiled
+from ground.compiled import compiled, inlined, leaf
 from ground.kernel import (
     ADHESION,
     AREA,
@@ -150,7 +150,7 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
     keep_poses(t)
 
 
-@compiled
+@leaf
 def finish_elements(t: Any, h: float) -> None:
     """Work, contact forces and commit of the elements in contact."""
     flags, footprint, row = 0, 0.0, 0
@@ -256,7 +256,7 @@ def settle(t: Any) -> None:
                 t.memory[i, LINE_C] = 2.0 * ratio * t.memory[i, LINE_K] / omega
 
 
-@compiled
+@leaf
 def finish_wheels(t: Any) -> None:
     """Work and commit of the tyres; lift-off and touch-down as events."""
     for w in range(t.wheel_i.size):
@@ -272,7 +272,7 @@ def finish_wheels(t: Any) -> None:
             note_event(t, kind, w, (g[E_WHERE], g[E_WHERE + 1], g[E_WHERE + 2]), g[E_FORCE_NOW])
 
 
-@compiled
+@leaf
 def finish_mounts(t: Any) -> None:
     """Work and permanent set of mounts and hinges; the first yielding of each axis as an event."""
     for i in range(t.mount_f.shape[0]):
@@ -285,7 +285,7 @@ def finish_mounts(t: Any) -> None:
                 g[S_SET + k], g[S_FLOWED + k] = g[S_SET_NOW + k], g[S_FLOWED_NOW + k]
 
 
-@compiled
+@leaf
 def finish_axle(t: Any) -> None:
     """Work of the axle stops; reaching one is an event."""
     if t.axle_f.size == 0:
@@ -342,7 +342,7 @@ def keep_strain(t: Any) -> None:
             shear[0], shear[1], shear[2] = along_axle(e, n, lean, shear)
 
 
-@compiled
+@leaf
 def grip(t: Any, w: int) -> None:
     """Add what a tyre's anchor has moved to its stick spring, as far as friction holds; off the ground it is free."""
     g = t.wheel_memory[w]
@@ -354,7 +354,7 @@ def grip(t: Any, w: int) -> None:
             g[E_SHEAR + k] = 0.0
 
 
-@compiled
+@inlined
 def hold(g: Any) -> None:
     """Let the stick spring take hold of the tread's lowest point as it stands now."""
     for k in range(3):
@@ -383,7 +383,7 @@ def start_step(t: Any) -> None:
         t.axle_memory[M_ANGLE], t.axle_memory[M_TORQUE] = t.axle_memory[M_ANGLE_NOW], t.axle_memory[M_TORQUE_NOW]
 
 
-@compiled
+@leaf
 def kinetic_of_soil(t: Any) -> float:
     """Kinetic energy of the co-moving masses, J."""
     total = 0.0

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ground.compiled import compiled
+from ground.compiled import compiled, inlined, leaf
 from rollover.tables import EXTRA_WORK, OMEGA, ROT, VEL, X
 from rollover.vectors import add_force, direction_row, relative_angle, spin, to_body, to_world, velocity
 
@@ -29,7 +29,7 @@ INCHING = 1e-4  # m/s: the same of a guide in a drop by itself, which then holds
 STANDING = 2e-6  # m/s: the same of a guide in a full run: what stands on stiff ground gives way over seconds
 
 
-@compiled
+@inlined
 def drag(factor: float, crisis: float, ratio: float, speed: float) -> float:
     """1/2 rho C_d A at a speed: C_d falls to `ratio` of itself about the speed `crisis`, N s2/m2."""
     if crisis == np.inf:
@@ -38,7 +38,7 @@ def drag(factor: float, crisis: float, ratio: float, speed: float) -> float:
     return factor * (ratio + (1.0 - ratio) / (1.0 + np.exp(min(over, 100.0))))  # type: ignore[no-any-return]
 
 
-@compiled
+@inlined
 def rub(force: float, creep: float, zone: float, v: float) -> float:
     """Friction of a guide against a speed v, N: F_c tanh(v/v_c) of one that creeps, else F_c beyond a narrow zone."""
     if creep > 0.0:
@@ -46,7 +46,7 @@ def rub(force: float, creep: float, zone: float, v: float) -> float:
     return force * min(max(v / zone, -1.0), 1.0)
 
 
-@compiled
+@inlined
 def free(g: float, mass: float, guide: float, creep: float, air: float, crisis: float, thin: float, v: float) -> float:
     """Downward acceleration of a body that falls with v on a guide through air, m/s2."""
     if guide == 0.0 and air == 0.0:
@@ -54,7 +54,7 @@ def free(g: float, mass: float, guide: float, creep: float, air: float, crisis: 
     return g - (rub(guide, creep, INCHING, v) + drag(air, crisis, thin, abs(v)) * v * abs(v)) / mass
 
 
-@compiled
+@leaf
 def fall_back(
     g: float, mass: float, guide: float, creep: float, air: float, crisis: float, thin: float, v: float, time: float
 ) -> Any:
@@ -161,7 +161,7 @@ def try_bed(t: Any, i: int, Q: Any) -> Any:
     return held, power
 
 
-@compiled
+@leaf
 def finish_terms(t: Any, h: float) -> None:
     """Book what the terms took in a step, and start the next one."""
     for i in range(t.term_i.shape[0]):
@@ -216,7 +216,7 @@ def stiffen_bed(t: Any, i: int, f: float, fd: float, K: Any) -> None:
         add_both(K, f * n[B_KR] + fd * n[B_CR], J, 6 * b, 6 * c)
 
 
-@compiled
+@leaf
 def add_both(K: Any, factor: float, J: Any, at: int, bt: int) -> None:
     """K += factor (a - b)(a - b)' with the rows a and b of J at two bodies."""
     for j in range(6):

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ground.compiled import compiled
+from ground.compiled import compiled, leaf
 from ground.kernel import (
     AREA,
     BODY,
@@ -56,7 +56,7 @@ from rollover.tables import (
 from rollover.vectors import depth_acceleration, place, velocity
 
 
-@compiled
+@leaf
 def note_event(t: Any, kind: int, subject: int, x: Any, value: float) -> None:
     """Append to the events of this step; a full list drops the rest (the caller empties it every step)."""
     e = t.counts[EVENTS]
@@ -68,7 +68,7 @@ def note_event(t: Any, kind: int, subject: int, x: Any, value: float) -> None:
         t.counts[EVENTS] = e + 1
 
 
-@compiled
+@leaf
 def drop_mass(t: Any, slot: int) -> None:
     """Let an element's co-moving mass go; its kinetic energy stays in the soil."""
     m, b = t.memory[slot], t.state[slot, BODY]
@@ -80,7 +80,7 @@ def drop_mass(t: Any, slot: int) -> None:
     m[GROWING] = 0.0
 
 
-@compiled
+@leaf
 def change_owner(t: Any, slot: int, b: int, r: Any, speed: float) -> None:
     """Move an element's contact to the centroid r of body b; the co-moving mass stays with its body.
 
@@ -98,7 +98,7 @@ def change_owner(t: Any, slot: int, b: int, r: Any, speed: float) -> None:
         m[OWNER_R + k] = r[k]
 
 
-@compiled
+@leaf
 def let_go(t: Any) -> None:
     """End the contacts that are released or that no point covers any more; the rut stays."""
     kept = 0
@@ -116,7 +116,7 @@ def let_go(t: Any) -> None:
     t.counts[ACTIVE] = kept
 
 
-@compiled
+@leaf
 def domain_flags(domain: Any, speed: float, mass: float, obliquity: float, hits: int) -> int:
     """Bits of `tables.FLAG_NAMES` for one touch; the contact area is judged for the whole footprint elsewhere."""
     flags = 0
@@ -161,7 +161,7 @@ def touch(t: Any, qd: Any, h: float) -> float:
     return exchange(t, fresh, hits, qd) if moving else 0.0
 
 
-@compiled
+@leaf
 def renew(t: Any, slot: int, h: float) -> bool:
     """Sinkage, area and owner of an element as the search found them; whether its contact is new, and then latched."""
     m, state, f = t.memory[slot], t.state[slot], t.found[slot]
@@ -188,7 +188,7 @@ def renew(t: Any, slot: int, h: float) -> bool:
     return True
 
 
-@compiled
+@leaf
 def latch(t: Any, slot: int, b: int, speed: float, swept: float) -> None:
     """What a new contact with body b keeps of its touch: place, speed at the surface, start, angle of the way in."""
     m, state, f = t.memory[slot], t.state[slot], t.found[slot]
@@ -209,7 +209,7 @@ def latch(t: Any, slot: int, b: int, speed: float, swept: float) -> None:
     f[1], f[2] = start, angle
 
 
-@compiled
+@leaf
 def begin_contact(t: Any, slot: int, share: float) -> None:
     """Start an element's memory for this touch with the law's mass; its flags, its event."""
     m, state = t.memory[slot], t.state[slot]

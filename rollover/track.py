@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ground.compiled import compiled
+from ground.compiled import compiled, leaf
 from ground.kernel import COLUMNS, IDLE, MODE, SINKAGE, STATE_COLUMNS
 from rollover.cubic import between_ends
 from rollover.nose import (
@@ -44,7 +44,7 @@ def wider(table: Any) -> Any:
     return found
 
 
-@compiled
+@leaf
 def is_another(elements: Any, last: int, row: Any, s: Any) -> bool:
     """Whether an element is another than the last one noted, by more than how deep it was pressed."""
     if last < 0:

@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from ground.compiled import compiled
+from ground.compiled import compiled, leaf
 from ground.relief import height_and_gradient, highest
 from rollover.tables import (
     W_AXIS,
@@ -52,7 +52,7 @@ C_DEPTH, C_BY_HUB, C_BY_AXLE, C_LEAN, C_LEAN_X, C_LEAN_Y, C_AROUND, C_NORMAL, CU
 S_DEPTH, S_PLACE, S_FORWARD, S_UP, S_HEIGHT, SLICED = 0, 1, 4, 7, 10, 11
 
 
-@compiled
+@leaf
 def stretch(R: float, a: float, b: float, ra: float, rb: float) -> Any:
     """Area between a straight stretch of ground and the arc below it, and what each end's height adds to it.
 
@@ -84,7 +84,7 @@ def stretch(R: float, a: float, b: float, ra: float, rb: float) -> Any:
     return max(arc + width * (c + slope * middle), 0.0), width - at_b, at_b
 
 
-@compiled
+@leaf
 def depth_of(R: float, area: float) -> Any:
     """Depth of the segment of a disc that has this area, and its chord; past the centre the chord stays."""
     half = 0.5 * math.pi * R * R
@@ -100,7 +100,7 @@ def depth_of(R: float, area: float) -> Any:
     return d, 2.0 * math.sqrt(d * (2.0 * R - d))
 
 
-@compiled
+@leaf
 def slope_around(t: Any, hub: Any, reach: float, g: Any) -> None:
     """The ground's slope around the wheel (2,) and its change with the hub's x, then y, into `g` (6,).
 
@@ -116,7 +116,7 @@ def slope_around(t: Any, hub: Any, reach: float, g: Any) -> None:
     g[4], g[5] = 0.5 * (ay - by) / reach, 0.5 * (cy - dy) / reach
 
 
-@compiled
+@leaf
 def slice_through(
     t: Any, centre: Any, forward: Any, up: Any, R: float, flat: float, at: Any, weight: Any, one: Any
 ) -> None:
@@ -235,13 +235,13 @@ def cut(t: Any, row: Any, wheel: Any, found: Any) -> None:
         found[C_NORMAL + k] = -found[C_BY_HUB + k] / strength
 
 
-@compiled
+@leaf
 def pressing(found: Any) -> float:
     """Force on the hub for a unit of force on the depth."""
     return math.sqrt(found[C_BY_HUB] ** 2 + found[C_BY_HUB + 1] ** 2 + found[C_BY_HUB + 2] ** 2)
 
 
-@compiled
+@leaf
 def closing_rate(row: Any, c: Any, e: Any, found: Any) -> float:
     """Rate of the depth on uneven ground, m/s; e is the axle."""
     v = velocity(row, c[W_CENTRE], c[W_CENTRE + 1], c[W_CENTRE + 2])

@@ -8,11 +8,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ground.compiled import compiled
+from ground.compiled import inlined, leaf
 from rollover.tables import ACC, ALPHA, OMEGA, ROT, VEL, X
 
 
-@compiled
+@leaf
 def set_rotation(row: Any, a: float, b: float, c: float) -> None:
     """Write the rotation matrix of the rotation vector (a, b, c) into a pose, row by row."""
     angle = math.sqrt(a * a + b * b + c * c)
@@ -31,7 +31,7 @@ def set_rotation(row: Any, a: float, b: float, c: float) -> None:
     row[ROT + 8] = 1.0 - k * (a * a + b * b)
 
 
-@compiled
+@inlined
 def to_world(row: Any, a: float, b: float, c: float) -> Any:
     """R (a, b, c)."""
     return (
@@ -41,7 +41,7 @@ def to_world(row: Any, a: float, b: float, c: float) -> Any:
     )
 
 
-@compiled
+@inlined
 def to_body(row: Any, a: float, b: float, c: float) -> Any:
     """R' (a, b, c)."""
     return (
@@ -51,26 +51,26 @@ def to_body(row: Any, a: float, b: float, c: float) -> Any:
     )
 
 
-@compiled
+@inlined
 def cross(a: float, b: float, c: float, d: float, e: float, f: float) -> Any:
     """(a, b, c) x (d, e, f)."""
     return b * f - c * e, c * d - a * f, a * e - b * d
 
 
-@compiled
+@inlined
 def spin(row: Any) -> Any:
     """Angular velocity in world axes."""
     return to_world(row, row[OMEGA], row[OMEGA + 1], row[OMEGA + 2])
 
 
-@compiled
+@inlined
 def place(row: Any, a: float, b: float, c: float) -> Any:
     """World position of a point given about the centre of mass."""
     x, y, z = to_world(row, a, b, c)
     return row[X] + x, row[X + 1] + y, row[X + 2] + z
 
 
-@compiled
+@inlined
 def velocity(row: Any, a: float, b: float, c: float) -> Any:
     """World velocity of a point given about the centre of mass."""
     d, e, f = cross(row[OMEGA], row[OMEGA + 1], row[OMEGA + 2], a, b, c)
@@ -78,7 +78,7 @@ def velocity(row: Any, a: float, b: float, c: float) -> Any:
     return row[VEL] + x, row[VEL + 1] + y, row[VEL + 2] + z
 
 
-@compiled
+@leaf
 def centripetal_depth(row: Any, r: Any, n: Any) -> float:
     """-n . R (w x (w x r)): the part of a depth's acceleration that does not come from accelerations."""
     p, q, w = row[OMEGA], row[OMEGA + 1], row[OMEGA + 2]
@@ -88,7 +88,7 @@ def centripetal_depth(row: Any, r: Any, n: Any) -> float:
     return -(n[0] * a + n[1] * b + n[2] * c)  # type: ignore[no-any-return]
 
 
-@compiled
+@leaf
 def depth_acceleration(row: Any, r: Any, n: Any) -> float:
     """Second derivative of the depth of the point r along -n, m/s2."""
     a, b, c = cross(row[ALPHA], row[ALPHA + 1], row[ALPHA + 2], r[0], r[1], r[2])
@@ -97,7 +97,7 @@ def depth_acceleration(row: Any, r: Any, n: Any) -> float:
     return centripetal_depth(row, r, n) - linear  # type: ignore[no-any-return]
 
 
-@compiled
+@leaf
 def add_force(row: Any, body: int, r: Any, f: float, g: float, h: float, Q: Any) -> None:
     """Add a world force (f, g, h) at the point r of a body to the generalised forces; torques are in body axes."""
     at = 6 * body
@@ -111,7 +111,7 @@ def add_force(row: Any, body: int, r: Any, f: float, g: float, h: float, Q: Any)
     Q[at + 5] += h
 
 
-@compiled
+@leaf
 def direction_row(row: Any, r: Any, a: float, b: float, c: float, J: Any) -> None:
     """J (6,) with the speed of the point r of a body along the world direction (a, b, c) = J [v, omega]."""
     J[0], J[1], J[2] = a, b, c
@@ -119,13 +119,13 @@ def direction_row(row: Any, r: Any, a: float, b: float, c: float, J: Any) -> Non
     J[3], J[4], J[5] = cross(r[0], r[1], r[2], a, b, c)
 
 
-@compiled
+@leaf
 def depth_row(row: Any, r: Any, n: Any, J: Any) -> None:
     """J (6,) with dz/dt = J [v, omega], z the depth of the point r along -n."""
     direction_row(row, r, -n[0], -n[1], -n[2], J)
 
 
-@compiled
+@leaf
 def relative_angle(a: Any, b: Any, k: int) -> float:
     """Component k of the rotation of body b against body a, in a's axes; exact to second order in the angle."""
     i, j = (k + 1) % 3, (k + 2) % 3

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ground.compiled import compiled
+from ground.compiled import compiled, leaf
 
 LEAP, WITHIN = 4.0, 2.5  # times the steps beside it: of samples, and within a mean of some
 SHOWS = 3.0  # times the noise, from which on a step may be a leap
@@ -36,7 +36,7 @@ def about_leaps(y: Any, least: Any, first: Any, last: Any) -> Any:
     return np.flatnonzero(found)
 
 
-@compiled
+@leaf
 def within_means(values: Any, mean: Any, sizes: Any) -> None:
     """How far values (n,) leap within or beside each mean, into sizes (m,); `mean` (n,) is that of each value."""
     sizes[:] = 0.0
