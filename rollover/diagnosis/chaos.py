@@ -161,8 +161,11 @@ def _share(expected: float, beyond: float) -> float:
 
 
 def _beyond(e: Evidence, squares: Array) -> tuple[float, float, NDArray[np.bool_]] | None:
-    """E and x of (D9), and the samples after the blow, of squares (n,) of a misfit; None where x is not above 0."""
-    if len(e.signals) < ALONE or not any(s.weight is not None for s in e.signals):
+    """E and x of (D9), and the samples after the blow, of squares (n,) of a misfit; None where x is not above 0.
+
+    None too of a recording that begins after it: nothing shows that it came to the blow as its run did.
+    """
+    if len(e.signals) < ALONE or not any(s.weight is not None for s in e.signals) or not e.early.any():
         return None
     over, expected, inside = [], 0.0, np.zeros(squares.size, dtype=bool)
     for s, part in e.spans():

@@ -35,8 +35,8 @@ from rollover.diagnosis.refine import conditioned, is_doubtful
 from rollover.diagnosis.remainder import matters
 from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing, with_scatter
 from rollover.diagnosis.scores import before_a_blow, judged
-from rollover.diagnosis.selection import Explanation, by_the_first, decided, explained
-from rollover.diagnosis.shown import by_themselves
+from rollover.diagnosis.selection import Explanation, by_the_first, decided, explained, takes_little
+from rollover.diagnosis.shown import broken_off, by_themselves
 from rollover.diagnosis.simulator import blow_of, set_up
 from rollover.diagnosis.statements import (
     by_steps,
@@ -123,9 +123,15 @@ def diagnose(
         named_so = _named_beside(judge, explanation, verdict, kept, groups, phases)
     explanation, effects, kept = named_so
     found = list(judge.evidence)
-    shown = by_themselves(found, dict(recordings), phases, explanation.p_value) if verdict == "no-mismatch" else None
+    shown = None
+    if verdict == "no-mismatch":
+        shown = by_themselves(found, dict(recordings), phases, explanation.p_value)
+    elif effects and takes_little(explanation, groups):
+        # what is lost again and again is met by no effect, and bends those that are fitted to it
+        shown = broken_off(found, dict(recordings), phases, explanation.p_value)
     if shown is not None:
         verdict, effects = shown.verdict, shown.effects
+        explanation = explanation.refused()
     before, after = explanation.before, explanation.after
     set_ups = [set_up(scenario, e.recording) for e in found]
     is_mismatch = verdict not in ("no-mismatch", "cannot-tell") and shown is None

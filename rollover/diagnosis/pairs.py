@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import replace
 
 from rollover.diagnosis.blocks import turned
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.crew import Job
 from rollover.diagnosis.explain import Step
+from rollover.diagnosis.fit import Fitted
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.otherwise import shaped_too
+from rollover.diagnosis.otherwise import SHAPED, from_there, shaped_too
 from rollover.diagnosis.refine import BEHIND, few_of, shifts_told
 from rollover.diagnosis.screening import is_far
 
@@ -32,7 +34,7 @@ def best_pair(inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate
     lead = min(first.rivals, key=lambda f: f.left)
     few, shifts = few_of(lead), tuple(b.shift for b in lead.blocks)
     at, pinned = tuple(shifts[r] for r in few), is_far(judge, first.base)
-    pairs = list(itertools.combinations(partners, 2))
+    pairs = [(a, b) for a, b in itertools.combinations(partners, 2) if a[0].key != b[0].key]
     inquiry.say(f"{len(pairs)} pairs of effects")
     jobs = [
         Job(candidates=(a, b), start=(*x, *y), shifts=at, only=tuple(few), rounds=ROUNDS, pinned=pinned)
@@ -43,7 +45,7 @@ def best_pair(inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate
     fits = [f for f in inquiry.fits(jobs) if f is not None]
     if not fits:
         return None
-    best = min(fits, key=lambda f: f.left)
+    best = min([*fits, *_in_tune(inquiry, fits)], key=lambda f: f.left)
     if best.left < BEHIND * (taken[-1] if taken else first).fitted.left:
         ways = (best, judge.again(turned(best)))
         jobs = [Job(candidates=p.candidates[:-1], start=p.x[: -len(p.own)], shifts=shifts) for p in ways]
@@ -54,15 +56,37 @@ def best_pair(inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate
     return None if alone is None else Step(base=alone, fitted=best, p_value=first.p_value, rivals=(best,))
 
 
+def _in_tune(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fitted]:
+    """Those of the pairs whose one effect rings with its shape fitted too.
+
+    With a wrong share of the nose all that stands beside it is met as badly, and the wrong one may lead.
+    """
+    able = [f if f.candidates[-1].rings else inquiry.judge.again(turned(f)) for f in pairs if _rings(f)]
+    lead = min(pairs, key=lambda f: f.left)
+    near = [f for f in able if f.left < SHAPED * lead.left and f.candidates[-1].shapes]
+    leaves = tuple(b.total for b in lead.blocks)
+    made = inquiry.fits([replace(from_there(f, "shape"), leaves=leaves) for f in near])
+    return [f for f in made if f is not None]
+
+
+def _rings(pair: Fitted) -> bool:
+    return any(c.rings for c in pair.candidates)
+
+
 def _partners(
     inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate
 ) -> list[tuple[Candidate, tuple[float, ...]]]:
-    """Who may be one of two, and where its fit begins."""
+    """Who may be one of two, and where its fit begins; what took another form alone also in its usual one."""
     leading = sorted((inquiry.judge.again(f) for f in first.rivals), key=lambda f: f.left)[:LEADING]
     later = [f for s in taken[1:] for f in sorted(s.rivals, key=lambda f: f.left)[:FOLLOWING]]
-    found: dict[str, tuple[Candidate, tuple[float, ...]]] = {}
+    found: dict[tuple[str, bool], tuple[Candidate, tuple[float, ...]]] = {}
     for f in (*leading, *later):
-        found.setdefault(f.candidates[-1].key, (f.candidates[-1], f.own))
-    for s in sorted(first.screened, key=lambda s: -looked.scores.get(s.candidate.key, 0.0))[:SCORED]:
-        found.setdefault(s.candidate.key, (s.candidate, s.starts[0]))
+        last = f.candidates[-1]
+        found.setdefault((last.key, last.is_bent), (last, f.own))
+    bent = {key for key, is_bent in found if is_bent}
+    known = {key for key, _ in found}
+    ranked = sorted(first.screened, key=lambda s: -looked.scores.get(s.candidate.key, 0.0))
+    for k, s in enumerate(ranked):
+        if s.candidate.key in bent or (k < SCORED and s.candidate.key not in known):
+            found.setdefault((s.candidate.key, s.candidate.is_bent), (s.candidate, s.starts[0]))
     return list(found.values())

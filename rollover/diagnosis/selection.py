@@ -327,7 +327,7 @@ def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) ->
     least = MANY if len(found.parts) == MOST or is_one_sensor(held) or is_pliant(held) else SURE
     is_whole = found.after.p_value > least or not matters(judge, found.fitted, found.after)
     start, ahead = held_out(found.base, groups).total, held_out(found.fitted, groups).total
-    is_whole = is_whole and not (ahead > NEARLY_NOISE and start**2 - ahead**2 < LITTLE * (start**2 - 1.0))
+    is_whole = is_whole and not (ahead > NEARLY_NOISE and takes_little(found, groups))
     # what a tolerance allows has structure too
     is_whole = is_whole or (is_tolerated(judge, found.fitted) and ahead < HARDLY_MORE)
     if found.parts and is_whole and ahead < start:
@@ -344,6 +344,12 @@ def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) ->
     significant = significant and not is_tolerated(judge, found.base) and not is_slight(judge, found.first, phases)
     verdict: Verdict = "unexplained" if significant or found.parts else "no-mismatch"
     return found.refused(), verdict
+
+
+def takes_little(found: Explanation, groups: Groups) -> bool:
+    """Whether an explanation takes next to nothing of what was beyond the noise in held-out recordings."""
+    start, ahead = held_out(found.base, groups).total, held_out(found.fitted, groups).total
+    return start**2 - ahead**2 < LITTLE * (start**2 - 1.0)
 
 
 def by_the_first(judge: Judge, found: Explanation, nothing: Collection[str], phases: Phases) -> Explanation:

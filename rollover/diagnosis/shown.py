@@ -39,9 +39,16 @@ def by_themselves(
         said = agreeing_but(effects, len(evidence), p_value)
         least = min(p_value, *(e.p_value for e in effects))
         return Shown(verdict="sensor", effects=effects, places=places, sentence=said, p_value=least)
-    if places := lost(names, whole, phases):
-        return _unexplained(places, by_loss(places), len(evidence), p_value)
-    return None
+    return broken_off(evidence, recordings, phases, p_value)
+
+
+def broken_off(
+    evidence: Sequence[Evidence], recordings: Mapping[str, Recording], phases: Phases, p_value: float
+) -> Shown | None:
+    """Where recordings break off again and again; None if they do not."""
+    names = [e.name for e in evidence]
+    places = lost(names, [recordings[name] for name in names], phases)
+    return _unexplained(places, by_loss(places), len(evidence), p_value) if places else None
 
 
 def agreeing_but(effects: Sequence[Named], recordings: int, p_value: float) -> str:

@@ -2,47 +2,62 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import freed
 
+Array = NDArray[np.float64]
 LINES = ("sensor-gain", "sensor-scale", "sensor-bias")
 MOST = 3  # effects in one explanation
-BENT = 16.0  # gain of a curve beside a line, of four standard errors
+BENT = 16.0  # gain of a curve or a drift beside a line, of four standard errors
 
 
 def is_a_curve(judge: Judge, fitted: Fitted) -> bool:
-    """Whether effects that make a straight line of one channel leave a curve of it."""
+    """Whether effects that make a straight line of one channel leave a curve of it, or one that drifts."""
     channels = {c.channel for c in fitted.candidates}
-    is_a_line = len(channels) == 1 and all(c.id in LINES for c in fitted.candidates)
-    return is_a_line and not judge.effort.thrifty and bow(judge, fitted, str(channels.pop())) > BENT
+    if len(channels) != 1 or not all(c.id in LINES for c in fitted.candidates):
+        return False
+    channel = str(channels.pop())
+    return max(bow(judge, fitted, channel, term) for term in (square, drift)) > BENT
 
 
-def bow(judge: Judge, fitted: Fitted, channel: str) -> float:
-    """Gain of a term in the square of what a channel reads, beside all effects of a fit and the time shifts.
+def square(read: Array, time: Array) -> Array:
+    """What a sensor of curved characteristic adds to what is read (n,)."""
+    del time
+    return read * read
 
-    Of noise alone it is chi-square of one degree of freedom: z = q'e/|q|, q the square, whitened, freed of the fit's
-    own directions.
+
+def drift(read: Array, time: Array) -> Array:
+    """What one adds whose gain changes as it warms, at times (n,) s."""
+    return np.asarray(read * (time - time.mean()))
+
+
+def bow(judge: Judge, fitted: Fitted, channel: str, term: Callable[[Array, Array], Array] = square) -> float:
+    """Gain of a term in what a channel reads, over its range, beside all effects of a fit and the time shifts.
+
+    Of noise alone it is chi-square of one degree of freedom: z = q'e/|q|, q the term, whitened, freed of the fit's
+    own directions; less where runs scatter, whose samples count less than their scatter asks for.
     """
-    squares, misfits, held = [], [], []
+    terms, misfits, held = [], [], []
     for r, block in enumerate(fitted.blocks):
         raw = judge.raw(r, fitted.candidates, fitted.x, block.shift)
         if raw is None:
             return 0.0
-        e, square = judge.evidence[r], np.zeros_like(raw)
+        e, added = judge.evidence[r], np.zeros_like(raw)
         for signal, part in e.spans():
             if signal.channel == channel:
-                square[part] = (raw[part] / signal.span) ** 2
-        own = np.column_stack([block.counted(e.whitened(square)), block.residual, block.J])
+                added[part] = term(raw[part] / signal.span, e.recording.time[signal.rows])
+        own = np.column_stack([block.counted(e.whitened(added)), block.residual, block.J])
         own = freed(own, block)
-        squares.append(own[:, 0])
+        terms.append(own[:, 0])
         misfits.append(own[:, 1])
         held.append(own[:, 2:])
-    q, misfit = np.concatenate(squares), np.concatenate(misfits)
+    q, misfit = np.concatenate(terms), np.concatenate(misfits)
     basis, _ = np.linalg.qr(np.concatenate(held))
     q, misfit = q - basis @ (basis.T @ q), misfit - basis @ (basis.T @ misfit)
     return float((q @ misfit) ** 2 / max(float(q @ q), 1e-300))

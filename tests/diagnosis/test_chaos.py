@@ -250,6 +250,14 @@ def test_what_one_channel_leaves_alone_is_not_forgiven() -> None:
     assert course(few, misfit(few, [20.0, 20.0])) is None
 
 
+def test_what_begins_after_its_blow_is_not_forgiven() -> None:
+    """A clock that is late by more than a fall takes: nothing shows that it came to the blow as its run did."""
+    e = blown()
+    w = misfit(e, [8.0] * len(CHANNELS))
+    assert course(e, w) is not None
+    assert course(replace(e, blow=float(e.recording.time[0])), w) is None
+
+
 def test_p_values_are_uniform_where_another_course_is_forgiven() -> None:
     """Four waves in each of four channels, of recordings and neighbours of one law.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -17,6 +18,7 @@ from rollover.prechecks.leaps import across, leaping, of_a_blow
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
+diagnosing = importlib.import_module("rollover.diagnosis.diagnose")
 RATE, N = 1000.0, 600
 TIME = np.arange(N) / RATE
 PHASES = [((0.0, "approach"), (0.3, "impact"))] * 3
@@ -123,3 +125,18 @@ def test_what_breaks_off_where_the_signal_is_small_is_unexplained() -> None:
     assert found.depends_on == "time"
     assert found.remaining_significant
     assert f"{FORCE} breaks off in 2 places" in found.sentence
+
+
+@pytest.mark.parametrize("little", [False, True])
+def test_what_takes_little_where_channels_break_off_is_not_named(little: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Samples that were lost bend a gain to themselves; one that takes what there is stays named."""
+    monkeypatch.setattr(diagnosing, "takes_little", lambda *_: little)
+    recordings = recorded({"effects.sensor-gain.gain": 1.05}, 3, noise=0.003, rate=600.0)
+    name, first = recordings[0]
+    holed = first.channels[DEPTH].copy()
+    holed[1:6] = holed[9:14] = 0.0  # before the contact, where nothing is missed by that
+    recordings[0] = name, replace(first, channels={**first.channels, DEPTH: holed})
+    found = diagnose(scenario(), recordings)
+    named = ["sensor-gain"] * (not little)
+    assert (found.verdict, [e.id for e in found.effects]) == ("unexplained" if little else "sensor", named)
+    assert ("breaks off" in found.sentence) == little

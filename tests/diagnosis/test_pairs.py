@@ -1,0 +1,85 @@
+"""Two effects at once: in which forms they are tried two by two, and with which shapes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+
+from rollover.diagnosis import pairs
+from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.explain import Step
+from rollover.diagnosis.fit import Fitted
+from rollover.diagnosis.gate import Gate
+from rollover.diagnosis.inquiry import Inquiry
+from rollover.diagnosis.screening import Screened
+from rollover.effects import Search
+from tests.diagnosis.drops import linear_blocks
+
+MASS = Candidate(id="mass", kind="parameter", family="", search={"added": Search(-1, 1)})
+DAMPING = Candidate(id="soil-viscous-damping", kind="physics", family="", search={"damping": Search(1, 2)})
+PROPORTION = replace(DAMPING, search={"proportion": Search(0, 1)}, form={"damping": 0.0})
+NOSE = Candidate(
+    id="structural-compliance", kind="physics", family="",
+    search={"stiffness": Search(1, 2), "damping": Search(1, 2)}, shapes={"nose_share": Search(0.1, 0.9)},
+)  # fmt: skip
+
+
+def fitted(candidates: tuple[Candidate, ...], times: float) -> Fitted:
+    """A fit that leaves so many times what chance does."""
+    blocks = tuple(
+        replace(b, residual=b.residual * np.sqrt(times), J=np.zeros((40, sum(len(c.search) for c in candidates))))
+        for b in linear_blocks(np.random.default_rng(4), 2, 40, np.zeros(1))
+    )
+    return Fitted(candidates=candidates, x=(0.5,) * blocks[0].J.shape[1], blocks=blocks)
+
+
+def screened(c: Candidate) -> Screened:
+    return Screened(candidate=c, starts=((0.3,),), left=1.0, potential=1.0)
+
+
+def inquiry(asked: list[Any]) -> Inquiry:
+    """Answers each job with a fit that leaves nothing but chance, and notes it."""
+
+    def fits(jobs: list[Any]) -> list[Fitted]:
+        asked.extend(jobs)
+        return [fitted((*j.candidates[:-1], j.candidates[-1].whole()), 1.0) for j in jobs]
+
+    return cast(Inquiry, SimpleNamespace(fits=fits, judge=SimpleNamespace(again=lambda f: f)))
+
+
+def test_what_took_another_form_alone_is_tried_in_its_usual_one_beside_others() -> None:
+    """A form may make up for the second effect: a damping in proportion to the force for a little more mass."""
+    alone = fitted((PROPORTION,), 1.1)
+    first = Step(
+        base=fitted((), 30.0), fitted=alone, p_value=0.0, rivals=(alone, fitted((MASS,), 4.0)),
+        screened=(screened(DAMPING), screened(MASS)),
+    )  # fmt: skip
+    looked = Gate(score=9.0, scores={"mass": 9.0}, null=np.zeros(9), detectable={})
+    found = pairs._partners(inquiry([]), first, (), looked)
+    assert [(c.id, c.form, x) for c, x in found] == [
+        ("soil-viscous-damping", {"damping": 0.0}, (0.5,)),
+        ("mass", {}, (0.5,)),
+        ("soil-viscous-damping", {}, (0.3,)),
+    ]
+
+
+def test_of_pairs_with_a_part_that_rings_all_are_fitted_with_its_share() -> None:
+    """With a wrong share of the nose the wrong other effect may lead, as a mass before an impact speed."""
+    asked: list[Any] = []
+    bent = replace(MASS, id="soil-adhesion", shapes={"reach": Search(1, 2)})
+    whole = [
+        fitted((NOSE, MASS), 30.0),
+        fitted((DAMPING, NOSE), 20.0),
+        fitted((replace(bent, id="soil-layer"), bent), 20.0),
+    ]
+    far = fitted((replace(MASS, id="soil-stiffness"), NOSE), 100.0)
+    found = pairs._in_tune(inquiry(asked), [*whole, far])
+    assert [(j.how, [c.id for c in j.candidates]) for j in asked] == [
+        ("shape", ["mass", "structural-compliance"]),
+        ("shape", ["soil-viscous-damping", "structural-compliance"]),
+    ]
+    assert [sorted(f.candidates[-1].search) for f in found] == [["damping", "nose_share", "stiffness"]] * 2
+    assert {len(j.leaves) for j in asked} == {2}
