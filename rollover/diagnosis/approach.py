@@ -8,6 +8,8 @@ With c the first cosines of a stretch of a misfit, over what the quiet noise let
     mean c^2 after over that before   within F: no more of it where physics acts                               (A2)
     mean of c over its error          within t, for each of all that comes after: nothing recordings share     (A3)
 
+(A3) is asked of c as it was read as well: one offset is as many times unlike noises as these are unlike.
+
 An offset that all recordings have moves the first cosine, the mean, by the same: in (A1) and (A2) that is taken out.
 """
 
@@ -40,8 +42,12 @@ def is_recorders(told: Sequence[tuple[Evidence, Signal, Array]]) -> bool:
     if not is_slow(before):
         return False
     after = [along(s, part, TERMS) for n, (_, s, w) in zip(ends, told, strict=True) for part in _windows(w[n:], n)]
+    if is_louder(before, np.array(after)):
+        return False
     whole = [along(s, w[n:], SHARED) for n, (_, s, w) in zip(ends, told, strict=True)]
-    return not is_louder(before, np.array(after)) and not is_shared(np.array(whole))
+    plain = [cosines(w.size - n, SHARED) @ w[n:] / math.sqrt(w.size - n) for n, (*_, w) in zip(ends, told, strict=True)]
+    # over the noise of each, or as it was read: the same offset is not as many times two noises
+    return not (is_shared(np.array(whole)) or is_shared(np.array(plain)))
 
 
 def _windows(values: Array, n: int) -> Array:
