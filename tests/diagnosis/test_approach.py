@@ -89,7 +89,7 @@ def test_what_is_louder_after_the_contact_or_shared_is_missing() -> None:
 
 
 def test_one_offset_is_shared_by_recordings_of_unlike_noise() -> None:
-    """5 in each, under noise of 2, 2 and 0.8 that remembers 0.6, 0.65 and 0.2: no noise, as a bias of 2.4 times it was."""
+    """5 in each, under noise of 2, 2 and 0.8 that remembers 0.6, 0.65 and 0.2: no noise, as one was taken for."""
 
     def make(rng: np.random.Generator) -> Told:
         found: Told = []
