@@ -51,6 +51,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 _POINTER = types.CPointer(types.float64)
 _DATA = 3  # which member of what holds a bundle points to it
+_UNCOUNTED: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
 # force(p, s, z, v): parameters, memory, sinkage, sinkage rate -> force on the reference face
 FORCE = types.float64(_POINTER, _POINTER, types.float64, types.float64)
 # begin(p, s): at first touch, once s[SPEED] and s[MASS] are latched
@@ -131,13 +132,13 @@ def leaf(function: F) -> F:
     It reads and writes arrays and bundles that it is handed, makes and returns none, and calls nothing that does.
     """
     with _own_cache():
-        return numba.njit(cache=True, error_model="numpy", _nrt=False)(function)  # type: ignore[no-any-return]
+        return numba.njit(**_UNCOUNTED)(function)  # type: ignore[no-any-return]
 
 
 def inlined(function: F) -> F:
     """The same as `leaf`, laid out in each of its callers: for what is short, or asked again and again."""
     with _own_cache():
-        return numba.njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)(function)  # type: ignore
+        return numba.njit(**_UNCOUNTED, forceinline=True)(function)  # type: ignore[no-any-return]
 
 
 def force_law(function: Callable[..., float]) -> Any:
