@@ -57,7 +57,7 @@ def best_pair(inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate
 
 
 def _in_tune(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fitted]:
-    """Those of the pairs whose one effect rings with its shape fitted too.
+    """Pairs of which one effect rings, with its shape fitted too.
 
     With a wrong share of the nose all that stands beside it is met as badly, and the wrong one may lead.
     """
