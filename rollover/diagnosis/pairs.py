@@ -13,7 +13,7 @@ from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Fitted
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.otherwise import SHAPED, from_there, shaped_too
+from rollover.diagnosis.otherwise import from_there, shaped_too
 from rollover.diagnosis.refine import BEHIND, few_of, shifts_told
 from rollover.diagnosis.screening import is_far
 
@@ -21,6 +21,7 @@ LEADING, FOLLOWING = 4, 2  # of the first effects, and of later ones each, that 
 SCORED = 10  # so many more, by what they scored at first
 ROUNDS = 8  # of a short fit to few recordings
 WHOLE = 6  # of these that are fitted to all
+ALIKE = 2.0  # times what the best of them leaves, up to which the shape of what rings may make another the best
 
 
 def best_pair(inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate) -> Step | None:
@@ -63,7 +64,7 @@ def _in_tune(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fitted]:
     """
     able = [f if f.candidates[-1].rings else inquiry.judge.again(turned(f)) for f in pairs if _rings(f)]
     lead = min(pairs, key=lambda f: f.left)
-    near = [f for f in able if f.left < SHAPED * lead.left and f.candidates[-1].shapes]
+    near = [f for f in able if f.left < ALIKE * lead.left and f.candidates[-1].shapes]
     leaves = tuple(b.total for b in lead.blocks)
     made = inquiry.fits([replace(from_there(f, "shape"), leaves=leaves) for f in near])
     return [f for f in made if f is not None]
@@ -76,17 +77,17 @@ def _rings(pair: Fitted) -> bool:
 def _partners(
     inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate
 ) -> list[tuple[Candidate, tuple[float, ...]]]:
-    """Who may be one of two, and where its fit begins; what took another form alone also in its usual one."""
+    """Who may be one of two, and where its fit begins; what leads in another form also in its usual one."""
     leading = sorted((inquiry.judge.again(f) for f in first.rivals), key=lambda f: f.left)[:LEADING]
     later = [f for s in taken[1:] for f in sorted(s.rivals, key=lambda f: f.left)[:FOLLOWING]]
     found: dict[tuple[str, bool], tuple[Candidate, tuple[float, ...]]] = {}
     for f in (*leading, *later):
         last = f.candidates[-1]
         found.setdefault((last.key, last.is_bent), (last, f.own))
-    bent = {key for key, is_bent in found if is_bent}
-    known = {key for key, _ in found}
+    lead, known = leading[0].candidates[-1], {key for key, _ in found}
     ranked = sorted(first.screened, key=lambda s: -looked.scores.get(s.candidate.key, 0.0))
     for k, s in enumerate(ranked):
-        if s.candidate.key in bent or (k < SCORED and s.candidate.key not in known):
+        is_usual = s.candidate.key == lead.key and lead.is_bent
+        if is_usual or (k < SCORED and s.candidate.key not in known):
             found.setdefault((s.candidate.key, s.candidate.is_bent), (s.candidate, s.starts[0]))
     return list(found.values())
