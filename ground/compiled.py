@@ -129,7 +129,8 @@ def compiled(function: F) -> F:
 def leaf(function: F) -> F:
     """Compile a kernel without counting who holds its arrays, which costs more than most kernels do.
 
-    It reads and writes arrays and bundles that it is handed, makes and returns none, and calls nothing that does.
+    It reads and writes arrays and bundles that it is handed, makes and returns none, and calls nothing that does. One
+    array is copied into another number by number: as a slice it might be made anew on the way.
     """
     with _own_cache():
         return numba.njit(**_UNCOUNTED)(function)  # type: ignore[no-any-return]

@@ -37,7 +37,7 @@ from rollover.tables import (
     T_YIELD,
     X,
 )
-from rollover.vectors import add_force, cross, place, relative_angle, spin, to_body, to_world, velocity
+from rollover.vectors import add_between, cross, place, relative_angle, spin, to_body, velocity
 
 
 @inlined
@@ -157,11 +157,4 @@ def try_mount(t: Any, i: int, room: Any, Q: Any) -> None:
         turned(turn, beta, 1.0, torque, moved)
         for k in range(3):
             torque[k] = moved[k]
-    x, y, z = to_world(under, g[S_FORCE_NOW], g[S_FORCE_NOW + 1], g[S_FORCE_NOW + 2])
-    add_force(upper, b, r, x, y, z, Q)
-    add_force(under, a, local, -x, -y, -z, Q)
-    x, y, z = to_world(under, torque[0], torque[1], torque[2])
-    on_upper = to_body(upper, x, y, z)
-    for k in range(3):
-        Q[6 * b + 3 + k] += on_upper[k]
-        Q[6 * a + 3 + k] -= torque[k]
+    add_between(under, a, local, upper, b, r, g[S_FORCE_NOW : S_FORCE_NOW + 3], torque, Q)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ground.compiled import compiled, inlined, leaf
 from rollover.tables import EXTRA_WORK, OMEGA, ROT, VEL, X
-from rollover.vectors import add_force, direction_row, relative_angle, spin, to_body, to_world, velocity
+from rollover.vectors import add_between, direction_row, relative_angle, spin, to_body, velocity
 
 GUIDE_BRAKE, AIR_DRAG, BETWEEN, ROTOR, REACTION, BED = 0, 1, 2, 3, 4, 5  # kinds
 HELD, POWER, HELD_NOW, POWER_NOW, TERM_MEMORY = 0, 1, 2, 3, 4  # columns of term_memory
@@ -150,14 +150,7 @@ def try_bed(t: Any, i: int, Q: Any) -> Any:
     rub = f[B_MU] * normal * min(max(rate[1] / CREEP, -1.0), 1.0)
     force[1] -= rub
     power += rub * rate[1]
-    x, y, z = to_world(chassis, force[0], force[1], force[2])
-    add_force(load, b, np.zeros(3), x, y, z, Q)
-    add_force(chassis, c, local, -x, -y, -z, Q)
-    x, y, z = to_world(chassis, torque[0], torque[1], torque[2])
-    on_load = to_body(load, x, y, z)
-    for k in range(3):
-        Q[6 * b + 3 + k] += on_load[k]
-        Q[6 * c + 3 + k] -= torque[k]
+    add_between(chassis, c, local, load, b, np.zeros(3), force, torque, Q)
     return held, power
 
 

@@ -112,6 +112,19 @@ def add_force(row: Any, body: int, r: Any, f: float, g: float, h: float, Q: Any)
 
 
 @leaf
+def add_between(a: Any, at: int, p: Any, b: Any, bt: int, r: Any, force: Any, torque: Any, Q: Any) -> None:
+    """Add a force and a torque (3,), in a's axes, on body b at its point r, and what they press back on a at p."""
+    x, y, z = to_world(a, force[0], force[1], force[2])
+    add_force(b, bt, r, x, y, z, Q)
+    add_force(a, at, p, -x, -y, -z, Q)
+    x, y, z = to_world(a, torque[0], torque[1], torque[2])
+    on_b = to_body(b, x, y, z)
+    for k in range(3):
+        Q[6 * bt + 3 + k] += on_b[k]
+        Q[6 * at + 3 + k] -= torque[k]
+
+
+@leaf
 def direction_row(row: Any, r: Any, a: float, b: float, c: float, J: Any) -> None:
     """J (6,) with the speed of the point r of a body along the world direction (a, b, c) = J [v, omega]."""
     J[0], J[1], J[2] = a, b, c
