@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.channels import describe
-from rollover.diagnosis.evidence import Evidence, Signal
-from rollover.diagnosis.phases import phase_at
+from rollover.diagnosis.evidence import Evidence
+from rollover.diagnosis.phases import whole
 from rollover.diagnosis.verdict import Place
 from rollover.effects import spoken
 
@@ -24,7 +24,7 @@ def coarse(evidence: Sequence[Evidence], phases: Sequence[Sequence[tuple[float, 
         values.setdefault(s.channel, []).append(s.values)
     least = {channel: FINEST * float(np.ptp(np.concatenate(v))) for channel, v in values.items()}
     rough = [(r, e, s) for r, e in enumerate(evidence) for s in e.signals if s.step > least[s.channel]]
-    return tuple(_place(e, s, phases[r], 1.0 / len(rough)) for r, e, s in rough)
+    return tuple(whole(e, s, phases[r], 1.0 / len(rough)) for r, e, s in rough)
 
 
 def by_digits(places: Sequence[Place], evidence: Sequence[Evidence]) -> str:
@@ -34,19 +34,4 @@ def by_digits(places: Sequence[Place], evidence: Sequence[Evidence]) -> str:
     return (
         f"Recorded is {said}, far more than the noise: what was measured and what was recorded differ by half of that, "
         "which no candidate explains."
-    )
-
-
-def _place(e: Evidence, s: Signal, phases: Sequence[tuple[float, str]], share: float) -> Place:
-    """The whole of a signal, with the phase in which it reaches furthest."""
-    times = e.recording.time[s.rows]
-    peak = float(times[int(np.abs(s.values - s.values[0]).argmax())])
-    return Place(
-        recording=e.name,
-        channel=s.channel,
-        phase=phase_at(phases, peak),
-        start=float(times[0]),
-        end=float(times[-1]),
-        share=share,
-        depends_on="value",
     )

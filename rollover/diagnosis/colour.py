@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.approach import is_recorders
 from rollover.diagnosis.bursts import LOUDER, without_bursts
-from rollover.diagnosis.evidence import Evidence, Signal
+from rollover.diagnosis.evidence import Evidence, Signal, by_differences
 from rollover.diagnosis.lines import lines, without
 from rollover.diagnosis.simulator import blow_of
 from rollover.filters import attenuation, least_rate
@@ -31,6 +31,8 @@ CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is belie
 OWN = 1.5  # times the common noise: beyond, a recording has its own
 UNLIKE = 4.0  # standard errors by which levels differ that are not one recorder's
 SURELY = 4  # quiet windows from which on that is believed
+ENOUGH = 2 * SURELY * LENGTH  # samples that have as many
+UNSURE_LEVEL, BY_CHANCE = 1.6, 1e-4  # standard error of ln sigma by sqrt(n); p-value of levels that are not alike
 LONGEST = 8  # samples of memory
 AKAIKE = 2.0  # what a coefficient costs by Akaike: octaves far off say little each, and count
 OCTAVES = (1, 2, 4, 8, 16, 32, 64)  # samples that the memory of a noise of 1/f reaches back
@@ -56,19 +58,40 @@ def quiet(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evid
             without_hum = _cleaned(evidence[r], s, residuals[r][part], humming)
             misfits.append((without_hum / s.loudness)[told])
             values.append(((s.values - residuals[r][part] + without_hum) / s.loudness)[told])
+        sizes = unlike(misfits, values)
+        misfits, values = ([v / size for v, size in zip(each, sizes, strict=True)] for each in (misfits, values))
         common = _quieter(misfits, values)
         if common is None:
             continue  # too short: what each says by itself stands
-        for (r, k, s, _), misfit, value in zip(members, misfits, values, strict=True):
+        for (r, k, s, _), misfit, value, size in zip(members, misfits, values, sizes, strict=True):
             own = _quieter([misfit], [value])
             loud = own is not None and own.windows >= SURELY and own.sigma > OWN * common.sigma
             best = own if own is not None and loud else common
-            found[r][k] = replace(s, noise=best.sigma, ar=best.ar)
+            found[r][k] = replace(s, noise=best.sigma * size, ar=best.ar)
     found = [
         [replace(with_noise(s, s.noise, s.ar, e.model_error), at_rest=(s.noise, s.ar)) for s in f]
         for e, f in zip(evidence, found, strict=True)
     ]
     return [replace(e, signals=tuple(s)) for e, s in zip(evidence, found, strict=True)]
+
+
+def unlike(misfits: Sequence[Array], values: Sequence[Array]) -> Array:
+    """How many times as loud each of several short recordings is as they are on the whole, (n,); 1 if chance makes it.
+
+    An amplifier may have been set for each test. What has many windows tells its own noise by these; by second
+    differences few samples tell it too, ln sigma to 1.6/sqrt(n), and hardly anything else that is in a channel.
+    """
+    from scipy.special import chdtrc
+
+    even = np.ones(len(misfits))
+    if max((v.size for v in misfits), default=0) < LENGTH or all(v.size >= ENOUGH for v in misfits):
+        return even
+    levels = np.array([min(map(by_differences, both)) for both in zip(misfits, values, strict=True)])
+    if len(misfits) == 1 or levels.min() <= 0.0:
+        return even
+    worth = np.array([v.size for v in misfits]) / UNSURE_LEVEL**2
+    apart = np.log(levels) - np.average(np.log(levels), weights=worth)
+    return np.exp(apart) if chdtrc(len(misfits) - 1, float(worth @ apart**2)) < BY_CHANCE else even
 
 
 def _before_the_blow(e: Evidence, s: Signal) -> slice:

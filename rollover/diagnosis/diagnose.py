@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,8 +36,9 @@ from rollover.diagnosis.remainder import matters
 from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing, with_scatter
 from rollover.diagnosis.scores import before_a_blow, judged
 from rollover.diagnosis.selection import Explanation, by_the_first, decided, explained, takes_little
-from rollover.diagnosis.shown import broken_off, by_themselves
+from rollover.diagnosis.shown import broken_off, by_themselves, misread
 from rollover.diagnosis.simulator import blow_of, set_up
+from rollover.diagnosis.slips import Slip, by_slips, slips_of, without
 from rollover.diagnosis.statements import (
     by_steps,
     closest,
@@ -91,10 +92,37 @@ def diagnose(
     every, notes = _evidence(scenario, recordings, crew)
     notes += rounded
     every = [replace(e, model_error=float(np.hypot(e.model_error, tolerance))) for e in every]
+    asked = Asked(scenario=scenario, recordings=dict(recordings), hold_out=hold_out, say=say, crew=crew, began=began)
+    some, shared = slips_of(every)
+    found = _diagnosed(asked, without(every, some), some, notes)
+    if found.verdict == "unexplained" and shared:
+        # beside a factor so large what else is missing may be out of sight
+        other = _diagnosed(asked, without(every, [*some, *shared]), [*some, *shared], notes)
+        found = other if other.effects else found
+    return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """What a diagnosis was asked for, and when (s of the clock that counts)."""
+
+    scenario: Scenario
+    recordings: Mapping[str, Recording]
+    hold_out: Sequence[str]
+    say: Callable[[str], None]
+    crew: Crew
+    began: float
+
+
+def _diagnosed(asked: Asked, every: Sequence[Evidence], slips: Sequence[Slip], notes: Sequence[str]) -> Diagnosis:
+    """The diagnosis of recordings without what was left aside."""
+    scenario, recordings, hold_out = asked.scenario, asked.recordings, asked.hold_out
+    say, crew, began, names = asked.say, asked.crew, asked.began, list(asked.recordings)
+    notes = [*notes, *(slip.says() for slip in slips)]
     found = _trusted(scenario, [e for e in every if e.name not in hold_out])
     kept = [e for e in _trusted(scenario, every) if e.name in hold_out] if hold_out else []
     if sum(e.count for e in found) < FEWEST:
-        return _nothing(every, names, notes, began)
+        return _nothing(every, names, notes, began, by_slips(slips))
     notes += _left_aside(every, found)
     groups = left_out(found)
     notes += differing(found)
@@ -125,10 +153,12 @@ def diagnose(
     found = list(judge.evidence)
     shown = None
     if verdict == "no-mismatch":
-        shown = by_themselves(found, dict(recordings), phases, explanation.p_value)
+        shown = by_themselves(found, recordings, phases, explanation.p_value) or misread(
+            slips, len(found), explanation.p_value
+        )
     elif effects and takes_little(explanation, groups):
         # what is lost again and again is met by no effect, and bends those that are fitted to it
-        shown = broken_off(found, dict(recordings), phases, explanation.p_value)
+        shown = broken_off(found, recordings, phases, explanation.p_value)
     if shown is not None:
         verdict, effects = shown.verdict, shown.effects
         explanation = explanation.refused()
@@ -171,6 +201,7 @@ def diagnose(
         + (closest(explanation, groups) if verdict == "unexplained" and shown is None else "")
         + (by_clock(mistimed(judge, explanation.fitted, crew.looks)) if is_left else "")
         + offered(law)
+        + by_slips(slips)
         + against_itself(verdict, contrary),
         p_value=explanation.p_value if shown is None else shown.p_value,
         noise=noise(found),
@@ -316,11 +347,13 @@ def _is_weak(detectable: Mapping[str, float]) -> bool:
     return blind > MOSTLY * len(typical) or not typical
 
 
-def _nothing(evidence: Sequence[Evidence], names: Sequence[str], notes: Sequence[str], began: float) -> Diagnosis:
+def _nothing(
+    evidence: Sequence[Evidence], names: Sequence[str], notes: Sequence[str], began: float, why: str = ""
+) -> Diagnosis:
     """The answer where there is too little to judge."""
     return Diagnosis(
         verdict="cannot-tell",
-        sentence="There is too little in these recordings to be compared with the simulation.",
+        sentence=f"There is too little in these recordings to be compared with the simulation.{why}",
         p_value=1.0,
         noise=noise(evidence),
         where=(),

@@ -288,7 +288,7 @@ def _oversampling(recording: Recording, channel: str) -> int:
 def _noise(residual: Array, values: Array, stated: float | None) -> tuple[float, tuple[float, ...]]:
     """Noise (1 sigma) and its colour, from the misfit; from the channel itself where that shows clearly less."""
     if values.size < LENGTH:
-        return (stated if stated is not None else _by_differences(residual)), ()
+        return (stated if stated is not None else by_differences(residual)), ()
     best, other = (_floor(v) for v in (residual, values))
     if other.sigma < CLEARLY * best.sigma:
         best = other
@@ -301,7 +301,7 @@ def _floor(values: Array) -> NoiseFloor:
     return noise_floor(values, order=2, strides=(1,)) if one.windows >= MANY else one
 
 
-def _by_differences(values: Array) -> float:
+def by_differences(values: Array) -> float:
     """Noise of a short series from its second differences: sd = 1.4826 median|d2|/sqrt(6)."""
     if values.size < 5:
         return 0.0

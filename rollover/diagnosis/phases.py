@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.evidence import Evidence
+from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.verdict import Place
 
 Array = NDArray[np.float64]
@@ -78,4 +78,19 @@ def placed(
             depends_on=on,
         )
         for channel, r, start, end, on in every
+    )
+
+
+def whole(e: Evidence, s: Signal, phases: Sequence[tuple[float, str]], share: float) -> Place:
+    """The whole of a signal as a place, with the phase in which it reaches furthest."""
+    times = e.recording.time[s.rows]
+    peak = float(times[int(np.abs(s.values - s.values[0]).argmax())])
+    return Place(
+        recording=e.name,
+        channel=s.channel,
+        phase=phase_at(phases, peak),
+        start=float(times[0]),
+        end=float(times[-1]),
+        share=share,
+        depends_on="value",
     )

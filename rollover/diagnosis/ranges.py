@@ -19,6 +19,7 @@ from rollover.scenario import Scenario
 from rollover.vehicle import Striker
 
 Array = NDArray[np.float64]
+TURNED = 0.8  # correlation with what is simulated, the other way round, from which on a channel is turned round
 FAINT = 20.0  # times weaker than an effect usually is, and still looked for
 
 
@@ -137,12 +138,17 @@ def _widened(search: Search, null: float | None) -> Search:
 
 
 def _times(evidence: Sequence[Evidence]) -> dict[str, float]:
-    """How many times as far as the scenario has it each channel moves, the middle recording's."""
+    """How many times as far as the scenario has it each channel moves, the middle recording's.
+
+    Below 0 where it is turned round.
+    """
     found: dict[str, list[float]] = {}
     for e in evidence:
         predicted = e.simulator.predict({}, 0.0) or {}
         for s in e.signals:
-            simulated = float(np.ptp(predicted[s.channel][s.rows])) if s.channel in predicted else 0.0
+            made = predicted[s.channel][s.rows] if s.channel in predicted else np.zeros(1)
+            simulated = float(np.ptp(made))
             if simulated > 0.0 and math.isfinite(simulated):
-                found.setdefault(s.channel, []).append(s.span / simulated)
+                turned = float(s.values @ made) < -TURNED * float(np.linalg.norm(s.values) * np.linalg.norm(made))
+                found.setdefault(s.channel, []).append((-1.0 if turned else 1.0) * float(np.ptp(s.values)) / simulated)
     return {channel: float(np.median(each)) for channel, each in found.items()}

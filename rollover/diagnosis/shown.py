@@ -11,6 +11,8 @@ from rollover.diagnosis.explain import SURE
 from rollover.diagnosis.flat_tops import cut_off
 from rollover.diagnosis.inquiry import Phases
 from rollover.diagnosis.lost import by_loss, lost
+from rollover.diagnosis.phases import phases_of, whole
+from rollover.diagnosis.slips import Slip
 from rollover.diagnosis.verdict import Named, Place, Verdict
 from rollover.recording import Recording
 
@@ -49,6 +51,14 @@ def broken_off(
     names = [e.name for e in evidence]
     places = lost(names, [recordings[name] for name in names], phases)
     return _unexplained(places, by_loss(places), len(evidence), p_value) if places else None
+
+
+def misread(slips: Sequence[Slip], recordings: int, p_value: float) -> Shown | None:
+    """Channels that stand in another unit or with the opposite sign, where all else agrees; None if there are none."""
+    share = 1.0 / max(len(slips), 1)
+    places = tuple(whole(slip.evidence, slip.signal, phases_of(slip.evidence), share) for slip in slips)
+    said = "Channels stand in another unit than is stated, or with the opposite sign."
+    return _unexplained(places, said, recordings, p_value) if slips else None
 
 
 def agreeing_but(effects: Sequence[Named], recordings: int, p_value: float) -> str:

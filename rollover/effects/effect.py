@@ -32,8 +32,8 @@ class Search(NamedTuple):
 class Heard(NamedTuple):
     """What recordings say of one of their channels, SI: `spans` of all by channel, and its `end`, see below.
 
-    `times` is how many times as far as simulated it moves: 1,000 of millimetres read as metres. `end` is the size of
-    its largest value if that is met again and again to the last digit, else 0.
+    `times` is how many times as far as simulated it moves: 1,000 of millimetres read as metres, below 0 of what moves
+    the other way. `end` is the size of its largest value if that is met again and again to the last digit, else 0.
     """
 
     channel: str

@@ -35,10 +35,14 @@ def _across(channel: str) -> str:
 
 
 def _other_unit(search: Mapping[str, Search], times: float) -> dict[str, Search]:
-    """Ranges that reach what a channel in another unit than it says would need."""
+    """Ranges that reach what a channel in another unit than it says would need, or one that is turned round.
+
+    Not of the logarithm: a factor is met in one step then, however far it is.
+    """
     if 1.0 / OTHER_UNIT < times < OTHER_UNIT:
         return dict(search)
-    return {p: Search(s.low * min(times, 1.0), s.high * max(times, 1.0), s.scale) for p, s in search.items()}
+    ends = {p: (s.low * times, s.high * times, s.low, s.high) for p, s in search.items()}
+    return {p: Search(min(each), max(each)) for p, each in ends.items()}
 
 
 def _is_length(channel: str) -> bool:
@@ -195,7 +199,7 @@ class SensorScale(Effect):
     @classmethod
     def looked_for_on(cls, heard: Heard) -> Mapping[str, Search] | None:
         """A scale is that of a position or a length."""
-        return _other_unit(cls.search, heard.times) if _is_length(heard.channel) else None
+        return _other_unit(cls.search, abs(heard.times)) if _is_length(heard.channel) else None
 
     def read(self, recording: Recording) -> Recording:
         """Scale the channel."""

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from rollover.diagnosis import colour
+from rollover.diagnosis import colour, diagnose
 from rollover.diagnosis.blocks import Block
-from rollover.diagnosis.colour import Rest, quiet, rests
+from rollover.diagnosis.colour import Rest, quiet, rests, unlike
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.filters import filtered
 from rollover.recording import Recording
+from tests.diagnosis.drops import recorded as dropped
+from tests.diagnosis.drops import scenario as drop
 
 CHANNEL = "chassis/acceleration_y"
 RATE, N, EVERY = 1000.0, 2048, 4  # Hz, samples, and of how many one tells something new behind CFC 60
@@ -101,3 +104,27 @@ def test_the_spectrum_of_what_is_left_is_one_on_average() -> None:
     mean = (1.0 + b * b - 2.0 * a * b) / (1.0 - a * a)
     np.testing.assert_allclose(other, (1.0 - 2.0 * b * np.cos(w) + b * b) / (1.0 - 2.0 * a * np.cos(w) + a * a) / mean,
                                rtol=1e-9)  # fmt: skip
+
+
+def short(random: np.random.Generator, levels: Sequence[float], n: int = 110) -> list[np.ndarray]:
+    return [level * random.standard_normal(n) for level in levels]
+
+
+def test_short_recordings_of_one_level_are_told_to_be_alike() -> None:
+    found = [unlike(r, r) for r in (short(np.random.default_rng(k), (2.0,) * 4) for k in range(400))]
+    assert sum(bool(np.any(sizes != 1.0)) for sizes in found) <= 1  # one in ten thousand by chance
+
+
+def test_an_amplifier_set_for_each_test_is_seen_in_few_samples_beside_what_is_measured() -> None:
+    """Levels of 1, 2 and 4 on a slow pulse a hundred times as large: what is rough is the noise."""
+    pulse = 100.0 * np.sin(np.linspace(0.0, np.pi, 110))
+    random, told = np.random.default_rng(3), []
+    for _ in range(50):
+        noisy = short(random, (1.0, 2.0, 4.0))
+        told.append(unlike(noisy, [pulse + v for v in noisy]))
+    assert np.mean(told, axis=0) == pytest.approx([0.5, 1.0, 2.0], rel=0.05)
+
+
+def test_noise_that_goes_with_each_recordings_range_is_no_mismatch() -> None:
+    found = [diagnose(drop(), dropped({}, seed, rate=300.0)) for seed in range(4)]
+    assert {f.verdict for f in found} == {"no-mismatch"}

@@ -1,0 +1,90 @@
+"""A channel in another unit or of the opposite sign is said to be that, and what is missing is found beside it."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis import diagnose
+from rollover.diagnosis.crew import Crew
+from rollover.diagnosis.slips import slips_of
+from rollover.recording import Recording
+from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
+
+diagnosing = importlib.import_module("rollover.diagnosis.diagnose")
+CHANNELS = (FORCE, DEPTH, ACCELERATION)
+LAYER = {"effects.soil-layer.depth": 0.05, "effects.soil-layer.stiffness_ratio": 2.0}
+Drops = list[tuple[str, Recording]]
+
+
+def mistaken(made: Drops, channel: str, factor: float, which: int | None = 1) -> Drops:
+    """One recording, or all, with a channel times a factor."""
+    return [
+        (n, replace(r, channels={**r.channels, channel: factor * r[channel]}) if which in (None, k) else r)
+        for k, (n, r) in enumerate(made)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("channel", "factor", "said"),
+    [
+        (FORCE, -1.0, "its sign were the opposite one"),
+        (ACCELERATION, 1.0 / 9.80665, "it were in g and not in the unit stated"),
+        (ACCELERATION, -9.80665, "it had been converted from g once too often, and its sign the opposite one"),
+        (DEPTH, 1000.0, "it were in mm and not in the unit stated"),
+    ],
+)
+def test_a_slip_is_unexplained_in_its_recording_and_said_to_be_one(channel: str, factor: float, said: str) -> None:
+    found = diagnose(scenario(), mistaken(recorded({}, 4, speeds=(1.5, 2.0, 2.5), channels=CHANNELS), channel, factor))
+    assert (found.verdict, found.effects) == ("unexplained", ())
+    assert [(p.recording, p.channel, p.share) for p in found.where] == [("v2.0", channel, 1.0)]
+    assert f"v2.0: {channel} reads" in found.sentence
+    assert said in found.sentence
+    assert "Otherwise simulation and 3 recordings agree within the noise" in found.sentence
+
+
+@pytest.mark.parametrize(
+    ("channel", "factor", "which"), [(DEPTH, -1.0, None), (FORCE, -1.0, 1), (FORCE, 1000.0, 1), (DEPTH, 1000.0, None)]
+)
+def test_what_else_is_missing_is_found_beside_it(channel: str, factor: float, which: int | None) -> None:
+    whole = recorded(LAYER, 4, speeds=(1.5, 2.0, 2.5), channels=CHANNELS, rate=1000.0)
+    found = diagnose(scenario(), mistaken(whole, channel, factor, which))
+    assert [e.id for e in found.effects] == ["soil-layer"]
+    depth = found.effects[0].parameters["depth"]
+    assert depth.low <= LAYER["effects.soil-layer.depth"] <= depth.high
+    assert found.sentence.count("it was left aside") == (1 if which else len(whole))
+
+
+@pytest.mark.parametrize("factor", [1e-3, -1.0, 9.80665])
+def test_what_all_are_too_large_by_is_a_gain(factor: float) -> None:
+    whole = recorded({}, 4, speeds=(1.5, 2.0, 2.5), channels=CHANNELS)
+    found = diagnose(scenario(), mistaken(whole, FORCE, factor, None))
+    assert [(e.id, e.channel) for e in found.effects] == [("sensor-gain", FORCE)]
+    assert found.effects[0].parameters["gain"].value == pytest.approx(factor, rel=5e-3)
+    assert "it was left aside" not in found.sentence
+
+
+def test_where_nothing_else_was_recorded_it_is_what_cannot_be_told() -> None:
+    found = diagnose(scenario(), mistaken(recorded({}, 4, channels=(DEPTH,)), DEPTH, -1.0, None))
+    assert (found.verdict, found.effects) == ("cannot-tell", ())
+    assert found.sentence.count("its sign were the opposite one") == 3
+
+
+@pytest.mark.parametrize("factor", [0.6, 1.4, math.pi])
+def test_no_other_factor_is_a_slip(factor: float) -> None:
+    """Of a force: 1.4 may be a gain, and nobody writes forces down in units of 1/pi N."""
+    found = diagnose(scenario(), mistaken(recorded({}, 4, speeds=(1.5, 2.0, 2.5), channels=CHANNELS), FORCE, factor))
+    assert "it was left aside" not in found.sentence
+
+
+def test_what_goes_its_own_way_is_no_slip() -> None:
+    """A channel turned round, with as much again that the simulation does not have: r = 0.7."""
+    made = mistaken(recorded({}, 4, speeds=(1.5, 2.0, 2.5), channels=CHANNELS), FORCE, -1.0)
+    other = np.roll(made[1][1][FORCE], 40) * 0.8
+    made[1] = (made[1][0], replace(made[1][1], channels={**made[1][1].channels, FORCE: made[1][1][FORCE] + other}))
+    every, _ = diagnosing._evidence(scenario(), made, Crew())
+    assert slips_of(every) == ([], [])
