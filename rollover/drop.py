@@ -30,6 +30,8 @@ from rollover.vehicle import Striker
 Array = NDArray[np.float64]
 LONGEST_STEP = 5e-4  # s, of the integration
 ENTRY = 0.02  # longest step over the time in which a cone goes in
+ROUNDING = 1e-6  # of the largest force: what changes by less has not jumped
+BESIDE = 1e-9  # s: on either side of a jump
 RESOLVED = 0.15  # longest step times the frequency of a striker that gives way
 
 COLUMNS = {
@@ -64,6 +66,19 @@ class Track:
         out = np.empty((len(times), track.OUT_COLUMNS))
         track.read_off(self.law, self.p, self.numbers, self.steps, self.elements, times, out)
         return out
+
+    @cached_property
+    def jumps(self) -> tuple[Array, Array]:
+        """Instants (j,), s, at which the force jumps, and how far the columns do there (j, OUT_COLUMNS)."""
+        steps = self.steps
+        ways = steps[:, [track.HOW, track.BOUND, track.ELEMENT]]
+        begins = np.concatenate([[True], np.any(ways[1:] != ways[:-1], axis=1)])
+        at = steps[begins, track.FROM]
+        at = at[at + BESIDE <= self.until]
+        rows = self.rows(np.stack([at - BESIDE, at + BESIDE], axis=1).ravel())
+        apart = rows[1::2] - rows[::2]
+        shows = np.abs(apart[:, track.OUT_FORCE]) > ROUNDING * np.max(np.abs(rows[:, track.OUT_FORCE]), initial=0.0)
+        return at[shows], apart[shows]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,10 +6,8 @@ axis names; nothing is converted here.
 
 from __future__ import annotations
 
-import hashlib
 import io
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,6 +15,8 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from viz.svg import cleaned
 
 Array = NDArray[np.float64]
 Role = Literal["first", "second", "third", "fourth", "limit", "muted", "ink"]
@@ -371,32 +371,10 @@ def _canvas(
         yield figure, svg
         stream = io.StringIO()
         figure.savefig(stream, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
-    svg.text = _cleaned(stream.getvalue())
+    svg.text = cleaned(stream.getvalue(), COLOURS)
 
 
 @contextmanager
 def _axes(width: float = WIDTH, height: float = HEIGHT) -> Iterator[tuple[Any, _Svg]]:
     with _canvas(width, height) as (figure, svg):
         yield figure.add_subplot(), svg
-
-
-_NUMBER = re.compile(r"-?\d+\.\d{3,}")
-
-
-def _cleaned(svg: str) -> str:
-    """Only what a page needs: no prologue, no other host's name, short numbers, ids of its own, the page's colours."""
-    svg = svg[svg.index("<svg") :].strip()
-    svg = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->|<style.*?</style>", "", svg, flags=re.DOTALL)
-    svg = re.sub(r'\sxmlns(:\w+)?="[^"]*"|\sversion="[^"]*"', "", svg).replace("xlink:href", "href")
-    box = re.search(r'viewBox="([^"]*)"', svg)
-    assert box is not None
-    wide = float(box[1].split()[2]) * 4.0 / 3.0  # px to a pt, so that letters are as large in all figures
-    head = f'<svg role="img" viewBox="{box[1]}" style="max-width: {wide:.0f}px">'
-    svg = re.sub(r"<svg[^>]*>", head, svg, count=1)
-    svg = re.sub(r"\s*font-family: [^;\"]*;?", "", svg)
-    svg = _NUMBER.sub(lambda m: f"{float(m[0]):.2f}".rstrip("0").rstrip("."), svg)
-    for role, colour in COLOURS.items():
-        svg = svg.replace(colour, f"var(--{role}, {colour})")
-    own = hashlib.sha256(svg.encode()).hexdigest()[:8]
-    svg = re.sub(r'(\sid="|="#|url\(#)', rf"\g<1>f{own}-", svg)
-    return re.sub(r"\n\s*", "\n", svg)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.effort import Effort
-from rollover.diagnosis.leaps import within_means
+from rollover.diagnosis.leaps import LEAP_IN, within_means
 from rollover.diagnosis.simulator import Simulator, simulator_of
 from rollover.filters import least_rate
 from rollover.initiation import Drop
@@ -20,7 +20,6 @@ from rollover.scenario import Scenario
 
 Array = NDArray[np.float64]
 
-LEAP_IN = "leap in "  # before the name of a channel: how far it leaps within each mean, SI
 MOST_ROWS = 500  # of a recording that are looked at
 FEW = 4  # stamps in a mean that are all simulated; for more, two times away from the first contact
 KNOWN, UNKNOWN = 4e-3, 30e-3  # s, by which a clock's zero may be off
@@ -41,8 +40,11 @@ class Averaged:
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """See `Simulator`."""
-        found = self.inner.predict(changes, shift)
-        return None if found is None else {**self._means(found), **self._leaps(found)}
+        every = self.inner.predict(changes, shift)
+        if every is None:
+            return None
+        found = {name: values for name, values in every.items() if not name.startswith(LEAP_IN)}
+        return {**self._means(found), **self._leaps(found)}
 
     def _leaps(self, found: Mapping[str, Array]) -> dict[str, Array]:
         if np.all(self.counts == self.many):

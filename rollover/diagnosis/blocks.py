@@ -10,6 +10,7 @@ to predict that one, so that holding out costs no simulation.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -118,6 +119,11 @@ class Fitted:
     def label(self) -> str:
         """Keys of the effects."""
         return " + ".join(c.key for c in self.candidates) or "as it is"
+
+
+def total_of(blocks: Sequence[Block]) -> float:
+    """Sum of (D1) over recordings where they stand."""
+    return sum(b.total for b in blocks)
 
 
 def turned(fitted: Fitted) -> Fitted:

@@ -286,6 +286,12 @@ def physical(x: float, search: Search) -> float:
     return float(search.low + x * (search.high - search.low))
 
 
+def key_at(r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> tuple[object, ...]:
+    """What tells a simulation of recording r at x from any other, its time shift (s) to the nanosecond."""
+    names = tuple((c.key, len(c.search), c.along, *c.form.items()) for c in candidates)
+    return (r, names, tuple([round(float(v), 12) for v in x]), round(shift, 9))
+
+
 def coordinate(value: float, search: Search) -> float:
     """Coordinate of a value."""
     if search.scale == "log":

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.bins import LEAP_IN
-from rollover.diagnosis.leaps import SHOWS, about_leaps, forgiven
+from rollover.diagnosis.leaps import LEAP_IN, SHOWS, about_leaps, forgiven
 from rollover.diagnosis.nuisance import Eased, doubts, eased
 from rollover.diagnosis.simulator import Simulator
 from rollover.noise import LENGTH, USUAL, NoiseFloor, grown, noise_floor
@@ -167,7 +166,7 @@ class Evidence:
         """
         if not leaps.size:
             return raw
-        moved: Array = forgiven(raw, leaps, self._values, self._inside.first, self._inside.last)
+        moved: Array = forgiven(raw, leaps, self.values, self._inside.first, self._inside.last)
         return moved
 
     def worth(self, leaps: NDArray[np.int64]) -> Array:
@@ -196,7 +195,7 @@ class Evidence:
         return found
 
     @cached_property
-    def _values(self) -> Array:
+    def values(self) -> Array:
         """The measured samples, one signal after another, SI."""
         return np.concatenate([s.values for s in self.signals])
 

@@ -287,7 +287,7 @@ def confusion(step_: Step, groups: Groups, shared: float = 1.0) -> list[Fitted]:
     for rival in step_.rivals:
         explains = base.left - rival.left > 0.5 * (base.left - best.left)
         as_well = len(rival.x) <= len(best.x) and rival.left < best.left + APART**2
-        becomes_best = len(rival.x) > len(best.x) and rival.left > best.left - APART**2 and _is_at_an_end(rival)
+        becomes_best = len(rival.x) > len(best.x) and rival.left > best.left - APART**2 and is_at_an_end(rival)
         if rival is best or becomes_best or not explains:
             continue
         if as_well or min(worse(rival, best, groups, shared)) < APART:
@@ -295,6 +295,6 @@ def confusion(step_: Step, groups: Groups, shared: float = 1.0) -> list[Fitted]:
     return found
 
 
-def _is_at_an_end(fitted: Fitted) -> bool:
+def is_at_an_end(fitted: Fitted) -> bool:
     """Whether a number of the last effect stands at an end of its range."""
     return any(at_an_end(v) for v in fitted.own)

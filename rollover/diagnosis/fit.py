@@ -8,8 +8,8 @@ from contextlib import contextmanager
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.blocks import GENTLE, Block, Fitted, bounded, shift_of
-from rollover.diagnosis.candidates import Candidate, each_with_own
+from rollover.diagnosis.blocks import GENTLE, Block, Fitted, bounded, shift_of, total_of
+from rollover.diagnosis.candidates import Candidate, each_with_own, key_at
 from rollover.diagnosis.chaos import course
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 FAR = 3.0  # misfit over the noise from which on a step may be lengthened
 STRIDE, STRIDES = 2.0, 6  # by what factor, how often
 TRIES = 4  # of a step, each damped more
+SHORTER = (0.5, 0.0)  # of the way of a time shift, tried where all of it leads nowhere
 NOISE_LEFT = 1.04  # misfit over the noise that needs no further search
 NONE = np.zeros(0, dtype=np.int64)
 
@@ -88,16 +89,12 @@ class Judge:
 
     def residuals(self, fitted: Fitted) -> list[Array]:
         """Measured less predicted, stacked, SI, of each recording."""
-        found = []
-        for r, (e, block) in enumerate(zip(self.evidence, fitted.blocks, strict=True)):
-            raw = self.raw(r, fitted.candidates, fitted.x, block.shift)
-            measured = np.concatenate([s.values for s in e.signals])
-            found.append(measured - raw if raw is not None else np.zeros_like(measured))
-        return found
+        raws = [self.raw(r, fitted.candidates, fitted.x, b.shift) for r, b in enumerate(fitted.blocks)]
+        return [np.zeros(e.count) if y is None else e.values - y for e, y in zip(self.evidence, raws, strict=True)]
 
     def predicted(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
         """Stacked prediction of recording r; None where the simulation fails or a value is out of bounds."""
-        key = _key(r, candidates, x, shift)
+        key = key_at(r, candidates, x, shift)
         if key not in self._known:
             raw = self.raw(r, candidates, x, shift)
             self._known[key] = None if raw is None else self.evidence[r].whitened(raw)
@@ -105,8 +102,7 @@ class Judge:
 
     def raw(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
         """The same in SI, before the noise comes in."""
-        key = _key(r, candidates, x, shift)
-        if key not in self._raw:
+        if (key := key_at(r, candidates, x, shift)) not in self._raw:
             self._raw[key] = self._simulated(r, candidates, x, shift)
         return self._raw[key]
 
@@ -118,7 +114,7 @@ class Judge:
         y, predicted = found
         leaps = self.evidence[r].leaps(y, predicted)
         if leaps.size:
-            self._leaps[_key(r, candidates, x, shift)] = leaps
+            self._leaps[key_at(r, candidates, x, shift)] = leaps
         return self.evidence[r].forgiven(y, leaps)
 
     def edged(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
@@ -168,11 +164,10 @@ class Judge:
             return None
         e, raw = self.evidence[r], self.raw(r, candidates, x, shift)
         assert raw is not None
-        leaps = self._leaps.get(_key(r, candidates, x, shift), NONE)
+        leaps = self._leaps.get(key_at(r, candidates, x, shift), NONE)
         J = np.zeros((y.size, len(x)))
         if known is not None:
             J[:, : known.shape[1]] = known
-
         clock = clock and not (self._pinned and e.recording.clock.zero != "unknown")
         slope = self._slope(r, candidates, x, shift, raw) if clock else np.zeros_like(raw)
 
@@ -239,9 +234,9 @@ class Judge:
             last = in_step(self.evidence[r], first, last, slope, lambda d: self.edged(r, *after, shift + d))
         d = last - first
         for point in (before, after):
-            d[self._leaps.get(_key(r, *point, shift), NONE)] = 0.0
+            d[self._leaps.get(key_at(r, *point, shift), NONE)] = 0.0
         e = self.evidence[r]
-        return e.eased(e.worth(self._leaps.get(_key(r, *before, shift), NONE)) * e.whitened(d))
+        return e.eased(e.worth(self._leaps.get(key_at(r, *before, shift), NONE)) * e.whitened(d))
 
     def clocked(
         self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float, rounds: int
@@ -262,6 +257,16 @@ class Judge:
         if self.effort.clocked:
             return self.clocked(r, candidates, x, shift, self.effort.clocked)
         return self.block(r, candidates, x, shift, 0.0, clock=False)
+
+    def _less_far(
+        self, r: int, candidates: Sequence[Candidate], x: Sequence[float], before: Block, after: Block | None
+    ) -> Block | None:
+        """The same with its time shift gone less far, or not at all, where edges left more after it than before."""
+        if after is None or after.total <= before.total:
+            return after
+        later = after.shift - before.shift
+        found = [self.block(r, candidates, x, before.shift + f * later, 0.0, clock=False) for f in SHORTER if later]
+        return min([after, *(b for b in found if b is not None)], key=lambda b: b.total)
 
     def fit(
         self,
@@ -302,7 +307,7 @@ class Judge:
         if any(b is None for b in found):
             return None
         blocks: list[Block] = [b for b in found if b is not None]
-        best, damping = self._total(blocks), 1e-3
+        best, damping = total_of(blocks), 1e-3
         fixed = len(x) - len(candidates[-1].search) if candidates else 0
         for turn in range(rounds):
             A, b = np.zeros((len(x), len(x))), np.zeros(len(x))
@@ -323,7 +328,11 @@ class Judge:
                     for r, block, d in zip(use, blocks, steps, strict=True)
                 ]
                 if all(a is not None for a in after):
-                    total = self._total([a for a in after if a is not None])
+                    total = total_of([a for a in after if a is not None])
+                    if total >= best and not self.effort.clocked:
+                        each = zip(use, blocks, after, strict=True)
+                        after = [self._less_far(r, candidates, trial, block, a) for r, block, a in each]
+                        total = total_of([a for a in after if a is not None])
                     if total < best:
                         improved = True
                         if total > FAR**2 * sum(k.residual.size for k in blocks):
@@ -381,20 +390,11 @@ class Judge:
             ]
             if there == trial or any(b is None for b in found):
                 break
-            left = self._total([b for b in found if b is not None])
+            left = total_of([b for b in found if b is not None])
             if left >= total:
                 break
             trial, after, total = there, list(found), left
         return trial, after, total
-
-    @staticmethod
-    def _total(blocks: Sequence[Block]) -> float:
-        return sum(b.total for b in blocks)
-
-
-def _key(r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> tuple[object, ...]:
-    names = tuple((c.key, len(c.search), c.along, *c.form.items()) for c in candidates)
-    return (r, names, tuple([round(float(v), 12) for v in x]), round(shift, 9))
 
 
 __all__ = ["GENTLE", "Block", "Fitted", "Judge", "shift_of"]

@@ -11,6 +11,7 @@ import numpy as np
 
 from ground.compiled import compiled, leaf
 
+LEAP_IN = "leap in "  # before the name of a channel: how far it leaps about each sample, or within each mean, SI
 LEAP, WITHIN = 4.0, 2.5  # times the steps beside it: of samples, and within a mean of some
 SHOWS = 3.0  # times the noise, from which on a step may be a leap
 LARGE = 50.0  # times the noise: a leap whose instant is not believed to the sample
@@ -34,6 +35,17 @@ def about_leaps(y: Any, least: Any, first: Any, last: Any) -> Any:
                 more = 2 if leap > LARGE / SHOWS * least[i] else 0
                 found[max(i - more, first[i]) : min(i + 2 + more, last[i]) + 1] = True
     return np.flatnonzero(found)
+
+
+@compiled
+def about_jumps(times: Any, jumps: Any, sizes: Any) -> Any:
+    """How far jumps at instants (j,) of `sizes` (j,) go between each of `times` (n,) and those beside it, the most."""
+    found = np.zeros(times.size)
+    for k in range(jumps.size):
+        after = np.searchsorted(times, jumps[k])
+        for i in range(max(after - 1, 0), min(after + 1, times.size)):
+            found[i] = max(found[i], abs(sizes[k]))
+    return found
 
 
 @leaf

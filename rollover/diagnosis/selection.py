@@ -13,6 +13,7 @@ from rollover.diagnosis.candidates import Candidate, is_one_sensor
 from rollover.diagnosis.chaos import is_other
 from rollover.diagnosis.clocks import is_all_by_clocks
 from rollover.diagnosis.detect import Mismatch, mismatch_of
+from rollover.diagnosis.endings import MANY, followed
 from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Step, moves, step, weighed
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
@@ -20,9 +21,9 @@ from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.inquiry import Groups, Inquiry, Phases
 from rollover.diagnosis.lasting import NEEDED, astray, backed, begun_anew, lasting, unforgiven
 from rollover.diagnosis.looks import look, look_again
-from rollover.diagnosis.otherwise import traced_too, tuned
+from rollover.diagnosis.otherwise import tuned
 from rollover.diagnosis.pairs import best_pair
-from rollover.diagnosis.refine import conditioned, ended, is_doubtful, polish, timed, without
+from rollover.diagnosis.refine import conditioned, is_doubtful, timed, without
 from rollover.diagnosis.remainder import NEGLIGIBLE, is_enough, is_tolerated, matters
 from rollover.diagnosis.straight import MOST, is_a_curve, is_any_curve, is_pliant
 from rollover.diagnosis.verdict import Verdict
@@ -32,9 +33,7 @@ SCATTERED = 0.05  # share of all errors that the look at candidates may make whe
 CERTAIN = 1.0 - 1e-12  # largest p-value whose logarithm is taken
 PARTLY = 0.005  # of the excess over the noise that one effect may leave, were it structured, and still be named
 LITTLE = 0.1  # of the excess over the noise, that effects must take which leave far more than noise
-MANY = 0.05  # p-value of what as many effects as may be leave, below which they are no explanation
 HOPELESS = 2.0  # misfit over the noise that two effects leave and a third is not looked for
-BESIDE = 3  # rivals of a step that are begun anew beside a better fit of what came before
 HARDLY_MORE = 1.2  # times a tolerance, that an explanation leaves of held-out recordings
 SEVERAL = 2  # recordings on another course, after which they are not forgiven if a candidate scores beyond chance
 ABLE = 0.7  # of what there was beyond the noise, above which two leave so much that no exchange of one will end it
@@ -193,41 +192,6 @@ def in_full(inquiry: Inquiry, current: Fitted) -> Step | None:
     return found
 
 
-def followed(inquiry: Inquiry, found: Step) -> tuple[Step, Mismatch]:
-    """A step and what it leaves; where that is little more than noise, its fit followed to the end; never worse.
-
-    Beside a kink, or a sample that a clock carries over a leap, or in the valley that two effects share, a fit may end
-    too early. One effect's is followed only if what it leaves is in doubt, or if it is met better with its threshold
-    elsewhere.
-    """
-    judge, phases, old = inquiry.judge, inquiry.phases, found.fitted
-    left = mismatch_of(judge.evidence, old.blocks, phases)
-    is_near = old.left < NEARLY_NOISE**2 * sum(b.residual.size for b in old.blocks)
-    if judge.effort.thrifty or not is_near:
-        return found, left
-    new = traced_too(inquiry, old)
-    if new.left < old.left or len(old.candidates) > 1 or left.p_value < MANY:
-        new = timed(judge, polish(judge, new))
-    new = ended(judge, new)
-    if new.left >= old.left:
-        return found, left
-    return _with_rivals(judge, found.moved_to(new)), mismatch_of(judge.evidence, new.blocks, phases)
-
-
-def _with_rivals(judge: Judge, found: Step) -> Step:
-    """A step with its nearest rivals begun anew beside what they share with its best, which was followed alone."""
-    best, shared = found.fitted, len(found.base.x)
-    if shared == 0:
-        return found
-    shifts, near = [b.shift for b in best.blocks], sorted(found.rivals, key=lambda f: f.left)[:BESIDE]
-    rivals = []
-    for f in found.rivals:
-        begun = f is not best and any(f is one for one in near)
-        again = judge.fit(f.candidates, (*best.x[:shared], *f.x[shared:]), shifts=shifts, width=1) if begun else None
-        rivals.append(again if again is not None and again.left < f.left else f)
-    return replace(found, rivals=tuple(rivals))
-
-
 def as_conditioned(judge: Judge, found: Step, left: Mismatch, phases: Phases) -> tuple[Step, Mismatch]:
     """A step and what it leaves; with the errors of the conditions as they act beside it if that leaves chance alone.
 
@@ -270,8 +234,14 @@ def _together(inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate
     pair = best_pair(inquiry, first, taken, looked)
     if pair is None:
         return None
-    last_step, left = followed(inquiry, pair)
-    return [replace(first, fitted=pair.base), last_step], left
+    found, left = followed(inquiry, pair)
+    if not is_enough(inquiry.judge, found.fitted, left) and any(c.rings for c in found.fitted.candidates):
+        # what its shape shows now did not show beside another one
+        held = found.fitted if found.fitted.candidates[-1].rings else inquiry.judge.again(turned(found.fitted))
+        other = _instead(inquiry, held)
+        if other is not None and other.fitted.left < found.fitted.left:
+            found, left = followed(inquiry, other)
+    return [replace(first, fitted=found.base), found], left
 
 
 def _needed(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step]:

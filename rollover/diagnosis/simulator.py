@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.effort import DROPS, Effort
 from rollover.diagnosis.filtering import Rows, behind_filters, rows_of
+from rollover.diagnosis.leaps import LEAP_IN, about_jumps
 from rollover.diagnosis.overturn import SENSORS, RunSimulator
 from rollover.drop import DropFailedError, DropModel, Track, channels_of, unfit
 from rollover.effects import every, read
@@ -99,7 +100,7 @@ class DropSimulator:
                 channels = dict(read({n: e for n, e in sensors.items() if e.id not in EDGES}, run).channels)
         except DropFailedError:
             return None
-        return behind_filters(channels, self.recording, self.rows)
+        return {**behind_filters(channels, self.recording, self.rows), **self._leaps(physical, shift, sensors)}
 
     def strays(
         self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1
@@ -124,6 +125,14 @@ class DropSimulator:
             return self._model({}).motion(self.recording.time - shift)
         except DropFailedError:
             return {}
+
+    def _leaps(self, physical: Mapping[str, Any], shift: float, sensors: Mapping[str, Any]) -> dict[str, Array]:
+        """How far channels that nothing smooths leap about each stamp, under `LEAP_IN` and their names."""
+        clocked = {e.channel for name in EDGES for e in every(sensors, name)} | set(self.recording.cfc)
+        at = self.recording.time - shift
+        instants, rows = self._track(physical, float(at[-1]) if at.size else 0.0).jumps
+        made = channels_of(rows, set(self.recording.channels) - clocked)
+        return {LEAP_IN + name: about_jumps(at, instants, sizes) for name, sizes in made.items() if np.any(sizes)}
 
     def _edges(self, physical: Mapping[str, Any], shift: float, sensors: Mapping[str, Any]) -> dict[str, Array]:
         """Channels behind a lag or with a clock of their own: what these make of a leap lies between the rows."""

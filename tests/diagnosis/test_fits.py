@@ -20,6 +20,7 @@ from rollover.diagnosis.crew import Crew, Job, work
 from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.fit import Block, Judge, shift_of
 from rollover.diagnosis.holdout import held_out, refitted
+from rollover.diagnosis.leaps import about_jumps
 from rollover.diagnosis.otherwise import _best_middle
 from rollover.diagnosis.ranges import candidates_of
 from rollover.diagnosis.simulator import simulator_of
@@ -64,6 +65,40 @@ def test_a_leap_is_forgiven_within_a_sample_and_not_beyond() -> None:
     other = replace(e, signals=tuple(replace(s, values=v) for s, v in zip(e.signals, moved, strict=True)))
     left = (late - other.forgiven(stepped, leaps))[part]
     assert np.max(np.abs(left)) == pytest.approx(signal.span)
+
+
+def test_about_a_jump_lie_the_samples_that_it_may_fall_to() -> None:
+    times = np.array([0.0, 1.0, 2.0, 3.0])
+    found = about_jumps(times, np.array([-0.5, 1.5, 1.7, 9.0]), np.array([5.0, -2.0, 3.0, 4.0]))
+    assert found.tolist() == [5.0, 3.0, 3.0, 4.0]
+
+
+def test_a_nose_that_meets_the_ground_again_is_forgiven_at_any_clock() -> None:
+    """Its force jumps by a third of the peak between two samples whose steps are as large: no two of them show it."""
+    ringing = {
+        "effects.structural-compliance.stiffness": 1.54e6,
+        "effects.structural-compliance.damping": 78.0,
+        "effects.structural-compliance.nose_share": 0.074,
+    }
+    judge = judge_of(recorded(ringing, speeds=(2.0,), noise=3e-3, rate=900.0))
+    c = candidate(judge, "structural-compliance").whole()
+    x = tuple(coordinate(ringing[f"effects.{c.id}.{p}"], s) for p, s in c.search.items())
+    shifts = judge.shifts[0] + np.arange(-1.0e-3, 1.0e-3, 5e-5)
+    blocks = [judge.block(0, (c,), x, float(s), 0.0) for s in shifts]
+    left = np.array([b.total for b in blocks if b is not None])
+    assert np.max(np.abs(np.diff(left))) < 0.2 * np.ptp(left)
+
+
+def test_a_clock_goes_less_far_where_all_of_its_way_leaves_more() -> None:
+    judge = judge_of(recorded({}, speeds=(2.0,), noise=3e-3))
+    before = judge.block(0, (), (), judge.shifts[0], 0.0)
+    assert before is not None
+    far, near = (judge.block(0, (), (), before.shift + d, 0.0) for d in (8e-3, 1e-6))
+    back = judge._less_far(0, (), (), before, far)
+    assert back is not None
+    assert back.shift == before.shift
+    assert judge._less_far(0, (), (), replace(before, residual=2.0 * before.residual), near) is near
+    assert judge._less_far(0, (), (), before, None) is None
 
 
 def test_a_block_says_whether_another_course_would_have_counted_for_less() -> None:

@@ -16,6 +16,7 @@ from rollover.diagnosis.detect import Cell, Mismatch
 from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
+from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.selection import MOST, Explanation, by_the_first, decided, is_better
 from rollover.effects import Search
 
@@ -207,25 +208,40 @@ def test_errors_of_conditions_beside_an_effect_count_where_they_leave_chance_alo
     assert same is found, "nothing is left to be eased"
 
 
-def test_rivals_are_begun_anew_beside_what_the_best_was_followed_to() -> None:
-    """A threshold that was followed beside the best alone leaves its rivals where they were."""
-    asked: list[tuple[str, tuple[float, ...]]] = []
+@pytest.mark.parametrize(
+    ("other", "p_value", "exchanged"), [(50.0, 1e-9, True), (90.0, 1e-9, False), (50.0, 0.5, False)]
+)
+def test_beside_what_rings_in_tune_the_other_of_a_pair_is_looked_for_anew(
+    monkeypatch: pytest.MonkeyPatch, other: float, p_value: float, exchanged: bool
+) -> None:
+    """With a wrong share of the nose all that stands beside it is met as badly: the second was chosen in the dark."""
 
-    def fitted(last: str, left: float, x: tuple[float, ...]) -> Fitted:
+    def pair(last: str, left: float) -> Fitted:
+        searches = {"structural-compliance": ("stiffness", "damping"), last: ("a",)}
         candidates = tuple(
-            Candidate(id=i, kind="physics", family="", search={"a": Search(0, 1)}) for i in (IDS[0], last)
+            Candidate(id=i, kind="physics", family="", search=dict.fromkeys(own, Search(0, 1)))
+            for i, own in searches.items()
         )
         zero = np.zeros(4)
-        block = Block(residual=zero + np.sqrt(left / 4.0), J=np.zeros((4, 2)), slope=zero, shift=0.0, prior=1.0)
-        return Fitted(candidates=candidates, x=x, blocks=(block,))
+        block = Block(residual=zero + np.sqrt(left / 4.0), J=np.zeros((4, 3)), slope=zero, shift=0.0, prior=1.0)
+        return Fitted(candidates=candidates, x=(0.1, 0.2, 0.3), blocks=(block,))
 
-    def fit(candidates: tuple[Candidate, ...], x: tuple[float, ...], **_: Any) -> Fitted:
-        asked.append((candidates[-1].id, x))
-        return fitted(candidates[-1].id, 4.0, x)
+    def stepped(fit: Fitted) -> Step:
+        return Step(base=fit, fitted=fit, p_value=0.0, rivals=(fit,))
 
-    best, rival = fitted("mass", 1.0, (0.7, 0.3)), fitted("guide-friction", 9.0, (0.2, 0.4))
-    base = Fitted(candidates=best.candidates[:1], x=(0.2,), blocks=best.blocks)
-    found = Step(base=base, fitted=best, p_value=0.0, rivals=(best, rival))
-    after = selection._with_rivals(cast(Judge, SimpleNamespace(fit=fit)), found)
-    assert asked == [("guide-friction", (0.7, 0.4))]
-    assert [f.left for f in after.rivals] == [1.0, 4.0]
+    asked: list[str] = []
+
+    def instead(_: Any, current: Fitted) -> Step:
+        asked.append(current.candidates[-1].id)
+        return stepped(pair("mass", other))
+
+    found = stepped(pair("soil-layer", 80.0))
+    judge = SimpleNamespace(again=lambda f: f)
+    monkeypatch.setattr(selection, "best_pair", lambda *_: found)
+    monkeypatch.setattr(selection, "followed", lambda _, one: (one, left(p_value)))
+    monkeypatch.setattr(selection, "is_enough", lambda _judge, _fit, what: what.p_value > 0.001)
+    monkeypatch.setattr(selection, "_instead", instead)
+    both = selection._together(cast(Inquiry, SimpleNamespace(judge=judge)), found, [], cast(Gate, None))
+    assert both is not None
+    assert both[0][-1].fitted.candidates[-1].id == ("mass" if exchanged else "soil-layer")
+    assert asked == ([] if p_value > 0.001 else ["structural-compliance"])

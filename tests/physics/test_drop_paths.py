@@ -56,6 +56,23 @@ def scene(changes: dict[str, Any]) -> Scenario:
     return drop(3.0, step=STEP, duration=0.45).replaced(changes)
 
 
+@pytest.mark.parametrize("changes", CHANGES.values(), ids=CHANGES)
+def test_a_track_knows_each_jump_of_its_force_and_no_other(changes: dict[str, Any]) -> None:
+    """On rows 2 us apart the force changes by 1 % of its most only where it is said to jump, and by as much."""
+    track = DropModel(scenario=scene(changes)).track(0.46)
+    times = np.arange(-0.01, 0.45, 2e-6)
+    force = track.rows(times)[:, 0]
+    most = 0.01 * float(np.max(np.abs(force)))
+    instants, apart = track.jumps
+    shown = np.flatnonzero(np.abs(np.diff(force)) > most)
+    large = np.abs(apart[:, 0]) > 1.5 * most
+    within = np.clip(np.searchsorted(times, instants[large]) - 1, 0, None)
+    assert set(within) <= set(shown)
+    assert np.diff(force)[within] == pytest.approx(apart[large, 0], abs=0.3 * most)
+    jumps = np.searchsorted(times, instants) - 1
+    assert all(np.min(np.abs(jumps - k)) <= 1 for k in shown)
+
+
 def peaks(result: Any) -> list[float]:
     names = ("ground/sinkage", "ground/force_normal", "ground/impulse_normal")
     return [float(result[name].max()) for name in names] + [float(result["striker/position_z"].min())]

@@ -1,0 +1,74 @@
+"""Fits followed to their end: rivals begun anew beside them, and what has fewer numbers where one tells nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis import endings
+from rollover.diagnosis.blocks import Block
+from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.crew import Job
+from rollover.diagnosis.explain import Step
+from rollover.diagnosis.fit import Fitted, Judge
+from rollover.diagnosis.inquiry import Inquiry
+from rollover.effects import Search
+
+FIRST = "soil-viscous-damping"
+
+
+def fitted(last: str, left: float, x: tuple[float, ...]) -> Fitted:
+    """A fit of a first effect and a last one, which has all numbers but one."""
+    own = {name: Search(0, 1) for name in "abc"[: len(x) - 1]}
+    first = Candidate(id=FIRST, kind="physics", family="", search={"a": Search(0, 1)})
+    candidates = (first, Candidate(id=last, kind="physics", family="", search=own))
+    zero = np.zeros(4)
+    block = Block(residual=zero + np.sqrt(left / 4.0), J=np.zeros((4, len(x))), slope=zero, shift=0.0, prior=1.0)
+    return Fitted(candidates=candidates, x=x, blocks=(block,))
+
+
+def step(best: Fitted, *rivals: Fitted) -> Step:
+    """A step to the best from a base that leaves 400."""
+    base = fitted("mass", 400.0, (0.2, 0.3))
+    base = Fitted(candidates=base.candidates[:1], x=(0.2,), blocks=base.blocks)
+    return Step(base=base, fitted=best, p_value=0.0, rivals=(best, *rivals))
+
+
+def test_rivals_are_begun_anew_beside_what_the_best_was_followed_to() -> None:
+    """A threshold that was followed beside the best alone leaves its rivals where they were."""
+    asked: list[tuple[str, tuple[float, ...]]] = []
+
+    def fit(candidates: tuple[Candidate, ...], x: tuple[float, ...], **_: Any) -> Fitted:
+        asked.append((candidates[-1].id, x))
+        return fitted(candidates[-1].id, 4.0, x)
+
+    best, rival = fitted("mass", 1.0, (0.7, 0.3)), fitted("guide-friction", 9.0, (0.2, 0.4))
+    after = endings._with_rivals(cast(Judge, SimpleNamespace(fit=fit)), step(best, rival))
+    assert asked == [("guide-friction", (0.7, 0.4))]
+    assert [f.left for f in after.rivals] == [1.0, 4.0]
+
+
+@pytest.mark.parametrize(
+    ("depth", "leaves", "taken"), [(0.0, 5.0, True), (0.0, 12.0, True), (0.0, 20.0, False), (0.5, 5.0, False)]
+)
+def test_a_layer_from_the_surface_on_is_a_stiffness(depth: float, leaves: float, taken: bool) -> None:
+    """At an end of its range a number tells nothing; what has none is begun beside what stands beside the layer."""
+    asked: list[tuple[float, ...]] = []
+
+    def fits(jobs: Sequence[Job]) -> list[Fitted | None]:
+        asked.extend(job.start for job in jobs)
+        return [fitted(job.candidates[-1].id, leaves, job.start) for job in jobs]
+
+    layer, stuck = fitted("soil-layer", 4.0, (0.7, depth, 0.3)), fitted("soil-stiffness", 90.0, (0.2, 0.4))
+    as_many, far = fitted("soil-crust", 50.0, (0.2, 0.4, 0.4)), fitted("mass", 500.0, (0.2, 0.4))
+    found = step(layer, as_many, stuck, far)
+    after = endings._simpler(cast(Inquiry, SimpleNamespace(fits=fits)), found)
+    assert asked == ([(0.7, 0.4)] if depth == 0.0 else [])
+    assert (after is not None) == taken
+    if after is not None:
+        assert after.fitted.candidates[-1].id == "soil-stiffness"
+        assert [f.candidates[-1].id for f in after.rivals] == ["soil-stiffness", "soil-crust", "mass"]

@@ -1,0 +1,31 @@
+"""Drawn figures made fit to stand in a page."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Mapping
+
+_NUMBER = re.compile(r"-?\d+\.\d{3,}")
+
+
+def cleaned(svg: str, colours: Mapping[str, str]) -> str:
+    """Only what a page needs: no prologue, no other host's name, short numbers, ids of its own.
+
+    `colours` are the page's by role: each becomes the variable of that name, with itself where there is no style sheet.
+    """
+    svg = svg[svg.index("<svg") :].strip()
+    svg = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->|<style.*?</style>", "", svg, flags=re.DOTALL)
+    svg = re.sub(r'\sxmlns(:\w+)?="[^"]*"|\sversion="[^"]*"', "", svg).replace("xlink:href", "href")
+    box = re.search(r'viewBox="([^"]*)"', svg)
+    assert box is not None
+    wide = float(box[1].split()[2]) * 4.0 / 3.0  # px to a pt, so that letters are as large in all figures
+    head = f'<svg role="img" viewBox="{box[1]}" style="max-width: {wide:.0f}px">'
+    svg = re.sub(r"<svg[^>]*>", head, svg, count=1)
+    svg = re.sub(r"\s*font-family: [^;\"]*;?", "", svg)
+    svg = _NUMBER.sub(lambda m: f"{float(m[0]):.2f}".rstrip("0").rstrip("."), svg)
+    for role, colour in colours.items():
+        svg = svg.replace(colour, f"var(--{role}, {colour})")
+    own = hashlib.sha256(svg.encode()).hexdigest()[:8]
+    svg = re.sub(r'(\sid="|="#|url\(#)', rf"\g<1>f{own}-", svg)
+    return re.sub(r"\n\s*", "\n", svg)
