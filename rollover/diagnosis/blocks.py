@@ -111,6 +111,11 @@ class Fitted:
         return self.x[len(self.x) - len(self.candidates[-1].search) :]
 
     @property
+    def total(self) -> float:
+        """Sum over the recordings of (D1) where they stand: what a fit without slopes leaves."""
+        return total_of(self.blocks)
+
+    @property
     def left(self) -> float:
         """Sum over the recordings of (D1) at its minimum."""
         return sum(b.normal()[2] for b in self.blocks)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from rollover.diagnosis.candidates import Candidate, coordinate, each_with_own
 from rollover.diagnosis.crew import Job
 from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.explain import NEARLY_NOISE, Step, is_at_an_end
-from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.otherwise import traced_too
 from rollover.diagnosis.refine import ended, polish, timed
@@ -37,8 +39,11 @@ def followed(inquiry: Inquiry, found: Step) -> tuple[Step, Mismatch]:
     if new.left < old.left:
         found = _with_rivals(judge, found.moved_to(new))
         left = mismatch_of(judge.evidence, new.blocks, phases)
-    simple = _simpler(inquiry, found)
-    return (found, left) if simple is None else (simple, mismatch_of(judge.evidence, simple.fitted.blocks, phases))
+    for simple in (_simpler, _straightened):
+        other = simple(inquiry, found)
+        if other is not None:
+            found, left = other, mismatch_of(judge.evidence, other.fitted.blocks, phases)
+    return found, left
 
 
 def _simpler(inquiry: Inquiry, found: Step) -> Step | None:
@@ -53,8 +58,7 @@ def _simpler(inquiry: Inquiry, found: Step) -> Step | None:
     able = [f for f in able if len(f.x) < len(best.x) and f.left < found.base.left][:SIMPLER]
     jobs = [Job(candidates=f.candidates, start=(*best.x[:shared], *f.own), shifts=shifts, width=1) for f in able]
     one = min((f for f in inquiry.fits(jobs) if f is not None), key=lambda f: f.left, default=None)
-    phi = max(1.0, best.left / sum(b.residual.size for b in best.blocks))
-    if one is None or one.left > best.left + phi * TELLS:
+    if one is None or not _is_as_good(one, best):
         return None
     others = tuple(f for f in found.rivals if f is not best and f.candidates[-1].key != one.candidates[-1].key)
     return replace(found, fitted=one, rivals=(one, *others))
@@ -72,3 +76,43 @@ def _with_rivals(judge: Judge, found: Step) -> Step:
         again = judge.fit(f.candidates, (*best.x[:shared], *f.x[shared:]), shifts=shifts, width=1) if begun else None
         rivals.append(again if again is not None and again.left < f.left else f)
     return replace(found, rivals=tuple(rivals))
+
+
+def _straightened(inquiry: Inquiry, found: Step) -> Step | None:
+    """A step of several effects with those in their usual shape that need no other beside each other; None if none.
+
+    What had to be bent to do another's work as well is straight again once that stands beside it.
+    """
+    best, usual = found.fitted, {c.key: c for c in inquiry.candidates}
+    bent = [k for k, c in enumerate(best.candidates) if c.is_bent and usual[c.key].search.keys() <= c.search.keys()]
+    if len(best.candidates) < 2 or not bent:
+        return None
+    shifts, ways = tuple(b.shift for b in best.blocks), [bent, *([k] for k in bent if len(bent) > 1)]
+    jobs = [Job(candidates=c, start=x, shifts=shifts, width=1) for c, x in (_unbent(best, usual, w) for w in ways)]
+    fits = [f for f in inquiry.fits(jobs) if f is not None and _is_as_good(f, best)]
+    if not fits:
+        return None
+    new = min(fits, key=lambda f: (len(f.x), f.left))
+    same = new.candidates[-1].key
+    return replace(found, fitted=new, rivals=(new, *(f for f in found.rivals if f.candidates[-1].key != same)))
+
+
+def _unbent(
+    fitted: Fitted, usual: Mapping[str, Candidate], which: Sequence[int]
+) -> tuple[tuple[Candidate, ...], tuple[float, ...]]:
+    """Effects of a fit, `which` of them in their usual shape, and where they stand."""
+    candidates, x = [], []
+    for k, (c, own) in enumerate(each_with_own(fitted.candidates)):
+        if k in which:
+            values, c = c.values(fitted.x[own]), usual[c.key]
+            x += [min(max(coordinate(values[name], search), 0.0), 1.0) for name, search in c.search.items()]
+        else:
+            x += fitted.x[own]
+        candidates.append(c)
+    return tuple(candidates), tuple(x)
+
+
+def _is_as_good(simple: Fitted, best: Fitted) -> bool:
+    """Whether a fit of fewer numbers leaves hardly more than the best."""
+    phi = max(1.0, best.left / sum(b.residual.size for b in best.blocks))
+    return simple.left < best.left + phi * TELLS * (len(best.x) - len(simple.x))

@@ -11,7 +11,7 @@ import numpy as np
 from rollover.diagnosis.blocks import Fitted
 from rollover.diagnosis.candidates import Candidate, coordinate
 from rollover.diagnosis.fit import NOISE_LEFT, Judge
-from rollover.diagnosis.refine import BEHIND, STARTS, by_what_is_left, few_of, polish, shifts_told, total_of
+from rollover.diagnosis.refine import BEHIND, STARTS, by_what_is_left, few_of, polish, shifts_told
 
 WORTH = 12.0  # gain that pays for a shape
 SHORT = 4  # rounds of a fit that tells where to begin
@@ -85,11 +85,11 @@ def _best_of(
     # fitted alone these soon leave less than beside all others
     most = min(ABREAST * sum(f.blocks[r].total for r in few), BEHIND * sum(leaves[r] for r in few))
     begun: list[Fitted] = []
-    for one in sorted((one for one in short if one is not None and total_of(one) < most), key=total_of):
+    for one in sorted((one for one in short if one is not None and one.total < most), key=lambda one: one.total):
         if len(begun) < STARTS and not any(_is_there(one, other) for other in begun):
             begun.append(one)
     best: Fitted | None = None
-    for one in (one for one in begun if total_of(one) < ABREAST * total_of(begun[0])):
+    for one in (one for one in begun if one.total < ABREAST * begun[0].total):
         shifts = shifts_told([b.shift for b in f.blocks], one, few)
         again = judge.fit(candidates, one.x, shifts=shifts)
         best = min((f for f in (best, again) if f is not None), key=lambda f: f.left, default=None)

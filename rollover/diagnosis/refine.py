@@ -166,7 +166,7 @@ def ended(judge: Judge, fitted: Fitted) -> Fitted:
 
 def _against(judge: Judge, fitted: Fitted) -> tuple[tuple[float, ...], list[float]]:
     """Coordinates, and time shifts (s) of all, moved against the clock of each channel that has one of its own."""
-    best, left = (fitted.x, [b.shift for b in fitted.blocks]), total_of(fitted)
+    best, left = (fitted.x, [b.shift for b in fitted.blocks]), fitted.total
     for c, own in each_with_own(fitted.candidates):
         if c.id != "sensor-clock-offset":
             continue
@@ -230,11 +230,6 @@ def shifts_told(shifts: Sequence[float], short: Fitted, few: Sequence[int]) -> t
     """Time shifts (s) of all recordings: as fitted to the few that a short fit was made to, elsewhere as given."""
     told = {r: block.shift for r, block in zip(few, short.blocks, strict=True)}
     return tuple(told.get(r, s) for r, s in enumerate(shifts))
-
-
-def total_of(f: Fitted) -> float:
-    """What a fit without slopes leaves."""
-    return sum(b.total for b in f.blocks)
 
 
 def without(judge: Judge, fitted: Fitted, k: int, rounds: int = 8) -> Fitted | None:

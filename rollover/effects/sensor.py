@@ -159,7 +159,8 @@ class SensorLag(Effect):
             return recording
         x, h = recording[self.channel], np.diff(recording.time)
         y = x.copy()
-        y[0] -= self.time * (x[1] - x[0]) / h[0]
+        with np.errstate(invalid="ignore"):  # what is infinite has no slope, and stays so
+            y[0] -= self.time * (x[1] - x[0]) / h[0]
         if self.second_order > 0.0:
             rise = np.diff(x) / h
             _swing(x, h, rise, self.time, self.second_order, y)

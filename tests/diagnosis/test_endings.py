@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -72,3 +73,35 @@ def test_a_layer_from_the_surface_on_is_a_stiffness(depth: float, leaves: float,
     if after is not None:
         assert after.fitted.candidates[-1].id == "soil-stiffness"
         assert [f.candidates[-1].id for f in after.rivals] == ["soil-stiffness", "soil-crust", "mass"]
+
+
+@pytest.mark.parametrize(("leaves", "straight"), [(9.0, ("first", "last")), (30.0, ("last",)), (99.0, ())])
+def test_what_was_bent_to_do_anothers_work_is_straight_beside_it(leaves: float, straight: tuple[str, ...]) -> None:
+    """A layer's width and a rate's reference speed, the one of which is needed where both at once leave far more."""
+    layer = Candidate(id="soil-layer", kind="physics", family="", search={"depth": Search(0, 0.4)})
+    rate = Candidate(id="soil-rate-hardening", kind="physics", family="", search={"per_decade": Search(0, 0.2)})
+    wide = replace(layer, search={**layer.search, "width": Search(0, 0.1)})
+    other = replace(rate, search={**rate.search, "reference_speed": Search(0, 1)})
+    names = {("soil-layer", 1): "first", ("soil-rate-hardening", 1): "last"}
+
+    def made(candidates: tuple[Candidate, ...], x: tuple[float, ...]) -> Fitted:
+        unbent = tuple(n for c in candidates if (n := names.get((c.id, len(c.search)))))
+        left = {(): 4.0, ("first",): 90.0, ("last",): 6.0, ("first", "last"): leaves}[unbent]
+        left = 99.0 if leaves == 99.0 and unbent else left
+        zero = np.zeros(4)
+        block = Block(residual=zero + np.sqrt(left / 4.0), J=np.zeros((4, len(x))), slope=zero, shift=0.0, prior=1.0)
+        return Fitted(candidates=candidates, x=x, blocks=(block,))
+
+    begun: list[tuple[float, ...]] = []
+
+    def fits(jobs: Sequence[Job]) -> list[Fitted | None]:
+        begun.extend(job.start for job in jobs)
+        return [made(job.candidates, job.start) for job in jobs]
+
+    best = made((wide, other), (0.25, 0.6, 0.5, 0.7))
+    found = replace(step(best), rivals=(best,))
+    after = endings._straightened(cast(Inquiry, SimpleNamespace(fits=fits, candidates=[layer, rate])), found)
+    assert begun == [(0.25, 0.5), (0.25, 0.5, 0.7), (0.25, 0.6, 0.5)]
+    assert (after is None) == (not straight)
+    if after is not None:
+        assert tuple(n for c in after.fitted.candidates if (n := names.get((c.id, len(c.search))))) == straight
