@@ -212,7 +212,9 @@ def _fingerprint(judge: Judge) -> str:
         total.update(repr((e.name, e.shift_prior)).encode())
         total.update(b"" if e.doubts is None else e.doubts.tobytes())
         for s in e.signals:
-            total.update(repr((s.channel, s.sigma, s.ar)).encode() + s.values.tobytes() + s.rows.tobytes())
+            total.update(
+                repr((s.channel, s.sigma, s.ar, s.zero_error)).encode() + s.values.tobytes() + s.rows.tobytes()
+            )
             if s.weight is not None:
                 total.update(s.weight.tobytes())
     return total.hexdigest()

@@ -50,6 +50,7 @@ from rollover.diagnosis.statements import (
     sentence,
 )
 from rollover.diagnosis.verdict import Degree, Diagnosis, Named
+from rollover.diagnosis.zeros import by_zeros, with_zeros
 from rollover.drop import unfit
 from rollover.effects import EFFECTS, spoken
 from rollover.recording import Recording
@@ -123,7 +124,7 @@ def _diagnosed(asked: Asked, every: Sequence[Evidence], slips: Sequence[Slip], n
     kept = [e for e in _trusted(scenario, every) if e.name in hold_out] if hold_out else []
     if sum(e.count for e in found) < FEWEST:
         return _nothing(every, names, notes, began, by_slips(slips))
-    notes += _left_aside(every, found)
+    notes += [*_left_aside(every, found), *by_zeros(found)]
     groups = left_out(found)
     notes += differing(found)
     if len(groups) == 1 and not kept:
@@ -236,7 +237,10 @@ def _weighed(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:
     judge = Judge(every)
     align(judge)
     base = judge.fit((), (), rounds=2)
-    return list(every) if base is None else colour.quiet(every, judge.residuals(base))
+    if base is None:
+        return list(every)
+    residuals, shifts = judge.residuals(base), [b.shift for b in base.blocks]
+    return with_zeros(colour.quiet(every, residuals), residuals, shifts)
 
 
 def _named_beside(

@@ -44,6 +44,8 @@ class Signal:
     scatter: float = 0.0  # between runs of one condition, SI
     step: float = 0.0  # of its digits, where noise does not hide it, SI
     end: float = 0.0  # of its range, where values pile up, SI; 0: none is seen
+    zero: float = 0.0  # that was taken off its values, SI
+    zero_error: float = 0.0  # standard error of that; 0: none was
     weight: Array | None = None  # (n,), below 1 where the model itself is not sure
     level: Array | None = None  # (n,), noise over `noise` where it grows with the value
     at_rest: tuple[float, tuple[float, ...]] | None = None  # noise and colour of its quiet stretches, once told
@@ -87,10 +89,15 @@ class Evidence:
 
     @cached_property
     def eased(self) -> Eased:
-        """What takes the uncertain conditions out of a whitened misfit."""
-        if self.doubts is None:
+        """What takes the uncertain conditions, and zeros, out of a whitened misfit."""
+        columns = [] if self.doubts is None else list(self.doubts.T)
+        for s, part in self.spans():
+            if s.zero_error > 0.0:
+                columns.append(np.zeros(self.count))
+                columns[-1][part] = s.zero_error
+        if not columns:
             return eased(np.zeros((self.count, 0)))
-        return eased(np.stack([self.whitened(column) for column in self.doubts.T], axis=1))
+        return eased(np.stack([self.whitened(column) for column in columns], axis=1))
 
     @cached_property
     def expected(self) -> float | None:
