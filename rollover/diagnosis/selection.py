@@ -294,8 +294,12 @@ def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) ->
     if is_any_curve(found.fitted.candidates) or is_a_curve(judge, found.fitted):
         return found.refused(), "unexplained"
     held = found.fitted.candidates
-    least = MANY if len(found.parts) == MOST or is_one_sensor(held) or is_pliant(held) else SURE
-    is_whole = found.after.p_value > least or not matters(judge, found.fitted, found.after)
+    is_bending = len(found.parts) == MOST or is_one_sensor(held) or is_pliant(held)
+    is_whole = found.after.p_value > (MANY if is_bending else SURE)
+    if is_bending and not judge.effort.thrifty:
+        # what is bent to a curve nearly everywhere leaves what it cannot be bent to in one place
+        is_whole = is_whole and min(found.after.adjusted, default=1.0) > SURE
+    is_whole = is_whole or not matters(judge, found.fitted, found.after)
     start, ahead = held_out(found.base, groups).total, held_out(found.fitted, groups).total
     is_whole = is_whole and not (ahead > NEARLY_NOISE and takes_little(found, groups))
     # what a tolerance allows has structure too

@@ -29,7 +29,9 @@ ALIKE = 0.7  # |r|, from which on two signals are one but for a factor and what 
 NEAR = 0.25  # of its logarithm, that a factor may be off by what is missing
 USUALLY = 0.6  # of that, that all recordings of a channel may be off by
 PLACES = np.linspace(-3.0, 3.0, 61)  # times its prior, where a time shift is looked for
-NO_GAIN = 2.0  # times, or one part of: what is nearer to 1 may be an effect's work
+UNIT = (
+    5.0  # times, or one part of, that a unit must make to be told from what is missing: ground may be 3 times as stiff
+)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,10 +93,13 @@ def _factor(e: Evidence, s: Signal, made: np.ndarray) -> float | None:
 
 
 def _beside(channel: str, usual: float) -> float:
-    """Factor that is no slip's, of what the recordings of a channel usually are off by: what is missing makes it."""
+    """Factor that is no slip's, of what the recordings of a channel usually are off by: what is missing makes it.
+
+    Where it is near no slip's, all of it.
+    """
     known = (1.0, *(abs(cause) for cause, _ in _causes(describe(channel).unit)))
     near = min(known, key=lambda one: _off(usual, one))
-    return usual / near if _off(usual, near) < USUALLY else 1.0
+    return usual / near if _off(usual, near) < USUALLY else usual
 
 
 def _slip(e: Evidence, s: Signal, factor: float, beside: float) -> Slip | None:
@@ -129,7 +134,7 @@ def _each(unit: str) -> Iterator[tuple[float, str]]:
     for name, size in UNITS.get(unit, {}).items():
         sizes.setdefault(size, name)
     for size, name in sizes.items():
-        if max(size, 1.0 / size) < NO_GAIN:
+        if max(size, 1.0 / size) < UNIT:
             continue
         for sign, turned in ((1.0, ""), (-1.0, ", and its sign the opposite one")):
             yield sign / size, f"it were in {name} and not in the unit stated{turned}"

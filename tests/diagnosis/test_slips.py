@@ -88,3 +88,12 @@ def test_what_goes_its_own_way_is_no_slip() -> None:
     made[1] = (made[1][0], replace(made[1][1], channels={**made[1][1].channels, FORCE: made[1][1][FORCE] + other}))
     every, _ = diagnosing._evidence(scenario(), made, Crew())
     assert slips_of(every) == ([], [])
+
+
+def test_ground_that_is_three_times_as_stiff_makes_no_feet_of_metres() -> None:
+    """Sinkages of 0.4 to 0.6 times what is simulated: the layer's work, more so the faster the drop."""
+    hard = {"effects.soil-layer.depth": 0.04, "effects.soil-layer.stiffness_ratio": 3.2}
+    speeds = (1.1, 1.6, 2.1, 2.6, 3.1)
+    found = diagnose(scenario(), recorded(hard, 4, speeds=speeds, channels=CHANNELS, rate=1000.0))
+    assert [e.id for e in found.effects] == ["soil-layer"]
+    assert "it was left aside" not in found.sentence
