@@ -5,8 +5,8 @@ what recording r misses there on the average, and e the standard error of that,
 
     sum ((d - mean d)/e)^2                    beyond chi-square: not one zero for all                          (Z1)
 
-each is brought back to none, and is known to e from there on. What all have in common, and zeros that differ so much
-have not by chance, is left to be found as an offset of the sensor.
+each is brought back to none unless it wanders there, and is known to e from there on. What all have in common, and
+zeros that differ so much have not by chance, is left to be found as an offset of the sensor.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.channels import describe
+from rollover.diagnosis.approach import along
 from rollover.diagnosis.colour import level_of
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.effects import spoken
@@ -25,6 +26,7 @@ from rollover.effects import spoken
 Array = NDArray[np.float64]
 EARLY = 0.6  # of the time before the first contact that is looked at: clocks may be off
 LEAST, FEWEST = 8, 3  # samples of it; recordings, to tell what they have in common
+WAVES, SLOW = 3, 0.01  # cosines beyond the mean; p-value of these, below which a channel wanders
 FLAT = 0.5  # times the noise, that what is predicted there may change by
 CHANCE, SHARED = 1e-4, 0.01  # p-value of (Z1); of a mean that is no chance of zeros which differ so
 SHOWS = 1.5  # times its error, by which zeros differ that are worth a line
@@ -38,6 +40,7 @@ class Zero:
     k: int
     off: float
     error: float
+    slow: float = 0.0  # sum of squares of its first cosines beyond the mean, over what noise lets expect of each
 
 
 def with_zeros(evidence: Sequence[Evidence], residuals: Sequence[Array], shifts: Sequence[float]) -> list[Evidence]:
@@ -48,11 +51,13 @@ def with_zeros(evidence: Sequence[Evidence], residuals: Sequence[Array], shifts:
             before = _before(e, s, shift)
             if before is not None and float(np.ptp((s.values - residual[part])[before])) < FLAT * s.sigma:
                 error = level_of(s.noise, s.ar) / np.sqrt(before.stop)
-                zero = Zero(r=r, k=k, off=float(residual[part][before].mean()), error=float(error))
+                early = residual[part][before]
+                slow = float(np.sum(along(s, early, 1 + WAVES)[1:] ** 2))
+                zero = Zero(r=r, k=k, off=float(early.mean()), error=float(error), slow=slow)
                 by.setdefault(s.channel, []).append(zero)
     able = [zeros for zeros in by.values() if len(zeros) >= FEWEST and all(z.error > 0.0 for z in zeros)]
     found = [list(e.signals) for e in evidence]
-    if _differ(able):
+    if _differ(able) and _stand(able):
         for z, off in ((z, off) for zeros in able for z, off in zip(zeros, _own(zeros), strict=True)):
             s = found[z.r][z.k]
             found[z.r][z.k] = replace(s, values=s.values - off, zero=off, zero_error=z.error)
@@ -71,6 +76,14 @@ def by_zeros(evidence: Sequence[Evidence]) -> list[str]:
         for channel, each in by.items()
         if spread[channel] > SHOWS * float(np.mean([s.zero_error for s in each]))
     ]
+
+
+def _stand(every: Sequence[Sequence[Zero]]) -> bool:
+    """Whether zeros stand still: what wanders before the first contact, as noise of 1/f, has none."""
+    from scipy.special import chdtrc
+
+    slow = [z.slow for zeros in every for z in zeros]
+    return float(chdtrc(WAVES * len(slow), sum(slow))) > SLOW
 
 
 def _differ(every: Sequence[Sequence[Zero]]) -> bool:

@@ -13,6 +13,7 @@ from rollover.diagnosis import explain, selection
 from rollover.diagnosis.blocks import Block
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.detect import Cell, Mismatch
+from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
@@ -70,9 +71,24 @@ def judged(monkeypatch: pytest.MonkeyPatch) -> dict[str, float]:
 def test_as_many_effects_as_may_be_must_leave_what_chance_leaves(
     count: int, p_value: float, named: int, judged: dict[str, float]
 ) -> None:
-    found, verdict = decided(cast(Judge, SimpleNamespace(evidence=())), explanation(count, p_value), [], [])
+    found, verdict = decided(
+        cast(Judge, SimpleNamespace(evidence=(), effort=DROPS)), explanation(count, p_value), [], []
+    )
     assert len(found.parts) == named
     assert verdict == ("missing-physics" if named else "unexplained")
+
+
+@pytest.mark.parametrize(("local", "named"), [(0.5, MOST), (1e-5, 0)])
+def test_what_can_be_bent_to_a_curve_must_leave_no_one_place_either(
+    local: float, named: int, judged: dict[str, float]
+) -> None:
+    """All places together hide one: chi-square of 960 takes no note of 50 beyond the 12 of one."""
+    found = explanation(MOST, 0.4)
+    found = replace(found, after=replace(found.after, adjusted=(0.9, local)))
+    judge = cast(Judge, SimpleNamespace(evidence=(), effort=DROPS))
+    assert len(decided(judge, found, [], [])[0].parts) == named
+    fewer = explanation(2, 0.4)
+    assert len(decided(judge, replace(fewer, after=found.after), [], [])[0].parts) == 2
 
 
 @pytest.mark.parametrize(
@@ -85,13 +101,15 @@ def test_what_an_effect_too_slight_for_a_name_explains_whole_is_no_mismatch(
     monkeypatch.setattr(selection, "moves", lambda *_: moved)
     monkeypatch.setattr(selection, "mismatch_of", lambda *_: left(remaining))
     one = explanation(1, 1e-9)
-    found = decided(cast(Judge, SimpleNamespace(evidence=())), replace(one, parts=(), fitted=one.base), [], [])
+    found = decided(
+        cast(Judge, SimpleNamespace(evidence=(), effort=DROPS)), replace(one, parts=(), fitted=one.base), [], []
+    )
     assert (found[0].parts, found[1]) == ((), verdict)
 
 
 def test_the_gain_of_one_effect_that_may_be_nothing_tells_nothing_either() -> None:
     """The p-value is that of the misfit then; of several, others may have gained what it seemed to."""
-    judge = cast(Judge, SimpleNamespace(evidence=()))
+    judge = cast(Judge, SimpleNamespace(evidence=(), effort=DROPS))
     one, two = (replace(explanation(count, 0.4), before=left(0.2)) for count in (1, 2))
     assert one.p_value < 1e-6  # of 99 that the best candidate scores
     refused = by_the_first(judge, one, {IDS[0]}, [])
@@ -106,7 +124,7 @@ def test_two_of_one_sensor_must_leave_what_chance_leaves(
     found = explanation(2, 0.002)
     candidates = tuple(replace(c, channel=k) for c, k in zip(found.fitted.candidates, channels, strict=True))
     found = replace(found, fitted=replace(found.fitted, candidates=candidates))
-    judge: Any = SimpleNamespace(evidence=())
+    judge: Any = SimpleNamespace(evidence=(), effort=DROPS)
     assert len(decided(judge, found, [], [])[0].parts) == named
 
 
@@ -127,7 +145,7 @@ def test_one_that_takes_nearly_all_is_named_with_what_it_leaves_itself(
     """20 times the noise before: of the excess 0.3 or 1.3 % is left, of what is structured 0.1 or 2 %."""
     judged["soil-crust"] = misfit
     monkeypatch.setattr(selection, "mismatch_of", lambda *_: left(1e-9, structure))
-    judge: Any = SimpleNamespace(evidence=())
+    judge: Any = SimpleNamespace(evidence=(), effort=DROPS)
     found, verdict = decided(judge, explanation(2, 1e-4), [], [])
     assert verdict == ("missing-physics" if named else "unexplained")
     if named:
@@ -152,7 +170,7 @@ def test_what_predicts_held_out_recordings_hardly_better_is_not_named(
 ) -> None:
     """Whatever it leaves of those that it was fitted to."""
     judged |= {"as it is": start, "soil-crust": ahead}
-    found, verdict = decided(cast(Judge, SimpleNamespace(evidence=())), explanation(1, 0.4), [], [])
+    found, verdict = decided(cast(Judge, SimpleNamespace(evidence=(), effort=DROPS)), explanation(1, 0.4), [], [])
     assert (len(found.parts), verdict) == (named, "missing-physics" if named else "unexplained")
 
 
@@ -163,7 +181,7 @@ def test_what_leaves_no_more_than_is_tolerated_is_named(
     monkeypatch.setattr(selection, "is_tolerated", lambda _, f: f.label == "soil-crust")
     for held_out, named, expected in ((1.1, 1, "missing-physics"), (3.5, 0, "unexplained")):
         judged["soil-crust"] = held_out
-        found, verdict = decided(cast(Judge, SimpleNamespace(evidence=())), explanation(1, 1e-9), [], [])
+        found, verdict = decided(cast(Judge, SimpleNamespace(evidence=(), effort=DROPS)), explanation(1, 1e-9), [], [])
         assert (len(found.parts), verdict) == (named, expected)
 
 

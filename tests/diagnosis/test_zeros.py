@@ -12,7 +12,7 @@ import pytest
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.evidence import Evidence
-from rollover.diagnosis.zeros import Zero, _differ, _own
+from rollover.diagnosis.zeros import WAVES, Zero, _differ, _own, _stand
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
@@ -94,3 +94,10 @@ def test_zeros_of_all_channels_are_judged_together() -> None:
     assert not _differ([one])
     assert _differ([one, one, one])
     assert not _differ([])
+
+
+def test_what_wanders_before_anything_is_hit_has_no_zero() -> None:
+    """Chi-square of 9 at 9 and at 30: p = 0.4 and 4e-4."""
+    still, wandering = ([Zero(r=r, k=0, off=9.0 * r, error=1.0, slow=v) for r in range(3)] for v in (WAVES, 10.0))
+    assert _stand([still])
+    assert not _stand([still, wandering, wandering])
