@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.leaps import LEAP_IN, SHOWS, about_leaps, forgiven
+from rollover.diagnosis.leaps import JUMPS, LEAP_IN, SHOWS, about_leaps, forgiven
 from rollover.diagnosis.nuisance import Eased, doubts, eased
 from rollover.diagnosis.simulator import Simulator
 from rollover.noise import LENGTH, USUAL, NoiseFloor, grown, noise_floor
@@ -153,7 +153,8 @@ class Evidence:
         for s, part in self.spans():
             size = predicted.get(LEAP_IN + s.channel)
             if size is not None:
-                within.append(part.start + np.flatnonzero(size[s.rows] > SHOWS * s.sigma))
+                least = SHOWS if self.averaged > 1 else JUMPS
+                within.append(part.start + np.flatnonzero(size[s.rows] > least * s.sigma))
         return np.unique(np.concatenate([found, *within])) if any(w.size for w in within) else found
 
     @cached_property
