@@ -14,7 +14,7 @@ from ground.compiled import compiled, leaf
 LEAP_IN = "leap in "  # before the name of a channel: how far it leaps about each sample, or within each mean, SI
 LEAP, WITHIN = 4.0, 2.5  # times the steps beside it: of samples, and within a mean of some
 SHOWS = 3.0  # times the noise, from which on a step may be a leap
-JUMPS = 8.0  # times the noise, from which on a known jump between two samples decides a fit
+JUMPS = 5.0  # times the noise, from which on a known jump between two samples decides a fit
 LARGE = 50.0  # times the noise: a leap whose instant is not believed to the sample
 BESIDE = 3  # samples to either side, between whose values one about a leap may be
 
