@@ -60,8 +60,7 @@ def _simpler(inquiry: Inquiry, found: Step) -> Step | None:
     one = min((f for f in inquiry.fits(jobs) if f is not None), key=lambda f: f.left, default=None)
     if one is None or not _is_as_good(one, best):
         return None
-    others = tuple(f for f in found.rivals if f is not best and f.candidates[-1].key != one.candidates[-1].key)
-    return replace(found, fitted=one, rivals=(one, *others))
+    return _led_by(one, found)
 
 
 def _with_rivals(judge: Judge, found: Step) -> Step:
@@ -92,9 +91,7 @@ def _straightened(inquiry: Inquiry, found: Step) -> Step | None:
     fits = [f for f in inquiry.fits(jobs) if f is not None and _is_as_good(f, best)]
     if not fits:
         return None
-    new = min(fits, key=lambda f: (len(f.x), f.left))
-    same = new.candidates[-1].key
-    return replace(found, fitted=new, rivals=(new, *(f for f in found.rivals if f.candidates[-1].key != same)))
+    return _led_by(min(fits, key=lambda f: (len(f.x), f.left)), found)
 
 
 def _unbent(
@@ -110,6 +107,13 @@ def _unbent(
             x += fitted.x[own]
         candidates.append(c)
     return tuple(candidates), tuple(x)
+
+
+def _led_by(new: Fitted, found: Step) -> Step:
+    """A step with another fit for its best, which is none of its rivals any more, nor is what was of that effect."""
+    same = new.candidates[-1].key
+    others = (f for f in found.rivals if f is not found.fitted and f.candidates[-1].key != same)
+    return replace(found, fitted=new, rivals=(new, *others))
 
 
 def _is_as_good(simple: Fitted, best: Fitted) -> bool:

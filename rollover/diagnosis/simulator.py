@@ -14,7 +14,7 @@ from rollover.diagnosis.effort import DROPS, Effort
 from rollover.diagnosis.filtering import Rows, behind_filters, rows_of
 from rollover.diagnosis.leaps import LEAP_IN, about_jumps
 from rollover.diagnosis.overturn import SENSORS, RunSimulator
-from rollover.drop import DropFailedError, DropModel, Track, channels_of, unfit
+from rollover.drop import BESIDE, DropFailedError, DropModel, Track, channels_of, unfit
 from rollover.effects import every, read
 from rollover.initiation import Drop
 from rollover.recording import Recording
@@ -25,7 +25,6 @@ T = TypeVar("T")
 EDGES = ("sensor-lag", "sensor-clock-offset", "sensor-clock-drift")
 # s: longest step of a drop, within 6e-5 of the range; and of one with abrupt effects, within 8e-4 where it rings
 STEP, SHORT = 2e-3, 1e-3
-BESIDE = 1e-9  # s: on either side of the first contact
 KEPT, TRACKS = 128, 16  # of one recording: what it is predicted to be, and falls that this is read from
 MARGIN = 0.02  # s, by which a fall is longer than it is asked for: clocks move on
 

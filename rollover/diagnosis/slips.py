@@ -1,7 +1,6 @@
 """Slips of the pen: channels that stand in another unit than is stated, or with the opposite sign.
 
-Of what was measured, m, and what the simulation says, s, each sample weighed as it counts, at the time shift at which
-the two are most alike,
+Of what was measured, m, and what the simulation says, s, at the time shift at which the two are most alike,
 
     a = m's / s's        r = m's / (|m| |s|)
 
@@ -82,11 +81,11 @@ def by_slips(found: Sequence[Slip]) -> str:
 
 def _factor(e: Evidence, s: Signal, made: np.ndarray) -> float | None:
     """How many times what is simulated a signal reads, where the two are alike; None if nowhere."""
-    time, weight = e.recording.time[s.rows], 1.0 if s.weight is None else s.weight
-    m, best = s.values * weight, (0.0, 0.0)
+    time, m, best = e.recording.time[s.rows], s.values, (0.0, 0.0)
+    size = float(np.linalg.norm(m))
     for shift in PLACES * e.shift_prior:
-        p = np.interp(time - shift, time, made[s.rows]) * weight
-        size, power = float(np.linalg.norm(m)), float(p @ p)
+        p = np.interp(time - shift, time, made[s.rows])
+        power = float(p @ p)
         if size > 0.0 and power > 0.0:
             best = max(best, (abs(float(m @ p)) / (size * power**0.5), float(m @ p) / power))
     return best[1] if best[0] > ALIKE else None

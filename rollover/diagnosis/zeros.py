@@ -90,7 +90,7 @@ def _differ(every: Sequence[Sequence[Zero]]) -> bool:
     """Whether (Z1) of all channels together is beyond chance: who sets one zero anew sets all."""
     from scipy.special import chdtrc
 
-    squares = sum(float(np.sum((_off(zeros)[0] / _off(zeros)[1]) ** 2)) for zeros in every)
+    squares = sum(float(np.sum((apart / error) ** 2)) for apart, error in map(_off, every))
     return bool(every) and float(chdtrc(sum(len(zeros) - 1 for zeros in every), squares)) < CHANCE
 
 
