@@ -39,14 +39,14 @@ def followed(inquiry: Inquiry, found: Step) -> tuple[Step, Mismatch]:
     if new.left < old.left:
         found = _with_rivals(judge, found.moved_to(new))
         left = mismatch_of(judge.evidence, new.blocks, phases)
-    for simple in (_simpler, _straightened):
+    for simple in (simpler, _straightened):
         other = simple(inquiry, found)
         if other is not None:
             found, left = other, mismatch_of(judge.evidence, other.fitted.blocks, phases)
     return found, left
 
 
-def _simpler(inquiry: Inquiry, found: Step) -> Step | None:
+def simpler(inquiry: Inquiry, found: Step) -> Step | None:
     """A step by an effect of fewer numbers where one of its own tells nothing, at an end of its range; else None.
 
     A layer from the surface on is a stiffness. What has fewer numbers is begun beside what stands beside it.

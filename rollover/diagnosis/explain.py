@@ -13,7 +13,7 @@ from rollover.diagnosis.blocks import at_an_end
 from rollover.diagnosis.crew import Job
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.effort import Effort
-from rollover.diagnosis.fit import NOISE_LEFT, Fitted, Judge
+from rollover.diagnosis.fit import NOISE_LEFT, Block, Fitted, Judge
 from rollover.diagnosis.gate import Gate, p_value
 from rollover.diagnosis.holdout import foretold, held_out, refitted, worse
 from rollover.diagnosis.inquiry import Groups, Inquiry, Phases
@@ -103,6 +103,8 @@ def step(inquiry: Inquiry, base: Fitted, looked: Gate) -> Step | None:
         fits = timed_too(inquiry, base, fits)
     if weighed(judge, fits[0], inquiry.phases):
         base, fits = judge.again(base), [judge.again(f) for f in fits]
+    if not judge.effort.thrifty:
+        fits = _by_fits(judge, fits, groups)
     fits.sort(key=lambda f: held_out(f, groups).left.sum())
     fits = simplest(fits, groups, judge.per_error)
     least = min(f.left for f in fits)
@@ -113,6 +115,14 @@ def step(inquiry: Inquiry, base: Fitted, looked: Gate) -> Step | None:
         phi, score = phi * judge.per_error, max(score, base.left - least)
     p = p_value(score / phi, looked.null)
     return Step(base=base, fitted=fits[0], p_value=p, rivals=tuple(fits), screened=tuple(screened))
+
+
+def _by_fits(judge: Judge, fits: Sequence[Fitted], groups: Groups) -> list[Fitted]:
+    """The fits, with what the one that leaves least foretells by fits, where by its slopes another foretells better."""
+    lead = min(fits, key=lambda f: f.left)
+    if lead is min(fits, key=lambda f: held_out(f, groups).left.sum()):
+        return list(fits)
+    return [refitted(judge, f, groups) if f is lead else f for f in fits]
 
 
 def _from_base(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: Gate) -> list[Fitted]:
@@ -246,8 +256,24 @@ def moves(judge: Judge, base: Fitted, fitted: Fitted) -> float:
 
     Within half a step of a channel's digits nothing is told to have moved.
     """
+    return _apart(judge, base.blocks, fitted.blocks)
+
+
+def does(judge: Judge, fitted: Fitted) -> float:
+    """How far the last effect moves any channel beside the others as they stand; 0 where these cannot be simulated.
+
+    What the others cannot be bent to of it is less: all that ground of another stiffness leaves of a rate, a tenth.
+    """
+    last = fitted.candidates[-1]
+    rest, x = fitted.candidates[:-1], fitted.x[: len(fitted.x) - len(last.search)]
+    alone = [judge.block(r, rest, x, b.shift, 0.0) for r, b in enumerate(fitted.blocks)]
+    return 0.0 if None in alone else _apart(judge, [b for b in alone if b is not None], fitted.blocks)
+
+
+def _apart(judge: Judge, some: Sequence[Block], others: Sequence[Block]) -> float:
+    """How far two lots of runs are apart in any channel of any recording, see `moves`."""
     most = 0.0
-    for r, (a, b) in enumerate(zip(base.blocks, fitted.blocks, strict=True)):
+    for r, (a, b) in enumerate(zip(some, others, strict=True)):
         for signal, part in judge.evidence[r].spans():
             d = (a.plain_residual - b.plain_residual)[part]
             size = float(np.sqrt(np.mean(d * d))) * signal.sigma

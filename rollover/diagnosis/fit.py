@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
@@ -14,12 +14,14 @@ from rollover.diagnosis.chaos import course
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.overturn import full_runs, made_ahead
-from rollover.diagnosis.secant import Point, beside, in_step, secant, valley_at
+from rollover.diagnosis.secant import Point, beside, in_step, in_time, narrowed, secant, valley_at
 
 Array = NDArray[np.float64]
 FAR = 3.0  # misfit over the noise from which on a step may be lengthened
 STRIDE, STRIDES = 2.0, 6  # by what factor, how often
 TRIES = 4  # of a step, each damped more
+KEPT = 0.7  # of the gain that slopes promise, which a step must make for those of what is held to be kept
+SLOW = 0.01  # of what is left, that a step must gain for the same
 SHORTER = (0.5, 0.0)  # of the way of a time shift, tried where all of it leads nowhere
 NOISE_LEFT = 1.04  # misfit over the noise that needs no further search
 NONE = np.zeros(0, dtype=np.int64)
@@ -169,10 +171,19 @@ class Judge:
         if known is not None:
             J[:, : known.shape[1]] = known
         clock = clock and not (self._pinned and e.recording.clock.zero != "unknown")
-        slope = self._slope(r, candidates, x, shift, raw) if clock else np.zeros_like(raw)
+        slope = np.zeros_like(raw)
+        if clock:
+            slope = in_time(e, self.changes(candidates, x), shift, raw, self.effort.later, both=self.effort.thrifty)
+
+        worth = e.worth(leaps)
+        residual = e.eased(worth * (self.measured[r] - y))
+        far = max(1.0, float(np.sqrt(np.mean(residual * residual)))) if 0.0 < nudge <= self.effort.fine else np.inf
 
         def off(end: Point) -> Array | None:
             return self.moved(r, (candidates, x), end, shift, None if self._pinned else slope)
+
+        def off_by(k: int) -> Callable[[float], Array | None]:
+            return lambda step: self.moved(r, (candidates, x), (candidates, [*x[:k], x[k] + step, *x[k + 1 :]]), shift)
 
         for k in range(0 if known is None else known.shape[1], len(x) if nudge else 0):
             if self.effort.wide:
@@ -183,16 +194,12 @@ class Judge:
                 valley = valley_at((candidates, x), k)
                 J[:, k] = column if valley is None else column - valley[1] * J[:, valley[0]]
                 continue
-            step = nudge if x[k] < 0.5 else -nudge
-            there = [*x[:k], x[k] + step, *x[k + 1 :]]
-            moved = self.moved(r, (candidates, x), (candidates, there), shift)
-            if moved is None:
+            column = narrowed(off_by(k), nudge if x[k] < 0.5 else -nudge, far)
+            if column is None:
                 return None
-            J[:, k] = moved / step
-        worth = e.worth(leaps)
+            J[:, k] = column
         slope[leaps] = 0.0
         slope = e.eased(worth * e.whitened(slope)) if clock else slope
-        residual = e.eased(worth * (self.measured[r] - y))
         counts = course(e, residual) if self.straying else None
         if counts is not None:
             residual, J, slope = counts.samples * residual, counts.samples[:, None] * J, counts.samples * slope
@@ -200,26 +207,6 @@ class Judge:
             residual=residual, J=J, slope=slope, shift=shift, prior=e.shift_prior, course=counts, expected=e.expected,
             forgiven=self.straying,
         )  # fmt: skip
-
-    def _slope(
-        self,
-        r: int,
-        candidates: Sequence[Candidate],
-        x: Sequence[float],
-        shift: float,
-        raw: Array,
-    ) -> Array:
-        """dy/dtau of recording r, stacked, SI; none across a leap, on whichever side a sample was and is."""
-        e, later = self.evidence[r], self.effort.later
-        found = e.simulator.predict(self.changes(candidates, x), shift + later)
-        after = raw if found is None else e.raw(found)
-        leaps = e.leaps(after, found or {})
-        slope = (after - raw) / later
-        if self.effort.thrifty:  # to both sides, where that costs no run
-            found = e.simulator.predict(self.changes(candidates, x), shift - later)
-            slope = slope if found is None else (after - e.raw(found)) / (2.0 * later)
-        slope[leaps] = 0.0
-        return np.nan_to_num(slope)
 
     def moved(self, r: int, before: Point, after: Point, shift: float, slope: Array | None = None) -> Array | None:
         """How the prediction of recording r differs between two points, whitened; nothing where either leaps.
@@ -315,11 +302,13 @@ class Judge:
                 Ar, br, _ = block.normal()
                 A, b = A + Ar, b + br
             improved, enough, total = False, max(1e-3 * max(1.0, 1e-2 * best), self.effort.least), best
+            due = 0.0  # gain of a step by these slopes
             for _ in range(TRIES):
                 dx = bounded(A, b, np.array(x), damping)
                 trial = [float(v) for v in np.clip(np.array(x) + dx, 0.0, 1.0)]
                 moved = np.array(trial) - np.array(x)
-                if width and 2.0 * float(b @ moved) - float(moved @ A @ moved) < 0.1 * enough:
+                due = 2.0 * float(b @ moved) - float(moved @ A @ moved)
+                if width and due < 0.1 * enough:
                     break  # nothing more is to be had, by these slopes
                 steps = [shift_of(block, moved) for block in blocks]
                 self.made_ahead((r, candidates, trial) for r in use)
@@ -352,9 +341,12 @@ class Judge:
             is_bare = bare and (last or turn + 1 == rounds)
             nudge = 0.0 if is_bare else self.effort.fine if last else nudges[width]
             self.made_ahead(() if is_bare else beside(use, candidates, x, nudge))
-            # what is held already moves little: its slopes are worked out anew only where the search narrows
+            # what is held already moves little: its slopes are worked out anew only where the search narrows, or where
+            # they lead astray or not far, as those of another place along a valley do
+            slow = gain < KEPT * due or gain < SLOW * best
+            anew = fresh or (slow and not self.effort.thrifty)
             again = [
-                self.block(r, candidates, x, s, nudge, None if fresh or is_bare else block.plain_J[:, :fixed])
+                self.block(r, candidates, x, s, nudge, None if anew or is_bare else block.plain_J[:, :fixed])
                 for r, s, block in zip(use, shifts, blocks, strict=True)
             ]
             if any(b is None for b in again):

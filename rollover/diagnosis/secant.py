@@ -14,7 +14,7 @@ which a clock explains as far as ever, and no less where s d is far from a blow 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +28,27 @@ Point = tuple[Sequence[Candidate], Sequence[float]]
 EXACT = 5e-3  # of a coordinate, for differences that are free of chance
 CLOCKED = 3  # times that a time shift is moved to where it fits
 CLEAR = 12.0  # times the squares that runs scatter by, that a difference should move
+TOLD = 1.0  # times the noise, that a difference should move a recording where a fit ends
+LOUD = 4.0  # times that, above which the step was too wide
 LEAP = 4.0  # times the squares of one side, that the other moves where a run leaps to another course
 FINER = 0.25  # of a step, for what tells only near its place
+
+
+def narrowed(moved: Callable[[float], Array | None], step: float, far: float) -> Array | None:
+    """dy/dx_k (n,) of a recording over a step, or over a narrower one where that tells far too much; None if it fails.
+
+    `moved` is what the prediction differs by, whitened, over a step; `far` the misfit over the noise. What moves a
+    recording by a hundred times its noise carries its edges past samples, and tells nothing of the place itself.
+    """
+    found = moved(step)
+    if found is None:
+        return None
+    size = float(np.linalg.norm(found))
+    if size > LOUD * TOLD * far:
+        narrow = step * TOLD * far / size
+        closer = moved(narrow)
+        found, step = (found, step) if closer is None else (closer, narrow)
+    return found / step
 
 
 def secant(
@@ -74,6 +93,22 @@ def but_chance(e: Evidence, d: Array, chance: float) -> Array:
     power = float(d[late] @ d[late])
     found[late] *= np.sqrt(max(1.0 - chance / power, 0.0)) if power > 0.0 else 1.0
     return found
+
+
+def in_time(e: Evidence, changes: Mapping[str, object], shift: float, raw: Array, later: float, *, both: bool) -> Array:
+    """dy/dtau (n,) of a recording, SI, `raw` y at `shift`; none across a leap, on whichever side a sample was and is.
+
+    Over `later` (s), to both sides where that costs no run.
+    """
+    found = e.simulator.predict(changes, shift + later)
+    after = raw if found is None else e.raw(found)
+    leaps = e.leaps(after, found or {})
+    slope = (after - raw) / later
+    if both:
+        found = e.simulator.predict(changes, shift - later)
+        slope = slope if found is None else (after - e.raw(found)) / (2.0 * later)
+    slope[leaps] = 0.0
+    return np.nan_to_num(slope)
 
 
 def in_step(e: Evidence, first: Array, last: Array, slope: Array, read: Callable[[float], Array | None]) -> Array:

@@ -13,8 +13,8 @@ from rollover.diagnosis.candidates import Candidate, is_one_sensor
 from rollover.diagnosis.chaos import is_other
 from rollover.diagnosis.clocks import is_all_by_clocks
 from rollover.diagnosis.detect import Mismatch, mismatch_of
-from rollover.diagnosis.endings import MANY, followed
-from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Step, moves, step, weighed
+from rollover.diagnosis.endings import MANY, followed, simpler
+from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Step, does, moves, step, weighed
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import held_out
@@ -29,6 +29,7 @@ from rollover.diagnosis.straight import MOST, is_a_curve, is_any_curve, is_plian
 from rollover.diagnosis.verdict import Verdict
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
+PART = 0.25  # of what moves something, that a part of more must move
 SCATTERED = 0.05  # share of all errors that the look at candidates may make where runs scatter
 CERTAIN = 1.0 - 1e-12  # largest p-value whose logarithm is taken
 PARTLY = 0.005  # of the excess over the noise that one effect may leave, were it structured, and still be named
@@ -104,7 +105,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
             break
         tried = step(inquiry, current, looked)
         first = first or tried
-        if not is_beyond_chance(tried, judge):
+        if not is_beyond_chance(tried, judge, phases):
             break
         found = upheld(inquiry, tried, looked)
         if found is None and not taken:
@@ -164,9 +165,21 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     )
 
 
-def is_beyond_chance(found: Step | None, judge: Judge) -> TypeGuard[Step]:
-    """Whether a step gains more than the best of all candidates does by chance, and moves something by it."""
-    return found is not None and found.p_value <= CHANCE and moves(judge, found.base, found.fitted) >= NEGLIGIBLE
+def is_beyond_chance(found: Step | None, judge: Judge, phases: Phases) -> TypeGuard[Step]:
+    """Whether a step gains more than the best of all candidates does by chance, and moves something by it.
+
+    An effect that moves things itself is none to be left out because others can be bent to nearly all of it, nor is a
+    part of what is not negligible as a whole.
+    """
+    if found is None or found.p_value > CHANCE:
+        return False
+    moved = moves(judge, found.base, found.fitted)
+    if moved >= NEGLIGIBLE or moved < PART * NEGLIGIBLE or judge.effort.thrifty:
+        return moved >= NEGLIGIBLE
+    if found.base.candidates and does(judge, found.fitted) >= NEGLIGIBLE:
+        return True
+    left = mismatch_of(judge.evidence, found.base.blocks, phases)
+    return left.p_value < SURE and matters(judge, found.base, left)
 
 
 def upheld(inquiry: Inquiry, found: Step, looked: Gate) -> Step | None:
@@ -187,7 +200,7 @@ def in_full(inquiry: Inquiry, current: Fitted) -> Step | None:
     base = judge.again(current)
     looked = look(judge, base, inquiry.candidates, inquiry.groups)
     tried = step(inquiry, base, looked)
-    found = upheld(inquiry, tried, looked) if is_beyond_chance(tried, judge) else None
+    found = upheld(inquiry, tried, looked) if is_beyond_chance(tried, judge, inquiry.phases) else None
     judge.straying = found is None
     return found
 
@@ -220,7 +233,8 @@ def _instead(inquiry: Inquiry, current: Fitted) -> Step | None:
     if found is None or found.fitted.left > held.left + NEEDED:  # on the way back nothing came as far
         rivals = () if found is None else found.rivals
         beside = tuple(f for f in rivals if f.candidates[-1].key != held.candidates[-1].key)
-        return Step(base=judge.again(rest), fitted=held, p_value=looked.p_value(), rivals=(held, *beside))
+        back = Step(base=judge.again(rest), fitted=held, p_value=looked.p_value(), rivals=(held, *beside))
+        return simpler(inquiry, back) or back
     return found
 
 

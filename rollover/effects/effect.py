@@ -13,6 +13,7 @@ from rollover.recording import Recording
 
 EFFECTS: dict[str, type[Effect]] = {}
 
+NEAR_ONE = 0.01  # of what is said with as many digits as tell it from one
 CHANNELS_OWN = "SI unit of the channel"
 Kind = Literal["physics", "parameter", "sensor"]
 
@@ -152,7 +153,9 @@ class _Spoken:
 
 
 def spoken(value: float) -> str:
-    """Three digits; 95,700 rather than 9.57e+04."""
+    """Three digits; 95,700 rather than 9.57e+04, and 1.0022 rather than 1."""
+    if NEAR_ONE > abs(abs(value) - 1.0) > 0.0:
+        return f"{value:.5g}"
     digits = float(f"{value:.3g}")
     return f"{digits:,.0f}" if 1e3 <= abs(digits) < 1e9 else f"{digits:.3g}"
 

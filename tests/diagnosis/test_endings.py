@@ -67,7 +67,7 @@ def test_a_layer_from_the_surface_on_is_a_stiffness(depth: float, leaves: float,
     layer, stuck = fitted("soil-layer", 4.0, (0.7, depth, 0.3)), fitted("soil-stiffness", 90.0, (0.2, 0.4))
     as_many, far = fitted("soil-crust", 50.0, (0.2, 0.4, 0.4)), fitted("mass", 500.0, (0.2, 0.4))
     found = step(layer, as_many, stuck, far)
-    after = endings._simpler(cast(Inquiry, SimpleNamespace(fits=fits)), found)
+    after = endings.simpler(cast(Inquiry, SimpleNamespace(fits=fits)), found)
     assert asked == ([(0.7, 0.4)] if depth == 0.0 else [])
     assert (after is not None) == taken
     if after is not None:

@@ -249,7 +249,7 @@ def test_an_accelerometer_alone_on_its_axis_may_be_turned_or_read_low() -> None:
 )
 def test_the_form_of_an_effect_is_found_with_it(id: str, hidden: dict[str, Any], shape: str) -> None:
     changes = {f"effects.{id}.{name}": value for name, value in hidden.items()}
-    found = diagnose(scenario(), recorded(changes, 11, speeds=(1.0, 1.7, 2.6, 3.4), rate=1000.0))
+    found = diagnose(scenario(), recorded(changes, 12, speeds=(1.0, 1.7, 2.6, 3.4), rate=1000.0))
     (named,) = found.effects
     assert named.id == id
     for name in (n for n in hidden if n != "channel"):

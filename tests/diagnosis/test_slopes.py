@@ -18,6 +18,7 @@ from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.screening import Screened, screen
+from rollover.diagnosis.secant import narrowed
 from rollover.diagnosis.settle import settled
 from rollover.effects import Search
 from rollover.recording import Recording
@@ -83,10 +84,32 @@ def test_what_a_clock_explains_tells_nothing_of_a_parameter() -> None:
     assert found.normal()[0][0, 0] == pytest.approx(expected, rel=0.05)
     g = float(found.slope @ found.J[:, 0]) / float(found.slope @ found.slope)
     assert g == pytest.approx(LATER, rel=0.05)  # the clock goes along by as much as the blow comes later
-    plain = Judge([evidence(blow(LATER * x), Late(), replace(DROPS, nudges=(x,)))])
+    plain = Judge([evidence(blow(LATER * x), Late(), replace(DROPS, nudges=(x, 1e-3)))])
     apart = plain.block(0, (SLOPE,), (x,), 0.0, x)
     assert apart is not None
     assert apart.normal()[0][0, 0] > 20.0 * expected
+
+
+def test_what_moves_a_recording_far_beyond_its_noise_is_told_over_a_narrower_step() -> None:
+    """y(h) = 200 tanh(h/1e-3) moves it by 200 times its noise over 5e-3, and by 40 of a slope of 200,000.
+
+    At a misfit of 100 times the noise that is what is asked for, and over 1e-5 it is the slope itself.
+    """
+    asked: list[float] = []
+
+    def moved(step: float) -> np.ndarray:
+        asked.append(step)
+        return np.array([200.0 * np.tanh(step / 1e-3)])
+
+    close, wide, narrow = narrowed(moved, 5e-3, 1.0), narrowed(moved, 5e-3, 100.0), narrowed(moved, -1e-5, 1.0)
+    assert close is not None
+    assert wide is not None
+    assert narrow is not None
+    assert close[0] == pytest.approx(2e5, rel=1e-3)
+    assert wide[0] == pytest.approx(4e4, rel=1e-3)
+    assert narrow[0] == pytest.approx(2e5, rel=1e-3)
+    assert asked == [5e-3, pytest.approx(5e-3 / 200.0, rel=1e-3), 5e-3, -1e-5]
+    assert narrowed(lambda _: None, 5e-3, 1.0) is None
 
 
 def test_a_rival_is_measured_by_clocks_that_are_held_as_its_own_are() -> None:
