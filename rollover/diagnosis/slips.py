@@ -23,6 +23,7 @@ import numpy as np
 from rollover.channels import UNITS, describe
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.effects import spoken
+from rollover.effects.sensor import is_length
 
 ALIKE = 0.7  # |r|, from which on two signals are one but for a factor and what is missing
 NEAR = 0.25  # of its logarithm, that a factor may be off by what is missing
@@ -113,7 +114,7 @@ def _is_shared(slip: Slip, found: Sequence[Slip], every: Sequence[Evidence]) -> 
     channel = slip.signal.channel
     heard = sum(s.channel == channel for e in every for s in e.signals)
     alike = sum((f.signal.channel, f.cause) == (channel, slip.cause) for f in found)
-    return alike == heard and (slip.factor > 0.0 or describe(channel).unit != "m")
+    return alike == heard and (slip.factor > 0.0 or not is_length(channel))
 
 
 def _off(factor: float, other: float) -> float:

@@ -45,7 +45,8 @@ def _other_unit(search: Mapping[str, Search], times: float) -> dict[str, Search]
     return {p: Search(min(each), max(each)) for p, each in ends.items()}
 
 
-def _is_length(channel: str) -> bool:
+def is_length(channel: str) -> bool:
+    """Whether a channel is one of lengths or angles, which have a scale and no gain."""
     return describe(channel).unit in ("m", "rad")
 
 
@@ -200,7 +201,7 @@ class SensorScale(Effect):
     @classmethod
     def looked_for_on(cls, heard: Heard) -> Mapping[str, Search] | None:
         """A scale is that of a position or a length."""
-        return _other_unit(cls.search, abs(heard.times)) if _is_length(heard.channel) else None
+        return _other_unit(cls.search, abs(heard.times)) if is_length(heard.channel) else None
 
     def read(self, recording: Recording) -> Recording:
         """Scale the channel."""
@@ -237,7 +238,7 @@ class SensorGain(Effect):
     @classmethod
     def looked_for_on(cls, heard: Heard) -> Mapping[str, Search] | None:
         """A gain is that of all but positions and lengths."""
-        return None if _is_length(heard.channel) else _other_unit(cls.search, heard.times)
+        return None if is_length(heard.channel) else _other_unit(cls.search, heard.times)
 
     def read(self, recording: Recording) -> Recording:
         """Scale the channel."""

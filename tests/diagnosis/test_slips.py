@@ -5,11 +5,14 @@ from __future__ import annotations
 import importlib
 import math
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
+from rollover.diagnosis import slips as slipping
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.slips import Slip, slips_of
 from rollover.recording import Recording
@@ -102,3 +105,20 @@ def test_ground_that_is_three_times_as_stiff_makes_no_feet_of_metres() -> None:
     found = diagnose(scenario(), recorded(hard, 4, speeds=speeds, channels=CHANNELS, rate=1000.0))
     assert [e.id for e in found.effects] == ["soil-layer"]
     assert "it was left aside" not in found.sentence
+
+
+@pytest.mark.parametrize(
+    ("channel", "factor", "shared"),
+    [
+        ("striker/acceleration_z", -1.0, True),
+        ("ground/sinkage", -1.0, False),
+        ("chassis/roll", -1.0, False),
+        ("chassis/roll", 57.3, True),
+    ],
+)
+def test_a_scale_is_never_negative(channel: str, factor: float, shared: bool) -> None:
+    """A channel turned round in all recordings has a negative gain; a length or an angle has none: it is left aside."""
+    every: list[Any] = [SimpleNamespace(name=name, signals=(SimpleNamespace(channel=channel),)) for name in "ab"]
+    found = [Slip(evidence=e, signal=e.signals[0], factor=factor, cause="such") for e in every]
+    assert slipping._is_shared(found[0], found, every) is shared
+    assert not slipping._is_shared(found[0], found[:1], every)
