@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from rollover.diagnosis.candidates import Candidate, coordinate, each_with_own
@@ -13,6 +13,7 @@ from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.otherwise import traced_too
 from rollover.diagnosis.refine import ended, polish, timed
+from rollover.effects import EFFECTS
 
 MANY = 0.05  # p-value of what as many effects as may be leave, below which they are no explanation
 BESIDE = 3  # rivals of a step that are begun anew beside a better fit of what came before
@@ -47,20 +48,34 @@ def followed(inquiry: Inquiry, found: Step) -> tuple[Step, Mismatch]:
 
 
 def simpler(inquiry: Inquiry, found: Step) -> Step | None:
-    """A step by an effect of fewer numbers where one of its own tells nothing, at an end of its range; else None.
+    """A step by an effect of fewer numbers that does as well; else None.
 
-    A layer from the surface on is a stiffness. What has fewer numbers is begun beside what stands beside it.
+    One that its own becomes at an end of its range, as a layer from the surface on is a stiffness; or any where one of
+    its own tells nothing, as it stands at such an end. What has fewer numbers is begun beside what stands beside it.
     """
-    best, shared = found.fitted, len(found.base.x)
-    if not is_at_an_end(best):
-        return None
-    shifts, able = tuple(b.shift for b in best.blocks), sorted(found.rivals, key=lambda f: f.left)
-    able = [f for f in able if len(f.x) < len(best.x) and f.left < found.base.left][:SIMPLER]
-    jobs = [Job(candidates=f.candidates, start=(*best.x[:shared], *f.own), shifts=shifts, width=1) for f in able]
+    best, shared = found.fitted, found.fitted.x[: len(found.base.x)]
+    begun = list(_become(inquiry, best))
+    if is_at_an_end(best):
+        able = sorted(found.rivals, key=lambda f: f.left)
+        able = [f for f in able if len(f.x) < len(best.x) and f.left < found.base.left][:SIMPLER]
+        begun += [(f.candidates, f.own) for f in able]
+    shifts = tuple(b.shift for b in best.blocks)
+    jobs = [Job(candidates=candidates, start=(*shared, *own), shifts=shifts, width=1) for candidates, own in begun]
     one = min((f for f in inquiry.fits(jobs) if f is not None), key=lambda f: f.left, default=None)
     if one is None or not _is_as_good(one, best):
         return None
     return _led_by(one, found)
+
+
+def _become(inquiry: Inquiry, best: Fitted) -> Iterator[tuple[tuple[Candidate, ...], tuple[float, ...]]]:
+    """What the last effect of a fit becomes at an end of its range, beside the others, and where that would stand."""
+    *others, last = best.candidates
+    values, kinds = last.values(best.own), EFFECTS[last.id].becomes
+    for c in inquiry.candidates:
+        names = kinds.get(c.id, {})
+        if all(names.get(p) in values for p in c.search) and c.key not in {o.key for o in others}:
+            at = (coordinate(values[names[p]], search) for p, search in c.search.items())
+            yield (*others, c), tuple(min(max(v, 0.0), 1.0) for v in at)
 
 
 def _with_rivals(judge: Judge, found: Step) -> Step:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from rollover.diagnosis.verdict import Considered, Named, Place, Verdict
 from rollover.effects import EFFECTS
 
 NOTABLE = 0.1  # of an interval
+UNSURE = 3.0  # times the error of a recording's clock, up to which a channel alone may be late or all others early
 SMALL = 0.2  # of a strength: an interval of its logarithm that goes down so far is one of a few times chance
 
 
@@ -53,7 +54,7 @@ def named(judge: Judge, found: Explanation, groups: Sequence[Sequence[int]]) -> 
             Named(
                 id=c.id,
                 kind=c.kind,
-                statement=" ".join([effect.says(), *same.values()]),
+                statement=" ".join([effect.says(), *same.values(), *_or_the_other(judge, c, values)]),
                 parameters=parameters,
                 settings=values,
                 channel=c.channel,
@@ -64,6 +65,17 @@ def named(judge: Judge, found: Explanation, groups: Sequence[Sequence[int]]) -> 
         )
     first = strongest(judge, found.base, fitted)
     return tuple(sorted(effects, key=lambda n: (n.id, n.channel) != (first.id, first.channel)))
+
+
+def _or_the_other(judge: Judge, c: Candidate, values: Mapping[str, Any]) -> list[str]:
+    """What is to be said of a channel that comes late by no more than the clocks are unsure of, beside one other."""
+    others = {s.channel for e in judge.evidence for s in e.signals} - {c.channel}
+    if c.id != "sensor-clock-offset" or len(others) != 1:
+        return []
+    if abs(values["offset"]) > UNSURE * min(e.shift_prior for e in judge.evidence):
+        return []
+    way = "early" if values["offset"] > 0.0 else "late"
+    return [f"Of two channels nobody can tell which: {others.pop()} may come as much too {way}."]
 
 
 def is_none(effect: Named) -> bool:

@@ -302,6 +302,7 @@ class SoilLayer(Effect):
         "width": Search(1e-3, 0.1, "log"),
     }
     shapes = ("width",)
+    becomes: ClassVar[Mapping[str, Mapping[str, str]]] = {"soil-stiffness": {"scale": "stiffness_ratio"}}
     forms = (
         Form({"onset": 1.0}, {}),
         Form(
@@ -343,6 +344,7 @@ class SoilCrust(Effect):
         "width": Search(1e-3, 0.1, "log"),
     }
     shapes = ("width",)
+    becomes: ClassVar[Mapping[str, Mapping[str, str]]] = {"soil-stiffness": {"scale": "stiffness_ratio"}}
     forms = (Form({"remains": 1.0}, {}),)
 
     def places(self) -> Mapping[int, float]:

@@ -67,12 +67,40 @@ def test_a_layer_from_the_surface_on_is_a_stiffness(depth: float, leaves: float,
     layer, stuck = fitted("soil-layer", 4.0, (0.7, depth, 0.3)), fitted("soil-stiffness", 90.0, (0.2, 0.4))
     as_many, far = fitted("soil-crust", 50.0, (0.2, 0.4, 0.4)), fitted("mass", 500.0, (0.2, 0.4))
     found = step(layer, as_many, stuck, far)
-    after = endings.simpler(cast(Inquiry, SimpleNamespace(fits=fits)), found)
+    after = endings.simpler(cast(Inquiry, SimpleNamespace(fits=fits, candidates=[])), found)
     assert asked == ([(0.7, 0.4)] if depth == 0.0 else [])
     assert (after is not None) == taken
     if after is not None:
         assert after.fitted.candidates[-1].id == "soil-stiffness"
         assert [f.candidates[-1].id for f in after.rivals] == ["soil-stiffness", "soil-crust", "mass"]
+
+
+@pytest.mark.parametrize(("leaves", "taken"), [(12.0, True), (20.0, False)])
+@pytest.mark.parametrize("is_held", [False, True])
+def test_a_layer_is_tried_as_the_stiffness_that_it_becomes(leaves: float, taken: bool, is_held: bool) -> None:
+    """A ratio of 0.5 + 0.2 (2 - 0.5) = 0.8 is a scale of 0.8, at 0.4 from 0 to 2, unless that is held beside it."""
+    asked: list[tuple[float, ...]] = []
+
+    def fits(jobs: Sequence[Job]) -> list[Fitted | None]:
+        asked.extend(job.start for job in jobs)
+        return [replace(best, candidates=job.candidates, x=job.start, blocks=(left(leaves, 2),)) for job in jobs]
+
+    def left(much: float, p: int) -> Block:
+        zero = np.zeros(4)
+        return Block(residual=zero + np.sqrt(much / 4.0), J=np.zeros((4, p)), slope=zero, shift=0.0, prior=1.0)
+
+    search = {"depth": Search(0, 0.4), "stiffness_ratio": Search(0.5, 2)}
+    layer = Candidate(id="soil-layer", kind="physics", family="", search=search)
+    stiff = Candidate(id="soil-stiffness", kind="parameter", family="", search={"scale": Search(0, 2)})
+    mass = Candidate(id="mass", kind="parameter", family="", search={"added": Search(-1, 1)})
+    first = stiff if is_held else mass
+    best = Fitted(candidates=(first, layer), x=(0.7, 0.5, 0.2), blocks=(left(4.0, 3),))
+    inquiry = cast(Inquiry, SimpleNamespace(fits=fits, candidates=[layer, stiff, mass]))
+    after = endings.simpler(inquiry, step(best))
+    assert asked == ([] if is_held else [pytest.approx((0.7, 0.4))])
+    assert (after is not None) == (taken and not is_held)
+    if after is not None:
+        assert after.fitted.candidates == (mass, stiff)
 
 
 @pytest.mark.parametrize(("leaves", "straight"), [(9.0, ("first", "last")), (30.0, ("last",)), (99.0, ())])

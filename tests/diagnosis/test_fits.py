@@ -228,6 +228,18 @@ def test_an_accelerometer_alone_on_its_axis_may_be_turned_or_read_low() -> None:
     assert "a motion across the channel" in named.discriminating_test
 
 
+@pytest.mark.parametrize(("offset", "of_two"), [(-0.001, True), (-0.01, False)])
+def test_of_two_channels_nobody_can_tell_which_is_late(offset: float, of_two: bool) -> None:
+    """But by more than the recordings' own clocks may be off it is the one that is alone in it."""
+    late = {"effects.sensor-clock-offset.channel": FORCE, "effects.sensor-clock-offset.offset": offset}
+    for channels in ((FORCE, DEPTH), (FORCE, DEPTH, ACCELERATION)):
+        found = diagnose(scenario(), recorded(late, 3, channels=channels, rate=1000.0, noise=0.003))
+        (named,) = found.effects
+        assert named.id == "sensor-clock-offset"
+        told = "nobody can tell which" in named.statement
+        assert told == (of_two and len(channels) == 2), named.statement
+
+
 @pytest.mark.parametrize(
     ("id", "hidden", "shape"),
     [
