@@ -58,6 +58,7 @@ from rollover.scenario import Scenario
 from rollover.vehicle import Striker
 
 NAMING = ("parameter", "sensor", "missing-physics")  # verdicts that name effects
+HALF = 0.5  # of what was beyond the noise: of less a channel that breaks off may be all of it
 MOSTLY = 0.6  # of the effects of the ground that would not have shown: then nothing can be told
 FEWEST = 24  # samples in all, below which nothing is said
 
@@ -157,9 +158,11 @@ def _diagnosed(asked: Asked, every: Sequence[Evidence], slips: Sequence[Slip], n
         shown = by_themselves(found, recordings, phases, explanation.p_value) or misread(
             slips, len(found), explanation.p_value
         )
-    elif effects and takes_little(explanation, groups):
+    elif effects and takes_little(explanation, groups, HALF):
         # what is lost again and again is met by no effect, and bends those that are fitted to it
         shown = broken_off(found, recordings, phases, explanation.p_value)
+        if shown is not None and not (takes_little(explanation, groups) or shown.is_of(e.channel for e in effects)):
+            shown = None  # what another channel loses is no reason to doubt them
     if shown is not None:
         verdict, effects = shown.verdict, shown.effects
         explanation = explanation.refused()

@@ -334,10 +334,10 @@ def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) ->
     return found.refused(), verdict
 
 
-def takes_little(found: Explanation, groups: Groups) -> bool:
-    """Whether an explanation takes next to nothing of what was beyond the noise in held-out recordings."""
+def takes_little(found: Explanation, groups: Groups, share: float = LITTLE) -> bool:
+    """Whether an explanation takes less than a share of what was beyond the noise in held-out recordings."""
     start, ahead = held_out(found.base, groups).total, held_out(found.fitted, groups).total
-    return start**2 - ahead**2 < LITTLE * (start**2 - 1.0)
+    return start**2 - ahead**2 < share * (start**2 - 1.0)
 
 
 def by_the_first(judge: Judge, found: Explanation, nothing: Collection[str], phases: Phases) -> Explanation:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from rollover.diagnosis.coarse import by_digits, coarse
@@ -26,6 +26,10 @@ class Shown:
     places: tuple[Place, ...]
     sentence: str
     p_value: float
+
+    def is_of(self, channels: Iterable[str | None]) -> bool:
+        """Whether all of some channels are among those that it shows."""
+        return {p.channel for p in self.places}.issuperset(channels)
 
 
 def by_themselves(

@@ -127,16 +127,24 @@ def test_what_breaks_off_where_the_signal_is_small_is_unexplained() -> None:
     assert f"{FORCE} breaks off in 2 places" in found.sentence
 
 
-@pytest.mark.parametrize("little", [False, True])
-def test_what_takes_little_where_channels_break_off_is_not_named(little: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Samples that were lost bend a gain to themselves; one that takes what there is stays named."""
-    monkeypatch.setattr(diagnosing, "takes_little", lambda *_: little)
+@pytest.mark.parametrize(
+    ("taken", "broken", "refused"),
+    [(0.05, DEPTH, True), (0.3, DEPTH, False), (0.3, FORCE, True), (0.8, FORCE, False)],
+)
+def test_what_takes_little_where_channels_break_off_is_not_named(
+    taken: float, broken: str, refused: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Samples that were lost bend a gain to themselves; one that takes what there is stays named.
+
+    A gain of the channel that breaks off must take more than half of it, of another one more than a tenth.
+    """
+    monkeypatch.setattr(diagnosing, "takes_little", lambda _, __, share=0.1: taken < share)
     recordings = recorded({"effects.sensor-gain.gain": 1.05}, 3, noise=0.003, rate=600.0)
     name, first = recordings[0]
-    holed = first.channels[DEPTH].copy()
+    holed = first.channels[broken].copy()
     holed[1:6] = holed[9:14] = 0.0  # before the contact, where nothing is missed by that
-    recordings[0] = name, replace(first, channels={**first.channels, DEPTH: holed})
+    recordings[0] = name, replace(first, channels={**first.channels, broken: holed})
     found = diagnose(scenario(), recordings)
-    named = ["sensor-gain"] * (not little)
-    assert (found.verdict, [e.id for e in found.effects]) == ("unexplained" if little else "sensor", named)
-    assert ("breaks off" in found.sentence) == little
+    named = ["sensor-gain"] * (not refused)
+    assert (found.verdict, [e.id for e in found.effects]) == ("unexplained" if refused else "sensor", named)
+    assert ("breaks off" in found.sentence) == refused
