@@ -54,7 +54,7 @@ class Step:
         """The same with what its fits foretell by runs, where slopes do not hold for long; of drops its best alone."""
         if judge.effort.thrifty:
             return self._each(lambda f: foretold(judge, f, groups))
-        return self.moved_to(refitted(judge, self.fitted, groups))
+        return self.moved_to(refitted(judge, self.fitted, groups, held_out(self.base, groups).total))
 
     def _each(self, made: Callable[[Fitted], Fitted]) -> Step:
         """The same with something made of each fit; its best stays one of its rivals."""

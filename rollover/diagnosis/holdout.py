@@ -72,13 +72,15 @@ def foretold(judge: Judge, fitted: Fitted, groups: Sequence[Sequence[int]]) -> F
     return replace(fitted, foretold=tuple(left))
 
 
-def refitted(judge: Judge, fitted: Fitted, groups: Sequence[Sequence[int]]) -> Fitted:
+def refitted(judge: Judge, fitted: Fitted, groups: Sequence[Sequence[int]], without: float = np.inf) -> Fitted:
     """A fit with what it foretells by fits to the other groups, where slopes foretell far worse than it meets them.
 
-    As it was where one fails, and where a single group is all there is.
+    And where they foretell no better than `without` the effect. As it was where one fails, and where a single group is
+    all there is.
     """
     count = sum(b.size for b in fitted.blocks)
-    if not fitted.x or len(groups) < 2 or held_out(fitted, groups).total < CROOKED * np.sqrt(fitted.left / count):
+    doubted = min(CROOKED * float(np.sqrt(fitted.left / count)), without)
+    if not fitted.x or len(groups) < 2 or held_out(fitted, groups).total < doubted:
         return fitted
     left = [b.normal()[2] for b in fitted.blocks]
     for group in groups:

@@ -2,7 +2,8 @@
 
 Between two runs lies what the parameter does and what chance does. Over a narrow step that is mostly chance, which
 squares make look like a strong slope: steps too short, and intervals too narrow. Where a run leaps to another course on
-one side, the other side alone tells what the parameter does.
+one side, the other side alone tells what the parameter does. Where nothing is left to chance, as in drops, a narrow
+step is the better one, see `narrowed`.
 
 So does a blow that comes some ms later: to a slope it is another blow, to a clock the same one. A prediction y(tau) of
 a recording with time shift tau is compared with another, y0(0), at the d where it is most like it,
@@ -30,6 +31,7 @@ CLOCKED = 3  # times that a time shift is moved to where it fits
 CLEAR = 12.0  # times the squares that runs scatter by, that a difference should move
 TOLD = 1.0  # times the noise, that a difference should move a recording where a fit ends
 LOUD = 4.0  # times that, above which the step was too wide
+STEEPER = 2.0  # times another slope, above which one is doubted
 LEAP = 4.0  # times the squares of one side, that the other moves where a run leaps to another course
 FINER = 0.25  # of a step, for what tells only near its place
 
@@ -38,17 +40,25 @@ def narrowed(moved: Callable[[float], Array | None], step: float, far: float) ->
     """dy/dx_k (n,) of a recording over a step, or over a narrower one where that tells far too much; None if it fails.
 
     `moved` is what the prediction differs by, whitened, over a step; `far` the misfit over the noise. What moves a
-    recording by a hundred times its noise carries its edges past samples, and tells nothing of the place itself.
+    recording by a hundred times its noise carries its edges past samples, and tells nothing of the place itself. A
+    slope that is far steeper closer by is that of a single edge that just lies there: on its other side there is none.
     """
     found = moved(step)
     if found is None:
         return None
     size = float(np.linalg.norm(found))
-    if size > LOUD * TOLD * far:
-        narrow = step * TOLD * far / size
-        closer = moved(narrow)
-        found, step = (found, step) if closer is None else (closer, narrow)
-    return found / step
+    if size <= LOUD * TOLD * far:
+        return found / step
+    narrow = step * TOLD * far / size
+    closer = moved(narrow)
+    if closer is None:
+        return found / step
+    slope = closer / narrow
+    if float(np.linalg.norm(slope)) * abs(step) < STEEPER * size:
+        return slope
+    other = moved(-narrow)
+    beyond = slope if other is None else -other / narrow
+    return beyond if STEEPER * float(np.linalg.norm(beyond)) < float(np.linalg.norm(slope)) else slope
 
 
 def secant(

@@ -309,6 +309,11 @@ def test_held_out_recordings_are_foretold_by_fits_where_slopes_mislead() -> None
     assert foretold.x == fitted.x
     assert held_out(foretold, groups).total == pytest.approx(held_out(fitted, groups).total, rel=0.01)
     assert refitted(judge, flat, groups[:1]) is flat
+    ahead = held_out(fitted, groups).total
+    assert refitted(judge, fitted, groups, ahead + 1e-6) is fitted
+    again = refitted(judge, fitted, groups, ahead - 1e-6)  # no better than without it, by its slopes
+    assert again.foretold is not None
+    assert held_out(again, groups).total == pytest.approx(ahead, rel=0.01)
 
 
 def test_a_strength_is_told_in_what_is_usual() -> None:

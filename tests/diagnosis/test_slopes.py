@@ -108,8 +108,24 @@ def test_what_moves_a_recording_far_beyond_its_noise_is_told_over_a_narrower_ste
     assert close[0] == pytest.approx(2e5, rel=1e-3)
     assert wide[0] == pytest.approx(4e4, rel=1e-3)
     assert narrow[0] == pytest.approx(2e5, rel=1e-3)
-    assert asked == [5e-3, pytest.approx(5e-3 / 200.0, rel=1e-3), 5e-3, -1e-5]
+    there = pytest.approx(5e-3 / 200.0, rel=1e-3)
+    assert asked == [5e-3, there, pytest.approx(-5e-3 / 200.0, rel=1e-3), 5e-3, -1e-5]
     assert narrowed(lambda _: None, 5e-3, 1.0) is None
+
+
+@pytest.mark.parametrize(("edge", "steps"), [(-1e-5, 3), (-1e-3, 2), (1e-5, 2)])
+def test_an_edge_that_just_lies_there_is_no_slope(edge: float, steps: int) -> None:
+    """y(h) = 20,000 h, and 20 more beyond an edge: over -5e-3 it moves by 100 to 120, over 1/100 of that by 1 or 21."""
+    asked: list[float] = []
+
+    def moved(step: float) -> np.ndarray:
+        asked.append(step)
+        return np.array([2e4 * step + 20.0 * np.sign(edge) * (abs(step) > abs(edge) and step * edge > 0.0)])
+
+    found = narrowed(moved, -5e-3, 1.0)
+    assert found is not None
+    assert found[0] == pytest.approx(2e4, rel=1e-9)
+    assert len(asked) == steps
 
 
 def test_a_rival_is_measured_by_clocks_that_are_held_as_its_own_are() -> None:
