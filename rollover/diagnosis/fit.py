@@ -13,6 +13,7 @@ from rollover.diagnosis.candidates import Candidate, each_with_own, key_at
 from rollover.diagnosis.chaos import course
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
+from rollover.diagnosis.memory import Memory
 from rollover.diagnosis.overturn import full_runs, made_ahead
 from rollover.diagnosis.secant import Point, beside, in_step, in_time, narrowed, secant, valley_at
 
@@ -38,9 +39,8 @@ class Judge:
         self.simulations = 0
         self.straying = True  # whether a recording may have taken another course than its run
         self._pinned = False
-        self._raw: dict[tuple[object, ...], Array | None] = {}
+        self._raw, self._known = Memory(), Memory()
         self._leaps: dict[tuple[object, ...], NDArray[np.int64]] = {}
-        self._known: dict[tuple[object, ...], Array | None] = {}
 
     def made_ahead(self, wanted: Iterable[tuple[int, Sequence[Candidate], Sequence[float]]]) -> None:
         """Make full runs of (recording, candidates, x) side by side where there are children to do it."""
@@ -58,7 +58,7 @@ class Judge:
         """Take the same recordings with another noise: nothing is simulated again, fits must be made anew."""
         self.evidence = tuple(evidence)
         self.measured = [e.measured() for e in self.evidence]
-        self._known = {}
+        self._known = Memory()
 
     @contextmanager
     def held(self, *, straying: bool | None = None, pinned: bool | None = None) -> Iterator[None]:
