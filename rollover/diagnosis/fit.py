@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 FAR = 3.0  # misfit over the noise from which on a step may be lengthened
 STRIDE, STRIDES = 2.0, 6  # by what factor, how often
 TRIES = 4  # of a step, each damped more
+NEAR = 2.0  # misfit over the noise, up to which slopes are those of the place itself
 KEPT = 0.7  # of the gain that slopes promise, which a step must make for those of what is held to be kept
 SLOW = 0.01  # of what is left, that a step must gain for the same
 SHORTER = (0.5, 0.0)  # of the way of a time shift, tried where all of it leads nowhere
@@ -178,6 +179,7 @@ class Judge:
         worth = e.worth(leaps)
         residual = e.eased(worth * (self.measured[r] - y))
         far = max(1.0, float(np.sqrt(np.mean(residual * residual)))) if 0.0 < nudge <= self.effort.fine else np.inf
+        far = far if far < NEAR else np.inf  # from afar a wide step leads over ripples
 
         def off(end: Point) -> Array | None:
             return self.moved(r, (candidates, x), end, shift, None if self._pinned else slope)

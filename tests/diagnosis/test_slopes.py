@@ -113,6 +113,26 @@ def test_what_moves_a_recording_far_beyond_its_noise_is_told_over_a_narrower_ste
     assert narrowed(lambda _: None, 5e-3, 1.0) is None
 
 
+@pytest.mark.parametrize(("off", "is_near"), [(0.0, True), (1.0, True), (3.0, False)])
+def test_from_afar_slopes_are_those_of_a_wide_step(off: float, is_near: bool) -> None:
+    """What misses a recording by three times its noise is far from an explanation: ripples there lead nowhere."""
+    x, effort = 0.03, replace(DROPS, nudges=(2e-2, 5e-3))
+    judge = Judge([evidence((1.0 + x) * blow(LATER * x) + off * SIGMA, Late(), effort)])
+    found = judge.block(0, (SLOPE,), (x,), 0.0, effort.fine)
+    assert found is not None
+    point = ((SLOPE,), (x,))
+    wide, narrow = (judge.moved(0, point, ((SLOPE,), (x + h,)), 0.0) for h in (5e-3, 1e-6))
+    assert wide is not None
+    assert narrow is not None
+    tangent, secant = narrow / 1e-6, wide / 5e-3
+    apart = float(np.abs(secant - tangent).max())
+    assert apart > 0.02 * float(np.abs(tangent).max())
+    if is_near:
+        assert np.abs(found.J[:, 0] - tangent).max() < 0.1 * apart
+    else:
+        np.testing.assert_allclose(found.J[:, 0], secant, rtol=1e-12)
+
+
 @pytest.mark.parametrize(("edge", "steps"), [(-1e-5, 3), (-1e-3, 2), (1e-5, 2)])
 def test_an_edge_that_just_lies_there_is_no_slope(edge: float, steps: int) -> None:
     """y(h) = 20,000 h, and 20 more beyond an edge: over -5e-3 it moves by 100 to 120, over 1/100 of that by 1 or 21."""
