@@ -18,6 +18,9 @@ class Memory:
         self._most, self._bytes = most, 0
         self._arrays: dict[Hashable, Array | None] = {}
 
+    def __len__(self) -> int:
+        return len(self._arrays)
+
     def __contains__(self, key: Hashable) -> bool:
         return key in self._arrays
 

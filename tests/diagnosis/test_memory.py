@@ -19,6 +19,7 @@ def test_the_older_half_is_let_go_of() -> None:
     held["failed"] = None
     assert all(k in held for k in range(10))
     held["new"] = np.zeros(1)
+    assert len(held) == 6
     assert [k for k in range(10) if k in held] == [6, 7, 8, 9]
     assert held["failed"] is None
     assert held[7] is not None
