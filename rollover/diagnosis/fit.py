@@ -15,7 +15,7 @@ from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.memory import Memory
 from rollover.diagnosis.overturn import full_runs, made_ahead
-from rollover.diagnosis.secant import Point, beside, in_step, in_time, narrowed, secant, valley_at
+from rollover.diagnosis.secant import Point, beside, in_step, in_time, moved_to, narrowed, secant, valley_at
 
 Array = NDArray[np.float64]
 FAR = 3.0  # misfit over the noise from which on a step may be lengthened
@@ -185,7 +185,8 @@ class Judge:
             return self.moved(r, (candidates, x), end, shift, None if self._pinned else slope)
 
         def off_by(k: int) -> Callable[[float], Array | None]:
-            return lambda step: self.moved(r, (candidates, x), (candidates, [*x[:k], x[k] + step, *x[k + 1 :]]), shift)
+            at = (candidates, x)
+            return lambda step: self.moved(r, at, (candidates, moved_to(at, k, x[k] + step)), shift)
 
         for k in range(0 if known is None else known.shape[1], len(x) if nudge else 0):
             if self.effort.wide:

@@ -29,9 +29,7 @@ ALIKE = 0.7  # |r|, from which on two signals are one but for a factor and what 
 NEAR = 0.25  # of its logarithm, that a factor may be off by what is missing
 USUALLY = 0.6  # of that, that all recordings of a channel may be off by
 PLACES = np.linspace(-3.0, 3.0, 61)  # times its prior, where a time shift is looked for
-UNIT = (
-    5.0  # times, or one part of, that a unit must make to be told from what is missing: ground may be 3 times as stiff
-)
+UNIT = 5.0  # times, or one part of, that a unit must make to be told from what is missing: ground 3 times as stiff
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -51,7 +51,7 @@ def test_a_slip_is_unexplained_in_its_recording_and_said_to_be_one(channel: str,
 
 
 @pytest.mark.parametrize(
-    ("channel", "factor", "which"), [(DEPTH, -1.0, None), (FORCE, 1000.0, 1), (DEPTH, 1000.0, None)]
+    ("channel", "factor", "which"), [(DEPTH, -1.0, None), (FORCE, -1.0, 1), (FORCE, 1000.0, 1), (DEPTH, 1000.0, None)]
 )
 def test_what_else_is_missing_is_found_beside_it(channel: str, factor: float, which: int | None) -> None:
     whole = recorded(LAYER, 4, speeds=(1.5, 2.0, 2.5), channels=CHANNELS, rate=1000.0)
