@@ -6,7 +6,7 @@ State: x and P of the nose with the soil that moves along, x and v of the body, 
 
 A stage ends at an event (the deepest point, a change of branch, a step in depth, lift-off, a new touch) and the next
 starts there, so that no step lies across a kink. Whether soil stays behind is asked within the steps too: a nose that
-rings pulls at it for less than a step.
+rings pulls at it for less than a step. A guide that does not creep rubs one way throughout a stage, or holds.
 """
 
 from __future__ import annotations
@@ -31,10 +31,12 @@ CHANNELS = (
     "striker/acceleration_z",
 )
 FREE, LOADING, LINE = "free", "loading", "line"
+HELD = 0.0  # the way of a guide (1: the striker slides down on it) that lets nothing slide
 RTOL, ATOL = 1e-9, 1e-11
 MOST_STAGES = 4000
 WITHIN = 12  # places of a step at which it is asked whether the soil would have to be pulled
 NUDGE = 1e-11  # m: past an event, so that it does not answer again
+BREAKS = 1.0 + 1e-6  # times its friction a guide holds what has come to rest; by as much more it lets go
 
 
 class DescentError(RuntimeError):
@@ -58,7 +60,10 @@ class Line:
 
 @dataclass(frozen=True, kw_only=True)
 class Stage:
-    """From `start` to `end` (s) under one set of equations; `soil` is m_b1 at `origin`, kg, and grows by `growth`."""
+    """From `start` to `end` (s) under one set of equations; `soil` is m_b1 at `origin`, kg, and grows by `growth`.
+
+    `way` is that of the guide's friction, None where it goes by the speed.
+    """
 
     rig: Rig
     mode: str
@@ -69,6 +74,7 @@ class Stage:
     origin: float
     curve: Curve | None
     line: Line | None
+    way: float | None = None
     state: Callable[[ArrayLike], Array]
 
     def moving(self, x: float) -> float:
@@ -100,6 +106,11 @@ class Stage:
         """Derivative of the state."""
         return self.motion(t, *y.tolist())[0]
 
+    def pulled(self, t: float, x: float, memory: float) -> float:
+        """What pulls a rigid striker downward that its guide holds at x, N."""
+        pushed = self.rig.push(t, x, 0.0) if self.rig.push is not None else 0.0
+        return self.rig.nose * self.rig.gravity + pushed - self.ground(t, x, 0.0, memory)
+
     def motion(self, t: float, x: float, p: float, xb: float, vb: float, memory: float) -> tuple[list[float], Any]:
         """Derivative of the state, and what instruments see: v, a of nose and body, N on the soil without impulse."""
         rig = self.rig
@@ -107,14 +118,16 @@ class Stage:
         v = p / total
         force = self.ground(t, x, v, memory)
         share = rig.nose / rig.mass
-        outer = rig.nose * rig.gravity - share * _resistance(rig, v)
+        outer = rig.nose * rig.gravity - share * _resistance(rig, v, self.way)
         if rig.push is not None:
             outer += rig.push(t, x, v)
         ab = 0.0
+        if self.way == HELD:
+            return [0.0, 0.0, 0.0, 0.0, -memory / rig.relaxation], (0.0, 0.0, x, 0.0, 0.0, force)
         if rig.spring > 0.0:
             between = rig.spring * (xb - x) + rig.dashpot * (vb - v)
             outer += between
-            ab = rig.gravity - _resistance(rig, vb) / rig.mass - between / (rig.mass - rig.nose)
+            ab = rig.gravity - _resistance(rig, vb, None) / rig.mass - between / (rig.mass - rig.nose)
         thrown = self.growth * v * v if self.mode == LOADING and v > 0.0 else 0.0
         a = (outer - force - thrown) / total
         if rig.side_load:
@@ -173,9 +186,10 @@ def _sign(v: float) -> float:
     return min(max(v / RAMP, -1.0), 1.0)
 
 
-def _resistance(rig: Rig, v: float) -> float:
-    rubs = math.tanh(v / rig.guide_creep) if rig.guide_creep > 0.0 else _sign(v)
-    return rig.guide * rubs + rig.air * v * abs(v)
+def _resistance(rig: Rig, v: float, way: float | None) -> float:
+    if way is None:
+        way = math.tanh(v / rig.guide_creep) if rig.guide_creep > 0.0 else _sign(v)
+    return rig.guide * way + rig.air * v * abs(v)
 
 
 def descend(rig: Rig, start: float, end: float) -> Descent:
@@ -221,6 +235,8 @@ def descend(rig: Rig, start: float, end: float) -> Descent:
             mode, x, origin = LOADING, x + NUDGE, x
         elif happened == "step":
             x += NUDGE
+        elif happened == "turned":
+            v = 0.0
         elif happened == "lift-off":
             mode, soil, growing = FREE, 0.0, False
             x -= NUDGE
@@ -288,6 +304,9 @@ def _stage(
     }  # fmt: skip
     bare = Stage(**common, end=end, state=lambda t: np.zeros(5))
     x, v, xb, vb, memory = at
+    if rig.guide > 0.0 and rig.guide_creep == 0.0 and rig.spring <= 0.0:
+        common["way"] = _way(bare, t, x, v, memory)
+        bare = replace(bare, way=common["way"])
     state = [x, v * (rig.nose + bare.moving(x)), xb, vb, memory]
     names: list[str] = []
     events: list[Any] = []
@@ -310,6 +329,10 @@ def _stage(
     else:
         depth = line.rut if line is not None else 0.0
         watch("touch", lambda t, y: y[0] - depth, 1.0)
+    if bare.way == HELD:
+        watch("turned", lambda t, y: abs(bare.pulled(t, y[0], y[4])) - BREAKS**2 * rig.guide, 1.0)
+    elif bare.way is not None and mode != LOADING:  # at the deepest point it turns by itself
+        watch("turned", lambda t, y: y[1], -bare.way)
     clinging: Callable[[float, Array], float] | None = None
     if mode != FREE and soil > 0.0 and rig.spring > 0.0:
 
@@ -334,6 +357,14 @@ def _stage(
     stage = Stage(**common, end=float(solved.t[-1]), state=solved.sol)
     happened = next((n for n, found in zip(names, solved.t_events, strict=True) if found.size), "end")
     return stage, happened
+
+
+def _way(bare: Stage, t: float, x: float, v: float, memory: float) -> float:
+    """Which way what moves with v on its guide slides from now on; from rest it goes where more pulls than holds."""
+    if v != 0.0:
+        return math.copysign(1.0, v)
+    pulled = bare.pulled(t, x, memory)
+    return math.copysign(1.0, pulled) if abs(pulled) > BREAKS * bare.rig.guide else HELD
 
 
 def _dips(value: Callable[[float, Array], float], solved: Any) -> float | None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 CLAY_MASS = 132.0  # kg in (5): the law belongs to the face, whatever strikes it
 FACE = 0.140 * 0.045  # m2
-RAMP = 2e-5  # m/s over which the friction of the guide changes its sign: what stands gives way over seconds
+RAMP = 2e-5  # m/s over which friction changes its sign where a stage does not say which way it is
 
 Push = Callable[[float, float, float], float]  # (t, x, v) -> N, downward
 Resist = Callable[[float, float, float, float], float]  # (t, z, v, F) -> F

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.proof.descent import CHANNELS, FREE, LOADING, Descent, descend
+from rollover.proof.descent import CHANNELS, FREE, HELD, LOADING, Descent, descend
 from rollover.proof.rig import Rig, loading_curve
 from tests.ground.reference_drop import solve
 
@@ -79,7 +79,7 @@ def test_the_energy_ledger_closes(name: str) -> None:
         powers = []
         for at, y in zip(t, np.asarray(stage.state(t)).T, strict=True):
             v = y[1] / (rig.nose + stage.moving(y[0]))
-            power = stage.ground(at, y[0], v, y[4]) * v + rig.guide * min(max(v / 0.005, -1), 1) * v
+            power = stage.ground(at, y[0], v, y[4]) * v + rig.guide * abs(v)
             powers.append(power + 0.5 * (stage.growth * v * v) * v)
         taken += 0.5 * (stage.end - stage.start) * float(weights @ np.array(powers))
         end = np.asarray(stage.state(stage.end))
@@ -239,3 +239,24 @@ def test_a_second_touch_shares_momentum_again() -> None:
     assert [s.mode for s in drop.stages].count(FREE) >= 2
     assert drop.stages[1].mode == LOADING
     assert drop.impulse > fall().impulse
+
+
+def test_a_guide_holds_what_has_come_to_rest() -> None:
+    """Critically damped it creeps to where weight and friction balance the soil, F_s = m g + F_c, and stays."""
+    drop = descend(Rig(speed=1.5, guide=300.0), -0.06, 1.3)
+    got = drop.channels(np.array([0.9, 1.2]))
+    assert drop.stages[-1].way == HELD
+    np.testing.assert_allclose(got[FORCE], 132.0 * 9.81 + 300.0, rtol=1e-6)
+    assert got[FORCE][0] == got[FORCE][1]
+    assert got[SPEED].tolist() == got[ACCELERATION].tolist() == [0.0, 0.0]
+
+
+def test_what_a_guide_holds_slides_when_more_pulls() -> None:
+    """Held with F_c upward against it, it slides down when a push that grows with time has reached 2 F_c."""
+    growing = 1000.0  # N/s
+    drop = descend(Rig(speed=1.5, guide=100.0, push=lambda t, x, v: growing * max(t - 1.0, 0.0)), -0.06, 1.5)
+    held = next(s for s in drop.stages if s.way == HELD and s.end > 1.0)
+    assert held.end == pytest.approx(1.2, abs=1e-5)
+    speed = drop.channels(np.array([1.199, 1.21]))[SPEED]
+    assert speed[0] == 0.0
+    assert speed[1] < 0.0
