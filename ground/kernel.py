@@ -166,7 +166,7 @@ def normal_force(law: Any, p: Any, s: Any, row: Any, z: float, v: float) -> floa
             # soil set moving takes its momentum, d(m_b1)/dt v
             f += growth(law, p, z) * p[law[EFFECTS] + GROWTH] * v * v
     else:
-        f = min(row[LINE_F] - row[LINE_K] * (row[LINE_Z] - z) + row[LINE_C] * v, row[LINE_F])
+        f = min(line_force(row, z, v), row[LINE_F])
         pull = p[law[EFFECTS] + ADHESION]
         if pull > 0.0 or p[law[EFFECTS] + CLINGS] != 0.0:
             gap = rut_depth(row) - z
@@ -175,6 +175,12 @@ def normal_force(law: Any, p: Any, s: Any, row: Any, z: float, v: float) -> floa
                 pull *= max(1.0 - gap / p[law[EFFECTS] + REACH], 0.0)
         f = max(f, 0.0 - pull)
     return f * row[AREA] / REFERENCE_AREA  # type: ignore[no-any-return]
+
+
+@inlined
+def line_force(row: Any, z: float, v: float) -> float:
+    """Force of the unloading line and its dashpot, N per reference area, before it is capped at either end."""
+    return row[LINE_F] - row[LINE_K] * (row[LINE_Z] - z) + row[LINE_C] * v  # type: ignore[no-any-return]
 
 
 @inlined

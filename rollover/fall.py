@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ground.compiled import compiled, leaf
+from ground.compiled import compiled, inlined, leaf
 from ground.kernel import (
     ADHESION,
     AREA,
@@ -20,6 +20,9 @@ from ground.kernel import (
     EFFECTS,
     GROWING,
     IDLE,
+    LINE_C,
+    LINE_F,
+    LINE_K,
     LINE_Z,
     LOADING,
     MASS_B,
@@ -30,6 +33,7 @@ from ground.kernel import (
     STATE_COLUMNS,
     UNLOADING,
     commit,
+    line_force,
     rut_depth,
 )
 from ground.law import REFERENCE_AREA
@@ -86,7 +90,8 @@ HALFWAY, LEAST = 0.5, 0.125  # of the time left until the motion turns, and of t
 FAINT, LONGEST = 0.02, 4.0  # of the speed of impact, below which a ringing admits longer steps; how many times as long
 SOFTLY = 0.5  # of the time in which a guide alone would stop what slides on it
 STILL = 1e-8  # m/s, and m/s2 over a millisecond: what is slower on its line of unloading stays where it is
-NOTHING, LEVEL, TURN, BEND = 0, 1, 2, 3  # what ends a step before its time
+OFF = 1e-6  # of the line's force: how near a step begins to where it is capped
+NOTHING, LEVEL, TURN, BEND, CAP = 0, 1, 2, 3, 4  # what ends a step before its time
 
 
 @leaf
@@ -144,14 +149,20 @@ def longest(law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, a: A
     return min(h, RESOLVED * math.sqrt((f[NOSE] + row[MASS_B]) / stiff))  # type: ignore[no-any-return]
 
 
+@inlined
+def line_rate(row: Any, v: float, a: float) -> float:
+    """How fast the force of the unloading line changes, N/s per reference area."""
+    return row[LINE_K] * v + row[LINE_C] * a  # type: ignore[no-any-return]
+
+
 @leaf
 def passed(
     law: Any, p: Any, s: Any, row: Any, state: Any, f: Any, y: Any, h: float, a: Any, end: Any, now: Any, stops: Any
 ) -> Any:
-    """What a step from y to `end` passes first: a level of the depth, its turn, a bend of the guide's friction.
+    """What a step from y to `end` passes first: a level of the depth, its turn, a bend of the guide's friction, a cap.
 
     Returns the share of the step, which of these, how far behind it a jump of the force ends (m), where it is (m, of a
-    bend m/s), and how near the step must end (m).
+    bend m/s, of a cap N per reference area), and how near the step must end (m).
     """
     share, what, jump, goal, slack = 1.0, NOTHING, 0.0, 0.0, 0.0
     for k in range(levels(law, p, s, row, state, f, stops)):
@@ -159,7 +170,8 @@ def passed(
         way = 1.0 if end[0] > y[0] else -1.0
         # up to a jump of the force, just past where contact begins or ends, to a kink
         near = level - way * CLOSE if k > 2 else level + way * PAST if k == 0 else level
-        if abs(y[0] - level) > 1.5 * CLOSE and (y[0] - near) * (end[0] - near) < 0.0:
+        begun = 2.0 * PAST if k == 0 else 1.5 * CLOSE  # where contact begins or ends none may be missed
+        if abs(y[0] - level) > begun and (y[0] - near) * (end[0] - near) < 0.0:
             theta = crossing(near, h, y[0], y[1], end[0], end[1])
             if theta < share:
                 share, what, jump, goal = theta, LEVEL, way * 2.0 * CLOSE if k > 2 else 0.0, near
@@ -169,6 +181,15 @@ def passed(
         theta = crossing(0.0, h, y[1], a[0, 0], end[1], now[0])
         if theta <= share:
             share, what, jump = theta, TURN, 0.0
+    if state[MODE] == UNLOADING and row[LINE_C] > 0.0:
+        before, after = line_force(row, y[0], y[1]), line_force(row, end[0], end[1])
+        for cap in (0.0, row[LINE_F]):
+            if abs(before - cap) > OFF * row[LINE_F] and (before - cap) * (after - cap) < 0.0:
+                accelerate(law, p, s, row, state, f, end, now)
+                begins, ends = line_rate(row, y[1], a[0, 0]), line_rate(row, end[1], now[0])
+                theta = crossing(cap, h, before, begins, after, ends)
+                if theta < share:
+                    share, what, jump, goal = theta, CAP, 0.0, cap
     if holds(f) and (abs(y[1]) < INCHING or abs(end[1]) < INCHING):
         accelerate(law, p, s, row, state, f, end, now)
         for side in (-INCHING, INCHING):
@@ -193,6 +214,10 @@ def ended(
         if what == BEND:
             accelerate(law, p, s, row, state, f, end, now)
             h = max(h - (end[1] - goal) / now[0], 1e-9 * f[STEP]) if now[0] != 0.0 else h
+        elif what == CAP:
+            accelerate(law, p, s, row, state, f, end, now)
+            rate = line_rate(row, end[1], now[0])
+            h = max(h - (line_force(row, end[0], end[1]) - goal) / rate, 1e-9 * f[STEP]) if rate != 0.0 else h
         else:
             miss = end[0] - goal
             if jump != 0.0:  # no stage may look beyond it

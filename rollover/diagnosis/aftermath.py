@@ -28,17 +28,8 @@ def shortened(e: Evidence, *, alone: bool = False) -> Evidence:
         return e
     n = int(np.searchsorted(time, end, side="right"))
     simulator = e.simulator.until(n)
-    kept = [(s, s.rows < n) for s in e.signals]
-    if simulator is None or any(inside.sum() < FEWEST for _, inside in kept):
+    kept = [s.rows < n for s in e.signals]
+    if simulator is None or any(inside.sum() < FEWEST for inside in kept):
         return e
-    signals = tuple(s.cut(inside) for s, inside in kept)
-    rows = np.concatenate([inside for _, inside in kept])
     recording = replace(e.recording, time=time[:n], channels={c: v[:n] for c, v in e.recording.channels.items()})
-    return replace(
-        e,
-        recording=recording,
-        simulator=simulator,
-        signals=signals,
-        strays=tuple(d[rows] for d in e.strays),
-        doubts=None if e.doubts is None else e.doubts[rows],
-    )
+    return replace(e.cut(kept), recording=recording, simulator=simulator)

@@ -87,6 +87,16 @@ class Evidence:
     doubtful: tuple[Mapping[str, Any], ...] = ()  # values exchanged for 1 sigma of each uncertain condition
     doubts: Array | None = None  # what that does to the stack, SI, (n, q)
 
+    def cut(self, inside: Sequence[NDArray[np.bool_]]) -> Evidence:
+        """The samples of each signal that are `inside` (n,) of it."""
+        rows = np.concatenate(list(inside))
+        return replace(
+            self,
+            signals=tuple(s.cut(those) for s, those in zip(self.signals, inside, strict=True)),
+            strays=tuple(d[rows] for d in self.strays),
+            doubts=None if self.doubts is None else self.doubts[rows],
+        )
+
     @cached_property
     def eased(self) -> Eased:
         """What takes the uncertain conditions, and zeros, out of a whitened misfit."""

@@ -17,10 +17,9 @@ from rollover.diagnosis.otherwise import from_there, shaped_too
 from rollover.diagnosis.refine import BEHIND, few_of, shifts_told
 from rollover.diagnosis.screening import is_far
 
-LEADING, FOLLOWING = 4, 2  # of the first effects, and of later ones each, that are tried two by two
-SCORED = 10  # so many more, by what they scored at first
-ROUNDS = 8  # of a short fit to few recordings
-WHOLE = 6  # of these that are fitted to all
+LEADING, FOLLOWING = 4, 4  # of the first effects, and of later ones each, that are tried two by two
+SCORED = 16  # so many more, by what they scored at first
+ROUNDS = ((3, 40), (8, 6))  # of a short fit to few recordings, and how many of these are gone on with
 ALIKE = 2.0  # times what the best of them leaves, up to which the shape of what rings may make another the best
 
 
@@ -37,12 +36,14 @@ def best_pair(inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate
     at, pinned = tuple(shifts[r] for r in few), is_far(judge, first.base)
     pairs = [(a, b) for a, b in itertools.combinations(partners, 2) if a[0].key != b[0].key]
     inquiry.say(f"{len(pairs)} pairs of effects")
-    jobs = [
-        Job(candidates=(a, b), start=(*x, *y), shifts=at, only=tuple(few), rounds=ROUNDS, pinned=pinned)
-        for (a, x), (b, y) in pairs
-    ]
-    short = sorted((f for f in inquiry.fits(jobs) if f is not None), key=lambda f: f.left)
-    jobs = [Job(candidates=f.candidates, start=f.x, shifts=shifts_told(shifts, f, few), width=1) for f in short[:WHOLE]]
+    short: Sequence[tuple[tuple[Candidate, ...], tuple[float, ...]]] = [((a, b), (*x, *y)) for (a, x), (b, y) in pairs]
+    for rounds, most in ROUNDS:
+        jobs = [
+            Job(candidates=both, start=x, shifts=at, only=tuple(few), rounds=rounds, pinned=pinned) for both, x in short
+        ]
+        met = sorted((f for f in inquiry.fits(jobs) if f is not None), key=lambda f: f.left)[:most]
+        short = [(f.candidates, f.x) for f in met]
+    jobs = [Job(candidates=f.candidates, start=f.x, shifts=shifts_told(shifts, f, few), width=1) for f in met]
     fits = [f for f in inquiry.fits(jobs) if f is not None]
     if not fits:
         return None
@@ -77,17 +78,16 @@ def _rings(pair: Fitted) -> bool:
 def _partners(
     inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate
 ) -> list[tuple[Candidate, tuple[float, ...]]]:
-    """Who may be one of two, and where its fit begins; what leads in another form also in its usual one."""
+    """Who may be one of two, and where its fit begins; what was bent to lead alone also in its usual shape."""
     leading = sorted((inquiry.judge.again(f) for f in first.rivals), key=lambda f: f.left)[:LEADING]
     later = [f for s in taken[1:] for f in sorted(s.rivals, key=lambda f: f.left)[:FOLLOWING]]
     found: dict[tuple[str, bool], tuple[Candidate, tuple[float, ...]]] = {}
     for f in (*leading, *later):
         last = f.candidates[-1]
         found.setdefault((last.key, last.is_bent), (last, f.own))
-    lead, known = leading[0].candidates[-1], {key for key, _ in found}
+    known, bent = {key for key, _ in found}, {key for key, is_bent in found if is_bent}
     ranked = sorted(first.screened, key=lambda s: -looked.scores.get(s.candidate.key, 0.0))
     for k, s in enumerate(ranked):
-        is_usual = s.candidate.key == lead.key and lead.is_bent
-        if is_usual or (k < SCORED and s.candidate.key not in known):
+        if s.candidate.key in bent or (k < SCORED and s.candidate.key not in known):
             found.setdefault((s.candidate.key, s.candidate.is_bent), (s.candidate, s.starts[0]))
     return list(found.values())

@@ -4,41 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeGuard
 
 import numpy as np
 
 from rollover.diagnosis.blocks import at_an_end, turned
 from rollover.diagnosis.candidates import Candidate, is_one_sensor
-from rollover.diagnosis.chaos import is_other
-from rollover.diagnosis.clocks import is_all_by_clocks
 from rollover.diagnosis.detect import Mismatch, mismatch_of
-from rollover.diagnosis.endings import MANY, followed, simpler
-from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Step, does, moves, step, weighed
+from rollover.diagnosis.endings import MANY, followed
+from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Step, moves
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.inquiry import Groups, Inquiry, Phases
-from rollover.diagnosis.lasting import NEEDED, astray, backed, begun_anew, lasting, unforgiven
-from rollover.diagnosis.looks import look, look_again
-from rollover.diagnosis.otherwise import tuned
+from rollover.diagnosis.lasting import NEEDED, unforgiven
+from rollover.diagnosis.one_by_one import as_conditioned, instead, is_better, one_by_one
 from rollover.diagnosis.pairs import best_pair
-from rollover.diagnosis.refine import conditioned, is_doubtful, timed, without
+from rollover.diagnosis.refine import without
 from rollover.diagnosis.remainder import NEGLIGIBLE, is_enough, is_tolerated, matters
 from rollover.diagnosis.straight import MOST, is_a_curve, is_any_curve, is_pliant
 from rollover.diagnosis.verdict import Verdict
+from rollover.diagnosis.way_down import down_first
 
-CHANCE = 0.005  # p-value of the best of all candidates that admits one
-PART = 0.25  # of what moves something, that a part of more must move
 SCATTERED = 0.05  # share of all errors that the look at candidates may make where runs scatter
 CERTAIN = 1.0 - 1e-12  # largest p-value whose logarithm is taken
 PARTLY = 0.005  # of the excess over the noise that one effect may leave, were it structured, and still be named
 LITTLE = 0.1  # of the excess over the noise, that effects must take which leave far more than noise
-HOPELESS = 2.0  # misfit over the noise that two effects leave and a third is not looked for
 HARDLY_MORE = 1.2  # times a tolerance, that an explanation leaves of held-out recordings
-SEVERAL = 2  # recordings on another course, after which they are not forgiven if a candidate scores beyond chance
-ABLE = 0.7  # of what there was beyond the noise, above which two leave so much that no exchange of one will end it
-BETTER = 0.5  # of what is left, that another first effect must leave
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,65 +71,16 @@ class Explanation:
 
 
 def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
-    """Forward selection of up to three effects, each beyond chance, then each tried without and against its rivals."""
-    judge, candidates, groups, phases = inquiry.judge, inquiry.candidates, inquiry.groups, inquiry.phases
-    count = sum(b.residual.size for b in base.blocks)
-    clocked = begun_anew if judge.effort.thrifty else timed
-    base = clocked(judge, base)  # what a clock leaves is no noise,
-    if weighed(judge, base, phases):
-        base = judge.again(base)
-    base = clocked(judge, base)  # and no effect's gain
-    before = mismatch_of(judge.evidence, base.blocks, phases)
-    base = astray(judge, base)
-    inquiry.say(f"looking at {len(candidates)} candidates, which of them could matter")
-    looked = first_look = look(judge, base, candidates, groups, looks=inquiry.crew.looks)
-    current, left = base, before
-    taken: list[Step] = []
-    first: Step | None = None
-    refuted = False
-    for _ in range(MOST):
-        if is_tolerated(judge, current):
-            break
-        if looked.p_value() > CHANCE and is_enough(judge, current, left):
-            break
-        if not taken and not judge.effort.thrifty and is_all_by_clocks(judge, base, inquiry.crew.looks):
-            break
-        tried = step(inquiry, current, looked)
-        first = first or tried
-        if not is_beyond_chance(tried, judge, phases):
-            break
-        found = upheld(inquiry, tried, looked)
-        if found is None and not taken:
-            found = in_full(inquiry, current)
-            first = found or first
-        if found is None:
-            refuted = not taken
-            break
-        found, left = as_conditioned(judge, *followed(inquiry, found), phases)
-        taken.append(found)
-        current = found.fitted
-        if not judge.straying:
-            current = astray(judge, current)
-            left = mismatch_of(judge.evidence, current.blocks, phases)
-        able = current.left - count < ABLE * (base.left - count)
-        if len(taken) == 2 and able and left.p_value < SURE and matters(judge, current, left):
-            # of two that are strong the first may have been taken for something else: is there a better one?
-            other = _instead(inquiry, current)
-            if other is not None and other.fitted.left < current.left:
-                other, beside = followed(inquiry, other.moved_to(tuned(inquiry, other.fitted)))
-                if is_better(other.fitted, beside, current):
-                    taken, left = [taken[1], other], beside
-                    current = other.fitted
-        if (len(taken) > 1 and current.left > HOPELESS**2 * count) or is_any_curve(current.candidates):
-            break
-        known = base if is_enough(judge, current, left) else None
-        looked = look_again(judge, current, known, inquiry.free(current), groups, first_look, inquiry.crew.looks)
-    if not judge.straying:
-        judge.straying, current = True, judge.again(current)
-        left = mismatch_of(judge.evidence, current.blocks, phases)
+    """Forward selection of up to three effects, each beyond chance, then each tried without and against its rivals.
+
+    Where that ends with less than all, the way down is explained first, and effects are tried two by two.
+    """
+    judge, groups, phases = inquiry.judge, inquiry.groups, inquiry.phases
+    found = down_first(inquiry, one_by_one(inquiry, base))
+    base, taken, left, current = found.base, list(found.steps), found.left, found.fitted
     is_whole = is_enough(judge, current, left)
-    if first is not None and not judge.effort.thrifty and (not is_whole or len(taken) == MOST):
-        both = _together(inquiry, first, taken, first_look)
+    if found.first is not None and not judge.effort.thrifty and (not is_whole or len(taken) == MOST):
+        both = _together(inquiry, found.first, taken, found.at_first)
         # two that leave what chance leaves are preferred to three that do
         if both is not None and (
             both[1].p_value > SURE if is_whole else is_better(both[0][-1].fitted, both[1], current)
@@ -156,91 +98,13 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
         base=base,
         fitted=current,
         parts=tuple(parts),
-        looked=first_look,
-        detectable={**first_look.detectable, **looked.detectable},
-        before=before,
+        looked=found.at_first,
+        detectable={**found.at_first.detectable, **found.looked.detectable},
+        before=found.before,
         after=mismatch_of(judge.evidence, current.blocks, phases),
-        first=first.again(judge).foretold(judge, groups) if first is not None else None,
-        refuted=refuted,
+        first=found.first.again(judge).foretold(judge, groups) if found.first is not None else None,
+        refuted=found.refuted,
     )
-
-
-def is_beyond_chance(found: Step | None, judge: Judge, phases: Phases) -> TypeGuard[Step]:
-    """Whether a step gains more than the best of all candidates does by chance, and moves something by it.
-
-    An effect that moves things itself is none to be left out because others can be bent to nearly all of it, nor is a
-    part of what is not negligible as a whole.
-    """
-    if found is None or found.p_value > CHANCE:
-        return False
-    moved = moves(judge, found.base, found.fitted)
-    if moved >= NEGLIGIBLE or moved < PART * NEGLIGIBLE or judge.effort.thrifty:
-        return moved >= NEGLIGIBLE
-    if found.base.candidates and does(judge, found.fitted) >= NEGLIGIBLE:
-        return True
-    left = mismatch_of(judge.evidence, found.base.blocks, phases)
-    return left.p_value < SURE and matters(judge, found.base, left)
-
-
-def upheld(inquiry: Inquiry, found: Step, looked: Gate) -> Step | None:
-    """A step as it is to be taken; None where runs scatter and its gain does not outlast that."""
-    judge = inquiry.judge
-    return lasting(judge, backed(found, looked), inquiry.groups) if judge.effort.thrifty else found
-
-
-def in_full(inquiry: Inquiry, current: Fitted) -> Step | None:
-    """A step with all samples counted in full where several recordings took another course; None if nothing lasts.
-
-    Chance could have sent them there, but so could what is missing; if nothing lasts they are forgiven again.
-    """
-    judge = inquiry.judge
-    if not judge.straying or sum(is_other(b.course) for b in current.blocks) < SEVERAL:
-        return None
-    judge.straying = False
-    base = judge.again(current)
-    looked = look(judge, base, inquiry.candidates, inquiry.groups)
-    tried = step(inquiry, base, looked)
-    found = upheld(inquiry, tried, looked) if is_beyond_chance(tried, judge, inquiry.phases) else None
-    judge.straying = found is None
-    return found
-
-
-def as_conditioned(judge: Judge, found: Step, left: Mismatch, phases: Phases) -> tuple[Step, Mismatch]:
-    """A step and what it leaves; with the errors of the conditions as they act beside it if that leaves chance alone.
-
-    Else these stay as they act on the scenario as it is: a wrong effect would bend them too.
-    """
-    if is_enough(judge, found.fitted, left) or not is_doubtful(judge):
-        return found, left
-    before = judge.evidence
-    new = conditioned(judge, found.fitted)
-    there = mismatch_of(judge.evidence, new.blocks, phases)
-    if is_enough(judge, new, there):
-        return found.moved_to(new), there
-    judge.weigh(before)
-    return found, left
-
-
-def _instead(inquiry: Inquiry, current: Fitted) -> Step | None:
-    """The first effect of an explanation taken out and looked for anew beside the rest: it comes back, or a better."""
-    judge = inquiry.judge
-    rest = without(judge, current, 0)
-    if rest is None:
-        return None
-    looked = look(judge, rest, inquiry.free(rest), inquiry.groups, looks=inquiry.crew.looks)
-    found = step(inquiry, rest, looked)
-    held = judge.again(turned(current))
-    if found is None or found.fitted.left > held.left + NEEDED:  # on the way back nothing came as far
-        rivals = () if found is None else found.rivals
-        beside = tuple(f for f in rivals if f.candidates[-1].key != held.candidates[-1].key)
-        back = Step(base=judge.again(rest), fitted=held, p_value=looked.p_value(), rivals=(held, *beside))
-        return simpler(inquiry, back) or back
-    return found
-
-
-def is_better(other: Fitted, left: Mismatch, current: Fitted) -> bool:
-    """Whether an explanation is to be taken instead of another: it leaves far less, or less and no more than chance."""
-    return other.left < current.left * (1.0 if left.p_value > SURE else BETTER)
 
 
 def _together(inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate) -> tuple[list[Step], Mismatch] | None:
@@ -252,7 +116,7 @@ def _together(inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate
     if not is_enough(inquiry.judge, found.fitted, left) and any(c.rings for c in found.fitted.candidates):
         # what its shape shows now did not show beside another one
         held = found.fitted if found.fitted.candidates[-1].rings else inquiry.judge.again(turned(found.fitted))
-        other = _instead(inquiry, held)
+        other = instead(inquiry, held)
         if other is not None and other.fitted.left < found.fitted.left:
             found, left = followed(inquiry, other)
     return [replace(first, fitted=found.base), found], left
@@ -275,7 +139,7 @@ def _needed(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step]:
         if whole and {c.key for c in current.candidates} == {c.key for c in last.fitted.candidates}:
             parts.append(last)  # found beside just these others
             break
-        found = _instead(inquiry, current)
+        found = instead(inquiry, current)
         if found is None:
             return [s.again(judge) for s in taken]
         current = without_needless(judge, found.fitted)

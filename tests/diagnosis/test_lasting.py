@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import lasting as believed
-from rollover.diagnosis import selection
+from rollover.diagnosis import one_by_one
 from rollover.diagnosis.blocks import Block, Fitted
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.chaos import Course
@@ -314,12 +314,12 @@ def test_two_on_another_course_are_looked_at_in_full_where_nothing_else_lasts(
         seen.append(judge.straying)
         return looked
 
-    monkeypatch.setattr(selection, "look", looks)
-    monkeypatch.setattr(selection, "step", lambda *_: made)
-    monkeypatch.setattr(selection, "lasting", lambda *_: made if lasts else None)
-    monkeypatch.setattr(selection, "moves", lambda *_: 1.0)
+    monkeypatch.setattr(one_by_one, "look", looks)
+    monkeypatch.setattr(one_by_one, "step", lambda *_: made)
+    monkeypatch.setattr(one_by_one, "lasting", lambda *_: made if lasts else None)
+    monkeypatch.setattr(one_by_one, "moves", lambda *_: 1.0)
     inquiry = Inquiry(judge=judge, candidates=[], groups=[], phases=[], say=lambda _: None, crew=cast(Any, None))
-    found = selection.in_full(inquiry, current)
+    found = one_by_one.in_full(inquiry, current)
     assert seen == [False] * (others - 1)
     assert (found is not None) == (others > 1 and lasts)
     assert judge.straying is (found is None)

@@ -66,6 +66,22 @@ def test_what_took_another_form_alone_is_tried_in_its_usual_one_beside_others() 
     ]
 
 
+def test_what_is_bent_and_does_not_lead_is_tried_in_its_usual_form_as_well() -> None:
+    """Damping with a layer is neither by itself: a layer from the top on leads, a proportional damping comes next."""
+    lead, bent = fitted((MASS,), 4.0), fitted((PROPORTION,), 6.0)
+    first = Step(
+        base=fitted((), 30.0), fitted=lead, p_value=0.0, rivals=(lead, bent),
+        screened=(screened(DAMPING), screened(MASS)),
+    )  # fmt: skip
+    looked = Gate(score=9.0, scores={"mass": 9.0}, null=np.zeros(9), detectable={})
+    found = pairs._partners(inquiry([]), first, (), looked)
+    assert [(c.id, c.form) for c, _ in found] == [
+        ("mass", {}),
+        ("soil-viscous-damping", {"damping": 0.0}),
+        ("soil-viscous-damping", {}),
+    ]
+
+
 def test_of_pairs_with_a_part_that_rings_all_are_fitted_with_its_share() -> None:
     """With a wrong share of the nose the wrong other effect may lead, as a mass before an impact speed."""
     asked: list[Any] = []

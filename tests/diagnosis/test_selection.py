@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis import explain, selection
+from rollover.diagnosis import explain, one_by_one, selection
 from rollover.diagnosis.blocks import Block
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.detect import Cell, Mismatch
@@ -18,7 +18,8 @@ from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.selection import MOST, Explanation, by_the_first, decided, is_better
+from rollover.diagnosis.one_by_one import is_better
+from rollover.diagnosis.selection import MOST, Explanation, by_the_first, decided
 from rollover.effects import Search
 
 IDS = ("soil-crust", "guide-friction", "mass")
@@ -214,15 +215,15 @@ def test_errors_of_conditions_beside_an_effect_count_where_they_leave_chance_alo
     weighed: list[str] = []
     found, again = step(1), step(2).fitted
     judge = cast(Judge, SimpleNamespace(evidence="as it is", weigh=weighed.append))
-    monkeypatch.setattr(selection, "is_doubtful", lambda _: True)
-    monkeypatch.setattr(selection, "is_enough", lambda _judge, _fit, what: what.p_value > 0.001)
-    monkeypatch.setattr(selection, "conditioned", lambda *_: again)
-    monkeypatch.setattr(selection, "mismatch_of", lambda *_: left(beside))
-    after, remaining = selection.as_conditioned(judge, found, left(1e-9), [])
+    monkeypatch.setattr(one_by_one, "is_doubtful", lambda _: True)
+    monkeypatch.setattr(one_by_one, "is_enough", lambda _judge, _fit, what: what.p_value > 0.001)
+    monkeypatch.setattr(one_by_one, "conditioned", lambda *_: again)
+    monkeypatch.setattr(one_by_one, "mismatch_of", lambda *_: left(beside))
+    after, remaining = one_by_one.as_conditioned(judge, found, left(1e-9), [])
     assert (after.fitted is again) == taken
     assert remaining.p_value == (beside if taken else 1e-9)
     assert weighed == ([] if taken else ["as it is"])
-    same, _ = selection.as_conditioned(judge, found, left(0.4), [])
+    same, _ = one_by_one.as_conditioned(judge, found, left(0.4), [])
     assert same is found, "nothing is left to be eased"
 
 
@@ -258,7 +259,7 @@ def test_beside_what_rings_in_tune_the_other_of_a_pair_is_looked_for_anew(
     monkeypatch.setattr(selection, "best_pair", lambda *_: found)
     monkeypatch.setattr(selection, "followed", lambda _, one: (one, left(p_value)))
     monkeypatch.setattr(selection, "is_enough", lambda _judge, _fit, what: what.p_value > 0.001)
-    monkeypatch.setattr(selection, "_instead", instead)
+    monkeypatch.setattr(selection, "instead", instead)
     both = selection._together(cast(Inquiry, SimpleNamespace(judge=judge)), found, [], cast(Gate, None))
     assert both is not None
     assert both[0][-1].fitted.candidates[-1].id == ("mass" if exchanged else "soil-layer")

@@ -1,0 +1,210 @@
+"""Effects one after another, each beside those before it, as long as they gain more than chance does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeGuard
+
+from rollover.diagnosis.blocks import turned
+from rollover.diagnosis.chaos import is_other
+from rollover.diagnosis.clocks import is_all_by_clocks
+from rollover.diagnosis.detect import Mismatch, mismatch_of
+from rollover.diagnosis.endings import followed, simpler
+from rollover.diagnosis.explain import SURE, Step, does, moves, step, weighed
+from rollover.diagnosis.fit import Fitted, Judge
+from rollover.diagnosis.gate import Gate
+from rollover.diagnosis.inquiry import Inquiry, Phases
+from rollover.diagnosis.lasting import NEEDED, astray, backed, begun_anew, lasting
+from rollover.diagnosis.looks import look, look_again
+from rollover.diagnosis.otherwise import tuned
+from rollover.diagnosis.refine import conditioned, is_doubtful, timed, without
+from rollover.diagnosis.remainder import NEGLIGIBLE, is_enough, is_tolerated, matters
+from rollover.diagnosis.straight import MOST, is_any_curve
+
+CHANCE = 0.005  # p-value of the best of all candidates that admits one
+PART = 0.25  # of what moves something, that a part of more must move
+HOPELESS = 2.0  # misfit over the noise that two effects leave and a third is not looked for
+SEVERAL = 2  # recordings on another course, after which they are not forgiven if a candidate scores beyond chance
+ABLE = 0.7  # of what there was beyond the noise, above which two leave so much that no exchange of one will end it
+BETTER = 0.5  # of what is left, that another first effect must leave
+
+
+@dataclass(frozen=True, kw_only=True)
+class Taken:
+    """The base, the steps taken beside it, the fit with all of them (the base itself if none), and what it leaves.
+
+    `first` is the first step, taken or not; `at_first` what all candidates scored beside the base, `looked` beside the
+    last fit; `refuted` whether the best candidate's gain did not outlast the scatter of its own runs.
+    """
+
+    base: Fitted
+    steps: tuple[Step, ...]
+    fitted: Fitted
+    before: Mismatch
+    left: Mismatch
+    first: Step | None
+    at_first: Gate
+    looked: Gate
+    refuted: bool = False
+
+    @property
+    def count(self) -> int:
+        """Number of samples."""
+        return sum(b.residual.size for b in self.base.blocks)
+
+
+def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()) -> Taken:
+    """Up to three effects, one after another beside the base; it goes on from the steps `begun`, if any."""
+    judge, candidates, groups, phases = inquiry.judge, inquiry.candidates, inquiry.groups, inquiry.phases
+    count = sum(b.residual.size for b in base.blocks)
+    clocked = begun_anew if judge.effort.thrifty else timed
+    base = clocked(judge, base)  # what a clock leaves is no noise,
+    if weighed(judge, base, phases):
+        base = judge.again(base)
+    base = clocked(judge, base)  # and no effect's gain
+    before = mismatch_of(judge.evidence, base.blocks, phases)
+    base = astray(judge, base)
+    inquiry.say(f"looking at {len(candidates)} candidates, which of them could matter")
+    looked = first_look = look(judge, base, candidates, groups, looks=inquiry.crew.looks)
+
+    def beside(fitted: Fitted, left: Mismatch) -> Gate:
+        known = base if is_enough(judge, fitted, left) else None
+        return look_again(judge, fitted, known, inquiry.free(fitted), groups, first_look, inquiry.crew.looks)
+
+    current, left = base, before
+    taken = list(begun)
+    first = taken[0] if taken else None
+    if taken:
+        current = taken[-1].fitted
+        left = mismatch_of(judge.evidence, current.blocks, phases)
+        looked = beside(current, left)
+    refuted = False
+    for _ in range(MOST - len(begun)):
+        if is_tolerated(judge, current):
+            break
+        if looked.p_value() > CHANCE and is_enough(judge, current, left):
+            break
+        if not taken and not judge.effort.thrifty and is_all_by_clocks(judge, base, inquiry.crew.looks):
+            break
+        tried = step(inquiry, current, looked)
+        first = first or tried
+        if not is_beyond_chance(tried, judge, phases):
+            break
+        found = upheld(inquiry, tried, looked)
+        if found is None and not taken:
+            found = in_full(inquiry, current)
+            first = found or first
+        if found is None:
+            refuted = not taken
+            break
+        found, left = as_conditioned(judge, *followed(inquiry, found), phases)
+        taken.append(found)
+        current = found.fitted
+        if not judge.straying:
+            current = astray(judge, current)
+            left = mismatch_of(judge.evidence, current.blocks, phases)
+        able = current.left - count < ABLE * (base.left - count)
+        if len(taken) == 2 and able and left.p_value < SURE and matters(judge, current, left):
+            # of two that are strong the first may have been taken for something else: is there a better one?
+            other = instead(inquiry, current)
+            if other is not None and other.fitted.left < current.left:
+                other, there = followed(inquiry, other.moved_to(tuned(inquiry, other.fitted)))
+                if is_better(other.fitted, there, current):
+                    taken, left = [taken[1], other], there
+                    current = other.fitted
+        if (len(taken) > 1 and current.left > HOPELESS**2 * count) or is_any_curve(current.candidates):
+            break
+        looked = beside(current, left)
+    if not judge.straying:
+        judge.straying, current = True, judge.again(current)
+        left = mismatch_of(judge.evidence, current.blocks, phases)
+    return Taken(
+        base=base,
+        steps=tuple(taken),
+        fitted=current,
+        before=before,
+        left=left,
+        first=first,
+        at_first=first_look,
+        looked=looked,
+        refuted=refuted,
+    )
+
+
+def is_beyond_chance(found: Step | None, judge: Judge, phases: Phases) -> TypeGuard[Step]:
+    """Whether a step gains more than the best of all candidates does by chance, and moves something by it.
+
+    An effect that moves things itself is none to be left out because others can be bent to nearly all of it, nor is a
+    part of what is not negligible as a whole.
+    """
+    if found is None or found.p_value > CHANCE:
+        return False
+    moved = moves(judge, found.base, found.fitted)
+    if moved >= NEGLIGIBLE or moved < PART * NEGLIGIBLE or judge.effort.thrifty:
+        return moved >= NEGLIGIBLE
+    if found.base.candidates and does(judge, found.fitted) >= NEGLIGIBLE:
+        return True
+    left = mismatch_of(judge.evidence, found.base.blocks, phases)
+    return left.p_value < SURE and matters(judge, found.base, left)
+
+
+def upheld(inquiry: Inquiry, found: Step, looked: Gate) -> Step | None:
+    """A step as it is to be taken; None where runs scatter and its gain does not outlast that."""
+    judge = inquiry.judge
+    return lasting(judge, backed(found, looked), inquiry.groups) if judge.effort.thrifty else found
+
+
+def in_full(inquiry: Inquiry, current: Fitted) -> Step | None:
+    """A step with all samples counted in full where several recordings took another course; None if nothing lasts.
+
+    Chance could have sent them there, but so could what is missing; if nothing lasts they are forgiven again.
+    """
+    judge = inquiry.judge
+    if not judge.straying or sum(is_other(b.course) for b in current.blocks) < SEVERAL:
+        return None
+    judge.straying = False
+    base = judge.again(current)
+    looked = look(judge, base, inquiry.candidates, inquiry.groups)
+    tried = step(inquiry, base, looked)
+    found = upheld(inquiry, tried, looked) if is_beyond_chance(tried, judge, inquiry.phases) else None
+    judge.straying = found is None
+    return found
+
+
+def as_conditioned(judge: Judge, found: Step, left: Mismatch, phases: Phases) -> tuple[Step, Mismatch]:
+    """A step and what it leaves; with the errors of the conditions as they act beside it if that leaves chance alone.
+
+    Else these stay as they act on the scenario as it is: a wrong effect would bend them too.
+    """
+    if is_enough(judge, found.fitted, left) or not is_doubtful(judge):
+        return found, left
+    before = judge.evidence
+    new = conditioned(judge, found.fitted)
+    there = mismatch_of(judge.evidence, new.blocks, phases)
+    if is_enough(judge, new, there):
+        return found.moved_to(new), there
+    judge.weigh(before)
+    return found, left
+
+
+def instead(inquiry: Inquiry, current: Fitted) -> Step | None:
+    """The first effect of an explanation taken out and looked for anew beside the rest: it comes back, or a better."""
+    judge = inquiry.judge
+    rest = without(judge, current, 0)
+    if rest is None:
+        return None
+    looked = look(judge, rest, inquiry.free(rest), inquiry.groups, looks=inquiry.crew.looks)
+    found = step(inquiry, rest, looked)
+    held = judge.again(turned(current))
+    if found is None or found.fitted.left > held.left + NEEDED:  # on the way back nothing came as far
+        rivals = () if found is None else found.rivals
+        beside = tuple(f for f in rivals if f.candidates[-1].key != held.candidates[-1].key)
+        back = Step(base=judge.again(rest), fitted=held, p_value=looked.p_value(), rivals=(held, *beside))
+        return simpler(inquiry, back) or back
+    return found
+
+
+def is_better(other: Fitted, left: Mismatch, current: Fitted) -> bool:
+    """Whether an explanation is to be taken instead of another: it leaves far less, or less and no more than chance."""
+    return other.left < current.left * (1.0 if left.p_value > SURE else BETTER)

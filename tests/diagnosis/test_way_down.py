@@ -1,0 +1,124 @@
+"""What explains the way down alone, as a beginning where much is missing on the way back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis import way_down
+from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.crew import Crew
+from rollover.diagnosis.detect import Mismatch
+from rollover.diagnosis.diagnose import _evidence, diagnose
+from rollover.diagnosis.effort import DROPS
+from rollover.diagnosis.explain import Step
+from rollover.diagnosis.fit import Fitted
+from rollover.diagnosis.inquiry import Inquiry
+from rollover.diagnosis.one_by_one import Taken
+from rollover.diagnosis.phases import drop_phases
+from rollover.effects import Search
+from rollover.proof.descent import descend
+from rollover.proof.rig import Rig
+from rollover.recording import Recording
+from rollover.scenario import load
+from tests.diagnosis.drops import linear_blocks
+
+SPEEDS = (1.3, 1.8, 2.4, 3.0)
+NOISE = {"ground/force_normal": 40.0, "ground/sinkage": 2e-3, "striker/acceleration_z": 0.4}
+LAYER = Candidate(id="soil-layer", kind="physics", family="", search={"depth": Search(0, 1)})
+MASS = Candidate(id="mass", kind="parameter", family="", search={"added": Search(0, 1)})
+REBOUND = Candidate(id="soil-elastic-rebound", kind="physics", family="", search={"recovery": Search(0, 1)})
+
+
+def recordings(rig: dict[str, float]) -> list[tuple[str, Recording]]:
+    rng, times = np.random.default_rng(9), np.arange(-0.05, 0.7, 1e-3)
+    found = []
+    for k, speed in enumerate(SPEEDS):
+        made = descend(Rig(speed=speed, **rig), -0.1, 0.8).channels(times)
+        channels = {c: made[c] + size * rng.standard_normal(times.size) for c, size in NOISE.items()}
+        name = f"r{k + 1}"
+        found.append(
+            (name, Recording(title=name, time=times, channels=channels, conditions={"initiation.speed": speed}))
+        )
+    return found
+
+
+def test_a_layer_under_ground_that_springs_back() -> None:
+    """Neither meets a bouncing striker by itself; a mass that moves along, as heavy as may be, led, and nothing did."""
+    true = {"depth": 0.0646, "stiffness_ratio": 2.72, "recovery": 0.105, "damping_ratio": 0.06}
+    rig = {"layer_depth": 0.0646, "layer_ratio": 2.72, "recovery": 0.105, "unloading_ratio": 0.06}
+    found = diagnose(load("drop_test"), recordings(rig))
+    assert {e.id for e in found.effects} == {"soil-layer", "soil-elastic-rebound"}
+    told = {p: v.value for e in found.effects for p, v in e.parameters.items()}
+    assert told == pytest.approx(true, rel=0.02)
+
+
+def fit(candidates: tuple[Candidate, ...], left: float) -> Fitted:
+    block = linear_blocks(np.random.default_rng(4), 1, 40, np.zeros(1))[0]
+    residual = np.full(block.residual.size, np.sqrt(left / block.residual.size))
+    return Fitted(candidates=candidates, x=(0.5,) * len(candidates), blocks=(replace(block, residual=residual),))
+
+
+def taken(base: Fitted, found: Fitted) -> Taken:
+    step = Step(base=base, fitted=found, p_value=0.0, rivals=(found,))
+    left = Mismatch(p_value=0.0, cells=(), adjusted=())
+    return Taken(
+        base=base, steps=(step,) if found.candidates else (), fitted=found, before=left, left=left, first=step,
+        at_first=cast(Any, None), looked=cast(Any, None),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("above", "over_all", "better"),
+    [
+        (40.0, 90.0, True),  # the layer explains the way down, and with the rebound all of it
+        (80.0, 90.0, False),  # it does not explain the way down
+        (40.0, 9_900.0, False),  # it explains the way down, and hardly less is left over all
+    ],
+)
+def test_what_explains_the_way_down_is_a_beginning_if_it_leads_to_far_less(
+    above: float, over_all: float, better: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    base, asked = fit((), 40_000.0), []
+    before, there = taken(base, fit((MASS,), 10_000.0)), taken(base, fit((LAYER, REBOUND), over_all))
+
+    def one_by_one(asking: Inquiry, bare: Fitted, begun: Any = ()) -> Taken:
+        asked.append([s.fitted.candidates[-1].id for s in begun])
+        return there if begun else taken(bare, fit((LAYER,), above))
+
+    weighed: list[Any] = []
+    judge = SimpleNamespace(evidence=["whole"], effort=DROPS, simulations=3, weigh=weighed.append)
+    early = SimpleNamespace(evidence=["cut"], fit=lambda *_: fit((), 900.0), simulations=4)
+    monkeypatch.setattr(way_down, "_cut", lambda *_: "cut")
+    monkeypatch.setattr(way_down, "Judge", lambda _: early)
+    monkeypatch.setattr(way_down, "align", lambda _: None)
+    monkeypatch.setattr(way_down, "one_by_one", one_by_one)
+    whole = Inquiry(
+        judge=cast(Any, judge), candidates=(), groups=[], phases=[()], say=lambda _: None,
+        crew=cast(Any, SimpleNamespace(fits=lambda _judge, jobs, _say: [fit(j.candidates, 5_000.0) for j in jobs])),
+    )  # fmt: skip
+    found = way_down.down_first(whole, before)
+    assert found is (there if better else before)
+    assert asked == [[], ["soil-layer"]][: 2 if above < 60.0 else 1]
+    assert judge.simulations == 7
+    assert weighed == ([["whole"]] if over_all > 900.0 else []), "as it was before a way that led nowhere"
+    little = taken(base, fit((MASS,), 60.0))
+    assert way_down.down_first(whole, little) is little
+
+
+def test_the_way_down_ends_before_the_deepest_point() -> None:
+    evidence, _ = _evidence(load("drop_test"), recordings({}), Crew())
+    phases = drop_phases(evidence[0])
+    cut = way_down._cut(evidence[0], phases)
+    assert cut is not None
+    deepest = descend(Rig(speed=SPEEDS[0]), -0.1, 0.8).deepest()[0]
+    for before, after in zip(evidence[0].signals, cut.signals, strict=True):
+        last = evidence[0].recording.time[after.rows[-1]]
+        assert 0.8 * deepest < last < deepest
+        np.testing.assert_array_equal(before.values[: after.rows.size], after.values)
+    assert way_down._cut(evidence[0], ((-0.05, "approach"),)) is None
+    assert way_down._cut(evidence[0], ((-0.05, "free-fall"), (-0.045, "peak"))) is None, "five samples"
