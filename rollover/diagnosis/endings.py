@@ -53,18 +53,23 @@ def simpler(inquiry: Inquiry, found: Step) -> Step | None:
     One that its own becomes at an end of its range, as a layer from the surface on is a stiffness; or any where one of
     its own tells nothing, as it stands at such an end. What has fewer numbers is begun beside what stands beside it.
     """
-    best, shared = found.fitted, found.fitted.x[: len(found.base.x)]
+    best, beside, shared = found.fitted, *_shared(found.fitted)
     begun = list(_become(inquiry, best))
     if is_at_an_end(best):
         able = sorted(found.rivals, key=lambda f: f.left)
-        able = [f for f in able if len(f.x) < len(best.x) and f.left < found.base.left][:SIMPLER]
-        begun += [(f.candidates, f.own) for f in able]
+        able = [f for f in able if len(f.own) < len(best.own) and f.left < found.base.left][:SIMPLER]
+        begun += [((*beside, f.candidates[-1]), f.own) for f in able]
     shifts = tuple(b.shift for b in best.blocks)
     jobs = [Job(candidates=candidates, start=(*shared, *own), shifts=shifts, width=1) for candidates, own in begun]
     one = min((f for f in inquiry.fits(jobs) if f is not None), key=lambda f: f.left, default=None)
     if one is None or not _is_as_good(one, best):
         return None
     return _led_by(one, found)
+
+
+def _shared(fitted: Fitted) -> tuple[tuple[Candidate, ...], tuple[float, ...]]:
+    """What a fit holds beside its last effect, in the forms that it has there, and where that stands."""
+    return fitted.candidates[:-1], tuple(fitted.x[: len(fitted.x) - len(fitted.own)])
 
 
 def _become(inquiry: Inquiry, best: Fitted) -> Iterator[tuple[tuple[Candidate, ...], tuple[float, ...]]]:
@@ -80,14 +85,15 @@ def _become(inquiry: Inquiry, best: Fitted) -> Iterator[tuple[tuple[Candidate, .
 
 def _with_rivals(judge: Judge, found: Step) -> Step:
     """A step with its nearest rivals begun anew beside what they share with its best, which was followed alone."""
-    best, shared = found.fitted, len(found.base.x)
-    if shared == 0:
+    best, beside, shared = found.fitted, *_shared(found.fitted)
+    if not beside:
         return found
     shifts, near = [b.shift for b in best.blocks], sorted(found.rivals, key=lambda f: f.left)[:BESIDE]
     rivals = []
     for f in found.rivals:
         begun = f is not best and any(f is one for one in near)
-        again = judge.fit(f.candidates, (*best.x[:shared], *f.x[shared:]), shifts=shifts, width=1) if begun else None
+        both = (*beside, f.candidates[-1])
+        again = judge.fit(both, (*shared, *f.own), shifts=shifts, width=1) if begun else None
         rivals.append(again if again is not None and again.left < f.left else f)
     return replace(found, rivals=tuple(rivals))
 

@@ -24,7 +24,9 @@ from rollover.diagnosis.straight import MOST, is_any_curve
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
 PART = 0.25  # of what moves something, that a part of more must move
-HOPELESS = 2.0  # misfit over the noise that two effects leave and a third is not looked for
+# misfit over the noise that two effects leave and a third is not looked for, and the share of what was beyond the
+# noise that is little all the same
+HOPELESS, HARDLY_ANY = 2.0, 0.01
 SEVERAL = 2  # recordings on another course, after which they are not forgiven if a candidate scores beyond chance
 ABLE = 0.7  # of what there was beyond the noise, above which two leave so much that no exchange of one will end it
 BETTER = 0.5  # of what is left, that another first effect must leave
@@ -113,7 +115,8 @@ def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()) -> Ta
                 if is_better(other.fitted, there, current):
                     taken, left = [taken[1], other], there
                     current = other.fitted
-        if (len(taken) > 1 and current.left > HOPELESS**2 * count) or is_any_curve(current.candidates):
+        is_far = current.left > HOPELESS**2 * count and current.left - count > HARDLY_ANY * (base.left - count)
+        if (len(taken) > 1 and is_far) or is_any_curve(current.candidates):
             break
         looked = beside(current, left)
     if not judge.straying:

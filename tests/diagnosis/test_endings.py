@@ -53,6 +53,27 @@ def test_rivals_are_begun_anew_beside_what_the_best_was_followed_to() -> None:
     assert [f.left for f in after.rivals] == [1.0, 4.0]
 
 
+def test_rivals_are_begun_anew_beside_what_the_best_holds_in_the_form_that_it_has_there() -> None:
+    """A damping that stood in two numbers beside its rivals was straightened beside the best."""
+    asked: list[tuple[int, tuple[float, ...]]] = []
+
+    def fit(candidates: tuple[Candidate, ...], x: tuple[float, ...], **_: Any) -> Fitted:
+        asked.append((sum(len(c.search) for c in candidates), x))
+        return fitted(candidates[-1].id, 4.0, x)
+
+    def fits(jobs: Sequence[Job]) -> list[Fitted | None]:
+        return [fit(job.candidates, job.start) for job in jobs]
+
+    best, rival = fitted("soil-layer", 1.0, (0.7, 0.0, 0.3)), fitted("guide-friction", 9.0, (0.2, 0.4))
+    bent = replace(rival.candidates[0], search={"a": Search(0, 1), "b": Search(0, 1)})
+    stood = replace(rival, candidates=(bent, rival.candidates[1]), x=(0.2, 0.5, 0.4))
+    found = step(best, stood)
+    found = replace(found, base=replace(found.base, candidates=(bent,), x=(0.2, 0.5)))
+    endings._with_rivals(cast(Judge, SimpleNamespace(fit=fit)), found)
+    endings.simpler(cast(Inquiry, SimpleNamespace(fits=fits, candidates=[])), found)
+    assert asked == [(2, (0.7, 0.4)), (2, (0.7, 0.4))]
+
+
 @pytest.mark.parametrize(
     ("depth", "leaves", "taken"), [(0.0, 5.0, True), (0.0, 12.0, True), (0.0, 20.0, False), (0.5, 5.0, False)]
 )
