@@ -14,6 +14,7 @@ from rollover.diagnosis.verdict import Place
 Array = NDArray[np.float64]
 FIRST_CONTACT = 0.005  # s, after the impact
 AROUND_PEAK = 0.10  # of the time to the deepest point, either side
+PEAK = "peak"  # the phase about the deepest point
 SETTLING = 0.06  # s after the deepest point until what is left is rest
 
 
@@ -47,7 +48,7 @@ def drop_phases(evidence: Evidence) -> tuple[tuple[float, str], ...]:
         (start, "free-fall"),
         (0.0, "first-contact"),
         (FIRST_CONTACT, "loading"),
-        ((1.0 - AROUND_PEAK) * deepest, "peak"),
+        ((1.0 - AROUND_PEAK) * deepest, PEAK),
         ((1.0 + AROUND_PEAK) * deepest, "unloading"),
         (deepest + SETTLING, "rest"),
     ]

@@ -1,7 +1,8 @@
 """The way down first: what acts only behind the deepest point is no reason for what is seen before it.
 
 Where much is missing on the way back, as of ground that springs, no effect of the way down meets a recording well, and
-one that meets neither may lead. Up to the deepest point it is out of sight.
+one that meets neither may lead. Up to the deepest point it is out of sight. What bounces comes down again at other
+times with another spring, and fits to several such blows end at the wrong ones: the first rise comes before them.
 """
 
 from __future__ import annotations
@@ -16,10 +17,11 @@ from rollover.diagnosis.explain import NEARLY_NOISE, Step
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.one_by_one import HOPELESS, Taken, is_better, one_by_one
+from rollover.diagnosis.phases import AROUND_PEAK, PEAK
 
 FEWEST = 8  # samples of a signal on the way down
 RIVALS = 5  # that are held against the best over the whole way
-NEARLY_DOWN = "peak"  # phase that begins a little before the deepest point
+ENDS = (1.0 - AROUND_PEAK, 2.0)  # of the time to the deepest point: before it, and before what bounces comes down again
 
 
 def down_first(inquiry: Inquiry, found: Taken) -> Taken:
@@ -27,31 +29,43 @@ def down_first(inquiry: Inquiry, found: Taken) -> Taken:
     judge, base = inquiry.judge, found.base
     if judge.effort.thrifty or found.fitted.left < HOPELESS**2 * found.count:
         return found
-    some = [_cut(e, phases) for e, phases in zip(judge.evidence, inquiry.phases, strict=True)]
-    early = Judge([e for e in some if e is not None])
-    if len(early.evidence) < len(some):
+    steps: Sequence[Step] = ()
+    for end in ENDS:
+        above = _until(inquiry, end, steps)
+        if above is None or not above.steps or above.fitted.left > NEARLY_NOISE**2 * above.count:
+            break
+        steps = above.steps
+    begun, held = _over_all(inquiry, base, steps), judge.evidence
+    if not begun:
         return found
-    inquiry.say("the way down first")
-    align(early)
-    bare = early.fit((), ())
-    above = one_by_one(replace(inquiry, judge=early), bare) if bare is not None else None
-    judge.simulations += early.simulations
-    if above is None or not above.steps or above.fitted.left > NEARLY_NOISE**2 * above.count:
-        return found
-    begun, held = _over_all(inquiry, base, above.steps), judge.evidence
-    other = one_by_one(inquiry, base, begun) if begun else None
-    if other is not None and is_better(other.fitted, other.left, found.fitted):
+    other = one_by_one(inquiry, base, begun)
+    if is_better(other.fitted, other.left, found.fitted):
         return other
     judge.weigh(held)
     return found
 
 
-def _cut(e: Evidence, phases: Sequence[tuple[float, str]]) -> Evidence | None:
-    """What was recorded before the deepest point was near; None where a signal has too little of it."""
-    ends = [start for start, name in phases if name == NEARLY_DOWN]
-    if not ends:
+def _until(inquiry: Inquiry, end: float, steps: Sequence[Step]) -> Taken | None:
+    """What explains recordings up to an end, of the time to the deepest point, going on from steps; None if nothing."""
+    some = [_cut(e, phases, end) for e, phases in zip(inquiry.judge.evidence, inquiry.phases, strict=True)]
+    early = Judge([e for e in some if e is not None])
+    if len(early.evidence) < len(some):
         return None
-    kept = [e.recording.time[s.rows] < ends[0] for s in e.signals]
+    inquiry.say(f"up to {end:g} of the way down first")
+    align(early)
+    bare, above = early.fit((), ()), replace(inquiry, judge=early)
+    found = one_by_one(above, bare, _over_all(above, bare, steps)) if bare is not None else None
+    inquiry.judge.simulations += early.simulations
+    return found
+
+
+def _cut(e: Evidence, phases: Sequence[tuple[float, str]], end: float) -> Evidence | None:
+    """What was recorded before an end; None where a signal has too little of it."""
+    peaks = [start for start, name in phases if name == PEAK]
+    if not peaks:
+        return None
+    until = end * peaks[0] / (1.0 - AROUND_PEAK)
+    kept = [e.recording.time[s.rows] < until for s in e.signals]
     if any(inside.sum() < FEWEST for inside in kept):
         return None
     return e.cut(kept)

@@ -88,7 +88,8 @@ def test_what_explains_the_way_down_is_a_beginning_if_it_leads_to_far_less(
 
     def one_by_one(asking: Inquiry, bare: Fitted, begun: Any = ()) -> Taken:
         asked.append([s.fitted.candidates[-1].id for s in begun])
-        return there if begun else taken(bare, fit((LAYER,), above))
+        whole = asking.judge.evidence == ["whole"]
+        return there if whole else taken(bare, fit((LAYER, REBOUND) if begun else (LAYER,), above))
 
     weighed: list[Any] = []
     judge = SimpleNamespace(evidence=["whole"], effort=DROPS, simulations=3, weigh=weighed.append)
@@ -103,8 +104,9 @@ def test_what_explains_the_way_down_is_a_beginning_if_it_leads_to_far_less(
     )  # fmt: skip
     found = way_down.down_first(whole, before)
     assert found is (there if better else before)
-    assert asked == [[], ["soil-layer"]][: 2 if above < 60.0 else 1]
-    assert judge.simulations == 7
+    ways = [[], ["soil-layer"], ["soil-elastic-rebound"]]
+    assert asked == ways[: 3 if above < 60.0 else 1], "the way down, the first rise, the whole"
+    assert judge.simulations == (11 if above < 60.0 else 7)
     assert weighed == ([["whole"]] if over_all > 900.0 else []), "as it was before a way that led nowhere"
     little = taken(base, fit((MASS,), 60.0))
     assert way_down.down_first(whole, little) is little
@@ -113,12 +115,12 @@ def test_what_explains_the_way_down_is_a_beginning_if_it_leads_to_far_less(
 def test_the_way_down_ends_before_the_deepest_point() -> None:
     evidence, _ = _evidence(load("drop_test"), recordings({}), Crew())
     phases = drop_phases(evidence[0])
-    cut = way_down._cut(evidence[0], phases)
+    cut = way_down._cut(evidence[0], phases, 0.9)
     assert cut is not None
     deepest = descend(Rig(speed=SPEEDS[0]), -0.1, 0.8).deepest()[0]
     for before, after in zip(evidence[0].signals, cut.signals, strict=True):
         last = evidence[0].recording.time[after.rows[-1]]
         assert 0.8 * deepest < last < deepest
         np.testing.assert_array_equal(before.values[: after.rows.size], after.values)
-    assert way_down._cut(evidence[0], ((-0.05, "approach"),)) is None
-    assert way_down._cut(evidence[0], ((-0.05, "free-fall"), (-0.045, "peak"))) is None, "five samples"
+    assert way_down._cut(evidence[0], ((-0.05, "approach"),), 0.9) is None
+    assert way_down._cut(evidence[0], ((-0.05, "free-fall"), (-0.045, "peak")), 0.9) is None, "five samples"
