@@ -77,9 +77,9 @@ def _become(inquiry: Inquiry, best: Fitted) -> Iterator[tuple[tuple[Candidate, .
     *others, last = best.candidates
     values, kinds = last.values(best.own), EFFECTS[last.id].becomes
     for c in inquiry.candidates:
-        names = kinds.get(c.id, {})
-        if all(names.get(p) in values for p in c.search) and c.key not in {o.key for o in others}:
-            at = (coordinate(values[names[p]], search) for p, search in c.search.items())
+        there = {p: values[own] * times for p, (own, times) in kinds.get(c.id, {}).items() if own in values}
+        if there.keys() >= c.search.keys() and c.key not in {o.key for o in others}:
+            at = (coordinate(there[p], search) for p, search in c.search.items())
             yield (*others, c), tuple(min(max(v, 0.0), 1.0) for v in at)
 
 

@@ -79,8 +79,9 @@ class Effect:
     ] = {}  # parameter -> places in its range, near which alone it tells
     is_abrupt: ClassVar[bool] = False  # it rings, or turns from one instant to the next: drops take shorter steps
     is_sudden: ClassVar[bool] = False  # its least strength does something already: slopes there lead nowhere
-    # an effect of fewer numbers that it becomes at an end of its range -> which of its own numbers that one's are
-    becomes: ClassVar[Mapping[str, Mapping[str, str]]] = {}
+    # an effect of fewer numbers that it becomes at an end of its range -> which of its own numbers that one's are, and
+    # how many times as large
+    becomes: ClassVar[Mapping[str, Mapping[str, tuple[str, float]]]] = {}
     # parameter -> powers of mass and of face with which its range grows, from a striker of 132 kg on the reference face
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {}
 

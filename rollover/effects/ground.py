@@ -20,6 +20,7 @@ FORCE = ("ground/force_normal", "striker/acceleration_z")
 SPEED = "a resistance of the ground that grows with speed"
 DEPTH = "a resistance of the ground that changes with depth"
 CLINGS = "1: soil that moves along stays on the face that lifts off, and is not hit anew; 0: it stays behind"
+USUAL_DENSITY = 1800.0  # kg/m3
 POWERS = Search(2e-3, 0.5, "log")
 BY_POWER = "The ground is stronger by the power {power} of the speed over {reference_speed}."
 
@@ -62,6 +63,9 @@ class SoilViscousDamping(Effect):
         ),
     )
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {"damping": (1.0, -1.0)}
+    becomes: ClassVar[Mapping[str, Mapping[str, tuple[str, float]]]] = {
+        "soil-inertial-drag": {"coefficient": ("damping", 2.0 / (USUAL_DENSITY * REFERENCE_AREA))}  # at zeta 2
+    }
 
     def places(self) -> Mapping[int, float]:
         """D and zeta, J."""
@@ -134,7 +138,7 @@ class SoilInertialDrag(Effect):
     """F += 1/2 C rho A v^2 while the ground is pushed deeper: soil thrown aside (Poncelet)."""
 
     coefficient: Annotated[float, Quantity("1", "C", least=0)] = 2.0
-    density: Annotated[float, Quantity("kg/m3", "rho of the soil", above=0)] = 1800.0
+    density: Annotated[float, Quantity("kg/m3", "rho of the soil", above=0)] = USUAL_DENSITY
 
     id = "soil-inertial-drag"
     family = SPEED
@@ -302,7 +306,9 @@ class SoilLayer(Effect):
         "width": Search(1e-3, 0.1, "log"),
     }
     shapes = ("width",)
-    becomes: ClassVar[Mapping[str, Mapping[str, str]]] = {"soil-stiffness": {"scale": "stiffness_ratio"}}
+    becomes: ClassVar[Mapping[str, Mapping[str, tuple[str, float]]]] = {
+        "soil-stiffness": {"scale": ("stiffness_ratio", 1.0)}
+    }
     forms = (
         Form({"onset": 1.0}, {}),
         Form(
@@ -344,7 +350,9 @@ class SoilCrust(Effect):
         "width": Search(1e-3, 0.1, "log"),
     }
     shapes = ("width",)
-    becomes: ClassVar[Mapping[str, Mapping[str, str]]] = {"soil-stiffness": {"scale": "stiffness_ratio"}}
+    becomes: ClassVar[Mapping[str, Mapping[str, tuple[str, float]]]] = {
+        "soil-stiffness": {"scale": ("stiffness_ratio", 1.0)}
+    }
     forms = (Form({"remains": 1.0}, {}),)
 
     def places(self) -> Mapping[int, float]:

@@ -154,3 +154,24 @@ def test_what_was_bent_to_do_anothers_work_is_straight_beside_it(leaves: float, 
     assert (after is None) == (not straight)
     if after is not None:
         assert tuple(n for c in after.fitted.candidates if (n := names.get((c.id, len(c.search))))) == straight
+
+
+def test_a_damping_is_tried_as_the_drag_that_it_becomes_with_the_square_of_the_speed() -> None:
+    """1/2 C rho A v^2 = d v^2: C = 2 d/(rho A), whatever a drag that was fitted from afar came to."""
+    asked: list[Job] = []
+
+    def fits(jobs: Sequence[Job]) -> list[Fitted | None]:
+        asked.extend(jobs)
+        return [None for _ in jobs]
+
+    damping = Candidate(
+        id="soil-viscous-damping", kind="physics", family="",
+        search={"damping": Search(0.0, 100.0), "exponent": Search(0.5, 2.0)},
+    )  # fmt: skip
+    drag = Candidate(id="soil-inertial-drag", kind="physics", family="", search={"coefficient": Search(0.0, 50.0)})
+    mass = Candidate(id="mass", kind="parameter", family="", search={"added": Search(-1, 1)})
+    block = Block(residual=np.ones(4), J=np.zeros((4, 3)), slope=np.zeros(4), shift=0.0, prior=1.0)
+    best = Fitted(candidates=(mass, damping), x=(0.7, 0.22, 0.99), blocks=(block,))
+    assert endings.simpler(cast(Inquiry, SimpleNamespace(fits=fits, candidates=[damping, drag])), step(best)) is None
+    assert [job.candidates for job in asked] == [(mass, drag)]
+    assert asked[0].start == pytest.approx((0.7, 2.0 * 22.0 / (1800.0 * 0.140 * 0.045) / 50.0))
