@@ -26,10 +26,18 @@ def shortened(e: Evidence, *, alone: bool = False) -> Evidence:
     late = np.concatenate([time[s.rows] > end for s in e.signals])
     if not alone and float(np.mean(e.due[late])) > COUNTS:
         return e
-    n = int(np.searchsorted(time, end, side="right"))
-    simulator = e.simulator.until(n)
-    kept = [s.rows < n for s in e.signals]
-    if simulator is None or any(inside.sum() < FEWEST for inside in kept):
-        return e
+    return up_to(e, end) or e
+
+
+def up_to(e: Evidence, end: float, beyond: float = 0.0) -> Evidence | None:
+    """What was recorded up to an end (s); None where a signal has too little of it.
+
+    Its runs go on for `beyond` (s): a filter looks ahead.
+    """
+    time = e.recording.time
+    kept = [time[s.rows] <= end for s in e.signals]
+    if any(inside.sum() < FEWEST for inside in kept):
+        return None
+    n = int(np.searchsorted(time, end + beyond, side="right"))
     recording = replace(e.recording, time=time[:n], channels={c: v[:n] for c, v in e.recording.channels.items()})
-    return replace(e.cut(kept), recording=recording, simulator=simulator)
+    return replace(e.cut(kept), recording=recording, simulator=e.simulator.until(n))

@@ -74,13 +74,10 @@ class Averaged:
         """See `Simulator`."""
         self.inner.settle()
 
-    def until(self, n: int) -> Averaged | None:
+    def until(self, n: int) -> Averaged:
         """See `Simulator`."""
         last = int(self.starts[n]) if n < self.starts.size else int(self.counts.sum())
-        inner = self.inner.until(last)
-        if inner is None:
-            return None
-        return Averaged(inner=inner, starts=self.starts[:n], counts=self.counts[:n], many=self.many)
+        return Averaged(inner=self.inner.until(last), starts=self.starts[:n], counts=self.counts[:n], many=self.many)
 
     def marks(self) -> tuple[tuple[float, str], ...]:
         """See `Simulator`."""

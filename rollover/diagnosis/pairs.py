@@ -19,7 +19,7 @@ from rollover.diagnosis.screening import is_far
 
 LEADING, FOLLOWING = 4, 4  # of the first effects, and of later ones each, that are tried two by two
 SCORED = 16  # so many more, by what they scored at first
-ROUNDS = ((3, 40), (8, 6))  # of a short fit to few recordings, and how many of these are gone on with
+ROUNDS = ((2, 40), (8, 6))  # of a short fit to few recordings, and how many of these are gone on with
 ALIKE = 2.0  # times what the best of them leaves, up to which the shape of what rings may make another the best
 
 

@@ -46,8 +46,8 @@ class Simulator(Protocol):
     def settle(self) -> None:
         """Of runs that nobody could tell apart take the one that is the most like all."""
 
-    def until(self, n: int) -> Simulator | None:
-        """The same for the first n stamps, if that is the cheaper; None if not."""
+    def until(self, n: int) -> Simulator:
+        """The same for the first n stamps."""
 
     def marks(self) -> tuple[tuple[float, str], ...]:
         """(start s, name) of the phases of the scenario as it is; empty if the recording itself tells."""
@@ -111,8 +111,12 @@ class DropSimulator:
     def settle(self) -> None:
         """See `Simulator`."""
 
-    def until(self, n: int) -> None:
-        """See `Simulator`: a drop is over soon."""
+    def until(self, n: int) -> DropSimulator:
+        """See `Simulator`."""
+        channels = {c: v[:n] for c, v in self.recording.channels.items()}
+        return DropSimulator(
+            self.model.scenario, replace(self.recording, time=self.recording.time[:n], channels=channels)
+        )
 
     def marks(self) -> tuple[tuple[float, str], ...]:
         """See `Simulator`."""

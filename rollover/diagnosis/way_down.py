@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from rollover.diagnosis.aftermath import up_to
 from rollover.diagnosis.clocks import align
 from rollover.diagnosis.crew import Job
 from rollover.diagnosis.evidence import Evidence
@@ -19,7 +20,7 @@ from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.one_by_one import HOPELESS, Taken, is_better, one_by_one
 from rollover.diagnosis.phases import AROUND_PEAK, PEAK
 
-FEWEST = 8  # samples of a signal on the way down
+BEYOND = 0.05  # s that are simulated after an end, for filters that look ahead
 RIVALS = 5  # that are held against the best over the whole way
 ENDS = (1.0 - AROUND_PEAK, 2.0)  # of the time to the deepest point: before it, and before what bounces comes down again
 
@@ -64,11 +65,7 @@ def _cut(e: Evidence, phases: Sequence[tuple[float, str]], end: float) -> Eviden
     peaks = [start for start, name in phases if name == PEAK]
     if not peaks:
         return None
-    until = end * peaks[0] / (1.0 - AROUND_PEAK)
-    kept = [e.recording.time[s.rows] < until for s in e.signals]
-    if any(inside.sum() < FEWEST for inside in kept):
-        return None
-    return e.cut(kept)
+    return up_to(e, end * peaks[0] / (1.0 - AROUND_PEAK), BEYOND)
 
 
 def _over_all(inquiry: Inquiry, base: Fitted, steps: Sequence[Step]) -> list[Step]:
