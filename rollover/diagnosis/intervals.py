@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.blocks import Block, at_an_end, shift_of
-from rollover.diagnosis.candidates import each_with_own, physical
+from rollover.diagnosis.candidates import Candidate, each_with_own, physical
 from rollover.diagnosis.crew import linearised
 from rollover.diagnosis.evidence import MODEL_ERROR, Evidence
 from rollover.diagnosis.fit import GENTLE, Fitted, Judge
@@ -30,6 +30,7 @@ FURTHER, FARTHEST = 2.0, 30.0  # factors by which one goes on at a time, and at 
 RIPPLES = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)  # factors at which one looks behind a rise
 BEYOND = 1.2  # factor below which an interval that is too narrow is chance
 FEWEST = 3  # recordings that can disagree
+HALVINGS = 7  # of the way to the end of a range
 ALONG, VALLEY, FEW_ROUNDS = 1.3, 9, 8  # a factor, how often, and rounds of a fit with one coordinate held
 EVENLY = 12.0**-0.5  # standard deviation of what is spread evenly from 0 to 1
 
@@ -185,11 +186,8 @@ def _along_valley(judge: Judge, fitted: Fitted, k: int, way: float, rise: tuple[
     is followed as far as it is that low.
     """
     (start, due), far = rise, begun
-    c, place = next((c, place) for c, place in each_with_own(fitted.candidates) if place.start <= k < place.stop)
-    name = list(c.search)[k - place.start]
-    rest = {n: s for n, s in c.search.items() if n != name}
     x, shifts = [v for j, v in enumerate(fitted.x) if j != k], [b.shift for b in fitted.blocks]
-    if not rest:
+    if any(len(c.search) == 1 for c, place in each_with_own(fitted.candidates) if place.start <= k < place.stop):
         return far
     inside, beyond = (far, due), far
     for _ in range(VALLEY):
@@ -197,10 +195,7 @@ def _along_valley(judge: Judge, fitted: Fitted, k: int, way: float, rise: tuple[
         at = fitted.x[k] + beyond * way
         if not 0.0 < at < 1.0:
             break
-        held = replace(c, search=rest, fixed={**c.fixed, name: physical(at, c.search[name])})
-        found = judge.fit(
-            [held if one is c else one for one in fitted.candidates], x, rounds=FEW_ROUNDS, shifts=shifts, width=1
-        )
+        found = judge.fit(_held(fitted, k, at), x, rounds=FEW_ROUNDS, shifts=shifts, width=1)
         if found is None:
             break
         if found.left - start > due:
@@ -209,6 +204,41 @@ def _along_valley(judge: Judge, fitted: Fitted, k: int, way: float, rise: tuple[
             return float(inside[0] + share * (beyond - inside[0])) if low < due else inside[0]
         inside, x, shifts = (beyond, found.left - start), list(found.x), [b.shift for b in found.blocks]
     return inside[0]
+
+
+def _held(fitted: Fitted, k: int, at: float) -> list[Candidate]:
+    """The effects of a fit with its k-th coordinate held at a place."""
+    c, place = next((c, place) for c, place in each_with_own(fitted.candidates) if place.start <= k < place.stop)
+    name = list(c.search)[k - place.start]
+    rest = {n: s for n, s in c.search.items() if n != name}
+    held = replace(c, search=rest, fixed={**c.fixed, name: physical(at, c.search[name])})
+    return [held if one is c else one for one in fitted.candidates]
+
+
+def _within_range(judge: Judge, fitted: Fitted, wide: Array, phi: float) -> Array:
+    """Deviations (p, 2) down and up, with those that lead out of the range ended where too much is left before that.
+
+    What pulls no further once it holds has no slope there, and is something all the same: with next to none of it much
+    more is left. The way to the end of the range is halved again and again, all others fitted anew.
+    """
+    found, due = wide.copy(), TWO_SIDED**2 * phi
+    shifts = [b.shift for b in fitted.blocks]
+
+    def is_met(k: int, at: float) -> bool:
+        others = [v for j, v in enumerate(fitted.x) if j != k]
+        there = judge.fit(_held(fitted, k, at), others, rounds=FEW_ROUNDS, shifts=shifts, width=1)
+        return there is None or there.left - fitted.left < due
+
+    for k, x in enumerate(fitted.x):
+        for side, end in enumerate((0.0, 1.0)):
+            if abs(end - x) >= TWO_SIDED * wide[k, side] or is_met(k, end):
+                continue
+            inside, beyond = x, end
+            for _ in range(HALVINGS):
+                middle = 0.5 * (inside + beyond)
+                inside, beyond = (middle, beyond) if is_met(k, middle) else (inside, middle)
+            found[k, side] = abs(beyond - x) / TWO_SIDED
+    return found
 
 
 def _misfit(judge: Judge, fitted: Fitted, way: Array) -> float | None:
@@ -282,6 +312,8 @@ def intervals(
     sd = np.sqrt(variance)[kept]
     own = np.sqrt(phi * np.diag(inverse))[kept]
     wide = np.sqrt(sd[:, None] ** 2 + own[:, None] ** 2 * (reaches(judge, coarse, own, phi, sides) ** 2 - 1.0))
+    if not judge.effort.thrifty:
+        wide = _within_range(judge, told, wide, phi)
     found, at = [], 0
     for c in told.candidates:
         kind: Any = EFFECTS[c.id]

@@ -227,3 +227,26 @@ def test_an_end_of_a_range_is_read_off_where_samples_pile_up(limit: float, rate:
 def test_a_peak_that_is_met_once_is_no_end_of_a_range() -> None:
     judge = read(recorded({}, noise=0.02))
     assert stated.end_of(judge.evidence, FORCE) is None
+
+
+def test_where_slopes_tell_nothing_an_interval_ends_where_too_much_is_left() -> None:
+    """A pull that holds up to 0.3 of its range and more pulls no further above it: below, it lets go."""
+    asked: list[float] = []
+
+    def fit(candidates: list[Candidate], x: list[float], **_: Any) -> Any:
+        assert x == [0.2], "the other one is free"
+        assert [list(c.search) for c in candidates] == [["b"], []]
+        asked.append(candidates[1].fixed["a"])
+        return SimpleNamespace(left=1000.0 if asked[-1] < 0.3 else 5.0)
+
+    other = Candidate(id="mass", kind="parameter", family="", search={"b": Search(0, 1)})
+    pull = Candidate(id="soil-adhesion", kind="physics", family="", search={"a": Search(0, 1)})
+    zero = np.zeros(4)
+    block = Block(residual=np.ones(4), J=np.zeros((4, 2)), slope=zero, shift=0.0, prior=1.0)
+    fitted = Fitted(candidates=(other, pull), x=(0.2, 0.6), blocks=(block,))
+    wide = np.array([[0.01, 0.01], [10.0, 10.0]])
+    found = stated._within_range(SimpleNamespace(fit=fit), fitted, wide, 1.0)  # type: ignore[arg-type]
+    assert asked[0] == 0.0
+    assert 0.3 - 0.61 / 2**stated.HALVINGS < 0.6 - stated.TWO_SIDED * found[1, 0] < 0.3
+    assert found[1, 1] == 10.0, "up to the end of the range as little is left"
+    np.testing.assert_array_equal(found[0], wide[0])
