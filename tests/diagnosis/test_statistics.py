@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 from scipy.stats import kstest
 
 from rollover.diagnosis.bins import binned
-from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.candidates import Candidate, coordinate
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
@@ -153,7 +153,15 @@ def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
             off = b.J @ (np.array(x) - np.array(fitted.x)) + b.slope * (shift - b.shift)
             return replace(b, residual=b.residual - off, shift=shift)
 
-        judge.block = block
+        def fit(
+            held: list[Candidate], _x: object, fitted: Fitted = fitted, curved: Any = A, **_: object
+        ) -> Any:  # one held, all others anew: it rises by d^2/(A^-1)_kk
+            ((name, value),) = held[0].fixed.items()
+            k = list(candidate().search).index(name)
+            d = coordinate(value, candidate().search[name]) - fitted.x[k]
+            return SimpleNamespace(left=fitted.left + d * d / np.linalg.inv(curved)[k, k])
+
+        judge.block, judge.fit = block, fit
         found = intervals(judge, fitted)[0]
         for i, t in zip(found.values(), 0.5 + truth, strict=True):
             inside.append(i.low <= t <= i.high)
