@@ -39,5 +39,4 @@ def up_to(e: Evidence, end: float, beyond: float = 0.0) -> Evidence | None:
     if any(inside.sum() < FEWEST for inside in kept):
         return None
     n = int(np.searchsorted(time, end + beyond, side="right"))
-    recording = replace(e.recording, time=time[:n], channels={c: v[:n] for c, v in e.recording.channels.items()})
-    return replace(e.cut(kept), recording=recording, simulator=e.simulator.until(n))
+    return replace(e.cut(kept), recording=e.recording.until(n), simulator=e.simulator.until(n))

@@ -228,12 +228,7 @@ class RunSimulator:
 
     def until(self, n: int) -> RunSimulator:
         """The same for the first n stamps: its runs end soon after them, where their filters no longer look ahead."""
-        first = replace(
-            self.recording,
-            time=self.recording.time[:n],
-            channels={c: v[:n] for c, v in self.recording.channels.items()},
-        )
-        found = RunSimulator(self.scenario, first)
+        found = RunSimulator(self.scenario, self.recording.until(n))
         settings = found.scenario.simulation
         ahead = settings.output_step * np.ceil(AHEAD / settings.output_step) if self.recording.cfc else 0.0
         longer = min(round(settings.duration + float(ahead), 9), self.scenario.simulation.duration)

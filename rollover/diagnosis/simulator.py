@@ -113,10 +113,7 @@ class DropSimulator:
 
     def until(self, n: int) -> DropSimulator:
         """See `Simulator`."""
-        channels = {c: v[:n] for c, v in self.recording.channels.items()}
-        return DropSimulator(
-            self.model.scenario, replace(self.recording, time=self.recording.time[:n], channels=channels)
-        )
+        return DropSimulator(self.model.scenario, self.recording.until(n))
 
     def marks(self) -> tuple[tuple[float, str], ...]:
         """See `Simulator`."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -97,6 +97,10 @@ class Recording:
     def __getitem__(self, name: str) -> Array:
         """Values of a channel, (n,)."""
         return self.channels[name]
+
+    def until(self, n: int) -> Recording:
+        """The first n stamps, with their values."""
+        return replace(self, time=self.time[:n], channels={c: v[:n] for c, v in self.channels.items()})
 
     def samples(self, name: str) -> tuple[Array, Array]:
         """Time and values of a channel where it has any, (k,) and (k,)."""

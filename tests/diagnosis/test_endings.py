@@ -174,4 +174,4 @@ def test_a_damping_is_tried_as_the_drag_that_it_becomes_with_the_square_of_the_s
     best = Fitted(candidates=(mass, damping), x=(0.7, 0.22, 0.99), blocks=(block,))
     assert endings.simpler(cast(Inquiry, SimpleNamespace(fits=fits, candidates=[damping, drag])), step(best)) is None
     assert [job.candidates for job in asked] == [(mass, drag)]
-    assert asked[0].start == pytest.approx((0.7, 2.0 * 22.0 / (1800.0 * 0.140 * 0.045) / 50.0))
+    assert asked[0].start == pytest.approx((0.7, 2.0 * 22.0 / (1800.0 * 0.140 * 0.045) / 50.0), rel=1e-12)  # rounding

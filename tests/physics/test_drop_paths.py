@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rollover.drop import DropModel, simulate_drop, unfit
+from rollover.effects import EFFECTS
 from rollover.run import Run
 from rollover.scenario import Scenario
 from rollover.simulate import run
@@ -264,3 +265,13 @@ def test_a_striker_that_gives_way_rings() -> None:
     ring = a[(T > 0.001) & (T < 0.03)]
     crossings = int(np.sum(np.diff(np.sign(ring - ring.mean())) != 0))
     assert crossings > 5, (crossings, t[0])
+
+
+def test_a_damping_with_the_square_of_the_speed_is_a_drag() -> None:
+    """What `becomes` says: both give the same force with C = 2 d/(rho A)."""
+    t = np.linspace(0.0, 0.3, 200)
+    other, (own, times) = next(iter(EFFECTS["soil-viscous-damping"].becomes["soil-inertial-drag"].items()))
+    model = DropModel(scenario=shipped("drop_test"))
+    square = model.with_({f"effects.soil-viscous-damping.{own}": 40.0, "effects.soil-viscous-damping.exponent": 2.0})
+    drag = model.with_({f"effects.soil-inertial-drag.{other}": 40.0 * times})
+    np.testing.assert_allclose(square.run(t)["ground/force_normal"], drag.run(t)["ground/force_normal"], rtol=1e-9)

@@ -17,7 +17,6 @@ from scipy.linalg import expm
 from ground.law import REFERENCE_AREA
 from ground.ye import Ye2006
 from rollover.drop import DropModel, simulate_drop
-from rollover.effects import EFFECTS
 from tests.physics.scenes import drop, shipped
 
 Array = NDArray[np.float64]
@@ -392,14 +391,3 @@ def test_soil_stiffness_scales_the_law() -> None:
     b = linear(2e4).with_({"effects.soil-stiffness.scale": 1.5}).run(np.linspace(0, 0.5, 50))
     for name in a.channels:
         assert b[name] == pytest.approx(a[name], rel=1e-9, abs=1e-12)
-
-
-def test_a_damping_with_the_square_of_the_speed_is_a_drag() -> None:
-    """What `becomes` says: both give the same force with C = 2 d/(rho A)."""
-    t = np.linspace(0.0, 0.3, 200)
-    other, (own, times) = next(iter(EFFECTS["soil-viscous-damping"].becomes["soil-inertial-drag"].items()))
-    square = linear(2e4).with_(
-        {f"effects.soil-viscous-damping.{own}": 40.0, "effects.soil-viscous-damping.exponent": 2.0}
-    )
-    drag = linear(2e4).with_({f"effects.soil-inertial-drag.{other}": 40.0 * times})
-    np.testing.assert_allclose(square.run(t)["ground/force_normal"], drag.run(t)["ground/force_normal"], rtol=1e-9)
