@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ground.law import HIDDEN, REFERENCE_AREA, REFERENCE_MASS
 from ground.settings import settings
-from ground.surface import normal
+from ground.surface import gradient, is_flat
 from rollover import fall, nose, track
 from rollover.bodies import nose_share
 from rollover.document import exchanged
@@ -70,14 +70,8 @@ class Track:
     @cached_property
     def jumps(self) -> tuple[Array, Array]:
         """Instants (j,), s, at which the force jumps, and how far the columns do there (j, OUT_COLUMNS)."""
-        steps = self.steps
-        ways = steps[:, [track.HOW, track.BOUND, track.ELEMENT]]
-        begins = np.concatenate([[True], np.any(ways[1:] != ways[:-1], axis=1)])
-        at = steps[begins, track.FROM]
-        at = at[at + BESIDE <= self.until]
-        rows = self.rows(np.stack([at - BESIDE, at + BESIDE], axis=1).ravel())
-        apart = rows[1::2] - rows[::2]
-        shows = np.abs(apart[:, track.OUT_FORCE]) > ROUNDING * np.max(np.abs(rows[:, track.OUT_FORCE]), initial=0.0)
+        at, apart, largest = track.turns(self.law, self.p, self.numbers, self.steps, self.elements, self.until, BESIDE)
+        shows = np.abs(apart[:, track.OUT_FORCE]) > ROUNDING * largest
         return at[shows], apart[shows]
 
 
@@ -201,9 +195,9 @@ def unfit(scenario: Scenario) -> str:
     """Why a scenario is no drop test that can be run by itself, or nothing."""
     if not isinstance(scenario.vehicle, Striker):
         return f"vehicle.kind: not a drop test, got {scenario.vehicle.kind!r}; 'striker' is needed"
-    gradient = normal(scenario.ground.surface)
     slope = scenario.effects.get("slope")
-    if gradient[2] < 1.0 or (slope is not None and slope.angle != 0.0):
+    surface = scenario.ground.surface
+    if not is_flat(surface) or any(gradient(surface)) or (slope is not None and slope.angle != 0.0):
         return "ground.surface: not level, got an inclination; a drop test by itself needs level ground"
     return ""
 

@@ -40,27 +40,37 @@ def filtered(values: NDArray[np.float64], step: float, cfc: int, *, constant: fl
         return np.array(values, dtype=float)
     b, a, steady = _coefficients(cfc * constant, step)
     pad = min(max(round(0.01 / step), 100), values.size - 1)
-    smooth = np.concatenate([2.0 * values[0] - values[pad:0:-1], values, 2.0 * values[-1] - values[-2 : -pad - 2 : -1]])
+    smooth = np.empty(values.size + 2 * pad)
     # SciPy's filtfilt works the steady state out anew each time, and its lfilter looks at its arguments for longer than
     # a pass takes
-    run_through(b, a, steady, smooth)
-    run_through(b, a, steady, smooth[::-1])
+    run_through(b, a, steady, np.ascontiguousarray(values, dtype=np.float64), pad, smooth)
     return smooth[pad : pad + values.size].copy()
 
 
 @leaf
-def run_through(b: Any, a: Any, steady: Any, values: Any) -> None:
-    """Values (n,) through a second-order filter in place, begun as if the first had stood there for ever.
+def run_through(b: Any, a: Any, steady: Any, values: Any, pad: int, smooth: Any) -> None:
+    """Values (n,), continued by `pad` to either side, through a second-order filter forward and backward.
 
-    y = b_0 x + z_0, z_0' = b_1 x - a_1 y + z_1, z_1' = b_2 x - a_2 y (direct form II, transposed).
+    y = b_0 x + z_0, z_0' = b_1 x - a_1 y + z_1, z_1' = b_2 x - a_2 y (direct form II, transposed), begun as if the
+    first had stood there for ever.
     """
-    z0, z1 = steady[0] * values[0], steady[1] * values[0]
-    for i in range(values.size):
-        x = values[i]
-        y = z0 + b[0] * x
-        z0 = z1 + x * b[1] - y * a[1]
-        z1 = x * b[2] - y * a[2]
-        values[i] = y
+    n, last = values.size, values.size - 1
+    for i in range(pad):
+        smooth[i] = 2.0 * values[0] - values[pad - i]
+        smooth[pad + n + i] = 2.0 * values[last] - values[last - 1 - i]
+    for i in range(n):
+        smooth[pad + i] = values[i]
+    end = smooth.size - 1
+    for turn in range(2):
+        first = end if turn else 0
+        z0, z1 = steady[0] * smooth[first], steady[1] * smooth[first]
+        for k in range(smooth.size):
+            i = end - k if turn else k
+            x = smooth[i]
+            y = z0 + b[0] * x
+            z0 = z1 + x * b[1] - y * a[1]
+            z1 = x * b[2] - y * a[2]
+            smooth[i] = y
 
 
 @lru_cache(maxsize=64)

@@ -109,3 +109,29 @@ def read_off(law: Any, p: Any, f: Any, track: Any, elements: Any, times: Any, ou
             out[i, OUT_X], out[i, OUT_V], out[i, OUT_A] = at[2], at[3], now[1]
             out[i, OUT_IMPULSE] = step[HIT]
             i += 1
+
+
+@compiled
+def turns(law: Any, p: Any, f: Any, track: Any, elements: Any, until: float, beside: float) -> Any:
+    """Instants (k,), s, at which another way of moving begins, what the columns differ by (k, OUT_COLUMNS), max |F|.
+
+    They are read off `beside` (s) to either side, those that are not beyond `until` (s).
+    """
+    count = 0
+    at, times = np.empty(track.shape[0]), np.empty(2 * track.shape[0])
+    for j in range(track.shape[0]):
+        is_new = j == 0
+        for k in (HOW, BOUND, ELEMENT):
+            is_new = is_new or track[j, k] != track[j - 1, k]
+        if is_new and track[j, FROM] + beside <= until:
+            at[count] = track[j, FROM]
+            times[2 * count], times[2 * count + 1] = at[count] - beside, at[count] + beside
+            count += 1
+    rows = np.empty((2 * count, OUT_COLUMNS))
+    read_off(law, p, f, track, elements, times[: 2 * count], rows)
+    apart, largest = np.empty((count, OUT_COLUMNS)), 0.0
+    for i in range(count):
+        before, after = rows[2 * i], rows[2 * i + 1]
+        apart[i] = after - before
+        largest = max(largest, abs(before[OUT_FORCE]), abs(after[OUT_FORCE]))
+    return at[:count], apart, largest

@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,11 @@ class Candidate:
         """Id, with the channel of a sensor effect and what is not fitted."""
         told = [str(v) for v in self.fixed.values()]
         return ":".join([self.id, *([] if self.channel is None else [self.channel]), *told])
+
+    @cached_property
+    def token(self) -> tuple[object, ...]:
+        """What tells the meaning of its coordinates from that of any other's."""
+        return (self.key, len(self.search), self.along, *self.form.items())
 
     @property
     def is_placed(self) -> bool:
@@ -288,8 +294,7 @@ def physical(x: float, search: Search) -> float:
 
 def key_at(r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> tuple[object, ...]:
     """What tells a simulation of recording r at x from any other, its time shift (s) to the nanosecond."""
-    names = tuple((c.key, len(c.search), c.along, *c.form.items()) for c in candidates)
-    return (r, names, tuple([round(float(v), 12) for v in x]), round(shift, 9))
+    return (r, tuple([c.token for c in candidates]), tuple([round(float(v), 12) for v in x]), round(shift, 9))
 
 
 def coordinate(value: float, search: Search) -> float:

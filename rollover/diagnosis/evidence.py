@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rollover.diagnosis.leaps import JUMPS, LEAP_IN, SHOWS, about_leaps, forgiven
 from rollover.diagnosis.nuisance import Eased, doubts, eased
 from rollover.diagnosis.simulator import Simulator
+from rollover.diagnosis.whitening import Noise, Whitening
 from rollover.noise import LENGTH, USUAL, NoiseFloor, grown, noise_floor
 from rollover.recording import Recording
 from rollover.scenario import Scenario
@@ -59,6 +60,13 @@ class Signal:
     def loudness(self) -> Array | float:
         """Noise over `noise`, (n,); 1 where it is the same throughout."""
         return 1.0 if self.level is None else self.level
+
+    @property
+    def spread(self) -> Noise:
+        """What its samples are whitened by; the noise alone grows with the value, not what a model may be off by."""
+        rest = max(self.sigma**2 - self.noise**2, 0.0)
+        loud = None if self.level is None else np.sqrt((self.noise * self.level) ** 2 + rest)
+        return Noise(count=self.rows.size, sigma=self.sigma, ar=self.ar, loud=loud, weight=self.weight)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,11 +158,15 @@ class Evidence:
 
     def whitened(self, raw: Array) -> Array:
         """Stacked samples in units of the noise and whitened."""
-        return np.concatenate([self._whitened(s, raw[part]) for s, part in self.spans()])
+        return self._whitening(raw)
+
+    @cached_property
+    def _whitening(self) -> Whitening:
+        return Whitening([s.spread for s in self.signals])
 
     def measured(self) -> Array:
         """The same of the measurement."""
-        return np.concatenate([self._whitened(s, s.values) for s in self.signals])
+        return self.whitened(self.values)
 
     def leaps(self, raw: Array, predicted: Mapping[str, Array] = NOTHING) -> NDArray[np.int64]:
         """Samples (stacked) about which a prediction leaps, and means within which it is `predicted` to."""
@@ -216,27 +228,6 @@ class Evidence:
     def values(self) -> Array:
         """The measured samples, one signal after another, SI."""
         return np.concatenate([s.values for s in self.signals])
-
-    @staticmethod
-    def _whitened(signal: Signal, values: Array) -> Array:
-        x = values / signal.sigma
-        if signal.level is not None:
-            # the noise alone grows, not what a model may be off by; samples, or columns of them
-            rest = max(signal.sigma**2 - signal.noise**2, 0.0)
-            x = (x.T * signal.sigma / np.sqrt((signal.noise * signal.level) ** 2 + rest)).T
-        if signal.weight is not None:
-            return np.asarray((Evidence._coloured(signal, x).T * signal.weight).T)
-        return Evidence._coloured(signal, x)
-
-    @staticmethod
-    def _coloured(signal: Signal, x: Array) -> Array:
-        if not signal.ar:
-            return x
-        y = x.copy()
-        for k, a in enumerate(signal.ar, start=1):
-            y[k:] -= a * x[:-k]
-        y[: len(signal.ar)] = 0.0  # no past to whiten with
-        return y * grown(signal.ar)
 
 
 def doubted(e: Evidence, scenario: Scenario) -> Evidence:

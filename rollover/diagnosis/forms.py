@@ -17,6 +17,8 @@ WORTH = 12.0  # gain that pays for a shape
 SHORT = 4  # rounds of a fit that tells where to begin
 ABREAST = 1.5  # times what the best of short fits leaves, up to which others are followed
 THERE = 0.003  # of a coordinate, within which two short fits came to one place
+ASTRAY = 1.2  # times what another explanation leaves, above which a crooked valley is not followed
+FURTHER, ALIKE = 3, 0.1  # rounds of all recordings, after which fits within so much of a coordinate go to one place
 BESIDE_FORM = np.linspace(-0.1, 0.05, 13)  # of a coordinate: where a threshold of another form may lie
 ELSEWHERE = (0.2, 0.35, 0.5, 0.65, 0.8)  # coordinates of a number that only this form has
 
@@ -35,7 +37,7 @@ def shaped(judge: Judge, f: Fitted, leaves: Sequence[float]) -> Fitted | None:
     found = _best_of(judge, f, replace(last.whole(), along=tuple(last.shapes)), places, leaves)
     if found is None:
         return None
-    found = found if is_noise(found) else polish(judge, found)
+    found = found if is_noise(found) or found.left > ASTRAY * sum(leaves) else polish(judge, found)
     (whole, x), shifts = found.candidates[-1].plain(found.own), [b.shift for b in found.blocks]
     bent = judge.fit((*f.candidates[:-1], whole), (*found.x[:at], *x), shifts=shifts, width=2)
     own = dict(zip(found.candidates[-1].search, found.own, strict=True))
@@ -76,8 +78,8 @@ def _best_of(
 ) -> Fitted | None:
     """The best fit with another last effect from some places.
 
-    Short fits to the recordings that are met worst, best and in the middle tell where to begin; None if none can be
-    made.
+    Short fits to the recordings that are met worst, best and in the middle tell where to begin, and a few rounds of
+    all which of these lead to one place; None if none can be made.
     """
     candidates, few = (*f.candidates[:-1], last), few_of(f)
     at = [f.blocks[r].shift for r in few]
@@ -86,18 +88,27 @@ def _best_of(
     most = min(ABREAST * sum(f.blocks[r].total for r in few), BEHIND * sum(leaves[r] for r in few))
     begun: list[Fitted] = []
     for one in sorted((one for one in short if one is not None and one.total < most), key=lambda one: one.total):
+        if begun and one.total > ABREAST * begun[0].total:
+            break
         if len(begun) < STARTS and not any(_is_there(one, other) for other in begun):
             begun.append(one)
+    shifts = [shifts_told([b.shift for b in f.blocks], one, few) for one in begun]
+    again = [
+        judge.fit(candidates, one.x, shifts=s, rounds=FURTHER, bare=True) for one, s in zip(begun, shifts, strict=True)
+    ]
     best: Fitted | None = None
-    for one in (one for one in begun if one.total < ABREAST * begun[0].total):
-        shifts = shifts_told([b.shift for b in f.blocks], one, few)
-        again = judge.fit(candidates, one.x, shifts=shifts)
-        best = min((f for f in (best, again) if f is not None), key=lambda f: f.left, default=None)
+    done: list[Fitted] = []
+    for one in sorted((one for one in again if one is not None), key=lambda one: one.total):
+        if any(_is_there(one, other, ALIKE) for other in done) or (best and one.total > ABREAST * best.left):
+            continue
+        done.append(one)
+        ended = judge.fit(candidates, one.x, shifts=[b.shift for b in one.blocks])
+        best = min((f for f in (best, ended) if f is not None), key=lambda f: f.left, default=None)
         if best is not None and is_noise(best):
             break
     return best
 
 
-def _is_there(one: Fitted, other: Fitted) -> bool:
+def _is_there(one: Fitted, other: Fitted, within: float = THERE) -> bool:
     """Whether two fits ended in one place."""
-    return max(abs(a - b) for a, b in zip(one.x, other.x, strict=True)) < THERE
+    return max(abs(a - b) for a, b in zip(one.x, other.x, strict=True)) < within

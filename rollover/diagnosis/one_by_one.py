@@ -6,19 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeGuard
 
-from rollover.diagnosis.blocks import turned
 from rollover.diagnosis.chaos import is_other
 from rollover.diagnosis.clocks import is_all_by_clocks
 from rollover.diagnosis.detect import Mismatch, mismatch_of
-from rollover.diagnosis.endings import followed, simpler
+from rollover.diagnosis.endings import followed
 from rollover.diagnosis.explain import SURE, Step, does, moves, step, weighed
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry, Phases
-from rollover.diagnosis.lasting import NEEDED, astray, backed, begun_anew, lasting
+from rollover.diagnosis.lasting import astray, backed, begun_anew, lasting
 from rollover.diagnosis.looks import look, look_again
-from rollover.diagnosis.otherwise import tuned
-from rollover.diagnosis.refine import conditioned, is_doubtful, timed, without
+from rollover.diagnosis.pairs import exchanged, two_by_two
+from rollover.diagnosis.refine import conditioned, is_doubtful, timed
 from rollover.diagnosis.remainder import NEGLIGIBLE, is_enough, is_tolerated, matters
 from rollover.diagnosis.straight import MOST, is_any_curve
 
@@ -37,7 +36,8 @@ class Taken:
     """The base, the steps taken beside it, the fit with all of them (the base itself if none), and what it leaves.
 
     `first` is the first step, taken or not; `at_first` what all candidates scored beside the base, `looked` beside the
-    last fit; `refuted` whether the best candidate's gain did not outlast the scatter of its own runs.
+    last fit; `refuted` whether the best candidate's gain did not outlast the scatter of its own runs; `paired` whether
+    all were tried two by two.
     """
 
     base: Fitted
@@ -49,6 +49,7 @@ class Taken:
     at_first: Gate
     looked: Gate
     refuted: bool = False
+    paired: bool = False
 
     @property
     def count(self) -> int:
@@ -56,8 +57,11 @@ class Taken:
         return sum(b.residual.size for b in self.base.blocks)
 
 
-def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()) -> Taken:
-    """Up to three effects, one after another beside the base; it goes on from the steps `begun`, if any."""
+def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = (), *, pairs: bool = True) -> Taken:
+    """Up to three effects, one after another beside the base; it goes on from the steps `begun`, if any.
+
+    Two that leave more than noise are given for the best of all `pairs`, if these are to be tried.
+    """
     judge, candidates, groups, phases = inquiry.judge, inquiry.candidates, inquiry.groups, inquiry.phases
     count = sum(b.residual.size for b in base.blocks)
     clocked = begun_anew if judge.effort.thrifty else timed
@@ -81,7 +85,7 @@ def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()) -> Ta
         current = taken[-1].fitted
         left = mismatch_of(judge.evidence, current.blocks, phases)
         looked = beside(current, left)
-    refuted = False
+    refuted = paired = False
     for _ in range(MOST - len(begun)):
         if is_tolerated(judge, current):
             break
@@ -106,15 +110,15 @@ def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()) -> Ta
         if not judge.straying:
             current = astray(judge, current)
             left = mismatch_of(judge.evidence, current.blocks, phases)
-        able = current.left - count < ABLE * (base.left - count)
-        if len(taken) == 2 and able and left.p_value < SURE and matters(judge, current, left):
-            # of two that are strong the first may have been taken for something else: is there a better one?
-            other = instead(inquiry, current)
-            if other is not None and other.fitted.left < current.left:
-                other, there = followed(inquiry, other.moved_to(tuned(inquiry, other.fitted)))
-                if is_better(other.fitted, there, current):
-                    taken, left = [taken[1], other], there
-                    current = other.fitted
+        if len(taken) == 2 and left.p_value < SURE and matters(judge, current, left):
+            # of two that are strong the first may have been taken for something else
+            other = None
+            if pairs and not judge.effort.thrifty:
+                other, paired = two_by_two(inquiry, taken, first_look), True
+            elif judge.effort.thrifty and current.left - count < ABLE * (base.left - count):
+                other = exchanged(inquiry, taken)
+            if other is not None and is_better(other[0][-1].fitted, other[1], current):
+                (taken, left), current = other, other[0][-1].fitted
         is_far = current.left > HOPELESS**2 * count and current.left - count > HARDLY_ANY * (base.left - count)
         if (len(taken) > 1 and is_far) or is_any_curve(current.candidates):
             break
@@ -132,6 +136,7 @@ def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = ()) -> Ta
         at_first=first_look,
         looked=looked,
         refuted=refuted,
+        paired=paired,
     )
 
 
@@ -189,23 +194,6 @@ def as_conditioned(judge: Judge, found: Step, left: Mismatch, phases: Phases) ->
         return found.moved_to(new), there
     judge.weigh(before)
     return found, left
-
-
-def instead(inquiry: Inquiry, current: Fitted) -> Step | None:
-    """The first effect of an explanation taken out and looked for anew beside the rest: it comes back, or a better."""
-    judge = inquiry.judge
-    rest = without(judge, current, 0)
-    if rest is None:
-        return None
-    looked = look(judge, rest, inquiry.free(rest), inquiry.groups, looks=inquiry.crew.looks)
-    found = step(inquiry, rest, looked)
-    held = judge.again(turned(current))
-    if found is None or found.fitted.left > held.left + NEEDED:  # on the way back nothing came as far
-        rivals = () if found is None else found.rivals
-        beside = tuple(f for f in rivals if f.candidates[-1].key != held.candidates[-1].key)
-        back = Step(base=judge.again(rest), fitted=held, p_value=looked.p_value(), rivals=(held, *beside))
-        return simpler(inquiry, back) or back
-    return found
 
 
 def is_better(other: Fitted, left: Mismatch, current: Fitted) -> bool:

@@ -28,7 +28,6 @@ PROMISED = 0.5  # of the best score: what has it, and gains less than half of it
 TIED = 1.2  # times what the best leaves, up to which time shifts are tried out
 BY_CHANCE = 0.01  # p-value of what is left, above which no other form of an effect is looked for
 PARTS = 4  # into which places are split for those who look
-TURNS, PAYS = 4, 0.9  # how often, and to what share of what it leaves, a fit of what rings is followed
 # of what the base leaves beyond the noise, that an effect must take before its shape is fitted too; of what the best
 # takes, before its time shifts are tried out
 LEAST = 0.1
@@ -218,22 +217,6 @@ def traced_too(inquiry: Inquiry, fitted: Fitted) -> Fitted:
     """The fit, or a better one begun where a threshold of its last effect lies elsewhere."""
     begun = inquiry.fits([replace(from_there(fitted, "trace"), stretch=s) for s in stretches(fitted)])
     return min([fitted, *(f for f in begun if f is not None)], key=lambda f: f.left)
-
-
-def tuned(inquiry: Inquiry, fitted: Fitted) -> Fitted:
-    """The fit whose last effect rings in its own shape, followed as long as that pays; any other as it is.
-
-    Its valley is crooked twice: along its frequency, and across that by what stands beside it.
-    """
-    if not (fitted.candidates[-1].rings and fitted.candidates[-1].is_bent):
-        return fitted
-    for _ in range(TURNS):
-        traced = traced_too(inquiry, fitted)
-        (new,) = inquiry.fits([from_there(traced, "polish")])
-        if new is None or new.left > PAYS * fitted.left:
-            break
-        fitted = new
-    return fitted
 
 
 def from_there(f: Fitted, how: Literal["polish", "shape", "time", "trace"]) -> Job:

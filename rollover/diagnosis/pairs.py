@@ -9,27 +9,76 @@ from dataclasses import replace
 from rollover.diagnosis.blocks import turned
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.crew import Job
-from rollover.diagnosis.explain import Step
+from rollover.diagnosis.detect import Mismatch
+from rollover.diagnosis.endings import followed, simpler
+from rollover.diagnosis.explain import Step, step
 from rollover.diagnosis.fit import Fitted
+from rollover.diagnosis.forms import is_noise
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
+from rollover.diagnosis.lasting import NEEDED
+from rollover.diagnosis.looks import look
 from rollover.diagnosis.otherwise import from_there, shaped_too
-from rollover.diagnosis.refine import BEHIND, few_of, shifts_told
+from rollover.diagnosis.refine import BEHIND, few_of, shifts_told, without
+from rollover.diagnosis.remainder import is_enough
 from rollover.diagnosis.screening import is_far
+from rollover.diagnosis.thresholds import stretches
 
 LEADING, FOLLOWING = 4, 4  # of the first effects, and of later ones each, that are tried two by two
 SCORED = 16  # so many more, by what they scored at first
 ROUNDS = ((2, 40), (8, 6))  # of a short fit to few recordings, and how many of these are gone on with
+PLACED, PLACES = 1.5, 2  # times what the best of them leaves, up to which so many are tried with their places elsewhere
 ALIKE = 2.0  # times what the best of them leaves, up to which the shape of what rings may make another the best
 
 
-def best_pair(inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate) -> Step | None:
+def two_by_two(inquiry: Inquiry, taken: Sequence[Step], looked: Gate) -> tuple[list[Step], Mismatch] | None:
+    """The best pair of effects, as steps, and what it leaves; see `best_pair`."""
+    pair = best_pair(inquiry, taken, looked)
+    if pair is None:
+        return None
+    found, left = followed(inquiry, pair)
+    if not is_enough(inquiry.judge, found.fitted, left) and any(c.rings for c in found.fitted.candidates):
+        # what its shape shows now did not show beside another one
+        held = found.fitted if found.fitted.candidates[-1].rings else inquiry.judge.again(turned(found.fitted))
+        other = instead(inquiry, held)
+        if other is not None and other.fitted.left < found.fitted.left:
+            found, left = followed(inquiry, other)
+    return [replace(taken[0], fitted=found.base), found], left
+
+
+def exchanged(inquiry: Inquiry, taken: Sequence[Step]) -> tuple[list[Step], Mismatch] | None:
+    """Two steps with the first effect given for a better one beside the second, and what they leave; None if none."""
+    other = instead(inquiry, taken[-1].fitted)
+    if other is None or other.fitted.left >= taken[-1].fitted.left:
+        return None
+    found, left = followed(inquiry, other)
+    return [taken[-1], found], left
+
+
+def instead(inquiry: Inquiry, current: Fitted) -> Step | None:
+    """The first effect of an explanation taken out and looked for anew beside the rest: it comes back, or a better."""
+    judge = inquiry.judge
+    rest = without(judge, current, 0)
+    if rest is None:
+        return None
+    looked = look(judge, rest, inquiry.free(rest), inquiry.groups, looks=inquiry.crew.looks)
+    found = step(inquiry, rest, looked)
+    held = judge.again(turned(current))
+    if found is None or found.fitted.left > held.left + NEEDED:  # on the way back nothing came as far
+        rivals = () if found is None else found.rivals
+        beside = tuple(f for f in rivals if f.candidates[-1].key != held.candidates[-1].key)
+        back = Step(base=judge.again(rest), fitted=held, p_value=looked.p_value(), rivals=(held, *beside))
+        return simpler(inquiry, back) or back
+    return found
+
+
+def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: Gate) -> Step | None:
     """The best pair of the first step's rivals, of what led later, and of what scored most, as a step of its second.
 
     Of two effects neither need come first alone: a third may be like both, and the second may leave much alone. Short
     fits tell which pairs are worth whole ones; the best takes the shapes that pay if it comes near what others leave.
     """
-    judge = inquiry.judge
+    judge, first = inquiry.judge, taken[0]
     partners = _partners(inquiry, first, taken, looked)
     lead = min(first.rivals, key=lambda f: f.left)
     few, shifts = few_of(lead), tuple(b.shift for b in lead.blocks)
@@ -47,8 +96,8 @@ def best_pair(inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate
     fits = [f for f in inquiry.fits(jobs) if f is not None]
     if not fits:
         return None
-    best = min([*fits, *_in_tune(inquiry, fits)], key=lambda f: f.left)
-    if best.left < BEHIND * (taken[-1] if taken else first).fitted.left:
+    best = min([*fits, *_in_tune(inquiry, fits), *_traced(inquiry, fits)], key=lambda f: f.left)
+    if best.left < BEHIND * taken[-1].fitted.left:
         ways = (best, judge.again(turned(best)))
         jobs = [Job(candidates=p.candidates[:-1], start=p.x[: -len(p.own)], shifts=shifts) for p in ways]
         for pair, alone in zip(ways, inquiry.fits(jobs), strict=True):
@@ -69,6 +118,23 @@ def _in_tune(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fitted]:
     leaves = tuple(b.total for b in lead.blocks)
     made = inquiry.fits([replace(from_there(f, "shape"), leaves=leaves) for f in near])
     return [f for f in made if f is not None]
+
+
+def _traced(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fitted]:
+    """Pairs near the best of which one effect has a place, as a layer its depth, tried all along: one valley of many.
+
+    None where the best leaves no more than noise.
+    """
+    lead = min(pairs, key=lambda f: f.left)
+    able = [
+        way
+        for f in sorted(pairs, key=lambda f: f.left)
+        if f.left < PLACED * lead.left
+        for way in (f, inquiry.judge.again(turned(f)))
+        if stretches(way) and not way.candidates[-1].rings
+    ]
+    jobs = [replace(from_there(f, "trace"), stretch=s) for f in able[:PLACES] for s in stretches(f)]
+    return [] if is_noise(lead) else [f for f in inquiry.fits(jobs) if f is not None]
 
 
 def _rings(pair: Fitted) -> bool:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rollover.diagnosis.blocks import at_an_end, turned
+from rollover.diagnosis.blocks import at_an_end
 from rollover.diagnosis.candidates import Candidate, is_one_sensor
 from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.endings import MANY, followed
@@ -17,8 +17,8 @@ from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.inquiry import Groups, Inquiry, Phases
 from rollover.diagnosis.lasting import NEEDED, unforgiven
-from rollover.diagnosis.one_by_one import as_conditioned, instead, is_better, one_by_one
-from rollover.diagnosis.pairs import best_pair
+from rollover.diagnosis.one_by_one import as_conditioned, is_better, one_by_one
+from rollover.diagnosis.pairs import instead, two_by_two
 from rollover.diagnosis.refine import without
 from rollover.diagnosis.remainder import NEGLIGIBLE, is_enough, is_tolerated, matters
 from rollover.diagnosis.straight import MOST, is_a_curve, is_any_curve, is_pliant
@@ -79,8 +79,9 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     found = down_first(inquiry, one_by_one(inquiry, base))
     base, taken, left, current = found.base, list(found.steps), found.left, found.fitted
     is_whole = is_enough(judge, current, left)
-    if found.first is not None and not judge.effort.thrifty and (not is_whole or len(taken) == MOST):
-        both = _together(inquiry, found.first, taken, found.at_first)
+    is_open = not (judge.effort.thrifty or found.paired) and (not is_whole or len(taken) == MOST)
+    if found.first is not None and is_open:
+        both = two_by_two(inquiry, taken or [found.first], found.at_first)
         # two that leave what chance leaves are preferred to three that do
         if both is not None and (
             both[1].p_value > SURE if is_whole else is_better(both[0][-1].fitted, both[1], current)
@@ -105,21 +106,6 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
         first=found.first.again(judge).foretold(judge, groups) if found.first is not None else None,
         refuted=found.refuted,
     )
-
-
-def _together(inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate) -> tuple[list[Step], Mismatch] | None:
-    """The best pair of effects, as steps, and what it leaves; see `best_pair`."""
-    pair = best_pair(inquiry, first, taken, looked)
-    if pair is None:
-        return None
-    found, left = followed(inquiry, pair)
-    if not is_enough(inquiry.judge, found.fitted, left) and any(c.rings for c in found.fitted.candidates):
-        # what its shape shows now did not show beside another one
-        held = found.fitted if found.fitted.candidates[-1].rings else inquiry.judge.again(turned(found.fitted))
-        other = instead(inquiry, held)
-        if other is not None and other.fitted.left < found.fitted.left:
-            found, left = followed(inquiry, other)
-    return [replace(first, fitted=found.base), found], left
 
 
 def _needed(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step]:

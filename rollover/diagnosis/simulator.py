@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import cached_property
 from typing import Any, Protocol, TypeVar
 
@@ -14,6 +13,7 @@ from rollover.diagnosis.effort import DROPS, Effort
 from rollover.diagnosis.filtering import Rows, behind_filters, rows_of
 from rollover.diagnosis.leaps import LEAP_IN, about_jumps
 from rollover.diagnosis.overturn import SENSORS, RunSimulator
+from rollover.document import exchanged
 from rollover.drop import BESIDE, DropFailedError, DropModel, Track, channels_of, unfit
 from rollover.effects import every, read
 from rollover.initiation import Drop
@@ -195,10 +195,10 @@ class DropSimulator:
         """The drop with values exchanged, its steps as short as it asks for."""
         key = tuple(sorted(changes.items()))
         if key not in self._models:
-            model = self.model.with_(changes) if changes else self.model
-            has_own = model.scenario.ground.law.advance is not None  # states of its own are second order in the step
-            is_abrupt = has_own or any(effect.is_abrupt for effect in model.scenario.effects.values())
-            self._keep(self._models, key, replace(model, step=SHORT if is_abrupt else STEP), KEPT)
+            own = exchanged(self.model.scenario, changes) if changes else self.model.scenario
+            has_own = own.ground.law.advance is not None  # states of its own are second order in the step
+            is_abrupt = has_own or any(effect.is_abrupt for effect in own.effects.values())
+            self._keep(self._models, key, DropModel(scenario=own, step=SHORT if is_abrupt else STEP), KEPT)
         return self._models[key]
 
     @staticmethod

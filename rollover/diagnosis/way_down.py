@@ -55,7 +55,7 @@ def _until(inquiry: Inquiry, end: float, steps: Sequence[Step]) -> Taken | None:
     inquiry.say(f"up to {end:g} of the way down first")
     align(early)
     bare, above = early.fit((), ()), replace(inquiry, judge=early)
-    found = one_by_one(above, bare, _over_all(above, bare, steps)) if bare is not None else None
+    found = one_by_one(above, bare, _over_all(above, bare, steps), pairs=False) if bare is not None else None
     inquiry.judge.simulations += early.simulations
     return found
 

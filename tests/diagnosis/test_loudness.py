@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.loudness import SPREAD, with_loudness
 from rollover.diagnosis.simulator import simulator_of
+from rollover.diagnosis.whitening import Whitening
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario, signal
 from tests.diagnosis.test_chaos import BLOW, blown
@@ -96,9 +96,10 @@ def test_what_a_model_may_be_off_by_does_not_grow_with_the_noise() -> None:
     """A noise of 0.1, ten times as loud at the end, beside an error of the model of 1: equal but for rounding."""
     values, level = np.ones(50), np.linspace(1.0, 10.0, 50)
     s = replace(signal(values, float(np.hypot(0.1, 1.0))), noise=0.1, level=level)
-    assert Evidence._whitened(s, values) == pytest.approx(1.0 / np.hypot(0.1 * level, 1.0), rel=1e-12)
+    whitened = Whitening([s.spread])
+    assert whitened(values) == pytest.approx(1.0 / np.hypot(0.1 * level, 1.0), rel=1e-12)
     columns = np.stack([values, 2.0 * values], axis=1)
-    assert Evidence._whitened(s, columns)[:, 1] == pytest.approx(2.0 / np.hypot(0.1 * level, 1.0), rel=1e-12)
+    assert whitened(columns)[:, 1] == pytest.approx(2.0 / np.hypot(0.1 * level, 1.0), rel=1e-12)
 
 
 def test_contacts_after_a_blow_are_no_noise() -> None:

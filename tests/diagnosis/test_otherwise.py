@@ -17,7 +17,7 @@ from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.otherwise import begun_otherwise, tuned
+from rollover.diagnosis.otherwise import begun_otherwise
 from rollover.diagnosis.ranges import candidates_of
 from rollover.diagnosis.screening import is_far, screen
 from rollover.effects import Search
@@ -108,33 +108,3 @@ def test_what_rings_and_scored_most_is_combed_though_its_fit_went_astray(score: 
     looked = Gate(score=50.0, scores={"mass": 40.0, rings.key: score}, null=np.zeros(9), detectable={})
     assert begun_otherwise(cast(Inquiry, inquiry), best, [best, astray], looked, (0.0, 0.0)) == [best, astray]
     assert asked == ["comb structural-compliance"] * combed
-
-
-@pytest.mark.parametrize(("gains", "turns"), [((0.6, 0.5, 0.99), 3), ((0.95,), 1)])
-def test_what_rings_is_followed_in_turns_as_long_as_that_pays(gains: tuple[float, ...], turns: int) -> None:
-    shape = {"nose_share": Search(0.02, 0.5)}
-    rings = replace(
-        PLAIN, id="structural-compliance",
-        search={"stiffness": Search(1e4, 1e7, "log"), "damping": Search(1.0, 1e4), **shape},
-    )  # fmt: skip
-    fitted = Fitted(
-        candidates=(rings,),
-        x=(0.5, 0.5, 0.5),
-        blocks=tuple(linear_blocks(np.random.default_rng(4), 2, 40, np.zeros(1))),
-    )
-    asked: list[str] = []
-    left = [fitted]
-
-    def fits(jobs: list[Any]) -> list[Fitted | None]:
-        asked.extend(j.how for j in jobs)
-        if jobs[0].how == "trace":
-            return [None] * len(jobs)
-        gain = np.sqrt(gains[asked.count("polish") - 1])
-        left.append(replace(left[-1], blocks=tuple(replace(b, residual=gain * b.residual) for b in left[-1].blocks)))
-        return [left[-1]]
-
-    inquiry = cast(Inquiry, SimpleNamespace(fits=fits))
-    found = tuned(inquiry, fitted)
-    assert asked.count("polish") == turns
-    assert found is left[-2]
-    assert tuned(inquiry, replace(fitted, candidates=(PLAIN,), x=(0.5,))).candidates == (PLAIN,)

@@ -99,3 +99,23 @@ def test_of_pairs_with_a_part_that_rings_all_are_fitted_with_its_share() -> None
     ]
     assert [sorted(f.candidates[-1].search) for f in found] == [["damping", "nose_share", "stiffness"]] * 2
     assert {len(j.leaves) for j in asked} == {2}
+
+
+def test_places_of_the_best_pairs_are_tried_all_along_unless_nothing_but_noise_is_left() -> None:
+    """The depth of a layer is one valley of many: fitted at 0.02 m, its pair leaves more than the wrong one."""
+    search = {"depth": Search(0.01, 1.0, "log"), "stiffness_ratio": Search(0.2, 5.0, "log")}
+    layer = Candidate(id="soil-layer", kind="physics", family="", search=search)
+    wrong, right, third = fitted((DAMPING, MASS), 20.0), fitted((layer, DAMPING), 21.0), fitted((layer, MASS), 22.0)
+    far = fitted((DAMPING, layer), 50.0)
+    asked: list[Any] = []
+    found = pairs._traced(inquiry(asked), [third, wrong, far, right])
+    assert [(j.how, [c.id for c in j.candidates], j.stretch) for j in asked] == [
+        ("trace", ["soil-viscous-damping", "soil-layer"], (1, 0.0, 0.5)),
+        ("trace", ["soil-viscous-damping", "soil-layer"], (1, 0.5, 1.0)),
+        ("trace", ["mass", "soil-layer"], (1, 0.0, 0.5)),
+        ("trace", ["mass", "soil-layer"], (1, 0.5, 1.0)),
+    ]
+    assert len(found) == 4
+    asked.clear()
+    assert pairs._traced(inquiry(asked), [fitted((DAMPING, MASS), 1.0), right]) == []
+    assert asked == []

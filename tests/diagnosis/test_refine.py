@@ -20,11 +20,11 @@ from rollover.diagnosis.forms import shaped
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.intervals import intervals
+from rollover.diagnosis.pairs import two_by_two
 from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.ranges import candidates_of
 from rollover.diagnosis.refine import combed, ended, timed
 from rollover.diagnosis.screening import Screened
-from rollover.diagnosis.selection import _together
 from rollover.diagnosis.thresholds import stretches, traced
 from rollover.effects import EFFECTS
 from rollover.proof.generator import Case, make, plan
@@ -270,10 +270,10 @@ def test_two_effects_of_which_neither_comes_first_are_tried_together() -> None:
     guide = Screened(candidate=c["guide-friction"], starts=tuple(c["guide-friction"].starts()), left=9.0, potential=0.0)
     phases = [phases_of(e) for e in judge.evidence]
     inquiry = Inquiry(judge=judge, candidates=[*c.values()], groups=[], phases=phases, say=lambda _: None, crew=Crew())
-    alone = _together(inquiry, replace(first, screened=(guide,)), [first], looked)
+    alone = two_by_two(inquiry, [replace(first, screened=(guide,))], looked)
     assert alone is not None  # what scored most need not have led anything
     assert alone[0][-1].fitted.label == "mass + guide-friction"
-    found = _together(inquiry, first, [first, then], looked)
+    found = two_by_two(inquiry, [first, then], looked)
     assert found is not None
     (one, both), left = found
     assert one.fitted.label == "mass"

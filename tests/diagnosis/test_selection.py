@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis import explain, one_by_one, selection
+from rollover.diagnosis import explain, one_by_one, pairs, selection
 from rollover.diagnosis.blocks import Block
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.detect import Cell, Mismatch
@@ -256,11 +256,11 @@ def test_beside_what_rings_in_tune_the_other_of_a_pair_is_looked_for_anew(
 
     found = stepped(pair("soil-layer", 80.0))
     judge = SimpleNamespace(again=lambda f: f)
-    monkeypatch.setattr(selection, "best_pair", lambda *_: found)
-    monkeypatch.setattr(selection, "followed", lambda _, one: (one, left(p_value)))
-    monkeypatch.setattr(selection, "is_enough", lambda _judge, _fit, what: what.p_value > 0.001)
-    monkeypatch.setattr(selection, "instead", instead)
-    both = selection._together(cast(Inquiry, SimpleNamespace(judge=judge)), found, [], cast(Gate, None))
+    monkeypatch.setattr(pairs, "best_pair", lambda *_: found)
+    monkeypatch.setattr(pairs, "followed", lambda _, one: (one, left(p_value)))
+    monkeypatch.setattr(pairs, "is_enough", lambda _judge, _fit, what: what.p_value > 0.001)
+    monkeypatch.setattr(pairs, "instead", instead)
+    both = pairs.two_by_two(cast(Inquiry, SimpleNamespace(judge=judge)), [found], cast(Gate, None))
     assert both is not None
     assert both[0][-1].fitted.candidates[-1].id == ("mass" if exchanged else "soil-layer")
     assert asked == ([] if p_value > 0.001 else ["structural-compliance"])

@@ -86,9 +86,10 @@ def test_what_explains_the_way_down_is_a_beginning_if_it_leads_to_far_less(
     base, asked = fit((), 40_000.0), []
     before, there = taken(base, fit((MASS,), 10_000.0)), taken(base, fit((LAYER, REBOUND), over_all))
 
-    def one_by_one(asking: Inquiry, bare: Fitted, begun: Any = ()) -> Taken:
+    def one_by_one(asking: Inquiry, bare: Fitted, begun: Any = (), *, pairs: bool = True) -> Taken:
         asked.append([s.fitted.candidates[-1].id for s in begun])
         whole = asking.judge.evidence == ["whole"]
+        assert pairs == whole, "all pairs over all that was recorded alone"
         return there if whole else taken(bare, fit((LAYER, REBOUND) if begun else (LAYER,), above))
 
     weighed: list[Any] = []

@@ -161,8 +161,10 @@ def test_times_may_be_any_and_do_not_change_the_motion() -> None:
 def test_what_is_no_drop_test_is_said() -> None:
     assert "not a drop test" in unfit(shipped("side_overturn"))
     tilted = drop(3.0).replaced({"ground.surface": {"kind": "slope", "angle_deg": 5.0}})
-    with pytest.raises(ValueError, match="not level"):
-        DropModel(scenario=tilted)
+    ditch = drop(3.0).replaced({"ground.surface": {"kind": "ditch", "depth": 0.3, "angle_deg": 45.0, "bottom": 1.0}})
+    for uneven in (tilted, ditch):
+        with pytest.raises(ValueError, match="not level"):
+            DropModel(scenario=uneven)
     with pytest.raises(KeyError, match="no such path: masss in Striker"):
         DropModel(scenario=drop(3.0)).with_({"vehicle.masss": 1.0})
     with pytest.raises(ValueError, match="mass: out of bounds"):

@@ -1,0 +1,56 @@
+"""Shapes and forms: begun in many places, of which those that lead to one are followed once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis import forms
+from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.fit import Fitted, Judge
+from rollover.effects import Search
+from tests.diagnosis.drops import linear_blocks
+
+DAMPING = Candidate(id="soil-viscous-damping", kind="physics", family="", search={"damping": Search(1, 2)})
+BENT = replace(DAMPING, search={"damping": Search(1, 2), "exponent": Search(0, 1)})
+
+
+def fitted(c: Candidate, x: Sequence[float], times: float) -> Fitted:
+    """A fit to two recordings that leaves so many times what chance does."""
+    blocks = tuple(
+        replace(b, residual=b.residual * np.sqrt(times), J=np.zeros((40, len(x))))
+        for b in linear_blocks(np.random.default_rng(4), 2, 40, np.zeros(1))
+    )
+    return Fitted(candidates=(c,), x=tuple(x), blocks=blocks)
+
+
+@pytest.mark.parametrize(
+    ("ends", "followed"),
+    [
+        ((0.50, 0.52, 0.55), [0.50]),  # three ways to one place: the one that is nearest there
+        ((0.50, 0.90, 0.52), [0.50, 0.90]),
+        ((0.10, 0.50, 0.90), [0.10, 0.50, 0.90]),
+    ],
+)
+def test_of_fits_that_lead_to_one_place_one_is_followed(ends: tuple[float, ...], followed: list[float]) -> None:
+    """Short fits come from 0.2, 0.4 and 0.6; a few rounds more lead to `ends`."""
+    begun, whole = (0.2, 0.4, 0.6), []
+
+    def fit(_: Any, x: Sequence[float], *, rounds: int | None = None, **how: Any) -> Fitted:
+        if rounds == forms.SHORT:
+            return fitted(BENT, x, 10.0 + x[1])
+        if rounds == forms.FURTHER:
+            return fitted(BENT, (0.3, ends[begun.index(x[1])]), 9.0 + 0.1 * x[1])
+        whole.append(x[1])
+        return fitted(BENT, x, 8.0)
+
+    judge, start = cast(Judge, SimpleNamespace(fit=fit)), fitted(DAMPING, (0.3,), 30.0)
+    best = forms._best_of(judge, start, BENT, [(0.3, v) for v in begun], [b.total for b in start.blocks])
+    assert whole == followed
+    assert best is not None
+    assert best.x == (0.3, followed[0])

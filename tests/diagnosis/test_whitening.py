@@ -1,0 +1,51 @@
+"""Stacks of signals are whitened one by one: by their noise, its colour, what grows, and what they count."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from rollover.diagnosis.whitening import Noise, Whitening
+from rollover.noise import grown
+
+
+def stack(*noises: Noise) -> Whitening:
+    return Whitening(noises)
+
+
+def test_a_stack_is_whitened_signal_by_signal() -> None:
+    """g (x_i - a_1 x_i-1 - a_2 x_i-2) of the second alone: nothing of the first comes in, which has no colour."""
+    x = np.random.default_rng(1).standard_normal(30)
+    ar = (0.5, 0.2)
+    white = Noise(count=10, sigma=2.0, ar=(), loud=None, weight=None)
+    coloured = Noise(count=20, sigma=4.0, ar=ar, loud=None, weight=None)
+    y = stack(white, coloured)(x)
+    assert np.array_equal(y[:10], x[:10] / 2.0)
+    expected = grown(ar) * lfilter([1.0, -0.5, -0.2], [1.0], x[10:] / 4.0)
+    assert y[12:] == pytest.approx(expected[2:], rel=1e-12)
+    assert np.array_equal(y[10:12], np.zeros(2)), "no past to whiten with"
+
+
+def test_what_grows_is_divided_by_its_own_noise_and_weighed_behind_its_colour() -> None:
+    rng = np.random.default_rng(2)
+    x, loud, weight = rng.standard_normal(12), np.linspace(1.0, 3.0, 12), np.linspace(1.0, 0.1, 12)
+    y = stack(Noise(count=12, sigma=2.0, ar=(0.6,), loud=loud, weight=weight))(x)
+    u = x / loud
+    assert y[1:] == pytest.approx(weight[1:] * grown((0.6,)) * (u[1:] - 0.6 * u[:-1]), rel=1e-12)
+
+
+def test_columns_are_whitened_each_and_what_is_handed_in_stays() -> None:
+    rng = np.random.default_rng(3)
+    columns = rng.standard_normal((9, 3))
+    before = columns.copy()
+    one = stack(Noise(count=9, sigma=0.5, ar=(0.3,), loud=None, weight=None))
+    found = one(columns)
+    assert np.array_equal(columns, before)
+    for k in range(3):
+        assert np.array_equal(found[:, k], one(columns[:, k]))
+
+
+def test_a_signal_shorter_than_its_memory_tells_nothing() -> None:
+    short = Noise(count=1, sigma=1.0, ar=(0.5, 0.2), loud=None, weight=None)
+    assert np.array_equal(stack(short, short)(np.ones(2)), np.zeros(2))
