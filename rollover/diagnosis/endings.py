@@ -13,6 +13,7 @@ from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.otherwise import traced_too
 from rollover.diagnosis.refine import ended, polish, timed
+from rollover.diagnosis.straight import is_any_curve
 from rollover.effects import EFFECTS
 
 MANY = 0.05  # p-value of what as many effects as may be leave, below which they are no explanation
@@ -33,13 +34,14 @@ def followed(inquiry: Inquiry, found: Step) -> tuple[Step, Mismatch]:
     is_near = old.left < NEARLY_NOISE**2 * sum(b.residual.size for b in old.blocks)
     if judge.effort.thrifty or not is_near:
         return found, left
-    new = traced_too(inquiry, old)
-    if new.left < old.left or len(old.candidates) > 1 or left.p_value < MANY:
-        new = timed(judge, polish(judge, new))
-    new = ended(judge, new)
-    if new.left < old.left:
-        found = _with_rivals(judge, found.moved_to(new))
-        left = mismatch_of(judge.evidence, new.blocks, phases)
+    if not is_any_curve(old.candidates):  # as they stand these will be refused, however well they fit
+        new = traced_too(inquiry, old)
+        if new.left < old.left or len(old.candidates) > 1 or left.p_value < MANY:
+            new = timed(judge, polish(judge, new))
+        new = ended(judge, new)
+        if new.left < old.left:
+            found = _with_rivals(judge, found.moved_to(new))
+            left = mismatch_of(judge.evidence, new.blocks, phases)
     for simple in (simpler, _straightened):
         other = simple(inquiry, found)
         if other is not None:

@@ -202,15 +202,19 @@ class Evidence:
     def worth(self, leaps: NDArray[np.int64]) -> Array:
         """Weights (n,) of whitened samples: those whose past was forgiven are as wide as the noise itself."""
         found = np.ones(self.count)
-        if not leaps.size:
-            return found
-        leaping = np.zeros(self.count, dtype=np.bool_)
-        leaping[leaps] = True
-        for s, part in self.spans():
-            there = leaping[part]
-            for k in range(1, len(s.ar) + 1):
-                found[part][k:][there[:-k] & ~there[k:]] = 1.0 / grown(s.ar)
+        last, orders, gains = self._memories
+        for k in range(1, int(orders.max(initial=0)) + 1):
+            before = leaps[(orders[leaps] >= k) & (leaps + k <= last[leaps])]
+            found[before + k] = gains[before]
+        found[leaps] = 1.0
         return found
+
+    @cached_property
+    def _memories(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+        """Of the signal of each sample (n,): the last one, how many its noise remembers, and what that makes of one."""
+        sizes = [s.rows.size for s in self.signals]
+        orders = np.repeat([len(s.ar) for s in self.signals], sizes)
+        return self._inside.last, orders, np.repeat([1.0 / grown(s.ar) for s in self.signals], sizes)
 
     def spans(self) -> list[tuple[Signal, slice]]:
         """Each signal with its place in the stack."""

@@ -195,7 +195,7 @@ def _first_fits(
         ]
     worth = worth[: judge.effort.most_leaders]
     # a first fit may lead astray what scored most
-    if not judge.effort.thrifty and all(f.candidates[-1].key != looked.best for f in worth):
+    if all(f.candidates[-1].key != looked.best for f in worth):
         worth += [f for f in fits if f.candidates[-1].key == looked.best][:1]
     return [replace(s, nrmse=told.get(s.candidate.key, 0.0)) for s in screened], worth
 

@@ -99,7 +99,7 @@ def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = (), *, pa
             break
         found = upheld(inquiry, tried, looked)
         if found is None and not taken:
-            found = in_full(inquiry, current)
+            found = counted_otherwise(inquiry, current)
             first = found or first
         if found is None:
             refuted = not taken
@@ -163,20 +163,22 @@ def upheld(inquiry: Inquiry, found: Step, looked: Gate) -> Step | None:
     return lasting(judge, backed(found, looked), inquiry.groups) if judge.effort.thrifty else found
 
 
-def in_full(inquiry: Inquiry, current: Fitted) -> Step | None:
-    """A step with all samples counted in full where several recordings took another course; None if nothing lasts.
+def counted_otherwise(inquiry: Inquiry, current: Fitted) -> Step | None:
+    """A step with recordings on another course counted in full where they were forgiven, or forgiven; None if none.
 
-    Chance could have sent them there, but so could what is missing; if nothing lasts they are forgiven again.
+    Chance could have sent several there, but so could what is missing; and where they went there may hide what shows
+    before. If nothing lasts they are counted as they were.
     """
     judge = inquiry.judge
-    if not judge.straying or sum(is_other(b.course) for b in current.blocks) < SEVERAL:
+    before = judge.straying
+    if before and sum(is_other(b.course) for b in current.blocks) < SEVERAL:
         return None
-    judge.straying = False
+    judge.straying = not before
     base = judge.again(current)
     looked = look(judge, base, inquiry.candidates, inquiry.groups)
     tried = step(inquiry, base, looked)
     found = upheld(inquiry, tried, looked) if is_beyond_chance(tried, judge, inquiry.phases) else None
-    judge.straying = found is None
+    judge.straying = before if found is None else not before
     return found
 
 

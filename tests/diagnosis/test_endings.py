@@ -156,6 +156,27 @@ def test_what_was_bent_to_do_anothers_work_is_straight_beside_it(leaves: float, 
         assert tuple(n for c in after.fitted.candidates if (n := names.get((c.id, len(c.search))))) == straight
 
 
+@pytest.mark.parametrize("is_a_curve", [True, False])
+def test_what_draws_any_curve_is_not_followed_but_straightened(
+    is_a_curve: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However well it fits it would be refused as it stands."""
+    traced: list[Fitted] = []
+    best = fitted("soil-layer", 4.0, (0.7, 0.3))
+    judge = SimpleNamespace(effort=SimpleNamespace(thrifty=False), evidence=[])
+    monkeypatch.setattr(endings, "mismatch_of", lambda *_: SimpleNamespace(p_value=1e-9))
+    monkeypatch.setattr(endings, "is_any_curve", lambda _: is_a_curve)
+    monkeypatch.setattr(endings, "traced_too", lambda _, f: traced.append(f) or f)
+    for name in ("timed", "polish", "ended"):
+        monkeypatch.setattr(endings, name, lambda _, f: f)
+    monkeypatch.setattr(endings, "simpler", lambda *_: None)
+    straight = step(fitted("soil-stiffness", 4.0, (0.7, 0.3)))
+    monkeypatch.setattr(endings, "_straightened", lambda *_: straight)
+    found, _ = endings.followed(cast(Inquiry, SimpleNamespace(judge=judge, phases=[])), step(best))
+    assert found is straight
+    assert traced == ([] if is_a_curve else [best])
+
+
 def test_a_damping_is_tried_as_the_drag_that_it_becomes_with_the_square_of_the_speed() -> None:
     """1/2 C rho A v^2 = d v^2: C = 2 d/(rho A), whatever a drag that was fitted from afar came to."""
     asked: list[Job] = []

@@ -295,18 +295,24 @@ def _from(low: float, high: float) -> Interval:
     return Interval(value=0.5 * (low + high), low=low, high=high, unit="1")
 
 
-@pytest.mark.parametrize(("others", "lasts"), [(1, True), (2, True), (2, False)])
-def test_two_on_another_course_are_looked_at_in_full_where_nothing_else_lasts(
-    others: int, lasts: bool, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("straying", "others", "lasts"),
+    [(True, 1, True), (True, 2, True), (True, 2, False), (False, 0, True), (False, 0, False)],
+)
+def test_other_courses_are_counted_otherwise_where_nothing_lasts(
+    straying: bool, others: int, lasts: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One may be chance's; of two it is asked what could have sent them there, and they are forgiven if nothing has."""
+    """One may be chance's; of two it is asked what could have sent them there, and they are forgiven if nothing has.
+
+    Those that count in full are forgiven: what shows before the blow is little beside where they went.
+    """
     far = Course(samples=np.full(N, 0.1), share=0.2, more=1.0)
     bare = Block(residual=np.ones(N), J=np.zeros((N, 0)), slope=np.zeros(N), shift=0.0, prior=1.0)
     current = Fitted(
         candidates=(), x=(), blocks=tuple(replace(bare, course=far if k < others else None) for k in range(4))
     )
     seen: list[bool] = []
-    judge: Any = SimpleNamespace(straying=True, again=lambda f: f, effort=RUNS)
+    judge: Any = SimpleNamespace(straying=straying, again=lambda f: f, effort=RUNS)
     looked = Gate(score=0.0, scores={}, null=np.zeros(9), detectable={})
     made = Step(base=current, fitted=current, p_value=0.0)
 
@@ -319,10 +325,11 @@ def test_two_on_another_course_are_looked_at_in_full_where_nothing_else_lasts(
     monkeypatch.setattr(one_by_one, "lasting", lambda *_: made if lasts else None)
     monkeypatch.setattr(one_by_one, "moves", lambda *_: 1.0)
     inquiry = Inquiry(judge=judge, candidates=[], groups=[], phases=[], say=lambda _: None, crew=cast(Any, None))
-    found = one_by_one.in_full(inquiry, current)
-    assert seen == [False] * (others - 1)
-    assert (found is not None) == (others > 1 and lasts)
-    assert judge.straying is (found is None)
+    found = one_by_one.counted_otherwise(inquiry, current)
+    able = others > 1 or not straying
+    assert seen == [not straying] * able
+    assert (found is not None) == (able and lasts)
+    assert judge.straying is (straying if found is None else not straying)
 
 
 @pytest.mark.parametrize(("straying", "forgiven"), [(True, True), (False, True), (False, False)])

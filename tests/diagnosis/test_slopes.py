@@ -178,6 +178,8 @@ def test_what_leads_by_its_score_is_fitted_whatever_another_gains() -> None:
     assert base is not None
     assert leading(judge, base, {SLOPE.key: 9.0, MASS.key: 2.0}) == {SLOPE.key}
     assert leading(judge, base, {SLOPE.key: 8.0, MASS.key: 9.0}) == {SLOPE.key, MASS.key}
+    judge.effort = replace(judge.effort, most_leaders=1)  # nor however many others are followed
+    assert leading(judge, base, {SLOPE.key: 8.0, MASS.key: 9.0}) == {SLOPE.key, MASS.key}
 
 
 def test_runs_are_announced_before_they_are_needed(monkeypatch: pytest.MonkeyPatch) -> None:

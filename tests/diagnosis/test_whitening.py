@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any, cast
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.whitening import Noise, Whitening
 from rollover.noise import grown
+from rollover.recording import Recording
+from tests.diagnosis.drops import FORCE, signal
 
 
 def stack(*noises: Noise) -> Whitening:
@@ -49,3 +54,17 @@ def test_columns_are_whitened_each_and_what_is_handed_in_stays() -> None:
 def test_a_signal_shorter_than_its_memory_tells_nothing() -> None:
     short = Noise(count=1, sigma=1.0, ar=(0.5, 0.2), loud=None, weight=None)
     assert np.array_equal(stack(short, short)(np.ones(2)), np.zeros(2))
+
+
+def test_samples_whose_past_was_forgiven_are_as_wide_as_the_noise_within_their_own_signal() -> None:
+    """Two of a memory of two follow each leap, none of the other signal, and none that leaps itself."""
+    ar = (0.5, 0.2)
+    wide = 1.0 / grown(ar)
+    signals = (signal(np.arange(6.0), 1.0, ar), signal(np.arange(6.0), 1.0))
+    recording = Recording(title="r", time=np.arange(6.0), channels={FORCE: np.arange(6.0)})
+    e = Evidence(
+        name="r", recording=recording, simulator=cast(Any, None), signals=signals, shift_prior=1e-3, condition=""
+    )
+    assert np.array_equal(e.worth(np.zeros(0, dtype=np.int64)), np.ones(12))
+    found = e.worth(np.array([1, 2, 5, 8]))
+    assert found == pytest.approx([1.0, 1.0, 1.0, wide, wide, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
