@@ -13,6 +13,7 @@ from rollover.diagnosis.gate import freed
 
 Array = NDArray[np.float64]
 LINES = ("sensor-gain", "sensor-scale", "sensor-bias")
+BACK = ("soil-elastic-rebound", "soil-adhesion")  # effects of the soil that act on the way back alone
 MOST = 3  # effects in one explanation
 BENT = 16.0  # gain of a curve or a drift beside a line, of four standard errors
 
@@ -66,11 +67,17 @@ def bow(judge: Judge, fitted: Fitted, channel: str, term: Callable[[Array, Array
 def is_any_curve(candidates: Sequence[Candidate]) -> bool:
     """Whether they draw any curve: as many effects as may be, all of one sensor or of the soil, or two bent ones.
 
-    Two effects of the soil that both take another form than their usual one are curves enough, whatever joins them.
+    Two effects of the soil that both take another form than their usual one are curves enough, whatever joins them. The
+    soil draws one on the way down and another on the way back.
     """
-    subjects = [c.channel or ("soil" if c.id.startswith("soil-") else c.id) for c in candidates]
+    subjects = [c.channel or _subject(c) for c in candidates]
     bent = [s for s, c in zip(subjects, candidates, strict=True) if c.is_bent]
     return (len(candidates) == MOST and len(set(subjects)) == 1) or len(set(bent)) < len(bent)
+
+
+def _subject(c: Candidate) -> str:
+    """What an effect is of that is no sensor's."""
+    return "way back" if c.id in BACK else "soil" if c.id.startswith("soil-") else c.id
 
 
 def is_pliant(candidates: Sequence[Candidate]) -> bool:

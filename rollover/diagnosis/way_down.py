@@ -2,7 +2,8 @@
 
 Where much is missing on the way back, as of ground that springs, no effect of the way down meets a recording well, and
 one that meets neither may lead. Up to the deepest point it is out of sight. What bounces comes down again at other
-times with another spring, and fits to several such blows end at the wrong ones: the first rise comes before them.
+times with another spring, and fits to several such blows end at the wrong ones: the first rise comes before them, and
+before what holds the face as it lifts off comes what it springs back by.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from rollover.diagnosis.phases import AROUND_PEAK, PEAK
 
 BEYOND = 0.05  # s that are simulated after an end, for filters that look ahead
 RIVALS = 5  # that are held against the best over the whole way
-ENDS = (1.0 - AROUND_PEAK, 2.0)  # of the time to the deepest point: before it, and before what bounces comes down again
+# of the time to the deepest point: before it, as the ground springs back, and before what bounces comes down again
+ENDS = (1.0 - AROUND_PEAK, 1.2, 2.0)
 
 
 def down_first(inquiry: Inquiry, found: Taken) -> Taken:

@@ -218,6 +218,9 @@ def test_three_effects_of_one_sensor_or_of_the_soil_are_any_curve_and_two_are_no
     soil = [on("soil-layer", None), on("soil-rate-hardening", None), on("soil-stiffness", None)]
     assert is_any_curve(soil)
     assert not is_any_curve([*soil[:2], on("mass", None)])
+    back = [on("soil-elastic-rebound", None), on("soil-adhesion", None)]
+    assert not is_any_curve([soil[0], *back]), "the way back is another curve than the way down"
+    assert not is_any_curve([*soil[:2], back[0]])
     shaped = replace(soil[1], search={"per_decade": Search(0.01, 0.5), "reference_speed": Search(0.01, 1.0)})
     assert not is_any_curve([soil[0], shaped])
     bent = [replace(soil[0], form={"onset": 1.0}), shaped]
