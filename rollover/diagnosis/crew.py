@@ -12,6 +12,7 @@ import pickle
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Literal, TypeVar
 
 from rollover.diagnosis.candidates import Candidate
@@ -77,6 +78,7 @@ class Crew:
         self.children = Children(workers)
         if workers > 1:
             begin_server(WARM)
+        self._folder: TemporaryDirectory[str] | None = None  # what children read
         self._beginning: list[Any] = []  # what tells that the children are there
         self._done: dict[str, dict[str, Any] | None] = {}
         if notebook is not None and notebook.exists():
@@ -92,6 +94,8 @@ class Crew:
 
     def __exit__(self, *_: object) -> None:
         self.children.stop()
+        if self._folder is not None:
+            self._folder.cleanup()
 
     def begin(self, judge: Judge) -> None:
         """Begin the children, if any, while this process goes on: each makes a run, so that it has all it needs."""
@@ -138,8 +142,8 @@ class Crew:
             ended(k, work(judge, jobs[k]))
         if done == len(todo):
             return found
-        bare, rest, about = pickle.dumps(judge.bare()), todo[done:], f"{about} {judge.shifts}"
-        outcomes = map_cases(_worked, [(about, bare, jobs[k]) for k in rest], children=self.children)
+        told, rest = self._told(judge), todo[done:]
+        outcomes = map_cases(_worked, [(told, jobs[k]) for k in rest], children=self.children)
         for outcome in outcomes:
             k = rest[outcome.index]
             if outcome.failure is not None:
@@ -156,17 +160,27 @@ class Crew:
         """
         if judge.effort.thrifty or len(things) < 2 or not self.is_there():
             return at_each(judge, look, things)
-        about, bare = f"{self.about} {_fingerprint(judge)} {judge.shifts}", pickle.dumps(judge.bare())
+        told = self._told(judge)
         shares = [list(things)[k :: 2 * self.workers] for k in range(2 * self.workers)]
         found: dict[int, R] = {}
-        tasks = [(about, bare, look, share) for share in shares if share]
+        tasks = [(told, look, share) for share in shares if share]
         for outcome in map_cases(_looked, tasks, children=self.children):
             if outcome.value is None:
                 raise RuntimeError(f"a look: {outcome.failure.sentence if outcome.failure else 'no reason given'}")
-            told, made = outcome.value
+            seen, made = outcome.value
             judge.simulations += made
-            found |= {outcome.index + 2 * self.workers * k: one for k, one in enumerate(told)}
+            found |= {outcome.index + 2 * self.workers * k: one for k, one in enumerate(seen)}
         return [found[k] for k in range(len(things))]
+
+    def _told(self, judge: Judge) -> Path:
+        """A file with the judge for children to read, once each: megabytes for each of a thousand jobs take long."""
+        if self._folder is None:
+            self._folder = TemporaryDirectory(prefix="rollover-")
+        about = f"{self.about} {_fingerprint(judge)} {judge.shifts}"
+        path = Path(self._folder.name, hashlib.sha256(about.encode()).hexdigest())
+        if not path.exists():
+            path.write_bytes(pickle.dumps(judge.bare()))
+        return path
 
     def _note(self, key: str, fitted: Fitted | None) -> None:
         row: dict[str, Any] | None = None
@@ -220,7 +234,7 @@ def _fingerprint(judge: Judge) -> str:
     return total.hexdigest()
 
 
-_held: dict[str, Judge] = {}  # in a child: what it simulated for the job before
+_held: dict[Path, Judge] = {}  # in a child: what it simulated for the job before
 
 
 def _begun(sent: bytes) -> None:
@@ -228,26 +242,26 @@ def _begun(sent: bytes) -> None:
     judge.fit((), (), rounds=1)
 
 
-def _worked(case: tuple[str, bytes, Job]) -> tuple[Fitted | None, int]:
-    about, sent, job = case
-    judge = _kept(about, sent)
+def _worked(case: tuple[Path, Job]) -> tuple[Fitted | None, int]:
+    told, job = case
+    judge = _kept(told)
     before = judge.simulations
     return work(judge, job), judge.simulations - before
 
 
-def _looked(case: tuple[str, bytes, Callable[[Judge, Any], Any], list[Any]]) -> tuple[list[Any], int]:
-    about, sent, look, things = case
-    judge = _kept(about, sent)
+def _looked(case: tuple[Path, Callable[[Judge, Any], Any], list[Any]]) -> tuple[list[Any], int]:
+    told, look, things = case
+    judge = _kept(told)
     before = judge.simulations
     return at_each(judge, look, things), judge.simulations - before
 
 
-def _kept(about: str, sent: bytes) -> Judge:
-    """The judge that was sent, with what it simulated before."""
-    if about not in _held:
+def _kept(told: Path) -> Judge:
+    """The judge of a file, with what it simulated before."""
+    if told not in _held:
         _held.clear()
-        _held[about] = pickle.loads(sent)
-    return _held[about]
+        _held[told] = pickle.loads(told.read_bytes())
+    return _held[told]
 
 
 def _rebuilt(judge: Judge, job: Job, row: dict[str, Any] | None) -> Fitted | None:
