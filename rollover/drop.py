@@ -198,7 +198,7 @@ def unfit(scenario: Scenario) -> str:
     slope = scenario.effects.get("slope")
     surface = scenario.ground.surface
     if not is_flat(surface) or any(gradient(surface)) or (slope is not None and slope.angle != 0.0):
-        return "ground.surface: not level, got an inclination; a drop test by itself needs level ground"
+        return "ground.surface: not level throughout; a drop test by itself needs level ground"
     return ""
 
 

@@ -16,7 +16,7 @@ from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry, Phases
 from rollover.diagnosis.lasting import astray, backed, begun_anew, lasting
 from rollover.diagnosis.looks import look, look_again
-from rollover.diagnosis.pairs import exchanged, two_by_two
+from rollover.diagnosis.pairs import two_by_two, with_another_first
 from rollover.diagnosis.refine import conditioned, is_doubtful, timed
 from rollover.diagnosis.remainder import NEGLIGIBLE, is_enough, is_tolerated, matters
 from rollover.diagnosis.straight import MOST, is_any_curve
@@ -116,7 +116,7 @@ def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = (), *, pa
             if pairs and not judge.effort.thrifty:
                 other, paired = two_by_two(inquiry, taken, first_look), True
             elif judge.effort.thrifty and current.left - count < ABLE * (base.left - count):
-                other = exchanged(inquiry, taken)
+                other = with_another_first(inquiry, taken)
             if other is not None and is_better(other[0][-1].fitted, other[1], current):
                 (taken, left), current = other, other[0][-1].fitted
         is_far = current.left > HOPELESS**2 * count and current.left - count > HARDLY_ANY * (base.left - count)

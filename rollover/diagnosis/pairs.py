@@ -46,7 +46,7 @@ def two_by_two(inquiry: Inquiry, taken: Sequence[Step], looked: Gate) -> tuple[l
     return [replace(taken[0], fitted=found.base), found], left
 
 
-def exchanged(inquiry: Inquiry, taken: Sequence[Step]) -> tuple[list[Step], Mismatch] | None:
+def with_another_first(inquiry: Inquiry, taken: Sequence[Step]) -> tuple[list[Step], Mismatch] | None:
     """Two steps with the first effect given for a better one beside the second, and what they leave; None if none."""
     other = instead(inquiry, taken[-1].fitted)
     if other is None or other.fitted.left >= taken[-1].fitted.left:
@@ -125,16 +125,14 @@ def _traced(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fitted]:
 
     None where the best leaves no more than noise.
     """
-    lead = min(pairs, key=lambda f: f.left)
-    able = [
-        way
-        for f in sorted(pairs, key=lambda f: f.left)
-        if f.left < PLACED * lead.left
-        for way in (f, inquiry.judge.again(turned(f)))
-        if stretches(way) and not way.candidates[-1].rings
-    ]
-    jobs = [replace(from_there(f, "trace"), stretch=s) for f in able[:PLACES] for s in stretches(f)]
-    return [] if is_noise(lead) else [f for f in inquiry.fits(jobs) if f is not None]
+    ranked = sorted(pairs, key=lambda f: f.left)
+    if is_noise(ranked[0]):
+        return []
+    near = (f for f in ranked if f.left < PLACED * ranked[0].left)
+    ways = (way for f in near for way in (f, inquiry.judge.again(turned(f))))
+    able = itertools.islice((way for way in ways if stretches(way) and not way.candidates[-1].rings), PLACES)
+    jobs = [replace(from_there(f, "trace"), stretch=s) for f in able for s in stretches(f)]
+    return [f for f in inquiry.fits(jobs) if f is not None]
 
 
 def _rings(pair: Fitted) -> bool:
