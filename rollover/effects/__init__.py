@@ -78,13 +78,13 @@ def entries() -> dict[str, type[Effect]]:
 
     A sensor effect is one channel's; with its number the same one acts on a second and a third channel.
     """
-    return _entries(tuple(effects().values()))
+    return _entries(tuple(effects().items()))
 
 
 @functools.lru_cache(maxsize=4)  # asked for with every value that is exchanged
-def _entries(found: tuple[type[Effect], ...]) -> dict[str, type[Effect]]:
-    more = {nth(e.id, n): e for e in found if e.kind == "sensor" for n in range(2, MOST + 1)}
-    return {e.id: e for e in found} | more
+def _entries(found: tuple[tuple[str, type[Effect]], ...]) -> dict[str, type[Effect]]:
+    more = {nth(id, n): kind for id, kind in found if kind.kind == "sensor" for n in range(2, MOST + 1)}
+    return dict(found) | more
 
 
 def nth(id: str, n: int) -> str:
