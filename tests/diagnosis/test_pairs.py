@@ -117,5 +117,5 @@ def test_places_of_the_best_pairs_are_tried_all_along_unless_nothing_but_noise_i
     ]
     assert len(found) == 4
     asked.clear()
-    assert pairs._traced(inquiry(asked), [fitted((DAMPING, MASS), 1.0), right]) == []
+    assert pairs._traced(inquiry(asked), [fitted((DAMPING, MASS), 0.9), fitted((layer, DAMPING), 1.0)]) == []
     assert asked == []
