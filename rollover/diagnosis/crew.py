@@ -100,8 +100,8 @@ class Crew:
     def begin(self, judge: Judge) -> None:
         """Begin the children, if any, while this process goes on: each makes a run, so that it has all it needs."""
         if self.workers > 1 and not judge.effort.thrifty:
-            bare = pickle.dumps(judge.bare())  # here: what goes on changes what another thread would pickle
-            self._beginning = [self.children.pool.schedule(_begun, args=(bare,)) for _ in range(self.workers)]
+            told = self._told(judge, self._about(judge))
+            self._beginning = [self.children.pool.schedule(_begun, args=(told,)) for _ in range(self.workers)]
 
     def is_there(self) -> bool:
         """Whether the children have begun."""
@@ -114,7 +114,7 @@ class Crew:
 
     def fits(self, judge: Judge, jobs: Sequence[Job], say: Progress = lambda _: None) -> list[Fitted | None]:
         """Fits in the order of the jobs; None where nothing could be simulated."""
-        about = f"{self.about} {_fingerprint(judge)}"
+        about = self._about(judge)
         found: list[Fitted | None] = [None] * len(jobs)
         keys = [job.key(about) for job in jobs]
         todo = [k for k, key in enumerate(keys) if key not in self._done]
@@ -142,7 +142,7 @@ class Crew:
             ended(k, work(judge, jobs[k]))
         if done == len(todo):
             return found
-        told, rest = self._told(judge), todo[done:]
+        told, rest = self._told(judge, about), todo[done:]
         outcomes = map_cases(_worked, [(told, jobs[k]) for k in rest], children=self.children)
         for outcome in outcomes:
             k = rest[outcome.index]
@@ -160,7 +160,7 @@ class Crew:
         """
         if judge.effort.thrifty or len(things) < 2 or not self.is_there():
             return at_each(judge, look, things)
-        told = self._told(judge)
+        told = self._told(judge, self._about(judge))
         shares = [list(things)[k :: 2 * self.workers] for k in range(2 * self.workers)]
         found: dict[int, R] = {}
         tasks = [(told, look, share) for share in shares if share]
@@ -172,12 +172,15 @@ class Crew:
             found |= {outcome.index + 2 * self.workers * k: one for k, one in enumerate(seen)}
         return [found[k] for k in range(len(things))]
 
-    def _told(self, judge: Judge) -> Path:
+    def _about(self, judge: Judge) -> str:
+        """What all fits depend on beside their jobs."""
+        return f"{self.about} {_fingerprint(judge)}"
+
+    def _told(self, judge: Judge, about: str) -> Path:
         """A file with the judge for children to read, once each: megabytes for each of a thousand jobs take long."""
         if self._folder is None:
             self._folder = TemporaryDirectory(prefix="rollover-")
-        about = f"{self.about} {_fingerprint(judge)} {judge.shifts}"
-        path = Path(self._folder.name, hashlib.sha256(about.encode()).hexdigest())
+        path = Path(self._folder.name, hashlib.sha256(f"{about} {judge.shifts}".encode()).hexdigest())
         if not path.exists():
             path.write_bytes(pickle.dumps(judge.bare()))
         return path
@@ -237,9 +240,8 @@ def _fingerprint(judge: Judge) -> str:
 _held: dict[Path, Judge] = {}  # in a child: what it simulated for the job before
 
 
-def _begun(sent: bytes) -> None:
-    judge: Judge = pickle.loads(sent)
-    judge.fit((), (), rounds=1)
+def _begun(told: Path) -> None:
+    _kept(told).fit((), (), rounds=1)
 
 
 def _worked(case: tuple[Path, Job]) -> tuple[Fitted | None, int]:

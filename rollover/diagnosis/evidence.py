@@ -202,6 +202,8 @@ class Evidence:
     def worth(self, leaps: NDArray[np.int64]) -> Array:
         """Weights (n,) of whitened samples: those whose past was forgiven are as wide as the noise itself."""
         found = np.ones(self.count)
+        if not leaps.size:
+            return found
         last, orders, gains = self._memories
         for k in range(1, int(orders.max(initial=0)) + 1):
             before = leaps[(orders[leaps] >= k) & (leaps + k <= last[leaps])]

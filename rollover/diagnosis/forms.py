@@ -92,9 +92,9 @@ def _best_of(
             break
         if len(begun) < STARTS and not any(_is_there(one, other) for other in begun):
             begun.append(one)
-    shifts = [shifts_told([b.shift for b in f.blocks], one, few) for one in begun]
+    held = [b.shift for b in f.blocks]
     again = [
-        judge.fit(candidates, one.x, shifts=s, rounds=FURTHER, bare=True) for one, s in zip(begun, shifts, strict=True)
+        judge.fit(candidates, one.x, shifts=shifts_told(held, one, few), rounds=FURTHER, bare=True) for one in begun
     ]
     best: Fitted | None = None
     done: list[Fitted] = []

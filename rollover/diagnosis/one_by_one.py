@@ -178,7 +178,8 @@ def counted_otherwise(inquiry: Inquiry, current: Fitted) -> Step | None:
     looked = look(judge, base, inquiry.candidates, inquiry.groups)
     tried = step(inquiry, base, looked)
     found = upheld(inquiry, tried, looked) if is_beyond_chance(tried, judge, inquiry.phases) else None
-    judge.straying = before if found is None else not before
+    if found is None:
+        judge.straying = before
     return found
 
 
