@@ -20,12 +20,12 @@ from typing import Any
 
 import numpy as np
 
-from ground.fluid import cone_rate
 from rollover.diagnosis import Diagnosis, diagnose
 from rollover.importers import COLLECTIONS
-from rollover.importers.cone_drops import BODY, CLIPS, G
+from rollover.importers.cone_drops import BODY, CLIPS, RADIUS, G
 from rollover.recording import Clock, Recording
 from rollover.scenario import Scenario, load
+from tests.real import cone_drops
 
 DRAWS = "cube tosses, draws of five"
 RESULTS = Path(__file__).with_suffix(".json")
@@ -47,12 +47,11 @@ class Set:
     """Recordings, the scenario without the effect, what was left out, and what is published of it."""
 
     left_out: str
-    make: Callable[[Path, Mapping[str, Any]], tuple[Scenario, Recordings]]
+    make: Callable[[Path], tuple[Scenario, Recordings]]
     tolerance: float = 0.0
     hold_out: tuple[str, ...] = ()
     published: str = ""
     value: Callable[[Diagnosis, Recordings], dict[str, float]] = lambda _d, _r: {}
-    needs: str = ""  # another set, whose numbers come in
 
 
 def cut(recording: Recording, rows: Any, channels: Sequence[str], **changes: Any) -> Recording:
@@ -61,14 +60,14 @@ def cut(recording: Recording, rows: Any, channels: Sequence[str], **changes: Any
     return replace(recording, time=recording.time[rows], channels=kept, sensors={}, **changes)
 
 
-def balls(*names: str, referred: bool = False) -> Callable[[Path, Mapping[str, Any]], tuple[Scenario, Recordings]]:
+def balls(*names: str, referred: bool = False) -> Callable[[Path], tuple[Scenario, Recordings]]:
     """Drops of balls, no air, until they land. They were let go by hand: from 80 m (told), 0.3 m, 0.1 s, 0.3 m/s.
 
     The speed in the file is a difference of the height and says nothing by itself. `referred`: the drag of each ball
     over its own frontal area, so that one coefficient holds for all.
     """
 
-    def made(folder: Path, _: Mapping[str, Any]) -> tuple[Scenario, Recordings]:
+    def made(folder: Path) -> tuple[Scenario, Recordings]:
         found = []
         for name, r in COLLECTIONS["falling-balls"].read(folder / "falling_balls", [f"{n}-?" for n in names]):
             conditions = dict(r.conditions) | {"initiation.height": 80.0}
@@ -108,35 +107,34 @@ def drag(found: Diagnosis, recordings: Recordings) -> dict[str, float]:
     return {"drag_coefficient": area / face} | ({} if math.isnan(crisis) else {"crisis_speed": crisis})
 
 
-def cones(series: str, repeats: str = "12") -> Callable[[Path, Mapping[str, Any]], tuple[Scenario, Recordings]]:
-    """Cones on water from -15 to 50 ms, without clipped rows: drag and buoyancy alone, or with the water's mass.
+def cones(kind: str, angle: int) -> Callable[[Path], tuple[Scenario, Recordings]]:
+    """Two drops of each height onto water from -15 to 50 ms, without clipped rows.
 
-    The coefficient of drag is a choice, 0.7 +- 0.3; the clock's zero is "about" the impact, 2 ms.
+    Rigid cones ("R") meet drag and buoyancy alone, 0.7 +- 0.3; sprung ones ("F") the water that `cone_drops` fits to
+    the rigid ones of their angle, to half of its mass and half a cone's height for the end of its growth: after a
+    rigid cone's blow little tells where that ends. The clock's zero is "about" the impact, 2 ms.
     """
 
-    def made(folder: Path, earlier: Mapping[str, Any]) -> tuple[Scenario, Recordings]:
-        names = [f"{series}{h:03d}{k}" for h in HEIGHTS for k in repeats]
+    def made(folder: Path) -> tuple[Scenario, Recordings]:
+        folder = folder / "cone_drops"
+        names = [f"S{kind}{angle}{h:03d}{k}" for h in HEIGHTS for k in "12"]
+        scenario = load("cone_drop")
+        doubt = {cone_drops.DRAG: 0.3}
+        if kind == "F":
+            known = cone_drops.rigid(folder, angle)["with"]["numbers"]
+            scenario = scenario.replaced(known)
+            height = RADIUS / math.tan(math.radians(angle))
+            doubt |= {cone_drops.RATE: 0.5 * known[cone_drops.RATE], cone_drops.FADE: 0.5 * height}
         found = []
-        for name, r in COLLECTIONS["cone-drops"].read(folder / "cone_drops", names):
+        for name, r in COLLECTIONS["cone-drops"].read(folder, names):
             rows = np.flatnonzero((r.time > -0.015) & (r.time < 0.050) & (r[ACCELERATION] < 0.97 * CLIPS * G))
             conditions = dict(r.conditions)
-            if series.startswith("SF"):
+            if kind == "F":
                 # where the instrument sits: the body, all but the nose
                 share = 1.0 - BODY / conditions["vehicle.mass"]
-                conditions |= {"effects.structural-compliance.stiffness": None}
-                conditions |= {"effects.structural-compliance.nose_share": share}
+                conditions |= {cone_drops.STIFFNESS: None, cone_drops.SHARE: share}
             clock = Clock(zero="known", within=0.002)
-            doubt = {"ground.law.drag_coefficient": 0.3}
             found.append((name, cut(r, rows, [ACCELERATION], conditions=conditions, uncertainty=doubt, clock=clock)))
-        scenario = load("cone_drop")
-        if series.startswith("SF"):
-            water = earlier["value"]["rate"]
-            known = {f"effects.soil-added-mass-growth.{n}": earlier["value"].get(n, 0.0) for n in ("rate", "fade")}
-            scenario = scenario.replaced(known)
-            found = [
-                (n, replace(r, uncertainty={**r.uncertainty, "effects.soil-added-mass-growth.rate": 0.5 * water}))
-                for n, r in found
-            ]
         return scenario, found
 
     return made
@@ -147,10 +145,12 @@ def water(found: Diagnosis, recordings: Recordings) -> dict[str, float]:
     named = next((e for e in found.effects if e.id == "soil-added-mass-growth"), None)
     rate, fade = (named.parameters[n].value if named and n in named.parameters else d for n, d in WATER)
     conditions = recordings[0][1].conditions
-    height = conditions["vehicle.nose_height"]
-    half = math.atan2(conditions["vehicle.nose_radius"], height)
-    k = rate / cone_rate(half, coefficient=1.0, density=1000.0) * (1.0 + 3.0 * fade / height)
-    return {"rate": rate, "fade": fade, "k": k}
+    half = math.atan2(conditions["vehicle.nose_radius"], conditions["vehicle.nose_height"])
+    return {
+        "rate": rate,
+        "fade": fade,
+        "k": cone_drops.share_of_cube({cone_drops.RATE: rate, cone_drops.FADE: fade}, half),
+    }
 
 
 def spring(found: Diagnosis, _: Recordings) -> dict[str, float]:
@@ -159,14 +159,14 @@ def spring(found: Diagnosis, _: Recordings) -> dict[str, float]:
     return {"stiffness": named.parameters["stiffness"].value if named is not None else math.nan}
 
 
-def penetrometer(rate: float) -> Callable[[Path, Mapping[str, Any]], tuple[Scenario, Recordings]]:
+def penetrometer(rate: float) -> Callable[[Path], tuple[Scenario, Recordings]]:
     """Drops into a sea bed on the stand-in soil of the scenario, 0.2 s before to 0.4 s behind the contact.
 
     The water's drag is that of each fall before the contact. Three places are not one soil: its strength is told to a
     quarter, as laws fitted to these drops scatter. `rate` is the gain of strength for each decade of speed.
     """
 
-    def made(folder: Path, _: Mapping[str, Any]) -> tuple[Scenario, Recordings]:
+    def made(folder: Path) -> tuple[Scenario, Recordings]:
         scenario = load("penetrometer_drop")
         law = scenario.ground.law
         doubt = {f"ground.law.{n}": 0.25 * getattr(law, n) for n in ("surface_pressure", "depth_pressure")}
@@ -189,7 +189,7 @@ def penetrometer(rate: float) -> Callable[[Path, Mapping[str, Any]], tuple[Scena
     return made
 
 
-def cubes(numbers: Sequence[int]) -> Callable[[Path, Mapping[str, Any]], tuple[Scenario, Recordings]]:
+def cubes(numbers: Sequence[int]) -> Callable[[Path], tuple[Scenario, Recordings]]:
     """Tosses of a cube onto a table without friction, along the table, from the start to 0.1 s after the first contact.
 
     Tumbling is chaotic: nothing is asked of what comes later. The start is that of a flight fitted to the poses, which
@@ -198,7 +198,7 @@ def cubes(numbers: Sequence[int]) -> Callable[[Path, Mapping[str, Any]], tuple[S
     that a share of its own range could be allowed for.
     """
 
-    def made(folder: Path, _: Mapping[str, Any]) -> tuple[Scenario, Recordings]:
+    def made(folder: Path) -> tuple[Scenario, Recordings]:
         from tests.real.cube_tosses import tosses
 
         known = {t.number: t for t in tosses(str(folder / "cube_tosses" / "cube_tosses.npz"))}
@@ -237,7 +237,7 @@ def draws(folder: Path, seeds: Sequence[int] = tuple(range(SEEDS))) -> dict[str,
     rows = []
     for seed in seeds:
         one = replace(SETS["cube tosses"], make=cubes(drawn(folder, seed)))
-        scenario, recordings = one.make(folder, {})
+        scenario, recordings = one.make(folder)
         found = diagnose(scenario, recordings, tolerance=one.tolerance)
         rows.append({"seed": seed, **account(one, found, recordings)})
     named = [row for row in rows if [e["id"] for e in row["effects"]] == ["ground-friction"]]
@@ -273,18 +273,25 @@ SETS: dict[str, Set] = {
     "baseball": Set(left_out="air-drag", make=balls("baseball")),
     "golf-ball": Set(left_out="air-drag", make=balls("golf-ball")),
     "cones, rigid, 60 deg": Set(
-        left_out="soil-added-mass-growth", make=cones("SR60"), tolerance=CORRIDOR, value=water, published="k 0.6 to 1.7"
+        left_out="soil-added-mass-growth",
+        make=cones("R", 60),
+        tolerance=CORRIDOR,
+        value=water,
+        published="k 0.6 to 1.7",
     ),
     "cones, sprung, 60 deg": Set(
         left_out="structural-compliance",
-        make=cones("SF60"),
+        make=cones("F", 60),
         tolerance=CORRIDOR,
         value=spring,
         published="7800 N/m",
-        needs="cones, rigid, 60 deg",
     ),
     "cones, rigid, 80 deg": Set(
-        left_out="soil-added-mass-growth", make=cones("SR80"), tolerance=CORRIDOR, value=water, published="k 0.6 to 1.7"
+        left_out="soil-added-mass-growth",
+        make=cones("R", 80),
+        tolerance=CORRIDOR,
+        value=water,
+        published="k 0.6 to 1.7",
     ),
     "penetrometer, no rate": Set(left_out="soil-rate-hardening", make=penetrometer(0.0), tolerance=CORRIDOR),
     "penetrometer": Set(left_out="", make=penetrometer(0.15), tolerance=CORRIDOR),
@@ -339,10 +346,10 @@ def rounded(x: float | None) -> float | None:
     return None if x is None or not math.isfinite(x) else float(f"{x:.3g}")
 
 
-def study(folder: Path, name: str, known: Mapping[str, Any]) -> dict[str, Any]:
-    """Diagnose one set; `known` holds the answers to those it needs."""
+def study(folder: Path, name: str) -> dict[str, Any]:
+    """Diagnose one set."""
     one = SETS[name]
-    scenario, recordings = one.make(folder, known.get(one.needs, {}))
+    scenario, recordings = one.make(folder)
     found = diagnose(scenario, recordings, hold_out=one.hold_out, tolerance=one.tolerance)
     return account(one, found, recordings)
 
@@ -370,7 +377,7 @@ def main() -> None:
                 print(f"{name:28s} {many['named']} of {many['draws']} name ground-friction: {many['coefficients']}")
             write(known, to=given.write)
             continue
-        known[name] = found = study(given.folder, name, known)
+        known[name] = found = study(given.folder, name)
         named = ", ".join(e["id"] for e in found["effects"]) or "-"
         value = ", ".join(f"{k} {v}" for k, v in found["value"].items())
         if not given.json:

@@ -64,22 +64,25 @@ def test_the_water_that_a_rigid_cone_takes_along_shows_at_every_height_left_out(
     found = cone_drops.rigid(folder("cone_drops"), angle, repeats=1)
     without, with_mass = found["without"]["error"], found["with"]["error"]
     for height in set(without) & set(cone_drops.HELD_OUT):
-        # measured: 8.6 to 12.0 % of the range without, 2.7 to 4.8 % with
-        assert with_mass[height] < 0.065, height
-        assert with_mass[height] < 0.6 * without[height], height
-    # 4/3 rho r^3 of a disc by Lamb
-    assert 0.6 < found["k"] < 1.6
+        # measured: 8.6 to 11.2 % of the range without, 2.0 to 4.7 % with
+        assert with_mass[height] < 0.05, height
+        assert with_mass[height] < 0.55 * without[height], height
+    # 4/3 rho r^3 of a disc by Lamb, more for water that piles up: 1.7 is the most that is published
+    assert 0.6 < found["with"]["k"] < 1.7
 
 
 def test_the_spring_of_the_sprung_cones_is_found() -> None:
     path = folder("cone_drops")
     water = cone_drops.rigid(path, 60, repeats=1)["with"]["numbers"]
     found = cone_drops.sprung(path, 60, water, repeats=1)
-    for height in set(found["rigid"]["error"]) & set(cone_drops.HELD_OUT):
-        assert found["stated"]["error"][height] < 0.6 * found["rigid"]["error"][height], height
-        assert found["fitted"]["error"][height] < 0.4 * found["rigid"]["error"][height], height
+    error = {which: part["error"] for which, part in found.items()}
+    for height in set(error["rigid"]) & set(cone_drops.HELD_OUT):
+        assert error["stated"][height] < 0.6 * error["rigid"][height], height
+        assert error["fitted"][height] < 0.4 * error["rigid"][height], height
+        # with water of its own a drop is foretold as well as by another drop from that height (1.7 to 3.5 %)
+        assert error["own"][height] < min(0.04, error["fitted"][height]), height
     # 7.8 N/mm by the authors
-    assert found["fitted"]["numbers"][cone_drops.STIFFNESS] == pytest.approx(7800.0, rel=0.2)
+    assert found["own"]["numbers"][cone_drops.STIFFNESS] == pytest.approx(cone_drops.SPRING, rel=0.1)
 
 
 def test_air_brakes_light_balls_and_dense_ones_next_to_nothing() -> None:
@@ -147,7 +150,7 @@ def written(name: str) -> Any:
 def test_the_written_spring_covers_the_authors_and_stands_below_it() -> None:
     value, low, high = written("cones, sprung, 60 deg")["effects"][0]["parameters"]["stiffness"]
     assert low < cone_drops.SPRING < high
-    assert 0.85 * cone_drops.SPRING < value < cone_drops.SPRING
+    assert 0.9 * cone_drops.SPRING < value < cone_drops.SPRING
 
 
 def test_draws_of_tosses_name_friction_or_nothing() -> None:
@@ -174,12 +177,8 @@ def test_a_rate_that_three_drops_cannot_prove_is_not_named_but_stands_first() ->
 
 
 def test_a_diagnosis_of_real_recordings_is_made_again_as_it_was_written() -> None:
-    path = folder("falling_balls").parent
-    again, written = (
-        diagnoses.study(path, "whiffle-ball-1", {}),
-        json.loads(diagnoses.RESULTS.read_text(encoding="utf-8")),
-    )
-    known = written["whiffle-ball-1"]
+    again = diagnoses.study(folder("falling_balls").parent, "whiffle-ball-1")
+    known = written("whiffle-ball-1")
     assert again["verdict"] == known["verdict"]
     assert [e["id"] for e in again["effects"]] == [e["id"] for e in known["effects"]]
     assert again["value"]["drag_coefficient"] == pytest.approx(known["value"]["drag_coefficient"], rel=0.02)
