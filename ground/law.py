@@ -162,8 +162,21 @@ def evaluate(law: GroundLaw, z: float, v: float = 0.0, *, speed: float, mass: fl
 
     `z` sinkage (m, positive down), `v` sinkage rate (m/s), `speed` latched impact speed (m/s), `mass` (kg).
     """
+    return float(along(law, np.array([z]), np.array([v]), speed=speed, mass=mass)[0])
+
+
+def along(
+    law: GroundLaw,
+    z: NDArray[np.float64],
+    v: NDArray[np.float64],
+    *,
+    speed: float,
+    mass: float = REFERENCE_MASS,
+) -> NDArray[np.float64]:
+    """F(z, v) at sinkages (n,) and their rates (n,); see `evaluate`."""
     p, s = law.p, touched(law, speed=speed, mass=mass)
-    return float(law.force.ctypes(_address(p), _address(s), z, v))
+    at_p, at_s, force = _address(p), _address(s), law.force.ctypes
+    return np.array([force(at_p, at_s, d, u) for d, u in zip(z.tolist(), v.tolist(), strict=True)], dtype=float)
 
 
 def touched(law: GroundLaw, *, speed: float, mass: float = REFERENCE_MASS) -> NDArray[np.float64]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
 
 from rollover.diagnosis import Diagnosis
 from rollover.diagnosis.series import Told, Track
@@ -18,6 +20,12 @@ from viz.plots import Curve
 LEAST_SHARE = 0.01  # of a force that some quantity predicts, that is worth a table
 PICTURES = 3  # recordings shown in full view; the others are folded away
 Row = list[str | Cell]
+Each = Callable[[Callable[[Any], Any], Sequence[Any]], list[Any]]  # what a function makes of things, in their order
+
+
+def in_turn(function: Callable[[Any], Any], things: Sequence[Any]) -> list[Any]:
+    """What a function makes of each thing, one after another."""
+    return [function(thing) for thing in things]
 
 
 def page(
@@ -29,11 +37,12 @@ def page(
     command: str,
     scenario_hash: str = "",
     versions: Mapping[str, str] | None = None,
+    each: Each = in_turn,
 ) -> str:
-    """HTML of a diagnosis; `told` are its recordings over time, `prechecks` (recording, finding)."""
+    """HTML of a diagnosis; `told` are its recordings over time, `prechecks` (recording, finding); `each` draws."""
     blocks = [
         *_found(found),
-        *_where(found, told),
+        *_where(found, told, each),
         *_followed(found, told),
         *_next(found),
         *_considered(found),
@@ -71,14 +80,16 @@ def _found(found: Diagnosis) -> list[Block]:
     return [Section(title="What was found", blocks=[*notes, table])]
 
 
-def _where(found: Diagnosis, told: Sequence[Told]) -> list[Block]:
+def _where(found: Diagnosis, told: Sequence[Told], each: Each) -> list[Block]:
     """Pictures of the recordings with the largest share, and the table of shares."""
     by_share = ranked(found, told)
     front = by_share[: PICTURES if found.where else 1]
-    blocks: list[Block] = []
-    for one, tracks in front:
-        blocks += [_figure(one, t, found) for t in tracks[:2]]
-    rest = [_figure(one, t, found) for k, (one, tracks) in enumerate(by_share) for t in tracks[2 * (k < len(front)) :]]
+    shown = [(one, t) for one, tracks in front for t in tracks[:2]]
+    folded = [(one, t) for k, (one, tracks) in enumerate(by_share) for t in tracks[2 * (k < len(front)) :]]
+    simulated = "before" if found.effects else "simulated"
+    figures = each(_figure, [(replace(one, tracks=(t,)), simulated) for one, t in (*shown, *folded)])
+    blocks: list[Block] = figures[: len(shown)]
+    rest: list[Block] = figures[len(shown) :]
     if rest:
         blocks.append(Details(summary="All other channels and recordings", blocks=rest))
     if found.where:
@@ -114,7 +125,10 @@ def ranked(found: Diagnosis, told: Sequence[Told]) -> list[tuple[Told, list[Trac
     return [(one, tracks(one)) for one in sorted(told, key=lambda t: -total[t.recording])]
 
 
-def _figure(one: Told, track: Track, found: Diagnosis) -> Figure:
+def _figure(drawn: tuple[Told, str]) -> Figure:
+    """A recording's one track, with what the scenario as it is goes by."""
+    one, simulated = drawn
+    (track,) = one.tracks
     s = series(track.channel)
 
     def curve(name: str, values: plots.Array) -> Curve:
@@ -122,7 +136,7 @@ def _figure(one: Told, track: Track, found: Diagnosis) -> Figure:
 
     svg = plots.before_after(
         curve("measured", track.measured),
-        curve("before" if found.effects else "simulated", track.before),
+        curve(simulated, track.before),
         None if track.after is None else curve("after", track.after),
         label=f"{s.name}, {s.unit}",
         noise=track.noise * s.factor,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,6 +14,8 @@ from rollover.commands.door import AsJson, Force, Setting, answering, app, manua
 from rollover.faults import Fault, InputError
 
 if TYPE_CHECKING:
+    from rollover.diagnosis import Diagnosis
+    from rollover.diagnosis.series import Told
     from rollover.prechecks import Finding
     from rollover.recording import Recording
     from rollover.scenario import Scenario
@@ -58,6 +60,7 @@ def diagnose(
     as_json: AsJson = False,
 ) -> None:
     """Say what separates a scenario from recordings: which physics, value or sensor, where, and how sure that is."""
+    from concurrent.futures import ThreadPoolExecutor
     from dataclasses import replace
 
     from rollover.execute import begin_server, cores
@@ -94,32 +97,32 @@ def diagnose(
     # beside the results folder, which is written whole or not at all: what an interrupted diagnosis had fitted
     notebook = folder.parent / f".{folder.name}.fits"
     about_fits = json.dumps([about, store.versions()], sort_keys=True)
+    words = ["rollover", "diagnose", scenario, *recordings, *_options(hold_out, set_, tolerance)]
     with Crew(workers, notebook, about_fits) as crew:
         found = diagnosed(
             chosen, list(measured.items()), hold_out=held, tolerance=tolerance, say=console.say, crew=crew
         )
-    found = replace(found, notes=(*in_words(findings), *found.notes))
-    told = series(chosen, list(measured.items()), found)
-    answer = account(found, about, [{"recording": name, **_plain(f)} for name, f in findings])
-    words = ["rollover", "diagnose", scenario, *recordings, *_options(hold_out, set_, tolerance)]
-    with store.whole(folder) as part:
-        store.write_json(part / JSON, answer)
-        (part / SCENARIO).write_text(diagnosed_text(chosen, found), encoding="utf-8")
-        from viz.diagnosis_page import page
+        found = replace(found, notes=(*in_words(findings), *found.notes))
+        told = series(chosen, list(measured.items()), found)
+        answer = account(found, about, [{"recording": name, **_plain(f)} for name, f in findings])
+        with store.whole(folder) as part, ThreadPoolExecutor(1) as beside:
+            store.write_json(part / JSON, answer)
+            (part / SCENARIO).write_text(diagnosed_text(chosen, found), encoding="utf-8")
+            drawn = beside.submit(_draw, found, told, part / PICTURE, chosen.title)
+            from viz.diagnosis_page import page
 
-        text = page(
-            found,
-            told,
-            title=chosen.title,
-            prechecks=findings,
-            command=" ".join(map(shlex.quote, words)),
-            scenario_hash=about["scenario_hash"],
-            versions=store.versions(),
-        )
-        (part / PAGE).write_text(text, encoding="utf-8")
-        draw = _picture()
-        if draw is not None:
-            draw(found, told, part / PICTURE, chosen.title)
+            text = page(
+                found,
+                told,
+                title=chosen.title,
+                prechecks=findings,
+                command=" ".join(map(shlex.quote, words)),
+                scenario_hash=about["scenario_hash"],
+                versions=store.versions(),
+                each=crew.each,
+            )
+            (part / PAGE).write_text(text, encoding="utf-8")
+            drawn.result()
     crew.close()
     if as_json:
         print(json.dumps(answer, indent=2))
@@ -217,15 +220,15 @@ def _options(hold_out: list[str] | None, set_: list[str] | None, tolerance: floa
     return [part for name, texts in given for text in texts for part in (name, text)]
 
 
-def _picture() -> Callable[..., None] | None:
+def _draw(found: Diagnosis, told: Sequence[Told], path: Path, title: str) -> None:
+    """The recording for the viewer, where there is a wheel to write it."""
     from rollover import console
-    from rollover.diagnosis.account import PICTURE
 
     try:
         from viz.diagnosis import write_diagnosis
     except ImportError as e:
         if (e.name or "").partition(".")[0] != "rerun":
             raise
-        console.say(f"No rerun wheel for this platform: {PICTURE} was not written.")
-        return None
-    return write_diagnosis
+        console.say(f"No rerun wheel for this platform: {path.name} was not written.")
+        return
+    write_diagnosis(found, told, path, title)

@@ -163,13 +163,21 @@ class Crew:
         told = self._told(judge, self._about(judge))
         shares = [list(things)[k :: 2 * self.workers] for k in range(2 * self.workers)]
         found: dict[int, R] = {}
-        tasks = [(told, look, share) for share in shares if share]
-        for outcome in map_cases(_looked, tasks, children=self.children):
-            if outcome.value is None:
-                raise RuntimeError(f"a look: {outcome.failure.sentence if outcome.failure else 'no reason given'}")
-            seen, made = outcome.value
+        for start, (seen, made) in enumerate(self.each(_looked, [(told, look, share) for share in shares if share])):
             judge.simulations += made
-            found |= {outcome.index + 2 * self.workers * k: one for k, one in enumerate(seen)}
+            found |= {start + 2 * self.workers * k: one for k, one in enumerate(seen)}
+        return [found[k] for k in range(len(things))]
+
+    def each(self, function: Callable[[T], R], things: Sequence[T]) -> list[R]:
+        """What a function of a module makes of each thing, in their order: here, or in the children once there."""
+        if not self.is_there():
+            return [function(thing) for thing in things]
+        found: dict[int, R] = {}
+        for outcome in map_cases(function, things, children=self.children):
+            if outcome.failure is not None or outcome.value is None:
+                name = getattr(function, "__name__", "a look").strip("_")
+                raise RuntimeError(f"{name}: {outcome.failure.sentence if outcome.failure else 'no reason given'}")
+            found[outcome.index] = outcome.value
         return [found[k] for k in range(len(things))]
 
     def _about(self, judge: Judge) -> str:

@@ -12,12 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ground.law import REFERENCE_AREA, evaluate
+from ground.compiled import leaf
+from ground.law import REFERENCE_AREA, along
 from rollover.diagnosis.depend import hats
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.filtering import behind_filters, rows_of
@@ -71,19 +72,24 @@ class Way:
         `faster` is a change of speed (m/s) just after the impact. Newmark's rule of constant mean acceleration.
         """
         sign = -1.0 if where == "ground" else 1.0
-        n, h = self.time.size, STEP
-        z, v, a = (np.zeros_like(f) for _ in range(3))
+        z, v, a = (np.zeros(f.shape) for _ in range(3))
         v[0] = faster
-        a[0] = sign * f[0] / self.whole
-        push = sign * f / self.whole
-        k = self.stiffness / self.whole
-        for i in range(1, n):
-            ahead = z[i - 1] + h * v[i - 1] + 0.25 * h * h * a[i - 1]
-            a[i] = (push[i] - k[i] * ahead) / (1.0 + 0.25 * h * h * k[i])
-            z[i] = ahead + 0.25 * h * h * a[i]
-            v[i] = v[i - 1] + 0.5 * h * (a[i - 1] + a[i])
+        pushed(np.ascontiguousarray(sign * f / self.whole), self.stiffness / self.whole, STEP, z, v, a)
         felt = -self.mass * a if where == "ground" else f - self.mass * a
         return z, v, a, felt
+
+
+@leaf
+def pushed(push: Any, k: Any, h: float, z: Any, v: Any, a: Any) -> None:
+    """z'' = push - k z for each column of accelerations (n, m), by Newmark's rule; z and v begin as they are given."""
+    for j in range(push.shape[1]):
+        a[0, j] = push[0, j]
+    for i in range(1, push.shape[0]):
+        for j in range(push.shape[1]):
+            ahead = z[i - 1, j] + h * v[i - 1, j] + 0.25 * h * h * a[i - 1, j]
+            a[i, j] = (push[i, j] - k[i] * ahead) / (1.0 + 0.25 * h * h * k[i])
+            z[i, j] = ahead + 0.25 * h * h * a[i, j]
+            v[i, j] = v[i - 1, j] + 0.5 * h * (a[i - 1, j] + a[i, j])
 
 
 def channels_of(way: Way, moves: Moves, e: Evidence, shift: float) -> Array:
@@ -157,11 +163,7 @@ def descent(scenario: Scenario, e: Evidence, block: Block) -> Descent | None:
     touch = float(start.speed)
 
     def spring(depth: Array, speed: Array) -> Array:
-        at = [
-            evaluate(scenario.ground.law, max(float(d), 0.0), float(u), speed=touch)
-            for d, u in zip(depth, speed, strict=True)
-        ]
-        return area * np.array(at)
+        return area * along(scenario.ground.law, np.maximum(depth, 0.0), speed, speed=touch)
 
     force = spring(z, v)
     tangent = (spring(z + NUDGE, v) - force) / NUDGE

@@ -128,9 +128,11 @@ class DropSimulator:
 
     def _leaps(self, physical: Mapping[str, Any], shift: float, sensors: Mapping[str, Any]) -> dict[str, Array]:
         """How far channels that nothing smooths leap about each stamp, under `LEAP_IN` and their names."""
-        clocked = {e.channel for name in EDGES for e in every(sensors, name)} | set(self.recording.cfc)
         at = self.recording.time - shift
         instants, rows = self._track(physical, float(at[-1]) if at.size else 0.0).jumps
+        if not instants.size:
+            return {}
+        clocked = {e.channel for name in EDGES for e in every(sensors, name)} | set(self.recording.cfc)
         made = channels_of(rows, set(self.recording.channels) - clocked)
         return {LEAP_IN + name: about_jumps(at, instants, sizes) for name, sizes in made.items() if np.any(sizes)}
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ground.empirical import TERMS, shape
-from ground.law import REFERENCE_AREA, evaluate
+from ground.law import REFERENCE_AREA, along
 from rollover.diagnosis.depend import motion
 from rollover.diagnosis.evidence import Evidence
 from rollover.initiation import Drop
@@ -76,9 +76,7 @@ def _balance(scenario: Scenario, e: Evidence) -> Balance | None:
     phi, curved = _tests(t)
     weights = phi * dt
     area = striker.face_length * striker.face_width / REFERENCE_AREA
-    spring = area * np.array(
-        [evaluate(scenario.ground.law, float(d), float(u), speed=touch) for d, u in zip(z[rows], v[rows], strict=True)]
-    )
+    spring = area * along(scenario.ground.law, z[rows], v[rows], speed=touch)
     seen = "striker/acceleration_z" in r.channels
     mean_a = weights @ a[rows] if seen else (curved * dt) @ z[rows]
     if "ground/force_normal" in r.channels:

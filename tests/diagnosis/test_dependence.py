@@ -20,7 +20,7 @@ from rollover.diagnosis.evidence import Evidence, evidence_of
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.lines import lines, without
 from rollover.diagnosis.phases import drop_phases
-from rollover.diagnosis.response import channels_of
+from rollover.diagnosis.response import channels_of, pushed
 from rollover.diagnosis.simulator import set_up
 from rollover.diagnosis.straight import is_any_curve, is_pliant
 from rollover.effects import Search
@@ -51,6 +51,18 @@ def base_of(own: Scenario, recordings: Sequence[tuple[str, Recording]]) -> tuple
 def told(own: Scenario, recordings: Sequence[tuple[str, Recording]]) -> Dependence:
     judge, base = base_of(own, recordings)
     return dependence(judge, [set_up(own, e.recording) for e in judge.evidence], base)
+
+
+def test_a_constant_push_on_a_spring_swings_about_where_it_would_rest() -> None:
+    """z'' = p - w^2 z from z = 0, z' = u: z = p/w^2 (1 - cos wt) + u/w sin wt, by Newmark's rule to (w h)^2/12."""
+    h, w, many = 5e-4, np.array([40.0]), 400
+    p, u, t = np.array([3.0, -1.0]), 0.2, 5e-4 * np.arange(many)[:, None]
+    z, v, a = (np.zeros((many, 2)) for _ in range(3))
+    v[0] = u
+    pushed(np.tile(p, (many, 1)), np.full(many, w**2), h, z, v, a)
+    right = p / w**2 * (1.0 - np.cos(w * t)) + u / w * np.sin(w * t)
+    assert np.max(np.abs(z - right)) < 1.5 * (w * h) ** 2 / 12.0 * (w * t[-1]) * np.max(np.abs(right))
+    assert np.allclose(a, p - w**2 * z, rtol=0.0, atol=1e-9)
 
 
 def test_a_force_does_to_every_channel_what_the_simulation_says() -> None:

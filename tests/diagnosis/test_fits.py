@@ -165,8 +165,11 @@ def test_any_number_of_workers_gives_the_same_fits(workers: int) -> None:
         judge = judge_of(recordings)
         together = many.fits(judge, jobs)
         assert many.looks(judge, look, things) == seen
+        assert many.each(math.factorial, range(9)) == [math.factorial(k) for k in range(9)]
         assert not judge._raw  # nothing was simulated here
         assert many.children._pool is not None
+        with pytest.raises(RuntimeError, match=r"factorial: ValueError"):
+            many.each(math.factorial, [1, -1])
     assert many.children._pool is None
     for a, b in zip(alone, together, strict=True):
         assert a is not None

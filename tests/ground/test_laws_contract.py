@@ -10,6 +10,7 @@ import math
 import subprocess
 import sys
 from dataclasses import fields, replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from ground.bearing import Bearing
 from ground.compaction import Compaction
 from ground.fluid import FluidEntry
 from ground.hard import Hard
-from ground.law import BRANCH, HIDDEN, MASS, SPEED, GroundLaw, evaluate, laws, touched
+from ground.law import BRANCH, HIDDEN, MASS, SPEED, GroundLaw, along, evaluate, laws, touched
 from ground.press import Press
 from ground.quantity import quantities
 from ground.treated import Treated
@@ -103,6 +104,16 @@ def test_the_force_pushes_back_while_the_striker_goes_down(law: GroundLaw) -> No
                     assert math.isfinite(force), (speed, mass, z, v)
                     assert force >= 0.0, (speed, mass, z, v)
             assert evaluate(law, 0.2, speed=speed, mass=132.0) > 0.0
+
+
+@each_law
+def test_many_places_at_once_are_what_each_is_by_itself(law: GroundLaw) -> None:
+    places = list(product(DEPTHS, RATES))
+    p, s = law.p, touched(law, speed=2.0, mass=50.0)
+    one_by_one = [law.force.ctypes(address(p), address(s), z, v) for z, v in places]
+    z, v = (np.array(many) for many in zip(*places, strict=True))
+    assert along(law, z, v, speed=2.0, mass=50.0).tolist() == one_by_one
+    assert evaluate(law, *places[-1], speed=2.0, mass=50.0) == one_by_one[-1]
 
 
 @each_law

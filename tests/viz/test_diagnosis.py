@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import pickle
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -43,6 +46,20 @@ def test_the_page_of_a_finding() -> None:
     assert "<one>: a note." in said
     assert "What these recordings would have shown" not in said
     assert text.count("<svg") == 2
+
+
+def test_a_page_is_the_same_whoever_draws_its_figures() -> None:
+    asked = []
+
+    def backwards(function: Callable[[Any], Any], things: Sequence[Any]) -> list[Any]:
+        asked.extend(pickle.loads(pickle.dumps((function, things)))[1])  # as children are sent them
+        return [function(thing) for thing in reversed(things)][::-1]
+
+    two = tuple(replace(t, tracks=(*t.tracks, replace(t.tracks[0], channel="ground/sinkage"))) for t in told())
+    about = sensor_at_fault(), two
+    assert page(*about, title="Drop", command="x", each=backwards) == page(*about, title="Drop", command="x")
+    channels = [[t.channel for t in one.tracks] for one, _ in asked]  # no other track goes with a figure
+    assert channels == 2 * [[FORCE], ["ground/sinkage"]]
 
 
 def test_the_page_where_nothing_was_found() -> None:
