@@ -22,6 +22,7 @@ from rollover.diagnosis.remainder import NEGLIGIBLE, is_enough, is_tolerated, ma
 from rollover.diagnosis.straight import MOST, is_any_curve
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
+BY_SCATTER = 0.1  # the same where runs scatter and there is a mismatch: fits decide, and gains that last
 PART = 0.25  # of what moves something, that a part of more must move
 # misfit over the noise that two effects leave and a third is not looked for, and the share of what was beyond the
 # noise that is little all the same
@@ -144,17 +145,25 @@ def is_beyond_chance(found: Step | None, judge: Judge, phases: Phases) -> TypeGu
     """Whether a step gains more than the best of all candidates does by chance, and moves something by it.
 
     An effect that moves things itself is none to be left out because others can be bent to nearly all of it, nor is a
-    part of what is not negligible as a whole.
+    part of what is not negligible as a whole. Where runs scatter, slopes say less than the fits do: what is missing for
+    sure is looked for though the best slopes could be chance.
     """
-    if found is None or found.p_value > CHANCE:
+    if found is None or found.p_value > (BY_SCATTER if judge.effort.thrifty else CHANCE):
+        return False
+    if found.p_value > CHANCE and not is_missed(found.base, judge, phases):
         return False
     moved = moves(judge, found.base, found.fitted)
     if moved >= NEGLIGIBLE or moved < PART * NEGLIGIBLE or judge.effort.thrifty:
         return moved >= NEGLIGIBLE
     if found.base.candidates and does(judge, found.fitted) >= NEGLIGIBLE:
         return True
-    left = mismatch_of(judge.evidence, found.base.blocks, phases)
-    return left.p_value < SURE and matters(judge, found.base, left)
+    return is_missed(found.base, judge, phases)
+
+
+def is_missed(fitted: Fitted, judge: Judge, phases: Phases) -> bool:
+    """Whether a fit surely leaves something that matters."""
+    left = mismatch_of(judge.evidence, fitted.blocks, phases)
+    return left.p_value < SURE and matters(judge, fitted, left)
 
 
 def upheld(inquiry: Inquiry, found: Step, looked: Gate) -> Step | None:

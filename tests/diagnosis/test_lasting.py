@@ -15,7 +15,7 @@ from rollover.diagnosis import one_by_one
 from rollover.diagnosis.blocks import Block, Fitted
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.chaos import Course
-from rollover.diagnosis.effort import RUNS
+from rollover.diagnosis.effort import DROPS, RUNS, Effort
 from rollover.diagnosis.explain import Step, _chosen
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import Gate
@@ -124,6 +124,29 @@ def test_where_the_first_does_not_last_the_next_one_is_taken() -> None:
     kept = judge.evidence
     assert lasting(judge, replace(step, rivals=(wrong,)), groups) is None
     assert judge.evidence == kept
+
+
+@pytest.mark.parametrize(
+    ("missing", "p", "effort", "goes_on"),
+    [
+        (8.0, 0.05, RUNS, True),
+        (8.0, 0.2, RUNS, False),
+        (0.0, 0.05, RUNS, False),
+        (0.0, 0.001, RUNS, True),
+        (8.0, 0.05, DROPS, False),
+    ],
+)
+def test_where_runs_scatter_what_is_missing_for_sure_is_looked_for_though_slopes_could_be_chance(
+    missing: float, p: float, effort: Effort, goes_on: bool
+) -> None:
+    rng = np.random.default_rng(3)
+    sine = missing * np.sin(30.0 * TIME)
+    judge = Judge([evidence(r, 0.0, sine + 0.1 * rng.standard_normal(N), effort) for r in range(4)])
+    base, fitted = judge.fit((), ()), judge.fit((SLOPE,), (0.4,), rounds=0)
+    assert base is not None
+    assert fitted is not None
+    found = Step(base=base, fitted=fitted, p_value=p, rivals=(fitted,))
+    assert one_by_one.is_beyond_chance(found, judge, 4 * [[(0.0, "rest")]]) is goes_on
 
 
 @pytest.mark.parametrize(("others", "in_full"), [(0, False), (1, False), (2, False), (3, True), (4, True)])
