@@ -205,9 +205,11 @@ def sentence(
 ) -> str:
     """The verdict in one sentence or two; `early` is the misfit before the first blow without and with the effects."""
     if verdict == "no-mismatch" and p_value < SURE:
+        is_rough = any(e.is_rough(s) for e in evidence for s in e.signals)
+        beyond = " beyond what is tolerated or repeats differ by" if is_rough else ""
         return (
             f"Simulation and {len(evidence)} recordings differ by more than noise (p = {p_value:.2g}), but by less "
-            f"than {NEGLIGIBLE:.1%} of any channel's range."
+            f"than {NEGLIGIBLE:.1%} of any channel's range{beyond}."
         )
     if verdict == "no-mismatch":
         return f"Simulation and {len(evidence)} recordings agree within the noise (p = {p_value:.2g})."

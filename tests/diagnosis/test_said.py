@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -48,6 +49,16 @@ def test_phases_need_no_depth_gauge() -> None:
 def test_what_is_sure_and_too_small_to_matter_is_not_called_noise(p: float, said: str) -> None:
     nothing = Held(left=np.ones(1), count=np.ones(1))
     assert said in sentence("no-mismatch", (), p, nothing, nothing, [])
+
+
+def test_what_lies_within_a_tolerance_is_not_said_to_be_small() -> None:
+    """5 % of a range for a noise of 0.1 %: a misfit of 4 % is tolerated."""
+    nothing = Held(left=np.ones(1), count=np.ones(1))
+    ((name, r),) = recorded({}, 4, speeds=(2.0,), channels=(FORCE,), noise=1e-3)
+    exact = evidence_of(name, r, simulator_of(scenario(), r))
+    assert exact is not None
+    for e, ends in ((exact, "channel's range."), (replace(exact, model_error=0.05), "tolerated or repeats differ by.")):
+        assert sentence("no-mismatch", (), 1e-9, nothing, nothing, [e]).endswith(ends)
 
 
 def test_what_runs_that_scatter_miss_is_told_before_the_blow_too() -> None:
