@@ -73,13 +73,13 @@ def unforgiven(judge: Judge, base: Fitted) -> Fitted:
     return found
 
 
-def backed(found: Step, looked: Gate) -> Step:
-    """A step without rivals that nothing spoke for when looked at: their runs met the recordings by chance.
+def backed(found: Step, looked: Gate, spoken: float = SPOKEN) -> Step:
+    """A step without rivals that nothing spoke for when looked at, by a p-value: their runs met them by chance.
 
     What speaks for one that acts somewhere speaks for its kin; for a strong one its runs did.
     """
     last = [f.candidates[-1] for f in found.rivals]
-    told = [c for c in last if c.key in looked.far or p_value(looked.scores.get(c.key, 0.0), looked.null) < SPOKEN]
+    told = [c for c in last if c.key in looked.far or p_value(looked.scores.get(c.key, 0.0), looked.null) < spoken]
     kept = [*told, *akin(last, told)]
     return replace(found, rivals=tuple(f for f in found.rivals if f.candidates[-1] in kept))
 

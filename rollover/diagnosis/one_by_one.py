@@ -14,7 +14,7 @@ from rollover.diagnosis.explain import SURE, Step, does, moves, step, weighed
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry, Phases
-from rollover.diagnosis.lasting import astray, backed, begun_anew, lasting
+from rollover.diagnosis.lasting import SPOKEN, astray, backed, begun_anew, lasting
 from rollover.diagnosis.looks import look, look_again
 from rollover.diagnosis.pairs import two_by_two, with_another_first
 from rollover.diagnosis.refine import conditioned, is_doubtful, timed
@@ -169,7 +169,8 @@ def is_missed(fitted: Fitted, judge: Judge, phases: Phases) -> bool:
 def upheld(inquiry: Inquiry, found: Step, looked: Gate) -> Step | None:
     """A step as it is to be taken; None where runs scatter and its gain does not outlast that."""
     judge = inquiry.judge
-    return lasting(judge, backed(found, looked), inquiry.groups) if judge.effort.thrifty else found
+    spoken = SPOKEN if found.p_value <= CHANCE else BY_SCATTER  # what admitted the step speaks for its best
+    return lasting(judge, backed(found, looked, spoken), inquiry.groups) if judge.effort.thrifty else found
 
 
 def counted_otherwise(inquiry: Inquiry, current: Fitted) -> Step | None:

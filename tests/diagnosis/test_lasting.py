@@ -189,6 +189,23 @@ def test_with_what_leads_its_kin_gets_a_first_fit() -> None:
     assert kin(every, 4, 2) == []
 
 
+@pytest.mark.parametrize(("p", "kept"), [(0.004, 0), (0.06, 1), (0.004, 1)])
+def test_what_admits_a_step_speaks_for_its_best(monkeypatch: pytest.MonkeyPatch, p: float, kept: int) -> None:
+    """p of a best score of 7.5 is 0.06: what is missing for sure lets the step in, and its best is judged by its runs.
+
+    In a step that another one led it is none of the rivals.
+    """
+    seen: list[int] = []
+    monkeypatch.setattr(one_by_one, "lasting", lambda _judge, found, _groups: seen.append(len(found.rivals)))
+    null = np.sort(np.random.default_rng(0).standard_normal((4000, 10)).max(axis=1) ** 2)
+    score = float(np.quantile(null, 1.0 - (0.06 if p > 0.005 or not kept else p)))
+    one = Fitted(candidates=(candidate("slope", "physics", "a"),), x=(0.5,), blocks=())
+    looked = Gate(score=score, scores={"slope": score}, null=null, detectable={})
+    inquiry: Any = SimpleNamespace(judge=SimpleNamespace(effort=RUNS), groups=[])
+    one_by_one.upheld(inquiry, Step(base=one, fitted=one, p_value=p, rivals=(one,)), looked)
+    assert seen == [kept]
+
+
 def test_a_rival_that_nothing_spoke_for_is_none() -> None:
     fits = [
         Fitted(candidates=(candidate(k, "physics", "a"),), x=(0.5,), blocks=()) for k in ("slope", "mass", "inertia")
