@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -20,12 +20,7 @@ from viz.plots import Curve
 LEAST_SHARE = 0.01  # of a force that some quantity predicts, that is worth a table
 PICTURES = 3  # recordings shown in full view; the others are folded away
 Row = list[str | Cell]
-Each = Callable[[Callable[[Any], Any], Sequence[Any]], list[Any]]  # what a function makes of things, in their order
-
-
-def in_turn(function: Callable[[Any], Any], things: Sequence[Any]) -> list[Any]:
-    """What a function makes of each thing, one after another."""
-    return [function(thing) for thing in things]
+Each = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]  # what a function makes of things, as `map`
 
 
 def page(
@@ -37,7 +32,7 @@ def page(
     command: str,
     scenario_hash: str = "",
     versions: Mapping[str, str] | None = None,
-    each: Each = in_turn,
+    each: Each = map,
 ) -> str:
     """HTML of a diagnosis; `told` are its recordings over time, `prechecks` (recording, finding); `each` draws."""
     blocks = [
@@ -87,7 +82,7 @@ def _where(found: Diagnosis, told: Sequence[Told], each: Each) -> list[Block]:
     shown = [(one, t) for one, tracks in front for t in tracks[:2]]
     folded = [(one, t) for k, (one, tracks) in enumerate(by_share) for t in tracks[2 * (k < len(front)) :]]
     simulated = "before" if found.effects else "simulated"
-    figures = each(_figure, [(replace(one, tracks=(t,)), simulated) for one, t in (*shown, *folded)])
+    figures = list(each(_figure, [(replace(one, tracks=(t,)), simulated) for one, t in (*shown, *folded)]))
     blocks: list[Block] = figures[: len(shown)]
     rest: list[Block] = figures[len(shown) :]
     if rest:

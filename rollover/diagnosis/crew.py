@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar, cast
 
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Block, Fitted, Judge
@@ -174,10 +174,10 @@ class Crew:
             return [function(thing) for thing in things]
         found: dict[int, R] = {}
         for outcome in map_cases(function, things, children=self.children):
-            if outcome.failure is not None or outcome.value is None:
-                name = getattr(function, "__name__", "a look").strip("_")
-                raise RuntimeError(f"{name}: {outcome.failure.sentence if outcome.failure else 'no reason given'}")
-            found[outcome.index] = outcome.value
+            if outcome.failure is not None:
+                name = getattr(function, "__name__", "a child").strip("_")
+                raise RuntimeError(f"{name}: {outcome.failure.sentence}")
+            found[outcome.index] = cast(R, outcome.value)
         return [found[k] for k in range(len(things))]
 
     def _about(self, judge: Judge) -> str:

@@ -21,7 +21,6 @@ from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.digits import to_the_last_digit
 from rollover.diagnosis.empirical import offered, proposed
 from rollover.diagnosis.evidence import Evidence, doubted, doubted_beside, evidence_of, left_out
-from rollover.diagnosis.explain import SURE
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import yardstick
 from rollover.diagnosis.inquiry import Inquiry
@@ -32,7 +31,7 @@ from rollover.diagnosis.quantities import dependency
 from rollover.diagnosis.ranges import candidates_of, size_of
 from rollover.diagnosis.readings import digitised, without_spikes
 from rollover.diagnosis.refine import conditioned, is_doubtful
-from rollover.diagnosis.remainder import matters
+from rollover.diagnosis.remainder import is_enough
 from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing, with_scatter
 from rollover.diagnosis.scores import before_a_blow, judged
 from rollover.diagnosis.selection import Explanation, by_the_first, decided, explained, takes_little
@@ -189,7 +188,7 @@ def _diagnosed(asked: Asked, every: Sequence[Evidence], slips: Sequence[Slip], n
         verdict = "cannot-tell"
     h_before, h_after = (judged(judge, f, kept, groups) for f in (explanation.base, explanation.fitted))
     early = before_a_blow(judge.evidence, explanation.base), before_a_blow(judge.evidence, explanation.fitted)
-    remains = after.p_value < SURE and matters(judge, explanation.fitted, after)
+    remains = not is_enough(judge, explanation.fitted, after)
     by_itself = () if shown is None else shown.places
     lost = by_itself if verdict == "unexplained" else ()
     is_left = (verdict == "unexplained" and shown is None) or (bool(effects) and remains)

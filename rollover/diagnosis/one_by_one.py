@@ -18,7 +18,7 @@ from rollover.diagnosis.lasting import SPOKEN, astray, backed, begun_anew, lasti
 from rollover.diagnosis.looks import look, look_again
 from rollover.diagnosis.pairs import two_by_two, with_another_first
 from rollover.diagnosis.refine import conditioned, is_doubtful, timed
-from rollover.diagnosis.remainder import NEGLIGIBLE, is_enough, is_tolerated, matters
+from rollover.diagnosis.remainder import NEGLIGIBLE, is_enough, is_tolerated
 from rollover.diagnosis.straight import MOST, is_any_curve
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
@@ -111,7 +111,7 @@ def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = (), *, pa
         if not judge.straying:
             current = astray(judge, current)
             left = mismatch_of(judge.evidence, current.blocks, phases)
-        if len(taken) == 2 and left.p_value < SURE and matters(judge, current, left):
+        if len(taken) == 2 and not is_enough(judge, current, left):
             # of two that are strong the first may have been taken for something else
             other = None
             if pairs and not judge.effort.thrifty:
@@ -162,8 +162,7 @@ def is_beyond_chance(found: Step | None, judge: Judge, phases: Phases) -> TypeGu
 
 def is_missed(fitted: Fitted, judge: Judge, phases: Phases) -> bool:
     """Whether a fit surely leaves something that matters."""
-    left = mismatch_of(judge.evidence, fitted.blocks, phases)
-    return left.p_value < SURE and matters(judge, fitted, left)
+    return not is_enough(judge, fitted, mismatch_of(judge.evidence, fitted.blocks, phases))
 
 
 def upheld(inquiry: Inquiry, found: Step, looked: Gate) -> Step | None:

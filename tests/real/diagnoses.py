@@ -22,7 +22,7 @@ import numpy as np
 
 from rollover.diagnosis import Diagnosis, diagnose
 from rollover.importers import COLLECTIONS
-from rollover.importers.cone_drops import BODY, CLIPS, RADIUS, G
+from rollover.importers.cone_drops import BODY, CLIPS, G
 from rollover.recording import Clock, Recording
 from rollover.scenario import Scenario, load
 from tests.real import cone_drops
@@ -123,8 +123,7 @@ def cones(kind: str, angle: int) -> Callable[[Path], tuple[Scenario, Recordings]
         if kind == "F":
             known = cone_drops.rigid(folder, angle)["with"]["numbers"]
             scenario = scenario.replaced(known)
-            height = RADIUS / math.tan(math.radians(angle))
-            doubt |= {cone_drops.RATE: 0.5 * known[cone_drops.RATE], cone_drops.FADE: 0.5 * height}
+            doubt[cone_drops.RATE] = 0.5 * known[cone_drops.RATE]
         found = []
         for name, r in COLLECTIONS["cone-drops"].read(folder, names):
             rows = np.flatnonzero((r.time > -0.015) & (r.time < 0.050) & (r[ACCELERATION] < 0.97 * CLIPS * G))
@@ -133,6 +132,7 @@ def cones(kind: str, angle: int) -> Callable[[Path], tuple[Scenario, Recordings]
                 # where the instrument sits: the body, all but the nose
                 share = 1.0 - BODY / conditions["vehicle.mass"]
                 conditions |= {cone_drops.STIFFNESS: None, cone_drops.SHARE: share}
+                doubt[cone_drops.FADE] = 0.5 * conditions["vehicle.nose_height"]
             clock = Clock(zero="known", within=0.002)
             found.append((name, cut(r, rows, [ACCELERATION], conditions=conditions, uncertainty=doubt, clock=clock)))
         return scenario, found
