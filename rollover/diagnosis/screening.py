@@ -21,6 +21,7 @@ SCORED = 18  # candidates looked at closer, by their score
 BENT = 1.2  # misfit over the noise from which on time shifts fitted to it are bent by what is missing
 FAR = 3.0  # and from which on they are not fitted beside a first look
 ELSEWHERE = 0.2  # of a coordinate: starts so far apart are two
+STILL = 1e-12  # sum of squares over the noise, up to which a start moves nothing
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,7 +125,8 @@ def _screened(
     blocks: tuple[Block, ...],
 ) -> Screened | None:
     """One candidate looked at beside a base, which few recordings meet by these blocks; None if nothing can be made."""
-    c, met, potential = thing.candidate, [], 0.0
+    c, potential = thing.candidate, 0.0
+    looked_at: list[tuple[bool, float, tuple[float, ...]]] = []
     for start in thing.places:
         left, along, size, count = 0.0, 0.0, 0.0, 0
         for r, shift, block in zip(few, shifts, blocks, strict=True):
@@ -139,12 +141,14 @@ def _screened(
             size += float(free[:, 0] @ free[:, 0])
         if count < len(blocks):
             continue
-        if size > 1e-12:
+        is_still = size <= STILL
+        if not is_still:
             potential = max(potential, along * along / size)
-        met.append((left, start))
-    if not met:
+        looked_at.append((is_still, left, start))
+    if not looked_at:
         return None
-    met.sort()
+    # a fit finds no way from where nothing moves, however little less is left there than where too much does
+    met = [(left, start) for _, left, start in sorted(looked_at)]
     starts = tuple(dict.fromkeys((*thing.far, *_begun_at(c, met))))
     return Screened(candidate=c, starts=starts, left=met[0][0], potential=potential)
 

@@ -11,7 +11,7 @@ import pytest
 
 from rollover.diagnosis import looks
 from rollover.diagnosis.blocks import Fitted
-from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.candidates import BESIDE, Candidate
 from rollover.diagnosis.crew import Crew, Job
 from rollover.diagnosis.effort import RUNS
 from rollover.diagnosis.explain import _smoothly
@@ -127,3 +127,31 @@ def test_an_effect_is_strong_at_both_ends_or_at_the_one_that_it_has() -> None:
     assert set(tank.probes()) < set(places)
     assert {x for x, _ in set(places) - set(tank.probes())} == {0.9}
     assert {y for _, y in places} == {y for _, y in tank.probes()}
+
+
+def test_a_limit_begins_where_something_gives_way_though_less_is_left_where_nothing_does() -> None:
+    """Peaks of 20 N and a limit of 17 N; fits may begin beside the scenario's own of 30 N, or where 4 or 10 N yield."""
+    neutral, gives_way = 0.9, 0.3
+
+    class Yielding(Wave):
+        def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+            limit = changes.get("effects.rops-plasticity.yield_force", np.inf)
+            return {CHANNEL: np.clip(20.0 * np.sin(30.0 * TIME), -limit, limit)}
+
+    limit = Candidate(
+        id="rops-plasticity", kind="physics", family="x", search={"yield_force": Search(0.0, 33.0)}, neutral=(neutral,)
+    )  # fmt: skip
+    judge, base = judge_of((0.0,) * 4, (0.0,) * 4)
+    simulator: Any = Yielding(0.0)
+    for e in judge.evidence:
+        object.__setattr__(e, "simulator", simulator)
+    known, true = (simulator.predict(c, 0.0)[CHANNEL] for c in ({}, {"effects.rops-plasticity.yield_force": 17.0}))
+    judge.measured = [true + w for w in np.random.default_rng(1).standard_normal((4, N))]
+    blocks = [replace(b, residual=w - known) for b, w in zip(base.blocks, judge.measured, strict=True)]
+    base = replace(base, blocks=tuple(blocks))
+    inquiry = Inquiry(judge=judge, candidates=(limit,), groups=[], phases=[], say=lambda _: None, crew=Crew())
+    looked = replace(looks.look(judge, base, [limit], [[r] for r in range(4)]), far={})
+    found = screen(inquiry, base, [limit], [0, 1], [0.0] * 4, looked)[0]
+    assert [x for x in limit.probes() if abs(x[0] - neutral) < 0.1]  # places where nothing yields were looked at,
+    assert found.left > blocks[0].residual @ blocks[0].residual + blocks[1].residual @ blocks[1].residual  # and leave
+    assert found.starts == ((neutral + BESIDE,), (gives_way,))  # less
