@@ -98,9 +98,13 @@ class DropModel:
         return DropModel(scenario=exchanged(self.scenario, changes), step=self.step)
 
     @cached_property
+    def _applied(self) -> Scenario:
+        return self.scenario.applied()
+
+    @cached_property
     def numbers(self) -> Array:
         """What `fall` reads, (nose.NUMBERS,)."""
-        s = self.scenario.applied()
+        s = self._applied
         vehicle, ground, start = s.vehicle, s.ground, s.initiation
         assert isinstance(vehicle, Striker)
         assert isinstance(start, (Drop, Release))
@@ -139,7 +143,7 @@ class DropModel:
     @cached_property
     def told(self) -> tuple[NDArray[np.int64], Array]:
         """Settings and numbers of the ground's kernel."""
-        s = self.scenario.applied()
+        s = self._applied
         return settings(s.ground.law, *acting(s.effects))
 
     @property

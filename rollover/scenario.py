@@ -14,7 +14,7 @@ from ground.law import GroundLaw, laws
 from ground.quantity import Quantity, parameters
 from ground.surface import Plane, Surface
 from rollover import document
-from rollover.effects import entries, nothing
+from rollover.effects import EFFECTS, entries, nothing
 from rollover.excitation import Excitation
 from rollover.filters import least_rate
 from rollover.initiation import Driving, Drop, Initiation, Release, Standing, Throw, TipOver
@@ -109,8 +109,10 @@ class Scenario:
 
     def validate(self) -> None:
         """Refuse parts that do not fit together."""
-        known = entries() if self.effects else {}
         for name, parameters_ in self.effects.items():
+            if type(parameters_) is EFFECTS.get(name):
+                continue  # as nearly all, and a fit makes a hundred thousand of them
+            known = entries()
             if name not in known:
                 raise ValueError(f"effects: unknown effect, got {name!r}; allowed: {', '.join(known) or 'none'}")
             if not isinstance(parameters_, known[name]):
