@@ -5,26 +5,29 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rollover.diagnosis.evidence import Evidence
 
 LASTING = 0.6  # s after the blow that are always kept
 SHORT = 0.1  # s that are not worth cutting off
 COUNTS = 0.3  # of what it would, on the average, from which on the end is kept
+BEYOND = 3.0  # times what noise and scatter leave, that the end is missed by and kept
 FEWEST = 8  # samples of a signal
 
 
 def shortened(e: Evidence, *, alone: bool = False) -> Evidence:
     """The evidence without its end, where that counts little: long after a blow neighbours differ as effects do.
 
-    As it is where samples are not weighed, and where the end counts. Of a recording that is `alone` nothing after the
-    blow is kept: whether an effect or another course of the run did it, only a second one could tell.
+    As it is where samples are not weighed, and where the end counts or differs by more than chance does. Of a recording
+    that is `alone` nothing after the blow is kept: whether an effect or another course of the run did it, only a second
+    one could tell.
     """
     time, end = e.recording.time, e.blow + (0.0 if alone else LASTING)
     if not time[-1] > end + SHORT:
         return e
     late = np.concatenate([time[s.rows] > end for s in e.signals])
-    if not alone and float(np.mean(e.due[late])) > COUNTS:
+    if not alone and (float(np.mean(e.due[late])) > COUNTS or _differs(e, late)):
         return e
     return up_to(e, end) or e
 
@@ -40,3 +43,14 @@ def up_to(e: Evidence, end: float, beyond: float = 0.0) -> Evidence | None:
         return None
     n = int(np.searchsorted(time, end + beyond, side="right"))
     return replace(e.cut(kept), recording=e.recording.until(n), simulator=e.simulator.until(n))
+
+
+def _differs(e: Evidence, late: NDArray[np.bool_]) -> bool:
+    """Whether the scenario as it is misses an end by more than noise and scatter do."""
+    predicted = e.simulator.predict({}, 0.0)
+    if predicted is None:
+        return False
+    scatter = [float(np.sum(e.whitened(stray)[late] ** 2)) for stray in e.strays]
+    chance = float(np.sum(e.due[late])) + (float(np.mean(scatter)) if scatter else 0.0)
+    missed = (e.measured() - e.stacked(predicted))[late]
+    return float(missed @ missed) > BEYOND * chance

@@ -19,13 +19,15 @@ CHANNEL = "chassis/acceleration_z"
 STEP, END, BLOW = 0.002, 2.0, 0.5
 
 
-def evidence(counts: float, *, cfc: int | None = None) -> Evidence:
-    """A long recording of a toss, whose samples count so much after the blow."""
+def evidence(counts: float, *, cfc: int | None = None, off: float = 0.0) -> Evidence:
+    """A long recording of a toss, whose samples count so much after the blow, and are off by that at the end."""
     time = np.arange(0.0, END, STEP)
-    made = Recording(
-        title="toss", time=time, channels={CHANNEL: np.sin(9.0 * time)}, cfc={} if cfc is None else {CHANNEL: cfc}
-    )
     scenario = shipped("cube_toss").replaced({"simulation.duration": END + 0.1})
+    cfcs = {} if cfc is None else {CHANNEL: cfc}
+    empty = Recording(title="toss", time=time, channels={CHANNEL: np.zeros(time.size)}, cfc=cfcs)
+    there = RunSimulator(scenario, empty).predict({}, 0.0)
+    assert there is not None
+    made = replace(empty, channels={CHANNEL: there[CHANNEL] + off * (time > BLOW + LASTING)})
     rows = np.arange(0, time.size, 2)
     weight = np.where(time[rows] < BLOW, 1.0, counts)
     signal = Signal(
@@ -68,6 +70,16 @@ def test_an_end_that_counts_is_kept() -> None:
         assert shortened(e) is e
     plain = evidence(0.3)
     assert shortened(replace(plain, signals=(replace(plain.signals[0], weight=None),))).recording.time.size == 1000
+
+
+@pytest.mark.parametrize(("off", "is_kept"), [(0.0, False), (1.5, False), (2.5, True)])
+def test_an_end_that_hardly_counts_is_kept_where_it_differs_by_more_than_chance(off: float, is_kept: bool) -> None:
+    """Samples of noise 1 that count 0.3, of runs that differ by 1: (0.3 off)^2 against 3 (0.3^2 + 0.3^2)."""
+    whole = evidence(0.3, off=off)
+    one = np.ones(whole.signals[0].rows.size)
+    even = replace(whole.signals[0], level=one)
+    found = shortened(replace(whole, signals=(even,), strays=(one, -one)))
+    assert (found.recording.time.size == whole.recording.time.size) == is_kept
 
 
 def test_of_one_recording_alone_nothing_after_the_blow_counts() -> None:
