@@ -50,7 +50,5 @@ def _differs(e: Evidence, late: NDArray[np.bool_]) -> bool:
     predicted = e.simulator.predict({}, 0.0)
     if predicted is None:
         return False
-    scatter = [float(np.sum(e.whitened(stray)[late] ** 2)) for stray in e.strays]
-    chance = float(np.sum(e.due[late])) + (float(np.mean(scatter)) if scatter else 0.0)
     missed = (e.measured() - e.stacked(predicted))[late]
-    return float(missed @ missed) > BEYOND * chance
+    return float(missed @ missed) > BEYOND * e.by_chance(late)

@@ -120,10 +120,12 @@ class Evidence:
     @cached_property
     def expected(self) -> float | None:
         """Sum of squares that noise and scatter alone leave of the weighed samples; None where none is weighed."""
-        if all(s.weight is None for s in self.signals):
-            return None
-        scatter = [float(np.sum(self.whitened(stray) ** 2)) for stray in self.strays]
-        return float(np.sum(self.due)) + (float(np.mean(scatter)) if scatter else 0.0)
+        return None if all(s.weight is None for s in self.signals) else self.by_chance(np.s_[:])
+
+    def by_chance(self, rows: slice | NDArray[np.bool_]) -> float:
+        """Sum of squares that noise and scatter alone leave of some samples."""
+        scatter = [float(np.sum(self.whitened(stray)[rows] ** 2)) for stray in self.strays]
+        return float(np.sum(self.due[rows])) + (float(np.mean(scatter)) if scatter else 0.0)
 
     @cached_property
     def due(self) -> Array:

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar, cast
 
-from ground.kinds import ByKey
 from rollover.document.slot import slots
 
 T = TypeVar("T")
@@ -51,43 +50,22 @@ def _exchanged(thing: Any, places: Mapping[str, _Place], values: tuple[Any, ...]
             here[step] = values[cast(int, place.at)]
             continue
         inner = _part(thing, step) if place.at is None else values[place.at]
-        if known and (by_key := known[step].by_key):
-            here[step] = _exchanged_by_key(inner, place.below, values, by_key)
-        else:
-            here[step] = _exchanged(inner, place.below, values)
+        by_key = known[step].by_key if known else None
+        fresh = [key for key, p in place.below.items() if p.at is None and key not in inner] if by_key else []
+        if by_key and fresh:
+            table = by_key.table()
+            inner = {**inner, **{key: table[key]() for key in fresh}}
+        here[step] = _exchanged(inner, place.below, values)
     if isinstance(thing, tuple):
         names = {getattr(item, "name", None): i for i, item in enumerate(thing)}
         at = {names[step] if step in names else int(step): value for step, value in here.items()}
         return tuple(at.get(i, item) for i, item in enumerate(thing))
     if isinstance(thing, Mapping):
         return {**thing, **here}
-    return replace(thing, **_named(kind, here))
-
-
-def _exchanged_by_key(
-    table: Mapping[str, Any], places: Mapping[str, _Place], values: tuple[Any, ...], by_key: ByKey
-) -> dict[str, Any]:
-    """A mapping whose keys say what their values are: one that is not there begins with what it is given."""
-    found = dict(table)
-    for key, place in places.items():
-        if not place.below:
-            found[key] = values[cast(int, place.at)]
-        elif place.at is not None or key in found:
-            found[key] = _exchanged(found[key] if place.at is None else values[place.at], place.below, values)
-        elif any(p.below for p in place.below.values()):
-            found[key] = _exchanged(by_key.table()[key](), place.below, values)
-        else:
-            kind = by_key.table()[key]
-            found[key] = kind(**_named(kind, {step: values[cast(int, p.at)] for step, p in place.below.items()}))
-    return found
-
-
-def _named(kind: Any, own: dict[str, Any]) -> dict[str, Any]:
-    """The same. Raises ``KeyError`` for a name that the class does not know."""
-    for name in own:
-        if name not in slots(kind):
-            raise KeyError(f"no such path: {name} in {kind.__name__}")
-    return own
+    for step in here:
+        if step not in known:
+            raise KeyError(f"no such path: {step} in {kind.__name__}")
+    return replace(thing, **here)
 
 
 def value_at(thing: Any, path: str) -> Any:
