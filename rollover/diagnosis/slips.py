@@ -7,8 +7,9 @@ Of what was measured, m, and what the simulation says, s, at the time shift at w
 a is the factor between them, r how alike they are. No effect turns a channel round or makes 9.81 times as much of it in
 one recording: where |r| is near 1 and a, over what it is in the other recordings, is what the other sign or another
 unit makes, that is what happened. Such a channel tells nothing of what is missing, and what it misses would drown the
-rest: it is left aside, which is said. What all recordings of a channel are too large by is its gain or scale, which is
-fitted; only if nothing is found beside that is it left aside too.
+rest: it is left aside, which is said. Where neighbouring runs (`chaos`) are no more alike, none can tell. What all
+recordings of a channel are too large by is its gain or scale, which is fitted; only if nothing is found beside that is
+it left aside too.
 """
 
 from __future__ import annotations
@@ -61,9 +62,23 @@ def slips_of(every: Sequence[Evidence]) -> tuple[list[Slip], list[Slip]]:
     found = []
     for each in met.values():
         beside = _beside(each[0][1].channel, float(np.median([abs(factor) for *_, factor in each])))
-        found += [slip for one in each if (slip := _slip(*one, beside)) is not None]
+        found += [slip for one in each if (slip := _slip(*one, beside)) is not None and not _is_chance(slip)]
     shared = [slip for slip in found if _is_shared(slip, found, every)]
     return [slip for slip in found if slip not in shared], shared
+
+
+def _is_chance(slip: Slip) -> bool:
+    """Whether runs that nobody could tell apart are less alike in its channel than a slip would have to be.
+
+    Of an overturn straight backward, which way the vehicle falls at its end.
+    """
+    simulator, channel, rows = slip.evidence.simulator, slip.signal.channel, slip.signal.rows
+    strays = simulator.strays()
+    made = simulator.predict({}, 0.0)
+    if made is None or not strays:
+        return False
+    apart = float(np.median([np.sum(d[channel][rows] ** 2) for d in strays]))
+    return apart > (1.0 - ALIKE**2) * float(np.sum(made[channel][rows] ** 2))
 
 
 def without(every: Sequence[Evidence], slips: Sequence[Slip]) -> list[Evidence]:

@@ -98,6 +98,18 @@ def test_what_goes_its_own_way_is_no_slip() -> None:
     assert slips(made) == ([], [])
 
 
+@pytest.mark.parametrize(("apart", "is_slip"), [(0.6, True), (0.8, False)])
+def test_what_neighbouring_runs_do_as_well_is_no_slip(apart: float, is_slip: bool) -> None:
+    """Runs that nobody could tell apart, by so much of a channel: 0.71 of it leave |r| = 0.7."""
+    made = mistaken(recorded({}, 4, speeds=(1.5, 2.0, 2.5), channels=CHANNELS), FORCE, -1.0)
+    every, _ = diagnosing._evidence(scenario(), made, Crew())
+    there = every[1].simulator.predict({}, 0.0)
+    assert there is not None
+    strays = [{FORCE: size * apart * there[FORCE]} for size in (-1.0, 1.0, 0.0, 3.0, -1.0)]
+    every[1] = replace(every[1], simulator=SimpleNamespace(predict=every[1].simulator.predict, strays=lambda: strays))
+    assert [slip.signal.channel for slip in slips_of(every)[0]] == [FORCE] * is_slip
+
+
 def test_ground_that_is_three_times_as_stiff_makes_no_feet_of_metres() -> None:
     """Sinkages of 0.4 to 0.6 times what is simulated: the layer's work, more so the faster the drop."""
     hard = {"effects.soil-layer.depth": 0.04, "effects.soil-layer.stiffness_ratio": 3.2}
