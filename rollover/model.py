@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from rollover import interruption
 from rollover.bodies import Body
 from rollover.forces import added_mass, generalised_forces
 from rollover.frames import matrices
@@ -127,6 +128,8 @@ def solve(
         return newton
 
     def after(_mbs: Any, t: float) -> bool:
+        if waiting:
+            return False
         try:
             goes_on = after_step(t, views[0], views[1], views[2])
             live.time = t
@@ -170,9 +173,10 @@ def solve(
     settings.linearSolver.solverType = exu.LinearSolverType.EigenDense  # at some twenty coordinates
     failure = ""
     try:
-        mbs.SolveDynamic(
-            settings, solverType=exu.DynamicSolverType.GeneralizedAlpha, showHints=False, storeSolver=False
-        )
+        with interruption.held() as waiting:
+            mbs.SolveDynamic(
+                settings, solverType=exu.DynamicSolverType.GeneralizedAlpha, showHints=False, storeSolver=False
+            )
     except (ValueError, RuntimeError) as error:  # what exudyn's own errors derive from
         said = " ".join(str(error).split())[:300]
         failure = "Newton's iteration does not converge, even at a shorter step" if "terminated" in said else said

@@ -58,7 +58,7 @@ from rollover.vehicle import Striker
 
 NAMING = ("parameter", "sensor", "missing-physics")  # verdicts that name effects
 HALF = 0.5  # of what was beyond the noise: of less a channel that breaks off may be all of it
-MOSTLY = 0.6  # of the effects of the ground that would not have shown: then nothing can be told
+MOSTLY = 0.6  # of the effects that would not have shown: then nothing can be told
 FEWEST = 24  # samples in all, below which nothing is said
 
 
@@ -339,7 +339,10 @@ def _cost(found: Sequence[Evidence]) -> list[str]:
 
 
 def _is_weak(detectable: Mapping[str, float]) -> bool:
-    """Whether even typical strengths of most effects of the ground would have stayed below what shows."""
+    """Whether even typical strengths of most effects would have stayed below what shows; of all, where no ground acts.
+
+    How many others there are is a matter of the vehicle, not of what its recordings tell.
+    """
     typical = {
         name: value
         for name, value in detectable.items()
@@ -350,7 +353,8 @@ def _is_weak(detectable: Mapping[str, float]) -> bool:
         parameter, null = yardstick(name, EFFECTS[name].search)
         usual = getattr(EFFECTS[name](), parameter, None)
         blind += usual is None or value > abs(usual - null)
-    return blind > MOSTLY * len(typical) or not typical
+    acts = any(channel.startswith("ground/") for name in typical for channel in EFFECTS[name].channels)
+    return blind > MOSTLY * len(typical) if acts else blind == len(typical)
 
 
 def _nothing(

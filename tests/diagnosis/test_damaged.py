@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -12,6 +13,7 @@ from rollover.diagnosis import account, diagnose
 from rollover.recording import Recording
 from tests.diagnosis.drops import DEPTH, FORCE, recorded, scenario
 
+diagnosing = importlib.import_module("rollover.diagnosis.diagnose")
 Recordings = list[tuple[str, Recording]]
 SPEEDS = (1.5, 2.5)
 
@@ -106,6 +108,22 @@ def test_recordings_that_contradict_each_other_are_not_explained() -> None:
     assert not found.effects, found.sentence
     assert found.verdict == "cannot-tell"
     assert "They contradict each other: v1.5, v1.5 again: one condition" in found.sentence
+
+
+@pytest.mark.parametrize(
+    ("detectable", "is_weak"),
+    [
+        ({"payload-shift": 400.0, "tank-slosh": 400.0, "mount-play": 1e-5}, False),  # a pendulum's blow, no ground acts
+        ({"payload-shift": 400.0, "tank-slosh": 400.0, "mount-play": 1.0}, True),
+        ({"payload-shift": 400.0, "soil-adhesion": 1e6, "soil-viscous-damping": 10.0}, True),
+        ({"payload-shift": 10.0, "soil-adhesion": 1e6, "soil-viscous-damping": 10.0}, False),
+        ({"rops-plasticity": 1.0, "mass": 1.0}, True),  # of a limit, and of a value, nothing is usual
+    ],
+)
+def test_recordings_are_too_weak_where_usual_strengths_would_not_show(
+    detectable: dict[str, float], is_weak: bool
+) -> None:
+    assert diagnosing._is_weak(detectable) is is_weak
 
 
 def test_millimetres_that_say_they_are_metres_are_the_scale_of_their_channel() -> None:
