@@ -15,6 +15,7 @@ from rollover.diagnosis.verdict import Score
 from rollover.rating import Iso18571, iso18571
 
 SAMPLES = 1500  # that a rating is worked out on
+FEWEST = 24  # samples before a blow, of fewer nothing is said
 FORCES = ("ground/force_normal", "rops/force", "striker/acceleration_z", "chassis/acceleration_z")
 
 
@@ -51,12 +52,14 @@ def judged(judge: Judge, fitted: Fitted, kept: Sequence[Evidence], groups: Seque
 def before_a_blow(evidence: Sequence[Evidence], fitted: Fitted) -> float | None:
     """Misfit over the noise of all samples before the first blow, where no run scatters; None where none does after.
 
-    Samples beyond a blow count for less the more runs scatter there, and less is left of what they miss, too.
+    None of few too; those at a start, which have no past to be whitened with, are none. Samples beyond a blow count for
+    less the more runs scatter there, and less is left of what they miss, too.
     """
     if all(e.expected is None for e in evidence):
         return None
     early = np.concatenate([b.plain_residual[e.early] for e, b in zip(evidence, fitted.blocks, strict=True)])
-    return float(np.sqrt(np.mean(early**2))) if early.size else None
+    telling = early[early != 0.0]
+    return float(np.sqrt(np.mean(telling**2))) if telling.size >= FEWEST else None
 
 
 def predicted(judge: Judge, fitted: Fitted, rounds: int = 5) -> Fitted | None:

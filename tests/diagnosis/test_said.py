@@ -79,6 +79,17 @@ def test_what_runs_that_scatter_miss_is_told_before_the_blow_too() -> None:
     assert before_a_blow(at_once, fitted) is None
 
 
+@pytest.mark.parametrize(("told", "said"), [(11, None), (12, 3.0)])
+def test_of_few_samples_before_the_blow_nothing_is_said(told: int, said: float | None) -> None:
+    """Two recordings of so many samples before the blow, and as many at the start, which have no past: 24 in all."""
+    early = np.arange(80) < 2 * told
+    residual = np.where(np.arange(80) < told, 0.0, 3.0)
+    none: Any = {"J": np.zeros((80, 0)), "slope": np.zeros(80), "shift": 0.0, "prior": 1e-3}
+    fitted = Fitted(candidates=(), x=(), blocks=(Block(residual=residual, **none),) * 2)
+    scattering: Any = [SimpleNamespace(expected=50.0, early=early)] * 2
+    assert before_a_blow(scattering, fitted) == said
+
+
 def test_a_misfit_that_scatter_takes_part_in_is_said_to_be_one() -> None:
     first, last = (Held(left=np.array([left]), count=np.ones(1)) for left in (1.44, 0.64))
     tilted = Named(
