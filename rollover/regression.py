@@ -144,8 +144,10 @@ def updated(
         before = baselines.read(path) if path.is_file() else None
         mine = [(o.case.half_step, o.value) for o in outcomes[file] if o.value is not None]
         plain, half_ = ([v for h, v in mine if h is finer] for finer in (False, True))
-        new[path] = baselines.drawn_up(file.stem, scenario, plain, half_, reason, before)
-        answers.append(_written(new[path], before, scenario, plain, sum(o.wall_time for o in outcomes[file])))
+        drawn = baselines.drawn_up(file.stem, scenario, plain, half_, reason, before)
+        if drawn is not before:
+            new[path] = drawn
+        answers.append(_written(drawn, before, scenario, plain, sum(o.wall_time for o in outcomes[file])))
     baselines.write(new)
     return answers
 
@@ -153,7 +155,7 @@ def updated(
 def _written(
     new: Baseline, before: Baseline | None, scenario: Scenario, ensemble: list[tuple[Extreme, ...]], wall: float
 ) -> Answer:
-    """What an update changed, and which of its tolerances guard little."""
+    """What an update changed, and which of its tolerances guard little; `new` is `before` where that stays."""
     loose = [x for x in new.loads if x.tolerance > baselines.LOOSE]
     notes = [
         f"{x.load}, {x.filter}: a tolerance of {100 * x.tolerance:.0f} % guards little ({x.reason})" for x in loose
@@ -162,10 +164,11 @@ def _written(
     differences = baselines.against(new, scenario, ensemble[: new.starts]).differences
     if before is not None:
         old = baselines.against(before, scenario, ensemble[: before.starts])
-        sentence, differences = f"{sentence}; {old.sentence}", old.differences
+        first = "nothing new to write" if new is before else sentence
+        sentence, differences = f"{first}; {old.sentence}", old.differences
     return Answer(
         scenario=new.scenario,
-        verdict="updated",
+        verdict="same" if new is before else "updated",
         sentence=sentence,
         starts=new.starts,
         wall_time=wall,

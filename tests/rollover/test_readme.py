@@ -49,7 +49,9 @@ def rollover(line: str) -> Any:
 
 def test_every_command_of_the_readme_works_in_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shelf = tmp_path / "shelf"
-    shutil.copytree(shipped_folder(), shelf)  # one of the lines writes a baseline anew
+    shutil.copytree(shipped_folder(), shelf)  # one of the lines writes a baseline anew,
+    stale = shelf / "baselines" / "drop_test.yaml"  # of which nothing is new on the machine that made it
+    stale.write_text(stale.read_text().replace("numpy ", "numpy 0."))
     for module in ("rollover.document.include", "rollover.document"):
         monkeypatch.setattr(f"{module}.shipped_folder", lambda: shelf)
     shown: list[Path] = []

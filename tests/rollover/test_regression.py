@@ -201,6 +201,15 @@ def test_an_update_names_what_changed_and_the_next_comparison_passes(folder: Pat
     assert regress(path).exit_code == 0
 
 
+def test_an_update_of_what_is_as_it_was_writes_nothing_and_says_so(folder: Path) -> None:
+    before = kept(folder)
+    done = regress(folder, "--update", "--reason", "no reason at all")
+    assert done.exit_code == 0
+    assert done.stdout.count("nothing new to write; ") == 2
+    assert "All 2 scenarios are as they were." in done.stdout
+    assert kept(folder) == before
+
+
 def test_results_of_another_selection_are_not_overwritten(folder: Path) -> None:
     drop = folder / "drop.yaml"
     assert regress(drop).exit_code == 0
