@@ -365,7 +365,7 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--only", nargs="*", default=[*SETS, DRAWS])
+    parser.add_argument("--only", nargs="*", default=[*SETS, DRAWS], choices=[*SETS, DRAWS])
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--write", action="store_true")
     given = parser.parse_args()
