@@ -20,15 +20,13 @@ def held() -> Iterator[list[int]]:
     if threading.current_thread() is not threading.main_thread():
         yield waiting
         return
-    usual = {number: signal.getsignal(number) for number in SIGNALS}
-    for number, handler in usual.items():
-        if callable(handler):
-            signal.signal(number, lambda n, _: waiting.append(n))
+    usual = {number: handler for number in SIGNALS if callable(handler := signal.getsignal(number))}
+    for number in usual:
+        signal.signal(number, lambda n, _: waiting.append(n))
     try:
         yield waiting
     finally:
         for number, handler in usual.items():
-            if callable(handler):
-                signal.signal(number, handler)
+            signal.signal(number, handler)
         if waiting:
             signal.raise_signal(waiting[0])

@@ -160,15 +160,15 @@ def _written(
     notes = [
         f"{x.load}, {x.filter}: a tolerance of {100 * x.tolerance:.0f} % guards little ({x.reason})" for x in loose
     ]
-    sentence = f"{len(new.loads)} loads written"
+    stays = new is before
+    sentence = "nothing new to write" if stays else f"{len(new.loads)} loads written"
     differences = baselines.against(new, scenario, ensemble[: new.starts]).differences
     if before is not None:
         old = baselines.against(before, scenario, ensemble[: before.starts])
-        first = "nothing new to write" if new is before else sentence
-        sentence, differences = f"{first}; {old.sentence}", old.differences
+        sentence, differences = f"{sentence}; {old.sentence}", old.differences
     return Answer(
         scenario=new.scenario,
-        verdict="same" if new is before else "updated",
+        verdict="same" if stays else "updated",
         sentence=sentence,
         starts=new.starts,
         wall_time=wall,
