@@ -38,6 +38,8 @@ def is_recorders(told: Sequence[tuple[Evidence, Signal, Array]]) -> bool:
     ends = [int(np.searchsorted(e.recording.time[s.rows], e.simulator.contact)) for e, s, _ in told]
     if len(told) < FEWEST or any(n < LEAST or w.size < 2 * n for n, (_, _, w) in zip(ends, told, strict=True)):
         return False
+    if any(s.quiet[0] <= 0.0 for _, s, _ in told):
+        return False  # next to no noise at all everything is slow and loud
     before = np.array([along(s, w[:n], TERMS) for n, (_, s, w) in zip(ends, told, strict=True)])
     if not is_slow(before):
         return False
@@ -64,7 +66,7 @@ def along(s: Signal, misfit: Array, terms: int) -> Array:
     from scipy.signal import lfilter
 
     ways = cosines(misfit.size, terms)
-    noise, ar = s.at_rest or (s.noise, s.ar)
+    noise, ar = s.quiet
     past = lfilter([1.0], [1.0, -min(max(sum(ar), 0.0), STEADY)], ways, axis=1)
     power = np.sum(ways * (2.0 * past - ways), axis=1)
     return np.asarray(ways @ misfit / (noise * np.sqrt(np.maximum(power, 1e-12))))

@@ -167,10 +167,11 @@ def slower(told: Sequence[Told]) -> set[str]:
     """Channels whose misfits are so much slower than their quiet stretches that they are no noise."""
     by: dict[str, list[tuple[float, float, int]]] = {}
     for _, _, s, sigma, ar in told:
-        noise, own = s.at_rest or (s.noise, s.ar)
+        noise, own = s.quiet
         if noise > 0.0 and sigma > 0.0:
             more = np.log(level_of(sigma, ar) / level_of(noise, own))
-            more -= max(np.log(sigma / noise), 0.0)  # what is only louder was not quiet there
+            # what is only louder was not quiet there: all of it, what is rough too
+            more -= max(np.log(sigma / grown(ar) / (noise / grown(own))), 0.0)
             by.setdefault(s.channel, []).append((float(more), min(max(sum(own), 0.0), STEADY), s.rows.size))
     slow = set()
     for channel, each in by.items():

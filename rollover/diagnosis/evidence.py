@@ -57,6 +57,11 @@ class Signal:
         return replace(self, rows=self.rows[inside], values=self.values[inside], weight=weight, level=level)
 
     @property
+    def quiet(self) -> tuple[float, tuple[float, ...]]:
+        """Noise and colour of its quiet stretches; those that are held before these are told."""
+        return self.at_rest or (self.noise, self.ar)
+
+    @property
     def loudness(self) -> Array | float:
         """Noise over `noise`, (n,); 1 where it is the same throughout."""
         return 1.0 if self.level is None else self.level

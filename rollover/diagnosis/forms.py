@@ -16,6 +16,8 @@ from rollover.diagnosis.refine import BEHIND, STARTS, by_what_is_left, few_of, p
 WORTH = 12.0  # gain that pays for a shape
 SHORT = 4  # rounds of a fit that tells where to begin
 ABREAST = 1.5  # times what the best of short fits leaves, up to which others are followed
+FAR = 2.0  # misfit over the noise, from which on much is left
+SOON = 0.9  # times what an effect leaves as it is, that the shape which it has must then leave after a short fit
 THERE = 0.003  # of a coordinate, within which two short fits came to one place
 ASTRAY = 1.2  # times what another explanation leaves, above which a crooked valley is not followed
 FURTHER, ALIKE = 3, 0.1  # rounds of all recordings, after which fits within so much of a coordinate go to one place
@@ -79,13 +81,17 @@ def _best_of(
     """The best fit with another last effect from some places.
 
     Short fits to the recordings that are met worst, best and in the middle tell where to begin, and a few rounds of
-    all which of these lead to one place; None if none can be made.
+    all which of these lead to one place; None if none can be made, or where much more than noise is left and none soon
+    takes a part of that: a shape that is the right one does.
     """
     candidates, few = (*f.candidates[:-1], last), few_of(f)
     at = [f.blocks[r].shift for r in few]
     short = [judge.fit(candidates, x, rounds=SHORT, shifts=at, only=few, bare=True) for x in places]
     # fitted alone these soon leave less than beside all others
-    most = min(ABREAST * sum(f.blocks[r].total for r in few), BEHIND * sum(leaves[r] for r in few))
+    own = sum(f.blocks[r].total for r in few)
+    most = min(ABREAST * own, BEHIND * sum(leaves[r] for r in few))
+    if sum(leaves) > FAR**2 * sum(b.residual.size for b in f.blocks):
+        most = min(most, SOON * own)
     begun: list[Fitted] = []
     for one in sorted((one for one in short if one is not None and one.total < most), key=lambda one: one.total):
         if begun and one.total > ABREAST * begun[0].total:

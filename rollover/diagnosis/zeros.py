@@ -52,7 +52,7 @@ def with_zeros(evidence: Sequence[Evidence], residuals: Sequence[Array], shifts:
             if before is not None and float(np.ptp((s.values - residual[part])[before])) < FLAT * s.sigma:
                 error = level_of(s.noise, s.ar) / np.sqrt(before.stop)
                 early = residual[part][before]
-                slow = float(np.sum(along(s, early, 1 + WAVES)[1:] ** 2))
+                slow = float(np.sum(along(s, early, 1 + WAVES)[1:] ** 2)) if error > 0.0 else np.inf
                 zero = Zero(r=r, k=k, off=float(early.mean()), error=float(error), slow=slow)
                 by.setdefault(s.channel, []).append(zero)
     able = [zeros for zeros in by.values() if len(zeros) >= FEWEST and all(z.error > 0.0 for z in zeros)]

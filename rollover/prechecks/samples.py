@@ -21,6 +21,7 @@ AROUND = 6  # samples on either side that say what a sample should be
 ALONE = 0.5  # of what a spike is off both sides, at least, that it is off each
 MOST = 0.05  # of the samples, that lie far off what their neighbours say
 CROWDED = 0.05  # chance below which spikes that lie together are something quick
+ROUNDING = 1e-9  # of a noise, that is arithmetic's
 OFFSETS = beside(AROUND)
 SPREAD = np.eye(2 * AROUND) - np.vander(OFFSETS / AROUND, 4) @ np.linalg.pinv(np.vander(OFFSETS / AROUND, 4))
 BEFORE, AFTER = (np.linalg.pinv(np.vander(side, 3))[-1] for side in (OFFSETS[:AROUND], OFFSETS[AROUND:]))
@@ -142,6 +143,10 @@ def spikes(t: Trace, unit: str) -> Iterator[Finding]:
     error = off_a_cubic(values, AROUND)
     inner = np.abs(error[AROUND:-AROUND])
     scale = float(np.median(inner[inner <= np.median(inner) * 6.0])) / 0.6745
+    if scale < ROUNDING * t.floor.sigma:
+        # most samples read exactly what their neighbours say: digits, one of which is no disturbance
+        apart = np.diff(np.unique(values))
+        scale = float(np.min(apart[apart > ROUNDING * t.floor.sigma]))
     beyond = -float(ndtri(0.5 * CHANCE / values.size)) * scale
     left, found = np.ones(values.size, dtype=bool), dict[int, float]()
     while abs(error[i := int(np.argmax(np.abs(error) * left))]) > beyond and left[i]:

@@ -55,6 +55,13 @@ def test_cosines_are_orthonormal_and_expected_of_noise() -> None:
     np.testing.assert_allclose(np.mean(found, axis=0), 1.0, atol=0.05)
 
 
+def test_of_a_channel_that_is_silent_at_rest_nothing_is_its_recorder_s() -> None:
+    """Over no noise everything is slow, and as loud before as after: no number to go by."""
+    rng = np.random.default_rng(1)
+    with np.errstate(divide="raise", invalid="raise"):
+        assert not is_recorders(told([pink(rng) for _ in range(6)], 0.0))
+
+
 def test_noise_of_one_over_f_is_its_recorder_s() -> None:
     """(A2) errs in one of a hundred, (A3) in up to twice two: 95, of 100 drawn with a standard deviation of 2.2."""
     assert 0.92 < share(lambda rng: told([pink(rng) for _ in range(6)], 0.6)) < 1.0

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from rollover.diagnosis import colour, diagnose
 from rollover.diagnosis.blocks import Block
@@ -129,3 +130,30 @@ def test_an_amplifier_set_for_each_test_is_seen_in_few_samples_beside_what_is_me
 def test_noise_that_goes_with_each_recordings_range_is_no_mismatch() -> None:
     found = [diagnose(drop(), dropped({}, seed, rate=300.0)) for seed in range(4)]
     assert {f.verdict for f in found} == {"no-mismatch"}
+
+
+def markov(random: np.random.Generator, sigma: float, memory: float, n: int = 1200) -> np.ndarray:
+    """x_t = memory x_(t-1) + e_t with a standard deviation of sigma, (n,)."""
+    driven = random.standard_normal(n + 200) * sigma * np.sqrt(1.0 - memory**2)
+    return np.asarray(lfilter([1.0], [1.0, -memory], driven)[200:])
+
+
+def pulses(random: np.random.Generator, sigma: float, n: int = 1200, width: int = 7) -> np.ndarray:
+    """Smooth pulses of seven samples, one after another, with a standard deviation of sigma, (n,)."""
+    shape = np.hanning(width + 2)[1:-1]
+    return np.convolve(random.standard_normal(n + width - 1), sigma * shape / np.linalg.norm(shape), "valid")
+
+
+@pytest.mark.parametrize(("loud", "slow", "taken"), [(1.0, 0.0, True), (2.4, 0.0, True), (1.0, 2.2, False)])
+def test_only_noise_that_is_louder_in_all_it_holds_is_taken_for_noise(loud: float, slow: float, taken: bool) -> None:
+    """Noise with a memory of 0.34, 2.4 times as loud as at rest: by itself, or with pulses of 2.2 times its size.
+
+    Both have a standard deviation of 2.4. What drives the noise, its rough part, is louder in the first and much as it
+    was in the second: of pulses next to nothing is rough.
+    """
+    e = recorded(np.random.default_rng(6).standard_normal(N))
+    s = replace(e.signals[0], at_rest=(1.0, (0.34,)))
+    for seed in range(20):
+        random = np.random.default_rng([6, seed])
+        sigma, ar = colour.autoregression([markov(random, loud, 0.34) + pulses(random, slow)])
+        assert (colour.slower([(0, 0, s, sigma, ar)]) == set()) is taken, seed

@@ -59,6 +59,15 @@ def test_where_zeros_are_one_none_is_touched() -> None:
     assert all(s.zero == s.zero_error == 0.0 for e in weighed(made) for s in e.signals)
 
 
+@pytest.mark.filterwarnings("error")
+def test_digits_that_show_no_noise_before_anything_is_hit_tell_no_zero() -> None:
+    """Sinkage in steps of 30 mm reads 0 there, in which noise of 3 mm never shows: no error to tell a zero to."""
+    made = [(n, replace(r, channels={**r.channels, DEPTH: 0.03 * np.round(r[DEPTH] / 0.03)})) for n, r in drops({})]
+    coarse = [s for e in weighed(made) for s in e.signals if s.channel == DEPTH]
+    assert min(s.quiet[0] for s in coarse) == 0.0
+    assert all(s.zero == s.zero_error == 0.0 for s in coarse)
+
+
 @pytest.mark.parametrize("size", [0.5, 3.0])
 def test_zeros_that_differ_are_no_mismatch_and_are_said_to_differ(size: float) -> None:
     made, _ = moved(drops({}), {FORCE: size, DEPTH: 0.0, ACCELERATION: size}, 0.0)

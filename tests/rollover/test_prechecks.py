@@ -184,6 +184,24 @@ def test_spikes_beside_each_other_are_found_one_by_one(at: list[int]) -> None:
         assert spiked(at, seed) == at, seed
 
 
+def coarse(seed: int, more: int = 0) -> np.ndarray:
+    """A rise by five digits, in which two samples of a thousand read one digit off, and one of them `more`."""
+    random, k = np.random.default_rng(seed), np.arange(N)
+    off = random.choice([-1, 1], N) * (random.random(N) < 0.002)
+    off[3000] = more
+    return np.asarray(0.125 * (np.round(5.0 / (1.0 + np.exp(-(k - 0.4 * N) / 60.0))) + off))
+
+
+@pytest.mark.parametrize(("more", "found"), [(0, []), (1, []), (-10, [3000]), (10, [3000])])
+def test_a_digit_that_flips_is_no_spike_and_ten_of_them_are(more: int, found: list[int]) -> None:
+    """Most samples read exactly what their neighbours say: how far others are off by chance is a digit, not nothing."""
+    clean = drop(0)
+    for seed in range(6):
+        told = prechecks(replace(clean, channels={A: coarse(seed, more)}))
+        spikes = [int(np.argmin(np.abs(clean.time - f.start))) for f in told if f.check == "spike"]
+        assert spikes == found, seed
+
+
 def test_contacts_that_follow_one_another_are_no_spikes() -> None:
     """Six within 60 of 500 samples, where chance puts one or two."""
     for seed in range(6):
