@@ -54,3 +54,22 @@ def test_of_fits_that_lead_to_one_place_one_is_followed(ends: tuple[float, ...],
     assert whole == followed
     assert best is not None
     assert best.x == (0.3, followed[0])
+
+
+@pytest.mark.parametrize(
+    ("left", "soon", "is_followed"), [(30.0, 28.0, False), (30.0, 26.0, True), (3.0, 2.99, True), (3.0, 2.6, True)]
+)
+def test_far_from_noise_a_shape_is_followed_if_it_soon_takes_a_part(left: float, soon: float, is_followed: bool) -> None:
+    """Short fits leave so much of what the usual shape leaves: seven in a hundred is nothing, thirteen is a part of it.
+
+    Near noise, at three times what chance leaves, any little may be all there is.
+    """
+    whole = []
+
+    def fit(_: Any, x: Sequence[float], *, rounds: int | None = None, **how: Any) -> Fitted:
+        whole.extend([] if rounds == forms.SHORT else [x])
+        return fitted(BENT, x, soon)
+
+    judge, start = cast(Judge, SimpleNamespace(fit=fit)), fitted(DAMPING, (0.3,), left)
+    best = forms._best_of(judge, start, BENT, [(0.3, 0.4)], [b.total for b in start.blocks])
+    assert (best is not None) is bool(whole) is is_followed
