@@ -11,7 +11,7 @@ from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.explain import NEARLY_NOISE, Step, is_at_an_end
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.otherwise import traced_too
+from rollover.diagnosis.otherwise import from_there, traced_too
 from rollover.diagnosis.refine import ended, polish, timed
 from rollover.diagnosis.straight import is_any_curve
 from rollover.effects import EFFECTS
@@ -19,6 +19,7 @@ from rollover.effects import EFFECTS
 MANY = 0.05  # p-value of what as many effects as may be leave, below which they are no explanation
 BESIDE = 3  # rivals of a step that are begun anew beside a better fit of what came before
 SIMPLER = 4  # rivals of fewer numbers that are begun anew beside a fit at an end of its range
+NEARLY = 1.5  # times what the best leaves, up to which a fit of fewer numbers is followed along its valley
 TELLS = 10.8  # chi-square of one number, p = 0.001
 
 
@@ -42,7 +43,7 @@ def followed(inquiry: Inquiry, found: Step) -> tuple[Step, Mismatch]:
         if new.left < old.left:
             found = _with_rivals(judge, found.moved_to(new))
             left = mismatch_of(judge.evidence, new.blocks, phases)
-    for simple in (simpler, _straightened):
+    for simple in (simpler, _straightened, plainer):
         other = simple(inquiry, found)
         if other is not None:
             found, left = other, mismatch_of(judge.evidence, other.fitted.blocks, phases)
@@ -115,6 +116,25 @@ def _straightened(inquiry: Inquiry, found: Step) -> Step | None:
     if not fits:
         return None
     return _led_by(min(fits, key=lambda f: (len(f.x), f.left)), found)
+
+
+def plainer(inquiry: Inquiry, found: Step) -> Step | None:
+    """A step by any effect of fewer numbers, but a sensor's, that does as well beside the others; None if none.
+
+    Two thresholds in one place do the work of one and a stiffness. The way there is crooked: all others move with it.
+    """
+    best, beside, shared = found.fitted, *_shared(found.fitted)
+    held = {c.key for c in best.candidates}
+    able = [c for c in inquiry.candidates if c.kind != "sensor" and len(c.search) < len(best.own) and c.key not in held]
+    if not beside or not able:
+        return None
+    shifts = tuple(b.shift for b in best.blocks)
+    jobs = [Job(candidates=(*beside, c), start=(*shared, *c.probes()[0]), shifts=shifts) for c in able]
+    one = min((f for f in inquiry.fits(jobs) if f is not None), key=lambda f: f.left, default=None)
+    if one is None or one.left > NEARLY * best.left:
+        return None
+    one = inquiry.fits([from_there(one, "polish")])[0] or one
+    return _led_by(one, found) if _is_as_good(one, best) else None
 
 
 def _unbent(

@@ -9,11 +9,10 @@ from dataclasses import replace
 from rollover.diagnosis.blocks import turned
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.crew import Job
-from rollover.diagnosis.detect import Mismatch
+from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.endings import followed, simpler
-from rollover.diagnosis.explain import Step, step
+from rollover.diagnosis.explain import SURE, Step, step
 from rollover.diagnosis.fit import Fitted
-from rollover.diagnosis.forms import is_noise
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.lasting import NEEDED
@@ -92,7 +91,7 @@ def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: Gate) -> Step | N
         ]
         met = sorted((f for f in inquiry.fits(jobs) if f is not None), key=lambda f: f.left)[:most]
         short = [(f.candidates, f.x) for f in met]
-    jobs = [Job(candidates=f.candidates, start=f.x, shifts=shifts_told(shifts, f, few), width=1) for f in met]
+    jobs = [Job(candidates=f.candidates, start=f.x, shifts=shifts_told(shifts, f, few)) for f in met]
     fits = [f for f in inquiry.fits(jobs) if f is not None]
     if not fits:
         return None
@@ -126,7 +125,7 @@ def _traced(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fitted]:
     None where the best leaves no more than noise.
     """
     ranked = sorted(pairs, key=lambda f: f.left)
-    if is_noise(ranked[0]):
+    if mismatch_of(inquiry.judge.evidence, ranked[0].blocks, inquiry.phases).p_value > SURE:
         return []
     near = (f for f in ranked if f.left < PLACED * ranked[0].left)
     ways = (way for f in near for way in (f, inquiry.judge.again(turned(f))))

@@ -119,18 +119,30 @@ def _needed(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step]:
     if (judge.effort.thrifty or is_any_curve(current.candidates)) and len(current.candidates) == len(taken):
         return [s.again(judge) for s in taken]  # the second will be refused, whichever came first
     parts: list[Step] = []
+    exchanged = 0
     while len(parts) < len(current.candidates):
         whole = len(parts) == len(current.candidates) - 1
         whole = whole and current.candidates[0].key == last.fitted.candidates[-1].key
+        whole = whole and not is_elsewhere(last)
         if whole and {c.key for c in current.candidates} == {c.key for c in last.fitted.candidates}:
             parts.append(last)  # found beside just these others
             break
-        found = instead(inquiry, current)
+        found, taken_out = instead(inquiry, current), current.candidates[0].key
         if found is None:
             return [s.again(judge) for s in taken]
         current = without_needless(judge, found.fitted)
+        if found.fitted.candidates[-1].key != taken_out and exchanged < MOST:
+            parts, exchanged = [], exchanged + 1  # those before were looked for beside what is no more
         parts = [*parts, found] if len(current.candidates) == len(found.fitted.candidates) else []
     return [s.again(judge) for s in parts]
+
+
+def is_elsewhere(last: Step) -> bool:
+    """Whether the other effects are no more what they were as the last one and its rivals were looked for beside them.
+
+    What was bent to do the last one's work as well left little to those that have less to bend.
+    """
+    return [c.token for c in last.base.candidates] != [c.token for c in last.fitted.candidates[:-1]]
 
 
 def without_needless(judge: Judge, fitted: Fitted) -> Fitted:

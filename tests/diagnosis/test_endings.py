@@ -172,7 +172,7 @@ def test_what_draws_any_curve_is_not_followed_but_straightened(
     monkeypatch.setattr(endings, "simpler", lambda *_: None)
     straight = step(fitted("soil-stiffness", 4.0, (0.7, 0.3)))
     monkeypatch.setattr(endings, "_straightened", lambda *_: straight)
-    found, _ = endings.followed(cast(Inquiry, SimpleNamespace(judge=judge, phases=[])), step(best))
+    found, _ = endings.followed(cast(Inquiry, SimpleNamespace(judge=judge, phases=[], candidates=[])), step(best))
     assert found is straight
     assert traced == ([] if is_a_curve else [best])
 
@@ -196,3 +196,38 @@ def test_a_damping_is_tried_as_the_drag_that_it_becomes_with_the_square_of_the_s
     assert endings.simpler(cast(Inquiry, SimpleNamespace(fits=fits, candidates=[damping, drag])), step(best)) is None
     assert [job.candidates for job in asked] == [(mass, drag)]
     assert asked[0].start == pytest.approx((0.7, 2.0 * 22.0 / (1800.0 * 0.140 * 0.045) / 50.0), rel=1e-12)  # rounding
+
+
+@pytest.mark.parametrize(("leaves", "polished", "taken"), [(7.0, 6.9, True), (7.0, 4.0, True), (20.0, 4.0, False)])
+def test_two_thresholds_in_one_place_are_a_threshold_and_a_stiffness(
+    leaves: float, polished: float, taken: bool
+) -> None:
+    """A crust of two numbers beside a layer leaves 5; one number is saved for chi-square of 10.8, of what comes near.
+
+    Sensors are not asked, nor what has as many numbers; the best of those that are is followed along its valley.
+    """
+    asked: list[Job] = []
+
+    def fits(jobs: Sequence[Job]) -> list[Fitted | None]:
+        asked.extend(jobs)
+        return [fitted(j.candidates[-1].id, polished if j.how == "polish" else leaves, j.start) for j in jobs]
+
+    plain = Candidate(id="soil-stiffness", kind="parameter", family="", search={"a": Search(0, 1)})
+    others = [replace(plain, kind="sensor"), replace(plain, search={"a": Search(0, 1), "b": Search(0, 1)})]
+    best, rival = fitted("soil-crust", 5.0, (0.7, 0.4, 0.3)), fitted("mass", 9.0, (0.7, 0.2))
+    there = cast(Inquiry, SimpleNamespace(fits=fits, candidates=[plain, *others, best.candidates[0]]))
+    found = endings.plainer(there, step(best, rival))
+    assert [(j.candidates[-1].id, j.how) for j in asked] == [("soil-stiffness", "fit"), ("soil-stiffness", "polish")][
+        : 1 + taken
+    ]
+    assert asked[0].start[:-1] == (0.7,)
+    assert (found is not None) is taken
+    if found is not None:
+        assert [f.candidates[-1].id for f in found.rivals] == ["soil-stiffness", "mass"]
+
+
+def test_an_effect_by_itself_is_not_given_for_a_plainer_one() -> None:
+    """Beside nothing all of fewer numbers were tried before it."""
+    both = fitted("soil-crust", 5.0, (0.7, 0.4, 0.3))
+    alone = replace(both, candidates=both.candidates[1:], x=both.x[1:])
+    assert endings.plainer(cast(Inquiry, SimpleNamespace(candidates=[both.candidates[0]])), step(alone)) is None

@@ -59,7 +59,7 @@ def test_of_fits_that_lead_to_one_place_one_is_followed(ends: tuple[float, ...],
 @pytest.mark.parametrize(
     ("left", "soon", "is_followed"), [(30.0, 29.0, False), (30.0, 28.0, True), (3.0, 2.99, True), (3.0, 2.6, True)]
 )
-def test_far_from_noise_a_shape_is_followed_if_it_soon_takes_a_part(left: float, soon: float, is_followed: bool) -> None:
+def test_far_from_noise_a_shape_is_followed_if_it_soon_takes_part(left: float, soon: float, is_followed: bool) -> None:
     """Short fits leave so much of what the usual shape leaves: three in a hundred is nothing, seven is a part of it.
 
     Near noise, at three times what chance leaves, any little may be all there is.

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
+import pytest
 
 from rollover.diagnosis import pairs
 from rollover.diagnosis.candidates import Candidate
@@ -47,7 +48,7 @@ def inquiry(asked: list[Any]) -> Inquiry:
         asked.extend(jobs)
         return [fitted((*j.candidates[:-1], j.candidates[-1].whole()), 1.0) for j in jobs]
 
-    return cast(Inquiry, SimpleNamespace(fits=fits, judge=SimpleNamespace(again=lambda f: f)))
+    return cast(Inquiry, SimpleNamespace(fits=fits, judge=SimpleNamespace(again=lambda f: f, evidence=()), phases=()))
 
 
 def test_what_took_another_form_alone_is_tried_in_its_usual_one_beside_others() -> None:
@@ -101,13 +102,17 @@ def test_of_pairs_with_a_part_that_rings_all_are_fitted_with_its_share() -> None
     assert {len(j.leaves) for j in asked} == {2}
 
 
-def test_places_of_the_best_pairs_are_tried_all_along_unless_nothing_but_noise_is_left() -> None:
+def test_places_of_the_best_pairs_are_tried_all_along_unless_nothing_but_noise_is_left(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """The depth of a layer is one valley of many: fitted at 0.02 m, its pair leaves more than the wrong one."""
     search = {"depth": Search(0.01, 1.0, "log"), "stiffness_ratio": Search(0.2, 5.0, "log")}
     layer = Candidate(id="soil-layer", kind="physics", family="", search=search)
     wrong, right, third = fitted((DAMPING, MASS), 20.0), fitted((layer, DAMPING), 21.0), fitted((layer, MASS), 22.0)
     far = fitted((DAMPING, layer), 50.0)
     asked: list[Any] = []
+    left = {"p": 1e-9}
+    monkeypatch.setattr(pairs, "mismatch_of", lambda *_: SimpleNamespace(p_value=left["p"]))
     found = pairs._traced(inquiry(asked), [third, wrong, far, right])
     assert [(j.how, [c.id for c in j.candidates], j.stretch) for j in asked] == [
         ("trace", ["soil-viscous-damping", "soil-layer"], (1, 0.0, 0.5)),
@@ -117,5 +122,6 @@ def test_places_of_the_best_pairs_are_tried_all_along_unless_nothing_but_noise_i
     ]
     assert len(found) == 4
     asked.clear()
-    assert pairs._traced(inquiry(asked), [fitted((DAMPING, MASS), 0.9), fitted((layer, DAMPING), 1.0)]) == []
+    left["p"] = 0.5
+    assert pairs._traced(inquiry(asked), [third, wrong, far, right]) == []
     assert asked == []
