@@ -121,9 +121,8 @@ def _needed(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step]:
     parts: list[Step] = []
     exchanged = 0
     while len(parts) < len(current.candidates):
-        whole = len(parts) == len(current.candidates) - 1
+        whole = len(parts) == len(current.candidates) - 1 and not is_elsewhere(last)
         whole = whole and current.candidates[0].key == last.fitted.candidates[-1].key
-        whole = whole and not is_elsewhere(last)
         if whole and {c.key for c in current.candidates} == {c.key for c in last.fitted.candidates}:
             parts.append(last)  # found beside just these others
             break
