@@ -11,7 +11,7 @@ from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.explain import NEARLY_NOISE, Step, is_at_an_end
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.otherwise import from_there, traced_too
+from rollover.diagnosis.otherwise import LEADS, from_there, traced_too
 from rollover.diagnosis.refine import ended, polish, timed
 from rollover.diagnosis.straight import is_any_curve
 from rollover.effects import EFFECTS
@@ -19,7 +19,6 @@ from rollover.effects import EFFECTS
 MANY = 0.05  # p-value of what as many effects as may be leave, below which they are no explanation
 BESIDE = 3  # rivals of a step that are begun anew beside a better fit of what came before
 SIMPLER = 4  # rivals of fewer numbers that are begun anew beside a fit at an end of its range
-NEARLY = 1.5  # times what the best leaves, up to which a fit of fewer numbers is followed along its valley
 TELLS = 10.8  # chi-square of one number, p = 0.001
 
 
@@ -131,7 +130,7 @@ def plainer(inquiry: Inquiry, found: Step) -> Step | None:
     shifts = tuple(b.shift for b in best.blocks)
     jobs = [Job(candidates=(*beside, c), start=(*shared, *c.probes()[0]), shifts=shifts) for c in able]
     one = min((f for f in inquiry.fits(jobs) if f is not None), key=lambda f: f.left, default=None)
-    if one is None or one.left > NEARLY * best.left:
+    if one is None or one.left > LEADS * best.left:
         return None
     one = inquiry.fits([from_there(one, "polish")])[0] or one
     return _led_by(one, found) if _is_as_good(one, best) else None
