@@ -35,10 +35,14 @@ def shaped(judge: Judge, f: Fitted, leaves: Sequence[float]) -> Fitted | None:
     if not f.candidates[-1].shapes:
         return None
     last, at = f.candidates[-1], len(f.x) - len(f.candidates[-1].search)
+    along = replace(last.whole(), along=tuple(last.shapes))
     places = [(*f.x[:at], *start) for start in last.with_shapes(f.x[at:])]
-    found = _best_of(judge, f, replace(last.whole(), along=tuple(last.shapes)), places, leaves)
+    found = _best_of(judge, f, along, places, leaves)
     if found is None:
         return None
+    if found.left > f.left:  # the few led to where the others are not met: all of them, from where the fit stands
+        onward = judge.fit((*f.candidates[:-1], along), places[0], shifts=[b.shift for b in f.blocks])
+        found = min((one for one in (found, onward) if one is not None), key=lambda one: one.left)
     found = found if is_noise(found) or found.left > ASTRAY * sum(leaves) else polish(judge, found)
     (whole, x), shifts = found.candidates[-1].plain(found.own), [b.shift for b in found.blocks]
     bent = judge.fit((*f.candidates[:-1], whole), (*found.x[:at], *x), shifts=shifts, width=2)

@@ -73,3 +73,21 @@ def test_far_from_noise_a_shape_is_followed_if_it_soon_takes_part(left: float, s
     judge, start = cast(Judge, SimpleNamespace(fit=fit)), fitted(DAMPING, (0.3,), left)
     best = forms._best_of(judge, start, BENT, [(0.3, 0.4)], [b.total for b in start.blocks])
     assert (best is not None) is bool(whole) is is_followed
+
+
+def test_where_few_recordings_lead_astray_all_are_fitted_from_where_the_usual_shape_stands() -> None:
+    """From other places short fits to three recordings leave least, and whole ones from there far more than before."""
+    usual = replace(DAMPING, shapes={"exponent": Search(0, 1)})
+    start, stands = fitted(usual, (0.3,), 30.0), usual.with_shapes((0.3,))[0]
+    least = [60.0]
+
+    def fit(candidates: Sequence[Candidate], x: Sequence[float], **how: Any) -> Fitted:
+        if how.get("rounds") == forms.SHORT:
+            return fitted(candidates[-1], x, 20.0 if tuple(x) == stands else 10.0)
+        least[:] = [1.0] if tuple(x) == stands else least
+        return fitted(candidates[-1], x, 30.0 if len(x) == 1 else least[0])
+
+    found = forms.shaped(cast(Judge, SimpleNamespace(fit=fit)), start, [b.total for b in start.blocks])
+    assert found is not None
+    assert len(found.x) == 2
+    assert forms.is_noise(found)
