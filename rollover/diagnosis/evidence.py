@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.leaps import JUMPS, LEAP_IN, SHOWS, about_leaps, forgiven
+from rollover.diagnosis.leaps import JUMPS, LEAP_IN, SHOWS, about_leaps, beside_leaps, forgiven
 from rollover.diagnosis.nuisance import Eased, doubts, eased
 from rollover.diagnosis.simulator import Simulator
 from rollover.diagnosis.whitening import Noise, Whitening
@@ -177,14 +177,13 @@ class Evidence:
 
     def leaps(self, raw: Array, predicted: Mapping[str, Array] = NOTHING) -> NDArray[np.int64]:
         """Samples (stacked) about which a prediction leaps, and means within which it is `predicted` to."""
-        own, within = self._inside, []
-        found: NDArray[np.int64] = about_leaps(raw, own.least, own.first, own.last)
+        own = self._inside
+        found: NDArray[np.bool_] = about_leaps(raw, own.least, own.first, own.last)
         for s, part in self.spans():
             size = predicted.get(LEAP_IN + s.channel)
             if size is not None:
-                least = SHOWS if self.averaged > 1 else JUMPS
-                within.append(part.start + np.flatnonzero(size[s.rows] > least * s.sigma))
-        return np.unique(np.concatenate([found, *within])) if any(w.size for w in within) else found
+                found[part] |= size[s.rows] > (SHOWS if self.averaged > 1 else JUMPS) * s.sigma
+        return np.flatnonzero(found)
 
     @cached_property
     def _inside(self) -> _Inside:
@@ -208,14 +207,7 @@ class Evidence:
 
     def worth(self, leaps: NDArray[np.int64]) -> Array:
         """Weights (n,) of whitened samples: those whose past was forgiven are as wide as the noise itself."""
-        found = np.ones(self.count)
-        if not leaps.size:
-            return found
-        last, orders, gains = self._memories
-        for k in range(1, int(orders.max(initial=0)) + 1):
-            before = leaps[(orders[leaps] >= k) & (leaps + k <= last[leaps])]
-            found[before + k] = gains[before]
-        found[leaps] = 1.0
+        found: Array = beside_leaps(leaps, *self._memories) if leaps.size else np.ones(self.count)
         return found
 
     @cached_property

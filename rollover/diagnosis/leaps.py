@@ -21,7 +21,7 @@ BESIDE = 3  # samples to either side, between whose values one about a leap may 
 
 @compiled
 def about_leaps(y: Any, least: Any, first: Any, last: Any) -> Any:
-    """Places in a stack y (n,) about which it leaps over two samples by more than `least` (n,) from each.
+    """Whether a stack y (n,) leaps about each sample, over two samples by more than `least` (n,) from the first.
 
     `first` and `last` (n,) are the ends of the signal of each sample.
     """
@@ -35,7 +35,7 @@ def about_leaps(y: Any, least: Any, first: Any, last: Any) -> Any:
                 # when a body lifts off again hangs on little
                 more = 2 if leap > LARGE / SHOWS * least[i] else 0
                 found[max(i - more, first[i]) : min(i + 2 + more, last[i]) + 1] = True
-    return np.flatnonzero(found)
+    return found
 
 
 @compiled
@@ -61,6 +61,20 @@ def within_means(values: Any, mean: Any, sizes: Any) -> None:
         if step > WITHIN * max(before, after):
             sizes[mean[k]] = max(sizes[mean[k]], step)
             sizes[mean[k + 1]] = max(sizes[mean[k + 1]], step)
+
+
+@compiled
+def beside_leaps(leaps: Any, last: Any, orders: Any, gains: Any) -> Any:
+    """Weights (n,) of whitened samples: those after leaps, as many as the noise remembers, have `gains`, all others 1.
+
+    A leap itself counts in full. `last`, `orders` (how many) and `gains` (n,) are those of the signal of each sample.
+    """
+    found = np.ones(last.size)
+    for i in leaps:
+        found[i + 1 : min(i + orders[i], last[i]) + 1] = gains[i]
+    for i in leaps:
+        found[i] = 1.0
+    return found
 
 
 @compiled
