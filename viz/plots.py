@@ -35,6 +35,7 @@ COLOURS: dict[str, str] = {
 CYCLE: tuple[Role, ...] = ("first", "second", "third", "fourth", "muted")
 MOST_POINTS = 1600  # of a curve, a few for each pixel across
 LETTERS = 14  # of a legend to an inch
+PHASE_LETTERS, LINE = 16, 9.5  # of the names of phases to an inch; from one line of these to the next, points
 WIDTH, HEIGHT = 7.2, 2.7  # inch
 # of a figure: laid out by hand where there are many, which takes half the time
 MARGINS = {"left": 0.13, "right": 0.975, "top": 0.935, "bottom": 0.105, "hspace": 0.07}
@@ -315,6 +316,8 @@ def _level(axes: Any, levels: Sequence[Level]) -> None:
 
 def _shade(axes: Any, phases: Sequence[tuple[float, str]]) -> None:
     low, high = axes.get_xlim()
+    letter = (high - low) / (PHASE_LETTERS * axes.get_figure().get_figwidth() * axes.get_position().width)
+    ended = low  # where the last name on the first line ends
     for k, (start, name) in enumerate(phases):
         end = phases[k + 1][0] if k + 1 < len(phases) else high
         a, b = max(start, low), min(end, high)
@@ -323,10 +326,13 @@ def _shade(axes: Any, phases: Sequence[tuple[float, str]]) -> None:
         if k % 2:
             axes.axvspan(a, b, color=COLOURS["muted"], alpha=0.10, lw=0)
         if name and b - a > 0.05 * (high - low):
-            at = (0.5 * (a + b), 0.985)
+            middle, half = 0.5 * (a + b), 0.5 * letter * len(name)
+            is_lower = middle - half < ended
+            ended = ended if is_lower else middle + half + letter
             axes.annotate(
-                name, at, xycoords=("data", "axes fraction"), ha="center", va="top", fontsize=8, color=COLOURS["muted"]
-            )
+                name, (middle, 0.985), xycoords=("data", "axes fraction"), xytext=(0.0, -LINE if is_lower else 0.0),
+                textcoords="offset points", ha="center", va="top", fontsize=8, color=COLOURS["muted"],
+            )  # fmt: skip
     axes.set_xlim(low, high)
 
 

@@ -129,3 +129,11 @@ def test_colours_of_figures_and_of_the_page_are_the_same() -> None:
     for role, colour in COLOURS.items():
         assert f"--{role}: {colour}" in light
         assert css.count(f"--{role}:") == 3, "light, dark and paper"
+
+
+def test_names_of_short_phases_do_not_run_into_each_other() -> None:
+    short = ((0.0, "loading"), (1.3, "peak"), (1.65, "unloading"), (1.9, "rest"))
+    svg = plots.overlay(RAW, SINE, label="force, kN", phases=short)
+    line = {name: float(y) for y, name in re.findall(r'<text [^>]* y="([\d.]+)"[^>]*>(\w+)</text>', svg)}
+    assert line["loading"] == line["peak"] == line["rest"]
+    assert line["unloading"] > line["peak"] + 8.0
