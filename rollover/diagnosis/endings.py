@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+from rollover.diagnosis.blocks import turned
 from rollover.diagnosis.candidates import Candidate, coordinate, each_with_own
 from rollover.diagnosis.crew import Job
 from rollover.diagnosis.detect import Mismatch, mismatch_of
@@ -12,7 +13,7 @@ from rollover.diagnosis.explain import NEARLY_NOISE, Step, is_at_an_end
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.otherwise import LEADS, from_there, traced_too
-from rollover.diagnosis.refine import ended, polish, timed
+from rollover.diagnosis.refine import ended, polish, timed, without
 from rollover.diagnosis.straight import is_any_curve
 from rollover.effects import EFFECTS
 
@@ -120,8 +121,25 @@ def _straightened(inquiry: Inquiry, found: Step) -> Step | None:
 def plainer(inquiry: Inquiry, found: Step) -> Step | None:
     """A step by any effect of fewer numbers, but a sensor's, that does as well beside the others; None if none.
 
-    Two thresholds in one place do the work of one and a stiffness. The way there is crooked: all others move with it.
+    Two thresholds in one place do the work of one and a stiffness: of either. The way there is crooked: all others move
+    with it, beside that which does most of the work less far.
     """
+    made = (_plainer_last(inquiry, way) for way in _ways(inquiry.judge, found))
+    return next((new for new in made if new is not None), None)
+
+
+def _ways(judge: Judge, found: Step) -> Iterator[Step]:
+    """A step, and of two effects of one family, of several numbers each, the same with the first for its last."""
+    yield found
+    each = found.fitted.candidates
+    if len(each) == 2 and len({c.family for c in each}) == 1 and all(len(c.search) > 1 for c in each):
+        around = turned(found.fitted)
+        base = without(judge, around, 1)
+        if base is not None:
+            yield Step(base=base, fitted=around, p_value=found.p_value, rivals=(around,))
+
+
+def _plainer_last(inquiry: Inquiry, found: Step) -> Step | None:
     best, beside, shared = found.fitted, *_shared(found.fitted)
     held = {c.key for c in best.candidates}
     able = [c for c in inquiry.candidates if c.kind != "sensor" and len(c.search) < len(best.own) and c.key not in held]

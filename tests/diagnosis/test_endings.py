@@ -215,7 +215,7 @@ def test_two_thresholds_in_one_place_are_a_threshold_and_a_stiffness(
     plain = Candidate(id="soil-stiffness", kind="parameter", family="", search={"a": Search(0, 1)})
     others = [replace(plain, kind="sensor"), replace(plain, search={"a": Search(0, 1), "b": Search(0, 1)})]
     best, rival = fitted("soil-crust", 5.0, (0.7, 0.4, 0.3)), fitted("mass", 9.0, (0.7, 0.2))
-    there = cast(Inquiry, SimpleNamespace(fits=fits, candidates=[plain, *others, best.candidates[0]]))
+    there = cast(Inquiry, SimpleNamespace(fits=fits, candidates=[plain, *others, best.candidates[0]], judge=None))
     found = endings.plainer(there, step(best, rival))
     assert [(j.candidates[-1].id, j.how) for j in asked] == [("soil-stiffness", "fit"), ("soil-stiffness", "polish")][
         : 1 + taken
@@ -226,8 +226,36 @@ def test_two_thresholds_in_one_place_are_a_threshold_and_a_stiffness(
         assert [f.candidates[-1].id for f in found.rivals] == ["soil-stiffness", "mass"]
 
 
+@pytest.mark.parametrize(("family", "taken"), [("depth", True), ("damping", False)])
+def test_of_two_thresholds_either_may_be_the_one_that_is_a_stiffness(family: str, taken: bool) -> None:
+    """Beside the layer a stiffness leaves 90 where both leave 5; beside the crust it leaves 6."""
+    two = {"depth": Search(0, 1), "ratio": Search(0, 1)}
+    layer, crust = (
+        Candidate(id=f"soil-{name}", kind="physics", family=of, search=two)
+        for name, of in (("layer", "depth"), ("crust", family))
+    )
+    plain = Candidate(id="soil-stiffness", kind="parameter", family="", search={"scale": Search(0, 1)})
+
+    def left(candidates: Sequence[Candidate], x: Sequence[float], squares: float) -> Fitted:
+        block = fitted("mass", squares, (0.5, *x)[: len(x)]).blocks[0]
+        return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=(block,))
+
+    def fits(jobs: Sequence[Job]) -> list[Fitted | None]:
+        return [left(j.candidates, j.start, 6.0 if j.candidates[0] == crust else 90.0) for j in jobs]
+
+    judge = SimpleNamespace(fit=lambda c, x, **_: left(c, x, 400.0))
+    there = cast(Inquiry, SimpleNamespace(fits=fits, candidates=[layer, crust, plain], judge=judge))
+    found = endings.plainer(there, step(left((layer, crust), (0.4, 0.5, 0.3, 0.6), 5.0)))
+    assert (found is not None) is taken
+    if found is not None:
+        assert [c.id for c in found.fitted.candidates] == ["soil-crust", "soil-stiffness"]
+        assert found.fitted.x[:2] == (0.3, 0.6)
+        assert found.base.label == "soil-crust"
+
+
 def test_an_effect_by_itself_is_not_given_for_a_plainer_one() -> None:
     """Beside nothing all of fewer numbers were tried before it."""
     both = fitted("soil-crust", 5.0, (0.7, 0.4, 0.3))
     alone = replace(both, candidates=both.candidates[1:], x=both.x[1:])
-    assert endings.plainer(cast(Inquiry, SimpleNamespace(candidates=[both.candidates[0]])), step(alone)) is None
+    there = cast(Inquiry, SimpleNamespace(candidates=[both.candidates[0]], judge=None))
+    assert endings.plainer(there, step(alone)) is None
