@@ -111,7 +111,7 @@ def _straightened(inquiry: Inquiry, found: Step) -> Step | None:
     if len(best.candidates) < 2 or not bent:
         return None
     shifts, ways = tuple(b.shift for b in best.blocks), [bent, *([k] for k in bent if len(bent) > 1)]
-    jobs = [Job(candidates=c, start=x, shifts=shifts, width=1) for c, x in (_unbent(best, usual, w) for w in ways)]
+    jobs = [Job(candidates=c, start=x, shifts=shifts, width=1) for c, x in (unbent(best, usual, w) for w in ways)]
     fits = [f for f in inquiry.fits(jobs) if f is not None and _is_as_good(f, best)]
     if not fits:
         return None
@@ -154,7 +154,47 @@ def _plainer_last(inquiry: Inquiry, found: Step) -> Step | None:
     return _led_by(one, found) if _is_as_good(one, best) else None
 
 
-def _unbent(
+def mirrored(inquiry: Inquiry, found: Step) -> Step:
+    """A step of several effects with what mirrors its last one among its rivals, begun where it would do the same.
+
+    The others have to move for that, so far that no look comes there.
+    """
+    for new in mirror_images(inquiry, found.fitted, *_shared(found.fitted)):
+        known = [f for f in found.rivals if f.candidates[-1].key == new.candidates[-1].key]
+        if all(new.left < f.left for f in known):
+            others = (f for f in found.rivals if not any(f is one for one in known))
+            found = replace(found, rivals=(*others, new))
+    return found
+
+
+def mirror_images(
+    inquiry: Inquiry, fitted: Fitted, beside: Sequence[Candidate], shared: Sequence[float]
+) -> list[Fitted]:
+    """Fits of what mirrors the last effect of a fit beside some others from `shared`, which are led there first."""
+    last, shifts = fitted.candidates[-1], tuple(b.shift for b in fitted.blocks)
+    begun = list(_mirrors(last, fitted.own, inquiry.free(fitted))) if beside else []
+    held = [replace(c, search={}, fixed={**c.fixed, **c.values(own)}) for c, own in begun]
+    jobs = [Job(candidates=(c, *beside), start=tuple(shared), shifts=shifts) for c in held]
+    led = [(c, own, f) for (c, own), f in zip(begun, inquiry.fits(jobs), strict=True) if f is not None]
+    jobs = [
+        Job(candidates=(*beside, c), start=(*f.x, *own), shifts=tuple(b.shift for b in f.blocks)) for c, own, f in led
+    ]
+    return [f for f in inquiry.fits(jobs) if f is not None]
+
+
+def _mirrors(
+    last: Candidate, own: Sequence[float], candidates: Sequence[Candidate]
+) -> Iterator[tuple[Candidate, tuple[float, ...]]]:
+    """What does the same as an effect beside another stiffness of all the ground, and where it would stand."""
+    values = last.values(own)
+    for c in candidates:
+        there = {p: values[n] ** to for p, (n, to) in EFFECTS[last.id].mirrors.get(c.id, {}).items() if n in values}
+        if there and there.keys() >= c.search.keys():
+            at = (coordinate(there[p], search) for p, search in c.search.items())
+            yield c, tuple(min(max(v, 0.0), 1.0) for v in at)
+
+
+def unbent(
     fitted: Fitted, usual: Mapping[str, Candidate], which: Sequence[int]
 ) -> tuple[tuple[Candidate, ...], tuple[float, ...]]:
     """Effects of a fit, `which` of them in their usual shape, and where they stand."""

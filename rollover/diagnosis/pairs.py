@@ -10,7 +10,7 @@ from rollover.diagnosis.blocks import turned
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.crew import Job
 from rollover.diagnosis.detect import Mismatch, mismatch_of
-from rollover.diagnosis.endings import followed, simpler
+from rollover.diagnosis.endings import followed, mirror_images, simpler, unbent
 from rollover.diagnosis.explain import SURE, Step, step
 from rollover.diagnosis.fit import Fitted
 from rollover.diagnosis.gate import Gate
@@ -96,6 +96,7 @@ def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: Gate) -> Step | N
     if not fits:
         return None
     best = min([*fits, *_in_tune(inquiry, fits), *_traced(inquiry, fits)], key=lambda f: f.left)
+    best = min([best, *_mirrored(inquiry, best)], key=lambda f: f.left)
     if best.left < BEHIND * taken[-1].fitted.left:
         ways = (best, judge.again(turned(best)))
         jobs = [Job(candidates=p.candidates[:-1], start=p.x[: -len(p.own)], shifts=shifts) for p in ways]
@@ -132,6 +133,19 @@ def _traced(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fitted]:
     able = itertools.islice((way for way in ways if stretches(way) and not way.candidates[-1].rings), PLACES)
     jobs = [replace(from_there(f, "trace"), stretch=s) for f in able for s in stretches(f)]
     return [f for f in inquiry.fits(jobs) if f is not None]
+
+
+def _mirrored(inquiry: Inquiry, pair: Fitted) -> list[Fitted]:
+    """A pair with what mirrors one of its effects in the place of that, and the other as it usually is.
+
+    That may have been bent to a stiffness of all the ground, as a rate by where it sets in.
+    """
+    usual, found = {c.key: c for c in inquiry.candidates}, []
+    for way in (pair, turned(pair)):
+        other = way.candidates[0]
+        (other, _), x = unbent(way, usual, (0,) if usual[other.key].search.keys() <= other.search.keys() else ())
+        found += mirror_images(inquiry, way, (other,), x[: len(other.search)])
+    return found
 
 
 def _rings(pair: Fitted) -> bool:

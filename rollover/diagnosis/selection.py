@@ -10,7 +10,7 @@ import numpy as np
 from rollover.diagnosis.blocks import at_an_end
 from rollover.diagnosis.candidates import Candidate, is_one_sensor
 from rollover.diagnosis.detect import Mismatch, mismatch_of
-from rollover.diagnosis.endings import MANY, followed
+from rollover.diagnosis.endings import MANY, followed, mirrored
 from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Step, moves
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
@@ -92,6 +92,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     if is_whole and len(taken) > 1:
         parts = _needed(inquiry, taken)
         parts[-1], _ = followed(inquiry, parts[-1])
+        parts = [mirrored(inquiry, s) for s in parts]
     base = unforgiven(judge, base) if taken and judge.effort.thrifty else judge.again(base)
     parts = [s.foretold(judge, groups) for s in parts]
     current = parts[-1].fitted if parts else base

@@ -82,6 +82,9 @@ class Effect:
     # an effect of fewer numbers that it becomes at an end of its range -> which of its own numbers that one's are, and
     # how many times as large
     becomes: ClassVar[Mapping[str, Mapping[str, tuple[str, float]]]] = {}
+    # an effect that does the same beside another stiffness of all the ground -> which of its own numbers that one's
+    # are, and to which power
+    mirrors: ClassVar[Mapping[str, Mapping[str, tuple[str, float]]]] = {}
     # parameter -> powers of mass and of face with which its range grows, from a striker of 132 kg on the reference face
     grows: ClassVar[Mapping[str, tuple[float, float]]] = {}
 

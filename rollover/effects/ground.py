@@ -309,6 +309,9 @@ class SoilLayer(Effect):
     becomes: ClassVar[Mapping[str, Mapping[str, tuple[str, float]]]] = {
         "soil-stiffness": {"scale": ("stiffness_ratio", 1.0)}
     }
+    mirrors: ClassVar[Mapping[str, Mapping[str, tuple[str, float]]]] = {
+        "soil-crust": {"thickness": ("depth", 1.0), "stiffness_ratio": ("stiffness_ratio", -1.0)}
+    }
     forms = (
         Form({"onset": 1.0}, {}),
         Form(
@@ -352,6 +355,9 @@ class SoilCrust(Effect):
     shapes = ("width",)
     becomes: ClassVar[Mapping[str, Mapping[str, tuple[str, float]]]] = {
         "soil-stiffness": {"scale": ("stiffness_ratio", 1.0)}
+    }
+    mirrors: ClassVar[Mapping[str, Mapping[str, tuple[str, float]]]] = {
+        "soil-layer": {"depth": ("thickness", 1.0), "stiffness_ratio": ("stiffness_ratio", -1.0)}
     }
     forms = (Form({"remains": 1.0}, {}),)
 

@@ -259,3 +259,37 @@ def test_an_effect_by_itself_is_not_given_for_a_plainer_one() -> None:
     alone = replace(both, candidates=both.candidates[1:], x=both.x[1:])
     there = cast(Inquiry, SimpleNamespace(candidates=[both.candidates[0]], judge=None))
     assert endings.plainer(there, step(alone)) is None
+
+
+@pytest.mark.parametrize(("reaches", "known"), [(5.5, 40.0), (5.5, None), (50.0, 40.0)])
+def test_what_mirrors_the_last_effect_competes_with_it(reaches: float, known: float | None) -> None:
+    """A layer that a look beside the stiffness left at 40 leaves 5.5 where the stiffness has gone along."""
+    two, stiff = (
+        Search(0.01, 1, "log"),
+        Candidate(id="soil-stiffness", kind="", family="", search={"scale": Search(0, 1)}),
+    )
+    layer, crust = (
+        Candidate(
+            id=f"soil-{name}", kind="physics", family="", search={at: two, "stiffness_ratio": Search(0.1, 10, "log")}
+        )
+        for name, at in (("layer", "depth"), ("crust", "thickness"))
+    )
+
+    def left(candidates: Sequence[Candidate], x: Sequence[float], squares: float) -> Fitted:
+        return Fitted(
+            candidates=tuple(candidates), x=tuple(x), blocks=fitted("mass", squares, (0.5, *x)[: len(x)]).blocks
+        )
+
+    def fits(jobs: Sequence[Job]) -> list[Fitted | None]:
+        return [left(j.candidates, (0.9, *j.start[1:]), reaches) for j in jobs]
+
+    best = left((stiff, crust), (0.5, 0.4, 0.75), 5.0)
+    rivals = [] if known is None else [left((stiff, layer), (0.5, 0.4, 0.5), known)]
+    there = cast(Inquiry, SimpleNamespace(fits=fits, free=lambda _: [layer]))
+    found = endings.mirrored(there, step(best, *rivals))
+    assert found.fitted is best
+    if known is not None and reaches > known:
+        assert [f.left for f in found.rivals] == pytest.approx([5.0, known])
+    else:
+        assert [f.left for f in found.rivals] == pytest.approx([5.0, reaches])
+        assert found.rivals[-1].x == pytest.approx((0.9, 0.4, 0.25))

@@ -19,6 +19,7 @@ from rollover.diagnosis.screening import Screened
 from rollover.effects import Search
 from tests.diagnosis.drops import linear_blocks
 
+RATIO = Search(0.2, 5.0, "log")
 MASS = Candidate(id="mass", kind="parameter", family="", search={"added": Search(-1, 1)})
 DAMPING = Candidate(id="soil-viscous-damping", kind="physics", family="", search={"damping": Search(1, 2)})
 PROPORTION = replace(DAMPING, search={"proportion": Search(0, 1)}, form={"damping": 0.0})
@@ -125,3 +126,43 @@ def test_places_of_the_best_pairs_are_tried_all_along_unless_nothing_but_noise_i
     left["p"] = 0.5
     assert pairs._traced(inquiry(asked), [third, wrong, far, right]) == []
     assert asked == []
+
+
+LAYER, CRUST = (
+    Candidate(
+        id=f"soil-{name}", kind="physics", family="", search={at: Search(0.01, 1, "log"), "stiffness_ratio": RATIO}
+    )
+    for name, at in (("layer", "depth"), ("crust", "thickness"))
+)
+BENT = replace(CRUST, search={**CRUST.search, "width": Search(0.001, 0.1, "log")})
+OF_ITS_OWN = replace(LAYER, search={"depth": Search(0.01, 1, "log"), "stiffness": Search(1, 9)}, form={"onset": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("pair", "places"),
+    [
+        ((DAMPING, BENT), [("soil-layer", {"depth": 0.1, "stiffness_ratio": 1.0})]),
+        ((BENT, DAMPING), [("soil-layer", {"depth": 0.1, "stiffness_ratio": 1.0})]),
+        ((PROPORTION, BENT), [("soil-layer", {"depth": 0.1, "stiffness_ratio": 1.0})]),
+        ((DAMPING, OF_ITS_OWN), []),
+        ((DAMPING, MASS), []),
+    ],
+)
+def test_what_is_stiffer_above_is_tried_as_what_is_softer_below(
+    pair: tuple[Candidate, ...], places: list[tuple[str, dict[str, float]]]
+) -> None:
+    """The other is led there first, as it usually is; in a form that has no usual one it stays in that."""
+    asked: list[Any] = []
+    there = inquiry(asked)
+    there = cast(
+        Inquiry,
+        SimpleNamespace(fits=there.fits, candidates=[DAMPING, MASS, LAYER, CRUST], free=lambda _: [LAYER, MASS]),
+    )
+    found = pairs._mirrored(there, fitted(pair, 4.0))
+    assert [(f.candidates[-1].id, dict(f.candidates[-1].values(f.own))) for f in found] == [
+        (id, pytest.approx(values)) for id, values in places
+    ]
+    assert [(len(j.candidates[0].search), j.candidates[0].fixed.keys()) for j in asked[: len(places)]] == [
+        (0, {"depth", "stiffness_ratio"})
+    ] * len(places)
+    assert [j.candidates[0] for j in asked[len(places) :]] == [c for c in pair if c is not BENT][: len(places)]

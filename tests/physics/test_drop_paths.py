@@ -277,3 +277,19 @@ def test_a_damping_with_the_square_of_the_speed_is_a_drag() -> None:
     square = model.with_({f"effects.soil-viscous-damping.{own}": 40.0, "effects.soil-viscous-damping.exponent": 2.0})
     drag = model.with_({f"effects.soil-inertial-drag.{other}": 40.0 * times})
     np.testing.assert_allclose(square.run(t)["ground/force_normal"], drag.run(t)["ground/force_normal"], rtol=1e-9)
+
+
+@pytest.mark.parametrize("id", [id for id, effect in EFFECTS.items() if effect.mirrors])
+def test_what_mirrors_an_effect_does_the_same_beside_another_stiffness_of_all_the_ground(id: str) -> None:
+    """K' r below and K' above are (r K') / r above and r K' below: with s a scale, (d, r, s) and (d, 1/r, r s)."""
+    own = {name: 0.06 if getattr(EFFECTS[id](), name) < 1.0 else 1.7 for name in list(EFFECTS[id].search)[:2]}
+    t = np.linspace(0.0, 0.4, 300)
+    model = DropModel(scenario=shipped("drop_test"))
+    for other, told in EFFECTS[id].mirrors.items():
+        there = {f"effects.{other}.{p}": own[n] ** power for p, (n, power) in told.items()}
+        scale = "effects.soil-stiffness.scale"
+        one = model.with_({**{f"effects.{id}.{n}": v for n, v in own.items()}, scale: 1.2})
+        same = model.with_({**there, scale: 1.2 * 1.7})
+        np.testing.assert_allclose(
+            same.run(t)["ground/force_normal"], one.run(t)["ground/force_normal"], rtol=1e-9, atol=1e-6
+        )
