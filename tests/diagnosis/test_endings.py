@@ -281,7 +281,8 @@ def test_what_mirrors_the_last_effect_competes_with_it(reaches: float, known: fl
         )
 
     def fits(jobs: Sequence[Job]) -> list[Fitted | None]:
-        return [left(j.candidates, (0.9, *j.start[1:]), reaches) for j in jobs]
+        # where the layer is held, the stiffness goes along
+        return [left(j.candidates, j.start if j.candidates[-1].id == "soil-layer" else (0.9,), reaches) for j in jobs]
 
     best = left((stiff, crust), (0.5, 0.4, 0.75), 5.0)
     rivals = [] if known is None else [left((stiff, layer), (0.5, 0.4, 0.5), known)]
