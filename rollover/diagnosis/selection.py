@@ -92,7 +92,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     if is_whole and len(taken) > 1:
         parts = _needed(inquiry, taken)
         parts[-1], _ = followed(inquiry, parts[-1])
-        parts = [mirrored(inquiry, s) for s in parts]
+        parts = parts if judge.effort.thrifty else [mirrored(inquiry, s) for s in parts]
     base = unforgiven(judge, base) if taken and judge.effort.thrifty else judge.again(base)
     parts = [s.foretold(judge, groups) for s in parts]
     current = parts[-1].fitted if parts else base
