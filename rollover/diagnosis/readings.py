@@ -82,5 +82,6 @@ def without_spikes(recording: Recording, before: float = np.inf) -> tuple[Record
         if found:
             gone = np.isin(recording.time, [f.start for f in found])
             channels[name] = np.where(gone, np.nan, recording.channels[name])
-            lines.append(f"{name}: {int(gone.sum())} spikes were left aside")
+            count = int(gone.sum())
+            lines.append(f"{name}: {'one spike was' if count == 1 else f'{count} spikes were'} left aside")
     return (replace(recording, channels=channels), lines) if lines else (recording, [])

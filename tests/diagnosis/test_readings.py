@@ -114,7 +114,7 @@ def test_spikes_are_left_aside_and_said_so() -> None:
     )
     assert without_spikes(clean[0][1]) == (clean[0][1], [])
     early, lines = without_spikes(made[0][1], before=float(made[0][1].time[700]))
-    assert lines == [f"{FORCE}: 1 spikes were left aside"]
+    assert lines == [f"{FORCE}: one spike was left aside"]
     assert np.flatnonzero(np.isnan(early[FORCE])).tolist() == [500]
     found = diagnose(scenario(), made)
     assert found.verdict == "no-mismatch"
