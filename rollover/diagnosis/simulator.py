@@ -25,6 +25,7 @@ T = TypeVar("T")
 EDGES = ("sensor-lag", "sensor-clock-offset", "sensor-clock-drift")
 # s: longest step of a drop, within 6e-5 of the range; and of one with abrupt effects, within 8e-4 where it rings
 STEP, SHORT = 2e-3, 1e-3
+SHORTEST = 2e-4  # s: with a force term of one's own, which may jump where nothing knows of it
 KEPT, TRACKS = 128, 16  # of one recording: what it is predicted to be, and falls that this is read from
 MARGIN = 0.02  # s, by which a fall is longer than it is asked for: clocks move on
 
@@ -200,7 +201,9 @@ class DropSimulator:
             own = exchanged(self.model.scenario, changes) if changes else self.model.scenario
             has_own = own.ground.law.advance is not None  # states of its own are second order in the step
             is_abrupt = has_own or any(effect.is_abrupt for effect in own.effects.values())
-            self._keep(self._models, key, DropModel(scenario=own, step=SHORT if is_abrupt else STEP), KEPT)
+            may_jump = any(effect.force_terms() and not effect.is_smooth for effect in own.effects.values())
+            step = SHORTEST if may_jump else SHORT if is_abrupt else STEP
+            self._keep(self._models, key, DropModel(scenario=own, step=step), KEPT)
         return self._models[key]
 
     @staticmethod

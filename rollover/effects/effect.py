@@ -78,6 +78,7 @@ class Effect:
         Mapping[str, tuple[float, ...]]
     ] = {}  # parameter -> places in its range, near which alone it tells
     is_abrupt: ClassVar[bool] = False  # it rings, or turns from one instant to the next: drops take shorter steps
+    is_smooth: ClassVar[bool] = False  # its force terms jump nowhere: drops take no shorter steps for them
     is_sudden: ClassVar[bool] = False  # its least strength does something already: slopes there lead nowhere
     # an effect of fewer numbers that it becomes at an end of its range -> which of its own numbers that one's are, and
     # how many times as large

@@ -41,6 +41,7 @@ class Empirical(Effect):
         "soil-layer": "drops that go deeper than those it was found on",
     }
     channels = ("ground/force_normal", "striker/acceleration_z")
+    is_smooth = True
     null: ClassVar = {"first_force": 0.0, "second_force": 0.0, "third_force": 0.0}
     search: ClassVar = {f"{part}_force": FORCE for part in PARTS}
 
