@@ -188,9 +188,7 @@ class Candidate:
 
     def plain(self, x: Sequence[float]) -> tuple[Candidate, tuple[float, ...]]:
         """The same with nothing `along` its shape, and the coordinates at which that is what this one is at x."""
-        values = self.values(x)
-        at = (coordinate(values[name], s) for name, s in self.search.items())
-        return replace(self, along=()), tuple(min(max(v, 0.0), 1.0) for v in at)
+        return replace(self, along=()), coordinates(self.values(x), self.search)
 
     def bent(self, x: Sequence[float]) -> tuple[Candidate, tuple[float, ...]]:
         """The same along its shape as far as that is fitted, and its coordinates there: the way back from `plain`."""
@@ -198,8 +196,7 @@ class Candidate:
         names = tuple(name for name in self.search if name in kind.shapes)
         for name in names:
             values = {**kind.bent(values, name, getattr(kind(), name)), name: values[name]}
-        at = (coordinate(values[name], s) for name, s in self.search.items())
-        return replace(self, along=names), tuple(min(max(v, 0.0), 1.0) for v in at)
+        return replace(self, along=names), coordinates(values, self.search)
 
     def whole(self) -> Candidate:
         """The same effect with its shape fitted too."""
@@ -295,6 +292,11 @@ def physical(x: float, search: Search) -> float:
 def key_at(r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> tuple[object, ...]:
     """What tells a simulation of recording r at x from any other, its time shift (s) to the nanosecond."""
     return (r, tuple([c.token for c in candidates]), tuple([round(float(v), 12) for v in x]), round(shift, 9))
+
+
+def coordinates(values: Mapping[str, float], search: Mapping[str, Search]) -> tuple[float, ...]:
+    """Coordinates of values by name, those out of range at its end."""
+    return tuple(min(max(coordinate(values[name], s), 0.0), 1.0) for name, s in search.items())
 
 
 def coordinate(value: float, search: Search) -> float:

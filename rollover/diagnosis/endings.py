@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from rollover.diagnosis.blocks import turned
-from rollover.diagnosis.candidates import Candidate, coordinate, each_with_own
+from rollover.diagnosis.candidates import Candidate, coordinates, each_with_own
 from rollover.diagnosis.crew import Job
 from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.explain import NEARLY_NOISE, Step, is_at_an_end
@@ -82,8 +82,7 @@ def _become(inquiry: Inquiry, best: Fitted) -> Iterator[tuple[tuple[Candidate, .
     for c in inquiry.candidates:
         there = {p: values[own] * times for p, (own, times) in kinds.get(c.id, {}).items() if own in values}
         if there.keys() >= c.search.keys() and c.key not in {o.key for o in others}:
-            at = (coordinate(there[p], search) for p, search in c.search.items())
-            yield (*others, c), tuple(min(max(v, 0.0), 1.0) for v in at)
+            yield (*others, c), coordinates(there, c.search)
 
 
 def _with_rivals(judge: Judge, found: Step) -> Step:
@@ -190,19 +189,19 @@ def _mirrors(
     for c in candidates:
         there = {p: values[n] ** to for p, (n, to) in EFFECTS[last.id].mirrors.get(c.id, {}).items() if n in values}
         if there and there.keys() >= c.search.keys():
-            at = (coordinate(there[p], search) for p, search in c.search.items())
-            yield c, tuple(min(max(v, 0.0), 1.0) for v in at)
+            yield c, coordinates(there, c.search)
 
 
 def unbent(
     fitted: Fitted, usual: Mapping[str, Candidate], which: Sequence[int]
 ) -> tuple[tuple[Candidate, ...], tuple[float, ...]]:
     """Effects of a fit, `which` of them in their usual shape, and where they stand."""
-    candidates, x = [], []
+    candidates: list[Candidate] = []
+    x: list[float] = []
     for k, (c, own) in enumerate(each_with_own(fitted.candidates)):
         if k in which:
             values, c = c.values(fitted.x[own]), usual[c.key]
-            x += [min(max(coordinate(values[name], search), 0.0), 1.0) for name, search in c.search.items()]
+            x += coordinates(values, c.search)
         else:
             x += fitted.x[own]
         candidates.append(c)
