@@ -111,9 +111,10 @@ _SOURCES = _sources_hash()
 
 
 @contextmanager
-def _own_cache() -> Iterator[None]:
+def _own_cache(function: Callable[..., Any]) -> Iterator[None]:
+    """By module: machine code asks for the one it was made in, and a file of effects is loaded under another name."""
     before = config.CACHE_DIR
-    config.CACHE_DIR = before or str(cache_folder())
+    config.CACHE_DIR = str(Path(before or cache_folder()) / function.__module__)
     try:
         yield
     finally:
@@ -122,7 +123,7 @@ def _own_cache() -> Iterator[None]:
 
 def compiled(function: F) -> F:
     """Compile at the first call and keep the machine code on disk."""
-    with _own_cache():
+    with _own_cache(function):
         return numba.njit(cache=True, error_model="numpy")(function)  # type: ignore[no-any-return]
 
 
@@ -132,31 +133,31 @@ def leaf(function: F) -> F:
     It reads and writes arrays and bundles that it is handed, makes and returns none, and calls nothing that does. One
     array is copied into another number by number: as a slice it might be made anew on the way.
     """
-    with _own_cache():
+    with _own_cache(function):
         return numba.njit(**_UNCOUNTED)(function)  # type: ignore[no-any-return]
 
 
 def inlined(function: F) -> F:
     """The same as `leaf`, laid out in each of its callers: for what is short, or asked again and again."""
-    with _own_cache():
+    with _own_cache(function):
         return numba.njit(**_UNCOUNTED, forceinline=True)(function)  # type: ignore[no-any-return]
 
 
 def force_law(function: Callable[..., float]) -> Any:
     """Compile ``force(p, s, z, v) -> F`` of a ground law so that kernels can call it by address."""
-    with _own_cache():
+    with _own_cache(function):
         return numba.cfunc(FORCE, cache=True, error_model="numpy")(function)
 
 
 def advance_law(function: Callable[..., None]) -> Any:
     """Compile ``advance(p, s, z, v, h)`` of a law with hidden states of its own."""
-    with _own_cache():
+    with _own_cache(function):
         return numba.cfunc(ADVANCE, cache=True, error_model="numpy")(function)
 
 
 def begin_law(function: Callable[..., None]) -> Any:
     """Compile ``begin(p, s)``: what a law works out once for each touch."""
-    with _own_cache():
+    with _own_cache(function):
         return numba.cfunc(BEGIN, cache=True, error_model="numpy")(function)
 
 

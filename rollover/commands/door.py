@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Annotated, Any, TypeVar
 
 import typer
+from typer.core import TyperGroup
 
 # what takes long to import is imported by the command that needs it: `rollover --help` answers at once
 from rollover.faults import Fault, InputError
@@ -34,7 +35,20 @@ def manual(*examples: str, writes: str, status: str = "") -> str:
     return "\n\n".join([*lines, f"Writes:  {writes}", f"Exit status:  {words}."])
 
 
+class Before(TyperGroup):
+    """The commands; an option of `rollover` itself that follows one of them is told where it stands."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that the first word names, of which the rest is for that command."""
+        own = {name: option.metavar for option in self.params for name in option.opts if option.metavar}
+        for name in (word.partition("=")[0] for word in args[1:]):
+            if name in own:
+                ctx.fail(f"{name} stands before the command: rollover {name} {own[name]} {args[0]} ...")
+        return super().resolve_command(ctx, args)
+
+
 app = typer.Typer(
+    cls=Before,
     help="Vehicle rollover load studies: what the ground does to a ROPS.",
     epilog=manual("run side_overturn", "run --help", writes="each command into its own folder, whole or not at all.")
     + f" Some commands also end with {NO}, or with {BROKE}.",

@@ -256,6 +256,21 @@ def test_the_command_line_takes_a_file_of_effects(tmp_path: Path) -> None:
     answer = outside("-m", "tests.rollover.command", "--effects", str(broken), "list", "effects")
     assert answer.returncode == 2
     assert "cannot be used: ZeroDivisionError" in answer.stderr
+    late = outside("-m", "tests.rollover.command", "list", "effects", f"--effects={OWN}")
+    assert late.returncode == 2
+    assert "--effects stands before the command: rollover --effects FILE list ..." in " ".join(late.stderr.split())
+
+
+def test_a_file_of_effects_can_be_imported_under_its_own_name_before_and_after(tmp_path: Path) -> None:
+    """Its machine code is kept for each name that it is loaded under."""
+    (tmp_path / "mine.py").write_text(OWN.read_text(encoding="utf-8"), encoding="utf-8")
+    kept = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    by_name = ["-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import mine; print(mine.SoilRoots.id)"]
+    by_path = ["-c", "from rollover.effects import effects; print(list(effects())[-1])"]
+    for _ in range(2):
+        for asked, variables in ((by_name, kept), (by_path, {**kept, "ROLLOVER_EFFECTS": str(tmp_path / "mine.py")})):
+            done = outside(*asked, **variables)
+            assert done.stdout.strip() == "soil-roots", done.stderr
 
 
 def test_an_id_given_twice_is_an_error() -> None:
