@@ -18,7 +18,7 @@ from rollover.diagnosis.forms import WORTH, enough, is_noise
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.refine import BEHIND, along_shapes, least_of
+from rollover.diagnosis.refine import BEHIND, LITTLE, along_shapes, least_of
 from rollover.diagnosis.thresholds import is_clock, stretches
 
 RUGGED = 2.0  # misfit over the noise that the best leaves, from which on there may be something behind a cliff
@@ -27,6 +27,7 @@ MOSTLY = 0.25  # of what the middle recording is left with by the best, below wh
 PROMISED = 0.5  # of the best score: what has it, and gains less than half of its own, may have another shape
 TIED = 1.2  # times what the best leaves, up to which time shifts are tried out
 BY_CHANCE = 0.01  # p-value of what is left, above which no other form of an effect is looked for
+TOLD = 2e-5  # s, by which time shifts are told apart
 PARTS = 4  # into which places are split for those who look
 # of what the base leaves beyond the noise, that an effect must take before its shape is fitted too; of what the best
 # takes, before its time shifts are tried out
@@ -209,8 +210,31 @@ def timed_too(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[Fi
     near = [f for f in fits if f.left < TIED * least and base.left - f.left >= LEAST * (base.left - least)]
     others = [f for f in fits if not any(f is one for one in near)]
     traced = [traced_too(inquiry, f) if is_clock(f) else f for f in near]
-    timed = inquiry.fits([from_there(f, "time") for f in traced])
-    return sorted([new or old for new, old in zip(timed, traced, strict=True)] + others, key=lambda f: f.left)
+    timed = [new or f for new, f in zip(inquiry.fits([from_there(f, "time") for f in traced]), traced, strict=True)]
+    return sorted(clocked_alike(inquiry, timed) + others, key=lambda f: f.left)
+
+
+def clocked_alike(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
+    """The fits; some recordings at the time shifts of the one that leaves least, where that is better; never worse.
+
+    Edges leave a shift in the first dip of many, and a recording's clock is the same whatever is missing.
+    """
+    lead = min(fits, key=lambda f: f.left)
+    shifts = [_shifts_beside(inquiry.judge, f, lead) for f in fits]
+    jobs = {k: replace(from_there(fits[k], "time"), shifts=s) for k, s in enumerate(shifts) if s is not None}
+    found = dict(zip(jobs, inquiry.fits(list(jobs.values())), strict=True))
+    return [min((f, found.get(k) or f), key=lambda one: one.left) for k, f in enumerate(fits)]
+
+
+def _shifts_beside(judge: Judge, fitted: Fitted, lead: Fitted) -> tuple[float, ...] | None:
+    """Time shifts (s) of all recordings, those of `lead` where they leave less; None if they do nowhere."""
+    shifts = [b.shift for b in fitted.blocks]
+    for r, (own, other) in enumerate(zip(fitted.blocks, lead.blocks, strict=True)):
+        if fitted is not lead and abs(other.shift - own.shift) > TOLD:
+            there = judge.block(r, fitted.candidates, fitted.x, other.shift, 0.0, clock=False)
+            if there is not None and there.total < own.total - LITTLE:
+                shifts[r] = other.shift
+    return tuple(shifts) if any(s != b.shift for s, b in zip(shifts, fitted.blocks, strict=True)) else None
 
 
 def traced_too(inquiry: Inquiry, fitted: Fitted) -> Fitted:

@@ -12,12 +12,12 @@ import pytest
 from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.clocks import align
-from rollover.diagnosis.crew import Crew
+from rollover.diagnosis.crew import Crew, Job, work
 from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.otherwise import begun_otherwise
+from rollover.diagnosis.otherwise import begun_otherwise, clocked_alike
 from rollover.diagnosis.ranges import candidates_of
 from rollover.diagnosis.screening import is_far, screen
 from rollover.effects import Search
@@ -108,3 +108,30 @@ def test_what_rings_and_scored_most_is_combed_though_its_fit_went_astray(score: 
     looked = Gate(score=50.0, scores={"mass": 40.0, rings.key: score}, null=np.zeros(9), detectable={})
     assert begun_otherwise(cast(Inquiry, inquiry), best, [best, astray], looked, (0.0, 0.0)) == [best, astray]
     assert asked == ["comb structural-compliance"] * combed
+
+
+def test_a_recordings_clock_is_that_of_the_fit_that_leaves_least_where_another_ended_in_a_dip() -> None:
+    made = recorded({}, speeds=(1.5, 2.5), rate=1000.0, noise=0.01)
+    found = [evidence_of(name, *simulated(scenario(), r)) for name, r in made]
+    judge = Judge([e for e in found if e is not None])
+    align(judge)
+
+    def clocked(c: Candidate, *late: float) -> Fitted:
+        blocks = [judge.block(r, (c,), (0.5,), judge.shifts[r] + s, 0.0) for r, s in enumerate(late)]
+        return Fitted(candidates=(c,), x=(0.5,), blocks=tuple(b for b in blocks if b is not None))
+
+    lead, late = clocked(PLAIN, 0.0, 0.0), clocked(replace(PLAIN, own={"added": 0.0}), 0.0, 2e-3)
+    alike = clocked(PLAIN, 1e-5, 0.0)
+    asked: list[Job] = []
+
+    def fits(jobs: list[Job]) -> list[Fitted | None]:
+        asked.extend(jobs)
+        return [work(judge, job) for job in jobs]
+
+    inquiry = cast(Inquiry, SimpleNamespace(judge=judge, fits=fits))
+    kept, moved, same = clocked_alike(inquiry, [lead, late, alike])
+    assert kept is lead
+    assert same is alike
+    assert [(job.how, job.shifts) for job in asked] == [("time", tuple(judge.shifts))]
+    assert abs(moved.blocks[1].shift - judge.shifts[1]) < 1e-4
+    assert moved.left < late.left
