@@ -199,7 +199,9 @@ def _diagnosed(asked: Asked, every: Sequence[Evidence], slips: Sequence[Slip], n
         sentence=(
             shown.sentence
             if shown is not None
-            else sentence(verdict, effects, explanation.p_value, h_before.held, h_after.held, found, early)
+            else sentence(
+                verdict, effects, explanation.p_value, h_before.held, h_after.held, found, early, remains=remains
+            )
         )
         + (closest(explanation, groups) if verdict == "unexplained" and shown is None else "")
         + (by_clock(mistimed(judge, explanation.fitted, crew.looks)) if is_left else "")

@@ -202,8 +202,13 @@ def sentence(
     last: Held,
     evidence: Sequence[Evidence],
     early: tuple[float | None, float | None] = (None, None),
+    *,
+    remains: bool = False,
 ) -> str:
-    """The verdict in one sentence or two; `early` is the misfit before the first blow without and with the effects."""
+    """The verdict in a few sentences; `early` is the misfit before the first blow without and with the effects.
+
+    `remains` says that these are not all that separates simulation and recordings.
+    """
     if verdict == "no-mismatch" and p_value < SURE:
         is_rough = any(e.is_rough(s) for e in evidence for s in e.signals)
         beyond = " beyond what is tolerated or repeats differ by" if is_rough else ""
@@ -222,7 +227,8 @@ def sentence(
         )
     said = " ".join(e.statement for e in effects)
     rivals = sorted({r for e in effects for r in e.indistinguishable_from})
-    also = f" Not told apart by these recordings: {', '.join(rivals)}." if rivals else ""
+    also = " What is left of it has structure: this is not the whole." if remains else ""
+    also += f" Not told apart by these recordings: {', '.join(rivals)}." if rivals else ""
     falls = f"{said} With it the held-out misfit falls from {first.total:.1f} to {last.total:.2f} times the noise"
     without, with_ = early
     if without is None or with_ is None:

@@ -90,7 +90,7 @@ def test_of_few_samples_before_the_blow_nothing_is_said(told: int, said: float |
     assert before_a_blow(scattering, fitted) == said
 
 
-def test_a_misfit_that_scatter_takes_part_in_is_said_to_be_one() -> None:
+def test_a_misfit_that_scatter_takes_part_in_or_that_is_not_all_met_is_said_to_be_one() -> None:
     first, last = (Held(left=np.array([left]), count=np.ones(1)) for left in (1.44, 0.64))
     tilted = Named(
         id="slope", kind="parameter", statement="The ground is inclined.", parameters={}, settings={}, channel=None,
@@ -98,6 +98,8 @@ def test_a_misfit_that_scatter_takes_part_in_is_said_to_be_one() -> None:
     )  # fmt: skip
     plain = sentence("parameter", [tilted], 0.0, first, last, [])
     assert plain == "The ground is inclined. With it the held-out misfit falls from 1.2 to 0.80 times the noise."
+    more = sentence("parameter", [tilted], 0.0, first, last, [], remains=True)
+    assert more == plain + " What is left of it has structure: this is not the whole."
     said = sentence("parameter", [tilted], 0.0, first, last, [], (6.94, 1.02))
     assert said.startswith(plain[:-1] + " and the scatter of runs; before the first blow")
     assert said.endswith("the misfit is 1.02 times the noise for 6.9.")
