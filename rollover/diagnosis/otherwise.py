@@ -219,6 +219,8 @@ def clocked_alike(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
 
     Edges leave a shift in the first dip of many, and a recording's clock is the same whatever is missing.
     """
+    if len(fits) < 2:
+        return list(fits)
     lead = min(fits, key=lambda f: f.left)
     shifts = [_shifts_beside(inquiry.judge, f, lead) for f in fits]
     jobs = {k: replace(from_there(fits[k], "time"), shifts=s) for k, s in enumerate(shifts) if s is not None}

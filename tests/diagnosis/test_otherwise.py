@@ -129,6 +129,7 @@ def test_a_recordings_clock_is_that_of_the_fit_that_leaves_least_where_another_e
         return [work(judge, job) for job in jobs]
 
     inquiry = cast(Inquiry, SimpleNamespace(judge=judge, fits=fits))
+    assert clocked_alike(inquiry, []) == []  # nothing is near where each leaves more than the base
     kept, moved, same = clocked_alike(inquiry, [lead, late, alike])
     assert kept is lead
     assert same is alike
