@@ -34,7 +34,7 @@ from rollover.diagnosis.refine import conditioned, is_doubtful
 from rollover.diagnosis.remainder import is_enough
 from rollover.diagnosis.repeats import CONTRADICTING, against_itself, differing, with_scatter
 from rollover.diagnosis.scores import before_a_blow, judged
-from rollover.diagnosis.selection import Explanation, by_the_first, decided, explained, takes_little
+from rollover.diagnosis.selection import Explanation, by_the_first, decided, done_by_others, explained, takes_little
 from rollover.diagnosis.shown import broken_off, by_themselves, misread
 from rollover.diagnosis.simulator import blow_of, set_up
 from rollover.diagnosis.slips import Slip, by_slips, slips_of, without
@@ -143,7 +143,7 @@ def _diagnosed(asked: Asked, every: Sequence[Evidence], slips: Sequence[Slip], n
     explanation, verdict = decided(judge, explanation, groups, phases)
     held, named_so = judge.evidence, _named_beside(judge, explanation, verdict, kept, groups, phases)
     nothing: set[str] = set()
-    while more := may_be_nothing(named_so[1], judge.effort.thrifty) - nothing:
+    while more := done_by_others(judge, named_so[0], may_be_nothing(named_so[1], judge.effort.thrifty)) - nothing:
         # what may as well be nothing is none of it: what came first explains what there is alone, or nothing does
         nothing |= more
         judge.weigh(held)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rollover.diagnosis.blocks import at_an_end
-from rollover.diagnosis.candidates import Candidate, is_one_sensor
+from rollover.diagnosis.candidates import Candidate, each_with_own, is_one_sensor
 from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.endings import MANY, followed, mirrored
 from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Step, moves
@@ -200,6 +200,28 @@ def takes_little(found: Explanation, groups: Groups, share: float = LITTLE) -> b
     """Whether an explanation takes less than a share of what was beyond the noise in held-out recordings."""
     start, ahead = held_out(found.base, groups).total, held_out(found.fitted, groups).total
     return start**2 - ahead**2 < share * (start**2 - 1.0)
+
+
+def done_by_others(judge: Judge, found: Explanation, ids: Collection[str]) -> set[str]:
+    """Of effects that may be nothing by their intervals, those whose work the others do, in any shape of theirs.
+
+    A shape that was not fitted widens an interval as far as slopes say. Of full runs, where a fit costs much, all are.
+    """
+    fitted = found.fitted
+    phi = max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks))
+    shifts, done = [b.shift for b in fitted.blocks], set()
+    for k, c in enumerate(fitted.candidates):
+        if c.id not in ids or judge.effort.thrifty:
+            continue
+        others = [(o, fitted.x[own]) for j, (o, own) in enumerate(each_with_own(fitted.candidates)) if j != k]
+        fits = [without(judge, fitted, k)]
+        for j, (bent, x) in enumerate(others):
+            for place in bent.with_shapes(x) if bent.shapes else ():
+                way = [*others[:j], (bent.whole(), place), *others[j + 1 :]]
+                fits.append(judge.fit([o for o, _ in way], [v for _, at in way for v in at], shifts=shifts))
+        if min((f.left for f in fits if f is not None), default=np.inf) - fitted.left < NEEDED * phi:
+            done.add(c.id)
+    return set(ids) if judge.effort.thrifty else done
 
 
 def by_the_first(judge: Judge, found: Explanation, nothing: Collection[str], phases: Phases) -> Explanation:

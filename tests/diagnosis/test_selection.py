@@ -9,9 +9,10 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis import explain, one_by_one, pairs, selection
+from rollover.diagnosis import colour, explain, one_by_one, pairs, selection
 from rollover.diagnosis.blocks import Block
 from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.clocks import align
 from rollover.diagnosis.detect import Cell, Mismatch
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.explain import Step
@@ -19,8 +20,11 @@ from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.one_by_one import is_better
+from rollover.diagnosis.ranges import candidates_of
 from rollover.diagnosis.selection import MOST, Explanation, by_the_first, decided
 from rollover.effects import Search
+from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded
+from tests.diagnosis.test_fits import judge_of
 
 IDS = ("soil-crust", "guide-friction", "mass")
 
@@ -116,6 +120,30 @@ def test_the_gain_of_one_effect_that_may_be_nothing_tells_nothing_either() -> No
     refused = by_the_first(judge, one, {IDS[0]}, [])
     assert (refused.parts, refused.fitted, refused.p_value) == ((), one.base, 0.2)
     assert by_the_first(judge, two, {IDS[0]}, []).p_value == two.p_value
+
+
+@pytest.mark.parametrize(("second_order", "offset", "done"), [(0.0, -4e-4, False), (0.25, 0.0, True)])
+def test_what_may_be_nothing_is_another_effects_work_only_if_that_does_it(
+    second_order: float, offset: float, done: bool
+) -> None:
+    """A sensor of second order comes late, as one of first does whose clock is off."""
+    lag = {"channel": ACCELERATION, "time": 3e-3, "second_order": second_order}
+    clock = {"channel": ACCELERATION, "offset": offset}
+    changes = {f"effects.sensor-lag.{k}": v for k, v in lag.items()}
+    changes |= {f"effects.sensor-clock-offset.{k}": v for k, v in clock.items()} if offset else {}
+    judge = judge_of(recorded(changes, speeds=(1.5, 2.5), channels=(FORCE, DEPTH, ACCELERATION), noise=0.001))
+    align(judge)
+    able = candidates_of(judge.evidence, (), "drop")
+    both = [
+        next(c for c in able if (c.id, c.channel) == (id, ACCELERATION)) for id in ("sensor-lag", "sensor-clock-offset")
+    ]
+    fitted = judge.fit(both, (*both[0].starts()[0], 0.5))
+    assert fitted is not None
+    judge.weigh(colour.whole(judge.evidence, judge.residuals(fitted)))  # by what is left, as a step is
+    found: Any = SimpleNamespace(fitted=judge.again(fitted))
+    doubtful = {"sensor-clock-offset"}
+    assert selection.done_by_others(judge, found, doubtful) == (doubtful if done else set())
+    assert selection.done_by_others(judge, found, set()) == set()
 
 
 @pytest.mark.parametrize(("channels", "named"), [(("a", "a"), 0), (("a", "b"), 2), ((None, None), 2), ((None, "a"), 2)])
