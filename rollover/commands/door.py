@@ -40,11 +40,13 @@ class Before(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command that the first word names, of which the rest is for that command."""
-        own = {name: option.metavar for option in self.params for name in option.opts if option.metavar}
-        for name in (word.partition("=")[0] for word in args[1:]):
-            if name in own:
-                ctx.fail(f"{name} stands before the command: rollover {name} {own[name]} {args[0]} ...")
-        return super().resolve_command(ctx, args)
+        name, command, rest = super().resolve_command(ctx, args)
+        own = {opt: option.metavar for option in self.params for opt in option.opts if option.metavar}
+        known = {opt for option in command.params for opt in option.opts} if command else set()  # `prove` has its own
+        for opt in (word.partition("=")[0] for word in rest):
+            if opt in own.keys() - known:
+                ctx.fail(f"{opt} stands before the command: rollover {opt} {own[opt]} {name} ...")
+        return name, command, rest
 
 
 app = typer.Typer(
