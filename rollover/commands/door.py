@@ -41,10 +41,10 @@ class Before(TyperGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command that the first word names, of which the rest is for that command."""
         name, command, rest = super().resolve_command(ctx, args)
-        own = {opt: option.metavar for option in self.params for opt in option.opts if option.metavar}
         known = {opt for option in command.params for opt in option.opts} if command else set()  # `prove` has its own
+        own = {opt: o.metavar for o in self.params for opt in o.opts if o.metavar and opt not in known}
         for opt in (word.partition("=")[0] for word in rest):
-            if opt in own.keys() - known:
+            if opt in own:
                 ctx.fail(f"{opt} stands before the command: rollover {opt} {own[opt]} {name} ...")
         return name, command, rest
 

@@ -232,7 +232,7 @@ def _shifts_beside(judge: Judge, fitted: Fitted, lead: Fitted) -> tuple[float, .
     """Time shifts (s) of all recordings, those of `lead` where they leave less; None if they do nowhere."""
     shifts = [b.shift for b in fitted.blocks]
     for r, (own, other) in enumerate(zip(fitted.blocks, lead.blocks, strict=True)):
-        if fitted is not lead and abs(other.shift - own.shift) > TOLD:
+        if abs(other.shift - own.shift) > TOLD:
             there = judge.block(r, fitted.candidates, fitted.x, other.shift, 0.0, clock=False)
             if there is not None and there.total < own.total - LITTLE:
                 shifts[r] = other.shift

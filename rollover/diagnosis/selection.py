@@ -207,21 +207,23 @@ def done_by_others(judge: Judge, found: Explanation, ids: Collection[str]) -> se
 
     A shape that was not fitted widens an interval as far as slopes say. Of full runs, where a fit costs much, all are.
     """
-    fitted = found.fitted
+    if judge.effort.thrifty:
+        return set(ids)
+    fitted, done = found.fitted, set()
     phi = max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks))
-    shifts, done = [b.shift for b in fitted.blocks], set()
+    shifts = [b.shift for b in fitted.blocks]
     for k, c in enumerate(fitted.candidates):
-        if c.id not in ids or judge.effort.thrifty:
+        if c.id not in ids:
             continue
         others = [(o, fitted.x[own]) for j, (o, own) in enumerate(each_with_own(fitted.candidates)) if j != k]
         fits = [without(judge, fitted, k)]
-        for j, (bent, x) in enumerate(others):
-            for place in bent.with_shapes(x) if bent.shapes else ():
-                way = [*others[:j], (bent.whole(), place), *others[j + 1 :]]
+        for j, (other, x) in enumerate(others):
+            for place in other.with_shapes(x) if other.shapes else ():
+                way = [*others[:j], (other.whole(), place), *others[j + 1 :]]
                 fits.append(judge.fit([o for o, _ in way], [v for _, at in way for v in at], shifts=shifts))
         if min((f.left for f in fits if f is not None), default=np.inf) - fitted.left < NEEDED * phi:
             done.add(c.id)
-    return set(ids) if judge.effort.thrifty else done
+    return done
 
 
 def by_the_first(judge: Judge, found: Explanation, nothing: Collection[str], phases: Phases) -> Explanation:

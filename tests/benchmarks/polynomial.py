@@ -9,6 +9,7 @@ from ground.quantity import Quantity, parameters
 from ground.settings import ForceTerm
 from rollover.effects import Effect
 
+Coefficient = Annotated[float, Quantity("N", "at the scales, on the reference face")]
 NAMES = tuple(f"z{a}v{b}" for a in range(4) for b in range(4 - a))
 
 
@@ -26,24 +27,20 @@ def of_rate(p, s, z, v):  # type: ignore[no-untyped-def]
     return u * (p[0] + u * (p[1] + u * p[2]) + x * (p[3] + p[4] * u + p[5] * x))
 
 
-def _force() -> Quantity:
-    return Quantity("N", "at the scales, on the reference face")
-
-
 @parameters
 class Polynomial(Effect):
     """F += sum_ab c_ab (z/z_0)^a (v/v_0)^b, a + b up to 3."""
 
-    z0v0: Annotated[float, _force()] = 0.0
-    z0v1: Annotated[float, _force()] = 0.0
-    z0v2: Annotated[float, _force()] = 0.0
-    z0v3: Annotated[float, _force()] = 0.0
-    z1v0: Annotated[float, _force()] = 0.0
-    z1v1: Annotated[float, _force()] = 0.0
-    z1v2: Annotated[float, _force()] = 0.0
-    z2v0: Annotated[float, _force()] = 0.0
-    z2v1: Annotated[float, _force()] = 0.0
-    z3v0: Annotated[float, _force()] = 0.0
+    z0v0: Coefficient = 0.0
+    z0v1: Coefficient = 0.0
+    z0v2: Coefficient = 0.0
+    z0v3: Coefficient = 0.0
+    z1v0: Coefficient = 0.0
+    z1v1: Coefficient = 0.0
+    z1v2: Coefficient = 0.0
+    z2v0: Coefficient = 0.0
+    z2v1: Coefficient = 0.0
+    z3v0: Coefficient = 0.0
     depth: Annotated[float, Quantity("m", "z_0", above=0)] = 0.1
     speed: Annotated[float, Quantity("m/s", "v_0", above=0)] = 1.0
 

@@ -293,4 +293,4 @@ def test_what_mirrors_the_last_effect_competes_with_it(reaches: float, known: fl
         assert [f.left for f in found.rivals] == pytest.approx([5.0, known])
     else:
         assert [f.left for f in found.rivals] == pytest.approx([5.0, reaches])
-        assert found.rivals[-1].x == pytest.approx((0.9, 0.4, 0.25), rel=1e-12)  # rounding
+        assert found.rivals[-1].x == pytest.approx((0.9, 0.4, 0.25), rel=1e-12)  # rounding: a logarithm and back
