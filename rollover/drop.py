@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from ground.settings import settings
 from ground.surface import gradient, is_flat
 from rollover import fall, nose, track
 from rollover.bodies import nose_share
-from rollover.document import exchanged
+from rollover.document import Itself, exchanged
 from rollover.effects import acting, read
 from rollover.initiation import Drop, Release
 from rollover.recording import Recording
@@ -32,6 +32,7 @@ LONGEST_STEP = 5e-4  # s, of the integration
 ENTRY = 0.02  # longest step over the time in which a cone goes in
 ROUNDING = 1e-6  # of the largest force: what changes by less has not jumped
 BESIDE = 1e-9  # s: on either side of a jump
+TOLD = 64  # grounds with their effects, of which the kernel's numbers are kept: drops share them
 RESOLVED = 0.15  # longest step times the frequency of a striker that gives way
 
 COLUMNS = {
@@ -144,7 +145,7 @@ class DropModel:
     def told(self) -> tuple[NDArray[np.int64], Array]:
         """Settings and numbers of the ground's kernel."""
         s = self._applied
-        return settings(s.ground.law, *acting(s.effects))
+        return _told(Itself(s.ground.law), Itself(s.effects))
 
     @property
     def times(self) -> Array:
@@ -183,6 +184,11 @@ class DropModel:
         at = self.times if times is None else np.ascontiguousarray(times, dtype=np.float64)
         recording = Recording(title=self.scenario.title, time=at, channels=self.motion(at), source="simulation")
         return read(self.scenario.effects, recording)
+
+
+@lru_cache(maxsize=TOLD)
+def _told(law: Itself, effects: Itself) -> tuple[NDArray[np.int64], Array]:
+    return settings(law.thing, *acting(effects.thing))
 
 
 def channels_of(rows: Array, names: Collection[str]) -> dict[str, Array]:

@@ -31,6 +31,7 @@ OUT_FORCE, OUT_SINKAGE, OUT_X, OUT_V, OUT_A, OUT_IMPULSE, OUT_COLUMNS = 0, 1, 2,
 # impulse (N s), force at rest (N), which element, state at both ends (4 each), accelerations at the first (2)
 FROM, LONG, HOW, BOUND, HIT, PRESSED, ELEMENT, START, END, FIRST, TRACK_COLUMNS = 0, 1, 2, 3, 4, 5, 6, 7, 11, 15, 17
 RESTS = -1.0  # mode of the last step of a track that has come to rest
+SAME = 1e-7  # of an acceleration, up to which one at the end of a step is that at the beginning of the next
 ROOM = 256  # steps that a track has room for at first; of an element that changes less often a quarter
 
 
@@ -56,6 +57,15 @@ def is_another(elements: Any, last: int, row: Any, s: Any) -> bool:
         if elements[last, COLUMNS + k] != s[k]:
             return True
     return False
+
+
+@leaf
+def put(elements: Any, element: int, row: Any, s: Any) -> None:
+    """Put an element as it was noted into the tables that the kernel reads."""
+    for k in range(COLUMNS):
+        row[k] = elements[element, k]
+    for k in range(s.size):
+        s[k] = elements[element, COLUMNS + k]
 
 
 @compiled
@@ -86,10 +96,7 @@ def read_off(law: Any, p: Any, f: Any, track: Any, elements: Any, times: Any, ou
             break
         if element != int(step[ELEMENT]):
             element = int(step[ELEMENT])
-            for k in range(COLUMNS):
-                row[k] = elements[element, k]
-            for k in range(s.size):
-                s[k] = elements[element, COLUMNS + k]
+            put(elements, element, row, s)
         state[MODE] = int(step[HOW])
         for k in range(4):
             end[k] = step[END + k]
@@ -119,10 +126,21 @@ def turns(law: Any, p: Any, f: Any, track: Any, elements: Any, until: float, bes
     """
     count = 0
     at, times = np.empty(track.shape[0]), np.empty(2 * track.shape[0])
+    end, last = np.zeros(4), np.zeros(2)
+    row, state, s = np.zeros(COLUMNS), np.zeros(STATE_COLUMNS, np.int64), np.zeros(elements.shape[1] - COLUMNS)
+    bound = f.copy()
+    bound[SPRING] = 0.0
     for j in range(track.shape[0]):
-        is_new = j == 0
-        for k in (HOW, BOUND, ELEMENT):
-            is_new = is_new or track[j, k] != track[j - 1, k]
+        is_new = j == 0 or track[j, HOW] != track[j - 1, HOW] or track[j, BOUND] != track[j - 1, BOUND]
+        if not is_new and track[j, ELEMENT] != track[j - 1, ELEMENT]:
+            # as long as no acceleration jumps it is the same element further on, as at nearly every step
+            put(elements, int(track[j - 1, ELEMENT]), row, s)
+            state[MODE] = int(track[j - 1, HOW])
+            for k in range(4):
+                end[k] = track[j - 1, END + k]
+            accelerate(law, p, s, row, state, bound if track[j - 1, BOUND] != 0.0 else f, end, last)
+            for k in range(2):
+                is_new = is_new or abs(track[j, FIRST + k] - last[k]) > SAME * max(abs(last[k]), f[GRAVITY])
         if is_new and track[j, FROM] + beside <= until:
             at[count] = track[j, FROM]
             times[2 * count], times[2 * count + 1] = at[count] - beside, at[count] + beside

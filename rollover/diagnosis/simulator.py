@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields, replace
 from functools import cached_property
 from typing import Any, Protocol, TypeVar
 
@@ -133,9 +134,9 @@ class DropSimulator:
         instants, rows = self._track(physical, float(at[-1]) if at.size else 0.0).jumps
         if not instants.size:
             return {}
-        clocked = {e.channel for name in EDGES for e in every(sensors, name)} | set(self.recording.cfc)
-        made = channels_of(rows, set(self.recording.channels) - clocked)
-        return {LEAP_IN + name: about_jumps(at, instants, sizes) for name, sizes in made.items() if np.any(sizes)}
+        clocked = {e.channel for name in EDGES for e in every(sensors, name)} if sensors else ()
+        made = channels_of(rows, self._sharp.difference(clocked))
+        return {LEAP_IN + name: about_jumps(at, instants, sizes) for name, sizes in made.items() if sizes.any()}
 
     def _edges(self, physical: Mapping[str, Any], shift: float, sensors: Mapping[str, Any]) -> dict[str, Array]:
         """Channels behind a lag or with a clock of their own: what these make of a leap lies between the rows."""
@@ -158,6 +159,11 @@ class DropSimulator:
             late = lags[channel].read(Recording(title=self.recording.title, time=dense, channels=raw))
             found[channel] = late[channel][where[: own.size]]
         return found
+
+    @cached_property
+    def _sharp(self) -> frozenset[str]:
+        """Channels that nothing smooths."""
+        return frozenset(self.recording.channels).difference(self.recording.cfc)
 
     @cached_property
     def rows(self) -> Rows:
@@ -224,8 +230,12 @@ def simulator_of(scenario: Scenario, recording: Recording) -> Simulator:
 
 
 def set_up(scenario: Scenario, recording: Recording) -> Scenario:
-    """The scenario under a recording's conditions. Raises `InputError`."""
-    return scenario.replaced(dict(recording.conditions), origin=recording.title) if recording.conditions else scenario
+    """The scenario under a recording's conditions; what these leave as it is, is the same. Raises `InputError`."""
+    if not recording.conditions:
+        return scenario
+    found = scenario.replaced(dict(recording.conditions), origin=recording.title)
+    own = {f.name: (getattr(scenario, f.name), getattr(found, f.name)) for f in fields(found)}
+    return replace(found, **{name: old for name, (old, new) in own.items() if new == old})
 
 
 __all__ = ["DropSimulator", "RunSimulator", "Simulator", "blow_of", "set_up", "simulator_of"]

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rollover.document.check import check
-from rollover.document.exchange import exchanged, value_at
+from rollover.document.exchange import Itself, exchanged, value_at
 from rollover.document.include import expand, find, headings, shipped_folder
 from rollover.document.replace import parse_setting, replaced
 from rollover.document.resolved import Leaf, content_hash, dump, paths, to_mapping
@@ -20,6 +20,7 @@ from rollover.document.tree import Node, read
 from rollover.document.tree import write as dump_mapping
 
 __all__ = [
+    "Itself",
     "Leaf",
     "Node",
     "check",
