@@ -9,7 +9,7 @@ from rollover.diagnosis.blocks import turned
 from rollover.diagnosis.candidates import Candidate, coordinates, each_with_own
 from rollover.diagnosis.crew import Job
 from rollover.diagnosis.detect import Mismatch, mismatch_of
-from rollover.diagnosis.explain import NEARLY_NOISE, Step, is_at_an_end
+from rollover.diagnosis.explain import NEARLY_NOISE, SOON, Step, is_at_an_end
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.otherwise import LEADS, from_there, traced_too
@@ -20,6 +20,7 @@ from rollover.effects import EFFECTS
 MANY = 0.05  # p-value of what as many effects as may be leave, below which they are no explanation
 BESIDE = 3  # rivals of a step that are begun anew beside a better fit of what came before
 SIMPLER = 4  # rivals of fewer numbers that are begun anew beside a fit at an end of its range
+PLAINER = 3  # effects of fewer numbers, of all, that are gone on with after a short fit
 TELLS = 10.8  # chi-square of one number, p = 0.001
 
 
@@ -41,7 +42,7 @@ def followed(inquiry: Inquiry, found: Step) -> tuple[Step, Mismatch]:
             new = timed(judge, polish(judge, new))
         new = ended(judge, new)
         if new.left < old.left:
-            found = _with_rivals(judge, found.moved_to(new))
+            found = _with_rivals(inquiry, found.moved_to(new))
             left = mismatch_of(judge.evidence, new.blocks, phases)
     for simple in (simpler, _straightened, plainer):
         other = simple(inquiry, found)
@@ -85,18 +86,16 @@ def _become(inquiry: Inquiry, best: Fitted) -> Iterator[tuple[tuple[Candidate, .
             yield (*others, c), coordinates(there, c.search)
 
 
-def _with_rivals(judge: Judge, found: Step) -> Step:
+def _with_rivals(inquiry: Inquiry, found: Step) -> Step:
     """A step with its nearest rivals begun anew beside what they share with its best, which was followed alone."""
     best, beside, shared = found.fitted, *_shared(found.fitted)
     if not beside:
         return found
-    shifts, near = [b.shift for b in best.blocks], sorted(found.rivals, key=lambda f: f.left)[:BESIDE]
-    rivals = []
-    for f in found.rivals:
-        begun = f is not best and any(f is one for one in near)
-        both = (*beside, f.candidates[-1])
-        again = judge.fit(both, (*shared, *f.own), shifts=shifts, width=1) if begun else None
-        rivals.append(again if again is not None and again.left < f.left else f)
+    shifts, near = tuple(b.shift for b in best.blocks), sorted(found.rivals, key=lambda f: f.left)[:BESIDE]
+    begun = [f for f in near if f is not best]
+    jobs = [Job(candidates=(*beside, f.candidates[-1]), start=(*shared, *f.own), shifts=shifts, width=1) for f in begun]
+    better = {id(f): again for f, again in zip(begun, inquiry.fits(jobs), strict=True) if again is not None}
+    rivals = (min(f, better.get(id(f), f), key=lambda one: one.left) for f in found.rivals)
     return replace(found, rivals=tuple(rivals))
 
 
@@ -145,7 +144,9 @@ def _plainer_last(inquiry: Inquiry, found: Step) -> Step | None:
     if not beside or not able:
         return None
     shifts = tuple(b.shift for b in best.blocks)
-    jobs = [Job(candidates=(*beside, c), start=(*shared, *c.probes()[0]), shifts=shifts) for c in able]
+    jobs = [Job(candidates=(*beside, c), start=(*shared, *c.probes()[0]), shifts=shifts, rounds=SOON) for c in able]
+    short = sorted((f for f in inquiry.fits(jobs) if f is not None), key=lambda f: f.total)[:PLAINER]
+    jobs = [Job(candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks)) for f in short]
     one = min((f for f in inquiry.fits(jobs) if f is not None), key=lambda f: f.left, default=None)
     if one is None or one.left > LEADS * best.left:
         return None

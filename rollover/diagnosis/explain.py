@@ -30,6 +30,7 @@ ROUGHNESS = 0.002  # of the misfit
 WITHIN_ONE = 1.0  # standard errors within which the simpler one is preferred
 APART = 2.0  # standard errors beyond which a rival is excluded
 ALIKE = 0.3  # of the summed misfit, which fits end short of: two no further apart are one and the same
+SOON, PART = 4, 0.5  # rounds, by which a fit begun anew must gain a part of what the best gains
 NEARLY_NOISE = 1.3  # misfit over the noise up to which its own colour is believed
 
 LIKE_NOISE = 2.2  # misfit over the noise up to which it may be noise that was underrated
@@ -126,15 +127,21 @@ def _by_fits(judge: Judge, fits: Sequence[Fitted], groups: Groups) -> list[Fitte
 
 
 def _from_base(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: Gate) -> list[Fitted]:
-    """Fits anew, from the base itself, of candidates that were led astray: beside them more is left than without."""
-    jobs = []
+    """Fits anew, from the base itself, of candidates that were led astray: beside them more is left than without.
+
+    Those that soon gain a part of what the best does are gone on with.
+    """
+    jobs, least = [], min(f.left for f in fits)
     for f in fits:
         if f.left > base.left:
             begin = looked.starts.get(f.candidates[-1].key, (f.own,))[0]
-            jobs.append(
-                Job(candidates=f.candidates, start=(*base.x, *begin), shifts=tuple(b.shift for b in base.blocks))
-            )
-    return [f for f in inquiry.fits(jobs) if f is not None]
+            shifts = tuple(b.shift for b in base.blocks)
+            jobs.append(Job(candidates=f.candidates, start=(*base.x, *begin), shifts=shifts, rounds=SOON))
+    short = [f for f in inquiry.fits(jobs) if f is not None]
+    able = [f for f in short if base.left - f.total > PART * (base.left - least)]
+    jobs = [Job(candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks)) for f in able]
+    ended = [f for f in inquiry.fits(jobs) if f is not None]
+    return ended + [inquiry.judge.again(f) for f in short if not any(f is one for one in able)]
 
 
 def weighed(judge: Judge, fitted: Fitted, phases: Phases) -> bool:

@@ -25,6 +25,8 @@ NEAR = 2.0  # misfit over the noise, up to which slopes are those of the place i
 KEPT = 0.7  # of the gain that slopes promise, which a step must make for those of what is held to be kept
 SLOW = 0.01  # of what is left, that a step must gain for the same
 SHORTER = (0.5, 0.0)  # of the way of a time shift, tried where all of it leads nowhere
+PROMISING = 0.3  # of such a gain, that slopes must promise
+ENOUGH, FINELY = 0.3, 1e-3  # gain of a round below which a search narrows; where a fit is ended
 NOISE_LEFT = 1.04  # misfit over the noise that needs no further search
 NONE = np.zeros(0, dtype=np.int64)
 
@@ -269,13 +271,15 @@ class Judge:
         width: int = 0,
         pinned: bool = False,
         bare: bool = False,
+        finely: bool = False,
     ) -> Fitted | None:
         """Levenberg-Marquardt on (D1) from a start within the unit box; None if nothing can be simulated there.
 
-        `pinned` as in `held`. A `bare` one ends without slopes, where only what it leaves is asked for.
+        `pinned` as in `held`. A `bare` one ends without slopes, where only what it leaves is asked for; one that is
+        made `finely` where a round gains next to nothing, others where it gains less than tells two apart.
         """
         with self.held(pinned=pinned):
-            return self._fit(candidates, start, rounds, only, shifts, width, bare)
+            return self._fit(candidates, start, rounds, only, shifts, width, bare, FINELY if finely else ENOUGH)
 
     def _fit(
         self,
@@ -286,6 +290,7 @@ class Judge:
         shifts: Sequence[float] | None,
         width: int,
         bare: bool,
+        least: float,
     ) -> Fitted | None:
         use = list(range(len(self.evidence))) if only is None else list(only)
         nudges = self.effort.nudges
@@ -304,14 +309,14 @@ class Judge:
             for block in blocks:
                 Ar, br, _ = block.normal()
                 A, b = A + Ar, b + br
-            improved, enough, total = False, max(1e-3 * max(1.0, 1e-2 * best), self.effort.least), best
+            improved, enough, total = False, max(least, FINELY * 1e-2 * best, self.effort.least), best
             due = 0.0  # gain of a step by these slopes
             for _ in range(TRIES):
                 dx = bounded(A, b, np.array(x), damping)
                 trial = [float(v) for v in np.clip(np.array(x) + dx, 0.0, 1.0)]
                 moved = np.array(trial) - np.array(x)
                 due = 2.0 * float(b @ moved) - float(moved @ A @ moved)
-                if width and due < 0.1 * enough:
+                if width and due < PROMISING * enough:
                     break  # nothing more is to be had, by these slopes
                 steps = [shift_of(block, moved) for block in blocks]
                 self.made_ahead((r, candidates, trial) for r in use)

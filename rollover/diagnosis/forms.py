@@ -21,6 +21,8 @@ SOON = 0.95  # times what an effect leaves as it is, that the shape which it has
 THERE = 0.003  # of a coordinate, within which two short fits came to one place
 ASTRAY = 1.2  # times what another explanation leaves, above which a crooked valley is not followed
 FURTHER, ALIKE = 3, 0.1  # rounds of all recordings, after which fits within so much of a coordinate go to one place
+# of the samples, by which a short fit, and one gone on with, may leave more than another explanation that leaves noise
+NEARBY, NEARER = 0.5, 0.35
 BESIDE_FORM = np.linspace(-0.1, 0.05, 13)  # of a coordinate: where a threshold of another form may lie
 ELSEWHERE = (0.2, 0.35, 0.5, 0.65, 0.8)  # coordinates of a number that only this form has
 
@@ -93,7 +95,7 @@ def _best_of(
     short = [judge.fit(candidates, x, rounds=SHORT, shifts=at, only=few, bare=True) for x in places]
     # fitted alone these soon leave less than beside all others
     own = sum(f.blocks[r].total for r in few)
-    most = min(ABREAST * own, BEHIND * sum(leaves[r] for r in few))
+    most = min(ABREAST * own, reach([leaves[r] for r in few], sum(f.blocks[r].residual.size for r in few), NEARBY))
     if sum(leaves) > FAR**2 * sum(b.residual.size for b in f.blocks):
         most = min(most, SOON * own)
     begun: list[Fitted] = []
@@ -108,7 +110,8 @@ def _best_of(
     ]
     best: Fitted | None = None
     done: list[Fitted] = []
-    for one in sorted((one for one in again if one is not None), key=lambda one: one.total):
+    most = reach(leaves, sum(b.residual.size for b in f.blocks), NEARER)
+    for one in sorted((one for one in again if one is not None and one.total < most), key=lambda one: one.total):
         if any(_is_there(one, other, ALIKE) for other in done) or (best and one.total > ABREAST * best.left):
             continue
         done.append(one)
@@ -117,6 +120,15 @@ def _best_of(
         if best is not None and is_noise(best):
             break
     return best
+
+
+def reach(leaves: Sequence[float], size: int, part: float) -> float:
+    """What a fit on its way may leave that is to meet as well as another, which `leaves` so much of each recording.
+
+    As far again from the noise as that is, or `part` of the samples.
+    """
+    left = sum(leaves)
+    return left + max((BEHIND - 1.0) * (left - size), part * size)
 
 
 def _is_there(one: Fitted, other: Fitted, within: float = THERE) -> bool:

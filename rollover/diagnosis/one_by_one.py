@@ -27,6 +27,9 @@ PART = 0.25  # of what moves something, that a part of more must move
 # misfit over the noise that two effects leave and a third is not looked for, and the share of what was beyond the
 # noise that is little all the same
 HOPELESS, HARDLY_ANY = 2.0, 0.01
+# times what the second effect took, that two leave beyond the noise and no third is looked for: it would have to take
+# that, and the one that takes more comes first
+UNLIKELY = 5.0
 SEVERAL = 2  # recordings on another course, after which they are not forgiven if a candidate scores beyond chance
 ABLE = 0.7  # of what there was beyond the noise, above which two leave so much that no exchange of one will end it
 BETTER = 0.5  # of what is left, that another first effect must leave
@@ -121,7 +124,7 @@ def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = (), *, pa
             if other is not None and is_better(other[0][-1].fitted, other[1], current):
                 (taken, left), current = other, other[0][-1].fitted
         is_far = current.left > HOPELESS**2 * count and current.left - count > HARDLY_ANY * (base.left - count)
-        if (len(taken) > 1 and is_far) or is_any_curve(current.candidates):
+        if (len(taken) > 1 and (is_far or is_unlikely(judge, taken[-1], current))) or is_any_curve(current.candidates):
             break
         looked = beside(current, left)
     if not judge.straying:
@@ -139,6 +142,12 @@ def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = (), *, pa
         refuted=refuted,
         paired=paired,
     )
+
+
+def is_unlikely(judge: Judge, last: Step, current: Fitted) -> bool:
+    """Whether a third effect, of drops, would have to take far more than the second did for nothing to be left."""
+    beyond = current.left - sum(b.residual.size for b in current.blocks)
+    return not judge.effort.thrifty and beyond > UNLIKELY * max(last.base.left - current.left, 0.0)
 
 
 def is_beyond_chance(found: Step | None, judge: Judge, phases: Phases) -> TypeGuard[Step]:

@@ -25,7 +25,7 @@ from rollover.diagnosis.thresholds import stretches
 
 LEADING, FOLLOWING = 4, 4  # of the first effects, and of later ones each, that are tried two by two
 SCORED = 16  # so many more, by what they scored at first
-ROUNDS = ((2, 40), (8, 6))  # of a short fit to few recordings, and how many of these are gone on with
+ROUNDS = ((2, 40), (2, 14), (6, 6))  # of a short fit to few recordings, and how many of these are gone on with
 PLACED, PLACES = 1.5, 2  # times what the best of them leaves, up to which so many are tried with their places elsewhere
 ALIKE = 2.0  # times what the best of them leaves, up to which the shape of what rings may make another the best
 

@@ -154,7 +154,7 @@ def ended(judge: Judge, fitted: Fitted) -> Fitted:
     """The fit gone on with over narrow steps as long as that gains: its rounds may have been too few; never worse."""
     best = fitted
     for _ in range(TWICE):
-        again = judge.fit(best.candidates, best.x, shifts=[b.shift for b in best.blocks], width=2)
+        again = judge.fit(best.candidates, best.x, shifts=[b.shift for b in best.blocks], width=2, finely=True)
         if again is None or again.left > best.left:
             break
         is_there = again.left > best.left - LITTLE

@@ -10,11 +10,12 @@ from rollover.diagnosis.blocks import Fitted
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import followed, freed, yardstick
-from rollover.diagnosis.refine import blocks_at, left_at
+from rollover.diagnosis.refine import blocks_at, few_of, left_at
 from rollover.effects import EFFECTS
 
 AFAR, NEAR = (np.arange(80) + 0.5) / 80, 0.002 * np.arange(-20, 21)  # places of a threshold, all along and about a fit
 VALLEYS = 3  # of these to either side in which a fit begins
+SHORT = 4  # rounds of a fit that tells whether one is worth while
 CLOCKS = ("sensor-clock-offset", "sensor-clock-drift")
 
 Stretch = tuple[int, float, float]  # a coordinate of a fit, and from where to where it is tried
@@ -45,13 +46,14 @@ def traced(judge: Judge, fitted: Fitted, stretch: Stretch) -> Fitted:
     """The fit begun anew where its last effect acts elsewhere, as strongly as recordings ask for there; never worse.
 
     A threshold that moves past a sample leaves a misfit of many small valleys: it is tried all along its stretch, and
-    finely beside the fit. What rings keeps its frequency meanwhile.
+    finely beside the fit, on few recordings. What rings keeps its frequency meanwhile.
     """
     if fitted.candidates[-1].rings:
         return _in_tune(judge, fitted, stretch)
     last, shifts = fitted.candidates[-1], [b.shift for b in fitted.blocks]
     k, at = stretch[0], len(fitted.x) - len(fitted.own)
-    blocks = blocks_at(judge, fitted.candidates[:-1], fitted.x[:at], shifts)
+    few = range(len(shifts)) if is_clock(fitted) else few_of(fitted)  # each has its own edges
+    blocks = blocks_at(judge, fitted.candidates[:-1], fitted.x[:at], shifts, few)
     best = fitted
     if blocks is None:
         return best
@@ -59,14 +61,27 @@ def traced(judge: Judge, fitted: Fitted, stretch: Stretch) -> Fitted:
     met = []
     for v in _places(fitted, stretch):
         there = (*fitted.x[:k], float(v), *fitted.x[k + 1 :])
-        x = there if is_clock(fitted) else _as_strong(judge, alone, last, there)
-        left = None if x is None else left_at(judge, fitted.candidates, x, shifts)
+        x = there if is_clock(fitted) else _as_strong(judge, alone, last, there, few)
+        left = None if x is None else left_at(judge, fitted.candidates, x, shifts, few)
         if x is not None and left is not None:
             met.append((left, x))
-    for x in _valleys(met)[:VALLEYS]:
+    for x in _soonest(judge, fitted, _valleys(met)[:VALLEYS], few):
         again = judge.fit(fitted.candidates, x, shifts=shifts, width=1)
         best = again if again is not None and again.left < best.left else best
     return best
+
+
+def _soonest(
+    judge: Judge, fitted: Fitted, places: Sequence[tuple[float, ...]], few: Sequence[int]
+) -> list[tuple[float, ...]]:
+    """Of several places those from which a short fit to `few` recordings comes to less than one from where a fit is."""
+    at = [fitted.blocks[r].shift for r in few]
+    short = [
+        judge.fit(fitted.candidates, x, rounds=SHORT, only=few, shifts=at, width=1, bare=True)
+        for x in (fitted.x, *places)
+    ]
+    own = np.inf if short[0] is None else short[0].total
+    return [one.x for one in short[1:] if one is not None and one.total < own]
 
 
 def _in_tune(judge: Judge, fitted: Fitted, stretch: Stretch) -> Fitted:
@@ -75,7 +90,8 @@ def _in_tune(judge: Judge, fitted: Fitted, stretch: Stretch) -> Fitted:
     bent, own = fitted.candidates[-1].bent(fitted.own)
     candidates, x = (*fitted.candidates[:-1], bent), (*fitted.x[:at], *own)
     there = [(*x[: stretch[0]], v, *x[stretch[0] + 1 :]) for v in _places(fitted, stretch)]
-    met = [(left, y) for y in there if (left := left_at(judge, candidates, y, shifts)) is not None]
+    few = few_of(fitted)
+    met = [(left, y) for y in there if (left := left_at(judge, candidates, y, shifts, few)) is not None]
     best = fitted
     for y in _valleys(met)[:VALLEYS]:
         new = judge.fit(candidates, y, shifts=shifts, width=1)
@@ -92,10 +108,15 @@ def _places(fitted: Fitted, stretch: Stretch) -> list[float]:
     return sorted(float(v) for v in (*AFAR, *(fitted.x[k] + NEAR)) if low <= v <= high and 0.0 < v < 1.0)
 
 
-def _as_strong(judge: Judge, alone: Fitted, last: Candidate, x: tuple[float, ...]) -> tuple[float, ...] | None:
-    """Coordinates x with the last effect as strong as recordings ask for beside the fit without it; None if none."""
+def _as_strong(
+    judge: Judge, alone: Fitted, last: Candidate, x: tuple[float, ...], few: Sequence[int]
+) -> tuple[float, ...] | None:
+    """Coordinates x with the last effect as strong as recordings ask for beside the fit without it; None if none.
+
+    `alone` is that fit, of these `few`.
+    """
     along, size = 0.0, 0.0
-    for r, b in enumerate(alone.blocks):
+    for r, b in zip(few, alone.blocks, strict=True):
         way = judge.moved(r, (alone.candidates, alone.x), ((*alone.candidates, last), x), b.shift)
         if way is not None:
             d = freed(way[:, None], b)[:, 0]
