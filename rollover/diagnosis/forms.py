@@ -45,6 +45,8 @@ def shaped(judge: Judge, f: Fitted, leaves: Sequence[float]) -> Fitted | None:
     if found.left > f.left:  # the few led to where the others are not met: all of them, from where the fit stands
         onward = judge.fit((*f.candidates[:-1], along), places[0], shifts=[b.shift for b in f.blocks])
         found = min((one for one in (found, onward) if one is not None), key=lambda one: one.left)
+    if found.left > _reach_of_all(f, leaves):
+        return None
     found = found if is_noise(found) or found.left > ASTRAY * sum(leaves) else polish(judge, found)
     (whole, x), shifts = found.candidates[-1].plain(found.own), [b.shift for b in found.blocks]
     bent = judge.fit((*f.candidates[:-1], whole), (*found.x[:at], *x), shifts=shifts, width=2)
@@ -68,7 +70,8 @@ def in_form(judge: Judge, f: Fitted, last: Candidate, leaves: Sequence[float]) -
         axes.append(list(ELSEWHERE) if there is None else [v for v in several if v is not None and 0.0 < v < 1.0])
     places = [(*f.x[:at], *own) for own in itertools.product(*axes)]
     met = by_what_is_left(judge, (*f.candidates[:-1], last), places, shifts, few_of(f))
-    return _best_of(judge, f, last, met[: 2 * STARTS], leaves)
+    found = _best_of(judge, f, last, met[: 2 * STARTS], leaves)
+    return found if found is not None and found.left < _reach_of_all(f, leaves) else None
 
 
 def enough(left: float, size: int) -> float:
@@ -88,7 +91,8 @@ def _best_of(
 
     Short fits to the recordings that are met worst, best and in the middle tell where to begin, and a few rounds of
     all which of these lead to one place; None if none can be made, or where much more than noise is left and none soon
-    takes a part of that: a shape that is the right one does.
+    takes a part of that: a shape that is the right one does. What then comes nowhere near what another explanation
+    `leaves` is returned as it stands.
     """
     candidates, few = (*f.candidates[:-1], last), few_of(f)
     at = [f.blocks[r].shift for r in few]
@@ -110,8 +114,13 @@ def _best_of(
     ]
     best: Fitted | None = None
     done: list[Fitted] = []
-    most = reach(leaves, sum(b.residual.size for b in f.blocks), NEARER)
-    for one in sorted((one for one in again if one is not None and one.total < most), key=lambda one: one.total):
+    ranked, most = (
+        sorted((one for one in again if one is not None), key=lambda one: one.total),
+        _reach_of_all(f, leaves),
+    )
+    for one in ranked:
+        if one.total > most:
+            return best or one
         if any(_is_there(one, other, ALIKE) for other in done) or (best and one.total > ABREAST * best.left):
             continue
         done.append(one)
@@ -129,6 +138,10 @@ def reach(leaves: Sequence[float], size: int, part: float) -> float:
     """
     left = sum(leaves)
     return left + max((BEHIND - 1.0) * (left - size), part * size)
+
+
+def _reach_of_all(f: Fitted, leaves: Sequence[float]) -> float:
+    return reach(leaves, sum(b.residual.size for b in f.blocks), NEARER)
 
 
 def _is_there(one: Fitted, other: Fitted, within: float = THERE) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from rollover.diagnosis.blocks import Block
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.crew import Job
 from rollover.diagnosis.explain import Step
-from rollover.diagnosis.fit import Fitted, Judge
+from rollover.diagnosis.fit import Fitted
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.effects import Search
 
@@ -43,12 +43,12 @@ def test_rivals_are_begun_anew_beside_what_the_best_was_followed_to() -> None:
     """A threshold that was followed beside the best alone leaves its rivals where they were."""
     asked: list[tuple[str, tuple[float, ...]]] = []
 
-    def fit(candidates: tuple[Candidate, ...], x: tuple[float, ...], **_: Any) -> Fitted:
-        asked.append((candidates[-1].id, x))
-        return fitted(candidates[-1].id, 4.0, x)
+    def fits(jobs: Sequence[Job]) -> list[Fitted | None]:
+        asked.extend((job.candidates[-1].id, job.start) for job in jobs)
+        return [fitted(job.candidates[-1].id, 4.0, job.start) for job in jobs]
 
     best, rival = fitted("mass", 1.0, (0.7, 0.3)), fitted("guide-friction", 9.0, (0.2, 0.4))
-    after = endings._with_rivals(cast(Judge, SimpleNamespace(fit=fit)), step(best, rival))
+    after = endings._with_rivals(cast(Inquiry, SimpleNamespace(fits=fits)), step(best, rival))
     assert asked == [("guide-friction", (0.7, 0.4))]
     assert [f.left for f in after.rivals] == [1.0, 4.0]
 
@@ -57,20 +57,18 @@ def test_rivals_are_begun_anew_beside_what_the_best_holds_in_the_form_that_it_ha
     """A damping that stood in two numbers beside its rivals was straightened beside the best."""
     asked: list[tuple[int, tuple[float, ...]]] = []
 
-    def fit(candidates: tuple[Candidate, ...], x: tuple[float, ...], **_: Any) -> Fitted:
-        asked.append((sum(len(c.search) for c in candidates), x))
-        return fitted(candidates[-1].id, 4.0, x)
-
     def fits(jobs: Sequence[Job]) -> list[Fitted | None]:
-        return [fit(job.candidates, job.start) for job in jobs]
+        asked.extend((sum(len(c.search) for c in job.candidates), job.start) for job in jobs)
+        return [fitted(job.candidates[-1].id, 4.0, job.start) for job in jobs]
 
     best, rival = fitted("soil-layer", 1.0, (0.7, 0.0, 0.3)), fitted("guide-friction", 9.0, (0.2, 0.4))
     bent = replace(rival.candidates[0], search={"a": Search(0, 1), "b": Search(0, 1)})
     stood = replace(rival, candidates=(bent, rival.candidates[1]), x=(0.2, 0.5, 0.4))
     found = step(best, stood)
     found = replace(found, base=replace(found.base, candidates=(bent,), x=(0.2, 0.5)))
-    endings._with_rivals(cast(Judge, SimpleNamespace(fit=fit)), found)
-    endings.simpler(cast(Inquiry, SimpleNamespace(fits=fits, candidates=[])), found)
+    there = cast(Inquiry, SimpleNamespace(fits=fits, candidates=[]))
+    endings._with_rivals(there, found)
+    endings.simpler(there, found)
     assert asked == [(2, (0.7, 0.4)), (2, (0.7, 0.4))]
 
 
@@ -217,9 +215,9 @@ def test_two_thresholds_in_one_place_are_a_threshold_and_a_stiffness(
     best, rival = fitted("soil-crust", 5.0, (0.7, 0.4, 0.3)), fitted("mass", 9.0, (0.7, 0.2))
     there = cast(Inquiry, SimpleNamespace(fits=fits, candidates=[plain, *others, best.candidates[0]], judge=None))
     found = endings.plainer(there, step(best, rival))
-    assert [(j.candidates[-1].id, j.how) for j in asked] == [("soil-stiffness", "fit"), ("soil-stiffness", "polish")][
-        : 1 + taken
-    ]
+    assert {j.candidates[-1].id for j in asked} == {"soil-stiffness"}
+    ways = [("fit", endings.SOON), ("fit", None), ("polish", None)]
+    assert [(j.how, j.rounds) for j in asked] == ways[: 2 + taken]
     assert asked[0].start[:-1] == (0.7,)
     assert (found is not None) is taken
     if found is not None:

@@ -91,3 +91,37 @@ def test_where_few_recordings_lead_astray_all_are_fitted_from_where_the_usual_sh
     assert found is not None
     assert len(found.x) == 2
     assert forms.is_noise(found)
+
+
+@pytest.mark.parametrize(
+    ("leaves", "soon", "then", "whole"),
+    [
+        (1.0, 1.45, 1.3, 1),  # beside an explanation that leaves noise: what comes near it may be another
+        (1.0, 1.45, 1.4, 0),
+        (1.0, 1.55, 1.3, 0),
+        (3.0, 4.9, 4.9, 1),  # twice as far from the noise as the best is
+        (3.0, 4.9, 5.1, 0),
+        (3.0, 5.1, 4.9, 0),
+    ],
+)
+def test_a_shape_is_gone_on_with_if_it_comes_near_what_another_explanation_leaves(
+    leaves: float, soon: float, then: float, whole: int
+) -> None:
+    """Times what chance leaves: after a short fit to few recordings, and after a few rounds of all."""
+    made = []
+
+    def fit(_: Any, x: Sequence[float], *, rounds: int | None = None, **how: Any) -> Fitted:
+        made.extend([] if rounds else [x])
+        return fitted(BENT, x, soon if rounds == forms.SHORT else then)
+
+    start, lead = fitted(DAMPING, (0.3,), 6.0), fitted(DAMPING, (0.3,), leaves)
+    size = sum(b.residual.size for b in lead.blocks)
+    scale = leaves * size / lead.total  # blocks of chance: what they leave is nearly their number
+    judge = cast(Judge, SimpleNamespace(fit=lambda *a, **k: _scaled(fit(*a, **k), scale)))
+    forms._best_of(judge, _scaled(start, scale), BENT, [(0.3, 0.4)], [scale * b.total for b in lead.blocks])
+    assert len(made) == whole
+
+
+def _scaled(f: Fitted, times: float) -> Fitted:
+    """A fit that leaves exactly so many times as much."""
+    return replace(f, blocks=tuple(replace(b, residual=b.residual * np.sqrt(times)) for b in f.blocks))

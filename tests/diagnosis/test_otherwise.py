@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.bins import simulated
+from rollover.diagnosis.blocks import Block
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.clocks import align
 from rollover.diagnosis.crew import Crew, Job, work
 from rollover.diagnosis.evidence import evidence_of
+from rollover.diagnosis.explain import SOON, _from_base
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
@@ -136,3 +138,29 @@ def test_a_recordings_clock_is_that_of_the_fit_that_leaves_least_where_another_e
     assert [(job.how, job.shifts) for job in asked] == [("time", tuple(judge.shifts))]
     assert abs(moved.blocks[1].shift - judge.shifts[1]) < 1e-4
     assert moved.left < late.left
+
+
+def test_what_was_led_astray_is_begun_anew_and_gone_on_with_if_it_soon_gains() -> None:
+    """The base leaves 400 and the best 200: one comes to 290 in a few rounds and to 250 in the end, one to 310."""
+    asked: list[Job] = []
+
+    def fitted(id: str, left: float, x: tuple[float, ...]) -> Fitted:
+        c = replace(PLAIN, id=id)
+        block = Block(
+            residual=np.full(4, np.sqrt(left / 4.0)), J=np.zeros((4, len(x))), slope=np.zeros(4), shift=0.0, prior=1.0
+        )
+        return Fitted(candidates=(PLAIN, c)[-len(x) :], x=x, blocks=(block,))
+
+    def fits(jobs: list[Job]) -> list[Fitted]:
+        asked.extend(jobs)
+        ends = {("inertia", SOON): 290.0, ("inertia", None): 250.0, ("air-drag", SOON): 310.0}
+        return [fitted(j.candidates[-1].id, ends[j.candidates[-1].id, j.rounds], j.start) for j in jobs]
+
+    base = fitted("mass", 400.0, (0.5,))
+    astray = [fitted("inertia", 900.0, (0.4, 0.9)), fitted("air-drag", 700.0, (0.4, 0.8))]
+    judge = SimpleNamespace(again=lambda f: f)
+    inquiry = cast(Inquiry, SimpleNamespace(fits=fits, judge=judge))
+    looked = Gate(score=1.0, scores={}, null=np.zeros(1), detectable={}, starts={"inertia": ((0.7,),)})
+    found = _from_base(inquiry, base, [fitted("slope", 200.0, (0.5, 0.2)), *astray], looked)
+    assert [(f.candidates[-1].id, f.left) for f in found] == [("inertia", 250.0), ("air-drag", 310.0)]
+    assert [j.start for j in asked] == [(0.5, 0.7), (0.5, 0.8), (0.5, 0.7)]

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from rollover.diagnosis import diagnose
+from rollover.diagnosis import diagnose, fit, thresholds
 from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import coordinate
 from rollover.diagnosis.clocks import align
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.explain import Step
-from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.forms import shaped
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
@@ -283,3 +285,37 @@ def test_two_effects_of_which_neither_comes_first_are_tried_together() -> None:
     assert left.p_value > 0.01
     assert c["mass"].values(both.fitted.x[:1])["added"] == pytest.approx(2.3, rel=0.05)
     assert c["guide-friction"].values(both.fitted.x[1:])["force"] == pytest.approx(31.0, rel=0.05)
+
+
+def test_a_fit_is_ended_finely_whatever_others_may_leave(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rounds that gain less than tells two fits apart are saved, until a fit is the last one."""
+    hidden = {"effects.soil-viscous-damping.damping": 900.0}
+    judge = judge_of(recorded(hidden, 2, speeds=(1.6, 2.6), channels=CHANNELS, rate=1500.0, noise=0.005))
+    c, begun = candidate(judge, "soil-viscous-damping"), (0.05,)
+    usual = judge.fit((c,), begun)
+    monkeypatch.setattr(fit, "ENOUGH", 1e5)
+    coarse, fine = judge.fit((c,), begun), judge.fit((c,), begun, finely=True)
+    assert usual is not None
+    assert coarse is not None
+    assert fine is not None
+    assert fine.left - 1e-6 < usual.left < fine.left + 1.0
+    assert coarse.left > fine.left + 1.0
+    assert ended(judge, coarse).left < fine.left + 0.05
+
+
+def test_a_place_is_gone_on_with_if_it_soon_leaves_less_than_where_the_fit_stands() -> None:
+    """Short fits to few recordings, one from the fit itself: what it gains on these alone others must gain too."""
+    block = SimpleNamespace(shift=0.0)
+    fitted = cast(Fitted, SimpleNamespace(candidates=(), x=(0.5,), blocks=(block, block, block)))
+    leaves = {0.5: 90.0, 0.1: 95.0, 0.2: 80.0, 0.3: None, 0.4: 89.0}
+    asked = []
+
+    def short(_: Any, x: tuple[float, ...], **how: Any) -> Any:
+        asked.append(how["only"])
+        left = leaves[x[0]]
+        return None if left is None else SimpleNamespace(x=(x[0] + 0.01,), total=left)
+
+    judge = cast(Judge, SimpleNamespace(fit=short))
+    found = thresholds._soonest(judge, fitted, [(0.1,), (0.2,), (0.3,), (0.4,)], (0, 2))
+    assert [round(x, 9) for (x,) in found] == [0.21, 0.41]
+    assert asked == 5 * [(0, 2)]

@@ -340,3 +340,30 @@ def test_beside_effects_in_another_form_the_last_one_is_looked_for_anew(
     assert looked == asked
     assert {c.id for c in parts[-1].fitted.candidates} == {"soil-layer", answers.get("soil-crust", CRUST)[0]}
     assert len(parts) == 2
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "unlikely"),
+    [
+        (400.0, 300.0, False),  # of 40 samples: the second took 100, a third would have to take 260
+        (320.0, 300.0, True),  # 20, and 260
+        (300.0, 305.0, True),  # under another noise it took nothing
+        (100.0, 50.0, False),
+    ],
+)
+def test_a_third_effect_is_not_looked_for_that_would_have_to_take_far_more_than_the_second(
+    before: float, after: float, unlikely: bool
+) -> None:
+    base, current = leaving(before), leaving(after)
+    last = explain.Step(base=base, fitted=current, p_value=0.0)
+    judge = cast(Judge, SimpleNamespace(effort=SimpleNamespace(thrifty=False)))
+    assert one_by_one.is_unlikely(judge, last, current) is unlikely
+    # a full run costs much, and a third is rare there
+    assert not one_by_one.is_unlikely(cast(Judge, SimpleNamespace(effort=SimpleNamespace(thrifty=True))), last, current)
+
+
+def leaving(squares: float) -> Fitted:
+    """A fit of nothing to 40 samples that leaves so much."""
+    residual = np.full(40, np.sqrt(squares / 40.0))
+    block = Block(residual=residual, J=np.zeros((40, 0)), slope=np.zeros(40), shift=0.0, prior=1.0)
+    return Fitted(candidates=(), x=(), blocks=(block,))

@@ -87,3 +87,29 @@ def test_what_does_not_exist_or_is_out_of_bounds_is_refused(
     scenario: Scenario = load(DROP)
     with pytest.raises(error, match=says):
         exchanged(scenario, changes)
+
+
+def test_what_several_scenarios_share_is_exchanged_once() -> None:
+    """Six drops of one striker differ by their speed: an effect is made for the first, and is that of all others."""
+    some = load(DROP)
+    other = exchanged(some, {"initiation.speed": 2.0})
+    assert exchanged(other, LAYER).effects is exchanged(some, LAYER).effects
+    twice = {**LAYER, "effects.mass.added": 1.0}
+    assert exchanged(other, twice).effects["soil-layer"] == exchanged(some, LAYER).effects["soil-layer"]
+    assert exchanged(other, {**LAYER, "effects.soil-layer.depth": 0.06}).effects["soil-layer"].depth == 0.06
+
+
+def test_a_part_is_told_from_another_by_what_its_values_are() -> None:
+    """1 and 1.0 are equal, and not the same."""
+    for value in (1.0, 1, 1.0):
+        assert type(exchanged(load(DROP), {"effects.mass.added": value}).effects["mass"].added) is type(value)
+
+
+def test_a_value_that_cannot_be_looked_up_is_exchanged_all_the_same() -> None:
+    class Loose(float):
+        __hash__ = None  # type: ignore[assignment]
+
+    with pytest.raises(TypeError):
+        hash(Loose(3.0))
+    for added in (3.0, 4.0):
+        assert exchanged(load(DROP), {"effects.mass.added": Loose(added)}).effects["mass"].added == added
