@@ -43,8 +43,7 @@ class Averaged:
         every = self.inner.predict(changes, shift)
         if every is None:
             return None
-        found = {name: values for name, values in every.items() if not name.startswith(LEAP_IN)}
-        return {**self._means(found), **self._leaps(found)}
+        return {**self._means(every), **self._leaps(every)}
 
     def _leaps(self, found: Mapping[str, Array]) -> dict[str, Array]:
         if np.all(self.counts == self.many):
@@ -121,7 +120,8 @@ def simulated(scenario: Scenario, recording: Recording) -> tuple[Recording, Simu
     channels = {c: v[at] for c, v in recording.channels.items()}  # which there are is all that is asked of them
     part = replace(recording, time=np.concatenate(stamps), channels=channels)
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    return thin, Averaged(inner=simulator_of(scenario, part), starts=starts, counts=counts, many=many), many
+    inner = simulator_of(scenario, part, leaps=False)
+    return thin, Averaged(inner=inner, starts=starts, counts=counts, many=many), many
 
 
 def binned(recording: Recording) -> Recording:

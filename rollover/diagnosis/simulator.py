@@ -76,9 +76,10 @@ class DropSimulator:
 
     effort = DROPS
 
-    def __init__(self, scenario: Scenario, recording: Recording) -> None:
+    def __init__(self, scenario: Scenario, recording: Recording, *, leaps: bool = True) -> None:
         self.model = DropModel(scenario=scenario)
         self.recording = recording
+        self.leaps = leaps  # whether it says how far channels leap
         self._raw: dict[tuple[Any, ...], dict[str, Array]] = {}
         self._models: dict[tuple[Any, ...], DropModel] = {}
         self._tracks: dict[tuple[Any, ...], Track] = {}
@@ -86,7 +87,8 @@ class DropSimulator:
     def __getstate__(self) -> dict[str, Any]:
         """What is sent to another process: not the runs."""
         bare = DropModel(scenario=self.model.scenario)
-        return {"model": bare, "recording": self.recording, "_raw": {}, "_models": {}, "_tracks": {}}
+        stores: dict[str, Any] = {"_raw": {}, "_models": {}, "_tracks": {}}
+        return {"model": bare, "recording": self.recording, "leaps": self.leaps, **stores}
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """See `Simulator`; ``ValueError`` for a value out of bounds passes."""
@@ -101,7 +103,8 @@ class DropSimulator:
                 channels = dict(read({n: e for n, e in sensors.items() if e.id not in EDGES}, run).channels)
         except DropFailedError:
             return None
-        return {**behind_filters(channels, self.recording, self.rows), **self._leaps(physical, shift, sensors)}
+        found = behind_filters(channels, self.recording, self.rows)
+        return found | self._leaps(physical, shift, sensors) if self.leaps else found
 
     def strays(
         self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1
@@ -115,7 +118,7 @@ class DropSimulator:
 
     def until(self, n: int) -> DropSimulator:
         """See `Simulator`."""
-        return DropSimulator(self.model.scenario, self.recording.until(n))
+        return DropSimulator(self.model.scenario, self.recording.until(n), leaps=self.leaps)
 
     def marks(self) -> tuple[tuple[float, str], ...]:
         """See `Simulator`."""
@@ -220,13 +223,13 @@ class DropSimulator:
         store[key] = value
 
 
-def simulator_of(scenario: Scenario, recording: Recording) -> Simulator:
+def simulator_of(scenario: Scenario, recording: Recording, *, leaps: bool = True) -> Simulator:
     """The quickest simulator that a scenario admits; the recording's conditions are put in by path.
 
-    Raises `InputError` for a condition that the scenario does not know.
+    `leaps` as in `DropSimulator`. Raises `InputError` for a condition that the scenario does not know.
     """
     own = set_up(scenario, recording)
-    return RunSimulator(own, recording) if unfit(own) else DropSimulator(own, recording)
+    return RunSimulator(own, recording) if unfit(own) else DropSimulator(own, recording, leaps=leaps)
 
 
 def set_up(scenario: Scenario, recording: Recording) -> Scenario:
