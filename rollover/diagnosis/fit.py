@@ -25,8 +25,8 @@ NEAR = 2.0  # misfit over the noise, up to which slopes are those of the place i
 KEPT = 0.7  # of the gain that slopes promise, which a step must make for those of what is held to be kept
 SLOW = 0.01  # of what is left, that a step must gain for the same
 SHORTER = (0.5, 0.0)  # of the way of a time shift, tried where all of it leads nowhere
-PROMISING = 0.3  # of such a gain, that slopes must promise
 ENOUGH, FINELY = 0.3, 1e-3  # gain of a round below which a search narrows; where a fit is ended
+PROMISING, HARDLY = 0.3, 0.1  # of such a gain, and of what is enough where more is left, that slopes must promise
 NOISE_LEFT = 1.04  # misfit over the noise that needs no further search
 NONE = np.zeros(0, dtype=np.int64)
 
@@ -316,7 +316,7 @@ class Judge:
                 trial = [float(v) for v in np.clip(np.array(x) + dx, 0.0, 1.0)]
                 moved = np.array(trial) - np.array(x)
                 due = 2.0 * float(b @ moved) - float(moved @ A @ moved)
-                if width and due < PROMISING * enough:
+                if width and due < max(PROMISING * least, HARDLY * enough):
                     break  # nothing more is to be had, by these slopes
                 steps = [shift_of(block, moved) for block in blocks]
                 self.made_ahead((r, candidates, trial) for r in use)

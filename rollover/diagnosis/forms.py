@@ -114,11 +114,8 @@ def _best_of(
     ]
     best: Fitted | None = None
     done: list[Fitted] = []
-    ranked, most = (
-        sorted((one for one in again if one is not None), key=lambda one: one.total),
-        _reach_of_all(f, leaves),
-    )
-    for one in ranked:
+    most = _reach_of_all(f, leaves)
+    for one in sorted((one for one in again if one is not None), key=lambda one: one.total):
         if one.total > most:
             return best or one
         if any(_is_there(one, other, ALIKE) for other in done) or (best and one.total > ABREAST * best.left):
