@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.bins import simulated
-from rollover.diagnosis.simulator import SHORTEST, STEP, DropSimulator
+from rollover.diagnosis.simulator import SHORTEST, STEP, DropSimulator, set_up
 from rollover.drop import DropModel
 from rollover.effects.empirical import Empirical
+from rollover.initiation import Drop
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
@@ -109,3 +110,15 @@ def test_a_force_term_that_may_jump_anywhere_takes_the_shortest_steps(
     _, recording = recorded({}, speeds=(2.0,))[0]
     made = DropSimulator(scenario(), recording)._model({"effects.empirical.first_force": force})
     assert made.step == step
+
+
+def test_drops_share_what_their_conditions_leave_as_it_is() -> None:
+    """Two speeds: one ground, and one table of numbers for the kernel, whatever effect is switched on."""
+    own = scenario()
+    made = [set_up(own, recording) for _, recording in recorded({}, speeds=(1.3, 2.2))]
+    assert [s.initiation.speed for s in made if isinstance(s.initiation, Drop)] == [1.3, 2.2]
+    assert made[0].ground is made[1].ground is own.ground
+    layer = {"effects.soil-layer.depth": 0.1}
+    one, other = (DropModel(scenario=s).with_(layer).told[1] for s in made)
+    assert one is other
+    assert one.tolist() != DropModel(scenario=own).told[1].tolist()
