@@ -210,7 +210,7 @@ def done_by_others(judge: Judge, found: Explanation, ids: Collection[str]) -> se
     if judge.effort.thrifty:
         return set(ids)
     fitted, done = found.fitted, set()
-    phi = max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks))
+    phi = judge.per_error * max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks))
     shifts = [b.shift for b in fitted.blocks]
     for k, c in enumerate(fitted.candidates):
         if c.id not in ids:

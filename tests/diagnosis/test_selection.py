@@ -124,9 +124,12 @@ def test_the_gain_of_one_effect_that_may_be_nothing_tells_nothing_either() -> No
 
 @pytest.mark.parametrize(("second_order", "offset", "done"), [(0.0, -4e-4, False), (0.25, 0.0, True)])
 def test_what_may_be_nothing_is_another_effects_work_only_if_that_does_it(
-    second_order: float, offset: float, done: bool
+    second_order: float, offset: float, done: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A sensor of second order comes late, as one of first does whose clock is off."""
+    """A sensor of second order comes late, as one of first does whose clock is off.
+
+    Where a tolerance prevails all samples of a signal share one error, and what they lose together counts for one.
+    """
     lag = {"channel": ACCELERATION, "time": 3e-3, "second_order": second_order}
     clock = {"channel": ACCELERATION, "offset": offset}
     changes = {f"effects.sensor-lag.{k}": v for k, v in lag.items()}
@@ -144,6 +147,8 @@ def test_what_may_be_nothing_is_another_effects_work_only_if_that_does_it(
     doubtful = {"sensor-clock-offset"}
     assert selection.done_by_others(judge, found, doubtful) == (doubtful if done else set())
     assert selection.done_by_others(judge, found, set()) == set()
+    monkeypatch.setattr(Judge, "per_error", 1e6)
+    assert selection.done_by_others(judge, found, doubtful) == doubtful
 
 
 @pytest.mark.parametrize(("channels", "named"), [(("a", "a"), 0), (("a", "b"), 2), ((None, None), 2), ((None, "a"), 2)])
