@@ -29,6 +29,7 @@ KNOWN, UNKNOWN = 4e-3, 30e-3  # s, by which a clock's zero may be off
 class Averaged:
     """A simulator at several stamps for each mean, `starts` (bins,) where those of each begin; predicts the means.
 
+    `inner` tells of no leaps from stamp to stamp, see `DropSimulator`: their means would say nothing.
     Where fewer than all that are in a mean are simulated, it also says under `LEAP_IN` and the channel's name how far
     that leaps within or beside each mean: of how many of its samples it has leapt already is not known then.
     """

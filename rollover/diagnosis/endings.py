@@ -146,8 +146,8 @@ def _plainer_last(inquiry: Inquiry, found: Step) -> Step | None:
     shifts = tuple(b.shift for b in best.blocks)
     jobs = [Job(candidates=(*beside, c), start=(*shared, *c.probes()[0]), shifts=shifts, rounds=SOON) for c in able]
     short = sorted((f for f in inquiry.fits(jobs) if f is not None), key=lambda f: f.total)[:PLAINER]
-    jobs = [Job(candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks)) for f in short]
-    one = min((f for f in inquiry.fits(jobs) if f is not None), key=lambda f: f.left, default=None)
+    whole = inquiry.fits([from_there(f, "fit") for f in short])
+    one = min((f for f in whole if f is not None), key=lambda f: f.left, default=None)
     if one is None or one.left > LEADS * best.left:
         return None
     one = inquiry.fits([from_there(one, "polish")])[0] or one

@@ -131,16 +131,14 @@ def _from_base(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: G
 
     Those that soon gain a part of what the best does are gone on with.
     """
-    jobs, least = [], min(f.left for f in fits)
+    jobs, least, shifts = [], min(f.left for f in fits), tuple(b.shift for b in base.blocks)
     for f in fits:
         if f.left > base.left:
             begin = looked.starts.get(f.candidates[-1].key, (f.own,))[0]
-            shifts = tuple(b.shift for b in base.blocks)
             jobs.append(Job(candidates=f.candidates, start=(*base.x, *begin), shifts=shifts, rounds=SOON))
     short = [f for f in inquiry.fits(jobs) if f is not None]
     able = [f for f in short if base.left - f.total > PART * (base.left - least)]
-    jobs = [Job(candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks)) for f in able]
-    ended = [f for f in inquiry.fits(jobs) if f is not None]
+    ended = [f for f in inquiry.fits([from_there(f, "fit") for f in able]) if f is not None]
     return ended + [inquiry.judge.again(f) for f in short if not any(f is one for one in able)]
 
 

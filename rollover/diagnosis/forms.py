@@ -138,6 +138,7 @@ def reach(leaves: Sequence[float], size: int, part: float) -> float:
 
 
 def _reach_of_all(f: Fitted, leaves: Sequence[float]) -> float:
+    """The same of a fit to all recordings that was gone on with."""
     return reach(leaves, sum(b.residual.size for b in f.blocks), NEARER)
 
 

@@ -245,7 +245,7 @@ def traced_too(inquiry: Inquiry, fitted: Fitted) -> Fitted:
     return min([fitted, *(f for f in begun if f is not None)], key=lambda f: f.left)
 
 
-def from_there(f: Fitted, how: Literal["polish", "shape", "time", "trace"]) -> Job:
+def from_there(f: Fitted, how: Literal["fit", "polish", "shape", "time", "trace"]) -> Job:
     """What is made of a fit where it stands."""
     return Job(how=how, candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks))
 
