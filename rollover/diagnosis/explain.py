@@ -120,10 +120,10 @@ def step(inquiry: Inquiry, base: Fitted, looked: Gate) -> Step | None:
 
 def _by_fits(judge: Judge, fits: Sequence[Fitted], groups: Groups) -> list[Fitted]:
     """The fits, with what the one that leaves least foretells by fits, where by its slopes another foretells better."""
-    lead = min(fits, key=lambda f: f.left)
-    if lead is min(fits, key=lambda f: held_out(f, groups).left.sum()):
+    lead, ahead = min(fits, key=lambda f: f.left), min(fits, key=lambda f: held_out(f, groups).left.sum())
+    if lead is ahead:
         return list(fits)
-    return [refitted(judge, f, groups) if f is lead else f for f in fits]
+    return [refitted(judge, f, groups, held_out(ahead, groups).total) if f is lead else f for f in fits]
 
 
 def _from_base(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: Gate) -> list[Fitted]:

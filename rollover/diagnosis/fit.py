@@ -26,6 +26,7 @@ KEPT = 0.7  # of the gain that slopes promise, which a step must make for those 
 SLOW = 0.01  # of what is left, that a step must gain for the same
 SHORTER = (0.5, 0.0)  # of the way of a time shift, tried where all of it leads nowhere
 ENOUGH, FINELY = 0.3, 1e-3  # gain of a round below which a search narrows; where a fit is ended
+TRIFLING = 1e-3  # of what is left beyond the noise: the same of drops, where much is
 PROMISING, HARDLY = 0.3, 0.1  # of such a gain, and of what is enough where more is left, that slopes must promise
 NOISE_LEFT = 1.04  # misfit over the noise that needs no further search
 NONE = np.zeros(0, dtype=np.int64)
@@ -310,6 +311,8 @@ class Judge:
                 Ar, br, _ = block.normal()
                 A, b = A + Ar, b + br
             improved, enough, total = False, max(least, FINELY * 1e-2 * best, self.effort.least), best
+            if least > FINELY and not self.effort.thrifty:
+                enough = max(enough, TRIFLING * (best - sum(k.residual.size for k in blocks)))
             due = 0.0  # gain of a step by these slopes
             for _ in range(TRIES):
                 dx = bounded(A, b, np.array(x), damping)

@@ -19,6 +19,7 @@ ABREAST = 1.5  # times what the best of short fits leaves, up to which others ar
 FAR = 2.0  # misfit over the noise, from which on much is left
 SOON = 0.95  # times what an effect leaves as it is, that the shape which it has must then leave after a short fit
 THERE = 0.003  # of a coordinate, within which two short fits came to one place
+AS_MUCH = 0.01  # of what it leaves, within which another one near it is on the way to one place with it
 ASTRAY = 1.2  # times what another explanation leaves, above which a crooked valley is not followed
 FURTHER, ALIKE = 3, 0.1  # rounds of all recordings, after which fits within so much of a coordinate go to one place
 # of the samples, by which a short fit, and one gone on with, may leave more than another explanation that leaves noise
@@ -108,6 +109,7 @@ def _best_of(
             break
         if len(begun) < STARTS and not any(_is_there(one, other) for other in begun):
             begun.append(one)
+    begun = [one for k, one in enumerate(begun) if not any(_is_one_valley(one, other) for other in begun[:k])]
     held = [b.shift for b in f.blocks]
     again = [
         judge.fit(candidates, one.x, shifts=shifts_told(held, one, few), rounds=FURTHER, bare=True) for one in begun
@@ -140,6 +142,11 @@ def reach(leaves: Sequence[float], size: int, part: float) -> float:
 def _reach_of_all(f: Fitted, leaves: Sequence[float]) -> float:
     """The same of a fit to all recordings that was gone on with."""
     return reach(leaves, sum(b.residual.size for b in f.blocks), NEARER)
+
+
+def _is_one_valley(one: Fitted, other: Fitted) -> bool:
+    """Whether two short fits are on their way to one place, and as far."""
+    return _is_there(one, other, ALIKE) and abs(one.total - other.total) < AS_MUCH * other.total
 
 
 def _is_there(one: Fitted, other: Fitted, within: float = THERE) -> bool:

@@ -11,7 +11,7 @@ from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.crew import Job
 from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.endings import followed, mirror_images, simpler, unbent
-from rollover.diagnosis.explain import SURE, Step, step
+from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Step, step
 from rollover.diagnosis.fit import Fitted
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
@@ -27,6 +27,7 @@ LEADING, FOLLOWING = 4, 4  # of the first effects, and of later ones each, that 
 SCORED = 16  # so many more, by what they scored at first
 ROUNDS = ((2, 40), (2, 14), (6, 6))  # of a short fit to few recordings, and how many of these are gone on with
 PLACED, PLACES = 1.5, 2  # times what the best of them leaves, up to which so many are tried with their places elsewhere
+LITTLE = 0.1  # of what the best effect alone leaves beyond the noise, that a pair must take to be gone on with
 ALIKE = 2.0  # times what the best of them leaves, up to which the shape of what rings may make another the best
 
 
@@ -91,6 +92,8 @@ def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: Gate) -> Step | N
         ]
         met = sorted((f for f in inquiry.fits(jobs) if f is not None), key=lambda f: f.left)[:most]
         short = [(f.candidates, f.x) for f in met]
+    if not met or _takes_little(judge.again(lead), met[0], few):
+        return None
     jobs = [Job(candidates=f.candidates, start=f.x, shifts=shifts_told(shifts, f, few)) for f in met]
     fits = [f for f in inquiry.fits(jobs) if f is not None]
     if not fits:
@@ -105,6 +108,15 @@ def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: Gate) -> Step | N
                 best = min(best, *shaped_too(inquiry, alone, [pair]), key=lambda f: f.left)
     alone = judge.fit(best.candidates[:-1], best.x[: -len(best.own)], shifts=[b.shift for b in best.blocks])
     return None if alone is None else Step(base=alone, fitted=best, p_value=first.p_value, rivals=(best,))
+
+
+def _takes_little(lead: Fitted, pair: Fitted, few: Sequence[int]) -> bool:
+    """Whether a pair fitted to few recordings takes next to nothing of what its lead alone leaves beyond the noise.
+
+    Where that is little itself none does for sure: the place of a threshold decides, and is looked for later.
+    """
+    alone, size = sum(lead.blocks[r].total for r in few), sum(lead.blocks[r].residual.size for r in few)
+    return alone > NEARLY_NOISE**2 * size and alone - pair.total < LITTLE * (alone - size)
 
 
 def _in_tune(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fitted]:

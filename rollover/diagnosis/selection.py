@@ -29,6 +29,7 @@ SCATTERED = 0.05  # share of all errors that the look at candidates may make whe
 CERTAIN = 1.0 - 1e-12  # largest p-value whose logarithm is taken
 PARTLY = 0.005  # of the excess over the noise that one effect may leave, were it structured, and still be named
 LITTLE = 0.1  # of the excess over the noise, that effects must take which leave far more than noise
+AGAIN = 1  # times that one of as many effects as may be is given for a better one
 HARDLY_MORE = 1.2  # times a tolerance, that an explanation leaves of held-out recordings
 
 
@@ -50,6 +51,7 @@ class Explanation:
     after: Mismatch
     first: Step | None = None
     refuted: bool = False  # whether the best candidate's gain did not outlast the scatter of its own runs
+    settled: bool = True  # whether as many effects as may be are these, and not any that can be bent to what is there
 
     def refused(self) -> Explanation:
         """The same with nothing held to be found."""
@@ -89,8 +91,9 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
             (taken, left), current = both, both[0][-1].fitted
             is_whole = is_enough(judge, current, left)
     parts = [s.again(judge) for s in taken]
-    if is_whole and len(taken) > 1:
-        parts = _needed(inquiry, taken)
+    needed = _needed(inquiry, taken) if is_whole and len(taken) > 1 else parts
+    if needed is not None and needed is not parts:
+        parts = needed
         parts[-1], _ = followed(inquiry, parts[-1])
         parts = parts if judge.effort.thrifty else [mirrored(inquiry, s) for s in parts]
     base = unforgiven(judge, base) if taken and judge.effort.thrifty else judge.again(base)
@@ -106,14 +109,16 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
         after=mismatch_of(judge.evidence, current.blocks, phases),
         first=found.first.again(judge).foretold(judge, groups) if found.first is not None else None,
         refuted=found.refuted,
+        settled=needed is not None,
     )
 
 
-def _needed(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step]:
+def _needed(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
     """Steps of the effects that are needed: each dropped if that costs no more than chance, or given to a better one.
 
     Beside a better one others may not be needed any more. Returned in such an order that the last one's fit is the
-    whole explanation; every step's fit is.
+    whole explanation; every step's fit is. None where as many as may be are given for others again and again: that any
+    which can be bent to it will do explains nothing.
     """
     judge = inquiry.judge
     current, last = without_needless(judge, judge.again(taken[-1].fitted)), taken[-1]
@@ -133,6 +138,8 @@ def _needed(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step]:
         current = without_needless(judge, found.fitted)
         if found.fitted.candidates[-1].key != taken_out and exchanged < MOST:
             parts, exchanged = [], exchanged + 1  # those before were looked for beside what is no more
+            if exchanged > AGAIN and len(current.candidates) == MOST:
+                return None
         parts = [*parts, found] if len(current.candidates) == len(found.fitted.candidates) else []
     return [s.again(judge) for s in parts]
 
@@ -167,7 +174,7 @@ def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) ->
     as may be, or two of one sensor, or of a soil that is bent, more surely so: they can be bent to more. One alone also
     where it takes nearly all.
     """
-    if is_any_curve(found.fitted.candidates) or is_a_curve(judge, found.fitted):
+    if not found.settled or is_any_curve(found.fitted.candidates) or is_a_curve(judge, found.fitted):
         return found.refused(), "unexplained"
     held = found.fitted.candidates
     is_bending = len(found.parts) == MOST or is_one_sensor(held) or is_pliant(held)

@@ -57,6 +57,34 @@ def test_of_fits_that_lead_to_one_place_one_is_followed(ends: tuple[float, ...],
 
 
 @pytest.mark.parametrize(
+    ("near", "gone_on_with"),
+    [
+        ([(0.20, 10.0), (0.25, 10.05), (0.60, 10.1)], [0.20, 0.60]),  # two on their way to one place, as far
+        ([(0.20, 10.0), (0.25, 10.3), (0.60, 10.4)], [0.20, 0.25, 0.60]),  # not as far: a valley of many
+        ([(0.20, 10.0), (0.35, 10.05), (0.60, 10.1)], [0.20, 0.35, 0.60]),
+        # those that are apart, up to three: a fourth does not come instead
+        ([(0.20, 10.0), (0.25, 10.05), (0.60, 10.06), (0.90, 10.2)], [0.20, 0.60]),
+    ],
+)
+def test_of_short_fits_on_their_way_to_one_place_one_is_gone_on_with(
+    near: list[tuple[float, float]], gone_on_with: list[float]
+) -> None:
+    """Begun at places that leave so much after a short fit."""
+    begun: list[float] = []
+
+    def fit(_: Any, x: Sequence[float], *, rounds: int | None = None, **how: Any) -> Fitted:
+        if rounds == forms.SHORT:
+            return fitted(BENT, x, dict(near)[x[1]])
+        if rounds == forms.FURTHER:
+            begun.append(x[1])
+        return fitted(BENT, x, 9.0)
+
+    judge, start = cast(Judge, SimpleNamespace(fit=fit)), fitted(DAMPING, (0.3,), 30.0)
+    forms._best_of(judge, start, BENT, [(0.3, v) for v, _ in near], [b.total for b in start.blocks])
+    assert begun == gone_on_with
+
+
+@pytest.mark.parametrize(
     ("left", "soon", "is_followed"), [(30.0, 29.0, False), (30.0, 28.0, True), (3.0, 2.99, True), (3.0, 2.6, True)]
 )
 def test_far_from_noise_a_shape_is_followed_if_it_soon_takes_part(left: float, soon: float, is_followed: bool) -> None:

@@ -128,6 +128,30 @@ def test_places_of_the_best_pairs_are_tried_all_along_unless_nothing_but_noise_i
     assert asked == []
 
 
+@pytest.mark.parametrize(
+    ("alone", "pair", "takes_little"),
+    [
+        (21.0, 19.5, True),  # 1.5 of 20 times what chance leaves
+        (21.0, 18.5, False),
+        (1.6, 1.59, False),  # not much is left: what takes all of it may not be met yet
+    ],
+)
+def test_a_pair_that_takes_next_to_nothing_of_much_is_not_gone_on_with(
+    alone: float, pair: float, takes_little: bool
+) -> None:
+    lead, both = leaving((DAMPING,), alone), leaving((DAMPING, MASS), pair)
+    assert pairs._takes_little(lead, both, (0, 1)) is takes_little
+    # of few recordings the pair was fitted to these alone
+    assert pairs._takes_little(lead, replace(both, blocks=both.blocks[:1]), (1,)) is takes_little
+
+
+def leaving(candidates: tuple[Candidate, ...], times: float) -> Fitted:
+    """A fit that leaves just so many times the number of samples."""
+    found = fitted(candidates, 1.0)
+    blocks = tuple(replace(b, residual=np.full(40, np.sqrt(times)), shift=0.0) for b in found.blocks)
+    return replace(found, blocks=blocks)
+
+
 LAYER, CRUST = (
     Candidate(
         id=f"soil-{name}", kind="physics", family="", search={at: Search(0.01, 1, "log"), "stiffness_ratio": RATIO}

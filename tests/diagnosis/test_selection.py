@@ -299,52 +299,12 @@ def test_beside_what_rings_in_tune_the_other_of_a_pair_is_looked_for_anew(
     assert asked == ([] if p_value > 0.001 else ["structural-compliance"])
 
 
-def of(*effects: tuple[str, tuple[str, ...]]) -> Fitted:
-    """A fit of effects with these numbers."""
-    kinds = [Candidate(id=i, kind="physics", family="", search=dict.fromkeys(own, Search(0, 1))) for i, own in effects]
-    return Fitted(candidates=tuple(kinds), x=(0.5,) * sum(len(own) for _, own in effects), blocks=())
-
-
-LAYER, CRUST, STIFFNESS = ("soil-layer", ("a", "b")), ("soil-crust", ("a", "b")), ("soil-stiffness", ("a",))
-BENT = ("soil-layer", ("a", "b", "width"))
-
-
-@pytest.mark.parametrize(
-    ("beside", "answers", "asked"),
-    [
-        (LAYER, {"soil-layer": LAYER}, ["soil-layer"]),  # found beside just this layer
-        (BENT, {"soil-layer": LAYER, "soil-crust": CRUST}, ["soil-layer", "soil-crust"]),
-        (BENT, {"soil-layer": LAYER, "soil-crust": STIFFNESS, "soil-stiffness": STIFFNESS},
-         ["soil-layer", "soil-crust", "soil-layer"]),
-    ],
-)  # fmt: skip
-def test_beside_effects_in_another_form_the_last_one_is_looked_for_anew(
-    monkeypatch: pytest.MonkeyPatch, beside: Any, answers: dict[str, Any], asked: list[str]
-) -> None:
-    """A layer that was bent to do a stiffness's work as well left little to it: a crust came, the layer is straight.
-
-    What takes the place of the crust stands beside another: the layer is looked for once more, now beside that.
-    """
-    looked: list[str] = []
-
-    def instead(_: Any, current: Fitted) -> Step:
-        first, *rest = current.candidates
-        looked.append(first.id)
-        kept = [(c.id, tuple(c.search)) for c in rest]
-        found = of(*kept, answers[first.id])
-        return Step(base=of(*kept), fitted=found, p_value=0.0, rivals=(found,))
-
-    monkeypatch.setattr(selection, "instead", instead)
-    monkeypatch.setattr(selection, "without_needless", lambda _, f: f)
-    judge = SimpleNamespace(again=lambda f: f, effort=DROPS)
-    taken = [
-        Step(base=of(), fitted=of(beside), p_value=0.0),
-        Step(base=of(beside), fitted=of(LAYER, CRUST), p_value=0.0),
-    ]
-    parts = selection._needed(cast(Inquiry, SimpleNamespace(judge=judge)), taken)
-    assert looked == asked
-    assert {c.id for c in parts[-1].fitted.candidates} == {"soil-layer", answers.get("soil-crust", CRUST)[0]}
-    assert len(parts) == 2
+def test_effects_that_may_be_any_others_are_not_named(judged: dict[str, float]) -> None:
+    judge = cast(Judge, SimpleNamespace(evidence=(), effort=DROPS))
+    found = explanation(MOST, 0.4)
+    assert len(decided(judge, found, [], [])[0].parts) == MOST
+    refused, verdict = decided(judge, replace(found, settled=False), [], [])
+    assert (refused.parts, verdict) == ((), "unexplained")
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,109 @@
+"""Of several effects each is taken out and looked for anew: what comes back, what comes instead, what any could do."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from rollover.diagnosis import selection
+from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.effort import DROPS
+from rollover.diagnosis.explain import Step
+from rollover.diagnosis.fit import Fitted
+from rollover.diagnosis.inquiry import Inquiry
+from rollover.diagnosis.selection import MOST
+from rollover.effects import Search
+
+
+def of(*effects: tuple[str, tuple[str, ...]]) -> Fitted:
+    """A fit of effects with these numbers."""
+    kinds = [Candidate(id=i, kind="physics", family="", search=dict.fromkeys(own, Search(0, 1))) for i, own in effects]
+    return Fitted(candidates=tuple(kinds), x=(0.5,) * sum(len(own) for _, own in effects), blocks=())
+
+
+LAYER, CRUST, STIFFNESS = ("soil-layer", ("a", "b")), ("soil-crust", ("a", "b")), ("soil-stiffness", ("a",))
+BENT = ("soil-layer", ("a", "b", "width"))
+
+
+@pytest.mark.parametrize(
+    ("beside", "answers", "asked"),
+    [
+        (LAYER, {"soil-layer": LAYER}, ["soil-layer"]),  # found beside just this layer
+        (BENT, {"soil-layer": LAYER, "soil-crust": CRUST}, ["soil-layer", "soil-crust"]),
+        (BENT, {"soil-layer": LAYER, "soil-crust": STIFFNESS, "soil-stiffness": STIFFNESS},
+         ["soil-layer", "soil-crust", "soil-layer"]),
+    ],
+)  # fmt: skip
+def test_beside_effects_in_another_form_the_last_one_is_looked_for_anew(
+    monkeypatch: pytest.MonkeyPatch, beside: Any, answers: dict[str, Any], asked: list[str]
+) -> None:
+    """A layer that was bent to do a stiffness's work as well left little to it: a crust came, the layer is straight.
+
+    What takes the place of the crust stands beside another: the layer is looked for once more, now beside that.
+    """
+    looked: list[str] = []
+
+    def instead(_: Any, current: Fitted) -> Step:
+        first, *rest = current.candidates
+        looked.append(first.id)
+        kept = [(c.id, tuple(c.search)) for c in rest]
+        found = of(*kept, answers[first.id])
+        return Step(base=of(*kept), fitted=found, p_value=0.0, rivals=(found,))
+
+    monkeypatch.setattr(selection, "instead", instead)
+    monkeypatch.setattr(selection, "without_needless", lambda _, f: f)
+    judge = SimpleNamespace(again=lambda f: f, effort=DROPS)
+    taken = [
+        Step(base=of(), fitted=of(beside), p_value=0.0),
+        Step(base=of(beside), fitted=of(LAYER, CRUST), p_value=0.0),
+    ]
+    parts = selection._needed(cast(Inquiry, SimpleNamespace(judge=judge)), taken)
+    assert parts is not None
+    assert looked == asked
+    assert {c.id for c in parts[-1].fitted.candidates} == {"soil-layer", answers.get("soil-crust", CRUST)[0]}
+    assert len(parts) == 2
+
+
+MASS, SPEED, RATE, DRAG = ((i, ("a",)) for i in ("mass", "impact-speed", "soil-rate-hardening", "soil-inertial-drag"))
+
+
+@pytest.mark.parametrize(
+    ("answers", "needless", "asked", "found"),
+    [
+        # each comes back
+        ([LAYER, CRUST], "", ["soil-layer", "soil-crust"], {"soil-layer", "soil-crust", "mass"}),
+        # one exchange mends what the first step took
+        ([SPEED, CRUST, MASS, SPEED], "", ["soil-layer", "soil-crust", "mass"], {"impact-speed", "soil-crust", "mass"}),
+        # again and again: any will do
+        ([SPEED, RATE, DRAG], "", ["soil-layer", "soil-crust"], None),
+        # beside the better ones the mass is not needed any more: two that are these
+        ([SPEED, RATE, SPEED, RATE], "mass", ["soil-layer", "soil-crust", "impact-speed", "soil-rate-hardening"],
+         {"impact-speed", "soil-rate-hardening"}),
+    ],
+)  # fmt: skip
+def test_as_many_effects_as_may_be_that_are_given_for_others_again_and_again_explain_nothing(
+    monkeypatch: pytest.MonkeyPatch, answers: list[Any], needless: str, asked: list[str], found: set[str] | None
+) -> None:
+    looked: list[str] = []
+
+    def instead(_: Any, current: Fitted) -> Step:
+        first, *rest = current.candidates
+        kept = [(c.id, tuple(c.search)) for c in rest]
+        new = of(*kept, answers[len(looked)])
+        looked.append(first.id)
+        return Step(base=of(*kept), fitted=new, p_value=0.0, rivals=(new,))
+
+    def without_needless(_: Any, f: Fitted) -> Fitted:
+        left = [(c.id, tuple(c.search)) for c in f.candidates if len(looked) < 2 or c.id != needless]
+        return of(*left)
+
+    monkeypatch.setattr(selection, "instead", instead)
+    monkeypatch.setattr(selection, "without_needless", without_needless)
+    judge = SimpleNamespace(again=lambda f: f, effort=DROPS)
+    order = (LAYER, CRUST, MASS)
+    taken = [Step(base=of(*order[:k]), fitted=of(*order[: k + 1]), p_value=0.0) for k in range(MOST)]
+    parts = selection._needed(cast(Inquiry, SimpleNamespace(judge=judge)), taken)
+    assert looked == asked
+    assert (None if parts is None else {c.id for c in parts[-1].fitted.candidates}) == found
