@@ -301,7 +301,7 @@ def test_a_fit_in_another_form_is_taken_up_from_the_notebook(tmp_path: Path) -> 
 def test_far_from_the_noise_a_fit_ends_where_a_round_gains_a_trifle(monkeypatch: pytest.MonkeyPatch) -> None:
     """A layer fitted as another mass leaves a hundred times the noise: its last hundredths of a percent tell nothing.
 
-    What is met is fitted as ever, to the digit.
+    What is met is fitted as far as ever.
     """
     judge = judge_of(recorded(LAYER, 3, speeds=(1.2, 2.2, 3.2)))
     ends: dict[tuple[str, float], tuple[tuple[float, ...], float, int]] = {}
@@ -316,6 +316,9 @@ def test_far_from_the_noise_a_fit_ends_where_a_round_gains_a_trifle(monkeypatch:
     assert fewer < made
     assert left <= more < 1.005 * left
     assert y == pytest.approx(x, abs=0.02)
+    (x, left, _), (y, more, _) = (ends["soil-layer", t] for t in (0.0, fit.TRIFLING))
+    assert more == pytest.approx(left, abs=fit.ENOUGH)
+    assert y == pytest.approx(x, abs=1e-3)
 
 
 def test_a_strength_is_told_in_what_is_usual() -> None:
