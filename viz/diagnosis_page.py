@@ -12,7 +12,7 @@ from rollover.diagnosis.verdict import Place, Score
 from rollover.effects import effects
 from rollover.prechecks import Finding
 from viz import plots
-from viz.diagnosis_words import STATES, answer, label_of, named
+from viz.diagnosis_words import STATES, answer, label_of, named, predicted_as
 from viz.entities import series
 from viz.page import Block, Cell, Details, Figure, Footer, Headline, Note, Section, Table, render
 from viz.plots import Curve
@@ -182,11 +182,7 @@ def _followed(found: Diagnosis, told: Sequence[Told]) -> list[Block]:
         how = "All recordings share one condition: nothing could be held out, and all numbers are of the fit."
     heads = ["", "recordings", "", "misfit / noise", "ISO/TS 18571", "peak force error, %"]
     blocks: list[Block] = [Table(columns=heads, rows=rows, numeric=(3, 4, 5), caption=how)]
-    held = {t.recording: t.held_out for t in told}
-    per = [
-        [name, "held out" if each or held.get(name) else "fitted", _g(a, 3), _g(b, 3)]
-        for name, a, b in found.per_recording
-    ]
+    per = [[name, predicted_as(found, name), _g(a, 3), _g(b, 3)] for name, a, b in found.per_recording]
     columns = ["recording", "predicted as", "before", "after"]
     caption = "Misfit over the noise of each recording; 1 is the noise itself."
     blocks.append(Table(columns=columns, rows=per, numeric=(2, 3), caption=caption))

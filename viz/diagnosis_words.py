@@ -51,6 +51,11 @@ def label_of(quantity: str) -> str:
     return words.get(quantity, series(quantity).name if is_known(quantity) else quantity)
 
 
+def predicted_as(found: Diagnosis, recording: str) -> str:
+    """Whether what is left of a recording was left out of the fit that says it."""
+    return "held out" if recording in found.held_out else "fitted"
+
+
 def markdown(found: Diagnosis) -> str:
     """The answer as a document: verdict, parameters, where, what to measure next."""
     lines = [f"# {answer(found)}", "", found.sentence, ""]
@@ -67,8 +72,8 @@ def markdown(found: Diagnosis) -> str:
         lines += [f"| {p.recording} | {p.channel} | {p.phase} | {100.0 * p.share:.0f} % |" for p in found.where[:6]]
         lines.append("")
     if found.per_recording:
-        lines += ["## Misfit over the noise, held out", "", "| recording | before | after |", "|-|-|-|"]
-        lines += [f"| {name} | {a:.3g} | {b:.3g} |" for name, a, b in found.per_recording]
+        lines += ["## Misfit over the noise", "", "| recording | predicted as | before | after |", "|-|-|-|-|"]
+        lines += [f"| {name} | {predicted_as(found, name)} | {a:.3g} | {b:.3g} |" for name, a, b in found.per_recording]
         lines.append("")
     lines += [f"- {note}" for note in found.notes]
     return "\n".join(lines)

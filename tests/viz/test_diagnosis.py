@@ -127,6 +127,19 @@ def test_the_recording_for_the_viewer(with_after: bool, tmp_path: Path) -> None:
     assert np.nanmax(residual) == pytest.approx(np.max(track.measured - track.before) / 40.0)
 
 
+@pytest.mark.parametrize(
+    ("kept", "one", "two"), [(("two",), "fitted", "held out"), (("one", "two"), "held out", "held out")]
+)
+def test_the_words_say_which_recordings_were_left_out(kept: tuple[str, ...], one: str, two: str) -> None:
+    """With some kept out of all fits the others are fitted; else each is left out in turn."""
+    rows = (("one", 8.0, 1.0), ("two", 9.0, 1.02))
+    training = tuple(name for name in ("one", "two") if name not in kept or len(kept) == 2)
+    found = replace(sensor_at_fault(), training=training, held_out=kept, per_recording=rows)
+    words = markdown(found)
+    assert f"| one | {one} | 8 | 1 |" in words
+    assert f"| two | {two} | 9 | 1.02 |" in words
+
+
 def test_the_words_name_the_rival_and_the_next_test() -> None:
     words = markdown(sensor_at_fault())
     assert words.startswith("# A sensor is at fault: sensor-gain of ground/force_normal.")
