@@ -186,7 +186,13 @@ def _against(judge: Judge, fitted: Fitted) -> tuple[tuple[float, ...], list[floa
 
 
 def _tried(judge: Judge, r: int, candidates: Sequence[Candidate], x: Sequence[float], block: Block) -> Block:
-    """Recording r at a time shift beside which none is better."""
+    """Recording r at a time shift beside which none is better, nor its clock's as stated, nor the one it began with.
+
+    Edges leave one of many recordings in a dip that is a millisecond off.
+    """
+    for there in (0.0, judge.shifts[r]):
+        other = judge.block(r, candidates, x, there, 0.0, clock=False)
+        block = other if other is not None and other.total < block.total else block
     step, tried = TICK, 0
     while step > SHORTEST and tried < TRIED:
         for there in (block.shift + step, block.shift - step):

@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis import diagnose, fit, thresholds
+from rollover.diagnosis import diagnose, fit, refine, thresholds
 from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import coordinate
 from rollover.diagnosis.clocks import align
@@ -319,3 +319,25 @@ def test_a_place_is_gone_on_with_if_it_soon_leaves_less_than_where_the_fit_stand
     found = thresholds._soonest(judge, fitted, [(0.1,), (0.2,), (0.3,), (0.4,)], (0, 2))
     assert [round(x, 9) for (x,) in found] == [0.21, 0.41]
     assert asked == 5 * [(0, 2)]
+
+
+@pytest.mark.parametrize(
+    ("dips", "began", "met"),
+    [
+        ((0.0, 9e-4), 7e-4, 0.0),  # where its clock is as stated
+        ((4e-4, 9e-4), 4.1e-4, 4e-4),  # where the scenario as it is was met best
+        ((5e-4, 9e-4), 1.2e-3, 9e-4),  # nowhere near a better one: where it was
+    ],
+)
+def test_a_recording_whose_clock_is_in_another_dip_is_tried_where_it_began(
+    dips: tuple[float, float], began: float, met: float
+) -> None:
+    """Edges leave it in the second of two dips, 0.1 ms wide, with twice as much."""
+
+    def block(_r: int, _c: Any, _x: Any, shift: float, _nudge: float, *, clock: bool) -> Any:
+        left = min(k + min(abs(shift - dip) / 1e-4, 1.0) for k, dip in enumerate(dips)) + 10.0
+        return SimpleNamespace(total=left, shift=shift, prior=1e-3)
+
+    judge = cast(Judge, SimpleNamespace(block=block, shifts=[began]))
+    found = refine._tried(judge, 0, (), (), block(0, (), (), 9e-4, 0.0, clock=False))
+    assert found.shift == pytest.approx(met, abs=refine.SHORTEST)
