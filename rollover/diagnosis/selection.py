@@ -91,11 +91,13 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
             (taken, left), current = both, both[0][-1].fitted
             is_whole = is_enough(judge, current, left)
     parts = [s.again(judge) for s in taken]
-    needed = _needed(inquiry, taken) if is_whole and len(taken) > 1 else parts
-    if needed is not None and needed is not parts:
-        parts = needed
-        parts[-1], _ = followed(inquiry, parts[-1])
-        parts = parts if judge.effort.thrifty else [mirrored(inquiry, s) for s in parts]
+    settled = True
+    if is_whole and len(taken) > 1:
+        needed = _needed(inquiry, taken)
+        settled = needed is not None
+        if needed is not None:
+            needed[-1], _ = followed(inquiry, needed[-1])
+            parts = needed if judge.effort.thrifty else [mirrored(inquiry, s) for s in needed]
     base = unforgiven(judge, base) if taken and judge.effort.thrifty else judge.again(base)
     parts = [s.foretold(judge, groups) for s in parts]
     current = parts[-1].fitted if parts else base
@@ -109,7 +111,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
         after=mismatch_of(judge.evidence, current.blocks, phases),
         first=found.first.again(judge).foretold(judge, groups) if found.first is not None else None,
         refuted=found.refuted,
-        settled=needed is not None,
+        settled=settled,
     )
 
 
