@@ -17,6 +17,7 @@ from rollover.diagnosis.fit import NOISE_LEFT, Block, Fitted, Judge
 from rollover.diagnosis.gate import Gate, p_value
 from rollover.diagnosis.holdout import foretold, held_out, refitted, worse
 from rollover.diagnosis.inquiry import Groups, Inquiry, Phases
+from rollover.diagnosis.lookout import Looks, at_each
 from rollover.diagnosis.otherwise import begun_otherwise, from_there, one_each, shaped_too, timed_too
 from rollover.diagnosis.refine import shifts_told
 from rollover.diagnosis.screening import ELSEWHERE, Screened, begun, is_far, kin, promising, screen, spread
@@ -51,11 +52,11 @@ class Step:
         """The same under the noise as it is held now."""
         return self._each(judge.again)
 
-    def foretold(self, judge: Judge, groups: Groups) -> Step:
+    def foretold(self, judge: Judge, groups: Groups, looks: Looks = at_each) -> Step:
         """The same with what its fits foretell by runs, where slopes do not hold for long; of drops its best alone."""
         if judge.effort.thrifty:
             return self._each(lambda f: foretold(judge, f, groups))
-        return self.moved_to(refitted(judge, self.fitted, groups, held_out(self.base, groups).total))
+        return self.moved_to(refitted(judge, self.fitted, groups, held_out(self.base, groups).total, looks))
 
     def _each(self, made: Callable[[Fitted], Fitted]) -> Step:
         """The same with something made of each fit; its best stays one of its rivals."""
@@ -105,7 +106,7 @@ def step(inquiry: Inquiry, base: Fitted, looked: Gate) -> Step | None:
     if weighed(judge, fits[0], inquiry.phases):
         base, fits = judge.again(base), [judge.again(f) for f in fits]
     if not judge.effort.thrifty:
-        fits = _by_fits(judge, fits, groups)
+        fits = _by_fits(inquiry, fits)
     fits.sort(key=lambda f: held_out(f, groups).left.sum())
     fits = simplest(fits, groups, judge.per_error)
     least = min(f.left for f in fits)
@@ -118,12 +119,14 @@ def step(inquiry: Inquiry, base: Fitted, looked: Gate) -> Step | None:
     return Step(base=base, fitted=fits[0], p_value=p, rivals=tuple(fits), screened=tuple(screened))
 
 
-def _by_fits(judge: Judge, fits: Sequence[Fitted], groups: Groups) -> list[Fitted]:
+def _by_fits(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
     """The fits, with what the one that leaves least foretells by fits, where by its slopes another foretells better."""
+    groups = inquiry.groups
     lead, ahead = min(fits, key=lambda f: f.left), min(fits, key=lambda f: held_out(f, groups).left.sum())
     if lead is ahead:
         return list(fits)
-    return [refitted(judge, f, groups, held_out(ahead, groups).total) if f is lead else f for f in fits]
+    new = refitted(inquiry.judge, lead, groups, held_out(ahead, groups).total, inquiry.crew.looks)
+    return [new if f is lead else f for f in fits]
 
 
 def _from_base(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: Gate) -> list[Fitted]:

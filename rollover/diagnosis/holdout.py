@@ -9,11 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.fit import GENTLE, Fitted, Judge, shift_of
+from rollover.diagnosis.lookout import Looks, at_each
+from rollover.diagnosis.secant import Point
 
 Array = NDArray[np.float64]
 CROOKED = 1.2  # times what a fit leaves, from which on what slopes foretell of held-out recordings is doubted
@@ -72,7 +75,13 @@ def foretold(judge: Judge, fitted: Fitted, groups: Sequence[Sequence[int]]) -> F
     return replace(fitted, foretold=tuple(left))
 
 
-def refitted(judge: Judge, fitted: Fitted, groups: Sequence[Sequence[int]], without: float = np.inf) -> Fitted:
+def refitted(
+    judge: Judge,
+    fitted: Fitted,
+    groups: Sequence[Sequence[int]],
+    without: float = np.inf,
+    looks: Looks = at_each,
+) -> Fitted:
     """A fit with what it foretells by fits to the other groups, where slopes foretell far worse than it meets them.
 
     And where they foretell no better than `without` the effect. As it was where one fails, and where a single group is
@@ -82,19 +91,26 @@ def refitted(judge: Judge, fitted: Fitted, groups: Sequence[Sequence[int]], with
     doubted = min(CROOKED * float(np.sqrt(fitted.left / count)), without)
     if not fitted.x or len(groups) < 2 or held_out(fitted, groups).total < doubted:
         return fitted
+    shifts = [b.shift for b in fitted.blocks]
     left = [b.normal()[2] for b in fitted.blocks]
-    for group in groups:
-        rest = [r for r in range(len(fitted.blocks)) if r not in group]
-        shifts = [fitted.blocks[r].shift for r in rest]
-        other = judge.fit(fitted.candidates, fitted.x, only=rest, shifts=shifts, width=1)
-        if other is None:
+    look = partial(_by_the_rest, at=(fitted.candidates, fitted.x), shifts=shifts)
+    for group, found in zip(groups, looks(judge, look, groups), strict=True):
+        if found is None:
             return fitted
-        for r in group:
-            there = judge.clocked(r, other.candidates, other.x, fitted.blocks[r].shift, ROUNDS)
-            if there is None:
-                return fitted
-            left[r] = there.normal()[2]
+        for r, there in zip(group, found, strict=True):
+            left[r] = there
     return replace(fitted, foretold=tuple(left))
+
+
+def _by_the_rest(judge: Judge, group: Sequence[int], *, at: Point, shifts: Sequence[float]) -> list[float] | None:
+    """What a fit to all other recordings, begun at a point, leaves of each of a group; None where one fails."""
+    (candidates, x), rest = at, [r for r in range(len(shifts)) if r not in group]
+    other = judge.fit(candidates, x, only=rest, shifts=[shifts[r] for r in rest], width=1)
+    if other is None:
+        return None
+    found = [judge.clocked(r, other.candidates, other.x, shifts[r], ROUNDS) for r in group]
+    left = [there.normal()[2] for there in found if there is not None]
+    return left if len(left) == len(found) else None
 
 
 def _without(fitted: Fitted, group: Sequence[int]) -> Array:

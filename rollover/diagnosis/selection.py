@@ -99,7 +99,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
             needed[-1], _ = followed(inquiry, needed[-1])
             parts = needed if judge.effort.thrifty else [mirrored(inquiry, s) for s in needed]
     base = unforgiven(judge, base) if taken and judge.effort.thrifty else judge.again(base)
-    parts = [s.foretold(judge, groups) for s in parts]
+    parts = [s.foretold(judge, groups, inquiry.crew.looks) for s in parts]
     current = parts[-1].fitted if parts else base
     return Explanation(
         base=base,

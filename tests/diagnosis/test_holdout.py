@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import pickle
+from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from rollover.diagnosis.explain import _by_fits
+from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.holdout import held_out, refitted
+from rollover.diagnosis.inquiry import Inquiry
+from rollover.diagnosis.lookout import at_each
 from tests.diagnosis.drops import FORCE, recorded
 from tests.diagnosis.test_fits import GAIN, candidate, judge_of
 
@@ -50,8 +57,16 @@ def test_what_leaves_least_is_foretold_by_fits_where_by_slopes_another_foretells
     rival = replace(rival, foretold=tuple(1.01 * b.total for b in fitted.blocks))
     assert lead.left < rival.left
     assert held_out(rival, groups).left.sum() < held_out(lead, groups).left.sum() < 1.2**2 * lead.left
-    new, beside = _by_fits(judge, [lead, rival], groups)
+    asked: list[Any] = []
+
+    def looks(judge: Judge, look: Any, things: Sequence[Any]) -> list[Any]:
+        asked.append(list(things))
+        return at_each(judge, pickle.loads(pickle.dumps(look)), things)  # as it is sent to children
+
+    inquiry = cast(Inquiry, SimpleNamespace(judge=judge, groups=groups, crew=SimpleNamespace(looks=looks)))
+    new, beside = _by_fits(inquiry, [lead, rival])
     assert beside is rival
     assert new.foretold is not None
     assert held_out(new, groups).left.sum() == pytest.approx(ahead, rel=0.01)
-    assert _by_fits(judge, [fitted, rival], groups)[0] is fitted  # it foretells best as it is
+    assert asked == [groups]
+    assert _by_fits(inquiry, [fitted, rival])[0] is fitted  # it foretells best as it is
