@@ -29,7 +29,7 @@ SCATTERED = 0.05  # share of all errors that the look at candidates may make whe
 CERTAIN = 1.0 - 1e-12  # largest p-value whose logarithm is taken
 PARTLY = 0.005  # of the excess over the noise that one effect may leave, were it structured, and still be named
 LITTLE = 0.1  # of the excess over the noise, that effects must take which leave far more than noise
-AGAIN = 1  # times that one of as many effects as may be is given for a better one
+AGAIN = 1  # times that one of as many effects as may be is given for a better one, beyond which any would do
 HARDLY_MORE = 1.2  # times a tolerance, that an explanation leaves of held-out recordings
 
 
