@@ -109,7 +109,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
         detectable={**found.at_first.detectable, **found.looked.detectable},
         before=found.before,
         after=mismatch_of(judge.evidence, current.blocks, phases),
-        first=found.first.again(judge).foretold(judge, groups) if found.first is not None else None,
+        first=None if found.first is None else found.first.again(judge).foretold(judge, groups, inquiry.crew.looks),
         refuted=found.refuted,
         settled=settled,
     )

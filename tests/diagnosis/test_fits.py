@@ -299,7 +299,7 @@ def test_a_fit_in_another_form_is_taken_up_from_the_notebook(tmp_path: Path) -> 
 
 
 def test_far_from_the_noise_a_fit_ends_where_a_round_gains_a_trifle(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A layer fitted as another mass leaves a hundred times the noise: its last hundredths of a percent tell nothing.
+    """A layer fitted as a rate leaves 3.7 times the noise: the last thousandths of what is beyond it tell nothing.
 
     What is met is fitted as far as ever.
     """

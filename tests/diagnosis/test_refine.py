@@ -332,7 +332,7 @@ def test_a_place_is_gone_on_with_if_it_soon_leaves_less_than_where_the_fit_stand
 def test_a_recording_whose_clock_is_in_another_dip_is_tried_where_it_began(
     dips: tuple[float, float], began: float, met: float
 ) -> None:
-    """Edges leave it in the second of two dips, 0.1 ms wide, with twice as much."""
+    """Edges leave it in the second of two dips, 0.1 ms to either side, that leaves 11 where the first leaves 10."""
 
     def block(_r: int, _c: Any, _x: Any, shift: float, _nudge: float, *, clock: bool) -> Any:
         left = min(k + min(abs(shift - dip) / 1e-4, 1.0) for k, dip in enumerate(dips)) + 10.0
