@@ -34,6 +34,7 @@ class ByKey:
 
     noun: str
     table: Callable[[], Mapping[str, type]]
+    elsewhere: str = ""  # how a key is made known that the table does not hold
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> dict[str, Any]:
         """Let the validator of files look the class up by the key."""

@@ -104,7 +104,9 @@ class Scenario:
     loads: Loads = Loads()
     gravity: Annotated[float, Quantity("m/s2", "acceleration of free fall, along -z", least=0, most=30)] = 9.81
     effects: Annotated[
-        Mapping[str, Any], ByKey("effect", entries), "terms beyond the basic model, by effect id, with their parameters"
+        Mapping[str, Any],
+        ByKey("effect", entries, elsewhere="one of your own: `rollover --effects FILE ...`"),
+        "terms beyond the basic model, by effect id, with their parameters",
     ] = field(default_factory=dict, hash=False)
 
     def validate(self) -> None:

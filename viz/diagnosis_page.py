@@ -38,7 +38,7 @@ def page(
     blocks = [
         *_found(found),
         *_where(found, told, each),
-        *_followed(found, told),
+        *_followed(found, told, each),
         *_next(found),
         *_considered(found),
         *_detectable(found),
@@ -77,12 +77,13 @@ def _found(found: Diagnosis) -> list[Block]:
 
 def _where(found: Diagnosis, told: Sequence[Told], each: Each) -> list[Block]:
     """Pictures of the recordings with the largest share, and the table of shares."""
-    by_share = ranked(found, told)
+    foretold = _foretold(told)
+    by_share = ranked(found, [one for one in told if one is not foretold])
     front = by_share[: PICTURES if found.where else 1]
     shown = [(one, t) for one, tracks in front for t in tracks[:2]]
     folded = [(one, t) for k, (one, tracks) in enumerate(by_share) for t in tracks[2 * (k < len(front)) :]]
     simulated = "before" if found.effects else "simulated"
-    figures = list(each(_figure, [(replace(one, tracks=(t,)), simulated) for one, t in (*shown, *folded)]))
+    figures = _figures([*shown, *folded], simulated, each)
     blocks: list[Block] = figures[: len(shown)]
     rest: list[Block] = figures[len(shown) :]
     if rest:
@@ -118,6 +119,16 @@ def ranked(found: Diagnosis, told: Sequence[Told]) -> list[tuple[Told, list[Trac
 
     total = {t.recording: sum(s for (name, _), s in share.items() if name == t.recording) for t in told}
     return [(one, tracks(one)) for one in sorted(told, key=lambda t: -total[t.recording])]
+
+
+def _foretold(told: Sequence[Told]) -> Told | None:
+    """The recording that was kept from every fit and is foretold: of several, the one that the scenario misses most."""
+    kept = [one for one in told if one.held_out and any(t.rms_after is not None for t in one.tracks)]
+    return max(kept, key=lambda one: max(t.rms_before for t in one.tracks), default=None)
+
+
+def _figures(drawn: Sequence[tuple[Told, Track]], simulated: str, each: Each) -> list[Figure]:
+    return list(each(_figure, [(replace(one, tracks=(t,)), simulated) for one, t in drawn]))
 
 
 def _figure(drawn: tuple[Told, str]) -> Figure:
@@ -164,8 +175,8 @@ def _places(places: Sequence[Place], caption: str) -> Table:
     return Table(columns=columns, rows=rows, numeric=(3, 4, 5), caption=caption)
 
 
-def _followed(found: Diagnosis, told: Sequence[Told]) -> list[Block]:
-    """Before and after: training and held-out apart, then each recording."""
+def _followed(found: Diagnosis, told: Sequence[Told], each: Each) -> list[Block]:
+    """Before and after: training and held-out apart, then each recording, then what no fit had seen as a picture."""
     rows: list[Row] = []
     for title, which, names in (
         ("fitted", "training", found.training),
@@ -176,9 +187,9 @@ def _followed(found: Diagnosis, told: Sequence[Told]) -> list[Block]:
                 rows.append([title, ", ".join(names), when, *_score(scores[which])])
     if not rows:
         return []
-    each = set(found.training) == set(found.held_out)
+    in_turn = set(found.training) == set(found.held_out)
     how = "Held out: the misfit is predicted from a fit to the others; rating and peak are of the fit to all."
-    if each and len({t.condition or t.recording for t in told}) < 2:
+    if in_turn and len({t.condition or t.recording for t in told}) < 2:
         how = "All recordings share one condition: nothing could be held out, and all numbers are of the fit."
     heads = ["", "recordings", "", "misfit / noise", "ISO/TS 18571", "peak force error, %"]
     blocks: list[Block] = [Table(columns=heads, rows=rows, numeric=(3, 4, 5), caption=how)]
@@ -186,6 +197,10 @@ def _followed(found: Diagnosis, told: Sequence[Told]) -> list[Block]:
     columns = ["recording", "predicted as", "before", "after"]
     caption = "Misfit over the noise of each recording; 1 is the noise itself."
     blocks.append(Table(columns=columns, rows=per, numeric=(2, 3), caption=caption))
+    foretold = _foretold(told)
+    if foretold is not None:
+        tracks = sorted(foretold.tracks, key=lambda t: -t.rms_before)
+        blocks.extend(_figures([(foretold, t) for t in tracks], "before", each))
     return [Section(title="How well the recordings are followed", blocks=blocks)]
 
 

@@ -73,8 +73,11 @@ def _fault(node: Node, slot: Slot, error: Any) -> Fault:
     if reason in ("missing", "missing_keyword_only_argument"):
         return where.missing()
     if reason in ("unexpected_keyword_argument", "extra_forbidden"):
-        noun = where.slot.by_key.noun if where.slot.by_key else "key"
-        return where.fault(f"unknown {noun}, got {where.rest!r}; {hint(where.rest, where.slot.keys(where.node.kind))}")
+        by_key = where.slot.by_key
+        help_ = hint(where.rest, where.slot.keys(where.node.kind))
+        if by_key and by_key.elsewhere:
+            help_ += f" ({by_key.elsewhere})"
+        return where.fault(f"unknown {by_key.noun if by_key else 'key'}, got {where.rest!r}; {help_}")
     if reason in ("union_tag_invalid", "union_tag_not_found"):
         return where.wrong_kind()
     if reason == "literal_error":

@@ -135,7 +135,8 @@ ONE_FAULT: dict[str, tuple[str | bytes, str]] = {
     "title": (without("title: Drop", "title: 5"), "bad.yaml:1: title: not text, got 5; text is allowed"),
     "effect": (
         f"{TEXT}effects:\n  soil-adhesio: {{stress: 5}}\n",
-        "bad.yaml:12: effects.soil-adhesio: unknown effect, got 'soil-adhesio'; did you mean 'soil-adhesion'?",
+        "bad.yaml:12: effects.soil-adhesio: unknown effect, got 'soil-adhesio'; did you mean 'soil-adhesion'?"
+        " (one of your own: `rollover --effects FILE ...`)",
     ),
     "striker tips": (
         without("kind: drop\n  speed: 3.0", "kind: tip-over"),

@@ -199,7 +199,8 @@ def test_a_new_kind_starts_its_part_afresh() -> None:
         ),
         (
             {"effects.soil-adhesio.stress": 500.0},
-            "replaced: effects.soil-adhesio: unknown effect, got 'soil-adhesio'; did you mean 'soil-adhesion'?",
+            "replaced: effects.soil-adhesio: unknown effect, got 'soil-adhesio'; did you mean 'soil-adhesion'?"
+            " (one of your own: `rollover --effects FILE ...`)",
         ),
         (
             {"vehicle": "vehicles/compact_tractr.yaml"},
@@ -249,6 +250,7 @@ def test_an_effect_of_the_table_is_read_replaced_and_written(monkeypatch: pytest
     assert load("bare.yaml").replaced({"effects.soil-adhesion.stress": 500.0}) == scenario
     assert faults_of(f"{TEXT}effects: {{soil-adhesio: {{stress: 5}}}}\n") == [
         "bad.yaml:11: effects.soil-adhesio: unknown effect, got 'soil-adhesio'; did you mean 'soil-adhesion'?"
+        " (one of your own: `rollover --effects FILE ...`)"
     ]
     assert faults_of(f"{TEXT}effects: {{soil-adhesion: {{stress: -5}}}}\n") == [
         "bad.yaml:11: effects.soil-adhesion.stress: out of bounds, got -5; a number at least 0 Pa is allowed"

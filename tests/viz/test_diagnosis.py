@@ -62,6 +62,19 @@ def test_a_page_is_the_same_whoever_draws_its_figures() -> None:
     assert channels == 2 * [[FORCE], ["ground/sinkage"]]
 
 
+def test_what_no_fit_had_seen_is_shown_beside_how_well_it_is_followed() -> None:
+    """Of several the one that is missed most; not where the mismatch is looked for, and not twice."""
+    one, two = told()
+    worse = replace(two, recording="three", tracks=(replace(two.tracks[0], before=0.9 * two.tracks[0].before),))
+    text = page(sensor_at_fault(), (one, two, worse), title="Drop", command="x")
+    assert text.count("<svg") == 3
+    followed = text.index("How well the recordings are followed")
+    assert text.index("three, held out: ") > followed > text.index("two, held out: ")
+    alike = replace(sensor_at_fault(), training=("one", "two"), held_out=("one", "two"))
+    in_turn = page(alike, [replace(t, held_out=False) for t in (one, two)], title="Drop", command="x")
+    assert in_turn.rindex("<svg") < in_turn.index("How well the recordings are followed")
+
+
 def test_the_page_where_nothing_was_found() -> None:
     parts = Parts(page(nothing_found(), told(with_after=False), title="Drop", command="rollover diagnose x"))
     assert "Simulation and recordings agree within the noise." in parts.said
