@@ -83,14 +83,14 @@ def answering(command: C) -> C:
     return wrapped  # type: ignore[return-value]
 
 
-def settings(given: list[str]) -> dict[str, Any]:
-    """Path -> value of each `--set PATH=VALUE`. Raises `InputError`."""
+def settings(given: list[str], option: str = "--set") -> dict[str, Any]:
+    """Path -> value of each `--set PATH=VALUE`, or of what `option` reads likewise. Raises `InputError`."""
     from rollover import document
 
     settings: dict[str, Any] = {}
     for text in given:
-        path, value = document.parse_setting(text)
+        path, value = document.parse_setting(text, option)
         if path in settings:
-            raise InputError(Fault(file="--set", path=path, message="given twice; once is allowed"))
+            raise InputError(Fault(file=option, path=path, message="given twice; once is allowed"))
         settings[path] = value
     return settings

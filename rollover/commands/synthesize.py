@@ -57,7 +57,7 @@ def synthesize(
     from rollover.synthesis import synthetic, usual
 
     path = document.find(scenario)
-    stated, unstated = settings(set_ or []), settings(hidden or [])
+    stated, unstated = settings(set_ or []), settings(hidden or [], "--hide")
     chosen = scenarios.load(path).replaced(stated, origin="--set").replaced(unstated, origin="--hide")
     for line in chosen.idle:
         console.say(f"{path}: {line}")

@@ -52,6 +52,20 @@ def test_a_synthetic_recording_states_what_it_may(folder: Path) -> None:
     assert rollover("synthesize", "drop_test", "--out", folder, "--name", "d3.0").exit_code == 2
 
 
+@pytest.mark.parametrize("option", ["--set", "--hide"])
+def test_what_is_wrong_with_a_value_is_said_of_the_option_that_gave_it(option: str, tmp_path: Path) -> None:
+    wrong = {
+        "effects.soil-viscous-damping.coefficient=180": "effects.soil-viscous-damping.coefficient: unknown key, got",
+        "vehicle.mass": "not a setting, got 'vehicle.mass'; PATH=VALUE is needed",
+    }
+    for given, why in wrong.items():
+        done = rollover("synthesize", "drop_test", option, given, "--out", tmp_path)
+        assert (done.exit_code, done.stderr.splitlines()[-1][: len(f"{option}: {why}")]) == (2, f"{option}: {why}")
+    twice = rollover("synthesize", "drop_test", *2 * (option, "vehicle.mass=140"), "--out", tmp_path)
+    assert twice.stderr.splitlines()[-1] == f"{option}: vehicle.mass: given twice; once is allowed"
+    assert not list(tmp_path.iterdir())
+
+
 def test_no_two_recordings_share_their_noise_unless_told_so(tmp_path: Path) -> None:
     for name, seed in (("a", ()), ("b", ()), ("c", ("--seed", 4)), ("d", ("--seed", 4))):
         done = rollover("synthesize", "drop_test", "--rate", 200, *seed, "--out", tmp_path, "--name", name)
