@@ -84,8 +84,8 @@ def _where(found: Diagnosis, told: Sequence[Told], each: Each) -> list[Block]:
     folded = [(one, t) for k, (one, tracks) in enumerate(by_share) for t in tracks[2 * (k < len(front)) :]]
     simulated = "before" if found.effects else "simulated"
     figures = _figures([*shown, *folded], simulated, each)
-    blocks: list[Block] = figures[: len(shown)]
-    rest: list[Block] = figures[len(shown) :]
+    blocks: list[Block] = [*figures[: len(shown)]]
+    rest: list[Block] = [*figures[len(shown) :]]
     if rest:
         blocks.append(Details(summary="All other channels and recordings", blocks=rest))
     if found.where:

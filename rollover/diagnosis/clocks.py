@@ -25,6 +25,8 @@ from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.lookout import Looks, at_each
 from rollover.diagnosis.secant import Point
+from rollover.diagnosis.triggers import first_shown
+from rollover.effects import spoken
 
 Array = NDArray[np.float64]
 WIDTH = 3.0  # times its prior, within which a time shift is sought
@@ -38,6 +40,8 @@ FURTHEST = 0.25  # s, that a clock may be off where it should not be
 MOST = 0.5  # of a recording that must be left to compare
 MEETS, BEFORE = 2.0, 4.0  # times the noise's power, that is left there at most, and of that, at least where it stands
 FALLS = 30.0  # times less than where it stands: as good, for rows that are means about another contact
+# s that no physics imitates: beyond, so many times less will do beside what is missing; and as far aside, so many more
+ASIDE, FALLS_FAR, SHARP = 0.02, 10.0, 1.5
 UNKNOWN = 1e30  # power of what cannot be compared
 
 Made = Callable[[float], Array | None]
@@ -95,39 +99,60 @@ def is_all_by_clocks(judge: Judge, fitted: Fitted, looks: Looks = at_each) -> bo
 
 def by_clock(found: Sequence[tuple[str, float]]) -> str:
     """What of `mistimed` stands behind the verdict."""
-    each = [f"{abs(s) * 1e3:.3g} ms {'late' if s > 0.0 else 'early'} ({name})" for name, s in found]
+    each = [f"{spoken(abs(s) * 1e3)} ms {'late' if s > 0.0 else 'early'} ({name})" for name, s in found]
     if not each:
         return ""
     return (
-        " The simulation would meet these recordings if their clocks were off by far more than they are said to be: "
-        f"{', '.join(each)}. Check what started them; `clock: {{within: SECONDS}}` in a sidecar allows for it."
+        " The simulation would meet these recordings, or come far nearer to them, if their clocks were off by far more "
+        f"than they are said to be: {', '.join(each)}. Check what started them; a `clock` of `{{zero: unknown}}` or "
+        "`{{within: SECONDS}}` in a sidecar allows for it."
     )
 
 
 def _elsewhere(judge: Judge, r: int, *, fitted: Fitted) -> float | None:
-    """Time shift (s), however large, at which recording r meets a fit far better than where it stands; None if none."""
-    from scipy.optimize import minimize_scalar
+    """Time shift (s), however large, at which recording r meets a fit far better than where it stands; None if none.
 
+    Beside that it is met far worse: what rests long before and after is met by any clock in most of its samples.
+    """
     e, made = judge.evidence[r], partial(judge.raw, r, fitted.candidates, fitted.x)
+    falls = not judge.effort.thrifty  # a drop is known at any time
 
     def left(shift: float) -> float:
         raw = made(float(shift))
-        return UNKNOWN if raw is None else _left(e, raw, float(shift))
+        return UNKNOWN if raw is None else _left(e, raw, float(shift), whole=falls)
 
-    about = _best(judge, r, made, partial(_left, e), np.arange(-FURTHEST, FURTHEST, e.shift_prior))
-    if about is None:
+    about = _best(judge, r, made, partial(_left, e), np.arange(-FURTHEST, FURTHEST, min(e.shift_prior, ASIDE)))
+    shown = [at for at in first_shown(e) if abs(at) > ASIDE] if falls else []
+    starts = [*([] if about is None else [about]), *shown]
+    if not starts:
         return None
-    there = minimize_scalar(left, bounds=about + e.shift_prior * np.array([-1.0, 1.0]), method="bounded")
+    there, least = min((_lowest(left, start, e.shift_prior) for start in starts), key=lambda found: found[1])
     here = left(fitted.blocks[r].shift)
-    return float(there.x) if there.fun < max(min(MEETS, here / BEFORE), here / FALLS) else None
+    bound = max(min(MEETS, here / BEFORE), here / (FALLS_FAR if abs(there) > ASIDE else FALLS))
+    if least >= bound or min(left(there - ASIDE), left(there + ASIDE)) < SHARP * least:
+        return None
+    return there
 
 
-def _left(e: Evidence, raw: Array, shift: float) -> float:
-    """Power over the noise of what a run leaves that comes `shift` (s) late; `UNKNOWN` where most of it is."""
+def _lowest(left: Callable[[float], float], start: float, width: float) -> tuple[float, float]:
+    """Time shift (s) beside a first one that leaves least, and what it leaves."""
+    from scipy.optimize import minimize_scalar
+
+    beside = start + width * np.arange(-6.0, 4.0)
+    about = beside[int(np.argmin([left(float(s)) for s in beside]))]
+    there = minimize_scalar(left, bounds=about + width * np.array([-1.0, 1.0]), method="bounded")
+    return float(there.x), float(there.fun)
+
+
+def _left(e: Evidence, raw: Array, shift: float, *, whole: bool = False) -> float:
+    """Power over the noise of what a run leaves that comes `shift` (s) late; `UNKNOWN` where most of it is.
+
+    `whole` says that a run is known at all stamps, however late.
+    """
     signals, known = [], np.zeros(raw.size, dtype=bool)
     for s, part in e.spans():
         time = e.recording.time[s.rows]
-        known[part] = (time - shift >= time[0]) & (time - shift <= time[-1])
+        known[part] = whole | ((time - shift >= time[0]) & (time - shift <= time[-1]))
         signals.append(s if s.weight is None else replace(s, weight=np.interp(time - shift, time, s.weight)))
     if known.mean() < MOST or not np.all(np.isfinite(raw[known])):
         return UNKNOWN

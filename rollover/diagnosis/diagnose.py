@@ -48,6 +48,7 @@ from rollover.diagnosis.statements import (
     places,
     sentence,
 )
+from rollover.diagnosis.triggers import from_first_contact
 from rollover.diagnosis.verdict import Degree, Diagnosis, Named
 from rollover.diagnosis.zeros import by_zeros, with_zeros
 from rollover.drop import unfit
@@ -87,11 +88,12 @@ def diagnose(
     if not 0.0 <= tolerance < 1.0:
         raise ValueError(f"tolerance: not a share of a range, got {tolerance:g}; at least 0 and below 1")
     crew = crew or Crew()
+    recordings, zeroed = from_first_contact(scenario, recordings)
     rounded: list[str] = []
     if isinstance(scenario.vehicle, Striker):  # what little errors of a start do to an overturn is chance, see `chaos`
         recordings, rounded = to_the_last_digit(recordings)
     every, notes = _evidence(scenario, recordings, crew)
-    notes += rounded
+    notes += zeroed + rounded
     every = [replace(e, model_error=float(np.hypot(e.model_error, tolerance))) for e in every]
     asked = Asked(scenario=scenario, recordings=dict(recordings), hold_out=hold_out, say=say, crew=crew, began=began)
     some, shared = slips_of(every)
@@ -127,7 +129,8 @@ def _diagnosed(asked: Asked, every: Sequence[Evidence], slips: Sequence[Slip], n
     notes += [*_left_aside(every, found), *by_zeros(found)]
     groups = left_out(found)
     notes += differing(found)
-    if len(groups) == 1 and not kept:
+    is_foretold = len(groups) > 1 or bool(kept)
+    if not is_foretold:
         notes.append("one condition only: what stands as held out is predicted by the fit to it")
     judge = Judge(found)
     crew.begin(judge)
@@ -200,7 +203,15 @@ def _diagnosed(asked: Asked, every: Sequence[Evidence], slips: Sequence[Slip], n
             shown.sentence
             if shown is not None
             else sentence(
-                verdict, effects, explanation.p_value, h_before.held, h_after.held, found, early, remains=remains
+                verdict,
+                effects,
+                explanation.p_value,
+                h_before.held,
+                h_after.held,
+                found,
+                early,
+                remains=remains,
+                foretold=is_foretold,
             )
         )
         + (closest(explanation, groups) if verdict == "unexplained" and shown is None else "")

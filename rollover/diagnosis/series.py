@@ -24,6 +24,7 @@ from rollover.diagnosis.loudness import with_loudness
 from rollover.diagnosis.overturn import CENTRE
 from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.simulator import Simulator, simulator_of
+from rollover.diagnosis.triggers import from_first_contact
 from rollover.diagnosis.verdict import Diagnosis
 from rollover.recording import Recording
 from rollover.scenario import Scenario
@@ -88,7 +89,7 @@ def series(scenario: Scenario, recordings: Sequence[tuple[str, Recording]], foun
     diagnosed = diagnosed_scenario(scenario, found)
     judged = found.held_out if set(found.held_out) != set(found.training) else ()
     told = []
-    for name, recording in recordings:
+    for name, recording in from_first_contact(scenario, recordings)[0]:
         laid = {CENTRE: found.grids[name]} if name in found.grids else {}
         other = diagnosed.replaced(laid) if found.effects or found.empirical else None
         one = _told(name, recording, scenario.replaced(laid), other, name in judged)

@@ -204,10 +204,12 @@ def sentence(
     early: tuple[float | None, float | None] = (None, None),
     *,
     remains: bool = False,
+    foretold: bool = True,
 ) -> str:
     """The verdict in a few sentences; `early` is the misfit before the first blow without and with the effects.
 
-    `remains` says that these are not all that separates simulation and recordings.
+    `remains` says that these are not all that separates simulation and recordings, `foretold` that some recordings
+    were held out, as none can be of one condition.
     """
     if verdict == "no-mismatch" and p_value < SURE:
         is_rough = any(e.is_rough(s) for e in evidence for s in e.signals)
@@ -222,14 +224,16 @@ def sentence(
         return "These recordings are too weak to show even typical effects: nothing can be said."
     if verdict == "unexplained":
         return (
-            f"Simulation and recordings differ ({first.total:.1f} times the noise), and no candidate explains it on "
-            "recordings that were held out."
+            f"Simulation and recordings differ ({first.total:.1f} times the noise), and no candidate explains it"
+            f"{' on recordings that were held out' if foretold else ''}."
         )
     said = " ".join(e.statement for e in effects)
     rivals = sorted({r for e in effects for r in e.indistinguishable_from})
-    also = " What is left of it has structure: this is not the whole." if remains else ""
+    also = "" if foretold else " Of one condition nothing can be held out: that is the misfit of what was fitted."
+    also += " What is left of it has structure: this is not the whole." if remains else ""
     also += f" Not told apart by these recordings: {', '.join(rivals)}." if rivals else ""
-    falls = f"{said} With it the held-out misfit falls from {first.total:.1f} to {last.total:.2f} times the noise"
+    misfit = "held-out misfit" if foretold else "misfit"
+    falls = f"{said} With it the {misfit} falls from {first.total:.1f} to {last.total:.2f} times the noise"
     without, with_ = early
     if without is None or with_ is None:
         return f"{falls}.{also}"

@@ -16,6 +16,7 @@ from rollover.diagnosis.ranges import candidates_of
 from rollover.diagnosis.refine import ended
 from rollover.diagnosis.simulator import DropSimulator, simulator_of
 from rollover.drop import DropModel
+from rollover.effects import spoken
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
 HARDPAN = {"effects.soil-layer.depth": 0.08, "effects.soil-layer.stiffness_ratio": 1.6}
@@ -194,7 +195,7 @@ def test_a_clock_that_is_far_off_is_told_by_where_the_simulation_meets_the_recor
     assert name == judge.evidence[1].name
     assert found == pytest.approx(late, abs=2e-3)  # what `recorded` makes it late by itself is up to 1.5 ms
     said = by_clock([(name, found)])
-    assert f"{abs(found) * 1e3:.3g} ms {'late' if late > 0 else 'early'} ({name})" in said
+    assert f"{spoken(abs(found) * 1e3)} ms {'late' if late > 0 else 'early'} ({name})" in said
 
 
 @pytest.mark.parametrize("missing", [{}, HARDPAN, {"effects.soil-stiffness.scale": 2.0}])
@@ -206,25 +207,39 @@ def test_no_clock_is_blamed_for_what_the_simulation_misses(missing: dict[str, ob
     assert by_clock([]) == ""
 
 
-def test_a_shift_that_leaves_little_to_compare_blames_no_clock() -> None:
-    """Of what ends 30 ms after a contact 150 ms late, most of the samples come before all that was simulated."""
-    judge = one_late(judge_of({}), 0.15)
-    base = judge.fit((), (), rounds=3)
-    assert base is not None
-    assert [round(s, 2) for _, s in mistimed(judge, base)] == [0.15]
+def cut_at(judge: Judge, until: float) -> Judge:
+    """The second recording alone, without what comes after `until` (s)."""
     e = judge.evidence[1]
-    rows = np.flatnonzero(e.recording.time < 0.18)
-    cut = replace(
-        e.recording,
-        time=e.recording.time[rows],
-        channels={c: v[rows] for c, v in e.recording.channels.items()},
-    )
+    rows = np.flatnonzero(e.recording.time < until)
+    kept = {c: v[rows] for c, v in e.recording.channels.items()}
+    cut = replace(e.recording, time=e.recording.time[rows], channels=kept)
     one = evidence_of(e.name, cut, simulator_of(scenario(), cut))
     assert one is not None
-    short = Judge([one])
+    return Judge([one])
+
+
+@pytest.mark.parametrize(("until", "told"), [(0.18, [0.15]), (0.14, [])])
+def test_a_clock_is_told_by_a_contact_however_short_and_not_without_one(until: float, told: list[float]) -> None:
+    """150 ms late: of 30 ms after it most samples come before all that is simulated at the stamps as they are."""
+    short = cut_at(one_late(judge_of({}), 0.15), until)
     base = short.fit((), (), rounds=3)
     assert base is not None
-    assert mistimed(short, base) == []
+    assert [round(s, 2) for _, s in mistimed(short, base)] == told
+
+
+@pytest.mark.parametrize("late", [0.4, -0.1, 7.0])
+def test_a_clock_is_told_beside_what_is_missing_however_far_off_it_is(late: float) -> None:
+    """What rests long before or after its blow is met by most samples at many a clock: 0.4 s was called 0.243."""
+    judge = one_late(judge_of({"effects.soil-viscous-damping.damping": 180.0}), late)
+    base = judge.fit((), (), rounds=3)
+    assert base is not None
+    [(name, found)] = mistimed(judge, base)
+    assert name == judge.evidence[1].name
+    assert found == pytest.approx(late, abs=8e-3)  # no more than the damping bends it
+
+
+def test_milliseconds_that_are_many_are_spoken_in_full() -> None:
+    assert " 6,990 ms late (d)" in by_clock([("d", 6.99)])
 
 
 def test_a_channel_that_comes_far_too_early_is_looked_at_there_where_runs_are_dear() -> None:

@@ -100,6 +100,10 @@ def test_a_misfit_that_scatter_takes_part_in_or_that_is_not_all_met_is_said_to_b
     assert plain == "The ground is inclined. With it the held-out misfit falls from 1.2 to 0.80 times the noise."
     more = sentence("parameter", [tilted], 0.0, first, last, [], remains=True)
     assert more == plain + " What is left of it has structure: this is not the whole."
+    one = sentence("parameter", [tilted], 0.0, first, last, [], foretold=False)
+    assert one.startswith(plain.replace("held-out ", "") + " Of one condition nothing can be held out")
+    unexplained = sentence("unexplained", (), 0.0, first, last, [], foretold=False)
+    assert unexplained.endswith("no candidate explains it.")
     said = sentence("parameter", [tilted], 0.0, first, last, [], (6.94, 1.02))
     assert said.startswith(plain[:-1] + " and the scatter of runs; before the first blow")
     assert said.endswith("the misfit is 1.02 times the noise for 6.9.")
