@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -52,3 +53,10 @@ def _differs(e: Evidence, late: NDArray[np.bool_]) -> bool:
         return False
     missed = (e.measured() - e.stacked(predicted))[late]
     return float(missed @ missed) > BEYOND * e.by_chance(late)
+
+
+def left_aside(every: Sequence[Evidence], found: Sequence[Evidence]) -> list[str]:
+    """The ends of recordings that do not count, in sentences."""
+    ends = {e.name: float(e.recording.time[-1]) for e in every}
+    cut = [(e.name, float(e.recording.time[-1])) for e in found if float(e.recording.time[-1]) < ends[e.name]]
+    return [f"{name}: what comes after {at:.2f} s depends on chance and was left aside" for name, at in cut]

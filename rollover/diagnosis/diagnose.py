@@ -10,7 +10,7 @@ import numpy as np
 
 from rollover.channels import describe
 from rollover.diagnosis import colour
-from rollover.diagnosis.aftermath import shortened
+from rollover.diagnosis.aftermath import left_aside, shortened
 from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.chaos import weighted
 from rollover.diagnosis.chassis import degrees_of
@@ -25,6 +25,7 @@ from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import yardstick
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.loudness import with_loudness
+from rollover.diagnosis.misstated import Misstated, misstated
 from rollover.diagnosis.overturn import full_runs
 from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.quantities import dependency
@@ -97,10 +98,12 @@ def diagnose(
     every = [replace(e, model_error=float(np.hypot(e.model_error, tolerance))) for e in every]
     asked = Asked(scenario=scenario, recordings=dict(recordings), hold_out=hold_out, say=say, crew=crew, began=began)
     some, shared = slips_of(every)
-    found = _diagnosed(asked, without(every, some), some, notes)
+    wrong = misstated([e for e in without(every, some) if e.name not in hold_out])
+    every = [e for e in every if e.name not in {one.evidence.name for one in wrong}]
+    found = _diagnosed(asked, without(every, some), [*some, *wrong], notes)
     if found.verdict == "unexplained" and shared:
         # beside a factor so large what else is missing may be out of sight
-        other = _diagnosed(asked, without(every, [*some, *shared]), [*some, *shared], notes)
+        other = _diagnosed(asked, without(every, [*some, *shared]), [*some, *shared, *wrong], notes)
         found = other if other.effects else found
     return found
 
@@ -117,7 +120,9 @@ class Asked:
     began: float
 
 
-def _diagnosed(asked: Asked, every: Sequence[Evidence], slips: Sequence[Slip], notes: Sequence[str]) -> Diagnosis:
+def _diagnosed(
+    asked: Asked, every: Sequence[Evidence], slips: Sequence[Slip | Misstated], notes: Sequence[str]
+) -> Diagnosis:
     """The diagnosis of recordings without what was left aside."""
     scenario, recordings, hold_out = asked.scenario, asked.recordings, asked.hold_out
     say, crew, began, names = asked.say, asked.crew, asked.began, list(asked.recordings)
@@ -126,7 +131,7 @@ def _diagnosed(asked: Asked, every: Sequence[Evidence], slips: Sequence[Slip], n
     kept = [e for e in _trusted(scenario, every) if e.name in hold_out] if hold_out else []
     if sum(e.count for e in found) < FEWEST:
         return _nothing(every, names, notes, began, by_slips(slips))
-    notes += [*_left_aside(every, found), *by_zeros(found)]
+    notes += [*left_aside(every, found), *by_zeros(found)]
     groups = left_out(found)
     notes += differing(found)
     is_foretold = len(groups) > 1 or bool(kept)
@@ -321,13 +326,6 @@ def _evidence(
         for c, step in steps.items()
     ]
     return found, notes
-
-
-def _left_aside(every: Sequence[Evidence], found: Sequence[Evidence]) -> list[str]:
-    """The ends of recordings that do not count, in sentences."""
-    ends = {e.name: float(e.recording.time[-1]) for e in every}
-    cut = [(e.name, float(e.recording.time[-1])) for e in found if float(e.recording.time[-1]) < ends[e.name]]
-    return [f"{name}: what comes after {at:.2f} s depends on chance and was left aside" for name, at in cut]
 
 
 def _grids(evidence: Sequence[Evidence]) -> dict[str, tuple[float, ...]]:

@@ -18,6 +18,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -33,6 +34,13 @@ PLACES = np.linspace(-3.0, 3.0, 61)  # times its prior, where a time shift is lo
 UNIT = 5.0  # times, or one part of, that a unit must make to be told from what is missing: ground 3 times as stiff
 
 
+class Says(Protocol):
+    """What has a sentence on it."""
+
+    def says(self) -> str:
+        """The sentence."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Slip:
     """A channel of a recording that reads `factor` times what is simulated, as `cause` would have it."""
@@ -41,6 +49,8 @@ class Slip:
     signal: Signal
     factor: float
     cause: str
+
+    whole: ClassVar = "Channels stand in another unit than is stated, or with the opposite sign."
 
     def says(self) -> str:
         """The sentence on it."""
@@ -56,7 +66,7 @@ def slips_of(every: Sequence[Evidence]) -> tuple[list[Slip], list[Slip]]:
     for e in every:
         made = e.simulator.predict({}, 0.0) or {}
         for s in e.signals:
-            factor = _factor(e, s, made[s.channel]) if s.channel in made else None
+            factor = factor_of(e, s, made[s.channel]) if s.channel in made else None
             if factor is not None:
                 met.setdefault(s.channel, []).append((e, s, factor))
     found = []
@@ -88,12 +98,12 @@ def without(every: Sequence[Evidence], slips: Sequence[Slip]) -> list[Evidence]:
     return [e for e in left if e.signals] if aside else list(every)
 
 
-def by_slips(found: Sequence[Slip]) -> str:
+def by_slips(found: Sequence[Says]) -> str:
     """What stands behind a verdict where channels were left aside; nothing where none was."""
     return "".join(f" {slip.says()}" for slip in found)
 
 
-def _factor(e: Evidence, s: Signal, made: np.ndarray) -> float | None:
+def factor_of(e: Evidence, s: Signal, made: np.ndarray) -> float | None:
     """How many times what is simulated a signal reads, where the two are alike; None if nowhere."""
     time, m, best = e.recording.time[s.rows], s.values, (0.0, 0.0)
     size = float(np.linalg.norm(m))
