@@ -133,24 +133,24 @@ class DropSimulator:
 
     def _leaps(self, physical: Mapping[str, Any], shift: float, sensors: Mapping[str, Any]) -> dict[str, Array]:
         """How far channels that nothing smooths leap about each stamp, under `LEAP_IN` and their names."""
-        at = self.recording.time - shift
-        instants, rows = self._track(physical, float(at[-1]) if at.size else 0.0).jumps
+        time = self.recording.time
+        instants, rows = self._track(physical, float(time[-1] - shift) if time.size else 0.0).jumps
         if not instants.size:
             return {}
-        clocked = {e.channel for name in EDGES for e in every(sensors, name)} if sensors else ()
-        made = channels_of(rows, self._sharp.difference(clocked))
-        return {LEAP_IN + name: about_jumps(at, instants, sizes) for name, sizes in made.items() if sizes.any()}
+        lags, *clocks = ({e.channel: e for e in every(sensors, name)} for name in EDGES)
+        made = channels_of(rows, self._sharp.difference(lags))
+        return {
+            LEAP_IN + name: about_jumps(_own(time, name, *clocks) - shift, instants, sizes)
+            for name, sizes in made.items()
+            if sizes.any()
+        }
 
     def _edges(self, physical: Mapping[str, Any], shift: float, sensors: Mapping[str, Any]) -> dict[str, Array]:
         """Channels behind a lag or with a clock of their own: what these make of a leap lies between the rows."""
         lags, offsets, drifts = ({e.channel: e for e in every(sensors, name)} for name in EDGES)
         found = {}
         for channel in {*lags, *offsets, *drifts} & set(self.recording.channels):
-            own = self.rows.times
-            if channel in offsets:
-                own = own - offsets[channel].offset
-            if channel in drifts:
-                own = (1.0 - drifts[channel].drift) * own
+            own = _own(self.rows.times, channel, offsets, drifts)
             key = channel, offsets.get(channel), drifts.get(channel)
             if channel not in lags:
                 found[channel] = self._run(physical, own, shift, key)[channel]
@@ -221,6 +221,12 @@ class DropSimulator:
         if len(store) >= most:
             store.pop(next(iter(store)))
         store[key] = value
+
+
+def _own(time: Array, channel: str, offsets: Mapping[str, Any], drifts: Mapping[str, Any]) -> Array:
+    """Times (s) of a channel by its own clock."""
+    own = time - offsets[channel].offset if channel in offsets else time
+    return (1.0 - drifts[channel].drift) * own if channel in drifts else own
 
 
 def simulator_of(scenario: Scenario, recording: Recording, *, leaps: bool = True) -> Simulator:

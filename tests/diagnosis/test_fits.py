@@ -19,10 +19,11 @@ from rollover.diagnosis.candidates import Candidate, coordinate
 from rollover.diagnosis.crew import Crew, Job, work
 from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.fit import Block, Judge, shift_of
-from rollover.diagnosis.leaps import about_jumps
+from rollover.diagnosis.leaps import LEAP_IN, about_jumps
 from rollover.diagnosis.otherwise import _best_middle
 from rollover.diagnosis.ranges import candidates_of
 from rollover.diagnosis.simulator import simulator_of
+from rollover.drop import DropModel
 from rollover.scenario import load
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
@@ -370,6 +371,31 @@ def test_a_clock_of_its_own_is_simulated_at_its_own_stamps() -> None:
     assert plain is not None
     assert np.array_equal(late[FORCE], shifted[FORCE])
     assert np.array_equal(late[DEPTH], plain[DEPTH]), name
+    # and what leaps in it leaps there: on which side a sample lies is this clock's to say
+    assert np.any(late[LEAP_IN + FORCE] > 0.0)
+    assert np.array_equal(late[LEAP_IN + FORCE], shifted[LEAP_IN + FORCE])
+    assert not np.array_equal(late[LEAP_IN + FORCE], plain[LEAP_IN + FORCE])
+    lag = {"effects.sensor-lag.channel": FORCE, "effects.sensor-lag.time": 0.002}
+    behind = simulator.predict(lag, 0.0)
+    assert behind is not None
+    assert LEAP_IN + FORCE not in behind  # which makes a kink of it
+
+
+@pytest.mark.parametrize("beside", [2e-5, -2e-5])
+def test_a_clock_that_drifts_is_met_where_its_first_contact_lies_beside_a_sample(beside: float) -> None:
+    """The load cell's clock loses 0.3 %: the sample at the contact does not hold the time shift on its side."""
+    (name, made), *_ = recorded({}, speeds=(2.0,), rate=1000.0)
+    time, rng = np.arange(-30, 350) * 1e-3 + beside, np.random.default_rng(4)
+    model = DropModel(scenario=scenario(), step=2e-4).with_({"initiation.speed": 2.0})
+    runs = {FORCE: model.run(0.997 * time)[FORCE], DEPTH: model.run(time)[DEPTH]}
+    channels = {c: v + 3e-3 * np.ptp(v) * rng.normal(size=v.size) for c, v in runs.items()}
+    judge = judge_of([(name, replace(made, time=time, channels=channels))])
+    c = next(c for c in candidates_of(judge.evidence, (), "drop") if c.key == f"sensor-clock-drift:{FORCE}")
+    for start in (-2e-4, 2e-4):
+        found = judge.fit((c,), [0.5], shifts=[start])
+        assert found is not None
+        assert found.left < 1.2 * sum(b.residual.size for b in found.blocks)
+        assert found.x[0] == pytest.approx(coordinate(0.003, c.search["drift"]), abs=3e-3)
 
 
 def test_a_rebound_is_looked_for_from_what_the_law_springs_back_by_itself() -> None:
