@@ -61,17 +61,17 @@ def misstated(every: Sequence[Evidence]) -> list[Misstated]:
         return []
     x, y = np.log([_speed(e) for e, *_ in told]), np.log([a for *_, a in told])
     off = [_off(r, x, y) for r in range(x.size)]
-    apart = [r for r, (d, error) in enumerate(off) if abs(d) > max(LEAST, SURE * error)]
-    if len(apart) != 1:
+    r = int(np.argmax([abs(d) / error for d, error in off]))
+    d, error = off[r]
+    if abs(d) < max(LEAST, SURE * error):
         return []
-    (r,) = apart
     e, signal, _ = told[r]
     best = [_dropped(other) for other, *_ in told]
     more, _ = _off(r, x, np.array([log_ for log_, _ in best]))
     _, left = best[r]
     stated = _missed(e, _speed(e))
     alike = left < ALIKE * max(power for k, (_, power) in enumerate(best) if k != r)
-    if more * off[r][0] < 0.0 or abs(more) < OTHER or not alike or left > stated / FALLS:
+    if more * d < 0.0 or abs(more) < OTHER or not alike or left > stated / FALLS:
         return []
     return [Misstated(evidence=e, signal=signal, speed=_speed(e) * math.exp(more))]
 

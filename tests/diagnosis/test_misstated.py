@@ -36,7 +36,7 @@ def evidence(made: Recordings) -> list[Evidence]:
     return [e for e in found if e is not None]
 
 
-@pytest.mark.parametrize("missing", [{}, DAMPING, {"vehicle.mass": 140.0}])
+@pytest.mark.parametrize("missing", [{}, DAMPING, {"effects.impact-speed.scale": 1.15}])
 @pytest.mark.parametrize(("which", "times"), [(1, 1.5), (4, 0.7), (0, 1.3)])
 def test_the_speed_that_was_dropped_at_is_told(missing: dict[str, Any], which: int, times: float) -> None:
     """Beside what is missing too, and to what that bends it: a tenth."""
@@ -57,6 +57,7 @@ def test_the_speed_that_was_dropped_at_is_told(missing: dict[str, Any], which: i
         {"effects.impact-speed.scale": 1.2},  # of all
         {"effects.sensor-scale.scale": 1.2, "effects.sensor-scale.channel": DEPTH},
         {"ground.law.stiffness_scale": 2.0},
+        {"effects.soil-layer.depth": 0.19, "effects.soil-layer.stiffness_ratio": 0.1},  # as if it came faster
     ],
 )
 def test_what_ground_and_sensors_do_is_no_other_speed(missing: dict[str, Any]) -> None:
