@@ -64,6 +64,14 @@ def test_what_ground_and_sensors_do_is_no_other_speed(missing: dict[str, Any]) -
     assert misstated(evidence(drops(missing))) == []
 
 
+@pytest.mark.parametrize("which", [1, 4])
+def test_another_mass_in_one_drop_is_no_other_speed(which: int) -> None:
+    """Another speed leaves a quarter of what it misses, but far more than the others leave."""
+    made = drops({})
+    made[which] = drops({"vehicle.mass": 110.0})[which]
+    assert misstated(evidence(made)) == []
+
+
 def test_of_three_drops_none_is_apart_and_two_are_no_one() -> None:
     assert misstated(evidence(stating(drops({}, SPEEDS[:3]), 1, 1.5))) == []
     assert misstated(evidence(stating(stating(drops({}), 1, 1.5), 3, 0.6))) == []
