@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollover.diagnosis.aftermath import LASTING, shortened
+from rollover.diagnosis.aftermath import LASTING, left_aside, shortened
 from rollover.diagnosis.bins import Averaged
-from rollover.diagnosis.diagnose import _left_aside
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.overturn import AHEAD, RunSimulator
 from rollover.recording import Recording
@@ -47,7 +46,7 @@ def evidence(counts: float, *, cfc: int | None = None, off: float = 0.0) -> Evid
     )  # fmt: skip
 
 
-def test_an_end_that_hardly_counts_is_left_aside() -> None:
+def test_an_end_that_hardly_counts_isleft_aside() -> None:
     whole = evidence(0.3)
     found = shortened(whole)
     assert found.recording.time[-1] == pytest.approx(BLOW + LASTING, abs=STEP)
@@ -62,7 +61,7 @@ def test_an_end_that_hardly_counts_is_left_aside() -> None:
     np.testing.assert_array_equal(found.strays[0], np.arange(n))
     assert isinstance(found.simulator, RunSimulator)
     assert found.simulator.scenario.simulation.duration < BLOW + LASTING + 0.05
-    assert _left_aside([whole], [found]) == ["toss: what comes after 1.10 s depends on chance and was left aside"]
+    assert left_aside([whole], [found]) == ["toss: what comes after 1.10 s depends on chance and was left aside"]
 
 
 def test_an_end_that_counts_is_kept() -> None:
