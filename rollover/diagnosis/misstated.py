@@ -40,7 +40,7 @@ class Misstated:
     signal: Signal
     speed: float
 
-    whole: ClassVar = "What is stated of a recording is not what was tested."
+    summary: ClassVar = "What is stated of a recording is not what was tested."
 
     def says(self) -> str:
         """The sentence on it."""

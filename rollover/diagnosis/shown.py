@@ -62,7 +62,7 @@ def misread(slips: Sequence[Slip | Misstated], recordings: int, p_value: float) 
     """What was left aside as no recording of what it states, where all else agrees; None if nothing was."""
     share = 1.0 / max(len(slips), 1)
     places = tuple(whole(slip.evidence, slip.signal, phases_of(slip.evidence), share) for slip in slips)
-    said = " ".join(dict.fromkeys(slip.whole for slip in slips))
+    said = " ".join(dict.fromkeys(slip.summary for slip in slips))
     return _unexplained(places, said, recordings, p_value) if slips else None
 
 

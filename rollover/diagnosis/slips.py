@@ -50,7 +50,7 @@ class Slip:
     factor: float
     cause: str
 
-    whole: ClassVar = "Channels stand in another unit than is stated, or with the opposite sign."
+    summary: ClassVar = "Channels stand in another unit than is stated, or with the opposite sign."
 
     def says(self) -> str:
         """The sentence on it."""
