@@ -25,7 +25,7 @@ from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import yardstick
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.loudness import with_loudness
-from rollover.diagnosis.misstated import Misstated, misstated
+from rollover.diagnosis.misstated import misstated
 from rollover.diagnosis.overturn import full_runs
 from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.quantities import dependency
@@ -38,7 +38,7 @@ from rollover.diagnosis.scores import before_a_blow, judged
 from rollover.diagnosis.selection import Explanation, by_the_first, decided, done_by_others, explained, takes_little
 from rollover.diagnosis.shown import broken_off, by_themselves, misread
 from rollover.diagnosis.simulator import blow_of, set_up
-from rollover.diagnosis.slips import Slip, by_slips, slips_of, without
+from rollover.diagnosis.slips import Aside, by_slips, slips_of, without
 from rollover.diagnosis.statements import (
     by_steps,
     closest,
@@ -120,9 +120,7 @@ class Asked:
     began: float
 
 
-def _diagnosed(
-    asked: Asked, every: Sequence[Evidence], slips: Sequence[Slip | Misstated], notes: Sequence[str]
-) -> Diagnosis:
+def _diagnosed(asked: Asked, every: Sequence[Evidence], slips: Sequence[Aside], notes: Sequence[str]) -> Diagnosis:
     """The diagnosis of recordings without what was left aside."""
     scenario, recordings, hold_out = asked.scenario, asked.recordings, asked.hold_out
     say, crew, began, names = asked.say, asked.crew, asked.began, list(asked.recordings)

@@ -16,12 +16,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
+from rollover.diagnosis.clocks import WIDTH
 from rollover.diagnosis.evidence import Evidence, Signal
-from rollover.diagnosis.slips import factor_of
+from rollover.diagnosis.slips import Aside, factor_of
 from rollover.effects import spoken
 
 SPEED, DEPTH = "initiation.speed", "ground/sinkage"
@@ -33,14 +33,12 @@ ALIKE, FALLS = 4.0, 4.0  # times the power that the others miss, at most, and le
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Misstated:
+class Misstated(Aside):
     """A recording that was made at another `speed` (m/s) than it states, as its sinkage, `signal`, shows first."""
 
-    evidence: Evidence
-    signal: Signal
     speed: float
 
-    summary: ClassVar = "What is stated of a recording is not what was tested."
+    summary = "What is stated of a recording is not what was tested."
 
     def says(self) -> str:
         """The sentence on it."""
@@ -100,7 +98,7 @@ def _missed(e: Evidence, speed: float) -> float:
         misfit = np.concatenate([s.values - made[s.channel][s.rows] for s in e.signals])
         return float(np.mean(e.whitened(misfit) ** 2)) + (shift / e.shift_prior) ** 2 / misfit.size
 
-    wide = 3.0 * e.shift_prior
+    wide = WIDTH * e.shift_prior
     return float(minimize_scalar(left, bounds=(-wide, wide), method="bounded", options={"maxiter": 12}).fun)
 
 

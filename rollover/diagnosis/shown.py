@@ -11,9 +11,8 @@ from rollover.diagnosis.explain import SURE
 from rollover.diagnosis.flat_tops import cut_off
 from rollover.diagnosis.inquiry import Phases
 from rollover.diagnosis.lost import by_loss, lost
-from rollover.diagnosis.misstated import Misstated
 from rollover.diagnosis.phases import phases_of, whole
-from rollover.diagnosis.slips import Slip
+from rollover.diagnosis.slips import Aside
 from rollover.diagnosis.verdict import Named, Place, Verdict
 from rollover.recording import Recording
 
@@ -58,7 +57,7 @@ def broken_off(
     return _unexplained(places, by_loss(places), len(evidence), p_value) if places else None
 
 
-def misread(slips: Sequence[Slip | Misstated], recordings: int, p_value: float) -> Shown | None:
+def misread(slips: Sequence[Aside], recordings: int, p_value: float) -> Shown | None:
     """What was left aside as no recording of what it states, where all else agrees; None if nothing was."""
     share = 1.0 / max(len(slips), 1)
     places = tuple(whole(slip.evidence, slip.signal, phases_of(slip.evidence), share) for slip in slips)

@@ -15,10 +15,11 @@ it left aside too.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 
@@ -34,23 +35,28 @@ PLACES = np.linspace(-3.0, 3.0, 61)  # times its prior, where a time shift is lo
 UNIT = 5.0  # times, or one part of, that a unit must make to be told from what is missing: ground 3 times as stiff
 
 
-class Says(Protocol):
-    """What has a sentence on it."""
-
-    def says(self) -> str:
-        """The sentence."""
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Slip:
-    """A channel of a recording that reads `factor` times what is simulated, as `cause` would have it."""
+class Aside(ABC):
+    """What is left aside as no recording of what it states: a channel, or all of a recording as a channel shows."""
 
     evidence: Evidence
     signal: Signal
+
+    summary: ClassVar[str]
+
+    @abstractmethod
+    def says(self) -> str:
+        """The sentence on it."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Slip(Aside):
+    """A channel of a recording that reads `factor` times what is simulated, as `cause` would have it."""
+
     factor: float
     cause: str
 
-    summary: ClassVar = "Channels stand in another unit than is stated, or with the opposite sign."
+    summary = "Channels stand in another unit than is stated, or with the opposite sign."
 
     def says(self) -> str:
         """The sentence on it."""
@@ -98,7 +104,7 @@ def without(every: Sequence[Evidence], slips: Sequence[Slip]) -> list[Evidence]:
     return [e for e in left if e.signals] if aside else list(every)
 
 
-def by_slips(found: Sequence[Says]) -> str:
+def by_slips(found: Sequence[Aside]) -> str:
     """What stands behind a verdict where channels were left aside; nothing where none was."""
     return "".join(f" {slip.says()}" for slip in found)
 

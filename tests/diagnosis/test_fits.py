@@ -19,11 +19,9 @@ from rollover.diagnosis.candidates import Candidate, coordinate
 from rollover.diagnosis.crew import Crew, Job, work
 from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.fit import Block, Judge, shift_of
-from rollover.diagnosis.leaps import LEAP_IN, about_jumps
+from rollover.diagnosis.leaps import about_jumps
 from rollover.diagnosis.otherwise import _best_middle
 from rollover.diagnosis.ranges import candidates_of
-from rollover.diagnosis.simulator import simulator_of
-from rollover.drop import DropModel
 from rollover.scenario import load
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
@@ -357,48 +355,6 @@ def test_one_condition_alone_says_that_nothing_was_held_out() -> None:
     assert named.effects
     assert "the misfit falls" in named.sentence
     assert "Of one condition nothing can be held out" in named.sentence
-
-
-def test_a_clock_of_its_own_is_simulated_at_its_own_stamps() -> None:
-    name, recording = recorded({}, speeds=(2.0,), channels=(FORCE, DEPTH, ACCELERATION), noise=1e-4)[0]
-    simulator = simulator_of(scenario(), recording)
-    late = simulator.predict(
-        {"effects.sensor-clock-offset.channel": FORCE, "effects.sensor-clock-offset.offset": 0.004}, 0.0
-    )
-    shifted, plain = simulator.predict({}, 0.004), simulator.predict({}, 0.0)
-    assert late is not None
-    assert shifted is not None
-    assert plain is not None
-    assert np.array_equal(late[FORCE], shifted[FORCE])
-    assert np.array_equal(late[DEPTH], plain[DEPTH]), name
-    # and what leaps in it leaps there: on which side a sample lies is this clock's to say
-    assert np.any(late[LEAP_IN + FORCE] > 0.0)
-    assert np.array_equal(late[LEAP_IN + FORCE], shifted[LEAP_IN + FORCE])
-    assert not np.array_equal(late[LEAP_IN + FORCE], plain[LEAP_IN + FORCE])
-    lag = {"effects.sensor-lag.channel": FORCE, "effects.sensor-lag.time": 0.002}
-    behind = simulator.predict(lag, 0.0)
-    assert behind is not None
-    assert LEAP_IN + FORCE not in behind  # which makes a kink of it
-
-
-def test_a_clock_that_drifts_is_forgiven_for_the_side_of_a_contact_that_a_sample_lies_on() -> None:
-    """The load cell's clock loses 0.3 %, and one of its samples lies at the contact: 10 us to either side are alike."""
-    (name, made), *_ = recorded({}, speeds=(1.4,), rate=1000.0)
-    time, rng = np.arange(-30, 350) * 1e-3 + 1e-6, np.random.default_rng(4)
-    model = DropModel(scenario=scenario(), step=2e-4).with_({"initiation.speed": 1.4})
-    runs = {FORCE: model.run(0.997 * time)[FORCE], DEPTH: model.run(time)[DEPTH]}
-    channels = {c: v + 3e-3 * np.ptp(v) * rng.normal(size=v.size) for c, v in runs.items()}
-    judge = judge_of([(name, replace(made, time=time, channels=channels))])
-    c = next(c for c in candidates_of(judge.evidence, (), "drop") if c.key == f"sensor-clock-drift:{FORCE}")
-    there = (coordinate(0.003, c.search["drift"]),)
-
-    def left(shift: float) -> float:
-        e, raw = judge.evidence[0], judge.raw(0, (c,), there, shift)
-        assert raw is not None
-        return float(np.sum((e.measured() - e.whitened(raw)) ** 2))
-
-    assert left(1e-5) == pytest.approx(left(-1e-5), rel=0.1)
-    assert left(1e-5) < 1.2 * 2 * time.size
 
 
 def test_a_rebound_is_looked_for_from_what_the_law_springs_back_by_itself() -> None:

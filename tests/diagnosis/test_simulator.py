@@ -9,7 +9,12 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.bins import simulated
-from rollover.diagnosis.simulator import SHORTEST, STEP, DropSimulator, set_up
+from rollover.diagnosis.candidates import coordinate
+from rollover.diagnosis.evidence import evidence_of
+from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.leaps import LEAP_IN
+from rollover.diagnosis.ranges import candidates_of
+from rollover.diagnosis.simulator import SHORTEST, STEP, DropSimulator, set_up, simulator_of
 from rollover.drop import DropModel
 from rollover.effects.empirical import Empirical
 from rollover.initiation import Drop
@@ -122,3 +127,47 @@ def test_drops_share_what_their_conditions_leave_as_it_is() -> None:
     one, other = (DropModel(scenario=s).with_(layer).told[1] for s in made)
     assert one is other
     assert one.tolist() != DropModel(scenario=own).told[1].tolist()
+
+
+def test_a_clock_of_its_own_is_simulated_at_its_own_stamps() -> None:
+    name, recording = recorded({}, speeds=(2.0,), channels=(FORCE, DEPTH, ACCELERATION), noise=1e-4)[0]
+    simulator = simulator_of(scenario(), recording)
+    late = simulator.predict(
+        {"effects.sensor-clock-offset.channel": FORCE, "effects.sensor-clock-offset.offset": 0.004}, 0.0
+    )
+    shifted, plain = simulator.predict({}, 0.004), simulator.predict({}, 0.0)
+    assert late is not None
+    assert shifted is not None
+    assert plain is not None
+    assert np.array_equal(late[FORCE], shifted[FORCE])
+    assert np.array_equal(late[DEPTH], plain[DEPTH]), name
+    # and what leaps in it leaps there: on which side a sample lies is this clock's to say
+    assert np.any(late[LEAP_IN + FORCE] > 0.0)
+    assert np.array_equal(late[LEAP_IN + FORCE], shifted[LEAP_IN + FORCE])
+    assert not np.array_equal(late[LEAP_IN + FORCE], plain[LEAP_IN + FORCE])
+    lag = {"effects.sensor-lag.channel": FORCE, "effects.sensor-lag.time": 0.002}
+    behind = simulator.predict(lag, 0.0)
+    assert behind is not None
+    assert LEAP_IN + FORCE not in behind  # which makes a kink of it
+
+
+def test_a_clock_that_drifts_is_forgiven_for_the_side_of_a_contact_that_a_sample_lies_on() -> None:
+    """The load cell's clock loses 0.3 %, and one of its samples lies at the contact: 10 us to either side are alike."""
+    (name, made), *_ = recorded({}, speeds=(1.4,), rate=1000.0)
+    time, rng = np.arange(-30, 350) * 1e-3 + 1e-6, np.random.default_rng(4)
+    model = DropModel(scenario=scenario(), step=2e-4).with_({"initiation.speed": 1.4})
+    runs = {FORCE: model.run(0.997 * time)[FORCE], DEPTH: model.run(time)[DEPTH]}
+    channels = {c: v + 3e-3 * np.ptp(v) * rng.normal(size=v.size) for c, v in runs.items()}
+    one = evidence_of(name, *simulated(scenario(), replace(made, time=time, channels=channels)))
+    assert one is not None
+    judge = Judge([one])
+    c = next(c for c in candidates_of(judge.evidence, (), "drop") if c.key == f"sensor-clock-drift:{FORCE}")
+    there = (coordinate(0.003, c.search["drift"]),)
+
+    def left(shift: float) -> float:
+        e, raw = judge.evidence[0], judge.raw(0, (c,), there, shift)
+        assert raw is not None
+        return float(np.sum((e.measured() - e.whitened(raw)) ** 2))
+
+    assert left(1e-5) == pytest.approx(left(-1e-5), rel=0.1)
+    assert left(1e-5) < 1.2 * 2 * time.size
