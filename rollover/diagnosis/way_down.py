@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from rollover.diagnosis.aftermath import up_to
 from rollover.diagnosis.clocks import align
 from rollover.diagnosis.crew import Job
@@ -25,6 +27,9 @@ BEYOND = 0.05  # s that are simulated after an end, for filters that look ahead
 RIVALS = 5  # that are held against the best over the whole way
 # of the time to the deepest point: before it, as the ground springs back, and before what bounces comes down again
 ENDS = (1.0 - AROUND_PEAK, 1.2, 2.0)
+# of the time to the deepest point, after which what rests does not move any more; how near to its deepest that is; and
+# of what is left beyond the noise, that must move there for the way back to be a reason
+AT_REST, DEEPEST, BACK = 1.2, 0.999, 0.02
 
 
 def down_first(inquiry: Inquiry, found: Taken) -> Taken:
@@ -32,6 +37,8 @@ def down_first(inquiry: Inquiry, found: Taken) -> Taken:
     judge, base = inquiry.judge, found.base
     if judge.effort.thrifty or found.fitted.left < HOPELESS**2 * found.count:
         return found
+    if moving_back(inquiry, base) < BACK * (found.fitted.left - found.count):
+        return found  # it came to rest as the simulation does, wherever that was
     steps: Sequence[Step] = ()
     for end in ENDS:
         above = _until(inquiry, end, steps)
@@ -45,6 +52,26 @@ def down_first(inquiry: Inquiry, found: Taken) -> Taken:
     if is_better(other.fitted, other.left, found.fitted):
         return other
     judge.weigh(held)
+    return found
+
+
+def moving_back(inquiry: Inquiry, base: Fitted) -> float:
+    """What a fit leaves beyond the noise where both it and the recordings are past the deepest point, about its mean.
+
+    Ground that holds what fell into it leaves an offset there, whatever is missing on the way down.
+    """
+    found = 0.0
+    for e, block, phases in zip(inquiry.judge.evidence, base.blocks, inquiry.phases, strict=True):
+        depth = e.simulator.state(block.shift).get("ground/sinkage")
+        peaks = [start for start, name in phases if name == PEAK]
+        if depth is None or not peaks:
+            return np.inf
+        own = float(e.recording.time[int(np.argmax(depth >= DEEPEST * depth.max()))])
+        rest = AT_REST * max(peaks[0] / (1.0 - AROUND_PEAK), own)
+        for signal, part in e.spans():
+            late = block.plain_residual[part][e.recording.time[signal.rows] > rest]
+            if late.size:
+                found += float(np.sum((late - late.mean()) ** 2)) - late.size
     return found
 
 

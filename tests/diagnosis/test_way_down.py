@@ -16,7 +16,7 @@ from rollover.diagnosis.detect import Mismatch
 from rollover.diagnosis.diagnose import _evidence, diagnose
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.explain import Step
-from rollover.diagnosis.fit import Fitted
+from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.one_by_one import Taken
 from rollover.diagnosis.phases import drop_phases
@@ -99,6 +99,8 @@ def test_what_explains_the_way_down_is_a_beginning_if_it_leads_to_far_less(
     monkeypatch.setattr(way_down, "Judge", lambda _: early)
     monkeypatch.setattr(way_down, "align", lambda _: None)
     monkeypatch.setattr(way_down, "one_by_one", one_by_one)
+    back = {"moves": np.inf}
+    monkeypatch.setattr(way_down, "moving_back", lambda *_: back["moves"])
     whole = Inquiry(
         judge=cast(Any, judge), candidates=(), groups=[], phases=[()], say=lambda _: None,
         crew=cast(Any, SimpleNamespace(fits=lambda _judge, jobs, _say: [fit(j.candidates, 5_000.0) for j in jobs])),
@@ -111,6 +113,8 @@ def test_what_explains_the_way_down_is_a_beginning_if_it_leads_to_far_less(
     assert weighed == ([["whole"]] if over_all > 900.0 else []), "as it was before a way that led nowhere"
     little = taken(base, fit((MASS,), 60.0))
     assert way_down.down_first(whole, little) is little
+    back["moves"] = 50.0
+    assert way_down.down_first(whole, before) is before, "what rests as simulated is no reason for ten thousand"
 
 
 def test_the_way_down_ends_before_the_deepest_point() -> None:
@@ -125,3 +129,23 @@ def test_the_way_down_ends_before_the_deepest_point() -> None:
         np.testing.assert_array_equal(before.values[: after.rows.size], after.values)
     assert way_down._cut(evidence[0], ((-0.05, "approach"),), 0.9) is None
     assert way_down._cut(evidence[0], ((-0.05, "free-fall"), (-0.045, "peak")), 0.9) is None, "five samples"
+
+
+@pytest.mark.parametrize(
+    ("rig", "is_back"),
+    [
+        ({"layer_depth": 0.05, "layer_ratio": 3.0}, False),  # far from the simulation, and as still as that
+        ({"layer_depth": 0.05, "layer_ratio": 3.0, "recovery": 0.05, "unloading_ratio": 0.06}, True),
+        ({"recovery": 0.05, "unloading_ratio": 0.06}, True),
+    ],
+)
+def test_what_holds_what_fell_into_it_moves_nothing_on_the_way_back(rig: dict[str, float], is_back: bool) -> None:
+    evidence, _ = _evidence(load("drop_test"), recordings(rig), Crew())
+    judge = Judge(evidence)
+    base = judge.fit((), ())
+    assert base is not None
+    phases = [drop_phases(e) for e in evidence]
+    asking = Inquiry(judge=judge, candidates=(), groups=[], phases=phases, say=lambda _: None, crew=Crew())
+    beyond = base.left - sum(b.residual.size for b in base.blocks)
+    moved = way_down.moving_back(asking, base)
+    assert moved > 0.1 * beyond if is_back else abs(moved) < 0.1 * way_down.BACK * beyond
