@@ -29,7 +29,7 @@ PART = 0.25  # of what moves something, that a part of more must move
 HOPELESS, HARDLY_ANY = 2.0, 0.01
 # times what the second effect took, that two leave beyond the noise and no third is looked for: it would have to take
 # that, and the one that takes more comes first
-UNLIKELY = 5.0
+UNLIKELY = 3.0
 SEVERAL = 2  # recordings on another course, after which they are not forgiven if a candidate scores beyond chance
 ABLE = 0.7  # of what there was beyond the noise, above which two leave so much that no exchange of one will end it
 BETTER = 0.5  # of what is left, that another first effect must leave

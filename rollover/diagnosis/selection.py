@@ -21,7 +21,7 @@ from rollover.diagnosis.one_by_one import as_conditioned, is_better, one_by_one
 from rollover.diagnosis.pairs import instead, two_by_two
 from rollover.diagnosis.refine import without
 from rollover.diagnosis.remainder import NEGLIGIBLE, is_enough, is_tolerated, matters
-from rollover.diagnosis.straight import MOST, is_a_curve, is_any_curve, is_pliant
+from rollover.diagnosis.straight import MOST, is_a_curve, is_any_curve, is_one_line, is_pliant
 from rollover.diagnosis.verdict import Verdict
 from rollover.diagnosis.way_down import down_first
 
@@ -176,9 +176,9 @@ def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) ->
     as may be, or two of one sensor, or of a soil that is bent, more surely so: they can be bent to more. One alone also
     where it takes nearly all.
     """
-    if not found.settled or is_any_curve(found.fitted.candidates) or is_a_curve(judge, found.fitted):
+    held, is_curved = found.fitted.candidates, is_a_curve(judge, found.fitted)
+    if not found.settled or is_any_curve(held) or (is_curved and is_one_line(held)):
         return found.refused(), "unexplained"
-    held = found.fitted.candidates
     is_bending = len(found.parts) == MOST or is_one_sensor(held) or is_pliant(held)
     is_whole = found.after.p_value > (MANY if is_bending else SURE)
     if is_bending and not judge.effort.thrifty:
@@ -186,7 +186,7 @@ def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) ->
         is_whole = is_whole and min(found.after.adjusted, default=1.0) > SURE
     is_whole = is_whole or not matters(judge, found.fitted, found.after)
     start, ahead = held_out(found.base, groups).total, held_out(found.fitted, groups).total
-    is_whole = is_whole and not (ahead > NEARLY_NOISE and takes_little(found, groups))
+    is_whole = is_whole and not (ahead > NEARLY_NOISE and takes_little(found, groups)) and not is_curved
     # what a tolerance allows has structure too
     is_whole = is_whole or (is_tolerated(judge, found.fitted) and ahead < HARDLY_MORE)
     if found.parts and is_whole and ahead < start:

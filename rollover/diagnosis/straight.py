@@ -19,12 +19,14 @@ BENT = 16.0  # gain of a curve or a drift beside a line, of four standard errors
 
 
 def is_a_curve(judge: Judge, fitted: Fitted) -> bool:
-    """Whether effects that make a straight line of one channel leave a curve of it, or one that drifts."""
-    channels = {c.channel for c in fitted.candidates}
-    if len(channels) != 1 or not all(c.id in LINES for c in fitted.candidates):
-        return False
-    channel = str(channels.pop())
-    return max(bow(judge, fitted, channel, term) for term in (square, drift)) > BENT
+    """Whether effects that make a straight line of a channel leave a curve of it, or one that drifts."""
+    channels = {str(c.channel) for c in fitted.candidates if c.id in LINES}
+    return any(bow(judge, fitted, channel, term) > BENT for channel in sorted(channels) for term in (square, drift))
+
+
+def is_one_line(candidates: Sequence[Candidate]) -> bool:
+    """Whether all of several effects make a straight line of one channel."""
+    return len({c.channel for c in candidates}) == 1 and all(c.id in LINES for c in candidates)
 
 
 def square(read: Array, time: Array) -> Array:

@@ -307,10 +307,23 @@ def test_effects_that_may_be_any_others_are_not_named(judged: dict[str, float]) 
     assert (refused.parts, verdict) == ((), "unexplained")
 
 
+@pytest.mark.parametrize(("alone", "named"), [(3.5, []), (1.5, ["soil-crust"])])
+def test_effects_beside_which_a_sensor_reads_a_curve_are_not_named_together(
+    alone: float, named: list[str], judged: dict[str, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They leave no more than chance over all, and what is looked for itself: one that takes nearly all is named."""
+    monkeypatch.setattr(selection, "is_a_curve", lambda *_: True)
+    judged["soil-crust"] = alone
+    found, verdict = decided(cast(Judge, SimpleNamespace(evidence=(), effort=DROPS)), explanation(2, 0.4), [], [])
+    assert [s.fitted.candidates[-1].id for s in found.parts] == named
+    assert verdict == ("missing-physics" if named else "unexplained")
+
+
 @pytest.mark.parametrize(
     ("before", "after", "unlikely"),
     [
         (400.0, 300.0, False),  # of 40 samples: the second took 100, a third would have to take 260
+        (370.0, 300.0, True),  # 70, and 260
         (320.0, 300.0, True),  # 20, and 260
         (300.0, 305.0, True),  # under another noise it took nothing
         (100.0, 50.0, False),

@@ -9,7 +9,7 @@ import pytest
 
 from rollover.diagnosis import diagnose, selection
 from rollover.diagnosis.candidates import coordinate
-from rollover.diagnosis.straight import BENT, bow, drift, is_a_curve, square
+from rollover.diagnosis.straight import BENT, bow, drift, is_a_curve, is_one_line, square
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 from tests.diagnosis.test_fits import GAIN, candidate, judge_of
 
@@ -68,7 +68,14 @@ def test_gain_and_offset_that_meet_a_curved_sensor_are_refused(monkeypatch: pyte
     fitted = judge.fit(both, [coordinate(1.0, both[0].search["gain"]), coordinate(1.0, both[1].search["bias"])])
     assert fitted is not None
     assert is_a_curve(judge, fitted)
-    assert not is_a_curve(judge, replace(fitted, candidates=(both[0], candidate(judge, f"sensor-bias:{DEPTH}"))))
+    assert is_one_line(both)
+    mass = candidate(judge, "mass")
+    beside = judge.fit((both[0], mass), (fitted.x[0], 0.6))
+    assert beside is not None
+    assert is_a_curve(judge, beside), "whatever stands beside its gain"
+    assert not is_one_line(beside.candidates)
+    assert not is_one_line([both[0], candidate(judge, f"sensor-bias:{DEPTH}")])
+    assert not is_a_curve(judge, replace(beside, candidates=(mass, mass))), "of no line"
     monkeypatch.setattr(selection, "is_a_curve", lambda *_: True)
     found = diagnose(scenario(), recorded(GAIN, speeds=(1.2, 2.2, 3.2)))
     assert (found.verdict, found.effects) == ("unexplained", ())
