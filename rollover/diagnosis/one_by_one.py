@@ -10,7 +10,7 @@ from rollover.diagnosis.chaos import is_other
 from rollover.diagnosis.clocks import is_all_by_clocks
 from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.endings import followed
-from rollover.diagnosis.explain import SURE, Step, does, moves, step, weighed
+from rollover.diagnosis.explain import Step, does, moves, step, weighed
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry, Phases
@@ -32,7 +32,6 @@ HOPELESS, HARDLY_ANY = 2.0, 0.01
 UNLIKELY = 3.0
 SEVERAL = 2  # recordings on another course, after which they are not forgiven if a candidate scores beyond chance
 ABLE = 0.7  # of what there was beyond the noise, above which two leave so much that no exchange of one will end it
-BETTER = 0.5  # of what is left, that another first effect must leave
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,10 +117,10 @@ def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = (), *, pa
             # of two that are strong the first may have been taken for something else
             other = None
             if pairs and not judge.effort.thrifty:
-                other, paired = two_by_two(inquiry, taken, first_look), True
+                other, paired = two_by_two(inquiry, taken, first_look, current), True
             elif judge.effort.thrifty and current.left - count < ABLE * (base.left - count):
-                other = with_another_first(inquiry, taken)
-            if other is not None and is_better(other[0][-1].fitted, other[1], current):
+                other = with_another_first(inquiry, taken, current)
+            if other is not None:
                 (taken, left), current = other, other[0][-1].fitted
         is_far = current.left > HOPELESS**2 * count and current.left - count > HARDLY_ANY * (base.left - count)
         if (len(taken) > 1 and (is_far or is_unlikely(judge, taken[-1], current))) or is_any_curve(current.candidates):
@@ -215,8 +214,3 @@ def as_conditioned(judge: Judge, found: Step, left: Mismatch, phases: Phases) ->
         return found.moved_to(new), there
     judge.weigh(before)
     return found, left
-
-
-def is_better(other: Fitted, left: Mismatch, current: Fitted) -> bool:
-    """Whether an explanation is to be taken instead of another: it leaves far less, or less and no more than chance."""
-    return other.left < current.left * (1.0 if left.p_value > SURE else BETTER)

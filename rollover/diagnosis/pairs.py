@@ -5,13 +5,14 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 from rollover.diagnosis.blocks import turned
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.crew import Job
 from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.endings import followed, mirror_images, simpler, unbent
-from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Step, step
+from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Step, step, weighed
 from rollover.diagnosis.fit import Fitted
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
@@ -21,38 +22,59 @@ from rollover.diagnosis.otherwise import from_there, shaped_too
 from rollover.diagnosis.refine import BEHIND, few_of, shifts_told, without
 from rollover.diagnosis.remainder import is_enough
 from rollover.diagnosis.screening import is_far
-from rollover.diagnosis.thresholds import stretches
+from rollover.diagnosis.thresholds import has_threshold, placed_beside, stretches
 
 LEADING, FOLLOWING = 4, 4  # of the first effects, and of later ones each, that are tried two by two
 SCORED = 16  # so many more, by what they scored at first
 ROUNDS = ((2, 40), (2, 14), (6, 6))  # of a short fit to few recordings, and how many of these are gone on with
 PLACED, PLACES = 1.5, 2  # times what the best of them leaves, up to which so many are tried with their places elsewhere
 LITTLE = 0.1  # of what the best effect alone leaves beyond the noise, that a pair must take to be gone on with
+BETTER = 0.5  # of what is left, that another explanation must leave
 ALIKE = 2.0  # times what the best of them leaves, up to which the shape of what rings may make another the best
 
+Start = tuple[tuple[Candidate, ...], tuple[float, ...]]  # two effects, and where a fit of them begins
 
-def two_by_two(inquiry: Inquiry, taken: Sequence[Step], looked: Gate) -> tuple[list[Step], Mismatch] | None:
-    """The best pair of effects, as steps, and what it leaves; see `best_pair`."""
+
+def two_by_two(
+    inquiry: Inquiry, taken: Sequence[Step], looked: Gate, current: Fitted, *, is_whole: bool = False
+) -> tuple[list[Step], Mismatch] | None:
+    """The best pair of effects, as steps, and what it leaves, see `best_pair`; None if `current` stays.
+
+    A pair is given for it that is better, or, where it is whole, that leaves what chance leaves too. Where a pair
+    leaves nearly noise, and more than quiet stretches tell of, it is under the noise that all of it tells of.
+    """
+    judge, held = inquiry.judge, inquiry.judge.evidence
     pair = best_pair(inquiry, taken, looked)
     if pair is None:
         return None
     found, left = followed(inquiry, pair)
-    if not is_enough(inquiry.judge, found.fitted, left) and any(c.rings for c in found.fitted.candidates):
+    if not is_enough(judge, found.fitted, left) and any(c.rings for c in found.fitted.candidates):
         # what its shape shows now did not show beside another one
-        held = found.fitted if found.fitted.candidates[-1].rings else inquiry.judge.again(turned(found.fitted))
-        other = instead(inquiry, held)
+        ringing = found.fitted if found.fitted.candidates[-1].rings else judge.again(turned(found.fitted))
+        other = instead(inquiry, ringing)
         if other is not None and other.fitted.left < found.fitted.left:
             found, left = followed(inquiry, other)
+    if not is_enough(judge, found.fitted, left) and weighed(judge, found.fitted, inquiry.phases):
+        found = found.again(judge)
+        left = mismatch_of(judge.evidence, found.fitted.blocks, inquiry.phases)
+    if not (left.p_value > SURE if is_whole else is_better(found.fitted, left, current)):
+        judge.weigh(held)
+        return None
     return [replace(taken[0], fitted=found.base), found], left
 
 
-def with_another_first(inquiry: Inquiry, taken: Sequence[Step]) -> tuple[list[Step], Mismatch] | None:
-    """Two steps with the first effect given for a better one beside the second, and what they leave; None if none."""
+def is_better(other: Fitted, left: Mismatch, current: Fitted) -> bool:
+    """Whether an explanation is to be taken instead of another: it leaves far less, or less and no more than chance."""
+    return other.left < current.left * (1.0 if left.p_value > SURE else BETTER)
+
+
+def with_another_first(inquiry: Inquiry, taken: Sequence[Step], current: Fitted) -> tuple[list[Step], Mismatch] | None:
+    """Two steps with the first effect given for another beside the second, and what they leave; None if not better."""
     other = instead(inquiry, taken[-1].fitted)
     if other is None or other.fitted.left >= taken[-1].fitted.left:
         return None
     found, left = followed(inquiry, other)
-    return [taken[-1], found], left
+    return ([taken[-1], found], left) if is_better(found.fitted, left, current) else None
 
 
 def instead(inquiry: Inquiry, current: Fitted) -> Step | None:
@@ -85,7 +107,9 @@ def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: Gate) -> Step | N
     at, pinned = tuple(shifts[r] for r in few), is_far(judge, first.base)
     pairs = [(a, b) for a, b in itertools.combinations(partners, 2) if a[0].key != b[0].key]
     inquiry.say(f"{len(pairs)} pairs of effects")
-    short: Sequence[tuple[tuple[Candidate, ...], tuple[float, ...]]] = [((a, b), (*x, *y)) for (a, x), (b, y) in pairs]
+    short: Sequence[Start] = [((a, b), (*x, *y)) for (a, x), (b, y) in pairs]
+    if pinned:
+        short = [*short, *_placed_anew(inquiry, partners, few, shifts)]
     for rounds, most in ROUNDS:
         jobs = [
             Job(candidates=both, start=x, shifts=at, only=tuple(few), rounds=rounds, pinned=pinned) for both, x in short
@@ -108,6 +132,22 @@ def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: Gate) -> Step | N
                 best = min(best, *shaped_too(inquiry, alone, [pair]), key=lambda f: f.left)
     alone = judge.fit(best.candidates[:-1], best.x[: -len(best.own)], shifts=[b.shift for b in best.blocks])
     return None if alone is None else Step(base=alone, fitted=best, p_value=first.p_value, rivals=(best,))
+
+
+def _placed_anew(
+    inquiry: Inquiry,
+    partners: Sequence[tuple[Candidate, tuple[float, ...]]],
+    few: Sequence[int],
+    shifts: Sequence[float],
+) -> list[Start]:
+    """Pairs of an effect that led and one with a threshold, begun where that leaves least beside it.
+
+    Alone, for all that is missing, it may have ended elsewhere, or nowhere.
+    """
+    able = [c for c, _ in partners if has_threshold(c) and not c.is_bent]
+    ways = [(a, x, c) for a, x in partners[:LEADING] for c in able if c.key != a.key]
+    found = inquiry.looks(partial(placed_beside, few=tuple(few), shifts=tuple(shifts)), ways)
+    return [((a, c), x) for (a, _, c), x in zip(ways, found, strict=True) if x is not None]
 
 
 def _takes_little(lead: Fitted, pair: Fitted, few: Sequence[int]) -> bool:

@@ -17,7 +17,7 @@ from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.inquiry import Groups, Inquiry, Phases
 from rollover.diagnosis.lasting import NEEDED, unforgiven
-from rollover.diagnosis.one_by_one import as_conditioned, is_better, one_by_one
+from rollover.diagnosis.one_by_one import as_conditioned, one_by_one
 from rollover.diagnosis.pairs import instead, two_by_two
 from rollover.diagnosis.refine import without
 from rollover.diagnosis.remainder import NEGLIGIBLE, is_enough, is_tolerated, matters
@@ -83,11 +83,9 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     is_whole = is_enough(judge, current, left)
     is_open = not (judge.effort.thrifty or found.paired) and (not is_whole or len(taken) == MOST)
     if found.first is not None and is_open:
-        both = two_by_two(inquiry, taken or [found.first], found.at_first)
         # two that leave what chance leaves are preferred to three that do
-        if both is not None and (
-            both[1].p_value > SURE if is_whole else is_better(both[0][-1].fitted, both[1], current)
-        ):
+        both = two_by_two(inquiry, taken or [found.first], found.at_first, current, is_whole=is_whole)
+        if both is not None:
             (taken, left), current = both, both[0][-1].fitted
             is_whole = is_enough(judge, current, left)
     parts = [s.again(judge) for s in taken]

@@ -42,6 +42,37 @@ def is_clock(fitted: Fitted) -> bool:
     return fitted.candidates[-1].id in CLOCKS
 
 
+def has_threshold(c: Candidate) -> bool:
+    """Whether one parameter of an effect says how strong it is and another where it sets in, of those it is fitted by.
+
+    Neither of what rings has a null.
+    """
+    null = EFFECTS[c.id].null
+    is_strength_known = null.get(yardstick(c.id, c.search)[0]) is not None
+    return is_strength_known and any(null.get(name) is None for name in c.search)
+
+
+def placed_beside(
+    judge: Judge, pair: tuple[Candidate, tuple[float, ...], Candidate], *, few: Sequence[int], shifts: Sequence[float]
+) -> tuple[float, ...] | None:
+    """Where a fit of two effects may begin: the first as it is, the second where least of few recordings is left.
+
+    The second has a threshold, and is as strong at each place as these ask for there. None where it helps nowhere.
+    """
+    first, x, second = pair
+    blocks = blocks_at(judge, (first,), x, shifts, few)
+    if blocks is None:
+        return None
+    alone = Fitted(candidates=(first,), x=x, blocks=tuple(blocks))
+    best, least = None, alone.total
+    for place in second.probes():
+        there = _as_strong(judge, alone, second, (*x, *place), few)
+        left = None if there is None else left_at(judge, (first, second), there, shifts, few)
+        if left is not None and left < least:
+            best, least = there, left
+    return best
+
+
 def traced(judge: Judge, fitted: Fitted, stretch: Stretch) -> Fitted:
     """The fit begun anew where its last effect acts elsewhere, as strongly as recordings ask for there; never worse.
 

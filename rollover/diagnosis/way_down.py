@@ -20,7 +20,8 @@ from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.explain import NEARLY_NOISE, Step
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.one_by_one import HOPELESS, Taken, is_better, one_by_one
+from rollover.diagnosis.one_by_one import HOPELESS, Taken, one_by_one
+from rollover.diagnosis.pairs import is_better
 from rollover.diagnosis.phases import AROUND_PEAK, PEAK
 
 BEYOND = 0.05  # s that are simulated after an end, for filters that look ahead

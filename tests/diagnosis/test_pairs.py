@@ -10,14 +10,18 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import pairs
-from rollover.diagnosis.candidates import Candidate
+from rollover.diagnosis.candidates import Candidate, coordinate
+from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.explain import Step
-from rollover.diagnosis.fit import Fitted
+from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
+from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.screening import Screened
+from rollover.diagnosis.thresholds import has_threshold, placed_beside
 from rollover.effects import Search
-from tests.diagnosis.drops import linear_blocks
+from tests.diagnosis.drops import linear_blocks, recorded
+from tests.diagnosis.test_fits import candidate, judge_of
 
 RATIO = Search(0.2, 5.0, "log")
 MASS = Candidate(id="mass", kind="parameter", family="", search={"added": Search(-1, 1)})
@@ -190,3 +194,138 @@ def test_what_is_stiffer_above_is_tried_as_what_is_softer_below(
         (0, {"depth", "stiffness_ratio"})
     ] * len(places)
     assert [j.candidates[0] for j in asked[len(places) :]] == [c for c in pair if c is not BENT][: len(places)]
+
+
+RATE, DEPTH = 0.05, 0.13  # per decade, m
+
+
+def layered(ratio: float, depth: float = DEPTH) -> Judge:
+    """Ground that hardens by its rate and is so many times as stiff below a depth, met three times."""
+    hidden = {
+        "effects.soil-rate-hardening.per_decade": RATE,
+        "effects.soil-layer.depth": depth,
+        "effects.soil-layer.stiffness_ratio": ratio,
+    }
+    return judge_of(recorded(hidden, 3, speeds=(1.4, 1.9, 2.6), noise=0.003, rate=1000.0))
+
+
+@pytest.mark.parametrize(("ratio", "lost"), [(0.7, 500.0), (1.3, 0.0)])
+def test_what_sets_in_somewhere_is_begun_where_it_helps_beside_the_other(ratio: float, lost: float) -> None:
+    """Alone a softer layer ends elsewhere than under ground that hardens: from there a fit of both leads nowhere."""
+    judge = layered(ratio)
+    rate, layer = candidate(judge, "soil-rate-hardening"), candidate(judge, "soil-layer")
+    shifts, few = [0.0] * 3, [0, 1, 2]
+    hardening = judge.fit((rate,), (0.6,), shifts=shifts, pinned=True)
+    alone = judge.fit((layer,), (0.3, 0.5), shifts=shifts, pinned=True)
+    assert hardening is not None
+    assert alone is not None
+    begun = placed_beside(judge, (rate, hardening.x, layer), few=few, shifts=shifts)
+    assert begun is not None
+    assert begun[:1] == hardening.x
+    assert begun[1] == pytest.approx(coordinate(DEPTH, layer.search["depth"]), abs=0.1)
+    led = [judge.fit((rate, layer), x, shifts=shifts) for x in (begun, (*hardening.x, *alone.x))]
+    assert led[0] is not None
+    assert led[1] is not None
+    count = sum(b.residual.size for b in led[0].blocks)
+    assert led[0].left < 1.1 * count
+    assert led[1].left > lost * count
+
+
+def test_of_the_places_beside_another_one_that_leaves_least_is_taken() -> None:
+    """Two more are reached by the fastest drop, and leave more."""
+    shallow = 0.07
+    judge = layered(0.7, shallow)
+    rate, layer = candidate(judge, "soil-rate-hardening"), candidate(judge, "soil-layer")
+    begun = placed_beside(judge, (rate, (0.1,), layer), few=[0, 1, 2], shifts=[0.0] * 3)
+    assert begun is not None
+    assert begun[1] == pytest.approx(coordinate(shallow, layer.search["depth"]), abs=0.1)
+
+
+def test_what_sets_in_somewhere_says_how_strong_it_is_and_where() -> None:
+    judge = layered(1.3)
+    able = ("soil-layer", "soil-crust")
+    others = ("soil-rate-hardening", "structural-compliance", "mass")
+    assert [has_threshold(candidate(judge, i)) for i in (*able, *others)] == [True, True, False, False, False]
+
+
+def test_what_led_and_what_sets_in_somewhere_are_placed_two_by_two(monkeypatch: pytest.MonkeyPatch) -> None:
+    search = {"depth": Search(0.01, 1.0, "log"), "stiffness_ratio": Search(0.2, 5.0, "log")}
+    layer = Candidate(id="soil-layer", kind="physics", family="", search=search)
+    bent = replace(layer, id="soil-crust", form={"a": 1.0})
+    partners = [(MASS, (0.1,)), (DAMPING, (0.2,)), (layer, (0.3, 0.4)), (bent, (0.5, 0.6)), (PROPORTION, (0.7,))]
+    tried: list[Any] = []
+
+    def looks(look: Any, ways: list[Any]) -> list[Any]:
+        tried.append((look.keywords, [(a.id, x, c.id) for a, x, c in ways]))
+        return [None, *((*x, 0.8, 0.9) for _, x, _ in ways[1:])]
+
+    asking = cast(Inquiry, SimpleNamespace(looks=looks))
+    found = pairs._placed_anew(asking, partners, [0, 2], [1e-3, 0.0, 0.0])
+    ways = [
+        ("mass", (0.1,), "soil-layer"),
+        ("soil-viscous-damping", (0.2,), "soil-layer"),
+        ("soil-crust", (0.5, 0.6), "soil-layer"),
+    ]
+    assert tried == [({"few": (0, 2), "shifts": (1e-3, 0.0, 0.0)}, ways)]
+    assert [([c.id for c in both], x) for both, x in found] == [
+        (["soil-viscous-damping", "soil-layer"], (0.2, 0.8, 0.9)),
+        (["soil-crust", "soil-layer"], (0.5, 0.6, 0.8, 0.9)),
+    ]
+
+
+def test_a_pair_of_which_one_is_placed_beside_the_other() -> None:
+    """The hardening does not lead and the layer ended elsewhere alone: together they are all there is."""
+    judge = layered(0.7)
+    rate, layer, stiffer = (candidate(judge, i) for i in ("soil-rate-hardening", "soil-layer", "soil-stiffness"))
+    base = judge.fit((), ())
+    assert base is not None
+    alone = [judge.fit((c,), x, shifts=[0.0] * 3) for c, x in ((stiffer, (0.5,)), (rate, (0.6,)))]
+    led = [f for f in alone if f is not None]
+    lost = Screened(candidate=layer, starts=((0.05, 0.9),), left=9.0, potential=0.0)
+    first = Step(base=base, fitted=led[0], p_value=0.0, rivals=tuple(led), screened=(lost,))
+    looked = Gate(score=9.0, scores={"soil-layer": 9.0}, null=np.zeros(9), detectable={})
+    asking = Inquiry(
+        judge=judge, candidates=[rate, layer, stiffer], groups=[], phases=[phases_of(e) for e in judge.evidence],
+        say=lambda _: None, crew=Crew(),
+    )  # fmt: skip
+    best = pairs.best_pair(asking, [first], looked)
+    assert best is not None
+    assert best.fitted.label == "soil-rate-hardening + soil-layer"
+    assert best.fitted.left < 1.1 * sum(b.residual.size for b in best.fitted.blocks)
+    assert layer.values(best.fitted.own)["depth"] == pytest.approx(DEPTH, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("p_value", "is_noise", "is_whole", "told"),
+    [
+        (1e-6, True, False, 0.4),
+        (1e-6, False, False, None),  # it leaves structure, and hardly less than there is
+        (0.4, True, False, 0.4),
+        (0.4, True, True, 0.4),  # three that are all there is are given for two
+        (1e-6, False, True, None),
+    ],
+)
+def test_a_pair_that_leaves_nearly_noise_tells_of_it(
+    p_value: float, is_noise: bool, is_whole: bool, told: float | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Quiet stretches alone tell of a noise that is a little too small: two that are all there is left structure."""
+    found = Step(base=fitted((), 30.0), fitted=fitted((MASS,), 1.0), p_value=0.0)
+    weighed: list[Any] = []
+
+    def weigh(_judge: Any, fit: Fitted, _phases: Any) -> bool:
+        weighed.append(fit)
+        return is_noise
+
+    monkeypatch.setattr(pairs, "best_pair", lambda *_: found)
+    monkeypatch.setattr(pairs, "followed", lambda _, one: (one, SimpleNamespace(p_value=p_value)))
+    monkeypatch.setattr(pairs, "is_enough", lambda _judge, _fit, left: left.p_value > 0.001)
+    monkeypatch.setattr(pairs, "weighed", weigh)
+    monkeypatch.setattr(pairs, "mismatch_of", lambda *_: SimpleNamespace(p_value=0.4))
+    asking = inquiry([])
+    asking.judge.evidence, asking.judge.weigh = ("quiet",), weighed.append  # type: ignore[assignment,method-assign]
+    both = pairs.two_by_two(
+        asking, [found], cast(Gate, None), fitted((MASS,), 0.9 if is_whole else 1.5), is_whole=is_whole
+    )
+    assert (None if both is None else both[1].p_value) == told
+    tried = [] if p_value > 0.001 else [found.fitted]
+    assert weighed == [*tried, *([("quiet",)] if both is None else [])], "the noise is as it was if they are not taken"

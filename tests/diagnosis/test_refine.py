@@ -272,10 +272,10 @@ def test_two_effects_of_which_neither_comes_first_are_tried_together() -> None:
     guide = Screened(candidate=c["guide-friction"], starts=tuple(c["guide-friction"].starts()), left=9.0, potential=0.0)
     phases = [phases_of(e) for e in judge.evidence]
     inquiry = Inquiry(judge=judge, candidates=[*c.values()], groups=[], phases=phases, say=lambda _: None, crew=Crew())
-    alone = two_by_two(inquiry, [replace(first, screened=(guide,))], looked)
+    alone = two_by_two(inquiry, [replace(first, screened=(guide,))], looked, stiffer)
     assert alone is not None  # what scored most need not have led anything
     assert alone[0][-1].fitted.label == "mass + guide-friction"
-    found = two_by_two(inquiry, [first, then], looked)
+    found = two_by_two(inquiry, [first, then], looked, beside)
     assert found is not None
     (one, both), left = found
     assert one.fitted.label == "mass"

@@ -19,7 +19,6 @@ from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.one_by_one import is_better
 from rollover.diagnosis.ranges import candidates_of
 from rollover.diagnosis.selection import MOST, Explanation, by_the_first, decided
 from rollover.effects import Search
@@ -167,7 +166,7 @@ def test_two_of_one_sensor_must_leave_what_chance_leaves(
 )
 def test_a_little_less_is_better_where_it_is_all_that_chance_leaves(other: float, p_value: float, better: bool) -> None:
     fits: Any = [SimpleNamespace(left=other), SimpleNamespace(left=100.0)]
-    assert is_better(fits[0], left(p_value), fits[1]) is better
+    assert pairs.is_better(fits[0], left(p_value), fits[1]) is better
 
 
 @pytest.mark.parametrize(
@@ -288,12 +287,14 @@ def test_beside_what_rings_in_tune_the_other_of_a_pair_is_looked_for_anew(
         return stepped(pair("mass", other))
 
     found = stepped(pair("soil-layer", 80.0))
-    judge = SimpleNamespace(again=lambda f: f)
+    judge = SimpleNamespace(again=lambda f: f, evidence=())
     monkeypatch.setattr(pairs, "best_pair", lambda *_: found)
     monkeypatch.setattr(pairs, "followed", lambda _, one: (one, left(p_value)))
     monkeypatch.setattr(pairs, "is_enough", lambda _judge, _fit, what: what.p_value > 0.001)
     monkeypatch.setattr(pairs, "instead", instead)
-    both = pairs.two_by_two(cast(Inquiry, SimpleNamespace(judge=judge)), [found], cast(Gate, None))
+    monkeypatch.setattr(pairs, "weighed", lambda *_: False)
+    asking = cast(Inquiry, SimpleNamespace(judge=judge, phases=()))
+    both = pairs.two_by_two(asking, [found], cast(Gate, None), pair("mass", 1e4))
     assert both is not None
     assert both[0][-1].fitted.candidates[-1].id == ("mass" if exchanged else "soil-layer")
     assert asked == ([] if p_value > 0.001 else ["structural-compliance"])
