@@ -59,9 +59,10 @@ def down_first(inquiry: Inquiry, found: Taken) -> Taken:
 def moving_back(inquiry: Inquiry, base: Fitted) -> float:
     """What a fit leaves beyond the noise where both it and the recordings are past the deepest point, about its mean.
 
-    Ground that holds what fell into it leaves an offset there, whatever is missing on the way down.
+    Ground that holds what fell into it leaves an offset there, whatever is missing on the way down. Infinite where
+    nothing was recorded there.
     """
-    found = 0.0
+    found, count = 0.0, 0
     for e, block, phases in zip(inquiry.judge.evidence, base.blocks, inquiry.phases, strict=True):
         depth = e.simulator.state(block.shift).get("ground/sinkage")
         peaks = [start for start, name in phases if name == PEAK]
@@ -72,8 +73,8 @@ def moving_back(inquiry: Inquiry, base: Fitted) -> float:
         for signal, part in e.spans():
             late = block.plain_residual[part][e.recording.time[signal.rows] > rest]
             if late.size:
-                found += float(np.sum((late - late.mean()) ** 2)) - late.size
-    return found
+                found, count = found + float(np.sum((late - late.mean()) ** 2)) - late.size, count + late.size
+    return found if count else np.inf
 
 
 def _until(inquiry: Inquiry, end: float, steps: Sequence[Step]) -> Taken | None:

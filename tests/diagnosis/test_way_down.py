@@ -149,3 +149,8 @@ def test_what_holds_what_fell_into_it_moves_nothing_on_the_way_back(rig: dict[st
     beyond = base.left - sum(b.residual.size for b in base.blocks)
     moved = way_down.moving_back(asking, base)
     assert moved > 0.1 * beyond if is_back else abs(moved) < 0.1 * way_down.BACK * beyond
+    early = [way_down._cut(e, p, way_down.ENDS[0]) for e, p in zip(evidence, phases, strict=True)]
+    cut = Judge([e for e in early if e is not None])
+    above = cut.fit((), ())
+    assert above is not None
+    assert way_down.moving_back(replace(asking, judge=cut), above) == np.inf, "nothing tells of it"
