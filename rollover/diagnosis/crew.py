@@ -19,7 +19,7 @@ from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Block, Fitted, Judge
 from rollover.diagnosis.forms import in_form, shaped
 from rollover.diagnosis.lookout import at_each
-from rollover.diagnosis.refine import combed, polish, timed
+from rollover.diagnosis.refine import polish, timed
 from rollover.diagnosis.secant import beside
 from rollover.diagnosis.thresholds import Stretch, traced
 from rollover.execute import Children, begin_server, map_cases
@@ -28,6 +28,7 @@ WARM = "rollover.diagnosis.warm"
 Progress = Callable[[str], None]
 T = TypeVar("T")
 R = TypeVar("R")
+How = Literal["fit", "polish", "shape", "time", "trace"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,12 +37,11 @@ class Job:
 
     One of few `rounds` is a first look: it ends without slopes.
     "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too or takes it in another
-    `form`, "time" tries out the time shifts, "comb" begins anew all along the second parameter of the last effect,
-    "trace" where it sets in, over a `stretch`. A shape or form that comes nowhere near what the best fit `leaves` of
-    each recording is not gone on with.
+    `form`, "time" tries out the time shifts, "trace" begins anew where it sets in, over a `stretch`. A shape or form
+    that comes nowhere near what the best fit `leaves` of each recording is not gone on with.
     """
 
-    how: Literal["fit", "polish", "shape", "time", "comb", "trace"] = "fit"
+    how: How = "fit"
     candidates: tuple[Candidate, ...]
     start: tuple[float, ...]
     shifts: tuple[float, ...]
@@ -226,7 +226,7 @@ def work(judge: Judge, job: Job) -> Fitted | None:
         return shaped(judge, begun, leaves) if job.form is None else in_form(judge, begun, job.form, leaves)
     if job.stretch is not None:
         return traced(judge, begun, job.stretch)
-    ways: dict[str, Callable[[Judge, Fitted], Fitted | None]] = {"polish": polish, "time": timed, "comb": combed}
+    ways: dict[str, Callable[[Judge, Fitted], Fitted | None]] = {"polish": polish, "time": timed}
     return ways[job.how](judge, begun)
 
 

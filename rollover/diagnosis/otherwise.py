@@ -5,20 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Literal
 
 import numpy as np
 
 from rollover.diagnosis.blocks import Block
 from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.crew import Job
+from rollover.diagnosis.crew import How, Job
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.forms import WORTH, enough, is_noise
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.refine import BEHIND, LITTLE, along_shapes, least_of
+from rollover.diagnosis.refine import BEHIND, LITTLE, along_shapes, apart, few_of, least_of, left_at, teeth
 from rollover.diagnosis.thresholds import is_clock, stretches
 
 RUGGED = 2.0  # misfit over the noise that the best leaves, from which on there may be something behind a cliff
@@ -29,6 +28,7 @@ TIED = 1.2  # times what the best leaves, up to which time shifts are tried out
 BY_CHANCE = 0.01  # p-value of what is left, above which no other form of an effect is looked for
 TOLD = 2e-5  # s, by which time shifts are told apart
 PARTS = 4  # into which places are split for those who look
+FOLLOWED: tuple[How, ...] = ("polish", "time")  # how what rings is gone on with
 # of what the base leaves beyond the noise, that an effect must take before its shape is fitted too; of what the best
 # takes, before its time shifts are tried out
 LEAST = 0.1
@@ -64,11 +64,30 @@ def _combed(inquiry: Inquiry, fits: Sequence[Fitted], looked: Gate, shifts: Sequ
     It leads by what it leaves, or by its score: its frequency may have been found beside a wrong damping.
     """
     near = [f for f in fits if f.left < LEADS * fits[0].left or f.candidates[-1].key == looked.best]
-    able = [f for f in near if f.candidates[-1].rings and len(f.own) == 2][:1]
-    jobs = [Job(how="comb", candidates=f.candidates, start=f.x, shifts=tuple(shifts)) for f in able]
-    tried = zip(inquiry.fits(jobs), able, strict=True)
-    better = [new if new is not None and new.left < old.left else old for new, old in tried]
-    return sorted([*better, *(f for f in fits if not any(f is one for one in able))], key=lambda f: f.left)
+    old = next((f for f in near if f.candidates[-1].rings and len(f.own) == 2), None)
+    if old is None:
+        return list(fits)
+    few, places = few_of(old), teeth(old)
+    left = inquiry.looks(partial(_left_of, candidates=old.candidates, shifts=tuple(shifts), few=tuple(few)), places)
+    chosen = apart([(there, x) for there, x in zip(left, places, strict=True) if there is not None])
+    jobs = [Job(candidates=old.candidates, start=x, shifts=tuple(shifts), width=1) for x in chosen]
+    new = min((f for f in inquiry.fits(jobs) if f is not None), key=lambda f: f.left, default=old)
+    for how in FOLLOWED:
+        new = inquiry.fits([from_there(new, how)])[0] or new
+    better = new if new.left < old.left else old
+    return sorted([better, *(f for f in fits if f is not old)], key=lambda f: f.left)
+
+
+def _left_of(
+    judge: Judge,
+    x: tuple[float, ...],
+    *,
+    candidates: Sequence[Candidate],
+    shifts: Sequence[float],
+    few: Sequence[int],
+) -> float | None:
+    """What is left of `few` recordings at x; None if a run fails."""
+    return left_at(judge, candidates, x, shifts, few)
 
 
 def _but_for_some(
@@ -245,7 +264,7 @@ def traced_too(inquiry: Inquiry, fitted: Fitted) -> Fitted:
     return min([fitted, *(f for f in begun if f is not None)], key=lambda f: f.left)
 
 
-def from_there(f: Fitted, how: Literal["fit", "polish", "shape", "time", "trace"]) -> Job:
+def from_there(f: Fitted, how: How) -> Job:
     """What is made of a fit where it stands."""
     return Job(how=how, candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks))
 

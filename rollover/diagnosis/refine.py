@@ -86,22 +86,23 @@ def polish(judge: Judge, fitted: Fitted, size: float = 0.02, most: int = 45) -> 
     return again if again is not None and again.left < fitted.left else fitted
 
 
-def combed(judge: Judge, fitted: Fitted) -> Fitted:
-    """The fit begun anew all along the second parameter of its last effect; never worse.
+def teeth(fitted: Fitted) -> list[tuple[float, ...]]:
+    """Places all along the second parameter of the last effect of a fit, beside where its first one stands.
 
     What hops leaves a misfit full of cliffs: a frequency is found soon, what damps it may lie far off behind one.
     """
-    at, shifts = len(fitted.x) - 2, [b.shift for b in fitted.blocks]
+    at = len(fitted.x) - 2
     firsts = np.clip(fitted.x[at] + COMBED * np.linspace(-1.0, 1.0, TEETH), 0.0, 1.0)
-    places = [(*fitted.x[:at], float(a), float(b)) for a in firsts for b in (np.arange(BESIDE) + 0.5) / BESIDE]
+    return [(*fitted.x[:at], float(a), float(b)) for a in firsts for b in (np.arange(BESIDE) + 0.5) / BESIDE]
+
+
+def apart(met: Sequence[tuple[float, tuple[float, ...]]]) -> list[tuple[float, ...]]:
+    """Of places, each with what it leaves, the best that are not beside each other."""
     chosen: list[tuple[float, ...]] = []
-    for x in by_what_is_left(judge, fitted.candidates, places, shifts, few_of(fitted)):
+    for _, x in sorted(met):
         if len(chosen) < STARTS and all(max(abs(a - b) for a, b in zip(x, c, strict=True)) > APART for c in chosen):
             chosen.append(x)
-    found = [judge.fit(fitted.candidates, x, shifts=shifts, width=1) for x in chosen]
-    best = min((f for f in found if f is not None), key=lambda f: f.left, default=fitted)
-    best = timed(judge, polish(judge, best))
-    return best if best.left < fitted.left else fitted
+    return chosen
 
 
 def along_shapes(last: Candidate, x: Sequence[float]) -> list[tuple[float, ...]]:

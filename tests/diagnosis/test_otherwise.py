@@ -109,7 +109,7 @@ def test_what_rings_and_scored_most_is_combed_though_its_fit_went_astray(score: 
     inquiry = SimpleNamespace(free=lambda _: [PLAIN, rings], fits=fits, looks=lambda look, things: [None] * len(things))
     looked = Gate(score=50.0, scores={"mass": 40.0, rings.key: score}, null=np.zeros(9), detectable={})
     assert begun_otherwise(cast(Inquiry, inquiry), best, [best, astray], looked, (0.0, 0.0)) == [best, astray]
-    assert asked == ["comb structural-compliance"] * combed
+    assert asked == ["polish structural-compliance", "time structural-compliance"] * combed
 
 
 def test_a_recordings_clock_is_that_of_the_fit_that_leaves_least_where_another_ended_in_a_dip() -> None:

@@ -22,10 +22,11 @@ from rollover.diagnosis.forms import shaped
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.intervals import intervals
+from rollover.diagnosis.otherwise import _combed
 from rollover.diagnosis.pairs import two_by_two
 from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.ranges import candidates_of
-from rollover.diagnosis.refine import combed, ended, timed
+from rollover.diagnosis.refine import ended, timed
 from rollover.diagnosis.screening import Screened
 from rollover.diagnosis.thresholds import stretches, traced
 from rollover.effects import EFFECTS
@@ -57,7 +58,11 @@ def test_a_damping_behind_a_cliff_is_found() -> None:
     led_astray = judge.fit((c,), (0.5625, 0.2), shifts=[0.0] * len(speeds))
     assert led_astray is not None
     assert led_astray.left > 4.0 * count
-    found = combed(judge, led_astray)
+    inquiry = Inquiry(
+        judge=judge, candidates=[c], groups=[[0], [1, 2, 3, 4, 5]], phases=[], say=lambda _: None, crew=Crew()
+    )
+    looked = Gate(score=9.0, scores={c.key: 9.0}, null=np.zeros(9), detectable={})
+    (found,) = _combed(inquiry, [led_astray], looked, [b.shift for b in led_astray.blocks])
     assert found.left < 1.2 * count
     assert c.values(found.x)["stiffness"] == pytest.approx(true["stiffness"], rel=0.02)
     assert c.values(found.x)["damping"] == pytest.approx(true["damping"], rel=0.1)
