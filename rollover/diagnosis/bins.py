@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 
 MOST_ROWS = 500  # of a recording that are looked at
 FEW = 4  # stamps in a mean that are all simulated; for more, two times away from the first contact
+CLEARLY = 1.05  # times the rate that a filter class needs
 KNOWN, UNKNOWN = 4e-3, 30e-3  # s, by which a clock's zero may be off
 
 
@@ -103,14 +104,17 @@ def simulated(scenario: Scenario, recording: Recording) -> tuple[Recording, Simu
 
     Raises `InputError`.
     """
-    thin, inside = _thinned(recording)
+    is_drop = isinstance(scenario.initiation, Drop)
+    # of a full run it is not the rows that cost
+    classes = () if is_drop else tuple(recording.cfc.values())
+    thin, inside = thinned(recording, max(map(least_rate, classes), default=0.0))
     if inside is None:
         return recording, simulator_of(scenario, recording), 1
     many = inside.shape[1]
     # a filter needs all stamps, and so does the kink of the force at the first contact
     near = UNKNOWN if recording.clock.zero == "unknown" else KNOWN
     whole = np.abs(thin.time) < near + many * float(np.median(np.diff(recording.time)))
-    if recording.cfc or many <= FEW or not isinstance(scenario.initiation, Drop):
+    if recording.cfc or many <= FEW or not is_drop:
         whole[:] = True
     # two times at the standard deviation about the mean have the mean of any cubic
     times = recording.time[inside]
@@ -125,22 +129,17 @@ def simulated(scenario: Scenario, recording: Recording) -> tuple[Recording, Simu
     return thin, Averaged(inner=inner, starts=starts, counts=counts, many=many), many
 
 
-def binned(recording: Recording) -> Recording:
-    """The recording at no more than `MOST_ROWS` rows: means of neighbouring samples, none across a gap.
+def thinned(recording: Recording, slowest: float = 0.0) -> tuple[Recording, NDArray[np.int64] | None]:
+    """The recording at no more than `MOST_ROWS` rows, means of neighbours, none across a gap, and which these are.
 
-    What is averaged keeps its information while noise falls with the root of the number; a rate that a filter class
-    needs is kept.
+    (rows, many), None where there are few enough as it is, or would be fewer than `slowest` asks for, Hz. What is
+    averaged keeps its information while noise falls with the root of the number.
     """
-    return _thinned(recording)[0]
-
-
-def _thinned(recording: Recording) -> tuple[Recording, NDArray[np.int64] | None]:
-    """The recording of means, and the rows (bins, many) of each; None where there are few enough as it is."""
     n = recording.time.size
     step = float(np.median(np.diff(recording.time))) if n > 1 else 1.0
     most = int(n // MOST_ROWS)
-    for cfc in recording.cfc.values():
-        most = min(most, int(1.0 / (step * 1.05 * least_rate(cfc))))
+    if slowest:
+        most = min(most, int(1.0 / (step * CLEARLY * slowest)))
     if most < 2:
         return recording, None
     inside = np.arange(n // most * most).reshape(-1, most)

@@ -113,21 +113,22 @@ def _told(
     after = None if diagnosed is None else last.predict({}, at)
     strays = last.strays({}, at)
     tracks = []
-    single = float(np.sqrt(_rows_in_one(recording, thinner)))
     for signal in evidence.signals:
         channel = signal.channel
         there = np.isfinite(recording.channels[channel])
-        stamps = recording.time[there]
-        both = (_scatter([d[channel][there] for d in strays], stamps), _louder(signal, thinner.time, stamps, single))
+        stamps, measured = recording.time[there], recording.channels[channel][there]
+        met = before[channel][there] if after is None else after[channel][there]
+        times = single(measured - met, signal.sigma, evidence.averaged) / signal.sigma
+        both = (_scatter([d[channel][there] for d in strays], stamps), _louder(signal, thinner.time, stamps, times))
         more = [s for s in both if s is not None]
         tracks.append(
             Track(
                 channel=channel,
                 time=stamps,
-                measured=recording.channels[channel][there],
+                measured=measured,
                 before=before[channel][there],
                 after=None if after is None else after[channel][there],
-                noise=signal.sigma * single,
+                noise=signal.sigma * times,
                 scatter=np.sqrt(np.sum(np.square(more), axis=0)) if more else None,
             )
         )
@@ -154,16 +155,24 @@ def _scatter(strays: Sequence[Array], time: Array) -> Array | None:
     return np.sqrt(averaged(np.mean(np.square(whole), axis=0), time)) if whole else None
 
 
-def _louder(signal: Signal, time: Array, stamps: Array, single: float) -> Array | None:
-    """1 sigma (n,) at `stamps` of the noise beyond its least, of `single` samples; None where it does not grow."""
+def _louder(signal: Signal, time: Array, stamps: Array, times: float) -> Array | None:
+    """1 sigma (n,) at `stamps` of the noise beyond its least, `times` that of means; None where it does not grow."""
     if signal.level is None:
         return None
-    return np.interp(stamps, time[signal.rows], signal.noise * single * np.sqrt(signal.level**2 - 1.0))
+    return np.interp(stamps, time[signal.rows], signal.noise * times * np.sqrt(signal.level**2 - 1.0))
 
 
-def _rows_in_one(recording: Recording, thinner: Recording) -> float:
-    """How many samples were averaged into one: single samples are that much noisier."""
-    return max(1.0, float(np.median(np.diff(thinner.time)) / np.median(np.diff(recording.time))))
+def single(residual: Array, sigma: float, many: int) -> float:
+    """Noise (1 sigma) of single samples, of which means of `many` have `sigma`, by their misfit (n,).
+
+    Variance of the means and that within them: of coloured noise, as behind a filter, it is no `many` times the means'.
+    The one within is told by the median, as most of the misfit is noise, k = many - 1 degrees of freedom having theirs
+    at (1 - 2/(9 k))^3 of the mean (Wilson and Hilferty, 1931).
+    """
+    if many == 1 or residual.size < many:
+        return sigma
+    within = residual[: residual.size // many * many].reshape(-1, many).var(axis=1)
+    return float(np.hypot(sigma, np.sqrt(np.median(within) / (1.0 - 2.0 / (9.0 * (many - 1))) ** 3)))
 
 
 def _shift(evidence: Evidence) -> float:

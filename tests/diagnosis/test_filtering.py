@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rollover import scenario
+from rollover.diagnosis.bins import MOST_ROWS, simulated, thinned
 from rollover.diagnosis.filtering import rows_of
 from rollover.diagnosis.leaps import LEAP_IN
 from rollover.diagnosis.simulator import DropSimulator
@@ -63,3 +64,27 @@ def test_even_rows_that_are_fast_enough_are_as_they_are() -> None:
     assert np.array_equal(rows.even, np.arange(FAST.size))
     unfiltered = replace(recorded(FAST[KEPT["uneven"]]), cfc={})
     assert rows_of(unfiltered).times.size == unfiltered.time.size
+
+
+def test_means_of_rows_behind_a_filter_are_those_of_all_rows(whole: dict[str, NDArray[np.float64]]) -> None:
+    """The filter sees every row that the rig sampled; what is compared is as few as without one."""
+    recording = recorded(FAST)
+    thin, simulator, many = simulated(scenario.load("drop_test"), recording)
+    assert many == FAST.size // MOST_ROWS
+    assert thin.cfc == recording.cfc
+    found = simulator.predict({"effects.mass.added": 3.0}, 2e-4)
+    assert found is not None
+    rows = FAST.size // many * many
+    for name in CHANNELS:
+        means = whole[name][:rows].reshape(-1, many).mean(axis=1)
+        off = np.abs(found[name] - means) / np.ptp(means)
+        assert np.max(off[:-20]) < 1e-9, "but where the last rows, which fill no mean, bend the end of the filter"
+
+
+def test_a_full_run_keeps_the_rate_of_its_filters() -> None:
+    recording = recorded(FAST)
+    thin, inside = thinned(recording, 1800.0)
+    assert inside is not None
+    assert inside.shape[1] == 5
+    assert 1.0 / float(np.median(np.diff(thin.time))) > 1800.0
+    assert thinned(recording, 6000.0) == (recording, None)

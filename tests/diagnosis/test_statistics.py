@@ -12,7 +12,7 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import kstest
 
-from rollover.diagnosis.bins import binned
+from rollover.diagnosis.bins import thinned
 from rollover.diagnosis.candidates import Candidate, coordinate
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.effort import DROPS
@@ -173,10 +173,10 @@ def test_binning_keeps_means_and_averages_across_no_gap() -> None:
     recording = Recording(
         title="r", time=time, channels={FORCE: 3.0 + 2.0 * time}, noise={FORCE: 2.0}
     )  # fmt: skip
-    found = binned(recording)
+    found, _ = thinned(recording)
     assert found.time.size < 1002
     assert np.allclose(found.channels[FORCE], 3.0 + 2.0 * found.time)
     assert not np.any((found.time > 0.1001) & (found.time < 0.1999))
     assert found.noise[FORCE] == pytest.approx(2.0 / np.sqrt(4.0))
     name, short = recorded({}, speeds=(2.0,))[0]
-    assert binned(short) is short, name
+    assert thinned(short)[0] is short, name
