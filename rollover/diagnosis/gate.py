@@ -19,11 +19,13 @@ from numpy.typing import NDArray
 from rollover.diagnosis.candidates import Candidate, coordinate, physical
 from rollover.diagnosis.chaos import FEW, gained
 from rollover.diagnosis.fit import Block, Fitted, Judge
+from rollover.diagnosis.joint import jointly
 from rollover.diagnosis.lookout import Looks, at_each
 from rollover.diagnosis.secant import Point
 from rollover.effects import EFFECTS
 
 Array = NDArray[np.float64]
+Place = tuple[str, tuple[float, ...]]  # a candidate's key, and coordinates of it
 DRAWS = 4000
 SHOWS = 1e-3  # noise units: a direction that moves the whole by less is arithmetic's
 VISIBLE = 5.0  # standard errors of the noise at which an effect shows
@@ -48,7 +50,8 @@ class Gate:
     `starts` are the places where a fit may begin, by key, the best first: the directions that score most, followed as
     far as the misfit goes along them. Thresholds have no such way and are not in it. `only` are the recordings that all
     candidates were looked at in; empty for all. `leading` are candidates to be tried whatever they score, and `far`
-    where some of them begin that have to be strong.
+    where some of them begin that have to be strong. `both` are two that may gain much together, and where they begin,
+    the best pair first.
     """
 
     score: float
@@ -60,6 +63,7 @@ class Gate:
     leading: tuple[str, ...] = ()
     far: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
     places: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
+    both: tuple[tuple[Place, Place], ...] = ()
 
     @property
     def best(self) -> str:
@@ -135,6 +139,13 @@ def gate(
         start = followed(c, x, float(along[k]) / sizes[k])
         if start is not None and len(ways.setdefault(c.key, [])) < WAYS:
             ways[c.key].append(start)
+    together: list[tuple[Place, Place]] = []
+    for pair in [] if judge.effort.thrifty else jointly(along, D.T @ D, [c.key for c, _ in seen_at]):
+        one, other = (
+            (c.key, followed(c, x, far / sizes[k]) or x)
+            for k, far, (c, x) in zip(pair.places, pair.along, (seen_at[k] for k in pair.places), strict=True)
+        )
+        together.append((one, other))
     return Gate(
         score=float(scores.max()),
         scores=own_best,
@@ -143,6 +154,7 @@ def gate(
         starts={key: tuple(each) for key, each in ways.items()},
         only=tuple(only or ()),
         places={key: tuple(each[:CLOSER]) for key, each in places.items()},
+        both=tuple(together),
     )
 
 

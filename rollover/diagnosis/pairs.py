@@ -13,7 +13,7 @@ from rollover.diagnosis.crew import Job
 from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.endings import followed, mirror_images, simpler, unbent
 from rollover.diagnosis.explain import NEARLY_NOISE, SURE, Step, step, weighed
-from rollover.diagnosis.fit import Fitted
+from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.lasting import NEEDED
@@ -22,14 +22,15 @@ from rollover.diagnosis.otherwise import from_there, shaped_too
 from rollover.diagnosis.refine import BEHIND, few_of, shifts_told, without
 from rollover.diagnosis.remainder import is_enough
 from rollover.diagnosis.screening import is_far
+from rollover.diagnosis.straight import is_any_curve
 from rollover.diagnosis.thresholds import has_threshold, placed_beside, stretches
 
 LEADING, FOLLOWING = 4, 4  # of the first effects, and of later ones each, that are tried two by two
-SCORED = 16  # so many more, by what they scored at first
+SCORED, TOGETHER = 16, 40  # so many more, by what they scored at first; pairs, by what they do together
 ROUNDS = ((2, 40), (2, 14), (6, 6))  # of a short fit to few recordings, and how many of these are gone on with
 PLACED, PLACES = 1.5, 2  # times what the best of them leaves, up to which so many are tried with their places elsewhere
 LITTLE = 0.1  # of what the best effect alone leaves beyond the noise, that a pair must take to be gone on with
-BETTER = 0.5  # of what is left, that another explanation must leave
+BETTER = 0.5  # of what is left beyond the noise, that another explanation may leave
 ALIKE = 2.0  # times what the best of them leaves, up to which the shape of what rings may make another the best
 
 Start = tuple[tuple[Candidate, ...], tuple[float, ...]]  # two effects, and where a fit of them begins
@@ -40,8 +41,9 @@ def two_by_two(
 ) -> tuple[list[Step], Mismatch] | None:
     """The best pair of effects, as steps, and what it leaves, see `best_pair`; None if `current` stays.
 
-    A pair is given for it that is better, or, where it is whole, that leaves what chance leaves too. Where a pair
-    leaves nearly noise, and more than quiet stretches tell of, it is under the noise that all of it tells of.
+    A pair is given for it that is better, or, where it is whole, that leaves what chance leaves too, and no more than
+    an effect that is not needed takes. Where a pair leaves nearly noise, and more than quiet stretches tell of, it is
+    under the noise that all of it tells of.
     """
     judge, held = inquiry.judge, inquiry.judge.evidence
     pair = best_pair(inquiry, taken, looked)
@@ -54,6 +56,8 @@ def two_by_two(
         other = instead(inquiry, ringing)
         if other is not None and other.fitted.left < found.fitted.left:
             found, left = followed(inquiry, other)
+    if is_whole and costs(judge, found.fitted, current) > NEEDED:
+        return None  # noise that such a pair tells of would hold the third effect
     if not is_enough(judge, found.fitted, left) and weighed(judge, found.fitted, inquiry.phases):
         found = found.again(judge)
         left = mismatch_of(judge.evidence, found.fitted.blocks, inquiry.phases)
@@ -63,9 +67,22 @@ def two_by_two(
     return [replace(taken[0], fitted=found.base), found], left
 
 
+def costs(judge: Judge, fewer: Fitted, more: Fitted) -> float:
+    """What a fit of fewer effects leaves more than one of more, over what that leaves per sample."""
+    left = judge.again(more).left
+    return (fewer.left - left) / max(1.0, left / sum(b.residual.size for b in more.blocks))
+
+
 def is_better(other: Fitted, left: Mismatch, current: Fitted) -> bool:
-    """Whether an explanation is to be taken instead of another: it leaves far less, or less and no more than chance."""
-    return other.left < current.left * (1.0 if left.p_value > SURE else BETTER)
+    """Whether an explanation is to be taken instead of another: it leaves far less, or less and no more than chance.
+
+    Far less of what is beyond the noise. Instead of any curve, which will be refused, as much more will do.
+    """
+    if left.p_value > SURE:
+        return other.left < current.left
+    count = sum(b.residual.size for b in other.blocks)
+    part = 1.0 / BETTER if is_any_curve(current.candidates) else BETTER
+    return other.left - count < part * (current.left - count)
 
 
 def with_another_first(inquiry: Inquiry, taken: Sequence[Step], current: Fitted) -> tuple[list[Step], Mismatch] | None:
@@ -95,21 +112,21 @@ def instead(inquiry: Inquiry, current: Fitted) -> Step | None:
 
 
 def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: Gate) -> Step | None:
-    """The best pair of the first step's rivals, of what led later, and of what scored most, as a step of its second.
+    """The best pair of the first step's rivals, of what led later, and of what gains most, as a step of its second.
 
     Of two effects neither need come first alone: a third may be like both, and the second may leave much alone. Short
     fits tell which pairs are worth whole ones; the best takes the shapes that pay if it comes near what others leave.
     """
     judge, first = inquiry.judge, taken[0]
-    partners = _partners(inquiry, first, taken, looked)
     lead = min(first.rivals, key=lambda f: f.left)
     few, shifts = few_of(lead), tuple(b.shift for b in lead.blocks)
     at, pinned = tuple(shifts[r] for r in few), is_far(judge, first.base)
-    pairs = [(a, b) for a, b in itertools.combinations(partners, 2) if a[0].key != b[0].key]
-    inquiry.say(f"{len(pairs)} pairs of effects")
-    short: Sequence[Start] = [((a, b), (*x, *y)) for (a, x), (b, y) in pairs]
-    if pinned:
-        short = [*short, *_placed_anew(inquiry, partners, few, shifts)]
+    # slopes tell what two do together where these are not far off
+    partners = _partners(inquiry, first, taken, looked, SCORED if pinned else 0)
+    two = itertools.combinations(partners, 2)
+    short: list[Start] = [((a, b), (*x, *y)) for (a, x), (b, y) in two if _may_explain(a, b)]
+    short += _placed_anew(inquiry, partners, few, shifts) if pinned else _together(inquiry, looked)
+    inquiry.say(f"{len(short)} pairs of effects")
     for rounds, most in ROUNDS:
         jobs = [
             Job(candidates=both, start=x, shifts=at, only=tuple(few), rounds=rounds, pinned=pinned) for both, x in short
@@ -132,6 +149,18 @@ def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: Gate) -> Step | N
                 best = min(best, *shaped_too(inquiry, alone, [pair]), key=lambda f: f.left)
     alone = judge.fit(best.candidates[:-1], best.x[: -len(best.own)], shifts=[b.shift for b in best.blocks])
     return None if alone is None else Step(base=alone, fitted=best, p_value=first.p_value, rivals=(best,))
+
+
+def _may_explain(one: Candidate, other: Candidate) -> bool:
+    """Whether two may be named together: they are not one effect twice, nor any curve."""
+    return one.key != other.key and not is_any_curve((one, other))
+
+
+def _together(inquiry: Inquiry, looked: Gate) -> list[Start]:
+    """Pairs of candidates that gain most together by their slopes, in their usual shapes, from where these lead."""
+    usual = {c.key: c for c in inquiry.candidates}
+    begun = [(usual[key], x, usual[other], y) for (key, x), (other, y) in looked.both[:TOGETHER]]
+    return [((a, b), (*x, *y)) for a, x, b, y in begun if _may_explain(a, b)]
 
 
 def _placed_anew(
@@ -205,9 +234,12 @@ def _rings(pair: Fitted) -> bool:
 
 
 def _partners(
-    inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate
+    inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate, scored: int
 ) -> list[tuple[Candidate, tuple[float, ...]]]:
-    """Who may be one of two, and where its fit begins; what was bent to lead alone also in its usual shape."""
+    """Who may be one of two, and where its fit begins; what was bent to lead alone also in its usual shape.
+
+    Those that led, and of the others so many that `scored` most at first.
+    """
     leading = sorted((inquiry.judge.again(f) for f in first.rivals), key=lambda f: f.left)[:LEADING]
     later = [f for s in taken[1:] for f in sorted(s.rivals, key=lambda f: f.left)[:FOLLOWING]]
     found: dict[tuple[str, bool], tuple[Candidate, tuple[float, ...]]] = {}
@@ -217,6 +249,6 @@ def _partners(
     known, bent = {key for key, _ in found}, {key for key, is_bent in found if is_bent}
     ranked = sorted(first.screened, key=lambda s: -looked.scores.get(s.candidate.key, 0.0))
     for k, s in enumerate(ranked):
-        if s.candidate.key in bent or (k < SCORED and s.candidate.key not in known):
+        if s.candidate.key in bent or (k < scored and s.candidate.key not in known):
             found.setdefault((s.candidate.key, s.candidate.is_bent), (s.candidate, s.starts[0]))
     return list(found.values())

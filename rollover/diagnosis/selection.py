@@ -90,7 +90,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
             is_whole = is_enough(judge, current, left)
     parts = [s.again(judge) for s in taken]
     settled = True
-    if is_whole and len(taken) > 1:
+    if is_whole and len(taken) > 1 and is_open_to_be_named(judge, current, left):
         needed = _needed(inquiry, taken)
         settled = needed is not None
         if needed is not None:
@@ -111,6 +111,15 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
         refuted=found.refuted,
         settled=settled,
     )
+
+
+def is_open_to_be_named(judge: Judge, fitted: Fitted, left: Mismatch) -> bool:
+    """Whether several effects may be named: as many as may be leave no more than `decided` asks, or one is needless."""
+    if judge.effort.thrifty or len(fitted.candidates) < MOST or left.p_value > MANY:
+        return True
+    if not matters(judge, fitted, left) or is_tolerated(judge, fitted):
+        return True
+    return len(without_needless(judge, judge.again(fitted)).candidates) < MOST
 
 
 def _needed(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:

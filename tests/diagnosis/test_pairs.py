@@ -64,7 +64,7 @@ def test_what_took_another_form_alone_is_tried_in_its_usual_one_beside_others() 
         screened=(screened(DAMPING), screened(MASS)),
     )  # fmt: skip
     looked = Gate(score=9.0, scores={"mass": 9.0}, null=np.zeros(9), detectable={})
-    found = pairs._partners(inquiry([]), first, (), looked)
+    found = pairs._partners(inquiry([]), first, (), looked, pairs.SCORED)
     assert [(c.id, c.form, x) for c, x in found] == [
         ("soil-viscous-damping", {"damping": 0.0}, (0.5,)),
         ("mass", {}, (0.5,)),
@@ -80,7 +80,7 @@ def test_what_is_bent_and_does_not_lead_is_tried_in_its_usual_form_as_well() -> 
         screened=(screened(DAMPING), screened(MASS)),
     )  # fmt: skip
     looked = Gate(score=9.0, scores={"mass": 9.0}, null=np.zeros(9), detectable={})
-    found = pairs._partners(inquiry([]), first, (), looked)
+    found = pairs._partners(inquiry([]), first, (), looked, pairs.SCORED)
     assert [(c.id, c.form) for c, _ in found] == [
         ("mass", {}),
         ("soil-viscous-damping", {"damping": 0.0}),
@@ -295,6 +295,76 @@ def test_a_pair_of_which_one_is_placed_beside_the_other() -> None:
     assert layer.values(best.fitted.own)["depth"] == pytest.approx(DEPTH, rel=0.05)
 
 
+GRADUAL = (
+    Candidate(id="soil-layer", kind="physics", family="", search={"depth": Search(0, 1)}, form={"onset": 1.0}),
+    Candidate(id="soil-crust", kind="physics", family="", search={"thickness": Search(0, 1)}, form={"onset": 1.0}),
+)
+
+
+@pytest.mark.parametrize(
+    ("other", "current", "p_value", "better"),
+    [
+        (3.0, (6.0, (MASS, DAMPING)), 0.0, True),  # 2 beyond the noise for 5
+        (4.0, (6.0, (MASS, DAMPING)), 0.0, False),  # 3 for 5, though two thirds of all
+        (1.4, (2.5, (MASS, DAMPING)), 0.0, True),  # 0.4 for 1.5
+        (5.5, (6.0, (MASS, DAMPING)), 0.5, True),  # no more than chance
+        (6.5, (6.0, (MASS, DAMPING)), 0.5, False),
+        (10.0, (6.0, GRADUAL), 0.0, True),  # any curve will be refused
+        (12.0, (6.0, GRADUAL), 0.0, False),
+    ],
+)
+def test_far_less_is_far_less_beyond_the_noise(
+    other: float, current: tuple[float, tuple[Candidate, ...]], p_value: float, better: bool
+) -> None:
+    left = cast(Any, SimpleNamespace(p_value=p_value))
+    assert pairs.is_better(fitted((MASS, DAMPING), other), left, fitted(current[1], current[0])) == better
+
+
+def test_slopes_lead_to_two_near_the_noise_and_any_curve_is_not_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Far off what scored is tried two by two; near, those that led, and what gains most together."""
+    asked: list[Any] = []
+    leading = fitted((MASS,), 2.0)
+    first = Step(
+        base=fitted((), 4.0), fitted=leading, p_value=0.0,
+        rivals=(leading, fitted(GRADUAL[:1], 3.0), fitted(GRADUAL[1:], 3.5)),
+        screened=tuple(screened(c) for c in (DAMPING, NOSE)),
+    )  # fmt: skip
+    both = ((("soil-viscous-damping", (0.7,)), ("mass", (0.2,))),)
+    looked = Gate(
+        score=9.0, scores={"mass": 9.0, "soil-viscous-damping": 1.0}, null=np.zeros(9), detectable={}, both=both
+    )
+    asking = inquiry(asked)
+    object.__setattr__(asking, "say", lambda _: None)
+    object.__setattr__(asking, "candidates", [MASS, DAMPING, NOSE])
+    monkeypatch.setattr(pairs, "_placed_anew", lambda *_: [])
+    monkeypatch.setattr(pairs, "_takes_little", lambda *_: True)
+    for far in (False, True):
+        asked.clear()
+        monkeypatch.setattr(pairs, "is_far", lambda *_, far=far: far)
+        assert pairs.best_pair(asking, [first], looked) is None
+        tried = [(tuple(c.id for c in job.candidates), job.start) for job in asked if job.rounds == 2]
+        names = {frozenset(ids) for ids, _ in tried}
+        assert frozenset(("soil-layer", "soil-crust")) not in names
+        assert frozenset(("mass", "soil-layer")) in names
+        assert (frozenset(("mass", "structural-compliance")) in names) == far
+        assert ((("soil-viscous-damping", "mass"), (0.7, 0.2)) in tried) == (not far)
+
+
+@pytest.mark.parametrize(("left", "taken"), [(1.2, True), (1.5, False)])
+def test_three_are_given_for_two_only_where_the_third_is_not_needed(
+    left: float, taken: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Weighed as noise by all that a pair leaves, what the third effect takes would be noise: it takes 40 of 80."""
+    found = Step(base=fitted((), 30.0), fitted=fitted((MASS,), left), p_value=0.0)
+    monkeypatch.setattr(pairs, "best_pair", lambda *_: found)
+    monkeypatch.setattr(pairs, "followed", lambda _, one: (one, SimpleNamespace(p_value=1e-6)))
+    monkeypatch.setattr(pairs, "is_enough", lambda *_: False)
+    monkeypatch.setattr(pairs, "weighed", lambda *_: True)
+    monkeypatch.setattr(pairs, "mismatch_of", lambda *_: SimpleNamespace(p_value=0.4))
+    both = pairs.two_by_two(inquiry([]), [found], cast(Gate, None), fitted((MASS,), 1.0), is_whole=True)
+    assert (both is not None) == taken
+
+
 @pytest.mark.parametrize(
     ("p_value", "is_noise", "is_whole", "told"),
     [
@@ -309,7 +379,7 @@ def test_a_pair_that_leaves_nearly_noise_tells_of_it(
     p_value: float, is_noise: bool, is_whole: bool, told: float | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Quiet stretches alone tell of a noise that is a little too small: two that are all there is left structure."""
-    found = Step(base=fitted((), 30.0), fitted=fitted((MASS,), 1.0), p_value=0.0)
+    found = Step(base=fitted((), 30.0), fitted=fitted((MASS,), 2.0), p_value=0.0)
     weighed: list[Any] = []
 
     def weigh(_judge: Any, fit: Fitted, _phases: Any) -> bool:
@@ -324,7 +394,7 @@ def test_a_pair_that_leaves_nearly_noise_tells_of_it(
     asking = inquiry([])
     asking.judge.evidence, asking.judge.weigh = ("quiet",), weighed.append  # type: ignore[assignment,method-assign]
     both = pairs.two_by_two(
-        asking, [found], cast(Gate, None), fitted((MASS,), 0.9 if is_whole else 1.5), is_whole=is_whole
+        asking, [found], cast(Gate, None), fitted((MASS,), 1.8 if is_whole else 2.5), is_whole=is_whole
     )
     assert (None if both is None else both[1].p_value) == told
     tried = [] if p_value > 0.001 else [found.fitted]

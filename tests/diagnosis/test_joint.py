@@ -1,0 +1,86 @@
+"""What two effects gain together, against least squares of two columns."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis.gate import gate
+from rollover.diagnosis.joint import MOST, jointly
+from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded
+from tests.diagnosis.test_fits import candidate, judge_of
+
+
+def unit(D: np.ndarray) -> np.ndarray:
+    return np.asarray(D / np.sqrt(np.sum(D**2, axis=0)))
+
+
+def test_gain_and_way_of_two_directions_are_those_of_least_squares() -> None:
+    rng = np.random.default_rng(1)
+    D = unit(rng.standard_normal((60, 6)))
+    misfit = 3.0 * rng.standard_normal(60)
+    found = jointly(D.T @ misfit, D.T @ D, list("abcdef"))
+    assert len(found) == 15
+    told = {}
+    for i, j in itertools.combinations(range(6), 2):
+        way, left, _, _ = np.linalg.lstsq(D[:, [i, j]], misfit, rcond=None)
+        told[i, j] = misfit @ misfit - left[0], way
+    assert [b.gain for b in found] == sorted((b.gain for b in found), reverse=True)
+    for both in found:
+        gain, way = told[both.places]
+        assert both.gain == pytest.approx(gain, rel=1e-9)
+        assert both.along == pytest.approx(tuple(way), rel=1e-9)
+
+
+def test_two_that_gain_nothing_alone_may_gain_all_together() -> None:
+    """The misfit lies along the difference of two that are nearly alike: each alone sees 1 % of it."""
+    rng = np.random.default_rng(2)
+    first, across, other = np.linalg.qr(rng.standard_normal((40, 3)))[0].T
+    second = np.cos(0.2) * first + np.sin(0.2) * across
+    misfit = 30.0 * (np.cos(0.1) * across - np.sin(0.1) * first)  # at right angles to their mean
+    D = np.stack([first, second, other], axis=1)
+    best, *_ = jointly(D.T @ misfit, D.T @ D, ["layer", "crust", "mass"])
+    assert best.places == (0, 1)
+    assert best.gain == pytest.approx(900.0, rel=1e-9)
+    assert np.max((D.T @ misfit) ** 2) < 0.011 * 900.0
+
+
+def test_directions_that_are_one_and_the_same_gain_nothing_by_their_difference() -> None:
+    first, across = np.eye(40)[:2]
+    D = np.stack([first, np.cos(0.01) * first + np.sin(0.01) * across], axis=1)
+    misfit = 5.0 * across
+    found = jointly(D.T @ misfit, D.T @ D, ["one", "other"])
+    assert all(b.gain == 0.0 for b in found)
+
+
+def test_of_two_owners_the_best_two_directions_count_and_none_joins_itself() -> None:
+    rng = np.random.default_rng(3)
+    D = unit(rng.standard_normal((200, 40)))
+    owners = [f"{k // 2}" for k in range(40)]  # two directions each: 190 pairs of owners
+    found = jointly(D.T @ rng.standard_normal(200), D.T @ D, owners)
+    assert len(found) == MOST
+    pairs = [frozenset(owners[k] for k in b.places) for b in found]
+    assert len(set(pairs)) == MOST
+    assert all(len(p) == 2 for p in pairs)
+
+
+def test_a_gate_leads_to_two_that_hide_each_other() -> None:
+    """Friction and a co-moving mass that grows push against each other: alone the second gains hardly anything."""
+    hidden = {"effects.guide-friction.force": 60.0, "effects.soil-added-mass-growth.rate": 20.0}
+    judge = judge_of(
+        recorded(hidden, 5, speeds=(1.5, 2.0, 2.5, 3.0), channels=(FORCE, DEPTH, ACCELERATION), rate=600.0, noise=0.02)
+    )
+    kinds = [candidate(judge, key) for key in ("guide-friction", "soil-added-mass-growth", "mass", "soil-stiffness")]
+    base = judge.fit((), ())
+    assert base is not None
+    looked = gate(judge, base, kinds)
+    assert looked.scores["soil-added-mass-growth"] < 0.5 * looked.score
+    (one, x), (other, y) = looked.both[0]
+    assert {one, other} == {"guide-friction", "soil-added-mass-growth"}
+    begun = {one: x, other: y}
+    for c in kinds[:2]:
+        told = c.values(begun[c.key])
+        true = hidden[f"effects.{c.key}.{next(iter(c.search))}"]
+        assert told[next(iter(c.search))] == pytest.approx(true, rel=0.5)
