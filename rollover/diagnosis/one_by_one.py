@@ -25,8 +25,8 @@ CHANCE = 0.005  # p-value of the best of all candidates that admits one
 BY_SCATTER = 0.1  # the same where runs scatter and there is a mismatch: fits decide, and gains that last
 PART = 0.25  # of what moves something, that a part of more must move
 # misfit over the noise that two effects leave and a third is not looked for, and the share of what was beyond the
-# noise that is little all the same
-HOPELESS, HARDLY_ANY = 2.0, 0.01
+# noise that is little all the same, of drops and of full runs, of which a third effect asks for many
+HOPELESS, HARDLY_ANY = 2.0, (0.1, 0.01)
 # times what the second effect took, that two leave beyond the noise and no third is looked for: it would have to take
 # that, and the one that takes more comes first
 UNLIKELY = 3.0
@@ -122,8 +122,8 @@ def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = (), *, pa
                 other = with_another_first(inquiry, taken, current)
             if other is not None:
                 (taken, left), current = other, other[0][-1].fitted
-        is_far = current.left > HOPELESS**2 * count and current.left - count > HARDLY_ANY * (base.left - count)
-        if (len(taken) > 1 and (is_far or is_unlikely(judge, taken[-1], current))) or is_any_curve(current.candidates):
+        is_lost = len(taken) > 1 and (is_hopeless(judge, base, current) or is_unlikely(judge, taken[-1], current))
+        if is_lost or is_any_curve(current.candidates):
             break
         looked = beside(current, left)
     if not judge.straying:
@@ -141,6 +141,12 @@ def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = (), *, pa
         refuted=refuted,
         paired=paired,
     )
+
+
+def is_hopeless(judge: Judge, base: Fitted, current: Fitted) -> bool:
+    """Whether two effects leave far more than noise, and no small part of what there was beyond it."""
+    count, hardly_any = sum(b.residual.size for b in current.blocks), HARDLY_ANY[judge.effort.thrifty]
+    return current.left > HOPELESS**2 * count and current.left - count > hardly_any * (base.left - count)
 
 
 def is_unlikely(judge: Judge, last: Step, current: Fitted) -> bool:

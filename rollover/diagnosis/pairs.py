@@ -73,16 +73,17 @@ def costs(judge: Judge, fewer: Fitted, more: Fitted) -> float:
     return (fewer.left - left) / max(1.0, left / sum(b.residual.size for b in more.blocks))
 
 
-def is_better(other: Fitted, left: Mismatch, current: Fitted) -> bool:
+def is_better(other: Fitted, left: Mismatch, current: Fitted, *, scattered: bool = False) -> bool:
     """Whether an explanation is to be taken instead of another: it leaves far less, or less and no more than chance.
 
-    Far less of what is beyond the noise. Instead of any curve, which will be refused, as much more will do.
+    Far less of what is beyond the noise, or of all where runs are `scattered`, so that nobody knows what chance leaves.
+    Instead of any curve, which will be refused, as much more will do.
     """
     if left.p_value > SURE:
         return other.left < current.left
-    count = sum(b.residual.size for b in other.blocks)
-    part = 1.0 / BETTER if is_any_curve(current.candidates) else BETTER
-    return other.left - count < part * (current.left - count)
+    chance = 0 if scattered else sum(b.residual.size for b in other.blocks)
+    part = 1.0 / BETTER if is_any_curve(current.candidates) and not scattered else BETTER
+    return other.left - chance < part * (current.left - chance)
 
 
 def with_another_first(inquiry: Inquiry, taken: Sequence[Step], current: Fitted) -> tuple[list[Step], Mismatch] | None:
@@ -91,7 +92,7 @@ def with_another_first(inquiry: Inquiry, taken: Sequence[Step], current: Fitted)
     if other is None or other.fitted.left >= taken[-1].fitted.left:
         return None
     found, left = followed(inquiry, other)
-    return ([taken[-1], found], left) if is_better(found.fitted, left, current) else None
+    return ([taken[-1], found], left) if is_better(found.fitted, left, current, scattered=True) else None
 
 
 def instead(inquiry: Inquiry, current: Fitted) -> Step | None:

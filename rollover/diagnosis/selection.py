@@ -138,7 +138,7 @@ def _needed(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
     while len(parts) < len(current.candidates):
         whole = len(parts) == len(current.candidates) - 1 and not is_elsewhere(last)
         whole = whole and current.candidates[0].key == last.fitted.candidates[-1].key
-        if whole and {c.key for c in current.candidates} == {c.key for c in last.fitted.candidates}:
+        if whole and {c.token for c in current.candidates} == {c.token for c in last.fitted.candidates}:
             parts.append(last)  # found beside just these others
             break
         found, taken_out = instead(inquiry, current), current.candidates[0].key

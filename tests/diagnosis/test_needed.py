@@ -28,16 +28,18 @@ BENT = ("soil-layer", ("a", "b", "width"))
 
 
 @pytest.mark.parametrize(
-    ("beside", "answers", "asked"),
+    ("beside", "held", "answers", "asked"),
     [
-        (LAYER, {"soil-layer": LAYER}, ["soil-layer"]),  # found beside just this layer
-        (BENT, {"soil-layer": LAYER, "soil-crust": CRUST}, ["soil-layer", "soil-crust"]),
-        (BENT, {"soil-layer": LAYER, "soil-crust": STIFFNESS, "soil-stiffness": STIFFNESS},
+        (LAYER, LAYER, {"soil-layer": LAYER}, ["soil-layer"]),  # found beside just this layer
+        # the layer is straight beside it
+        (BENT, BENT, {"soil-layer": LAYER, "soil-crust": CRUST}, ["soil-layer", "soil-crust"]),
+        (BENT, LAYER, {"soil-layer": LAYER, "soil-crust": CRUST}, ["soil-layer", "soil-crust"]),
+        (BENT, LAYER, {"soil-layer": LAYER, "soil-crust": STIFFNESS, "soil-stiffness": STIFFNESS},
          ["soil-layer", "soil-crust", "soil-layer"]),
     ],
 )  # fmt: skip
 def test_beside_effects_in_another_form_the_last_one_is_looked_for_anew(
-    monkeypatch: pytest.MonkeyPatch, beside: Any, answers: dict[str, Any], asked: list[str]
+    monkeypatch: pytest.MonkeyPatch, beside: Any, held: Any, answers: dict[str, Any], asked: list[str]
 ) -> None:
     """A layer that was bent to do a stiffness's work as well left little to it: a crust came, the layer is straight.
 
@@ -57,7 +59,7 @@ def test_beside_effects_in_another_form_the_last_one_is_looked_for_anew(
     judge = SimpleNamespace(again=lambda f: f, effort=DROPS)
     taken = [
         Step(base=of(), fitted=of(beside), p_value=0.0),
-        Step(base=of(beside), fitted=of(LAYER, CRUST), p_value=0.0),
+        Step(base=of(beside), fitted=of(held, CRUST), p_value=0.0),
     ]
     parts = selection._needed(cast(Inquiry, SimpleNamespace(judge=judge)), taken)
     assert parts is not None
@@ -107,3 +109,26 @@ def test_as_many_effects_as_may_be_that_are_given_for_others_again_and_again_exp
     parts = selection._needed(cast(Inquiry, SimpleNamespace(judge=judge)), taken)
     assert looked == asked
     assert (None if parts is None else {c.id for c in parts[-1].fitted.candidates}) == found
+
+
+@pytest.mark.parametrize(
+    ("count", "p_value", "matters", "needless", "is_open"),
+    [
+        (3, 0.2, True, False, True),
+        (3, 0.01, True, False, False),  # three that are bent to much must leave more than chance leaves once in twenty
+        (3, 0.01, False, False, True),
+        (3, 0.01, True, True, True),  # two of them may do
+        (2, 0.01, True, False, True),
+    ],
+)
+def test_effects_that_will_be_refused_are_not_looked_for_anew(
+    monkeypatch: pytest.MonkeyPatch, count: int, p_value: float, matters: bool, needless: bool, is_open: bool
+) -> None:
+    held = of(LAYER, CRUST, MASS)
+    fitted = of(*(LAYER, CRUST, MASS)[:count])
+    monkeypatch.setattr(selection, "matters", lambda *_: matters)
+    monkeypatch.setattr(selection, "is_tolerated", lambda *_: False)
+    monkeypatch.setattr(selection, "without_needless", lambda *_: of(LAYER, CRUST) if needless else held)
+    judge = cast(Any, SimpleNamespace(again=lambda f: f, effort=DROPS))
+    left = cast(Any, SimpleNamespace(p_value=p_value))
+    assert selection.is_open_to_be_named(judge, fitted, left) == is_open

@@ -317,7 +317,10 @@ def test_far_less_is_far_less_beyond_the_noise(
     other: float, current: tuple[float, tuple[Candidate, ...]], p_value: float, better: bool
 ) -> None:
     left = cast(Any, SimpleNamespace(p_value=p_value))
-    assert pairs.is_better(fitted((MASS, DAMPING), other), left, fitted(current[1], current[0])) == better
+    new, held = fitted((MASS, DAMPING), other), fitted(current[1], current[0])
+    assert pairs.is_better(new, left, held) == better
+    runs = other < current[0] if p_value > 0.001 else other < 0.5 * current[0]
+    assert pairs.is_better(new, left, held, scattered=True) == runs, "nobody knows what chance leaves of full runs"
 
 
 def test_slopes_lead_to_two_near_the_noise_and_any_curve_is_not_tried(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -162,14 +162,6 @@ def test_two_of_one_sensor_must_leave_what_chance_leaves(
 
 
 @pytest.mark.parametrize(
-    ("other", "p_value", "better"), [(90.0, 0.4, True), (90.0, 1e-9, False), (40.0, 1e-9, True), (110.0, 0.4, False)]
-)
-def test_a_little_less_is_better_where_it_is_all_that_chance_leaves(other: float, p_value: float, better: bool) -> None:
-    fits: Any = [SimpleNamespace(left=other), SimpleNamespace(left=100.0)]
-    assert pairs.is_better(fits[0], left(p_value), fits[1]) is better
-
-
-@pytest.mark.parametrize(
     ("misfit", "structure", "named"), [(1.5, 100.0, True), (1.5, 2000.0, False), (2.5, 100.0, False)]
 )
 def test_one_that_takes_nearly_all_is_named_with_what_it_leaves_itself(
@@ -339,6 +331,22 @@ def test_a_third_effect_is_not_looked_for_that_would_have_to_take_far_more_than_
     assert one_by_one.is_unlikely(judge, last, current) is unlikely
     # a full run costs much, and a third is rare there
     assert not one_by_one.is_unlikely(cast(Judge, SimpleNamespace(effort=SimpleNamespace(thrifty=True))), last, current)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "thrifty", "hopeless"),
+    [
+        (2040.0, 300.0, False, True),  # of 40 samples, 2.7 times the noise: 260 of 2000 are left
+        (3040.0, 300.0, False, False),  # of 3000 that is little: a third effect of three may be no more
+        (3040.0, 300.0, True, True),  # full runs are dear
+        (2040.0, 150.0, False, False),  # less than twice the noise
+    ],
+)
+def test_two_that_leave_a_small_part_of_much_may_have_a_third_beside_them(
+    before: float, after: float, thrifty: bool, hopeless: bool
+) -> None:
+    judge = cast(Judge, SimpleNamespace(effort=SimpleNamespace(thrifty=thrifty)))
+    assert one_by_one.is_hopeless(judge, leaving(before), leaving(after)) is hopeless
 
 
 def leaving(squares: float) -> Fitted:
