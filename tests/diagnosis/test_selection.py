@@ -339,7 +339,7 @@ def test_a_third_effect_is_not_looked_for_that_would_have_to_take_far_more_than_
         (2040.0, 300.0, False, True),  # of 40 samples, 2.7 times the noise: 260 of 2000 are left
         (3040.0, 300.0, False, False),  # of 3000 that is little: a third effect of three may be no more
         (3040.0, 300.0, True, True),  # full runs are dear
-        (2040.0, 150.0, False, False),  # less than twice the noise
+        (1040.0, 150.0, False, False),  # less than twice the noise, though 110 of 1000 are left
     ],
 )
 def test_two_that_leave_a_small_part_of_much_may_have_a_third_beside_them(
