@@ -139,22 +139,20 @@ def gate(
         start = followed(c, x, float(along[k]) / sizes[k])
         if start is not None and len(ways.setdefault(c.key, [])) < WAYS:
             ways[c.key].append(start)
-    together: list[tuple[Place, Place]] = []
-    for pair in [] if judge.effort.thrifty else jointly(along, D.T @ D, [c.key for c, _ in seen_at]):
-        one, other = (
-            (c.key, followed(c, x, far / sizes[k]) or x)
-            for k, far, (c, x) in zip(pair.places, pair.along, (seen_at[k] for k in pair.places), strict=True)
-        )
-        together.append((one, other))
+    cosines = D.T @ D
+    both = []
+    for pair in [] if judge.effort.thrifty else jointly(along, cosines, [c.key for c, _ in seen_at]):
+        one, other = (_led(*seen_at[k], far / sizes[k]) for k, far in zip(pair.places, pair.along, strict=True))
+        both.append((one, other))
     return Gate(
         score=float(scores.max()),
         scores=own_best,
-        null=null_of_the_best([D]),
+        null=null_by(cosines),
         detectable=detectable,
         starts={key: tuple(each) for key, each in ways.items()},
         only=tuple(only or ()),
         places={key: tuple(each[:CLOSER]) for key, each in places.items()},
-        both=tuple(together),
+        both=tuple(both),
     )
 
 
@@ -176,6 +174,11 @@ def followed(c: Candidate, x: Sequence[float], factor: float) -> tuple[float, ..
     value = null + factor * (physical(x[at], search) - null)
     inside = coordinate(min(max(value, search.low), search.high), search)
     return (*x[:at], min(max(inside, EDGE), 1.0 - EDGE), *x[at + 1 :])
+
+
+def _led(c: Candidate, x: tuple[float, ...], factor: float) -> Place:
+    """Where a direction leads: `factor` times as strong as at x, or x itself where there is no zero to go from."""
+    return c.key, followed(c, x, factor) or x
 
 
 def _best_along(misfit: Array, D: Array, blocks: Sequence[Block]) -> tuple[Array, Array]:
@@ -295,7 +298,12 @@ def null_of_the_best(directions: Sequence[Array], draws: int = DRAWS, seed: int 
     m = directions[0].shape[1] if len(directions) else 0
     if m == 0:
         return np.zeros(draws)
-    G = sum((np.asarray(d).T @ np.asarray(d) for d in directions), np.zeros((m, m)))
+    return null_by(sum((np.asarray(d).T @ np.asarray(d) for d in directions), np.zeros((m, m))), draws, seed)
+
+
+def null_by(G: Array, draws: int = DRAWS, seed: int = 0) -> Array:
+    """The same by the scalar products of the directions (m, m)."""
+    m = len(G)
     size = np.sqrt(np.maximum(np.diag(G), 1e-300))
     root = np.linalg.cholesky(G / np.outer(size, size) + JITTER * m * np.eye(m))
     z = np.random.default_rng(seed).standard_normal((draws, m)) @ root.T

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 ALIKE = 1e-3  # of the sine squared between two directions, below which they are one and the same
-MOST = 60  # pairs that are told of
+MOST = 40  # pairs that are told of
 
 
 @dataclass(frozen=True, kw_only=True)

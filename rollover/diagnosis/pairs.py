@@ -26,7 +26,7 @@ from rollover.diagnosis.straight import is_any_curve
 from rollover.diagnosis.thresholds import has_threshold, placed_beside, stretches
 
 LEADING, FOLLOWING = 4, 4  # of the first effects, and of later ones each, that are tried two by two
-SCORED, TOGETHER = 16, 40  # so many more, by what they scored at first; pairs, by what they do together
+SCORED = 16  # so many more, by what they scored at first
 ROUNDS = ((2, 40), (2, 14), (6, 6))  # of a short fit to few recordings, and how many of these are gone on with
 PLACED, PLACES = 1.5, 2  # times what the best of them leaves, up to which so many are tried with their places elsewhere
 LITTLE = 0.1  # of what the best effect alone leaves beyond the noise, that a pair must take to be gone on with
@@ -81,8 +81,10 @@ def is_better(other: Fitted, left: Mismatch, current: Fitted, *, scattered: bool
     """
     if left.p_value > SURE:
         return other.left < current.left
-    chance = 0 if scattered else sum(b.residual.size for b in other.blocks)
-    part = 1.0 / BETTER if is_any_curve(current.candidates) and not scattered else BETTER
+    if scattered:
+        return other.left < BETTER * current.left
+    chance = sum(b.residual.size for b in other.blocks)
+    part = 1.0 / BETTER if is_any_curve(current.candidates) else BETTER
     return other.left - chance < part * (current.left - chance)
 
 
@@ -160,7 +162,7 @@ def _may_explain(one: Candidate, other: Candidate) -> bool:
 def _together(inquiry: Inquiry, looked: Gate) -> list[Start]:
     """Pairs of candidates that gain most together by their slopes, in their usual shapes, from where these lead."""
     usual = {c.key: c for c in inquiry.candidates}
-    begun = [(usual[key], x, usual[other], y) for (key, x), (other, y) in looked.both[:TOGETHER]]
+    begun = [(usual[key], x, usual[other], y) for (key, x), (other, y) in looked.both]
     return [((a, b), (*x, *y)) for a, x, b, y in begun if _may_explain(a, b)]
 
 

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import itertools
+from typing import Any
 
 import numpy as np
 import pytest
 
-from rollover.diagnosis.gate import gate
+from rollover.diagnosis import pairs
+from rollover.diagnosis.explain import Step
+from rollover.diagnosis.gate import Gate, gate
 from rollover.diagnosis.joint import MOST, jointly
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded
 from tests.diagnosis.test_fits import candidate, judge_of
+from tests.diagnosis.test_pairs import DAMPING, GRADUAL, MASS, NOSE, fitted, inquiry, screened
 
 
 def unit(D: np.ndarray) -> np.ndarray:
@@ -61,9 +65,9 @@ def test_of_two_owners_the_best_two_directions_count_and_none_joins_itself() -> 
     owners = [f"{k // 2}" for k in range(40)]  # two directions each: 190 pairs of owners
     found = jointly(D.T @ rng.standard_normal(200), D.T @ D, owners)
     assert len(found) == MOST
-    pairs = [frozenset(owners[k] for k in b.places) for b in found]
-    assert len(set(pairs)) == MOST
-    assert all(len(p) == 2 for p in pairs)
+    told = [frozenset(owners[k] for k in b.places) for b in found]
+    assert len(set(told)) == MOST
+    assert all(len(p) == 2 for p in told)
 
 
 def test_a_gate_leads_to_two_that_hide_each_other() -> None:
@@ -83,4 +87,34 @@ def test_a_gate_leads_to_two_that_hide_each_other() -> None:
     for c in kinds[:2]:
         told = c.values(begun[c.key])
         true = hidden[f"effects.{c.key}.{next(iter(c.search))}"]
-        assert told[next(iter(c.search))] == pytest.approx(true, rel=0.5)
+        assert told[next(iter(c.search))] == pytest.approx(true, rel=0.15)  # by slopes beside none: 11 % short
+
+
+def test_slopes_lead_to_two_near_the_noise_and_any_curve_is_not_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Far off what scored is tried two by two; near, those that led, and what gains most together."""
+    asked: list[Any] = []
+    leading = fitted((MASS,), 2.0)
+    first = Step(
+        base=fitted((), 4.0), fitted=leading, p_value=0.0,
+        rivals=(leading, fitted(GRADUAL[:1], 3.0), fitted(GRADUAL[1:], 3.5)),
+        screened=tuple(screened(c) for c in (DAMPING, NOSE)),
+    )  # fmt: skip
+    both = ((("soil-viscous-damping", (0.7,)), ("mass", (0.2,))),)
+    looked = Gate(
+        score=9.0, scores={"mass": 9.0, "soil-viscous-damping": 1.0}, null=np.zeros(9), detectable={}, both=both
+    )
+    asking = inquiry(asked)
+    object.__setattr__(asking, "say", lambda _: None)
+    object.__setattr__(asking, "candidates", [MASS, DAMPING, NOSE])
+    monkeypatch.setattr(pairs, "_placed_anew", lambda *_: [])
+    monkeypatch.setattr(pairs, "_takes_little", lambda *_: True)
+    for far in (False, True):
+        asked.clear()
+        monkeypatch.setattr(pairs, "is_far", lambda *_, far=far: far)
+        assert pairs.best_pair(asking, [first], looked) is None
+        tried = [(tuple(c.id for c in job.candidates), job.start) for job in asked if job.rounds == 2]
+        names = {frozenset(ids) for ids, _ in tried}
+        assert frozenset(("soil-layer", "soil-crust")) not in names
+        assert frozenset(("mass", "soil-layer")) in names
+        assert (frozenset(("mass", "structural-compliance")) in names) == far
+        assert ((("soil-viscous-damping", "mass"), (0.7, 0.2)) in tried) == (not far)

@@ -323,36 +323,6 @@ def test_far_less_is_far_less_beyond_the_noise(
     assert pairs.is_better(new, left, held, scattered=True) == runs, "nobody knows what chance leaves of full runs"
 
 
-def test_slopes_lead_to_two_near_the_noise_and_any_curve_is_not_tried(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Far off what scored is tried two by two; near, those that led, and what gains most together."""
-    asked: list[Any] = []
-    leading = fitted((MASS,), 2.0)
-    first = Step(
-        base=fitted((), 4.0), fitted=leading, p_value=0.0,
-        rivals=(leading, fitted(GRADUAL[:1], 3.0), fitted(GRADUAL[1:], 3.5)),
-        screened=tuple(screened(c) for c in (DAMPING, NOSE)),
-    )  # fmt: skip
-    both = ((("soil-viscous-damping", (0.7,)), ("mass", (0.2,))),)
-    looked = Gate(
-        score=9.0, scores={"mass": 9.0, "soil-viscous-damping": 1.0}, null=np.zeros(9), detectable={}, both=both
-    )
-    asking = inquiry(asked)
-    object.__setattr__(asking, "say", lambda _: None)
-    object.__setattr__(asking, "candidates", [MASS, DAMPING, NOSE])
-    monkeypatch.setattr(pairs, "_placed_anew", lambda *_: [])
-    monkeypatch.setattr(pairs, "_takes_little", lambda *_: True)
-    for far in (False, True):
-        asked.clear()
-        monkeypatch.setattr(pairs, "is_far", lambda *_, far=far: far)
-        assert pairs.best_pair(asking, [first], looked) is None
-        tried = [(tuple(c.id for c in job.candidates), job.start) for job in asked if job.rounds == 2]
-        names = {frozenset(ids) for ids, _ in tried}
-        assert frozenset(("soil-layer", "soil-crust")) not in names
-        assert frozenset(("mass", "soil-layer")) in names
-        assert (frozenset(("mass", "structural-compliance")) in names) == far
-        assert ((("soil-viscous-damping", "mass"), (0.7, 0.2)) in tried) == (not far)
-
-
 @pytest.mark.parametrize(("left", "taken"), [(1.2, True), (1.5, False)])
 def test_three_are_given_for_two_only_where_the_third_is_not_needed(
     left: float, taken: bool, monkeypatch: pytest.MonkeyPatch
