@@ -46,6 +46,7 @@ from rollover.diagnosis.statements import (
     may_be_nothing,
     named,
     noise,
+    of_no_ground,
     places,
     sentence,
 )
@@ -221,7 +222,8 @@ def _diagnosed(asked: Asked, every: Sequence[Evidence], slips: Sequence[Aside], 
         + (by_clock(mistimed(judge, explanation.fitted, crew.looks)) if is_left else "")
         + offered(law)
         + by_slips(slips)
-        + against_itself(verdict, contrary),
+        + against_itself(verdict, contrary)
+        + of_no_ground(found),
         p_value=explanation.p_value if shown is None else shown.p_value,
         noise=noise(found),
         where=places(before, found, depends_on.on) if is_mismatch else by_itself,

@@ -17,7 +17,7 @@ from rollover.diagnosis.forms import WORTH, enough, is_noise
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.refine import BEHIND, LITTLE, along_shapes, apart, few_of, least_of, left_at, teeth
+from rollover.diagnosis.refine import BEHIND, LITTLE, along_shapes, apart, chords, few_of, least_of, left_at, teeth
 from rollover.diagnosis.thresholds import is_clock, stretches
 
 RUGGED = 2.0  # misfit over the noise that the best leaves, from which on there may be something behind a cliff
@@ -28,6 +28,7 @@ TIED = 1.2  # times what the best leaves, up to which time shifts are tried out
 BY_CHANCE = 0.01  # p-value of what is left, above which no other form of an effect is looked for
 TOLD = 2e-5  # s, by which time shifts are told apart
 PARTS = 4  # into which places are split for those who look
+HEARD = 60  # places of what rings, of all that one recording was asked for, that a few are
 FOLLOWED: tuple[How, ...] = ("polish", "time")  # how what rings is gone on with
 # of what the base leaves beyond the noise, that an effect must take before its shape is fitted too; of what the best
 # takes, before its time shifts are tried out
@@ -59,7 +60,7 @@ def _as_promised(
 
 
 def _combed(inquiry: Inquiry, fits: Sequence[Fitted], looked: Gate, shifts: Sequence[float]) -> list[Fitted]:
-    """The fits, best first, the best that rings begun anew along its second parameter if it leads or nearly so.
+    """The fits, best first, the best that rings begun anew along its damping and its frequency.
 
     It leads by what it leaves, or by its score: its frequency may have been found beside a wrong damping.
     """
@@ -67,15 +68,41 @@ def _combed(inquiry: Inquiry, fits: Sequence[Fitted], looked: Gate, shifts: Sequ
     old = next((f for f in near if f.candidates[-1].rings and len(f.own) == 2), None)
     if old is None:
         return list(fits)
-    few, places = few_of(old), teeth(old)
-    left = inquiry.looks(partial(_left_of, candidates=old.candidates, shifts=tuple(shifts), few=tuple(few)), places)
-    chosen = apart([(there, x) for there, x in zip(left, places, strict=True) if there is not None])
-    jobs = [Job(candidates=old.candidates, start=x, shifts=tuple(shifts), width=1) for x in chosen]
-    new = min((f for f in inquiry.fits(jobs) if f is not None), key=lambda f: f.left, default=old)
+    few = few_of(old)
+    begun = [(old.candidates, x) for x in apart(_met(inquiry, old.candidates, teeth(old), shifts, few))]
+    begun += _in_chords(inquiry, old, shifts, few)
+    made = inquiry.fits([Job(candidates=c, start=x, shifts=tuple(shifts), width=1) for c, x in begun])
+    new = _plainest([f for f in made if f is not None] or [old], sum(b.residual.size for b in old.blocks))
     for how in FOLLOWED:
         new = inquiry.fits([from_there(new, how)])[0] or new
     better = new if new.left < old.left else old
     return sorted([better, *(f for f in fits if f is not old)], key=lambda f: f.left)
+
+
+def _in_chords(
+    inquiry: Inquiry, old: Fitted, shifts: Sequence[float], few: Sequence[int]
+) -> list[tuple[tuple[Candidate, ...], tuple[float, ...]]]:
+    """Where what rings last in a fit leaves least at all frequencies and shapes: first of the recording met worst."""
+    *beside, last = old.candidates
+    at = old.x[: len(old.x) - len(old.own)]
+    whole, places = chords(last, old.own)
+    candidates, worst = (*beside, whole), max(few, key=lambda r: old.blocks[r].total)
+    heard = _met(inquiry, candidates, [(*at, *own) for own in places], shifts, (worst,))[:HEARD]
+    plain = [whole.plain(x[len(at) :]) for x in apart(_met(inquiry, candidates, [x for _, x in heard], shifts, few))]
+    return [((*beside, c), (*at, *own)) for c, own in plain]
+
+
+def _met(
+    inquiry: Inquiry,
+    candidates: Sequence[Candidate],
+    places: Sequence[tuple[float, ...]],
+    shifts: Sequence[float],
+    few: Sequence[int],
+) -> list[tuple[float, tuple[float, ...]]]:
+    """What is left of `few` recordings at those of some places that can be simulated, with these, the least first."""
+    look = partial(_left_of, candidates=tuple(candidates), shifts=tuple(shifts), few=tuple(few))
+    met = zip(inquiry.looks(look, places), places, strict=True)
+    return sorted((there, x) for there, x in met if there is not None)
 
 
 def _left_of(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,9 @@ from rollover.diagnosis.fit import Judge
 
 Array = NDArray[np.float64]
 TEETH, COMBED, BESIDE = 11, 0.05, 20  # places on a first coordinate, within so much of its fit; on the other, over all
+WAVES, OCTAVES = 57, 0.225  # frequencies, within so much of a coordinate of its fit: three octaves
+QUIETLY = (0.3, 0.5)  # coordinates of a damping that lets it ring
+SPREAD = (np.arange(6) + 0.5) / 6  # places of a shape that goes along with them
 STARTS, APART = 3, 0.06  # of the best places, so far apart
 SCANNED = (np.arange(40) + 0.5) / 40  # places of a shape
 TICK, SHORTEST, NARROWER = 8e-5, 5e-6, 0.4  # s, by which a time shift is tried to either side; then less, by a factor
@@ -94,6 +99,17 @@ def teeth(fitted: Fitted) -> list[tuple[float, ...]]:
     at = len(fitted.x) - 2
     firsts = np.clip(fitted.x[at] + COMBED * np.linspace(-1.0, 1.0, TEETH), 0.0, 1.0)
     return [(*fitted.x[:at], float(a), float(b)) for a in firsts for b in (np.arange(BESIDE) + 0.5) / BESIDE]
+
+
+def chords(last: Candidate, own: Sequence[float]) -> tuple[Candidate, list[tuple[float, ...]]]:
+    """The last effect of a fit along its shape, and places all along its frequency and its shape, little damped.
+
+    One that was fitted beside a wrong frequency hardly rings any more: what it rings by is not to be seen from there.
+    """
+    whole = replace(last.whole(), along=tuple(last.shapes))
+    firsts = np.clip(own[0] + OCTAVES * np.linspace(-1.0, 1.0, WAVES), 0.0, 1.0)
+    shapes = itertools.product(*(SPREAD for _ in last.shapes))
+    return whole, [(float(a), b, *map(float, shape)) for shape in shapes for a in firsts for b in QUIETLY]
 
 
 def apart(met: Sequence[tuple[float, tuple[float, ...]]]) -> list[tuple[float, ...]]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rollover.diagnosis.blocks import at_an_end
+from rollover.diagnosis.blocks import at_an_end, turned
 from rollover.diagnosis.candidates import Candidate, each_with_own, is_one_sensor
 from rollover.diagnosis.detect import Mismatch, mismatch_of
 from rollover.diagnosis.endings import MANY, followed, mirrored
@@ -88,14 +88,11 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
         if both is not None:
             (taken, left), current = both, both[0][-1].fitted
             is_whole = is_enough(judge, current, left)
-    parts = [s.again(judge) for s in taken]
-    settled = True
-    if is_whole and len(taken) > 1 and is_open_to_be_named(judge, current, left):
-        needed = _needed(inquiry, taken)
-        settled = needed is not None
-        if needed is not None:
-            needed[-1], _ = followed(inquiry, needed[-1])
-            parts = needed if judge.effort.thrifty else [mirrored(inquiry, s) for s in needed]
+    is_open = is_whole and len(taken) > 1 and is_open_to_be_named(judge, current, left)
+    needed = _ended(inquiry, taken) if is_open else _one_each(inquiry, taken)
+    parts = [s.again(judge) for s in taken] if needed is None else needed
+    if is_open and needed is not None and not judge.effort.thrifty:
+        parts = [mirrored(inquiry, s) for s in needed]
     base = unforgiven(judge, base) if taken and judge.effort.thrifty else judge.again(base)
     parts = [s.foretold(judge, groups, inquiry.crew.looks) for s in parts]
     current = parts[-1].fitted if parts else base
@@ -109,7 +106,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
         after=mismatch_of(judge.evidence, current.blocks, phases),
         first=None if found.first is None else found.first.again(judge).foretold(judge, groups, inquiry.crew.looks),
         refuted=found.refuted,
-        settled=settled,
+        settled=needed is not None,
     )
 
 
@@ -122,6 +119,35 @@ def is_open_to_be_named(judge: Judge, fitted: Fitted, left: Mismatch) -> bool:
     return len(without_needless(judge, judge.again(fitted)).candidates) < MOST
 
 
+def _ended(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
+    """Steps of the effects that are needed, as `_needed`, the last one's fit followed to its end."""
+    needed = _needed(inquiry, taken)
+    return None if needed is None else _one_each(inquiry, [*needed[:-1], followed(inquiry, needed[-1])[0]])
+
+
+def _one_each(inquiry: Inquiry, steps: Sequence[Step]) -> list[Step]:
+    """Steps of all effects of the last one's fit, again, that one at last; none of none.
+
+    What came there in the place of another is looked for once more, so that it has rivals too.
+    """
+    known = {s.fitted.candidates[-1].key: s.again(inquiry.judge) for s in steps}
+    if not steps:
+        return []
+    *others, last = known[steps[-1].fitted.candidates[-1].key].fitted.candidates
+    found: list[Step] = []
+    current = known[last.key].fitted
+    for c in others:
+        back = None if c.key in known else instead(inquiry, current)
+        current = turned(current)
+        if back is not None and back.fitted.candidates[-1].key == c.key:
+            known[c.key] = back
+        elif c.key not in known:
+            base, rivals = (known[last.key].base, ()) if back is None else (back.base, back.rivals)
+            known[c.key] = Step(base=base, fitted=current, p_value=known[last.key].p_value, rivals=(current, *rivals))
+        found.append(known[c.key])
+    return [*found, known[last.key]]
+
+
 def _needed(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
     """Steps of the effects that are needed: each dropped if that costs no more than chance, or given to a better one.
 
@@ -132,7 +158,7 @@ def _needed(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
     judge = inquiry.judge
     current, last = without_needless(judge, judge.again(taken[-1].fitted)), taken[-1]
     if (judge.effort.thrifty or is_any_curve(current.candidates)) and len(current.candidates) == len(taken):
-        return [s.again(judge) for s in taken]  # the second will be refused, whichever came first
+        return _one_each(inquiry, taken)  # the second will be refused, whichever came first
     parts: list[Step] = []
     exchanged = 0
     while len(parts) < len(current.candidates):
@@ -143,7 +169,7 @@ def _needed(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
             break
         found, taken_out = instead(inquiry, current), current.candidates[0].key
         if found is None:
-            return [s.again(judge) for s in taken]
+            return _one_each(inquiry, taken)
         current = without_needless(judge, found.fitted)
         if found.fitted.candidates[-1].key != taken_out and exchanged < MOST:
             parts, exchanged = [], exchanged + 1  # those before were looked for beside what is no more

@@ -107,6 +107,15 @@ def may_be_nothing(effects: Sequence[Named], scattering: bool) -> set[str]:
     return {e.id for e in effects if is_none(e)}
 
 
+def of_no_ground(found: Sequence[Evidence]) -> str:
+    """What a sentence goes on with where no recording reaches the first contact that is simulated."""
+    contacts = [e.simulator.contact for e in found]
+    ends = [max(float(e.recording.time[s.rows[-1]]) for s in e.signals) for e in found]
+    if any(end >= at or not np.isfinite(at) for end, at in zip(ends, contacts, strict=True)):
+        return ""
+    return " None of them reaches the first contact: of the ground nothing can be told."
+
+
 def by_steps(effects: Sequence[Named]) -> list[str]:
     """What the scenario's own steps would have said of values, where that is far off beside their intervals."""
     return [

@@ -132,3 +132,41 @@ def test_effects_that_will_be_refused_are_not_looked_for_anew(
     judge = cast(Any, SimpleNamespace(again=lambda f: f, effort=DROPS))
     left = cast(Any, SimpleNamespace(p_value=p_value))
     assert selection.is_open_to_be_named(judge, fitted, left) == is_open
+
+
+@pytest.mark.parametrize(
+    ("back", "rivals"),
+    [
+        (LAYER, ["soil-layer"]),  # it comes back, with what competed there
+        (CRUST, ["soil-layer", "soil-crust"]),  # a better one does: it stays, with that for a rival
+        (None, ["soil-layer"]),  # nothing can be simulated without it
+    ],
+)
+def test_what_ends_with_others_than_it_began_with_has_a_step_for_each(
+    monkeypatch: pytest.MonkeyPatch, back: Any, rivals: list[str]
+) -> None:
+    """A crust with a layer on it is followed to a layer on another stiffness: none of the steps was the layer's."""
+    looked: list[str] = []
+
+    def instead(_: Any, current: Fitted) -> Step | None:
+        looked.append(current.candidates[0].id)
+        found = None if back is None else of(STIFFNESS, back)
+        return None if found is None else Step(base=of(STIFFNESS), fitted=found, p_value=0.0, rivals=(found,))
+
+    crust, both = of(LAYER, CRUST), of(LAYER, STIFFNESS)
+    needed = [
+        Step(base=of(LAYER), fitted=crust, p_value=0.0),
+        Step(base=of(CRUST), fitted=of(CRUST, LAYER), p_value=0.0),
+    ]
+    ended = Step(base=of(LAYER), fitted=both, p_value=0.0, rivals=(both,))
+    monkeypatch.setattr(selection, "instead", instead)
+    monkeypatch.setattr(selection, "_needed", lambda *_: needed)
+    monkeypatch.setattr(selection, "followed", lambda *_: (ended, None))
+    judge = SimpleNamespace(again=lambda f: f, effort=DROPS)
+    parts = selection._ended(cast(Inquiry, SimpleNamespace(judge=judge)), needed)
+    assert parts is not None
+    assert [s.fitted.candidates[-1].id for s in parts] == ["soil-layer", "soil-stiffness"]
+    assert parts[-1].fitted is both
+    assert {c.id for c in parts[0].fitted.candidates} == {"soil-layer", "soil-stiffness"}
+    assert [f.candidates[-1].id for f in parts[0].rivals] == rivals
+    assert looked == ["soil-layer"]

@@ -10,9 +10,9 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis import diagnose, fit, refine, thresholds
+from rollover.diagnosis import diagnose, fit, otherwise, refine, thresholds
 from rollover.diagnosis.bins import simulated
-from rollover.diagnosis.candidates import coordinate
+from rollover.diagnosis.candidates import coordinate, coordinates
 from rollover.diagnosis.clocks import align
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.evidence import evidence_of
@@ -66,6 +66,28 @@ def test_a_damping_behind_a_cliff_is_found() -> None:
     assert found.left < 1.2 * count
     assert c.values(found.x)["stiffness"] == pytest.approx(true["stiffness"], rel=0.02)
     assert c.values(found.x)["damping"] == pytest.approx(true["damping"], rel=0.1)
+
+
+def test_a_nose_that_was_fitted_beside_a_wrong_frequency_is_found_by_what_it_rings_by(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Damped until it hardly rings, as a share of the mass that it has not: nothing leads from there to what it is."""
+    true = {"stiffness": 3.619e6, "damping": 385.3, "nose_share": 0.2545}
+    hidden = {f"effects.structural-compliance.{name}": value for name, value in true.items()}
+    speeds = (1.13, 1.6, 2.4)
+    judge = judge_of(recorded(hidden, 1, speeds=speeds, channels=CHANNELS, rate=1500.0, noise=0.005))
+    c = candidate(judge, "structural-compliance")
+    astray = judge.fit((c,), coordinates({"stiffness": 6.4e6, "damping": 8000.0}, c.search), shifts=[0.0] * len(speeds))
+    assert astray is not None
+    assert astray.left > 10.0 * sum(e.count for e in judge.evidence)
+    inquiry = Inquiry(judge=judge, candidates=[c], groups=[[0], [1, 2]], phases=[], say=lambda _: None, crew=Crew())
+    looked = Gate(score=9.0, scores={c.key: 9.0}, null=np.zeros(9), detectable={})
+    (found,) = _combed(inquiry, [astray], looked, [b.shift for b in astray.blocks])
+    assert found.left < 1.2 * sum(e.count for e in judge.evidence)
+    assert found.candidates[-1].values(found.x) == pytest.approx(true, rel=0.01)
+    monkeypatch.setattr(otherwise, "_in_chords", lambda *_: [])
+    (near,) = _combed(inquiry, [astray], looked, [b.shift for b in astray.blocks])
+    assert near.left > 10.0 * found.left
 
 
 def test_the_clock_of_a_channel_is_followed_against_all_others(tmp_path: Path) -> None:
