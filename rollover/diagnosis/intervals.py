@@ -14,6 +14,7 @@ from rollover.diagnosis.candidates import Candidate, each_with_own, physical
 from rollover.diagnosis.crew import linearised
 from rollover.diagnosis.evidence import MODEL_ERROR, Evidence
 from rollover.diagnosis.fit import GENTLE, Fitted, Judge
+from rollover.diagnosis.roughness import over_roughness
 from rollover.diagnosis.secant import CLOCKED
 from rollover.diagnosis.settle import PARTS, along, left_of_means, pull_of_means, step_of_means
 from rollover.diagnosis.verdict import Interval
@@ -241,8 +242,38 @@ def _within_range(judge: Judge, fitted: Fitted, wide: Array, phi: float) -> Arra
     return found
 
 
+def rough_reaches(judge: Judge, fitted: Fitted, own: Array, phi: float) -> Array:
+    """The same factors (p, 2) by how rough the misfit of runs is, see `over_roughness`."""
+    inverse = np.linalg.inv(sum((b.normal()[0] for b in fitted.blocks), GENTLE * np.eye(len(fitted.x))))
+    found = np.ones((own.size, 2))
+    for k in range(own.size):
+        way = TWO_SIDED * own[k] * inverse[:, k] / inverse[k, k]
+
+        def misfits(places: Sequence[float], way: Array = way) -> list[float | None]:
+            points = [np.array(fitted.x) + t * way for t in places]
+            inside = [bool(np.all((x >= 0.0) & (x <= 1.0))) for x in points]
+            judge.made_ahead(
+                (r, fitted.candidates, [float(v) for v in x])
+                for x, there in zip(points, inside, strict=True)
+                for r in range(len(fitted.blocks) if there else 0)
+            )
+            met = [_clocked(judge, fitted, t * way) if there else None for t, there in zip(places, inside, strict=True)]
+            return [None if f is None else f.left for f in met]
+
+        found[k] = over_roughness(misfits, fitted.left, TWO_SIDED**2 * phi)
+    return found
+
+
 def _misfit(judge: Judge, fitted: Fitted, way: Array) -> float | None:
-    """What is left some way (p,) from a fit; None where it cannot be simulated."""
+    """What is left some way (p,) from a fit, of runs that scatter by their mean; None where it cannot be simulated."""
+    moved = _clocked(judge, fitted, way)
+    if moved is None:
+        return None
+    return left_of_means(judge, moved)[0] if any(e.strays for e in judge.evidence) else moved.left
+
+
+def _clocked(judge: Judge, fitted: Fitted, way: Array) -> Fitted | None:
+    """A fit moved some way (p,), clocks gone along, without slopes; None where it cannot be simulated."""
     x = [float(v) for v in np.array(fitted.x) + way]
     judge.made_ahead((r, fitted.candidates, x) for r in range(len(fitted.blocks)))
     found = [
@@ -252,8 +283,7 @@ def _misfit(judge: Judge, fitted: Fitted, way: Array) -> float | None:
     blocks = [b for b in found if b is not None]
     if len(blocks) < len(found):
         return None
-    moved = replace(fitted, x=tuple(x), blocks=tuple(blocks))
-    return left_of_means(judge, moved)[0] if any(e.strays for e in judge.evidence) else moved.left
+    return replace(fitted, x=tuple(x), blocks=tuple(blocks))
 
 
 def _noise(judge: Judge, fitted: Fitted, prior: Array) -> Array:
@@ -311,7 +341,10 @@ def intervals(
         variance = np.maximum(variance, disagreeing(judge.evidence, fitted.blocks, inverse))
     sd = np.sqrt(variance)[kept]
     own = np.sqrt(phi * np.diag(inverse))[kept]
-    wide = np.sqrt(sd[:, None] ** 2 + own[:, None] ** 2 * (reaches(judge, coarse, own, phi, sides) ** 2 - 1.0))
+    far = reaches(judge, coarse, own, phi, sides)
+    if strayed and sides is None:
+        far = np.maximum(far, rough_reaches(judge, coarse, own, phi))
+    wide = np.sqrt(sd[:, None] ** 2 + own[:, None] ** 2 * (far**2 - 1.0))
     if not judge.effort.thrifty:
         wide = _within_range(judge, told, wide, phi)
     found, at = [], 0
