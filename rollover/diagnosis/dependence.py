@@ -17,6 +17,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.clocks import by_first_contact
 from rollover.diagnosis.depend import ACCELERATION, DEPTH, SPEED, TIME, hats
 from rollover.diagnosis.detect import Mismatch
 from rollover.diagnosis.evidence import Evidence
@@ -122,27 +123,29 @@ def ways(
     judge: Judge, scenarios: Sequence[Scenario], base: Fitted, looks: Looks = at_each
 ) -> tuple[list[list[Block]], list[Descent]]:
     """Each recording at some time shifts, and its way down at the best of them."""
-    found = looks(judge, partial(_way, base=base), list(enumerate(scenarios)))
+    told = by_first_contact(judge, base.candidates, base.x, looks)
+    found = looks(judge, partial(_way, base=base), list(zip(range(len(scenarios)), scenarios, told, strict=True)))
     return [blocks for blocks, _ in found], [best for _, best in found if best is not None]
 
 
-def _way(judge: Judge, one: tuple[int, Scenario], *, base: Fitted) -> tuple[list[Block], Descent | None]:
+def _way(judge: Judge, one: tuple[int, Scenario, float | None], *, base: Fitted) -> tuple[list[Block], Descent | None]:
     """A recording's blocks at some time shifts, and its way down at the best of them.
 
-    Far from an explanation a shift eats what is missing: tried are the base's, what a clock says, and the one that
-    goes with a force that may be anything.
+    Far from an explanation a shift eats what is missing: tried are the base's, what a clock says, the one that the
+    first contact tells, and the one that goes with a force that may be anything.
     """
-    r, scenario = one
+    r, scenario, told = one
     e, b = judge.evidence[r], base.blocks[r]
     blocks, best = [b], descent(scenario, e, b)
     tried = [b.shift]
     shift = 0.0 if e.recording.clock.zero != "unknown" else b.shift
-    for _ in range(SHIFTS):
+    for turn in range(SHIFTS):
+        shift = told if turn == 1 and told is not None else shift
         if min(abs(shift - other) for other in tried) > NEAR * b.prior:
-            told = judge.block(r, base.candidates, base.x, shift, 0.0)
-            other = None if told is None else descent(scenario, e, told)
+            there = judge.block(r, base.candidates, base.x, shift, 0.0)
+            other = None if there is None else descent(scenario, e, there)
             tried.append(shift)
-            blocks += [] if told is None else [told]
+            blocks += [] if there is None else [there]
             best = other if best is None or (other is not None and other.score < best.score) else best
         shift = shift if best is None else best.better
     return blocks, best

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import colour
+from rollover.diagnosis import dependence as dependence_of
 from rollover.diagnosis.bins import simulated
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.clocks import align
@@ -25,7 +26,7 @@ from rollover.diagnosis.simulator import set_up
 from rollover.diagnosis.straight import is_any_curve, is_pliant
 from rollover.effects import Search
 from rollover.proof.generator import Order, make
-from rollover.recording import Recording
+from rollover.recording import Clock, Recording
 from rollover.scenario import Scenario, load
 from tests.diagnosis import drops
 from tests.diagnosis.drops import recorded, scenario
@@ -107,6 +108,26 @@ def test_what_is_in_no_table_is_put_down_to_what_it_was_made_from(
     assert found.channel == (case.truth["effects"][0]["channel"] if channel else None)
     assert found.shares[0][1] > 0.5
     assert sum(share for _, share in found.shares) <= 1.0 + 1e-9
+
+
+def test_the_way_down_is_told_by_the_first_contact_where_a_base_ate_what_is_missing_by_its_clocks(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Nobody timed these drops, and a base is 30 ms late: from there no slope leads over the edge of the contact."""
+    hidden = {f"effects.soil-layer.{n}": v for n, v in {"stiffness_ratio": 0.6, "depth": 0.05, "width": 0.02}.items()}
+    made = recorded(hidden, 5, speeds=(1.2, 1.8, 2.6, 3.2), channels=THREE, rate=1000.0, noise=0.005)
+    judge, _ = base_of(scenario(), [(n, replace(r, clock=Clock(zero="unknown"))) for n, r in made])
+    blocks = [judge.block(r, (), (), 0.03, 0.0) for r in range(len(made))]
+    base = Fitted(candidates=(), x=(), blocks=tuple(b for b in blocks if b is not None))
+    scenarios = [set_up(scenario(), e.recording) for e in judge.evidence]
+
+    def worst() -> float:
+        return max(d.score / d.rows.sum() for d in ways(judge, scenarios, base)[1])
+
+    assert all(abs(d.shift) < 1.5e-3 for d in ways(judge, scenarios, base)[1])
+    assert worst() < 0.3  # of what noise leaves, beyond it
+    monkeypatch.setattr(dependence_of, "by_first_contact", lambda *_: [None] * len(made))
+    assert worst() > 3.0
 
 
 def test_a_sensor_that_drops_out_is_told_from_a_force_and_comes_and_goes_in_time() -> None:
