@@ -45,6 +45,19 @@ def test_an_interval_reaches_as_far_as_the_parabola_beside_a_dip_says(
     assert len(seen) == places
 
 
+def test_an_interval_is_wider_by_what_roughness_moves_the_least_of_the_parabola_by() -> None:
+    """e = r (t^3 - 11.8 t) at t = +-1 ... +-4 is at right angles to 1, t and t^2: c stays due/16, b nought.
+
+    With s^2 = sum e^2/(8 - 3) the standard deviation of b is s/sqrt(sum t^2), of the least -b/2c that over 2c.
+    """
+    r, c, t = 0.05, DUE / 16.0, np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0])
+    rough = np.sqrt(np.sum((r * (t**3 - 11.8 * t)) ** 2) / 5.0)
+    half = np.hypot(4.0, 1.96 * rough / np.sqrt(np.sum(t**2)) / (2.0 * c))
+    assert half > 4.02
+    found = over_roughness(misfits(lambda t: c * t**2 + r * (t**3 - 11.8 * t), []), 0.0, DUE)
+    assert found == pytest.approx((half, half), rel=1e-9)
+
+
 def test_intervals_hold_where_a_fit_ends_in_the_lowest_of_many_dips() -> None:
     """What is left at place x is u^2 + e_x with u = (x - m)/w; truth lies N(0, w) from m; a fit ends where it is least.
 
