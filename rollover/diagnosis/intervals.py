@@ -14,14 +14,13 @@ from rollover.diagnosis.candidates import Candidate, each_with_own, physical
 from rollover.diagnosis.crew import linearised
 from rollover.diagnosis.evidence import MODEL_ERROR, Evidence
 from rollover.diagnosis.fit import GENTLE, Fitted, Judge
-from rollover.diagnosis.roughness import over_roughness
+from rollover.diagnosis.roughness import TWO_SIDED, over_roughness
 from rollover.diagnosis.secant import CLOCKED
 from rollover.diagnosis.settle import PARTS, along, left_of_means, pull_of_means, step_of_means
 from rollover.diagnosis.verdict import Interval
 from rollover.effects import EFFECTS, possible, units_of
 
 Array = NDArray[np.float64]
-TWO_SIDED = 1.96
 OUTSIDE = 1.0  # ranges beyond an end, where an interval ends at the latest: what tells nothing has no end of its own
 NEAR = 0.1  # of a value, by which the end of a range may lie beside the fit
 KNOWN = 1e-3  # of such an end, by which it is known
@@ -260,7 +259,7 @@ def rough_reaches(judge: Judge, fitted: Fitted, own: Array, phi: float) -> Array
             met = [_clocked(judge, fitted, t * way) if there else None for t, there in zip(places, inside, strict=True)]
             return [None if f is None else f.left for f in met]
 
-        found[k] = over_roughness(misfits, fitted.left, TWO_SIDED**2 * phi)
+        found[k] = over_roughness(misfits, TWO_SIDED**2 * phi)
     return found
 
 

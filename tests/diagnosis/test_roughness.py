@@ -41,7 +41,7 @@ def test_an_interval_reaches_as_far_as_the_parabola_beside_a_dip_says(
     of: Callable[[float], float | None], down: float, up: float, places: int
 ) -> None:
     seen: list[float] = []
-    assert over_roughness(misfits(of, seen), 0.0, DUE) == pytest.approx((down, up), rel=1e-9)
+    assert over_roughness(misfits(of, seen), DUE) == pytest.approx((down, up), rel=1e-9)
     assert len(seen) == places
 
 
@@ -54,7 +54,7 @@ def test_an_interval_is_wider_by_what_roughness_moves_the_least_of_the_parabola_
     rough = np.sqrt(np.sum((r * (t**3 - 11.8 * t)) ** 2) / 5.0)
     half = np.hypot(4.0, 1.96 * rough / np.sqrt(np.sum(t**2)) / (2.0 * c))
     assert half > 4.02
-    found = over_roughness(misfits(lambda t: c * t**2 + r * (t**3 - 11.8 * t), []), 0.0, DUE)
+    found = over_roughness(misfits(lambda t: c * t**2 + r * (t**3 - 11.8 * t), []), DUE)
     assert found == pytest.approx((half, half), rel=1e-9)
 
 
@@ -72,7 +72,7 @@ def test_intervals_hold_where_a_fit_ends_in_the_lowest_of_many_dips() -> None:
 
         fitted = min((float(x) for x in rng.uniform(-2.0, 2.0, 20)), key=left)
         unit = 1.96 * slopes * w
-        down, up = over_roughness(misfits(lambda t: left(fitted + t * unit), []), left(fitted), DUE)  # noqa: B023
+        down, up = over_roughness(misfits(lambda t: left(fitted + t * unit), []), DUE)  # noqa: B023
         held += fitted - down * unit < truth < fitted + up * unit
         alone += abs(truth - fitted) < unit
     assert alone < 0.25 * 400

@@ -10,6 +10,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from rollover.diagnosis import intervals as intervals_of
 from rollover.diagnosis import overturn, settle
 from rollover.diagnosis.blocks import GENTLE, Block, Fitted
 from rollover.diagnosis.candidates import Candidate
@@ -257,7 +258,7 @@ LAG = 0.06
 
 
 @pytest.mark.parametrize("size", [0.05, 0.0])
-def test_a_value_is_that_of_shorter_steps(size: float) -> None:
+def test_a_value_is_that_of_shorter_steps(size: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Measured at 0.4: fitted 0.4 - LAG, 0.4 - LAG/4 by steps of a quarter; LAG/4 more is another standard error."""
     every = []
     for r in range(4):
@@ -281,6 +282,11 @@ def test_a_value_is_that_of_shorter_steps(size: float) -> None:
     assert more == pytest.approx(1.96 * (fine.x[0] - fitted.x[0]) / (settle.PARTS - 1), rel=1e-6)
     assert whole.low < 0.4 < whole.high
     assert (by_itself.as_simulated, whole.as_simulated) == (None, fitted.x[0])
+    # how rough the misfit of runs is counts where an interval is stated, not where a side of it is asked for
+    monkeypatch.setattr(intervals_of, "rough_reaches", lambda *_: np.full((1, 2), 50.0))
+    assert intervals(judge, fine, {}, fitted)[0]["angle"] == whole
+    rough = intervals(judge, fine, None, fitted)[0]["angle"]
+    assert rough.high - rough.low > 5.0 * (whole.high - whole.low)
     told = [cast(Any, SimpleNamespace(id="slope", parameters={"angle": i})) for i in (by_itself, whole)]
     assert by_steps(told) == [
         f"slope angle: {fine.x[0]:.4g} rad by steps of 1/4 of the scenario's, in its own {fitted.x[0]:.4g}"
