@@ -126,7 +126,6 @@ def reaches(judge: Judge, fitted: Fitted, own: Array, phi: float, sides: Mapping
     that scatter it is the misfit of their mean, which is rough by itself. With `sides`, coordinates with -1.0 for down
     or 1.0 for up, these alone are looked at.
     """
-    inverse = np.linalg.inv(sum((b.normal()[0] for b in fitted.blocks), GENTLE * np.eye(len(fitted.x))))
     start = _misfit(judge, fitted, np.zeros(len(fitted.x)))
     due = TWO_SIDED**2 * phi
     enough = max(CLEARLY * due, ROUGH if any(e.strays for e in judge.evidence) else 0.0)
@@ -134,8 +133,7 @@ def reaches(judge: Judge, fitted: Fitted, own: Array, phi: float, sides: Mapping
     if start is None:
         return found
     rippled = _rippled(fitted) if not judge.effort.thrifty else set()
-    for k in range(own.size):
-        way = TWO_SIDED * own[k] * inverse[:, k] / inverse[k, k]
+    for k, way in enumerate(_ways(fitted, own)):
         for side, sign in enumerate((-1.0, 1.0)):
             if sides is not None and sides.get(k) != sign:
                 continue
@@ -154,6 +152,12 @@ def reaches(judge: Judge, fitted: Fitted, own: Array, phi: float, sides: Mapping
                 far = _along_valley(judge, fitted, k, sign * TWO_SIDED * own[k], (start, due), far)
             found[k, side] = far if far > BEYOND else 1.0
     return found
+
+
+def _ways(fitted: Fitted, own: Array) -> list[Array]:
+    """For each coordinate how far (p,) all go where it goes `TWO_SIDED` of its `own` deviations, the others along."""
+    inverse = np.linalg.inv(sum((b.normal()[0] for b in fitted.blocks), GENTLE * np.eye(len(fitted.x))))
+    return [TWO_SIDED * own[k] * inverse[:, k] / inverse[k, k] for k in range(own.size)]
 
 
 def _rippled(fitted: Fitted) -> set[int]:
@@ -243,10 +247,8 @@ def _within_range(judge: Judge, fitted: Fitted, wide: Array, phi: float) -> Arra
 
 def rough_reaches(judge: Judge, fitted: Fitted, own: Array, phi: float) -> Array:
     """The same factors (p, 2) by how rough the misfit of runs is, see `over_roughness`."""
-    inverse = np.linalg.inv(sum((b.normal()[0] for b in fitted.blocks), GENTLE * np.eye(len(fitted.x))))
     found = np.ones((own.size, 2))
-    for k in range(own.size):
-        way = TWO_SIDED * own[k] * inverse[:, k] / inverse[k, k]
+    for k, way in enumerate(_ways(fitted, own)):
 
         def misfits(places: Sequence[float], way: Array = way) -> list[float | None]:
             points = [np.array(fitted.x) + t * way for t in places]
