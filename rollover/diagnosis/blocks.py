@@ -69,6 +69,11 @@ class Block:
         return self.J if self.course is None else self.J / self.course.samples[:, None]
 
     @property
+    def plain_slope(self) -> Array:
+        """Slope of the shift of samples that count in full."""
+        return self.slope if self.course is None else self.slope / self.course.samples
+
+    @property
     def squares(self) -> float:
         """Sum of squares of what is left, another course for what it counts (D9)."""
         return float(self.residual @ self.residual) + (0.0 if self.course is None else self.course.more)

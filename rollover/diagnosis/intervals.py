@@ -14,7 +14,7 @@ from rollover.diagnosis.candidates import Candidate, each_with_own, physical
 from rollover.diagnosis.crew import linearised
 from rollover.diagnosis.evidence import MODEL_ERROR, Evidence
 from rollover.diagnosis.fit import GENTLE, Fitted, Judge
-from rollover.diagnosis.roughness import TWO_SIDED, over_roughness
+from rollover.diagnosis.roughness import TWO_SIDED, by_student, over_roughness
 from rollover.diagnosis.secant import CLOCKED
 from rollover.diagnosis.settle import PARTS, along, left_of_means, pull_of_means, step_of_means
 from rollover.diagnosis.verdict import Interval
@@ -33,13 +33,6 @@ FEWEST = 3  # recordings that can disagree
 HALVINGS = 7  # of the way to the end of a range
 ALONG, VALLEY, FEW_ROUNDS = 1.3, 9, 8  # a factor, how often, and rounds of a fit with one coordinate held
 EVENLY = 12.0**-0.5  # standard deviation of what is spread evenly from 0 to 1
-
-
-def by_student(free: int) -> float:
-    """(t/1.96)^2: how much wider squares are told by so few degrees of freedom."""
-    from scipy.special import stdtrit
-
-    return (float(stdtrit(free, 0.975)) / TWO_SIDED) ** 2
 
 
 def scattered(evidence: Sequence[Evidence], blocks: Sequence[Block], inverse: Array) -> Array:
@@ -246,11 +239,14 @@ def _within_range(judge: Judge, fitted: Fitted, wide: Array, phi: float) -> Arra
 
 
 def rough_reaches(judge: Judge, fitted: Fitted, own: Array, phi: float) -> Array:
-    """The same factors (p, 2) by how rough the misfit of runs is, see `over_roughness`."""
-    found = np.ones((own.size, 2))
+    """How far (p, 2) the mean course of runs beside the fit may be what was measured, see `over_roughness`; or nought.
+
+    In units of `own` deviations down and up. It has in it what scatter and disagreement do.
+    """
+    found = np.zeros((own.size, 2))
     for k, way in enumerate(_ways(fitted, own)):
 
-        def misfits(places: Sequence[float], way: Array = way) -> list[float | None]:
+        def runs(places: Sequence[float], way: Array = way) -> list[Sequence[Block] | None]:
             points = [np.array(fitted.x) + t * way for t in places]
             inside = [bool(np.all((x >= 0.0) & (x <= 1.0))) for x in points]
             judge.made_ahead(
@@ -259,9 +255,9 @@ def rough_reaches(judge: Judge, fitted: Fitted, own: Array, phi: float) -> Array
                 for r in range(len(fitted.blocks) if there else 0)
             )
             met = [_clocked(judge, fitted, t * way) if there else None for t, there in zip(places, inside, strict=True)]
-            return [None if f is None else f.left for f in met]
+            return [None if f is None else f.blocks for f in met]
 
-        found[k] = over_roughness(misfits, TWO_SIDED**2 * phi)
+        found[k] = over_roughness(runs, [b.plain_J @ way for b in fitted.blocks], TWO_SIDED**2 * phi)
     return found
 
 
@@ -343,9 +339,9 @@ def intervals(
     sd = np.sqrt(variance)[kept]
     own = np.sqrt(phi * np.diag(inverse))[kept]
     far = reaches(judge, coarse, own, phi, sides)
-    if strayed and sides is None:
-        far = np.maximum(far, rough_reaches(judge, coarse, own, phi))
     wide = np.sqrt(sd[:, None] ** 2 + own[:, None] ** 2 * (far**2 - 1.0))
+    if strayed and sides is None:
+        wide = np.maximum(wide, own[:, None] * rough_reaches(judge, judge.again(coarse), own, phi))
     if not judge.effort.thrifty:
         wide = _within_range(judge, told, wide, phi)
     found, at = [], 0

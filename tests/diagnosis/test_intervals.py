@@ -74,9 +74,9 @@ def test_an_interval_reaches_as_far_as_the_misfit_stays_low(flatter: float) -> N
 def test_where_misfits_are_rough_an_interval_reaches_as_far_as_places_beside_the_fit_say(
     start: float, places: int
 ) -> None:
-    """The same four times flatter than slopes say, but for the fit itself, which stands in a dip.
+    """The same three times flatter than slopes say, but for the fit itself, which stands in a dip.
 
-    One width is 1.96/40 = 0.049: from 0.08 on one place lies below the fit, and of five no parabola is told yet.
+    One width is 1.96/40 = 0.049: from 0.08 on one place lies below the fit, and of five nothing is told yet.
     """
     J, n, asked = 40.0, 50, []
     w = np.random.default_rng(1).standard_normal(n)
@@ -86,7 +86,7 @@ def test_where_misfits_are_rough_an_interval_reaches_as_far_as_places_beside_the
 
     def clocked(_r: int, _c: object, x: list[float], _s: float, _rounds: int) -> Block:
         asked.append(x[0])
-        there = (0.5 if x[0] == start else 1.0) * w - J / 4.0 * (x[0] - start) * way
+        there = (0.5 if x[0] == start else 1.0) * w - J / 3.0 * (x[0] - start) * way
         return Block(residual=there, J=J * way[:, None], slope=np.zeros(n), shift=0.0, prior=1e-3)
 
     judge: Any = SimpleNamespace(clocked=clocked, made_ahead=list)
@@ -94,7 +94,7 @@ def test_where_misfits_are_rough_an_interval_reaches_as_far_as_places_beside_the
     fitted = Fitted(candidates=(candidate,), x=(start,), blocks=(clocked(0, None, [start], 0.0, 0),))
     asked.clear()
     assert stated.rough_reaches(judge, fitted, np.array([1.0 / J]), 1.0) == pytest.approx(
-        np.full((1, 2), 4.0), rel=1e-9
+        np.full((1, 2), 3.0), rel=1e-9
     )
     assert len(asked) == places
     assert all(0.0 <= x <= 1.0 and x != start for x in asked)
