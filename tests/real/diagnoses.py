@@ -358,7 +358,7 @@ def write(known: Mapping[str, Any], *, to: bool) -> None:
     """All answers into the file of results, if asked for."""
     if to:
         ordered = {k: known[k] for k in (*SETS, DRAWS) if k in known}
-        RESULTS.write_text(json.dumps(ordered, indent=1) + "\n", encoding="utf-8")
+        RESULTS.write_text(json.dumps(ordered, indent=2) + "\n", encoding="utf-8")
 
 
 def main() -> None:
