@@ -5,7 +5,7 @@ of all that were tried, and slopes J there are those of its dip: two runs side b
 t = +-1, +-2, ... on either side of it, 1 the half width of an interval by these slopes, what is left of recording r,
 its time shift taken out, is met sample by sample by
 
-    w_r(t) = u_r + v_r t + z_r t^2 + e_r(t), s_r^2 the mean |e_r|^2                                            (R1)
+    w_r(t) = u_r + v_r t + z_r t^2 + e_r(t), s_r^2 = sum |e_r|^2/(k - 3) of k places                           (R1)
 
 with h = (X'X)^-1 of 1, t, t^2. Where c = sum_r |v_r|^2 - s_r^2 h_11 stands out of what scatter alone makes of |v|^2,
 and J'v is but a share of J'J, the mean of runs is nearest to what was measured at
@@ -76,8 +76,8 @@ def over_roughness(runs: Runs, slopes: Sequence[Array], due: float) -> tuple[flo
         found = _slope(t[kept], [(left[kept], J) for left, J in recordings], due)
         if found.clear > TOLD and found.flat < stage[-1]:
             best = found
-        if best.clear > CLEAR:
-            break
+            if found.clear > CLEAR:
+                break
     return (best.down, best.up) if best.share < KEPT else (0.0, 0.0)
 
 

@@ -17,6 +17,7 @@ from rollover.diagnosis.roughness import over_roughness
 Array = NDArray[np.float64]
 DUE = 1.96**2
 N = 40
+HALF = 7.0 / np.sqrt(2.0)  # of what is due, where two recordings rise by it 7 places from their leasts
 STAGE = np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0])
 ALONG = np.ones(N) / np.sqrt(N)
 ACROSS = np.where(np.arange(N) % 2 == 0, 1.0, -1.0) / np.sqrt(N)
@@ -57,7 +58,7 @@ def straight(t: float, flatter: float, least: float = 0.0) -> list[Array]:
         (lambda t: straight(t, 3.5), 3.5, 3.5, 8),  # the fit stands in a dip, and is as much flatter beside
         (lambda t: straight(t, 4.5), 4.5, 4.5, 12),  # nearer places do not reach as far
         (lambda t: straight(t, 3.5, 1.5), 2.0, 5.0, 8),  # which is to one side of the least
-        (lambda t: [*straight(t, 7.0, 8.0), *straight(t, 7.0, -4.0)], 2.95, 6.95, 12),  # of two recordings the middle
+        (lambda t: [*straight(t, 7.0, 8.0), *straight(t, 7.0, -4.0)], HALF - 2.0, HALF + 2.0, 12),  # the middle of two
         (lambda t: straight(1e3, 1.0) if t > 2.5 else straight(t, 3.5), 3.5, 3.5, 8),  # runs take another course there
         (lambda t: None if t < -0.5 else straight(t, 5.0), 5.0, 5.0, 12),  # the range ends there: four are too few
         (lambda t: straight(t, 1e3), 0.0, 0.0, 20),  # not within 32 places
@@ -68,7 +69,7 @@ def test_an_interval_reaches_as_far_as_the_mean_of_runs_says(
     of: Callable[[float], list[Array] | None], down: float, up: float, places: int
 ) -> None:
     seen: list[float] = []
-    assert reach(of, seen) == pytest.approx((down, up), abs=1e-3)
+    assert reach(of, seen) == pytest.approx((down, up), rel=1e-9)
     assert len(seen) == places
 
 
@@ -78,7 +79,7 @@ def test_a_run_that_meets_the_recording_much_further_by_chance_is_one_of_another
     def left(t: float) -> list[Array]:
         return [1.96 * t / 3.5 * ALONG + np.sqrt(0.0 if t == 3.0 else 1e4) * ACROSS]
 
-    assert reach(left) == pytest.approx((3.5, 3.5), rel=1e-6)
+    assert reach(left) == pytest.approx((3.5, 3.5), rel=1e-9)
 
 
 @pytest.mark.parametrize(("share", "is_looked_at"), [(0.7, True), (0.9, False)])
@@ -107,7 +108,7 @@ def test_samples_count_alike_at_all_places_and_no_clock_does() -> None:
             found.append([block(counts * plain, slope=counts * clock, prior=1e6, course=course)])
         return found
 
-    assert over_roughness(met, [1.96 * DIP], DUE) == pytest.approx((3.0 / np.sqrt(0.68),) * 2, rel=1e-6)
+    assert over_roughness(met, [1.96 * DIP], DUE) == pytest.approx((3.0 / np.sqrt(0.68),) * 2, rel=1e-9)
 
 
 def test_what_was_measured_moves_as_runs_scatter() -> None:
@@ -129,7 +130,7 @@ def test_what_was_measured_moves_as_runs_scatter() -> None:
     half = np.hypot(np.sqrt(DUE / c), scatter)
     assert half > 3.1
     found = reach(lambda t: [(slope * t + r * (t**3 - 11.8 * t)) * ALONG])
-    assert found == pytest.approx((half, half), rel=1e-6)
+    assert found == pytest.approx((half, half), rel=1e-9)
 
 
 def test_a_slope_that_scatter_makes_is_none() -> None:
