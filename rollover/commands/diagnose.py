@@ -103,7 +103,7 @@ def diagnose(
             chosen, list(measured.items()), hold_out=held, tolerance=tolerance, say=console.say, crew=crew
         )
         found = replace(found, notes=(*in_words(findings), *found.notes))
-        told = series(chosen, list(measured.items()), found)
+        told = series(chosen, list(measured.items()), found, crew.children)
         answer = account(found, about, [{"recording": name, **_plain(f)} for name, f in findings])
         with store.whole(folder) as part, ThreadPoolExecutor(1) as beside:
             store.write_json(part / JSON, answer)

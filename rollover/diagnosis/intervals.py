@@ -33,6 +33,9 @@ FEWEST = 3  # recordings that can disagree
 HALVINGS = 7  # of the way to the end of a range
 ALONG, VALLEY, FEW_ROUNDS = 1.3, 9, 8  # a factor, how often, and rounds of a fit with one coordinate held
 EVENLY = 12.0**-0.5  # standard deviation of what is spread evenly from 0 to 1
+BOTH = (-1.0, 1.0)
+
+Sides = Mapping[int, Sequence[float]]  # coordinates, and of each -1.0 for down, 1.0 for up
 
 
 def scattered(evidence: Sequence[Evidence], blocks: Sequence[Block], inverse: Array) -> Array:
@@ -111,13 +114,12 @@ def with_shapes(judge: Judge, fitted: Fitted) -> tuple[Fitted, Array, list[int]]
     return fitted, np.array(own_prior), list(range(len(fitted.x)))
 
 
-def reaches(judge: Judge, fitted: Fitted, own: Array, phi: float, sides: Mapping[int, float] | None = None) -> Array:
+def reaches(judge: Judge, fitted: Fitted, own: Array, phi: float, sides: Sides | None = None) -> Array:
     """How much further than by its slopes a misfit stays low, factors (p, 2) of `own` deviations down and up, >= 1.
 
     `TWO_SIDED` deviations off, the other parameters going along, it should have risen by `TWO_SIDED`^2 phi. Leaps and
     chance make slopes too steep: where it has clearly not, one goes on until it has, and back on a parabola. Of runs
-    that scatter it is the misfit of their mean, which is rough by itself. With `sides`, coordinates with -1.0 for down
-    or 1.0 for up, these alone are looked at.
+    that scatter it is the misfit of their mean, which is rough by itself. With `sides` these alone are looked at.
     """
     start = _misfit(judge, fitted, np.zeros(len(fitted.x)))
     due = TWO_SIDED**2 * phi
@@ -127,8 +129,8 @@ def reaches(judge: Judge, fitted: Fitted, own: Array, phi: float, sides: Mapping
         return found
     rippled = _rippled(fitted) if not judge.effort.thrifty else set()
     for k, way in enumerate(_ways(fitted, own)):
-        for side, sign in enumerate((-1.0, 1.0)):
-            if sides is not None and sides.get(k) != sign:
+        for side, sign in enumerate(BOTH):
+            if sides is not None and sign not in sides.get(k, ()):
                 continue
             far = 1.0
             while far < FARTHEST:
@@ -239,11 +241,11 @@ def _within_range(judge: Judge, fitted: Fitted, wide: Array, phi: float) -> Arra
 
 
 def rough_reaches(judge: Judge, fitted: Fitted, own: Array, phi: float) -> Array:
-    """How far (p, 2) the mean course of runs beside the fit may be what was measured, see `over_roughness`; or nought.
+    """How far (p, 2) the mean course of runs beside the fit may be what was measured, see `over_roughness`.
 
-    In units of `own` deviations down and up. It has in it what scatter and disagreement do.
+    In units of `own` deviations down and up, NaN where runs do not tell. It has in it what scatter and disagreement do.
     """
-    found = np.zeros((own.size, 2))
+    found = np.full((own.size, 2), np.nan)
     for k, way in enumerate(_ways(fitted, own)):
 
         def runs(places: Sequence[float], way: Array = way) -> list[Sequence[Block] | None]:
@@ -257,7 +259,9 @@ def rough_reaches(judge: Judge, fitted: Fitted, own: Array, phi: float) -> Array
             met = [_clocked(judge, fitted, t * way) if there else None for t, there in zip(places, inside, strict=True)]
             return [None if f is None else f.blocks for f in met]
 
-        found[k] = over_roughness(runs, [b.plain_J @ way for b in fitted.blocks], TWO_SIDED**2 * phi)
+        told = over_roughness(runs, [b.plain_J @ way for b in fitted.blocks], TWO_SIDED**2 * phi)
+        if told is not None:
+            found[k] = told
     return found
 
 
@@ -294,7 +298,7 @@ def _noise(judge: Judge, fitted: Fitted, prior: Array) -> Array:
 
 
 def intervals(
-    judge: Judge, fitted: Fitted, sides: Mapping[int, float] | None = None, coarse: Fitted | None = None
+    judge: Judge, fitted: Fitted, sides: Sides | None = None, coarse: Fitted | None = None
 ) -> list[dict[str, Interval]]:
     """For each effect, its parameters with 95 % intervals.
 
@@ -302,9 +306,10 @@ def intervals(
     model of `MODEL_ERROR` in any one channel would do, A^-1 J'(error): integrators differ, noise or not. Where runs
     that nobody could tell apart scatter and samples are weighed by that, cov = phi A^-1 N A^-1 with N the covariance
     that the noise alone gives J'w; beside it stand `scattered` and `unshaped`. Elsewhere shapes that were not fitted
-    are in A, see `with_shapes`; an end of a range is read off where samples pile up there. `sides` as in `reaches`: all
-    others are as wide as slopes say. `coarse` is the fit that was moved to this one `in_shorter_steps`: steps of no
-    length would move it by another 1/(PARTS - 1) of that.
+    are in A, see `with_shapes`; an end of a range is read off where samples pile up there. How far the misfit stays low
+    is told by `rough_reaches` where runs scatter, and by `reaches` elsewhere and where that does not tell; with `sides`
+    by `reaches` alone, and all others are as wide as slopes say. `coarse` is the fit that was moved to this one
+    `in_shorter_steps`: steps of no length would move it by another 1/(PARTS - 1) of that.
     """
     told, coarse = fitted, coarse or fitted
     fitted, prior, kept = with_shapes(judge, fitted)
@@ -338,10 +343,12 @@ def intervals(
         variance = np.maximum(variance, disagreeing(judge.evidence, fitted.blocks, inverse))
     sd = np.sqrt(variance)[kept]
     own = np.sqrt(phi * np.diag(inverse))[kept]
-    far = reaches(judge, coarse, own, phi, sides)
-    wide = np.sqrt(sd[:, None] ** 2 + own[:, None] ** 2 * (far**2 - 1.0))
+    rough = np.full((own.size, 2), np.nan)
     if strayed and sides is None:
-        wide = np.maximum(wide, own[:, None] * rough_reaches(judge, judge.again(coarse), own, phi))
+        rough = rough_reaches(judge, judge.again(coarse), own, phi)
+        sides = {k: BOTH for k in range(own.size) if np.isnan(rough[k, 0])}  # for means of seven runs
+    far = reaches(judge, coarse, own, phi, sides)
+    wide = np.fmax(np.sqrt(sd[:, None] ** 2 + own[:, None] ** 2 * (far**2 - 1.0)), own[:, None] * rough)
     if not judge.effort.thrifty:
         wide = _within_range(judge, told, wide, phi)
     found, at = [], 0

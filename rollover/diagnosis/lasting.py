@@ -153,7 +153,7 @@ def is_there(judge: Judge, fitted: Fitted) -> bool:
     if not apart(by_slopes, 1.0):
         return False  # runs only widen it
     first, values = len(fitted.x) - len(last.search), last.values(fitted.x[-len(last.search) :])
-    sides = {first + k: -1.0 if values[n] > nulls[n] else 1.0 for k, n in enumerate(last.search) if n in numbers}
+    sides = {first + k: (-1.0 if values[n] > nulls[n] else 1.0,) for k, n in enumerate(last.search) if n in numbers}
     return apart(by_slopes, SURELY) or apart(intervals(judge, fitted, sides)[-1], 1.0)
 
 

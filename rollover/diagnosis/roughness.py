@@ -50,12 +50,12 @@ def by_student(free: float) -> float:
     return (float(stdtrit(free, 0.975)) / TWO_SIDED) ** 2
 
 
-def over_roughness(runs: Runs, slopes: Sequence[Array], due: float) -> tuple[float, float]:
+def over_roughness(runs: Runs, slopes: Sequence[Array], due: float) -> tuple[float, float] | None:
     """How far (t, down and up) the mean course of runs may be what was measured, by (R1) to (R3).
 
     `slopes` (n,) are those at the fit, of each recording by t, of samples that count in full. Nought both where they
-    are right, for then they tell more, and where no slope stands out within the places that are looked at: more and
-    more, until one is told well.
+    are surely right, for then they tell more. None where that is not told: no slope stands out within the places that
+    are looked at, more and more until one is told well.
     """
     met: list[tuple[float, Sequence[Block]]] = []
     best = Slope(clear=0.0)
@@ -78,7 +78,9 @@ def over_roughness(runs: Runs, slopes: Sequence[Array], due: float) -> tuple[flo
             best = found
             if found.clear > CLEAR:
                 break
-    return (best.down, best.up) if best.share < KEPT else (0.0, 0.0)
+    if best.share < KEPT:
+        return (best.down, best.up) if best.clear > TOLD else None
+    return (0.0, 0.0) if best.clear > CLEAR else None
 
 
 @dataclass(frozen=True, kw_only=True)

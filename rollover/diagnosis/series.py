@@ -21,11 +21,12 @@ from rollover.diagnosis.clocks import align
 from rollover.diagnosis.evidence import Evidence, Signal, evidence_of
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.loudness import with_loudness
-from rollover.diagnosis.overturn import CENTRE
+from rollover.diagnosis.overturn import CENTRE, full_runs, made_ahead
 from rollover.diagnosis.phases import phases_of
 from rollover.diagnosis.simulator import Simulator, simulator_of
 from rollover.diagnosis.triggers import from_first_contact
 from rollover.diagnosis.verdict import Diagnosis
+from rollover.execute import Children
 from rollover.recording import Recording
 from rollover.scenario import Scenario
 
@@ -84,29 +85,47 @@ class Told:
     condition: str = ""
 
 
-def series(scenario: Scenario, recordings: Sequence[tuple[str, Recording]], found: Diagnosis) -> tuple[Told, ...]:
-    """Each recording beside its simulations, in the order given; those that could not be simulated are left out."""
+def series(
+    scenario: Scenario,
+    recordings: Sequence[tuple[str, Recording]],
+    found: Diagnosis,
+    children: Children | None = None,
+) -> tuple[Told, ...]:
+    """Each recording beside its simulations, in the order given; those that could not be simulated are left out.
+
+    `children` make full runs side by side.
+    """
     diagnosed = diagnosed_scenario(scenario, found)
     judged = found.held_out if set(found.held_out) != set(found.training) else ()
     told = []
     for name, recording in from_first_contact(scenario, recordings)[0]:
         laid = {CENTRE: found.grids[name]} if name in found.grids else {}
         other = diagnosed.replaced(laid) if found.effects or found.empirical else None
-        one = _told(name, recording, scenario.replaced(laid), other, name in judged)
+        one = _told(name, recording, scenario.replaced(laid), other, name in judged, children)
         if one is not None:
             told.append(one)
     return tuple(told)
 
 
 def _told(
-    name: str, recording: Recording, scenario: Scenario, diagnosed: Scenario | None, held_out: bool
+    name: str,
+    recording: Recording,
+    scenario: Scenario,
+    diagnosed: Scenario | None,
+    held_out: bool,
+    children: Children | None,
 ) -> Told | None:
-    simulator, evidence = _ready(name, scenario, recording)
+    made = [_simulators(one, recording) for one in (scenario, diagnosed) if one is not None]
+    full = [runs for _, *both, _ in made for one in both if (runs := full_runs(one)) is not None]
+    for runs in full:
+        runs.children = children
+    made_ahead(children, [(runs, {}) for runs in full])
+    ready = [(whole, evidence_of(name, thin, simulator, many)) for thin, simulator, whole, many in made]
+    (simulator, evidence), (last, best) = ready[0], ready[-1]
     if evidence is None:
         return None
     (evidence,), thinner = with_loudness([evidence]), evidence.recording
-    last, best = (simulator, evidence) if diagnosed is None else _ready(name, diagnosed, recording)
-    at = _shift(best or evidence)
+    at = _shift(evidence if diagnosed is None or best is None else best)
     before = simulator.predict({}, at)
     if before is None:
         return None
@@ -143,10 +162,10 @@ def _told(
     )
 
 
-def _ready(name: str, scenario: Scenario, recording: Recording) -> tuple[Simulator, Evidence | None]:
-    """What simulates all stamps, and the evidence at no more rows than are needed: of one and the same if it can be."""
+def _simulators(scenario: Scenario, recording: Recording) -> tuple[Recording, Simulator, Simulator, int]:
+    """A recording at no more rows than are needed, what simulates it, what all stamps, and how many are in a row."""
     thin, simulator, many = simulated(scenario, recording)
-    return simulator if many == 1 else simulator_of(scenario, recording), evidence_of(name, thin, simulator, many)
+    return thin, simulator, simulator if many == 1 else simulator_of(scenario, recording), many
 
 
 def _scatter(strays: Sequence[Array], time: Array) -> Array | None:

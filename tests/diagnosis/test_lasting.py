@@ -319,7 +319,7 @@ def test_a_strength_that_is_not_told_from_none_is_no_effect(monkeypatch: pytest.
     assert not told(0.73, 1.37)
     assert told(1.1, 1.4)
     assert told(0.5, 0.9)
-    assert asked == [{}, {}, {1: 1.0}, {}, {1: 1.0}]  # by slopes, and by runs towards no effect where these decide
+    assert asked == [{}, {}, {1: (1.0,)}, {}, {1: (1.0,)}]  # by slopes, and towards none by runs
     asked.clear()
     assert told(7.9, 8.1)
     assert asked == [{}]  # beyond doubt

@@ -12,11 +12,14 @@ import numpy as np
 import pytest
 
 from rollover import simulate
-from rollover.diagnosis import diagnose
+from rollover.diagnosis import diagnose, overturn
 from rollover.diagnosis.candidates import Candidate, physical
 from rollover.diagnosis.effort import RUNS
+from rollover.diagnosis.overturn import RunSimulator
 from rollover.diagnosis.ranges import candidates_of
+from rollover.diagnosis.series import series
 from rollover.document import value_at
+from rollover.execute import Children
 from rollover.recording import Recording
 from rollover.scenario import Scenario
 from tests.physics.scenes import shipped
@@ -59,14 +62,27 @@ def tosses(changes: Mapping[str, Any], noise: float = 0.01) -> list[tuple[str, R
 
 
 @pytest.mark.usefixtures("_few_rivals")
-def test_friction_that_was_left_out_is_named_and_fitted() -> None:
-    found = diagnose(toss(), tosses({"ground.friction.coefficient": 0.30}))
+def test_friction_that_was_left_out_is_named_and_fitted(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = tosses({"ground.friction.coefficient": 0.30})
+    found = diagnose(toss(), given)
     assert found.verdict == "missing-physics", found.sentence
     assert found.effects[0].id == "ground-friction"
     assert found.effects[0].parameters["coefficient"].value == pytest.approx(0.30, rel=0.1)
     assert found.where[0].phase in ("impact", "sliding")
     assert any("full runs" in note for note in found.notes)
     assert found.after["held_out"].nrmse < 0.8 * found.before["held_out"].nrmse
+    shown, children = series(toss(), given, found), Children(2)
+    with monkeypatch.context() as patch:
+        patch.setattr(RunSimulator, "_run", lambda own, _, changes: own._known[overturn._key(changes)])
+        try:
+            side_by_side = series(toss(), given, found, children)  # no run is made here
+        finally:
+            children.stop()
+    for one, other in zip(shown, side_by_side, strict=True):
+        assert one.shift == other.shift
+        for a, b in zip(one.tracks, other.tracks, strict=True):
+            assert a.scatter is not None
+            np.testing.assert_array_equal((a.before, a.after, a.scatter), (b.before, b.after, b.scatter))
 
 
 @pytest.mark.usefixtures("_few_rivals")

@@ -287,6 +287,19 @@ def test_a_value_is_that_of_shorter_steps(size: float, monkeypatch: pytest.Monke
     assert intervals(judge, fine, {}, fitted)[0]["angle"] == whole
     rough = intervals(judge, fine, None, fitted)[0]["angle"]
     assert rough.high - rough.low > 5.0 * (whole.high - whole.low)
+    # what it tells is not asked of means of runs; where slopes are right, nor where it does not tell, it counts not
+    asked: list[Any] = []
+
+    def reaches(*given: Any) -> np.ndarray:
+        asked.append(given[4])
+        return np.ones((1, 2))
+
+    monkeypatch.setattr(intervals_of, "reaches", reaches)
+    assert intervals(judge, fine, None, fitted)[0]["angle"] == rough
+    for far in (0.0, np.nan):
+        monkeypatch.setattr(intervals_of, "rough_reaches", lambda *_, far=far: np.full((1, 2), far))
+        assert intervals(judge, fine, None, fitted)[0]["angle"] == whole
+    assert asked == [{}, {}, {0: (-1.0, 1.0)}]
     told = [cast(Any, SimpleNamespace(id="slope", parameters={"angle": i})) for i in (by_itself, whole)]
     assert by_steps(told) == [
         f"slope angle: {fine.x[0]:.4g} rad by steps of 1/4 of the scenario's, in its own {fitted.x[0]:.4g}"
