@@ -295,7 +295,7 @@ def linearised(
     """A fit to all recordings or some as it stands at x and these time shifts (s); None if nothing can be simulated."""
     blocks: list[Block] = []
     use = range(len(shifts)) if recordings is None else recordings
-    judge.made_ahead(beside(use, candidates, x, judge.effort.fine))
+    judge.made_beside(use, candidates, x, shifts, judge.effort.fine)
     for r, shift in zip(use, shifts, strict=True):
         block = judge.block(r, candidates, x, shift, judge.effort.fine)
         if block is None:

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.blocks import GENTLE, Block, Fitted, bounded, shift_of, total_of
-from rollover.diagnosis.candidates import Candidate, each_with_own, key_at
+from rollover.diagnosis.candidates import Candidate, key_at
 from rollover.diagnosis.chaos import course
-from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.memory import Memory
-from rollover.diagnosis.overturn import full_runs, made_ahead
-from rollover.diagnosis.secant import Point, beside, in_step, in_time, moved_to, narrowed, secant, valley_at
+from rollover.diagnosis.secant import Point, moved_to, narrowed, secant, valley_at
+from rollover.diagnosis.simulations import NONE, Simulations
 
 Array = NDArray[np.float64]
 FAR = 3.0  # misfit over the noise from which on a step may be lengthened
@@ -29,28 +28,16 @@ ENOUGH, FINELY = 0.3, 1e-3  # gain of a round below which a search narrows; wher
 TRIFLING = 1e-3  # of what is left beyond the noise: the same of drops, where much is
 PROMISING, HARDLY = 0.3, 0.1  # of such a gain, and of what is enough where more is left, that slopes must promise
 NOISE_LEFT = 1.04  # misfit over the noise that needs no further search
-NONE = np.zeros(0, dtype=np.int64)
 
 
-class Judge:
-    """Evidence with a memory of what was simulated: the same values are never simulated twice."""
+class Judge(Simulations):
+    """Recordings held against what is simulated of them."""
 
     def __init__(self, evidence: Sequence[Evidence]) -> None:
-        self.evidence = tuple(evidence)
-        self.effort = max((e.simulator.effort for e in self.evidence), key=lambda e: e.thrifty, default=DROPS)
+        super().__init__(evidence)
         self.measured = [e.measured() for e in self.evidence]
         self.shifts = [0.0] * len(self.evidence)
-        self.simulations = 0
         self.straying = True  # whether a recording may have taken another course than its run
-        self._pinned = False
-        self._raw, self._known = Memory(), Memory()
-        self._leaps: dict[tuple[object, ...], NDArray[np.int64]] = {}
-
-    def made_ahead(self, wanted: Iterable[tuple[int, Sequence[Candidate], Sequence[float]]]) -> None:
-        """Make full runs of (recording, candidates, x) side by side where there are children to do it."""
-        runs = full_runs(self.evidence[0].simulator) if self.evidence else None
-        if runs is not None:
-            made_ahead(runs.children, [(self.evidence[r].simulator, self.changes(c, x)) for r, c, x in wanted])
 
     def bare(self) -> Judge:
         """The same without what was simulated, to be sent to another process."""
@@ -79,8 +66,8 @@ class Judge:
 
     def again(self, fitted: Fitted) -> Fitted:
         """A fit where it stands, linearised anew under the noise as it is held now."""
-        fine = self.effort.fine
-        self.made_ahead(beside(range(len(fitted.blocks)), fitted.candidates, fitted.x, fine))
+        fine, shifts = self.effort.fine, [b.shift for b in fitted.blocks]
+        self.made_beside(range(len(shifts)), fitted.candidates, fitted.x, shifts, fine)
         blocks = [self.block(r, fitted.candidates, fitted.x, b.shift, fine) for r, b in enumerate(fitted.blocks)]
         kept = [new if new is not None else old for new, old in zip(blocks, fitted.blocks, strict=True)]
         return Fitted(candidates=fitted.candidates, x=fitted.x, blocks=tuple(kept))
@@ -97,58 +84,6 @@ class Judge:
         """Measured less predicted, stacked, SI, of each recording."""
         raws = [self.raw(r, fitted.candidates, fitted.x, b.shift) for r, b in enumerate(fitted.blocks)]
         return [np.zeros(e.count) if y is None else e.values - y for e, y in zip(self.evidence, raws, strict=True)]
-
-    def predicted(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
-        """Stacked prediction of recording r; None where the simulation fails or a value is out of bounds."""
-        key = key_at(r, candidates, x, shift)
-        if key not in self._known:
-            raw = self.raw(r, candidates, x, shift)
-            self._known[key] = None if raw is None else self.evidence[r].whitened(raw)
-        return self._known[key]
-
-    def raw(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
-        """The same in SI, before the noise comes in."""
-        if (key := key_at(r, candidates, x, shift)) not in self._raw:
-            self._raw[key] = self._simulated(r, candidates, x, shift)
-        return self._raw[key]
-
-    def _simulated(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
-        self.simulations += 1
-        found = self._made(r, candidates, x, shift)
-        if found is None:
-            return None
-        y, predicted = found
-        leaps = self.evidence[r].leaps(y, predicted)
-        if leaps.size:
-            self._leaps[key_at(r, candidates, x, shift)] = leaps
-        return self.evidence[r].forgiven(y, leaps)
-
-    def edged(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
-        """Stacked prediction of recording r, SI, with its leaps as they are; not remembered. None if it fails."""
-        found = self._made(r, candidates, x, shift)
-        return None if found is None else found[0]
-
-    def _made(
-        self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float
-    ) -> tuple[Array, dict[str, Array]] | None:
-        """What recording r is predicted to be, stacked (SI) and by channel; None if that fails."""
-        try:
-            found = self.evidence[r].simulator.predict(self.changes(candidates, x), shift)
-        except ValueError:
-            return None
-        if found is None:
-            return None
-        y = self.evidence[r].raw(found)
-        return (y, found) if np.all(np.isfinite(y)) else None
-
-    @staticmethod
-    def changes(candidates: Sequence[Candidate], x: Sequence[float]) -> dict[str, object]:
-        """Values to exchange in the scenario."""
-        found: dict[str, object] = {}
-        ids = [c.id for c in candidates]
-        for k, (c, own) in enumerate(each_with_own(candidates)):
-            found |= c.changes(x[own], 1 + ids[:k].count(c.id))
-        return found
 
     def block(
         self,
@@ -177,7 +112,7 @@ class Judge:
         clock = clock and not (self._pinned and e.recording.clock.zero != "unknown")
         slope = np.zeros_like(raw)
         if clock:
-            slope = in_time(e, self.changes(candidates, x), shift, raw, self.effort.later, both=self.effort.thrifty)
+            slope = self._in_time(r, candidates, x, shift, raw)
 
         worth = e.worth(leaps)
         residual = e.eased(worth * (self.measured[r] - y))
@@ -213,23 +148,6 @@ class Judge:
             residual=residual, J=J, slope=slope, shift=shift, prior=e.shift_prior, course=counts, expected=e.expected,
             forgiven=self.straying,
         )  # fmt: skip
-
-    def moved(self, r: int, before: Point, after: Point, shift: float, slope: Array | None = None) -> Array | None:
-        """How the prediction of recording r differs between two points, whitened; nothing where either leaps.
-
-        A leap that moves past a sample is no slope, and what is forgiven there follows the measurement. With `slope`,
-        dy/dtau (n,) before, SI, the two are compared as a clock would have them, see `in_step`.
-        """
-        first, last = self.raw(r, *before, shift), self.raw(r, *after, shift)
-        if first is None or last is None:
-            return None
-        if slope is not None:
-            last = in_step(self.evidence[r], first, last, slope, lambda d: self.edged(r, *after, shift + d))
-        d = last - first
-        for point in (before, after):
-            d[self._leaps.get(key_at(r, *point, shift), NONE)] = 0.0
-        e = self.evidence[r]
-        return e.eased(e.worth(self._leaps.get(key_at(r, *before, shift), NONE)) * e.whitened(d))
 
     def clocked(
         self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float, rounds: int
@@ -298,7 +216,7 @@ class Judge:
         rounds, width = self.effort.rounds if rounds is None else rounds, min(width, len(nudges) - 1)
         x = [float(v) for v in start]
         shifts = [self.shifts[r] for r in use] if shifts is None else list(shifts)
-        self.made_ahead(beside(use, candidates, x, nudges[width]))
+        self.made_beside(use, candidates, x, shifts, nudges[width])
         found = [self.block(r, candidates, x, s, nudges[width]) for r, s in zip(use, shifts, strict=True)]
         if any(b is None for b in found):
             return None
@@ -351,11 +269,12 @@ class Judge:
                 break
             is_bare = bare and (last or turn + 1 == rounds)
             nudge = 0.0 if is_bare else self.effort.fine if last else nudges[width]
-            self.made_ahead(() if is_bare else beside(use, candidates, x, nudge))
             # what is held already moves little: its slopes are worked out anew only where the search narrows, or where
             # they lead astray or not far, as those of another place along a valley do
             slow = gain < KEPT * due or gain < SLOW * best
             anew = fresh or (slow and not self.effort.thrifty)
+            if not is_bare:
+                self.made_beside(use, candidates, x, shifts, nudge, 0 if anew else fixed)
             again = [
                 self.block(r, candidates, x, s, nudge, None if anew or is_bare else block.plain_J[:, :fixed])
                 for r, s, block in zip(use, shifts, blocks, strict=True)
@@ -368,6 +287,7 @@ class Judge:
             if last:
                 break
         if width < len(nudges) and nudges[width] != self.effort.fine:
+            self.made_beside(use, candidates, x, shifts, self.effort.fine)
             ended = [self.block(r, candidates, x, s, self.effort.fine) for r, s in zip(use, shifts, strict=True)]
             if all(b is not None for b in ended):
                 blocks = [b for b in ended if b is not None]

@@ -69,28 +69,66 @@ def secant(
     `moved` is what the prediction differs by, whitened, from the point to another. A `widest` of 0 takes `nudge` as it
     is.
     """
-    candidates, x = at
-    owner, widest = owner_of(candidates, k)[0], nudged(candidates, k, widest)
+    candidates = at[0]
+    owner, chance = owner_of(candidates, k)[0], scattered_by(e)
     physical = owner.kind != "sensor"
-    power = [float(np.sum(e.eased(e.whitened(stray)) ** 2)) for stray in e.strays]
-    chance = float(np.mean(power)) if power else 0.0
-    enough = CLEAR * chance
-    nudge = nudged(candidates, k, nudge)
     while True:
-        low, high = max(x[k] - nudge, 0.0), min(x[k] + nudge, 1.0)
-        ends = [end for end in (low, high) if end != x[k]]
-        sides = [(d, end - x[k]) for end in ends if (d := moved((candidates, moved_to(at, k, end)))) is not None]
+        sides = _across(moved, at, k, nudge)
         if not sides:
             return None
-        whole = np.asarray(sum(np.sign(over) * d for d, over in sides))  # one side where the other fails
-        if float(whole @ whole) >= enough or 2.0 * nudge > widest or not physical:
+        if not _too_narrow(sides, candidates, k, chance, nudge, widest):
             break
         nudge *= 2.0
+    whole = _whole(sides)
     (quiet, over), (loud, _) = sorted((sides[0], sides[-1]), key=lambda side: float(side[0] @ side[0]))
     # nothing at all on one side is where an effect ends, and no leap
     leaps = physical and widest > 0.0 and 0.0 < LEAP * float(quiet @ quiet) < float(loud @ loud)
     difference, over = (quiet, over) if leaps else (whole, sum(abs(over) for _, over in sides))
     return (but_chance(e, difference, chance) if owner.is_narrow and widest > 0.0 else difference) / over
+
+
+def wider(e: Evidence, moved: Callable[[Point], Array | None], at: Point, k: int, nudge: float, widest: float) -> bool:
+    """Whether `secant` goes on to twice this `nudge`."""
+    sides = _across(moved, at, k, nudge)
+    return bool(sides) and _too_narrow(sides, at[0], k, scattered_by(e), nudge, widest)
+
+
+def scattered_by(e: Evidence) -> float:
+    """Sum of squares that runs of a recording scatter by, whitened."""
+    power = [float(np.sum(e.eased(e.whitened(stray)) ** 2)) for stray in e.strays]
+    return float(np.mean(power)) if power else 0.0
+
+
+def looked_at(at: Point, k: int, nudge: float) -> list[list[float]]:
+    """Coordinates a nudge of the k-th one to either side, within its range."""
+    step, value = nudged(at[0], k, nudge), at[1][k]
+    return [moved_to(at, k, end) for end in (max(value - step, 0.0), min(value + step, 1.0)) if end != value]
+
+
+def _across(moved: Callable[[Point], Array | None], at: Point, k: int, nudge: float) -> list[tuple[Array, float]]:
+    """What the prediction differs by to either side, (n,) whitened, and how far that is; but where it fails."""
+    there = [(moved((at[0], x)), x[k] - at[1][k]) for x in looked_at(at, k, nudge)]
+    return [(d, over) for d, over in there if d is not None]
+
+
+def _whole(sides: Sequence[tuple[Array, float]]) -> Array:
+    """The difference from one side to the other; of one side where the other fails."""
+    return np.asarray(sum(np.sign(over) * d for d, over in sides))
+
+
+def _too_narrow(
+    sides: Sequence[tuple[Array, float]],
+    candidates: Sequence[Candidate],
+    k: int,
+    chance: float,
+    nudge: float,
+    widest: float,
+) -> bool:
+    """Whether chance hides what a nudge does, and twice as much may be taken."""
+    if owner_of(candidates, k)[0].kind == "sensor" or 2.0 * nudge > widest:
+        return False
+    whole = _whole(sides)
+    return float(whole @ whole) < CLEAR * chance
 
 
 def but_chance(e: Evidence, d: Array, chance: float) -> Array:
@@ -162,10 +200,9 @@ def beside(
     """(recording, candidates, x) of a place and of those a nudge to either side of it, of the recordings in `use`."""
     for r in use:
         yield r, candidates, x
-        for k, value in enumerate(x):
-            step = nudged(candidates, k, nudge)
-            for there in (max(value - step, 0.0), min(value + step, 1.0)):
-                yield r, candidates, moved_to((candidates, x), k, there)
+        for k in range(len(x)):
+            for there in looked_at((candidates, x), k, nudge):
+                yield r, candidates, there
 
 
 def moved_to(at: Point, k: int, value: float) -> list[float]:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.candidates import Candidate, coordinate
-from rollover.diagnosis.crew import Crew, Job
+from rollover.diagnosis.crew import Crew, Job, linearised
 from rollover.diagnosis.effort import DROPS, RUNS, Effort
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.explain import Step, _first_fits
@@ -216,6 +216,56 @@ def test_runs_are_announced_before_they_are_needed(monkeypatch: pytest.MonkeyPat
     judge.again(replace(leaders[0], x=(0.77,)))
     assert all(needed)
     assert len(needed) > 40
+
+
+class Rough(Late):
+    """Runs that scatter by far more than a narrow step moves them: slopes ask for wider ones."""
+
+    def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+        seed = [round(1e9 * float(changes.get("effects.slope.angle", 0.0))), round(changes.get("neighbour", 0))]
+        chance = np.random.default_rng(seed).standard_normal(TIME.size)
+        return {CHANNEL: super().predict(changes, shift)[CHANNEL] + 0.1 * chance}
+
+    def strays(
+        self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1
+    ) -> list[dict[str, np.ndarray]]:
+        there = self.predict(changes or {}, shift)[CHANNEL]
+        return [{CHANNEL: self.predict({**(changes or {}), "neighbour": k}, shift)[CHANNEL] - there} for k in (1, 2, 3)]
+
+
+@pytest.mark.parametrize("is_helped", [True, False])
+def test_runs_over_wider_steps_are_announced_too(is_helped: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """0.03 and 0.06 to either side where a fit ends, 0.06 and 0.12 where it begins: all are asked for."""
+    judge = Judge([evidence(1.3 * blow(LATER * 0.3), Rough()) for _ in range(2)])
+    announced, alone, batches = set[tuple[int, float]](), list[float](), 0
+    made = Judge._made
+
+    def made_ahead(_: Judge, wanted: Any) -> None:
+        nonlocal batches
+        several = {(r, x[0]) for r, _, x in wanted}
+        batches += bool(several - announced)
+        announced.update(several)
+
+    def asked(own: Judge, r: int, c: Any, x: Any, shift: float) -> Any:
+        alone.extend([x[0]] * ((r, x[0]) not in announced))
+        return made(own, r, c, x, shift)
+
+    monkeypatch.setattr(Judge, "made_ahead", made_ahead)
+    monkeypatch.setattr(Judge, "_made", asked)
+    monkeypatch.setattr(Judge, "is_helped", property(lambda _: is_helped))
+    fitted = linearised(judge, (SLOPE,), (0.4,), (0.0, 0.0))
+    assert fitted is not None
+    assert announced >= {(r, 0.4 + d) for r in range(2) for d in (0.0, -0.03, 0.03)}
+    assert ({(r, 0.4 - 0.12) for r in range(2)} <= announced) == is_helped
+    assert (alone == []) == is_helped
+    assert batches == (3 if is_helped else 1)
+    judge.again(replace(fitted, x=(0.37,)))
+    for width in (0, 1):
+        assert judge.fit((SLOPE,), (0.5,), shifts=(0.0, 0.0), width=width) is not None
+        with judge.held(pinned=True):  # these are short: no step is wider than it is said
+            linearised(judge, (SLOPE,), (0.61,), (0.0, 0.0))
+            assert not announced & {(r, 0.61 + 0.06) for r in range(2)}
+    assert (alone == []) == is_helped
 
 
 def test_an_explanation_that_is_far_from_the_mean_goes_more_than_one_step() -> None:
