@@ -68,6 +68,9 @@ def test_an_interval_reaches_as_far_as_the_misfit_stays_low(flatter: float) -> N
     fitted = Fitted(candidates=(candidate,), x=(0.5,), blocks=(block(0, None, [0.5], 0.0, 0.0),))
     found = stated.reaches(judge, fitted, np.array([1.0 / J]), 1.0)
     assert found == pytest.approx(np.full((1, 2), flatter), rel=1e-12)  # rounding: the misfit is a parabola
+    for sides, looked in (({0: (1.0,)}, (0.0, 1.0)), ({0: (-1.0,)}, (1.0, 0.0)), ({}, (0.0, 0.0))):
+        found = stated.reaches(judge, fitted, np.array([1.0 / J]), 1.0, sides)
+        assert found == pytest.approx(1.0 + (flatter - 1.0) * np.array([looked]), rel=1e-12)
 
 
 @pytest.mark.parametrize(("start", "places"), [(0.5, 8), (0.08, 7)])

@@ -260,12 +260,17 @@ def test_runs_over_wider_steps_are_announced_too(is_helped: bool, monkeypatch: p
     assert (alone == []) == is_helped
     assert batches == (3 if is_helped else 1)
     judge.again(replace(fitted, x=(0.37,)))
+    for start in (0.24, 0.33, 0.44, 0.52):  # some end before they have narrowed
+        assert judge.fit((SLOPE,), (start,), shifts=(0.0, 0.0), rounds=1) is not None
     for width in (0, 1):
         assert judge.fit((SLOPE,), (0.5,), shifts=(0.0, 0.0), width=width) is not None
         with judge.held(pinned=True):  # these are short: no step is wider than it is said
             linearised(judge, (SLOPE,), (0.61,), (0.0, 0.0))
             assert not announced & {(r, 0.61 + 0.06) for r in range(2)}
     assert (alone == []) == is_helped
+    judge.made_beside((0,), (SLOPE, MASS), (0.71, 0.2), (0.0,), 0.03, first=1)  # what is held is not looked at closer
+    assert (0, 0.71 - 0.03) in announced
+    assert (0, 0.71 - 0.06) not in announced
 
 
 def test_an_explanation_that_is_far_from_the_mean_goes_more_than_one_step() -> None:
