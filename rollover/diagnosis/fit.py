@@ -12,7 +12,6 @@ from rollover.diagnosis.blocks import GENTLE, Block, Fitted, bounded, shift_of, 
 from rollover.diagnosis.candidates import Candidate, key_at
 from rollover.diagnosis.chaos import course
 from rollover.diagnosis.evidence import Evidence
-from rollover.diagnosis.memory import Memory
 from rollover.diagnosis.secant import Point, moved_to, narrowed, secant, valley_at
 from rollover.diagnosis.simulations import NONE, Simulations
 
@@ -47,9 +46,8 @@ class Judge(Simulations):
 
     def weigh(self, evidence: Sequence[Evidence]) -> None:
         """Take the same recordings with another noise: nothing is simulated again, fits must be made anew."""
-        self.evidence = tuple(evidence)
+        super().weigh(evidence)
         self.measured = [e.measured() for e in self.evidence]
-        self._known = Memory()
 
     @contextmanager
     def held(self, *, straying: bool | None = None, pinned: bool | None = None) -> Iterator[None]:

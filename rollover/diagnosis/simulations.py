@@ -29,6 +29,11 @@ class Simulations:
         self._raw, self._known = Memory(), Memory()
         self._leaps: dict[tuple[object, ...], NDArray[np.int64]] = {}
 
+    def weigh(self, evidence: Sequence[Evidence]) -> None:
+        """Take the same recordings with another noise: nothing is simulated again."""
+        self.evidence = tuple(evidence)
+        self._known = Memory()
+
     @property
     def is_helped(self) -> bool:
         """Whether there are children to make full runs."""
