@@ -121,10 +121,11 @@ def reaches(judge: Judge, fitted: Fitted, own: Array, phi: float, sides: Sides |
     chance make slopes too steep: where it has clearly not, one goes on until it has, and back on a parabola. Of runs
     that scatter it is the misfit of their mean, which is rough by itself. With `sides` these alone are looked at.
     """
-    start = _misfit(judge, fitted, np.zeros(len(fitted.x)))
-    due = TWO_SIDED**2 * phi
+    found, due = np.ones((own.size, 2)), TWO_SIDED**2 * phi
     enough = max(CLEARLY * due, ROUGH if any(e.strays for e in judge.evidence) else 0.0)
-    found = np.ones((own.size, 2))
+    if sides is not None and not any(sides.values()):
+        return found
+    start = _misfit(judge, fitted, np.zeros(len(fitted.x)))
     if start is None:
         return found
     rippled = _rippled(fitted) if not judge.effort.thrifty else set()

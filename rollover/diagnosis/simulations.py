@@ -13,6 +13,7 @@ from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.memory import Memory
 from rollover.diagnosis.overturn import full_runs, made_ahead
 from rollover.diagnosis.secant import Point, beside, in_step, in_time, looked_at, wider
+from rollover.execute import Children
 
 Array = NDArray[np.float64]
 NONE = np.zeros(0, dtype=np.int64)
@@ -37,14 +38,16 @@ class Simulations:
     @property
     def is_helped(self) -> bool:
         """Whether there are children to make full runs."""
+        return self._children is not None
+
+    @property
+    def _children(self) -> Children | None:
         runs = full_runs(self.evidence[0].simulator) if self.evidence else None
-        return runs is not None and runs.children is not None
+        return None if runs is None else runs.children
 
     def made_ahead(self, wanted: Iterable[tuple[int, Sequence[Candidate], Sequence[float]]]) -> None:
         """Make full runs of (recording, candidates, x) side by side where there are children to do it."""
-        runs = full_runs(self.evidence[0].simulator) if self.evidence else None
-        if runs is not None:
-            made_ahead(runs.children, [(self.evidence[r].simulator, self.changes(c, x)) for r, c, x in wanted])
+        made_ahead(self._children, ((self.evidence[r].simulator, self.changes(c, x)) for r, c, x in wanted))
 
     def made_beside(
         self,
