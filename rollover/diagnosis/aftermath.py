@@ -1,4 +1,7 @@
-"""What comes long after a blow and hardly counts, left aside: the end of a long recording costs most of a run."""
+"""What comes long after a blow: the end of a long recording costs most of a run.
+
+Where it hardly counts it is left aside, and looks at many candidates do without it.
+"""
 
 from __future__ import annotations
 
@@ -31,6 +34,18 @@ def shortened(e: Evidence, *, alone: bool = False) -> Evidence:
     if not alone and (float(np.mean(e.due[late])) > COUNTS or _differs(e, late)):
         return e
     return up_to(e, end) or e
+
+
+def soon(e: Evidence) -> Evidence:
+    """The evidence up to `LASTING` after the blow, the simulation's and the recording's; itself if it is no longer.
+
+    What happens later hangs on what happened until then. The recording's is when half of its channels have gone half of
+    their range.
+    """
+    time = e.recording.time
+    gone = [time[s.rows[np.argmax(2.0 * np.abs(s.values - s.values[0]) >= np.ptp(s.values))]] for s in e.signals]
+    end = max(e.blow, float(np.median(gone))) + LASTING
+    return (up_to(e, end) or e) if time[-1] > end + SHORT else e
 
 
 def up_to(e: Evidence, end: float, beyond: float = 0.0) -> Evidence | None:

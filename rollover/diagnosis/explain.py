@@ -80,9 +80,11 @@ def step(inquiry: Inquiry, base: Fitted, looked: Gate) -> Step | None:
     # of recordings that went another way together, two may be those that no explanation brings back
     several = judge.effort.few if judge.straying else judge.effort.looked_at
     few, shifts = spread(base, groups, several), begun(judge, base, inquiry.crew.looks)
-    screened = screen(inquiry, base, promising(candidates, looked, judge.effort), few, shifts, looked)
+    early = replace(inquiry, judge=judge.near())
+    start = base if early.judge is judge else early.judge.again(base)
+    screened = screen(early, start, promising(candidates, looked, judge.effort), few, shifts, looked)
     count = sum(b.residual.size for b in base.blocks)
-    screened, begun_with = _first_fits(inquiry, base, screened, few, shifts, looked)
+    screened, begun_with = _first_fits(early, start, screened, few, shifts, looked)
     jobs = [Job(candidates=f.candidates, start=f.x, shifts=shifts_told(shifts, f, few), width=1) for f in begun_with]
     fits = [f for f in inquiry.fits(jobs) if f is not None]
     if not fits:

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.aftermath import soon
 from rollover.diagnosis.blocks import GENTLE, Block, Fitted, bounded, shift_of, total_of
 from rollover.diagnosis.candidates import Candidate, key_at
 from rollover.diagnosis.chaos import course
@@ -37,6 +38,7 @@ class Judge(Simulations):
         self.measured = [e.measured() for e in self.evidence]
         self.shifts = [0.0] * len(self.evidence)
         self.straying = True  # whether a recording may have taken another course than its run
+        self._near: Judge | None = None
 
     def bare(self) -> Judge:
         """The same without what was simulated, to be sent to another process."""
@@ -48,6 +50,19 @@ class Judge(Simulations):
         """Take the same recordings with another noise: nothing is simulated again, fits must be made anew."""
         super().weigh(evidence)
         self.measured = [e.measured() for e in self.evidence]
+
+    def near(self) -> Judge:
+        """One that sees of the same recordings what comes `soon`; itself where none goes on for long after its blow."""
+        if not self.effort.thrifty:
+            return self
+        evidence = [soon(e) for e in self.evidence]
+        if all(a is b for a, b in zip(evidence, self.evidence, strict=True)):
+            return self
+        if self._near is None or [e.count for e in self._near.evidence] != [e.count for e in evidence]:
+            self._near = Judge(evidence)
+        self._near.weigh(evidence)
+        self._near.shifts, self._near.straying, self._near._pinned = list(self.shifts), self.straying, self._pinned
+        return self._near
 
     @contextmanager
     def held(self, *, straying: bool | None = None, pinned: bool | None = None) -> Iterator[None]:

@@ -35,11 +35,14 @@ def look(
     The null stays that of the best of all candidates: what was passed over could only have raised the maximum. Clocks
     are then taken where they say, or nearly so: far off they have eaten what is missing. `beside` as in `gate`, in
     `few` recordings that are given with it; then only what is known already is looked at, and nothing strong is tried.
+    Of recordings that go on for long after a blow the beginning is looked at.
     `looks` works off what costs no full run.
     """
     effort = judge.effort
     if not effort.thrifty:
         return gate(judge, base, candidates, looks=looks)
+    if (near := judge.near()) is not judge:
+        judge, base = near, near.again(base)
     if judge.per_error == 1.0:  # beside a tolerance it cannot be told what a clock has eaten
         base = unbent(judge, base)
     few, more = few or spread(base, groups, effort.few), spread(base, groups, effort.looked_at)
@@ -67,17 +70,30 @@ def strongly(
     samples count in full what comes near is told best, with other courses forgiven what is still far off.
     """
     shifts = begun(judge, base)
-    judge.made_ahead((r, (*base.candidates, c), (*base.x, *x)) for c in candidates for x in c.strong() for r in few)
+
+    def left(way: Sequence[Candidate], x: Sequence[float], use: Sequence[int]) -> float:
+        found = left_at(judge, (*base.candidates, *way), (*base.x, *x), shifts, use)
+        return np.inf if found is None else found
+
+    worst = max(few, key=lambda r: left((), (), [r]))
+    every = [(c, x) for c in candidates for x in c.strong()]
+    judge.made_ahead((worst, (*base.candidates, c), (*base.x, *x)) for c, x in every)
+
+    def hopeful() -> list[bool]:
+        return [left((c,), x, [worst]) < left((), (), [worst]) for c, x in every]
 
     def ranked() -> list[tuple[str, tuple[float, ...]]]:
-        usual = left_at(judge, base.candidates, base.x, shifts, few)
-        met = []
-        for c in candidates:
-            tried = [(left_at(judge, (*base.candidates, c), (*base.x, *x), shifts, few), x) for x in c.strong()]
-            met += sorted((left, c.key, x) for left, x in tried if left is not None)[:1]
-        best = sorted(one for one in met if usual is not None and one[0] < CLEARLY * usual)
+        met: dict[str, tuple[float, tuple[float, ...]]] = {}
+        for c, x in able:
+            met[c.key] = min(met.get(c.key, (np.inf, ())), (left((c,), x, few), x))
+        best = sorted((least, key, x) for key, (least, x) in met.items() if least < CLEARLY * left((), (), few))
         return [(key, x) for _, key, x in best[: judge.effort.leaders]]
 
+    with judge.held(straying=True):
+        either = hopeful()
+    # what leaves more of the worst than there was makes up for that in no other
+    able = [one for one, *is_able in zip(every, hopeful(), either, strict=True) if any(is_able)]
+    judge.made_ahead((r, (*base.candidates, c), (*base.x, *x)) for c, x in able for r in few)
     with judge.held(straying=True):
         forgiven = ranked()
     found: dict[str, tuple[tuple[float, ...], ...]] = {}

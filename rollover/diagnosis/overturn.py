@@ -8,7 +8,7 @@ the axes that the recording states for them, then through the channel's filter c
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -80,6 +80,14 @@ class Made(NamedTuple):
     seconds: float
 
 
+@dataclass
+class Tally:
+    """Runs that were made, and their wall time (s)."""
+
+    runs: int = 0
+    seconds: float = 0.0
+
+
 def make(making: Making) -> Made:
     """Run a scenario; one that takes too long has failed."""
     from rollover import simulate  # slow to import, and drops do without
@@ -99,15 +107,15 @@ def make(making: Making) -> Made:
 
 
 class RunSimulator:
-    """Any scenario by full runs; `runs` counts those that were made, `seconds` is their wall time."""
+    """Any scenario by full runs."""
 
     effort = RUNS
 
     def __init__(self, scenario: Scenario, recording: Recording) -> None:
         self.recording = recording
         self.scenario = _covering(scenario, recording)
-        self.runs = 0
-        self.seconds = 0.0
+        self._made = Tally()
+        self._shorter: dict[int, RunSimulator] = {}
         self._phases: dict[tuple[float, ...], tuple[tuple[float, str], ...]] = {}  # by where the grid lies
         self._centre: tuple[float, ...] = scenario.ground.elements.centre
         self._limit = np.inf
@@ -117,7 +125,17 @@ class RunSimulator:
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the runs: another process makes its own."""
-        return {**self.__dict__, "_known": {}, "_behind": {}, "children": None}
+        return {**self.__dict__, "_known": {}, "_behind": {}, "_shorter": {}, "children": None}
+
+    @property
+    def runs(self) -> int:
+        """Runs that were made, shorter ones too."""
+        return self._made.runs
+
+    @property
+    def seconds(self) -> float:
+        """Their wall time, s."""
+        return self._made.seconds
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """Channels (n,) at the recording's stamps less `shift` (s); None if the run fails.
@@ -227,14 +245,18 @@ class RunSimulator:
         return float("inf")
 
     def until(self, n: int) -> RunSimulator:
-        """The same for the first n stamps: its runs end soon after them, where their filters no longer look ahead."""
-        found = RunSimulator(self.scenario, self.recording.until(n))
+        """The same for the first n stamps: its runs end soon after them, where their filters no longer look ahead.
+
+        One and the same each time, so that its runs are not made again.
+        """
+        if n in self._shorter:
+            return self._shorter[n]
+        found = self._shorter[n] = RunSimulator(self.scenario, self.recording.until(n))
         settings = found.scenario.simulation
         ahead = settings.output_step * np.ceil(AHEAD / settings.output_step) if self.recording.cfc else 0.0
         longer = min(round(settings.duration + float(ahead), 9), self.scenario.simulation.duration)
         found.scenario = replace(found.scenario, simulation=replace(settings, duration=longer))
-        found._centre, found.children = self._centre, self.children
-        found.runs, found.seconds = self.runs, self.seconds
+        found._centre, found.children, found._made = self._centre, self.children, self._made
         return found
 
     def _places(self) -> list[tuple[float, ...]]:
@@ -269,8 +291,8 @@ class RunSimulator:
 
     def take(self, making: Making, made: Made) -> None:
         """Keep a run that was made."""
-        self.runs += 1
-        self.seconds += made.seconds
+        self._made.runs += 1
+        self._made.seconds += made.seconds
         if made.run is not None and self._limit == np.inf:
             self._limit = max(SLOWEST * made.seconds, LEAST_TIME)
         if made.run is not None and all(path == CENTRE for path, _ in making.key):

@@ -195,12 +195,15 @@ def nudged(candidates: Sequence[Candidate], k: int, nudge: float) -> float:
 
 
 def beside(
-    use: Sequence[int], candidates: Sequence[Candidate], x: Sequence[float], nudge: float
+    use: Sequence[int], candidates: Sequence[Candidate], x: Sequence[float], nudge: float, first: int = 0
 ) -> Iterator[tuple[int, Sequence[Candidate], Sequence[float]]]:
-    """(recording, candidates, x) of a place and of those a nudge to either side of it, of the recordings in `use`."""
+    """(recording, candidates, x) of a place and of those a nudge to either side of it, of the recordings in `use`.
+
+    To the sides of its coordinates from the `first` on.
+    """
     for r in use:
         yield r, candidates, x
-        for k in range(len(x)):
+        for k in range(first, len(x)):
             for there in looked_at((candidates, x), k, nudge):
                 yield r, candidates, there
 

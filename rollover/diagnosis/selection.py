@@ -156,7 +156,8 @@ def _needed(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
     which can be bent to it will do explains nothing.
     """
     judge = inquiry.judge
-    current, last = without_needless(judge, judge.again(taken[-1].fitted)), taken[-1]
+    last = taken[-1]
+    current = without_needless(judge, judge.again(last.fitted), last.base)
     if (judge.effort.thrifty or is_any_curve(current.candidates)) and len(current.candidates) == len(taken):
         return _one_each(inquiry, taken)  # the second will be refused, whichever came first
     parts: list[Step] = []
@@ -187,12 +188,15 @@ def is_elsewhere(last: Step) -> bool:
     return [c.token for c in last.base.candidates] != [c.token for c in last.fitted.candidates[:-1]]
 
 
-def without_needless(judge: Judge, fitted: Fitted) -> Fitted:
-    """The explanation without those of its effects that may be dropped for no more than chance."""
+def without_needless(judge: Judge, fitted: Fitted, base: Fitted | None = None) -> Fitted:
+    """The explanation without those of its effects that may be dropped for no more than chance.
+
+    `base` is the fit beside which the last one was found.
+    """
     while len(fitted.candidates) > 1:
         losses = []
         for k in range(len(fitted.candidates)):
-            rest = without(judge, fitted, k)
+            rest = _rest(judge, fitted, k, base)
             losses.append((rest.left - fitted.left if rest is not None else np.inf, k, rest))
         loss, _, rest = min(losses, key=lambda one: one[0])
         phi = max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks))
@@ -200,6 +204,14 @@ def without_needless(judge: Judge, fitted: Fitted) -> Fitted:
             break
         fitted = rest
     return fitted
+
+
+def _rest(judge: Judge, fitted: Fitted, k: int, base: Fitted | None, rounds: int = 8) -> Fitted | None:
+    """The explanation without its k-th effect, fitted again unless that is the `base` of full runs: these cost much."""
+    others = [c.token for j, c in enumerate(fitted.candidates) if j != k]
+    if judge.effort.thrifty and base is not None and [c.token for c in base.candidates] == others:
+        return judge.again(base)
+    return without(judge, fitted, k, rounds)
 
 
 def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) -> tuple[Explanation, Verdict]:
@@ -223,7 +235,7 @@ def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) ->
     # what a tolerance allows has structure too
     is_whole = is_whole or (is_tolerated(judge, found.fitted) and ahead < HARDLY_MORE)
     if found.parts and is_whole and ahead < start:
-        return found, _kind(strongest(judge, found.base, found.fitted))
+        return found, _kind(strongest(judge, found.base, found.fitted, found.parts[-1].base))
     if found.first is not None and found.parts:
         one = found.first
         end = held_out(one.fitted, groups).total
@@ -285,13 +297,13 @@ def _kind(c: Candidate) -> Verdict:
     return "missing-physics" if c.kind == "physics" else "parameter" if c.kind == "parameter" else "sensor"
 
 
-def strongest(judge: Judge, base: Fitted, fitted: Fitted) -> Candidate:
-    """The effect without which most would be left."""
+def strongest(judge: Judge, base: Fitted, fitted: Fitted, beside: Fitted | None = None) -> Candidate:
+    """The effect without which most would be left; `beside` is the fit beside which the last one was found."""
     best, loss = fitted.candidates[0], -np.inf
     for k, c in enumerate(fitted.candidates):
         if len(fitted.candidates) == 1:
             return c
-        rest = without(judge, fitted, k, rounds=4)
+        rest = _rest(judge, fitted, k, beside, rounds=4)
         left = rest.left if rest is not None else base.left
         if left > loss:
             best, loss = c, left

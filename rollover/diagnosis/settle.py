@@ -32,7 +32,7 @@ SHARES = (1.0, 0.5, 1.5)  # of the way: where a run leaps from one course to ano
 NEARLY = 1.15  # times the least misfit
 FARTHEST = 0.15  # of a coordinate, that a mean may move it at a time
 STEPS = 5  # at most
-WORTH = 2.0  # gain that pays for one
+WORTH, PART = 2.0, 0.01  # gain that pays for one, and of what is left beyond noise and scatter: then more is missing
 PARTS = 4  # of the scenario's step
 SHORTER = 2  # steps by runs in shorter ones, each of which costs as many runs as `PARTS` of others
 
@@ -41,24 +41,28 @@ def settled(judge: Judge, part: Step) -> Step:
     """A step under the scatter of runs with its explanation, moved to where the mean of them is met best (D8).
 
     Slopes beside a leap lead astray, and so may clocks that a wrong place has bent: it is moved again until a step
-    would gain no more than chance, and of all places on the way the one is kept whose mean is met best. As it was if
-    nothing can be simulated there; where runs do not scatter too.
+    would gain no more than chance, or little of what is left, and of all places on the way the one is kept whose mean
+    is met best. As it was if nothing can be simulated there; where runs do not scatter too.
     """
     rescattered(judge, part.fitted)
     part = part.again(judge)
     places = [part.fitted]
+    slopes = part.fitted
     for _ in range(STEPS):
         here = places[-1]
         if not any(e.strays for e in judge.evidence):
             break
         dx = step_of_means(judge.evidence, here.blocks)
-        if promised(here.blocks, dx) < WORTH:
+        if promised(here.blocks, dx) < max(WORTH, PART * (here.left - sum(b.size for b in here.blocks))):
             break
         there = _onward(judge, here, np.clip(dx, -FARTHEST, FARTHEST))
         if there is None:
             break
-        rescattered(judge, there)
-        places.append(judge.again(there))
+        found = _scattered_at(judge, slopes, *there)
+        if found is None:
+            break
+        place, slopes = found
+        places.append(place)
     if len(places) == 1:
         return part
     best = min(places, key=lambda f: left_of_means(judge, _weighed_anew(judge, f))[0])
@@ -81,16 +85,15 @@ def in_shorter_steps(judge: Judge, fitted: Fitted) -> Fitted:
     if not any(e.strays for e in judge.evidence):
         return fitted
     rescattered(judge, fitted, PARTS)
-    here = judge.again(fitted)
+    here = slopes = judge.again(fitted)
     for _ in range(SHORTER):
         dx = np.clip(step_of_means(judge.evidence, here.blocks), -FARTHEST, FARTHEST)
         if promised(here.blocks, dx) < WORTH:
             break
-        there = linearised(judge, here.candidates, *_moved(here, dx))
+        there = _scattered_at(judge, slopes, *_moved(here, dx), PARTS)
         if there is None:
             break
-        rescattered(judge, there, PARTS)
-        here = judge.again(there)
+        here, slopes = there
     return here
 
 
@@ -99,8 +102,8 @@ def promised(blocks: Sequence[Block], dx: Array) -> float:
     return float(sum(dx @ b.normal()[0] @ dx for b in blocks))
 
 
-def _onward(judge: Judge, old: Fitted, dx: Array) -> Fitted | None:
-    """A fit moved by dx, or by a share of that which leaves less; None where nothing can be simulated."""
+def _onward(judge: Judge, old: Fitted, dx: Array) -> tuple[Sequence[float], Sequence[float]] | None:
+    """Coordinates and time shifts (s) of a fit moved by dx, or a share of that which leaves less; None if none does."""
     begun = [_moved(old, share * dx) for share in SHARES]
     judge.made_ahead((r, old.candidates, x) for x, _ in begun for r in range(len(old.blocks)))
     met = [_met(judge, old.candidates, *place) for place in begun]
@@ -110,8 +113,32 @@ def _onward(judge: Judge, old: Fitted, dx: Array) -> Fitted | None:
         best = 0  # the whole way: the mean of runs is worth more than the one that happens to be there
     elif lefts[best] >= old.left:
         return None
-    shifts = met[best][1]
-    return linearised(judge, old.candidates, begun[best][0], shifts)
+    return begun[best][0], met[best][1]
+
+
+def _scattered_at(
+    judge: Judge, slopes: Fitted, x: Sequence[float], shifts: Sequence[float], parts: int = 1
+) -> tuple[Fitted, Fitted] | None:
+    """A fit as it stands at x and these time shifts (s) under the scatter of runs there, and where its slopes are told.
+
+    Between the ends of the step over which those were told they are as good as its own. None if nothing can be
+    simulated there.
+    """
+    is_beside = max(abs(a - b) for a, b in zip(x, slopes.x, strict=True)) < judge.effort.fine
+    there = _by_slopes_of(judge, slopes, x, shifts) if is_beside else linearised(judge, slopes.candidates, x, shifts)
+    if there is None:
+        return None
+    rescattered(judge, there, parts)
+    slopes = judge.again(slopes if is_beside else there)
+    return _by_slopes_of(judge, slopes, x, shifts) or there, slopes
+
+
+def _by_slopes_of(judge: Judge, near: Fitted, x: Sequence[float], shifts: Sequence[float]) -> Fitted | None:
+    """A fit as it stands at x and these time shifts (s), by the slopes of another place; None if a run fails."""
+    each = enumerate(zip(near.blocks, shifts, strict=True))
+    found = [judge.block(r, near.candidates, x, s, judge.effort.fine, b.plain_J) for r, (b, s) in each]
+    blocks = tuple(b for b in found if b is not None)
+    return Fitted(candidates=near.candidates, x=tuple(x), blocks=blocks) if len(blocks) == len(found) else None
 
 
 def _moved(old: Fitted, dx: Array) -> tuple[list[float], list[float]]:

@@ -62,7 +62,7 @@ class Simulations:
 
         Where runs scatter one step after another is too narrow to tell: all of one width are made before the next.
         """
-        self.made_ahead(beside(use, candidates, x, nudge))
+        self.made_ahead(beside(use, candidates, x, nudge, first))
         if self._pinned or not self.is_helped:
             return
         at, width, todo = (candidates, x), nudge, []

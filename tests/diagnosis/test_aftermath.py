@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from rollover.diagnosis.aftermath import LASTING, left_aside, shortened
+from rollover.diagnosis import explain, looks
+from rollover.diagnosis.aftermath import LASTING, left_aside, shortened, soon, up_to
 from rollover.diagnosis.bins import Averaged
+from rollover.diagnosis.blocks import Fitted
+from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.evidence import Evidence, Signal
+from rollover.diagnosis.fit import Judge
+from rollover.diagnosis.gate import Gate
+from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.overturn import AHEAD, RunSimulator
 from rollover.recording import Recording
 from tests.physics.scenes import shipped
@@ -114,3 +121,81 @@ def test_means_of_samples_are_shortened_too() -> None:
     predicted = found.simulator.predict({}, 0.0)
     assert predicted is not None
     assert predicted[CHANNEL].size == found.recording.time.size == found.simulator.starts.size
+
+
+def a_step_at(moment: float) -> Evidence:
+    """A recording whose samples count in full, and whose channel has moved by a half at a moment, later by all."""
+    whole = evidence(1.0)
+    (signal,) = whole.signals
+    time = whole.recording.time[signal.rows]
+    moved = 0.6 * (time >= moment) + 0.4 * (time >= moment + 0.3)
+    return replace(whole, signals=(replace(signal, values=moved),))
+
+
+@pytest.mark.parametrize(("moved", "blow", "end"), [(0.2, 0.5, 1.1), (0.8, 0.5, 1.4), (1.4, 0.5, END), (0.2, 1.4, END)])
+def test_looks_see_what_comes_soon_after_the_blow_of_simulation_and_recording(
+    moved: float, blow: float, end: float
+) -> None:
+    whole = replace(a_step_at(moved), blow=blow)
+    found = soon(whole)
+    assert found.recording.time[-1] == pytest.approx(end, abs=1.5 * STEP)
+    assert (found is whole) == (end == END)  # 1.4 + LASTING is the end
+    assert soon(whole).simulator is found.simulator  # its runs are known
+
+
+def test_who_looks_soon_after_the_blow_holds_recordings_as_they_are_held() -> None:
+    judge = Judge([evidence(0.9)])
+    near = judge.near()
+    assert near is not judge
+    assert near.near() is near
+    assert near.evidence[0].count < judge.evidence[0].count
+    assert near.predicted(0, (), (), 0.0) is not None
+    judge.straying, judge.shifts = False, [0.01]
+    (signal,) = judge.evidence[0].signals
+    judge.weigh([replace(judge.evidence[0], signals=(replace(signal, sigma=2.0),))])
+    assert judge.near() is near
+    assert (near.straying, near.shifts, near.evidence[0].signals[0].sigma) == (False, [0.01], 2.0)
+    simulator = judge.evidence[0].simulator
+    assert isinstance(simulator, RunSimulator)
+    made = simulator.runs
+    assert near.predicted(0, (), (), 0.0) is not None
+    assert simulator.runs == made >= 1  # what it makes is counted, once
+    short = evidence(0.9)
+    alone = Judge([up_to(short, BLOW + 0.1) or short])
+    assert alone.near() is alone
+
+
+def test_looks_and_first_fits_are_made_soon_after_the_blow_and_fits_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    judge = Judge([evidence(0.9), evidence(0.9)])
+    base = judge.fit((), ())
+    assert base is not None
+    near = judge.near()
+    asked: list[tuple[str, Judge, int]] = []
+
+    def gated(judge: Judge, base: Fitted, *_: object, **__: object) -> Gate:
+        asked.append(("look", judge, base.blocks[0].residual.size))
+        return Gate(score=0.0, scores={}, null=np.zeros(10), detectable={})
+
+    monkeypatch.setattr(looks, "gate", gated)
+    looked = looks.look(judge, base, [], [[0], [1]])
+
+    def screened(inquiry: Inquiry, base: Fitted, *_: object) -> list[Any]:
+        asked.append(("screen", inquiry.judge, base.blocks[0].residual.size))
+        return []
+
+    def fitted(inquiry: Inquiry, base: Fitted, *_: object) -> tuple[list[Any], list[Fitted]]:
+        asked.append(("first", inquiry.judge, base.blocks[0].residual.size))
+        return [], [base]
+
+    def fits(crew: Crew, judge: Judge, jobs: list[Any], *_: object) -> list[None]:
+        asked.append(("fits", judge, len(jobs)))
+        return [None for _ in jobs]
+
+    monkeypatch.setattr(explain, "screen", screened)
+    monkeypatch.setattr(explain, "_first_fits", fitted)
+    monkeypatch.setattr(Crew, "fits", fits)
+    inquiry = Inquiry(judge=judge, candidates=(), groups=[[0], [1]], phases=[], say=lambda _: None, crew=Crew())
+    assert explain.step(inquiry, base, looked) is None
+    rows = near.evidence[0].count
+    assert asked[-3:] == [("screen", near, rows), ("first", near, rows), ("fits", judge, 1)]
+    assert {(name, id(who), n) for name, who, n in asked[:-3]} == {("look", id(near), rows)}

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from rollover.diagnosis import selection
+from rollover.diagnosis.blocks import Block
 from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.effort import DROPS
+from rollover.diagnosis.effort import DROPS, RUNS, Effort
 from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Fitted
 from rollover.diagnosis.inquiry import Inquiry
@@ -55,7 +58,7 @@ def test_beside_effects_in_another_form_the_last_one_is_looked_for_anew(
         return Step(base=of(*kept), fitted=found, p_value=0.0, rivals=(found,))
 
     monkeypatch.setattr(selection, "instead", instead)
-    monkeypatch.setattr(selection, "without_needless", lambda _, f: f)
+    monkeypatch.setattr(selection, "without_needless", lambda _, f, *__: f)
     judge = SimpleNamespace(again=lambda f: f, effort=DROPS)
     taken = [
         Step(base=of(), fitted=of(beside), p_value=0.0),
@@ -66,6 +69,36 @@ def test_beside_effects_in_another_form_the_last_one_is_looked_for_anew(
     assert looked == asked
     assert {c.id for c in parts[-1].fitted.candidates} == {"soil-layer", answers.get("soil-crust", CRUST)[0]}
     assert len(parts) == 2
+
+
+@pytest.mark.parametrize(
+    ("effort", "beside", "fitted_again"),
+    [(RUNS, ("soil-layer", ("a",)), [0]), (RUNS, LAYER, [0, 1]), (DROPS, ("soil-layer", ("a",)), [0, 1])],
+)
+def test_of_full_runs_the_fit_without_the_last_effect_is_the_one_beside_which_it_was_found(
+    monkeypatch: pytest.MonkeyPatch, effort: Effort, beside: Any, fitted_again: list[int]
+) -> None:
+    """Without either 9 per sample more is left: both are needed, and without the first most is left."""
+
+    def left(fitted: Fitted, much: float) -> Fitted:
+        block = Block(residual=np.full(4, much), J=np.zeros((4, 0)), slope=np.zeros(4), shift=0.0, prior=1.0)
+        return replace(fitted, blocks=(block,))
+
+    asked: list[int] = []
+
+    def without(_: Any, fitted: Fitted, k: int, rounds: int = 0) -> Fitted:
+        asked.append(k)
+        return left(of(CRUST), 9.0 - k)
+
+    monkeypatch.setattr(selection, "without", without)
+    layer = ("soil-layer", ("a",))
+    base, held = left(of(beside), 8.0), left(of(layer, CRUST), 1.0)
+    judge = cast(Any, SimpleNamespace(again=lambda f: f, effort=effort))
+    assert selection.without_needless(judge, held, base) is held
+    assert asked == fitted_again
+    asked.clear()
+    assert selection.strongest(judge, left(of(), 9.0), held, base).id == "soil-layer"
+    assert asked == fitted_again
 
 
 MASS, SPEED, RATE, DRAG = ((i, ("a",)) for i in ("mass", "impact-speed", "soil-rate-hardening", "soil-inertial-drag"))
@@ -97,7 +130,7 @@ def test_as_many_effects_as_may_be_that_are_given_for_others_again_and_again_exp
         looked.append(first.id)
         return Step(base=of(*kept), fitted=new, p_value=0.0, rivals=(new,))
 
-    def without_needless(_: Any, f: Fitted) -> Fitted:
+    def without_needless(_: Any, f: Fitted, *__: Any) -> Fitted:
         left = [(c.id, tuple(c.search)) for c in f.candidates if len(looked) < 2 or c.id != needless]
         return of(*left)
 

@@ -75,6 +75,36 @@ def test_where_known_runs_must_do_no_strong_effect_is_tried() -> None:
     assert judge.simulations > known
 
 
+def test_what_leaves_more_of_the_worst_recording_is_tried_in_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """x beyond 60 tips as was recorded, any other place moves what no recording did."""
+    judge, base = tipped(20.0)
+    judge.measured[2] = 1.5 * judge.measured[2]
+    asked: dict[int, set[float]] = {1: set(), 2: set()}
+    left_at = looks.left_at
+
+    def counted(judge: Judge, candidates: Any, x: Any, shifts: Any, use: Any) -> float | None:
+        for r in use:
+            asked[r] |= {round(float(v), 9) for v in x}
+        return left_at(judge, candidates, x, shifts, use)
+
+    monkeypatch.setattr(looks, "left_at", counted)
+    assert looks.strongly(judge, base, [SLOPE], [1, 2]) == {"slope": ((0.95,),)}
+    assert asked[2] == {round(x, 9) for (x,) in SLOPE.strong()}
+    assert asked[1] == {0.95}
+
+
+@pytest.mark.parametrize(("full", "forgiven"), [(5.0, 20.0), (20.0, 5.0), (20.0, 20.0)])
+def test_what_leaves_less_of_it_in_full_or_forgiven_is_tried_in_all(
+    full: float, forgiven: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def left_at(judge: Judge, candidates: Any, x: Any, *_: Any) -> float:
+        return 10.0 if not x else 30.0 if x != (0.95,) else forgiven if judge.straying else full
+
+    monkeypatch.setattr(looks, "left_at", left_at)
+    judge, base = tipped(20.0)
+    assert looks.strongly(judge, base, [SLOPE], [1, 2]) == ({} if full == forgiven else {"slope": ((0.95,),)})
+
+
 def test_a_strong_effect_is_fitted_with_other_courses_forgiven_and_compared_in_full() -> None:
     """Before the blow x sets a wave, after it which of many courses is taken: in full the nearest dip ends a fit."""
 

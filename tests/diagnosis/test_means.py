@@ -1,0 +1,97 @@
+"""An explanation moved to where the mean of its neighbours is met best: how far, and when that is worth a step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis import settle
+from rollover.diagnosis.explain import Step
+from rollover.diagnosis.fit import Fitted, Judge
+from rollover.diagnosis.settle import settled
+from tests.diagnosis.test_slopes import CHANNEL, SLOPE, TIME, Scattering, evidence
+
+
+def test_an_explanation_that_is_far_from_the_mean_goes_more_than_one_step() -> None:
+    """y = 20 x^2 sin(30 t) measured at x = 0.6, begun at 0.2: no step is longer than 0.15 of a coordinate."""
+
+    class Bent(Scattering):
+        def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+            x, k = float(changes.get("effects.slope.angle", 0.0)), round(changes.get("neighbour", 0))
+            chance = np.random.default_rng([k, round(1e9 * x)]).standard_normal(TIME.size)
+            return {CHANNEL: 20.0 * x**2 * np.sin(30.0 * (TIME - shift)) + 0.05 * chance}
+
+    judge = Judge([evidence(Bent().predict({"effects.slope.angle": 0.6}, 0.0)[CHANNEL], Bent()) for _ in range(2)])
+    base, far = judge.fit((), ()), judge.fit((SLOPE,), (0.2,), rounds=0)
+    assert base is not None
+    assert far is not None
+    found = settled(judge, Step(base=base, fitted=far, p_value=0.0, rivals=(far,)))
+    assert found.fitted.x[0] == pytest.approx(0.6, abs=0.01)
+    assert found.rivals == (found.fitted,)
+
+
+class Straight(Scattering):
+    """y = 20 x sin(30 t); `asked` are the x of runs that are no neighbours."""
+
+    def __init__(self) -> None:
+        self.asked: set[float] = set()
+
+    def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+        x, k = float(changes.get("effects.slope.angle", 0.0)), round(changes.get("neighbour", 0))
+        if k == 0:
+            self.asked.add(round(x, 9))
+        chance = np.random.default_rng([k, round(1e9 * x)]).standard_normal(TIME.size)
+        return {CHANNEL: 20.0 * x * np.sin(30.0 * (TIME - shift)) + 0.05 * chance}
+
+
+def begun_at(x: float, values: np.ndarray) -> tuple[Judge, Step]:
+    """Two recordings, and a fit that was not made, at x."""
+    judge = Judge([evidence(values, Straight()) for _ in range(2)])
+    base, off = judge.fit((), ()), judge.fit((SLOPE,), (x,), rounds=0)
+    assert base is not None
+    assert off is not None
+    return judge, Step(base=base, fitted=off, p_value=0.0, rivals=(off,))
+
+
+@pytest.fixture
+def steps(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """Places to which it was moved."""
+    made: list[Any] = []
+    onward = settle._onward
+
+    def counted(judge: Judge, old: Fitted, dx: np.ndarray) -> Any:
+        made.append(onward(judge, old, dx))
+        return made[-1]
+
+    monkeypatch.setattr(settle, "_onward", counted)
+    return made
+
+
+@pytest.mark.parametrize(("missing", "least"), [(0.0, 2), (2.0, 1), (20.0, 0)])
+def test_an_explanation_that_is_not_the_whole_is_not_moved_for_little(
+    missing: float, least: int, steps: list[Any]
+) -> None:
+    """Begun 0.02 off: (0.4/2)^2 of what 2 cos(400 t) beside it leaves, (0.4/20)^2 of what 20 do."""
+    judge, off = begun_at(0.58, 12.0 * np.sin(30.0 * TIME) + missing * np.cos(400.0 * TIME))
+    found = settled(judge, off).fitted.x
+    assert len(steps) >= least if least else (len(steps), found) == (0, (0.58,))
+
+
+@pytest.mark.parametrize(("begun", "is_beside"), [(0.58, True), (0.5, False)])
+def test_slopes_are_told_anew_beyond_the_step_over_which_they_were_told(
+    begun: float, is_beside: bool, steps: list[Any]
+) -> None:
+    judge, off = begun_at(begun, 12.0 * np.sin(30.0 * TIME))
+    found = settled(judge, off).fitted
+    assert found.x[0] == pytest.approx(0.6, abs=2e-3)
+    assert len(steps) > 1
+    asked = judge.evidence[0].simulator.asked  # type: ignore[attr-defined]
+    (first,), _ = steps[0]
+    assert first != found.x[0]
+    assert (round(first + judge.effort.fine, 9) in asked) != is_beside
+    assert round(found.x[0] + judge.effort.fine, 9) in asked  # what it ends with are its own
+    for block, other in zip(found.blocks, judge.again(found).blocks, strict=True):
+        np.testing.assert_array_equal(block.J, other.J)
