@@ -63,7 +63,7 @@ def judged(monkeypatch: pytest.MonkeyPatch) -> dict[str, float]:
     misfits = {"as it is": 20.0, "soil-crust": 3.5}
     monkeypatch.setattr(selection, "matters", lambda *_: True)
     monkeypatch.setattr(selection, "is_tolerated", lambda *_: False)
-    monkeypatch.setattr(selection, "strongest", lambda *one: one[-1].candidates[0])
+    monkeypatch.setattr(selection, "strongest", lambda *one: one[2].candidates[0])
     monkeypatch.setattr(selection, "held_out", lambda f, _: SimpleNamespace(total=misfits.get(f.label, 1.0)))
     monkeypatch.setattr(selection, "mismatch_of", lambda *_: left(1e-9))
     return misfits
