@@ -80,8 +80,8 @@ def step(inquiry: Inquiry, base: Fitted, looked: Gate) -> Step | None:
     # of recordings that went another way together, two may be those that no explanation brings back
     several = judge.effort.few if judge.straying else judge.effort.looked_at
     few, shifts = spread(base, groups, several), begun(judge, base, inquiry.crew.looks)
-    early = replace(inquiry, judge=judge.near())
-    start = base if early.judge is judge else early.judge.again(base)
+    who, start = judge.beginning(base)
+    early = replace(inquiry, judge=who)
     screened = screen(early, start, promising(candidates, looked, judge.effort), few, shifts, looked)
     count = sum(b.residual.size for b in base.blocks)
     screened, begun_with = _first_fits(early, start, screened, few, shifts, looked)

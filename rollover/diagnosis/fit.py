@@ -60,9 +60,15 @@ class Judge(Simulations):
             return self
         if self._near is None or [e.count for e in self._near.evidence] != [e.count for e in evidence]:
             self._near = Judge(evidence)
-        self._near.weigh(evidence)
+        else:
+            self._near.weigh(evidence)
         self._near.shifts, self._near.straying, self._near._pinned = list(self.shifts), self.straying, self._pinned
         return self._near
+
+    def beginning(self, base: Fitted) -> tuple[Judge, Fitted]:
+        """Who is `near`, and a base as that one sees it."""
+        near = self.near()
+        return near, base if near is self else near.again(base)
 
     @contextmanager
     def held(self, *, straying: bool | None = None, pinned: bool | None = None) -> Iterator[None]:

@@ -41,8 +41,7 @@ def look(
     effort = judge.effort
     if not effort.thrifty:
         return gate(judge, base, candidates, looks=looks)
-    if (near := judge.near()) is not judge:
-        judge, base = near, near.again(base)
+    judge, base = judge.beginning(base)
     if judge.per_error == 1.0:  # beside a tolerance it cannot be told what a clock has eaten
         base = unbent(judge, base)
     few, more = few or spread(base, groups, effort.few), spread(base, groups, effort.looked_at)
@@ -80,13 +79,14 @@ def strongly(
     judge.made_ahead((worst, (*base.candidates, c), (*base.x, *x)) for c, x in every)
 
     def hopeful() -> list[bool]:
-        return [left((c,), x, [worst]) < left((), (), [worst]) for c, x in every]
+        usual = left((), (), [worst])
+        return [left((c,), x, [worst]) < usual for c, x in every]
 
     def ranked() -> list[tuple[str, tuple[float, ...]]]:
-        met: dict[str, tuple[float, tuple[float, ...]]] = {}
+        usual, met = left((), (), few), dict[str, tuple[float, tuple[float, ...]]]()
         for c, x in able:
             met[c.key] = min(met.get(c.key, (np.inf, ())), (left((c,), x, few), x))
-        best = sorted((least, key, x) for key, (least, x) in met.items() if least < CLEARLY * left((), (), few))
+        best = sorted((least, key, x) for key, (least, x) in met.items() if least < CLEARLY * usual)
         return [(key, x) for _, key, x in best[: judge.effort.leaders]]
 
     with judge.held(straying=True):

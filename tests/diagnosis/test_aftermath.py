@@ -138,7 +138,7 @@ def test_looks_see_what_comes_soon_after_the_blow_of_simulation_and_recording(
 ) -> None:
     whole = replace(a_step_at(moved), blow=blow)
     found = soon(whole)
-    assert found.recording.time[-1] == pytest.approx(end, abs=1.5 * STEP)
+    assert found.recording.time[-1] == pytest.approx(min(end, END - STEP), abs=STEP)  # stamps are a step apart
     assert (found is whole) == (end == END)  # 1.4 + LASTING is the end
     assert soon(whole).simulator is found.simulator  # its runs are known
 
