@@ -9,11 +9,14 @@ from __future__ import annotations
 import hashlib
 import json
 import pickle
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Literal, TypeVar, cast
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.fit import Block, Fitted, Judge
@@ -38,7 +41,7 @@ class Job:
     One of few `rounds` is a first look: it ends without slopes.
     "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too or takes it in another
     `form`, "time" tries out the time shifts, "trace" begins anew where it sets in, over a `stretch`. A shape or form
-    that comes nowhere near what the best fit `leaves` of each recording is not gone on with.
+    that comes nowhere near what the best fit `leaves` of each recording is not gone on with. `lent` as in `Judge.fit`.
     """
 
     how: How = "fit"
@@ -52,19 +55,27 @@ class Job:
     form: Candidate | None = None
     stretch: Stretch | None = None
     leaves: tuple[float, ...] | None = None
+    lent: tuple[NDArray[np.float64], ...] | None = None
 
     def key(self, about: str) -> str:
         """Hash of what is fitted and from where, with `about` for all else that it depends on."""
         every = (*self.candidates, *(() if self.form is None else (self.form,)))
         names = [(c.key, sorted(c.search.items()), sorted(c.form.items())) for c in every]
         ways = self.how, self.only, self.rounds, self.width, self.pinned, self.stretch, self.leaves
-        told = repr((about, names, self.start, self.shifts, ways))
-        return hashlib.sha256(told.encode()).hexdigest()
+        told = hashlib.sha256(repr((about, names, self.start, self.shifts, ways)).encode())
+        for J in self.lent or ():
+            told.update(J.tobytes())
+        return told.hexdigest()
 
     @property
     def recordings(self) -> tuple[int, ...]:
         """Places of the recordings."""
         return tuple(range(len(self.shifts))) if self.only is None else self.only
+
+    def beginning(self, nudges: Sequence[float]) -> Iterator[tuple[int, Sequence[Candidate], Sequence[float]]]:
+        """(recording, candidates, x) of the runs that a fit begins with."""
+        first = self.lent[0].shape[1] if self.lent else 0
+        return beside(self.recordings, self.candidates, self.start, nudges[min(self.width, len(nudges) - 1)], first)
 
 
 class Crew:
@@ -131,12 +142,8 @@ class Crew:
 
         # full runs are made side by side for each fit in turn, and kept here
         if judge.effort.thrifty:
-            nudges, begun = judge.effort.nudges, [job for k, job in enumerate(jobs) if k in todo and job.how == "fit"]
-            judge.made_ahead(
-                point
-                for job in begun
-                for point in beside(job.recordings, job.candidates, job.start, nudges[min(job.width, len(nudges) - 1)])
-            )
+            begun = [job for k, job in enumerate(jobs) if k in todo and job.how == "fit"]
+            judge.made_ahead(point for job in begun for point in job.beginning(judge.effort.nudges))
         while done < len(todo) and not (len(todo) - done > 1 and self.is_there()):
             k = todo[done]
             ended(k, work(judge, jobs[k]))
@@ -217,6 +224,7 @@ def work(judge: Judge, job: Job) -> Fitted | None:
             width=job.width,
             pinned=job.pinned,
             bare=job.rounds is not None,
+            lent=job.lent,
         )
     begun = linearised(judge, job.candidates, job.start, job.shifts, job.recordings)
     if begun is None:
@@ -282,6 +290,16 @@ def _rebuilt(judge: Judge, job: Job, row: dict[str, Any] | None) -> Fitted | Non
         candidates[-1] = next(c for c in candidates[-1].forms() if c.form == row["form"])
     elif len(row["x"]) > len(job.start):
         candidates[-1] = candidates[-1].whole()
+    if job.how == "fit" and job.rounds is not None:  # it ended without slopes
+        found = [
+            judge.block(r, candidates, row["x"], s, 0.0) for r, s in zip(job.recordings, row["shifts"], strict=True)
+        ]
+        blocks = tuple(b for b in found if b is not None)
+        return (
+            Fitted(candidates=tuple(candidates), x=tuple(row["x"]), blocks=blocks)
+            if len(blocks) == len(found)
+            else None
+        )
     return linearised(judge, candidates, row["x"], row["shifts"], job.recordings)
 
 

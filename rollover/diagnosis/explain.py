@@ -85,7 +85,11 @@ def step(inquiry: Inquiry, base: Fitted, looked: Gate) -> Step | None:
     screened = screen(early, start, promising(candidates, looked, judge.effort), few, shifts, looked)
     count = sum(b.residual.size for b in base.blocks)
     screened, begun_with = _first_fits(early, start, screened, few, shifts, looked)
-    jobs = [Job(candidates=f.candidates, start=f.x, shifts=shifts_told(shifts, f, few), width=1) for f in begun_with]
+    lent = lent_by(judge, base)
+    jobs = [
+        Job(candidates=f.candidates, start=f.x, shifts=shifts_told(shifts, f, few), width=1, lent=lent)
+        for f in begun_with
+    ]
     fits = [f for f in inquiry.fits(jobs) if f is not None]
     if not fits:
         return None
@@ -119,6 +123,13 @@ def step(inquiry: Inquiry, base: Fitted, looked: Gate) -> Step | None:
         phi, score = phi * judge.per_error, max(score, base.left - least)
     p = p_value(score / phi, looked.null)
     return Step(base=base, fitted=fits[0], p_value=p, rivals=tuple(fits), screened=tuple(screened))
+
+
+def lent_by(judge: Judge, base: Fitted, few: Sequence[int] | None = None) -> tuple[Array, ...] | None:
+    """Slopes (n, k) that a base has of each recording, or of `few`, for fits beside it; None where they cost no run."""
+    if not judge.effort.thrifty or not base.candidates:
+        return None
+    return tuple(base.blocks[r].plain_J for r in (range(len(base.blocks)) if few is None else few))
 
 
 def _by_fits(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
@@ -180,7 +191,7 @@ def _first_fits(
     jobs = [
         Job(
             candidates=(*base.candidates, s.candidate), start=(*base.x, *start), shifts=at, only=tuple(few),
-            rounds=judge.effort.short, pinned=pinned,
+            rounds=judge.effort.short, pinned=pinned, lent=lent_by(judge, base, few),
         )
         for s in chosen.values()
         for start in s.starts

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,9 +67,17 @@ class Judge(Simulations):
         return self._near
 
     def beginning(self, base: Fitted) -> tuple[Judge, Fitted]:
-        """Who is `near`, and a base as that one sees it."""
+        """Who is `near`, and a base as that one sees it, by the slopes that it has."""
         near = self.near()
-        return near, base if near is self else near.again(base)
+        if near is self:
+            return self, base
+        blocks = []
+        for r, (b, e, cut) in enumerate(zip(base.blocks, self.evidence, near.evidence, strict=True)):
+            both = zip(e.signals, cut.signals, strict=True)
+            seen = np.concatenate([np.arange(s.rows.size) < short.rows.size for s, short in both])
+            blocks.append(near.block(r, base.candidates, base.x, b.shift, self.effort.fine, b.plain_J[seen]))
+        known = tuple(b for b in blocks if b is not None)
+        return near, replace(base, blocks=known) if len(known) == len(blocks) else near.again(base)
 
     @contextmanager
     def held(self, *, straying: bool | None = None, pinned: bool | None = None) -> Iterator[None]:
@@ -90,6 +99,16 @@ class Judge(Simulations):
         blocks = [self.block(r, fitted.candidates, fitted.x, b.shift, fine) for r, b in enumerate(fitted.blocks)]
         kept = [new if new is not None else old for new, old in zip(blocks, fitted.blocks, strict=True)]
         return Fitted(candidates=fitted.candidates, x=fitted.x, blocks=tuple(kept))
+
+    def recounted(self, fitted: Fitted) -> Fitted:
+        """A fit where it stands by the slopes that it has, where nothing but what samples count has changed."""
+        each = enumerate(fitted.blocks)
+        new = [self.block(r, fitted.candidates, fitted.x, b.shift, self.effort.fine, b.plain_J) for r, b in each]
+        return replace(fitted, blocks=tuple(b or old for b, old in zip(new, fitted.blocks, strict=True)))
+
+    def is_beside(self, x: Sequence[float], there: Sequence[float]) -> bool:
+        """Whether a place is as near to another as the step is wide over which slopes are told where a fit ends."""
+        return max((abs(a - b) for a, b in zip(x, there, strict=True)), default=0.0) < self.effort.fine
 
     @property
     def per_error(self) -> float:
@@ -210,14 +229,17 @@ class Judge(Simulations):
         pinned: bool = False,
         bare: bool = False,
         finely: bool = False,
+        lent: Sequence[Array] | None = None,
     ) -> Fitted | None:
         """Levenberg-Marquardt on (D1) from a start within the unit box; None if nothing can be simulated there.
 
         `pinned` as in `held`. A `bare` one ends without slopes, where only what it leaves is asked for; one that is
-        made `finely` where a round gains next to nothing, others where it gains less than tells two apart.
+        made `finely` where a round gains next to nothing, others where it gains less than tells two apart. `lent` are
+        the first slopes (n, k) of each recording to begin with, as a fit of fewer effects has them; it ends with its
+        own.
         """
         with self.held(pinned=pinned):
-            return self._fit(candidates, start, rounds, only, shifts, width, bare, FINELY if finely else ENOUGH)
+            return self._fit(candidates, start, rounds, only, shifts, width, bare, FINELY if finely else ENOUGH, lent)
 
     def _fit(
         self,
@@ -229,19 +251,23 @@ class Judge(Simulations):
         width: int,
         bare: bool,
         least: float,
+        lent: Sequence[Array] | None,
     ) -> Fitted | None:
         use = list(range(len(self.evidence))) if only is None else list(only)
         nudges = self.effort.nudges
         rounds, width = self.effort.rounds if rounds is None else rounds, min(width, len(nudges) - 1)
         x = [float(v) for v in start]
         shifts = [self.shifts[r] for r in use] if shifts is None else list(shifts)
-        self.made_beside(use, candidates, x, shifts, nudges[width])
-        found = [self.block(r, candidates, x, s, nudges[width]) for r, s in zip(use, shifts, strict=True)]
+        fixed = len(x) - len(candidates[-1].search) if candidates else 0
+        known: Sequence[Array | None] = [None] * len(use) if lent is None else lent
+        self.made_beside(use, candidates, x, shifts, nudges[width], 0 if lent is None else lent[0].shape[1])
+        found = [self.block(r, candidates, x, s, nudges[width], J) for r, s, J in zip(use, shifts, known, strict=True)]
         if any(b is None for b in found):
             return None
         blocks: list[Block] = [b for b in found if b is not None]
         best, damping = total_of(blocks), 1e-3
-        fixed = len(x) - len(candidates[-1].search) if candidates else 0
+        borrowed = lent is not None  # whether slopes are those of another place
+        told = x if not borrowed and nudges[width] == self.effort.fine else None  # where all were last worked out
         for turn in range(rounds):
             A, b = np.zeros((len(x), len(x))), np.zeros(len(x))
             for block in blocks:
@@ -282,20 +308,28 @@ class Judge(Simulations):
                 shifts = [a.shift for a in after if a is not None]
             fresh = gain < enough
             if fresh:
-                width, damping = width + 1, 1e-3
+                # what slopes of another place promise no more those of this one may
+                width, damping = width if borrowed else width + 1, 1e-3
             last = width >= len(nudges)
             if last and not improved and len(nudges) == 1:
                 break
             is_bare = bare and (last or turn + 1 == rounds)
             nudge = 0.0 if is_bare else self.effort.fine if last else nudges[width]
             # what is held already moves little: its slopes are worked out anew only where the search narrows, or where
-            # they lead astray or not far, as those of another place along a valley do
+            # they lead astray or not far, as those of another place along a valley do; where a run is dear a short fit
+            # keeps all that foretold well, and another ends with those of a place beside it
             slow = gain < KEPT * due or gain < SLOW * best
             anew = fresh or (slow and not self.effort.thrifty)
+            kept = 0 if anew else len(x) if bare and self.effort.thrifty and not slow else fixed
+            if last and self.effort.thrifty and told is not None and self.is_beside(x, told):
+                kept = len(x)
+            elif anew and not is_bare:
+                told = x if nudge == self.effort.fine else None
+            borrowed = self.effort.thrifty and ((borrowed and not anew) or 0 < kept == len(x))
             if not is_bare:
-                self.made_beside(use, candidates, x, shifts, nudge, 0 if anew else fixed)
+                self.made_beside(use, candidates, x, shifts, nudge, kept)
             again = [
-                self.block(r, candidates, x, s, nudge, None if anew or is_bare else block.plain_J[:, :fixed])
+                self.block(r, candidates, x, s, nudge, None if not kept or is_bare else block.plain_J[:, :kept])
                 for r, s, block in zip(use, shifts, blocks, strict=True)
             ]
             if any(b is None for b in again):
@@ -305,7 +339,7 @@ class Judge(Simulations):
                 return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=tuple(blocks))
             if last:
                 break
-        if width < len(nudges) and nudges[width] != self.effort.fine:
+        if width < len(nudges) and (borrowed or nudges[width] != self.effort.fine):
             self.made_beside(use, candidates, x, shifts, self.effort.fine)
             ended = [self.block(r, candidates, x, s, self.effort.fine) for r, s in zip(use, shifts, strict=True)]
             if all(b is not None for b in ended):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.candidates import akin, physical
+from rollover.diagnosis.candidates import Candidate, akin, physical
 from rollover.diagnosis.chaos import SENT, is_other, too_many
 from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Fitted, Judge
@@ -25,7 +25,8 @@ from rollover.effects import EFFECTS
 Array = NDArray[np.float64]
 SPOKEN = 0.05  # p-value of a candidate's own score, beyond which its fit to runs that scatter is one to chance
 RIVAL = 0.5  # of the best's gain, by the mean of its runs, that a rival must have
-SURELY = 4.0  # times an interval by slopes, beyond which no run is needed to tell a strength from none
+# times an interval by slopes, beyond which no run is needed to tell a strength from none, and the effect is needed
+SURELY, INDEED = 4.0, 10.0
 NEEDED = 25.0  # gain, over what is left per sample, that an effect must bring beside all the others
 SHARED = 9.0  # of that, what all recordings but one must bring together
 
@@ -137,24 +138,35 @@ def is_there_as_held(judge: Judge, fitted: Fitted) -> bool:
 def is_there(judge: Judge, fitted: Fitted) -> bool:
     """Whether the strength of the last effect is told from none: its interval keeps away from what changes nothing."""
     last = fitted.candidates[-1]
-    nulls: dict[str, Any] = dict(EFFECTS[last.id].null)
-    for (name, search), at in zip(last.search.items(), last.neutral or (None,) * len(last.search), strict=True):
-        nulls[name] = nulls.get(name) if at is None else physical(at, search)
-    numbers = [name for name in last.search if isinstance(nulls.get(name), (int, float))]
-    if not numbers:
+    nulls = _nulls(last)
+    if not nulls:
         return True
-
-    def apart(found: Mapping[str, Interval], times: float) -> bool:
-        """Whether the null of a number lies outside its interval, made wider about its value."""
-        known = [(found[n].value, found[n].low, found[n].high, nulls[n]) for n in numbers]
-        return any(null < v - times * (v - low) or null > v + times * (high - v) for v, low, high, null in known)
-
     by_slopes = intervals(judge, fitted, {})[-1]
-    if not apart(by_slopes, 1.0):
+    if not _is_apart(by_slopes, nulls, 1.0):
         return False  # runs only widen it
     first, values = len(fitted.x) - len(last.search), last.values(fitted.x[-len(last.search) :])
-    sides = {first + k: (-1.0 if values[n] > nulls[n] else 1.0,) for k, n in enumerate(last.search) if n in numbers}
-    return apart(by_slopes, SURELY) or apart(intervals(judge, fitted, sides)[-1], 1.0)
+    sides = {first + k: (-1.0 if values[n] > nulls[n] else 1.0,) for k, n in enumerate(last.search) if n in nulls}
+    return _is_apart(by_slopes, nulls, SURELY) or _is_apart(intervals(judge, fitted, sides)[-1], nulls, 1.0)
+
+
+def surely_there(judge: Judge, fitted: Fitted) -> set[int]:
+    """Places of the effects that no run is needed to tell that something would be missing without: by slopes alone."""
+    each = zip(map(_nulls, fitted.candidates), intervals(judge, fitted, {}), strict=True)
+    return {k for k, (nulls, by_slopes) in enumerate(each) if _is_apart(by_slopes, nulls, INDEED)}
+
+
+def _nulls(c: Candidate) -> dict[str, float]:
+    """Values of an effect's parameters that change nothing, of those that have a number for it."""
+    nulls: dict[str, Any] = dict(EFFECTS[c.id].null)
+    for (name, search), at in zip(c.search.items(), c.neutral or (None,) * len(c.search), strict=True):
+        nulls[name] = nulls.get(name) if at is None else physical(at, search)
+    return {name: float(nulls[name]) for name in c.search if isinstance(nulls.get(name), (int, float))}
+
+
+def _is_apart(found: Mapping[str, Interval], nulls: Mapping[str, float], times: float) -> bool:
+    """Whether the null of a number lies outside its interval, made wider about its value."""
+    known = [(found[n].value, found[n].low, found[n].high, null) for n, null in nulls.items()]
+    return any(null < v - times * (v - low) or null > v + times * (high - v) for v, low, high, null in known)
 
 
 def outlasts(found: Step, groups: Groups) -> bool:

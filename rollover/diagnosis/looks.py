@@ -52,7 +52,7 @@ def look(
     scores = {key: max(score, first.scores.get(key, 0.0)) for key, score in last.scores.items()}
     moving = [c for c in candidates if c.kind != "sensor"]
     with judge.held(straying=True):  # a part that gives way shows in how it does, not in where all else goes then
-        forgiven = _narrowed(judge, judge.again(base), moving, few, more, beside)[-1]
+        forgiven = _narrowed(judge, judge.recounted(base), moving, few, more, beside)[-1]
     able = [c.key for c in forgiven.ranked(moving) if p_value(forgiven.scores.get(c.key, 0.0), forgiven.null) < SPOKEN]
     scores = {key: max(score, forgiven.scores.get(key, 0.0)) for key, score in scores.items()}
     far = strongly(judge, base, moving, few) if beside is None else {}

@@ -202,13 +202,17 @@ class RunSimulator:
         if base is None:
             return []
         found = []
-        several = [{**values, **self._beside(one, parts)} for one in NEIGHBOURS]
+        several = self.neighbours(values, parts)
         made_ahead(self.children, [(self, beside) for beside in several])
         for beside in several:
             there = self.predict(beside, shift)
             if there is not None:
                 found.append({name: there[name] - base[name] for name in base})
         return found
+
+    def neighbours(self, changes: Mapping[str, Any], parts: int = 1) -> list[dict[str, Any]]:
+        """Changes of all neighbours of a run with `changes`, see `strays`."""
+        return [{**changes, **self._beside(one, parts)} for one in NEIGHBOURS]
 
     def settle(self) -> None:
         """Lay the grid where the run is the most like all others: of two ways that runs go, it takes the common one.
@@ -318,6 +322,15 @@ def full_runs(simulator: Any) -> RunSimulator | None:
     """What makes the full runs of a simulator, behind means of neighbouring samples too; None where there are none."""
     own = getattr(simulator, "inner", simulator)
     return own if isinstance(own, RunSimulator) else None
+
+
+def neighbours_of(
+    simulators: Iterable[Any], changes: Mapping[str, Any], parts: int
+) -> list[tuple[Any, Mapping[str, Any]]]:
+    """(simulator, changes) of a run and its neighbours by each simulator of full runs, the longest ones first."""
+    full = [own for own in map(full_runs, simulators) if own is not None]
+    each = [(own, one) for own in full for one in (changes, *own.neighbours(changes, parts))]
+    return sorted(each, key=lambda pair: float(pair[1].get("simulation.step", np.inf)))
 
 
 def made_ahead(children: Children | None, wanted: Iterable[tuple[Any, Mapping[str, Any]]]) -> None:

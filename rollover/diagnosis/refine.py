@@ -255,8 +255,15 @@ def shifts_told(shifts: Sequence[float], short: Fitted, few: Sequence[int]) -> t
     return tuple(told.get(r, s) for r, s in enumerate(shifts))
 
 
-def without(judge: Judge, fitted: Fitted, k: int, rounds: int = 8) -> Fitted | None:
-    """The explanation fitted again without its k-th effect."""
-    others = [(c, fitted.x[own]) for j, (c, own) in enumerate(each_with_own(fitted.candidates)) if j != k]
-    rest, x = [c for c, _ in others], [v for _, own in others for v in own]
-    return judge.fit(rest, x, rounds=rounds, shifts=[b.shift for b in fitted.blocks])
+def but_one(fitted: Fitted, k: int) -> tuple[list[Candidate], list[int]]:
+    """The effects of a fit but its k-th, and the places of their coordinates."""
+    others = [(c, own) for j, (c, own) in enumerate(each_with_own(fitted.candidates)) if j != k]
+    return [c for c, _ in others], [at for _, own in others for at in range(own.start, own.stop)]
+
+
+def without(judge: Judge, fitted: Fitted, k: int, rounds: int = 8, *, bare: bool = False) -> Fitted | None:
+    """The explanation fitted again without its k-th effect; `bare` as in `Judge.fit`."""
+    rest, columns = but_one(fitted, k)
+    x, shifts = [fitted.x[at] for at in columns], [b.shift for b in fitted.blocks]
+    lent = [b.plain_J[:, columns] for b in fitted.blocks] if judge.effort.thrifty else None
+    return judge.fit(rest, x, rounds=rounds, shifts=shifts, bare=bare, lent=lent)

@@ -16,10 +16,10 @@ from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.holdout import held_out
 from rollover.diagnosis.inquiry import Groups, Inquiry, Phases
-from rollover.diagnosis.lasting import NEEDED, unforgiven
+from rollover.diagnosis.lasting import NEEDED, surely_there, unforgiven
 from rollover.diagnosis.one_by_one import as_conditioned, one_by_one
 from rollover.diagnosis.pairs import instead, two_by_two
-from rollover.diagnosis.refine import without
+from rollover.diagnosis.refine import but_one, left_at, without
 from rollover.diagnosis.remainder import NEGLIGIBLE, is_enough, is_tolerated, matters
 from rollover.diagnosis.straight import MOST, is_a_curve, is_any_curve, is_one_line, is_pliant
 from rollover.diagnosis.verdict import Verdict
@@ -191,27 +191,31 @@ def is_elsewhere(last: Step) -> bool:
 def without_needless(judge: Judge, fitted: Fitted, base: Fitted | None = None) -> Fitted:
     """The explanation without those of its effects that may be dropped for no more than chance.
 
-    `base` is the fit beside which the last one was found.
+    `base` is the fit beside which the last one was found. Of full runs, those that are surely there are not tried.
     """
     while len(fitted.candidates) > 1:
-        losses = []
-        for k in range(len(fitted.candidates)):
+        losses: list[tuple[float, int, Fitted | None]] = [(np.inf, -1, None)]
+        surely = surely_there(judge, fitted) if judge.effort.thrifty else set()
+        for k in {*range(len(fitted.candidates))} - surely:
             rest = _rest(judge, fitted, k, base)
             losses.append((rest.left - fitted.left if rest is not None else np.inf, k, rest))
         loss, _, rest = min(losses, key=lambda one: one[0])
         phi = max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks))
         if rest is None or loss / phi > NEEDED:
             break
-        fitted = rest
+        fitted = judge.again(rest) if judge.effort.thrifty else rest
     return fitted
 
 
-def _rest(judge: Judge, fitted: Fitted, k: int, base: Fitted | None, rounds: int = 8) -> Fitted | None:
-    """The explanation without its k-th effect, fitted again unless that is the `base` of full runs: these cost much."""
+def _rest(judge: Judge, fitted: Fitted, k: int, base: Fitted | None) -> Fitted | None:
+    """The explanation without its k-th effect, fitted again unless that is the `base` of full runs: these cost much.
+
+    Of these it ends without slopes.
+    """
     others = [c.token for j, c in enumerate(fitted.candidates) if j != k]
     if judge.effort.thrifty and base is not None and [c.token for c in base.candidates] == others:
         return judge.again(base)
-    return without(judge, fitted, k, rounds)
+    return without(judge, fitted, k, bare=judge.effort.thrifty)
 
 
 def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) -> tuple[Explanation, Verdict]:
@@ -235,7 +239,7 @@ def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) ->
     # what a tolerance allows has structure too
     is_whole = is_whole or (is_tolerated(judge, found.fitted) and ahead < HARDLY_MORE)
     if found.parts and is_whole and ahead < start:
-        return found, _kind(strongest(judge, found.base, found.fitted, found.parts[-1].base))
+        return found, _kind(strongest(judge, found.base, found.fitted))
     if found.first is not None and found.parts:
         one = found.first
         end = held_out(one.fitted, groups).total
@@ -297,14 +301,19 @@ def _kind(c: Candidate) -> Verdict:
     return "missing-physics" if c.kind == "physics" else "parameter" if c.kind == "parameter" else "sensor"
 
 
-def strongest(judge: Judge, base: Fitted, fitted: Fitted, beside: Fitted | None = None) -> Candidate:
-    """The effect without which most would be left; `beside` is the fit beside which the last one was found."""
+def strongest(judge: Judge, base: Fitted, fitted: Fitted) -> Candidate:
+    """The effect without which most would be left; of full runs, where fits are dear, with the others as they stand."""
     best, loss = fitted.candidates[0], -np.inf
     for k, c in enumerate(fitted.candidates):
         if len(fitted.candidates) == 1:
             return c
-        rest = _rest(judge, fitted, k, beside, rounds=4)
-        left = rest.left if rest is not None else base.left
+        if judge.effort.thrifty:
+            others, columns = but_one(fitted, k)
+            left = left_at(judge, others, [fitted.x[at] for at in columns], [b.shift for b in fitted.blocks])
+        else:
+            rest = without(judge, fitted, k, rounds=4)
+            left = rest.left if rest is not None else None
+        left = base.left if left is None else left
         if left > loss:
             best, loss = c, left
     return best

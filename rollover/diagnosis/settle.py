@@ -28,11 +28,11 @@ from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Fitted, Judge
 
 Array = NDArray[np.float64]
-SHARES = (1.0, 0.5, 1.5)  # of the way: where a run leaps from one course to another beside it
+WHOLE, OTHERS = 1.0, (0.5, 1.5)  # shares of the way: where a run leaps from one course to another beside it
 NEARLY = 1.15  # times the least misfit
 FARTHEST = 0.15  # of a coordinate, that a mean may move it at a time
 STEPS = 5  # at most
-WORTH, PART = 2.0, 0.01  # gain that pays for one, and of what is left beyond noise and scatter: then more is missing
+WORTH, PART = 2.0, 0.05  # gain that pays for one, and of what is left beyond noise and scatter: then more is missing
 PARTS = 4  # of the scenario's step
 SHORTER = 2  # steps by runs in shorter ones, each of which costs as many runs as `PARTS` of others
 
@@ -42,12 +42,12 @@ def settled(judge: Judge, part: Step) -> Step:
 
     Slopes beside a leap lead astray, and so may clocks that a wrong place has bent: it is moved again until a step
     would gain no more than chance, or little of what is left, and of all places on the way the one is kept whose mean
-    is met best. As it was if nothing can be simulated there; where runs do not scatter too.
+    is met best. As it was if nothing can be simulated there; where runs do not scatter too. Its rivals are not put
+    under that scatter: that costs runs, see `Step.again`.
     """
     rescattered(judge, part.fitted)
-    part = part.again(judge)
-    places = [part.fitted]
-    slopes = part.fitted
+    slopes = judge.again(part.fitted)
+    places = [slopes]
     for _ in range(STEPS):
         here = places[-1]
         if not any(e.strays for e in judge.evidence):
@@ -63,12 +63,12 @@ def settled(judge: Judge, part: Step) -> Step:
             break
         place, slopes = found
         places.append(place)
-    if len(places) == 1:
-        return part
-    best = min(places, key=lambda f: left_of_means(judge, _weighed_anew(judge, f))[0])
+    best = places[0]
+    if len(places) > 1:
+        best = min(places, key=lambda f: left_of_means(judge, _weighed_anew(judge, f))[0])
     if best.x != places[-1].x:
         rescattered(judge, best)
-    return part.moved_to(best).again(judge)
+    return replace(part.moved_to(judge.again(best)), base=judge.again(part.base))
 
 
 def _weighed_anew(judge: Judge, fitted: Fitted) -> Fitted:
@@ -80,7 +80,8 @@ def _weighed_anew(judge: Judge, fitted: Fitted) -> Fitted:
 def in_shorter_steps(judge: Judge, fitted: Fitted) -> Fitted:
     """A fit moved to where the mean of its neighbours in shorter steps is met best, under their scatter.
 
-    As it was where runs do not scatter, and as far as it came where nothing can be simulated further on.
+    As it was where runs do not scatter, and as far as it came where nothing can be simulated further on. Within the
+    step over which slopes were told one look at them is enough: each costs as many runs as `PARTS` of others.
     """
     if not any(e.strays for e in judge.evidence):
         return fitted
@@ -90,7 +91,10 @@ def in_shorter_steps(judge: Judge, fitted: Fitted) -> Fitted:
         dx = np.clip(step_of_means(judge.evidence, here.blocks), -FARTHEST, FARTHEST)
         if promised(here.blocks, dx) < WORTH:
             break
-        there = _scattered_at(judge, slopes, *_moved(here, dx), PARTS)
+        place = _moved(here, dx)
+        if judge.is_beside(place[0], slopes.x):
+            return _by_slopes_of(judge, here, *place) or here  # runs there scatter as they do here
+        there = _scattered_at(judge, slopes, *place, PARTS)
         if there is None:
             break
         here, slopes = there
@@ -103,17 +107,23 @@ def promised(blocks: Sequence[Block], dx: Array) -> float:
 
 
 def _onward(judge: Judge, old: Fitted, dx: Array) -> tuple[Sequence[float], Sequence[float]] | None:
-    """Coordinates and time shifts (s) of a fit moved by dx, or a share of that which leaves less; None if none does."""
-    begun = [_moved(old, share * dx) for share in SHARES]
-    judge.made_ahead((r, old.candidates, x) for x, _ in begun for r in range(len(old.blocks)))
-    met = [_met(judge, old.candidates, *place) for place in begun]
-    lefts = [left for left, _ in met]
-    best = int(np.argmin(lefts))
-    if lefts[0] < NEARLY * min(old.left, *lefts):
-        best = 0  # the whole way: the mean of runs is worth more than the one that happens to be there
-    elif lefts[best] >= old.left:
-        return None
-    return begun[best][0], met[best][1]
+    """Coordinates and time shifts (s) of a fit moved by dx, or a share of that which leaves less; None if none does.
+
+    The whole way unless that leaves clearly more: the mean of runs is worth more than the one that happens to be there.
+    """
+    met: list[tuple[float, tuple[Sequence[float], Sequence[float]]]] = []
+    for shares in ((WHOLE,), OTHERS):
+        begun = [_moved(old, share * dx) for share in shares]
+        judge.made_ahead((r, old.candidates, x) for x, _ in begun for r in range(len(old.blocks)))
+        for x, shifts in begun:
+            left, clocks = _met(judge, old.candidates, x, shifts)
+            met.append((left, (x, clocks)))
+        if met[0][0] < old.left:
+            return met[0][1]
+    least, best = min(met, key=lambda one: one[0])
+    if met[0][0] < NEARLY * min(old.left, least):
+        return met[0][1]
+    return best if least < old.left else None
 
 
 def _scattered_at(
@@ -124,7 +134,7 @@ def _scattered_at(
     Between the ends of the step over which those were told they are as good as its own. None if nothing can be
     simulated there.
     """
-    is_beside = max(abs(a - b) for a, b in zip(x, slopes.x, strict=True)) < judge.effort.fine
+    is_beside = judge.is_beside(x, slopes.x)
     there = _by_slopes_of(judge, slopes, x, shifts) if is_beside else linearised(judge, slopes.candidates, x, shifts)
     if there is None:
         return None
@@ -161,6 +171,7 @@ def _met(
 def rescattered(judge: Judge, fitted: Fitted, parts: int = 1) -> None:
     """Weigh the recordings by what runs at a fitted point scatter by, in `parts` of a step."""
     changes = judge.changes(fitted.candidates, fitted.x)
+    judge.made_scattered(changes, parts)
     evidence = []
     for e, block in zip(judge.evidence, fitted.blocks, strict=True):
         plain = replace(e, signals=tuple(replace(s, weight=None) for s in e.signals), strays=())
@@ -175,6 +186,7 @@ def left_of_means(judge: Judge, fitted: Fitted) -> tuple[float, float]:
     seven much less so.
     """
     changes = judge.changes(fitted.candidates, fitted.x)
+    judge.made_scattered(changes)
     total = before = 0.0
     for e, block in zip(judge.evidence, fitted.blocks, strict=True):
         strays = alike(e, e.simulator.strays(changes, block.shift), e.blow)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from rollover.diagnosis.candidates import Candidate, each_with_own, key_at
 from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.evidence import Evidence
 from rollover.diagnosis.memory import Memory
-from rollover.diagnosis.overturn import full_runs, made_ahead
+from rollover.diagnosis.overturn import full_runs, made_ahead, neighbours_of
 from rollover.diagnosis.secant import Point, beside, in_step, in_time, looked_at, wider
 from rollover.execute import Children
 
@@ -48,6 +48,10 @@ class Simulations:
     def made_ahead(self, wanted: Iterable[tuple[int, Sequence[Candidate], Sequence[float]]]) -> None:
         """Make full runs of (recording, candidates, x) side by side where there are children to do it."""
         made_ahead(self._children, ((self.evidence[r].simulator, self.changes(c, x)) for r, c, x in wanted))
+
+    def made_scattered(self, changes: Mapping[str, object], parts: int = 1) -> None:
+        """Make what all recordings' runs with `changes` and their neighbours' are, as `strays` asks for them."""
+        made_ahead(self._children, neighbours_of([e.simulator for e in self.evidence], changes, parts))
 
     def made_beside(
         self,

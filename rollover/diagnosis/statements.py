@@ -63,7 +63,7 @@ def named(judge: Judge, found: Explanation, groups: Sequence[Sequence[int]]) -> 
                 discriminating_test=tests[0] if tests else next(iter(kind.rivals.values()), ""),
             )
         )
-    first = strongest(judge, found.base, fitted, found.parts[-1].base)
+    first = strongest(judge, found.base, fitted)
     return tuple(sorted(effects, key=lambda n: (n.id, n.channel) != (first.id, first.channel)))
 
 

@@ -12,12 +12,14 @@ from rollover.diagnosis import explain, looks
 from rollover.diagnosis.aftermath import LASTING, left_aside, shortened, soon, up_to
 from rollover.diagnosis.bins import Averaged
 from rollover.diagnosis.blocks import Fitted
+from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.crew import Crew
 from rollover.diagnosis.evidence import Evidence, Signal
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import Gate
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.overturn import AHEAD, RunSimulator
+from rollover.effects import Search
 from rollover.recording import Recording
 from tests.physics.scenes import shipped
 
@@ -163,6 +165,25 @@ def test_who_looks_soon_after_the_blow_holds_recordings_as_they_are_held() -> No
     short = evidence(0.9)
     alone = Judge([up_to(short, BLOW + 0.1) or short])
     assert alone.near() is alone
+
+
+def test_who_looks_soon_after_the_blow_has_the_slopes_of_the_whole_as_far_as_it_sees() -> None:
+    friction = Candidate(id="ground-friction", kind="physics", family="", search={"coefficient": Search(0.1, 0.6)})
+    judge = Judge([evidence(0.9, cfc=60)])
+    base = judge.fit((friction,), (0.2,), rounds=0, width=1)
+    assert base is not None
+    near, seen = judge.beginning(base)
+    simulator = judge.evidence[0].simulator
+    assert isinstance(simulator, RunSimulator)
+    made = simulator.runs
+    own = near.again(base)
+    assert simulator.runs > made  # which it did without
+    assert seen.x == base.x
+    for block, other in zip(seen.blocks, own.blocks, strict=True):
+        np.testing.assert_array_equal(block.residual, other.residual)
+        np.testing.assert_allclose(block.J, other.J, rtol=1e-6, atol=1e-6 * float(np.abs(other.J).max()))
+    short = Judge([up_to(judge.evidence[0], BLOW + 0.1) or judge.evidence[0]])
+    assert short.beginning(base) == (short, base)
 
 
 def test_looks_and_first_fits_are_made_soon_after_the_blow_and_fits_of_all(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,6 +14,7 @@ from rollover.diagnosis import endings
 from rollover.diagnosis.blocks import Block
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.crew import Job
+from rollover.diagnosis.effort import DROPS
 from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Fitted
 from rollover.diagnosis.inquiry import Inquiry
@@ -241,7 +242,7 @@ def test_of_two_thresholds_either_may_be_the_one_that_is_a_stiffness(family: str
     def fits(jobs: Sequence[Job]) -> list[Fitted | None]:
         return [left(j.candidates, j.start, 6.0 if j.candidates[0] == crust else 90.0) for j in jobs]
 
-    judge = SimpleNamespace(fit=lambda c, x, **_: left(c, x, 400.0))
+    judge = SimpleNamespace(fit=lambda c, x, **_: left(c, x, 400.0), effort=DROPS)
     there = cast(Inquiry, SimpleNamespace(fits=fits, candidates=[layer, crust, plain], judge=judge))
     found = endings.plainer(there, step(left((layer, crust), (0.4, 0.5, 0.3, 0.6), 5.0)))
     assert (found is not None) is taken

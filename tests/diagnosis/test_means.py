@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from rollover.diagnosis import settle
+from rollover.diagnosis.blocks import Block
 from rollover.diagnosis.explain import Step
 from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.settle import settled
-from tests.diagnosis.test_slopes import CHANNEL, SLOPE, TIME, Scattering, evidence
+from tests.diagnosis.test_slopes import CHANNEL, MASS, SLOPE, TIME, Scattering, evidence
 
 
 def test_an_explanation_that_is_far_from_the_mean_goes_more_than_one_step() -> None:
@@ -70,11 +73,11 @@ def steps(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     return made
 
 
-@pytest.mark.parametrize(("missing", "least"), [(0.0, 2), (2.0, 1), (20.0, 0)])
+@pytest.mark.parametrize(("missing", "least"), [(0.0, 2), (1.0, 1), (4.0, 0)])
 def test_an_explanation_that_is_not_the_whole_is_not_moved_for_little(
     missing: float, least: int, steps: list[Any]
 ) -> None:
-    """Begun 0.02 off: (0.4/2)^2 of what 2 cos(400 t) beside it leaves, (0.4/20)^2 of what 20 do."""
+    """Begun 0.02 off: (0.4/1)^2 of what cos(400 t) beside it leaves, (0.4/4)^2 of what four times that does."""
     judge, off = begun_at(0.58, 12.0 * np.sin(30.0 * TIME) + missing * np.cos(400.0 * TIME))
     found = settled(judge, off).fitted.x
     assert len(steps) >= least if least else (len(steps), found) == (0, (0.58,))
@@ -95,3 +98,46 @@ def test_slopes_are_told_anew_beyond_the_step_over_which_they_were_told(
     assert round(found.x[0] + judge.effort.fine, 9) in asked  # what it ends with are its own
     for block, other in zip(found.blocks, judge.again(found).blocks, strict=True):
         np.testing.assert_array_equal(block.J, other.J)
+
+
+@pytest.mark.parametrize(
+    ("lefts", "found"),
+    [
+        ((99.0,), 0.6),
+        ((105.0, 98.0, 200.0), 0.6),  # within what one run and another differ by
+        ((120.0, 98.0, 200.0), 0.55),
+        ((120.0, 140.0, 98.0), 0.65),
+        ((120.0, 110.0, 101.0), None),
+    ],
+)
+def test_the_whole_way_is_gone_unless_a_share_of_it_leaves_clearly_less(
+    lefts: tuple[float, ...], found: float | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Begun where 100 are left; shares are tried only where the whole way leaves more than that."""
+    asked: list[float] = []
+    announced: list[float] = []
+
+    def met(_: Any, __: Any, x: Any, shifts: Any) -> Any:
+        asked.append(round(x[0], 9))
+        return lefts[len(asked) - 1], [s + 1.0 for s in shifts]
+
+    monkeypatch.setattr(settle, "_met", met)
+    judge: Any = SimpleNamespace(made_ahead=lambda points: announced.extend(round(x[0], 9) for _, _, x in points))
+    block = Block(residual=np.full(4, 5.0), J=np.zeros((4, 1)), slope=np.zeros(4), shift=0.0, prior=1.0)
+    old = Fitted(candidates=(SLOPE,), x=(0.5,), blocks=(block,))
+    there = settle._onward(judge, old, np.array([0.1]))
+    assert asked == announced == [0.6, 0.55, 0.65][: len(lefts)]
+    assert there == (None if found is None else ([pytest.approx(found)], [1.0]))
+
+
+def test_rivals_of_an_explanation_are_not_run_once_more_where_it_settles() -> None:
+    judge, off = begun_at(0.58, 12.0 * np.sin(30.0 * TIME))
+    rival = judge.fit((MASS,), (0.3,), rounds=0)
+    assert rival is not None
+    assert all(e.signals[0].weight is None for e in judge.evidence)
+    found = settled(judge, replace(off, rivals=(off.fitted, rival)))
+    assert found.fitted.x[0] == pytest.approx(0.6, abs=2e-3)
+    assert found.rivals[0] is found.fitted
+    assert found.rivals[1] is rival
+    assert all(e.signals[0].weight is not None for e in judge.evidence)  # what it stands beside is held under that
+    np.testing.assert_array_equal(found.base.blocks[0].residual, judge.again(off.base).blocks[0].residual)

@@ -72,33 +72,65 @@ def test_beside_effects_in_another_form_the_last_one_is_looked_for_anew(
 
 
 @pytest.mark.parametrize(
-    ("effort", "beside", "fitted_again"),
-    [(RUNS, ("soil-layer", ("a",)), [0]), (RUNS, LAYER, [0, 1]), (DROPS, ("soil-layer", ("a",)), [0, 1])],
+    ("effort", "beside", "surely", "fitted_again"),
+    [
+        (RUNS, ("soil-layer", ("a",)), set(), [0]),
+        (RUNS, LAYER, set(), [0, 1]),
+        (RUNS, LAYER, {0}, [1]),
+        (RUNS, LAYER, {0, 1}, []),
+        (DROPS, ("soil-layer", ("a",)), {0, 1}, [0, 1]),
+    ],
 )
-def test_of_full_runs_the_fit_without_the_last_effect_is_the_one_beside_which_it_was_found(
-    monkeypatch: pytest.MonkeyPatch, effort: Effort, beside: Any, fitted_again: list[int]
+def test_of_full_runs_what_is_surely_there_is_not_tried_without_and_the_fit_without_the_last_is_known(
+    monkeypatch: pytest.MonkeyPatch, effort: Effort, beside: Any, surely: set[int], fitted_again: list[int]
 ) -> None:
-    """Without either 9 per sample more is left: both are needed, and without the first most is left."""
-
-    def left(fitted: Fitted, much: float) -> Fitted:
-        block = Block(residual=np.full(4, much), J=np.zeros((4, 0)), slope=np.zeros(4), shift=0.0, prior=1.0)
-        return replace(fitted, blocks=(block,))
-
+    """Without either 9 per sample more is left: both are needed."""
     asked: list[int] = []
 
-    def without(_: Any, fitted: Fitted, k: int, rounds: int = 0) -> Fitted:
+    def without(_: Any, fitted: Fitted, k: int, *, bare: bool = False) -> Fitted:
         asked.append(k)
+        assert bare == effort.thrifty
         return left(of(CRUST), 9.0 - k)
 
     monkeypatch.setattr(selection, "without", without)
-    layer = ("soil-layer", ("a",))
-    base, held = left(of(beside), 8.0), left(of(layer, CRUST), 1.0)
+    monkeypatch.setattr(selection, "surely_there", lambda *_: surely)
+    base, held = left(of(beside), 8.0), left(of(("soil-layer", ("a",)), CRUST), 1.0)
     judge = cast(Any, SimpleNamespace(again=lambda f: f, effort=effort))
     assert selection.without_needless(judge, held, base) is held
     assert asked == fitted_again
-    asked.clear()
-    assert selection.strongest(judge, left(of(), 9.0), held, base).id == "soil-layer"
-    assert asked == fitted_again
+
+
+def left(fitted: Fitted, much: float) -> Fitted:
+    """A fit that leaves so much of each of four samples."""
+    block = Block(residual=np.full(4, much), J=np.zeros((4, 0)), slope=np.zeros(4), shift=0.0, prior=1.0)
+    return replace(fitted, blocks=(block,))
+
+
+@pytest.mark.parametrize("effort", [RUNS, DROPS])
+def test_the_strongest_is_that_without_which_most_is_left(monkeypatch: pytest.MonkeyPatch, effort: Effort) -> None:
+    """Of drops with the other fitted again, of full runs as it stands."""
+    asked: list[tuple[list[str], list[float]]] = []
+
+    def left_at(_: Any, candidates: Any, x: Any, shifts: Any) -> float | None:
+        asked.append(([c.id for c in candidates], x))
+        assert shifts == [0.0]
+        return {"soil-layer": 3.0, "soil-crust": None}[candidates[0].id]  # without the layer no run is to be had
+
+    monkeypatch.setattr(selection, "left_at", left_at)
+    monkeypatch.setattr(selection, "without", lambda _, f, k, rounds: left(of(CRUST), 2.0 - k))
+    judge = cast(Any, SimpleNamespace(effort=effort))
+    held = replace(left(of(LAYER, CRUST), 1.0), x=(0.1, 0.2, 0.3, 0.4))
+    assert selection.strongest(judge, left(of(), 9.0), held).id == "soil-layer"
+    assert asked == ([(["soil-crust"], [0.3, 0.4]), (["soil-layer"], [0.1, 0.2])] if effort.thrifty else [])
+
+
+def test_what_is_not_needed_goes_and_the_rest_has_slopes_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    rest, again = left(of(LAYER), 1.0), left(of(LAYER), 1.0)
+    monkeypatch.setattr(selection, "without", lambda *_, **__: rest)
+    monkeypatch.setattr(selection, "surely_there", lambda *_: {0})
+    for effort, found in ((RUNS, again), (DROPS, rest)):
+        judge = cast(Any, SimpleNamespace(again=lambda f: again if f is rest else f, effort=effort))
+        assert selection.without_needless(judge, left(of(LAYER, CRUST), 1.0)) is found
 
 
 MASS, SPEED, RATE, DRAG = ((i, ("a",)) for i in ("mass", "impact-speed", "soil-rate-hardening", "soil-inertial-drag"))

@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from rollover import simulate
-from rollover.diagnosis import overturn
+from rollover.diagnosis import overturn, simulations
 from rollover.diagnosis.evidence import evidence_of
+from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.overturn import RunSimulator, phases_of
 from rollover.diagnosis.phases import phases_of as phases
+from rollover.diagnosis.settle import left_of_means, rescattered
 from rollover.diagnosis.simulator import DropSimulator, simulator_of
 from rollover.execute import Children
 from rollover.filters import filtered
@@ -214,6 +216,42 @@ def test_all_neighbours_may_be_run_in_shorter_steps() -> None:
     assert steps == {own / 4}
     steps = {simulator.scenario.replaced(simulator._beside(n)).simulation.step for n in overturn.NEIGHBOURS}
     assert steps == {own / n.parts for n in overturn.NEIGHBOURS}
+
+
+@pytest.mark.parametrize("parts", [1, 4])
+def test_runs_that_scatter_is_told_by_are_made_at_once_for_all_recordings_the_longest_first(
+    parts: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All that `strays` asks for; a drop has none."""
+    drop = DropSimulator(shipped("drop_test"), recording("ground/sinkage"))
+    runs = [RunSimulator(toss(), recording(Z, until=until)) for until in (0.1, 0.2)]
+    changes = {FRICTION: 0.3}
+    wanted = overturn.neighbours_of([runs[0], drop, runs[1]], changes, parts)
+    steps = [toss().replaced(dict(one)).simulation.step for _, one in wanted]
+    assert steps == sorted(steps)
+    asked: list[tuple[Any, Mapping[str, Any]]] = []
+    monkeypatch.setattr(RunSimulator, "predict", lambda own, values, _: asked.append((own, values)) or {})
+    for own in runs:
+        own.strays(changes, parts=parts)
+    assert len(wanted) == len(asked) == 2 * (1 + len(overturn.NEIGHBOURS))
+    assert all(any(own is other and one == values for other, one in wanted) for own, values in asked)
+
+
+def test_scatter_is_asked_for_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[int] = []
+    monkeypatch.setattr(simulations, "made_ahead", lambda _, wanted: made.append(len(list(wanted))))
+    empty = recording(Z, until=0.5)
+    made_of = replace(empty, channels={Z: np.interp(empty.time, run().time, run()[Z])})
+    own = RunSimulator(toss(), made_of)
+    found = evidence_of("toss", made_of, own)
+    assert found is not None
+    judge = Judge([found])
+    nothing = judge.fit((), (), rounds=0)
+    assert nothing is not None
+    made.clear()
+    rescattered(judge, nothing, 4)
+    left_of_means(judge, nothing)
+    assert [n for n in made if n > 1] == 2 * [1 + len(overturn.NEIGHBOURS)]
 
 
 def test_the_motion_is_told_though_it_was_not_recorded() -> None:

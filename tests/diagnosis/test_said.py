@@ -148,14 +148,13 @@ def test_an_effect_that_is_named_is_no_look_alike_of_another(monkeypatch: pytest
     found: Any = SimpleNamespace(
         fitted=both,
         base=None,
-        parts=[SimpleNamespace(base=f"beside {i}", fitted=fit(i), p_value=0.0) for i in ("soil-stiffness", "inertia")],
+        parts=[SimpleNamespace(fitted=fit(i), p_value=0.0) for i in ("soil-stiffness", "inertia")],
     )
     monkeypatch.setattr(statements, "in_shorter_steps", lambda _, fitted: fitted)
     monkeypatch.setattr(statements, "intervals", lambda *_, **__: told)
     monkeypatch.setattr(statements, "confusion", lambda *_: [fit("soil-stiffness"), fit("inertia"), fit("soil-crust")])
-    known = (None, both, "beside inertia")
     monkeypatch.setattr(
-        statements, "strongest", lambda *given: one("soil-stiffness" if given[1:] == known else "inertia")
+        statements, "strongest", lambda *given: one("soil-stiffness" if given[1:] == (None, both) else "inertia")
     )
     each = statements.named(judge, found, ())
     assert [e.id for e in each] == ["soil-stiffness", "inertia"]

@@ -1,0 +1,197 @@
+"""Slopes that need no runs of their own: lent by a fit of fewer effects, kept where they foretold well."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis.crew import Crew, Job
+from rollover.diagnosis.effort import DROPS, RUNS
+from rollover.diagnosis.explain import lent_by
+from rollover.diagnosis.fit import Fitted, Judge
+from rollover.diagnosis.refine import without
+from tests.diagnosis.test_slopes import CHANNEL, MASS, SIGMA, SLOPE, TIME, Late, evidence
+
+Place = tuple[float, float]
+WAVES = np.sin(30.0 * TIME), np.cos(70.0 * TIME)
+
+
+class Bent(Late):
+    """y = 40 (x + bend x^2) sin(30 t) + 40 o cos(70 t); `asked` are the (x, o) of its runs, in their order."""
+
+    def __init__(self, bend: float) -> None:
+        self.bend, self.asked = bend, dict[Place, None]()
+
+    def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+        x, o = (float(changes.get(f"effects.{name}", 0.0)) for name in ("slope.angle", "mass.added"))
+        self.asked[round(x, 9), round(o, 9)] = None
+        return {CHANNEL: 40.0 * (x + self.bend * x**2) * WAVES[0] + 40.0 * o * WAVES[1]}
+
+
+def judge_of(x: float, o: float, bend: float = 0.0, effort: Any = RUNS) -> tuple[Judge, Bent]:
+    runs = Bent(bend)
+    values = runs.predict({"effects.slope.angle": x, "effects.mass.added": o}, 0.0)[CHANNEL]
+    runs.asked.clear()
+    return Judge([evidence(values, runs, effort)]), runs
+
+
+def beside(runs: Bent, at: Place) -> set[Place]:
+    """Runs to either side of a place, of those that a slope asks for where a fit ends."""
+    x, o = at
+    sides = {(x - RUNS.fine, o), (x + RUNS.fine, o), (x, o - RUNS.fine), (x, o + RUNS.fine)}
+    return {(round(a, 9), round(b, 9)) for a, b in sides} & set(runs.asked)
+
+
+def base_at(judge: Judge, x: float) -> Fitted:
+    found = judge.fit((SLOPE,), (x,), rounds=0, width=1)
+    assert found is not None
+    return found
+
+
+def fitted(judge: Judge, start: Place, base: Fitted | None) -> Fitted:
+    lent = None if base is None else lent_by(judge, base)
+    found = judge.fit((SLOPE, MASS), start, width=1, lent=lent)
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("is_lent", [True, False])
+def test_a_fit_beside_what_is_held_begins_with_the_slopes_of_that_and_ends_with_its_own(is_lent: bool) -> None:
+    judge, runs = judge_of(0.5, 0.6, bend=0.5)
+    base = base_at(judge, 0.45)
+    runs.asked.clear()
+    found = fitted(judge, (0.45, 0.2), base if is_lent else None)
+    first = [at for at in runs.asked if at[1] == 0.2]
+    assert set(first) == {(0.45, 0.2), *(() if is_lent else ((0.42, 0.2), (0.48, 0.2)))}
+    assert found.x == pytest.approx((0.5, 0.6), abs=1e-3)
+    other = judge.again(found)
+    for block, own in zip(found.blocks, other.blocks, strict=True):
+        np.testing.assert_allclose(block.J, own.J, rtol=0.05, atol=1e-6 * float(np.abs(own.J).max()))
+
+
+def test_slopes_of_another_place_are_no_reason_to_end() -> None:
+    """Those lent have the wrong sign: every way that they point leaves more, and a fit's own lead on."""
+    judge, _ = judge_of(0.5, 0.6)
+    base = base_at(judge, 0.3)
+    turned = replace(base, blocks=tuple(replace(b, J=-b.J) for b in base.blocks))
+    assert fitted(judge, (0.3, 0.6), turned).x == pytest.approx((0.5, 0.6), abs=1e-3)
+
+
+@pytest.mark.parametrize(("bend", "bare", "told"), [(0.0, True, 1), (4.0, True, 2), (0.0, False, 2)])
+def test_a_short_fit_keeps_slopes_that_foretold_well(bend: float, bare: bool, told: int) -> None:
+    """Of what is straight the first step leaves next to nothing; bent, it goes half as far again as it should."""
+    judge, runs = judge_of(0.5, 0.6, bend)
+    found = judge.fit((MASS, SLOPE), (0.2, 0.2), width=1, rounds=2, bare=bare)
+    assert found is not None
+    places = [at for at in runs.asked if len({x for x, o in beside(runs, at) if o == at[1]}) == 2]
+    assert places[0] == (0.2, 0.2)
+    assert len(places) >= told if not bare else len(places) == told
+
+
+@pytest.mark.parametrize("is_beside", [True, False])
+def test_a_fit_ends_with_the_slopes_of_a_place_beside_it(is_beside: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Slopes lent are twice too steep: half the way gains three quarters of 4.7, less than goes on, so all are told.
+
+    The step that these lead to ends 2e-5 further on.
+    """
+    judge, runs = judge_of(0.5, 0.6)
+    at = 0.5 - float(np.sqrt(4.7)) / float(np.linalg.norm(40.0 * WAVES[0] / SIGMA))
+    base = base_at(judge, at)
+    steep = replace(base, blocks=tuple(replace(b, J=2.0 * b.J) for b in base.blocks))
+    if not is_beside:
+        monkeypatch.setattr(Judge, "is_beside", lambda *_: False)
+    found = fitted(judge, (at, 0.6), steep)
+    assert found.x == pytest.approx((0.5, 0.6), abs=1e-6)
+    told = [place for place in runs.asked if len(beside(runs, place)) == 4]
+    assert len(told) == (1 if is_beside else 2)
+    assert all(b.J.any(axis=0).all() for b in found.blocks)
+
+
+def test_rounds_that_are_too_few_end_with_slopes_of_their_own_too() -> None:
+    judge, runs = judge_of(0.5, 0.6)
+    lent = lent_by(judge, base_at(judge, 0.2))
+    found = judge.fit((SLOPE, MASS), (0.2, 0.2), width=1, rounds=1, lent=lent)
+    assert found is not None
+    x, o = found.x
+    assert len(beside(runs, (round(x, 9), round(o, 9)))) == 4
+
+
+@pytest.mark.parametrize(("effort", "is_lent"), [(RUNS, True), (DROPS, False)])
+def test_what_is_fitted_without_an_effect_begins_with_the_slopes_of_the_others(effort: Any, is_lent: bool) -> None:
+    judge, runs = judge_of(0.5, 0.6, effort=effort)
+    whole = judge.fit((SLOPE, MASS), (0.5, 0.6))
+    assert whole is not None
+    runs.asked.clear()
+    rest = without(judge, whole, 1, bare=True)
+    assert rest is not None
+    assert rest.candidates == (SLOPE,)
+    assert all(o == 0.0 for _, o in runs.asked)
+    steps = [effort.nudges[0], effort.nudges[0] + RUNS.nudges[0]]
+    assert any((round(0.5 - step, 9), 0.0) in runs.asked for step in steps) != is_lent
+    assert not any(b.J.any() for b in rest.blocks)
+
+
+def test_slopes_are_lent_where_they_cost_runs_alone() -> None:
+    judge, _ = judge_of(0.5, 0.6)
+    base = base_at(judge, 0.45)
+    lent = lent_by(judge, base, [0])
+    assert lent is not None
+    np.testing.assert_array_equal(lent[0], base.blocks[0].J)
+    nothing = judge.fit((), ())
+    assert nothing is not None
+    assert lent_by(judge, nothing) is None
+    cheap, _ = judge_of(0.5, 0.6, effort=DROPS)
+    assert lent_by(cheap, base_at(cheap, 0.45)) is None
+
+
+def test_a_job_with_other_slopes_is_another_job() -> None:
+    job = Job(candidates=(SLOPE, MASS), start=(0.45, 0.2), shifts=(0.0,), width=1)
+    lent = [replace(job, lent=(np.full((3, 1), slope),)) for slope in (1.0, 1.0, 2.0)]
+    keys = [one.key("") for one in (job, *lent)]
+    assert keys[1] == keys[2]
+    assert len(set(keys)) == 3
+
+
+def test_a_job_asks_for_no_runs_beside_what_is_lent(monkeypatch: pytest.MonkeyPatch) -> None:
+    judge, _ = judge_of(0.5, 0.6)
+    base = base_at(judge, 0.45)
+    wanted: list[tuple[float, ...]] = []
+    monkeypatch.setattr(Judge, "made_ahead", lambda _, points: wanted.extend(tuple(x) for _, _, x in points))
+    monkeypatch.setattr(Judge, "fit", lambda *_, **told: wanted.append(told["lent"][0].shape))
+    with Crew() as crew:
+        job = Job(candidates=(SLOPE, MASS), start=(0.45, 0.2), shifts=(0.0,), width=1, lent=lent_by(judge, base))
+        crew.fits(judge, [job])
+    assert wanted[-1] == (TIME.size, 1)
+    assert [tuple(round(v, 9) for v in x) for x in wanted[:-1]] == [(0.45, 0.2), (0.45, 0.17), (0.45, 0.23)]
+
+
+def test_a_short_fit_that_is_taken_up_again_has_no_slopes_either(tmp_path: Path) -> None:
+    job = Job(candidates=(SLOPE, MASS), start=(0.45, 0.2), shifts=(0.0,), rounds=2)
+    found = []
+    for _ in range(2):
+        judge, runs = judge_of(0.5, 0.6, bend=0.5)
+        with Crew(notebook=tmp_path / "fits") as crew:
+            (fit,) = crew.fits(judge, [job])
+        assert fit is not None
+        found.append((fit.x, fit.total, fit.blocks[0].J.any()))
+        asked = len(runs.asked)
+    assert found[0] == found[1]
+    assert not found[0][2]
+    assert asked == 1
+
+
+def test_what_counts_otherwise_has_the_slopes_that_it_had() -> None:
+    judge, runs = judge_of(0.5, 0.6, bend=0.5)
+    base = base_at(judge, 0.45)
+    runs.asked.clear()
+    judge.straying = False
+    found = judge.recounted(base)
+    assert not found.blocks[0].forgiven
+    np.testing.assert_array_equal(found.blocks[0].J, base.blocks[0].J)
+    np.testing.assert_array_equal(found.blocks[0].residual, base.blocks[0].residual)
+    assert set(runs.asked) <= {(0.45, 0.0)}  # no place beside it
