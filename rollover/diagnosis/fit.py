@@ -267,7 +267,7 @@ class Judge(Simulations):
         blocks: list[Block] = [b for b in found if b is not None]
         best, damping = total_of(blocks), 1e-3
         borrowed = lent is not None  # whether slopes are those of another place
-        told = x if not borrowed and nudges[width] == self.effort.fine else None  # where all were last worked out
+        told = x  # where all were last worked out
         for turn in range(rounds):
             A, b = np.zeros((len(x), len(x))), np.zeros(len(x))
             for block in blocks:
@@ -324,7 +324,7 @@ class Judge(Simulations):
             if last and self.effort.thrifty and told is not None and self.is_beside(x, told):
                 kept = len(x)
             elif anew and not is_bare:
-                told = x if nudge == self.effort.fine else None
+                told = x
             borrowed = self.effort.thrifty and ((borrowed and not anew) or 0 < kept == len(x))
             if not is_bare:
                 self.made_beside(use, candidates, x, shifts, nudge, kept)

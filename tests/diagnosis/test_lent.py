@@ -14,7 +14,9 @@ from rollover.diagnosis.crew import Crew, Job
 from rollover.diagnosis.effort import DROPS, RUNS
 from rollover.diagnosis.explain import lent_by
 from rollover.diagnosis.fit import Fitted, Judge
+from rollover.diagnosis.looks import look
 from rollover.diagnosis.refine import without
+from tests.diagnosis.test_looks import judge_of as looks_of
 from tests.diagnosis.test_slopes import CHANNEL, MASS, SIGMA, SLOPE, TIME, Late, evidence
 
 Place = tuple[float, float]
@@ -186,12 +188,34 @@ def test_a_short_fit_that_is_taken_up_again_has_no_slopes_either(tmp_path: Path)
 
 
 def test_what_counts_otherwise_has_the_slopes_that_it_had() -> None:
-    judge, runs = judge_of(0.5, 0.6, bend=0.5)
+    judge, _ = judge_of(0.5, 0.6, bend=0.5)
     base = base_at(judge, 0.45)
-    runs.asked.clear()
+    steep = replace(base, blocks=tuple(replace(b, J=2.0 * b.J) for b in base.blocks))
     judge.straying = False
-    found = judge.recounted(base)
+    found = judge.recounted(steep)
     assert not found.blocks[0].forgiven
-    np.testing.assert_array_equal(found.blocks[0].J, base.blocks[0].J)
+    np.testing.assert_array_equal(found.blocks[0].J, steep.blocks[0].J)
     np.testing.assert_array_equal(found.blocks[0].residual, base.blocks[0].residual)
-    assert set(runs.asked) <= {(0.45, 0.0)}  # no place beside it
+
+
+def test_no_run_is_announced_beside_what_is_lent(monkeypatch: pytest.MonkeyPatch) -> None:
+    judge, _ = judge_of(0.5, 0.6)
+    lent, wanted = lent_by(judge, base_at(judge, 0.45)), list[Place]()
+    monkeypatch.setattr(
+        Judge, "made_ahead", lambda _, points: wanted.extend((round(x[0], 9), round(x[1], 9)) for _, _, x in points)
+    )
+    judge.fit((SLOPE, MASS), (0.45, 0.2), width=1, rounds=1, bare=True, lent=lent)
+    assert wanted[:3] == [(0.45, 0.2), (0.45, 0.17), (0.45, 0.23)]
+    assert not {(0.42, 0.2), (0.48, 0.2)} & set(wanted)
+
+
+def test_a_look_that_forgives_other_courses_has_the_slopes_of_one_that_does_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    judge, base = looks_of((0.0,) * 4, (0.0,) * 4)
+    judge.straying = False
+    recounted, asked = Judge.recounted, list[bool]()
+    monkeypatch.setattr(Judge, "again", lambda *_: pytest.fail("slopes cost runs"))
+    monkeypatch.setattr(Judge, "recounted", lambda own, f: (asked.append(own.straying), recounted(own, f))[1])
+    look(judge, base, [SLOPE], [[r] for r in range(4)])
+    assert asked == [True]
