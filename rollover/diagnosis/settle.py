@@ -80,8 +80,7 @@ def _weighed_anew(judge: Judge, fitted: Fitted) -> Fitted:
 def in_shorter_steps(judge: Judge, fitted: Fitted) -> Fitted:
     """A fit moved to where the mean of its neighbours in shorter steps is met best, under their scatter.
 
-    As it was where runs do not scatter, and as far as it came where nothing can be simulated further on. Within the
-    step over which slopes were told one look at them is enough: each costs as many runs as `PARTS` of others.
+    As it was where runs do not scatter, and as far as it came where nothing can be simulated further on.
     """
     if not any(e.strays for e in judge.evidence):
         return fitted
@@ -91,10 +90,7 @@ def in_shorter_steps(judge: Judge, fitted: Fitted) -> Fitted:
         dx = np.clip(step_of_means(judge.evidence, here.blocks), -FARTHEST, FARTHEST)
         if promised(here.blocks, dx) < WORTH:
             break
-        place = _moved(here, dx)
-        if judge.is_beside(place[0], slopes.x):
-            return _by_slopes_of(judge, here, *place) or here  # runs there scatter as they do here
-        there = _scattered_at(judge, slopes, *place, PARTS)
+        there = _scattered_at(judge, slopes, *_moved(here, dx), PARTS)
         if there is None:
             break
         here, slopes = there

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from types import SimpleNamespace
@@ -256,26 +255,6 @@ class Stepped(Rough):
 
 
 LAG = 0.06
-
-
-@pytest.mark.parametrize(("lag", "looks"), [(0.02, 1), (0.06, 2)])
-def test_of_a_short_way_one_look_at_shorter_steps_is_enough(
-    lag: float, looks: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Three quarters of the lag to go, and slopes told over 0.03 of a coordinate."""
-    monkeypatch.setattr(sys.modules[__name__], "LAG", lag)
-    every = [evidence(30 + r, 0.05, 8.0 * np.sin(30.0 * TIME)) for r in range(4)]
-    judge = Judge([replace(e, simulator=cast(Any, Stepped(30 + r, 0.05))) for r, e in enumerate(every)])
-    fitted = judge.fit((SLOPE,), (0.3,))
-    assert fitted is not None
-    asked: list[float] = []
-    scattered = settle.rescattered
-    monkeypatch.setattr(settle, "rescattered", lambda j, f, parts: (asked.append(f.x[0]), scattered(j, f, parts))[1])
-    fine = settle.in_shorter_steps(judge, fitted)
-    assert fine.x[0] == pytest.approx(0.4 - lag / settle.PARTS, abs=3e-3)
-    assert len(asked) == looks
-    assert (fine.x[0] in asked) == (looks > 1)
-    assert settle.step_of_means(judge.evidence, fine.blocks) == pytest.approx(0.0, abs=3e-3)
 
 
 @pytest.mark.parametrize("size", [0.05, 0.0])
