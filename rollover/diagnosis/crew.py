@@ -290,17 +290,8 @@ def _rebuilt(judge: Judge, job: Job, row: dict[str, Any] | None) -> Fitted | Non
         candidates[-1] = next(c for c in candidates[-1].forms() if c.form == row["form"])
     elif len(row["x"]) > len(job.start):
         candidates[-1] = candidates[-1].whole()
-    if job.how == "fit" and job.rounds is not None:  # it ended without slopes
-        found = [
-            judge.block(r, candidates, row["x"], s, 0.0) for r, s in zip(job.recordings, row["shifts"], strict=True)
-        ]
-        blocks = tuple(b for b in found if b is not None)
-        return (
-            Fitted(candidates=tuple(candidates), x=tuple(row["x"]), blocks=blocks)
-            if len(blocks) == len(found)
-            else None
-        )
-    return linearised(judge, candidates, row["x"], row["shifts"], job.recordings)
+    is_bare = job.how == "fit" and job.rounds is not None  # it ended without slopes
+    return linearised(judge, candidates, row["x"], row["shifts"], job.recordings, bare=is_bare)
 
 
 def linearised(
@@ -309,13 +300,20 @@ def linearised(
     x: Sequence[float],
     shifts: Sequence[float],
     recordings: Sequence[int] | None = None,
+    *,
+    bare: bool = False,
 ) -> Fitted | None:
-    """A fit to all recordings or some as it stands at x and these time shifts (s); None if nothing can be simulated."""
+    """A fit to all recordings or some as it stands at x and these time shifts (s); None if nothing can be simulated.
+
+    A `bare` one has no slopes.
+    """
     blocks: list[Block] = []
     use = range(len(shifts)) if recordings is None else recordings
-    judge.made_beside(use, candidates, x, shifts, judge.effort.fine)
+    nudge = 0.0 if bare else judge.effort.fine
+    if not bare:
+        judge.made_beside(use, candidates, x, shifts, nudge)
     for r, shift in zip(use, shifts, strict=True):
-        block = judge.block(r, candidates, x, shift, judge.effort.fine)
+        block = judge.block(r, candidates, x, shift, nudge)
         if block is None:
             return None
         blocks.append(block)

@@ -30,7 +30,6 @@ from rollover.diagnosis.lasting import (
     is_there,
     lasting,
     outlasts,
-    surely_there,
     unbent,
     unforgiven,
 )
@@ -330,17 +329,6 @@ def test_a_strength_that_is_not_told_from_none_is_no_effect(monkeypatch: pytest.
         alone = [{"coefficient": _from(low, high)}]
         monkeypatch.setattr(believed, "intervals", lambda *_, alone=alone: alone)
         assert is_there(judge, fitted) is there
-
-
-def test_what_is_surely_there_keeps_ten_times_its_interval_away_from_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    """2 +- 0.05 is 20 half intervals away from 1; what has no number for none is not told without a run."""
-    layer = candidate("soil-layer", "physics", "stiffness_ratio")
-    friction = candidate("ground-friction", "physics", "coefficient")  # what the scenario has is not said
-    fitted = Fitted(candidates=(layer, friction, layer), x=(0.5, 0.5, 0.5), blocks=())
-    found = [{"stiffness_ratio": _from(1.95, 2.05)}, {"coefficient": _from(1.95, 2.05)}]
-    found.append({"stiffness_ratio": _from(1.8, 2.2)})
-    monkeypatch.setattr(believed, "intervals", lambda _, f, sides: found if f is fitted and sides == {} else None)
-    assert surely_there(Judge([]), fitted) == {0}
 
 
 def _from(low: float, high: float) -> Interval:

@@ -70,7 +70,7 @@ def test_a_fit_beside_what_is_held_begins_with_the_slopes_of_that_and_ends_with_
     found = fitted(judge, (0.45, 0.2), base if is_lent else None)
     first = [at for at in runs.asked if at[1] == 0.2]
     assert set(first) == {(0.45, 0.2), *(() if is_lent else ((0.42, 0.2), (0.48, 0.2)))}
-    assert found.x == pytest.approx((0.5, 0.6), abs=1e-3)
+    assert found.x == pytest.approx((0.5, 0.6), abs=1e-4)  # 3e-5 leaves the gain of 4 at which a search ends
     other = judge.again(found)
     for block, own in zip(found.blocks, other.blocks, strict=True):
         np.testing.assert_allclose(block.J, own.J, rtol=0.05, atol=1e-6 * float(np.abs(own.J).max()))
@@ -81,7 +81,7 @@ def test_slopes_of_another_place_are_no_reason_to_end() -> None:
     judge, _ = judge_of(0.5, 0.6)
     base = base_at(judge, 0.3)
     turned = replace(base, blocks=tuple(replace(b, J=-b.J) for b in base.blocks))
-    assert fitted(judge, (0.3, 0.6), turned).x == pytest.approx((0.5, 0.6), abs=1e-3)
+    assert fitted(judge, (0.3, 0.6), turned).x == pytest.approx((0.5, 0.6), abs=1e-4)
 
 
 @pytest.mark.parametrize(("bend", "bare", "told"), [(0.0, True, 1), (4.0, True, 2), (0.0, False, 2)])
@@ -108,7 +108,7 @@ def test_a_fit_ends_with_the_slopes_of_a_place_beside_it(is_beside: bool, monkey
     if not is_beside:
         monkeypatch.setattr(Judge, "is_beside", lambda *_: False)
     found = fitted(judge, (at, 0.6), steep)
-    assert found.x == pytest.approx((0.5, 0.6), abs=1e-6)
+    assert found.x == pytest.approx((0.5, 0.6), abs=1e-6)  # a tenth of the last step
     told = [place for place in runs.asked if len(beside(runs, place)) == 4]
     assert len(told) == (1 if is_beside else 2)
     assert all(b.J.any(axis=0).all() for b in found.blocks)

@@ -9,14 +9,15 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis import selection
+from rollover.diagnosis import lasting, selection
 from rollover.diagnosis.blocks import Block
 from rollover.diagnosis.candidates import Candidate
 from rollover.diagnosis.effort import DROPS, RUNS, Effort
 from rollover.diagnosis.explain import Step
-from rollover.diagnosis.fit import Fitted
+from rollover.diagnosis.fit import Fitted, Judge
 from rollover.diagnosis.inquiry import Inquiry
 from rollover.diagnosis.selection import MOST
+from rollover.diagnosis.verdict import Interval
 from rollover.effects import Search
 
 
@@ -235,3 +236,18 @@ def test_what_ends_with_others_than_it_began_with_has_a_step_for_each(
     assert {c.id for c in parts[0].fitted.candidates} == {"soil-layer", "soil-stiffness"}
     assert [f.candidates[-1].id for f in parts[0].rivals] == rivals
     assert looked == ["soil-layer"]
+
+
+def test_what_is_surely_there_keeps_ten_times_its_interval_away_from_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """2 +- 0.05 is 20 half intervals away from 1; what has no number for none is not told without a run."""
+    layer = of(("soil-layer", ("stiffness_ratio",))).candidates[0]
+    friction = of(("ground-friction", ("coefficient",))).candidates[0]  # what the scenario has is not said
+    fitted = Fitted(candidates=(layer, friction, layer), x=(0.5, 0.5, 0.5), blocks=())
+    found = [{"stiffness_ratio": within(1.95, 2.05)}, {"coefficient": within(1.95, 2.05)}]
+    found.append({"stiffness_ratio": within(1.8, 2.2)})
+    monkeypatch.setattr(lasting, "intervals", lambda _, f, sides: found if f is fitted and sides == {} else None)
+    assert lasting.surely_there(Judge([]), fitted) == {0}
+
+
+def within(low: float, high: float) -> Interval:
+    return Interval(value=0.5 * (low + high), low=low, high=high, unit="1")
