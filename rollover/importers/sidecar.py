@@ -178,7 +178,7 @@ def read_described(path: Path, kind: type[Sidecar] | type[Profile]) -> Described
         if column is None:
             continue
         columns[name], lines[name] = column, node.key.line
-        if column.channel in first:
+        if column.channel in first and kind is Sidecar:  # a profile's columns may be stretches of one channel
             what = f"second column of {column.channel}, first {first[column.channel]!r}; one column a channel"
             faults += node.key.fault(f"channels.{name}", what).faults
         first.setdefault(column.channel, name)

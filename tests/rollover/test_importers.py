@@ -52,7 +52,7 @@ def test_csv_as_a_german_logger_writes_it(tmp_path: Path) -> None:
     assert found.time == pytest.approx(TIME, abs=1e-9)
     assert found["ground/force_normal"] == pytest.approx(1000.0 * (2.0 - FORCE), abs=1e-3)
     assert found.conditions == {"initiation.speed": 3.0}
-    assert found.notes == ("columns without a description, left out: Kürzel",)
+    assert found.notes == ("1 of 3 columns left out, without a description: Kürzel",)
 
 
 def test_a_profile_by_rate(tmp_path: Path) -> None:

@@ -56,7 +56,7 @@ def test_a_table_and_its_sidecar(tmp_path: Path) -> None:
         assert found.noise == {"ground/force_normal": pytest.approx(50.0)}
         assert found.cfc == {"striker/acceleration_z": 180}
         assert found.clock.zero == "known"
-        assert found.notes == ("columns without a description, left out: spare",)
+        assert found.notes == ("1 of 4 columns left out, without a description: spare",)
 
 
 def test_a_byte_order_mark_and_windows_lines(tmp_path: Path) -> None:
