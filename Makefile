@@ -1,19 +1,27 @@
 # make demo   a tractor tips over onto the ground array: loads in the terminal, recording in out/demo
-# make test   lint, types, import rules, tests
+# make test   lint, types, import rules, tests; first installs all optional packages that the tests use
 # Both set everything up in .venv first (Python >= 3.11 with pip is all they need).
 
 PYTHON ?= python3
 UV := $(shell command -v uv 2>/dev/null || echo .tools/bin/uv)
 READY := .venv/.ready
+TESTED := .venv/.tested
+GROUPS := --group formats --group oracle --group studies --group browser
+CORE := .venv/core
 
-.PHONY: demo test view setup lint bench clean
+.PHONY: demo test test-core view setup lint bench clean
 
 demo: setup
 	.venv/bin/rollover run side_overturn --out out/demo --force
 	@echo "Look at it with: .venv/bin/rollover view out/demo"
 
-test: setup lint
-	.venv/bin/pytest -n auto tests
+test: $(TESTED) lint test-core
+	.venv/bin/pytest -n auto --strict-skips tests
+
+# an environment without any optional package: what needs one says so in one line
+test-core: setup
+	UV_PROJECT_ENVIRONMENT=$(CORE) $(UV) sync --locked --quiet --python $(PYTHON)
+	$(CORE)/bin/pytest -q tests/core_only
 
 lint: setup
 	.venv/bin/ruff check .
@@ -36,6 +44,10 @@ $(READY): pyproject.toml uv.lock
 	@command -v $(UV) >/dev/null 2>&1 || $(PYTHON) -m pip install -q --disable-pip-version-check --root-user-action=ignore --target .tools 'uv==0.13.8'
 	$(UV) sync --locked --quiet --compile-bytecode --python $(PYTHON)
 	@touch $(READY)
+
+$(TESTED): $(READY)
+	$(UV) sync --locked --quiet --compile-bytecode --python $(PYTHON) $(GROUPS)
+	@touch $(TESTED)
 
 clean:
 	rm -rf .venv .tools out

@@ -14,6 +14,7 @@ import uuid
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
+from importlib.util import find_spec
 from multiprocessing.util import Finalize
 from typing import Any, TypeVar
 
@@ -165,10 +166,9 @@ def _let_go(token: str) -> None:
 
 @contextmanager
 def _client(address: str, workers: int | None) -> Iterator[Any]:
-    try:
-        from distributed import Client
-    except ImportError:
-        raise _missing("distributed", "cluster") from None
+    installed(address)
+    from distributed import Client
+
     cluster: Any = None
     try:
         if address == LOCAL:
@@ -214,10 +214,8 @@ def _local(workers: int | None) -> Any:
 
 
 def _slurm(workers: int | None) -> Any:
-    try:
-        from dask_jobqueue import SLURMCluster
-    except ImportError:
-        raise _missing("dask-jobqueue", "slurm") from None
+    from dask_jobqueue import SLURMCluster
+
     try:
         cluster = SLURMCluster()
     except ValueError as e:
@@ -227,7 +225,11 @@ def _slurm(workers: int | None) -> Any:
     return cluster
 
 
-def _missing(package: str, extra: str) -> InputError:
-    return InputError(
-        Fault(file="--scheduler", message=f"{package} is not installed; pip install 'rollover[{extra}]' brings it")
-    )
+def installed(address: str) -> None:
+    """Raise `InputError` with the cure where a package is missing that a scheduler at `address` needs."""
+    extra = "slurm" if address == SLURM else "cluster"
+    packages = {"distributed": "distributed", **({"dask-jobqueue": "dask_jobqueue"} if address == SLURM else {})}
+    for package, module in packages.items():
+        if find_spec(module) is None:
+            message = f"{package} is not installed; pip install 'rollover[{extra}]' brings it"
+            raise InputError(Fault(file="--scheduler", message=message))

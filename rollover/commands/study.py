@@ -49,7 +49,7 @@ def study(
 ) -> None:
     """Run what is missing of a study, then answer: quantiles, odds beyond a limit, sensitivities, the worst case."""
     from ground.compiled import is_warm
-    from rollover import console
+    from rollover import cluster, console
     from rollover import study as studies
     from rollover.study import reliability, shelf
     from rollover.study.answers import answers
@@ -59,6 +59,8 @@ def study(
     chosen = studies.load(path)
     if chosen.reliability is not None:
         reliability.installed()
+    if scheduler:
+        cluster.installed(scheduler)
     folder = out or Path("out", "study", path.stem)
     target = shelf.claim(folder, path.stem, force=force)
     way = Way(

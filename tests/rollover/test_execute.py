@@ -56,7 +56,7 @@ def test_what_goes_wrong_costs_one_case() -> None:
     assert "in odd" in found[1].failure.detail  # type: ignore[union-attr]
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="no limit of the address space")
+@pytest.mark.skipif(sys.platform == "win32", reason="platform: no limit of the address space")
 def test_memory_beyond_the_limit_is_a_failure_and_the_child_goes_on() -> None:
     found = {o.index: o for o in map_cases(odd, [2, "eat", 3], workers=1, memory_limit=1e9)}
     assert found[1].failure is not None
@@ -77,7 +77,7 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs /proc")
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="platform: needs /proc")
 def test_a_case_that_hangs_ends_with_its_parent(tmp_path: Path) -> None:
     script, told = tmp_path / "orphan.py", tmp_path / "pid"
     script.write_text(ORPHAN)
@@ -109,7 +109,7 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.skipif("forkserver" not in multiprocessing.get_all_start_methods(), reason="children are not forked here")
+@pytest.mark.skipif("forkserver" not in multiprocessing.get_all_start_methods(), reason="platform: no forked children")
 @pytest.mark.parametrize(("folder", "has"), [("", True), ("deep/" * 20, False)])
 def test_children_have_what_their_server_imported_beside(tmp_path: Path, folder: str, has: bool) -> None:
     """The first call alone counts, and the environment is as it was; a socket has no place at so long a path."""

@@ -25,7 +25,7 @@ from rollover.study import shelf
 from rollover.study.conduct import Way, conduct
 from tests.rollover.studies import EFFECTS, ROOT, faulty
 
-pytestmark = pytest.mark.skipif(not hasattr(os, "killpg"), reason="needs process groups")
+pytestmark = pytest.mark.skipif(not hasattr(os, "killpg"), reason="platform: needs process groups")
 
 FAULTS = {7: 1, 23: 2, 31: 3, 52: 4}  # point -> abort, hang, memory, raise
 LIMIT = 12  # s for a case

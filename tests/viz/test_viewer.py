@@ -13,7 +13,7 @@ import pytest
 
 from viz import viewer
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the stand-in is a shell script")
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="platform: the stand-in is a shell script")
 
 
 def stand_in(folder: Path, status: int) -> Path:
