@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from rollover import channels as table
 from rollover import document
 from rollover import scenario as scenarios
 from rollover.effects import effects as known_effects
-from rollover.faults import InputError
+from rollover.faults import Fault, InputError
 from rollover.rops import Rops
 from rollover.vehicle import Vehicle, pitch_inertia
 
@@ -140,8 +140,20 @@ def check(name: str) -> str:
         if meant:
             document.load(path, annotation)
             return what
+    if kind is None and not set(keys) & set(document.slot_of(scenarios.Scenario).keys()) - {"title"}:
+        raise InputError(Fault(file=str(path), line=1, path="kind", message=_which_kind(keys)))
     scenarios.load(path)
     return "scenario"
+
+
+def _which_kind(keys: Iterable[str]) -> str:
+    """Ask what a file without a `kind` is; the kind whose keys it has most of comes first."""
+    slots = {"a vehicle": document.slot_of(scenarios.AnyVehicle), "a soil": document.slot_of(scenarios.AnyLaw)}
+    found = {
+        f"{kind} ({what})": len(set(keys) & set(slot.keys(kind))) for what, slot in slots.items() for kind in slot.kinds
+    }
+    words = ", ".join(sorted(found, key=lambda word: -found[word]))
+    return f"missing, got {', '.join(keys) or 'nothing'}; {words}, or `vehicle`, `ground` ... of a scenario, are needed"
 
 
 def _found(name: str) -> Path:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,11 +10,12 @@ import numpy as np
 
 from rollover.document.slot import Slot
 from rollover.document.tree import Node, planted, read, shown
-from rollover.faults import Fault, InputError, nearest
+from rollover.faults import Fault, InputError, hint, nearest
 
 BASE = "base"
 ENDINGS = (".yaml", ".yml")
 GRIDS = (".csv", ".npy")
+SHELVES = ("", "vehicles", "soils")  # of shipped files, whose names without an ending may be used anywhere
 MOST_NODES = 500_000
 
 
@@ -55,18 +56,18 @@ def headings(path: Path) -> dict[str, Node]:
         base = below.get(BASE)
         if base is None or not isinstance(base.value, str):
             break
-        folders = (base.place.folder, shipped_folder())
-        path = next((f / base.value for f in folders if (f / base.value).is_file()), path)
+        path = _file(base) or path
     return found
 
 
 def expand(node: Node, slot: Slot, chain: tuple[Path, ...], path: str = "", under: Node | None = None) -> Node:
     """Put the content of files in the place of their names, and lay mappings over what they are based on.
 
-    `under` is what the node is laid over, key by key; a file name, a list and a different `kind` replace it whole.
-    `chain` holds the files that are being read, to find one that includes itself.
+    `under` is what the node is laid over, key by key; a file name, a list and a different `kind` replace it whole, a
+    mapping over a list goes to its elements by name or place. `chain` holds the files that are being read, to find one
+    that includes itself.
     """
-    if isinstance(node.value, str) and node.value.endswith(ENDINGS) and slot.kinds:
+    if isinstance(node.value, str) and slot.kinds and (node.value.endswith(ENDINGS) or _file(node) is not None):
         return _included(node, slot, chain, path)
     if slot.grid and isinstance(node.value, str) and node.value.endswith(GRIDS):
         return _grid(node, path)
@@ -78,11 +79,14 @@ def expand(node: Node, slot: Slot, chain: tuple[Path, ...], path: str = "", unde
         return replace(node, value=tuple(elements))
     if not isinstance(node.value, Mapping):
         return node
+    if slot.is_list and under is not None and isinstance(under.value, tuple):
+        return _over_list(node, slot, chain, path, under.value)
     below = dict(node.value)
     if slot.kinds and BASE in below and BASE not in slot.keys(node.kind):
         base = below.pop(BASE)
-        if not isinstance(base.value, str) or not base.value.endswith(ENDINGS):
-            raise base.place.fault(_join(path, BASE), f"not a file name, got {base.plain!r}; a .yaml file is needed")
+        if not isinstance(base.value, str):
+            message = f"not a file name, got {base.plain!r}; a .yaml file or the name of a shipped one is needed"
+            raise base.place.fault(_join(path, BASE), message)
         under = _included(base, slot, chain, _join(path, BASE))
     if under is None or not isinstance(under.value, Mapping) or (node.kind or under.kind) != under.kind:
         under = replace(node, value={})
@@ -94,6 +98,33 @@ def expand(node: Node, slot: Slot, chain: tuple[Path, ...], path: str = "", unde
             child, slot.child(key, kind) or Slot(type=object), chain, _join(path, key), under.value.get(key)
         )
     return replace(node, value=merged)
+
+
+def index_of(names: Sequence[object], step: str) -> int | None:
+    """Place of a list's element by its name or its place, or None; `names` has None where an element has no name."""
+    if step in names:
+        return names.index(step)
+    return int(step) if step.isdecimal() and int(step) < len(names) else None
+
+
+def _over_list(node: Node, slot: Slot, chain: tuple[Path, ...], path: str, elements: tuple[Node, ...]) -> Node:
+    """Lay a mapping from names (or places) over a list's elements."""
+    assert isinstance(node.value, Mapping)
+    names = [_name(element) for element in elements]
+    merged = list(elements)
+    for key, child in node.value.items():
+        index = index_of(names, key)
+        if index is None:
+            known = [str(i) if name is None else name for i, name in enumerate(names)]
+            raise child.key.fault(_join(path, key), f"no such element, got {key!r}; {hint(key, known)}")
+        inner = slot.element(index) or Slot(type=object)
+        merged[index] = expand(child, inner, chain, _join(path, key), merged[index])
+    return replace(node, value=tuple(merged))
+
+
+def _name(element: Node) -> str | None:
+    found = element.value.get("name") if isinstance(element.value, Mapping) else None
+    return found.value if found is not None and isinstance(found.value, str) else None
 
 
 def _grid(node: Node, path: str) -> Node:
@@ -117,13 +148,27 @@ def _grid(node: Node, path: str) -> Node:
     return planted(rows.tolist(), node.place)
 
 
+def _file(node: Node) -> Path | None:
+    """The file that a name means: beside the one that names it, a shipped one, or what `rollover list` calls so."""
+    name = Path(str(node.value))
+    folders = (node.place.folder, shipped_folder())
+    if not name.name.endswith(ENDINGS):
+        if name.name != str(node.value) or not name.name:  # a bare name, as `rollover list` has them
+            return None
+        name = Path(f"{name}.yaml")
+        folders = (node.place.folder, *(shipped_folder() / shelf for shelf in SHELVES))
+    return next((f / name for f in folders if (f / name).is_file()), None)
+
+
 def _included(node: Node, slot: Slot, chain: tuple[Path, ...], path: str) -> Node:
     name = Path(str(node.value))
     folders = (node.place.folder, shipped_folder())
-    file = next((f / name for f in folders if (f / name).is_file()), None)
+    file = _file(node)
     if file is None:
         known = {(name.parent / p.name).as_posix() for f in folders for p in (f / name).parent.glob("*.yaml")}
         known |= {p.relative_to(folders[1]).as_posix() for p in folders[1].glob("*/*.yaml")}
+        if not name.name.endswith(ENDINGS):
+            known = {p.stem for shelf in SHELVES for p in (folders[1] / shelf).glob("*.yaml")}
         close = nearest(name.as_posix(), sorted(known))
         help_ = f"; did you mean {close[0]!r}?" if close else ""
         raise node.place.fault(path, f"no such file, got {node.value!r}{help_}")

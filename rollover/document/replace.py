@@ -10,31 +10,52 @@ from typing import Any, TypeVar
 import numpy as np
 
 from rollover.document.check import check
-from rollover.document.include import ENDINGS, expand
+from rollover.document.include import ENDINGS, expand, index_of
 from rollover.document.resolved import paths, to_mapping
 from rollover.document.slot import Slot, slot_of
 from rollover.document.tree import Node, Place, parse, planted
 from rollover.faults import Fault, InputError, nearest
 
 T = TypeVar("T")
+ANY = "*"  # every element of a list
 
 
 def replaced(thing: T, changes: Mapping[str, Any], origin: str = "replaced") -> T:
     """Return `thing` with values replaced: ``{"ground.law.stiffness_scale": 1.2}``. Raises `InputError`.
 
-    Elements of a list are addressed by their name or their place. A value may be a number, text, a list, a
-    mapping, an object of a parameter class or the name of a .yaml file. A new `kind` starts that part afresh:
-    what belonged to the other kind is gone. `origin` stands for the file in messages.
+    Elements of a list are addressed by their name or their place, all of them by `*`. A value may be a number, text,
+    a list, a mapping, an object of a parameter class or the name of a .yaml file. A new `kind` starts that part
+    afresh: what belonged to the other kind is gone. `origin` stands for the file in messages.
     """
     place = Place(file=origin, line=None, folder=Path.cwd())
     tree = to_mapping(thing)
     fresh: dict[int, Any] = {}  # by id, and kept: an id may be given again to what comes later
-    # a whole part before what is below it, and a kind before what belongs to it, whatever the order of a mapping
-    for path in sorted(changes, key=lambda p: (p.count("."), not p.endswith("kind"))):
-        _put(thing, tree, path, changes[path], place, fresh)
+    # a whole part before what is below it, a kind before what belongs to it, all elements before one of them,
+    # whatever the order of a mapping
+    for path in sorted(changes, key=lambda p: (p.count("."), not p.endswith("kind"), ANY not in p.split("."))):
+        for each in _each(thing, tree, path, place):
+            _put(thing, tree, each, changes[path], place, fresh)
     slot = slot_of(type(thing))
     result: T = check(expand(planted(tree, place), slot, ()), type(thing))
     return result
+
+
+def _each(thing: Any, tree: dict[str, Any], path: str, place: Place) -> list[str]:
+    """The paths that a path with `*` stands for, every element of a list; without one the path itself."""
+    steps = path.split(".")
+    if ANY not in steps:
+        return [path]
+    at = steps.index(ANY)
+    part: Any = tree
+    for step in steps[:at]:
+        index = _index(part, step) if isinstance(part, list) else None
+        part = part.get(step) if isinstance(part, dict) else None if index is None else part[index]
+        part = _opened(part) if isinstance(part, Node) else part
+    if not isinstance(part, list) or not part:
+        raise place.fault(path, f"no list, got {'.'.join(steps[:at])!r} before the *; a list such as vehicle.wheels.*")
+    names = [_plain(element.get("name")) if isinstance(element, dict) else None for element in part]
+    each = [".".join([*steps[:at], name or str(i), *steps[at + 1 :]]) for i, name in enumerate(names)]
+    return [found for one in each for found in _each(thing, tree, one, place)]
 
 
 def parse_setting(text: str, origin: str = "--set") -> tuple[str, Node]:
@@ -109,10 +130,7 @@ def _freshen(value: Any, fresh: dict[int, Any]) -> None:
 
 
 def _index(elements: list[Any], step: str) -> int | None:
-    for i, element in enumerate(elements):
-        if isinstance(element, dict) and _plain(element.get("name")) == step:
-            return i
-    return int(step) if step.isdecimal() and int(step) < len(elements) else None
+    return index_of([_plain(e.get("name")) if isinstance(e, dict) else None for e in elements], step)
 
 
 def _bare(value: Any, path: str, place: Place) -> Any:

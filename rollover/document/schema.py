@@ -11,7 +11,11 @@ from rollover.document.include import BASE
 from rollover.document.resolved import plain
 from rollover.document.slot import Slot, required, slot_of, slots
 
-_FILE = {"type": "string", "pattern": "\\.ya?ml$", "description": "name of a .yaml file with this part"}
+_FILE = {
+    "type": "string",
+    "pattern": "\\.ya?ml$|^[A-Za-z0-9_-]+$",
+    "description": "name of a .yaml file with this part, or of a shipped one",
+}
 _PARTIAL = "-partial"  # what is laid over a base: nothing in it is required
 
 
@@ -53,7 +57,11 @@ class _Writer:
         if slot.grid:
             return {"anyOf": [self._list(slot), {"type": "string", "pattern": "\\.(csv|npy)$"}]}
         if slot.is_list:
-            return self._list(slot)
+            whole, element = self._list(slot), slot.element(0)
+            if not suffix or element is None or not element.kinds:
+                return whole
+            # over a base's list: a mapping from names to what differs
+            return {"anyOf": [whole, {"type": "object", "additionalProperties": self.one_of(element, suffix)}]}
         if slot.by_key:
             table = slot.by_key.table()
             return {

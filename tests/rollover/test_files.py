@@ -168,6 +168,11 @@ def test_the_schema_knows_base_and_file_names() -> None:
     validator = jsonschema.Draft202012Validator(schema())
     assert validator.is_valid({"base": "a.yaml", "simulation": {"duration": 2}, "ground": {"law": "soil.yaml"}})
     assert not validator.is_valid({"base": "a.yaml", "simulation": {"duraton": 2}})
+    assert validator.is_valid({"base": "side_overturn", "vehicle": "utility_tractor"})
+    wheels = {"base": "a.yaml", "vehicle": {"kind": "vehicle", "wheels": {"front_left": {"inertia": 2.5}}}}
+    assert validator.is_valid(wheels)
+    wheels["vehicle"]["wheels"]["front_left"] = {"inertai": 2.5}
+    assert not validator.is_valid(wheels)
     assert not validator.is_valid({"base": "a.yaml", "ground": {"law": "soil.txt"}})
     assert not validator.is_valid({"simulation": {"duration": 2}})
 

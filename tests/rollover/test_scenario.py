@@ -8,9 +8,9 @@ import pytest
 
 from ground.surface import Plane, Slope
 from ground.ye import Ye2006
-from rollover import document
+from rollover import catalogue, document
 from rollover.faults import InputError
-from rollover.scenario import load
+from rollover.scenario import AnyVehicle, load
 from tests.rollover.example import TEXT
 
 SPEED = "a number greater than 0 and at most 20 m/s is allowed"
@@ -173,7 +173,7 @@ ONE_FAULT: dict[str, tuple[str | bytes, str]] = {
         "base: side_overtrun.yaml\n",
         "bad.yaml:1: base: no such file, got 'side_overtrun.yaml'; did you mean 'side_overturn.yaml'?",
     ),
-    "base is no file": ("base: 3\n", "bad.yaml:1: base: not a file name, got 3; a .yaml file is needed"),
+    "base is no file": ("base: 3\n", "bad.yaml:1: base: not a file name, got 3; a .yaml file or the name of a shipped one is needed"),
     "includes itself": (
         "base: bad.yaml\n",
         "bad.yaml:1: base: a file includes itself, got bad.yaml -> bad.yaml; no circles",
@@ -281,6 +281,60 @@ def test_files_are_looked_for_beside_the_including_file_and_then_among_the_shipp
     Path("mine/soils").mkdir()
     Path("mine/soils/natural_clay.yaml").write_text("kind: ye-2006\nrecovery: 0.4\n")
     assert load("mine/b.yaml").ground.law.recovery == 0.4
+
+
+def test_elements_of_a_list_are_overridden_by_name_as_set_addresses_them() -> None:
+    shipped = load("side_overturn")
+    Path("mine.yaml").write_text("base: utility_tractor\nwheels: {front_left: {inertia: 2.5, tyre: {friction: 0.1}}}\n")
+    Path("a.yaml").write_text("base: side_overturn\nvehicle: mine.yaml\n")
+    by_set = {"vehicle.wheels.front_left.inertia": 2.5, "vehicle.wheels.front_left.tyre.friction": 0.1}
+    assert load("a.yaml").vehicle == shipped.replaced(by_set).vehicle
+    # over a base in the same file, and by place
+    Path("b.yaml").write_text("base: side_overturn\nvehicle: {wheels: {'0': {inertia: 2.5}}}\n")
+    assert load("b.yaml") == shipped.replaced({"vehicle.wheels.0.inertia": 2.5})
+
+
+def test_an_element_that_the_base_lacks_is_named() -> None:
+    Path("mine.yaml").write_text("base: utility_tractor\nwheels:\n  front_lef: {inertia: 2.5}\n")
+    with pytest.raises(
+        InputError, match=r"mine.yaml:3: wheels.front_lef: no such element, .* did you mean 'front_left'"
+    ):
+        document.load("mine.yaml", AnyVehicle)
+
+
+def test_base_and_parts_go_by_the_names_that_list_shows() -> None:
+    Path("a.yaml").write_text("base: side_overturn\nvehicle: vineyard_tractor\nground: {law: natural_clay_soft}\n")
+    whole = {"vehicle": "vehicles/vineyard_tractor.yaml", "ground.law": "soils/natural_clay_soft.yaml"}
+    assert load("a.yaml") == load("side_overturn").replaced(whole)
+    Path("vineyard_tractor.yaml").write_text("base: utility_tractor\nname: one of my own\n")
+    assert load("a.yaml").vehicle.name == "one of my own"
+    Path("a.yaml").write_text("base: side_overtur\n")
+    with pytest.raises(InputError, match=r"a.yaml:1: base: no such file, got 'side_overtur'; did you mean 'side_over"):
+        load("a.yaml")
+
+
+def test_a_star_stands_for_every_element_of_a_list() -> None:
+    shipped = load("side_overturn")
+    names = [wheel.name for wheel in shipped.vehicle.wheels]
+    each = shipped.replaced({f"vehicle.wheels.{name}.inertia": 7.0 for name in names})
+    assert shipped.replaced({"vehicle.wheels.*.inertia": 7.0}) == each
+    # one element's own value stands, in whichever order they are given
+    one = {"vehicle.wheels.rear_left.inertia": 9.0, "vehicle.wheels.*.inertia": 7.0}
+    assert shipped.replaced(one) == each.replaced({"vehicle.wheels.rear_left.inertia": 9.0})
+    with pytest.raises(InputError, match=r"vehicle.\*.mass: no list, got 'vehicle' before the \*"):
+        shipped.replaced({"vehicle.*.mass": 1.0})
+    with pytest.raises(InputError, match=r"vehicle.wheels.front_left.inertai: no such path; did you mean"):
+        shipped.replaced({"vehicle.wheels.*.inertai": 1.0})
+
+
+def test_a_file_that_says_not_what_it_is_is_asked_for_its_kind() -> None:
+    Path("soil.yaml").write_text("surface_pressure: 3000\ndepth_pressure: 2000\n")
+    message = r"soil.yaml:1: kind: missing, got surface_pressure, depth_pressure; bearing \(a soil\), .*scenario"
+    with pytest.raises(InputError, match=message):
+        catalogue.check("soil.yaml")
+    Path("tractor.yaml").write_text("name: mine\nwhole: {mass: 3000}\nwheels: []\n")
+    with pytest.raises(InputError, match=r"tractor.yaml:1: kind: missing, .*; vehicle \(a vehicle\)"):
+        catalogue.check("tractor.yaml")
 
 
 def test_shipped_scenarios_are_found_by_name() -> None:
