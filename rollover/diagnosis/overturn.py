@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.attitude import beside, reference_of
 from rollover.diagnosis.effort import RUNS
 from rollover.document import exchanged
 from rollover.effects import read
@@ -120,6 +121,7 @@ class RunSimulator:
         self._centre: tuple[float, ...] = scenario.ground.elements.centre
         self._limit = np.inf
         self.children: Children | None = None  # make runs that are wanted next
+        self.reference: Recording | None = None  # beside whose attitude those of all runs are put
         self._known: dict[tuple[Any, ...], tuple[Scenario, Recording] | None] = {}
         self._behind: dict[tuple[Any, ...], tuple[Recording, dict[str, Array]]] = {}
 
@@ -166,7 +168,14 @@ class RunSimulator:
         for name, values in behind.items():
             values = self._filtered(misread, name) if name in spoiled else values
             found[name] = np.where(outside, np.nan, np.interp(at, seen.time, values))
-        return found
+        if self.reference is None:
+            return found
+        return dict(beside(replace(self.recording, channels=found), self.reference).channels)
+
+    def attitude(self) -> Recording | None:
+        """Attitude of the run as it is, on its own rows; None if the run fails."""
+        known = self._run(self.scenario, {})
+        return None if known is None else reference_of(known[1])
 
     def _filtered(self, run: Recording, channel: str) -> Array:
         """A channel of a run behind the filter class that was applied to it, where the run is fast enough."""
@@ -261,6 +270,7 @@ class RunSimulator:
         longer = min(round(settings.duration + float(ahead), 9), self.scenario.simulation.duration)
         found.scenario = replace(found.scenario, simulation=replace(settings, duration=longer))
         found._centre, found.children, found._made = self._centre, self.children, self._made
+        found.reference = self.reference
         return found
 
     def _places(self) -> list[tuple[float, ...]]:
