@@ -34,7 +34,8 @@ ANGLES = ("chassis/roll", "chassis/pitch", "chassis/yaw")
 QUATERNION = tuple(f"chassis/quaternion_{axis}" for axis in "wxyz")
 RATES = tuple(f"chassis/angular_velocity_{axis}" for axis in "xyz")
 PERIODIC = frozenset(name for name, channel in CHANNELS.items() if channel.period == TURN)
-NEAR, LEAST = 0.484, 0.366  # cos - sin of half of 50 degrees, from which (A2) is mixed in, and of 60, at which it is all
+# cos - sin of half a pitch of 50 degrees, from which (A1) is mixed in, and of 60, from which it stands alone
+NEAR, LEAST = 0.484, 0.366
 GAP = 2.5  # times the usual step: beyond, the branch may have been lost
 FAST = 1.0  # rad between samples of the reference: a measured turn beyond pi is near
 BEGINNING = 9  # samples whose median tells the branch: more than a few may be disturbed
@@ -221,12 +222,13 @@ def _angles_beside(recording: Recording, reference: Recording) -> Array:
     here, other = (np.nansum(wrapped(b - own) ** 2, axis=1) for b in (rpy, other_branch(rpy)))
     crossed = over & np.where(share > 0.0, other < here - SAME, _by_stretch(changed, here, other, known.any(axis=1)))
     rpy = np.where(crossed[:, None], other_branch(rpy), rpy)
-    locked = (share > 0.0) & known.all(axis=1)
+    locked, same = (share > 0.0) & known.all(axis=1), np.all(rpy == own, axis=1)
     if locked.any():
         away = _parts(own[locked], _attitude(recording.time[locked], reference, own[locked]), rpy[locked])
         branch = min_branch(rpy[locked] - own[locked], other_branch(rpy[locked]) - own[locked], away)
         part = share[locked][:, None]
         rpy[locked] = own[locked] + part * away + (1.0 - part) * branch
+        rpy[same] = own[same]
     for k in range(3):
         rpy[:, k] += _turns(rpy[:, k] - own[:, k])
     return rpy

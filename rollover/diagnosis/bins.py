@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.attitude import beside, has_attitude
 from rollover.diagnosis.effort import Effort
 from rollover.diagnosis.leaps import LEAP_IN, within_means
+from rollover.diagnosis.overturn import full_runs
 from rollover.diagnosis.simulator import Simulator, simulator_of
 from rollover.filters import least_rate
 from rollover.initiation import Drop
@@ -109,6 +111,12 @@ def on_one_branch(scenario: Scenario, recording: Recording) -> tuple[Recording, 
     runs = full_runs(simulator_of(scenario, recording))
     reference = None if runs is None else runs.attitude()
     return beside(recording, reference), reference
+
+
+def compared(scenario: Scenario, recording: Recording) -> tuple[Recording, Recording, Simulator, int]:
+    """The recording `on_one_branch`, and it as it is `simulated`. Raises `InputError`."""
+    recording, reference = on_one_branch(scenario, recording)
+    return recording, *simulated(scenario, recording, reference)
 
 
 def simulated(
