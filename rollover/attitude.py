@@ -120,6 +120,13 @@ def has_attitude(recording: Recording) -> bool:
     return any(_is_attitude(name) for name in recording.channels)
 
 
+def is_locked(name: str, recording: Recording, reference: Recording) -> bool:
+    """Whether a channel is a roll or yaw that tells no time: about the lock it is put by the reference's, at its time."""
+    if name not in ANGLES or name == ANGLES[1] or any(n not in recording.channels for n in ANGLES):
+        return False
+    return bool(np.any(_nearness(np.interp(recording.time, reference.time, reference[ANGLES[1]])) > 0.0))
+
+
 def _is_attitude(name: str) -> bool:
     return name in PERIODIC or name in QUATERNION
 
@@ -211,13 +218,10 @@ def _angles_beside(recording: Recording, reference: Recording) -> Array:
     rpy, own = _columns(recording, ANGLES), _at(recording.time, reference, ANGLES)
     known = np.isfinite(rpy)
     count = [name in recording.channels for name in ANGLES]
-    edge = np.minimum(*(np.abs(f) for f in _factors(own[:, 1])))
-    share = np.clip((NEAR - edge) / (NEAR - LEAST), 0.0, 1.0) if sum(count) > 1 else np.zeros(edge.size)
-    if sum(count) == 1:
-        # alone, a roll or yaw is the other one where the reference lies on its back by its pitch
-        over = np.cos(own[:, 1]) < 0.0 if not count[1] else np.zeros(edge.size, dtype=bool)
-    else:
-        over = np.ones(edge.size, dtype=bool)
+    n, is_alone = recording.time.size, sum(count) == 1
+    share = np.zeros(n) if is_alone else _nearness(own[:, 1])
+    # alone, a roll or yaw may be of the other branch only where the reference has its pitch beyond a right angle
+    over = (np.cos(own[:, 1]) < 0.0) & (not count[1]) if is_alone else np.ones(n, dtype=bool)
     changed = _stretches(recording.time, own[:, count], np.column_stack([share > 0.0, over]), known.any(axis=1))
     here, other = (np.nansum(wrapped(b - own) ** 2, axis=1) for b in (rpy, other_branch(rpy)))
     crossed = over & np.where(share > 0.0, other < here - SAME, _by_stretch(changed, here, other, known.any(axis=1)))
@@ -225,7 +229,7 @@ def _angles_beside(recording: Recording, reference: Recording) -> Array:
     locked, same = (share > 0.0) & known.all(axis=1), np.all(rpy == own, axis=1)
     if locked.any():
         away = _parts(own[locked], _attitude(recording.time[locked], reference, own[locked]), rpy[locked])
-        branch = min_branch(rpy[locked] - own[locked], other_branch(rpy[locked]) - own[locked], away)
+        branch = _nearer(rpy[locked] - own[locked], other_branch(rpy[locked]) - own[locked], away)
         part = share[locked][:, None]
         rpy[locked] = own[locked] + part * away + (1.0 - part) * branch
         rpy[same] = own[same]
@@ -234,7 +238,7 @@ def _angles_beside(recording: Recording, reference: Recording) -> Array:
     return rpy
 
 
-def min_branch(one: Array, other: Array, near: Array) -> Array:
+def _nearer(one: Array, other: Array, near: Array) -> Array:
     """Of two differences of angles (n, 3) the one nearest to a third, by whole turns too."""
     a, b = (near + wrapped(d - near) for d in (one, other))
     nearer = np.sum((b - near) ** 2, axis=1) < np.sum((a - near) ** 2, axis=1) - SAME
@@ -266,6 +270,12 @@ def _by_stretch(stretch: NDArray[np.int64], here: Array, other: Array, known: Ma
     return np.asarray(crossed[stretch])
 
 
+def _nearness(pitch: Array) -> Array:
+    """How much (A1) counts at a pitch of the reference, 0 to 1, (n,)."""
+    edge = np.minimum(*(np.abs(f) for f in _factors(pitch)))
+    return np.clip((NEAR - edge) / (NEAR - LEAST), 0.0, 1.0)
+
+
 def _factors(pitch: Array) -> tuple[Array, Array]:
     """c - s and c + s of (A2), (n,) each."""
     c, s = np.cos(0.5 * pitch), np.sin(0.5 * pitch)
@@ -282,7 +292,7 @@ def _attitude(time: Array, reference: Recording, own: Array) -> Rotation:
 def _parts(own: Array, attitude: Rotation, rpy: Array) -> Array:
     """Parts (n, 3) by (A1) and (A2) of the turn from the reference to roll, pitch, yaw (n, 3)."""
     away = attitude.inv() * Rotation.from_euler("ZYX", rpy[:, ::-1])
-    half = Rotation.from_euler("Y", 0.5 * own[:, 1]) * Rotation.from_euler("X", own[:, 0])
+    half = Rotation.from_euler("Y", 0.5 * own[:, 1:2]) * Rotation.from_euler("X", own[:, :1])
     v = half.apply(away.as_rotvec())
     minus, plus = (np.where(f < 0.0, -1.0, 1.0) * np.maximum(np.abs(f), LEAST) for f in _factors(own[:, 1]))
     both, apart = (v[:, 0] + v[:, 2]) / minus, (v[:, 0] - v[:, 2]) / plus

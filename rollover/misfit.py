@@ -167,7 +167,7 @@ def misfit(
         phases=phases,
         contact_measured=seen,
         contact_simulated=first,
-        clock=clock(signals, simulated),
+        clock=clock([s for s in signals if not attitude.is_locked(s[0].channel, recording, simulated)], simulated),
         energy_measured=_absorbed(recording, start, end),
         energy_simulated=_absorbed(simulated, float(recording.time[0]), float(recording.time[-1])),
         skipped=skipped,
