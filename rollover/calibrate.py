@@ -14,7 +14,6 @@ from rollover import alignment, drop, simulate
 from rollover.determined import Determination, determine
 from rollover.document import exchanged
 from rollover.execute import map_cases
-from rollover.misfit import as_measured
 from rollover.noise import USUAL
 from rollover.objective import Case, Noise, Objective, Parameter, Simulate, case, check_free
 from rollover.rating import Iso18571, Rating, rate
@@ -241,7 +240,7 @@ def score(cases: Sequence[Case], objective: Objective, u: Array) -> Score:
         squares += sum(float(p @ p) for p in parts[:-1])
         samples += sum(p.size for p in parts[:-1])
         under = exchanged(each.scenario, own.values(u))
-        simulated = as_measured(under, own.simulate(under), each.recording)
+        simulated = each.seen(under, own.simulate(under))
         for signal, sigma in zip(each.signals, each.sigmas, strict=True):
             found = rate(signal.time, signal.values, alignment.simulated_at(signal, simulated, late=late), noise=sigma)
             if isinstance(found, Rating):

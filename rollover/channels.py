@@ -23,6 +23,10 @@ class Channel:
     name: str
     unit: str
     meaning: str
+    period: float | None = None  # in its unit: values that differ by it say the same
+
+
+TURN = 2.0 * math.pi
 
 
 def _axes(name: str, unit: str, meaning: str, axes: str = "xyz") -> list[Channel]:
@@ -65,9 +69,9 @@ CHANNELS: dict[str, Channel] = {
         Channel(name="striker/acceleration_z", unit="m/s2", meaning="world, coordinate acceleration"),
         *_axes("chassis/position", "m", "centre of mass, world"),
         *_axes("chassis/velocity", "m/s", "centre of mass, world"),
-        Channel(name="chassis/roll", unit="rad", meaning="ISO 8855"),
-        Channel(name="chassis/pitch", unit="rad", meaning="ISO 8855"),
-        Channel(name="chassis/yaw", unit="rad", meaning="ISO 8855"),
+        Channel(name="chassis/roll", unit="rad", meaning="ISO 8855, on one branch along a run", period=TURN),
+        Channel(name="chassis/pitch", unit="rad", meaning="ISO 8855, on one branch along a run", period=TURN),
+        Channel(name="chassis/yaw", unit="rad", meaning="ISO 8855, on one branch along a run", period=TURN),
         *_axes("chassis/angular_velocity", "rad/s", "body axes"),
         *_axes("chassis/acceleration", "m/s2", "centre of mass, body axes, coordinate acceleration"),
         *_axes("chassis/quaternion", "1", "attitude, body axes to world, scalar first", "wxyz"),
@@ -88,7 +92,7 @@ CHANNELS: dict[str, Channel] = {
         Channel(name="device/deflection", unit="m", meaning="of the loaded point along the load, since it began"),
         Channel(name="device/energy", unit="J", meaning="put in by the device since the load began"),
         Channel(name="wheel/NAME/spin", unit="rad/s", meaning="of a wheel that turns by itself, forward"),
-        Channel(name="axle/front/angle", unit="rad", meaning="of the front axle about its pivot"),
+        Channel(name="axle/front/angle", unit="rad", meaning="of the front axle about its pivot", period=TURN),
         Channel(name="axle/front/impulse", unit="N m s", meaning="of the axle on its stops, accumulated"),
         *[Channel(name=f"energy/{name}", unit="J", meaning=meaning) for name, meaning in _ENERGY.items()],
     ]

@@ -13,6 +13,9 @@ from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 
+LOCKED = 1e-6  # cosine of a pitch at which rounding (1e-16) leaves roll and yaw no better than 1e-10
+SAME = 1e-9  # rad, and rad2 of what is squared: differences that rounding makes
+
 
 def from_angles(roll: float, pitch: float, yaw: float) -> Array:
     """R_WV of ISO 8855 angles (rad), (3, 3): turn by yaw about z, then pitch about y, then roll about x."""
@@ -61,9 +64,54 @@ def from_quaternions(quaternions: Array) -> Array:
 
 
 def angles(vectors: Array) -> tuple[Array, Array, Array]:
-    """Roll, pitch, yaw (n,) of rotation vectors (n, 3), roll and yaw unwrapped along n."""
+    """Roll, pitch, yaw (n,) of rotation vectors (n, 3), on one branch along n: pitch goes on beyond a right angle."""
     R = matrices(vectors)
     roll = np.arctan2(R[:, 2, 1], R[:, 2, 2])
     pitch = -np.arcsin(np.clip(R[:, 2, 0], -1.0, 1.0))
     yaw = np.arctan2(R[:, 1, 0], R[:, 0, 0])
-    return np.unwrap(roll), pitch, np.unwrap(yaw)
+    for k in np.flatnonzero(np.hypot(R[:, 0, 0], R[:, 1, 0]) < LOCKED):
+        # only the sum or the difference of roll and yaw is one turn: roll stays as it was
+        roll[k] = roll[k - 1] if k else 0.0
+        sine, cosine = math.sin(roll[k]), math.cos(roll[k])
+        yaw[k] = math.atan2(sine * R[k, 0, 2] - cosine * R[k, 0, 1], cosine * R[k, 1, 1] - sine * R[k, 1, 2])
+    for angle in (roll, yaw):
+        if angle.size and angle[0] < -math.pi + SAME:
+            angle[0] = math.pi  # the sign of half a turn is rounding's
+    found = one_branch(np.column_stack([roll, pitch, yaw]))
+    return found[:, 0].copy(), found[:, 1].copy(), found[:, 2].copy()
+
+
+def wrapped(angle: Array) -> Array:
+    """Angles (rad) less whole turns, within half a turn to either side."""
+    return np.asarray(angle - 2.0 * math.pi * np.round(angle / (2.0 * math.pi)))
+
+
+def other_branch(rpy: Array) -> Array:
+    """The same attitudes by the other roll, pitch, yaw (n, 3): roll + 180, 180 - pitch, yaw + 180 degrees."""
+    return np.asarray(np.array([math.pi, math.pi, math.pi]) + rpy * np.array([1.0, -1.0, 1.0]))
+
+
+def unwrapped(angle: Array) -> Array:
+    """Angles (n,) without jumps of whole turns along n; gaps (NaN) are passed over."""
+    known = np.isfinite(angle)
+    found = angle.copy()
+    found[known] = np.unwrap(angle[known])
+    return found
+
+
+def one_branch(rpy: Array) -> Array:
+    """Roll, pitch, yaw (n, 3) along n without jumps from branch to branch, of two or all three; NaN what is not known.
+
+    Each row is given by the branch nearest to the row before, the first as it is.
+    """
+    several = np.flatnonzero(np.isfinite(rpy).sum(axis=1) >= 2)
+    a, b = rpy[several[:-1]], rpy[several[1:]]
+    steps, others = wrapped(b - a), wrapped(other_branch(b) - a)
+    both = np.isfinite(steps).sum(axis=1) >= 2
+    # both branches mirror alike, so that which of them is nearer is known without the row before being put right
+    crossed = both & (np.nansum(others**2, axis=1) < np.nansum(steps**2, axis=1) - SAME)
+    turned = np.zeros(rpy.shape[0], dtype=np.int64)
+    turned[several[1:]] = crossed
+    turned = np.cumsum(turned) % 2
+    found = np.where(turned[:, None] == 1, other_branch(rpy), rpy)
+    return np.column_stack([unwrapped(found[:, k]) for k in range(3)])

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover import alignment
+from rollover import alignment, attitude
 from rollover.alignment import Signal
 from rollover.filters import least_rate
 from rollover.measured import at_sensors
@@ -121,6 +121,8 @@ def misfit(
     recorded samples where the recording states none.
     """
     simulated = as_measured(run.scenario, run.recording, recording)
+    said = len(recording.notes)
+    recording = attitude.beside(recording, simulated)
     start, end = float(simulated.time[0]), float(simulated.time[-1])
     phases = phases_of(run)
     first = next((at for at, phase in phases if phase in ("loading", "impact")), None)
@@ -131,7 +133,7 @@ def misfit(
     found: list[ChannelMisfit] = []
     signals: list[tuple[Signal, float]] = []
     skipped: dict[str, str] = {}
-    notes: list[str] = []
+    notes: list[str] = list(recording.notes[said:])
     for channel in recording.channels if channels is None else channels:
         if channel not in simulated.channels:
             skipped[channel] = "not simulated in this scenario"
@@ -165,7 +167,7 @@ def misfit(
         phases=phases,
         contact_measured=seen,
         contact_simulated=first,
-        clock=clock(signals, simulated),
+        clock=clock([s for s in signals if not attitude.is_locked(s[0].channel, recording, simulated)], simulated),
         energy_measured=_absorbed(recording, start, end),
         energy_simulated=_absorbed(simulated, float(recording.time[0]), float(recording.time[-1])),
         skipped=skipped,
@@ -223,6 +225,7 @@ def estimated_noise(recording: Recording, channel: str) -> float | None:
 
 def as_measured(scenario: Scenario, simulated: Recording, recording: Recording) -> Recording:
     """A simulation at the places and in the axes of a recording's instruments; as it is where none are stated."""
+    simulated = attitude.as_recorded(simulated, recording)
     if not recording.sensors:
         return simulated
     vehicle = scenario.vehicle

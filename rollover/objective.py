@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover import alignment
+from rollover import alignment, attitude
 from rollover.alignment import Signal
 from rollover.document import exchanged, paths
 from rollover.faults import Fault, InputError
@@ -97,7 +97,10 @@ def parameter(scenario: Scenario, text: str) -> Parameter:
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A recording, the scenario under its conditions, and its channels made ready; `sigmas` 1 sigma of each."""
+    """A recording, the scenario under its conditions, and its channels made ready; `sigmas` 1 sigma of each.
+
+    `reference` is the attitude of the scenario as it is, beside whose branch those of all others are put.
+    """
 
     name: str
     scenario: Scenario
@@ -105,6 +108,11 @@ class Case:
     signals: tuple[Signal, ...]
     sigmas: tuple[float, ...]
     skipped: Mapping[str, str] = field(default_factory=dict)
+    reference: Recording | None = None
+
+    def seen(self, scenario: Scenario, simulated: Recording) -> Recording:
+        """A simulation as the recording's instruments would have read it, on the branch that its attitude is on."""
+        return attitude.beside(as_measured(scenario, simulated, self.recording), self.reference)
 
 
 def case(
@@ -123,6 +131,7 @@ def case(
     """
     under = scenario.replaced(recording.conditions, origin=f"{name}: conditions")
     simulated = as_measured(under, simulate(under), recording)
+    recording = attitude.beside(recording, simulated)
     start, end = float(simulated.time[0]), float(simulated.time[-1])
     rows = 1.0 / float(np.median(np.diff(simulated.time)))
     signals, sigmas, skipped = [], [], {}
@@ -151,6 +160,7 @@ def case(
         signals=tuple(signals),
         sigmas=tuple(sigmas),
         skipped=skipped,
+        reference=attitude.reference_of(simulated) if attitude.has_attitude(recording) else None,
     )
 
 
@@ -186,7 +196,7 @@ class Objective:
         """Residuals over noise of case `k`, channel by channel and then the clock's prior; its clock offset, s."""
         case = self.cases[k]
         under = exchanged(case.scenario, self.values(u))
-        simulated = as_measured(under, self.simulate(under), case.recording)
+        simulated = case.seen(under, self.simulate(under))
         smooth = [alignment.smooth(signal, simulated) for signal in case.signals]
         worth = self.correlation[k] if self.correlation else (1.0,) * len(case.signals)
         doubts = [alignment.doubt(v) for v in smooth]

@@ -6,7 +6,7 @@ Nothing is simulated and nothing is shifted in time: both are read from their re
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover import document, scenario
+from rollover.attitude import beside
 from rollover.faults import Fault, InputError
 from rollover.loads import PeakLoad, leading
 from rollover.recording import Recording, read_parquet
@@ -133,7 +134,8 @@ def read(folder: Path) -> Result:
 
 
 def pair(baseline: Result, candidate: Result) -> Pair:
-    """What separates two runs."""
+    """What separates two runs; the candidate's attitude is put on the baseline's branch."""
+    candidate = replace(candidate, recording=beside(candidate.recording, baseline.recording))
     return Pair(
         baseline=baseline,
         candidate=candidate,

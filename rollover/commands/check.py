@@ -74,11 +74,12 @@ def _is_recording(name: str) -> bool:
 
 
 def _recording(name: str, profile: Path | None, scenario: str | None) -> dict[str, Any]:
+    from rollover.attitude import continuous
     from rollover.channels import describe
     from rollover.importers import read_recording
     from rollover.prechecks import noise_floors, prechecks
 
-    recording = read_recording(name, profile=profile)
+    recording = continuous(read_recording(name, profile=profile))
     gravity = 9.81
     if scenario is not None:
         from rollover import scenario as scenarios

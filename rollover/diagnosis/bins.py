@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.attitude import beside, has_attitude
 from rollover.diagnosis.effort import Effort
 from rollover.diagnosis.leaps import LEAP_IN, within_means
+from rollover.diagnosis.overturn import full_runs
 from rollover.diagnosis.simulator import Simulator, simulator_of
 from rollover.filters import least_rate
 from rollover.initiation import Drop
@@ -99,17 +101,37 @@ class Averaged:
         return self.inner.effort
 
 
-def simulated(scenario: Scenario, recording: Recording) -> tuple[Recording, Simulator, int]:
-    """The recording at no more than `MOST_ROWS` rows, what simulates it, and how many samples are in a row.
+def on_one_branch(scenario: Scenario, recording: Recording) -> tuple[Recording, Recording | None]:
+    """The recording with its attitude on the branch of its simulation, and the attitude of that; None without any.
 
     Raises `InputError`.
+    """
+    if not has_attitude(recording):
+        return recording, None
+    runs = full_runs(simulator_of(scenario, recording))
+    reference = None if runs is None else runs.attitude()
+    return beside(recording, reference), reference
+
+
+def compared(scenario: Scenario, recording: Recording) -> tuple[Recording, Recording, Simulator, int]:
+    """The recording `on_one_branch`, and it as it is `simulated`. Raises `InputError`."""
+    recording, reference = on_one_branch(scenario, recording)
+    return recording, *simulated(scenario, recording, reference)
+
+
+def simulated(
+    scenario: Scenario, recording: Recording, reference: Recording | None = None
+) -> tuple[Recording, Simulator, int]:
+    """The recording at no more than `MOST_ROWS` rows, what simulates it, and how many samples are in a row.
+
+    `reference` is the attitude beside whose branch those of all runs are put. Raises `InputError`.
     """
     is_drop = isinstance(scenario.initiation, Drop)
     # of a full run it is not the rows that cost
     classes = () if is_drop else tuple(recording.cfc.values())
     thin, inside = thinned(recording, max(map(least_rate, classes), default=0.0))
     if inside is None:
-        return recording, simulator_of(scenario, recording), 1
+        return recording, referred(simulator_of(scenario, recording), reference), 1
     many = inside.shape[1]
     # a filter needs all stamps, and so does the kink of the force at the first contact
     near = UNKNOWN if recording.clock.zero == "unknown" else KNOWN
@@ -125,8 +147,16 @@ def simulated(scenario: Scenario, recording: Recording) -> tuple[Recording, Simu
     channels = {c: v[at] for c, v in recording.channels.items()}  # which there are is all that is asked of them
     part = replace(recording, time=np.concatenate(stamps), channels=channels)
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    inner = simulator_of(scenario, part, leaps=False)
+    inner = referred(simulator_of(scenario, part, leaps=False), reference)
     return thin, Averaged(inner=inner, starts=starts, counts=counts, many=many), many
+
+
+def referred(simulator: Simulator, reference: Recording | None) -> Simulator:
+    """The simulator itself, its full runs with their attitude beside a `reference`."""
+    runs = full_runs(simulator)
+    if runs is not None:
+        runs.reference = reference
+    return simulator
 
 
 def thinned(recording: Recording, slowest: float = 0.0) -> tuple[Recording, NDArray[np.int64] | None]:

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rollover.attitude import continuous
 from rollover.channels import describe
 from rollover.diagnosis import colour
 from rollover.diagnosis.aftermath import left_aside, shortened
-from rollover.diagnosis.bins import simulated
+from rollover.diagnosis.bins import compared
 from rollover.diagnosis.chaos import weighted
 from rollover.diagnosis.chassis import degrees_of
 from rollover.diagnosis.clocks import align, by_clock, mistimed
@@ -90,7 +91,7 @@ def diagnose(
     if not 0.0 <= tolerance < 1.0:
         raise ValueError(f"tolerance: not a share of a range, got {tolerance:g}; at least 0 and below 1")
     crew = crew or Crew()
-    recordings, zeroed = from_first_contact(scenario, recordings)
+    recordings, zeroed = from_first_contact(scenario, [(name, continuous(r)) for name, r in recordings])
     rounded: list[str] = []
     if isinstance(scenario.vehicle, Striker):  # what little errors of a start do to an overturn is chance, see `chaos`
         recordings, rounded = to_the_last_digit(recordings)
@@ -300,10 +301,10 @@ def _evidence(
     found, read, notes = [], [], []
     for name, whole in recordings:
         recording, spiked = without_spikes(whole)
-        thin, simulator, averaged = simulated(scenario, recording)
+        recording, thin, simulator, averaged = compared(scenario, recording)
         if spiked and (blow := blow_of(simulator)) < np.inf:
             recording, spiked = without_spikes(whole, blow)
-            thin, simulator, averaged = simulated(scenario, recording)
+            recording, thin, simulator, averaged = compared(scenario, recording)
         runs = full_runs(simulator)
         if runs is not None:
             runs.children = crew.children

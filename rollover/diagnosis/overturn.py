@@ -14,16 +14,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover import attitude
 from rollover.diagnosis.effort import RUNS
+from rollover.diagnosis.marks import phases_of
 from rollover.document import exchanged
 from rollover.effects import read
 from rollover.execute import Children, map_cases
 from rollover.filters import filtered, least_rate
 from rollover.misfit import as_measured
 from rollover.recording import Recording
-from rollover.run import Run
 from rollover.scenario import Scenario
-from rollover.vehicle import Striker
 
 Array = NDArray[np.float64]
 SENSORS = "sensor-"
@@ -35,8 +35,6 @@ SLOWEST = 20.0  # times the first run's wall time, and
 LEAST_TIME = 2.0  # s: a run that takes longer has lost its way in ever shorter steps
 # of an element, by which neighbours lie elsewhere on the grid
 ELSEWHERE = ((0.34, 0.28), (-0.41, 0.17), (0.12, -0.37), (-0.22, -0.15))
-BLOW = 2.0  # weights
-AFTER = 0.03  # s, shortest sliding that is a phase
 MOTION = ("chassis/", "striker/", "axle/front/angle", "ground/sinkage")  # what an instrument's place is worked out from
 
 
@@ -120,6 +118,7 @@ class RunSimulator:
         self._centre: tuple[float, ...] = scenario.ground.elements.centre
         self._limit = np.inf
         self.children: Children | None = None  # make runs that are wanted next
+        self.reference: Recording | None = None  # beside whose attitude those of all runs are put
         self._known: dict[tuple[Any, ...], tuple[Scenario, Recording] | None] = {}
         self._behind: dict[tuple[Any, ...], tuple[Recording, dict[str, Array]]] = {}
 
@@ -166,7 +165,14 @@ class RunSimulator:
         for name, values in behind.items():
             values = self._filtered(misread, name) if name in spoiled else values
             found[name] = np.where(outside, np.nan, np.interp(at, seen.time, values))
-        return found
+        if self.reference is None:
+            return found
+        return dict(attitude.beside(replace(self.recording, channels=found), self.reference).channels)
+
+    def attitude(self) -> Recording | None:
+        """Attitude of the run as it is, on its own rows; None if the run fails."""
+        known = self._run(self.scenario, {})
+        return None if known is None else attitude.reference_of(known[1])
 
     def _filtered(self, run: Recording, channel: str) -> Array:
         """A channel of a run behind the filter class that was applied to it, where the run is fast enough."""
@@ -261,6 +267,7 @@ class RunSimulator:
         longer = min(round(settings.duration + float(ahead), 9), self.scenario.simulation.duration)
         found.scenario = replace(found.scenario, simulation=replace(settings, duration=longer))
         found._centre, found.children, found._made = self._centre, self.children, self._made
+        found.reference = self.reference
         return found
 
     def _places(self) -> list[tuple[float, ...]]:
@@ -364,27 +371,6 @@ def _scaled(channels: Mapping[str, Array]) -> dict[str, Array]:
 def _key(changes: Mapping[str, Any]) -> tuple[Any, ...]:
     """What of the changes moves the vehicle."""
     return tuple(sorted((p, v) for p, v in changes.items() if not p.startswith(f"effects.{SENSORS}")))
-
-
-def phases_of(run: Run) -> tuple[tuple[float, str], ...]:
-    """(start s, name) of support, tipping, impact, sliding, rest: sliding is what comes after the last blow.
-
-    A blow is a force of the ground beyond `BLOW` times the weight; support ends with the first wheel that lifts off,
-    tipping with the first part that hits the ground and is no wheel.
-    """
-    marks = list(run.phases)
-    start = next((at for at, name in marks if name == "impact"), None)
-    if start is None:
-        return tuple(marks)
-    vehicle = run.scenario.vehicle
-    mass = vehicle.mass if isinstance(vehicle, Striker) else vehicle.whole.mass
-    time, force = run.recording.time, run.recording["ground/force_normal"]
-    blows = time[(force > BLOW * mass * run.scenario.gravity) & (time >= start)]
-    end = next((at for at, name in marks if name == "rest"), float(time[-1]))
-    sliding = float(blows[-1]) if blows.size else start
-    if start < sliding < end - AFTER:
-        marks.append((sliding, "sliding"))
-    return tuple(sorted(marks))
 
 
 def _covering(scenario: Scenario, recording: Recording) -> Scenario:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.account import diagnosed_scenario
-from rollover.diagnosis.bins import simulated
+from rollover.diagnosis.bins import on_one_branch, referred, simulated
 from rollover.diagnosis.chaos import averaged
 from rollover.diagnosis.clocks import align
 from rollover.diagnosis.evidence import Evidence, Signal, evidence_of
@@ -115,7 +115,8 @@ def _told(
     held_out: bool,
     children: Children | None,
 ) -> Told | None:
-    made = [_simulators(one, recording) for one in (scenario, diagnosed) if one is not None]
+    recording, reference = on_one_branch(scenario, recording)
+    made = [_simulators(one, recording, reference) for one in (scenario, diagnosed) if one is not None]
     full = [runs for _, *both, _ in made for one in both if (runs := full_runs(one)) is not None]
     for runs in full:
         runs.children = children
@@ -162,10 +163,12 @@ def _told(
     )
 
 
-def _simulators(scenario: Scenario, recording: Recording) -> tuple[Recording, Simulator, Simulator, int]:
+def _simulators(
+    scenario: Scenario, recording: Recording, reference: Recording | None
+) -> tuple[Recording, Simulator, Simulator, int]:
     """A recording at no more rows than are needed, what simulates it, what all stamps, and how many are in a row."""
-    thin, simulator, many = simulated(scenario, recording)
-    return thin, simulator, simulator if many == 1 else simulator_of(scenario, recording), many
+    thin, simulator, many = simulated(scenario, recording, reference)
+    return thin, simulator, simulator if many == 1 else referred(simulator_of(scenario, recording), reference), many
 
 
 def _scatter(strays: Sequence[Array], time: Array) -> Array | None:

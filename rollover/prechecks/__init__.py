@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from rollover.attitude import continuous
 from rollover.channels import describe
 from rollover.noise import NoiseFloor
 from rollover.prechecks.finding import Finding, Trace, trace
@@ -51,6 +52,7 @@ def prechecks(
 
 
 def _traces(recording: Recording) -> dict[str, Trace]:
+    recording = continuous(recording)
     found = {name: trace(recording, name) for name in recording.channels}
     return {name: t for name, t in found.items() if t is not None}
 

@@ -13,7 +13,8 @@ from rollover import simulate
 from rollover.diagnosis import overturn, simulations
 from rollover.diagnosis.evidence import evidence_of
 from rollover.diagnosis.fit import Judge
-from rollover.diagnosis.overturn import RunSimulator, phases_of
+from rollover.diagnosis.marks import phases_of
+from rollover.diagnosis.overturn import RunSimulator
 from rollover.diagnosis.phases import phases_of as phases
 from rollover.diagnosis.settle import left_of_means, rescattered
 from rollover.diagnosis.simulator import DropSimulator, simulator_of
