@@ -144,6 +144,7 @@ def _fast_enough(
 
 
 def through(time: Array, values: Array, step: float, cfc: int) -> Array:
+    """Values (n,) at stamps about `step` s apart through a filter class; uneven ones by way of an even grid."""
     if time.size < 2:
         return values
     if np.max(np.abs(np.diff(time) - step)) <= UNEVEN * step:

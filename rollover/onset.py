@@ -16,9 +16,9 @@ channels, the simulation staying before and after as it begins and ends.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Literal
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from ground.drops import correlated
 from rollover import alignment
 from rollover.channels import describe
-from rollover.drop import BESIDE, DropFailedError, DropModel, landing_speed, unfit
+from rollover.drop import BESIDE, DropFailedError, DropModel, landing_speed, simulate_drop, unfit
 from rollover.faults import Fault, InputError
 from rollover.filters import least_rate
 from rollover.initiation import Drop, Release
@@ -57,9 +57,13 @@ MOST, SAMPLES = 0.5, 2000  # of the variance that may stay when laid over one an
 APART = 0.1  # of the time that is compared: 3 sigma of a zero beyond tell nothing
 
 
+class UntoldError(InputError):
+    """A clock without a zero that nothing in the recording tells."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Zero:
-    """The scenario's t = 0 on a recording's clock: `late` s, with 1 sigma, from its first stamp `since` s.
+    """The scenario's t = 0 on a recording's clock: `late` s, with 1 sigma.
 
     `by` is what told it; `why` it was looked for: stated as unknown, stated with a width, found to be off, or beyond
     all that the scenario lasts.
@@ -67,10 +71,14 @@ class Zero:
 
     late: float
     sigma: float
-    since: float
     by: Told
     why: Literal["unknown", "within", "off", "apart"]
     channels: tuple[str, ...]
+
+    @property
+    def answer(self) -> dict[str, Any]:
+        """For a file: the numbers, and the sentence."""
+        return {**asdict(self), "channels": list(self.channels), "sentence": self.sentence}
 
     @property
     def sentence(self) -> str:
@@ -88,8 +96,8 @@ class Zero:
             "deceleration": "by where the fall ends in",
         }[self.by]
         return (
-            f"its clock {why}; the scenario's zero lies at {self.late:.{digits}f} s, 1 sigma {1e3 * self.sigma:.2g} ms, "
-            f"{by} {', '.join(self.channels)}"
+            f"its clock {why}; the scenario's zero lies at {self.late:.{digits}f} s, 1 sigma "
+            f"{1e3 * self.sigma:.2g} ms, {by} {', '.join(self.channels)}"
         )
 
 
@@ -102,7 +110,7 @@ class Timed:
 
 
 def timed(
-    name: str, recording: Recording, scenario: Scenario, simulate: Simulate, *, trusting: bool = False
+    name: str, recording: Recording, scenario: Scenario, simulate: Simulate | None = None, *, trusting: bool = False
 ) -> Timed:
     """A recording on the time of a scenario, which is under its conditions.
 
@@ -110,6 +118,7 @@ def timed(
     scenario, and, unless `trusting`, where a drop's contact is clearly elsewhere: t = 0 is there by definition. Raises
     `InputError` for a clock that nothing tells the zero of.
     """
+    simulate = simulate or simulated
     start, end = _span(scenario)
     apart = recording.time[-1] < start or recording.time[0] > end
     why = _doubt(recording.clock, apart)
@@ -127,15 +136,24 @@ def timed(
         found = by_alignment(bare, scenario, simulate)
     if found is None:
         if is_lost:
-            raise InputError(Fault(file=name, path="clock", message=_nothing_tells(recording, start, end)))
+            raise UntoldError(Fault(file=name, path="clock", message=_nothing_tells(recording, start, end)))
         return Timed(recording=recording)
     at, sigma, by, channels = found
     sigma = float(np.hypot(sigma, rounding(recording.time)))
-    zero = Zero(late=since + at, sigma=sigma, since=since, by=by, why=why or "off", channels=channels)
+    zero = Zero(late=since + at, sigma=sigma, by=by, why=why or "off", channels=channels)
     moved = replace(bare, time=bare.time - at, clock=Clock(within=sigma))
     if why is None and not _is_off(recording, moved, scenario, simulate, zero):
         return Timed(recording=recording)
     return Timed(recording=moved, zero=zero)
+
+
+def simulated(scenario: Scenario) -> Recording:
+    """Channels of a scenario by the quickest simulation of its kind."""
+    if not unfit(scenario):
+        return simulate_drop(scenario)
+    from rollover.simulate import run  # with the solver, which a drop does without
+
+    return run(scenario).recording
 
 
 def _doubt(clock: Clock, apart: bool) -> Literal["unknown", "within", "apart"] | None:
@@ -153,8 +171,8 @@ def _span(scenario: Scenario) -> tuple[float, float]:
 def _nothing_tells(recording: Recording, start: float, end: float) -> str:
     stamps = f"{recording.time[0]:.10g} to {recording.time[-1]:.10g} s"
     return (
-        f"nothing tells where its zero is, got stamps from {stamps} for a scenario from {start:g} to {end:g} s, without "
-        "an onset of contact and like the simulation nowhere; stamps that begin with the scenario, or a longer record"
+        f"nothing tells where its zero is, got stamps from {stamps} for a scenario from {start:g} to {end:g} s, no "
+        "onset of contact, and no place where it is like the simulation; stamps that begin with the scenario are needed"
     )
 
 
@@ -402,22 +420,3 @@ def _refined(recording: Recording, channel: str, run: Recording, contact: float,
         sd = float(np.sqrt(p @ (places - mean) ** 2 / p.sum()))
         low, high = mean - 6.0 * sd, mean + 6.0 * sd
     return mean, max(sd, 1e-9)
-
-
-def timed_all(
-    recordings: Mapping[str, Recording] | Sequence[tuple[str, Recording]],
-    scenario: Scenario,
-    simulate: Simulate,
-) -> dict[str, Timed]:
-    """Each recording on the time of the scenario under its own conditions. Raises `InputError` for all at once."""
-    found: dict[str, Timed] = {}
-    faults: list[Fault] = []
-    for name, recording in dict(recordings).items():
-        try:
-            under = scenario.replaced(recording.conditions, origin=f"{name}: conditions")
-            found[name] = timed(name, recording, under, simulate)
-        except InputError as e:
-            faults += e.faults
-    if faults:
-        raise InputError(*faults)
-    return found
