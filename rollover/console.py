@@ -282,6 +282,10 @@ def calibration(found: Calibration, folder: str) -> None:
             rated = f", ISO 18571 {before.iso18571:.3f} -> {after.iso18571:.3f}"
         names = ", ".join(scores.recordings)
         out.print(f"{which}: residual over noise {before.over_noise:.3g} -> {after.over_noise:.3g}{rated} ({names})")
+    for name, zero in found.zeros.items():
+        total, error = found.clocks.get(name), found.clock_errors.get(name)
+        fitted = "" if total is None or error is None else f"; fitted {total:.12g} s, 1 sigma {1e3 * error:.2g} ms"
+        out.print(f"{name}: {zero.sentence}{fitted}", style="yellow")
     for warning in found.warnings:
         out.print(warning, style="yellow")
     out.print(f"Results: {folder}")
