@@ -17,10 +17,10 @@ from rollover.execute import map_cases
 from rollover.misfit import as_measured
 from rollover.noise import USUAL
 from rollover.objective import Case, Noise, Objective, Parameter, Simulate, case, check_free
-from rollover.onset import Zero
 from rollover.rating import Iso18571, Rating, rate
 from rollover.recording import Recording
 from rollover.scenario import Scenario
+from rollover.stamps import Zero
 
 Array = NDArray[np.float64]
 

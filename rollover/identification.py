@@ -14,10 +14,10 @@ from ground.identify import Identified, LawMass, identify, stiffness
 from ground.law import GroundLaw
 from ground.penetration import Fitted, chosen, fit_forms, law
 from rollover.faults import Fault, InputError
-from rollover.onset import UntoldError, Zero, timed
+from rollover.onset import UntoldError, timed
 from rollover.recording import Recording
 from rollover.scenario import Scenario
-from rollover.stamps import from_first
+from rollover.stamps import Zero, from_first
 from rollover.vehicle import Striker
 
 FORMAT = "rollover-identification/1"

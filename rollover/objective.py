@@ -15,9 +15,10 @@ from rollover.alignment import Signal
 from rollover.document import exchanged, paths
 from rollover.faults import Fault, InputError
 from rollover.misfit import as_measured, sigma_of
-from rollover.onset import Zero, timed
+from rollover.onset import timed
 from rollover.recording import Recording
 from rollover.scenario import Scenario
+from rollover.stamps import Zero
 
 Array = NDArray[np.float64]
 Simulate = Callable[[Scenario], Recording]
@@ -232,7 +233,7 @@ class Objective:
         return case.clock_sigma if case.zero is None else math.hypot(self.clock_sigma, case.clock_sigma)
 
     def clock_error(self, k: int, u: Array) -> float:
-        """1 sigma (s) of the clock offset of case `k` beside the values at `u`: of its prior and its residuals' slope."""
+        """1 sigma (s) of the clock offset of case `k` beside the values at `u`: of prior and residuals together."""
         width = self.width(self.cases[k])
         if self.held or width <= 0.0:
             return 0.0

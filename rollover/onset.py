@@ -17,8 +17,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, replace
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,12 +34,11 @@ from rollover.misfit import as_measured, estimated_noise, sigma_of
 from rollover.noise import LENGTH, noise_floor
 from rollover.recording import Clock, Recording
 from rollover.scenario import Scenario
-from rollover.stamps import from_first, rounding
+from rollover.stamps import Told, Zero, from_first, rounding
 from rollover.vehicle import Striker
 
 Array = NDArray[np.float64]
 Simulate = Callable[[Scenario], Recording]
-Told = Literal["onset", "alignment", "deceleration"]
 Found = tuple[float, float, Told, tuple[str, ...]]
 
 KNOWN = 1e-3  # s, 1 sigma of a zero that is said to be known
@@ -62,46 +61,6 @@ class UntoldError(InputError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Zero:
-    """The scenario's t = 0 on a recording's clock: `late` s, with 1 sigma.
-
-    `by` is what told it; `why` it was looked for: stated as unknown, stated with a width, found to be off, or beyond
-    all that the scenario lasts.
-    """
-
-    late: float
-    sigma: float
-    by: Told
-    why: Literal["unknown", "within", "off", "apart"]
-    channels: tuple[str, ...]
-
-    @property
-    def answer(self) -> dict[str, Any]:
-        """For a file: the numbers, and the sentence."""
-        return {**asdict(self), "channels": list(self.channels), "sentence": self.sentence}
-
-    @property
-    def sentence(self) -> str:
-        """What was found, in words; to a tenth of the standard deviation."""
-        digits = max(0, 1 - math.floor(math.log10(self.sigma)))
-        why = {
-            "unknown": "has no zero",
-            "within": "may be off",
-            "off": "is off, which is not stated",
-            "apart": "shares no time with the scenario",
-        }[self.why]
-        by = {
-            "onset": "by the onset of contact in",
-            "alignment": "by least-squares alignment of",
-            "deceleration": "by where the fall ends in",
-        }[self.by]
-        return (
-            f"its clock {why}; the scenario's zero lies at {self.late:.{digits}f} s, 1 sigma "
-            f"{1e3 * self.sigma:.2g} ms, {by} {', '.join(self.channels)}"
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
 class Timed:
     """A recording on the scenario's time, and the zero that was found; None: as it was stated."""
 
@@ -119,8 +78,7 @@ def timed(
     `InputError` for a clock that nothing tells the zero of.
     """
     simulate = simulate or simulated
-    start, end = _span(scenario)
-    apart = recording.time[-1] < start or recording.time[0] > end
+    apart = is_apart(recording, scenario)
     why = _doubt(recording.clock, apart)
     if why is None and (trusting or not isinstance(scenario.initiation, Drop)):
         return Timed(recording=recording)
@@ -136,7 +94,7 @@ def timed(
         found = by_alignment(bare, scenario, simulate)
     if found is None:
         if is_lost:
-            raise UntoldError(Fault(file=name, path="clock", message=_nothing_tells(recording, start, end)))
+            raise UntoldError(Fault(file=name, path="clock", message=_nothing_tells(recording, *_span(scenario))))
         return Timed(recording=recording)
     at, sigma, by, channels = found
     sigma = float(np.hypot(sigma, rounding(recording.time)))
@@ -162,6 +120,16 @@ def _doubt(clock: Clock, apart: bool) -> Literal["unknown", "within", "apart"] |
     if clock.within is not None and clock.within > KNOWN:
         return "within"
     return "apart" if apart else None
+
+
+def is_apart(recording: Recording, scenario: Scenario) -> bool:
+    """Whether the stamps of a recording and the time that a scenario lasts have nothing in common.
+
+    A striker's fall before is the scenario's too: what ends no longer before it than it lasts is one.
+    """
+    start, end = _span(scenario)
+    fall = recording.time[-1] - recording.time[0] if isinstance(scenario.vehicle, Striker) else 0.0
+    return bool(recording.time[-1] < start - fall or recording.time[0] > end)
 
 
 def _span(scenario: Scenario) -> tuple[float, float]:
@@ -213,9 +181,7 @@ def by_onset(
     return mean, sigma, "onset", tuple(c for c, _ in told)
 
 
-def by_alignment(
-    recording: Recording, scenario: Scenario, simulate: Simulate
-) -> Found | None:
+def by_alignment(recording: Recording, scenario: Scenario, simulate: Simulate) -> Found | None:
     """The zero (s), 1 sigma, and the channels that lie over the simulation best there; None if they do nowhere."""
     run = _fall(scenario, recording, simulate)
     run = as_measured(scenario, simulate(scenario), recording) if run is None else run

@@ -75,9 +75,7 @@ def identify_(
     wanted = form or (Form.bearing if is_cone else Form.ye)
     given = {name: recording for name, (recording, _) in found.items()}
     settled = identification.settled(given, chosen)
-    drops, unusable = identification.drops_of(
-        settled.recordings, chosen, buoyancy=buoyancy, terminal=terminal_speed
-    )
+    drops, unusable = identification.drops_of(settled.recordings, chosen, buoyancy=buoyancy, terminal=terminal_speed)
     refused = [*settled.refused, *unusable]
     zeros = {**settled.zeros, **identification.zeros_of(drops, given)}
     sources = sorted({recording.source for recording, _ in found.values() if recording.source})
