@@ -44,6 +44,7 @@ class Drop:
     gravity: float = 9.81
     buoyancy: float = 0.0  # N
     drag: float = 0.0  # N s2/m2, of the medium above the ground
+    zero_error: float = 0.0  # s, 1 sigma of time zero
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,6 +93,8 @@ def loading(drop: Drop, fraction: float) -> Loading:
         after = drop.speed / (1.0 + fraction)
         amounts, covariance = np.array([0.0, after, 0.0]), np.diag([1e-6, (0.02 * after) ** 2, 0.05**2])
         assumed = (*assumed, "depth: double integral of the acceleration from the speed at first contact")
+    if drop.sinkage is None:  # nothing else tells how deep it is where the integral begins
+        covariance[0, 0] += (drop.speed * drop.zero_error) ** 2
     z, v = depth + shapes @ amounts, speed + rates @ amounts
     doubt = np.sqrt(np.einsum("ni,ij,nj->n", rates, covariance, rates))
     for factor in (2.0, 4.0):  # zero, as far as the integral can tell
@@ -190,6 +193,7 @@ def found_contact(drop: Drop) -> Drop:
     return replace(
         drop,
         time=drop.time - t[contact],
+        zero_error=float(np.median(np.diff(t)) / np.sqrt(12.0)),  # it lies somewhere between two samples
         acceleration=drop.acceleration - float(np.mean(drop.acceleration[rows][rest])),
         speed=float(speed[contact]),
     )

@@ -63,7 +63,7 @@ def ready(
     for each in own:
         for k in range(int(stretch[-1]) + 1):
             here = stretch == k
-            values[here] = _through(time[here], values[here], step, each)
+            values[here] = through(time[here], values[here], step, each)
     return Signal(
         channel=channel,
         time=time,
@@ -93,7 +93,7 @@ def smooth(signal: Signal, simulated: Recording) -> Array:
         step = float(np.median(np.diff(simulated.time)))
         values = values.copy()
         for each in signal.chain:
-            values[inside] = _through(simulated.time[inside], values[inside], step, each)
+            values[inside] = through(simulated.time[inside], values[inside], step, each)
     return values
 
 
@@ -143,7 +143,8 @@ def _fast_enough(
             )
 
 
-def _through(time: Array, values: Array, step: float, cfc: int) -> Array:
+def through(time: Array, values: Array, step: float, cfc: int) -> Array:
+    """Values (n,) at stamps about `step` s apart through a filter class; uneven ones by way of an even grid."""
     if time.size < 2:
         return values
     if np.max(np.abs(np.diff(time) - step)) <= UNEVEN * step:

@@ -19,6 +19,7 @@ from rollover.objective import Case, Noise, Objective, Parameter, Simulate, case
 from rollover.rating import Iso18571, Rating, rate
 from rollover.recording import Recording
 from rollover.scenario import Scenario
+from rollover.stamps import Zero
 
 Array = NDArray[np.float64]
 
@@ -79,7 +80,11 @@ class Scores:
 
 @dataclass(frozen=True, kw_only=True)
 class Calibration:
-    """What was found. `correlation` (p, p) of the estimates; `combinations` sentences on what stays open together."""
+    """What was found. `correlation` (p, p) of the estimates; `combinations` sentences on what stays open together.
+
+    `clocks` s by which each recording is late in all, `clock_errors` 1 sigma beside the fitted values, `zeros` what
+    clocks in doubt were set by.
+    """
 
     scenario: Scenario
     calibrated: Scenario
@@ -88,6 +93,8 @@ class Calibration:
     condition: float
     combinations: tuple[str, ...]
     clocks: Mapping[str, float]
+    clock_errors: Mapping[str, float]
+    zeros: Mapping[str, Zero]
     clock_sigma: float
     noise: Mapping[str, Mapping[str, float]]
     training: Scores
@@ -167,8 +174,7 @@ def follow(task: tuple[Objective, Array, Literal["linear", "soft_l1"]]) -> tuple
     cost = np.inf
     for softening in SOFTENINGS if loss == "soft_l1" else (1.0,):
         # a clock that is free from far away would lead into a valley of its own
-        clock = objective.clock_sigma if softening == 1.0 else 0.0
-        soft = replace(objective, softening=softening, clock_sigma=clock)
+        soft = replace(objective, softening=softening, held=softening != 1.0)
         # at the end differences to both sides: those to one side lead beside the minimum
         slopes = soft.jacobian if loss == "soft_l1" else partial(soft.jacobian, central=True)
         found = least_squares(
@@ -203,7 +209,7 @@ def _from_starts(
         from scipy.stats import qmc
 
         spread = qmc.LatinHypercube(d=len(given), seed=seed).random(starts)
-        soft = replace(objective, softening=SOFTENINGS[0], clock_sigma=0.0)
+        soft = replace(objective, softening=SOFTENINGS[0], held=True)
         ranked = sorted(spread, key=lambda u: robust_cost(soft, np.asarray(u)))
         tried += [np.asarray(u) for u in ranked[: FOLLOWED - 1]]
     tasks: list[tuple[Objective, Array, Literal["linear", "soft_l1"]]] = [(objective, u, "soft_l1") for u in tried]
@@ -281,7 +287,10 @@ def _calibration(
         bare = replace(plain, parameters=())
         return Scores(recordings=tuple(names), before=score(cases, bare, np.empty(0)), after=score(cases, plain, u))
 
-    clocks = plain.clocks(u)
+    fine, everything = plain.clocks(u), {c.name: c for c in plain.cases}
+    zeros = {name: c.zero for name, c in ready.items() if c.zero is not None}
+    clocks = {name: late + (zeros[name].late if name in zeros else 0.0) for name, late in fine.items()}
+    beyond = [name for name, late in fine.items() if abs(late) > 3.0 * plain.width(everything[name]) > 0.0]
     counts = final.shape()
     result = Calibration(
         scenario=scenario,
@@ -291,6 +300,8 @@ def _calibration(
         condition=found.condition,
         combinations=tuple(_combination(final, d, s) for d, s in zip(found.directions, found.spread, strict=True)),
         clocks=clocks,
+        clock_errors={c.name: final.clock_error(k, u) for k, c in enumerate(final.cases)},
+        zeros=zeros,
         clock_sigma=plain.clock_sigma,
         noise={c.name: {s.channel: sigma for s, sigma in zip(c.signals, c.sigmas, strict=True)} for c in plain.cases},
         training=scores(fitted),
@@ -306,7 +317,7 @@ def _calibration(
         starts_agreeing=agreeing,
         warnings=(),
     )
-    return replace(result, warnings=tuple(_warnings(result)))
+    return replace(result, warnings=tuple(_warnings(result, fine, beyond)))
 
 
 def _estimate(objective: Objective, found: Determination, u: Array, i: int) -> Estimate:
@@ -357,7 +368,7 @@ def _step_unit(p: Parameter) -> str:
     return "%" if p.logarithmic else p.unit or "units"
 
 
-def _warnings(c: Calibration) -> list[str]:
+def _warnings(c: Calibration, fine: Mapping[str, float], beyond: Sequence[str]) -> list[str]:
     found = [
         f"{e.path}: at its {'lower' if e.at_bound == 'low' else 'upper'} bound {e.value:.6g}; wider bounds, or another "
         "parameter is at fault"
@@ -374,6 +385,8 @@ def _warnings(c: Calibration) -> list[str]:
     same, tried = c.starts_agreeing
     if tried > 1 and same == 1:
         found.append(f"of {tried} starts none ended where the best did: there may be a better minimum; narrower bounds")
-    late = [name for name, offset in c.clocks.items() if abs(offset) > 3.0 * c.clock_sigma > 0.0]
-    found += [f"{name}: its clock is off by {1e3 * c.clocks[name]:.3g} ms, beyond 3 sigma" for name in late]
+    found += [
+        f"{name}: its clock is off by {1e3 * fine[name]:.3g} ms{' more' if name in c.zeros else ''}, beyond 3 sigma"
+        for name in beyond
+    ]
     return found

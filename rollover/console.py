@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.table import Table
 
+from rollover.stamps import in_digits
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -252,6 +254,8 @@ def comparison(found: Sequence[Misfit], folder: str) -> None:
                 style="" if rated else "yellow",
             )
         out.print(table)
+        if each.zero is not None:
+            out.print(f"{each.zero.sentence[0].upper()}{each.zero.sentence[1:]}: set to it.", style="yellow")
         if each.clock is not None:
             late, sigma, gain = 1e3 * each.clock.offset, 1e3 * each.clock.sigma, 100.0 * each.clock.gain
             out.print(f"Clock {late:+.3g} +- {sigma:.2g} ms late; setting it (not done) would remove {gain:.0f} %.")
@@ -282,6 +286,11 @@ def calibration(found: Calibration, folder: str) -> None:
             rated = f", ISO 18571 {before.iso18571:.3f} -> {after.iso18571:.3f}"
         names = ", ".join(scores.recordings)
         out.print(f"{which}: residual over noise {before.over_noise:.3g} -> {after.over_noise:.3g}{rated} ({names})")
+    for name, zero in found.zeros.items():
+        out.print(f"{name}: {zero.sentence}", style="yellow")
+        if name in found.clocks:
+            late = in_digits(found.clocks[name], found.clock_errors[name])
+            out.print(f"{name}: fitted {late} s, 1 sigma {1e3 * found.clock_errors[name]:.2g} ms", style="yellow")
     for warning in found.warnings:
         out.print(warning, style="yellow")
     out.print(f"Results: {folder}")

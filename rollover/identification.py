@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -14,8 +14,10 @@ from ground.identify import Identified, LawMass, identify, stiffness
 from ground.law import GroundLaw
 from ground.penetration import Fitted, chosen, fit_forms, law
 from rollover.faults import Fault, InputError
+from rollover.onset import UntoldError, timed
 from rollover.recording import Recording
 from rollover.scenario import Scenario
+from rollover.stamps import Zero, from_first
 from rollover.vehicle import Striker
 
 FORMAT = "rollover-identification/1"
@@ -30,6 +32,37 @@ class Found:
     answer: Mapping[str, Any]
     table: tuple[tuple[str, ...], ...]
     remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settled:
+    """Recordings on the scenario's time, the zeros that were found for it, and a sentence for each left out."""
+
+    recordings: Mapping[str, Recording]
+    zeros: Mapping[str, Zero]
+    refused: tuple[str, ...]
+
+
+def settled(recordings: Mapping[str, Recording], scenario: Scenario) -> Settled:
+    """The recordings with the zero of each clock where a drop begins; those without a speed have their stamps only.
+
+    Raises `InputError` for a condition that the scenario does not know.
+    """
+    found, zeros, refused = {}, {}, []
+    for name, recording in recordings.items():
+        if "initiation.speed" not in recording.conditions:  # clock and speed are found together, see `drop_of`
+            found[name] = replace(recording, time=from_first(recording.time))
+            continue
+        try:
+            one = timed(name, recording, scenario.replaced(recording.conditions, origin=name))
+        except UntoldError as reason:
+            refused.append(str(reason))
+            continue
+        found[name] = one.recording
+        zeros |= {} if one.zero is None else {name: one.zero}
+    if not found:
+        raise InputError(*(Fault(message=reason) for reason in refused))
+    return Settled(recordings=found, zeros=zeros, refused=tuple(refused))
 
 
 def drop_of(
@@ -62,6 +95,7 @@ def drop_of(
         cone_height=striker.nose_height if is_cone else 0.0,
         gravity=scenario.gravity,
         buoyancy=buoyancy,
+        zero_error=recording.clock.within or 0.0,
     )
     if speed is None:
         drop = found_contact(drop)
@@ -81,6 +115,21 @@ def drops_of(
     if not drops:
         raise InputError(*(Fault(message=reason) for reason in refused))
     return drops, refused
+
+
+def zeros_of(drops: Sequence[Drop], recordings: Mapping[str, Recording]) -> dict[str, Zero]:
+    """Of the drops whose clock and speed their deceleration told: where their zero is on the recordings' clocks."""
+    return {
+        drop.name: Zero(
+            late=float(recordings[drop.name].time[0]) - float(drop.time[0]),
+            sigma=drop.zero_error,
+            by="deceleration",
+            why="unknown",
+            channels=(_CHANNELS["acceleration"],),
+        )
+        for drop in drops
+        if "initiation.speed" not in recordings[drop.name].conditions
+    }
 
 
 def identified(
@@ -218,4 +267,4 @@ def head(found: Found) -> str:
     return "\n".join([*lines, *found.remarks])
 
 
-__all__ = ["FORMAT", "Found", "drop_of", "drops_of", "head", "identified"]
+__all__ = ["FORMAT", "Found", "Settled", "drop_of", "drops_of", "head", "identified", "settled", "zeros_of"]

@@ -22,6 +22,7 @@ from rollover.rating import NotRateable, Peak, Rating, rate
 from rollover.recording import Recording
 from rollover.run import Run
 from rollover.scenario import Scenario
+from rollover.stamps import Zero
 from rollover.vehicle import Striker, Vehicle, chassis_of
 
 Array = NDArray[np.float64]
@@ -89,7 +90,10 @@ class Clock:
 
 @dataclass(frozen=True, kw_only=True)
 class Misfit:
-    """One recording against one run. `contact_*` s of first contact; `skipped` channel -> why it was left out."""
+    """One recording against one run. `contact_*` s of first contact; `skipped` channel -> why it was left out.
+
+    `zero` is what the recording's clock had been set by before, None where it stands as stated.
+    """
 
     recording: str
     title: str
@@ -102,6 +106,7 @@ class Misfit:
     energy_simulated: float | None
     skipped: Mapping[str, str]
     notes: tuple[str, ...]
+    zero: Zero | None = None
 
 
 def misfit(
@@ -380,6 +385,8 @@ def _absorbed(recording: Recording, start: float, end: float) -> float | None:
 
 def summary(found: Any) -> Any:
     """What a comparison or a rating says, as bare values for a file; without the arrays."""
+    if isinstance(found, Zero):
+        return found.answer
     if isinstance(found, NotRateable):
         return {"not_rateable": found.reason}
     if is_dataclass(found):

@@ -15,8 +15,10 @@ from rollover.alignment import Signal
 from rollover.document import exchanged, paths
 from rollover.faults import Fault, InputError
 from rollover.misfit import as_measured, sigma_of
+from rollover.onset import timed
 from rollover.recording import Recording
 from rollover.scenario import Scenario
+from rollover.stamps import Zero
 
 Array = NDArray[np.float64]
 Simulate = Callable[[Scenario], Recording]
@@ -100,6 +102,8 @@ class Case:
     """A recording, the scenario under its conditions, and its channels made ready; `sigmas` 1 sigma of each.
 
     `reference` is the attitude of the scenario as it is, beside whose branch those of all others are put.
+    `zero` is what its clock was set by, None where it stands as stated; `clock_sigma` s its own prior, None for that of
+    the objective.
     """
 
     name: str
@@ -113,6 +117,8 @@ class Case:
     def seen(self, scenario: Scenario, simulated: Recording) -> Recording:
         """A simulation as the recording's instruments would have read it, on the branch that its attitude is on."""
         return attitude.beside(as_measured(scenario, simulated, self.recording), self.reference)
+    zero: Zero | None = None
+    clock_sigma: float | None = None
 
 
 def case(
@@ -127,9 +133,12 @@ def case(
     """Put a scenario under a recording's conditions and make the recording's channels ready for it.
 
     A filter that the recording went through is applied to the simulation; nothing else is filtered, so that noise
-    stays white. Raises `InputError` for a condition that the scenario lacks, ``ValueError`` if nothing is left.
+    stays white. A clock in doubt is set to where `onset.timed` finds its zero. Raises `InputError` for a condition that
+    the scenario lacks and a clock that nothing tells the zero of, ``ValueError`` if nothing is left.
     """
     under = scenario.replaced(recording.conditions, origin=f"{name}: conditions")
+    at = timed(name, recording, under, simulate)
+    recording = at.recording
     simulated = as_measured(under, simulate(under), recording)
     recording = attitude.beside(recording, simulated)
     start, end = float(simulated.time[0]), float(simulated.time[-1])
@@ -161,6 +170,8 @@ def case(
         sigmas=tuple(sigmas),
         skipped=skipped,
         reference=attitude.reference_of(simulated) if attitude.has_attitude(recording) else None,
+        zero=at.zero,
+        clock_sigma=recording.clock.within,
     )
 
 
@@ -169,16 +180,18 @@ class Objective:
     """Residuals over noise as a function of `u` (p,).
 
     The noise of a sample is the channel's and, beside a jump of the simulation, what interpolation leaves in doubt.
-    Each case's clock offset has a Gaussian prior of `clock_sigma` s and is profiled out: at every `u` it stands at
-    its best. `correlation` gives, for each case and channel, how many samples are worth one (>= 1); `weights` (n,)
-    hold down outliers, None for all alike. `softening` multiplies every sigma but that of the clocks, so that a start
-    far away is first led by what is large.
+    Each case's clock offset has a Gaussian prior of `clock_sigma` s, together with the uncertainty of a zero that was
+    found, or that of the width that was stated, and is profiled out: at every `u` it stands at its best, unless all are
+    `held`. `correlation` gives, for each case and channel, how many samples are worth one (>= 1); `weights` (n,) hold
+    down outliers, None for all alike. `softening` multiplies every sigma but that of the clocks, so that a start far
+    away is first led by what is large.
     """
 
     cases: tuple[Case, ...]
     parameters: tuple[Parameter, ...]
     simulate: Simulate
     clock_sigma: float = CLOCK_SIGMA
+    held: bool = False
     softening: float = 1.0
     correlation: tuple[tuple[float, ...], ...] = ()
     weights: Array | None = None
@@ -194,12 +207,20 @@ class Objective:
 
     def parts(self, k: int, u: Array) -> tuple[list[Array], float]:
         """Residuals over noise of case `k`, channel by channel and then the clock's prior; its clock offset, s."""
+        at, width = self._by_clock(k, u), self.width(self.cases[k])
+        if self.held or width <= 0.0:
+            return at(0.0), 0.0
+        return _profiled(at, width)
+
+    def _by_clock(self, k: int, u: Array) -> Callable[[float], list[Array]]:
+        """The residuals of case `k` as a function of its clock offset, s."""
         case = self.cases[k]
         under = exchanged(case.scenario, self.values(u))
         simulated = case.seen(under, self.simulate(under))
         smooth = [alignment.smooth(signal, simulated) for signal in case.signals]
         worth = self.correlation[k] if self.correlation else (1.0,) * len(case.signals)
         doubts = [alignment.doubt(v) for v in smooth]
+        width = self.width(case)
 
         def at(late: float) -> list[Array]:
             found = []
@@ -208,11 +229,25 @@ class Objective:
                 size = np.hypot(sigma, alignment.at_stamps(s, simulated.time, d, late=late))
                 away = s.values - alignment.at_stamps(s, simulated.time, v, late=late)
                 found.append(away / (size * math.sqrt(tau) * self.softening))
-            return [*found, np.array([late / self.clock_sigma if self.clock_sigma > 0.0 else 0.0])]
+            return [*found, np.array([late / width if width > 0.0 else 0.0])]
 
-        if self.clock_sigma <= 0.0:
-            return at(0.0), 0.0
-        return _profiled(at, self.clock_sigma)
+        return at
+
+    def width(self, case: Case) -> float:
+        """1 sigma of the prior of a case's clock offset, s."""
+        if case.clock_sigma is None:
+            return self.clock_sigma
+        # the zero that was found is that of one channel's onset: what recorders add comes on top
+        return case.clock_sigma if case.zero is None else math.hypot(self.clock_sigma, case.clock_sigma)
+
+    def clock_error(self, k: int, u: Array) -> float:
+        """1 sigma (s) of the clock offset of case `k` beside the values at `u`: of prior and residuals together."""
+        width = self.width(self.cases[k])
+        if self.held or width <= 0.0:
+            return 0.0
+        late, at, h = self.parts(k, u)[1], self._by_clock(k, u), 0.05 * width
+        slope = [(b - a) / (2.0 * h) for a, b in zip(at(late - h), at(late + h), strict=True)]
+        return float(_squared(slope) ** -0.5)
 
     def clocks(self, u: Array) -> dict[str, float]:
         """Clock offset of each case at its best, s."""

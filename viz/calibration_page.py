@@ -39,14 +39,18 @@ def page(c: Calibration, *, command: str, scenario_hash: str = "", versions: Map
         caption = f"Condition number of the Jacobian with columns scaled to one: {c.condition:.3g}."
         correlations = Table(columns=["", *names], rows=cells, numeric=range(1, len(names) + 1), caption=caption)
         blocks.append(Section(title="Correlations", blocks=[correlations]))
-    clocks: list[list[str | Cell]] = [[name, f"{1e3 * late:+.3g}"] for name, late in c.clocks.items()]
+    clocks: list[list[str | Cell]] = [
+        [name, f"{1e3 * late:+.{12 if abs(late) > 1.0 else 3}g}", f"{1e3 * c.clock_errors[name]:.2g}"]
+        for name, late in c.clocks.items()
+    ]
     text = (
         f"{c.samples} samples, worth {c.independent:.0f} independent ones; {c.outliers} outliers held down; "
         f"{c.starts_agreeing[0]} of {c.starts_agreeing[1]} starts ended here. Clock offsets are profiled out under a "
         f"prior of {1e3 * c.clock_sigma:g} ms."
     )
-    clock = Table(columns=["recording", "clock late, ms"], rows=clocks, numeric=(1,))
-    blocks.append(Section(title="What it rests on", blocks=[Note(text=text), clock]))
+    clock = Table(columns=["recording", "clock late, ms", "1 sigma, ms"], rows=clocks, numeric=(1, 2))
+    zeros = [Note(text=f"{name}: {zero.sentence}.") for name, zero in c.zeros.items()]
+    blocks.append(Section(title="What it rests on", blocks=[Note(text=text), *zeros, clock]))
     return render(
         title=c.scenario.title,
         subtitle="Calibration",

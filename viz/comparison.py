@@ -101,7 +101,7 @@ def _cells(c: ChannelMisfit) -> list[str]:
 
 def sentences(found: Misfit) -> list[str]:
     """What is to be known about a comparison besides its numbers."""
-    lines = []
+    lines = [] if found.zero is None else [f"{found.zero.sentence}; it was set to it"]
     if found.contact_measured is not None and found.contact_simulated is not None:
         lines.append(
             f"first contact: measured {_instant(found.contact_measured)}, simulated {_instant(found.contact_simulated)}"

@@ -29,8 +29,8 @@ def page(
     blocks: list[Block] = [
         Note(
             text="Each recording is compared at its own stamps with a run under its own conditions, both through the "
-            "same filter class. Nothing was shifted in time. ISO/TS 18571 and peaks are over the event, from first "
-            "contact to rest."
+            "same filter class. Nothing was shifted in time but a clock in doubt, where that is said. "
+            "ISO/TS 18571 and peaks are over the event, from first contact to rest."
         )
     ]
     for each in found:

@@ -170,6 +170,8 @@ def _answer(about: dict[str, Any], c: Calibration) -> dict[str, Any]:
         "condition": c.condition,
         "combinations": list(c.combinations),
         "clock_offsets": dict(c.clocks),
+        "clock_errors": dict(c.clock_errors),
+        "clocks": {name: zero.answer for name, zero in c.zeros.items()},
         "clock_sigma": c.clock_sigma,
         "noise": {name: dict(of) for name, of in c.noise.items()},
         "fit": {"training": summary(c.training), "held_out": None if c.held_out is None else summary(c.held_out)},

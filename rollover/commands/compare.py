@@ -58,7 +58,10 @@ def compare(
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
-    """Compare recordings with runs under their conditions: rated, by channel and phase, nothing shifted in time."""
+    """Compare recordings with runs under their conditions: rated, by channel and phase.
+
+    Nothing is shifted in time but a clock in doubt, to the zero that the recording shows.
+    """
     from rollover import console, document, store
     from rollover import scenario as scenarios
     from rollover.pair import is_result
@@ -78,7 +81,7 @@ def compare(
     store.claim_account(folder, FORMAT, about, [JSON, PAGE, *pictures.values()], force=force)
     _say_compiling()
     runs = {name: _run(chosen, name, recording) for name, recording in measured.items()}
-    found = [_misfit(runs[name], recording, name, cfc) for name, recording in measured.items()]
+    found = _misfits(runs, measured, cfc)
     answer = _answer(about, runs, found)
     command = " ".join(map(shlex.quote, ["rollover", "compare", scenario, *recordings]))
     with store.whole(folder) as part:
@@ -196,14 +199,36 @@ def _run(scenario: Scenario, name: str, recording: Recording) -> Run:
         return simulate.run(under, progress=show)
 
 
+def _misfits(runs: Mapping[str, Run], measured: Mapping[str, Recording], cfc: int | None) -> list[Misfit]:
+    """Each recording against its run. Raises `InputError` for all at once of which nothing can be compared."""
+    found, faults = [], []
+    for name, recording in measured.items():
+        try:
+            found.append(_misfit(runs[name], recording, name, cfc))
+        except InputError as e:
+            faults += e.faults
+    if faults:
+        raise InputError(*faults)
+    return found
+
+
 def _misfit(run: Run, recording: Recording, name: str, cfc: int | None) -> Misfit:
+    from dataclasses import replace
+
     from rollover.misfit import estimated_noise, misfit
+    from rollover.onset import timed
 
     wanted = run.scenario.loads.cfc if cfc is None else cfc
+    at = timed(name, recording, run.scenario, lambda _: run.recording)
     try:
-        return misfit(run, recording, name=name, cfc=wanted, at_least=cfc is not None, noise=estimated_noise)
+        found = misfit(run, at.recording, name=name, cfc=wanted, at_least=cfc is not None, noise=estimated_noise)
     except ValueError as e:
         raise InputError(Fault(file=name, message=str(e))) from None
+    if not found.channels:
+        why = "; ".join(f"{channel}: {reason}" for channel, reason in found.skipped.items())
+        message = f"nothing to compare, got {why}; one channel that both have at one time is needed"
+        raise InputError(Fault(file=name, message=message))
+    return replace(found, zero=at.zero)
 
 
 def _answer(about: Mapping[str, Any], runs: Mapping[str, Run], found: list[Misfit]) -> dict[str, Any]:

@@ -73,12 +73,11 @@ def identify_(
     _claim(folder, force)
     is_cone = isinstance(chosen.vehicle, Striker) and chosen.vehicle.nose == "cone"
     wanted = form or (Form.bearing if is_cone else Form.ye)
-    drops, refused = identification.drops_of(
-        {name: recording for name, (recording, _) in found.items()},
-        chosen,
-        buoyancy=buoyancy,
-        terminal=terminal_speed,
-    )
+    given = {name: recording for name, (recording, _) in found.items()}
+    settled = identification.settled(given, chosen)
+    drops, unusable = identification.drops_of(settled.recordings, chosen, buoyancy=buoyancy, terminal=terminal_speed)
+    refused = [*settled.refused, *unusable]
+    zeros = {**settled.zeros, **identification.zeros_of(drops, given)}
     sources = sorted({recording.source for recording, _ in found.values() if recording.source})
     answer = identification.identified(
         drops,
@@ -89,7 +88,14 @@ def identify_(
         keep=keep,
         source="; ".join(sources) or "recorded drops",
     )
-    report = {**answer.answer, "refused": refused, "remarks": list(answer.remarks)}
+    clocks = {name: zero.answer for name, zero in zeros.items()}
+    timed = [f"{name}: {zero.sentence}" for name, zero in zeros.items()]
+    report = {
+        **answer.answer,
+        "clocks": clocks,
+        "refused": refused,
+        "remarks": [*timed, *answer.remarks],
+    }
     _write(folder, document.dump(answer.law, identification.head(answer)), report)
     for reason in refused:
         console.say(f"left out: {reason}")
@@ -99,7 +105,7 @@ def identify_(
     widths = [max(map(len, column)) for column in zip(*answer.table, strict=True)]
     for row in answer.table:
         print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
-    for remark in answer.remarks:
+    for remark in (*timed, *answer.remarks):
         print(remark)
     print(f"Soil: {folder / SOIL}")
 

@@ -105,7 +105,7 @@ def by_clock(found: Sequence[tuple[str, float]]) -> str:
     return (
         " The simulation would meet these recordings, or come far nearer to them, if their clocks were off by far more "
         f"than they are said to be: {', '.join(each)}. Check what started them; a `clock` of `{{zero: unknown}}` or "
-        "`{{within: SECONDS}}` in a sidecar allows for it."
+        "`{within: SECONDS}` in a sidecar allows for it."
     )
 
 

@@ -21,7 +21,7 @@ from rollover.diagnosis.dependence import Dependence, dependence, dependence_of_
 from rollover.diagnosis.detect import mismatch_of
 from rollover.diagnosis.digits import to_the_last_digit
 from rollover.diagnosis.empirical import offered, proposed
-from rollover.diagnosis.evidence import Evidence, doubted, doubted_beside, evidence_of, left_out
+from rollover.diagnosis.evidence import Evidence, doubted, doubted_beside, evidence_of, foreign_to, left_out
 from rollover.diagnosis.fit import Judge
 from rollover.diagnosis.gate import yardstick
 from rollover.diagnosis.inquiry import Inquiry
@@ -56,6 +56,7 @@ from rollover.diagnosis.verdict import Degree, Diagnosis, Named
 from rollover.diagnosis.zeros import by_zeros, with_zeros
 from rollover.drop import unfit
 from rollover.effects import EFFECTS, spoken
+from rollover.faults import InputError
 from rollover.recording import Recording
 from rollover.scenario import Scenario
 from rollover.vehicle import Striker
@@ -80,7 +81,8 @@ def diagnose(
     `recordings` are (name, recording); `hold_out` names those that are never fitted, otherwise each condition is left
     out in turn. `tolerance` is the share of a channel's range by which a scenario that lacks nothing may still miss it:
     what is smaller counts as noise. `crew` works off the fits, in children if it has any; the answer is the same.
-    Raises `InputError` for a condition that the scenario does not know, ``ValueError`` for a name in `hold_out` that is
+    Raises `InputError` for a condition that the scenario does not know, a clock that nothing tells the zero of, and
+    recordings without any channel that is simulated; ``ValueError`` for a name in `hold_out` that is
     none, and for a tolerance outside 0 to 1.
     """
     began = clock.perf_counter()
@@ -298,7 +300,7 @@ def _trusted(scenario: Scenario, every: Sequence[Evidence]) -> list[Evidence]:
 def _evidence(
     scenario: Scenario, recordings: Sequence[tuple[str, Recording]], crew: Crew
 ) -> tuple[list[Evidence], list[str]]:
-    found, read, notes = [], [], []
+    found, read, notes, foreign = [], [], [], []
     for name, whole in recordings:
         recording, spiked = without_spikes(whole)
         recording, thin, simulator, averaged = compared(scenario, recording)
@@ -315,9 +317,12 @@ def _evidence(
         notes += [f"{name}: {channel} never moves and was left aside" for channel in still]
         if one is None:
             notes.append(f"{name}: shares no usable channel with the simulation and was left aside")
+            foreign += foreign_to(simulator, name, recording)
         else:
             found.append(one)
             read.append(recording)
+    if foreign and not found:
+        raise InputError(*foreign)
     found = with_loudness(digitised(found, read))
     louder = {s.channel: float(s.level.max()) for e in found for s in e.signals if s.level is not None}
     notes += [f"{c}: the noise grows with the value, to {most:.1f} times its least" for c, most in louder.items()]

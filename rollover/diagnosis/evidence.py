@@ -15,6 +15,7 @@ from rollover.diagnosis.leaps import JUMPS, LEAP_IN, SHOWS, about_leaps, beside_
 from rollover.diagnosis.nuisance import Eased, doubts, eased
 from rollover.diagnosis.simulator import Simulator
 from rollover.diagnosis.whitening import Noise, Whitening
+from rollover.faults import Fault
 from rollover.noise import LENGTH, USUAL, NoiseFloor, grown, noise_floor
 from rollover.recording import Recording
 from rollover.scenario import Scenario
@@ -288,6 +289,15 @@ def evidence_of(name: str, recording: Recording, simulator: Simulator, averaged:
         condition=condition_of(recording.conditions),
         averaged=averaged,
     )
+
+
+def foreign_to(simulator: Simulator, name: str, recording: Recording) -> list[Fault]:
+    """That nothing that was recorded is simulated, where that is so."""
+    made = simulator.predict({}, 0.0)
+    if made is None or made.keys() & recording.channels.keys():
+        return []
+    message = f"no channel that this scenario simulates, got {', '.join(recording.channels)}; one of them at least"
+    return [Fault(file=name, message=message)]
 
 
 def _oversampling(recording: Recording, channel: str) -> int:

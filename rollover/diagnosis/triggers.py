@@ -1,8 +1,7 @@
-"""Recordings whose clock has no zero: what they show first is taken for the first contact.
+"""Recordings whose clock is in doubt: their zero is found, see `rollover.onset`, before anything is compared.
 
-A drop falls, and then something happens. Where nobody says when t = 0 was, the sample at which a channel first leaves
-what it read until then is when. A time shift that is fitted goes no further than a trigger's usual delay; this one goes
-as far as the stamps do.
+A time shift that is fitted goes no further than a trigger's usual delay; a zero that is found goes as far as the stamps
+do. What a zero that is found leaves is no more than that delay, so that the shift is fitted from there on.
 """
 
 from __future__ import annotations
@@ -12,37 +11,55 @@ from dataclasses import replace
 
 import numpy as np
 
-from rollover.diagnosis.evidence import ALONE, Evidence, evidence_of
-from rollover.diagnosis.simulator import simulator_of
+from rollover.diagnosis.evidence import ALONE, Evidence
+from rollover.diagnosis.simulator import set_up
+from rollover.faults import InputError
+from rollover.onset import CLEAR, IN_A_ROW, QUIET, UntoldError, is_apart, is_quiet, timed
 from rollover.recording import Clock, Recording
 from rollover.scenario import Scenario
-from rollover.vehicle import Striker
 
-CLEAR, IN_A_ROW = 8.0, 4  # times its noise, and samples in a row, by which a channel shows that something is met
-QUIET, DRIFT = 8, 4.0  # samples before, at least, and by how much of its noise a channel may drift in them
-REACH = 3.0 * ALONE  # s, within which a time shift is fitted
+SAME = 0.01  # sigmas: a zero that is where it is stated to be
 
 
 def from_first_contact(
     scenario: Scenario, recordings: Sequence[tuple[str, Recording]]
 ) -> tuple[list[tuple[str, Recording]], list[str]]:
-    """The recordings, drops that nobody timed with the zero that their first contact tells, and a line for each moved.
+    """The recordings, those whose clock is in doubt with the zero that they show, and a line for each of these.
 
-    Those are the ones whose zero is unknown or may be off by more than where one is unknown. A contact within reach of
-    a time shift is left to that.
+    In doubt is a zero that is unknown, may be off by more than where one is unknown, or shares no time with the
+    scenario. Raises `InputError` for all of the latter that tell of no zero.
     """
-    found, notes = [], []
+    found, notes, faults = [], [], []
     for name, recording in recordings:
-        late = _late(name, recording, scenario) if _is_loose(recording, scenario) else None
-        if late is not None:
-            recording = replace(recording, clock=Clock(zero="unknown"))
-            if abs(late) > REACH:
-                recording = replace(recording, time=recording.time - late)
-                notes.append(
-                    f"{name}: its clock has no zero; what it shows first, at {late:.4g} s, is its first contact"
-                )
-        found.append((name, recording))
+        try:
+            moved, note = _moved(scenario, name, recording)
+        except InputError as e:
+            faults += e.faults
+            continue
+        found.append((name, moved))
+        notes += note
+    if faults:
+        raise InputError(*faults)
     return found, notes
+
+
+def _moved(scenario: Scenario, name: str, recording: Recording) -> tuple[Recording, list[str]]:
+    under, clock = set_up(scenario, recording), recording.clock
+    apart = is_apart(recording, under)
+    if not (apart or clock.zero == "unknown" or (clock.within or 0.0) > ALONE):
+        return recording, []
+    try:
+        at = timed(name, recording, under, trusting=True)
+    except UntoldError:
+        if apart:
+            raise
+        return recording, []  # the shift that is fitted may tell
+    if at.zero is None:
+        return recording, []
+    loose = replace(at.recording, clock=Clock(zero="unknown"))
+    if abs(at.zero.late) < SAME * at.zero.sigma:
+        return (recording if clock == loose.clock else replace(recording, clock=loose.clock)), []
+    return loose, [f"{name}: {at.zero.sentence}"]
 
 
 def first_shown(e: Evidence) -> Iterator[float]:
@@ -50,23 +67,5 @@ def first_shown(e: Evidence) -> Iterator[float]:
     for s in e.signals:
         off = np.abs(s.values - np.median(s.values[:QUIET])) > CLEAR * s.sigma
         row = np.flatnonzero(np.convolve(off, np.ones(IN_A_ROW), "valid") == IN_A_ROW)
-        if row.size and np.isfinite(e.simulator.contact) and _is_quiet(s.values[: row[0]] / s.sigma):
+        if row.size and np.isfinite(e.simulator.contact) and is_quiet(s.values[: row[0]] / s.sigma):
             yield float(e.recording.time[s.rows][row[0]] - e.simulator.contact)
-
-
-def _is_quiet(z: np.ndarray) -> bool:
-    """Whether what comes before a contact, in units of the noise, stays what it is: a blow that has begun does not."""
-    fall = z[: -(z.size // 4) or None]
-    return fall.size >= QUIET and abs(float(np.polyfit(np.linspace(0.0, 1.0, fall.size), fall, 1)[0])) < DRIFT
-
-
-def _is_loose(recording: Recording, scenario: Scenario) -> bool:
-    clock = recording.clock
-    return isinstance(scenario.vehicle, Striker) and (clock.zero == "unknown" or (clock.within or 0.0) > ALONE)
-
-
-def _late(name: str, recording: Recording, scenario: Scenario) -> float | None:
-    """How late (s) a recording is by the channels that show a contact; None where none does."""
-    evidence = evidence_of(name, recording, simulator_of(scenario, recording))
-    found = [] if evidence is None else list(first_shown(evidence))
-    return float(np.median(found)) if found else None

@@ -1,0 +1,95 @@
+"""Time stamps from their first one on, and where on them a scenario begins.
+
+No computing beyond needs to know at which hour of which clock they began. A double holds about 16 digits: seconds of an
+epoch (1.7e9) come in steps of 2.4e-7 s. Stamps that are a regular grid within that rounding are that grid.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+ROUNDINGS = 2.0  # steps of a double that two stamps may be off by: half a one each, and as much for how they were made
+DIGITS = 15  # that a double surely holds
+Told = Literal["onset", "alignment", "deceleration"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Zero:
+    """The scenario's t = 0 on a recording's clock: `late` s, with 1 sigma.
+
+    `by` is what told it; `why` it was looked for: stated as unknown, stated with a width, found to be off, or beyond
+    all that the scenario lasts.
+    """
+
+    late: float
+    sigma: float
+    by: Told
+    why: Literal["unknown", "within", "off", "apart"]
+    channels: tuple[str, ...]
+
+    @property
+    def answer(self) -> dict[str, Any]:
+        """For a file: the numbers, and the sentence."""
+        return {**asdict(self), "channels": list(self.channels), "sentence": self.sentence}
+
+    @property
+    def sentence(self) -> str:
+        """What was found, in words; to a tenth of the standard deviation."""
+        why = {
+            "unknown": "has no zero",
+            "within": "may be off",
+            "off": "is off, which is not stated",
+            "apart": "shares no time with the scenario",
+        }[self.why]
+        by = {
+            "onset": "by the onset of contact in",
+            "alignment": "by least-squares alignment of",
+            "deceleration": "by where the fall ends in",
+        }[self.by]
+        return (
+            f"its clock {why}; the scenario's zero lies at {in_digits(self.late, self.sigma)} s, 1 sigma "
+            f"{1e3 * self.sigma:.2g} ms, {by} {', '.join(self.channels)}"
+        )
+
+
+def from_first(time: Array) -> Array:
+    """Stamps (n,) less the first one, s; on their grid where they are one within their own rounding."""
+    since = time - time[0]
+    if time.size < 3:
+        return since
+    step = float(np.median(np.diff(since)))
+    count = np.rint(since / step)
+    if np.any(np.diff(count) < 1.0):
+        return since
+    off = ROUNDINGS * float(np.spacing(np.max(np.abs(time))))
+    low, high = float(np.max((since - off)[1:] / count[1:])), float(np.min((since + off)[1:] / count[1:]))
+    return count * _roundest(low, high) if low <= high else since
+
+
+def in_digits(value: float, sigma: float) -> str:
+    """A value to a tenth of its standard deviation."""
+    return f"{value:.{max(0, 1 - math.floor(math.log10(sigma))) if sigma > 0.0 else 9}f}"
+
+
+def rounding(time: Array) -> float:
+    """How far a stamp may be off by the rounding of a double alone, 1 sigma of a uniform distribution, s."""
+    return float(np.spacing(np.max(np.abs(time))) / np.sqrt(12.0))
+
+
+def _roundest(low: float, high: float) -> float:
+    """Of the steps within two bounds (s) that of a whole rate, else that of the fewest digits: loggers have such."""
+    rate = np.rint(2.0 / (low + high))
+    if rate >= 1.0 and low <= 1.0 / rate <= high:
+        return float(1.0 / rate)
+    middle = 0.5 * (low + high)
+    for digits in range(DIGITS):
+        step = float(f"{middle:.{digits}e}")
+        if low <= step <= high:
+            return step
+    return middle
