@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rollover.commands.door import AsJson, answering, app, manual
 from rollover.faults import Fault, InputError
+
+if TYPE_CHECKING:
+    from rollover.importers.sidecar import Described
 
 
 @app.command(
@@ -28,11 +31,12 @@ def check(
     """Validate files and run nothing; recordings are searched for faults of their sensors."""
     rows: list[dict[str, Any]] = []
     faults: list[Fault] = []
-    for name in (one for given in files for one in _each(given)):
+    given = _given(profile)
+    for name in (one for text in files for one in _each(text, given)):
         found: list[Fault] = []
         row: dict[str, Any] = {"file": name, "is": ""}
         try:
-            row |= _recording(name, profile, scenario) if _is_recording(name) or profile else _document(name)
+            row |= _recording(name, given, scenario) if _is_recording(name, given) else _document(name)
         except InputError as e:
             found = e.faults
         faults += found
@@ -45,12 +49,18 @@ def check(
         raise InputError(*faults)
 
 
-def _each(name: str) -> list[str]:
+def _given(profile: Path | None) -> Described | None:
+    from rollover.importers import read_profile
+
+    return None if profile is None else read_profile(profile)
+
+
+def _each(name: str, profile: Described | None) -> list[str]:
     """A file, or the recordings of a folder one by one; a folder without any is left to be refused."""
     from rollover.importers import recordings_at
 
     try:
-        return [str(p) for p in recordings_at(Path(name))] if Path(name).is_dir() else [name]
+        return [str(p) for p in recordings_at(Path(name), profile)] if Path(name).is_dir() else [name]
     except InputError:
         return [name]
 
@@ -61,11 +71,11 @@ def _document(name: str) -> dict[str, Any]:
     return {"is": catalogue.check(name)}
 
 
-def _is_recording(name: str) -> bool:
-    """Whatever is there and no YAML of ours; a sidecar by its format."""
+def _is_recording(name: str, profile: Described | None) -> bool:
+    """Whatever is there and no YAML of ours; a sidecar by its format. Without an ending it is one by its profile."""
     path = Path(name)
     if path.suffix.lower() not in (".yaml", ".yml"):
-        return bool(path.suffix) or path.is_dir()
+        return bool(path.suffix) or path.is_dir() or (profile is not None and path.is_file())
     try:
         with path.open("rb") as file:
             return b"rollover-recording/" in file.read(2000)
@@ -73,7 +83,7 @@ def _is_recording(name: str) -> bool:
         return False
 
 
-def _recording(name: str, profile: Path | None, scenario: str | None) -> dict[str, Any]:
+def _recording(name: str, profile: Described | None, scenario: str | None) -> dict[str, Any]:
     from rollover.channels import describe
     from rollover.importers import read_recording
     from rollover.prechecks import noise_floors, prechecks
