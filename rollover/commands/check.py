@@ -13,6 +13,7 @@ from rollover.faults import Fault, InputError
 
 if TYPE_CHECKING:
     from rollover.importers.sidecar import Described
+    from rollover.recording import Recording
 
 
 @app.command(
@@ -30,19 +31,22 @@ def check(
 ) -> None:
     """Validate files and run nothing; recordings are searched for faults of their sensors."""
     rows: list[dict[str, Any]] = []
+    read: dict[str, Recording] = {}
     faults: list[Fault] = []
     given = _given(profile)
     for name in (one for text in files for one in _each(text, given)):
         found: list[Fault] = []
         row: dict[str, Any] = {"file": name, "is": ""}
         try:
-            row |= _recording(name, given, scenario) if _is_recording(name, given) else _document(name)
+            row |= _recording(name, given, scenario, read) if _is_recording(name, given) else _document(name)
         except InputError as e:
             found = e.faults
         faults += found
         rows.append({**row, "faults": [{**vars(f), "text": str(f)} for f in found]})
-        if not as_json and not found:
-            _print(name, row)
+    _shared(rows, read)
+    for row in rows if not as_json else ():
+        if not row["faults"]:
+            _print(row["file"], row)
     if as_json:
         print(json.dumps({"ok": not faults, "files": rows}, indent=2))
     if faults:
@@ -83,12 +87,16 @@ def _is_recording(name: str, profile: Described | None) -> bool:
         return False
 
 
-def _recording(name: str, profile: Described | None, scenario: str | None) -> dict[str, Any]:
+def _recording(
+    name: str, profile: Described | None, scenario: str | None, read: dict[str, Recording]
+) -> dict[str, Any]:
+    import numpy as np
+
     from rollover.channels import describe
     from rollover.importers import read_recording
     from rollover.prechecks import noise_floors, prechecks
 
-    recording = read_recording(name, profile=profile)
+    recording = read[name] = read_recording(name, profile=profile)
     gravity = 9.81
     if scenario is not None:
         from rollover import scenario as scenarios
@@ -101,6 +109,7 @@ def _recording(name: str, profile: Described | None, scenario: str | None) -> di
         "samples": recording.time.size,
         "start": float(recording.time[0]),
         "end": float(recording.time[-1]),
+        "step": float(np.median(np.diff(recording.time))) if recording.time.size > 1 else 0.0,
         "notes": list(recording.notes),
         "channels": [
             {
@@ -115,11 +124,26 @@ def _recording(name: str, profile: Described | None, scenario: str | None) -> di
     }
 
 
+def _shared(rows: list[dict[str, Any]], read: dict[str, Recording]) -> None:
+    """Add to each recording what only several of them tell together, where it is not told already."""
+    if len(read) < 2:
+        return
+    from rollover.prechecks import shared_rails
+
+    by_name = {row["file"]: row for row in rows if row["is"] == "recording"}
+    for name, f in shared_rails(read):
+        told = by_name[name]["findings"] if name in by_name else None
+        if told is not None and not any((t["check"], t["channel"]) == (f.check, f.channel) for t in told):
+            told.append(vars(f))
+
+
 def _print(name: str, row: dict[str, Any]) -> None:
     if row["is"] != "recording":
         print(f"{name}: {row['is']}, in order")
         return
-    span = f"{row['samples']} samples, {row['start']:.6g} to {row['end']:.6g} s"
+    from rollover.prechecks import when
+
+    span = f"{row['samples']} samples, {when(row['start'], row['end'], row['step'])}"
     print(f"{name}: recording, in order: {row['title']}, {span}")
     for channel in row["channels"]:
         noise = "noise not known" if channel["noise"] is None else f"noise {channel['noise']:.3g} {channel['unit']}"
@@ -127,6 +151,6 @@ def _print(name: str, row: dict[str, Any]) -> None:
     for note in row["notes"]:
         print(f"  note: {note}")
     for f in row["findings"]:
-        print(f"  {f['check']}: {f['channel']}, {f['start']:.6g} to {f['end']:.6g} s: {f['sentence']}")
-    if not row["findings"]:
+        print(f"  {f['check']}: {f['channel']}, {when(f['start'], f['end'], row['step'])}: {f['sentence']}")
+    if all(f["check"] == "wrap-around" for f in row["findings"]):
         print("  no fault of a sensor found")

@@ -177,14 +177,15 @@ def in_words(findings: Sequence[tuple[str, Finding]]) -> Iterator[str]:
 def _prechecks(scenario: Scenario, measured: Mapping[str, Recording]) -> list[tuple[str, Finding]]:
     """What the recordings alone give away about their sensors, before any model is asked."""
     from rollover.diagnosis.simulator import set_up
-    from rollover.prechecks import prechecks
+    from rollover.prechecks import prechecks, shared_rails
 
     found = []
     for name, recording in measured.items():
         own = set_up(scenario, recording)
         mass = getattr(own.vehicle, "mass", None)
         found += [(name, f) for f in prechecks(recording, mass=mass, gravity=own.gravity)]
-    return found
+    told = {(name, f.check, f.channel) for name, f in found}
+    return found + [(name, f) for name, f in shared_rails(measured) if (name, f.check, f.channel) not in told]
 
 
 def _plain(finding: Finding) -> dict[str, Any]:

@@ -133,7 +133,9 @@ def read_named(
         for file in files:
             name = name_of(file)
             if name in first:
-                message = f"a second recording by this name, got {name!r}, first {first[name]}; each its own"
+                message = (
+                    f"a second recording by this name, got {name!r}, first {first[name]}; two recordings share a name"
+                )
                 faults.append(Fault(file=str(file), message=message))
                 continue
             first[name] = file

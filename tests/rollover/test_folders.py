@@ -87,7 +87,7 @@ def test_two_recordings_of_one_name_are_refused_before_anything_is_written(tmp_p
     assert (code, said) == (2, "")
     assert (
         faults
-        == f"{tmp_path}/raw/a.lvm: a second recording by this name, got 'a', first {tmp_path}/raw/a.csv; each its own\n"
+        == f"{tmp_path}/raw/a.lvm: a second recording by this name, got 'a', first {tmp_path}/raw/a.csv; two recordings share a name\n"
     )
     assert not (tmp_path / "out").exists()
 
