@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ground import relief
 from ground.kinds import ByKind
+from ground.no_data import missing
 from ground.quantity import Grid, Quantity, parameters
 
 Array = NDArray[np.float64]
@@ -115,12 +116,17 @@ class Heightmap:
     corner: Annotated[Where, "of the node with the smallest x and y"] = (0.0, 0.0)
 
     def validate(self) -> None:
-        """Refuse what is no grid."""
+        """Refuse what is no grid, and nodes without a height."""
         lengths = {len(row) for row in self.heights}
         if len(self.heights) < 2 or len(lengths) != 1 or min(lengths) < 2:
             raise ValueError(f"heights: not a grid, got {len(self.heights)} rows of {sorted(lengths)}; at least 2 x 2")
-        if not all(math.isfinite(z) for row in self.heights for z in row):
-            raise ValueError("heights: not finite, got NaN or infinity; a number at each node")
+        found = missing(np.array(self.heights, dtype=float), self.spacing, relief.STEEPEST)
+        if found is not None:
+            i, j, why = found
+            raise ValueError(
+                f"heights.{i}.{j}: no height at row {i + 1}, column {j + 1}, got {why}: a mark for no data; "
+                "fill such nodes in from those beside them, or cut the map down to where it has heights"
+            )
 
 
 Part = Annotated[Plane | Slope | Bank | Ditch | Ramp | Kerb | Heightmap, ByKind()]

@@ -113,12 +113,12 @@ class Case:
     sigmas: tuple[float, ...]
     skipped: Mapping[str, str] = field(default_factory=dict)
     reference: Recording | None = None
+    zero: Zero | None = None
+    clock_sigma: float | None = None
 
     def seen(self, scenario: Scenario, simulated: Recording) -> Recording:
         """A simulation as the recording's instruments would have read it, on the branch that its attitude is on."""
         return attitude.beside(as_measured(scenario, simulated, self.recording), self.reference)
-    zero: Zero | None = None
-    clock_sigma: float | None = None
 
 
 def case(

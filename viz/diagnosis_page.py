@@ -273,10 +273,12 @@ def _detectable(found: Diagnosis) -> list[Block]:
 
 def _sensors(prechecks: Sequence[tuple[str, Finding]], count: int) -> Section:
     if not prechecks:
-        text = f"Nothing was found in {count} recordings: free fall, rest, double integrals, flat tops, gaps, spikes."
+        asked = "zero offsets, free fall, rest, double integrals, clipping, gaps, spikes"
+        text = f"Nothing was found in {count} recordings: {asked}."
         return Section(title="Sensors, before any model", blocks=[Note(text=text)])
     rows: list[Row] = [
-        [name, f.channel, Cell(f.check, "warn"), f"{f.start:.4f}", f"{f.end:.4f}", f.sentence] for name, f in prechecks
+        [name, f.channel, Cell(f.check, "warn"), f"{f.start:z.4f}", f"{f.end:z.4f}", f.sentence]
+        for name, f in prechecks
     ]
     columns = ["recording", "channel", "check", "from, s", "to, s", "what it means"]
     note = Note(text="A sensor at fault looks like missing physics: settle these before the ground is blamed.")

@@ -31,7 +31,7 @@ JSON, OVERRIDE, SCENARIO, PAGE = "calibrate.json", "override.yaml", "scenario-ca
 def calibrate(
     scenario: Annotated[str, typer.Argument(help="A scenario file, or the name of a shipped one.")],
     recordings: Annotated[
-        list[str], typer.Argument(help="Recordings, each with its conditions.", metavar="RECORDING...")
+        list[str], typer.Argument(help="Recordings with their conditions, or folders of them.", metavar="RECORDING...")
     ],
     fit: Annotated[
         list[str], typer.Option("--fit", metavar="PATH[=LOW:HIGH]", help="A value to be fitted; may be repeated.")
@@ -44,7 +44,7 @@ def calibrate(
     clock_sigma: Annotated[float, typer.Option(help="Prior of each recording's clock offset, s.", min=0.0)] = 1e-3,
     starts: Annotated[int, typer.Option(help="Random starts that are looked at.", min=0)] = 8,
     seed: Annotated[int, typer.Option(help="Of the random starts.")] = 0,
-    profile: Annotated[Path | None, typer.Option(help="What the columns of a foreign file are.")] = None,
+    profile: Annotated[Path | None, typer.Option(help="What the columns of foreign files are.")] = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/calibrate/NAME")] = None,
     workers: Annotated[int, typer.Option(help="Starts followed at once; 0 for this process.", min=0)] = 0,
     force: Force = False,
@@ -98,7 +98,8 @@ def calibrate(
         _write_scenario(part, folder, path, settings(set_ or []), found)
         from viz.calibration_page import page
 
-        command = " ".join(map(shlex.quote, ["rollover", "calibrate", scenario, *recordings, *_options(fit, hold_out)]))
+        options = [*_options(fit, hold_out), *(["--profile", str(profile)] if profile else [])]
+        command = " ".join(map(shlex.quote, ["rollover", "calibrate", scenario, *recordings, *options]))
         text = page(found, command=command, scenario_hash=about["scenario_hash"], versions=store.versions())
         (part / PAGE).write_text(text, encoding="utf-8")
     if as_json:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rollover.commands.door import AsJson, answering, app, manual
 from rollover.faults import Fault, InputError
+
+if TYPE_CHECKING:
+    from rollover.importers.sidecar import Described
+    from rollover.recording import Recording
 
 
 @app.command(
@@ -27,30 +31,40 @@ def check(
 ) -> None:
     """Validate files and run nothing; recordings are searched for faults of their sensors."""
     rows: list[dict[str, Any]] = []
+    read: dict[str, Recording] = {}
     faults: list[Fault] = []
-    for name in (one for given in files for one in _each(given)):
+    given = _given(profile)
+    for name in (one for text in files for one in _each(text, given)):
         found: list[Fault] = []
         row: dict[str, Any] = {"file": name, "is": ""}
         try:
-            row |= _recording(name, profile, scenario) if _is_recording(name) or profile else _document(name)
+            row |= _recording(name, given, scenario, read) if _is_recording(name, given) else _document(name)
         except InputError as e:
             found = e.faults
         faults += found
         rows.append({**row, "faults": [{**vars(f), "text": str(f)} for f in found]})
-        if not as_json and not found:
-            _print(name, row)
+    _shared(rows, read)
+    for row in rows if not as_json else ():
+        if not row["faults"]:
+            _print(row["file"], row)
     if as_json:
         print(json.dumps({"ok": not faults, "files": rows}, indent=2))
     if faults:
         raise InputError(*faults)
 
 
-def _each(name: str) -> list[str]:
+def _given(profile: Path | None) -> Described | None:
+    from rollover.importers import read_profile
+
+    return None if profile is None else read_profile(profile)
+
+
+def _each(name: str, profile: Described | None) -> list[str]:
     """A file, or the recordings of a folder one by one; a folder without any is left to be refused."""
     from rollover.importers import recordings_at
 
     try:
-        return [str(p) for p in recordings_at(Path(name))] if Path(name).is_dir() else [name]
+        return [str(p) for p in recordings_at(Path(name), profile)] if Path(name).is_dir() else [name]
     except InputError:
         return [name]
 
@@ -61,11 +75,11 @@ def _document(name: str) -> dict[str, Any]:
     return {"is": catalogue.check(name)}
 
 
-def _is_recording(name: str) -> bool:
-    """Whatever is there and no YAML of ours; a sidecar by its format."""
+def _is_recording(name: str, profile: Described | None) -> bool:
+    """Whatever is there and no YAML of ours; a sidecar by its format. Without an ending it is one by its profile."""
     path = Path(name)
     if path.suffix.lower() not in (".yaml", ".yml"):
-        return bool(path.suffix) or path.is_dir()
+        return bool(path.suffix) or path.is_dir() or (profile is not None and path.is_file())
     try:
         with path.open("rb") as file:
             return b"rollover-recording/" in file.read(2000)
@@ -73,13 +87,16 @@ def _is_recording(name: str) -> bool:
         return False
 
 
-def _recording(name: str, profile: Path | None, scenario: str | None) -> dict[str, Any]:
-    from rollover.attitude import continuous
+def _recording(
+    name: str, profile: Described | None, scenario: str | None, read: dict[str, Recording]
+) -> dict[str, Any]:
+    import numpy as np
+
     from rollover.channels import describe
     from rollover.importers import read_recording
     from rollover.prechecks import noise_floors, prechecks
 
-    recording = continuous(read_recording(name, profile=profile))
+    recording = read[name] = read_recording(name, profile=profile)
     gravity = 9.81
     if scenario is not None:
         from rollover import scenario as scenarios
@@ -92,6 +109,7 @@ def _recording(name: str, profile: Path | None, scenario: str | None) -> dict[st
         "samples": recording.time.size,
         "start": float(recording.time[0]),
         "end": float(recording.time[-1]),
+        "step": float(np.median(np.diff(recording.time))) if recording.time.size > 1 else 0.0,
         "notes": list(recording.notes),
         "channels": [
             {
@@ -106,11 +124,26 @@ def _recording(name: str, profile: Path | None, scenario: str | None) -> dict[st
     }
 
 
+def _shared(rows: list[dict[str, Any]], read: dict[str, Recording]) -> None:
+    """Add to each recording what only several of them tell together, where it is not told already."""
+    if len(read) < 2:
+        return
+    from rollover.prechecks import shared_rails
+
+    by_name = {row["file"]: row for row in rows if row["is"] == "recording"}
+    for name, f in shared_rails(read):
+        told = by_name[name]["findings"] if name in by_name else None
+        if told is not None and not any((t["check"], t["channel"]) == (f.check, f.channel) for t in told):
+            told.append(vars(f))
+
+
 def _print(name: str, row: dict[str, Any]) -> None:
     if row["is"] != "recording":
         print(f"{name}: {row['is']}, in order")
         return
-    span = f"{row['samples']} samples, {row['start']:.6g} to {row['end']:.6g} s"
+    from rollover.prechecks import when
+
+    span = f"{row['samples']} samples, {when(row['start'], row['end'], row['step'])}"
     print(f"{name}: recording, in order: {row['title']}, {span}")
     for channel in row["channels"]:
         noise = "noise not known" if channel["noise"] is None else f"noise {channel['noise']:.3g} {channel['unit']}"
@@ -118,6 +151,6 @@ def _print(name: str, row: dict[str, Any]) -> None:
     for note in row["notes"]:
         print(f"  note: {note}")
     for f in row["findings"]:
-        print(f"  {f['check']}: {f['channel']}, {f['start']:.6g} to {f['end']:.6g} s: {f['sentence']}")
-    if not row["findings"]:
+        print(f"  {f['check']}: {f['channel']}, {when(f['start'], f['end'], row['step'])}: {f['sentence']}")
+    if all(f["check"] == "wrap-around" for f in row["findings"]):
         print("  no fault of a sensor found")

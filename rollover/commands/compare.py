@@ -43,7 +43,8 @@ def compare(
     recordings: Annotated[
         list[str],
         typer.Argument(
-            help="Recordings, each with its conditions; beside results another run's.", metavar="RECORDING..."
+            help="Recordings with their conditions, or folders of them; beside results another run's.",
+            metavar="RECORDING...",
         ),
     ],
     set_: Setting = None,
@@ -53,7 +54,7 @@ def compare(
             help="Filter class for both sides, refused where one is too slow", show_default="loads.cfc if possible"
         ),
     ] = None,
-    profile: Annotated[Path | None, typer.Option(help="What the columns of a foreign file are.")] = None,
+    profile: Annotated[Path | None, typer.Option(help="What the columns of foreign files are.")] = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/compare/NAME")] = None,
     force: Force = False,
     as_json: AsJson = False,
@@ -83,7 +84,8 @@ def compare(
     runs = {name: _run(chosen, name, recording) for name, recording in measured.items()}
     found = _misfits(runs, measured, cfc)
     answer = _answer(about, runs, found)
-    command = " ".join(map(shlex.quote, ["rollover", "compare", scenario, *recordings]))
+    by = ["--profile", str(profile)] if profile else []
+    command = " ".join(map(shlex.quote, ["rollover", "compare", scenario, *recordings, *by]))
     with store.whole(folder) as part:
         store.write_json(part / JSON, answer)
         from viz.comparison_page import page
@@ -163,23 +165,10 @@ def _draw_pair(found: Pair, path: Path) -> None:
 
 
 def read(paths: list[str], profile: Path | None) -> dict[str, Recording]:
-    """Recordings by their file's stem. Raises `InputError` for all faults at once, and for one name twice."""
-    from rollover.importers import read_recording
+    """Recordings by name, those in folders too. Raises `InputError` for all faults at once, and for one name twice."""
+    from rollover.importers import read_named
 
-    found: dict[str, Recording] = {}
-    faults: list[Fault] = []
-    for text in paths:
-        name = Path(text).stem
-        if name in found:
-            faults.append(Fault(file=text, message=f"a second recording by this name, got {name!r}; each its own"))
-            continue
-        try:
-            found[name] = read_recording(text, profile=profile)
-        except InputError as e:
-            faults += e.faults
-    if faults:
-        raise InputError(*faults)
-    return found
+    return {name: recording for name, (_, recording) in read_named(paths, profile).items()}
 
 
 def _say_compiling() -> None:

@@ -51,6 +51,7 @@ def diagnose(
         ),
     ] = 0.0,
     set_: Setting = None,
+    profile: Annotated[Path | None, typer.Option(help="What the columns of foreign files are.")] = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/diagnose/NAME")] = None,
     workers: Annotated[
         int | None,
@@ -81,7 +82,7 @@ def diagnose(
     chosen = scenarios.load(path)
     if set_:
         chosen = chosen.replaced(settings(set_), origin="--set")
-    measured = read(recordings)
+    measured = read(recordings, profile)
     _check(chosen, measured)
     held = _held_out(list(measured), hold_out or [])
     folder = out or Path("out", "diagnose", path.stem)
@@ -97,7 +98,7 @@ def diagnose(
     # beside the results folder, which is written whole or not at all: what an interrupted diagnosis had fitted
     notebook = folder.parent / f".{folder.name}.fits"
     about_fits = json.dumps([about, store.versions()], sort_keys=True)
-    words = ["rollover", "diagnose", scenario, *recordings, *_options(hold_out, set_, tolerance)]
+    words = ["rollover", "diagnose", scenario, *recordings, *_options(hold_out, set_, tolerance, profile)]
     with Crew(workers, notebook, about_fits) as crew:
         found = diagnosed(
             chosen, list(measured.items()), hold_out=held, tolerance=tolerance, say=console.say, crew=crew
@@ -130,30 +131,11 @@ def diagnose(
         console.diagnosis(found, str(folder))
 
 
-def read(paths: Sequence[str]) -> dict[str, Recording]:
-    """Recordings by their file's stem, those in folders too. Raises `InputError` for all faults at once."""
-    from rollover.importers import read_recording, recordings_at
+def read(paths: Sequence[str], profile: Path | None = None) -> dict[str, Recording]:
+    """Recordings by name, those in folders too. Raises `InputError` for all faults at once."""
+    from rollover.importers import read_named
 
-    found: dict[str, Recording] = {}
-    faults: list[Fault] = []
-    for text in paths:
-        try:
-            files = recordings_at(Path(text))
-        except InputError as e:
-            faults += e.faults
-            continue
-        for file in files:
-            if file.stem in found:
-                message = f"a second recording by this name, got {file.stem!r}; each its own"
-                faults.append(Fault(file=str(file), message=message))
-                continue
-            try:
-                found[file.stem] = read_recording(file)
-            except InputError as e:
-                faults += e.faults
-    if faults:
-        raise InputError(*faults)
-    return found
+    return {name: recording for name, (_, recording) in read_named(paths, profile).items()}
 
 
 def _check(scenario: Scenario, measured: Mapping[str, Recording]) -> None:
@@ -195,14 +177,15 @@ def in_words(findings: Sequence[tuple[str, Finding]]) -> Iterator[str]:
 def _prechecks(scenario: Scenario, measured: Mapping[str, Recording]) -> list[tuple[str, Finding]]:
     """What the recordings alone give away about their sensors, before any model is asked."""
     from rollover.diagnosis.simulator import set_up
-    from rollover.prechecks import prechecks
+    from rollover.prechecks import prechecks, shared_rails
 
     found = []
     for name, recording in measured.items():
         own = set_up(scenario, recording)
         mass = getattr(own.vehicle, "mass", None)
         found += [(name, f) for f in prechecks(recording, mass=mass, gravity=own.gravity)]
-    return found
+    told = {(name, f.check, f.channel) for name, f in found}
+    return found + [(name, f) for name, f in shared_rails(measured) if (name, f.check, f.channel) not in told]
 
 
 def _plain(finding: Finding) -> dict[str, Any]:
@@ -214,9 +197,9 @@ def _plain(finding: Finding) -> dict[str, Any]:
     return bare
 
 
-def _options(hold_out: list[str] | None, set_: list[str] | None, tolerance: float) -> list[str]:
-    stated = [f"{tolerance:g}"] if tolerance else []
-    given = (("--hold-out", hold_out or []), ("--set", set_ or []), ("--tolerance", stated))
+def _options(hold_out: list[str] | None, set_: list[str] | None, tolerance: float, profile: Path | None) -> list[str]:
+    stated, by = [f"{tolerance:g}"] if tolerance else [], [str(profile)] if profile else []
+    given = (("--hold-out", hold_out or []), ("--set", set_ or []), ("--tolerance", stated), ("--profile", by))
     return [part for name, texts in given for text in texts for part in (name, text)]
 
 

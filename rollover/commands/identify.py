@@ -5,15 +5,12 @@ from __future__ import annotations
 import json
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from rollover.commands.door import AsJson, Force, Setting, answering, app, manual, settings
 from rollover.faults import Fault, InputError
-
-if TYPE_CHECKING:
-    from rollover.recording import Recording
 
 SOIL, ANSWER = "soil.yaml", "identify.json"
 
@@ -41,7 +38,9 @@ class StrikerMass(StrEnum):
 )
 @answering
 def identify_(
-    recordings: Annotated[list[str], typer.Argument(help="Recorded drops.", metavar="RECORDING...")],
+    recordings: Annotated[
+        list[str], typer.Argument(help="Recorded drops, or folders of them.", metavar="RECORDING...")
+    ],
     scenario: Annotated[str, typer.Option(help="Whose striker fell, unless a recording says otherwise.")] = "drop_test",
     set_: Setting = None,
     form: Annotated[Form | None, typer.Option("--law", help="Law", show_default="ye-2006; bearing for a cone")] = None,
@@ -54,6 +53,7 @@ def identify_(
         bool, typer.Option("--terminal-speed", help="It fell at terminal speed: take the drag from there.")
     ] = False,
     keep: Annotated[bool, typer.Option("--keep", help="Published values for what the drops cannot determine.")] = False,
+    profile: Annotated[Path | None, typer.Option(help="What the columns of foreign files are.")] = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/identify/NAME")] = None,
     force: Force = False,
     as_json: AsJson = False,
@@ -61,15 +61,14 @@ def identify_(
     """Identify a ground law from drops: stiffness over depth, coefficients with intervals, a soil file."""
     from rollover import console, document, identification
     from rollover import scenario as scenarios
+    from rollover.importers import name_of, read_named
     from rollover.vehicle import Striker
 
     chosen = scenarios.load(document.find(scenario))
     if set_:
         chosen = chosen.replaced(settings(set_), origin="--set")
-    found = {Path(name).stem: _read(name) for name in recordings}
-    if len(found) < len(recordings):
-        raise InputError(Fault(message=f"two recordings share a name, got {', '.join(recordings)}; each name once"))
-    folder = out or Path("out", "identify", Path(recordings[0]).stem)
+    found = {name: (recording, _digest(at)) for name, (at, recording) in read_named(recordings, profile).items()}
+    folder = out or Path("out", "identify", name_of(Path(recordings[0])))
     _claim(folder, force)
     is_cone = isinstance(chosen.vehicle, Striker) and chosen.vehicle.nose == "cone"
     wanted = form or (Form.bearing if is_cone else Form.ye)
@@ -110,15 +109,17 @@ def identify_(
     print(f"Soil: {folder / SOIL}")
 
 
-def _read(name: str) -> tuple[Recording, str]:
-    """A recording and the SHA-256 of its file; of a run's folder its channels."""
+def _digest(path: Path) -> str:
+    """SHA-256 of a recording's file: of a run's folder its channels, of another one all files with their names."""
     import hashlib
 
-    from rollover.importers import read_recording
-
-    path = Path(name)
-    path = path / "channels.parquet" if path.is_dir() else path
-    return read_recording(path), hashlib.sha256(path.read_bytes()).hexdigest()
+    path = path / "channels.parquet" if (path / "channels.parquet").is_file() else path
+    if path.is_file():
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    every = hashlib.sha256()
+    for file in sorted(p for p in path.rglob("*") if p.is_file()):
+        every.update(f"{file.relative_to(path).as_posix()}\0".encode() + hashlib.sha256(file.read_bytes()).digest())
+    return every.hexdigest()
 
 
 def _claim(folder: Path, force: bool) -> None:

@@ -12,7 +12,7 @@ from rollover.commands.door import AsJson, Force, answering, app, manual
 from rollover.faults import Fault, InputError, hint
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Mapping
 
     from rollover.recording import Recording
 
@@ -21,15 +21,18 @@ if TYPE_CHECKING:
     "import",
     epilog=manual(
         "import test.mme --out rec",
+        "import raw --profile bench.yaml --out rec",
         "import tosses --as cube-tosses --select 'toss00*'",
         writes="NAME.csv (or .parquet, .mme.zip) with its sidecar NAME.yaml for each recording.",
     ),
 )
 @answering
 def import_(
-    source: Annotated[Path, typer.Argument(help="A file or folder.")],
+    source: Annotated[Path, typer.Argument(help="A file, or a folder of them.")],
     kind: Annotated[str, typer.Option("--as", help="What it is; found out by itself where that is possible.")] = "",
-    profile: Annotated[Path | None, typer.Option(help="What the columns are (rollover-profile/1).")] = None,
+    profile: Annotated[
+        Path | None, typer.Option(help="What the columns and conditions are (rollover-profile/1).")
+    ] = None,
     select: Annotated[
         list[str] | None, typer.Option(help="Of a set of recordings, those whose names fit; may be repeated.")
     ] = None,
@@ -39,40 +42,48 @@ def import_(
     as_json: AsJson = False,
 ) -> None:
     """Turn recordings of other formats into rollover-recording/1 files."""
-    from rollover.importers import write_recording
+    from rollover.importers import name_of
 
     endings = ("csv", "parquet", "mme.zip")
     if to not in endings:
         raise InputError(Fault(file="--to", message=f"no such format, got {to!r}; {', '.join(endings)} are allowed"))
-    folder = out or Path("out", "import", source.name.split(".")[0])
-    made, rows = list(_recordings(source, kind, profile, select)), []  # all are read before the first is written
-    targets = [folder / f"{name}.{to}" for name, _ in made]
-    for target in targets:
-        if target.exists() and not force:
-            raise InputError(Fault(file=str(target), message="exists; --force replaces it, --out leaves it"))
-    for target, (_, recording) in zip(targets, made, strict=True):
-        write_recording(recording, target, force=force)
+    folder = out or Path("out", "import", name_of(source))
+    made = _recordings(source, kind, profile, select)  # all are read before the first is written
+    targets = {name: folder / f"{name}.{to}" for name in made}
+    for target, (at, _) in zip(targets.values(), made.values(), strict=True):
+        if at is not None and target.exists() and target.samefile(at):
+            raise InputError(Fault(file=str(target), message="would replace the recording that is read; another --out"))
+    taken = [t for t in targets.values() if t.exists()]
+    if taken and not force:
+        raise InputError(Fault(file=str(taken[0]), message="exists; --force replaces it, --out leaves it"))
+    _write(folder, {targets[name].name: recording for name, (_, recording) in made.items()}, force)
+    rows = []
+    for name, (_, recording) in made.items():
         channels = list(recording.channels)
-        rows.append({"file": str(target), "samples": recording.time.size, "channels": channels})
+        rows.append({"file": str(targets[name]), "samples": recording.time.size, "channels": channels})
         if not as_json:
-            print(f"{target}: {recording.time.size} samples of {len(channels)} channels")
+            print(f"{targets[name]}: {recording.time.size} samples of {len(channels)} channels")
     if as_json:
         print(json.dumps({"files": rows}, indent=2))
 
 
 def _recordings(
     source: Path, kind: str, profile: Path | None, select: list[str] | None
-) -> Iterator[tuple[str, Recording]]:
-    from rollover.importers import COLLECTIONS, importers, read_recording
+) -> dict[str, tuple[Path | None, Recording]]:
+    """File, where it is one, and recording by name. Raises `InputError`, for two of one name too."""
+    from rollover.importers import COLLECTIONS, importers, read_named
 
     if kind in COLLECTIONS:
         if profile is not None:
             raise InputError(Fault(file=str(profile), message=f"{kind} needs no profile; leave it out"))
-        found = list(COLLECTIONS[kind].read(source, select or ["*"]))
+        found: dict[str, tuple[Path | None, Recording]] = {}
+        for name, recording in COLLECTIONS[kind].read(source, select or ["*"]):
+            if name in found:
+                raise InputError(Fault(file=str(source), message=f"two recordings by one name, got {name!r}; --select"))
+            found[name] = (None, recording)
         if not found:
             raise InputError(Fault(file=str(source), message=f"nothing fits, got {select}; names such as toss001, *"))
-        yield from found
-        return
+        return found
     known = [*importers(), *COLLECTIONS]
     if kind and kind not in known:
         raise InputError(Fault(file="--as", message=f"no such format, got {kind!r}; {hint(kind, known)}"))
@@ -80,4 +91,30 @@ def _recordings(
         raise InputError(
             Fault(file="--select", message=f"one recording, got {select}; only of a set can some be taken")
         )
-    yield source.name.split(".")[0], read_recording(source, profile=profile, kind=kind)
+    return dict(read_named([source], profile, kind))
+
+
+def _write(folder: Path, made: Mapping[str, Recording], force: bool) -> None:
+    """All recordings, by the name of their file, or none. Raises `InputError`."""
+    import os
+    import shutil
+    import tempfile
+
+    from rollover.importers import write_recording
+
+    is_new = not folder.exists()
+    folder.mkdir(parents=True, exist_ok=True)
+    part = Path(tempfile.mkdtemp(prefix=".import.", suffix=".part", dir=folder))
+    try:
+        for name, recording in made.items():
+            write_recording(recording, part / name)
+        files = sorted(part.iterdir())
+        taken = [folder / p.name for p in files if (folder / p.name).exists()]
+        if taken and not force:
+            raise InputError(Fault(file=str(taken[0]), message="exists; --force replaces it, --out leaves it"))
+        for file in files:
+            os.replace(file, folder / file.name)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+        if is_new and not any(folder.iterdir()):
+            folder.rmdir()

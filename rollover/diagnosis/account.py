@@ -13,7 +13,7 @@ from rollover.diagnosis.diagnose import diagnose
 from rollover.diagnosis.verdict import Diagnosis, Interval, Law, Named, Place, Score
 from rollover.document import dump
 from rollover.effects import nth
-from rollover.importers import read_recording, recordings_at
+from rollover.importers import read_named
 from rollover.recording import Recording
 from rollover.scenario import Scenario, load
 from rollover.store import plain, versions
@@ -119,7 +119,7 @@ def diagnosed_text(scenario: Scenario, found: Diagnosis) -> str:
 
 def recordings_in(folder: Path) -> list[tuple[str, Recording]]:
     """Name and recording of each table in a folder, by name. Raises `InputError`."""
-    return [(p.stem, read_recording(p)) for p in recordings_at(folder)]
+    return [(name, recording) for name, (_, recording) in read_named([folder]).items()]
 
 
 def diagnose_folder(folder: Path, out: Path | None = None, workers: int = 1) -> dict[str, Any]:

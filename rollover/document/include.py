@@ -6,17 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
+from rollover.document import grids
 from rollover.document.slot import Slot
-from rollover.document.tree import Node, planted, read, shown
+from rollover.document.tree import Node, read, shown
 from rollover.faults import Fault, InputError, hint, nearest
 
 BASE = "base"
 ENDINGS = (".yaml", ".yml")
 GRIDS = (".csv", ".npy")
 SHELVES = ("", "vehicles", "soils")  # of shipped files, whose names without an ending may be used anywhere
-MOST_NODES = 500_000
 
 
 def shipped_folder() -> Path:
@@ -128,24 +126,13 @@ def _name(element: Node) -> str | None:
 
 
 def _grid(node: Node, path: str) -> Node:
-    """Rows of numbers from a file beside the one that names it, or among the shipped ones."""
+    """Heights from a file beside the one that names it, or among the shipped ones."""
     name = Path(str(node.value))
     folders = (node.place.folder, shipped_folder())
     file = next((f / name for f in folders if (f / name).is_file()), None)
     if file is None:
         raise node.place.fault(path, f"no such file, got {node.value!r}; a .csv or .npy file beside this one is needed")
-    try:
-        if file.suffix == ".npy":
-            found = np.load(file, allow_pickle=False)
-        else:
-            found = np.loadtxt(file, delimiter=",", comments="#", ndmin=2)
-        rows = np.asarray(found, dtype=float)
-    except (OSError, ValueError, EOFError) as e:
-        raise node.place.fault(path, f"{shown(file)} is no grid of numbers: {str(e).splitlines()[0]}") from None
-    if rows.ndim != 2 or rows.size > MOST_NODES or not np.isfinite(rows).all():
-        what = f"{shown(file)} is no grid of finite numbers, got shape {rows.shape}"
-        raise node.place.fault(path, f"{what}; two dimensions and at most {MOST_NODES} numbers are allowed")
-    return planted(rows.tolist(), node.place)
+    return grids.read(file, node, path)
 
 
 def _file(node: Node) -> Path | None:

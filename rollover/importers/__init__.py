@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rollover.faults import Fault, InputError, absent, hint
@@ -23,9 +23,14 @@ from rollover.importers.tdms import TDMS
 from rollover.recording import Recording
 
 __all__ = ["COLLECTIONS", "Collection", "Importer", "importers", "read_profile", "read_recording", "recordings_at"]
-__all__ += ["write_recording"]
+__all__ += ["name_of", "read_named", "write_recording"]
 
 NOT_RECORDINGS = (".yaml", ".yml", ".json", ".md", ".txt")
+ENDINGS = (  # what a name loses: in Messung_3.0.csv only the last of two, in drop.001 none
+    *(".mme.zip", ".mme", ".csv", ".parquet", ".txt", ".asc", ".dat", ".tsv", ".lvm", ".log", ".yaml", ".yml"),
+    *(".mat", ".tdms", ".mdf", ".mf4", ".h5", ".hdf5", ".nc", ".mcap", ".bag", ".db3"),
+    *(".zip", ".tar", ".tar.gz", ".tar.bz2", ".tar.xz", ".tgz"),
+)
 
 PLAIN = Importer(name="plain", meaning="CSV or Parquet with a sidecar", sniff=plain.sniff, read=plain.read)
 _OWN = {i.name: i for i in (PLAIN, iso_mme.ISO_MME, MAT, TDMS, MDF, HDF5, MCAP, CSV)}
@@ -63,6 +68,8 @@ def read_recording(path: str | Path, *, profile: str | Path | Described | None =
         what = "cannot be read: a link that leads nowhere" if path.is_symlink() else absent(path)
         raise InputError(Fault(file=str(path), message=what))
     given = profile if isinstance(profile, Described) or profile is None else read_profile(profile)
+    if given is not None:
+        given = given.of(path)
     return _importer(path, given, kind).read(path, given)
 
 
@@ -76,19 +83,78 @@ def write_recording(recording: Recording, path: str | Path, *, force: bool = Fal
     (iso_mme.write if is_mme else plain.write)(recording, path, force=force)
 
 
-def recordings_at(path: Path) -> list[Path]:
-    """A recording's own path, or those of all in a folder that is none itself. Raises `InputError`."""
-    if not path.is_dir() or (path / "channels.parquet").is_file() or any(i.sniff(path) for i in importers().values()):
+def recordings_at(path: Path, profile: Described | None = None) -> list[Path]:
+    """A recording's own path, or those of all in a folder that is none itself. Raises `InputError`.
+
+    With a profile any file may be one, but for those that no instrument writes, hidden ones and its own table.
+    """
+    if not path.is_dir() or (path / "channels.parquet").is_file() or _is_known(path):
         return [path]
-    files = [p for p in sorted(path.iterdir()) if p.is_file() and p.suffix not in NOT_RECORDINGS]
-    if not files:
+    other = NOT_RECORDINGS if profile is None else (".yaml", ".yml", ".json", ".md")
+    table = Path(profile.by_file.table) if profile is not None and profile.by_file is not None else None
+    found = [
+        p
+        for p in sorted(path.iterdir())
+        if not p.name.startswith(".")
+        and (p.suffix.lower() not in other if p.is_file() else p.is_dir() and _is_known(p))
+        and not (table is not None and table.is_file() and p.samefile(table))
+    ]
+    if not found:
         raise InputError(Fault(file=str(path), message="no recordings in this folder; tables such as NAME.csv are"))
-    return files
+    return found
+
+
+def name_of(path: Path) -> str:
+    """What a recording is called: its file's name without the ending of a known format."""
+    name = path.resolve().name if path.name in ("", "..") else path.name
+    if path.is_dir() and not name.lower().endswith(".mme"):
+        return name
+    ending = max((e for e in ENDINGS if name.lower().endswith(e) and len(name) > len(e)), key=len, default="")
+    return name[: len(name) - len(ending)]
+
+
+def read_named(
+    paths: Sequence[str | Path], profile: str | Path | None = None, kind: str = ""
+) -> dict[str, tuple[Path, Recording]]:
+    """Path and recording by name, of files and of all in folders; all are read with the profile, if one is given.
+
+    Raises `InputError` for all faults at once, and for two recordings of one name.
+    """
+    given = None if profile is None else read_profile(profile)
+    found: dict[str, tuple[Path, Recording]] = {}
+    first: dict[str, Path] = {}
+    faults: list[Fault] = []
+    for text in paths:
+        try:
+            files = recordings_at(Path(text), given)
+        except InputError as e:
+            faults += e.faults
+            continue
+        for file in files:
+            name = name_of(file)
+            if name in first:
+                message = (
+                    f"a second recording by this name, got {name!r}, first {first[name]}; two recordings share a name"
+                )
+                faults.append(Fault(file=str(file), message=message))
+                continue
+            first[name] = file
+            try:
+                found[name] = (file, read_recording(file, profile=given, kind=kind))
+            except InputError as e:
+                faults += e.faults
+    if faults:
+        raise InputError(*faults)
+    return found
 
 
 def read_profile(path: str | Path) -> Described:
     """What the columns of a foreign file are, from a `rollover-profile/1` file. Raises `InputError`."""
     return read_described(Path(path), Profile)
+
+
+def _is_known(path: Path) -> bool:
+    return any(i.sniff(path) for i in importers().values())
 
 
 def _importer(path: Path, given: Described | None, kind: str) -> Importer:
@@ -100,6 +166,8 @@ def _importer(path: Path, given: Described | None, kind: str) -> Importer:
     for importer in table.values():
         if importer.sniff(path) and not (importer is PLAIN and given is not None):
             return importer
+    if given is not None and path.is_file():
+        return CSV  # whatever its name ends in: the profile says how to read it
     if path.is_dir():
         raise InputError(
             Fault(

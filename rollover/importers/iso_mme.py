@@ -48,7 +48,7 @@ class _Channel:
 
 def _sniff(path: Path) -> bool:
     if path.is_dir():
-        return any(p.suffix.lower() == ".mme" for p in path.iterdir())
+        return any(p.suffix.lower() == ".mme" and p.is_file() for p in path.iterdir())
     return path.suffix.lower() in (".mme", ".zip", ".tar", ".tgz", ".gz", ".bz2", ".xz") and path.is_file()
 
 

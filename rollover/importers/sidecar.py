@@ -14,6 +14,7 @@ from rollover import document
 from rollover.channels import describe, factor
 from rollover.document import Node
 from rollover.faults import Fault, InputError
+from rollover.importers.conditions import ByFile, ConditionsFrom, read_by_file
 from rollover.recording import Clock, Doubt, Sensor
 
 MOST_BYTES = 1 << 18  # of a sidecar: what is longer is no sidecar, and would take long to be refused
@@ -106,6 +107,7 @@ class Profile:
     title: str = ""
     source: Annotated[str, "who measured it, licence, citation"] = ""
     conditions: Annotated[Mapping[str, Any], "scenario path -> value this was run with"] = field(default_factory=dict)
+    conditions_from: Annotated[ConditionsFrom | None, "of each file its own, by its name or a table"] = None
     uncertainty: Annotated[Mapping[str, Any], "scenario path -> 1 sigma, a list's of each number"] = field(
         default_factory=dict
     )
@@ -142,6 +144,14 @@ class Described:
     about: Sidecar | Profile
     columns: Mapping[str, Column]
     lines: Mapping[str, int | None]
+    by_file: ByFile | None = None
+
+    def of(self, path: Path) -> Described:
+        """This with the conditions of one file. Raises `InputError` where it has none of its own but should."""
+        if self.by_file is None:
+            return self
+        conditions = {**self.about.conditions, **self.by_file.of(path)}
+        return replace(self, about=replace(self.about, conditions=conditions), by_file=None)
 
     def refuse(self, column: str, message: str) -> InputError:
         """A fault at a column's description."""
@@ -189,7 +199,11 @@ def read_described(path: Path, kind: type[Sidecar] | type[Profile]) -> Described
     assert about is not None
     if not columns:
         raise root.place.fault("channels", "empty; at least time and one channel are needed")
-    return Described(file=str(path), about=about, columns=columns, lines=lines)
+    wanted = about.conditions_from if isinstance(about, Profile) else None
+    by_file = None
+    if wanted is not None and isinstance(about, Profile):
+        by_file = read_by_file(wanted, root, path, about.csv.decimal)
+    return Described(file=str(path), about=about, columns=columns, lines=lines, by_file=by_file)
 
 
 def _checked(node: Node, kind: type[T], path: str, faults: list[Fault]) -> T | None:

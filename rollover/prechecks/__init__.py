@@ -7,21 +7,25 @@ from collections.abc import Iterator, Mapping
 from rollover.attitude import continuous
 from rollover.channels import describe
 from rollover.noise import NoiseFloor
-from rollover.prechecks.finding import Finding, Trace, trace
+from rollover.prechecks.angles import wraps
+from rollover.prechecks.finding import Finding, Trace, instant, trace, when
 from rollover.prechecks.kinematic import disagreements
 from rollover.prechecks.leaps import leaps
 from rollover.prechecks.levels import free_fall, rest
+from rollover.prechecks.offsets import VEHICLE, polarity, zero_offsets
+from rollover.prechecks.rails import rails, shared
 from rollover.prechecks.samples import clipping, gaps, spikes, stuck
+from rollover.prechecks.timebase import MOVING, lost, stamps
 from rollover.recording import Recording
 
-__all__ = ["Finding", "noise_floors", "prechecks"]
+__all__ = ["Finding", "instant", "noise_floors", "prechecks", "shared_rails", "when"]
 
 GRAVITY = 9.81  # m/s2
 
 
 def noise_floors(recording: Recording) -> dict[str, NoiseFloor]:
     """Noise floor of each channel that is long enough to have one."""
-    return {name: t.floor for name, t in _traces(recording).items()}
+    return {name: t.floor for name, t in _traces(continuous(recording)).items()}
 
 
 def prechecks(
@@ -34,25 +38,38 @@ def prechecks(
     """
     if recording.source == "simulation":
         return ()
-    traces = _traces(recording)
+    traces, as_read = _traces(continuous(recording)), _traces(recording)
     stated = recording.conditions.get("vehicle.mass")
     mass = float(stated) if mass is None and isinstance(stated, (int, float)) else mass
     found = [*free_fall(traces, gravity), *rest(traces, mass, gravity), *disagreements(traces, seed=seed)]
+    found += zero_offsets(traces, mass, gravity, {f.channel for f in found if f.check == "free-fall"})
+    found += stamps(recording)
+    is_vehicle = any(name.startswith(VEHICLE) for name in traces)
     for name, t in traces.items():
         unit = describe(name).unit
+        flat = list(clipping(t, unit))
         found += [
-            *clipping(t, unit),
+            *(wraps(as_read[name]) if name in as_read else ()),
+            *flat,
+            *rails(t, unit, {f.value for f in flat}),
+            *polarity(t, unit),
+            *lost(t, unit),
             *stuck(t, unit),
             *gaps(t),
-            *spikes(t, unit),
+            *spikes(t, unit, among_contacts=is_vehicle and not name.endswith(MOVING)),
             *leaps(t, unit, recording.cfc.get(name)),
         ]
     found += _stated(recording, traces)
     return tuple(sorted(found, key=lambda f: (f.start, f.channel, f.check)))
 
 
+def shared_rails(recordings: Mapping[str, Recording]) -> list[tuple[str, Finding]]:
+    """(recording, finding) where a channel's peak is the same to the last digit in several measured recordings."""
+    measured = {name: r for name, r in recordings.items() if r.source != "simulation"}
+    return list(shared({name: _traces(r) for name, r in measured.items()}))
+
+
 def _traces(recording: Recording) -> dict[str, Trace]:
-    recording = continuous(recording)
     found = {name: trace(recording, name) for name in recording.channels}
     return {name: t for name, t in found.items() if t is not None}
 
@@ -74,5 +91,6 @@ def _stated(recording: Recording, traces: Mapping[str, Trace]) -> Iterator[Findi
                 value=t.floor.sigma,
                 unit=unit,
                 error=None,
-                sentence=f"noise of {t.floor.sigma:.3g} {unit} where {stated:.3g} is stated",
+                sentence=f"noise of {t.floor.sigma:.3g} {unit} where {stated:.3g} is stated: "
+                "electrical noise, aliasing or quantisation",
             )

@@ -73,7 +73,7 @@ def leaps(t: Trace, unit: str, cfc: int | None) -> Iterator[Finding]:
         unit="",
         error=None,
         sentence=f"{found.size} leaps of up to {2.0 * float(off.max()):.4g} {unit} from one sample to the next, which "
-        f"CFC {cfc} lets no signal make: a contact that opens behind the filter, or samples that were lost",
+        f"CFC {cfc} lets no signal make: an intermittent contact behind the filter, or lost samples",
     )
 
 

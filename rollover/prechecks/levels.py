@@ -8,6 +8,16 @@ from collections.abc import Iterator, Mapping
 from rollover.prechecks.finding import SURE, Finding, Trace, plateau
 
 LEAST = 0.001  # of g or of the weight: what is smaller lies within gravity's own spread over the earth
+SAME = 0.005  # of a level: gravity differs by as much from place to place
+FACTORS = {  # of free fall's reading
+    -1.0: "its polarity is reversed, or it hangs at rest and reads proper acceleration (`gravity: proper`)",
+    1.0 / 9.80665: "a gain or unit error, g for m/s2",
+    9.80665: "a gain or unit error, m/s2 for g",
+    1e-3: "a gain or unit error of 1000",
+    1e3: "a gain or unit error of 1000",
+    0.3048: "a gain or unit error, m/s2 for ft/s2",
+    1.0 / 0.3048: "a gain or unit error, ft/s2 for m/s2",
+}
 _PLACES = ("striker/position_z", "striker/velocity_z")
 NEAR = 0.3  # of g or of the weight: what lies further off is not free fall, or not rest
 
@@ -22,6 +32,7 @@ def free_fall(traces: Mapping[str, Trace], gravity: float) -> Iterator[Finding]:
         return
     mean = float(fall.values[where].mean())
     if abs(mean + gravity) > NEAR * gravity:
+        yield from _by_a_factor(fall, where, mean, gravity)
         return
     start, end = float(fall.time[where][0]), float(fall.time[where][-1])
     error = fall.floor.of_mean(where.stop - where.start)
@@ -29,11 +40,11 @@ def free_fall(traces: Mapping[str, Trace], gravity: float) -> Iterator[Finding]:
     if abs(off) > max(SURE * error, LEAST * gravity):
         rest = _level(fall, 0.0, gravity)
         if rest is not None and abs(rest[0] - off) < max(SURE * (rest[1] + error), 0.25 * abs(off)):
-            means = "the same is there at rest: a bias of the accelerometer"
+            means = "the same is there at rest: a bias of the accelerometer (zero offset)"
         elif off > 0.0:
-            means = "it falls more slowly than freely: friction of the guide, a gain below 1 or a bias"
+            means = "it falls more slowly than freely: friction of the guide, a gain error below 1 or a zero offset"
         else:
-            means = "faster than free fall is not possible: a gain above 1 or a bias of the accelerometer"
+            means = "faster than free fall is not possible: a gain error above 1 or a zero offset of the accelerometer"
         yield Finding(
             check="free-fall",
             channel=fall.channel,
@@ -61,8 +72,26 @@ def free_fall(traces: Mapping[str, Trace], gravity: float) -> Iterator[Finding]:
             value=bias,
             unit="N",
             error=error,
-            sentence=f"reads {bias:.4g} N in free fall, where nothing touches: a bias of the load cell",
+            sentence=f"reads {bias:.4g} N in free fall, where nothing touches: a zero offset of the load cell",
         )
+
+
+def _by_a_factor(fall: Trace, where: slice, mean: float, gravity: float) -> Iterator[Finding]:
+    """A level before contact that is free fall in another unit, or upside down."""
+    error = fall.floor.of_mean(where.stop - where.start)
+    for times, means in FACTORS.items():
+        if abs(mean + times * gravity) < max(SURE * error, SAME * abs(times) * gravity) and error < 0.1 * abs(mean):
+            yield Finding(
+                check="polarity" if times == -1.0 else "gain",
+                channel=fall.channel,
+                start=float(fall.time[where][0]),
+                end=float(fall.time[where][-1]),
+                value=mean,
+                unit="m/s2",
+                error=error,
+                sentence=f"reads {mean:.4g} m/s2 before contact instead of {-gravity:.4g}: {means}",
+            )
+            return
 
 
 def rest(traces: Mapping[str, Trace], mass: float | None, gravity: float) -> Iterator[Finding]:
@@ -86,7 +115,7 @@ def rest(traces: Mapping[str, Trace], mass: float | None, gravity: float) -> Ite
             value=a[0],
             unit="m/s2",
             error=a[1],
-            sentence=f"reads {a[0]:.4g} m/s2 at rest instead of 0: a bias, or it is not upright",
+            sentence=f"reads {a[0]:.4g} m/s2 at rest instead of 0: a zero offset, or it is not upright",
         )
     if load is not None and F is not None and abs(F[0]) > max(SURE * F[1], LEAST * weight):
         if still is not None and a is None:
@@ -100,7 +129,7 @@ def rest(traces: Mapping[str, Trace], mass: float | None, gravity: float) -> Ite
             unit="N",
             error=F[1],
             sentence=f"reads {weight + F[0]:.5g} N at rest instead of the weight, {weight:.5g} N: "
-            f"a gain of {1.0 + F[0] / weight:.4g}, a bias, or another mass",
+            f"a gain error ({1.0 + F[0] / weight:.4g}), a zero offset, or another mass",
         )
 
 

@@ -12,7 +12,7 @@ from scipy.special import ndtri, pdtrc
 from rollover.prechecks.finding import Finding, Trace
 from rollover.prechecks.neighbours import beside, off_a_cubic
 
-CHANCE = 0.001  # that a clean channel shows a spike or a stuck run
+CHANCE = 1e-4  # that a clean channel shows a spike or a stuck run: 1 in 1000 recordings of ten channels
 FEWEST = 120  # samples, to know what is usual
 FLAT = 3  # samples exactly alike at the very top: what a peak that is measured does not do
 TURNS = 6  # times as long as beside it, that a digitised signal stays where it turns: 2/(sqrt 2 - 1), and some
@@ -20,6 +20,7 @@ APART = 60  # samples within which a disturbance stands alone
 AROUND = 6  # samples on either side that say what a sample should be
 ALONE = 0.5  # of what a spike is off both sides, at least, that it is off each
 MOST = 0.05  # of the samples, that lie far off what their neighbours say
+LARGER = 2.0  # times the largest quick event among contacts: these scatter by as much from one to the next
 CROWDED = 0.05  # chance below which spikes that lie together are something quick
 ROUNDING = 1e-9  # of a noise, that is arithmetic's
 OFFSETS = beside(AROUND)
@@ -40,7 +41,7 @@ def clipping(t: Trace, unit: str) -> Iterator[Finding]:
             continue
         first, last = int(starts[flat][0]), int((starts + lengths)[flat][-1]) - 1
         jump = np.abs(t.values[starts[flat] - 1] - extreme).max()
-        if jump <= 1e-6 * abs(extreme):
+        if jump <= 1e-6 * abs(extreme) or not _piled_up(t.values, extreme):
             continue
         yield Finding(
             check="clipping",
@@ -51,7 +52,7 @@ def clipping(t: Trace, unit: str) -> Iterator[Finding]:
             unit=unit,
             error=None,
             sentence=f"flat {side} at {extreme:.5g} {unit} over {int(lengths[flat].sum())} samples: "
-            "the range was exceeded, what lies beyond is lost",
+            "clipping at full scale (amplifier saturation), what lies beyond is lost",
         )
 
 
@@ -65,6 +66,13 @@ def _usual_run(values: NDArray[np.float64], extreme: float) -> int:
     inner = lengths[(starts > 0) & (starts + lengths < other.size)]
     # a few long runs are stuck stretches, many short ones the digitising
     return 3 * (int(np.quantile(inner, 0.9)) + 1) + 1 if inner.size > 3 else FLAT + 1
+
+
+def _piled_up(values: NDArray[np.float64], extreme: float) -> bool:
+    """Whether more samples stand at an end than at the next two levels: digits of noise grow fewer towards it."""
+    levels, counts = np.unique(values, return_counts=True)
+    counts = counts if extreme == levels[-1] else counts[::-1]
+    return bool(counts[-1] > counts[-3:-1].sum())
 
 
 def _creeping(values: NDArray[np.float64], starts: NDArray[np.int64], lengths: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -107,7 +115,7 @@ def stuck(t: Trace, unit: str) -> Iterator[Finding]:
             unit=unit,
             error=None,
             sentence=f"{int(length) + 1} samples in a row read exactly {t.values[start]:.6g} {unit}: "
-            "the logger repeated a sample",
+            "a dropout, in which the logger repeated a sample",
         )
 
 
@@ -127,15 +135,18 @@ def gaps(t: Trace) -> Iterator[Finding]:
             value=float(lost),
             unit="samples",
             error=None,
-            sentence=f"{lost} samples missing in {wide.size} places at {1.0 / t.step:.6g} Hz: dropped by the logger",
+            sentence=f"{lost} samples missing in {wide.size} places at {1.0 / t.step:.6g} Hz: "
+            "lost samples (dropout of the logger)",
         )
 
 
-def spikes(t: Trace, unit: str) -> Iterator[Finding]:
+def spikes(t: Trace, unit: str, *, among_contacts: bool = False) -> Iterator[Finding]:
     """Single samples far from what a cubic through their neighbours says, where these agree.
 
     And from what those before and those after say, each by themselves: at a corner or a leap one side is right. The
     largest first, each put where its neighbours say before the next is looked for, as it spoils what is said of these.
+    `among_contacts`: of a force or acceleration of a vehicle, which touches again and again for no more than a sample.
+    A spike is larger there than such contacts, those that hide in noise and, once it touches, all that are seen.
     """
     if not t.regular or t.floor.sigma == 0.0 or t.values.size < FEWEST:
         return
@@ -160,10 +171,14 @@ def spikes(t: Trace, unit: str) -> Iterator[Finding]:
     if np.mean(np.abs(error) > 3.0 * scale) > MOST:
         return  # so here
     quick = np.flatnonzero(np.abs(error) > beyond)
+    contacts = np.abs(error[quick]).max(initial=0.0) if among_contacts else 0.0
+    begun = quick[0] - APART if among_contacts and quick.size else values.size
     events = np.array([*found, *quick[np.diff(quick, prepend=-AROUND - 1) > AROUND]], dtype=np.int64)
     for i in sorted(found):
         if _crowded(events, i, values.size):
             continue  # something quick happens
+        if among_contacts and abs(found[i]) <= LARGER * max(beyond, contacts if i > begun else 0.0):
+            continue  # a contact as any other
         yield Finding(
             check="spike",
             channel=t.channel,
@@ -173,7 +188,7 @@ def spikes(t: Trace, unit: str) -> Iterator[Finding]:
             unit=unit,
             error=scale,
             sentence=f"one sample lies {found[i]:.4g} {unit} off its neighbours, {abs(found[i]) / scale:.1f} sigma: "
-            "a disturbance, or a contact of no more than a sample",
+            "an electromagnetic spike, or a contact of no more than a sample",
         )
 
 
