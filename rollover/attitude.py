@@ -121,7 +121,7 @@ def has_attitude(recording: Recording) -> bool:
 
 
 def is_locked(name: str, recording: Recording, reference: Recording) -> bool:
-    """Whether a channel is a roll or yaw that tells no time: about the lock it is put by the reference's, at its time."""
+    """Whether a channel is a roll or yaw that tells no time: near the lock it is set by the reference at its time."""
     if name not in ANGLES or name == ANGLES[1] or any(n not in recording.channels for n in ANGLES):
         return False
     return bool(np.any(_nearness(np.interp(recording.time, reference.time, reference[ANGLES[1]])) > 0.0))
