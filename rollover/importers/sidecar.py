@@ -142,6 +142,7 @@ class Described:
     about: Sidecar | Profile
     columns: Mapping[str, Column]
     lines: Mapping[str, int | None]
+    states_clock: bool = False  # whether it says itself what t = 0 is
 
     def refuse(self, column: str, message: str) -> InputError:
         """A fault at a column's description."""
@@ -189,7 +190,7 @@ def read_described(path: Path, kind: type[Sidecar] | type[Profile]) -> Described
     assert about is not None
     if not columns:
         raise root.place.fault("channels", "empty; at least time and one channel are needed")
-    return Described(file=str(path), about=about, columns=columns, lines=lines)
+    return Described(file=str(path), about=about, columns=columns, lines=lines, states_clock="clock" in root.value)
 
 
 def _checked(node: Node, kind: type[T], path: str, faults: list[Fault]) -> T | None:
