@@ -3,29 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from rollover.importers.arrays import Array
 from rollover.importers.columns import Index, no_numbers, text
 
 _MATLAB_INSIDE = {"#refs#": "contents of MATLAB cells and tables", "#subsystem#": "contents of MATLAB objects"}
+_MATLAB = {"char": "text", "logical": "true or false", "cell": "a MATLAB cell", "struct": "an empty MATLAB structure"}
 _MATLAB_NUMBERS = ("single", "double", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Array:
-    """One array: `load` takes an index and gives numbers; `around` are its attributes, its group's, and so outward."""
-
-    shape: tuple[int, ...]
-    dtype: np.dtype[Any]
-    load: Callable[[Index], Any]
-    attributes: Mapping[str, Any] = field(default_factory=dict)
-    around: Sequence[Mapping[str, Any]] = ()
-    scales: Mapping[int, Any] = field(default_factory=dict)  # axis -> dataset of its coordinate
-    fill: Any = None
-    reason: str = ""  # why it is no numbers
 
 
 def contents(h5py: Any, file: Any, named: Sequence[str]) -> dict[str, Array | str]:
@@ -80,11 +67,13 @@ def _through_links(h5py: Any, file: Any, name: str) -> Any:
     for _ in range(64):  # as many links as a path may pass, so that circles end
         if not steps:
             return group
-        if not isinstance(group, h5py.Group) or steps[0] not in group.keys():  # noqa: SIM118: `in group` follows links
+        try:
+            link = group.get(steps[0], getlink=True)
+        except (AttributeError, KeyError):  # an array on the way, or nothing of that name
             return None
-        link = group.get(steps[0], getlink=True)
         if isinstance(link, h5py.SoftLink):
-            group, steps = (file if link.path.startswith("/") else group), [*link.path.strip("/").split("/"), *steps[1:]]
+            group = file if link.path.startswith("/") else group
+            steps = [step for step in link.path.split("/") if step not in ("", ".")] + steps[1:]
         elif isinstance(link, h5py.HardLink):
             group, steps = group[steps[0]], steps[1:]
         else:
@@ -105,6 +94,7 @@ def _attributes(thing: Any) -> dict[str, Any]:
 def _arrays(
     h5py: Any, file: Any, name: str, dataset: Any, group: Any, around: tuple[Mapping[str, Any], ...]
 ) -> dict[str, Array | str]:
+    """Columns of a dataset by name: itself, or the fields of its records, or those of MATLAB structures."""
     attributes = _attributes(dataset)
     matlab = text(attributes.get("MATLAB_class", ""))
     if dataset.shape is None or "MATLAB_empty" in attributes:  # there the numbers are the lengths of its axes
@@ -114,48 +104,54 @@ def _arrays(
         return _of_structs(h5py, file, name, dataset) if is_struct else {name: "references, as of a MATLAB cell"}
     if text(attributes.get("NAME", "")).startswith("This is a netCDF dimension but not a netCDF variable"):
         return {name: "a dimension without coordinates"}
-    if dataset.shape == () and dataset.dtype.names is None:
-        return {name: no_numbers(dataset.dtype) or "a single number"}
-    reason = "" if not matlab or matlab in _MATLAB_NUMBERS else _MATLAB.get(matlab, f"a MATLAB object, {matlab}")
-    if (states := h5py.check_enum_dtype(dataset.dtype)) is not None and dataset.dtype.kind != "b":
-        reason = f"names of states: {', '.join(list(states)[:6])}"
-    own = [Array(shape=dataset.shape, dtype=dataset.dtype, load=dataset.__getitem__, reason=reason)]
-    if dataset.dtype.names is not None:
-        if set(dataset.dtype.names) == {"real", "imag"}:
-            return {name: "complex numbers"}
-        fields = _fields(dataset.dtype)
-        at = ((n, p, t) for n, (p, t) in fields.items())
+    if dataset.dtype.names is not None and set(dataset.dtype.names) != {"real", "imag"}:
         return {
-            f"{name}.{n}": Array(
-                shape=(*dataset.shape, *t.shape), dtype=t.base, load=_field_of(dataset, p), around=(attributes, *around)
+            f"{name}.{key}": Array(
+                shape=(*dataset.shape, *kind.shape),
+                dtype=kind.base,
+                load=_field_of(dataset, way),
+                around=(attributes, *around),
             )
-            for n, p, t in at
+            for key, (way, kind) in _fields(dataset.dtype).items()
         }
-    scales = {axis: dim[0] for axis, dim in enumerate(dataset.dims) if len(dim) and dim[0] != dataset}
+    if reason := _no_numbers(h5py, dataset, matlab):
+        return {name: reason}
+    return {name: _array(h5py, dataset, attributes, around)}
+
+
+def _no_numbers(h5py: Any, dataset: Any, matlab: str) -> str:
+    """Why a dataset is no column of numbers; nothing where it is one."""
+    if matlab and matlab not in _MATLAB_NUMBERS:
+        return _MATLAB.get(matlab, f"a MATLAB object, {matlab}")
+    if h5py.check_string_dtype(dataset.dtype) is not None:
+        return "text"
+    if dataset.dtype.names is not None:
+        return "complex numbers"
+    states = h5py.check_enum_dtype(dataset.dtype)
+    if states is not None and dataset.dtype.kind != "b":
+        return f"names of states: {', '.join(list(states)[:6])}"
+    return no_numbers(dataset.dtype) or ("a single number" if dataset.shape == () else "")
+
+
+def _array(h5py: Any, dataset: Any, attributes: Mapping[str, Any], around: Sequence[Mapping[str, Any]]) -> Array:
     plist = dataset.id.get_create_plist()
-    is_stated = plist.fill_value_defined() == h5py.h5d.FILL_VALUE_USER_DEFINED and dataset.dtype.kind in "fiu"
-    fill = dataset.fillvalue if is_stated and dataset.fillvalue != 0 else None  # zeros are measured too
-    (array,) = own
-    return {
-        name: Array(
-            shape=array.shape,
-            dtype=array.dtype,
-            load=array.load,
-            attributes=attributes,
-            around=(attributes, *around),
-            scales=scales,
-            fill=fill,
-            reason=reason,
-        )
-    }
-
-
-_MATLAB = {"char": "text", "logical": "true or false", "cell": "a MATLAB cell", "struct": "an empty MATLAB structure"}
+    is_stated = plist.fill_value_defined() == h5py.h5d.FILL_VALUE_USER_DEFINED
+    coordinates = {axis: dim[0] for axis, dim in enumerate(dataset.dims) if len(dim) and dim[0] != dataset}
+    return Array(
+        shape=dataset.shape,
+        dtype=dataset.dtype,
+        load=dataset.__getitem__,
+        attributes=attributes,
+        around=(attributes, *around),
+        scales={axis: _array(h5py, scale, _attributes(scale), ()) for axis, scale in coordinates.items()},
+        fill=dataset.fillvalue if is_stated and dataset.fillvalue != 0 else None,  # zeros are measured too
+        last_axis_first="MATLAB_class" in attributes,
+    )
 
 
 def _fields(dtype: np.dtype[Any], above: tuple[str, ...] = ()) -> dict[str, tuple[tuple[str, ...], np.dtype[Any]]]:
     """Fields of records by dotted name: the way to each, and its type."""
-    found = {}
+    found: dict[str, tuple[tuple[str, ...], np.dtype[Any]]] = {}
     for key in dtype.names or ():
         kind = dtype[key]
         if kind.names is not None:

@@ -27,7 +27,7 @@ _LONGEST = 2000  # characters of a formula: the parser's time and depth are boun
 
 @dataclass
 class Converted:
-    """Physical numbers, with gaps where the raw value stands for a text; which texts, how often; the unit if one is said."""
+    """Physical numbers, with gaps where the raw value is a text; which texts, how often; the unit if said."""
 
     values: NDArray[np.float64]
     texts: Counter[str] = field(default_factory=Counter)
@@ -35,7 +35,7 @@ class Converted:
 
 
 def converted(raw: NDArray[Any], conversion: Any, version: str) -> Converted:
-    """Raw numbers of a channel, (n,), by its conversion block of an MDF `version`. Raises ``ValueError`` for its reason."""
+    """Raw numbers of a channel, (n,), by its conversion block of an MDF `version`. Raises ``ValueError``."""
     if conversion is None:
         return Converted(raw.astype(np.float64))
     major, kind = version[:1], int(conversion.conversion_type)
@@ -56,7 +56,7 @@ def converted(raw: NDArray[Any], conversion: Any, version: str) -> Converted:
 
 
 def _beside_texts(raw: NDArray[Any], conversion: Any, major: str) -> Converted:
-    """A table of single values or ranges, each a text or a conversion of its own; what it leaves out goes by its default."""
+    """A table of values or ranges, each a text or a conversion of its own; what it leaves out goes by its default."""
     found = Converted(np.full(raw.size, np.nan))
     free = np.ones(raw.size, dtype=bool)
     is_table = int(conversion.conversion_type) == _TEXTS[major]

@@ -27,8 +27,8 @@ class Signal:
     """One column of a file: its numbers, its unit where the file says so, and its own time where it has any.
 
     A reader hands over everything that a file holds: `left_out` says why a column is no numbers over time (text, all
-    invalid, of another test), and is passed on to the recording's notes. `unreadable` says why its numbers would be wrong
-    as they stand (a scale that is not known): refused where the column is to be read, else left out with that reason.
+    invalid, of another test), and is passed on to the recording's notes. `unreadable` says why its numbers would be
+    wrong as they stand (a scale that is not known): refused where the column is to be read, else left out like others.
     """
 
     values: NDArray[Any]
@@ -40,7 +40,7 @@ class Signal:
     unreadable: str = ""
     began: int | None = None  # ns since 1970 from which `time`, or a column of time in s, counts
     shared: str = ""  # name without its group, which a profile may give for the columns of all groups
-    other_stamps: str = ""  # the column of its group that a profile may take for its time instead
+    clock: str = ""  # column of stamps beside it, which it goes by where a profile calls that one time
     notes: tuple[str, ...] = ()  # what is to be said of it where it is read
 
 
@@ -96,7 +96,7 @@ def assemble(
             raise InputError(Fault(file=str(path), message="no time, got no column of channel time; or `rate` in Hz"))
         own = clock.time
         if not any(clock is known for known in clocks.by_group.values()):
-            check_time(path, own, line, signals[name].other_stamps)
+            check_time(path, own, line, signals[name].clock)
         if own.size != values.size:
             message = f"column {name}: got {values.size} values for {own.size} time stamps; one each"
             raise InputError(Fault(file=str(path), message=message))
@@ -150,9 +150,12 @@ class _Clocks:
     """Columns of time: one for the whole file, or one for each group of columns (`group/time`, `struct.t`)."""
 
     by_group: Mapping[str, _Stamps]
+    by_name: Mapping[str, _Stamps]
 
     def of(self, name: str, signal: Signal) -> _Stamps | None:
         """Stamps of a column: those of the innermost group that it stands in, its own, or the only ones there are."""
+        if signal.clock in self.by_name:
+            return self.by_name[signal.clock]
         own = None if signal.time is None else _Stamps(signal.time, signal.began)
         around = [g for g in self.by_group if not g or name.startswith((f"{g}/", f"{g}."))]
         inner = max(around, key=len, default=None)
@@ -172,7 +175,7 @@ def _clocks(path: Path, signals: Mapping[str, Signal], by: Described, line: Line
         clock = _instants(path, name, signals[name], by)
         check_time(path, clock.time, line)
         found[group] = name, clock
-    return _Clocks({group: clock for group, (_, clock) in found.items()})
+    return _Clocks({group: clock for group, (_, clock) in found.items()}, dict(found.values()))
 
 
 def _instants(path: Path, name: str, signal: Signal, by: Described) -> _Stamps:

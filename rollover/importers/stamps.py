@@ -1,4 +1,4 @@
-"""Instants of a calendar as seconds since the first of them: differences are taken of whole numbers, never of floats."""
+"""Instants of a calendar as seconds since the first of them, by differences of whole numbers."""
 
 from __future__ import annotations
 

@@ -11,16 +11,22 @@ from numpy.typing import NDArray
 from rollover.importers import stamps
 from rollover.importers.columns import number, text
 
-_STEPS = ("dt", "wf_increment", "delta_t", "time_step", "sample_interval", "sampling_interval", "sample_period")
+_STEPS: tuple[str, ...] = (
+    "dt",
+    "wf_increment",
+    "delta_t",
+    "time_step",
+    "sample_interval",
+    "sampling_interval",
+    "sample_period",
+)
 _STEPS += ("sampling_period",)
 _RATES = ("sample_rate", "sampling_rate", "samplerate", "fs", "sample_frequency", "sampling_frequency")
 _STARTS = ("t0", "wf_start_offset", "wf_start_time")
 _SAME = 1e-6  # relative: what a rate of six digits differs from its step
 
 
-def even_stamps(
-    around: Iterable[Mapping[str, Any]], count: int
-) -> tuple[NDArray[np.float64] | None, int | None]:
+def even_stamps(around: Iterable[Mapping[str, Any]], count: int) -> tuple[NDArray[np.float64] | None, int | None]:
     """Stamps of `count` samples in s, and the instant in ns since 1970 that they count from, where one is said.
 
     `around` are the attributes of the array, of its group, and so on outward: the innermost that says a thing holds.
@@ -42,7 +48,7 @@ def even_stamps(
             began = stamps.seconds_from_first(np.array([start]), stamps.NANO)[1]
         else:
             offset += start
-    return offset + step * np.arange(count), began
+    return np.asarray(offset + step * np.arange(count), dtype=np.float64), began
 
 
 def _step(level: Mapping[str, Any]) -> float | None:

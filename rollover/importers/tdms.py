@@ -20,7 +20,17 @@ from rollover.importers.signals import Signal, assemble, left_out
 from rollover.recording import Recording
 
 # what nptdms scales; of any other type it logs a warning and hands over the numbers without a scale
-_SCALES = ("Linear", "Polynomial", "RTD", "Strain", "Table", "Thermistor", "Thermocouple", "Add", "Subtract")
+_SCALES: tuple[str, ...] = (
+    "Linear",
+    "Polynomial",
+    "RTD",
+    "Strain",
+    "Table",
+    "Thermistor",
+    "Thermocouple",
+    "Add",
+    "Subtract",
+)
 _SCALES += ("AdvancedAPI",)
 _FROM_1904 = 2_082_844_800  # s from the zero of TDMS stamps to 1970
 Properties = Mapping[str, Any]
@@ -59,8 +69,8 @@ def _signal(channel: Any, levels: tuple[Properties, ...]) -> Signal:
     except Exception as e:  # of its scale: a sensor type or a property that the reader misses
         return Signal(values=np.empty(0), unreadable=f"its scale cannot be applied: {type(e).__name__} {e}"[:160])
     if hasattr(values, "seconds"):  # stamps, of which a float would keep 240 ns
-        seconds, began = stamps.seconds_from_first(_nanoseconds(values), 1)
-        return Signal(values=seconds, unit="s", began=began)
+        seconds, first = stamps.seconds_from_first(_nanoseconds(values), 1)
+        return Signal(values=seconds, unit="s", began=first)
     values = np.asarray(values)
     if reason := no_numbers(values.dtype):
         return left_out(reason)
@@ -70,7 +80,7 @@ def _signal(channel: Any, levels: tuple[Properties, ...]) -> Signal:
     except ValueError as e:
         return Signal(values=np.empty(0), unreadable=str(e))
     start = properties.get("wf_start_time")
-    began = None if time is None or start is None else int(_nanoseconds(start))
+    began: int | None = None if time is None or start is None else int(_nanoseconds(start))
     is_set = began is not None and began != -_FROM_1904 * stamps.NANO  # LabVIEW writes 1904 where none was set
     unit = str(properties.get("unit_string", ""))
     return Signal(values=values.astype(np.float64), unit=unit, time=time, began=began if is_set else None)
