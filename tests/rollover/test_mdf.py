@@ -69,7 +69,15 @@ def test_a_column_of_states_is_text(tmp_path: Path) -> None:
 
 
 def test_ranges_to_numbers(tmp_path: Path) -> None:
-    ranges = {"lower_0": 0, "upper_0": 9, "phys_0": 100.0, "lower_1": 20, "upper_1": 29, "phys_1": 200.0, "default": -1.0}
+    ranges = {
+        "lower_0": 0,
+        "upper_0": 9,
+        "phys_0": 100.0,
+        "lower_1": 20,
+        "upper_1": 29,
+        "phys_1": 200.0,
+        "default": -1.0,
+    }
     whole = converted(tmp_path / "a.mf4", ranges)[FORCE]
     assert whole == pytest.approx([-1, 100, 100, 100, 100, -1, 200, -1])
     real = converted(tmp_path / "b.mf4", ranges, values=np.array([-0.5, 0.0, 8.9, 9.0, 19.0, 20.0, 28.9, 29.0]))[FORCE]
@@ -78,7 +86,11 @@ def test_ranges_to_numbers(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("formula", "right"),
-    [("X1^2+1", RAW.astype(float) ** 2 + 1), ("pow(X1, 2)", RAW.astype(float) ** 2), ("-(X1-1)/2*3e1", -15.0 * (RAW - 1.0))],
+    [
+        ("X1^2+1", RAW.astype(float) ** 2 + 1),
+        ("pow(X1, 2)", RAW.astype(float) ** 2),
+        ("-(X1-1)/2*3e1", -15.0 * (RAW - 1.0)),
+    ],
 )
 def test_formulas(tmp_path: Path, formula: str, right: Any) -> None:
     assert converted(tmp_path / "a.mf4", {"formula": formula})[FORCE] == pytest.approx(right)
@@ -156,7 +168,7 @@ def test_what_runs_over_an_angle_is_not_over_time(tmp_path: Path) -> None:
 def test_a_group_without_a_master_has_no_time_but_a_rate(tmp_path: Path) -> None:
     path = write(tmp_path / "a.mf4", ("", [signal(FORCE)]))
     with MDF(path) as file:
-        file.groups[0].channels[0].channel_type = 0
+        file.groups[0].channels[0].channel_type, file.groups[0].channels[0].name = 0, "t"
         file.save(tmp_path / "b.mf4")
     with pytest.raises(InputError, match="no time, got no column of channel time"):
         read_recording(tmp_path / "b.mf4")
@@ -165,7 +177,9 @@ def test_a_group_without_a_master_has_no_time_but_a_rate(tmp_path: Path) -> None
 
 def test_all_that_a_file_holds_is_counted(tmp_path: Path) -> None:
     text = signal("note", np.array([b"a"] * 8), encoding="utf-8", unit="")
-    path = write(tmp_path / "a.mf4", ("", [signal("F"), signal("spare")]), ("", [text]), ("", [signal("F", time=TIME + 9)]))
+    path = write(
+        tmp_path / "a.mf4", ("", [signal("F"), signal("spare")]), ("", [text]), ("", [signal("F", time=TIME + 9)])
+    )
     found = named(path, {"F (group 0)": FORCE})
     assert left_out(found) == (3, 4)
     shutil.copy(path, tmp_path / "again.mf4")
