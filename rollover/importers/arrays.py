@@ -79,6 +79,19 @@ def _stamps_of(scale: Array) -> Stamps:
     return since or (values * UNITS["s"][cf.unit_of(scale.attributes)], None)
 
 
+def _own_stamps(thing: Array, index: Index, count: int) -> tuple[NDArray[np.float64] | None, int | None]:
+    """Stamps of an array's coordinate of time, else of the step that its attributes state. Raises ``ValueError``."""
+    scale = next((s for axis, s in thing.scales.items() if index[axis] == slice(None) and _is_time(s)), None)
+    return even_stamps(thing.around, count) if scale is None else _stamps_of(scale)
+
+
+def _has_time(profile: Described | None, name: str) -> bool:
+    """Whether a profile names a column of time for this one: in its group, or in a group around it."""
+    columns = {} if profile is None else profile.columns
+    groups = [n[: max(n.rfind("/"), n.rfind("."), 0)] for n, column in columns.items() if column.channel == "time"]
+    return any(not group or name.startswith((f"{group}/", f"{group}.")) for group in groups)
+
+
 def _signal(thing: Array, index: Index, place: tuple[int, int], profile: Described | None, name: str) -> Signal:
     given = None if profile is None else profile.columns[name]
     states_scale = given is not None and (given.scale != 1.0 or given.offset != 0.0)
@@ -90,8 +103,7 @@ def _signal(thing: Array, index: Index, place: tuple[int, int], profile: Describ
             return Signal(values=since[0], unit="s", began=since[1])
         if (given.channel if given is not None else channel_of(name)) == "time":
             return Signal(values=values, unit=unit, unreadable=unknown)  # whole numbers stay whole
-        scale = next((s for axis, s in thing.scales.items() if index[axis] == slice(None) and _is_time(s)), None)
-        time, began = even_stamps(thing.around, values.size) if scale is None else _stamps_of(scale)
+        time, began = (None, None) if _has_time(profile, name) else _own_stamps(thing, index, values.size)
     except ValueError as e:
         return Signal(values=np.empty(0), unreadable=str(e))
     if np.isnan(values.astype(np.float64, copy=False)).all():

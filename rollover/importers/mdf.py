@@ -31,14 +31,18 @@ def _read(path: Path, profile: Described | None) -> Recording:
         ]
         titles = [_title(file.groups[g]) for g in range(len(file.groups))]
         groups = [t if t and titles.count(t) == 1 else str(g) for g, t in enumerate(titles)]
-        shared = [name for _, _, name in places]
-        for (g, c, base), name in zip(places, unique(shared, [groups[g] for g, _, _ in places]), strict=True):
+        names = unique([name for _, _, name in places], [groups[g] for g, _, _ in places])
+        columns = {} if profile is None else profile.columns
+        clocks = {
+            g: n for (g, _, _), n in zip(places, names, strict=True) if n in columns and columns[n].channel == "time"
+        }
+        for (g, c, base), name in zip(places, names, strict=True):
             if not is_wanted(profile, name, channel=base, shared=base) and not _is_part(profile, name):
                 signals[name] = Signal(values=np.empty(0), channel=base, shared=base)
                 continue
             for column, signal in _signals(file, g, c, name).items():
                 about = base if column == name else ""
-                signals[column] = replace(signal, channel=about, shared=about)
+                signals[column] = replace(signal, channel=about, shared=about, clock=clocks.get(g, ""))
     return assemble(path, signals, profile)
 
 

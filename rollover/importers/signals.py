@@ -104,8 +104,11 @@ def assemble(
         stretches.setdefault(column.channel, []).append(_Stretch(name, column, own, values, clock.began))
     if not stretches:
         raise InputError(Fault(file=by.file, message="nothing but time, got no other channel; one at least is needed"))
-    origin = _one_origin(path, [part for parts in stretches.values() for part in parts])
-    notes = [note for channel, parts in stretches.items() for note in _joined(path, channel, parts)]
+    all_parts = [part for parts in stretches.values() for part in parts]
+    idle = [n for n, clock in clocks.by_name.items() if not any(clock.time is part.time for part in all_parts)]
+    origin = _one_origin(path, all_parts)
+    notes = [f"{name}: a column of time that no column goes by" for name in idle]
+    notes += [note for channel, parts in stretches.items() for note in _joined(path, channel, parts)]
     time, table = _one_table({c: (parts[0].time, parts[0].values) for c, parts in stretches.items()})
     known = {c: (parts[0].name, parts[0].column) for c, parts in stretches.items()}
     recording = Recording(

@@ -284,3 +284,8 @@ def test_all_that_a_file_holds_is_counted(tmp_path: Path) -> None:
     shutil.copy(path, tmp_path / "b.h5")
     with pytest.raises(InputError, match=r"channels.gaps: not a column of numbers over time: all gaps"):
         named(tmp_path / "b.h5", {"t": "time, unit: s", "gaps": f"{FORCE}, unit: N"})
+
+
+def test_the_profiles_column_of_time_comes_before_a_step_in_the_attributes(tmp_path: Path) -> None:
+    assert force(tmp_path / "a.h5", TIME, dt=0.09).time == pytest.approx(TIME)
+    assert named(tmp_path / "a.h5", {"F": FORCE}).time == pytest.approx(0.09 * np.arange(6))

@@ -184,3 +184,12 @@ def test_all_that_a_file_holds_is_counted(tmp_path: Path) -> None:
     assert left_out(found) == (3, 4)
     shutil.copy(path, tmp_path / "again.mf4")
     assert left_out(named(tmp_path / "again.mf4", {"F": FORCE})) == (2, 4)
+
+
+def test_a_channel_that_the_profile_calls_time_holds_for_its_group(tmp_path: Path) -> None:
+    gps = signal("gps", 1.7e9 + 2.0 * TIME, unit="s")
+    path = write(tmp_path / "a.mf4", ("", [gps, signal("F")]), ("", [signal("z", unit="m")]))
+    found = named(path, {"gps": "time", "F": FORCE})
+    assert found.time == pytest.approx(2.0 * TIME)
+    assert found.clock.zero == "unknown"
+    assert "gps: a column of time that no column goes by" in named(path, {"gps": "time", "z": SINKAGE}).notes
