@@ -1,7 +1,7 @@
 """Conversions of MDF from raw to physical: numbers stay numbers beside texts, formulas are computed or refused.
 
-asammdf makes text of a whole column where one of its raw values stands for a text, reads `^` as exclusive or, and hands
-over raw numbers where it cannot compute a formula; so tables of texts and formulas are applied here.
+asammdf makes text of a whole column where one of its raw values stands for a text, hands over raw numbers where it
+cannot compute a formula, and takes whole numbers out of their ranges; so these three are applied here.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def converted(raw: NDArray[Any], conversion: Any, version: str) -> Converted:
     if major == "4" and kind in _NO_NUMBERS:
         raise ValueError(_NO_NUMBERS[kind])
     if kind == _FORMULA[major]:
-        found = Converted(computed(_text(conversion.formula), raw.astype(np.float64)))
+        found = Converted(computed(_text(conversion.formula), raw))
     elif major == "4" and kind == _RANGES:
         found = Converted(_by_ranges(raw, conversion))
     elif kind in (_TEXTS[major], _RANGES_OF_TEXTS[major]):
@@ -92,7 +92,7 @@ def _fill(found: Converted, raw: NDArray[Any], hit: NDArray[np.bool_], by: Any, 
     if isinstance(by, (bytes, str)) and (text := _text(by)):
         linear = re.fullmatch(r'.*"(.*\{X\}.*)".*', text) if major == "3" else None  # a formula in the words of MDF 3
         if linear:
-            found.values[hit] = computed(linear.group(1).replace("{X}", "X"), raw[hit].astype(np.float64))
+            found.values[hit] = computed(linear.group(1).replace("{X}", "X"), raw[hit])
         elif hit.any():
             found.texts[text] += int(hit.sum())
         return
@@ -105,11 +105,17 @@ def _fill(found: Converted, raw: NDArray[Any], hit: NDArray[np.bool_], by: Any, 
     found.units |= inner.units
 
 
-def computed(formula: str, x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A formula in X or X1, such as `0.5*X1^2 + pow(X1, 3)`, where `^` raises to a power. Raises ``ValueError``."""
+def computed(formula: str, raw: NDArray[Any]) -> NDArray[np.float64]:
+    """A formula in X or X1, such as `0.5*X1 + pow(X1, 3)`, of raw numbers. Raises ``ValueError``.
+
+    `^` is a power of real numbers; of whole ones it is a power to some writers and exclusive or to others.
+    """
+    x = raw.astype(np.float64)
     try:
         if len(formula) > _LONGEST:
             raise ValueError("too long")
+        if "^" in formula and raw.dtype.kind in "iu":
+            raise ValueError("^ of whole numbers is a power or exclusive or; pow() is clear")
         tree = ast.parse(formula.replace("^", "**").strip(), mode="eval")
         return np.broadcast_to(np.asarray(_value(tree.body, x), dtype=np.float64), x.shape).copy()
     except (ValueError, SyntaxError, TypeError, RecursionError) as e:

@@ -21,12 +21,8 @@ def needs(library: str) -> None:
         pytest.skip(f"{library} is not installed: its format is not tested", allow_module_level=True)
 
 
-def read(path: Path, more: str = "", **columns: str) -> Recording:
-    """Read a file by a profile of `column name -> description`; underscores of keywords stay, others by `named`."""
-    return named(path, columns, more)
-
-
 def named(path: Path, columns: dict[str, str], more: str = "") -> Recording:
+    """Read a file by a profile of these columns, `name -> channel, and more of its description`."""
     text = "format: rollover-profile/1\n" + more + "channels:\n"
     text += "".join(f"  {name!r}: {{channel: {about}}}\n" for name, about in columns.items())
     profile = path.parent / f"{path.name}.profile.yaml"

@@ -87,7 +87,7 @@ def test_ranges_to_numbers(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("formula", "right"),
     [
-        ("X1^2+1", RAW.astype(float) ** 2 + 1),
+        ("2*X1**2+1", 2 * RAW.astype(float) ** 2 + 1),
         ("pow(X1, 2)", RAW.astype(float) ** 2),
         ("-(X1-1)/2*3e1", -15.0 * (RAW - 1.0)),
     ],
@@ -100,6 +100,12 @@ def test_formulas(tmp_path: Path, formula: str, right: Any) -> None:
 def test_formulas_that_cannot_be_computed_are_refused(formula: str) -> None:
     with pytest.raises(ValueError, match="its formula cannot be computed, got"):
         computed(formula, np.ones(3))
+
+
+def test_a_caret_is_a_power_of_real_numbers_and_refused_of_whole_ones() -> None:
+    assert computed("X1^2", np.array([0.5, 3.0])) == pytest.approx([0.25, 9.0])
+    with pytest.raises(ValueError, match=r"a power or exclusive or; pow\(\) is clear"):
+        computed("X1^2", np.array([1, 3]))
 
 
 def test_a_refused_formula_is_one_line_at_the_profile(tmp_path: Path) -> None:

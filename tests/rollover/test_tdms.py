@@ -84,10 +84,13 @@ def test_scales_that_are_well_defined(tmp_path: Path) -> None:
     terms = {f"Polynomial_Coefficients[{k}]": c for k, c in enumerate((1.0, 0.0, 0.5))}
     square = scaled("Polynomial", **size, **terms)
     done = {**linear, "NI_Scaling_Status": "scaled"}
-    path = write(tmp_path / "a.tdms", ("g", "lin", RAW, linear), ("g", "sq", RAW, square), ("g", "done", RAW, done))
+    gone = {**scaled("Reciprocal"), "NI_Scaling_Status": "scaled"}  # of a type that need not be known any more
+    channels = [("g", "lin", RAW, linear), ("g", "sq", RAW, square), ("g", "done", RAW, done), ("g", "gone", RAW, gone)]
+    path = write(tmp_path / "a.tdms", *channels)
     assert named(path, {"g/lin": FORCE})[FORCE] == pytest.approx(2.0 * RAW + 1.0)
     assert named(path, {"g/sq": FORCE})[FORCE] == pytest.approx(1.0 + 0.5 * RAW.astype(float) ** 2)
     assert named(path, {"g/done": FORCE})[FORCE] == pytest.approx(RAW)
+    assert named(path, {"g/gone": FORCE})[FORCE] == pytest.approx(RAW)
 
 
 def test_a_scale_whose_numbers_are_missing_is_the_columns_fault_not_the_files(tmp_path: Path) -> None:
