@@ -53,9 +53,12 @@ def import_(
     for target, (_, recording) in zip(targets, made, strict=True):
         write_recording(recording, target, force=force)
         channels = list(recording.channels)
-        rows.append({"file": str(target), "samples": recording.time.size, "channels": channels})
+        notes = list(recording.notes)
+        rows.append({"file": str(target), "samples": recording.time.size, "channels": channels, "notes": notes})
         if not as_json:
             print(f"{target}: {recording.time.size} samples of {len(channels)} channels")
+            for note in notes:
+                print(f"  note: {note}")
     if as_json:
         print(json.dumps({"files": rows}, indent=2))
 

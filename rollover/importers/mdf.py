@@ -99,10 +99,11 @@ def _signal(raw: Any, invalid: Any, channel: Any, version: str) -> Signal:
             return left_out("all invalid")
         values = np.where(invalid, np.nan, values)
         notes.append(f"{int(invalid.sum())} of {values.size} values are invalid, left as gaps")
-    units = {str(channel.unit).strip()} if str(channel.unit or "").strip() else physical.units
-    if len(units) > 1:
-        raise ValueError(f"parts of its conversion are in different units, got {' and '.join(sorted(units))}; one")
-    return Signal(values=values, unit=next(iter(units), ""), notes=tuple(notes))
+    if len(physical.units) > 1:
+        each = " and ".join(sorted(physical.units))
+        raise ValueError(f"parts of its conversion are in different units, got {each}; one")
+    unit = str(channel.unit or "").strip() or next(iter(physical.units), "")
+    return Signal(values=values, unit=unit, notes=tuple(notes))
 
 
 def _time(file: Any, group: int, stamps: Any) -> tuple[Any, str]:

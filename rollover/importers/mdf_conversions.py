@@ -50,7 +50,7 @@ def converted(raw: NDArray[Any], conversion: Any, version: str) -> Converted:
         found = _beside_texts(raw, conversion, major)
     else:
         found = Converted(np.asarray(conversion.convert(raw), dtype=np.float64))
-    if unit := _text(conversion.unit):
+    if not found.units and (unit := _text(conversion.unit)):  # parts of a table know better than the table
         found.units = {unit}
     return found
 

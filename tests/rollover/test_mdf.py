@@ -62,6 +62,13 @@ def test_ranges_of_text_beside_ranges_of_numbers(tmp_path: Path) -> None:
     assert found[FORCE] == pytest.approx([-9, 1, 3, 11, 19, NAN, NAN, NAN], nan_ok=True)
 
 
+def test_parts_of_a_conversion_in_different_units_are_refused(tmp_path: Path) -> None:
+    coarse = {"lower_0": -10, "upper_0": 9, "text_0": {"a": 2.0, "b": 1.0, "unit": "N"}, "lower_1": 10, "upper_1": 40}
+    parts = {**coarse, "text_1": {"a": 0.002, "b": 0.0, "unit": "kN"}, "default_addr": b"none"}
+    with pytest.raises(InputError, match=r"channels.F: parts of its conversion are in different units, got N and kN"):
+        converted(tmp_path / "a.mf4", parts)
+
+
 def test_a_column_of_states_is_text(tmp_path: Path) -> None:
     states = {"val_0": 0, "text_0": b"off", "val_1": 1, "text_1": b"on", "default_addr": b"unknown"}
     with pytest.raises(InputError, match=r"channels.F: not a column of numbers over time: text: 6 'unknown', 1 'off'"):
