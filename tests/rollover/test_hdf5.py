@@ -250,6 +250,16 @@ def test_matlab_7_3(tmp_path: Path) -> None:
         assert reason in said
 
 
+def test_a_square_matrix_of_matlab_7_3_has_its_columns_along_the_last_axis(tmp_path: Path) -> None:
+    there = np.array([[0.0, 5.0], [1.0, 6.0]])  # two samples of time and force, as MATLAB shows them
+    path = write(tmp_path / "a.h5", {"data": there.T, "other": there}, data={"MATLAB_class": np.bytes_("double")})
+    names = {"data[0]": "time, unit: s", "data[1]": f"{FORCE}, unit: N", "other[1]": f"{SINKAGE}, unit: m"}
+    found = named(path, names)
+    assert found.time == pytest.approx([0.0, 1.0])
+    assert found[FORCE] == pytest.approx([5.0, 6.0])
+    assert found[SINKAGE] == pytest.approx([5.0, 6.0])
+
+
 def test_classic_netcdf(tmp_path: Path) -> None:
     from scipy.io import netcdf_file
 
