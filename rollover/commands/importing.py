@@ -60,9 +60,12 @@ def import_(
     rows = []
     for name, (_, recording) in made.items():
         channels = list(recording.channels)
-        rows.append({"file": str(targets[name]), "samples": recording.time.size, "channels": channels})
+        notes = list(recording.notes)
+        rows.append({"file": str(targets[name]), "samples": recording.time.size, "channels": channels, "notes": notes})
         if not as_json:
             print(f"{targets[name]}: {recording.time.size} samples of {len(channels)} channels")
+            for note in notes:
+                print(f"  note: {note}")
     if as_json:
         print(json.dumps({"files": rows}, indent=2))
 

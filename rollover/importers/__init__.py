@@ -17,6 +17,7 @@ from rollover.importers.importer import Collection, Importer
 from rollover.importers.mat import MAT
 from rollover.importers.mcap import MCAP
 from rollover.importers.mdf import MDF
+from rollover.importers.netcdf import NETCDF
 from rollover.importers.sidecar import Described, Profile, read_described
 from rollover.importers.soil_penetrometer import SOIL_PENETROMETER
 from rollover.importers.tdms import TDMS
@@ -33,7 +34,7 @@ ENDINGS = (  # what a name loses: in Messung_3.0.csv only the last of two, in dr
 )
 
 PLAIN = Importer(name="plain", meaning="CSV or Parquet with a sidecar", sniff=plain.sniff, read=plain.read)
-_OWN = {i.name: i for i in (PLAIN, iso_mme.ISO_MME, MAT, TDMS, MDF, HDF5, MCAP, CSV)}
+_OWN = {i.name: i for i in (PLAIN, iso_mme.ISO_MME, MAT, TDMS, MDF, HDF5, NETCDF, MCAP, CSV)}
 COLLECTIONS: dict[str, Collection] = {c.name: c for c in (CUBE_TOSSES, FALLING_BALLS, SOIL_PENETROMETER, CONE_DROPS)}
 ENTRY_POINTS = "rollover.importers"
 

@@ -1,35 +1,87 @@
-"""MATLAB files up to version 7: vectors by name, those inside structures as `structure.field`."""
+"""MATLAB files up to version 7: `name`, `name[1]` of a matrix, `structure.field`, `structure[2].field` of an array."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rollover.importers.columns import is_wanted, matrix, no_numbers
 from rollover.importers.importer import Importer, check_claim, reading, starts_with
 from rollover.importers.sidecar import Described
-from rollover.importers.signals import Signal, assemble
+from rollover.importers.signals import Signal, assemble, left_out
 from rollover.recording import Recording
+
+_OPAQUE = "function_workspace"  # under this name MATLAB keeps what its tables and objects hold
 
 
 def _read(path: Path, profile: Described | None) -> Recording:
     from scipy.io import loadmat, whosmat
 
     with reading(path, "MATLAB 5"):
-        for _, shape, _ in whosmat(str(path)):
+        kinds = {}
+        for name, shape, kind in whosmat(str(path)):
             check_claim(path, int(np.prod([int(n) for n in shape], dtype=object)))
-        found = loadmat(str(path), simplify_cells=True)
-    return assemble(path, {name: Signal(values=values) for name, values in _vectors("", found)}, profile)
+            kinds[str(name)] = kind
+        found = loadmat(str(path), mat_dtype=False, squeeze_me=False, struct_as_record=True)
+        signals: dict[str, Signal] = {}
+        for name, value in found.items():
+            if name in ("__header__", "__version__", "__globals__"):
+                continue
+            if kinds.get(name) == "logical":  # its numbers are read as 0 and 1
+                signals[name] = left_out("true or false")
+            elif name.strip("_") == _OPAQUE:
+                signals[name] = left_out("contents of MATLAB tables and objects")
+            else:
+                signals |= {column: _signal(found, column, profile) for column, found in _columns(name, value)}
+    return assemble(path, signals, profile)
 
 
-def _vectors(above: str, table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    for name, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _vectors(f"{above}{name}.", value)
-        elif isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "fiu" and name[:2] != "__":
-            yield above + name, value.astype(np.float64)
+def _signal(values: Any, name: str, profile: Described | None) -> Signal:
+    if isinstance(values, str):
+        return left_out(values)
+    if not is_wanted(profile, name):
+        return Signal(values=np.empty(0))
+    is_time = profile is not None and profile.columns[name].channel == "time"
+    return Signal(values=values.copy() if is_time else values.astype(np.float64))
+
+
+def _columns(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Columns of numbers by name, and for all else why it is none."""
+    if not isinstance(value, np.ndarray):
+        yield name, "a sparse matrix" if hasattr(value, "tocsc") else f"a MATLAB {type(value).__name__}"
+    elif type(value).__name__ in ("MatlabOpaque", "MatlabObject", "MatlabFunction"):
+        yield name, "a MATLAB table or object" if type(value).__name__ != "MatlabFunction" else "a MATLAB function"
+    elif value.dtype.names is not None:
+        yield from _of_structs(name, value)
+    elif value.dtype.kind == "O":
+        yield name, "a MATLAB cell"
+    elif reason := no_numbers(value.dtype):
+        yield name, reason
+    elif value.size < 2:
+        yield name, "a single number" if value.size else "empty"
+    else:
+        columns = matrix(name, value.shape)
+        if not columns:
+            yield name, f"an array {value.shape}"
+        for column, index in columns.items():
+            yield column, value[index]
+
+
+def _of_structs(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Fields of a structure, or of an array of them: one column where each element holds a single number."""
+    elements = value.ravel()
+    if not elements.size:
+        yield name, "an empty MATLAB structure"
+    for key in value.dtype.names:
+        each = [element[key] for element in elements]
+        if len(each) > 1 and all(isinstance(v, np.ndarray) and v.dtype.kind in "fiu" and v.size == 1 for v in each):
+            yield f"{name}.{key}", np.array([v.ravel()[0] for v in each])
+            continue
+        for k, inner in enumerate(each):
+            yield from _columns(f"{name}[{k}].{key}" if len(each) > 1 else f"{name}.{key}", inner)
 
 
 MAT = Importer(

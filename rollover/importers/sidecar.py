@@ -145,6 +145,7 @@ class Described:
     columns: Mapping[str, Column]
     lines: Mapping[str, int | None]
     by_file: ByFile | None = None
+    states_clock: bool = False  # whether it says itself what t = 0 is
 
     def of(self, path: Path) -> Described:
         """This with the conditions of one file. Raises `InputError` where it has none of its own but should."""
@@ -203,7 +204,14 @@ def read_described(path: Path, kind: type[Sidecar] | type[Profile]) -> Described
     by_file = None
     if wanted is not None and isinstance(about, Profile):
         by_file = read_by_file(wanted, root, path, about.csv.decimal)
-    return Described(file=str(path), about=about, columns=columns, lines=lines, by_file=by_file)
+    return Described(
+        file=str(path),
+        about=about,
+        columns=columns,
+        lines=lines,
+        by_file=by_file,
+        states_clock="clock" in root.value,
+    )
 
 
 def _checked(node: Node, kind: type[T], path: str, faults: list[Fault]) -> T | None:

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.channels import factor, is_known
-from rollover.faults import Fault, InputError, hint
-from rollover.importers.sidecar import Column, Described, Profile, doubts_of
-from rollover.recording import Recording
+from rollover.faults import Fault, InputError, nearest
+from rollover.importers import stamps
+from rollover.importers.sidecar import Column, Described, Profile, Sidecar, doubts_of
+from rollover.recording import Clock, Recording
 
 Array = NDArray[np.float64]
 SAME_INSTANT = 1e-9  # s: stamps of different clocks that lie closer are one row
@@ -26,15 +27,21 @@ class Signal:
     """One column of a file: its numbers, its unit where the file says so, and its own time where it has any.
 
     A reader hands over everything that a file holds: `left_out` says why a column is no numbers over time (text, all
-    invalid, of another test), and is passed on to the recording's notes.
+    invalid, of another test), and is passed on to the recording's notes. `unreadable` says why its numbers would be
+    wrong as they stand (a scale that is not known): refused where the column is to be read, else left out like others.
     """
 
-    values: Array
+    values: NDArray[Any]
     unit: str = ""
     time: Array | None = None
     cfc: int | None = None
     channel: str = ""  # what a self-describing file says it is
     left_out: str = ""
+    unreadable: str = ""
+    began: int | None = None  # ns since 1970 from which `time`, or a column of time in s, counts
+    shared: str = ""  # name without its group, which a profile may give for the columns of all groups
+    clock: str = ""  # column of stamps beside it, which it goes by where a profile calls that one time
+    notes: tuple[str, ...] = ()  # what is to be said of it where it is read
 
 
 def left_out(reason: str) -> Signal:
@@ -48,10 +55,13 @@ def described(signals: Mapping[str, Signal], path: Path) -> Described:
     for name, signal in signals.items():
         channel = signal.channel or name
         if not signal.left_out and is_known(channel) and not channel.startswith("sensor/"):
+            if signal.unreadable:
+                message = f"column {name}: {signal.unreadable}; a profile without it reads the others"
+                raise InputError(Fault(file=str(path), message=message))
             columns[name] = Column(channel=channel, cfc=signal.cfc)  # type: ignore[arg-type]
     if not any(column.channel != "time" for column in columns.values()):
-        held = [f"{name} ({signal.left_out})" if signal.left_out else name for name, signal in signals.items()]
-        raise InputError(Fault(file=str(path), message=f"no column is a channel, got {_listed(held)}; --profile FILE"))
+        message = f"no column is a channel, got {_listed(_held(signals))}; --profile FILE"
+        raise InputError(Fault(file=str(path), message=message))
     about = Profile(format="rollover-profile/1", channels={name: {} for name in columns})
     return Described(file=str(path), about=about, columns=columns, lines={})
 
@@ -64,34 +74,41 @@ def assemble(
     One column is one channel: columns that mean the same are joined where their times are disjoint, else refused. What
     is not read is named in the notes.
     """
-    by = given or described(signals, path)
+    by = _of_all_groups(given, signals) if given else described(signals, path)
     about = by.about
     for name in by.columns:
         if name not in signals:
-            raise by.refuse(name, f"no such column in {path.name}; {hint(name, signals)}")
+            raise by.refuse(name, f"no such column in {path.name}; {_instead(name, signals)}")
         if signals[name].left_out:
             raise by.refuse(name, f"not a column of numbers over time: {signals[name].left_out}; another column")
+        if signals[name].unreadable:
+            raise by.refuse(name, f"{signals[name].unreadable}; another column")
     clocks = _clocks(path, signals, by, line)
     stretches: dict[str, list[_Stretch]] = {}
     for name, column in by.columns.items():
         if column.channel == "time":
             continue
         values = _si(path, name, signals[name], by)
-        own = clocks.of(name, signals[name].time)
-        if own is None and isinstance(about, Profile) and about.rate is not None:
-            own = about.start + np.arange(values.size) / about.rate
-        if own is None:
+        clock = clocks.of(name, signals[name])
+        if clock is None and isinstance(about, Profile) and about.rate is not None:
+            clock = _Stamps(about.start + np.arange(values.size) / about.rate)
+        if clock is None:
             raise InputError(Fault(file=str(path), message="no time, got no column of channel time; or `rate` in Hz"))
-        if not any(own is stamps for stamps in clocks.by_group.values()):
-            check_time(path, own, line)
+        own = clock.time
+        if not any(clock is known for known in clocks.by_group.values()):
+            check_time(path, own, line, signals[name].clock)
         if own.size != values.size:
             message = f"column {name}: got {values.size} values for {own.size} time stamps; one each"
             raise InputError(Fault(file=str(path), message=message))
         check_values(path, name, values, line)
-        stretches.setdefault(column.channel, []).append(_Stretch(name, column, own, values))
+        stretches.setdefault(column.channel, []).append(_Stretch(name, column, own, values, clock.began))
     if not stretches:
         raise InputError(Fault(file=by.file, message="nothing but time, got no other channel; one at least is needed"))
-    notes = [note for channel, parts in stretches.items() for note in _joined(path, channel, parts)]
+    all_parts = [part for parts in stretches.values() for part in parts]
+    idle = [n for n, clock in clocks.by_name.items() if not any(clock.time is part.time for part in all_parts)]
+    origin = _one_origin(path, all_parts)
+    notes = [f"{name}: a column of time that no column goes by" for name in idle]
+    notes += [note for channel, parts in stretches.items() for note in _joined(path, channel, parts)]
     time, table = _one_table({c: (parts[0].time, parts[0].values) for c, parts in stretches.items()})
     known = {c: (parts[0].name, parts[0].column) for c, parts in stretches.items()}
     recording = Recording(
@@ -101,8 +118,8 @@ def assemble(
         source=about.source,
         conditions=dict(about.conditions),
         uncertainty=doubts_of(about.uncertainty),
-        clock=about.clock,
-        notes=(*about.notes, *notes, *_not_read(signals, by)),
+        clock=about.clock if not origin or by.states_clock else Clock(zero="unknown"),
+        notes=(*about.notes, *origin, *notes, *_of_columns(signals, by), *_not_read(signals, by)),
         noise={
             c: col.noise * factor(_unit(n, signals[n], by), c) for c, (n, col) in known.items() if col.noise is not None
         },
@@ -120,16 +137,29 @@ class _Stretch:
     column: Column
     time: Array
     values: Array
+    began: int | None
+
+
+@dataclass(frozen=True, eq=False)
+class _Stamps:
+    """Seconds, from their own zero or from an instant."""
+
+    time: Array
+    began: int | None = None
 
 
 @dataclass(frozen=True)
 class _Clocks:
     """Columns of time: one for the whole file, or one for each group of columns (`group/time`, `struct.t`)."""
 
-    by_group: Mapping[str, Array]
+    by_group: Mapping[str, _Stamps]
+    by_name: Mapping[str, _Stamps]
 
-    def of(self, name: str, own: Array | None) -> Array | None:
+    def of(self, name: str, signal: Signal) -> _Stamps | None:
         """Stamps of a column: those of the innermost group that it stands in, its own, or the only ones there are."""
+        if signal.clock in self.by_name:
+            return self.by_name[signal.clock]
+        own = None if signal.time is None else _Stamps(signal.time, signal.began)
         around = [g for g in self.by_group if not g or name.startswith((f"{g}/", f"{g}."))]
         inner = max(around, key=len, default=None)
         if inner is not None and (own is None or inner):
@@ -138,17 +168,53 @@ class _Clocks:
 
 
 def _clocks(path: Path, signals: Mapping[str, Signal], by: Described, line: Line) -> _Clocks:
-    found: dict[str, tuple[str, Array]] = {}
+    found: dict[str, tuple[str, _Stamps]] = {}
     for name, column in by.columns.items():
         if column.channel != "time":
             continue
         group = name[: max(name.rfind("/"), name.rfind("."), 0)]
         if group in found:
             raise _ambiguous(path, "time", found[group][0], name)
-        stamps = _si(path, name, signals[name], by)
-        check_time(path, stamps, line)
-        found[group] = name, stamps
-    return _Clocks({group: stamps for group, (_, stamps) in found.items()})
+        clock = _instants(path, name, signals[name], by)
+        check_time(path, clock.time, line)
+        found[group] = name, clock
+    return _Clocks({group: clock for group, (_, clock) in found.items()}, dict(found.values()))
+
+
+def _instants(path: Path, name: str, signal: Signal, by: Described) -> _Stamps:
+    """A column of time in s; stamps of a calendar, which count years from 1970, as seconds since the first of them."""
+    if signal.began is not None:
+        return _Stamps(np.asarray(signal.values, dtype=np.float64), signal.began)
+    column, unit = by.columns[name], factor(_unit(name, signal, by), "time")
+    step = round(unit * stamps.NANO)
+    first = float(signal.values[0]) * unit if signal.values.ndim == 1 and signal.values.size else 0.0
+    is_bare = column.scale == 1.0 and column.offset == 0.0 and not isinstance(by.about, Sidecar)
+    if is_bare and stamps.CALENDAR < first < np.inf:
+        try:
+            return _Stamps(*stamps.seconds_from_first(signal.values, step))
+        except ValueError as e:
+            raise by.refuse(name, str(e)) from None
+    return _Stamps(_si(path, name, replace(signal, values=signal.values.astype(np.float64, copy=False)), by))
+
+
+def _one_origin(path: Path, parts: list[_Stretch]) -> list[str]:
+    """Count all stretches from the earliest instant in place, and say which that is. Raises `InputError`."""
+    stated = {part.name: part.began for part in parts if part.began is not None}
+    if not stated:
+        return []
+    bare = [part.name for part in parts if part.began is None]
+    zero = min(stated.values())
+    other = next((name for name, began in stated.items() if began != zero), None)
+    if bare and other is not None:
+        first = min(stated, key=lambda name: stated[name])
+        what = f"columns start at different instants, and one states none, got {first!r}, {other!r}, {bare[0]!r}"
+        raise InputError(Fault(file=str(path), message=f"{what}; a profile with the columns of one clock"))
+    moved: dict[tuple[int, int], Array] = {}
+    for part in parts:
+        if part.began is not None and part.began != zero:
+            key = id(part.time), part.began
+            part.time = moved.setdefault(key, part.time + (part.began - zero) / stamps.NANO)
+    return [f"time counts from {stamps.said(zero)}" + (f", taken for {_listed(bare)} too" if bare else "")]
 
 
 def _joined(path: Path, channel: str, parts: list[_Stretch]) -> list[str]:
@@ -177,9 +243,39 @@ def _not_read(signals: Mapping[str, Signal], by: Described) -> list[str]:
     spare: dict[str, list[str]] = {}
     for name, signal in signals.items():
         if name not in by.columns:
-            spare.setdefault(signal.left_out or "without a description", []).append(name)
+            spare.setdefault(signal.left_out or signal.unreadable or "without a description", []).append(name)
     several = {reason: f"{len(names)} of {len(signals)} columns left out" for reason, names in spare.items()}
     return [f"{several[reason]}, {reason}: {_listed(names)}" for reason, names in spare.items()]
+
+
+def _of_columns(signals: Mapping[str, Signal], by: Described) -> list[str]:
+    return [f"{name}: {note}" for name in by.columns for note in signals[name].notes]
+
+
+def _of_all_groups(by: Described, signals: Mapping[str, Signal]) -> Described:
+    """A description in which a name that several groups share stands for the columns of all of them."""
+    columns, lines = {}, {}
+    for name, column in by.columns.items():
+        shared = [n for n, s in signals.items() if s.shared == name] if name not in signals else []
+        for each in [n for n in shared if not signals[n].left_out] or shared or [name]:
+            columns[each], lines[each] = by.columns.get(each, column), by.lines.get(each, by.lines.get(name))
+    return replace(by, columns=columns, lines=lines)
+
+
+def _held(signals: Mapping[str, Signal]) -> list[str]:
+    """Names of all that a file holds, with the reason where one is not to be read."""
+    reasons = {name: signal.left_out or signal.unreadable for name, signal in signals.items()}
+    return [f"{name} ({reason})" if reason else name for name, reason in reasons.items()]
+
+
+def _instead(name: str, signals: Mapping[str, Signal]) -> str:
+    """What to write instead of a name that the file does not hold: the nearest, and what there is."""
+    parts = [n for n in signals if n.startswith((f"{name}[", f"{name}.", f"{name} ("))]
+    if parts:
+        return f"it is {_listed(parts)}"
+    close = nearest(name, signals)
+    there = f"it holds {_listed(_held(signals))}"
+    return f"did you mean {close[0]!r}? {there}" if close else there
 
 
 def _listed(names: Sequence[str], most: int = 24) -> str:
@@ -187,8 +283,11 @@ def _listed(names: Sequence[str], most: int = 24) -> str:
     return f"{shown} and {len(names) - most} more" if len(names) > most else shown
 
 
-def check_time(path: Path, time: Array, line: Line = lambda row: None) -> None:
-    """Refuse stamps that are missing, infinite, repeated or run backwards. Raises `InputError` with the line."""
+def check_time(path: Path, time: Array, line: Line = lambda row: None, other: str = "") -> None:
+    """Refuse stamps that are missing, infinite, repeated or run backwards. Raises `InputError` with the line.
+
+    `other` names a column of stamps that could be taken instead.
+    """
     if time.size == 0:
         raise InputError(Fault(file=str(path), message="empty, got no time stamps"))
     wrong = np.flatnonzero(~np.isfinite(time))
@@ -199,9 +298,9 @@ def check_time(path: Path, time: Array, line: Line = lambda row: None) -> None:
     if wrong.size:
         row = int(wrong[0]) + 1
         what = "repeated stamp" if time[row] == time[row - 1] else "runs backwards"
-        raise _at(
-            path, line, row, f"time: {what}, got {float(time[row])!r} after {float(time[row - 1])!r}; it must increase"
-        )
+        cure = f"; it must increase, or a profile takes other stamps: {{{other!r}: {{channel: time}}}}" if other else ""
+        said = f"time: {what}, got {float(time[row])!r} after {float(time[row - 1])!r}{cure or '; it must increase'}"
+        raise _at(path, line, row, said)
 
 
 def check_values(path: Path, name: str, values: Array, line: Line = lambda row: None) -> None:

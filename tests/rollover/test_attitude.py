@@ -16,8 +16,8 @@ from rollover import simulate
 from rollover.attitude import ANGLES, QUATERNION, beside, continuous
 from rollover.calibrate import simulator
 from rollover.channels import CHANNELS
-from rollover.frames import from_angles, one_branch, other_branch, rotation_vector
 from rollover.frames import angles as angles_of
+from rollover.frames import from_angles, one_branch, other_branch, rotation_vector
 from rollover.misfit import Misfit, estimated_noise, misfit, summary
 from rollover.objective import Objective, case, parameter
 from rollover.pair import Result, difference, pair

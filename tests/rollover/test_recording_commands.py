@@ -44,6 +44,14 @@ def test_import_by_profile_and_check(tmp_path: Path) -> None:
     assert said.startswith(f"{out / 'raw.csv'}: recording, in order: Bench, 2 samples, 0 to 0.1 s\n")
 
 
+def test_import_says_what_it_left_out(tmp_path: Path) -> None:
+    (tmp_path / "raw.csv").write_text("t;F;spare\n0;1,5;1\n0,1;2;1\n")
+    (tmp_path / "p.yaml").write_text(PROFILE)
+    code, said, _ = ask("import", tmp_path / "raw.csv", "--profile", tmp_path / "p.yaml", "--out", tmp_path / "out")
+    assert code == 0
+    assert said.splitlines()[1:] == ["  note: 1 of 3 columns left out, without a description: spare"]
+
+
 def test_check_takes_a_folder_of_recordings_one_by_one(tmp_path: Path) -> None:
     time = np.arange(10) * 0.1
     for name in ("a", "b"):

@@ -173,7 +173,10 @@ ONE_FAULT: dict[str, tuple[str | bytes, str]] = {
         "base: side_overtrun.yaml\n",
         "bad.yaml:1: base: no such file, got 'side_overtrun.yaml'; did you mean 'side_overturn.yaml'?",
     ),
-    "base is no file": ("base: 3\n", "bad.yaml:1: base: not a file name, got 3; a .yaml file or the name of a shipped one is needed"),
+    "base is no file": (
+        "base: 3\n",
+        "bad.yaml:1: base: not a file name, got 3; a .yaml file or the name of a shipped one is needed",
+    ),
     "includes itself": (
         "base: bad.yaml\n",
         "bad.yaml:1: base: a file includes itself, got bad.yaml -> bad.yaml; no circles",
