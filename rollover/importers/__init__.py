@@ -107,5 +107,7 @@ def _importer(path: Path, given: Described | None, kind: str) -> Importer:
                 message="a folder, and neither a run, an ISO-MME test nor a ROS bag; its files one by one",
             )
         )
+    if given is not None:
+        return CSV
     message = f"no importer knows this file; {', '.join(table)} are known, --profile says what its columns are"
     raise InputError(Fault(file=str(path), message=message))

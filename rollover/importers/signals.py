@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.channels import factor, is_known
-from rollover.faults import Fault, InputError, hint
+from rollover.faults import Fault, InputError, nearest
 from rollover.importers.sidecar import Column, Described, Profile, doubts_of
 from rollover.recording import Recording
 
 Array = NDArray[np.float64]
+RATE_INSTEAD = "; a clock too coarse for its samples: `rate` in Hz in a profile, and no column of time"
 SAME_INSTANT = 1e-9  # s: stamps of different clocks that lie closer are one row
 Line = Callable[[int], int | None]  # row of a channel -> line of the file, for messages
 
@@ -50,8 +51,8 @@ def described(signals: Mapping[str, Signal], path: Path) -> Described:
         if not signal.left_out and is_known(channel) and not channel.startswith("sensor/"):
             columns[name] = Column(channel=channel, cfc=signal.cfc)  # type: ignore[arg-type]
     if not any(column.channel != "time" for column in columns.values()):
-        held = [f"{name} ({signal.left_out})" if signal.left_out else name for name, signal in signals.items()]
-        raise InputError(Fault(file=str(path), message=f"no column is a channel, got {_listed(held)}; --profile FILE"))
+        message = f"no column is a channel, got {_listed(_held(signals))}; --profile FILE"
+        raise InputError(Fault(file=str(path), message=message))
     about = Profile(format="rollover-profile/1", channels={name: {} for name in columns})
     return Described(file=str(path), about=about, columns=columns, lines={})
 
@@ -64,13 +65,17 @@ def assemble(
     One column is one channel: columns that mean the same are joined where their times are disjoint, else refused. What
     is not read is named in the notes.
     """
+    if given is None:
+        signals = {name: _with_readable_unit(name, signal) for name, signal in signals.items()}
     by = given or described(signals, path)
     about = by.about
-    for name in by.columns:
+    for name, column in by.columns.items():
         if name not in signals:
-            raise by.refuse(name, f"no such column in {path.name}; {hint(name, signals)}")
+            raise by.refuse(name, f"no such column in {path.name}, got {name!r}; {_there(name, signals)}")
         if signals[name].left_out:
             raise by.refuse(name, f"not a column of numbers over time: {signals[name].left_out}; another column")
+        if column.is_stamp:
+            raise by.refuse(name, "date-times and stamps in two columns are read from text files by a profile; seconds")
     clocks = _clocks(path, signals, by, line)
     stretches: dict[str, list[_Stretch]] = {}
     for name, column in by.columns.items():
@@ -166,6 +171,28 @@ def _joined(path: Path, channel: str, parts: list[_Stretch]) -> list[str]:
     return [f"{channel}: joined from {each}"]
 
 
+def _with_readable_unit(name: str, signal: Signal) -> Signal:
+    """The column itself, or left out where it is a channel in a unit that is none: the others can still be read."""
+    channel = signal.channel or name
+    if not signal.left_out and channel != "time" and is_known(channel):
+        try:
+            factor(signal.unit, channel)
+        except ValueError:
+            return replace(signal, left_out=f"unit {signal.unit!r} does not fit {channel}")
+    return signal
+
+
+def _held(signals: Mapping[str, Signal]) -> list[str]:
+    return [f"{name} ({signal.left_out})" if signal.left_out else name for name, signal in signals.items()]
+
+
+def _there(name: str, signals: Mapping[str, Signal]) -> str:
+    """What a file holds, and which of it may have been meant."""
+    close = nearest(name, signals)
+    meant = f"did you mean {close[0]!r}? " if close else ""
+    return f"{meant}the file holds: {_listed(_held(signals))}"
+
+
 def _ambiguous(path: Path, channel: str, first: str, second: str) -> InputError:
     cure = f"channels: {{{first!r}: {{channel: {channel}, ...}}}}"
     message = f"two columns mean {channel}, got {first!r} and {second!r}; a profile chooses one: {cure}"
@@ -199,9 +226,9 @@ def check_time(path: Path, time: Array, line: Line = lambda row: None) -> None:
     if wrong.size:
         row = int(wrong[0]) + 1
         what = "repeated stamp" if time[row] == time[row - 1] else "runs backwards"
-        raise _at(
-            path, line, row, f"time: {what}, got {float(time[row])!r} after {float(time[row - 1])!r}; it must increase"
-        )
+        cure = RATE_INSTEAD if time[row] == time[row - 1] else ""
+        got = f"got {float(time[row])!r} after {float(time[row - 1])!r}"
+        raise _at(path, line, row, f"time: {what}, {got}; it must increase{cure}")
 
 
 def check_values(path: Path, name: str, values: Array, line: Line = lambda row: None) -> None:
