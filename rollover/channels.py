@@ -128,7 +128,7 @@ def is_known(name: str) -> bool:
 
 _POUND, _FOOT, _INCH, _MILE, _G = 4.4482216152605, 0.3048, 0.0254, 1609.344, 9.80665  # exact by definition
 
-# unit of the channel -> spelling -> factor; a table for each dimension, so that g is never a gram and Nm never a length;
+# unit of the channel -> spelling -> factor; a table for each dimension, so that g is no gram and Nm no length;
 # `rollover.units` knows other spellings of the same
 UNITS: dict[str, dict[str, float]] = {
     "1": {"1": 1.0, "-": 1.0, "": 1.0, "%": 0.01},

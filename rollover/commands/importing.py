@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -31,7 +32,10 @@ def import_(
     kind: Annotated[str, typer.Option("--as", help="What it is; found out by itself where that is possible.")] = "",
     profile: Annotated[Path | None, typer.Option(help="What the columns are (rollover-profile/1).")] = None,
     select: Annotated[
-        list[str] | None, typer.Option(help="Of a set of recordings, those whose names fit; may be repeated.")
+        list[str] | None,
+        typer.Option(
+            help="Of a set of recordings, or several tests in a file, those whose names fit; may be repeated."
+        ),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder", show_default="out/import/NAME")] = None,
     to: Annotated[str, typer.Option(help="csv, parquet or mme.zip.")] = "csv",
@@ -63,7 +67,7 @@ def import_(
 def _recordings(
     source: Path, kind: str, profile: Path | None, select: list[str] | None
 ) -> Iterator[tuple[str, Recording]]:
-    from rollover.importers import COLLECTIONS, importers, read_recording
+    from rollover.importers import COLLECTIONS, importers, read_recording, tests_in
 
     if kind in COLLECTIONS:
         if profile is not None:
@@ -76,6 +80,14 @@ def _recordings(
     known = [*importers(), *COLLECTIONS]
     if kind and kind not in known:
         raise InputError(Fault(file="--as", message=f"no such format, got {kind!r}; {hint(kind, known)}"))
+    if tests := tests_in(source, kind):
+        chosen = [name for name in tests if any(fnmatch.fnmatch(name, pattern) for pattern in select or ["*"])]
+        if not chosen:
+            message = f"nothing fits, got {' '.join(select or ())}; {', '.join(tests)} are in {source.name}"
+            raise InputError(Fault(file="--select", message=message))
+        for name in chosen:
+            yield name, read_recording(source, profile=profile, kind=kind, test=name)
+        return
     if select:
         raise InputError(
             Fault(file="--select", message=f"one recording, got {select}; only of a set can some be taken")

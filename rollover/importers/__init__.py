@@ -11,24 +11,27 @@ from rollover.importers import iso_mme, plain
 from rollover.importers.cone_drops import CONE_DROPS
 from rollover.importers.csv_profile import CSV
 from rollover.importers.cube_tosses import CUBE_TOSSES
+from rollover.importers.dts import DTS
 from rollover.importers.falling_balls import FALLING_BALLS
 from rollover.importers.hdf5 import HDF5
 from rollover.importers.importer import Collection, Importer
+from rollover.importers.lvm import LVM
 from rollover.importers.mat import MAT
 from rollover.importers.mcap import MCAP
 from rollover.importers.mdf import MDF
+from rollover.importers.nhtsa import NHTSA
 from rollover.importers.sidecar import Described, Profile, read_described
 from rollover.importers.soil_penetrometer import SOIL_PENETROMETER
 from rollover.importers.tdms import TDMS
 from rollover.recording import Recording
 
 __all__ = ["COLLECTIONS", "Collection", "Importer", "importers", "read_profile", "read_recording", "recordings_at"]
-__all__ += ["write_recording"]
+__all__ += ["tests_in", "write_recording"]
 
 NOT_RECORDINGS = (".yaml", ".yml", ".json", ".md", ".txt")
 
 PLAIN = Importer(name="plain", meaning="CSV or Parquet with a sidecar", sniff=plain.sniff, read=plain.read)
-_OWN = {i.name: i for i in (PLAIN, iso_mme.ISO_MME, MAT, TDMS, MDF, HDF5, MCAP, CSV)}
+_OWN = {i.name: i for i in (PLAIN, NHTSA, iso_mme.ISO_MME, MAT, TDMS, MDF, HDF5, MCAP, LVM, DTS, CSV)}
 COLLECTIONS: dict[str, Collection] = {c.name: c for c in (CUBE_TOSSES, FALLING_BALLS, SOIL_PENETROMETER, CONE_DROPS)}
 ENTRY_POINTS = "rollover.importers"
 
@@ -47,11 +50,36 @@ def importers() -> Mapping[str, Importer]:
     return found
 
 
-def read_recording(path: str | Path, *, profile: str | Path | Described | None = None, kind: str = "") -> Recording:
+def read_recording(
+    path: str | Path, *, profile: str | Path | Described | None = None, kind: str = "", test: str = ""
+) -> Recording:
     """Recording from any file that an importer knows, or a run's folder; SI. Raises `InputError`.
 
-    `profile` says what the columns of a foreign file are; `kind` names the importer instead of finding it.
+    `profile` says what the columns of a foreign file are; `kind` names the importer instead of finding it; `test` one
+    of several in the file, which is refused without.
     """
+    path = _there(path)
+    given = profile if isinstance(profile, Described) or profile is None else read_profile(profile)
+    importer = _importer(path, given, kind)
+    if test and importer.read_test:
+        return importer.read_test(path, given, test)
+    tests = importer.tests(path) if importer.tests else ()
+    if len(tests) > 1:
+        cure = f"rollover import {path.name} makes a recording of each, --select NAME of one"
+        raise InputError(Fault(file=str(path), message=f"{len(tests)} tests, got {', '.join(tests)}; {cure}"))
+    return importer.read(path, given)
+
+
+def tests_in(path: str | Path, kind: str) -> list[str]:
+    """Names of the tests in a file that holds several; else nothing. Raises `InputError`."""
+    path = _there(path)
+    importers_ = [importers()[kind]] if kind in importers() else [i for i in importers().values() if i.sniff(path)]
+    tests = importers_[0].tests(path) if importers_ and importers_[0].tests else ()
+    return list(tests) if len(tests) > 1 else []
+
+
+def _there(path: str | Path) -> Path:
+    """A path that leads somewhere; of a run's folder, that of its channels. Raises `InputError`."""
     path = Path(path)
     try:
         if (path / "channels.parquet").is_file():
@@ -62,8 +90,7 @@ def read_recording(path: str | Path, *, profile: str | Path | Described | None =
     if not exists:
         what = "cannot be read: a link that leads nowhere" if path.is_symlink() else absent(path)
         raise InputError(Fault(file=str(path), message=what))
-    given = profile if isinstance(profile, Described) or profile is None else read_profile(profile)
-    return _importer(path, given, kind).read(path, given)
+    return path
 
 
 def write_recording(recording: Recording, path: str | Path, *, force: bool = False) -> None:

@@ -178,9 +178,7 @@ class Numbers(io.RawIOBase):
                 if self.above:
                     self.above -= 1
                 else:
-                    kept.append(
-                        line if self.fit is None else self._row(line.decode(errors="surrogateescape"), *self.fit)
-                    )
+                    kept.append(line if self.fit is None else self._row(line, *self.fit))
             block = b"".join(kept)
         self.ready = block
         return True
