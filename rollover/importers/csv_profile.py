@@ -27,7 +27,8 @@ from rollover.importers.stamps import (
     whole_seconds,
 )
 from rollover.recording import Clock, Recording
-from rollover.recording.tables import Dialect, csv_heading, first_rows, is_number, line_of_row, read_columns
+from rollover.recording.tables import csv_heading, first_rows, is_number, line_of_row, read_columns
+from rollover.recording.text_rows import Dialect
 
 Words = Mapping[str, list[str | None]]
 
@@ -47,7 +48,8 @@ def read(path: Path, profile: Described | None) -> Recording:
     how = profile.about.csv
     units = {name: in_brackets(name) for name in names}
     if how.units_row:
-        units = dict(zip(names, between[how.units_row - (how.names_row or 0) - dialect.named], strict=False))
+        below = between[how.units_row - dialect.before - dialect.named - 1 :]
+        units = dict(zip(names, below[0], strict=False)) if below else {}
     _refuse_twins(profile, names)
     nothing = Signal(values=np.empty(0))
     if not set(profile.columns) <= set(names):

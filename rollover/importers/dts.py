@@ -19,7 +19,8 @@ from rollover.importers.polarity import sign
 from rollover.importers.sidecar import Described
 from rollover.importers.signals import Signal, assemble
 from rollover.recording import Recording
-from rollover.recording.tables import Dialect, csv_heading, first_rows, line_of_row, read_columns
+from rollover.recording.tables import csv_heading, first_rows, line_of_row, read_columns
+from rollover.recording.text_rows import Dialect
 
 MARK = re.compile(rb"^\W*data starts here(.?)", re.IGNORECASE | re.MULTILINE)
 LOOKED_AT = 1 << 16  # bytes, in which the header ends

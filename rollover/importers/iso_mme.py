@@ -103,15 +103,14 @@ def _recording(place: Path, path: Path, chosen: str, profile: Described | None) 
     title = _value(test, "title") or _value(test, "type of the test") or PurePosixPath(chosen).stem
     laboratory = _value(test, "laboratory name")
     found = assemble(path, signals, profile)
-    more = {} if profile and profile.about.title else {"title": title}
-    if laboratory and not (profile and profile.about.source):
-        more["source"] = laboratory
+    title = found.title if profile and profile.about.title else title
+    source = found.source or laboratory
     listing = next((n for n in sorted(files) if n.lower().endswith(".chn")), "")
     head = _header(place, listing, content(place, listing))[0] if listing else {}
     held = [(channel.file, channel.code) for channel in channels]
     notes = (*found.notes, *promised(PurePosixPath(listing or chosen).name, {**test, **head}, held))
     flipped = {name: sign(name) * values for name, values in found.channels.items() if sign(name) < 0.0}
-    return replace(found, **more, channels={**found.channels, **flipped}, notes=notes)
+    return replace(found, title=title, source=source, channels={**found.channels, **flipped}, notes=notes)
 
 
 def _beside(place: Path, chosen: str) -> list[str]:

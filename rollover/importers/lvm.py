@@ -74,6 +74,10 @@ def _read(path: Path, profile: Described | None) -> Recording:
             signals[_unique(full, signals)] = signal
     if profile is not None and len(file.segments) > 1:
         profile = _of_each_segment(profile, signals)
+    readable = set(profile.columns) <= set(signals) if profile else any(s.channel for s in signals.values())
+    if readable:  # X is the time of the others, and not left out
+        clocks = [n for n in signals if n.rpartition("/")[2].startswith(X) and not (profile and n in profile.columns)]
+        signals = {n: s for n, s in signals.items() if n not in clocks or s.unit != "s"}
     notes = [f"zero of time is the stamp of the first channel, {spelt(began)}"] if began else []
     if file.special:
         notes.append(f"{file.special} special blocks left out")
@@ -147,11 +151,12 @@ def _signals(file: _File, segment: _Segment, zero: int | None, *, own_x: bool) -
             yield name, left_out("text" if said else "empty")
             continue
         values = _column(file, segment, c)
+        count = 1 + max((i for i, (_, cells) in enumerate(segment.rows) if len(cells) > c and cells[c]), default=-1)
         stated = segment.tag("Samples", c)
-        count = int(stated) if stated.isdigit() else len(np.trim_zeros(np.isfinite(values), "b"))
-        if stated.isdigit() and (count > values.size or np.isfinite(values[count:]).any()):
-            _refuse(file.path, f"{name}: Samples: says {stated}, got {np.flatnonzero(np.isfinite(values))[-1] + 1}")
-        time = _time(file, segment, c, at, count, zero, first=first)
+        if stated.isdigit() and count < int(stated):
+            _refuse(file.path, f"{name}: Samples: says {stated}, got {count}; a whole file is needed")
+        appended = stated.isdigit() and count > int(stated)  # the header is that of the first packet alone
+        time = _time(file, segment, c, at, count, zero, first=first, appended=appended)
         shared = first or _grid(file, segment, c) == _grid(file, segment, at + 1)
         if first:
             unit = segment.tag("X_Unit_Label", c) or ("s" if time is not None else "")
@@ -159,27 +164,30 @@ def _signals(file: _File, segment: _Segment, zero: int | None, *, own_x: bool) -
             yield X, Signal(values=x, unit=unit)
         unit = segment.tag("Y_Unit_Label", c)
         channel = name if is_known(name) else ""
-        signal = Signal(values=values[:count], unit=unit, time=None if own_x and shared else time, channel=channel)
+        by_x = own_x and shared and names.count(X) == 1
+        signal = Signal(values=values[:count], unit=unit, time=None if by_x else time, channel=channel)
         yield name, signal if np.isfinite(values[:count]).any() else left_out("not one number")
         first = False
 
 
-def _time(file: _File, s: _Segment, c: int, at: int, count: int, zero: int | None, *, first: bool) -> Array | None:
-    """Stamps of a channel, s since the first channel's; None where its X is no time."""
+def _time(
+    file: _File, s: _Segment, c: int, at: int, count: int, zero: int | None, *, first: bool, appended: bool
+) -> Array | None:
+    """Stamps of a channel, s since the first channel's; None where its X is no time, or nothing says what it is."""
     if s.tag("X_Dimension", c) not in ("", "Time"):
         return None
     grid = _grid(file, s, c)
-    even = None if grid is None or not grid[1] > 0.0 else grid[0] + grid[1] * np.arange(count)
+    even = None if grid is None or appended or not grid[1] > 0.0 else grid[0] + grid[1] * np.arange(count)
     stamp = _stamp(s, c)
     away = (stamp.ns - zero) / SECOND if stamp and zero is not None else 0.0
-    if first or grid == _grid(file, s, at + 1):
+    if first or appended or grid == _grid(file, s, at + 1):
         printed = _column(file, s, at)[:count]
         if printed.size and np.isfinite(printed).all():
             if abs(printed[0]) > SINCE_1904:
-                return printed - printed[0] + away
+                return np.asarray(printed - printed[0] + away)
             if even is None or not (np.abs(even - printed) <= PRINTED * np.maximum(1.0, np.abs(printed))).all():
-                return printed + away
-    return None if even is None else even + away
+                return np.asarray(printed + away)
+    return None if even is None else np.asarray(even + away)
 
 
 def _grid(file: _File, segment: _Segment, c: int) -> tuple[float, float] | None:

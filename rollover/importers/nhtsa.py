@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import zipfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import NoReturn
 
@@ -118,26 +118,20 @@ def _recording(path: Path, profile: Described | None, test: _Test) -> Recording:
         unit = UNITS.get(row.get("YUNITS", ""), row.get("YUNITS", ""))
         signals[name] = Signal(values=values, time=time, unit=unit, channel=_channel(row))
     found = assemble(path, signals, profile)
-    notes = (
-        [*found.notes, f"instruments: {'; '.join(_spoken(n, row) for n, row in listed.items())}"]
-        if listed
-        else found.notes
-    )
-    extra = sorted(set(test.curves) - set(listed)) if test.about else []
+    notes = list(found.notes)
+    if listed:
+        notes.append(f"instruments: {'; '.join(_spoken(n, row) for n, row in listed.items())}")
+    extra = [f"{n:03d}" for n in sorted(set(test.curves) - set(listed))] if test.about else []
     if extra:
-        notes = [
-            *notes,
-            f"files that {PurePosixPath(test.about).name} does not list: {', '.join(f'{n:03d}' for n in extra)}",
-        ]
+        notes.append(f"files that {PurePosixPath(test.about).name} does not list: {', '.join(extra)}")
     turned = [c for c in found.channels if profile is None and sign(c) < 0.0]
     if turned:
         notes.append(f"turned from SAE J211 axes to ISO 8855: {', '.join(turned)}")
     fields = about.get("TEST", [[]])[0]
     title = fields[1] if profile is None and len(fields) > 1 and fields[1] else found.title
     table = {c: -v if c in turned else v for c, v in found.channels.items()}
-    kept = {f: getattr(found, f) for f in ("time", "conditions", "uncertainty", "noise", "cfc", "clock", "sensors")}
     source = found.source or (fields[4] if len(fields) > 4 else "")
-    return Recording(title=title, source=source, channels=table, notes=tuple(notes), **kept)
+    return replace(found, title=title, source=source, channels=table, notes=tuple(notes))
 
 
 def _channel(row: dict[str, str]) -> str:

@@ -15,7 +15,7 @@ from rollover.channels import describe, factor
 from rollover.document import Node
 from rollover.faults import Fault, InputError
 from rollover.recording import Clock, Doubt, Sensor
-from rollover.recording.tables import WHITESPACE
+from rollover.recording.text_rows import WHITESPACE
 
 MOST_BYTES = 1 << 18  # of a sidecar: what is longer is no sidecar, and would take long to be refused
 DATE_TIME = "date-time"  # as a unit: the cells of a column of time are dates, times of day or both
@@ -209,6 +209,9 @@ def read_described(path: Path, kind: type[Sidecar] | type[Profile]) -> Described
             what = f"second column of {column.channel}, first {first[column.channel]!r}; one column a channel"
             faults += node.key.fault(f"channels.{name}", what).faults
         first.setdefault(column.channel, name)
+        if kind is Sidecar and column.is_stamp:
+            what = "date-times and stamps in several columns are read with a profile, not a sidecar; seconds here"
+            faults += node.key.fault(f"channels.{name}", f"unit: {what}").faults
         if kind is Sidecar and column.unit is None:
             faults += node.key.fault(f"channels.{name}", "unit: missing; the column's unit is needed").faults
     if faults:
