@@ -67,7 +67,7 @@ def import_(
 def _recordings(
     source: Path, kind: str, profile: Path | None, select: list[str] | None
 ) -> Iterator[tuple[str, Recording]]:
-    from rollover.importers import COLLECTIONS, importers, read_recording, tests_in
+    from rollover.importers import COLLECTIONS, importers, names_of_tests, read_recording
 
     if kind in COLLECTIONS:
         if profile is not None:
@@ -80,7 +80,7 @@ def _recordings(
     known = [*importers(), *COLLECTIONS]
     if kind and kind not in known:
         raise InputError(Fault(file="--as", message=f"no such format, got {kind!r}; {hint(kind, known)}"))
-    if tests := tests_in(source, kind):
+    if tests := names_of_tests(source, kind):
         chosen = [name for name in tests if any(fnmatch.fnmatch(name, pattern) for pattern in select or ["*"])]
         if not chosen:
             message = f"nothing fits, got {' '.join(select or ())}; {', '.join(tests)} are in {source.name}"

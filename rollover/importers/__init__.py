@@ -26,7 +26,7 @@ from rollover.importers.tdms import TDMS
 from rollover.recording import Recording
 
 __all__ = ["COLLECTIONS", "Collection", "Importer", "importers", "read_profile", "read_recording", "recordings_at"]
-__all__ += ["tests_in", "write_recording"]
+__all__ += ["names_of_tests", "write_recording"]
 
 NOT_RECORDINGS = (".yaml", ".yml", ".json", ".md", ".txt")
 
@@ -70,7 +70,7 @@ def read_recording(
     return importer.read(path, given)
 
 
-def tests_in(path: str | Path, kind: str) -> list[str]:
+def names_of_tests(path: str | Path, kind: str) -> list[str]:
     """Names of the tests in a file that holds several; else nothing. Raises `InputError`."""
     path = _there(path)
     importers_ = [importers()[kind]] if kind in importers() else [i for i in importers().values() if i.sniff(path)]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rollover.faults import InputError
-from rollover.importers import read_recording, tests_in
+from rollover.importers import names_of_tests, read_recording
 from rollover.recording import Recording
 
 G = 9.80665
@@ -186,7 +186,7 @@ def test_nhtsa_two_tests_in_a_zip(tmp_path: Path) -> None:
             archive.writestr(f"{name}/{name}.EV5", ev5(TWO[0]))
             archive.writestr(f"{name}/{name}.001", curve(scale))
     path = tmp_path / "both.zip"
-    assert tests_in(path, "") == ["v00001", "v00002"]
+    assert names_of_tests(path, "") == ["v00001", "v00002"]
     assert read_recording(path, test="v00002")[X] == pytest.approx(3.0 * G * WAVE, abs=1e-5)
     with pytest.raises(InputError, match=r"2 tests, got v00001, v00002; rollover import both.zip makes a recording of"):
         read_recording(path)
