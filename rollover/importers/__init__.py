@@ -61,9 +61,11 @@ def read_recording(
     path = _there(path)
     given = profile if isinstance(profile, Described) or profile is None else read_profile(profile)
     importer = _importer(path, given, kind)
+    tests = importer.tests(path) if importer.tests else ()
+    if test and test not in tests:
+        raise InputError(Fault(file=str(path), message=f"no such test, got {test!r}; {hint(test, tests)}"))
     if test and importer.read_test:
         return importer.read_test(path, given, test)
-    tests = importer.tests(path) if importer.tests else ()
     if len(tests) > 1:
         cure = f"rollover import {path.name} makes a recording of each, --select NAME of one"
         raise InputError(Fault(file=str(path), message=f"{len(tests)} tests, got {', '.join(tests)}; {cure}"))
@@ -73,8 +75,8 @@ def read_recording(
 def names_of_tests(path: str | Path, kind: str) -> list[str]:
     """Names of the tests in a file that holds several; else nothing. Raises `InputError`."""
     path = _there(path)
-    importers_ = [importers()[kind]] if kind in importers() else [i for i in importers().values() if i.sniff(path)]
-    tests = importers_[0].tests(path) if importers_ and importers_[0].tests else ()
+    importer = importers().get(kind) or next((i for i in importers().values() if i.sniff(path)), None)
+    tests = importer.tests(path) if importer and importer.tests else ()
     return list(tests) if len(tests) > 1 else []
 
 

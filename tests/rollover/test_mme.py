@@ -251,6 +251,8 @@ def test_some_of_several_tests(tmp_path: Path) -> None:
 def test_what_reads_one_recording_refuses_several_with_their_names() -> None:
     with pytest.raises(InputError, match=r"2 tests, got mme_ang, mme_exp; rollover import two_tests.zip makes a rec"):
         read_recording(CASES / "two_tests.zip")
+    with pytest.raises(InputError, match=r"no such test, got 'mme_exo'; did you mean 'mme_exp'\?"):
+        read_recording(CASES / "two_tests.zip", test="mme_exo")
     one = read_recording(CASES / "two_tests.zip", test="mme_exp")
     assert list(one.channels) == [Z]
 
