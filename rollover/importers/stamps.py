@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import functools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,6 +27,7 @@ _CLOCK = re.compile(
     r"(?P<h>\d{1,2}):(?P<min>\d{2})(?::(?P<s>\d{2})(?:[.,](?P<f>\d+)|:(?P<ms>\d{3}))?)?(?:\s*(?P<half>[AaPp])\.?[Mm]\.?)?"
     r"|(?P<h2>\d{2})(?P<min2>\d{2})(?P<s2>\d{2})(?:[.,](?P<f2>\d+))?"
 )
+_FRACTION = re.compile(r"(.*:\d{2}:\d{2})[.,](\d+)(Z?)")
 _ZONE = re.compile(r"\s*(?:(?P<utc>Z|UTC|GMT)|(?P<sign>[+-])(?P<h>\d{2}):?(?P<m>\d{2})?)")
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 
@@ -45,6 +47,15 @@ class Stamp:
 
 def moment(text: str) -> Stamp:
     """Read a date with its time of day, or a time of day alone. Raises `NotAStampError`."""
+    parts = _FRACTION.fullmatch(text)
+    if parts is None:
+        return _moment(text)
+    second = _moment(parts[1] + parts[3])
+    return Stamp(ns=second.ns + int(parts[2][:9].ljust(9, "0")), dated=second.dated, zoned=second.zoned)
+
+
+@functools.lru_cache(maxsize=4096)  # many samples share a second
+def _moment(text: str) -> Stamp:
     rest = text.strip()
     day = 0
     date = _DATE.match(rest)
