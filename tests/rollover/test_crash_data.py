@@ -170,6 +170,8 @@ def test_nhtsa_a_broken_curve_is_refused_if_it_is_needed_and_else_left_out(tmp_p
         re.search(r"1 of 2 columns left out, v00001.002: line 2: not two numbers.*: 002", n) for n in found.notes
     )
     (path / "v00001.001").write_text(broken)
+    (path / "v00001.002").write_text(curve(1.0))
+    (path / "v00001.EV5").write_text(ev5(TWO[0], instrument(2, "AC", "VECG", "ZL", "G'S")))
     with pytest.raises(InputError, match=r"v00001.001: line 2: not two numbers, got 'oops'"):
         read_recording(path)
 

@@ -84,7 +84,7 @@ def test_spellings_of_real_tools(spelling: str, dimension: str, si: float) -> No
     ("spelling", "dimension"),
     [
         *[(s, "N") for s in ("mn", "Mn", "g", "G", "N/m", "N2", "kN kN")],  # mN or MN?
-        *[(s, "m") for s in ("Mm", "m/s", "1/m", "", "-")],
+        *[(s, "m") for s in ("Mm", "m/s", "1/m", "", "-", "m/s*s", "m/s s")],  # (m/s) s or m/(s s)?
         *[(s, "s") for s in ("Ms", "Ns", "Hz", "1/s", "m")],
         *[(s, "J") for s in ("Mj", "mj")],
         *[(s, "N m") for s in ("nm", "N/m", "mN", "J m")],  # nm is a length
