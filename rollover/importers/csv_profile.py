@@ -10,10 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rollover.faults import Fault, InputError
-from rollover.importers.importer import Importer
-from rollover.importers.sidecar import DATE_TIME, Column, Described, Profile
-from rollover.importers.signals import RATE_INSTEAD, Signal, assemble
-from rollover.importers.stamps import (
+from rollover.importers.date_times import (
     EXACT,
     SECOND,
     NotAStampError,
@@ -26,6 +23,9 @@ from rollover.importers.stamps import (
     spelt,
     whole_seconds,
 )
+from rollover.importers.importer import Importer
+from rollover.importers.sidecar import DATE_TIME, Column, Described, Profile
+from rollover.importers.signals import RATE_INSTEAD, Signal, assemble
 from rollover.recording import Clock, Recording
 from rollover.recording.tables import csv_heading, first_rows, is_number, line_of_row, read_columns
 from rollover.recording.text_rows import Dialect

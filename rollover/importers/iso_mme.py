@@ -133,7 +133,7 @@ def _signals(place: Path, channels: list[_Channel], profile: Described | None) -
     count = Counter(channel.code for channel in channels)
     signals: dict[str, Signal] = {}
     wrong: list[str] = []
-    clocks = {channel.head.get("reference channel name", "").strip() for channel in channels} - {""}
+    clocks = {_reference(channel) for channel in channels} - {""}
     for channel in channels:
         name = f"{channel.code} ({channel.file})" if count[channel.code] > 1 else channel.code or channel.file
         try:
@@ -290,8 +290,8 @@ def _signal(place: Path, channel: _Channel, channels: list[_Channel]) -> Signal:
 
 def _time(place: Path, channel: _Channel, channels: list[_Channel]) -> NDArray[np.float64]:
     head = channel.head
-    if head.get("reference channel", "implicit").lower() == "explicit":
-        wanted = head.get("reference channel name", "").strip()
+    if _is_explicit(channel):
+        wanted = _reference(channel)
         for other in channels:
             if wanted and wanted in (other.code, other.head.get("name of the channel", "")):
                 if other.wrong:
@@ -312,6 +312,15 @@ def _time(place: Path, channel: _Channel, channels: list[_Channel]) -> NDArray[n
     if not (np.isfinite(start) and 0.0 < step < 1e6):
         _refuse(place, f"{channel.file}: Sampling interval: got {step!r}; a time greater than 0 s")
     return np.asarray(start + step * np.arange(channel.values.size))
+
+
+def _is_explicit(channel: _Channel) -> bool:
+    return channel.head.get("reference channel", "implicit").lower() == "explicit"
+
+
+def _reference(channel: _Channel) -> str:
+    """Code or name of the channel that holds the time of this one, or nothing."""
+    return _value(channel.head, "reference channel name") if _is_explicit(channel) else ""
 
 
 def _value(head: Mapping[str, str], key: str) -> str:

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from rollover.channels import is_known
 from rollover.faults import Fault, InputError
 from rollover.importers import csv_profile
+from rollover.importers.date_times import SECOND, NotAStampError, Stamp, moment, spelt
 from rollover.importers.importer import Importer, starts_with
 from rollover.importers.sidecar import Described
 from rollover.importers.signals import Signal, assemble, left_out
-from rollover.importers.stamps import SECOND, NotAStampError, Stamp, moment, spelt
 from rollover.recording import Recording
 from rollover.recording.tables import is_number
 

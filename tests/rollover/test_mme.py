@@ -225,6 +225,12 @@ def test_an_explicit_clock_in_milliseconds(tmp_path: Path) -> None:
     assert found.notes == ()  # the clock is not left out
 
 
+def test_a_channel_without_a_name_is_not_taken_for_a_clock(tmp_path: Path) -> None:
+    nameless = channel("11SEAT000000FOZA", [1, 2], Name_of_the_channel="NOVALUE")
+    found = read(made(tmp_path, channel(UP, [1, 2]), nameless))
+    assert found.notes == ("1 of 2 columns left out, without a description: 11SEAT000000FOZA",)
+
+
 # ---- several tests
 
 

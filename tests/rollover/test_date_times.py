@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from rollover.faults import InputError
 from rollover.importers import read_recording
-from rollover.importers.stamps import NotAStampError, is_moment, moment, spelt
+from rollover.importers.date_times import NotAStampError, is_moment, moment, spelt
 from rollover.recording import Recording
 
 HOUR = 3_600 * 10**9
