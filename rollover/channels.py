@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rollover import units
 from rollover.faults import hint, nearest
 
 
@@ -131,7 +132,8 @@ def is_known(name: str) -> bool:
 
 _POUND, _FOOT, _INCH, _MILE, _G = 4.4482216152605, 0.3048, 0.0254, 1609.344, 9.80665  # exact by definition
 
-# unit of the channel -> spelling -> factor; a table for each dimension, so that g is never a gram and Nm never a length
+# unit of the channel -> spelling -> factor; a table for each dimension, so that g is no gram and Nm no length;
+# `rollover.units` knows other spellings of the same
 UNITS: dict[str, dict[str, float]] = {
     "1": {"1": 1.0, "-": 1.0, "": 1.0, "%": 0.01},
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0},
@@ -164,7 +166,7 @@ UNITS: dict[str, dict[str, float]] = {
         **dict.fromkeys(("N m s", "Nms", "N·m·s", "N*m*s"), 1.0),
         **dict.fromkeys(("kN m s", "kNms"), 1e3),
     },
-    "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6, "km": 1e3, "in": _INCH, "ft": _FOOT},
+    "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6, "nm": 1e-9, "km": 1e3, "in": _INCH, "ft": _FOOT},
     "m2": {
         **dict.fromkeys(("m2", "m^2", "m²"), 1.0),
         **dict.fromkeys(("cm2", "cm^2", "cm²"), 1e-4),
@@ -200,8 +202,8 @@ UNITS: dict[str, dict[str, float]] = {
         "rad/s": 1.0,
         "mrad/s": 1e-3,
         "rev/s": 2.0 * math.pi,
-        **dict.fromkeys(("deg/s", "°/s"), math.pi / 180.0),
-        **dict.fromkeys(("rpm", "1/min", "rev/min"), math.pi / 30.0),
+        **dict.fromkeys(("deg/s", "°/s", "dps"), math.pi / 180.0),
+        **dict.fromkeys(("rpm", "1/min", "rev/min", "r/min"), math.pi / 30.0),
     },
     "J": {
         **dict.fromkeys(("J", "N m", "Nm", "N·m", "N*m", "W s", "Ws"), 1.0),
@@ -218,10 +220,12 @@ UNITS: dict[str, dict[str, float]] = {
 
 def factor(unit: str, channel: str) -> float:
     """What one `unit` is in the channel's own unit. Raises ``ValueError`` that lists what fits the channel."""
-    known = UNITS[describe(channel).unit]
-    if unit.strip() not in known:
+    own = describe(channel).unit
+    known = UNITS[own]
+    found = units.find(unit, known, {other: table for other, table in UNITS.items() if other != own})
+    if found is None:
         raise ValueError(f"unit does not fit {channel}, got {unit!r}; {hint(unit, known, most_listed=99)}")
-    return known[unit.strip()]
+    return found
 
 
 def to_si(values: ArrayLike, unit: str, channel: str) -> NDArray[np.float64]:

@@ -34,7 +34,10 @@ def import_(
         Path | None, typer.Option(help="What the columns and conditions are (rollover-profile/1).")
     ] = None,
     select: Annotated[
-        list[str] | None, typer.Option(help="Of a set of recordings, those whose names fit; may be repeated.")
+        list[str] | None,
+        typer.Option(
+            help="Of a set of recordings, or several tests in a file, those whose names fit; may be repeated."
+        ),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder", show_default="out/import/NAME")] = None,
     to: Annotated[str, typer.Option(help="csv, parquet or mme.zip.")] = "csv",
@@ -90,11 +93,7 @@ def _recordings(
     known = [*importers(), *COLLECTIONS]
     if kind and kind not in known:
         raise InputError(Fault(file="--as", message=f"no such format, got {kind!r}; {hint(kind, known)}"))
-    if select:
-        raise InputError(
-            Fault(file="--select", message=f"one recording, got {select}; only of a set can some be taken")
-        )
-    return dict(read_named([source], profile, kind))
+    return read_named([source], profile, kind, select)
 
 
 def _write(folder: Path, made: Mapping[str, Recording], force: bool) -> None:

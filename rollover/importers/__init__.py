@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 import functools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -11,20 +12,23 @@ from rollover.importers import iso_mme, plain
 from rollover.importers.cone_drops import CONE_DROPS
 from rollover.importers.csv_profile import CSV
 from rollover.importers.cube_tosses import CUBE_TOSSES
+from rollover.importers.dts import DTS
 from rollover.importers.falling_balls import FALLING_BALLS
 from rollover.importers.hdf5 import HDF5
 from rollover.importers.importer import Collection, Importer
+from rollover.importers.lvm import LVM
 from rollover.importers.mat import MAT
 from rollover.importers.mcap import MCAP
 from rollover.importers.mdf import MDF
 from rollover.importers.netcdf import NETCDF
+from rollover.importers.nhtsa import NHTSA
 from rollover.importers.sidecar import Described, Profile, read_described
 from rollover.importers.soil_penetrometer import SOIL_PENETROMETER
 from rollover.importers.tdms import TDMS
 from rollover.recording import Recording
 
 __all__ = ["COLLECTIONS", "Collection", "Importer", "importers", "read_profile", "read_recording", "recordings_at"]
-__all__ += ["name_of", "read_named", "write_recording"]
+__all__ += ["name_of", "names_of_tests", "read_named", "write_recording"]
 
 NOT_RECORDINGS = (".yaml", ".yml", ".json", ".md", ".txt")
 ENDINGS = (  # what a name loses: in Messung_3.0.csv only the last of two, in drop.001 none
@@ -34,7 +38,7 @@ ENDINGS = (  # what a name loses: in Messung_3.0.csv only the last of two, in dr
 )
 
 PLAIN = Importer(name="plain", meaning="CSV or Parquet with a sidecar", sniff=plain.sniff, read=plain.read)
-_OWN = {i.name: i for i in (PLAIN, iso_mme.ISO_MME, MAT, TDMS, MDF, HDF5, NETCDF, MCAP, CSV)}
+_OWN = {i.name: i for i in (PLAIN, NHTSA, iso_mme.ISO_MME, MAT, TDMS, MDF, HDF5, NETCDF, MCAP, LVM, DTS, CSV)}
 COLLECTIONS: dict[str, Collection] = {c.name: c for c in (CUBE_TOSSES, FALLING_BALLS, SOIL_PENETROMETER, CONE_DROPS)}
 ENTRY_POINTS = "rollover.importers"
 
@@ -53,11 +57,39 @@ def importers() -> Mapping[str, Importer]:
     return found
 
 
-def read_recording(path: str | Path, *, profile: str | Path | Described | None = None, kind: str = "") -> Recording:
+def read_recording(
+    path: str | Path, *, profile: str | Path | Described | None = None, kind: str = "", test: str = ""
+) -> Recording:
     """Recording from any file that an importer knows, or a run's folder; SI. Raises `InputError`.
 
-    `profile` says what the columns of a foreign file are; `kind` names the importer instead of finding it.
+    `profile` says what the columns of a foreign file are; `kind` names the importer instead of finding it; `test` one
+    of several in the file, which is refused without.
     """
+    path = _there(path)
+    given = profile if isinstance(profile, Described) or profile is None else read_profile(profile)
+    given = given and given.of(path)
+    importer = _importer(path, given, kind)
+    tests = importer.tests(path) if importer.tests else ()
+    if test and test not in tests:
+        raise InputError(Fault(file=str(path), message=f"no such test, got {test!r}; {hint(test, tests)}"))
+    if test and importer.read_test:
+        return importer.read_test(path, given, test)
+    if len(tests) > 1:
+        cure = f"rollover import {path.name} makes a recording of each, --select NAME of one"
+        raise InputError(Fault(file=str(path), message=f"{len(tests)} tests, got {', '.join(tests)}; {cure}"))
+    return importer.read(path, given)
+
+
+def names_of_tests(path: str | Path, kind: str) -> list[str]:
+    """Names of the tests in a file that holds several; else nothing. Raises `InputError`."""
+    path = _there(path)
+    importer = importers().get(kind) or next((i for i in importers().values() if i.sniff(path)), None)
+    tests = importer.tests(path) if importer and importer.tests else ()
+    return list(tests) if len(tests) > 1 else []
+
+
+def _there(path: str | Path) -> Path:
+    """A path that leads somewhere; of a run's folder, that of its channels. Raises `InputError`."""
     path = Path(path)
     try:
         if (path / "channels.parquet").is_file():
@@ -68,10 +100,7 @@ def read_recording(path: str | Path, *, profile: str | Path | Described | None =
     if not exists:
         what = "cannot be read: a link that leads nowhere" if path.is_symlink() else absent(path)
         raise InputError(Fault(file=str(path), message=what))
-    given = profile if isinstance(profile, Described) or profile is None else read_profile(profile)
-    if given is not None:
-        given = given.of(path)
-    return _importer(path, given, kind).read(path, given)
+    return path
 
 
 def write_recording(recording: Recording, path: str | Path, *, force: bool = False) -> None:
@@ -115,11 +144,15 @@ def name_of(path: Path) -> str:
 
 
 def read_named(
-    paths: Sequence[str | Path], profile: str | Path | None = None, kind: str = ""
+    paths: Sequence[str | Path],
+    profile: str | Path | None = None,
+    kind: str = "",
+    select: Sequence[str] | None = None,
 ) -> dict[str, tuple[Path, Recording]]:
-    """Path and recording by name, of files and of all in folders; all are read with the profile, if one is given.
+    """Path and recording by name, of files, of all in folders and of all tests in archives.
 
-    Raises `InputError` for all faults at once, and for two recordings of one name.
+    All are read with the profile, if one is given; `select` has patterns of names. Raises `InputError` for all faults
+    at once, and for two recordings of one name.
     """
     given = None if profile is None else read_profile(profile)
     found: dict[str, tuple[Path, Recording]] = {}
@@ -127,26 +160,36 @@ def read_named(
     faults: list[Fault] = []
     for text in paths:
         try:
-            files = recordings_at(Path(text), given)
+            named = [named for file in recordings_at(Path(text), given) for named in _named(file, kind)]
         except InputError as e:
             faults += e.faults
             continue
-        for file in files:
-            name = name_of(file)
+        for name, file, test in named:
             if name in first:
-                message = (
-                    f"a second recording by this name, got {name!r}, first {first[name]}; two recordings share a name"
-                )
+                message = f"a second recording by this name, got {name!r}, first {first[name]}; two share a name"
                 faults.append(Fault(file=str(file), message=message))
                 continue
             first[name] = file
+            if select and not any(fnmatch.fnmatch(name, pattern) for pattern in select):
+                continue
             try:
-                found[name] = (file, read_recording(file, profile=given, kind=kind))
+                found[name] = (file, read_recording(file, profile=given, kind=kind, test=test))
             except InputError as e:
                 faults += e.faults
     if faults:
         raise InputError(*faults)
+    if not found:
+        names = ", ".join(list(first)[:24])
+        raise InputError(
+            Fault(file="--select", message=f"nothing fits, got {' '.join(select or ())}; there are {names}")
+        )
     return found
+
+
+def _named(file: Path, kind: str) -> list[tuple[str, Path, str]]:
+    """Name, file and test of each recording in a file; most hold one, without a name of its own."""
+    tests = names_of_tests(file, kind)
+    return [(test, file, test) for test in tests] or [(name_of(file), file, "")]
 
 
 def read_profile(path: str | Path) -> Described:
@@ -176,5 +219,7 @@ def _importer(path: Path, given: Described | None, kind: str) -> Importer:
                 message="a folder, and neither a run, an ISO-MME test nor a ROS bag; its files one by one",
             )
         )
+    if given is not None:
+        return CSV
     message = f"no importer knows this file; {', '.join(table)} are known, --profile says what its columns are"
     raise InputError(Fault(file=str(path), message=message))

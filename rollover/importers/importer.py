@@ -20,6 +20,7 @@ MOST_VALUES = 500_000_000  # of one file, 4 GB of float64
 class Importer:
     """A file format: `sniff` tells from a path, quickly, whether it is one; `read` gives the recording.
 
+    Where a file may hold several tests, `tests` names them and `read_test` gives one by its name.
     A lab's own format is one of these under the entry point group `rollover.importers`.
     """
 
@@ -27,6 +28,8 @@ class Importer:
     meaning: str
     sniff: Callable[[Path], bool]
     read: Callable[[Path, Described | None], Recording]
+    tests: Callable[[Path], Sequence[str]] | None = None
+    read_test: Callable[[Path, Described | None, str], Recording] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

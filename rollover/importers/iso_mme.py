@@ -11,22 +11,24 @@ import re
 import shutil
 import tempfile
 import zipfile
+from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.channels import describe, is_known
+from rollover.channels import describe, factor, is_known
 from rollover.faults import Fault, InputError
 from rollover.importers import mme_codes as codes
 from rollover.importers.importer import Importer
 from rollover.importers.mme_archive import content, names_in
+from rollover.importers.mme_listing import promised
 from rollover.importers.polarity import sign
 from rollover.importers.sidecar import Described
-from rollover.importers.signals import Signal, assemble
+from rollover.importers.signals import Signal, assemble, left_out
 from rollover.recording import Recording
 
 NOVALUE = "NOVALUE"
@@ -37,13 +39,22 @@ _NUMBER = re.compile(r"\s*[-+]?(\d|\.\d|nan|inf|novalue)", re.IGNORECASE)
 
 @dataclass(frozen=True, kw_only=True)
 class _Channel:
+    """A channel file: its head, its values, and what is wrong with it, if anything."""
+
     file: str
     head: Mapping[str, str]
     values: NDArray[np.float64]
+    wrong: str = ""
 
     @property
     def code(self) -> str:
         return self.head.get("channel code", "").strip()
+
+    @property
+    def known(self) -> str:
+        """Channel that it is, by its name or its code; or nothing."""
+        name = _value(self.head, "name of the channel")
+        return name if is_known(name) else codes.channel_of(self.code) or ""
 
 
 def _sniff(path: Path) -> bool:
@@ -52,38 +63,92 @@ def _sniff(path: Path) -> bool:
     return path.suffix.lower() in (".mme", ".zip", ".tar", ".tgz", ".gz", ".bz2", ".xz") and path.is_file()
 
 
+def tests(path: Path) -> list[str]:
+    """Names of the tests in a folder or archive. Raises `InputError`."""
+    return list(_tests(path)) if path.suffix.lower() != ".mme" or path.is_dir() else [path.stem]
+
+
+def read_test(path: Path, profile: Described | None, name: str) -> Recording:
+    """One of several tests by its name. Raises `InputError`."""
+    return _recording(path, path / name, _tests(path)[name], profile)
+
+
 def _read(path: Path, profile: Described | None) -> Recording:
-    place = path.parent if path.suffix.lower() == ".mme" and path.is_file() else path
-    names = names_in(place)
-    tests = sorted((n for n in names if n.lower().endswith(".mme")), key=lambda n: (n.count("/"), n))
-    if not tests:
-        _refuse(path, "no ISO-MME test, got no .mme file inside")
-    chosen = path.name if place != path else tests[0]
+    if path.suffix.lower() == ".mme" and path.is_file():
+        return _recording(path.parent, path, path.name, profile)
+    return _recording(path, path, next(iter(_tests(path).values())), profile)
+
+
+def _tests(place: Path) -> dict[str, str]:
+    """Files that describe a test, by its name; tests of one name get that of their folder."""
+    found = sorted((n for n in names_in(place) if n.lower().endswith(".mme")), key=lambda n: (n.count("/"), n))
+    if not found:
+        _refuse(place, "no ISO-MME test, got no .mme file inside")
+    stems = [PurePosixPath(n).stem for n in found]
+    return {
+        stem if stems.count(stem) == 1 else str(PurePosixPath(n).with_suffix("")).replace("/", "-"): n
+        for n, stem in zip(found, stems, strict=True)
+    }
+
+
+def _recording(place: Path, path: Path, chosen: str, profile: Described | None) -> Recording:
+    """Recording of the test that the file `chosen` in `place` describes; `path` is its name in messages."""
     test = _header(place, chosen, content(place, chosen))[0]
-    above = PurePosixPath(chosen).parent
-    files = [n for n in names if _CHANNEL_FILE.match(n) and PurePosixPath(n).parent.parent == above]
-    files = [n for n in files if PurePosixPath(n).parent.name.lower() == "channel"]
-    if not files:
+    files = _beside(place, chosen)
+    names = sorted(n for n in files if _CHANNEL_FILE.match(n))
+    if not names:
         _refuse(path, f"no channels, got no Channel/*.001 beside {chosen}")
-    channels = [_channel(place, name) for name in sorted(files)]
-    signals: dict[str, Signal] = {}
-    for channel in channels:
-        key, signal = _signal(place, channel, channels)
-        signals[f"{key} ({channel.file})" if key in signals else key] = signal
+    channels = [_channel(place, name) for name in names]
+    signals = _signals(place, channels, profile)
     title = _value(test, "title") or _value(test, "type of the test") or PurePosixPath(chosen).stem
     laboratory = _value(test, "laboratory name")
     found = assemble(path, signals, profile)
-    more = {} if profile and profile.about.title else {"title": title}
-    if laboratory and not (profile and profile.about.source):
-        more["source"] = laboratory
+    title = found.title if profile and profile.about.title else title
+    source = found.source or laboratory
+    listing = next((n for n in sorted(files) if n.lower().endswith(".chn")), "")
+    head = _header(place, listing, content(place, listing))[0] if listing else {}
+    held = [(channel.file, channel.code) for channel in channels]
+    notes = (*found.notes, *promised(PurePosixPath(listing or chosen).name, {**test, **head}, held))
     flipped = {name: sign(name) * values for name, values in found.channels.items() if sign(name) < 0.0}
-    kept = {
-        field: getattr(found, field)
-        for field in ("time", "conditions", "uncertainty", "noise", "cfc", "clock", "sensors", "notes")
-    }
-    return Recording(
-        **{"title": found.title, "source": found.source, **more, **kept, "channels": {**found.channels, **flipped}}
-    )
+    return replace(found, title=title, source=source, channels={**found.channels, **flipped}, notes=notes)
+
+
+def _beside(place: Path, chosen: str) -> list[str]:
+    """Files of a test in the folder Channel beside it; of several tests that share it, those of its name."""
+    above = PurePosixPath(chosen).parent
+    names = names_in(place)
+    files = [n for n in names if PurePosixPath(n).parent.parent == above]
+    files = [n for n in files if PurePosixPath(n).parent.name.lower() == "channel"]
+    if sum(n.lower().endswith(".mme") and PurePosixPath(n).parent == above for n in names) > 1:
+        stem = PurePosixPath(chosen).stem.lower()
+        files = [n for n in files if PurePosixPath(n).stem.lower() == stem]
+    return files
+
+
+def _signals(place: Path, channels: list[_Channel], profile: Described | None) -> dict[str, Signal]:
+    """Channels by their codes, with their files where a code stands twice.
+
+    A channel that cannot be read is left out, unless it is one of ours, the profile names it, or no other is left.
+    """
+    count = Counter(channel.code for channel in channels)
+    signals: dict[str, Signal] = {}
+    wrong: list[str] = []
+    clocks = {_reference(channel) for channel in channels} - {""}
+    for channel in channels:
+        name = f"{channel.code} ({channel.file})" if count[channel.code] > 1 else channel.code or channel.file
+        try:
+            signal = _signal(place, channel, channels)
+        except InputError as e:
+            if channel.known if profile is None else name in profile.columns:
+                raise
+            wrong.append(e.faults[0].message)
+            signal = left_out(wrong[-1])
+        is_clock = {channel.code, channel.head.get("name of the channel", "")} & clocks and not signal.left_out
+        if not is_clock or (profile and name in profile.columns):
+            signals[name] = signal
+    if profile is None and wrong and not any(signal.channel for signal in signals.values()):
+        _refuse(place, wrong[0])
+    return signals
 
 
 def write(recording: Recording, path: Path, *, force: bool = False) -> None:
@@ -178,9 +243,19 @@ def _header(place: Path, name: str, data: bytes) -> tuple[dict[str, str], list[s
 
 def _channel(place: Path, name: str) -> _Channel:
     head, lines, first = _header(place, name, content(place, name))
-    code = head.get("channel code", "").strip()
-    if len(code) != 16 or not re.fullmatch(r"[A-Za-z0-9?]{16}", code):
-        _refuse(place, f"{name}: Channel code: got {code!r}; 16 letters and digits are needed")
+    wrong, values = "", np.empty(0)
+    try:
+        values = _numbers(place, name, head, lines, first)
+        code = head.get("channel code", "").strip()
+        if not re.fullmatch(r"[A-Za-z0-9?]{16}", code):
+            _refuse(place, f"{name}: Channel code: got {code!r}; 16 letters and digits are needed")
+    except InputError as e:
+        wrong = e.faults[0].message
+    return _Channel(file=PurePosixPath(name).name, head=head, values=values, wrong=wrong)
+
+
+def _numbers(place: Path, name: str, head: Mapping[str, str], lines: list[str], first: int) -> NDArray[np.float64]:
+    """Values of a channel file, gaps NaN, (n,). Raises `InputError`."""
     if lines and lines[0].strip().lower() == "start of data":
         lines, first = lines[1:], first + 1
     words = [line.strip() for line in lines]
@@ -196,33 +271,38 @@ def _channel(place: Path, name: str) -> _Channel:
         _refuse(place, f"{name}: Number of samples: says {claimed[:20]}, got {values.size}; a whole file is needed")
     if not values.size:
         _refuse(place, f"{name}: empty, got no samples")
-    return _Channel(file=PurePosixPath(name).name, head=head, values=values)
+    return values
 
 
-def _signal(place: Path, channel: _Channel, channels: list[_Channel]) -> tuple[str, Signal]:
-    """Name of a channel (its code, or ours that it carries) and its samples on their own clock."""
-    head = channel.head
-    name = _value(head, "name of the channel")
-    known = name if is_known(name) else codes.channel_of(channel.code) or ""
+def _signal(place: Path, channel: _Channel, channels: list[_Channel]) -> Signal:
+    """Samples of a channel on their own clock. Raises `InputError`."""
+    if channel.wrong:
+        _refuse(place, channel.wrong)
     dimension = codes.dimension_of(channel.code)
-    unit = _value(head, "unit") or codes.DEFAULT_UNITS.get(dimension, "")
-    if dimension == "TI" or known == "time":
-        return channel.code, Signal(values=channel.values, unit=unit)
+    unit = _value(channel.head, "unit") or codes.DEFAULT_UNITS.get(dimension, "")
+    if np.isnan(channel.values).all():
+        return left_out("no value in it")
+    if dimension == "TI" or channel.known == "time":
+        return Signal(values=channel.values, unit=unit)
     time = _time(place, channel, channels)
-    cfc = codes.cfc_of(channel.code)
-    return channel.code, Signal(values=channel.values, unit=unit, time=time, cfc=cfc, channel=known)
+    return Signal(values=channel.values, unit=unit, time=time, cfc=codes.cfc_of(channel.code), channel=channel.known)
 
 
 def _time(place: Path, channel: _Channel, channels: list[_Channel]) -> NDArray[np.float64]:
     head = channel.head
-    if head.get("reference channel", "implicit").lower() == "explicit":
-        wanted = head.get("reference channel name", "").strip()
+    if _is_explicit(channel):
+        wanted = _reference(channel)
         for other in channels:
             if wanted and wanted in (other.code, other.head.get("name of the channel", "")):
+                if other.wrong:
+                    _refuse(place, other.wrong)
                 if other.values.size != channel.values.size:
                     what = f"got {channel.values.size} values for {other.values.size} time stamps in {other.file}"
                     _refuse(place, f"{channel.file}: {what}; one each")
-                return other.values
+                try:
+                    return other.values * factor(_value(other.head, "unit") or "s", "time")
+                except ValueError as e:
+                    _refuse(place, f"{other.file}: Unit: {e}")
         _refuse(place, f"{channel.file}: Reference channel name: no such channel, got {wanted!r}; the code of another")
     try:
         step, start = float(head["sampling interval"]), float(_value(head, "time of first sample") or 0.0)
@@ -232,6 +312,15 @@ def _time(place: Path, channel: _Channel, channels: list[_Channel]) -> NDArray[n
     if not (np.isfinite(start) and 0.0 < step < 1e6):
         _refuse(place, f"{channel.file}: Sampling interval: got {step!r}; a time greater than 0 s")
     return np.asarray(start + step * np.arange(channel.values.size))
+
+
+def _is_explicit(channel: _Channel) -> bool:
+    return channel.head.get("reference channel", "implicit").lower() == "explicit"
+
+
+def _reference(channel: _Channel) -> str:
+    """Code or name of the channel that holds the time of this one, or nothing."""
+    return _value(channel.head, "reference channel name") if _is_explicit(channel) else ""
 
 
 def _value(head: Mapping[str, str], key: str) -> str:
@@ -251,4 +340,11 @@ def _refuse(path: Path, message: str) -> NoReturn:
     raise InputError(Fault(file=str(path), message=message))
 
 
-ISO_MME = Importer(name="iso-mme", meaning="ISO-MME, ISO/TS 13499: folder, zip or tar", sniff=_sniff, read=_read)
+ISO_MME = Importer(
+    name="iso-mme",
+    meaning="ISO-MME, ISO/TS 13499: folder, zip or tar",
+    sniff=_sniff,
+    read=_read,
+    tests=tests,
+    read_test=read_test,
+)

@@ -21,7 +21,7 @@ def names_in(place: Path) -> list[str]:
     if place.is_dir():
         here = [p for p in place.iterdir() if p.is_file()]
         here += [p for sub in place.iterdir() if sub.is_dir() and sub.name.lower() == "channel" for p in sub.iterdir()]
-        return [p.relative_to(place).as_posix() for p in here]
+        return [p.relative_to(place).as_posix() for p in here if not _of_a_file_manager(p.name)]
     try:
         if zipfile.is_zipfile(place):
             with zipfile.ZipFile(place) as archive:
@@ -40,7 +40,8 @@ def names_in(place: Path) -> list[str]:
             _refuse(place, f"{name[:80]}: unpacks to {size} bytes from {packed}; at most {MOST_BYTES} are allowed")
     if total > SMALL and total > MOST_RATIO * place.stat().st_size:
         _refuse(place, f"unpacks to {total} bytes from {place.stat().st_size}; that is no test")
-    return [name.replace("\\", "/") for name, _, _ in sizes]
+    names = [name.replace("\\", "/") for name, _, _ in sizes]
+    return [name for name in names if not _of_a_file_manager(name)]
 
 
 def content(place: Path, name: str) -> bytes:
@@ -71,6 +72,11 @@ def content(place: Path, name: str) -> bytes:
     if len(data) > MOST_BYTES:
         _refuse(place, f"{name}: unpacks to more than {MOST_BYTES} bytes")
     return data
+
+
+def _of_a_file_manager(name: str) -> bool:
+    """What macOS puts beside each file of an archive, under the same ending."""
+    return name.startswith("__MACOSX/") or "/__MACOSX/" in name or name.rpartition("/")[2].startswith("._")
 
 
 def _inside(names: list[str], name: str) -> str:

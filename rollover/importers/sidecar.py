@@ -16,8 +16,10 @@ from rollover.document import Node
 from rollover.faults import Fault, InputError
 from rollover.importers.conditions import ByFile, ConditionsFrom, read_by_file
 from rollover.recording import Clock, Doubt, Sensor
+from rollover.recording.text_rows import WHITESPACE
 
 MOST_BYTES = 1 << 18  # of a sidecar: what is longer is no sidecar, and would take long to be refused
+DATE_TIME = "date-time"  # as a unit: the cells of a column of time are dates, times of day or both
 T = TypeVar("T")
 _DEEP = re.compile(rb"(?:[\[{]\s*){60}")  # the parser needs seconds to give up on brackets in brackets
 
@@ -33,14 +35,29 @@ class Column:
     sensor: Annotated[Sensor | None, "where it was measured"] = None
     scale: Annotated[float, Quantity("1", "factor on the file's numbers")] = 1.0
     offset: Annotated[float, Quantity("", "added after the factor, in the unit")] = 0.0
+    rest: Annotated[tuple[str, ...], "of a time: columns with the rest of the stamp, a time of day or a fraction"] = ()
+    rest_unit: Annotated[Literal["s", "ms", "us", "ns"] | None, "of the last of them, if it is a fraction"] = None
+
+    @property
+    def is_stamp(self) -> bool:
+        """Whether this is a time that has to be put together: a date-time, or whole seconds and a fraction."""
+        return self.unit == DATE_TIME or bool(self.rest)
 
     def validate(self) -> None:
         """Refuse what is no channel, a unit of another dimension, and an instrument without a place."""
+        if self.is_stamp and self.channel != "time":
+            raise ValueError(f"{'rest' if self.rest else 'unit'}: of channel time alone, got channel {self.channel}")
+        if self.rest_unit and not self.rest:
+            raise ValueError("rest_unit: without rest; the column of the fraction is needed, rest: [NAME]")
+        if self.rest and self.unit not in (DATE_TIME, "s"):
+            raise ValueError(f"unit: not of a stamp in several columns, got {self.unit!r}; {DATE_TIME} or s")
+        if self.rest and self.unit == "s" and (len(self.rest) > 1 or self.rest_unit is None):
+            raise ValueError("rest_unit: missing; whole seconds and one column with the fraction in s, ms, us or ns")
         try:
             describe(self.channel)
         except ValueError as e:
             raise ValueError(f"channel: {e}") from None
-        if self.unit is not None:
+        if self.unit not in (None, DATE_TIME):
             try:
                 factor(self.unit, self.channel)
             except ValueError as e:
@@ -55,10 +72,14 @@ class Column:
 class Csv:
     """How a CSV file is written."""
 
-    delimiter: Annotated[str, "one character"] = ","
+    delimiter: Annotated[str, "one character, or whitespace: any number of blanks and tabs"] = ","
     decimal: Literal[".", ","] = "."
     encoding: Annotated[str, "such as utf-8, cp1252, iso-8859-1, utf-16"] = "utf-8"
-    names_row: Annotated[int, "which row holds the names; blank lines and comments do not count"] = 1
+    names_row: Annotated[
+        int | None,
+        "which row holds the names, blank lines and comments do not count; 0: none does, columns are 1, 2, ...; "
+        "left out: the first, or none if that holds nothing but numbers",
+    ] = None
     units_row: Annotated[int | None, "which row holds the units, below the names"] = None
     data_row: Annotated[int | None, "which row is the first of numbers; else the one after names and units"] = None
     comment: Annotated[str, "what a comment line begins with"] = "#"
@@ -67,15 +88,20 @@ class Csv:
         """Refuse rows out of order, a delimiter of several characters and an encoding that Python does not know."""
         import codecs
 
-        if len(self.delimiter) != 1 or self.delimiter == self.decimal or not self.delimiter.isascii():
-            raise ValueError(f"delimiter: got {self.delimiter!r}; one character, and not the decimal mark")
+        one = len(self.delimiter) == 1 and self.delimiter.isascii() and self.delimiter != self.decimal
+        if not one and self.delimiter != WHITESPACE:
+            message = f"got {self.delimiter!r}; one character, not the decimal mark, or {WHITESPACE}"
+            raise ValueError(f"delimiter: {message}")
         try:
             codecs.lookup(self.encoding)
         except LookupError:
             raise ValueError(f"encoding: unknown, got {self.encoding!r}; such as utf-8, cp1252, utf-16") from None
-        if self.names_row < 1 or (self.units_row is not None and self.units_row <= self.names_row):
-            raise ValueError(f"units_row: not below the names, got {self.units_row}; after row {self.names_row}")
-        if self.data_row is not None and self.data_row <= (self.units_row or self.names_row):
+        names = 1 if self.names_row is None else self.names_row
+        if names < 0:
+            raise ValueError(f"names_row: got {names}; 1 or more, or 0 where no row holds names")
+        if self.units_row is not None and self.units_row <= names:
+            raise ValueError(f"units_row: not below the names, got {self.units_row}; after row {names}")
+        if self.data_row is not None and self.data_row <= (self.units_row or names):
             raise ValueError(f"data_row: not below names and units, got {self.data_row}; a later row")
 
 
@@ -145,7 +171,7 @@ class Described:
     columns: Mapping[str, Column]
     lines: Mapping[str, int | None]
     by_file: ByFile | None = None
-    states_clock: bool = False  # whether it says itself what t = 0 is
+    stated: frozenset[str] = frozenset()  # which of its keys the file itself gives
 
     def of(self, path: Path) -> Described:
         """This with the conditions of one file. Raises `InputError` where it has none of its own but should."""
@@ -193,6 +219,9 @@ def read_described(path: Path, kind: type[Sidecar] | type[Profile]) -> Described
             what = f"second column of {column.channel}, first {first[column.channel]!r}; one column a channel"
             faults += node.key.fault(f"channels.{name}", what).faults
         first.setdefault(column.channel, name)
+        if kind is Sidecar and column.is_stamp:
+            what = "date-times and stamps in several columns are read with a profile, not a sidecar; seconds here"
+            faults += node.key.fault(f"channels.{name}", f"unit: {what}").faults
         if kind is Sidecar and column.unit is None:
             faults += node.key.fault(f"channels.{name}", "unit: missing; the column's unit is needed").faults
     if faults:
@@ -210,7 +239,7 @@ def read_described(path: Path, kind: type[Sidecar] | type[Profile]) -> Described
         columns=columns,
         lines=lines,
         by_file=by_file,
-        states_clock="clock" in root.value,
+        stated=frozenset(root.value),
     )
 
 

@@ -18,6 +18,7 @@ from rollover.importers.sidecar import Column, Described, Profile, Sidecar, doub
 from rollover.recording import Clock, Recording
 
 Array = NDArray[np.float64]
+RATE_INSTEAD = "; a clock too coarse for its samples: `rate` in Hz in a profile, and no column of time"
 SAME_INSTANT = 1e-9  # s: stamps of different clocks that lie closer are one row
 Line = Callable[[int], int | None]  # row of a channel -> line of the file, for messages
 
@@ -74,15 +75,19 @@ def assemble(
     One column is one channel: columns that mean the same are joined where their times are disjoint, else refused. What
     is not read is named in the notes.
     """
+    if given is None:
+        signals = {name: _with_readable_unit(name, signal) for name, signal in signals.items()}
     by = _of_all_groups(given, signals) if given else described(signals, path)
     about = by.about
-    for name in by.columns:
+    for name, column in by.columns.items():
         if name not in signals:
-            raise by.refuse(name, f"no such column in {path.name}; {_instead(name, signals)}")
+            raise by.refuse(name, f"no such column in {path.name}, got {name!r}; {_instead(name, signals)}")
         if signals[name].left_out:
             raise by.refuse(name, f"not a column of numbers over time: {signals[name].left_out}; another column")
         if signals[name].unreadable:
             raise by.refuse(name, f"{signals[name].unreadable}; another column")
+        if column.is_stamp:
+            raise by.refuse(name, "date-times and stamps in two columns are read from text files by a profile; seconds")
     clocks = _clocks(path, signals, by, line)
     stretches: dict[str, list[_Stretch]] = {}
     for name, column in by.columns.items():
@@ -118,7 +123,7 @@ def assemble(
         source=about.source,
         conditions=dict(about.conditions),
         uncertainty=doubts_of(about.uncertainty),
-        clock=about.clock if not origin or by.states_clock else Clock(zero="unknown"),
+        clock=about.clock if not origin or "clock" in by.stated else Clock(zero="unknown"),
         notes=(*about.notes, *origin, *notes, *_of_columns(signals, by), *_not_read(signals, by)),
         noise={
             c: col.noise * factor(_unit(n, signals[n], by), c) for c, (n, col) in known.items() if col.noise is not None
@@ -232,6 +237,17 @@ def _joined(path: Path, channel: str, parts: list[_Stretch]) -> list[str]:
     return [f"{channel}: joined from {each}"]
 
 
+def _with_readable_unit(name: str, signal: Signal) -> Signal:
+    """The column itself, or left out where it is a channel in a unit that is none: the others can still be read."""
+    channel = signal.channel or name
+    if not signal.left_out and channel != "time" and is_known(channel):
+        try:
+            factor(signal.unit, channel)
+        except ValueError:
+            return replace(signal, left_out=f"unit {signal.unit!r} does not fit {channel}")
+    return signal
+
+
 def _ambiguous(path: Path, channel: str, first: str, second: str) -> InputError:
     cure = f"channels: {{{first!r}: {{channel: {channel}, ...}}}}"
     message = f"two columns mean {channel}, got {first!r} and {second!r}; a profile chooses one: {cure}"
@@ -274,7 +290,7 @@ def _instead(name: str, signals: Mapping[str, Signal]) -> str:
     if parts:
         return f"it is {_listed(parts)}"
     close = nearest(name, signals)
-    there = f"it holds {_listed(_held(signals))}"
+    there = f"the file holds: {_listed(_held(signals))}"
     return f"did you mean {close[0]!r}? {there}" if close else there
 
 
@@ -298,9 +314,11 @@ def check_time(path: Path, time: Array, line: Line = lambda row: None, other: st
     if wrong.size:
         row = int(wrong[0]) + 1
         what = "repeated stamp" if time[row] == time[row - 1] else "runs backwards"
-        cure = f"; it must increase, or a profile takes other stamps: {{{other!r}: {{channel: time}}}}" if other else ""
-        said = f"time: {what}, got {float(time[row])!r} after {float(time[row - 1])!r}{cure or '; it must increase'}"
-        raise _at(path, line, row, said)
+        cure = RATE_INSTEAD if time[row] == time[row - 1] else ""
+        if other:
+            cure = f", or a profile takes other stamps: {{{other!r}: {{channel: time}}}}"
+        got = f"got {float(time[row])!r} after {float(time[row - 1])!r}"
+        raise _at(path, line, row, f"time: {what}, {got}; it must increase{cure}")
 
 
 def check_values(path: Path, name: str, values: Array, line: Line = lambda row: None) -> None:

@@ -241,7 +241,8 @@ CASES: dict[str, tuple[Callable[[Path], str], str]] = {
     "HDF5 says 16 GB": (hdf5, "a.h5: claims too much"),
     "HDF5 junk": (raw("a.h5", b"\x89HDF\r\n\x1a\n" + b"\xff" * 100), "a.h5: not a readable HDF5 file"),
     "MCAP junk": (raw("a.mcap", b"\x89MCAP0\r\n" + b"\xff" * 100), "a.mcap: not a readable MCAP"),
-    "unknown ending": (raw("a.xyz", b"hello"), "a.xyz: no importer knows this file"),
+    "unknown ending": (raw("a.xyz", b"hello"), "channels.F: no such column in a.xyz, got 'F'; the file holds: hello"),
+    "unknown ending, no text": (raw("a.xyz", b"F\n1\n\0\n"), "a.xyz:3: not a text file, got a NUL byte"),
     "missing": (lambda folder: "b.csv", "b.csv: no such file"),
 }
 
