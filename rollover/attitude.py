@@ -180,12 +180,12 @@ def _too_fast(recording: Recording, found: Mapping[str, Array]) -> Iterator[str]
 
 def _signs(q: Array, first: bool = False) -> Array:
     """Signs (n,) by which quaternions (n, 4) do not jump along n; with `first` those of the beginning are positive."""
-    sign = np.ones(q.shape[0])
+    sign: Array = np.ones(q.shape[0])
     rows = np.flatnonzero(np.isfinite(q).sum(axis=1) >= 3)
     rows = rows[np.nansum(q[rows] ** 2, axis=1) > 0.0]
     along = np.nansum(q[rows[1:]] * q[rows[:-1]], axis=1)
     sign[rows[1:]] = np.where(along < 0.0, -1.0, 1.0)
-    sign = np.cumprod(sign)
+    sign = np.asarray(np.cumprod(sign))
     if first and rows.size:
         w = np.median(sign[rows[:BEGINNING]] * np.nan_to_num(q[rows[:BEGINNING], 0]))
         sign = sign if w >= 0.0 else -sign

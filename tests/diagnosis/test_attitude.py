@@ -69,6 +69,20 @@ def test_the_evidence_is_the_same(name: str, otherwise: Callable[[Recording], Re
     assert float(np.sqrt(np.mean(misfit**2))) < 1.2
 
 
+def test_near_the_lock_a_later_run_is_no_other_attitude() -> None:
+    """A cube thrown on its nose: roll and yaw swing by radians within a millisecond, it turns by 6 mrad."""
+    start = {"initiation.quaternion": [0.75**0.5, 0.0, 0.5, 0.0], "initiation.angular_velocity": [0.05, 6.0, 0.1]}
+    own = shipped("cube_toss").replaced({**start, "simulation.duration": 0.4})
+    made = simulate.run(own).recording
+    assert max(np.abs(np.interp(made.time - 1e-3, made.time, made[a]) - made[a]).max() for a in ANGLES) > 1.0
+    _, _, simulator, _ = compared(own, synthetic(made, channels=ANGLES, rate=500.0, share=1e-4, seed=4))
+    now, later = simulator.predict({}, 0.0), simulator.predict({}, 1e-3)
+    assert now is not None
+    assert later is not None
+    # (A2) makes of a turn at most 1/0.366 times as much, and rates rise at a blow
+    assert max(float(np.nanmax(np.abs(later[a] - now[a]))) for a in ANGLES) < 3.0 * 6e-3 / 0.366
+
+
 def test_an_opposite_sign_of_a_wrapped_roll_is_found() -> None:
     made = recorded("multiple_roll")
     roll = replace(made, channels={ROLL: made[ROLL]}, noise={})
