@@ -121,7 +121,7 @@ def has_attitude(recording: Recording) -> bool:
 
 
 def is_locked(name: str, recording: Recording, reference: Recording) -> bool:
-    """Whether a channel is a roll or yaw that tells no time: near the lock it is set by the reference at its time."""
+    """Whether a channel is a roll or yaw that tells no time: about the lock it stands by the reference's, unshifted."""
     if name not in ANGLES or name == ANGLES[1] or any(n not in recording.channels for n in ANGLES):
         return False
     return bool(np.any(_nearness(np.interp(recording.time, reference.time, reference[ANGLES[1]])) > 0.0))
@@ -149,7 +149,7 @@ def _upright(pitch: Array) -> Array:
     """A pitch alone (n,) as of a vehicle that begins upright; within a right angle if it jumps about beyond that."""
     known = pitch[np.isfinite(pitch)]
     if known.size and np.max(np.abs(np.diff(known)), initial=0.0) > HALF:
-        return np.arcsin(np.sin(pitch))
+        return np.asarray(np.arcsin(np.sin(pitch)))
     begun = float(np.median(known[:BEGINNING])) if known.size else 0.0
     if math.cos(begun) < 0.0:
         pitch, begun = math.pi - pitch, math.pi - begun
@@ -180,12 +180,12 @@ def _too_fast(recording: Recording, found: Mapping[str, Array]) -> Iterator[str]
 
 def _signs(q: Array, first: bool = False) -> Array:
     """Signs (n,) by which quaternions (n, 4) do not jump along n; with `first` those of the beginning are positive."""
-    sign = np.ones(q.shape[0])
+    sign: Array = np.ones(q.shape[0])
     rows = np.flatnonzero(np.isfinite(q).sum(axis=1) >= 3)
     rows = rows[np.nansum(q[rows] ** 2, axis=1) > 0.0]
     along = np.nansum(q[rows[1:]] * q[rows[:-1]], axis=1)
     sign[rows[1:]] = np.where(along < 0.0, -1.0, 1.0)
-    sign = np.cumprod(sign)
+    sign = np.asarray(np.cumprod(sign))
     if first and rows.size:
         w = np.median(sign[rows[:BEGINNING]] * np.nan_to_num(q[rows[:BEGINNING], 0]))
         sign = sign if w >= 0.0 else -sign
@@ -217,14 +217,15 @@ def _angles_beside(recording: Recording, reference: Recording) -> Array:
     """Roll, pitch, yaw (n, 3) on the branch of the reference, NaN for those that are not recorded."""
     rpy, own = _columns(recording, ANGLES), _at(recording.time, reference, ANGLES)
     known = np.isfinite(rpy)
+    there = np.asarray(known.any(axis=1))
     count = [name in recording.channels for name in ANGLES]
     n, is_alone = recording.time.size, sum(count) == 1
     share = np.zeros(n) if is_alone else _nearness(own[:, 1])
     # alone, a roll or yaw may be of the other branch only where the reference has its pitch beyond a right angle
     over = (np.cos(own[:, 1]) < 0.0) & (not count[1]) if is_alone else np.ones(n, dtype=bool)
-    changed = _stretches(recording.time, own[:, count], np.column_stack([share > 0.0, over]), known.any(axis=1))
+    changed = _stretches(recording.time, own[:, count], np.column_stack([share > 0.0, over]), there)
     here, other = (np.nansum(wrapped(b - own) ** 2, axis=1) for b in (rpy, other_branch(rpy)))
-    crossed = over & np.where(share > 0.0, other < here - SAME, _by_stretch(changed, here, other, known.any(axis=1)))
+    crossed = over & np.where(share > 0.0, other < here - SAME, _by_stretch(changed, here, other, there))
     rpy = np.where(crossed[:, None], other_branch(rpy), rpy)
     locked, same = (share > 0.0) & known.all(axis=1), np.all(rpy == own, axis=1)
     if locked.any():

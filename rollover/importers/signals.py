@@ -240,7 +240,7 @@ def _joined(path: Path, channel: str, parts: list[_Stretch]) -> list[str]:
 def _with_readable_unit(name: str, signal: Signal) -> Signal:
     """The column itself, or left out where it is a channel in a unit that is none: the others can still be read."""
     channel = signal.channel or name
-    if not signal.left_out and channel != "time" and is_known(channel):
+    if not signal.left_out and not signal.unreadable and channel != "time" and is_known(channel):
         try:
             factor(signal.unit, channel)
         except ValueError:

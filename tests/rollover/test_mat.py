@@ -38,7 +38,7 @@ def test_a_column_of_a_matrix_is_named_from_zero(tmp_path: Path) -> None:
     assert peak(found, SINKAGE) == pytest.approx(0.3272, abs=1e-4)
     with pytest.raises(
         InputError,
-        match=r"profile.yaml:3: channels.data: no such column in two.mat; it is data\[0\], data\[1\], data\[2\]",
+        match=r"yaml:3: channels.data: no such column in two.mat, got 'data'; it is data\[0\], data\[1\], data\[2\]",
     ):
         read_recording(CASES / "two.mat", profile=CASES / "two.profile.yaml")
 

@@ -152,7 +152,7 @@ def test_two_groups_at_the_same_time_are_refused_by_both_names(tmp_path: Path) -
     with pytest.raises(InputError, match=r"got 'F \(group 0\)' and 'F \(group 1\)'; a profile chooses one"):
         named(path, {"F": FORCE})
     assert named(path, {"F (group 1)": FORCE, "z": SINKAGE})[FORCE] == pytest.approx(2 * RAW)
-    with pytest.raises(InputError, match=r"no such column in a.mf4; .*the file holds: F \(group 0\), z, F \(group 1\)"):
+    with pytest.raises(InputError, match=r"no such column in a.mf4, .*the file holds: F \(group 0\), z, F \(group 1\)"):
         named(path, {"force": FORCE})
 
 

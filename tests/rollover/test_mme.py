@@ -95,7 +95,7 @@ def test_one_code_twice_is_told_apart_by_the_files(tmp_path: Path) -> None:
     path = made(tmp_path, channel(UP, [1, 2, 3]), channel(UP, [4, 5, 6]))
     with pytest.raises(InputError, match=rf"got '{UP} \(T1.001\)' and '{UP} \(T1.002\)'"):
         read(path)
-    with pytest.raises(InputError, match=rf"channels.{UP}: no such column in T1, .*the file holds: {UP} \(T1.001\), "):
+    with pytest.raises(InputError, match=rf"channels.{UP}: no such column in T1, .*it is {UP} \(T1.001\), "):
         read(path, f"  {UP}: {{channel: {Z}}}\n")
     assert read(path, f'  "{UP} (T1.002)": {{channel: {Z}}}\n')[Z].tolist() == [-4.0, -5.0, -6.0]
 
