@@ -65,7 +65,7 @@ def lost(t: Trace, unit: str) -> Iterator[Finding]:
         return
     beyond = -float(ndtri(0.5 * CHANCE / t.values.size / len(SIDES)))
     places: dict[int, tuple[float, float]] = {}
-    for side in SIDES:
+    for side in reversed(SIDES):  # the longest first, which tells best how many
         if t.values.size < 4 * side:
             continue
         leap, way, bend, error = _across(t, side)
@@ -77,7 +77,7 @@ def lost(t: Trace, unit: str) -> Iterator[Finding]:
         for k in np.flatnonzero(sure):
             near = np.abs(leap[max(0, k - side) : k + side + 1])
             if abs(leap[k]) >= near.max():
-                places.setdefault(int(k), (float(whole[k]), float(abs(leap[k]))))
+                places.setdefault(int(k), (float(whole[k]), float(abs(leap[k])) / error))
     kept: list[int] = []
     for k in sorted(places, key=lambda k: -places[k][1]):
         if all(abs(k - other) > SIDES[-1] for other in kept):
