@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rollover.commands.door import AsJson, Force, answering, app, manual
+from rollover.commands.profiles import profile_of
 from rollover.faults import Fault, InputError, hint
 
 if TYPE_CHECKING:
@@ -91,7 +92,7 @@ def _recordings(
         raise InputError(
             Fault(file="--select", message=f"one recording, got {select}; only of a set can some be taken")
         )
-    return dict(read_named([source], profile, kind))
+    return dict(read_named([source], profile_of(profile), kind))
 
 
 def _write(folder: Path, made: Mapping[str, Recording], force: bool) -> None:

@@ -114,13 +114,13 @@ def name_of(path: Path) -> str:
 
 
 def read_named(
-    paths: Sequence[str | Path], profile: str | Path | None = None, kind: str = ""
+    paths: Sequence[str | Path], profile: str | Path | Described | None = None, kind: str = ""
 ) -> dict[str, tuple[Path, Recording]]:
     """Path and recording by name, of files and of all in folders; all are read with the profile, if one is given.
 
     Raises `InputError` for all faults at once, and for two recordings of one name.
     """
-    given = None if profile is None else read_profile(profile)
+    given = profile if isinstance(profile, Described) or profile is None else read_profile(profile)
     found: dict[str, tuple[Path, Recording]] = {}
     first: dict[str, Path] = {}
     faults: list[Fault] = []

@@ -75,10 +75,10 @@ def lost(t: Trace, unit: str) -> Iterator[Finding]:
         doubt = np.hypot(error, whole * slope) / np.maximum(np.abs(way), 1e-300)
         sure = np.abs(leap) > beyond * error + bend
         sure &= (whole >= 1.0) & (np.abs(number - whole) < WHOLE + 3.0 * doubt) & (error * SAMPLES < np.abs(way))
-        for k in np.flatnonzero(sure):
+        for k in map(int, np.flatnonzero(sure)):
             near = np.abs(leap[max(0, k - side) : k + side + 1])
             if abs(leap[k]) >= near.max():
-                places.setdefault(int(k), (float(whole[k]), float(abs(leap[k])) / error, float(doubt[k])))
+                places.setdefault(k, (float(whole[k]), float(abs(leap[k])) / error, float(doubt[k])))
     kept: list[int] = []
     for k in sorted(places, key=lambda k: -places[k][1]):
         if all(abs(k - other) > SIDES[-1] for other in kept):
