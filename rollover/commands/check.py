@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rollover.commands.door import AsJson, answering, app, manual
+from rollover.commands.profiles import profile_of
 from rollover.faults import Fault, InputError
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def check(
     rows: list[dict[str, Any]] = []
     read: dict[str, Recording] = {}
     faults: list[Fault] = []
-    given = _given(profile)
+    given = profile_of(profile)
     for name in (one for text in files for one in _each(text, given)):
         found: list[Fault] = []
         row: dict[str, Any] = {"file": name, "is": ""}
@@ -51,12 +52,6 @@ def check(
         print(json.dumps({"ok": not faults, "files": rows}, indent=2))
     if faults:
         raise InputError(*faults)
-
-
-def _given(profile: Path | None) -> Described | None:
-    from rollover.importers import read_profile
-
-    return None if profile is None else read_profile(profile)
 
 
 def _each(name: str, profile: Described | None) -> list[str]:

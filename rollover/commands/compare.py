@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rollover.commands.door import BROKE, COMPILING, FAILED, AsJson, Force, Setting, answering, app, manual, settings
+from rollover.commands.profiles import profile_of
 from rollover.faults import Fault, InputError, absent
 
 if TYPE_CHECKING:
@@ -168,7 +169,7 @@ def read(paths: list[str], profile: Path | None) -> dict[str, Recording]:
     """Recordings by name, those in folders too. Raises `InputError` for all faults at once, and for one name twice."""
     from rollover.importers import read_named
 
-    return {name: recording for name, (_, recording) in read_named(paths, profile).items()}
+    return {name: recording for name, (_, recording) in read_named(paths, profile_of(profile)).items()}
 
 
 def _say_compiling() -> None:

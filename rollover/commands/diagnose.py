@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rollover.commands.door import AsJson, Force, Setting, answering, app, manual, settings
+from rollover.commands.profiles import profile_of
 from rollover.faults import Fault, InputError
 
 if TYPE_CHECKING:
@@ -135,7 +136,7 @@ def read(paths: Sequence[str], profile: Path | None = None) -> dict[str, Recordi
     """Recordings by name, those in folders too. Raises `InputError` for all faults at once."""
     from rollover.importers import read_named
 
-    return {name: recording for name, (_, recording) in read_named(paths, profile).items()}
+    return {name: recording for name, (_, recording) in read_named(paths, profile_of(profile)).items()}
 
 
 def _check(scenario: Scenario, measured: Mapping[str, Recording]) -> None:

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from rollover.commands.door import AsJson, Force, Setting, answering, app, manual, settings
+from rollover.commands.profiles import profile_of
 from rollover.faults import Fault, InputError
 
 SOIL, ANSWER = "soil.yaml", "identify.json"
@@ -67,7 +68,9 @@ def identify_(
     chosen = scenarios.load(document.find(scenario))
     if set_:
         chosen = chosen.replaced(settings(set_), origin="--set")
-    found = {name: (recording, _digest(at)) for name, (at, recording) in read_named(recordings, profile).items()}
+    found = {
+        name: (recording, _digest(at)) for name, (at, recording) in read_named(recordings, profile_of(profile)).items()
+    }
     folder = out or Path("out", "identify", name_of(Path(recordings[0])))
     _claim(folder, force)
     is_cone = isinstance(chosen.vehicle, Striker) and chosen.vehicle.nose == "cone"

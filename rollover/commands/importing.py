@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rollover.commands.door import AsJson, Force, answering, app, manual
+from rollover.commands.profiles import profile_of
 from rollover.faults import Fault, InputError, hint
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ def _recordings(
     known = [*importers(), *COLLECTIONS]
     if kind and kind not in known:
         raise InputError(Fault(file="--as", message=f"no such format, got {kind!r}; {hint(kind, known)}"))
-    return read_named([source], profile, kind, select)
+    return read_named([source], profile_of(profile), kind, select)
 
 
 def _write(folder: Path, made: Mapping[str, Recording], force: bool) -> None:

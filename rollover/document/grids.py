@@ -27,7 +27,7 @@ def read(file: Path, node: Node, path: str) -> Node:
         if grid.ndim != 2 or grid.size > MOST_NODES:
             what = f"{name} is no grid of numbers, got shape {grid.shape}"
             raise node.place.fault(path, f"{what}; two dimensions and at most {MOST_NODES} numbers are allowed")
-        rows = [(None, row) for row in grid.tolist()]
+        rows: list[tuple[int | None, list[float]]] = [(None, row) for row in grid.tolist()]
     else:
         rows = list(_rows(file, node, path))
     for i, (line, row) in enumerate(rows, 1):

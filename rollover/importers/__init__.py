@@ -145,7 +145,7 @@ def name_of(path: Path) -> str:
 
 def read_named(
     paths: Sequence[str | Path],
-    profile: str | Path | None = None,
+    profile: str | Path | Described | None = None,
     kind: str = "",
     select: Sequence[str] | None = None,
 ) -> dict[str, tuple[Path, Recording]]:
@@ -154,7 +154,7 @@ def read_named(
     All are read with the profile, if one is given; `select` has patterns of names. Raises `InputError` for all faults
     at once, and for two recordings of one name.
     """
-    given = None if profile is None else read_profile(profile)
+    given = profile if isinstance(profile, Described) or profile is None else read_profile(profile)
     found: dict[str, tuple[Path, Recording]] = {}
     first: dict[str, Path] = {}
     faults: list[Fault] = []

@@ -6,7 +6,7 @@ import csv
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, cast
@@ -48,14 +48,14 @@ class ConditionsFrom:
 
 @dataclass(frozen=True, kw_only=True)
 class ByFile:
-    """`ConditionsFrom` of a profile, read and checked; `line` is that of the profile."""
+    """`ConditionsFrom` of a profile, read and checked; `places` says by scenario path where it stands, for messages."""
 
     file: str
-    line: int | None
     decimal: str
     pattern: str = ""
     table: str = ""
-    rows: Mapping[str, Mapping[str, Any]]
+    rows: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    places: Mapping[str, Fault]
 
     def of(self, path: Path) -> dict[str, Any]:
         """Conditions of one recording. Raises `InputError` where its name does not fit, or no row is its own."""
@@ -83,19 +83,20 @@ def read_by_file(given: ConditionsFrom, root: document.Node, profile: Path, deci
     below = cast("Mapping[str, document.Node]", node.value)
     stated = root.plain.get("conditions") or {}
     if given.name is not None:
-        for part in parts_of(given.name):
-            if part[0] == "{":
-                _check_path(part[1:], stated, lambda what: below["name"].place.fault("conditions_from.name", what))
         place = below["name"].place
-        return ByFile(file=place.file, line=place.line, decimal=decimal, pattern=given.name, rows={})
+        at = Fault(file=place.file, line=place.line, path="conditions_from.name", message="")
+        places = {part[1:]: at for part in parts_of(given.name) if part[0] == "{"}
+        for path in places:
+            _check_not_stated(path, stated, at)
+        return ByFile(file=place.file, decimal=decimal, pattern=given.name, places=places)
     assert given.table is not None
     place = below["table"].place
     table = profile.parent / given.table
     if not table.is_file():
         message = f"no such file, got {given.table!r}; a CSV file beside this one is needed"
         raise place.fault("conditions_from.table", message)
-    rows = _table(table, stated)
-    return ByFile(file=place.file, line=place.line, decimal=decimal, table=str(table), rows=rows)
+    rows, places = _table(table, stated)
+    return ByFile(file=place.file, decimal=decimal, table=str(table), rows=rows, places=places)
 
 
 def parts_of(pattern: str) -> list[str]:
@@ -169,24 +170,14 @@ def value_of(text: str, decimal: str = ".") -> Any:
     return text
 
 
-def _check_path(path: str, stated: Mapping[str, Any], fault: Any) -> None:
-    """Refuse what no scenario has, and what the profile states for all files."""
-    from rollover.scenario import Scenario
-
-    slot = document.slot_of(Scenario)
-    steps = path.split(".")
-    for depth, step in enumerate(steps):
-        inner = slot.element(0) if slot.is_list else slot.child(step)
-        if inner is None:
-            where = ".".join(steps[:depth]) or "a scenario"
-            raise fault(f"no such path, got {path!r}; below {where}: {hint(step, slot.keys())}")
-        slot = inner
+def _check_not_stated(path: str, stated: Mapping[str, Any], place: Fault) -> None:
+    """Refuse what the profile states for all files."""
     if path in stated:
-        raise fault(f"{path} is stated in conditions as well; one of them")
+        raise InputError(replace(place, message=f"{path} is stated in conditions as well; one of them"))
 
 
-def _table(path: Path, stated: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Conditions by file name. Raises `InputError` with the line."""
+def _table(path: Path, stated: Mapping[str, Any]) -> tuple[dict[str, dict[str, Any]], dict[str, Fault]]:
+    """Conditions by file name, and where each scenario path stands. Raises `InputError` with the line."""
 
     def at(line: int | None, what: str, column: str = "") -> InputError:
         return InputError(Fault(file=str(path), line=line, path=column, message=what))
@@ -206,9 +197,9 @@ def _table(path: Path, stated: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     names = [cell.strip() for cell in next(reader)]
     if len(set(names)) < len(names):
         raise at(1, f"a column twice, got {', '.join(names)}; once each")
-    for name in names:
-        if name != FILE:
-            _check_path(name, stated, lambda what: at(1, what))
+    places = {name: Fault(file=str(path), line=1, message="") for name in names if name != FILE}
+    for name, place in places.items():
+        _check_not_stated(name, stated, place)
     if len(names) < 2:
         raise at(1, f"nothing but {FILE!r}; a column with a scenario path is needed")
     rows: dict[str, dict[str, Any]] = {}
@@ -227,4 +218,4 @@ def _table(path: Path, stated: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         if file in rows:
             raise at(line, f"a second row for {file!r}; one each", FILE)
         rows[file] = {name: value_of(cell, decimal if is_number(cell, decimal) else ".") for name, cell in row.items()}
-    return rows
+    return rows, places

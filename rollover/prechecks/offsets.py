@@ -16,6 +16,7 @@ FEWEST = 10  # samples before it that say what is read there
 STANDS_OUT = 3.0  # times what is read before, that the load rises to: less may be a weight that rests on it
 NEAR = 0.3  # of the weight: what reads so much may carry it
 RECTIFIED = 3.0  # deviations: what never falls below 0 and stays within is the size of noise
+LEAST = 2.0  # independent samples
 MARGIN = 0.2  # of the stretch, at its end: what is filtered begins to rise before the blow
 
 _DROP = re.compile(r"ground/(force_normal|force_tangential|sinkage)")
@@ -35,7 +36,7 @@ def before_contact(t: Trace) -> slice | None:
     if not begun.size:
         return None
     count = int((1.0 - MARGIN) * begun[0])
-    if count < max(FEWEST, 4.0 * t.floor.independence):
+    if count < max(FEWEST, LEAST * t.floor.independence):
         return None
     inside = x[:count]
     half = count // 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -14,7 +15,7 @@ from rollover.recording import Recording
 Array = NDArray[np.float64]
 LONGEST = 120.0  # s: `simulation.duration` of a scenario is this at most
 EVEN = 1e-6  # of a step: stamps that are counted, not read off a clock
-SIDES = (6, 12, 24)  # samples to either side of a gap, through which a parabola is laid
+SIDES = (6, 12, 24, 48)  # samples to either side of a gap, through which a parabola is laid
 CHANCE = 1e-4  # that a clean channel shows a gap
 WHOLE = 0.25  # of a step, by which a gap may miss a whole number of samples
 STEADY = 0.5  # of the speed, by which it may change across a gap: else something begins or ends there
@@ -64,20 +65,20 @@ def lost(t: Trace, unit: str) -> Iterator[Finding]:
     if not t.channel.endswith(MOVING) or t.floor.sigma == 0.0 or np.abs(steps - t.step).max() > EVEN * t.step + 1e-9:
         return
     beyond = -float(ndtri(0.5 * CHANCE / t.values.size / len(SIDES)))
-    places: dict[int, tuple[float, float]] = {}
-    for side in SIDES:
+    places: dict[int, tuple[float, float, float]] = {}
+    for side in reversed(SIDES):  # the longest first, which tells best how many
         if t.values.size < 4 * side:
             continue
-        leap, way, bend, error = _across(t, side)
+        leap, way, bend, error, slope = _across(t, side)
         number = leap / np.where(way == 0.0, np.inf, way)
         whole = np.round(number)
-        doubt = error / np.maximum(np.abs(way), 1e-300)
+        doubt = np.hypot(error, whole * slope) / np.maximum(np.abs(way), 1e-300)
         sure = np.abs(leap) > beyond * error + bend
-        sure &= (whole >= 1.0) & (np.abs(number - whole) < WHOLE + 3.0 * doubt) & (doubt * SAMPLES < 1.0)
-        for k in np.flatnonzero(sure):
+        sure &= (whole >= 1.0) & (np.abs(number - whole) < WHOLE + 3.0 * doubt) & (error * SAMPLES < np.abs(way))
+        for k in map(int, np.flatnonzero(sure)):
             near = np.abs(leap[max(0, k - side) : k + side + 1])
             if abs(leap[k]) >= near.max():
-                places.setdefault(int(k), (float(whole[k]), float(abs(leap[k]))))
+                places.setdefault(k, (float(whole[k]), float(abs(leap[k])) / error, float(doubt[k])))
     kept: list[int] = []
     for k in sorted(places, key=lambda k: -places[k][1]):
         if all(abs(k - other) > SIDES[-1] for other in kept):
@@ -86,6 +87,7 @@ def lost(t: Trace, unit: str) -> Iterator[Finding]:
         return
     kept.sort()
     count = sum(places[k][0] for k in kept)
+    error = math.sqrt(sum(places[k][2] ** 2 for k in kept))
     yield Finding(
         check="gap",
         channel=t.channel,
@@ -93,15 +95,15 @@ def lost(t: Trace, unit: str) -> Iterator[Finding]:
         end=float(t.time[kept[-1] + 1]),
         value=count,
         unit="samples",
-        error=None,
-        sentence=f"goes on as if {count:.0f} sample{'s' if count > 1 else ''} were missing in {len(kept)} "
+        error=error,
+        sentence=f"goes on as if {count:.0f} +- {error:.1f} samples were missing in {len(kept)} "
         f"place{'s' if len(kept) > 1 else ''}, though its stamps are even ({1.0 / t.step:.6g} Hz): lost samples "
         "(dropout of the logger) under a counted clock, all later stamps are early",
     )
 
 
-def _across(t: Trace, side: int) -> tuple[Array, Array, Array, float]:
-    """Leap between samples k and k + 1 (n - 1,), the way of one sample there, what bends may feign, and its error."""
+def _across(t: Trace, side: int) -> tuple[Array, Array, Array, float, float]:
+    """Leap from sample k to k + 1 (n - 1,), way of one sample, what bends may feign; errors of leap and way."""
     n = t.values.size
     s = np.arange(side) + 0.5  # in steps, from the middle between both
     V = np.vander(s, 3, increasing=True)
@@ -114,10 +116,11 @@ def _across(t: Trace, side: int) -> tuple[Array, Array, Array, float]:
     way[k] = 0.5 * (after[:, 1] - before[:, 1])
     misfit_before = np.abs(windows[k - side + 1][:, ::-1] - before @ V.T).max(axis=1)
     misfit_after = np.abs(windows[k + 1] - after @ V.T).max(axis=1)
-    noise = 4.5 * t.floor.sigma  # the largest of 24 that noise leaves
+    noise = 4.5 * t.floor.sigma  # the largest of 48 that noise leaves, 1 in 3000
     bend[k] = np.where(np.maximum(misfit_before, misfit_after) > noise, np.inf, 0.0)
     turns = np.abs(after[:, 1] + before[:, 1])  # the speed leaps as well: a blow between both
     excess = np.maximum(turns - 6.0 * t.floor.sigma * float(np.linalg.norm(W[1])), 0.0)
     bend[k] += np.where(turns > STEADY * np.abs(way[k]) + 0.5 * (turns - excess), np.inf, 0.5 * excess)
-    error = t.floor.sigma * np.sqrt(2.0) * float(np.linalg.norm(W[0])) * np.sqrt(t.floor.independence)
-    return leap, way, bend, error
+    sigma = t.floor.sigma * float(np.sqrt(t.floor.independence))
+    error, slope = sigma * np.sqrt(2.0) * np.linalg.norm(W[0]), sigma * np.sqrt(0.5) * np.linalg.norm(W[1])
+    return leap, way, bend, float(error), float(slope)

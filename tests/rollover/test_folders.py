@@ -184,7 +184,6 @@ def test_a_name_that_can_be_read_in_two_ways_is_refused(tmp_path: Path) -> None:
         ('{name: "raw/{initiation.speed}.csv"}', "no folders"),
         ('{name: "{initiation.speed}_{initiation.speed}.csv"}', "a path given twice"),
         ('{name: "{vehicle.mass}.csv"}', "vehicle.mass is stated in conditions as well"),
-        ('{name: "{vehicle.weight}.csv"}', "no such path, got 'vehicle.weight'; below vehicle"),
         ("{table: none.csv}", "conditions_from.table: no such file, got 'none.csv'"),
         ("{}", "one of name and table is needed"),
         ('{name: "a{initiation.speed}.csv", table: c.csv}', "one of name and table is needed"),
@@ -197,6 +196,14 @@ def test_a_profile_is_refused_at_its_line(tmp_path: Path, given: str, words: str
     (fault,) = said.value.faults
     assert fault.line == 4
     assert words in str(fault)
+
+
+def test_a_pattern_for_what_no_scenario_has(tmp_path: Path) -> None:
+    profile = bench(tmp_path, ["a1.csv"], 'conditions_from: {name: "a{vehicle.weight}.csv"}')
+    code, _, faults = ask("import", tmp_path / "raw", "--profile", profile, "--out", tmp_path / "rec")
+    assert code == 2
+    assert faults.startswith(f"{profile}:4: conditions_from.name: no such path, got 'vehicle.weight'; below vehicle")
+    assert not (tmp_path / "rec").exists()
 
 
 def test_the_longest_pattern_ends_in_time() -> None:
