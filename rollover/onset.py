@@ -3,11 +3,12 @@
 A striker falls, and then something happens: the sample at which a channel first leaves what it read until then tells
 when, whatever the ground is like. About it the zero is found from each channel by
 
-    y(t) = level + amount c(t - zero),                                                              (O1)
+    y(t) = level + amount c(t - zero) + jump H(t - zero),                                           (O1)
 
-c being what the scenario predicts to change from its contact on; level and amount are free, so that a ground of another
-stiffness, or a gain, moves no clock. The likelihood over the zero, times its prior, gives its mean and standard
-deviation: noise over slope, or the time between two samples where all is over within one.
+c being what the scenario predicts to change from its contact on, without what it jumps by then; level and amounts are
+free, the jump within what moves along with a striker, so that a ground of another stiffness moves no clock. The
+likelihood over the zero, times its prior, gives its mean and standard deviation: noise over slope, or the time between
+two samples where all is over within one.
 
 What shows no onset (a vehicle on its wheels, a position) is laid over the simulation by least squares of all its
 channels, the simulation staying before and after as it begins and ends.
@@ -45,8 +46,10 @@ KNOWN = 1e-3  # s, 1 sigma of a zero that is said to be known
 SURE = 5.0  # sigmas, beyond which a zero is not where it is said to be
 BETTER = 4.0  # times less misfit there: half the distance, as that of an error of the model is
 CLEAR, IN_A_ROW, QUIET = 8.0, 4, 8  # times the noise, samples in a row, and samples before, that make an onset
+FEW = 4  # samples before that will do where what they read is what a fall reads
 DRIFT = 4.0  # noises, that a channel may drift before
 FALLING = 0.5  # of g, within which an accelerometer reads that it falls
+JUMPS = 0.5  # of the jump at a contact, 1 sigma: the mass that moves along is known no better
 SOON, LEAST = 8e-3, 4  # s after an onset, and samples, that tell when it was
 MODEL = 2e-4  # of a channel's range: what integrators differ by
 SHAPE = 0.05  # of it: what a scenario may miss where all channels are laid over it
@@ -117,9 +120,9 @@ def simulated(scenario: Scenario) -> Recording:
 def _doubt(clock: Clock, apart: bool) -> Literal["unknown", "within", "apart"] | None:
     if clock.zero == "unknown":
         return "unknown"
-    if clock.within is not None and clock.within > KNOWN:
-        return "within"
-    return "apart" if apart else None
+    if apart:
+        return "apart"
+    return "within" if clock.within is not None and clock.within > KNOWN else None
 
 
 def is_apart(recording: Recording, scenario: Scenario) -> bool:
@@ -205,9 +208,9 @@ def by_alignment(recording: Recording, scenario: Scenario, simulate: Simulate) -
 
     best = float(minimize_scalar(left, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-9}).x)
     least = left(best)
-    plain = sum(float(np.sum(((p.values - p.values.mean()) / p.scale) ** 2)) for p in parts)
+    alike = sum(p.unlike(best) for p in parts), sum(p.unlike(None) for p in parts)
     overlap = min(float(recording.time[-1]) - best, end) - max(float(recording.time[0]) - best, start)
-    if least > MOST * plain or overlap <= 0.0:
+    if alike[0] > MOST * alike[1] or overlap <= 0.0:
         return None
     h = max(0.25 * step, 1e-6)
     bend = (left(best + h) - 2.0 * least + left(best - h)) / h**2
@@ -240,6 +243,16 @@ class _Part:
         if describe(self.channel).unit == "rad":
             away = np.remainder(away + np.pi, 2.0 * np.pi) - np.pi
         return np.asarray(away / self.scale)
+
+    def unlike(self, zero: float | None) -> float:
+        """Sum of squares that the simulation leaves at any gain and level; of the values alone for None."""
+        y = (self.values - self.values.mean()) / self.scale
+        if zero is None:
+            return float(y @ y)
+        x = np.interp(self.time - zero, self.run_time, self.run)
+        x, power = x - x.mean(), float(np.sum((x - x.mean()) ** 2))
+        gain = max(float(x @ y) / power, 0.0) if power > 0.0 else 0.0
+        return float(np.sum((y - gain * x) ** 2))
 
 
 def _parts(recording: Recording, run: Recording) -> Iterator[_Part]:
@@ -324,7 +337,7 @@ def _first_shown(recording: Recording, channel: str, run: Recording, contact: fl
     time, values = recording.samples(channel)
     made = _behind(run, channel, recording.cfc.get(channel))
     before = made[run.time < contact]
-    if time.size < QUIET + IN_A_ROW or before.size < 2 or np.ptp(values) == 0.0:
+    if time.size < FEW + IN_A_ROW or before.size < 2 or np.ptp(values) == 0.0:
         return None
     sigma = _noise(recording, channel, float(np.ptp(values)))
     if float(np.ptp(before)) > CLEAR * sigma:
@@ -332,22 +345,22 @@ def _first_shown(recording: Recording, channel: str, run: Recording, contact: fl
     begin = 0
     if describe(channel).unit == "m/s2":  # it may have hung before it fell
         falls = np.abs(values - before[0]) < FALLING * 9.81
-        row = np.flatnonzero(np.convolve(falls, np.ones(QUIET), "valid") == QUIET)
+        row = np.flatnonzero(np.convolve(falls, np.ones(FEW), "valid") == FEW)
         if not row.size:
             return None
         begin = int(row[0])
     time, values = time[begin:], values[begin:]
-    off = np.abs(values - np.median(values[:QUIET])) > CLEAR * sigma
+    off = np.abs(values - np.median(values[:FEW])) > CLEAR * sigma
     row = np.flatnonzero(np.convolve(off, np.ones(IN_A_ROW), "valid") == IN_A_ROW)
-    if not row.size or not is_quiet(values[: row[0]] / sigma):
+    if not row.size or not is_quiet(values[: row[0]] / sigma, FEW):
         return None
     return float(time[row[0]]) - contact
 
 
-def is_quiet(z: Array) -> bool:
+def is_quiet(z: Array, least: int = QUIET) -> bool:
     """Whether what comes before a contact, in units of the noise, stays what it is: a blow that has begun does not."""
     fall = z[: -(z.size // 4) or None]
-    return fall.size >= QUIET and abs(float(np.polyfit(np.linspace(0.0, 1.0, fall.size), fall, 1)[0])) < DRIFT
+    return fall.size >= least and abs(float(np.polyfit(np.linspace(0.0, 1.0, fall.size), fall, 1)[0])) < DRIFT
 
 
 def _refined(recording: Recording, channel: str, run: Recording, contact: float, about: float) -> tuple[float, float]:
@@ -365,15 +378,14 @@ def _refined(recording: Recording, channel: str, run: Recording, contact: float,
     t, y = time[use], values[use] / sigma
     known = values[: 4 * LENGTH]
     worth = 1.0 / noise_floor(known, order=1, strides=(1,)).independence if known.size >= LENGTH else 1.0
-    y = y - y[0]
+
+    jump = (float(made[run.time >= contact][0]) - level) / sigma if channel not in recording.cfc else 0.0
+    y = y - y.mean()
 
     def left(zero: float) -> float:
-        c = (np.interp(t - zero, run.time, made) - level) / sigma
-        away, shape = y - y.mean(), c - c.mean()
-        power = float(shape @ shape)
-        amount = max(float(shape @ away) / power, 0.0) if power > 0.0 else 0.0
-        rest = away - amount * shape
-        return float(rest @ rest)
+        late = (t - zero >= contact).astype(float)
+        c = (np.interp(t - zero, run.time, made) - level) / sigma - jump * late
+        return _left(y, c, jump * late)
 
     low, high = about - back, about + step
     mean, sd = about, step
@@ -386,3 +398,17 @@ def _refined(recording: Recording, channel: str, run: Recording, contact: float,
         sd = float(np.sqrt(p @ (places - mean) ** 2 / p.sum()))
         low, high = mean - 6.0 * sd, mean + 6.0 * sd
     return mean, max(sd, 1e-9)
+
+
+def _left(y: Array, c: Array, jump: Array) -> float:
+    """What the best amounts of `c` and `jump` (n,) leave of values (n,) without a mean, and what the jump's prior asks.
+
+    Squares over the noise; the amount of `c` is none below zero, that of the jump 1 within `JUMPS`.
+    """
+    c, jump = c - c.mean(), jump - jump.mean()
+    y = y - jump
+    cc, cj, jj = float(c @ c), float(c @ jump), float(jump @ jump) + JUMPS**-2
+    cy, jy, yy = float(c @ y), float(jump @ y), float(y @ y)
+    least = yy - jy**2 / jj
+    free, along = cc - cj**2 / jj, cy - cj * jy / jj
+    return least - max(along, 0.0) ** 2 / free if free > 1e-12 * cc > 0.0 else least

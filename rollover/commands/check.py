@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -77,21 +78,35 @@ def _recording(name: str, profile: Path | None, scenario: str | None) -> dict[st
     from rollover.channels import describe
     from rollover.importers import read_recording
     from rollover.prechecks import noise_floors, prechecks
+    from rollover.stamps import from_first, is_far
 
     recording = read_recording(name, profile=profile)
-    gravity = 9.81
+    gravity, clock, notes = 9.81, None, list(recording.notes)
     if scenario is not None:
         from rollover import scenario as scenarios
+        from rollover.onset import timed
 
-        gravity = scenarios.load(scenario).replaced(recording.conditions, origin=f"{name}: conditions").gravity
-    floors = noise_floors(recording)
+        under = scenarios.load(scenario).replaced(recording.conditions, origin=f"{name}: conditions")
+        gravity, clock = under.gravity, timed(name, recording, under).zero
+    # an hour of a day says nothing, and costs digits
+    first = float(recording.time[0]) if is_far(recording.time) else 0.0
+    bare = replace(recording, time=from_first(recording.time)) if first else recording
+    if clock is not None:
+        notes.append(clock.sentence)
+    elif first and recording.clock.zero == "known":
+        notes.append(
+            f"its stamps begin at {first:.10g} s, further from zero than they last: read as a clock without a zero"
+        )
+    floors = noise_floors(bare)
     return {
         "is": "recording",
         "title": recording.title,
         "samples": recording.time.size,
         "start": float(recording.time[0]),
         "end": float(recording.time[-1]),
-        "notes": list(recording.notes),
+        "first": first,
+        "notes": notes,
+        **({} if clock is None else {"clock": clock.answer}),
         "channels": [
             {
                 "channel": channel,
@@ -101,7 +116,9 @@ def _recording(name: str, profile: Path | None, scenario: str | None) -> dict[st
             }
             for channel in recording.channels
         ],
-        "findings": [vars(finding) for finding in prechecks(recording, gravity=gravity)],
+        "findings": [
+            {**vars(f), "start": f.start + first, "end": f.end + first} for f in prechecks(bare, gravity=gravity)
+        ],
     }
 
 
@@ -109,7 +126,9 @@ def _print(name: str, row: dict[str, Any]) -> None:
     if row["is"] != "recording":
         print(f"{name}: {row['is']}, in order")
         return
-    span = f"{row['samples']} samples, {row['start']:.6g} to {row['end']:.6g} s"
+    first = row["first"]
+    span = f"{row['samples']} samples, {row['start'] - first:.6g} to {row['end'] - first:.6g} s"
+    span += f" from its first stamp at {first:.10g} s" if first else ""
     print(f"{name}: recording, in order: {row['title']}, {span}")
     for channel in row["channels"]:
         noise = "noise not known" if channel["noise"] is None else f"noise {channel['noise']:.3g} {channel['unit']}"
@@ -117,6 +136,6 @@ def _print(name: str, row: dict[str, Any]) -> None:
     for note in row["notes"]:
         print(f"  note: {note}")
     for f in row["findings"]:
-        print(f"  {f['check']}: {f['channel']}, {f['start']:.6g} to {f['end']:.6g} s: {f['sentence']}")
+        print(f"  {f['check']}: {f['channel']}, {f['start'] - first:.6g} to {f['end'] - first:.6g} s: {f['sentence']}")
     if not row["findings"]:
         print("  no fault of a sensor found")

@@ -194,12 +194,17 @@ def in_words(findings: Sequence[tuple[str, Finding]]) -> Iterator[str]:
 
 def _prechecks(scenario: Scenario, measured: Mapping[str, Recording]) -> list[tuple[str, Finding]]:
     """What the recordings alone give away about their sensors, before any model is asked."""
+    from dataclasses import replace
+
     from rollover.diagnosis.simulator import set_up
     from rollover.prechecks import prechecks
+    from rollover.stamps import from_first, is_far
 
     found = []
     for name, recording in measured.items():
         own = set_up(scenario, recording)
+        if is_far(recording.time):
+            recording = replace(recording, time=from_first(recording.time))
         mass = getattr(own.vehicle, "mass", None)
         found += [(name, f) for f in prechecks(recording, mass=mass, gravity=own.gravity)]
     return found
