@@ -167,11 +167,11 @@ def by_onset(
     if not seen:
         return None
     # of two that disagree the earlier one: an instrument is late, never early
-    about = sorted(seen.values())[(len(seen) - 1) // 2]
+    about = sorted(onset for onset, _ in seen.values())[(len(seen) - 1) // 2]
     told = []
-    for channel, onset in seen.items():
+    for channel, (onset, since) in seen.items():
         if abs(onset - about) <= SOON + LEAST * _step(recording, channel):
-            told.append((channel, _refined(recording, channel, run, contact, onset)))
+            told.append((channel, _refined(recording, channel, run, contact, onset, since)))
     weight = np.array([s**-2 for _, (_, s) in told])
     each = np.array([m for _, (m, _) in told])
     mean = float(weight @ each / weight.sum())
@@ -332,8 +332,8 @@ def _noise(recording: Recording, channel: str, span: float) -> float:
     return float(np.hypot(sigma_of(recording, channel, estimated_noise) or 0.0, MODEL * span))
 
 
-def _first_shown(recording: Recording, channel: str, run: Recording, contact: float) -> float | None:
-    """The zero (s) by where a channel first leaves what it read, less a contact's time; None where it does not."""
+def _first_shown(recording: Recording, channel: str, run: Recording, contact: float) -> tuple[float, float] | None:
+    """The zero (s) by where a channel first leaves what it read while it fell, and since when it fell; None: never."""
     time, values = recording.samples(channel)
     made = _behind(run, channel, recording.cfc.get(channel))
     before = made[run.time < contact]
@@ -354,7 +354,7 @@ def _first_shown(recording: Recording, channel: str, run: Recording, contact: fl
     row = np.flatnonzero(np.convolve(off, np.ones(IN_A_ROW), "valid") == IN_A_ROW)
     if not row.size or not is_quiet(values[: row[0]] / sigma, FEW):
         return None
-    return float(time[row[0]]) - contact
+    return float(time[row[0]]) - contact, float(time[0])
 
 
 def is_quiet(z: Array, least: int = QUIET) -> bool:
@@ -363,7 +363,9 @@ def is_quiet(z: Array, least: int = QUIET) -> bool:
     return fall.size >= least and abs(float(np.polyfit(np.linspace(0.0, 1.0, fall.size), fall, 1)[0])) < DRIFT
 
 
-def _refined(recording: Recording, channel: str, run: Recording, contact: float, about: float) -> tuple[float, float]:
+def _refined(
+    recording: Recording, channel: str, run: Recording, contact: float, about: float, since: float
+) -> tuple[float, float]:
     """Mean and standard deviation (s) of the zero by (O1) in one channel, about where it first shows it."""
     time, values = recording.samples(channel)
     made = _behind(run, channel, recording.cfc.get(channel))
@@ -374,7 +376,7 @@ def _refined(recording: Recording, channel: str, run: Recording, contact: float,
     late = time[time >= onset]
     until = max(onset + SOON, float(late[min(LEAST - 1, late.size - 1)]) + 1e-9)
     back = SOON + LEAST * step
-    use = (time > onset - 4.0 * back) & (time <= until)
+    use = (time >= max(since, onset - 4.0 * back)) & (time <= until)
     t, y = time[use], values[use] / sigma
     known = values[: 4 * LENGTH]
     worth = 1.0 / noise_floor(known, order=1, strides=(1,)).independence if known.size >= LENGTH else 1.0
