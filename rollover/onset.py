@@ -10,29 +10,26 @@ free, the jump within what moves along with a striker, so that a ground of anoth
 likelihood over the zero, times its prior, gives its mean and standard deviation: noise over slope, or the time between
 two samples where all is over within one.
 
-What shows no onset (a vehicle on its wheels, a position) is laid over the simulation by least squares of all its
-channels, the simulation staying before and after as it begins and ends.
+What shows no onset (a vehicle on its wheels, a position) is laid over the simulation, see `rollover.overlay`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ground.drops import correlated
-from rollover import alignment
 from rollover.channels import describe
 from rollover.drop import BESIDE, DropFailedError, DropModel, landing_speed, simulate_drop, unfit
 from rollover.faults import Fault, InputError
-from rollover.filters import least_rate
 from rollover.initiation import Drop, Release
 from rollover.misfit import as_measured, estimated_noise, sigma_of
 from rollover.noise import LENGTH, noise_floor
+from rollover.overlay import behind, laid_over, parts
 from rollover.recording import Clock, Recording
 from rollover.scenario import Scenario
 from rollover.stamps import Told, Zero, from_first, rounding
@@ -52,11 +49,8 @@ FALLING = 0.5  # of g, within which an accelerometer reads that it falls
 JUMPS = 0.5  # of the jump at a contact, 1 sigma: the mass that moves along is known no better
 SOON, LEAST = 8e-3, 4  # s after an onset, and samples, that tell when it was
 MODEL = 2e-4  # of a channel's range: what integrators differ by
-SHAPE = 0.05  # of it: what a scenario may miss where all channels are laid over it
 PLACES = 601  # zeros that are tried at once
 FINE = 2.5e-4  # s, between rows of a fall that onsets are looked up in
-MOST, SAMPLES = 0.5, 2000  # of the variance that may stay when laid over one another; samples of a channel there
-APART = 0.1  # of the time that is compared: 3 sigma of a zero beyond tell nothing
 
 
 class UntoldError(InputError):
@@ -188,87 +182,8 @@ def by_alignment(recording: Recording, scenario: Scenario, simulate: Simulate) -
     """The zero (s), 1 sigma, and the channels that lie over the simulation best there; None if they do nowhere."""
     run = _fall(scenario, recording, simulate)
     run = as_measured(scenario, simulate(scenario), recording) if run is None else run
-    parts = list(_parts(recording, run))
-    if not parts:
-        return None
-    start, end = float(run.time[0]), float(run.time[-1])
-    low, high = float(recording.time[0]) - end, float(recording.time[-1]) - start
-
-    def left(zero: float) -> float:
-        return sum(float(np.sum(p.off(zero) ** 2)) for p in parts)
-
-    step = min(high - low, 2.0 * (end - start)) / PLACES
-    places = np.arange(low, high + step, step)
-    for _ in range(3):
-        costs = np.array([left(float(z)) for z in places])
-        best = float(places[int(np.argmin(costs))])
-        step = float(places[1] - places[0])
-        places = np.linspace(best - 2.0 * step, best + 2.0 * step, 81)
-    from scipy.optimize import minimize_scalar
-
-    best = float(minimize_scalar(left, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-9}).x)
-    least = left(best)
-    alike = sum(p.unlike(best) for p in parts), sum(p.unlike(None) for p in parts)
-    overlap = min(float(recording.time[-1]) - best, end) - max(float(recording.time[0]) - best, start)
-    if alike[0] > MOST * alike[1] or overlap <= 0.0:
-        return None
-    h = max(0.25 * step, 1e-6)
-    bend = (left(best + h) - 2.0 * least + left(best - h)) / h**2
-    count = sum(p.values.size for p in parts)
-    worth = max(correlated(p.off(best)) for p in parts)
-    if bend <= 0.0:
-        return None
-    sigma = float(np.sqrt(2.0 / bend * least / count * worth))
-    # what is left bends the minimum as well: no better than the step of the simulation's rows
-    sigma = float(np.hypot(sigma, np.median(np.diff(run.time)) / np.sqrt(12.0)))
-    if 3.0 * sigma > APART * overlap:
-        return None
-    return best, sigma, "alignment", tuple(p.channel for p in parts)
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Part:
-    """A channel beside its simulation: samples (n,), rows of the run (m,), and 1 sigma of what they may differ by."""
-
-    channel: str
-    time: Array
-    values: Array
-    run_time: Array
-    run: Array
-    scale: float
-
-    def off(self, zero: float) -> Array:
-        """What is between them over the scale, (n,); angles whichever way round."""
-        away = self.values - np.interp(self.time - zero, self.run_time, self.run)
-        if describe(self.channel).unit == "rad":
-            away = np.remainder(away + np.pi, 2.0 * np.pi) - np.pi
-        return np.asarray(away / self.scale)
-
-    def unlike(self, zero: float | None) -> float:
-        """Sum of squares that the simulation leaves at any gain and level; of the values alone for None."""
-        y = (self.values - self.values.mean()) / self.scale
-        if zero is None:
-            return float(y @ y)
-        x = np.interp(self.time - zero, self.run_time, self.run)
-        x, power = x - x.mean(), float(np.sum((x - x.mean()) ** 2))
-        gain = max(float(x @ y) / power, 0.0) if power > 0.0 else 0.0
-        return float(np.sum((y - gain * x) ** 2))
-
-
-def _parts(recording: Recording, run: Recording) -> Iterator[_Part]:
-    for channel in recording.channels:
-        time, values = recording.samples(channel)
-        if channel not in run.channels or time.size < 2:
-            continue
-        every = -(-time.size // SAMPLES)
-        made = _behind(run, channel, recording.cfc.get(channel))
-        span = max(float(np.ptp(values)), float(np.ptp(made)))
-        if span <= 0.0:
-            continue
-        scale = float(np.hypot(sigma_of(recording, channel, estimated_noise) or 0.0, SHAPE * span))
-        yield _Part(
-            channel=channel, time=time[::every], values=values[::every], run_time=run.time, run=made, scale=scale
-        )
+    found = laid_over(recording, run)
+    return None if found is None else (*found[:2], "alignment", found[2])
 
 
 def _is_off(recording: Recording, moved: Recording, scenario: Scenario, simulate: Simulate, zero: Zero) -> bool:
@@ -279,7 +194,7 @@ def _is_off(recording: Recording, moved: Recording, scenario: Scenario, simulate
     run = _fall(scenario, recording, simulate)
     if run is None:
         return False
-    pairs = list(zip(_parts(recording, run), _parts(moved, run), strict=True))
+    pairs = list(zip(parts(recording, run), parts(moved, run), strict=True))
     here = [float(np.mean(a.off(0.0) ** 2)) for a, _ in pairs]
     there = [float(np.mean(b.off(0.0) ** 2)) for _, b in pairs]
     chance = [1.0 + 2.0 * math.sqrt(2.0 / a.values.size) for a, _ in pairs]  # what shows nothing goes either way
@@ -315,14 +230,6 @@ def _contact(scenario: Scenario) -> float | None:
     return (landing_speed(start, scenario.gravity) - start.speed) / scenario.gravity
 
 
-def _behind(run: Recording, channel: str, cfc: int | None) -> Array:
-    """A channel of a run through the class that the recording went through."""
-    values, step = run[channel], float(np.median(np.diff(run.time)))
-    if cfc is None or 1.0 / step < least_rate(cfc):
-        return values
-    return alignment.through(run.time, values, step, cfc)
-
-
 def _step(recording: Recording, channel: str) -> float:
     time, _ = recording.samples(channel)
     return float(np.median(np.diff(time))) if time.size > 1 else 0.0
@@ -335,7 +242,7 @@ def _noise(recording: Recording, channel: str, span: float) -> float:
 def _first_shown(recording: Recording, channel: str, run: Recording, contact: float) -> tuple[float, float] | None:
     """The zero (s) by where a channel first leaves what it read while it fell, and since when it fell; None: never."""
     time, values = recording.samples(channel)
-    made = _behind(run, channel, recording.cfc.get(channel))
+    made = behind(run, channel, recording.cfc.get(channel))
     before = made[run.time < contact]
     if time.size < FEW + IN_A_ROW or before.size < 2 or np.ptp(values) == 0.0:
         return None
@@ -368,7 +275,7 @@ def _refined(
 ) -> tuple[float, float]:
     """Mean and standard deviation (s) of the zero by (O1) in one channel, about where it first shows it."""
     time, values = recording.samples(channel)
-    made = _behind(run, channel, recording.cfc.get(channel))
+    made = behind(run, channel, recording.cfc.get(channel))
     level = float(made[run.time < contact][-1])
     step = _step(recording, channel)
     sigma = _noise(recording, channel, float(np.ptp(values)))

@@ -92,11 +92,10 @@ def diagnose(
         raise ValueError(f"tolerance: not a share of a range, got {tolerance:g}; at least 0 and below 1")
     crew = crew or Crew()
     recordings, zeros = at_their_zeros(scenario, recordings)
-    rounded: list[str] = []
-    if isinstance(scenario.vehicle, Striker):  # what little errors of a start do to an overturn is chance, see `chaos`
-        recordings, rounded = to_the_last_digit(recordings)
+    is_drop = isinstance(scenario.vehicle, Striker)  # what little errors do to an overturn is chance, see `chaos`
+    recordings, rounded = to_the_last_digit(recordings) if is_drop else (recordings, [])
     every, notes = _evidence(scenario, recordings, crew)
-    notes += [f"{n}: {zero.sentence}" for n, zero in zeros.items()] + rounded
+    notes += [*(f"{n}: {zero.sentence}" for n, zero in zeros.items()), *rounded]
     every = [replace(e, model_error=float(np.hypot(e.model_error, tolerance))) for e in every]
     asked = Asked(scenario=scenario, recordings=dict(recordings), hold_out=hold_out, say=say, crew=crew, began=began)
     some, shared = slips_of(every)
