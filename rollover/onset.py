@@ -163,9 +163,9 @@ def by_onset(
     # of two that disagree the earlier one: an instrument is late, never early
     about = sorted(onset for onset, _ in seen.values())[(len(seen) - 1) // 2]
     told = []
-    for channel, (onset, since) in seen.items():
-        if abs(onset - about) <= SOON + LEAST * _step(recording, channel):
-            told.append((channel, _refined(recording, channel, run, contact, onset, since)))
+    for channel, (at, since) in seen.items():
+        if abs(at - about) <= SOON + LEAST * _step(recording, channel):
+            told.append((channel, _refined(recording, channel, run, contact, at, since)))
     weight = np.array([s**-2 for _, (_, s) in told])
     each = np.array([m for _, (m, _) in told])
     mean = float(weight @ each / weight.sum())
@@ -212,8 +212,8 @@ def _fall(scenario: Scenario, recording: Recording, simulate: Simulate) -> Recor
     start, end = _span(scenario)
     contact, step = _contact(scenario) or 0.0, max(FINE, length / 20_000.0)
     first, last = (math.ceil((at - contact) / step) for at in (min(start, 0.0) - length, max(end, length)))
-    times = contact + step * np.arange(first, last + 1)
-    times = np.insert(times, -first, contact - BESIDE)  # channels jump there
+    times: Array = contact + step * np.arange(first, last + 1, dtype=np.float64)
+    times = np.asarray(np.insert(times, -first, contact - BESIDE), dtype=np.float64)  # channels jump there
     try:
         return as_measured(scenario, DropModel(scenario=scenario).run(times), recording)
     except DropFailedError:

@@ -21,7 +21,7 @@ from rollover.misfit import estimated_noise, sigma_of
 from rollover.recording import Recording
 
 Array = NDArray[np.float64]
-SHAPE = 0.05  # of it: what a scenario may miss where all channels are laid over it
+SHAPE = 0.05  # of a channel's range: what a scenario may miss where all channels are laid over it
 MOST, SAMPLES = 0.5, 2000  # of the variance that may stay when laid over one another; samples of a channel there
 APART = 0.1  # of the time that is compared: 3 sigma of a zero beyond tell nothing
 PLACES, LONGEST = 601, 20_000  # zeros that are tried over twice a run, and at most

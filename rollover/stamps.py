@@ -60,7 +60,7 @@ class Zero:
 
 def from_first(time: Array) -> Array:
     """Stamps (n,) less the first one, s; on their grid where they are one within their own rounding."""
-    since = time - time[0]
+    since: Array = np.asarray(time - time[0], dtype=np.float64)
     if time.size < 3:
         return since
     off = ROUNDINGS * float(np.spacing(np.max(np.abs(time))))
@@ -68,7 +68,7 @@ def from_first(time: Array) -> Array:
     if np.any(np.diff(count) < 1.0):
         return since
     low, high = float(np.max((since - off)[1:] / count[1:])), float(np.min((since + off)[1:] / count[1:]))
-    return count * _roundest(low, high) if low <= high else since
+    return np.asarray(count * _roundest(low, high)) if low <= high else since
 
 
 def is_far(time: Array) -> bool:
