@@ -48,7 +48,9 @@ def settled(recordings: Mapping[str, Recording], scenario: Scenario) -> Settled:
 
     Raises `InputError` for a condition that the scenario does not know.
     """
-    found, zeros, refused = {}, {}, []
+    found: dict[str, Recording] = {}
+    zeros: dict[str, Zero] = {}
+    refused: list[str] = []
     for name, recording in recordings.items():
         if "initiation.speed" not in recording.conditions:  # clock and speed are found together, see `drop_of`
             found[name] = replace(recording, time=from_first(recording.time))

@@ -3,35 +3,33 @@
 A striker falls, and then something happens: the sample at which a channel first leaves what it read until then tells
 when, whatever the ground is like. About it the zero is found from each channel by
 
-    y(t) = level + amount c(t - zero),                                                              (O1)
+    y(t) = level + amount c(t - zero) + jump H(t - zero),                                           (O1)
 
-c being what the scenario predicts to change from its contact on; level and amount are free, so that a ground of another
-stiffness, or a gain, moves no clock. The likelihood over the zero, times its prior, gives its mean and standard
-deviation: noise over slope, or the time between two samples where all is over within one.
+c being what the scenario predicts to change from its contact on, without what it jumps by then; level and amounts are
+free, the jump within what moves along with a striker, so that a ground of another stiffness moves no clock. The
+likelihood over the zero, times its prior, gives its mean and standard deviation: noise over slope, or the time between
+two samples where all is over within one.
 
-What shows no onset (a vehicle on its wheels, a position) is laid over the simulation by least squares of all its
-channels, the simulation staying before and after as it begins and ends.
+What shows no onset (a vehicle on its wheels, a position) is laid over the simulation, see `rollover.overlay`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ground.drops import correlated
-from rollover import alignment
 from rollover.channels import describe
 from rollover.drop import BESIDE, DropFailedError, DropModel, landing_speed, simulate_drop, unfit
 from rollover.faults import Fault, InputError
-from rollover.filters import least_rate
 from rollover.initiation import Drop, Release
 from rollover.misfit import as_measured, estimated_noise, sigma_of
 from rollover.noise import LENGTH, noise_floor
+from rollover.overlay import behind, laid_over, parts
 from rollover.recording import Clock, Recording
 from rollover.scenario import Scenario
 from rollover.stamps import Told, Zero, from_first, rounding
@@ -45,15 +43,14 @@ KNOWN = 1e-3  # s, 1 sigma of a zero that is said to be known
 SURE = 5.0  # sigmas, beyond which a zero is not where it is said to be
 BETTER = 4.0  # times less misfit there: half the distance, as that of an error of the model is
 CLEAR, IN_A_ROW, QUIET = 8.0, 4, 8  # times the noise, samples in a row, and samples before, that make an onset
+FEW = 4  # samples before that will do where what they read is what a fall reads
 DRIFT = 4.0  # noises, that a channel may drift before
 FALLING = 0.5  # of g, within which an accelerometer reads that it falls
+JUMPS = 0.5  # of the jump at a contact, 1 sigma: the mass that moves along is known no better
 SOON, LEAST = 8e-3, 4  # s after an onset, and samples, that tell when it was
 MODEL = 2e-4  # of a channel's range: what integrators differ by
-SHAPE = 0.05  # of it: what a scenario may miss where all channels are laid over it
 PLACES = 601  # zeros that are tried at once
 FINE = 2.5e-4  # s, between rows of a fall that onsets are looked up in
-MOST, SAMPLES = 0.5, 2000  # of the variance that may stay when laid over one another; samples of a channel there
-APART = 0.1  # of the time that is compared: 3 sigma of a zero beyond tell nothing
 
 
 class UntoldError(InputError):
@@ -117,9 +114,9 @@ def simulated(scenario: Scenario) -> Recording:
 def _doubt(clock: Clock, apart: bool) -> Literal["unknown", "within", "apart"] | None:
     if clock.zero == "unknown":
         return "unknown"
-    if clock.within is not None and clock.within > KNOWN:
-        return "within"
-    return "apart" if apart else None
+    if apart:
+        return "apart"
+    return "within" if clock.within is not None and clock.within > KNOWN else None
 
 
 def is_apart(recording: Recording, scenario: Scenario) -> bool:
@@ -164,11 +161,11 @@ def by_onset(
     if not seen:
         return None
     # of two that disagree the earlier one: an instrument is late, never early
-    about = sorted(seen.values())[(len(seen) - 1) // 2]
+    about = sorted(onset for onset, _ in seen.values())[(len(seen) - 1) // 2]
     told = []
-    for channel, onset in seen.items():
-        if abs(onset - about) <= SOON + LEAST * _step(recording, channel):
-            told.append((channel, _refined(recording, channel, run, contact, onset)))
+    for channel, (at, since) in seen.items():
+        if abs(at - about) <= SOON + LEAST * _step(recording, channel):
+            told.append((channel, _refined(recording, channel, run, contact, at, since)))
     weight = np.array([s**-2 for _, (_, s) in told])
     each = np.array([m for _, (m, _) in told])
     mean = float(weight @ each / weight.sum())
@@ -185,77 +182,8 @@ def by_alignment(recording: Recording, scenario: Scenario, simulate: Simulate) -
     """The zero (s), 1 sigma, and the channels that lie over the simulation best there; None if they do nowhere."""
     run = _fall(scenario, recording, simulate)
     run = as_measured(scenario, simulate(scenario), recording) if run is None else run
-    parts = list(_parts(recording, run))
-    if not parts:
-        return None
-    start, end = float(run.time[0]), float(run.time[-1])
-    low, high = float(recording.time[0]) - end, float(recording.time[-1]) - start
-
-    def left(zero: float) -> float:
-        return sum(float(np.sum(p.off(zero) ** 2)) for p in parts)
-
-    step = min(high - low, 2.0 * (end - start)) / PLACES
-    places = np.arange(low, high + step, step)
-    for _ in range(3):
-        costs = np.array([left(float(z)) for z in places])
-        best = float(places[int(np.argmin(costs))])
-        step = float(places[1] - places[0])
-        places = np.linspace(best - 2.0 * step, best + 2.0 * step, 81)
-    from scipy.optimize import minimize_scalar
-
-    best = float(minimize_scalar(left, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-9}).x)
-    least = left(best)
-    plain = sum(float(np.sum(((p.values - p.values.mean()) / p.scale) ** 2)) for p in parts)
-    overlap = min(float(recording.time[-1]) - best, end) - max(float(recording.time[0]) - best, start)
-    if least > MOST * plain or overlap <= 0.0:
-        return None
-    h = max(0.25 * step, 1e-6)
-    bend = (left(best + h) - 2.0 * least + left(best - h)) / h**2
-    count = sum(p.values.size for p in parts)
-    worth = max(correlated(p.off(best)) for p in parts)
-    if bend <= 0.0:
-        return None
-    sigma = float(np.sqrt(2.0 / bend * least / count * worth))
-    # what is left bends the minimum as well: no better than the step of the simulation's rows
-    sigma = float(np.hypot(sigma, np.median(np.diff(run.time)) / np.sqrt(12.0)))
-    if 3.0 * sigma > APART * overlap:
-        return None
-    return best, sigma, "alignment", tuple(p.channel for p in parts)
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Part:
-    """A channel beside its simulation: samples (n,), rows of the run (m,), and 1 sigma of what they may differ by."""
-
-    channel: str
-    time: Array
-    values: Array
-    run_time: Array
-    run: Array
-    scale: float
-
-    def off(self, zero: float) -> Array:
-        """What is between them over the scale, (n,); angles whichever way round."""
-        away = self.values - np.interp(self.time - zero, self.run_time, self.run)
-        if describe(self.channel).unit == "rad":
-            away = np.remainder(away + np.pi, 2.0 * np.pi) - np.pi
-        return np.asarray(away / self.scale)
-
-
-def _parts(recording: Recording, run: Recording) -> Iterator[_Part]:
-    for channel in recording.channels:
-        time, values = recording.samples(channel)
-        if channel not in run.channels or time.size < 2:
-            continue
-        every = -(-time.size // SAMPLES)
-        made = _behind(run, channel, recording.cfc.get(channel))
-        span = max(float(np.ptp(values)), float(np.ptp(made)))
-        if span <= 0.0:
-            continue
-        scale = float(np.hypot(sigma_of(recording, channel, estimated_noise) or 0.0, SHAPE * span))
-        yield _Part(
-            channel=channel, time=time[::every], values=values[::every], run_time=run.time, run=made, scale=scale
-        )
+    found = laid_over(recording, run)
+    return None if found is None else (*found[:2], "alignment", found[2])
 
 
 def _is_off(recording: Recording, moved: Recording, scenario: Scenario, simulate: Simulate, zero: Zero) -> bool:
@@ -266,7 +194,7 @@ def _is_off(recording: Recording, moved: Recording, scenario: Scenario, simulate
     run = _fall(scenario, recording, simulate)
     if run is None:
         return False
-    pairs = list(zip(_parts(recording, run), _parts(moved, run), strict=True))
+    pairs = list(zip(parts(recording, run), parts(moved, run), strict=True))
     here = [float(np.mean(a.off(0.0) ** 2)) for a, _ in pairs]
     there = [float(np.mean(b.off(0.0) ** 2)) for _, b in pairs]
     chance = [1.0 + 2.0 * math.sqrt(2.0 / a.values.size) for a, _ in pairs]  # what shows nothing goes either way
@@ -284,8 +212,8 @@ def _fall(scenario: Scenario, recording: Recording, simulate: Simulate) -> Recor
     start, end = _span(scenario)
     contact, step = _contact(scenario) or 0.0, max(FINE, length / 20_000.0)
     first, last = (math.ceil((at - contact) / step) for at in (min(start, 0.0) - length, max(end, length)))
-    times = contact + step * np.arange(first, last + 1)
-    times = np.insert(times, -first, contact - BESIDE)  # channels jump there
+    times: Array = contact + step * np.arange(first, last + 1, dtype=np.float64)
+    times = np.asarray(np.insert(times, -first, contact - BESIDE), dtype=np.float64)  # channels jump there
     try:
         return as_measured(scenario, DropModel(scenario=scenario).run(times), recording)
     except DropFailedError:
@@ -302,14 +230,6 @@ def _contact(scenario: Scenario) -> float | None:
     return (landing_speed(start, scenario.gravity) - start.speed) / scenario.gravity
 
 
-def _behind(run: Recording, channel: str, cfc: int | None) -> Array:
-    """A channel of a run through the class that the recording went through."""
-    values, step = run[channel], float(np.median(np.diff(run.time)))
-    if cfc is None or 1.0 / step < least_rate(cfc):
-        return values
-    return alignment.through(run.time, values, step, cfc)
-
-
 def _step(recording: Recording, channel: str) -> float:
     time, _ = recording.samples(channel)
     return float(np.median(np.diff(time))) if time.size > 1 else 0.0
@@ -319,12 +239,12 @@ def _noise(recording: Recording, channel: str, span: float) -> float:
     return float(np.hypot(sigma_of(recording, channel, estimated_noise) or 0.0, MODEL * span))
 
 
-def _first_shown(recording: Recording, channel: str, run: Recording, contact: float) -> float | None:
-    """The zero (s) by where a channel first leaves what it read, less a contact's time; None where it does not."""
+def _first_shown(recording: Recording, channel: str, run: Recording, contact: float) -> tuple[float, float] | None:
+    """The zero (s) by where a channel first leaves what it read while it fell, and since when it fell; None: never."""
     time, values = recording.samples(channel)
-    made = _behind(run, channel, recording.cfc.get(channel))
+    made = behind(run, channel, recording.cfc.get(channel))
     before = made[run.time < contact]
-    if time.size < QUIET + IN_A_ROW or before.size < 2 or np.ptp(values) == 0.0:
+    if time.size < FEW + IN_A_ROW or before.size < 2 or np.ptp(values) == 0.0:
         return None
     sigma = _noise(recording, channel, float(np.ptp(values)))
     if float(np.ptp(before)) > CLEAR * sigma:
@@ -332,28 +252,30 @@ def _first_shown(recording: Recording, channel: str, run: Recording, contact: fl
     begin = 0
     if describe(channel).unit == "m/s2":  # it may have hung before it fell
         falls = np.abs(values - before[0]) < FALLING * 9.81
-        row = np.flatnonzero(np.convolve(falls, np.ones(QUIET), "valid") == QUIET)
+        row = np.flatnonzero(np.convolve(falls, np.ones(FEW), "valid") == FEW)
         if not row.size:
             return None
         begin = int(row[0])
     time, values = time[begin:], values[begin:]
-    off = np.abs(values - np.median(values[:QUIET])) > CLEAR * sigma
+    off = np.abs(values - np.median(values[:FEW])) > CLEAR * sigma
     row = np.flatnonzero(np.convolve(off, np.ones(IN_A_ROW), "valid") == IN_A_ROW)
-    if not row.size or not is_quiet(values[: row[0]] / sigma):
+    if not row.size or not is_quiet(values[: row[0]] / sigma, FEW):
         return None
-    return float(time[row[0]]) - contact
+    return float(time[row[0]]) - contact, float(time[0])
 
 
-def is_quiet(z: Array) -> bool:
+def is_quiet(z: Array, least: int = QUIET) -> bool:
     """Whether what comes before a contact, in units of the noise, stays what it is: a blow that has begun does not."""
     fall = z[: -(z.size // 4) or None]
-    return fall.size >= QUIET and abs(float(np.polyfit(np.linspace(0.0, 1.0, fall.size), fall, 1)[0])) < DRIFT
+    return fall.size >= least and abs(float(np.polyfit(np.linspace(0.0, 1.0, fall.size), fall, 1)[0])) < DRIFT
 
 
-def _refined(recording: Recording, channel: str, run: Recording, contact: float, about: float) -> tuple[float, float]:
+def _refined(
+    recording: Recording, channel: str, run: Recording, contact: float, about: float, since: float
+) -> tuple[float, float]:
     """Mean and standard deviation (s) of the zero by (O1) in one channel, about where it first shows it."""
     time, values = recording.samples(channel)
-    made = _behind(run, channel, recording.cfc.get(channel))
+    made = behind(run, channel, recording.cfc.get(channel))
     level = float(made[run.time < contact][-1])
     step = _step(recording, channel)
     sigma = _noise(recording, channel, float(np.ptp(values)))
@@ -361,19 +283,18 @@ def _refined(recording: Recording, channel: str, run: Recording, contact: float,
     late = time[time >= onset]
     until = max(onset + SOON, float(late[min(LEAST - 1, late.size - 1)]) + 1e-9)
     back = SOON + LEAST * step
-    use = (time > onset - 4.0 * back) & (time <= until)
+    use = (time >= max(since, onset - 4.0 * back)) & (time <= until)
     t, y = time[use], values[use] / sigma
     known = values[: 4 * LENGTH]
     worth = 1.0 / noise_floor(known, order=1, strides=(1,)).independence if known.size >= LENGTH else 1.0
-    y = y - y[0]
+
+    jump = (float(made[run.time >= contact][0]) - level) / sigma if channel not in recording.cfc else 0.0
+    y = y - y.mean()
 
     def left(zero: float) -> float:
-        c = (np.interp(t - zero, run.time, made) - level) / sigma
-        away, shape = y - y.mean(), c - c.mean()
-        power = float(shape @ shape)
-        amount = max(float(shape @ away) / power, 0.0) if power > 0.0 else 0.0
-        rest = away - amount * shape
-        return float(rest @ rest)
+        late = (t - zero >= contact).astype(float)
+        c = (np.interp(t - zero, run.time, made) - level) / sigma - jump * late
+        return _left(y, c, jump * late)
 
     low, high = about - back, about + step
     mean, sd = about, step
@@ -386,3 +307,17 @@ def _refined(recording: Recording, channel: str, run: Recording, contact: float,
         sd = float(np.sqrt(p @ (places - mean) ** 2 / p.sum()))
         low, high = mean - 6.0 * sd, mean + 6.0 * sd
     return mean, max(sd, 1e-9)
+
+
+def _left(y: Array, c: Array, jump: Array) -> float:
+    """What the best amounts of `c` and `jump` (n,) leave of values (n,) without a mean, and what the jump's prior asks.
+
+    Squares over the noise; the amount of `c` is none below zero, that of the jump 1 within `JUMPS`.
+    """
+    c, jump = c - c.mean(), jump - jump.mean()
+    y = y - jump
+    cc, cj, jj = float(c @ c), float(c @ jump), float(jump @ jump) + JUMPS**-2
+    cy, jy, yy = float(c @ y), float(jump @ y), float(y @ y)
+    least = yy - jy**2 / jj
+    free, along = cc - cj**2 / jj, cy - cj * jy / jj
+    return least - max(along, 0.0) ** 2 / free if free > 1e-12 * cc > 0.0 else least

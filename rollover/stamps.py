@@ -60,16 +60,20 @@ class Zero:
 
 def from_first(time: Array) -> Array:
     """Stamps (n,) less the first one, s; on their grid where they are one within their own rounding."""
-    since = time - time[0]
+    since: Array = np.asarray(time - time[0], dtype=np.float64)
     if time.size < 3:
         return since
-    step = float(np.median(np.diff(since)))
-    count = np.rint(since / step)
+    off = ROUNDINGS * float(np.spacing(np.max(np.abs(time))))
+    count = _counted(since, off)
     if np.any(np.diff(count) < 1.0):
         return since
-    off = ROUNDINGS * float(np.spacing(np.max(np.abs(time))))
     low, high = float(np.max((since - off)[1:] / count[1:])), float(np.min((since + off)[1:] / count[1:]))
-    return count * _roundest(low, high) if low <= high else since
+    return np.asarray(count * _roundest(low, high)) if low <= high else since
+
+
+def is_far(time: Array) -> bool:
+    """Whether zero lies further from all stamps than they last: no trigger stands there."""
+    return bool(max(time[0], -time[-1]) > time[-1] - time[0])
 
 
 def in_digits(value: float, sigma: float) -> str:
@@ -80,6 +84,20 @@ def in_digits(value: float, sigma: float) -> str:
 def rounding(time: Array) -> float:
     """How far a stamp may be off by the rounding of a double alone, 1 sigma of a uniform distribution, s."""
     return float(np.spacing(np.max(np.abs(time))) / np.sqrt(12.0))
+
+
+def _counted(since: Array, off: float) -> Array:
+    """How many steps each stamp lies behind the first one, the step being told by ever more of them."""
+    step, reach = float(np.median(np.diff(since))), 1
+    while True:
+        # as many steps as `off` in the last ones lets count surely
+        reach = max(2 * reach, int(0.25 * reach * step / off)) if off > 0.0 else since.size
+        within = np.flatnonzero(since < (reach + 0.5) * step)
+        last = int(within[-1])
+        count = max(float(np.rint(since[last] / step)), 1.0)
+        step = float(since[last] / count) if last else step
+        if last == since.size - 1:
+            return np.rint(since / step)
 
 
 def _roundest(low: float, high: float) -> float:

@@ -90,13 +90,23 @@ def _recording(
     from rollover.channels import describe
     from rollover.importers import read_recording
     from rollover.prechecks import noise_floors, prechecks
+    from rollover.stamps import is_far
 
     recording = read[name] = read_recording(name, profile=profile)
-    gravity = 9.81
+    gravity, clock, notes = 9.81, None, list(recording.notes)
     if scenario is not None:
         from rollover import scenario as scenarios
+        from rollover.onset import timed
 
-        gravity = scenarios.load(scenario).replaced(recording.conditions, origin=f"{name}: conditions").gravity
+        under = scenarios.load(scenario).replaced(recording.conditions, origin=f"{name}: conditions")
+        gravity, clock = under.gravity, timed(name, recording, under).zero
+    first = float(recording.time[0]) if is_far(recording.time) else 0.0
+    if clock is not None:
+        notes.append(clock.sentence)
+    elif first and recording.clock.zero == "known":
+        notes.append(
+            f"its stamps begin at {first:.10g} s, further from zero than they last: read as a clock without a zero"
+        )
     floors = noise_floors(recording)
     return {
         "is": "recording",
@@ -105,7 +115,9 @@ def _recording(
         "start": float(recording.time[0]),
         "end": float(recording.time[-1]),
         "step": float(np.median(np.diff(recording.time))) if recording.time.size > 1 else 0.0,
-        "notes": list(recording.notes),
+        "first": first,
+        "notes": notes,
+        **({} if clock is None else {"clock": clock.answer}),
         "channels": [
             {
                 "channel": channel,
@@ -115,7 +127,7 @@ def _recording(
             }
             for channel in recording.channels
         ],
-        "findings": [vars(finding) for finding in prechecks(recording, gravity=gravity)],
+        "findings": [vars(f) for f in prechecks(recording, gravity=gravity)],
     }
 
 
@@ -138,7 +150,9 @@ def _print(name: str, row: dict[str, Any]) -> None:
         return
     from rollover.prechecks import when
 
-    span = f"{row['samples']} samples, {when(row['start'], row['end'], row['step'])}"
+    first, step = row["first"], row["step"]
+    span = f"{row['samples']} samples, {when(row['start'] - first, row['end'] - first, step)}"
+    span += f" from its first stamp at {first:.10g} s" if first else ""
     print(f"{name}: recording, in order: {row['title']}, {span}")
     for channel in row["channels"]:
         noise = "noise not known" if channel["noise"] is None else f"noise {channel['noise']:.3g} {channel['unit']}"
@@ -146,6 +160,6 @@ def _print(name: str, row: dict[str, Any]) -> None:
     for note in row["notes"]:
         print(f"  note: {note}")
     for f in row["findings"]:
-        print(f"  {f['check']}: {f['channel']}, {when(f['start'], f['end'], row['step'])}: {f['sentence']}")
+        print(f"  {f['check']}: {f['channel']}, {when(f['start'] - first, f['end'] - first, step)}: {f['sentence']}")
     if all(f["check"] == "wrap-around" for f in row["findings"]):
         print("  no fault of a sensor found")

@@ -57,6 +57,7 @@ def account(
             "simulations": found.simulations,
             "seconds": found.seconds,
             "prechecks": list(prechecks),
+            "clocks": {name: zero.answer for name, zero in found.clocks.items()},
             "notes": list(found.notes),
             "versions": versions(),
         }

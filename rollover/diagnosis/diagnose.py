@@ -51,7 +51,7 @@ from rollover.diagnosis.statements import (
     places,
     sentence,
 )
-from rollover.diagnosis.triggers import from_first_contact
+from rollover.diagnosis.triggers import at_their_zeros
 from rollover.diagnosis.verdict import Degree, Diagnosis, Named
 from rollover.diagnosis.zeros import by_zeros, with_zeros
 from rollover.drop import unfit
@@ -81,9 +81,8 @@ def diagnose(
     `recordings` are (name, recording); `hold_out` names those that are never fitted, otherwise each condition is left
     out in turn. `tolerance` is the share of a channel's range by which a scenario that lacks nothing may still miss it:
     what is smaller counts as noise. `crew` works off the fits, in children if it has any; the answer is the same.
-    Raises `InputError` for a condition that the scenario does not know, a clock that nothing tells the zero of, and
-    recordings without any channel that is simulated; ``ValueError`` for a name in `hold_out` that is
-    none, and for a tolerance outside 0 to 1.
+    Raises `InputError` for an unknown condition, a clock that nothing tells the zero of, and recordings without any
+    channel that is simulated; ``ValueError`` for a name in `hold_out` that is none, a tolerance outside 0 to 1.
     """
     began = clock.perf_counter()
     names = [name for name, _ in recordings]
@@ -93,12 +92,11 @@ def diagnose(
     if not 0.0 <= tolerance < 1.0:
         raise ValueError(f"tolerance: not a share of a range, got {tolerance:g}; at least 0 and below 1")
     crew = crew or Crew()
-    recordings, zeroed = from_first_contact(scenario, [(name, continuous(r)) for name, r in recordings])
-    rounded: list[str] = []
-    if isinstance(scenario.vehicle, Striker):  # what little errors of a start do to an overturn is chance, see `chaos`
-        recordings, rounded = to_the_last_digit(recordings)
+    recordings, zeros = at_their_zeros(scenario, [(name, continuous(r)) for name, r in recordings])
+    is_drop = isinstance(scenario.vehicle, Striker)  # what little errors do to an overturn is chance, see `chaos`
+    recordings, rounded = to_the_last_digit(recordings) if is_drop else (recordings, [])
     every, notes = _evidence(scenario, recordings, crew)
-    notes += zeroed + rounded
+    notes += [*(f"{n}: {zero.sentence}" for n, zero in zeros.items()), *rounded]
     every = [replace(e, model_error=float(np.hypot(e.model_error, tolerance))) for e in every]
     asked = Asked(scenario=scenario, recordings=dict(recordings), hold_out=hold_out, say=say, crew=crew, began=began)
     some, shared = slips_of(every)
@@ -109,7 +107,7 @@ def diagnose(
         # beside a factor so large what else is missing may be out of sight
         other = _diagnosed(asked, without(every, [*some, *shared]), [*some, *shared, *wrong], notes)
         found = other if other.effects else found
-    return found
+    return replace(found, clocks=zeros)
 
 
 @dataclass(frozen=True, kw_only=True)

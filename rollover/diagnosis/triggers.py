@@ -13,10 +13,11 @@ import numpy as np
 
 from rollover.diagnosis.evidence import ALONE, Evidence
 from rollover.diagnosis.simulator import set_up
-from rollover.faults import InputError
+from rollover.faults import Fault, InputError
 from rollover.onset import CLEAR, IN_A_ROW, QUIET, UntoldError, is_apart, is_quiet, timed
 from rollover.recording import Clock, Recording
 from rollover.scenario import Scenario
+from rollover.stamps import Zero
 
 SAME = 0.01  # sigmas: a zero that is where it is stated to be
 
@@ -26,40 +27,53 @@ def from_first_contact(
 ) -> tuple[list[tuple[str, Recording]], list[str]]:
     """The recordings, those whose clock is in doubt with the zero that they show, and a line for each of these.
 
+    Raises `InputError`, see `at_their_zeros`.
+    """
+    found, zeros = at_their_zeros(scenario, recordings)
+    return found, [f"{name}: {zero.sentence}" for name, zero in zeros.items()]
+
+
+def at_their_zeros(
+    scenario: Scenario, recordings: Sequence[tuple[str, Recording]]
+) -> tuple[list[tuple[str, Recording]], dict[str, Zero]]:
+    """The recordings, those whose clock is in doubt with the zero that they show, and these zeros by name.
+
     In doubt is a zero that is unknown, may be off by more than where one is unknown, or shares no time with the
     scenario. Raises `InputError` for all of the latter that tell of no zero.
     """
-    found, notes, faults = [], [], []
+    found: list[tuple[str, Recording]] = []
+    zeros: dict[str, Zero] = {}
+    faults: list[Fault] = []
     for name, recording in recordings:
         try:
-            moved, note = _moved(scenario, name, recording)
+            moved, zero = _moved(scenario, name, recording)
         except InputError as e:
             faults += e.faults
             continue
         found.append((name, moved))
-        notes += note
+        zeros |= {} if zero is None else {name: zero}
     if faults:
         raise InputError(*faults)
-    return found, notes
+    return found, zeros
 
 
-def _moved(scenario: Scenario, name: str, recording: Recording) -> tuple[Recording, list[str]]:
+def _moved(scenario: Scenario, name: str, recording: Recording) -> tuple[Recording, Zero | None]:
     under, clock = set_up(scenario, recording), recording.clock
     apart = is_apart(recording, under)
     if not (apart or clock.zero == "unknown" or (clock.within or 0.0) > ALONE):
-        return recording, []
+        return recording, None
     try:
         at = timed(name, recording, under, trusting=True)
     except UntoldError:
         if apart:
             raise
-        return recording, []  # the shift that is fitted may tell
+        return recording, None  # the shift that is fitted may tell
     if at.zero is None:
-        return recording, []
-    loose = replace(at.recording, clock=Clock(zero="unknown"))
+        return recording, None
+    loose = Clock(zero="unknown")
     if abs(at.zero.late) < SAME * at.zero.sigma:
-        return (recording if clock == loose.clock else replace(recording, clock=loose.clock)), []
-    return loose, [f"{name}: {at.zero.sentence}"]
+        return (recording if clock == loose else replace(recording, clock=loose)), None
+    return replace(at.recording, clock=loose), at.zero
 
 
 def first_shown(e: Evidence) -> Iterator[float]:

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from rollover.stamps import Zero
+
 Verdict = Literal["no-mismatch", "parameter", "sensor", "missing-physics", "unexplained", "cannot-tell"]
 
 
@@ -133,5 +135,6 @@ class Diagnosis:
     seconds: float
     degrees: tuple[Degree, ...] = ()
     notes: tuple[str, ...] = ()
+    clocks: Mapping[str, Zero] = field(default_factory=dict)  # zeros that were found, of clocks in doubt
     grids: Mapping[str, tuple[float, ...]] = field(default_factory=dict)  # of full runs: centre of the elements, m
     empirical: Law | None = None  # where no effect explains the mismatch

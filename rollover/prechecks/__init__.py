@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from rollover.attitude import continuous
 from rollover.channels import describe
@@ -17,6 +18,7 @@ from rollover.prechecks.rails import rails, shared
 from rollover.prechecks.samples import clipping, gaps, spikes, stuck
 from rollover.prechecks.timebase import MOVING, lost, stamps
 from rollover.recording import Recording
+from rollover.stamps import from_first, is_far
 
 __all__ = ["Finding", "instant", "noise_floors", "prechecks", "shared_rails", "when"]
 
@@ -25,7 +27,7 @@ GRAVITY = 9.81  # m/s2
 
 def noise_floors(recording: Recording) -> dict[str, NoiseFloor]:
     """Noise floor of each channel that is long enough to have one."""
-    return {name: t.floor for name, t in _traces(continuous(recording)).items()}
+    return {name: t.floor for name, t in _traces(continuous(_from_first(recording))).items()}
 
 
 def prechecks(
@@ -38,12 +40,14 @@ def prechecks(
     """
     if recording.source == "simulation":
         return ()
+    stamped = list(stamps(recording))
+    first = float(recording.time[0]) if is_far(recording.time) else 0.0
+    recording = _from_first(recording)
     traces, as_read = _traces(continuous(recording)), _traces(recording)
     stated = recording.conditions.get("vehicle.mass")
     mass = float(stated) if mass is None and isinstance(stated, (int, float)) else mass
     found = [*free_fall(traces, gravity), *rest(traces, mass, gravity), *disagreements(traces, seed=seed)]
     found += zero_offsets(traces, mass, gravity, {f.channel for f in found if f.check == "free-fall"})
-    found += stamps(recording)
     is_vehicle = any(name.startswith(VEHICLE) for name in traces)
     for name, t in traces.items():
         unit = describe(name).unit
@@ -60,6 +64,7 @@ def prechecks(
             *leaps(t, unit, recording.cfc.get(name)),
         ]
     found += _stated(recording, traces)
+    found = [replace(f, start=f.start + first, end=f.end + first) for f in found] + stamped
     return tuple(sorted(found, key=lambda f: (f.start, f.channel, f.check)))
 
 
@@ -67,6 +72,11 @@ def shared_rails(recordings: Mapping[str, Recording]) -> list[tuple[str, Finding
     """(recording, finding) where a channel's peak is the same to the last digit in several measured recordings."""
     measured = {name: r for name, r in recordings.items() if r.source != "simulation"}
     return list(shared({name: _traces(r) for name, r in measured.items()}))
+
+
+def _from_first(recording: Recording) -> Recording:
+    """Stamps far from zero, such as the hours of a day, counted from the first: they say nothing, and cost digits."""
+    return replace(recording, time=from_first(recording.time)) if is_far(recording.time) else recording
 
 
 def _traces(recording: Recording) -> dict[str, Trace]:
