@@ -22,6 +22,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from rollover.writing import put
 from viz.viewer import viewer_binary
 
 TEMPLATE = Path(__file__).parent / "templates" / "viewer.html"
@@ -46,13 +47,7 @@ def write_page(recording: Path, path: Path, *, title: str, footer: str = "") -> 
     if not recording.is_file():
         raise FileNotFoundError(f"{recording}: no such recording")
     text = page(recording.read_bytes(), installed(), title=title, footer=footer)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_text(text, encoding="utf-8")
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
+    put(path, lambda at: at.write_text(text, encoding="utf-8"))
 
 
 def page(recording: bytes, viewer: Viewer, *, title: str, footer: str = "") -> str:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from rollover.commands.door import AsJson, answering, app, manual
-from rollover.faults import Fault, InputError
+from rollover.faults import Fault, InputError, excerpt
 
 
 @app.command(
@@ -106,17 +106,19 @@ def _recording(name: str, profile: Path | None, scenario: str | None) -> dict[st
 
 
 def _print(name: str, row: dict[str, Any]) -> None:
+    from rollover.console import tell
+
     if row["is"] != "recording":
-        print(f"{name}: {row['is']}, in order")
+        tell(f"{name}: {row['is']}, in order")
         return
     span = f"{row['samples']} samples, {row['start']:.6g} to {row['end']:.6g} s"
-    print(f"{name}: recording, in order: {row['title']}, {span}")
+    tell(f"{name}: recording, in order: {excerpt(row['title'])}, {span}")
     for channel in row["channels"]:
         noise = "noise not known" if channel["noise"] is None else f"noise {channel['noise']:.3g} {channel['unit']}"
-        print(f"  {channel['channel']}: {noise}")
+        tell(f"  {channel['channel']}: {noise}")
     for note in row["notes"]:
-        print(f"  note: {note}")
+        tell(f"  note: {note}")
     for f in row["findings"]:
-        print(f"  {f['check']}: {f['channel']}, {f['start']:.6g} to {f['end']:.6g} s: {f['sentence']}")
+        tell(f"  {f['check']}: {f['channel']}, {f['start']:.6g} to {f['end']:.6g} s: {f['sentence']}")
     if not row["findings"]:
-        print("  no fault of a sensor found")
+        tell("  no fault of a sensor found")

@@ -39,23 +39,34 @@ def import_(
     as_json: AsJson = False,
 ) -> None:
     """Turn recordings of other formats into rollover-recording/1 files."""
+    from dataclasses import replace
+
+    from rollover import console
     from rollover.importers import write_recording
+    from rollover.names import distinct, inside
+    from rollover.writing import hold
 
     endings = ("csv", "parquet", "mme.zip")
     if to not in endings:
         raise InputError(Fault(file="--to", message=f"no such format, got {to!r}; {', '.join(endings)} are allowed"))
     folder = out or Path("out", "import", source.name.split(".")[0])
     made, rows = list(_recordings(source, kind, profile, select)), []  # all are read before the first is written
-    targets = [folder / f"{name}.{to}" for name, _ in made]
+    names = distinct((name for name, _ in made), f".{to}", file=str(source))
+    targets = [inside(folder, f"{names[name]}.{to}") for name, _ in made]
     for target in targets:
+        hold(target)
         if target.exists() and not force:
             raise InputError(Fault(file=str(target), message="exists; --force replaces it, --out leaves it"))
-    for target, (_, recording) in zip(targets, made, strict=True):
+    for target, (name, recording) in zip(targets, made, strict=True):
+        if names[name] != name:
+            what = f"stands for {name!r}, which is no name for a file"
+            recording = replace(recording, notes=(*recording.notes, what))
+            console.say(f"{target}: {what}")
         write_recording(recording, target, force=force)
         channels = list(recording.channels)
         rows.append({"file": str(target), "samples": recording.time.size, "channels": channels})
         if not as_json:
-            print(f"{target}: {recording.time.size} samples of {len(channels)} channels")
+            console.tell(f"{target}: {recording.time.size} samples of {len(channels)} channels")
     if as_json:
         print(json.dumps({"files": rows}, indent=2))
 

@@ -80,7 +80,8 @@ def recordings_at(path: Path) -> list[Path]:
     """A recording's own path, or those of all in a folder that is none itself. Raises `InputError`."""
     if not path.is_dir() or (path / "channels.parquet").is_file() or any(i.sniff(path) for i in importers().values()):
         return [path]
-    files = [p for p in sorted(path.iterdir()) if p.is_file() and p.suffix not in NOT_RECORDINGS]
+    shown = (p for p in sorted(path.iterdir()) if not p.name.startswith("."))
+    files = [p for p in shown if p.is_file() and p.suffix not in NOT_RECORDINGS]
     if not files:
         raise InputError(Fault(file=str(path), message="no recordings in this folder; tables such as NAME.csv are"))
     return files

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from rollover.importers.hdf5_guard import stands_alone
 from rollover.importers.importer import Importer, check_claim, library, reading, starts_with
 from rollover.importers.sidecar import Described
 from rollover.importers.signals import Signal, assemble
@@ -26,6 +27,7 @@ def _read(path: Path, profile: Described | None) -> Recording:
             found[name] = thing
 
     with reading(path, "HDF5"), h5py.File(path, "r") as file:
+        stands_alone(file, path)
         file.visititems(keep)
         for name, dataset in found.items():
             if profile is not None and name not in profile.columns:
