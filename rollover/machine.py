@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 from concurrent.futures import BrokenExecutor
 from pathlib import Path
 
@@ -41,6 +42,6 @@ def told(fault: OSError | MemoryError | BrokenExecutor, target: Path | None) -> 
         # what stands for a short while only, under a hidden name, says nobody anything
         if named and (target is None or not any(part.startswith(".") for part in Path(named[-1]).parts)):
             place = named[-1]
-        cause = fault.strerror or str(fault) or type(fault).__name__
+        cause = os.strerror(fault.errno) if fault.errno else str(fault) or type(fault).__name__
         cure = _CURES.get(fault.errno or 0, "mend it, and start again")
     return str(Fault(file=place, message=f"{cause[:1].lower()}{cause[1:]}: {cure}; {_STANDS}"))

@@ -85,7 +85,7 @@ def _serving(binary: Path) -> Iterator[int]:
     port, other = _free_ports()
     command = [str(binary), "--serve-web", "--bind", "127.0.0.1", "--web-viewer-port", str(port), "--port", str(other)]
     nowhere = subprocess.DEVNULL
-    quiet = {"RUST_LOG": "error", **os.environ}
+    quiet = {**os.environ, "RUST_LOG": "error"}
     subprocess.run([binary, "analytics", "disable"], check=False, stdout=nowhere, stderr=nowhere, env=quiet)
     child = subprocess.Popen(command, stdout=nowhere, stderr=nowhere, env=quiet)
     try:
