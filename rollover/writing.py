@@ -28,6 +28,8 @@ from typing import Any
 from rollover.faults import Fault, InputError
 
 PART, OLD, COMMIT = ".part", ".old", ".commit"
+NOTES = "fits"  # what a diagnosis has fitted so far, for a next start to go on with
+SCRATCH = "rollover-"  # how temporary folders begin
 _MOST_BYTES = 200  # of a name that others are made of; with what is added it stays below the 255 of a file system
 _MODES = 0o666, 0o777
 
@@ -69,10 +71,11 @@ def hold(target: Path) -> None:
 
 
 @contextlib.contextmanager
-def whole(folder: Path, commit: Callable[[Path, Path], None] | None = None) -> Iterator[Path]:
+def whole(folder: Path, prepare: Callable[[Path, Path], Callable[[], None] | None] | None = None) -> Iterator[Path]:
     """Fill a temporary folder that takes the place of `folder` at the very end, or leaves nothing behind.
 
-    `commit` (part, target) brings it there in another way than `exchange`.
+    `prepare` (part, target) may give what brings it there instead; from then on that holds, and the next start of its
+    command finishes what it leaves undone.
     """
     target = _resolved(folder)
     with _held(target):
@@ -82,10 +85,14 @@ def whole(folder: Path, commit: Callable[[Path, Path], None] | None = None) -> I
         try:
             part.chmod(_MODES[1] & ~_umask())  # mkdtemp makes it private
             yield part
-            (commit or exchange)(part, target)
+            act = prepare(part, target) if prepare is not None else None
+            if act is None:
+                exchange(part, target)
         except BaseException:
             shutil.rmtree(part, ignore_errors=True)
             raise
+        if act is not None:
+            act()
 
 
 @contextlib.contextmanager
@@ -160,7 +167,26 @@ def exchange(part: Path, target: Path) -> None:
 
 def own(target: Path, name: str) -> bool:
     """Whether a file is one of those that stand beside `target`, or in it, while it is written."""
-    return name == f"{_prefix(target)}lock" or _left(target).fullmatch(name) is not None
+    return name in (f"{_prefix(target)}lock", f"{_prefix(target)}{NOTES}") or _left(target).fullmatch(name) is not None
+
+
+def notes(target: Path) -> Path:
+    """Where a command may keep what it has worked out so far, until its results stand there."""
+    target = _resolved(target)
+    return _place(target) / f"{_prefix(target)}{NOTES}"
+
+
+@contextlib.contextmanager
+def scratch() -> Iterator[Path]:
+    """A temporary folder, away from all results; those that killed processes left go first."""
+    for left in Path(tempfile.gettempdir()).glob(f"{SCRATCH}*"):
+        with contextlib.suppress(OSError, InputError):
+            mine = not hasattr(os, "getuid") or left.lstat().st_uid == os.getuid()
+            if mine and not left.is_symlink() and (left / ".lock").is_file():
+                with _locked(left / ".lock", left):
+                    shutil.rmtree(left, ignore_errors=True)
+    with tempfile.TemporaryDirectory(prefix=SCRATCH) as name, _locked(Path(name) / ".lock", Path(name)):
+        yield Path(name)
 
 
 def sweep(folder: Path) -> None:

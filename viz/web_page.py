@@ -13,20 +13,23 @@ import functools
 import gzip
 import html
 import http.client
-import json
 import os
+import re
 import socket
 import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from rollover.writing import put
+from viz.embedded import embedded, in_script, policy
 from viz.viewer import viewer_binary
 
 TEMPLATE = Path(__file__).parent / "templates" / "viewer.html"
 SCRIPT, PROGRAM = "/re_viewer.js", "/re_viewer_bg.wasm"
+SCRIPTS = re.compile(r"<script>(.*?)</script>", re.DOTALL)  # those of the template, which run
+OWN_POLICY = ("script-src 'wasm-unsafe-eval'", "img-src data: blob:", "media-src data: blob:", "font-src data:")
 PATIENCE = 30.0  # s, until the viewer serves its page
 
 
@@ -55,18 +58,19 @@ def page(recording: bytes, viewer: Viewer, *, title: str, footer: str = "") -> s
     parts = {
         "title": html.escape(title),
         "footer": html.escape(footer),
-        "name": _in_script(json.dumps(title)),
-        "script": _in_script(viewer.script),
+        "name": embedded(title),
+        "script": in_script(viewer.script),
         "program": base64.b64encode(viewer.program).decode("ascii"),
         "recording": base64.b64encode(gzip.compress(recording, 6, mtime=0)).decode("ascii"),
     }
-    pieces = TEMPLATE.read_text(encoding="utf-8").split("@@")  # every second one is a part's name
+    template = TEMPLATE.read_text(encoding="utf-8")
+    parts["policy"] = policy((_filled(text, parts) for text in SCRIPTS.findall(template)), *OWN_POLICY)
+    return _filled(template, parts)
+
+
+def _filled(template: str, parts: Mapping[str, str]) -> str:
+    pieces = template.split("@@")  # every second one is a part's name
     return "".join(parts[piece] if k % 2 else piece for k, piece in enumerate(pieces))
-
-
-def _in_script(text: str) -> str:
-    """Text as it may stand in a script element, which ends at the first ``</script`` wherever that stands."""
-    return text.replace("</script", "<\\/script").replace("<!--", "<\\!--")
 
 
 @functools.cache
