@@ -10,12 +10,13 @@ import numpy as np
 
 from rollover.document.slot import Slot
 from rollover.document.tree import Node, planted, read, shown
-from rollover.faults import Fault, InputError, nearest
+from rollover.faults import Fault, InputError, excerpt, nearest
 
 BASE = "base"
 ENDINGS = (".yaml", ".yml")
 GRIDS = (".csv", ".npy")
 MOST_NODES = 500_000
+MOST_ECHOED = 80  # characters of what a reader says of a file that is no grid: it may quote the file
 
 
 def shipped_folder() -> Path:
@@ -110,7 +111,8 @@ def _grid(node: Node, path: str) -> Node:
             found = np.loadtxt(file, delimiter=",", comments="#", ndmin=2)
         rows = np.asarray(found, dtype=float)
     except (OSError, ValueError, EOFError) as e:
-        raise node.place.fault(path, f"{shown(file)} is no grid of numbers: {str(e).splitlines()[0]}") from None
+        what = f"{shown(file)} is no grid of numbers"
+        raise node.place.fault(path, f"{what}: {excerpt(str(e).splitlines()[0], MOST_ECHOED)}") from None
     if rows.ndim != 2 or rows.size > MOST_NODES or not np.isfinite(rows).all():
         what = f"{shown(file)} is no grid of finite numbers, got shape {rows.shape}"
         raise node.place.fault(path, f"{what}; two dimensions and at most {MOST_NODES} numbers are allowed")
@@ -132,7 +134,9 @@ def _included(node: Node, slot: Slot, chain: tuple[Path, ...], path: str) -> Nod
         raise node.place.fault(path, f"a file includes itself, got {' -> '.join(names)}; no circles")
     root = read(file)
     if not isinstance(root.value, Mapping):
-        raise root.place.fault("", f"not a mapping, got {root.plain!r}; {slot.allowed()} is needed")
+        # a file that somebody else's scenario names may be anything: what it is, not what stands in it
+        what = "a list" if isinstance(root.value, tuple) else "a single value"
+        raise root.place.fault("", f"not a mapping, got {what}; {slot.allowed()} is needed")
     return expand(root, slot, (*chain, file.resolve()), path)
 
 
