@@ -18,6 +18,7 @@ import errno
 import hashlib
 import os
 import re
+import secrets
 import shutil
 import sys
 import tempfile
@@ -153,16 +154,15 @@ def exchange(part: Path, target: Path) -> None:
     if not target.exists():
         os.rename(part, target)
         return
-    old = Path(tempfile.mkdtemp(prefix=_prefix(target), suffix=OLD, dir=target.parent))
+    old = target.with_name(f"{_prefix(target)}{secrets.token_hex(4)}{OLD}")  # it takes no room: the disk may be full
+    os.rename(target, old)
     try:
-        os.rename(target, old / "was")
         os.rename(part, target)
     except BaseException:
-        if (old / "was").exists() and not target.exists():
-            os.rename(old / "was", target)
+        if not target.exists():
+            os.rename(old, target)
         raise
-    finally:
-        shutil.rmtree(old, ignore_errors=True)
+    shutil.rmtree(old, ignore_errors=True)
 
 
 def own(target: Path, name: str) -> bool:
@@ -220,9 +220,9 @@ def _settle(target: Path) -> None:
         found = known.fullmatch(entry.name)
         if found is None:
             continue
-        if found[1] == OLD and (entry / "was").exists() and not target.exists():
-            os.rename(entry / "was", target)
-        if found[1] == COMMIT and not entry.is_symlink() and entry.is_dir():
+        if found[1] == OLD and not target.exists():
+            os.rename(entry, target)
+        elif found[1] == COMMIT and not entry.is_symlink() and entry.is_dir():
             _spread(entry, place, "" if place == target else target.name)
         else:
             _removed(entry)
@@ -273,26 +273,20 @@ def _unmade(folder: Path) -> Iterator[None]:
 def _locked(path: Path, target: Path) -> Iterator[None]:
     """A lock that ends with its process; its file goes with it, and is taken over where it was left."""
     flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
-    while True:
+    handle, again = -1, True
+    while again:  # whoever had it may have removed it just now
         handle = os.open(path, flags, 0o644)
-        try:
-            taken = _taken(handle)
+        if not _taken(handle):
             told = os.read(handle, 20).decode("ascii", "replace").strip()
-            if not taken:
-                by = f" {told}" if told.isdecimal() else ""
-                what = f"is being written by another process{by}; wait for it, or another --out"
-                raise InputError(Fault(file=str(target), message=what))
-            if not path.exists() or not os.path.samestat(os.fstat(handle), path.stat()):
-                os.close(handle)  # whoever had it has just removed it
-                continue
-            os.ftruncate(handle, 0)
-            os.pwrite(handle, f"{os.getpid()}\n".encode(), 0) if hasattr(os, "pwrite") else None
-        except BaseException:
-            with contextlib.suppress(OSError):
-                os.close(handle)
-            raise
-        break
+            os.close(handle)
+            what = f"is being written by another process{f' {told}' if told.isdecimal() else ''}"
+            raise InputError(Fault(file=str(target), message=f"{what}; wait for it, or another --out"))
+        again = not path.exists() or not os.path.samestat(os.fstat(handle), path.stat())
+        if again:
+            os.close(handle)
     try:
+        os.ftruncate(handle, 0)
+        os.write(handle, f"{os.getpid()}\n".encode())  # which a full disk refuses before any work is done
         yield
     finally:
         with contextlib.suppress(OSError):
