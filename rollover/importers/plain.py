@@ -9,7 +9,7 @@ import numpy as np
 
 from rollover.channels import describe
 from rollover.document import dump_mapping, to_mapping
-from rollover.faults import Fault, InputError
+from rollover.faults import Fault, InputError, seen
 from rollover.importers.sidecar import Described, Sidecar, read_described
 from rollover.importers.signals import Signal, assemble
 from rollover.names import inside
@@ -78,7 +78,7 @@ def write(recording: Recording, path: Path, *, force: bool = False) -> None:
     inside(path.parent, sidecar.name)
     with together(path) as part:
         columns = {"time": recording.time, **recording.channels}
-        text = f"# {_one_line(recording.title)}\n" + dump_mapping(_about(recording))
+        text = f"# {seen(_one_line(recording.title))}\n" + dump_mapping(_about(recording))
         (part / sidecar.name).write_text(text, encoding="utf-8")
         (write_csv if path.suffix == ".csv" else write_parquet_columns)(columns, part / path.name)
 
