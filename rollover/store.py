@@ -17,7 +17,8 @@ import numpy as np
 from rollover.document import content_hash, dump
 from rollover.faults import Fault, InputError
 from rollover.recording import write_parquet
-from rollover.writing import hold, own, whole
+from rollover.writing import hold, own
+from rollover.writing import whole as whole
 
 if TYPE_CHECKING:
     from rollover.loads import PeakLoad

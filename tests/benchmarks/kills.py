@@ -6,6 +6,7 @@ By hand: ``python -m tests.benchmarks.kills [KILLS] [SEED]``. A few of them are 
 from __future__ import annotations
 
 import json
+import os
 import random
 import signal
 import subprocess
@@ -13,6 +14,9 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+
+from rollover import writing
+from rollover.update import JOURNAL, finish, update
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -52,6 +56,76 @@ def kill_runs(folder: Path, kills: int, seed: int = 1) -> list[str]:
     return [*wrong, *unlike(out, first.stdout)]
 
 
+def kill_writers(folder: Path, kills: int, seed: int = 1) -> list[str]:
+    """What was found wrong in `kills` ends of a process that does nothing but write, in each of the three ways.
+
+    It writes one generation of files after the other; after its end the next start must find whole ones only.
+    """
+    pick, wrong = random.Random(seed), []
+    began = time.perf_counter()
+    write_on(folder, 0, 1)
+    lasts = time.perf_counter() - began
+    ran = latest = 1
+    for k in range(kills):
+        child = os.fork()
+        if child == 0:
+            try:
+                write_on(folder, ran)
+            finally:
+                os._exit(1)
+        time.sleep(pick.uniform(0.0, 2.0 * lasts))
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        with writing.working():
+            begin(folder)
+            found = generations(folder)
+            if any(len(of) > 1 for of in found.values()):
+                wrong.append(f"kill {k}: half the one and half the other: {found}")
+            latest = max((max(of) for of in found.values() if of), default=0)
+            if any(min(of, default=0) < ran for of in found.values()):
+                wrong.append(f"kill {k}: what was whole before is gone: {found}, {ran} stood there")
+            ran = min(min(of, default=0) for of in found.values())
+        left = [p.name for p in folder.rglob("*") if p.name.startswith(".")]
+        wrong += [f"kill {k}: left: {left}"] if left else []
+    return wrong if latest > kills // 4 else [*wrong, f"only {latest} generations: it was killed before it wrote"]
+
+
+def begin(folder: Path) -> None:
+    """Hold what is written, as commands do at their start."""
+    (folder / "baselines").mkdir(exist_ok=True)
+    writing.hold(folder / "baselines")
+    finish(folder / "baselines" / JOURNAL)
+    writing.sweep(folder / "baselines")
+    for name in ("run", "d.csv", "account"):
+        writing.hold(folder / name)
+
+
+def write_on(folder: Path, from_: int, count: int = 10**9) -> None:
+    """Write generation after generation until the end."""
+    with writing.working():
+        begin(folder)
+        for n in range(from_ + 1, from_ + 1 + count):
+            text = f"{n}\n" * 2000
+            with writing.whole(folder / "run") as part:
+                for name in ("run.json", "channels", "report"):
+                    (part / name).write_text(text)
+            with writing.together(folder / "d.csv") as part:
+                (part / "d.yaml").write_text(text)
+                (part / "d.csv").write_text(text)
+            with update(folder / "account", {folder / "baselines" / f"{x}.yaml": text for x in "ab"}) as part:
+                (part / "regress.json").write_text(text)
+
+
+def generations(folder: Path) -> dict[str, set[int]]:
+    """Which generations stand in each group of files that belong together; -1 for half a file."""
+    groups = {"run": "run/*", "pair": "d.*", "update": "baselines/*.yaml account/*"}
+    found: dict[str, set[int]] = {}
+    for group, patterns in groups.items():
+        texts = [p.read_text() for pattern in patterns.split() for p in folder.glob(pattern)]
+        found[group] = {int(t.split()[0]) if len(set(t.split())) == 1 and t.count("\n") == 2000 else -1 for t in texts}
+    return found
+
+
 def unlike(out: Path, first: str) -> list[str]:
     """How a results folder is not that of a whole run."""
     try:
@@ -70,8 +144,8 @@ def main() -> None:
     kills = int(sys.argv[1]) if len(sys.argv) > 1 else 100
     seed = int(sys.argv[2]) if len(sys.argv) > 2 else 1
     with tempfile.TemporaryDirectory() as name:
-        wrong = kill_runs(Path(name), kills, seed)
-    print("\n".join([*wrong, f"{kills} kills, {len(wrong)} faults"]))
+        wrong = kill_runs(Path(name, "runs"), kills, seed) + kill_writers(Path(name), 10 * kills, seed)
+    print("\n".join([*wrong, f"{kills} kills of runs, {10 * kills} of writers, {len(wrong)} faults"]))
     sys.exit(bool(wrong))
 
 

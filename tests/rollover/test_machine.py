@@ -354,7 +354,14 @@ def test_the_door_turns_it_into_a_status_and_not_a_bug(fault: Any, monkeypatch: 
 def test_killed_at_random_moments_nothing_is_lost_and_nothing_left(tmp_path: Path) -> None:
     from tests.benchmarks.kills import kill_runs
 
-    assert kill_runs(tmp_path, 5, seed=3) == []
+    assert kill_runs(tmp_path, 3, seed=3) == []
+
+
+@posix
+def test_killed_a_hundred_times_while_it_writes(tmp_path: Path) -> None:
+    from tests.benchmarks.kills import kill_writers
+
+    assert kill_writers(tmp_path, 100, seed=2) == []
 
 
 # ---- baselines

@@ -8,22 +8,25 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from rollover import store
 from rollover.baseline import Answer
+from rollover.calibrate import Calibration, Estimate, Score, Scores
 from rollover.loads import peak_loads
 from rollover.misfit import misfit
 from rollover.pair import pair, read
 from rollover.proof.tally import tally
 from rollover.recording import Recording
 from tests.rollover.diagnosed import sensor_at_fault, told
+from tests.rollover.studies import made_up
 from tests.viz import example
 from tests.viz.browser import CHROMIUM, has_browser
 from tests.viz.html import Parts
 from tests.viz.test_proof_page import row
-from tests.viz.test_study_page import written
-from viz import comparison_page, diagnosis_page, pair_page, proof_page, regression, report
+from tests.viz.test_study_page import account as made_account
+from viz import calibration_page, comparison_page, diagnosis_page, pair_page, proof_page, regression, report, study_page
 from viz.embedded import embedded, in_script, policy
 from viz.page import Cases, Details, Figure, Footer, Headline, Note, Pairs, Section, Table, render
 from viz.plots import Curve, history
@@ -43,8 +46,37 @@ MARKS = (
     "$\\frac{$ & </p>",
 )
 HOSTILE = " ".join(MARKS)
-KINDS = ("run", "compare", "two runs", "diagnose", "prove", "regress", "study", "every block", "viewer")
+KINDS = ("run", "compare", "two runs", "diagnose", "prove", "regress", "study", "calibrate", "every block", "viewer")
 ABOUT: dict[str, Any] = {"scenario_hash": HOSTILE, "versions": {HOSTILE: HOSTILE}}
+
+
+def calibrated() -> Calibration:
+    """A calibration with the marks in every word that is not the program's own."""
+    score = Score(over_noise=1.0, nrmse=0.1, iso18571=0.9, peak_force_error=0.01)
+    scores = Scores(recordings=(HOSTILE,), before=score, after=score)
+    values = dict.fromkeys(("start", "value", "low", "high", "alone_low", "alone_high"), 1.0)
+    words: dict[str, Any] = {"path": HOSTILE, "unit": HOSTILE, "method": "profile", "at_bound": "", "why": HOSTILE}
+    estimate = Estimate(**words, **values, bounds=(0.0, 2.0), open_low=False, open_high=False, determined=False)
+    scenario = replace(example.drop().scenario, title=HOSTILE)
+    return Calibration(
+        scenario=scenario,
+        calibrated=scenario,
+        estimates=(estimate, estimate),
+        correlation=np.eye(2),
+        condition=1.0,
+        combinations=(HOSTILE,),
+        clocks={HOSTILE: 0.001},
+        clock_sigma=1e-3,
+        noise={},
+        training=scores,
+        held_out=scores,
+        samples=9,
+        independent=3.0,
+        outliers=0,
+        widening=1.0,
+        starts_agreeing=(1, 1),
+        warnings=(HOSTILE,),
+    )
 
 
 def page_of(kind: str, folder: Path) -> str:
@@ -78,7 +110,11 @@ def page_of(kind: str, folder: Path) -> str:
         answer_ = Answer(scenario=HOSTILE, verdict="failed", sentence=HOSTILE, notes=(HOSTILE,))
         return regression.page([answer_], command=HOSTILE, scenario_hash=HOSTILE)
     if kind == "study":
-        return written(folder, 30).read_text(encoding="utf-8")
+        study, done = made_up(folder, 120)
+        study = replace(study, title=HOSTILE)
+        return study_page.page(study, done, made_account(study, done), command=HOSTILE)
+    if kind == "calibrate":
+        return calibration_page.page(calibrated(), command=HOSTILE, **ABOUT)
     if kind == "viewer":
         script = "var wasm_bindgen = async () => {}; // WebHandle </SCRIPT><script>" + RUN
         return viewer_page(b"rrd", Viewer(script=script, program=b""), title=HOSTILE, footer=HOSTILE)
@@ -117,7 +153,7 @@ def test_no_mark_runs_and_nothing_is_fetched(kind: str, tmp_path: Path) -> None:
         assert tab.evaluate("document.documentElement.dataset.marked") is None, "a mark ran"
         assert asked == [path.as_uri()]
         assert not [s for s in said if "Content Security Policy" in s], "a mark got as far as the policy"
-        if kind not in ("study", "viewer"):
+        if kind != "viewer":
             assert MARKS[0] in tab.inner_text("body"), "it is shown as the words that it is"
         if kind in ("study", "every block"):
             assert tab.locator(".cases .tools").first.is_visible(), "the page's own script runs"
