@@ -7,9 +7,13 @@ an upgrade never runs a stale kernel.
 
 from __future__ import annotations
 
+import atexit
+import errno
 import hashlib
 import os
+import shutil
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -46,6 +50,8 @@ __all__ = [
     "mark_warm",
     "register",
 ]
+
+VARIABLE = "NUMBA_CACHE_DIR"
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -108,13 +114,56 @@ def cache_folder() -> Path:
 
 
 _SOURCES = _sources_hash()
+ROOM = 64 << 20  # bytes that the machine code of all kernels takes, and as much again
+
+
+def _is_running(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def _kept_at() -> Path:
+    """Where machine code is kept: the folder for it, or where that cannot be written one that goes with this process.
+
+    That is said once; child processes are told by the same variable that a user may set.
+    """
+    given = config.CACHE_DIR
+    folder = Path(given) if given else cache_folder()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+        if not (folder / "warm").exists() and shutil.disk_usage(folder).free < ROOM:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return folder
+    except OSError as e:
+        what = f"Kernels cannot be kept in {folder} ({e.strerror or e}) and are compiled anew at every start, some 25 s"
+        print(f"{what}; {VARIABLE}=FOLDER names another place for them.", file=sys.stderr, flush=True)
+    for left in Path(tempfile.gettempdir()).glob("rollover-kernels-*-*") if sys.platform != "win32" else ():
+        with suppress(OSError, ValueError):
+            if left.lstat().st_uid == os.getuid() and not _is_running(int(left.name.split("-")[2])):
+                shutil.rmtree(left, ignore_errors=True)
+    passing = tempfile.mkdtemp(prefix=f"rollover-kernels-{os.getpid()}-")
+    atexit.register(shutil.rmtree, passing, ignore_errors=True)
+    config.CACHE_DIR = os.environ[VARIABLE] = passing
+    return Path(passing)
+
+
+KEPT = _kept_at()
+
+
+def is_warm() -> bool:
+    """Whether a run with kernels of these very sources has finished on this machine before."""
+    return (KEPT / "warm").exists()
 
 
 @contextmanager
 def _own_cache(function: Callable[..., Any]) -> Iterator[None]:
     """By module: machine code asks for the one it was made in, and a file of effects is loaded under another name."""
     before = config.CACHE_DIR
-    config.CACHE_DIR = str(Path(before or cache_folder()) / function.__module__)
+    config.CACHE_DIR = str(KEPT / function.__module__)
     try:
         yield
     finally:
@@ -161,16 +210,11 @@ def begin_law(function: Callable[..., None]) -> Any:
         return numba.cfunc(BEGIN, cache=True, error_model="numpy")(function)
 
 
-def is_warm() -> bool:
-    """Whether a run with kernels of these very sources has finished on this machine before."""
-    return (cache_folder() / "warm").exists()
-
-
 def mark_warm() -> None:
     """Note that all kernels have been compiled; where nothing can be written the next run compiles anew."""
     with suppress(OSError):
-        cache_folder().mkdir(parents=True, exist_ok=True)
-        (cache_folder() / "warm").touch()
+        KEPT.mkdir(parents=True, exist_ok=True)
+        (KEPT / "warm").touch()
 
 
 def _by_address(signature: Any) -> Any:

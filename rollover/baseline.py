@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import math
 import os
-import tempfile
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -21,6 +20,7 @@ from rollover.ensemble import Extreme, Spread, spreads
 from rollover.faults import Fault, InputError, hint
 from rollover.scenario import Scenario
 from rollover.store import versions
+from rollover.writing import staged
 
 FOLDER, EXCLUDED = "baselines", "excluded.yaml"
 STARTS = 5  # of an ensemble; one is enough where the loads are smooth
@@ -331,23 +331,23 @@ def by_hand(load: Load, starts: int) -> bool:
     return (load.tolerance, load.reason) != allowed(load.half_step_change, load.scatter, starts)
 
 
+def texts(folder_of: Mapping[Path, Baseline]) -> dict[Path, str]:
+    """What the files of baselines hold."""
+    return {path: document.dump(b, HEAD.format(name=b.scenario)) for path, b in folder_of.items()}
+
+
 def write(folder_of: Mapping[Path, Baseline]) -> None:
     """Write baselines to their files: none before all stand beside their places, and each whole or not at all."""
     parts: list[tuple[Path, Path]] = []
     try:
-        for path, baseline in folder_of.items():
+        for path, text in texts(folder_of).items():
             path.parent.mkdir(parents=True, exist_ok=True)
-            handle, part = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
-            parts.append((Path(part), path))
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(document.dump(baseline, HEAD.format(name=baseline.scenario)))
-            Path(part).chmod(path.stat().st_mode if path.exists() else 0o644)
-        for part_, path in parts:
-            os.replace(part_, path)
+            parts.append((staged(path, partial(Path.write_text, data=text, encoding="utf-8")), path))
+        for part, path in parts:
+            os.replace(part, path)
     finally:
-        for part_, _ in parts:
-            with suppress(FileNotFoundError):
-                part_.unlink()
+        for part, _ in parts:
+            part.unlink(missing_ok=True)
 
 
 HEAD = """Peak loads of {name} as they ought to be.

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
+from rollover.faults import excerpt, sentence
 from rollover.stamps import in_digits
 
 if TYPE_CHECKING:
@@ -31,9 +33,29 @@ EVERY = 5.0  # s between lines of progress where there is no terminal
 _READABLE = {"N": ("kN", 1e-3), "J": ("kJ", 1e-3), "m": ("mm", 1e3), "N s": ("N s", 1.0), "m/s2": ("g", 1.0 / 9.80665)}
 
 
-def say(sentence: str) -> None:
+class Plain(Console):
+    """A console on which words from data colour and move nothing, and of a long value the beginning stands."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**{"emoji": False, **options})
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        """Text of a line, of a sentence or of a table's cell."""
+        return super().render_str("\n".join(map(sentence, text.split("\n"))), **options)
+
+
+def _out() -> Console:
+    return Plain(highlight=False, markup=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
+
+
+def say(what: str) -> None:
     """One line on standard error."""
-    print(sentence, file=sys.stderr, flush=True)
+    print(sentence(what), file=sys.stderr, flush=True)
+
+
+def tell(lines: str) -> None:
+    """Lines on standard output."""
+    print("\n".join(sentence(line) for line in lines.split("\n")))
 
 
 @contextmanager
@@ -42,9 +64,10 @@ def progress(what: str, start: float, end: float) -> Iterator[Callable[[float, f
     if sys.stderr.isatty():
         from rich.progress import BarColumn, Progress, TextColumn
 
-        columns = (TextColumn(what), BarColumn(), TextColumn("{task.fields[state]}"))
-        with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-            task = bar.add_task(what, total=end - start, visible=False, state="")
+        name = TextColumn("{task.description}", markup=False)
+        columns = (name, BarColumn(), TextColumn("{task.fields[state]}", markup=False))
+        with Progress(*columns, console=Plain(stderr=True), transient=True) as bar:
+            task = bar.add_task(excerpt(what), total=end - start, visible=False, state="")
 
             def show(simulated: float, wall: float) -> None:
                 state = _state(simulated, wall, start, end)
@@ -66,10 +89,11 @@ def progress(what: str, start: float, end: float) -> Iterator[Callable[[float, f
 def counting(what: str) -> Iterator[Callable[..., None]]:
     """Give a callback (done, of, note) that shows how many are done: a bar on a terminal, otherwise a line at times."""
     if sys.stderr.isatty():
-        from rich.progress import MofNCompleteColumn, Progress, TextColumn
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-        columns = (*Progress.get_default_columns()[:2], MofNCompleteColumn(), TextColumn("{task.fields[note]}"))
-        with Progress(*columns, console=Console(stderr=True)) as bar:
+        words = (TextColumn(f"{{task.{field}}}", markup=False) for field in ("description", "fields[note]"))
+        columns = (next(words), BarColumn(), MofNCompleteColumn(), next(words))
+        with Progress(*columns, console=Plain(stderr=True)) as bar:
             task = bar.add_task(what, total=None, note="")
             yield lambda done, of, note="": bar.update(task, completed=done, total=of, note=note)
         return
@@ -109,8 +133,8 @@ def report(
     """The answer of a run on standard output; what took part of its time to compile tells no speed."""
     from rollover.loads import unconverged
 
-    out = Console(highlight=False, markup=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
-    out.print(run.scenario.title, style="bold")
+    out = _out()
+    out.print(excerpt(run.scenario.title), style="bold")
     if run.status == "done":
         speed = (run.stop_time - float(run.recording.time[0])) / run.wall_time if run.wall_time > 0.0 else 0.0
         pace = "most of it compiling, once" if compiled else f"{speed:.2g} x real time"
@@ -191,7 +215,7 @@ def _table(peaks: Sequence[PeakLoad]) -> Table:
 
 def regression(answers: Sequence[Answer], folder: str) -> None:
     """What changed, and one line for each scenario, on standard output."""
-    out = Console(highlight=False, markup=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
+    out = _out()
     table = Table(box=None, pad_edge=False)
     for heading in ("scenario", "", "runs", "wall s"):
         table.add_column(heading, justify="right" if heading in ("runs", "wall s") else "left")
@@ -230,7 +254,7 @@ def comparison(found: Sequence[Misfit], folder: str) -> None:
     """How well each recording is followed, a line for each channel."""
     from rollover.rating import Iso18571, NotRateable
 
-    out = Console(highlight=False, markup=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
+    out = _out()
     for each in found:
         out.print(each.recording, style="bold")
         table = Table(box=None, pad_edge=False)
@@ -268,7 +292,7 @@ def comparison(found: Sequence[Misfit], folder: str) -> None:
 
 def calibration(found: Calibration, folder: str) -> None:
     """Fitted values with their intervals, and what they gain."""
-    out = Console(highlight=False, markup=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
+    out = _out()
     table = Table(box=None, pad_edge=False)
     for heading in ("parameter", "unit", "was", "is", "95 % from", "to", "", ""):
         table.add_column(heading, justify="right" if heading in ("was", "is", "95 % from", "to") else "left")
@@ -298,7 +322,7 @@ def calibration(found: Calibration, folder: str) -> None:
 
 def diagnosis(found: Diagnosis, folder: str) -> None:
     """The verdict in a sentence, what was found with intervals, and what it gains."""
-    out = Console(highlight=False, markup=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
+    out = _out()
     out.print(f"{found.verdict}: {found.sentence}", style="bold")
     if found.effects:
         table = Table(box=None, pad_edge=False)
@@ -329,8 +353,8 @@ def diagnosis(found: Diagnosis, folder: str) -> None:
 
 def stability(answer: Mapping[str, Any], folder: str) -> None:
     """Static stability angles, a line for each heading, with the closed forms for stiff tyres beside."""
-    out = Console(highlight=False, markup=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
-    out.print(answer["vehicle"], style="bold")
+    out = _out()
+    out.print(excerpt(answer["vehicle"]), style="bold")
     table = Table(box=None, pad_edge=False)
     for heading in ("heading", "lift-off", "pivot ends", "on stop", "overturns", "stiff: pivot", "stiff: stop"):
         table.add_column(heading, justify="right")

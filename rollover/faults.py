@@ -3,9 +3,48 @@
 from __future__ import annotations
 
 import difflib
+import re
+import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+
+MOST_SHOWN = 300  # characters of a value in a message
+MOST_SAID = 1500  # characters of a message, which holds a value or two, what is allowed and a cure
+_JOINERS = "\u200c\u200d"  # without a picture of their own, but Persian and Hindi are not spelt without them
+_QUOTED = re.compile(rf"'[^']{{{MOST_SHOWN},}}'|\"[^\"]{{{MOST_SHOWN},}}\"|[^\s'\"]{{{MOST_SHOWN},}}")
+
+
+def unseen(character: str) -> bool:
+    """Whether a character is one that a terminal obeys instead of showing it, or that is no character at all."""
+    return unicodedata.category(character) in ("Cc", "Cf", "Cs", "Zl", "Zp") and character not in _JOINERS
+
+
+def seen(text: str) -> str:
+    """A text in which a terminal obeys nothing: what is `unseen` stands as its number, as in a string of Python."""
+    if text.isprintable():
+        return text
+    return "".join(c.encode("unicode_escape").decode("ascii") if unseen(c) else c for c in text)
+
+
+def excerpt(text: str, most: int = MOST_SHOWN) -> str:
+    """A value as it is shown: its beginning, and how long it is, where it is long."""
+    text = seen(text)
+    if len(text) <= most:
+        return text
+    end = f"... ({len(text)} characters)"
+    return text[: most - len(end)] + end
+
+
+def sentence(text: str) -> str:
+    """A message as it is shown: one line, of each value in it an excerpt."""
+    text = seen(text)
+    if len(text) < MOST_SHOWN:
+        return text
+    before, got, rest = text.partition("got ")
+    value, cure, allowed = rest.rpartition("; ") if "; " in rest else (rest, "", "")
+    text = _QUOTED.sub(lambda found: excerpt(found[0]), f"{before}{got}{excerpt(value)}{cure}{allowed}")
+    return excerpt(text, MOST_SAID)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,7 +58,9 @@ class Fault:
 
     def __str__(self) -> str:
         where = self.file if self.line is None else f"{self.file}:{self.line}"
-        return ": ".join(part for part in (where, self.path, self.message) if part)
+        return ": ".join(
+            part for part in (where and excerpt(where, MOST_SAID), excerpt(self.path), sentence(self.message)) if part
+        )
 
 
 class InputError(ValueError):

@@ -110,9 +110,11 @@ def updated(
     workers: int | None = None,
     time_limit: float = TIME_LIMIT,
     show: Show | None = None,
+    write: Callable[[Mapping[Path, Baseline]], None] = baselines.write,
 ) -> list[Answer]:
     """Draw up and write the baselines of all chosen scenarios that are not excluded, or of none.
 
+    `write` is handed those that are new, by their files.
     Raises `InputError`, also for a tolerance set by hand that has become too small, and `FailedUpdateError`.
     """
     answers: list[Answer] = []
@@ -148,7 +150,7 @@ def updated(
         if drawn is not before:
             new[path] = drawn
         answers.append(_written(drawn, before, scenario, plain, sum(o.wall_time for o in outcomes[file])))
-    baselines.write(new)
+    write(new)
     return answers
 
 

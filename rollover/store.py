@@ -5,12 +5,8 @@ from __future__ import annotations
 import csv
 import json
 import math
-import os
 import platform
-import shutil
-import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
@@ -21,6 +17,8 @@ import numpy as np
 from rollover.document import content_hash, dump
 from rollover.faults import Fault, InputError
 from rollover.recording import write_parquet
+from rollover.writing import hold, own
+from rollover.writing import whole as whole
 
 if TYPE_CHECKING:
     from rollover.loads import PeakLoad
@@ -53,7 +51,7 @@ def claim(folder: Path, scenario_hash: str, *, force: bool = False) -> Path:
     """Resolve a results folder after making sure that it may be written. Raises `InputError`, changes nothing.
 
     Results of the same scenario and versions may be written again; others only with `force`. A folder that holds
-    anything but results is never touched.
+    anything but results is never touched. A command holds it from here to its end, so that no other writes there.
     """
     target, names = _own_files(folder, (*FILES, VIEWER), RUN)
     if not names or force:
@@ -88,32 +86,18 @@ def claim_account(
 
 def _own_files(folder: Path, files: Sequence[str], first: str) -> tuple[Path, list[str]]:
     """The resolved folder and the names in it, none of which is foreign to `files`."""
+    if folder.exists() and not folder.is_dir():
+        raise _refused(folder, "not a folder, but a file; another --out is needed")
+    hold(folder)
     target = folder.resolve()
     if not target.exists():
         return target, []
-    if not target.is_dir():
-        raise _refused(folder, "not a folder, but a file; another --out is needed")
-    names = sorted(p.name for p in target.iterdir())
+    names = sorted(p.name for p in target.iterdir() if not own(target, p.name))
     foreign = [name for name in names if name not in files]
     if foreign or (names and first not in names):
         what = foreign[0] if foreign else names[0]
         raise _refused(folder, f"holds files that are not results, got {what!r}; another --out is needed")
     return target, names
-
-
-@contextmanager
-def whole(folder: Path) -> Iterator[Path]:
-    """Fill a temporary folder that takes the place of `folder` at the very end, or leaves nothing behind."""
-    target = folder.resolve()
-    target.parent.mkdir(parents=True, exist_ok=True)
-    part = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent))
-    try:
-        part.chmod(0o777 & ~_umask())  # mkdtemp makes it private
-        yield part
-        _swap(part, target)
-    except BaseException:
-        shutil.rmtree(part, ignore_errors=True)
-        raise
 
 
 def write(
@@ -201,28 +185,6 @@ def _answer(
         }
     )
     return answer
-
-
-def _swap(part: Path, target: Path) -> None:
-    if not target.exists():
-        os.rename(part, target)
-        return
-    old = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".old", dir=target.parent))
-    try:
-        os.rename(target, old / "was")
-        os.rename(part, target)
-    except BaseException:
-        if (old / "was").exists() and not target.exists():
-            os.rename(old / "was", target)
-        raise
-    finally:
-        shutil.rmtree(old, ignore_errors=True)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def _refused(path: Path, message: str) -> InputError:

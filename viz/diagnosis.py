@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,6 @@ from typing import Any
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-from rerun.error_utils import catch_and_log_exceptions
 
 from rollover.diagnosis import Diagnosis
 from rollover.diagnosis.series import Told, Track
@@ -18,7 +16,7 @@ from viz.blueprint import framed
 from viz.diagnosis_page import ranked
 from viz.diagnosis_words import answer, markdown
 from viz.entities import LIMIT, MEASURED, SIMULATED, escaped, series
-from viz.log import closed
+from viz.saved import saving
 from viz.stream import Stream, colour
 
 PHASES = {
@@ -41,22 +39,16 @@ _SOURCES = (("measured", MEASURED, 1.0), ("before", LIMIT, 1.5), ("after", SIMUL
 
 def write_diagnosis(found: Diagnosis, told: Sequence[Told], path: Path, title: str) -> None:
     """Write a diagnosis as a recording for the viewer, whole or not at all."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
     rec = rr.RecordingStream("rollover diagnosis", recording_id=_id(found, told))
-    try:
-        with catch_and_log_exceptions("recording", strict=True), closed(rec):
-            rec.save(part, default_blueprint=_blueprint(found, told))
-            out = Stream(rec)
-            out.static("answer", rr.TextDocument(markdown(found), media_type=rr.MediaType.MARKDOWN))
-            rec.send_recording_name(f"{title}: {answer(found)}")
-            for one in told:
-                _looks(out, one)
-            out.settle()
-            for one in told:
-                _recording(out, one)
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
+    with saving(rec, path, _blueprint(found, told)):
+        out = Stream(rec)
+        out.static("answer", rr.TextDocument(markdown(found), media_type=rr.MediaType.MARKDOWN))
+        rec.send_recording_name(f"{title}: {answer(found)}")
+        for one in told:
+            _looks(out, one)
+        out.settle()
+        for one in told:
+            _recording(out, one)
 
 
 def _id(found: Diagnosis, told: Sequence[Told]) -> str:

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import rerun as rr
-from rerun.error_utils import catch_and_log_exceptions
 
 from rollover.document import content_hash, dump
 from rollover.run import Run
 from viz.blueprint import Beside, blueprint
 from viz.draw import WARNINGS, moving, peak_place, picture, sentence, standing
 from viz.entities import FILTERED, LIMIT, PHASE, series
+from viz.saved import saving
 from viz.stream import Stream, colour
 from viz.verdict import Peak, filtered, known, ranked, raw, title_of, verdict
 from viz.viewer import open_viewer
@@ -49,44 +47,28 @@ def write_rrd(
     `peaks` are the peak loads of the report; without them, raw peaks are read off the channels. `beside` writes what
     stands beside the simulated values, `shown` says how the layout shows it.
     """
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
     name = run_id(run)
     # one application for each scenario: recordings of one application share a layout, and another vehicle's eye and
     # plots would be used for this one
     rec = rr.RecordingStream(f"rollover {name}", recording_id=name)
-    try:
-        with catch_and_log_exceptions("recording", strict=True), closed(rec):
-            with_ = picture(run)
-            rec.save(part, default_blueprint=blueprint(run, ", ".join(with_.scales), shown))
-            out, found = Stream(rec), ranked(run, peaks)
-            standing(out, run, with_)
-            _looks(out, run, found)
-            _documents(out, run, verdict(run, found, with_.scales))
-            out.settle()
-            moving(out, run, with_)
-            for channel, values in run.recording.channels.items():
-                s = series(channel)
-                out.columns(s.simulated, run.recording.time, rr.Scalars.columns(scalars=values * s.factor))
-            _peaks(out, run, found)
-            if found and found[0] in _marked(run, found):
-                peak_place(out, run, found[0], with_.size)
-            _phases(out, run)
-            _events(out, run, found)
-            if beside is not None:
-                beside(out)
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
-
-
-@contextlib.contextmanager
-def closed(rec: rr.RecordingStream) -> Iterator[None]:
-    """Flush and write the footer whatever happens; what is logged later would be lost without a word."""
-    try:
-        yield
-    finally:
-        rec.flush()
-        rec.disconnect()
+    with_ = picture(run)
+    with saving(rec, path, blueprint(run, ", ".join(with_.scales), shown)):
+        out, found = Stream(rec), ranked(run, peaks)
+        standing(out, run, with_)
+        _looks(out, run, found)
+        _documents(out, run, verdict(run, found, with_.scales))
+        out.settle()
+        moving(out, run, with_)
+        for channel, values in run.recording.channels.items():
+            s = series(channel)
+            out.columns(s.simulated, run.recording.time, rr.Scalars.columns(scalars=values * s.factor))
+        _peaks(out, run, found)
+        if found and found[0] in _marked(run, found):
+            peak_place(out, run, found[0], with_.size)
+        _phases(out, run)
+        _events(out, run, found)
+        if beside is not None:
+            beside(out)
 
 
 def run_id(run: Run) -> str:

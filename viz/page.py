@@ -9,12 +9,14 @@ A page is a headline, blocks and a footer; a block is one of the dataclasses her
 from __future__ import annotations
 
 import functools
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
+from viz.embedded import embedded, policy
+
+TEMPLATES = Path(__file__).parent / "templates"
 State = Literal["", "pass", "fail", "warn", "muted"]
 NOT_APPROVAL = "This is a simulation study, not type approval."
 
@@ -146,7 +148,7 @@ class Cases:
     def data(self) -> str:
         """All values as JSON that can stand inside a script element; numbers with six digits."""
         columns = [[_short(v) for v in values] for _, values in self.columns]
-        return json.dumps(columns, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+        return embedded(columns)
 
 
 def _cell(value: Any) -> str:
@@ -177,9 +179,17 @@ def render(
             blocks=blocks,
             footer=footer,
             disclaimer=NOT_APPROVAL if study else "",
+            policy=policy([f"\n{_script()}"]),
+            script=_script(),
         )
     )
     return page
+
+
+@functools.cache
+def _script() -> str:
+    """What lets a reader sort and filter a table: the only script that a page runs."""
+    return (TEMPLATES / "cases.js").read_text(encoding="utf-8")
 
 
 @functools.cache
@@ -187,7 +197,7 @@ def _environment() -> Any:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     return Environment(
-        loader=FileSystemLoader(Path(__file__).parent / "templates", encoding="utf-8"),
+        loader=FileSystemLoader(TEMPLATES, encoding="utf-8"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

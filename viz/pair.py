@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,14 +11,13 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from rerun.chunk import RrdReader
-from rerun.error_utils import catch_and_log_exceptions
 
 from rollover.pair import Pair, Result, difference
 from rollover.store import PICTURE
 from viz.blueprint import BACKGROUND, LOADS, MOTION, TOP, framed, matching
 from viz.entities import MEASURED, PHASE, SIMULATED, Series, series
-from viz.log import closed
 from viz.pair_words import markdown
+from viz.saved import saving
 from viz.stream import Stream, colour
 
 BASELINE, CANDIDATE = MEASURED, SIMULATED  # colours: orange was, blue is
@@ -40,34 +38,28 @@ def write_pair(found: Pair, path: Path) -> None:
     for result in results.values():
         if not (result.folder / PICTURE).is_file():
             raise FileNotFoundError(f"{result.folder}: no {PICTURE} there; run it again with `rollover run`")
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
     names = [str(r.answer["scenario_hash"])[:12] for r in results.values()]
     rec = rr.RecordingStream("rollover pair", recording_id="-".join(["pair", *names]))
     scenes = {side: _scene(side, result) for side, result in results.items()}
-    try:
-        with catch_and_log_exceptions("recording", strict=True), closed(rec):
-            rec.save(part, default_blueprint=_blueprint(found, scenes))
-            out = Stream(rec)
-            rec.send_recording_name(f"{found.baseline.answer['title']}: baseline and candidate")
-            out.static("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-            out.static("answer", rr.TextDocument(markdown(found), media_type=rr.MediaType.MARKDOWN))
-            rec.send_chunks([c for chunks in scenes.values() for c in chunks if c.is_static])
-            for channel in found.channels:
-                _looks(out, series(channel))
-            for side in SIDES:
-                looks = rr.StateConfiguration(values=list(PHASE), labels=list(PHASE), colors=colour(*PHASE.values()))
-                out.static(f"{side}/phase", looks)
-            out.settle()
-            rec.send_chunks([c for chunks in scenes.values() for c in chunks if not c.is_static])
-            for side, result in results.items():
-                _values(out, side, result, found.channels)
-            for channel in found.channels:
-                time, less = difference(found, channel)
-                s = series(channel)
-                out.columns(f"difference/{s.path}", time, rr.Scalars.columns(scalars=less * s.factor))
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
+    with saving(rec, path, _blueprint(found, scenes)):
+        out = Stream(rec)
+        rec.send_recording_name(f"{found.baseline.answer['title']}: baseline and candidate")
+        out.static("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+        out.static("answer", rr.TextDocument(markdown(found), media_type=rr.MediaType.MARKDOWN))
+        rec.send_chunks([c for chunks in scenes.values() for c in chunks if c.is_static])
+        for channel in found.channels:
+            _looks(out, series(channel))
+        for side in SIDES:
+            looks = rr.StateConfiguration(values=list(PHASE), labels=list(PHASE), colors=colour(*PHASE.values()))
+            out.static(f"{side}/phase", looks)
+        out.settle()
+        rec.send_chunks([c for chunks in scenes.values() for c in chunks if not c.is_static])
+        for side, result in results.items():
+            _values(out, side, result, found.channels)
+        for channel in found.channels:
+            time, less = difference(found, channel)
+            s = series(channel)
+            out.columns(f"difference/{s.path}", time, rr.Scalars.columns(scalars=less * s.factor))
 
 
 def _scene(side: str, result: Result) -> list[Any]:

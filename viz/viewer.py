@@ -37,7 +37,7 @@ def open_viewer(path: Path) -> int:
     if not path.is_file():
         raise FileNotFoundError(f"{path}: no such recording")
     binary = viewer_binary()
-    quiet = {"RUST_LOG": "error", **os.environ}
+    quiet = {**os.environ, "RUST_LOG": "error"}
     nowhere = subprocess.DEVNULL
     subprocess.run([binary, "analytics", "disable"], check=False, stdout=nowhere, stderr=nowhere, env=quiet)
     here = ["--bind", "127.0.0.1", "--port", "auto"]

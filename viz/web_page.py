@@ -13,19 +13,23 @@ import functools
 import gzip
 import html
 import http.client
-import json
 import os
+import re
 import socket
 import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from rollover.writing import put
+from viz.embedded import embedded, in_script, policy
 from viz.viewer import viewer_binary
 
 TEMPLATE = Path(__file__).parent / "templates" / "viewer.html"
 SCRIPT, PROGRAM = "/re_viewer.js", "/re_viewer_bg.wasm"
+SCRIPTS = re.compile(r"<script>(.*?)</script>", re.DOTALL)  # those of the template, which run
+OWN_POLICY = ("script-src 'wasm-unsafe-eval'", "img-src data: blob:", "media-src data: blob:", "font-src data:")
 PATIENCE = 30.0  # s, until the viewer serves its page
 
 
@@ -46,13 +50,7 @@ def write_page(recording: Path, path: Path, *, title: str, footer: str = "") -> 
     if not recording.is_file():
         raise FileNotFoundError(f"{recording}: no such recording")
     text = page(recording.read_bytes(), installed(), title=title, footer=footer)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_text(text, encoding="utf-8")
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
+    put(path, lambda at: at.write_text(text, encoding="utf-8"))
 
 
 def page(recording: bytes, viewer: Viewer, *, title: str, footer: str = "") -> str:
@@ -60,18 +58,19 @@ def page(recording: bytes, viewer: Viewer, *, title: str, footer: str = "") -> s
     parts = {
         "title": html.escape(title),
         "footer": html.escape(footer),
-        "name": _in_script(json.dumps(title)),
-        "script": _in_script(viewer.script),
+        "name": embedded(title),
+        "script": in_script(viewer.script),
         "program": base64.b64encode(viewer.program).decode("ascii"),
         "recording": base64.b64encode(gzip.compress(recording, 6, mtime=0)).decode("ascii"),
     }
-    pieces = TEMPLATE.read_text(encoding="utf-8").split("@@")  # every second one is a part's name
+    template = TEMPLATE.read_text(encoding="utf-8")
+    parts["policy"] = policy((_filled(text, parts) for text in SCRIPTS.findall(template)), *OWN_POLICY)
+    return _filled(template, parts)
+
+
+def _filled(template: str, parts: Mapping[str, str]) -> str:
+    pieces = template.split("@@")  # every second one is a part's name
     return "".join(parts[piece] if k % 2 else piece for k, piece in enumerate(pieces))
-
-
-def _in_script(text: str) -> str:
-    """Text as it may stand in a script element, which ends at the first ``</script`` wherever that stands."""
-    return text.replace("</script", "<\\/script").replace("<!--", "<\\!--")
 
 
 @functools.cache
@@ -90,7 +89,7 @@ def _serving(binary: Path) -> Iterator[int]:
     port, other = _free_ports()
     command = [str(binary), "--serve-web", "--bind", "127.0.0.1", "--web-viewer-port", str(port), "--port", str(other)]
     nowhere = subprocess.DEVNULL
-    quiet = {"RUST_LOG": "error", **os.environ}
+    quiet = {**os.environ, "RUST_LOG": "error"}
     subprocess.run([binary, "analytics", "disable"], check=False, stdout=nowhere, stderr=nowhere, env=quiet)
     child = subprocess.Popen(command, stdout=nowhere, stderr=nowhere, env=quiet)
     try:

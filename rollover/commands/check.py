@@ -10,7 +10,7 @@ import typer
 
 from rollover.commands.door import AsJson, answering, app, manual
 from rollover.commands.profiles import profile_of
-from rollover.faults import Fault, InputError
+from rollover.faults import Fault, InputError, excerpt
 
 if TYPE_CHECKING:
     from rollover.importers.sidecar import Described
@@ -145,21 +145,23 @@ def _shared(rows: list[dict[str, Any]], read: dict[str, Recording]) -> None:
 
 
 def _print(name: str, row: dict[str, Any]) -> None:
+    from rollover.console import tell
+
     if row["is"] != "recording":
-        print(f"{name}: {row['is']}, in order")
+        tell(f"{name}: {row['is']}, in order")
         return
     from rollover.prechecks import when
 
     first, step = row["first"], row["step"]
     span = f"{row['samples']} samples, {when(row['start'] - first, row['end'] - first, step)}"
     span += f" from its first stamp at {first:.10g} s" if first else ""
-    print(f"{name}: recording, in order: {row['title']}, {span}")
+    tell(f"{name}: recording, in order: {excerpt(row['title'])}, {span}")
     for channel in row["channels"]:
         noise = "noise not known" if channel["noise"] is None else f"noise {channel['noise']:.3g} {channel['unit']}"
-        print(f"  {channel['channel']}: {noise}")
+        tell(f"  {channel['channel']}: {noise}")
     for note in row["notes"]:
-        print(f"  note: {note}")
+        tell(f"  note: {note}")
     for f in row["findings"]:
-        print(f"  {f['check']}: {f['channel']}, {when(f['start'] - first, f['end'] - first, step)}: {f['sentence']}")
+        tell(f"  {f['check']}: {f['channel']}, {when(f['start'] - first, f['end'] - first, step)}: {f['sentence']}")
     if all(f["check"] == "wrap-around" for f in row["findings"]):
-        print("  no fault of a sensor found")
+        tell("  no fault of a sensor found")

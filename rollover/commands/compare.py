@@ -146,7 +146,7 @@ def _two_runs(
     if as_json:
         print(json.dumps(store.plain(answer), indent=2))
     else:
-        print(markdown(found))
+        console.tell(markdown(found))
         console.say(f"Results: {folder}")
 
 
@@ -238,7 +238,12 @@ def _answer(about: Mapping[str, Any], runs: Mapping[str, Run], found: list[Misfi
 
 def _pictures(names: list[str]) -> dict[str, str]:
     """A picture for each recording; a single one has the plain name."""
-    return {name: PICTURE if len(names) == 1 else f"compare-{name}.rrd" for name in names}
+    from rollover.names import distinct
+
+    if len(names) == 1:
+        return dict.fromkeys(names, PICTURE)
+    made = distinct((f"compare-{name}" for name in names), ".rrd", file="rollover compare")
+    return {name: f"{made[f'compare-{name}']}.rrd" for name in names}
 
 
 def _picture() -> Callable[[Run, Misfit, Path], None] | None:

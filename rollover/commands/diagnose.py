@@ -78,6 +78,7 @@ def diagnose(
     from rollover.diagnosis.account import FILES, FORMAT, JSON, PAGE, PICTURE, SCENARIO
     from rollover.diagnosis.crew import Crew
     from rollover.diagnosis.series import series
+    from rollover.writing import notes
 
     path = document.find(scenario)
     chosen = scenarios.load(path)
@@ -97,7 +98,7 @@ def diagnose(
     console.say("asking the sensors first")
     findings = _prechecks(chosen, measured)
     # beside the results folder, which is written whole or not at all: what an interrupted diagnosis had fitted
-    notebook = folder.parent / f".{folder.name}.fits"
+    notebook = notes(folder)
     about_fits = json.dumps([about, store.versions()], sort_keys=True)
     words = ["rollover", "diagnose", scenario, *recordings, *_options(hold_out, set_, tolerance, profile)]
     with Crew(workers, notebook, about_fits) as crew:

@@ -1,6 +1,7 @@
 """What all commands share: the application, exit status, options, and how wrong input is answered.
 
-Exit status: 0 done, 1 the answer is no, 2 the input is wrong, 3 the simulation failed.
+Exit status: 0 done, 1 the answer is no, 2 the input is wrong, 3 the simulation failed, 74 the machine failed (a disk
+that is full, memory that is not there), 130 interrupted.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import functools
 import sys
 from collections.abc import Callable
+from concurrent.futures import BrokenExecutor
 from typing import Annotated, Any, TypeVar
 
 import typer
@@ -15,14 +17,18 @@ from typer.core import TyperGroup
 
 # what takes long to import is imported by the command that needs it: `rollover --help` answers at once
 from rollover.faults import Fault, InputError
+from rollover.machine import told
+from rollover.writing import working
 
 THE_ANSWER_IS_NO, WRONG_INPUT, FAILED, INTERRUPTED, BUG = 1, 2, 3, 130, 70
+MACHINE = 74  # as sysexits.h has it: an error of input or output
 COMPILING = 25  # s, roughly, on two cores
 
 C = TypeVar("C", bound=Callable[..., None])
 
 DONE, NO, WRONG = "0 done", "1 the answer is no", "2 the input is wrong: a line for each fault, nothing written"
 BROKE = "3 a simulation failed: time, cause, last good state"
+MACHINERY = "74 the machine failed (disk, memory): what stood there stays"
 
 
 def manual(*examples: str, writes: str, status: str = "") -> str:
@@ -31,7 +37,7 @@ def manual(*examples: str, writes: str, status: str = "") -> str:
     `status` names what 1 and 3 mean where the command can end with them, parted by semicolons.
     """
     lines = [f"Example:  rollover {example}" for example in examples]
-    words = "; ".join(sorted([DONE, WRONG, *filter(None, status.split("; "))]))
+    words = "; ".join([*sorted([DONE, WRONG, *filter(None, status.split("; "))]), MACHINERY])
     return "\n\n".join([*lines, f"Writes:  {writes}", f"Exit status:  {words}."])
 
 
@@ -67,12 +73,22 @@ Force = Annotated[bool, typer.Option("--force", help="Replace another run's resu
 
 
 def answering(command: C) -> C:
-    """Turn wrong input and an interrupt into their exit status; any other exception is a bug and stays one."""
+    """Turn wrong input, a fault of the machine and an interrupt into a line and their exit status.
+
+    Any other exception is a bug and stays one. What the command held to write there is let go.
+    """
 
     @functools.wraps(command)
     def wrapped(*args: Any, **kwargs: Any) -> None:
         try:
-            command(*args, **kwargs)
+            with working() as work:
+                try:
+                    command(*args, **kwargs)
+                    sys.stdout.flush()  # a full disk may be behind it
+                except (OSError, MemoryError, BrokenExecutor) as e:
+                    target = next(reversed(work.targets), None)
+                    print(told(e, target), file=sys.stderr)
+                    raise typer.Exit(MACHINE) from None
         except InputError as e:
             print(e, file=sys.stderr)
             raise typer.Exit(WRONG_INPUT) from None

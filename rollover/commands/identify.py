@@ -64,6 +64,7 @@ def identify_(
     from rollover import scenario as scenarios
     from rollover.importers import name_of, read_named
     from rollover.vehicle import Striker
+    from rollover.writing import hold
 
     chosen = scenarios.load(document.find(scenario))
     if set_:
@@ -72,6 +73,8 @@ def identify_(
         name: (recording, _digest(at)) for name, (at, recording) in read_named(recordings, profile_of(profile)).items()
     }
     folder = out or Path("out", "identify", name_of(Path(recordings[0])))
+    if not folder.exists() or folder.is_dir():
+        hold(folder)
     _claim(folder, force)
     is_cone = isinstance(chosen.vehicle, Striker) and chosen.vehicle.nose == "cone"
     wanted = form or (Form.bearing if is_cone else Form.ye)
@@ -106,10 +109,10 @@ def identify_(
         return
     widths = [max(map(len, column)) for column in zip(*answer.table, strict=True)]
     for row in answer.table:
-        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+        console.tell("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
     for remark in (*timed, *answer.remarks):
-        print(remark)
-    print(f"Soil: {folder / SOIL}")
+        console.tell(remark)
+    console.tell(f"Soil: {folder / SOIL}")
 
 
 def _digest(path: Path) -> str:
@@ -128,25 +131,24 @@ def _digest(path: Path) -> str:
 def _claim(folder: Path, force: bool) -> None:
     if not folder.exists():
         return
-    foreign = [p.name for p in folder.iterdir() if p.name not in (SOIL, ANSWER)] if folder.is_dir() else [folder.name]
+    from rollover.writing import own
+
+    there = [p.name for p in folder.iterdir() if not own(folder.resolve(), p.name)] if folder.is_dir() else []
+    foreign = [name for name in there if name not in (SOIL, ANSWER)] if folder.is_dir() else [folder.name]
     if foreign:
         raise InputError(
             Fault(file=str(folder), message=f"holds files that are not results, got {foreign[0]!r}; another --out")
         )
-    if any(folder.iterdir()) and not force:
+    if there and not force:
         raise InputError(
             Fault(file=str(folder), message="holds an identification; --force replaces it, --out leaves it")
         )
 
 
 def _write(folder: Path, soil: str, report: dict[str, object]) -> None:
-    """Both files whole, each in one stroke, once both texts are there."""
-    import os
+    """Both files, or none."""
+    from rollover.writing import whole
 
-    texts = {SOIL: soil, ANSWER: json.dumps(report, indent=2, allow_nan=False) + "\n"}
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, text in texts.items():
-        part = folder / f".{name}.part"
-        part.write_text(text, encoding="utf-8")
-    for name in texts:
-        os.replace(folder / f".{name}.part", folder / name)
+    with whole(folder) as part:
+        (part / SOIL).write_text(soil, encoding="utf-8")
+        (part / ANSWER).write_text(json.dumps(report, indent=2, allow_nan=False) + "\n", encoding="utf-8")

@@ -46,30 +46,42 @@ def import_(
     as_json: AsJson = False,
 ) -> None:
     """Turn recordings of other formats into rollover-recording/1 files."""
+    from dataclasses import replace
+
+    from rollover import console
     from rollover.importers import name_of
+    from rollover.names import distinct, inside
+    from rollover.writing import hold
 
     endings = ("csv", "parquet", "mme.zip")
     if to not in endings:
         raise InputError(Fault(file="--to", message=f"no such format, got {to!r}; {', '.join(endings)} are allowed"))
     folder = out or Path("out", "import", name_of(source))
     made = _recordings(source, kind, profile, select)  # all are read before the first is written
-    targets = {name: folder / f"{name}.{to}" for name in made}
+    spelt = distinct(made, f".{to}", file=str(source))
+    targets = {name: inside(folder, f"{spelt[name]}.{to}") for name in made}
     for target, (at, _) in zip(targets.values(), made.values(), strict=True):
+        hold(target)
         if at is not None and target.exists() and target.samefile(at):
             raise InputError(Fault(file=str(target), message="would replace the recording that is read; another --out"))
     taken = [t for t in targets.values() if t.exists()]
     if taken and not force:
         raise InputError(Fault(file=str(taken[0]), message="exists; --force replaces it, --out leaves it"))
-    _write(folder, {targets[name].name: recording for name, (_, recording) in made.items()}, force)
+    for name in [n for n in made if spelt[n] != n]:
+        at, recording = made[name]
+        what = f"stands for {name!r}, which is no name for a file"
+        made[name] = at, replace(recording, notes=(*recording.notes, what))
+        console.say(f"{targets[name]}: {what}")
+    _write({targets[name]: recording for name, (_, recording) in made.items()})
     rows = []
     for name, (_, recording) in made.items():
         channels = list(recording.channels)
         notes = list(recording.notes)
         rows.append({"file": str(targets[name]), "samples": recording.time.size, "channels": channels, "notes": notes})
         if not as_json:
-            print(f"{targets[name]}: {recording.time.size} samples of {len(channels)} channels")
+            console.tell(f"{targets[name]}: {recording.time.size} samples of {len(channels)} channels")
             for note in notes:
-                print(f"  note: {note}")
+                console.tell(f"  note: {note}")
     if as_json:
         print(json.dumps({"files": rows}, indent=2))
 
@@ -94,30 +106,14 @@ def _recordings(
     known = [*importers(), *COLLECTIONS]
     if kind and kind not in known:
         raise InputError(Fault(file="--as", message=f"no such format, got {kind!r}; {hint(kind, known)}"))
-    return read_named([source], profile_of(profile), kind, select)
+    return {**read_named([source], profile_of(profile), kind, select)}
 
 
-def _write(folder: Path, made: Mapping[str, Recording], force: bool) -> None:
-    """All recordings, by the name of their file, or none. Raises `InputError`."""
-    import os
-    import shutil
-    import tempfile
-
+def _write(made: Mapping[Path, Recording]) -> None:
+    """All recordings, or none. Raises `InputError`."""
     from rollover.importers import write_recording
+    from rollover.writing import together
 
-    is_new = not folder.exists()
-    folder.mkdir(parents=True, exist_ok=True)
-    part = Path(tempfile.mkdtemp(prefix=".import.", suffix=".part", dir=folder))
-    try:
-        for name, recording in made.items():
-            write_recording(recording, part / name)
-        files = sorted(part.iterdir())
-        taken = [folder / p.name for p in files if (folder / p.name).exists()]
-        if taken and not force:
-            raise InputError(Fault(file=str(taken[0]), message="exists; --force replaces it, --out leaves it"))
-        for file in files:
-            os.replace(file, folder / file.name)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
-        if is_new and not any(folder.iterdir()):
-            folder.rmdir()
+    with together(list(made)[-1]) as part:
+        for target, recording in made.items():
+            write_recording(recording, part / target.name)

@@ -24,7 +24,7 @@ def list_(
     as_json: AsJson = False,
 ) -> None:
     """Say what exists, one line each."""
-    from rollover import catalogue
+    from rollover import catalogue, console
 
     if what not in LISTED:
         raise InputError(Fault(file="rollover list", message=f"no such thing, got {what!r}; {hint(what, LISTED)}"))
@@ -37,11 +37,9 @@ def list_(
         print(json.dumps(rows, indent=2))
         return
     if not rows:
-        from rollover import console
-
         console.say(f"There are no {what} in this version.")
         return
     cells = [[catalogue.text(value) for value in row.values()] for row in rows]
     widths = [min(48, max(map(len, column))) for column in zip(*cells, strict=True)]
     for row in cells:
-        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+        console.tell("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())

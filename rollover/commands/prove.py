@@ -85,7 +85,7 @@ def prove(
     if as_json:
         print(json.dumps(account, indent=2))
     else:
-        print("\n".join([*sentences(account["summary"]), f"Written to {out}"]))
+        console.tell("\n".join([*sentences(account["summary"]), f"Written to {out}"]))
     if not proof.diagnoses:
         console.say(f"Every diagnosis failed; the first: {account['rows'][0]['failure']}")
         raise typer.Exit(FAILED)

@@ -15,7 +15,7 @@ from rollover.commands.door import BROKE, COMPILING, FAILED, NO, THE_ANSWER_IS_N
 from rollover.faults import Fault, InputError
 
 if TYPE_CHECKING:
-    from rollover.baseline import Answer
+    from rollover.baseline import Answer, Baseline
 
 
 @app.command(
@@ -46,24 +46,30 @@ def regress(
     if reason.strip() and not update:
         raise InputError(Fault(file="--reason", message="nothing to give a reason for; --update is needed"))
     from ground.compiled import is_warm
+    from rollover import baseline as baselines
     from rollover import console, regression, store
+    from rollover.update import update as updating
 
     choice = regression.chosen(scenarios or [])
     selection = sorted(f.stem for f in choice.files)
+    _settled(choice.files, update)
     store.claim_account(out, FORMAT, {"scenarios": selection}, ACCOUNT, force=force)
     if not is_warm():
         console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
     failed: list[Answer] = []
+    new: dict[Path, Baseline] = {}
     with console.counting("runs") as show:
         if update:
             try:
-                answers = regression.updated(choice, reason.strip(), workers=workers, time_limit=time_limit, show=show)
+                answers = regression.updated(
+                    choice, reason.strip(), workers=workers, time_limit=time_limit, show=show, write=new.update
+                )
             except regression.FailedUpdateError as e:
                 answers = failed = e.answers
         else:
             answers = regression.compared(choice, workers=workers, time_limit=time_limit, show=show)
     account = _account(selection, answers, _hash(choice.files))
-    with store.whole(out) as part:
+    with updating(out, baselines.texts(new)) as part:
         store.write_json(part / JSON, account)
         store.write_csv(part / CSV, _rows(answers))
         (part / PAGE).write_text(_page(answers, selection, account["scenario_hash"]), encoding="utf-8")
@@ -81,6 +87,19 @@ def regress(
 FORMAT = "rollover-regress/1"
 JSON, CSV, PAGE = "regress.json", "regress.csv", "report.html"
 ACCOUNT = (JSON, CSV, PAGE)
+
+
+def _settled(files: Sequence[Path], update: bool) -> None:
+    """Keep the baselines to this process if they are to be written, and finish what a killed update began there."""
+    from rollover.baseline import FOLDER
+    from rollover.update import JOURNAL, finish
+    from rollover.writing import hold, sweep
+
+    for folder in sorted({file.parent.resolve() / FOLDER for file in files}):
+        if update or (folder / JOURNAL).exists():
+            hold(folder)
+            finish(folder / JOURNAL)
+            sweep(folder)
 
 
 def _hash(files: Sequence[Path]) -> str:

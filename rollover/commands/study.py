@@ -89,7 +89,7 @@ def study(
     if as_json:
         print(json.dumps(_plain(account), indent=2))
     else:
-        print("\n".join([*sentences(account), f"Results: {folder}"]))
+        console.tell("\n".join([*sentences(account), f"Results: {folder}"]))
     if not account["cases"]["done"]:
         console.say(f"{path}: every case failed; the first: {account['failures'][0]['sentence']}")
         raise typer.Exit(FAILED)
@@ -99,10 +99,10 @@ def begin(target: Path, name: str, chosen: Study) -> None:
     """Mark the folder as this study's, so that it can be gone on with after whatever happens."""
     from rollover import document
     from rollover.study import shelf
+    from rollover.writing import sweep
 
     target.mkdir(parents=True, exist_ok=True)
-    for part in target.glob(".*.part"):  # of a process that was killed
-        part.unlink()
+    sweep(target)  # what a process left that was killed
     head = f"{chosen.title}\nEvery value of the study beside this file."
     shelf.put_text(target / shelf.STUDY, document.dump(chosen, head))
     if not (target / shelf.ACCOUNT).exists() or _name_of(target / shelf.ACCOUNT) != name:

@@ -54,14 +54,17 @@ def synthesize(
     from rollover import console, document, simulate
     from rollover import scenario as scenarios
     from rollover.importers import write_recording
+    from rollover.names import inside
     from rollover.synthesis import synthetic, usual
+    from rollover.writing import hold
 
     path = document.find(scenario)
     stated, unstated = settings(set_ or []), settings(hidden or [], "--hide")
     chosen = scenarios.load(path).replaced(stated, origin="--set").replaced(unstated, origin="--hide")
     for line in chosen.idle:
         console.say(f"{path}: {line}")
-    target = out / f"{name or path.stem}.csv"
+    target = inside(out, f"{name or path.stem}.csv", file="--name")
+    hold(target)  # before a run that may take minutes
     share, sigmas = _noise(noise or [])
     done = simulate.run(chosen)
     if done.status == "failed":
@@ -85,7 +88,7 @@ def synthesize(
     if as_json:
         print(json.dumps({"recording": str(target), "samples": made.time.size, "noise": dict(made.noise)}, indent=2))
     else:
-        print(f"{made.time.size} samples of {len(made.channels)} channels: {target}")
+        console.tell(f"{made.time.size} samples of {len(made.channels)} channels: {target}")
 
 
 def _noise(given: list[str]) -> tuple[float, dict[str, float]]:

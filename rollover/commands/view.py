@@ -67,7 +67,9 @@ def _recording(results: Path) -> Path:
 def _page(path: Path, html: Path, force: bool) -> None:
     """Write the page beside the native viewer. Raises `InputError`."""
     from rollover import console
+    from rollover.names import inside
     from rollover.store import RUN, VIEWER
+    from rollover.writing import hold
     from viz.web_page import write_page
 
     if html.is_dir() or html.suffix.lower() not in (".html", ".htm"):
@@ -78,10 +80,14 @@ def _page(path: Path, html: Path, force: bool) -> None:
         raise InputError(Fault(file=str(html), message="exists; --force replaces it"))
     if (html.parent / RUN).exists() and html.name != VIEWER:
         raise InputError(Fault(file=str(html), message=f"a page in a results folder is {VIEWER}, got {html.name!r}"))
+    inside(html.parent, html.name, file="--html")
+    hold(html)
     title, footer = _about(path)
     try:
         write_page(path, html, title=title, footer=footer)
     except OSError as e:
+        if e.errno is not None:  # the machine's, no answer of the viewer
+            raise
         raise InputError(Fault(file=str(html), message=str(e))) from None
     console.say(f"Written: {html}, {html.stat().st_size / 1e6:.0f} MB. A double click opens it.")
 

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import pickle
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Literal, TypeVar, cast
 
 import numpy as np
@@ -26,6 +27,7 @@ from rollover.diagnosis.refine import polish, timed
 from rollover.diagnosis.secant import beside
 from rollover.diagnosis.thresholds import Stretch, traced
 from rollover.execute import Children, begin_server, map_cases
+from rollover.writing import scratch
 
 WARM = "rollover.diagnosis.warm"
 Progress = Callable[[str], None]
@@ -89,10 +91,11 @@ class Crew:
         self.children = Children(workers)
         if workers > 1:
             begin_server(WARM)
-        self._folder: TemporaryDirectory[str] | None = None  # what children read
+        self._scratch = ExitStack()
+        self._folder: Path | None = None  # what children read
         self._beginning: list[Any] = []  # what tells that the children are there
         self._done: dict[str, dict[str, Any] | None] = {}
-        if notebook is not None and notebook.exists():
+        if notebook is not None and notebook.is_file() and not notebook.is_symlink():
             for line in notebook.read_text(encoding="utf-8").splitlines():
                 try:
                     row = json.loads(line)
@@ -105,8 +108,7 @@ class Crew:
 
     def __exit__(self, *_: object) -> None:
         self.children.stop()
-        if self._folder is not None:
-            self._folder.cleanup()
+        self._scratch.close()
 
     def begin(self, judge: Judge) -> None:
         """Begin the children, if any, while this process goes on: each makes a run, so that it has all it needs."""
@@ -194,8 +196,8 @@ class Crew:
     def _told(self, judge: Judge, about: str) -> Path:
         """A file with the judge for children to read, once each: megabytes for each of a thousand jobs take long."""
         if self._folder is None:
-            self._folder = TemporaryDirectory(prefix="rollover-")
-        path = Path(self._folder.name, hashlib.sha256(f"{about} {judge.shifts}".encode()).hexdigest())
+            self._folder = self._scratch.enter_context(scratch())
+        path = Path(self._folder, hashlib.sha256(f"{about} {judge.shifts}".encode()).hexdigest())
         if not path.exists():
             path.write_bytes(pickle.dumps(judge.bare()))
         return path
@@ -208,8 +210,12 @@ class Crew:
         self._done[key] = row
         if self.notebook is not None:
             self.notebook.parent.mkdir(parents=True, exist_ok=True)
-            with self.notebook.open("a", encoding="utf-8") as file:
+            with open(self.notebook, "a", encoding="utf-8", opener=_no_link) as file:
                 file.write(json.dumps({"key": key, "fit": row}) + "\n")
+
+
+def _no_link(path: str, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0), 0o644)
 
 
 def work(judge: Judge, job: Job) -> Fitted | None:

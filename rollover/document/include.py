@@ -138,7 +138,7 @@ def _grid(node: Node, path: str) -> Node:
 def _file(node: Node) -> Path | None:
     """The file that a name means: beside the one that names it, a shipped one, or what `rollover list` calls so."""
     name = Path(str(node.value))
-    folders = (node.place.folder, shipped_folder())
+    folders: tuple[Path, ...] = (node.place.folder, shipped_folder())
     if not name.name.endswith(ENDINGS):
         if name.name != str(node.value) or not name.name:  # a bare name, as `rollover list` has them
             return None
@@ -164,7 +164,9 @@ def _included(node: Node, slot: Slot, chain: tuple[Path, ...], path: str) -> Nod
         raise node.place.fault(path, f"a file includes itself, got {' -> '.join(names)}; no circles")
     root = read(file)
     if not isinstance(root.value, Mapping):
-        raise root.place.fault("", f"not a mapping, got {root.plain!r}; {slot.allowed()} is needed")
+        # a file that somebody else's scenario names may be anything: what it is, not what stands in it
+        what = "a list" if isinstance(root.value, tuple) else "a single value"
+        raise root.place.fault("", f"not a mapping, got {what}; {slot.allowed()} is needed")
     return expand(root, slot, (*chain, file.resolve()), path)
 
 

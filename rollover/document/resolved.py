@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from rollover.document.slot import Slot, slot_of, slots
 from rollover.document.tree import write
+from rollover.faults import seen
 
 
 class Leaf(NamedTuple):
@@ -42,7 +43,7 @@ def plain(value: Any, slot: Slot) -> Any:
 
 def dump(thing: Any, head: str = "") -> str:
     """Text of a file that gives the same object again, to the last bit; `head` becomes its opening comment."""
-    comment = "".join(f"# {line}".rstrip() + "\n" for line in head.splitlines())
+    comment = "".join(f"# {seen(line)}".rstrip() + "\n" for line in head.splitlines())
     return comment + write(to_mapping(thing))
 
 

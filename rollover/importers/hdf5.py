@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rollover.importers.arrays import signals_of
 from rollover.importers.hdf5_contents import contents
+from rollover.importers.hdf5_guard import stands_alone
 from rollover.importers.importer import Importer, library, reading, starts_with
 from rollover.importers.sidecar import Described
 from rollover.importers.signals import assemble
@@ -17,6 +18,7 @@ _MATLAB_7_3 = (b"MATLAB 7.3", b"\x89HDF\r\n\x1a\n")
 def _read(path: Path, profile: Described | None) -> Recording:
     h5py = library("h5py", "hdf5", path)
     with reading(path, "HDF5"), h5py.File(path, "r") as file:
+        stands_alone(file, path)
         found = contents(h5py, file, () if profile is None else tuple(profile.columns))
         signals = signals_of(path, found, profile)
     return assemble(path, signals, profile)

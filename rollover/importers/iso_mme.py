@@ -6,10 +6,7 @@ NAME.mme about the test, Channel/NAME.chn the list of channels, Channel/NAME.001
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
-import tempfile
 import zipfile
 from collections import Counter
 from collections.abc import Mapping
@@ -29,7 +26,9 @@ from rollover.importers.mme_listing import promised
 from rollover.importers.polarity import sign
 from rollover.importers.sidecar import Described
 from rollover.importers.signals import Signal, assemble, left_out
+from rollover.names import inside
 from rollover.recording import Recording
+from rollover.writing import put, whole
 
 NOVALUE = "NOVALUE"
 _HEADER = re.compile(r"([^:]*?)\s*:(.*)")
@@ -159,25 +158,21 @@ def write(recording: Recording, path: Path, *, force: bool = False) -> None:
     """
     if path.exists() and not force:
         raise InputError(Fault(file=str(path), message="exists; --force replaces it, another name leaves it"))
-    path.parent.mkdir(parents=True, exist_ok=True)
+    inside(path.parent, path.name)
     name = path.name.removesuffix(".zip").removesuffix(".mme")
-    part = Path(tempfile.mkdtemp(prefix=".mme.", suffix=".part", dir=path.parent))
-    try:
-        folder = part / name
-        (folder / "Channel").mkdir(parents=True)
+    if path.suffix == ".zip":
+        put(path, lambda at: _packed(_files(recording, name), at))
+        return
+    with whole(path) as folder:
+        (folder / "Channel").mkdir()
         for file, text in _files(recording, name).items():
             (folder / file).write_text(text, encoding="utf-8")
-        done = folder
-        if path.suffix == ".zip":
-            done = part / "whole.zip"
-            with zipfile.ZipFile(done, "w", zipfile.ZIP_DEFLATED) as archive:
-                for inside in sorted(folder.rglob("*")):
-                    archive.write(inside, inside.relative_to(folder).as_posix())
-        if path.is_dir():
-            shutil.rmtree(path)
-        os.replace(done, path)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
+
+
+def _packed(files: Mapping[str, str], path: Path) -> None:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for file, text in sorted(files.items()):
+            archive.writestr(file, text)
 
 
 def _files(recording: Recording, name: str) -> dict[str, str]:

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import tempfile
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +9,10 @@ import numpy as np
 
 from rollover.channels import describe
 from rollover.document import dump_mapping, to_mapping
-from rollover.faults import Fault, InputError
+from rollover.faults import Fault, InputError, seen
 from rollover.importers.sidecar import Described, Sidecar, read_described
 from rollover.importers.signals import Signal, assemble
+from rollover.names import inside
 from rollover.recording import Clock, Recording, Sensor, is_run, read_parquet
 from rollover.recording.tables import (
     csv_heading,
@@ -26,6 +23,7 @@ from rollover.recording.tables import (
     write_csv,
     write_parquet_columns,
 )
+from rollover.writing import together
 
 FORMAT = "rollover-recording/1"
 TABLES = (".csv", ".parquet")
@@ -76,18 +74,13 @@ def write(recording: Recording, path: Path, *, force: bool = False) -> None:
     for target in (path, sidecar):
         if target.exists() and not force:
             raise InputError(Fault(file=str(target), message="exists; --force replaces it, another name leaves it"))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with _beside(path.parent) as part:
+    inside(path.parent, path.name)
+    inside(path.parent, sidecar.name)
+    with together(path) as part:
         columns = {"time": recording.time, **recording.channels}
-        text = f"# {_one_line(recording.title)}\n" + dump_mapping(_about(recording))
+        text = f"# {seen(_one_line(recording.title))}\n" + dump_mapping(_about(recording))
         (part / sidecar.name).write_text(text, encoding="utf-8")
         (write_csv if path.suffix == ".csv" else write_parquet_columns)(columns, part / path.name)
-        os.replace(part / path.name, path)
-        try:
-            os.replace(part / sidecar.name, sidecar)
-        except BaseException:
-            path.unlink()
-            raise
 
 
 def _table(path: Path) -> Path:
@@ -98,12 +91,6 @@ def _table(path: Path) -> Path:
         message = f"got {len(found)} tables beside it; one of {path.stem}.csv and {path.stem}.parquet is needed"
         raise InputError(Fault(file=str(path), message=message))
     return found[0]
-
-
-@contextlib.contextmanager
-def _beside(folder: Path) -> Iterator[Path]:
-    with tempfile.TemporaryDirectory(prefix=".recording.", suffix=".part", dir=folder) as name:
-        yield Path(name)
 
 
 def _about(recording: Recording) -> dict[str, Any]:

@@ -7,7 +7,6 @@ rig: the proof imports nothing of them.
 from __future__ import annotations
 
 import importlib
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +18,7 @@ from rollover.proof.generator import Case, Order
 from rollover.proof.score import score
 from rollover.proof.seal import Seal, opened, sealed, write_truth
 from rollover.proof.tally import tally
+from rollover.writing import scratch
 
 FORMAT = "rollover-proof/1"
 DIAGNOSIS = "rollover.diagnosis:diagnose_folder"
@@ -91,7 +91,7 @@ def prove(
     if rig not in RIGS:
         raise ValueError(f"rig: no such rig, got {rig!r}; {', '.join(RIGS)} are allowed")
     orders: list[Order] = importlib.import_module(RIGS[rig]).plan(count, seed, kinds, effects)
-    with tempfile.TemporaryDirectory(prefix="cases.") as given, tempfile.TemporaryDirectory(prefix="kept.") as kept:
+    with scratch() as given, scratch() as kept:
         folders = [Path(given) / order.name for order in orders]
         truths: dict[int, dict[str, Any]] = {}
         makings = [Making(order=o, folder=f, rig=rig) for o, f in zip(orders, folders, strict=True)]

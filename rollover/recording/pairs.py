@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from rollover.writing import put
 
 KEY = b"rollover"
 Column = NDArray[Any] | Sequence[Any]
@@ -29,7 +29,7 @@ def write_pairs(values: Mapping[str, float], about: Mapping[str, Any], path: Pat
     table = pa.table({"name": pa.array(list(values), pa.string()), "value": numbers})
     table = table.replace_schema_metadata({KEY: json.dumps(about)})
     # small as they are, dictionaries and statistics would be most of the file
-    _put(path, lambda at: pq.write_table(table, at, compression="none", use_dictionary=False, write_statistics=False))
+    put(path, lambda at: pq.write_table(table, at, compression="none", use_dictionary=False, write_statistics=False))
 
 
 def read_pairs(path: Path) -> tuple[dict[str, float], dict[str, Any]]:
@@ -58,7 +58,7 @@ def write_table(
     fields = [pa.field(name, array.type, metadata=dict(meanings.get(name, {}))) for name, array in arrays.items()]
     schema = pa.schema(fields, metadata={KEY: json.dumps(about)})
     table = pa.Table.from_arrays(list(arrays.values()), schema=schema)
-    _put(path, lambda at: pq.write_table(table, at))
+    put(path, lambda at: pq.write_table(table, at))
 
 
 def read_table(path: Path) -> tuple[dict[str, list[Any]], dict[str, Any]]:
@@ -81,19 +81,4 @@ def as_numbers(values: Sequence[Any]) -> NDArray[np.float64]:
 
 def put_text(path: Path, text: str) -> None:
     """Write a text file, whole or not at all."""
-    _put(path, lambda at: at.write_text(text, encoding="utf-8"))
-
-
-def _put(path: Path, write: Callable[[Path], Any]) -> None:
-    """Write beside the place and move there: a process that is killed leaves the whole file or none."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
-    os.close(handle)
-    part = Path(name)
-    try:
-        write(part)
-        part.chmod(0o644)
-        os.replace(part, path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
+    put(path, lambda at: at.write_text(text, encoding="utf-8"))

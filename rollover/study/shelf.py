@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from rollover.execute import Failure
 from rollover.faults import Fault, InputError
@@ -105,6 +105,8 @@ def claim(folder: Path, name: str, *, force: bool) -> Path:
     if not target.is_dir():
         raise _refused(folder, "not a folder, but a file; another --out is needed")
     names = [p.name for p in target.iterdir() if not p.name.endswith(".part")]
+    if led := [p.name for p in target.iterdir() if p.is_symlink() and not p.resolve().is_relative_to(target)]:
+        raise _refused(folder, f"holds a link that leads out of it, got {led[0]!r}; another --out is needed")
     if foreign := sorted(set(names) - set(FILES)):
         raise _refused(folder, f"holds files that are no study's, got {foreign[0]!r}; another --out is needed")
     if force or not set(names) - {LOCK, STUDY}:  # nothing yet, or killed before anything was there
@@ -127,13 +129,26 @@ def locked(folder: Path) -> Iterator[None]:
     except ImportError:  # Windows: two at once only do the same work twice
         yield
         return
-    folder.mkdir(parents=True, exist_ok=True)
-    with (folder / LOCK).open("w") as file:
+    with _opened(folder) as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             raise _refused(folder, "is being worked on by another process; wait for it, or another --out") from None
         yield
+
+
+def _opened(folder: Path) -> IO[str]:
+    """The file of the lock, written to: a full or a read-only disk refuses that before anything is worked out."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        file = (folder / LOCK).open("a", encoding="utf-8")
+        file.truncate(0)
+        file.write(f"{os.getpid()}\n")
+        file.flush()
+    except OSError as e:
+        what = f"cannot be written: {e.strerror or e}; a place with room that may be written is needed"
+        raise _refused(folder, what) from None
+    return file
 
 
 def path_of(folder: Path, key: str) -> Path:

@@ -41,7 +41,7 @@ def test_no_text_can_break_out_of_its_place() -> None:
     assert len(re.findall(r"<script[ >]", text)) == len(re.findall(r"</script>", text)) == 5
     assert text.count("<!--") == 1, "the page's own comment"
     assert text.count("</html>") == 1
-    assert 'handle.open_channel("recording", "a \\"b\\" <\\/script> <\\!-- & @@script@@")' in text
+    assert 'handle.open_channel("recording", "a \\"b\\" \\u003c/script\\u003e \\u003c!-- \\u0026 @@script@@")' in text
     assert 'say("<\\/script>"); // WebHandle <\\!-- @@title@@' in text, "put in as it is, not read as a template"
 
 

@@ -1,0 +1,120 @@
+"""What a file may name, and how little of a foreign file a message shows; see rollover/document/README.md."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rollover.faults import InputError
+from rollover.importers import read_recording
+from rollover.scenario import load
+
+SECRET = "root:x:0:0:secret"
+PROFILE = """format: rollover-profile/1
+channels:
+  t: {channel: time, unit: s}
+  F: {channel: ground/force_normal, unit: N}
+"""
+
+
+@pytest.mark.parametrize("how", ["above", "absolute", "link"])
+def test_a_scenario_names_a_vehicle_of_a_shared_library(how: str, tmp_path: Path) -> None:
+    (tmp_path / "shared").mkdir()
+    vehicle = tmp_path / "shared" / "striker.yaml"
+    vehicle.write_text("kind: striker\nname: Shared\nmass: 77.0\nface_length: 0.14\nface_width: 0.045\n")
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    (folder / "link.yaml").symlink_to(vehicle)
+    name = {"above": "../shared/striker.yaml", "absolute": str(vehicle), "link": "link.yaml"}[how]
+    (folder / "s.yaml").write_text(f"base: drop_test.yaml\nvehicle: {name}\n")
+    assert getattr(load(folder / "s.yaml").vehicle, "mass") == 77.0  # noqa: B009
+
+
+@pytest.mark.parametrize(
+    ("content", "line"),
+    [
+        (SECRET, "vehicle: {0}"),
+        (f"- {SECRET}\n- b\n", "base: {0}"),
+        (f'"{SECRET}"', "base: {0}"),
+        ("\x00" + SECRET, "base: {0}"),
+    ],
+)
+def test_of_a_file_that_is_none_nothing_is_told(content: str, line: str, tmp_path: Path) -> None:
+    (tmp_path / "passwd").write_text(content)
+    (tmp_path / "x.yaml").symlink_to("passwd")
+    base = "" if "base" in line else "base: drop_test.yaml\n"
+    (tmp_path / "s.yaml").write_text(f"{base}{line.replace('{0}', 'x.yaml')}\n")
+    with pytest.raises(InputError) as caught:
+        load(tmp_path / "s.yaml")
+    assert "secret" not in str(caught.value)
+
+
+def test_a_scenario_names_no_program(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text("raise SystemExit('it was run')")
+    for line in ("effects: own.py", "effects: {own.py: {}}", "vehicle: own.py", "base: own.py"):
+        (tmp_path / "s.yaml").write_text(f"base: drop_test.yaml\n{line}\n" if "base" not in line else line)
+        with pytest.raises(InputError):
+            load(tmp_path / "s.yaml")
+
+
+# ---- HDF5
+
+
+def hdf5(folder: Path, kind: str) -> Path:
+    h5py = pytest.importorskip("h5py", reason="h5py is not installed: HDF5 is not tested")
+    t, force = np.arange(50.0) / 1000.0, np.linspace(0.0, 9.0, 50)
+    (folder / "raw.bin").write_bytes(force.tobytes())
+    with h5py.File(folder / "other.h5", "w") as other:
+        other["F"] = force
+    (folder / "p.yaml").write_text(PROFILE)
+    path = folder / f"{kind}.h5"
+    with h5py.File(path, "w") as file:
+        file["t"] = t
+        if kind in ("storage", "deep storage"):
+            where = "F" if kind == "storage" else "a/b/c"
+            file.create_dataset(where, shape=(50,), dtype="f8", external=[(str(folder / "raw.bin"), 0, 400)])
+        if kind == "virtual":
+            layout = h5py.VirtualLayout(shape=(50,), dtype="f8")
+            layout[:] = h5py.VirtualSource(str(folder / "other.h5"), "F", shape=(50,))
+            file.create_virtual_dataset("F", layout)
+        if kind == "link":
+            file["F"] = h5py.ExternalLink(str(folder / "other.h5"), "/F")
+        if kind == "soft link out":
+            file["away"] = h5py.ExternalLink(str(folder / "other.h5"), "/")
+            file["F"] = h5py.SoftLink("/away/F")
+        if kind in ("plain", "cycle", "soft link", "deep storage"):
+            file["F"] = force
+        if kind == "cycle":
+            file["g/F"] = force
+            file["g/up"] = file["/"]
+        if kind == "soft link":
+            file["also"] = h5py.SoftLink("/F")
+            file["nowhere"] = h5py.SoftLink("/none")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("storage", "F: numbers kept in another file, '"),
+        ("deep storage", "a/b/c: numbers kept in another file, '"),
+        ("virtual", "F: a virtual data set, put together from '"),
+        ("link", "F: a link into another file, '"),
+        ("soft link out", "away: a link into another file, '"),
+    ],
+)
+def test_numbers_of_other_files_are_not_fetched(kind: str, words: str, tmp_path: Path) -> None:
+    path = hdf5(tmp_path, kind)
+    with pytest.raises(InputError) as caught:
+        read_recording(path, profile=tmp_path / "p.yaml")
+    said = str(caught.value)
+    assert said.startswith(f"{path}: {words}")
+    assert said.endswith("h5repack, or a copy made with h5py, puts them in")
+
+
+@pytest.mark.parametrize("kind", ["plain", "cycle", "soft link"])
+def test_a_file_that_stands_alone_is_read(kind: str, tmp_path: Path) -> None:
+    found = read_recording(hdf5(tmp_path, kind), profile=tmp_path / "p.yaml")
+    assert found["ground/force_normal"][-1] == 9.0
