@@ -128,6 +128,8 @@ def test_one_late_channel_is_no_late_clock() -> None:
     assert timed("d", faulty, under(made)).zero is None
     slow = replace(made, channels={**made.channels, FORCE: np.interp(made.time - 0.03, made.time, made[FORCE])})
     assert timed("d", slow, under(made)).zero is None
+    both = {c: np.interp(made.time - 0.03, made.time, made[c]) for c in (FORCE, ACCELERATION)}
+    assert timed("d", replace(made, channels={**made.channels, **both}), under(made)).zero is None
 
 
 def test_what_hangs_before_it_falls_is_not_in_contact_when_it_is_let_go() -> None:
