@@ -11,8 +11,11 @@ from rollover.importers import iso_mme, plain
 from rollover.importers.cone_drops import CONE_DROPS
 from rollover.importers.csv_profile import CSV
 from rollover.importers.cube_tosses import CUBE_TOSSES
+from rollover.importers.elbow_tosses import ELBOW_TOSSES
 from rollover.importers.falling_balls import FALLING_BALLS
 from rollover.importers.hdf5 import HDF5
+from rollover.importers.ide import IDE
+from rollover.importers.impack import IMPACK
 from rollover.importers.importer import Collection, Importer
 from rollover.importers.mat import MAT
 from rollover.importers.mcap import MCAP
@@ -28,8 +31,9 @@ __all__ += ["write_recording"]
 NOT_RECORDINGS = (".yaml", ".yml", ".json", ".md", ".txt")
 
 PLAIN = Importer(name="plain", meaning="CSV or Parquet with a sidecar", sniff=plain.sniff, read=plain.read)
-_OWN = {i.name: i for i in (PLAIN, iso_mme.ISO_MME, MAT, TDMS, MDF, HDF5, MCAP, CSV)}
-COLLECTIONS: dict[str, Collection] = {c.name: c for c in (CUBE_TOSSES, FALLING_BALLS, SOIL_PENETROMETER, CONE_DROPS)}
+_OWN = {i.name: i for i in (PLAIN, iso_mme.ISO_MME, MAT, TDMS, MDF, HDF5, MCAP, IDE, CSV)}
+_SETS = (CUBE_TOSSES, ELBOW_TOSSES, FALLING_BALLS, SOIL_PENETROMETER, CONE_DROPS, IMPACK)
+COLLECTIONS: dict[str, Collection] = {c.name: c for c in _SETS}
 ENTRY_POINTS = "rollover.importers"
 
 
