@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ground.fluid import cone_rate
 from rollover.faults import Fault, InputError
 from rollover.importers.importer import Collection, check_claim, reading
 from rollover.importers.signals import check_time, check_values
@@ -39,9 +40,25 @@ CONE = {  # kg, by the half angle in the name; 12 stands for 12.5 degrees
     80: 0.0257,
 }
 DRAG = (1.81100050e-07, -8.13339690e-05, 1.49104512e-02, -3.78712427e-02)  # C_d over degrees, the authors' cubic
+# the authors' fit of the water to rigid cones: depth to which its mass grows with the cone (m), k of k rho r^3, and how
+# fast the growth dies out behind, exp(-tau sqrt(z/depth - 1))
+WATER = {
+    10: (0.12512, 0.21614, 0.82432),
+    12: (0.10257, 0.18312, 1.13663),
+    25: (0.043915, 0.43677, 0.93576),
+    30: (0.035278, 0.51476, 0.86043),
+    40: (0.026107, 0.52548, 0.97613),
+    45: (0.022665, 0.66933, 1.41719),
+    50: (0.019473, 0.72813, 1.52306),
+    60: (0.014633, 0.87266, 2.52946),
+    70: (0.0086783, 1.06549, 2.22545),
+    80: (0.0049956, 0.80594, 2.63711),
+}
 CLIPS = 41.7  # g
 CLIPPED = 0.97 * CLIPS
 RADIUS = 0.026  # m, of the cone's base
+DENSITY = 997.0  # kg/m3, of the authors' water
+MOVING = "effects.soil-added-mass-growth"
 WINDOW = (-0.015, 0.050)  # s about the impact: falling, until the accelerometer comes off its stop
 WITHIN = 0.002  # s: time 0 is "about" at the impact
 AXIAL = "striker/acceleration_z"
@@ -114,12 +131,20 @@ def _drop(file: Path, name: str, rows: Array) -> Recording:
         "vehicle.nose_height": RADIUS / math.tan(half),
         "ground.law.drag_coefficient": drag,
     }
+    uncertainty = {"ground.law.drag_coefficient": 0.5 * drag}
+    water = "what of the water moves along is left to be found"
     if kind != "R":
+        rate, fade = _water(angle, half)
         # where the instrument sits: the body, all but the nose
         conditions |= {
             "effects.structural-compliance.stiffness": None,
             "effects.structural-compliance.nose_share": 1.0 - BODY / mass,
+            f"{MOVING}.rate": rate,
+            f"{MOVING}.fade": fade,
         }
+        # after a rigid cone's blow little tells where the growth ends
+        uncertainty |= {f"{MOVING}.rate": 0.5 * rate, f"{MOVING}.fade": 0.5 * conditions["vehicle.nose_height"]}
+        water = "the water that moves along: the authors' fit to rigid cones too; half of it in doubt"
     return Recording(
         title=f"Cone of {math.degrees(half):g} deg with {NAMED[kind]}, dropped {height:g} m, no. {match[4]}",
         source=CONE_DROPS.source,
@@ -127,7 +152,7 @@ def _drop(file: Path, name: str, rows: Array) -> Recording:
         # 0 in free fall: what the water does to the body; coordinate acceleration is that less gravity
         channels={AXIAL: kept[:, 1] * G - GRAVITY},
         conditions=conditions,
-        uncertainty={"ground.law.drag_coefficient": 0.5 * drag},
+        uncertainty=uncertainty,
         clock=Clock(zero="known", within=WITHIN),
         notes=(
             f"rows from {1e3 * WINDOW[0]:g} to {1e3 * WINDOW[1]:g} ms about the impact; {len(rows) - len(about)} others"
@@ -138,8 +163,18 @@ def _drop(file: Path, name: str, rows: Array) -> Recording:
             f"nose, with what lies between: {1.0 - BODY / mass:.4f} of the mass",
             "speed at impact worked out from the height of the drop, without air; time 0 is about at the impact",
             f"drag coefficient: the authors' fit to rigid cones at their half angles, here {drag:.3f}; half of it in doubt",
+            water,
         ),
     )
+
+
+def _water(angle: int, half: float) -> tuple[float, float]:
+    """Rate (kg/m) and fade (m) of `soil-added-mass-growth` with the mass that the authors' fit has in the end.
+
+    Its growth behind the depth L is that of the law at L times exp(-tau sqrt(z/L - 1)), whose integral is 2 L/tau^2.
+    """
+    depth, k, tau = WATER[angle]
+    return cone_rate(half, density=DENSITY, coefficient=k), 2.0 * depth / tau**2
 
 
 CONE_DROPS = Collection(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rollover.faults import Fault, InputError
 from rollover.importers.importer import Collection, check_claim, reading
-from rollover.importers.tosses import CLEAR, RATE, read_toss, start_of, toss_files, without_jumps
+from rollover.importers.tosses import RATE, read_toss, rows_of_flight, start_of, toss_files, without_jumps
 from rollover.recording import Clock, Recording
 
 Array = NDArray[np.float64]
@@ -62,10 +62,10 @@ def _toss(file: Path, name: str, rows: Array) -> Recording:
     q = without_jumps(file, rows[:, 3:7])
     matrices = Rotation.from_quat(q[:, [1, 2, 3, 0]]).as_matrix()
     lowest = rows[:, 2] + (matrices[:, 2] @ CORNERS).min(axis=1)
-    start = start_of(rows[:, :3], q, rows[0, 7:13], lowest)
+    start = start_of(rows[:, :3], q, rows[0, 7:13], rows_of_flight(lowest))
     table = _table(lowest)
     centre = rows[:, :3] - [0.0, 0.0, table or 0.0]
-    kept = min(start.flight + round(AFTER * RATE) + 1, len(rows)) if lowest.min() < CLEAR else len(rows)
+    kept = min(start.flight + round(AFTER * RATE) + 1, len(rows))
     conditions = {**start.conditions(), "vehicle.whole.mass": MASS}
     conditions["initiation.position"][2] -= table or 0.0
     notes = [

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.importers.importer import Collection
-from rollover.importers.tosses import CLEAR, RATE, read_toss, start_of, toss_files, without_jumps
+from rollover.importers.tosses import RATE, read_toss, rows_of_flight, start_of, toss_files, without_jumps
 from rollover.recording import Clock, Recording
 
 Array = NDArray[np.float64]
@@ -23,6 +23,7 @@ LENGTH, SIDE = 0.1, 0.05  # m, of a link: a box along x
 HINGE = np.array([-0.035, 0.06, 0.0])  # m, in the axes of the first link; it turns about y
 SECOND = np.array([0.035, 0.0, 0.0])  # m, centre of the second link from there, in its own axes
 AFTER = 0.1  # s after the first contact: what comes later is chance
+NEAR, SHARP = 0.03, 2  # m over the table in which a corner turns; rows before it does, in which it is slowed already
 WITHIN = 3e-4  # s: the first row is the start
 VELOCITY, SPIN = 0.001, 0.5  # m/s, rad/s: 1 sigma; links on a hinge do not turn as one body
 BOX = 0.5 * np.array([LENGTH, SIDE, SIDE])[:, None] * np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1)
@@ -38,8 +39,8 @@ def _toss(file: Path, name: str, rows: Array) -> Recording:
     first, angle = rows[:, 4:7], rows[:, 7]
     centre, lowest = _both(first, q, angle)
     rate = (centre[1] - centre[0]) * RATE
-    start = start_of(centre, q, np.concatenate([rate, rows[0, 8:11]]), lowest)
-    kept = min(start.flight + round(AFTER * RATE) + 1, len(rows)) if lowest.min() < CLEAR else len(rows)
+    start = start_of(centre, q, np.concatenate([rate, rows[0, 8:11]]), _flight(lowest))
+    kept = min(start.flight + round(AFTER * RATE) + 1, len(rows))
     notes = [
         f"two links of {MASS} kg, each a box of {LENGTH} x {SIDE} x {SIDE} m with {INERTIA} kg m2 about each axis; the"
         " second turns about y of the first, about a point 35 mm behind and 60 mm to the left of its centre",
@@ -69,6 +70,12 @@ def _toss(file: Path, name: str, rows: Array) -> Recording:
         clock=Clock(zero="known", within=WITHIN),
         notes=tuple(notes),
     )
+
+
+def _flight(lowest: Array) -> int:
+    """Rows before the first contact: the tracked corners turn a centimetre above the table that they come to rest on."""
+    turns = np.flatnonzero((lowest[1:-1] < NEAR) & (lowest[1:-1] < lowest[:-2]) & (lowest[1:-1] < lowest[2:])) + 1
+    return min(rows_of_flight(lowest), int(turns[0]) - SHARP if turns.size else len(lowest))
 
 
 def _both(centre: Array, q: Array, angle: Array) -> tuple[Array, Array]:

@@ -62,21 +62,18 @@ def _read(path: Path, select: Sequence[str]) -> Iterator[tuple[str, Recording]]:
 
 
 def _found(name: str, columns: Mapping[str, Array], how: str) -> Recording:
-    """The first drop that is a clean one, of the largest decelerations of a log in turn; or the largest one."""
+    """The fastest clean drop about the largest decelerations of a log; if there is none, the largest of them."""
     a = np.convolve(columns["a50g"], np.full(SMOOTH, 1.0 / SMOOTH), mode="same")
-    first = None
+    tried = []
     for _ in range(MOST_TRIED):
         peak = int(np.argmax(a))
         if not np.isfinite(a[peak]):
             break
         rows = slice(max(peak - round(BEFORE * RATE), 0), peak + round(BEHIND * RATE) + 1)
-        found = _drop(name, {c: v[rows] for c, v in columns.items()}, (how,))
-        if "initiation.speed" in found.conditions:
-            return found
-        first = first or found
+        tried.append(_drop(name, {c: v[rows] for c, v in columns.items()}, (how,)))
         a[max(peak - round(APART * RATE), 0) : peak + round(APART * RATE)] = -np.inf
-    assert first is not None
-    return first
+    # a knock on the deck may look like a stop, from a lower speed
+    return max(tried, key=lambda drop: float(drop.conditions.get("initiation.speed", 0.0)))
 
 
 def finest(columns: Mapping[str, Array]) -> str:

@@ -57,6 +57,12 @@ def without_jumps(file: Path, q: Array) -> Array:
     return q
 
 
+def rows_of_flight(lowest: Array) -> int:
+    """Rows before the lowest corner, (n,) over the table, is next to it; all of them if it never is."""
+    near = np.flatnonzero(lowest < CLEAR)
+    return int(near[0]) if near.size else len(lowest)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Start:
     """State at the first row, and rows of the flight before the first contact."""
@@ -78,17 +84,15 @@ class Start:
         }
 
 
-def start_of(centre: Array, q: Array, rates: Array, lowest: Array) -> Start:
-    """A flight without forces but gravity, fitted to the rows of it: a parabola, and a turn that is constant.
+def start_of(centre: Array, q: Array, rates: Array, flight: int) -> Start:
+    """A flight without forces but gravity, fitted to the first `flight` rows: a parabola, and a constant turn.
 
-    `centre` (n, 3) and `q` (n, 4) are poses, `lowest` (n,) the height of the lowest corner, `rates` (6,) what is
-    recorded at the first row. The turn of a body with the same inertia about each axis is constant. With fewer than
-    five rows before it touches the recorded rates stand.
+    `centre` (n, 3) and `q` (n, 4) are poses, `rates` (6,) what is recorded at the first row. The turn of a body with the
+    same inertia about each axis is constant. With fewer than five rows before it touches the recorded rates stand.
     """
     from scipy.spatial.transform import Rotation
 
     turn = Rotation.from_quat(q[:, [1, 2, 3, 0]])
-    flight = int(np.argmax(lowest < CLEAR)) if np.any(lowest < CLEAR) else len(centre)
     place, velocity, spin, first = centre[0], rates[:3], rates[3:], turn[0]
     if flight >= LEAST_FLIGHT:
         t = np.arange(flight) / RATE
