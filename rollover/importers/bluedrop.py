@@ -48,7 +48,9 @@ def read_log(path: Path) -> tuple[dict[str, Array], str]:
         raise InputError(Fault(file=str(book), message=message))
     apart, name, factors = tried[0]
     if apart > AGREED:
-        message = f"no sheet of {book.name} fits, got ranges {apart:.2f} g apart by the best, {name}; at most {AGREED:g} g"
+        message = (
+            f"no sheet of {book.name} fits, got ranges {apart:.2f} g apart by the best, {name}; at most {AGREED:g} g"
+        )
         raise InputError(Fault(file=str(path), message=message))
     found = {"t_s": _times(path, numbers)}
     for k, (sensor, column) in enumerate(SENSORS.items(), start=2):
@@ -100,7 +102,10 @@ def _sheets(book: Path) -> Iterator[tuple[str, Factors]]:
             factors = {str(row[0]): (row[k], row[k + 1]) for row in rows[1:] if len(row) > k + 1}
             if set(SENSORS) <= set(factors) and all(_is_factor(factors[name]) for name in SENSORS):
                 label = str(heading[k]).removesuffix("_offset")
-                yield f"{sheet}, {label}", {name: (float(a), float(b)) for name, (a, b) in factors.items() if name in SENSORS}
+                yield (
+                    f"{sheet}, {label}",
+                    {name: (float(a), float(b)) for name, (a, b) in factors.items() if name in SENSORS},
+                )
 
 
 def _is_factor(pair: Row) -> bool:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ground.fluid import cone_rate
+from ground.reference import REFERENCE_AREA
 from rollover.faults import Fault, InputError
 from rollover.importers.importer import Collection, check_claim, reading
 from rollover.importers.signals import check_time, check_values
@@ -108,7 +108,9 @@ def _drop(file: Path, name: str, rows: Array) -> Recording:
     check_claim(file, rows.size)
     kind, angle, height = match[1], int(match[2]), int(match[3]) / 100.0
     if rows.ndim != 2 or rows.shape[1] != 4:
-        message = f"{name}: not a drop, got a shape of {list(rows.shape)}; four columns are needed (time and three axes)"
+        message = (
+            f"{name}: not a drop, got a shape of {list(rows.shape)}; four columns are needed (time and three axes)"
+        )
         raise InputError(Fault(file=str(file), message=message))
     if angle not in CONE:
         message = f"{name}: no such cone, got {angle} degrees; {', '.join(map(str, CONE))} were dropped"
@@ -162,7 +164,7 @@ def _drop(file: Path, name: str, rows: Array) -> Recording:
             f"the accelerometer sits in the body of {BODY} kg, not in the nose; between them {NAMED[kind]}",
             f"nose, with what lies between: {1.0 - BODY / mass:.4f} of the mass",
             "speed at impact worked out from the height of the drop, without air; time 0 is about at the impact",
-            f"drag coefficient: the authors' fit to rigid cones at their half angles, here {drag:.3f}; half of it in doubt",
+            f"drag coefficient: the authors' fit to rigid cones, {drag:.3f} at this half angle; half of it in doubt",
             water,
         ),
     )
@@ -171,10 +173,11 @@ def _drop(file: Path, name: str, rows: Array) -> Recording:
 def _water(angle: int, half: float) -> tuple[float, float]:
     """Rate (kg/m) and fade (m) of `soil-added-mass-growth` with the mass that the authors' fit has in the end.
 
-    Its growth behind the depth L is that of the law at L times exp(-tau sqrt(z/L - 1)), whose integral is 2 L/tau^2.
+    The mass is k rho r^3, on a displaced volume of pi/3 r^3/tan(half). Its growth behind the depth L is that of the law
+    at L times exp(-tau sqrt(z/L - 1)), whose integral is 2 L/tau^2.
     """
     depth, k, tau = WATER[angle]
-    return cone_rate(half, density=DENSITY, coefficient=k), 2.0 * depth / tau**2
+    return 3.0 * k * DENSITY * math.tan(half) / math.pi * REFERENCE_AREA, 2.0 * depth / tau**2
 
 
 CONE_DROPS = Collection(

@@ -71,7 +71,9 @@ def _toss(file: Path, name: str, rows: Array) -> Recording:
     notes = [
         f"a cube of {MASS} kg, edge {EDGE} m, inertia {INERTIA} kg m2 about each axis; the table is at z = 0",
         "the table is where the cube comes to rest, "
-        + (f"{1e3 * table:+.1f} mm from the zero of the poses" if table is not None else "which it does not: as stated"),
+        + (
+            f"{1e3 * table:+.1f} mm from the zero of the poses" if table is not None else "which it does not: as stated"
+        ),
         "velocities are left out: filtered differences of the tracked poses, not measured by themselves; roll, pitch"
         " and yaw too, they are the quaternion once more and jump",
         "the start in the conditions is that of a flight fitted to the poses before the first contact"

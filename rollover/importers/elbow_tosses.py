@@ -73,7 +73,7 @@ def _toss(file: Path, name: str, rows: Array) -> Recording:
 
 
 def _flight(lowest: Array) -> int:
-    """Rows before the first contact: the tracked corners turn a centimetre above the table that they come to rest on."""
+    """Rows before the first contact: tracked corners turn a centimetre above the table that they come to rest on."""
     turns = np.flatnonzero((lowest[1:-1] < NEAR) & (lowest[1:-1] < lowest[:-2]) & (lowest[1:-1] < lowest[2:])) + 1
     return min(rows_of_flight(lowest), int(turns[0]) - SHARP if turns.size else len(lowest))
 

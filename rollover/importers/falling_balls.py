@@ -98,7 +98,7 @@ def _recording(
     uncertainty: dict[str, Any] = {"initiation.height": HEIGHT, "initiation.speed": SPEED}
     notes = [
         "height from video at 15 Hz",
-        f"let go by hand at about the first row, from about its height: {HEIGHT} m, {SPEED} m/s and {WITHIN} s in doubt",
+        f"let go by hand at about the first row, from about its height: {HEIGHT} m, {SPEED} m/s, {WITHIN} s in doubt",
         "the speed of the file is left out: a filtered difference of the height, not measured by itself",
     ]
     if falling < len(height):
@@ -172,7 +172,7 @@ def _key(name: str) -> str:
 
 FALLING_BALLS = Collection(
     name="falling-balls",
-    meaning="eleven balls dropped from a bridge, most of them twice, height by video, 15 Hz: the workbook and balls.txt",
+    meaning="eleven balls dropped twice from a bridge, height by video, 15 Hz: Ball_drops_data.xls and balls.txt",
     citation="de Silva, Higdon, Brunton, Kutz: Discovery of physics from data, Frontiers in AI 2020",
     licence="MIT",
     where="github.com/briandesilva/discovery-of-physics-from-data, Data",

@@ -126,7 +126,7 @@ def _laid_out(tensor: _Tensor, data: bytes, order: str) -> Array:
 def _followed(file: io.BytesIO) -> Any:
     """What one pickle makes, of plain values, names and tensors alone. ``ValueError`` for any other instruction."""
     stack: list[Any] = []
-    memo: dict[int, Any] = {}
+    memo: dict[Any, Any] = {}
     start = file.tell()
     for op, arg, _ in pickletools.genops(file):
         if file.tell() - start > MOST_PICKLED:
@@ -142,7 +142,7 @@ def _followed(file: io.BytesIO) -> Any:
         elif op.name in ("BINGET", "LONG_BINGET"):
             stack.append(memo[arg])
         elif op.name == "GLOBAL":
-            stack.append(_named(arg))
+            stack.append(_named(str(arg)))
         elif op.name in ("TUPLE", "TUPLE1", "TUPLE2", "TUPLE3"):
             items = _to_mark(stack) if op.name == "TUPLE" else _last(stack, int(op.name[-1]))
             stack.append(tuple(items))
@@ -195,7 +195,12 @@ def _called(what: Any, given: Any) -> Any:
 
 def _storage(about: Any) -> _Storage:
     """`about` is ("storage", type, key, device, count), and None in old files."""
-    if not isinstance(about, tuple) or len(about) not in (5, 6) or about[0] != "storage" or about[5:] not in ((), (None,)):
+    if (
+        not isinstance(about, tuple)
+        or len(about) not in (5, 6)
+        or about[0] != "storage"
+        or about[5:] not in ((), (None,))
+    ):
         raise ValueError("the pickle refers to something that is no storage")
     kind = about[1].name.removeprefix("torch ") if isinstance(about[1], _Name) else ""
     if kind not in STORAGES or type(about[2]) is not str or type(about[4]) is not int:

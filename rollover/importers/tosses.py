@@ -46,13 +46,16 @@ def read_toss(file: Path, columns: int, what: str) -> Array:
 
 
 def without_jumps(file: Path, q: Array) -> Array:
-    """Unit quaternions (n, 4) whose sign does not jump along n. Raises `InputError` for what are none."""
+    """Unit quaternions (n, 4) whose sign does not jump along n, the first with w >= 0, as a simulation begins.
+
+    Raises `InputError` for what are none.
+    """
     size = np.linalg.norm(q, axis=1)
     off = np.flatnonzero(np.abs(size - 1.0) > UNIT)
     if off.size:
         message = f"row {int(off[0])}: not a quaternion, got a length of {size[off[0]]:.4g}; 0.99 to 1.01 is allowed"
         raise InputError(Fault(file=str(file), message=message))
-    q = q / size[:, None]
+    q = q / (size * (-1.0 if q[0, 0] < 0.0 else 1.0))[:, None]
     q[1:] *= np.cumprod(np.where(np.sum(q[1:] * q[:-1], axis=1) < 0.0, -1.0, 1.0))[:, None]
     return q
 
@@ -87,8 +90,8 @@ class Start:
 def start_of(centre: Array, q: Array, rates: Array, flight: int) -> Start:
     """A flight without forces but gravity, fitted to the first `flight` rows: a parabola, and a constant turn.
 
-    `centre` (n, 3) and `q` (n, 4) are poses, `rates` (6,) what is recorded at the first row. The turn of a body with the
-    same inertia about each axis is constant. With fewer than five rows before it touches the recorded rates stand.
+    `centre` (n, 3) and `q` (n, 4) are poses, `rates` (6,) what is recorded at the first row. The turn of a body with
+    the same inertia about each axis is constant. With fewer than five rows before it touches the recorded rates stand.
     """
     from scipy.spatial.transform import Rotation
 

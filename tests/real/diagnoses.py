@@ -35,11 +35,14 @@ class Set:
 
 
 def balls(*names: str, more: str = "") -> tuple[str, ...]:
-    """Drops of balls, which the scenario lets fall without air."""
+    """Drops of balls, which the scenario lets fall without air.
+
+    Heights by video are off by 1 % of the way, smoothly: dense balls miss a free fall by 0.15 to 0.4 m of 36 m.
+    """
     chosen = " ".join(f"--select '{name}-?'" for name in names)
     return (
         f"import {{data}}/balls --as falling-balls {chosen} --out {{out}}/recordings",
-        f"diagnose ball_drop {{out}}/recordings{more} --out {{out}}/{FINAL}",
+        f"diagnose ball_drop {{out}}/recordings{more} --tolerance 0.01 --out {{out}}/{FINAL}",
     )
 
 
@@ -94,12 +97,8 @@ SETS: dict[str, Set] = {
     "cones, soft spring, 25 deg": Set(
         left_out="structural-compliance", commands=cones("SS25???[12]"), published="1700 N/m"
     ),
-    "cube tosses, 0 to 4": Set(
-        left_out="ground-friction", commands=cubes("toss00[0-4]"), published="mu 0.15 to 0.18"
-    ),
-    "cube tosses, 5 to 9": Set(
-        left_out="ground-friction", commands=cubes("toss00[5-9]"), published="mu 0.15 to 0.18"
-    ),
+    "cube tosses, 0 to 4": Set(left_out="ground-friction", commands=cubes("toss00[0-4]"), published="mu 0.15 to 0.18"),
+    "cube tosses, 5 to 9": Set(left_out="ground-friction", commands=cubes("toss00[5-9]"), published="mu 0.15 to 0.18"),
     "penetrometer, no rate": Set(
         left_out="soil-rate-hardening", commands=penetrometer(" --set ground.law.rate_per_decade=0")
     ),
@@ -137,7 +136,9 @@ def account(one: Set, found: Mapping[str, Any]) -> dict[str, Any]:
             {
                 "id": e["id"],
                 **({} if e.get("channel") is None else {"channel": e["channel"]}),
-                "parameters": {n: [rounded(p[k]) for k in ("value", "low", "high")] for n, p in e["parameters"].items()},
+                "parameters": {
+                    n: [rounded(p[k]) for k in ("value", "low", "high")] for n, p in e["parameters"].items()
+                },
                 "indistinguishable_from": e["indistinguishable_from"],
             }
             for e in found["effects"]

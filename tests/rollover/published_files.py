@@ -16,7 +16,16 @@ SYSTEM = {
     "little_endian": True,
     "type_sizes": {"short": 2, "int": 4, "long": 4},
 }
-BLUEDROP = ("2g_accel", "18g_accel", "50g_accel", "pore_pressure", "200g_accel", "55g_x_tilt", "55g_y_tilt", "250g_accel")
+BLUEDROP = (
+    "2g_accel",
+    "18g_accel",
+    "50g_accel",
+    "pore_pressure",
+    "200g_accel",
+    "55g_x_tilt",
+    "55g_y_tilt",
+    "250g_accel",
+)
 
 
 def text(value: str) -> bytes:

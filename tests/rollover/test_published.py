@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.io import loadmat, savemat
+from typer.testing import CliRunner
 
 from rollover.cli import app
 from rollover.faults import InputError
@@ -19,7 +20,6 @@ from rollover.importers.tensors import read_tensor
 from rollover.importers.tosses import RATE
 from rollover.recording import Recording
 from tests.rollover import published_files as files
-from typer.testing import CliRunner
 
 DATA = os.environ.get("ROLLOVER_DATA", "")
 G = 9.80665
@@ -154,13 +154,15 @@ def test_a_published_toss_comes_in_metres_with_the_start_of_its_flight(tmp_path:
         assert any("cut off" in note for note in toss.notes)
 
 
-def test_the_start_has_the_sign_of_the_recorded_quaternion(tmp_path: Path) -> None:
+def test_a_quaternion_begins_as_a_simulation_does_and_does_not_jump(tmp_path: Path) -> None:
     rows = files.cube_rows()
     rows[:, 3:7] *= -1.0
+    rows[5:9, 3:7] *= -1.0
     files.write_old_pt(tmp_path / "0.pt", files.as_tensor(rows))
     toss = read("cube-tosses", tmp_path)["toss000"]
     q = [toss[f"chassis/quaternion_{axis}"][0] for axis in "wxyz"]
     assert toss.conditions["initiation.quaternion"] == pytest.approx(q, abs=1e-6)
+    assert toss["chassis/quaternion_w"] == pytest.approx(files.cube_rows()[: toss.time.size, 3], abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -456,7 +458,8 @@ def test_any_ide_file_is_read_by_a_profile_and_a_cut_one_is_refused(tmp_path: Pa
     profile = tmp_path / "profile.yaml"
     profile.write_text(
         "format: rollover-profile/1\nchannels:\n"
-        "  40g DC Acceleration/X (40g): {channel: sensor/axial/acceleration_z, sensor: {body: striker, gravity: proper}}\n"
+        "  40g DC Acceleration/X (40g):\n"
+        "    {channel: sensor/axial/acceleration_z, sensor: {body: striker, gravity: proper}}\n"
         "  Rotation/Z: {channel: sensor/axial/angular_velocity_z, sensor: {body: striker}}\n",
         encoding="utf-8",
     )
