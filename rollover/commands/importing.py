@@ -33,19 +33,29 @@ def import_(
     select: Annotated[
         list[str] | None, typer.Option(help="Of a set of recordings, those whose names fit; may be repeated.")
     ] = None,
+    channel: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Channels to keep, such as 'chassis/position_?'; may be repeated.", show_default="all, or a set's own"
+        ),
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder", show_default="out/import/NAME")] = None,
     to: Annotated[str, typer.Option(help="csv, parquet or mme.zip.")] = "csv",
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
     """Turn recordings of other formats into rollover-recording/1 files."""
-    from rollover.importers import write_recording
+    from rollover.importers import COLLECTIONS, with_channels, write_recording
 
     endings = ("csv", "parquet", "mme.zip")
     if to not in endings:
         raise InputError(Fault(file="--to", message=f"no such format, got {to!r}; {', '.join(endings)} are allowed"))
     folder = out or Path("out", "import", source.name.split(".")[0])
-    made, rows = list(_recordings(source, kind, profile, select)), []  # all are read before the first is written
+    wanted = channel or (COLLECTIONS[kind].channels if kind in COLLECTIONS else ("*",))
+    made: list[tuple[str, Recording]] = []  # all are read before the first is written
+    for name, recording in _recordings(source, kind, profile, select):
+        made.append((name, with_channels(recording, wanted, str(source))))
+    rows = []
     targets = [folder / f"{name}.{to}" for name, _ in made]
     for target in targets:
         if target.exists() and not force:

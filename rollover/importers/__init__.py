@@ -16,7 +16,7 @@ from rollover.importers.falling_balls import FALLING_BALLS
 from rollover.importers.hdf5 import HDF5
 from rollover.importers.ide import IDE
 from rollover.importers.impack import IMPACK
-from rollover.importers.importer import Collection, Importer
+from rollover.importers.importer import Collection, Importer, with_channels
 from rollover.importers.mat import MAT
 from rollover.importers.mcap import MCAP
 from rollover.importers.mdf import MDF
@@ -26,7 +26,7 @@ from rollover.importers.tdms import TDMS
 from rollover.recording import Recording
 
 __all__ = ["COLLECTIONS", "Collection", "Importer", "importers", "read_profile", "read_recording", "recordings_at"]
-__all__ += ["write_recording"]
+__all__ += ["with_channels", "write_recording"]
 
 NOT_RECORDINGS = (".yaml", ".yml", ".json", ".md", ".txt")
 

@@ -501,3 +501,30 @@ def test_an_empty_folder_is_refused_with_the_files_that_are_needed(tmp_path: Pat
         assert asked.exit_code == 2, name
         assert "needed" in asked.output, name
     assert not (tmp_path / "out").exists()
+
+
+def test_an_import_keeps_the_channels_that_are_asked_for_and_tells_which_it_left_out(tmp_path: Path) -> None:
+    files.write_old_pt(tmp_path / "4.pt", files.as_tensor(files.cube_rows()))
+
+    def imported(name: str, *options: str) -> Recording:
+        out = tmp_path / name
+        done = CliRunner().invoke(app, ["import", str(tmp_path), "--as", "cube-tosses", "--out", str(out), *options])
+        assert done.exit_code == 0, done.output
+        return read_recording(out / "toss004.csv")
+
+    place = [f"chassis/position_{axis}" for axis in "xyz"]
+    usual, all_of_it, one = imported("a"), imported("b", "--channel", "*"), imported("c", "--channel", place[2])
+    assert list(usual.channels) == place
+    assert "chassis/quaternion_w" in usual.notes[-1]
+    assert len(all_of_it.channels) == 7
+    assert not any("channels left out" in note for note in all_of_it.notes)
+    assert list(one.channels) == place[2:]
+    # the others by --channel: any format, and nothing is written for one that is not there
+    csv = str(tmp_path / "a" / "toss004.csv")
+    options = ["--channel", "chassis/position_x", "--out", str(tmp_path / "d")]
+    assert CliRunner().invoke(app, ["import", csv, *options]).exit_code == 0
+    assert list(read_recording(tmp_path / "d" / "toss004.csv").channels) == place[:1]
+    wrong = CliRunner().invoke(app, ["import", csv, "--channel", "chassis/positon_x", "--out", str(tmp_path / "e")])
+    assert wrong.exit_code == 2
+    assert "--channel: no such channel, got 'chassis/positon_x'; did you mean 'chassis/position_x'" in wrong.output
+    assert not (tmp_path / "e").exists()
