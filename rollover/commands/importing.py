@@ -40,6 +40,12 @@ def import_(
             help="Of a set of recordings, or several tests in a file, those whose names fit; may be repeated."
         ),
     ] = None,
+    channel: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Channels to keep, such as 'chassis/position_?'; may be repeated.", show_default="all, or a set's own"
+        ),
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder", show_default="out/import/NAME")] = None,
     to: Annotated[str, typer.Option(help="csv, parquet or mme.zip.")] = "csv",
     force: Force = False,
@@ -49,7 +55,7 @@ def import_(
     from dataclasses import replace
 
     from rollover import console
-    from rollover.importers import name_of
+    from rollover.importers import COLLECTIONS, name_of, with_channels
     from rollover.names import distinct, inside
     from rollover.writing import hold
 
@@ -57,7 +63,11 @@ def import_(
     if to not in endings:
         raise InputError(Fault(file="--to", message=f"no such format, got {to!r}; {', '.join(endings)} are allowed"))
     folder = out or Path("out", "import", name_of(source))
-    made = _recordings(source, kind, profile, select)  # all are read before the first is written
+    wanted = channel or (COLLECTIONS[kind].channels if kind in COLLECTIONS else ("*",))
+    read = _recordings(source, kind, profile, select)  # all of it before the first is written
+    made = {
+        name: (at, with_channels(r, wanted, str(source))) for name, (at, r) in read.items()
+    }  # all are read before the first is written
     spelt = distinct(made, f".{to}", file=str(source))
     targets = {name: inside(folder, f"{spelt[name]}.{to}") for name in made}
     for target, (at, _) in zip(targets.values(), made.values(), strict=True):

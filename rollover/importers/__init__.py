@@ -13,9 +13,12 @@ from rollover.importers.cone_drops import CONE_DROPS
 from rollover.importers.csv_profile import CSV
 from rollover.importers.cube_tosses import CUBE_TOSSES
 from rollover.importers.dts import DTS
+from rollover.importers.elbow_tosses import ELBOW_TOSSES
 from rollover.importers.falling_balls import FALLING_BALLS
 from rollover.importers.hdf5 import HDF5
-from rollover.importers.importer import Collection, Importer
+from rollover.importers.ide import IDE
+from rollover.importers.impack import IMPACK
+from rollover.importers.importer import Collection, Importer, with_channels
 from rollover.importers.lvm import LVM
 from rollover.importers.mat import MAT
 from rollover.importers.mcap import MCAP
@@ -28,18 +31,20 @@ from rollover.importers.tdms import TDMS
 from rollover.recording import Recording
 
 __all__ = ["COLLECTIONS", "Collection", "Importer", "importers", "read_profile", "read_recording", "recordings_at"]
-__all__ += ["name_of", "names_of_tests", "read_named", "write_recording"]
+__all__ += ["name_of", "names_of_tests", "read_named", "with_channels", "write_recording"]
 
 NOT_RECORDINGS = (".yaml", ".yml", ".json", ".md", ".txt")
 ENDINGS = (  # what a name loses: in Messung_3.0.csv only the last of two, in drop.001 none
     *(".mme.zip", ".mme", ".csv", ".parquet", ".txt", ".asc", ".dat", ".tsv", ".lvm", ".log", ".yaml", ".yml"),
-    *(".mat", ".tdms", ".mdf", ".mf4", ".h5", ".hdf5", ".nc", ".mcap", ".bag", ".db3"),
+    *(".mat", ".tdms", ".mdf", ".mf4", ".h5", ".hdf5", ".nc", ".mcap", ".bag", ".db3", ".ide"),
     *(".zip", ".tar", ".tar.gz", ".tar.bz2", ".tar.xz", ".tgz"),
 )
 
 PLAIN = Importer(name="plain", meaning="CSV or Parquet with a sidecar", sniff=plain.sniff, read=plain.read)
-_OWN = {i.name: i for i in (PLAIN, NHTSA, iso_mme.ISO_MME, MAT, TDMS, MDF, HDF5, NETCDF, MCAP, LVM, DTS, CSV)}
-COLLECTIONS: dict[str, Collection] = {c.name: c for c in (CUBE_TOSSES, FALLING_BALLS, SOIL_PENETROMETER, CONE_DROPS)}
+_FORMATS = (PLAIN, NHTSA, iso_mme.ISO_MME, MAT, TDMS, MDF, HDF5, NETCDF, MCAP, IDE, LVM, DTS, CSV)
+_OWN = {i.name: i for i in _FORMATS}
+_SETS = (CUBE_TOSSES, ELBOW_TOSSES, FALLING_BALLS, SOIL_PENETROMETER, CONE_DROPS, IMPACK)
+COLLECTIONS: dict[str, Collection] = {c.name: c for c in _SETS}
 ENTRY_POINTS = "rollover.importers"
 
 

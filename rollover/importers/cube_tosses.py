@@ -1,34 +1,47 @@
-"""Tosses of an acrylic cube onto a table, tracked by cameras (ContactNets)."""
+"""Tosses of an acrylic cube onto a table, tracked by cameras (ContactNets).
+
+As published: one tensor for each toss, 0.pt and so on, lengths in half edges of the cube. All tosses in one
+`cube_tosses.npz`, in metres, are read as well.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatch
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rollover.faults import Fault, InputError
-from rollover.frames import angles
 from rollover.importers.importer import Collection, check_claim, reading
-from rollover.recording import Recording
+from rollover.importers.tosses import RATE, read_toss, rows_of_flight, start_of, toss_files, without_jumps
+from rollover.recording import Clock, Recording
 
 Array = NDArray[np.float64]
-RATE, GRAVITY = 148.0, 9.81  # Hz, m/s2
-CLEAR, LEAST_FLIGHT = 0.002, 5  # m under the lowest corner; rows before it touches
 MASS, INERTIA, EDGE = 0.37, 8.1e-4, 0.1048  # kg, kg m2 about each axis, m
 COLUMNS = ("x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz")
-_NOTES = (
-    f"a cube of {MASS} kg, edge {EDGE} m, inertia {INERTIA} kg m2 about each axis; the table is at z = 0",
-    "velocities are filtered differences of the tracked poses, not measured by themselves; the start in the"
-    " conditions is that of a flight fitted to the poses before the first contact",
-)
+WIDTH = len(COLUMNS) + 6  # of a tensor: the controls behind are all zero
+METRES = np.array([0.5 * EDGE] * 3 + [1.0] * 4 + [0.5 * EDGE] * 3 + [1.0] * 3)  # of a tensor's columns
+AFTER = 0.1  # s after the first contact: what comes later is chance
+LOWEST = 0.005  # m by which the table may lie off the zero of the poses
+RESTS, AT_REST = 5, 0.0005  # rows, m by which their lowest corner may move
+VELOCITY, SPIN = 0.001, 0.007  # m/s, rad/s: 1 sigma of a start that is fitted to a flight of usual length
+WITHIN = 3e-4  # s: the first row is the start
+CORNERS = 0.5 * EDGE * np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1)
 
 
 def _read(path: Path, select: Sequence[str]) -> Iterator[tuple[str, Recording]]:
-    file = path / "cube_tosses.npz" if path.is_dir() else path
+    one = path / "cube_tosses.npz" if path.is_dir() else path
+    if one.suffix == ".npz" and one.is_file():
+        yield from _repackaged(one, select)
+        return
+    for name, file in toss_files(path, "toss", select):
+        rows = read_toss(file, WIDTH, "a toss of the cube")
+        yield name, _toss(file, name, rows[:, : len(COLUMNS)] * METRES)
+
+
+def _repackaged(file: Path, select: Sequence[str]) -> Iterator[tuple[str, Recording]]:
     with reading(file, "cube tosses"), np.load(file, allow_pickle=False) as found:
         data, length = np.asarray(found["data"]), np.asarray(found["length"])
         if tuple(map(str, found["columns"])) != COLUMNS or data.ndim != 2 or int(length.sum()) != len(data):
@@ -39,71 +52,67 @@ def _read(path: Path, select: Sequence[str]) -> Iterator[tuple[str, Recording]]:
     for i, rows in enumerate(int(n) for n in length):
         name = f"toss{i:03d}"
         if any(fnmatch(name, pattern) for pattern in select):
-            yield name, _toss(name, data[at : at + rows].astype(np.float64))
+            yield name, _toss(file, name, data[at : at + rows].astype(np.float64))
         at += rows
 
 
-def _toss(name: str, rows: np.ndarray) -> Recording:
-    scalar_first = _without_jumps(rows[:, 3:7])
+def _toss(file: Path, name: str, rows: Array) -> Recording:
     from scipy.spatial.transform import Rotation
 
-    vectors = Rotation.from_quat(scalar_first[:, [1, 2, 3, 0]]).as_rotvec()
-    roll, pitch, yaw = angles(vectors)
-    channels = {f"chassis/position_{axis}": rows[:, k].copy() for k, axis in enumerate("xyz")}
-    channels |= {f"chassis/quaternion_{axis}": scalar_first[:, k].copy() for k, axis in enumerate("wxyz")}
-    channels |= {"chassis/roll": roll, "chassis/pitch": pitch, "chassis/yaw": yaw}
-    channels |= {f"chassis/velocity_{axis}": rows[:, 7 + k].copy() for k, axis in enumerate("xyz")}
-    channels |= {f"chassis/angular_velocity_{axis}": rows[:, 10 + k].copy() for k, axis in enumerate("xyz")}
+    q = without_jumps(file, rows[:, 3:7])
+    matrices = Rotation.from_quat(q[:, [1, 2, 3, 0]]).as_matrix()
+    lowest = rows[:, 2] + (matrices[:, 2] @ CORNERS).min(axis=1)
+    start = start_of(rows[:, :3], q, rows[0, 7:13], rows_of_flight(lowest))
+    table = _table(lowest)
+    centre = rows[:, :3] - [0.0, 0.0, table or 0.0]
+    kept = min(start.flight + round(AFTER * RATE) + 1, len(rows))
+    conditions = {**start.conditions(), "vehicle.whole.mass": MASS}
+    conditions["initiation.position"][2] -= table or 0.0
+    notes = [
+        f"a cube of {MASS} kg, edge {EDGE} m, inertia {INERTIA} kg m2 about each axis; the table is at z = 0",
+        "the table is where the cube comes to rest, "
+        + (
+            f"{1e3 * table:+.1f} mm from the zero of the poses" if table is not None else "which it does not: as stated"
+        ),
+        "velocities are left out: filtered differences of the tracked poses, not measured by themselves; roll, pitch"
+        " and yaw too, they are the quaternion once more and jump",
+        "the start in the conditions is that of a flight fitted to the poses before the first contact"
+        if start.is_fitted
+        else "touches too soon for a flight to be fitted: the start in the conditions is that of the filtered rates",
+    ]
+    if kept < len(rows):
+        notes.append(
+            f"{len(rows) - kept} rows from {AFTER:g} s after the first contact on cut off: tumbling is chaotic, what"
+            " comes later says more of the start than of the physics"
+        )
+    channels = {f"chassis/position_{axis}": centre[:kept, k].copy() for k, axis in enumerate("xyz")}
+    channels |= {f"chassis/quaternion_{axis}": q[:kept, k].copy() for k, axis in enumerate("wxyz")}
     return Recording(
         title=f"Cube {name}",
-        conditions=_start(rows[:, :3], Rotation.from_quat(scalar_first[:, [1, 2, 3, 0]]), rows[0, 7:]),
+        conditions=conditions,
+        uncertainty={"initiation.velocity": (VELOCITY,) * 3, "initiation.angular_velocity": (SPIN,) * 3},
         source=CUBE_TOSSES.source,
-        time=np.arange(len(rows)) / RATE,
+        time=np.arange(kept) / RATE,
         channels=channels,
-        notes=_NOTES,
+        clock=Clock(zero="known", within=WITHIN),
+        notes=tuple(notes),
     )
 
 
-def _start(centre: Array, turn: Any, rates: Array) -> dict[str, Any]:
-    """Where and how fast the cube is at its first row: a flight without forces but gravity, fitted to the rows of it.
-
-    Of a cube the turn is constant too. With fewer than five rows before it touches the recorded rates stand.
-    """
-    corners = 0.5 * EDGE * np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1)
-    lowest = centre[:, 2] + (turn.as_matrix()[:, 2] @ corners).min(axis=1)
-    flight = int(np.argmax(lowest < CLEAR)) if np.any(lowest < CLEAR) else len(centre)
-    place, velocity, spin, first = centre[0], rates[:3], rates[3:], turn[0]
-    if flight >= LEAST_FLIGHT:
-        t = np.arange(flight) / RATE
-        A = np.stack([np.ones_like(t), t], axis=1)
-        fallen = centre[:flight] + 0.5 * GRAVITY * t[:, None] ** 2 * [0.0, 0.0, 1.0]
-        place, velocity = np.linalg.lstsq(A, fallen, rcond=None)[0]
-        turned, along = np.linalg.lstsq(A, (turn[:flight] * turn[0].inv()).as_rotvec(), rcond=None)[0]
-        first = type(turn).from_rotvec(turned) * turn[0]
-        spin = first.inv().apply(along)
-    x, y, z, w = first.as_quat()
-    return {
-        "initiation.position": place.tolist(),
-        "initiation.velocity": velocity.tolist(),
-        "initiation.quaternion": [float(w), float(x), float(y), float(z)],
-        "initiation.angular_velocity": spin.tolist(),
-        "vehicle.whole.mass": MASS,
-    }
-
-
-def _without_jumps(q: np.ndarray) -> np.ndarray:
-    """Unit quaternions (n, 4) whose sign does not jump along n."""
-    q = q / np.linalg.norm(q, axis=1)[:, None]
-    flips = np.cumprod(np.where(np.sum(q[1:] * q[:-1], axis=1) < 0.0, -1.0, 1.0))
-    q[1:] *= flips[:, None]
-    return q
+def _table(lowest: Array) -> float | None:
+    """Height of the table over the zero of the poses, m: that of the lowest corner at rest; None if there is none."""
+    last = lowest[-RESTS:]
+    found = float(np.median(last))
+    return found if np.ptp(last) < AT_REST and abs(found) < LOWEST else None
 
 
 CUBE_TOSSES = Collection(
     name="cube-tosses",
-    meaning="300 tosses of an acrylic cube onto a table, tracked poses, 148 Hz",
+    meaning="tosses of an acrylic cube onto a table, tracked poses, 148 Hz: 0.pt, 1.pt and so on",
     citation="Pfrommer, Halm, Posa: ContactNets, CoRL 2020",
     licence="BSD-3-Clause",
-    where="github.com/DAIRLab/contact-nets",
+    where="github.com/DAIRLab/contact-nets, data/tosses_processed",
     read=_read,
+    # hard ground turns a cube otherwise than a table that gives way, which hides what its place shows of friction
+    channels=("chassis/position_?",),
 )

@@ -5,11 +5,12 @@ from __future__ import annotations
 import contextlib
 import importlib
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
-from rollover.faults import Fault, InputError
+from rollover.faults import Fault, InputError, hint
 from rollover.importers.sidecar import Described
 from rollover.recording import Recording
 
@@ -34,7 +35,10 @@ class Importer:
 
 @dataclass(frozen=True, kw_only=True)
 class Collection:
-    """A published set of recordings that a user downloads; `read` gives those whose name fits one of the patterns."""
+    """A published set of recordings that a user downloads; `read` gives those whose name fits one of the patterns.
+
+    `channels` are patterns of those that an import keeps where no others are asked for.
+    """
 
     name: str
     meaning: str
@@ -42,11 +46,31 @@ class Collection:
     licence: str
     where: str
     read: Callable[[Path, Sequence[str]], Iterator[tuple[str, Recording]]]
+    channels: tuple[str, ...] = ("*",)
 
     @property
     def source(self) -> str:
         """What a recording says about where it comes from."""
         return f"{self.citation}; {self.where}; licence: {self.licence}"
+
+
+def with_channels(recording: Recording, patterns: Sequence[str], file: str) -> Recording:
+    """The recording with those channels alone that fit a pattern; the others are told in its notes.
+
+    Raises `InputError` for a pattern that fits none.
+    """
+    for pattern in patterns:
+        if not any(fnmatch(name, pattern) for name in recording.channels):
+            message = f"no such channel, got {pattern!r}; {hint(pattern, recording.channels)}"
+            raise InputError(Fault(file=file, path="--channel", message=message))
+    kept = [name for name in recording.channels if any(fnmatch(name, pattern) for pattern in patterns)]
+    left_out = [name for name in recording.channels if name not in kept]
+    if not left_out:
+        return recording
+    own = {field: getattr(recording, field) for field in ("channels", "noise", "cfc", "sensors")}
+    note = f"channels left out, --channel '*' keeps them: {', '.join(left_out)}"
+    chosen = {field: {name: v for name, v in table.items() if name in kept} for field, table in own.items()}
+    return replace(recording, notes=(*recording.notes, note), **chosen)
 
 
 def starts_with(path: Path, *marks: bytes) -> bool:

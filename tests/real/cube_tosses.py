@@ -1,6 +1,8 @@
 """Friction and restitution of a tumbling cube, fitted to real tosses (Pfrommer, Halm, Posa, ContactNets, CoRL 2020).
 
-    python -m tests.real.cube_tosses $ROLLOVER_DATA/cube_tosses/cube_tosses.npz [--tosses 40] [--json]
+    python -m tests.real.cube_tosses FOLDER [--tosses 40] [--json]
+
+FOLDER holds the owners' files, 0.pt and so on; all tosses in one .npz will do too.
 
 Every second toss is fitted, the others are held out, whole. A toss begins with the state at its first row, estimated
 from all rows before its first contact: a parabola under gravity for the centre; for the orientation a constant turn,
@@ -16,6 +18,7 @@ import argparse
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,6 +26,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+from rollover.importers.cube_tosses import METRES, WIDTH
+from rollover.importers.tosses import read_toss, toss_files
 from rollover.scenario import Scenario, load
 from rollover.simulate import run
 
@@ -62,9 +67,12 @@ def corners(centre: Array, turn: Rotation) -> Array:
 
 def tosses(path: str) -> list[Toss]:
     """All tosses with a flight long enough to begin from."""
-    file = np.load(path)
-    ends = np.cumsum(file["length"])
-    rows = np.split(file["data"], ends[:-1])
+    if Path(path).is_dir():
+        found_files = [file for _, file in toss_files(Path(path), "toss", ["*"])]
+        rows = [read_toss(file, WIDTH, "a toss of the cube")[:, :13] * METRES for file in found_files]
+    else:
+        file = np.load(path)
+        rows = np.split(file["data"], np.cumsum(file["length"])[:-1])
     found = [_toss(number, part) for number, part in enumerate(rows)]
     return [toss for toss in found if toss is not None]
 
