@@ -71,7 +71,8 @@ def write_row(t: Any, q: Any, qd: Any, qdd: Any, row: Any) -> None:
     deepest, footprint = 0.0, 0.0
     for a in range(t.counts[ACTIVE]):
         deepest = max(deepest, t.memory[t.active[a], SINKAGE])
-        footprint += t.memory[t.active[a], AREA]
+        if t.memory[t.active[a], SINKAGE] > 0.0:  # not those that are near
+            footprint += t.memory[t.active[a], AREA]
     row[k + 1] = deepest
     row[k + 2] = t.counts[FLAGS_NOW]
     row[k + 3] = footprint

@@ -26,6 +26,7 @@ from ground.kernel import (
     LINE_C,
     LINE_K,
     MASS_B,
+    MET,
     MODE,
     NORMAL,
     OWNER_R,
@@ -40,6 +41,7 @@ from ground.kernel import (
     commit_friction,
 )
 from ground.law import REFERENCE_AREA
+from rollover.applied import A_NORMAL, A_TANGENT, NOW, finish_applied
 from rollover.dense import dot, times
 from rollover.devices import finish_devices, keep_poses
 from rollover.forces import along_axle, generalised_forces, read_poses
@@ -78,6 +80,7 @@ from rollover.tables import (
     E_WHERE,
     FLAGS_NOW,
     FN,
+    MEMORYLESS,
     FRICTION_WORK,
     FT,
     HINGE,
@@ -116,8 +119,8 @@ from rollover.tables import (
     Z,
 )
 from rollover.terms import BETWEEN, finish_terms
-from rollover.touch import drop_mass, note_event, touch
-from rollover.vectors import depth_acceleration, depth_row, place, to_world, velocity
+from rollover.touch import drop_mass, meet, note_event, touch
+from rollover.vectors import add_force, depth_acceleration, depth_row, place, to_world, velocity
 
 
 @compiled
@@ -132,6 +135,8 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
         for k in range(R_NORMAL, R_WEIGHT + 1):
             t.resultant[b, k] = 0.0
     finish_elements(t, h)
+    if t.scheme[3] > 0.0:
+        finish_applied(t, h, qd)
     finish_wheels(t)
     finish_mounts(t)
     finish_axle(t)
@@ -144,6 +149,8 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
     if strike(t, bodies):
         read_poses(t.pose, q, qd)
     t.work[COLLISION] += touch(t, bodies, h)
+    if t.scheme[3] > 0.0:
+        t.velocity[:] = bodies
     keep_spins(t, before, qd)
     settle(t)
     read_poses(t.pose, q, qd)  # the impact changed the velocities
@@ -158,9 +165,14 @@ def finish_elements(t: Any, h: float) -> None:
         i = t.active[a]
         m, state, trial = t.memory[i], t.state[i], t.trial[i]
         b, row = state[BODY], state[ROW]
-        t.work[SOIL] += 0.5 * (m[FORCE] + trial[FN]) * (trial[Z] - m[SINKAGE])
-        for k in range(3):
-            t.work[FRICTION_WORK] -= 0.5 * (m[FRICTION + k] + trial[FT + k]) * trial[MOVED + k]
+        if t.soil[row, MEMORYLESS] > 0.0:
+            f, r, n = trial[FN], m[OWNER_R : OWNER_R + 3], m[NORMAL : NORMAL + 3]
+            add_force(t.pose[b], b, r, f * n[0], f * n[1], f * n[2], t.applied[A_NORMAL, NOW])
+            add_force(t.pose[b], b, r, trial[FT], trial[FT + 1], trial[FT + 2], t.applied[A_TANGENT, NOW])
+        else:
+            t.work[SOIL] += 0.5 * (m[FORCE] + trial[FN]) * (trial[Z] - m[SINKAGE])
+            for k in range(3):
+                t.work[FRICTION_WORK] -= 0.5 * (m[FRICTION + k] + trial[FT + k]) * trial[MOVED + k]
         # what the ground and the vehicle exert on each other: (1) without the collision, F_s = F + m_b1 a
         contact = trial[FN]
         if m[MASS_B] > 0.0:
@@ -192,6 +204,8 @@ def finish_elements(t: Any, h: float) -> None:
         commit_friction(t.soil[row, STICK], m[SHEAR : SHEAR + 3], trial[MOVED : MOVED + 3], m[NORMAL : NORMAL + 3])
         for k in range(3):
             m[PLACE + k] += trial[MOVED + k]
+        if outcome & MET:
+            meet(t, i)
         if outcome & BRANCHED:
             note_event(t, BRANCH_CHANGE, b, x, trial[Z])
         if outcome & ARRESTED:
