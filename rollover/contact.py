@@ -131,7 +131,7 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         scheme=np.array([*coefficients(scenario.simulation.spectral_radius), float(any(memoryless))]),
         applied=np.zeros((ACCOUNTS, HISTORY, 6 * nb)),
         velocity=np.zeros(6 * nb),
-        clock=np.zeros(2),
+        clock=np.zeros(3),
         term_memory=np.zeros((len(term_i), terms.TERM_MEMORY)),
         pose=np.zeros((nb, c.POSE_COLUMNS)),
         counts=np.zeros(c.COUNTS, dtype=np.int64),

@@ -150,7 +150,7 @@ class Tables(NamedTuple):
     scheme: Any  # (4,) of generalised alpha: alpha_m, alpha_f, gamma; 1 if any ground is `MEMORYLESS`
     applied: Any  # (2, 3, 6 nb) see rollover.applied
     velocity: Any  # (6 nb,) of the bodies at the start of the step
-    clock: Any  # (2,) length of the step that is tried, time of the scenario at which forces are tried, s
+    clock: Any  # (3,) length of the step that is tried, time at which forces are tried, s; tries that the step needed
     term_memory: Any  # (ne, terms.TERM_MEMORY)
     pose: Any  # (nb, POSE_COLUMNS)
     counts: Any  # (COUNTS,)
