@@ -8,7 +8,7 @@ so that with a constant M the kinetic energy changes by h ((1 - gamma) A + gamma
 several forces apart. The mean of Q and Q+ times the way is the same for a force that changes by little in a step; for
 one that leaps by J it is off by some J v h, which is first order in the step at each leap.
 
-Exudyn 1.13 predicts A+ with Q+ = 0 and, where Newton's iteration then fails, tries half the step with that in place of A.
+Exudyn 1.13 predicts A+ with Q+ = 0 and, where Newton's iteration then fails, tries half the step with that as A.
 
 `Tables.applied` holds for each account the generalised forces now and at the start of the step, and A.
 """
@@ -42,7 +42,9 @@ def finish_applied(t: Any, h: float, qd: Any) -> None:
                 q[FILTERED, j] = (alpha_f * q[START, j] - alpha_m * q[FILTERED, j]) / (1.0 - alpha_m)
         for j in range(q.shape[1]):
             if h > 0.0:
-                after = ((1.0 - alpha_f) * q[NOW, j] + alpha_f * q[START, j] - alpha_m * q[FILTERED, j]) / (1.0 - alpha_m)
+                after = ((1.0 - alpha_f) * q[NOW, j] + alpha_f * q[START, j] - alpha_m * q[FILTERED, j]) / (
+                    1.0 - alpha_m
+                )
                 work += ((1.0 - gamma) * q[FILTERED, j] + gamma * after) * 0.5 * (t.velocity[j] + qd[j])
                 q[FILTERED, j] = after
             else:

@@ -69,7 +69,10 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         numbers[k, : len(p)] = p
     # nothing of the ground moves along, or could begin to
     still = ground.co_moving_mass.share == 0.0
-    memoryless = [law.memoryless and still and p[whole[EFFECTS] + GROWTH] == 0.0 for (law, _), (whole, p) in zip(rows, told, strict=True)]
+    memoryless = [
+        law.memoryless and still and p[whole[EFFECTS] + GROWTH] == 0.0
+        for (law, _), (whole, p) in zip(rows, told, strict=True)
+    ]
     return Tables(
         mass=mass,
         inverse=np.linalg.inv(mass),

@@ -12,10 +12,10 @@ from ground.compiled import compiled
 from ground.kernel import AREA, CELL, LINE_Z, SINKAGE
 from rollover import tables as c
 from rollover.bodies import Body
+from rollover.elements import kinetic_of_soil
 from rollover.frames import angles, matrices, quaternions
 from rollover.rops import Rops
 from rollover.scenario import Scenario
-from rollover.step import kinetic_of_soil
 from rollover.tables import (
     ACTIVE,
     E_FORCE,

@@ -12,7 +12,20 @@ from typing import Any
 import numpy as np
 
 from ground.compiled import compiled, leaf
-from ground.kernel import AREA, BODY, LINE_C, LINE_K, LINE_Z, NORMAL, OWNER_R, PLASTIC, ROW, SHEAR, SPREAD, loading_force
+from ground.kernel import (
+    AREA,
+    BODY,
+    LINE_C,
+    LINE_K,
+    LINE_Z,
+    NORMAL,
+    OWNER_R,
+    PLASTIC,
+    ROW,
+    SHEAR,
+    SPREAD,
+    loading_force,
+)
 from ground.law import REFERENCE_AREA
 from rollover.forces import TYRE_RELAXATION, tyre_stiffness
 from rollover.tables import (

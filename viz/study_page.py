@@ -276,6 +276,9 @@ def _cases(study: Study, done: Conducted) -> Cases:
         unit, factor = series_unit(output.unit)
         y = values_of(output, done.rows) * factor
         columns.append((f"{name}, {unit}", [float(v) if np.isfinite(v) else None for v in y]))
+    open_by = [row.measures.get("ledger/residual") for row in done.rows]
+    if any(share is not None for share in open_by):
+        columns.append(("ledger open by, %", [None if share is None else 100.0 * share for share in open_by]))
     columns.append(("status", [row.failure or row.status for row in done.rows]))
     if any(row.sentence for row in done.rows):
         columns.append(("in words", [row.sentence for row in done.rows]))
