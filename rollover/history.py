@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ground.compiled import compiled
-from ground.kernel import AREA, CELL, LINE_Z, SINKAGE
+from ground.kernel import AREA, CELL, LINE_Z, ROW, SINKAGE
 from rollover import tables as c
 from rollover.bodies import Body
 from rollover.elements import kinetic_of_soil
@@ -120,7 +120,8 @@ class History:
         table = np.zeros((len(self.track), n))
         for i, values in enumerate(self.track):
             table[i, : len(values)] = values
-        return np.array(self.track_time), t.state[:n, CELL].copy(), table
+        kept = t.soil[t.state[:n, ROW], c.MEMORYLESS] == 0.0  # the others go along with the body
+        return np.array(self.track_time), t.state[:n, CELL][kept], table[:, kept]
 
 
 @dataclass(frozen=True)

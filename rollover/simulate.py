@@ -174,9 +174,10 @@ def _runaway(scenario: Scenario, t: Tables) -> str:
     if not fast:
         return ""
     w = max(fast, key=lambda k: rate[k])
+    name, torque = vehicle.wheels[w].name, start.drive.torque
     return (
-        f"wheel {vehicle.wheels[w].name} runs away at t = {t.clock[1]:.4f} s: it turns at {rate[w]:.3g} rad/s, driven with "
-        f"{start.drive.torque:g} N m and no limit; initiation.drive.limit_rate (rad/s) is needed"
+        f"wheel {name} runs away at t = {t.clock[1]:.4f} s: it turns at {rate[w]:.0f} rad/s, "
+        f"driven with {torque:g} N m and no limit; initiation.drive.limit_rate (rad/s) is needed"
     )
 
 
