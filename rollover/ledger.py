@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -60,6 +62,15 @@ def closure(run: Run) -> Closure:
         return Closure(largest=math.nan, at=math.nan, end=math.nan, step=step)
     k = int(np.nanargmax(np.where(np.isfinite(share), share, np.nan)))
     return Closure(largest=float(share[k]), at=float(run.recording.time[k]), end=float(share[-1]), step=step)
+
+
+def of_cases(ledger: Mapping[str, Any]) -> str:
+    """In how many cases of a study the ledger stays open, by what its account says, and the cure."""
+    return (
+        f"The energy ledger does not close in {ledger['open']} cases: up to {_percent(ledger['largest_residual'])} of the "
+        f"energy released is unaccounted for (point {ledger['at_point']}), more than {_percent(ledger['limit'])}; "
+        "a smaller simulation.step is needed"
+    )
 
 
 def _percent(share: float) -> str:

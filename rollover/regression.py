@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -90,8 +91,7 @@ def compared(
             if failed
             else baselines.against(found, scenario, ensemble)
         )
-        notes = (*answer.notes, *_open_ledger(mine))
-        answers.append(replace(answer, notes=notes, wall_time=sum(o.wall_time for o in mine)))
+        answers.append(replace(_with_ledger(answer, mine), wall_time=sum(o.wall_time for o in mine)))
     order = {f.stem: k for k, f in enumerate(choice.files)}
     return sorted(answers, key=lambda a: order.get(a.scenario, len(order)))
 
@@ -149,7 +149,7 @@ def updated(
         if drawn is not before:
             new[path] = drawn
         answer = _written(drawn, before, scenario, plain, sum(o.wall_time for o in outcomes[file]))
-        answers.append(replace(answer, notes=(*answer.notes, *_open_ledger(outcomes[file]))))
+        answers.append(_with_ledger(answer, outcomes[file]))
     baselines.write(new)
     return answers
 
@@ -197,10 +197,14 @@ def _work(start: Start) -> Observed:
     return observed(start.scenario)
 
 
-def _open_ledger(outcomes: Sequence[Outcome[Start, Observed]]) -> tuple[str, ...]:
-    """A note on the run whose energy ledger closes worst, if that is not well enough."""
-    wide = [o.value.ledger for o in outcomes if o.value is not None and o.value.ledger.is_wide]
-    return (max(wide, key=lambda found: found.largest).warning,) if wide else ()
+def _with_ledger(answer: Answer, outcomes: Sequence[Outcome[Start, Observed]]) -> Answer:
+    """The answer with the largest residual of the energy ledger in any run, and a note where it is too large."""
+    found = [o.value.ledger for o in outcomes if o.value is not None and math.isfinite(o.value.ledger.largest)]
+    if not found:
+        return answer
+    worst = max(found, key=lambda closure: closure.largest)
+    notes = (*answer.notes, worst.warning) if worst.is_wide else answer.notes
+    return replace(answer, notes=notes, largest_residual=worst.largest)
 
 
 def _worked_off(

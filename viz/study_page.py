@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.ledger import of_cases
 from rollover.study.answers import values_of
 from rollover.study.conduct import Conducted
 from rollover.study.study import Study
@@ -36,6 +37,8 @@ def page(study: Study, done: Conducted, account: Mapping[str, Any], *, command: 
         blocks.append(_reliability(account["reliability"]))
     if account["worst"] is not None:
         blocks.append(_worst(account["worst"]))
+    if (ledger := account.get("ledger")) and ledger["open"]:
+        blocks.insert(0, Note(text=f"{of_cases(ledger)}.", warning=True))
     blocks.append(_failures(account))
     blocks.append(_flags(account))
     blocks.append(Section(title="Every case", blocks=[_cases(study, done)]))
