@@ -39,6 +39,7 @@ class Hard(GroundLaw):
 
     hidden = 1
     plastic = False
+    memoryless = True
 
     @staticmethod
     @begin_law

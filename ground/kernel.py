@@ -41,6 +41,7 @@ COLUMNS = 27
 CELL, BODY, MODE, FLAGS, HITS, ROW = 0, 1, 2, 3, 4, 5
 STATE_COLUMNS = 6
 IDLE, LOADING, UNLOADING = 0, 1, 2
+NEAR = 3  # of memoryless ground: a point that should reach it within the step
 
 # columns of the law's settings
 PLASTIC, REST_STIFFNESS, ADDRESS_FORCE, ADDRESS_ADVANCE, ADDRESS_BEGIN = 0, 1, 2, 3, 4
@@ -71,7 +72,7 @@ DOUBLED, HALVED = 12, 50  # times, of the way from a rut to where its line meets
 SAME = 1e-10  # m: sinkages closer than this are one, so that rounding does not switch a loaded element to its line
 
 # outcomes of a commit, as bits
-BRANCHED, ARRESTED, RELEASED = 1, 2, 4
+BRANCHED, ARRESTED, RELEASED, MET = 1, 2, 4, 8
 
 
 @inlined
@@ -279,6 +280,9 @@ def commit(law: Any, p: Any, s: Any, row: Any, state: Any, z: float, v: float, h
     if law[PLASTIC] == 0:
         if z <= 0.0:
             outcome |= RELEASED
+        elif state[MODE] == NEAR:
+            state[MODE] = LOADING
+            outcome |= MET
         return outcome
     if z > row[LINE_Z]:
         if state[MODE] == LOADING and before < s[BRANCH] <= z:

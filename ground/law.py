@@ -121,6 +121,9 @@ class GroundLaw:
     advance: ClassVar[Any] = None
     hidden: ClassVar[int] = 0
     plastic: ClassVar[bool] = True  # False: the loading curve is followed in both directions
+    memoryless: ClassVar[bool] = (
+        False  # True: not plastic, and nothing stays at the place: contacts go along with the body
+    )
 
     @property
     def p(self) -> NDArray[np.float64]:

@@ -128,6 +128,7 @@ class Answer:
     wall_time: float = 0.0
     differences: tuple[Difference, ...] = ()
     notes: tuple[str, ...] = ()
+    largest_residual: float | None = None  # of the energy ledger over the energy released, over all runs
 
     @property
     def ok(self) -> bool:

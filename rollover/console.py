@@ -131,6 +131,7 @@ def report(
     compiled: bool = False,
 ) -> None:
     """The answer of a run on standard output; what took part of its time to compile tells no speed."""
+    from rollover.ledger import closure
     from rollover.loads import unconverged
 
     out = _out()
@@ -150,6 +151,11 @@ def report(
         out.print(_criteria(rows))
     if unsure := unconverged(peaks):
         out.print(f"{unsure[0].upper()}{unsure[1:]}.", style="bold yellow")
+    closed = closure(run)
+    if closed.is_wide:
+        out.print(f"{closed.warning[0].upper()}{closed.warning[1:]}.", style="bold yellow")
+    elif closed.sentence:
+        out.print(f"{closed.sentence}.")
     if run.domain_flags:
         marked = " Loads marked * were taken there: an extrapolation, not a measured range." if peaks else ""
         flags = ", ".join(run.domain_flags)

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ground.kernel import COLUMNS, STATE_COLUMNS
+from ground.kernel import COLUMNS, EFFECTS, GROWTH, STATE_COLUMNS
 from ground.law import HIDDEN, REFERENCE_MASS, GroundLaw
 from ground.settings import settings
 from ground.surface import is_flat, normal
 from ground.surface import tables as surface_tables
 from rollover import tables as c
 from rollover import terms
+from rollover.applied import ACCOUNTS, HISTORY, coefficients
 from rollover.bodies import Body, bodies_of, nose_share
 from rollover.effects import acting
 from rollover.rows import joint_rows, mount_rows, term_rows, turning_rows, upright, wheel_rows
@@ -66,6 +67,12 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
     numbers = np.zeros((len(rows), max(len(p) for _, p in told)))
     for k, (_, p) in enumerate(told):
         numbers[k, : len(p)] = p
+    # nothing of the ground moves along, or could begin to
+    still = ground.co_moving_mass.share == 0.0
+    memoryless = [
+        law.memoryless and still and p[whole[EFFECTS] + GROWTH] == 0.0
+        for (law, _), (whole, p) in zip(rows, told, strict=True)
+    ]
     return Tables(
         mass=mass,
         inverse=np.linalg.inv(mass),
@@ -92,7 +99,10 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         law=integers,
         p=numbers,
         soil=np.array(
-            [_soil(ground, law, place, nose_share(scenario.vehicle, scenario.effects)) for law, place in rows]
+            [
+                _soil(ground, law, place, nose_share(scenario.vehicle, scenario.effects), is_free)
+                for (law, place), is_free in zip(rows, memoryless, strict=True)
+            ]
         ),
         domain=np.array([law.domain.vector for law, _ in rows]),
         patch_f=np.array([[p.low[0], p.high[0], p.low[1], p.high[1]] for p in ground.patches]).reshape(-1, 4),
@@ -107,7 +117,7 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
             ]
         ),
         grid_i=np.array([nx, ny], dtype=np.int64),
-        slot_of=np.full(nx * ny, -1, dtype=np.int32),
+        slot_of=np.full(nx * ny + (len(rows) * number if any(memoryless) else 0), -1, dtype=np.int32),
         memory=_untouched(capacity, COLUMNS),
         state=_untouched(capacity, STATE_COLUMNS, dtype=np.int64),
         s=_untouched(capacity, hidden),
@@ -121,7 +131,10 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         spin_memory=np.zeros((len(wheels), c.SPIN_MEMORY)),
         mount_memory=np.zeros((len(mount_f), c.SET_COLUMNS)),
         axle_memory=np.zeros(c.AXLE_MEMORY),
-        clock=np.zeros(2),
+        scheme=np.array([*coefficients(scenario.simulation.spectral_radius), float(any(memoryless))]),
+        applied=np.zeros((ACCOUNTS, HISTORY, 6 * nb)),
+        velocity=np.zeros(6 * nb),
+        clock=np.zeros(3),
         term_memory=np.zeros((len(term_i), terms.TERM_MEMORY)),
         pose=np.zeros((nb, c.POSE_COLUMNS)),
         counts=np.zeros(c.COUNTS, dtype=np.int64),
@@ -176,7 +189,7 @@ def _box(surface: SurfacePoints, centre: Array) -> list[float]:
     return [*middle, *half, *(surface.normal[0] if surface.is_flat else (0.0, 0.0, 0.0))]
 
 
-def _soil(ground: Ground, law: GroundLaw, place: Ground | Patch, share: float) -> list[float]:
+def _soil(ground: Ground, law: GroundLaw, place: Ground | Patch, share: float, is_free: bool) -> list[float]:
     rule = {"reference": c.RULE_REFERENCE, "effective": c.RULE_EFFECTIVE, "clamped": c.RULE_CLAMPED}
     friction = place.friction or ground.friction
     return [
@@ -187,6 +200,7 @@ def _soil(ground: Ground, law: GroundLaw, place: Ground | Patch, share: float) -
         rule[ground.striker_mass],
         REFERENCE_MASS,
         law.domain.momentum_most,
+        float(is_free),
     ]
 
 

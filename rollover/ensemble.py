@@ -16,6 +16,7 @@ import numpy as np
 from rollover import simulate
 from rollover.execute import map_cases
 from rollover.faults import Fault, InputError
+from rollover.ledger import Closure, closure
 from rollover.loads import PeakLoad, peak_loads
 from rollover.run import Run
 from rollover.scenario import Scenario
@@ -100,12 +101,25 @@ def extremes(run: Run) -> tuple[Extreme, ...]:
     return tuple(found)
 
 
-def measured(scenario: Scenario) -> tuple[Extreme, ...]:
-    """Run a scenario for its extremes. Raises `FailedRunError`."""
+@dataclass(frozen=True, kw_only=True)
+class Observed:
+    """What one run of an ensemble gives: its extremes, and how well its energy ledger closes."""
+
+    extremes: tuple[Extreme, ...]
+    ledger: Closure
+
+
+def observed(scenario: Scenario) -> Observed:
+    """Run a scenario for its extremes and its ledger. Raises `FailedRunError`."""
     run = simulate.run(scenario)
     if run.status == "failed":
         raise FailedRunError(run.sentence)
-    return extremes(run)
+    return Observed(extremes=extremes(run), ledger=closure(run))
+
+
+def measured(scenario: Scenario) -> tuple[Extreme, ...]:
+    """Run a scenario for its extremes. Raises `FailedRunError`."""
+    return observed(scenario).extremes
 
 
 def spreads(ensemble: Sequence[Sequence[Extreme]]) -> tuple[Spread, ...]:

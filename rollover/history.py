@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ground.compiled import compiled
-from ground.kernel import AREA, CELL, LINE_Z, SINKAGE
+from ground.kernel import AREA, CELL, LINE_Z, ROW, SINKAGE
 from rollover import tables as c
 from rollover.bodies import Body
+from rollover.elements import kinetic_of_soil
 from rollover.frames import angles, matrices, quaternions
 from rollover.rops import Rops
 from rollover.scenario import Scenario
-from rollover.step import kinetic_of_soil
 from rollover.tables import (
     ACTIVE,
     E_FORCE,
@@ -71,7 +71,8 @@ def write_row(t: Any, q: Any, qd: Any, qdd: Any, row: Any) -> None:
     deepest, footprint = 0.0, 0.0
     for a in range(t.counts[ACTIVE]):
         deepest = max(deepest, t.memory[t.active[a], SINKAGE])
-        footprint += t.memory[t.active[a], AREA]
+        if t.memory[t.active[a], SINKAGE] > 0.0:  # not those that are near
+            footprint += t.memory[t.active[a], AREA]
     row[k + 1] = deepest
     row[k + 2] = t.counts[FLAGS_NOW]
     row[k + 3] = footprint
@@ -119,7 +120,8 @@ class History:
         table = np.zeros((len(self.track), n))
         for i, values in enumerate(self.track):
             table[i, : len(values)] = values
-        return np.array(self.track_time), t.state[:n, CELL].copy(), table
+        kept = t.soil[t.state[:n, ROW], c.MEMORYLESS] == 0.0  # the others go along with the body
+        return np.array(self.track_time), t.state[:n, CELL][kept], table[:, kept]
 
 
 @dataclass(frozen=True)

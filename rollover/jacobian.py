@@ -6,12 +6,26 @@ where to.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from ground.compiled import compiled, leaf
-from ground.kernel import AREA, BODY, LINE_C, LINE_K, LINE_Z, NORMAL, OWNER_R, PLASTIC, ROW, SPREAD, loading_force
+from ground.kernel import (
+    AREA,
+    BODY,
+    LINE_C,
+    LINE_K,
+    LINE_Z,
+    NORMAL,
+    OWNER_R,
+    PLASTIC,
+    ROW,
+    SHEAR,
+    SPREAD,
+    loading_force,
+)
 from ground.law import REFERENCE_AREA
 from rollover.forces import TYRE_RELAXATION, tyre_stiffness
 from rollover.tables import (
@@ -24,6 +38,8 @@ from rollover.tables import (
     E_POINT,
     FN,
     M_TORQUE_NOW,
+    MEMORYLESS,
+    MOVED,
     MU,
     RELAXATION,
     ROT,
@@ -45,7 +61,7 @@ from rollover.tables import (
     Z,
 )
 from rollover.terms import stiffen_terms
-from rollover.vectors import direction_row, place, to_body
+from rollover.vectors import direction_row, place, to_body, velocity
 
 
 @leaf
@@ -68,6 +84,38 @@ def add_point(K: Any, row: Any, b: int, r: Any, n: Any, normal: float, tangentia
             d[k] = 1.0
             direction_row(row, r, d[0], d[1], d[2], J)
             add_block(K, tangential, J, 6 * b, J, 6 * b)
+
+
+@compiled
+def add_tangent(K: Any, row: Any, b: int, m: Any, trial: Any, soil: Any, normal: float, along: float) -> None:
+    """The whole derivative of a contact's normal force and friction, which is not symmetric where it slips.
+
+    With x the strain of the stick spring and u = x/max(|x|, d_s): F_t = -mu F_n u, so that F_n brings -mu u dF_n, and
+    u turns with dx across x only where |x| > d_s.
+    """
+    n, D, C, x, v = m[NORMAL : NORMAL + 3], np.empty((3, 6)), np.empty((3, 3)), np.empty(3), np.empty(3)
+    v[0], v[1], v[2] = velocity(row, m[OWNER_R], m[OWNER_R + 1], m[OWNER_R + 2])
+    lean = 0.0
+    for k in range(3):
+        x[k] = m[SHEAR + k] + trial[MOVED + k] + soil[RELAXATION] * v[k]
+        lean += x[k] * n[k]
+    for k in range(3):
+        x[k] -= lean * n[k]
+    size = math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
+    slips, reach = size > soil[STICK], max(size, soil[STICK])
+    spring = soil[MU] * trial[FN] * along / reach
+    for j in range(3):
+        for k in range(3):
+            C[j, k] = (normal - spring) * n[j] * n[k] - soil[MU] * normal * x[j] / reach * n[k]
+            if slips:
+                C[j, k] -= spring * x[j] * x[k] / (size * size)
+        C[j, j] += spring
+        v[0], v[1], v[2] = 0.0, 0.0, 0.0
+        v[j] = 1.0
+        direction_row(row, m[OWNER_R : OWNER_R + 3], v[0], v[1], v[2], D[j])
+    for j in range(3):
+        for k in range(3):
+            add_block(K, C[j, k], D[j], 6 * b, D[k], 6 * b)
 
 
 @leaf
@@ -105,8 +153,11 @@ def stiffness(t: Any, f: float, fd: float, K: Any) -> None:
             deeper = loading_force(law, p, s, z + 1e-6, v)
             faster = loading_force(law, p, s, z, v + 1e-6)
             normal = area * (f * (deeper - here) + fd * (faster - here)) * 1e6
-        stick = soil[MU] * trial[FN] / soil[STICK]
         b = t.state[i, BODY]
+        if soil[MEMORYLESS] > 0.0:
+            add_tangent(K, t.pose[b], b, m, trial, soil, normal, f + fd * soil[RELAXATION])
+            continue
+        stick = soil[MU] * trial[FN] / soil[STICK]
         add_point(
             K,
             t.pose[b],

@@ -49,6 +49,7 @@ class Live:
     tables: Tables
     handle: Handle
     time: float = 0.0  # of the last accepted step
+    tried: float = 0.0  # time at which forces were last tried
     error: BaseException | None = None
 
 
@@ -115,6 +116,9 @@ def solve(
     clock, zero = live.tables.clock, start.time
 
     def force(_mbs: Any, t: float, _item: int, _q: Any, _qd: Any) -> list[float]:
+        if t < live.tried:
+            clock[2] += 1.0  # Newton's iteration failed: once more, with half the step
+        live.tried = t
         clock[0], clock[1] = t - live.time, zero + t
         generalised_forces(live.handle, views[0], views[1], Q)
         return Q.tolist()
@@ -132,7 +136,7 @@ def solve(
             return False
         try:
             goes_on = after_step(t, views[0], views[1], views[2])
-            live.time = t
+            live.time, clock[2] = t, 0.0
             # like the contact set, the soil's mass matrix is that of the step's start
             if live.tables.counts[ACTIVE] > 0 or M.any():
                 added_mass(live.handle, views[0], M)

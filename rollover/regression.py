@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 from rollover import baseline as baselines
 from rollover import document
 from rollover.baseline import Answer, Baseline
-from rollover.ensemble import Extreme, measured, neighbours
+from rollover.ensemble import Extreme, Observed, neighbours, observed
 from rollover.execute import Outcome, map_cases
 from rollover.faults import Fault, InputError
 from rollover.scenario import Scenario, load
@@ -84,13 +85,13 @@ def compared(
     for file, (found, scenario) in known.items():
         mine = outcomes[file]
         failed = _failed(mine)
-        ensemble = [o.value for o in mine if o.value is not None]
+        ensemble = [o.value.extremes for o in mine if o.value is not None]
         answer = (
             Answer(scenario=file.stem, verdict="failed", sentence=failed, starts=found.starts)
             if failed
             else baselines.against(found, scenario, ensemble)
         )
-        answers.append(replace(answer, wall_time=sum(o.wall_time for o in mine)))
+        answers.append(replace(_with_ledger(answer, mine), wall_time=sum(o.wall_time for o in mine)))
     order = {f.stem: k for k, f in enumerate(choice.files)}
     return sorted(answers, key=lambda a: order.get(a.scenario, len(order)))
 
@@ -144,12 +145,13 @@ def updated(
     for file, scenario in known.items():
         path = baselines.path_of(file)
         before = baselines.read(path) if path.is_file() else None
-        mine = [(o.case.half_step, o.value) for o in outcomes[file] if o.value is not None]
+        mine = [(o.case.half_step, o.value.extremes) for o in outcomes[file] if o.value is not None]
         plain, half_ = ([v for h, v in mine if h is finer] for finer in (False, True))
         drawn = baselines.drawn_up(file.stem, scenario, plain, half_, reason, before)
         if drawn is not before:
             new[path] = drawn
-        answers.append(_written(drawn, before, scenario, plain, sum(o.wall_time for o in outcomes[file])))
+        answer = _written(drawn, before, scenario, plain, sum(o.wall_time for o in outcomes[file]))
+        answers.append(_with_ledger(answer, outcomes[file]))
     write(new)
     return answers
 
@@ -193,25 +195,35 @@ def _without_runs(file: Path) -> tuple[Answer | None, Path]:
     return Answer(scenario=file.stem, verdict="missing", sentence=sentence), path
 
 
-def _work(start: Start) -> tuple[Extreme, ...]:
-    return measured(start.scenario)
+def _work(start: Start) -> Observed:
+    return observed(start.scenario)
+
+
+def _with_ledger(answer: Answer, outcomes: Sequence[Outcome[Start, Observed]]) -> Answer:
+    """The answer with the largest residual of the energy ledger in any run, and a note where it is too large."""
+    found = [o.value.ledger for o in outcomes if o.value is not None and math.isfinite(o.value.ledger.largest)]
+    if not found:
+        return answer
+    worst = max(found, key=lambda closure: closure.largest)
+    notes = (*answer.notes, worst.warning) if worst.is_wide else answer.notes
+    return replace(answer, notes=notes, largest_residual=worst.largest)
 
 
 def _worked_off(
     starts: Sequence[Start], workers: int | None, time_limit: float, show: Show | None
-) -> Mapping[Path, list[Outcome[Start, tuple[Extreme, ...]]]]:
-    found: list[Outcome[Start, tuple[Extreme, ...]]] = []
+) -> Mapping[Path, list[Outcome[Start, Observed]]]:
+    found: list[Outcome[Start, Observed]] = []
     for outcome in map_cases(_work, starts, workers=workers, time_limit=time_limit):
         found.append(outcome)
         if show is not None:
             show(len(found), len(starts))
-    by_file: dict[Path, list[Outcome[Start, tuple[Extreme, ...]]]] = {}
+    by_file: dict[Path, list[Outcome[Start, Observed]]] = {}
     for outcome in sorted(found, key=lambda o: o.index):
         by_file.setdefault(outcome.case.file, []).append(outcome)
     return by_file
 
 
-def _failed(outcomes: Sequence[Outcome[Start, tuple[Extreme, ...]]]) -> str:
+def _failed(outcomes: Sequence[Outcome[Start, Observed]]) -> str:
     """Why there is no ensemble, or nothing."""
     for k, outcome in enumerate(outcomes):
         if outcome.failure is not None:

@@ -18,11 +18,16 @@ from ground.kernel import (
 )
 from ground.relief import element_plane, height_and_gradient, highest
 from rollover.tables import (
+    MEMORYLESS,
+    OMEGA,
     OUTSIDE,
     ROT,
     SLOTS,
 )
-from rollover.vectors import place, to_body
+from rollover.vectors import depth_acceleration, place, to_body, velocity
+
+AHEAD = 2.0  # steps that a point may be away from memoryless ground: the next may be twice as long, and faster
+FOUND = 1e-300  # m: depth that marks as found what is not yet in the ground
 
 
 @compiled
@@ -71,7 +76,8 @@ def on_plane(t: Any) -> Any:
             continue  # a flat patch that does not face the ground
         x, y, z = place(row, m[0], m[1], m[2])
         reach = abs(down[0]) * m[3] + abs(down[1]) * m[4] + abs(down[2]) * m[5]
-        if n[0] * x + n[1] * y + n[2] * z - offset > reach:
+        near = nearing(t, row, m)
+        if n[0] * x + n[1] * y + n[2] * z - offset > reach + near:
             continue
         base = offset - n[0] * row[0] - n[1] * row[1] - n[2] * row[2]
         facing = -(down[0] * m[6] + down[1] * m[7] + down[2] * m[8])
@@ -80,7 +86,7 @@ def on_plane(t: Any) -> Any:
         for i in range(t.member_i[member, 1], t.member_i[member, 2]):
             a, b, c = t.point_r[i, 0], t.point_r[i, 1], t.point_r[i, 2]
             depth = base - (d0 * a + d1 * b + d2 * c)
-            if depth <= 0.0:
+            if depth <= -near:
                 continue
             if not is_flat:
                 nx, ny, nz = t.point_n[i, 0], t.point_n[i, 1], t.point_n[i, 2]
@@ -94,9 +100,13 @@ def on_plane(t: Any) -> Any:
             if ix < 0 or iy < 0 or ix >= t.grid_i[0] or iy >= t.grid_i[1]:
                 t.counts[OUTSIDE] += 1
                 continue
-            slot = slot_at(t, ix * t.grid_i[1] + iy)
+            cell = ix * t.grid_i[1] + iy
+            key = key_of(t, cell, i)
+            if depth <= 0.0 and (key == cell or not arrives(t, row, i, n, depth)):
+                continue
+            slot = slot_at(t, cell, key)
             # an element at rest keeps its rut: it is touched only beyond it
-            if t.state[slot, MODE] == IDLE and depth <= rut_depth(t.memory[slot]):
+            if t.state[slot, MODE] == IDLE and depth <= rut_depth(t.memory[slot]) and key == cell:
                 continue
             count += note_candidate(t, candidates, count, slot, i, facing, depth)
             candidates += 1
@@ -114,8 +124,9 @@ def note_candidate(t: Any, candidates: int, count: int, slot: int, i: int, facin
         first = 1
         for k in range(1, 7):
             t.found[slot, k] = 0.0
-    if depth > t.found[slot, 0]:
-        t.found[slot, 0], t.found[slot, 2] = depth, i
+    deep = max(depth, FOUND)
+    if deep > t.found[slot, 0]:
+        t.found[slot, 0], t.found[slot, 2] = deep, i
     return first
 
 
@@ -134,7 +145,8 @@ def on_relief(t: Any, plane: Any) -> Any:
         tall = abs(row[ROT + 6]) * a + abs(row[ROT + 7]) * b + abs(row[ROT + 8]) * c
         # what lies under the box, and the elements that it looks into
         reach = math.hypot(wide, long) + t.grid_f[2] + t.grid_f[3]
-        top = highest(t.relief, t.nodes, x, y, reach)
+        near = nearing(t, row, m)
+        top = highest(t.relief, t.nodes, x, y, reach) + near
         if z - tall > top:
             following = t.member_i[member, 3]  # past its pieces
             continue
@@ -150,24 +162,25 @@ def on_relief(t: Any, plane: Any) -> Any:
                     t.counts[OUTSIDE] += 1
                 continue
             cell = ix * t.grid_i[1] + iy
-            slot = t.slot_of[cell]
+            key = key_of(t, cell, i)
+            slot = t.slot_of[key]
             ground, _, _ = height_and_gradient(t.relief, t.nodes, x, y)
             if z > ground + 2.0 * (t.grid_f[2] + t.grid_f[3]):
                 continue  # higher than a plane of 75 degrees stands over the surface within its element
-            if slot < 0:
+            if slot < 0 or t.state[slot, CELL] != cell:
                 plane_of(t, cell, plane)
             else:
                 for k in range(4):
                     plane[k] = t.memory[slot, NORMAL + k]
             depth = plane[3] - (plane[0] * x + plane[1] * y + plane[2] * z)
-            if depth <= 0.0:
+            if depth <= 0.0 and (key == cell or not arrives(t, row, i, plane[:3], depth)):
                 continue
             d0, d1, d2 = to_body(row, plane[0], plane[1], plane[2])
             facing = -(d0 * t.point_n[i, 0] + d1 * t.point_n[i, 1] + d2 * t.point_n[i, 2])
             if facing <= 1e-6:
                 continue
-            slot = slot_at(t, cell)
-            if t.state[slot, MODE] == IDLE and depth <= rut_depth(t.memory[slot]):
+            slot = slot_at(t, cell, key)
+            if t.state[slot, MODE] == IDLE and depth <= rut_depth(t.memory[slot]) and key == cell:
                 continue
             count += note_candidate(t, candidates, count, slot, i, facing, depth)
             candidates += 1
@@ -199,13 +212,46 @@ def law_of(t: Any, cell: int) -> int:
     return found
 
 
+@leaf
+def nearing(t: Any, row: Any, m: Any) -> float:
+    """How far above memoryless ground a point of a box may be and yet reach it within the step, m; else 0."""
+    if t.scheme[3] == 0.0:
+        return 0.0
+    x, y, z = velocity(row, m[0], m[1], m[2])
+    turning = math.sqrt(row[OMEGA] ** 2 + row[OMEGA + 1] ** 2 + row[OMEGA + 2] ** 2)
+    size = math.sqrt(m[3] * m[3] + m[4] * m[4] + m[5] * m[5])
+    return AHEAD * t.clock[0] * (math.sqrt(x * x + y * y + z * z) + turning * size)  # type: ignore[no-any-return]
+
+
+@leaf
+def arrives(t: Any, row: Any, i: int, n: Any, depth: float) -> bool:
+    """Whether a point above a surface should reach it within the step."""
+    r, h = t.point_r[i], AHEAD * t.clock[0]
+    x, y, z = velocity(row, r[0], r[1], r[2])
+    rate = -(n[0] * x + n[1] * y + n[2] * z)
+    return depth + h * (rate + max(0.5 * h * depth_acceleration(row, r, n), 0.0)) > 0.0  # type: ignore[no-any-return]
+
+
 @inlined
-def slot_at(t: Any, cell: int) -> int:
-    """Memory row of an element; made at its first touch, so that untouched elements cost nothing."""
-    slot = t.slot_of[cell]
+def key_of(t: Any, cell: int, i: int) -> int:
+    """Place in `slot_of` of the contact of point i over an element: the element's, or the point's own."""
+    if t.scheme[3] > 0.0:
+        law = law_of(t, cell)
+        if t.soil[law, MEMORYLESS] > 0.0:
+            return t.grid_i[0] * t.grid_i[1] + law * t.point_a.size + i  # type: ignore[no-any-return]
+    return cell
+
+
+@inlined
+def slot_at(t: Any, cell: int, key: int) -> int:
+    """Memory row of a contact; made at its first touch, so that untouched elements cost nothing."""
+    slot = t.slot_of[key]
+    if slot >= 0 and t.state[slot, CELL] != cell:  # a point has moved on
+        t.state[slot, CELL] = cell
+        plane_of(t, cell, t.memory[slot, NORMAL : NORMAL + 4])
     if slot < 0:
         slot = t.counts[SLOTS]
-        t.slot_of[cell] = slot
+        t.slot_of[key] = slot
         t.counts[SLOTS] = slot + 1
         t.memory[slot, :] = 0.0
         t.state[slot, :] = 0

@@ -37,6 +37,7 @@ FRAME_RATE = 100.0  # Hz, of motion for pictures
 TRACK_RATE = 50.0  # Hz, of the ground's deformation
 REST_SPEED = 0.02  # m/s: slower than this, all bodies, for REST_TIME is rest
 REST_TIME = 0.2
+RUNAWAY = 50.0  # m/s of a driven tread, 180 km/h: no vehicle that is rolled over here has gears for it
 
 KINDS: dict[int, str] = {
     c.TOUCH: "first-touch",
@@ -105,6 +106,7 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
         if (larger := grown(t)) is not t:
             live.tables, live.handle = larger, handle(larger)
         goes_on = control is None or control.after(now, dt, q, qd, live.tables)
+        live.tables.velocity[:] = qd[: len(t.mass)]  # a blow of the control has changed it
         k = int(state["rows"])
         if time >= k * every * h - 1e-9:
             past.add(now, live.handle, q, qd, qdd)
@@ -142,6 +144,8 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
             sentence = f"the solver gave up at t = {past.time[max(past.count - 1, 0)]:.4f} s: {sentence}"
     except DivergedError as reason:
         sentence = str(reason)
+    if sentence and (why := _runaway(scenario, live.tables)):
+        sentence = f"{why} ({sentence})"
     mark_warm()
     done = _result(scenario, bodies, live.tables, past, events, control, sentence, clock.perf_counter() - began)
     return done if given is scenario else replace(done, scenario=given)
@@ -156,6 +160,25 @@ def _throttle(scenario: Scenario, t: Tables, now: float) -> None:
             return
         rising = now / start.drive.rise_time if start.drive.rise_time > 0.0 else 1.0
         t.drive[c.D_TORQUE] = start.drive.torque * min(max(rising, 0.0), 1.0)
+
+
+def _runaway(scenario: Scenario, t: Tables) -> str:
+    """Which driven wheel an engine without a limit has spun up, and what is missing; empty if none."""
+    start, vehicle = scenario.initiation, scenario.vehicle
+    if not isinstance(start, Driving) or start.drive is None or start.drive.limit_rate is not None:
+        return ""
+    assert isinstance(vehicle, Vehicle)
+    spun = [w for w in range(len(vehicle.wheels)) if t.spin_i[w] >= 0 and t.spin_f[w, c.P_DRIVEN] > 0.0]
+    rate = {w: abs(float(t.spin_memory[w, c.P_RATE_NOW])) for w in spun}
+    fast = [w for w in spun if rate[w] * t.wheel_f[w, c.W_RADIUS] > RUNAWAY]
+    if not fast:
+        return ""
+    w = max(fast, key=lambda k: rate[k])
+    name, torque = vehicle.wheels[w].name, start.drive.torque
+    return (
+        f"wheel {name} runs away at t = {t.clock[1]:.4f} s: it turns at {rate[w]:.0f} rad/s, "
+        f"driven with {torque:g} N m and no limit; initiation.drive.limit_rate (rad/s) is needed"
+    )
 
 
 def _point(x: Any) -> tuple[float, float, float]:

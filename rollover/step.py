@@ -12,49 +12,22 @@ import numpy as np
 
 from ground.compiled import compiled, inlined, leaf
 from ground.kernel import (
-    ADHESION,
-    AREA,
-    ARRESTED,
-    BODY,
-    BRANCHED,
-    CLINGS,
-    EFFECTS,
-    FLAGS,
-    FORCE,
-    FRICTION,
-    IDLE,
-    LINE_C,
-    LINE_K,
-    MASS_B,
-    MODE,
-    NORMAL,
-    OWNER_R,
-    PLACE,
-    REBOUND_DAMPING,
-    RELEASED,
-    ROW,
-    SHEAR,
-    SINKAGE,
-    UNLOADING,
-    commit,
     commit_friction,
 )
-from ground.law import REFERENCE_AREA
-from rollover.dense import dot, times
+from rollover.applied import finish_applied
 from rollover.devices import finish_devices, keep_poses
+from rollover.elements import finish_elements, settle
 from rollover.forces import along_axle, generalised_forces, read_poses
-from rollover.impact import mobility, strike_stop
+from rollover.impact import strike_stop
 from rollover.spin import finish_spins, keep_spins
 from rollover.tables import (
     A_IMPACT,
     A_SWING,
     ACC,
-    ACTIVE,
     ALPHA,
     AXLE,
     AXLE_BLOW,
     AXLE_STOP,
-    BRANCH_CHANGE,
     COLLISION,
     DEVICE,
     E_ANCHOR,
@@ -76,10 +49,7 @@ from rollover.tables import (
     E_SHEAR,
     E_SLIP,
     E_WHERE,
-    FLAGS_NOW,
-    FN,
     FRICTION_WORK,
-    FT,
     HINGE,
     M_ANGLE,
     M_ANGLE_NOW,
@@ -88,11 +58,7 @@ from rollover.tables import (
     M_REACH,
     M_TORQUE,
     M_TORQUE_NOW,
-    MOVED,
-    OUT_OF_AREA,
     R_NORMAL,
-    R_POINT,
-    R_TANGENT,
     R_WEIGHT,
     ROPS,
     S_DELTA,
@@ -103,21 +69,16 @@ from rollover.tables import (
     S_FORCE_NOW,
     S_SET,
     S_SET_NOW,
-    SOIL,
-    STICK,
-    TURN,
     TYRE,
     W_AXIS,
     W_KY,
     W_MU,
     WHEEL_OFF,
     WHEEL_ON,
-    ZDOT,
-    Z,
 )
-from rollover.terms import BETWEEN, finish_terms
-from rollover.touch import drop_mass, note_event, touch
-from rollover.vectors import depth_acceleration, depth_row, place, to_world, velocity
+from rollover.terms import finish_terms
+from rollover.touch import note_event, touch
+from rollover.vectors import place, to_world
 
 
 @compiled
@@ -132,6 +93,7 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
         for k in range(R_NORMAL, R_WEIGHT + 1):
             t.resultant[b, k] = 0.0
     finish_elements(t, h)
+    finish_applied(t, h, qd)
     finish_wheels(t)
     finish_mounts(t)
     finish_axle(t)
@@ -144,116 +106,11 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
     if strike(t, bodies):
         read_poses(t.pose, q, qd)
     t.work[COLLISION] += touch(t, bodies, h)
+    t.velocity[:] = bodies
     keep_spins(t, before, qd)
     settle(t)
     read_poses(t.pose, q, qd)  # the impact changed the velocities
     keep_poses(t)
-
-
-@leaf
-def finish_elements(t: Any, h: float) -> None:
-    """Work, contact forces and commit of the elements in contact."""
-    flags, footprint, row = 0, 0.0, 0
-    for a in range(t.counts[ACTIVE]):
-        i = t.active[a]
-        m, state, trial = t.memory[i], t.state[i], t.trial[i]
-        b, row = state[BODY], state[ROW]
-        t.work[SOIL] += 0.5 * (m[FORCE] + trial[FN]) * (trial[Z] - m[SINKAGE])
-        for k in range(3):
-            t.work[FRICTION_WORK] -= 0.5 * (m[FRICTION + k] + trial[FT + k]) * trial[MOVED + k]
-        # what the ground and the vehicle exert on each other: (1) without the collision, F_s = F + m_b1 a
-        contact = trial[FN]
-        if m[MASS_B] > 0.0:
-            contact += m[MASS_B] * depth_acceleration(t.pose[b], m[OWNER_R : OWNER_R + 3], m[NORMAL : NORMAL + 3])
-            e = t.law[row, EFFECTS]
-            if t.p[row, e + CLINGS] == 0.0 and contact < -t.p[row, e + ADHESION] * m[AREA] / REFERENCE_AREA:
-                # the mass would have to be pulled along: it leaves, and stays in the soil
-                drop_mass(t, i)
-                contact = trial[FN]
-        x = place(t.pose[b], m[OWNER_R], m[OWNER_R + 1], m[OWNER_R + 2])
-        result = t.resultant[b]
-        for k in range(3):
-            result[R_NORMAL + k] += contact * m[NORMAL + k]
-            result[R_TANGENT + k] += trial[FT + k]
-            result[R_POINT + k] += contact * x[k]
-        result[R_WEIGHT] += contact
-        if trial[FN] > 0.0:
-            flags |= state[FLAGS]
-            footprint += m[AREA]
-        m[FORCE] = trial[FN]
-        for k in range(3):
-            m[FRICTION + k] = trial[FT + k]
-        along = m[MASS_B]
-        outcome = commit(
-            t.law[row], t.p[row], t.s[i], m, state, trial[Z], trial[ZDOT], h, t.s[i, 1] * m[AREA] / REFERENCE_AREA
-        )
-        # half of the work that sets more soil moving is that soil's kinetic energy
-        t.work[SOIL] -= 0.5 * (m[MASS_B] - along) * trial[ZDOT] * trial[ZDOT]
-        commit_friction(t.soil[row, STICK], m[SHEAR : SHEAR + 3], trial[MOVED : MOVED + 3], m[NORMAL : NORMAL + 3])
-        for k in range(3):
-            m[PLACE + k] += trial[MOVED + k]
-        if outcome & BRANCHED:
-            note_event(t, BRANCH_CHANGE, b, x, trial[Z])
-        if outcome & ARRESTED:
-            note_event(t, TURN, b, x, trial[Z])
-        if outcome & RELEASED:
-            state[MODE] = IDLE
-    if footprint > 0.0 and abs(footprint - t.domain[row, 3]) > 0.01 * t.domain[row, 3]:
-        flags |= OUT_OF_AREA
-    t.counts[FLAGS_NOW] = flags
-
-
-@compiled
-def settle(t: Any) -> None:
-    """Give newly arrested elements the dashpot that settles what stands on them critically.
-
-    c = 2 K_u / omega with omega^2 the Rayleigh quotient of the unloading stiffnesses of all elements under the
-    body against mass and co-moving masses, for the motion that a push through them gives; for one element this
-    is c = 2 sqrt(K_u (m_s + m_b1)). What stands on a nose that gives way moves along with it here.
-    """
-    nb6 = t.mass.shape[0]
-    for body in range(t.pose.shape[0]):
-        wanted = False
-        for a in range(t.counts[ACTIVE]):
-            i = t.active[a]
-            if t.state[i, BODY] == body and t.state[i, MODE] == UNLOADING and t.memory[i, LINE_C] == 0.0:
-                wanted = True
-        if not wanted:
-            continue
-        J = np.zeros(6)
-        g = np.zeros(nb6)
-        for a in range(t.counts[ACTIVE]):
-            i = t.active[a]
-            if t.state[i, BODY] == body:
-                m = t.memory[i]
-                depth_row(t.pose[body], m[OWNER_R : OWNER_R + 3], m[NORMAL : NORMAL + 3], J)
-                for k in range(6):
-                    g[6 * body + k] += m[LINE_K] * m[AREA] / REFERENCE_AREA * J[k]
-        motion = times(mobility(t), g)
-        for i in range(t.term_i.shape[0]):
-            kind, nose, behind = t.term_i[i]
-            if kind == BETWEEN and nose == body:
-                motion[6 * behind : 6 * behind + 6] = motion[6 * body : 6 * body + 6]
-        inertia, stiffness = dot(motion, times(t.mass, motion)), 0.0
-        for a in range(t.counts[ACTIVE]):
-            i = t.active[a]
-            if t.state[i, BODY] == body:
-                m = t.memory[i]
-                depth_row(t.pose[body], m[OWNER_R : OWNER_R + 3], m[NORMAL : NORMAL + 3], J)
-                w = 0.0
-                for k in range(6):
-                    w += J[k] * motion[6 * body + k]
-                stiffness += m[LINE_K] * m[AREA] / REFERENCE_AREA * w * w
-                inertia += m[MASS_B] * w * w
-        if stiffness <= 0.0:
-            continue
-        omega = math.sqrt(stiffness / inertia)
-        for a in range(t.counts[ACTIVE]):
-            i = t.active[a]
-            if t.state[i, BODY] == body and t.state[i, MODE] == UNLOADING and t.memory[i, LINE_C] == 0.0:
-                row = t.state[i, ROW]
-                ratio = t.p[row, t.law[row, EFFECTS] + REBOUND_DAMPING]
-                t.memory[i, LINE_C] = 2.0 * ratio * t.memory[i, LINE_K] / omega
 
 
 @leaf
@@ -381,16 +238,3 @@ def start_step(t: Any) -> None:
             g[S_DELTA + k], g[S_FORCE + k] = g[S_DELTA_NOW + k], g[S_FORCE_NOW + k]
     if t.axle_f.size > 0:
         t.axle_memory[M_ANGLE], t.axle_memory[M_TORQUE] = t.axle_memory[M_ANGLE_NOW], t.axle_memory[M_TORQUE_NOW]
-
-
-@leaf
-def kinetic_of_soil(t: Any) -> float:
-    """Kinetic energy of the co-moving masses, J."""
-    total = 0.0
-    for a in range(t.counts[ACTIVE]):
-        m = t.memory[t.active[a]]
-        if m[MASS_B] > 0.0:
-            v = velocity(t.pose[t.state[t.active[a], BODY]], m[OWNER_R], m[OWNER_R + 1], m[OWNER_R + 2])
-            speed = m[NORMAL] * v[0] + m[NORMAL + 1] * v[1] + m[NORMAL + 2] * v[2]
-            total += 0.5 * m[MASS_B] * speed * speed
-    return total

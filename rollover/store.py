@@ -16,6 +16,7 @@ import numpy as np
 
 from rollover.document import content_hash, dump
 from rollover.faults import Fault, InputError
+from rollover.ledger import closure
 from rollover.recording import write_parquet
 from rollover.writing import hold, own
 from rollover.writing import whole as whole
@@ -156,6 +157,7 @@ def _answer(
     half_step: Run | None,
     files: list[str],
 ) -> dict[str, Any]:
+    closed = closure(run)
     answer: dict[str, Any] = plain(
         {
             "format": FORMAT,
@@ -170,6 +172,7 @@ def _answer(
             "phases": [{"start": start, "name": name} for start, name in run.phases],
             "energy_ledger": run.ledger,
             "energy_released": run.released,
+            "ledger": {"largest_residual": closed.largest, "at": closed.at, "residual_at_end": closed.end},
             "tests": run.tests,
             "peak_loads": [asdict(peak) for peak in peaks],
             "criteria": criteria,

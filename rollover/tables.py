@@ -59,7 +59,9 @@ M_ANGLE, M_TORQUE, M_ANGLE_NOW, M_TORQUE_NOW, M_FREE, M_REACH, M_IMPULSE, AXLE_M
 PIVOT, GUIDE = 0, 1
 
 # places in soil
-MU, STICK, RELAXATION, FRACTION, MASS_RULE, MASS_GIVEN, MOMENTUM_MOST, SOIL_COLUMNS = 0, 1, 2, 3, 4, 5, 6, 7
+MU, STICK, RELAXATION, FRACTION, MASS_RULE, MASS_GIVEN, MOMENTUM_MOST = 0, 1, 2, 3, 4, 5, 6
+# 1: the ground remembers nothing and nothing of it moves along: each point of a body is a contact of its own
+MEMORYLESS, SOIL_COLUMNS = 7, 8
 RULE_REFERENCE, RULE_EFFECTIVE, RULE_CLAMPED = 0, 1, 2
 
 # places in counts
@@ -131,7 +133,7 @@ class Tables(NamedTuple):
     grid_f: Any  # (4,) x0, y0, dx, dy
     grid_i: Any  # (2,) nx, ny
     # memory
-    slot_of: Any  # (nx ny,) int32, -1: never touched
+    slot_of: Any  # (nx ny,) int32, -1: never touched; with `MEMORYLESS` ground also one for each law and point
     memory: Any  # (ns, COLUMNS)
     state: Any  # (ns, STATE_COLUMNS)
     s: Any  # (ns, 3 + hidden)
@@ -145,7 +147,10 @@ class Tables(NamedTuple):
     spin_memory: Any  # (nw, SPIN_MEMORY)
     mount_memory: Any  # (nt, SET_COLUMNS)
     axle_memory: Any  # (AXLE_MEMORY,)
-    clock: Any  # (2,) length of the step that is tried, time of the scenario at which forces are tried, s
+    scheme: Any  # (4,) of generalised alpha: alpha_m, alpha_f, gamma; 1 if any ground is `MEMORYLESS`
+    applied: Any  # (2, 3, 6 nb) see rollover.applied
+    velocity: Any  # (6 nb,) of the bodies at the start of the step
+    clock: Any  # (3,) length of the step that is tried, time at which forces are tried, s; tries that the step needed
     term_memory: Any  # (ne, terms.TERM_MEMORY)
     pose: Any  # (nb, POSE_COLUMNS)
     counts: Any  # (COUNTS,)
@@ -223,6 +228,9 @@ def handle(t: Any) -> Any:
         t.spin_memory,
         t.mount_memory,
         t.axle_memory,
+        t.scheme,
+        t.applied,
+        t.velocity,
         t.clock,
         t.term_memory,
         t.pose,

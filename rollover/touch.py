@@ -20,6 +20,7 @@ from ground.kernel import (
     LOADING,
     MASS_B,
     MODE,
+    NEAR,
     NORMAL,
     OWNER_R,
     PLACE,
@@ -43,6 +44,7 @@ from rollover.tables import (
     EVENTS,
     MASS_GIVEN,
     MASS_RULE,
+    MEMORYLESS,
     MOMENTUM_MOST,
     NOT_VIRGIN,
     OBLIQUE,
@@ -152,8 +154,12 @@ def touch(t: Any, qd: Any, h: float) -> float:
     if hits == 0:
         return 0.0
     share = np.zeros(hits)
-    share_mass(t, fresh, hits, share)
-    moving = False
+    asked, moving = False, False
+    for k in range(hits):
+        soil = t.soil[t.state[t.active[fresh[k]], ROW]]
+        asked = asked or soil[MEMORYLESS] == 0.0 or soil[MASS_RULE] != RULE_REFERENCE
+    if asked:
+        share_mass(t, fresh, hits, share)
     for k in range(hits):
         slot = t.active[fresh[k]]
         begin_contact(t, slot, share[k])
@@ -167,6 +173,8 @@ def renew(t: Any, slot: int, h: float) -> bool:
     m, state, f = t.memory[slot], t.state[slot], t.found[slot]
     law, p, n = t.law[state[ROW]], t.p[state[ROW]], m[NORMAL : NORMAL + 3]
     b, z, r = t.point_body[int(f[2])], f[0], f[4:7]
+    if t.soil[state[ROW], MEMORYLESS] > 0.0:
+        z = f[3]  # a single point, which may still be above the ground
     x, v = place(t.pose[b], r[0], r[1], r[2]), velocity(t.pose[b], r[0], r[1], r[2])
     speed = -(n[0] * v[0] + n[1] * v[1] + n[2] * v[2])
     known = state[MODE] != IDLE
@@ -184,20 +192,19 @@ def renew(t: Any, slot: int, h: float) -> bool:
     m[SINKAGE] = z
     if known:
         return False
-    latch(t, slot, b, speed, swept)
+    latch(t, slot, b, speed, swept, z)
     return True
 
 
 @leaf
-def latch(t: Any, slot: int, b: int, speed: float, swept: float) -> None:
+def latch(t: Any, slot: int, b: int, speed: float, swept: float, z: float) -> None:
     """What a new contact with body b keeps of its touch: place, speed at the surface, start, angle of the way in."""
     m, state, f = t.memory[slot], t.state[slot], t.found[slot]
-    n, r, z = m[NORMAL : NORMAL + 3], f[4:7], f[0]
+    n, r = m[NORMAL : NORMAL + 3], f[4:7]
     for k in range(3):
         m[OWNER_R + k] = r[k]
         m[SHEAR + k] = 0.0
     state[BODY] = b
-    state[HITS] += 1
     acceleration = depth_acceleration(t.pose[b], r, n)
     start = max(z - swept, rut_depth(m))
     # v_s at the surface, not up to a step later: K_b1 grows with its 18.7th power
@@ -221,5 +228,16 @@ def begin_contact(t: Any, slot: int, share: float) -> None:
     if rule == RULE_CLAMPED and speed > 0.0:
         mass = min(mass, soil[MOMENTUM_MOST] / speed)
     begin(t.law[row], t.p[row], t.s[slot], m, state, mass, start)
-    state[FLAGS] = domain_flags(t.domain[row], speed, mass, angle, state[HITS])
-    note_event(t, TOUCH, state[BODY], (m[PLACE], m[PLACE + 1], m[PLACE + 2]), speed)
+    state[FLAGS] = domain_flags(t.domain[row], speed, mass, angle, state[HITS] + 1)
+    if soil[MEMORYLESS] > 0.0 and m[SINKAGE] <= 0.0:
+        state[MODE] = NEAR
+    else:
+        meet(t, slot)
+
+
+@leaf
+def meet(t: Any, slot: int) -> None:
+    """Count a touch, and make it an event."""
+    m, state = t.memory[slot], t.state[slot]
+    state[HITS] += 1
+    note_event(t, TOUCH, state[BODY], (m[PLACE], m[PLACE + 1], m[PLACE + 2]), m[TOUCH_SPEED])

@@ -12,6 +12,7 @@ import numpy as np
 import rerun as rr
 
 from rollover.document import content_hash, dump
+from rollover.ledger import closure
 from rollover.run import Run
 from viz.blueprint import Beside, blueprint
 from viz.draw import WARNINGS, moving, peak_place, picture, sentence, standing
@@ -131,6 +132,7 @@ def _documents(out: Stream, run: Run, words: str) -> None:
         "stop_time_s": run.stop_time,
         "wall_time_s": run.wall_time,
         "energy_residual_J": float(run.ledger.get("residual", np.nan)),
+        "energy_residual_largest_share": closure(run).largest,
         **{
             f"version_{name.replace('-', '_')}": _version(name) for name in ("rollover", "exudyn", "numpy", "rerun-sdk")
         },

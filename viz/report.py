@@ -9,6 +9,7 @@ import numpy as np
 
 from rollover.criteria import Criterion
 from rollover.findings import findings
+from rollover.ledger import closure
 from rollover.loads import CONVERGED, PeakLoad, leading, load_channels, magnitude
 from rollover.run import Run
 from rollover.stand import TiltTable
@@ -227,7 +228,13 @@ def _ledger(run: Run) -> list[Block]:
     share = f", {_percent(abs(residual) / run.released)} of the {joules(run.released)} released" if run.released else ""
     svg = plots.bars(values, label="energy at the end, kJ", roles={"residual": "limit"})
     caption = f"The energy ledger at the end of the run: {joules(residual)} unaccounted for{share}."
-    return [Section(title="Energy", blocks=[Figure(svg=svg, caption=caption)])]
+    blocks: list[Block] = [Figure(svg=svg, caption=caption)]
+    closed = closure(run)
+    if closed.is_wide:
+        blocks.insert(0, Note(text=f"{title(closed.warning)}.", warning=True))
+    elif closed.sentence:
+        blocks.append(Note(text=f"{closed.sentence}."))
+    return [Section(title="Energy", blocks=blocks)]
 
 
 def _course(run: Run, answer: Mapping[str, Any]) -> list[Block]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.ledger import of_cases
 from rollover.study.answers import values_of
 from rollover.study.conduct import Conducted
 from rollover.study.study import Study
@@ -36,6 +37,8 @@ def page(study: Study, done: Conducted, account: Mapping[str, Any], *, command: 
         blocks.append(_reliability(account["reliability"]))
     if account["worst"] is not None:
         blocks.append(_worst(account["worst"]))
+    if (ledger := account.get("ledger")) and ledger["open"]:
+        blocks.insert(0, Note(text=f"{of_cases(ledger)}.", warning=True))
     blocks.append(_failures(account))
     blocks.append(_flags(account))
     blocks.append(Section(title="Every case", blocks=[_cases(study, done)]))
@@ -276,6 +279,9 @@ def _cases(study: Study, done: Conducted) -> Cases:
         unit, factor = series_unit(output.unit)
         y = values_of(output, done.rows) * factor
         columns.append((f"{name}, {unit}", [float(v) if np.isfinite(v) else None for v in y]))
+    open_by = [row.measures.get("ledger/residual") for row in done.rows]
+    if any(share is not None for share in open_by):
+        columns.append(("ledger open by, %", [None if share is None else 100.0 * share for share in open_by]))
     columns.append(("status", [row.failure or row.status for row in done.rows]))
     if any(row.sentence for row in done.rows):
         columns.append(("in words", [row.sentence for row in done.rows]))

@@ -11,6 +11,7 @@ import numpy as np
 
 from ground.law import Domain
 from rollover.findings import findings
+from rollover.ledger import closure
 from rollover.run import Run
 from rollover.stand import TiltTable
 from viz.entities import series, shown
@@ -276,5 +277,10 @@ def _ledger(run: Run) -> list[str]:
     judged = f", {100.0 * share:.2g} % of the {joules(run.released)} released" if math.isfinite(share) else ""
     names = [name for name, value in run.ledger.items() if name != "residual" and value]
     lines = [f"**Energy:** {joules(residual)} unaccounted for{judged}.", ""]
+    closed = closure(run)
+    if closed.is_wide:
+        lines += [f"**\N{WARNING SIGN} {closed.warning[0].upper()}{closed.warning[1:]}.**", ""]
+    elif closed.sentence:
+        lines += [f"{closed.sentence}.", ""]
     lines += ["| " + " | ".join(names) + " |", "|" + "---|" * len(names)]
     return [*lines, "| " + " | ".join(joules(run.ledger[name]) for name in names) + " |", ""]

@@ -214,6 +214,7 @@ def _plain(account: dict[str, Any]) -> Any:
 def sentences(account: dict[str, Any]) -> list[str]:
     """The account in a few lines."""
     from rollover.console import readable
+    from rollover.ledger import of_cases
     from viz.report import series_unit
 
     n = account["cases"]
@@ -241,6 +242,8 @@ def sentences(account: dict[str, Any]) -> list[str]:
             f"Beyond the limit by importance sampling {r['probability']:.3g} ({r['low']:.3g} to {r['high']:.3g}), "
             f"FORM {r['form_probability']:.3g}, beta {r['beta']:.3g}"
         )
+    if (ledger := account["ledger"])["open"]:
+        lines.append(of_cases(ledger))
     lines += [f"{f['cases']} failed ({f['failure']}): {f['sentence']}" for f in account["failures"][:5]]
     if (w := account["worst"]) is not None:
         lines.append(f"Worst case: point {w['point']}, written to {w['file']}")

@@ -67,10 +67,15 @@ def with_channels(recording: Recording, patterns: Sequence[str], file: str) -> R
     left_out = [name for name in recording.channels if name not in kept]
     if not left_out:
         return recording
-    own = {field: getattr(recording, field) for field in ("channels", "noise", "cfc", "sensors")}
     note = f"channels left out, --channel '*' keeps them: {', '.join(left_out)}"
-    chosen = {field: {name: v for name, v in table.items() if name in kept} for field, table in own.items()}
-    return replace(recording, notes=(*recording.notes, note), **chosen)
+    return replace(
+        recording,
+        notes=(*recording.notes, note),
+        channels={name: recording.channels[name] for name in kept},
+        noise={name: sigma for name, sigma in recording.noise.items() if name in kept},
+        cfc={name: cfc for name, cfc in recording.cfc.items() if name in kept},
+        sensors={name: sensor for name, sensor in recording.sensors.items() if name in kept},
+    )
 
 
 def starts_with(path: Path, *marks: bytes) -> bool:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.ledger import LIMIT
 from rollover.study import plan as plans
 from rollover.study import sensitivity
 from rollover.study.conduct import Conducted
@@ -44,12 +45,21 @@ def answers(study: Study, done: Conducted) -> dict[str, Any]:
         "outputs": [_output(study, output, done, chosen, drawn) for output in study.outputs],
         "flags": _flags(rows),
         "failures": _failures(rows),
+        "ledger": _ledger(rows),
     }
 
 
 def _counts(rows: Sequence[Row]) -> dict[str, int]:
     failed = sum(row.status == "failed" for row in rows)
     return {"all": len(rows), "done": len(rows) - failed, "failed": failed}
+
+
+def _ledger(rows: Sequence[Row]) -> dict[str, Any]:
+    """Largest residual of the energy ledger over the energy released in any case, and how many leave it open."""
+    found = [(row.measures["ledger/residual"], k) for k, row in enumerate(rows) if "ledger/residual" in row.measures]
+    most, at = max(found, default=(None, None))
+    wide = sum(share > LIMIT for share, _ in found)
+    return {"largest_residual": most, "at_point": at, "limit": LIMIT, "open": wide}
 
 
 def _independent(study: Study, n: int) -> slice:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import math
 import os
 import pickle
 import platform
@@ -19,6 +20,7 @@ import numpy as np
 from rollover import document
 from rollover.drop import DropFailedError, DropModel
 from rollover.effects import VARIABLE, effects
+from rollover.ledger import closure
 from rollover.loads import leading as leading_load
 from rollover.loads import load_channels, magnitude, peak_loads
 from rollover.recording import Recording
@@ -163,8 +165,8 @@ def _of_run(run: Run) -> dict[str, float]:
 
     share = rops_share(run)
     found = {} if share is None else {"rops/share": share}
-    if run.released > 0.0 and "energy/residual" in run.recording.channels:
-        found["ledger/residual"] = float(np.abs(run.recording["energy/residual"]).max()) / run.released
+    if math.isfinite(closed := closure(run).largest):
+        found["ledger/residual"] = closed
     return {**found, "time/stop": run.stop_time}
 
 

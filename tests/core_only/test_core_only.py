@@ -19,6 +19,7 @@ FILES = {
     "mdf": ("a.mf4", b"MDF     "),
     "hdf5": ("a.h5", b"\x89HDF\r\n\x1a\n"),
     "mcap": ("a.mcap", b"\x89MCAP0\r\n"),
+    "ide": ("a.ide", b"\x1a\x45\xdf\xa3" + b"mide"),
 }
 STUDY = """format: rollover-study/1
 title: Speeds
@@ -33,6 +34,7 @@ COMMANDS = {
     "cluster": ["study", "s.yaml", "--scheduler", "tcp://127.0.0.1:1"],
     "slurm": ["study", "s.yaml", "--scheduler", "slurm"],
     "reliability": ["study", "reliability.yaml"],
+    "xlsx": ["import", "balls", "--as", "falling-balls"],
 }
 CSV = "t,F\n" + "".join(f"{k * 1e-3},{(k * k) % 7 * 1e-2}\n" for k in range(200))
 SIDECAR = """format: rollover-recording/1
@@ -67,6 +69,9 @@ def test_a_file_that_needs_an_extra_is_refused_by_its_name(extra: str, tmp_path:
 def test_a_command_that_needs_an_extra_is_refused_by_its_name(extra: str, tmp_path: Path) -> None:
     (tmp_path / "s.yaml").write_text(STUDY)
     (tmp_path / "reliability.yaml").write_text(STUDY + "reliability: {count: 100}\n")
+    (tmp_path / "balls").mkdir()
+    (tmp_path / "balls" / "Ball_drops_data.xls").write_bytes(b"PK\x03\x04" + bytes(64))
+    (tmp_path / "balls" / "balls.txt").write_text("ball,mass,circumference\n")
     done = rollover(*COMMANDS[extra], cwd=tmp_path)
     assert done.returncode == 2, done.stderr
     (line,) = done.stderr.strip().splitlines()

@@ -1,0 +1,125 @@
+"""What is told of the energy ledger: in the terminal, run.json, the page, the recording, a study and a regression."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from rollover import console, ledger, store
+from rollover.cli import app
+from rollover.commands.study import sentences
+from rollover.ledger import closure
+from rollover.recording import Recording
+from rollover.run import Run
+from rollover.study.answers import answers
+from tests.rollover.studies import made_up
+from tests.viz.example import overturn
+from viz import report
+from viz.study_page import page as study_page
+from viz.verdict import verdict
+
+runner = CliRunner()
+
+
+@pytest.fixture(scope="module")
+def example() -> Run:
+    return overturn()
+
+
+def widened(run: Run, most: float) -> Run:
+    """The run with a residual whose largest magnitude is a share of the energy released, and less at the end."""
+    channels = dict(run.recording.channels)
+    residual = 0.0 * channels["energy/residual"]
+    residual[residual.size // 2], residual[-1] = -most * run.released, 0.1 * most * run.released
+    found = replace(run.recording, channels={**channels, "energy/residual": residual})
+    assert isinstance(found, Recording)
+    return replace(run, recording=found)
+
+
+def told(run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> tuple[dict[str, float], str, str, str]:
+    answer = store.write(tmp_path / "out", run, [], force=True)
+    console.report(run, [], [], answer, "out")
+    pages = report.page(run, [], answer, rows=[], command="rollover run")
+    return answer["ledger"], capsys.readouterr().out, pages, verdict(run, [])
+
+
+def test_the_largest_counts_not_the_last(example: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = widened(example, 0.02)
+    numbers, terminal, page, recording = told(run, tmp_path, capsys)
+    assert numbers["largest_residual"] == pytest.approx(0.02)
+    assert numbers["residual_at_end"] == pytest.approx(0.002)
+    assert numbers["at"] == run.recording.time[run.recording.time.size // 2]
+    step = f"{run.scenario.simulation.step:g}"
+    for text in (terminal, page, recording):
+        assert "nergy ledger does not close: 2 % of the energy released" in text
+        assert f"a smaller simulation.step than {step} s is needed" in text
+    assert 'class="warning"' in page or "warning" in page.split("nergy ledger does not close")[0][-200:]
+
+
+def test_one_that_closes_is_told_without_a_warning(
+    example: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    numbers, terminal, page, recording = told(widened(example, 0.004), tmp_path, capsys)
+    assert numbers["largest_residual"] == pytest.approx(0.004)
+    for text in (terminal, page, recording):
+        assert "at most 0.4 % of the energy released is unaccounted for" in text
+        assert "does not close" not in text
+
+
+def test_without_energy_there_is_no_share(example: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    numbers, terminal, _, _ = told(replace(example, released=0.0), tmp_path, capsys)
+    assert numbers["largest_residual"] is None
+    assert "nergy ledger" not in terminal
+
+
+def test_a_failed_run_is_judged_as_far_as_it_came(example: Run) -> None:
+    run = widened(example, 0.02)
+    residual = run.recording.channels["energy/residual"].copy()
+    residual[-1] = math.nan
+    broken = replace(
+        run, recording=replace(run.recording, channels={**run.recording.channels, "energy/residual": residual})
+    )
+    assert closure(broken).largest == pytest.approx(0.02)
+
+
+def test_a_study_has_a_column_and_a_warning(tmp_path: Path) -> None:
+    study, done = made_up(tmp_path, 40)
+    rows = [
+        row if row.status == "failed" else replace(row, measures={**row.measures, "ledger/residual": 1e-4 * k})
+        for k, row in enumerate(done.rows)
+    ]
+    rows[12] = replace(rows[12], measures={**rows[12].measures, "ledger/residual": 0.031})
+    done = replace(done, rows=rows)
+    head = {"title": "made up", "name": "x", "scenario_hash": "", "versions": {}, "reliability": None, "worst": None}
+    account = {**head, **answers(study, done), "ran": 40}
+    assert account["ledger"] == {"largest_residual": 0.031, "at_point": 12, "limit": 0.005, "open": 1}
+    page = study_page(study, done, account, command="rollover study x")
+    assert "ledger open by, %" in page
+    said = "energy ledger does not close in 1 cases: up to 3.1 % of the energy released"
+    assert said in page
+    assert any(said in line for line in sentences(account))
+
+
+def test_a_regression_notes_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "scenarios"
+    folder.mkdir()
+    (folder / "drop.yaml").write_text("base: drop_test.yaml\nsimulation: {duration: 0.25}\n")
+    monkeypatch.chdir(tmp_path)
+
+    def regress(*more: str) -> dict[str, object]:
+        done = runner.invoke(app, ["regress", str(folder), "--workers", "0", "--json", "--force", *more])
+        assert done.exit_code == 0, done.stdout + done.stderr
+        found: dict[str, object] = json.loads(done.stdout)["answers"][0]
+        return found
+
+    regress("--update", "--reason", "first")
+    plain = regress()
+    assert 0.0 < plain["largest_residual"] < 1e-3  # type: ignore[operator]
+    assert not plain["notes"]
+    monkeypatch.setattr(ledger, "LIMIT", 1e-9)
+    assert "the energy ledger does not close" in regress()["notes"][0]  # type: ignore[index]
