@@ -85,7 +85,7 @@ def _shared(channel: str, sign: float, there: Mapping[str, Trace]) -> Iterator[t
         top = tops[names[0]]
         different = _different([there[name] for name in names])
         highest = top >= (1.0 - EXACT) * max(tops.values())
-        if len(different) < 2 or not highest:
+        if not highest:
             continue
         expected = max(_expected(sign * t.values, top) for t in different)
         # the first says where, each other one has to meet it with one of its own highest values

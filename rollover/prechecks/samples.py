@@ -12,7 +12,8 @@ from scipy.special import ndtri, pdtrc
 from rollover.prechecks.finding import Finding, Trace
 from rollover.prechecks.neighbours import beside, off_a_cubic
 
-CHANCE = 1e-4  # that a clean channel shows a spike or a stuck run: 1 in 1000 recordings of ten channels
+CHANCE = 0.001  # that a clean channel shows a stuck run
+SPIKE = 1e-4  # that it shows a spike: 1 in 1000 recordings of ten channels
 FEWEST = 120  # samples, to know what is usual
 FLAT = 3  # samples exactly alike at the very top: what a peak that is measured does not do
 TURNS = 6  # times as long as beside it, that a digitised signal stays where it turns: 2/(sqrt 2 - 1), and some
@@ -158,7 +159,7 @@ def spikes(t: Trace, unit: str, *, among_contacts: bool = False) -> Iterator[Fin
         # most samples read exactly what their neighbours say: digits, one of which is no disturbance
         apart = np.diff(np.unique(values))
         scale = float(np.min(apart[apart > ROUNDING * t.floor.sigma]))
-    beyond = -float(ndtri(0.5 * CHANCE / values.size)) * scale
+    beyond = -float(ndtri(0.5 * SPIKE / values.size)) * scale
     left, found = np.ones(values.size, dtype=bool), dict[int, float]()
     while abs(error[i := int(np.argmax(np.abs(error) * left))]) > beyond and left[i]:
         left[i] = False

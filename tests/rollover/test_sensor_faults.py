@@ -107,6 +107,8 @@ def test_what_may_read_something_before_contact_is_no_offset() -> None:
     assert of(ground__force_normal=pulse + noise + MASS * 9.81) == []
     assert of(ground__force_normal=noise + 137.0) == []
     assert of(rops__force=np.abs(pulse + noise)) == []
+    shaken = Recording(title="r", time=time, channels={F: 0.1 * pulse + noise + 1000.0})  # a weight nobody states
+    assert prechecks(shaken) == ()
     assert of(ground__force_normal=pulse + noise + 137.0, chassis__roll=0.01 * noise) == []
     (found,) = of(rops__force_y=-pulse + noise + 137.0, chassis__roll=0.01 * noise)
     assert found.channel == "rops/force_y"
