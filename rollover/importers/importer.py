@@ -64,10 +64,15 @@ def with_channels(recording: Recording, patterns: Sequence[str], file: str) -> R
     left_out = [name for name in recording.channels if name not in kept]
     if not left_out:
         return recording
-    own = {field: getattr(recording, field) for field in ("channels", "noise", "cfc", "sensors")}
     note = f"channels left out, --channel '*' keeps them: {', '.join(left_out)}"
-    chosen = {field: {name: v for name, v in table.items() if name in kept} for field, table in own.items()}
-    return replace(recording, notes=(*recording.notes, note), **chosen)
+    return replace(
+        recording,
+        channels={name: recording.channels[name] for name in kept},
+        noise={name: v for name, v in recording.noise.items() if name in kept},
+        cfc={name: v for name, v in recording.cfc.items() if name in kept},
+        sensors={name: v for name, v in recording.sensors.items() if name in kept},
+        notes=(*recording.notes, note),
+    )
 
 
 def starts_with(path: Path, *marks: bytes) -> bool:
