@@ -70,11 +70,11 @@ def with_channels(recording: Recording, patterns: Sequence[str], file: str) -> R
     note = f"channels left out, --channel '*' keeps them: {', '.join(left_out)}"
     return replace(
         recording,
-        notes=(*recording.notes, note),
         channels={name: recording.channels[name] for name in kept},
-        noise={name: sigma for name, sigma in recording.noise.items() if name in kept},
-        cfc={name: cfc for name, cfc in recording.cfc.items() if name in kept},
-        sensors={name: sensor for name, sensor in recording.sensors.items() if name in kept},
+        noise={name: v for name, v in recording.noise.items() if name in kept},
+        cfc={name: v for name, v in recording.cfc.items() if name in kept},
+        sensors={name: v for name, v in recording.sensors.items() if name in kept},
+        notes=(*recording.notes, note),
     )
 
 
