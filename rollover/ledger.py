@@ -66,9 +66,10 @@ def closure(run: Run) -> Closure:
 
 def of_cases(ledger: Mapping[str, Any]) -> str:
     """In how many cases of a study the ledger stays open, by what its account says, and the cure."""
+    most = _percent(ledger["largest_residual"])
     return (
-        f"The energy ledger does not close in {ledger['open']} cases: up to {_percent(ledger['largest_residual'])} of "
-        f"the energy released is unaccounted for (point {ledger['at_point']}), more than {_percent(ledger['limit'])}; "
+        f"The energy ledger does not close in {ledger['open']} cases: up to {most} of the "
+        f"energy released is unaccounted for (point {ledger['at_point']}), more than {_percent(ledger['limit'])}; "
         "a smaller simulation.step is needed"
     )
 
