@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ def _read(path: Path, profile: Described | None) -> Recording:
             kinds[str(name)] = kind
         found = loadmat(str(path), mat_dtype=False, squeeze_me=False, struct_as_record=True)
         signals: dict[str, Signal] = {}
+        numbers = _numbers(found)
         for name, value in found.items():
             if name in ("__header__", "__version__", "__globals__"):
                 continue
@@ -35,17 +36,31 @@ def _read(path: Path, profile: Described | None) -> Recording:
             elif name.strip("_") == _OPAQUE:
                 signals[name] = left_out("contents of MATLAB tables and objects")
             else:
-                signals |= {column: _signal(found, column, profile) for column, found in _columns(name, value)}
+                columns = _columns(name, value)
+                signals |= {column: _signal(v, column, profile, numbers.get(column, "")) for column, v in columns}
     return assemble(path, signals, profile)
 
 
-def _signal(values: Any, name: str, profile: Described | None) -> Signal:
+def _numbers(found: Mapping[str, Any]) -> dict[str, str]:
+    """Columns of a file that holds one matrix and nothing else are 1, 2, ... too, as in a text file without names.
+
+    A profile then serves files whose matrix bears the name of the test.
+    """
+    held = [(name, value) for name, value in found.items() if not name.startswith("__")]
+    if len(held) != 1 or not isinstance(held[0][1], np.ndarray) or held[0][1].dtype.kind not in "fiu":
+        return {}
+    columns = matrix(held[0][0], held[0][1].shape)
+    return {column: str(k) for k, column in enumerate(columns, 1)} if len(columns) > 1 else {}
+
+
+def _signal(values: Any, name: str, profile: Described | None, number: str) -> Signal:
     if isinstance(values, str):
         return left_out(values)
-    if not is_wanted(profile, name):
-        return Signal(values=np.empty(0))
-    is_time = profile is not None and profile.columns[name].channel == "time"
-    return Signal(values=values.copy() if is_time else values.astype(np.float64))
+    if not is_wanted(profile, name, shared=number):
+        return Signal(values=np.empty(0), shared=number)
+    column = None if profile is None else profile.columns.get(name) or profile.columns[number]
+    is_time = column is not None and column.channel == "time"
+    return Signal(values=values.copy() if is_time else values.astype(np.float64), shared=number)
 
 
 def _columns(name: str, value: Any) -> Iterator[tuple[str, Any]]:

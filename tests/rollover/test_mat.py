@@ -96,3 +96,21 @@ def test_serial_stamps_of_whole_numbers_keep_their_nanoseconds(tmp_path: Path) -
     found = named(path, {"t": "time, unit: ns", "F": f"{FORCE}, unit: N"})
     assert found.time == pytest.approx([0.0, 1e-9, 3e-9], abs=1e-12)
     assert found.clock.zero == "unknown"
+
+
+def test_columns_of_the_only_matrix_go_by_number_as_in_a_file_without_names(tmp_path: Path) -> None:
+    # the matrix bears the name of the test: one profile serves all of them
+    for name in ("SR450251", "SR450252"):
+        table = np.column_stack([TIME, 10.0 * TIME, -TIME])
+        save(tmp_path / f"{name}.mat", **{name: table})
+        (tmp_path / "p.yaml").write_text(
+            "format: rollover-profile/1\nchannels:\n  '1': {channel: time, unit: s}\n"
+            "  '2': {channel: striker/acceleration_z, unit: g}\n"
+        )
+        found = read_recording(tmp_path / f"{name}.mat", profile=tmp_path / "p.yaml")
+        assert found.time == pytest.approx(TIME)
+        assert found["striker/acceleration_z"] == pytest.approx(98.0665 * TIME)
+        assert found.notes == (f"1 of 3 columns left out, without a description: {name}[2]",)
+    save(tmp_path / "two.mat", a=table, b=table)
+    with pytest.raises(InputError, match=r"no such column in two.mat, got '1'; the file holds: a\[0\], a\[1\]"):
+        read_recording(tmp_path / "two.mat", profile=tmp_path / "p.yaml")
