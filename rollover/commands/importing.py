@@ -51,10 +51,10 @@ def import_(
     if to not in endings:
         raise InputError(Fault(file="--to", message=f"no such format, got {to!r}; {', '.join(endings)} are allowed"))
     folder = out or Path("out", "import", source.name.split(".")[0])
-    wanted = channel or (COLLECTIONS[kind].channels if kind in COLLECTIONS else ("*",))
+    usual = COLLECTIONS[kind].channels if kind in COLLECTIONS else lambda _: ("*",)
     made: list[tuple[str, Recording]] = []  # all are read before the first is written
     for name, recording in _recordings(source, kind, profile, select):
-        made.append((name, with_channels(recording, wanted, str(source))))
+        made.append((name, with_channels(recording, channel or usual(recording), str(source))))
     rows = []
     targets = [folder / f"{name}.{to}" for name, _ in made]
     for target in targets:
