@@ -63,11 +63,9 @@ def import_(
     if to not in endings:
         raise InputError(Fault(file="--to", message=f"no such format, got {to!r}; {', '.join(endings)} are allowed"))
     folder = out or Path("out", "import", name_of(source))
-    wanted = channel or (COLLECTIONS[kind].channels if kind in COLLECTIONS else ("*",))
+    usual = COLLECTIONS[kind].channels if kind in COLLECTIONS else lambda _: ("*",)
     read = _recordings(source, kind, profile, select)  # all of it before the first is written
-    made = {
-        name: (at, with_channels(r, wanted, str(source))) for name, (at, r) in read.items()
-    }  # all are read before the first is written
+    made = {name: (at, with_channels(r, channel or usual(r), str(source))) for name, (at, r) in read.items()}
     spelt = distinct(made, f".{to}", file=str(source))
     targets = {name: inside(folder, f"{spelt[name]}.{to}") for name in made}
     for target, (at, _) in zip(targets.values(), made.values(), strict=True):

@@ -37,7 +37,7 @@ class Importer:
 class Collection:
     """A published set of recordings that a user downloads; `read` gives those whose name fits one of the patterns.
 
-    `channels` are patterns of those that an import keeps where no others are asked for.
+    `channels` gives patterns of those that an import keeps of a recording where no others are asked for.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Collection:
     licence: str
     where: str
     read: Callable[[Path, Sequence[str]], Iterator[tuple[str, Recording]]]
-    channels: tuple[str, ...] = ("*",)
+    channels: Callable[[Recording], Sequence[str]] = lambda _: ("*",)
 
     @property
     def source(self) -> str:

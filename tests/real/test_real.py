@@ -124,7 +124,11 @@ def test_the_command_makes_a_soil_of_the_imported_drops_that_the_scenario_takes(
 NAMED = {
     "whiffle-ball-1": "air-drag",
     "yellow-whiffle-ball": "air-drag",
+    "whiffle balls, one held out": "air-drag",
+    "volleyball": "air-drag",
     "cones, firm spring, 60 deg": "structural-compliance",
+    "cube tosses, 0 to 4": "ground-friction",
+    "cube tosses, 5 to 9": "ground-friction",
 }
 
 
@@ -153,6 +157,22 @@ def test_the_written_spring_covers_the_authors_and_stands_below_it() -> None:
     value, low, high = written("cones, firm spring, 60 deg")["effects"][0]["parameters"]["stiffness"]
     assert low < cone_drops.SPRING < high
     assert 0.8 * cone_drops.SPRING < value < cone_drops.SPRING
+
+
+@pytest.mark.parametrize("name", ["cube tosses, 0 to 4", "cube tosses, 5 to 9"])
+def test_the_written_friction_covers_what_is_published(name: str) -> None:
+    _, low, high = written(name)["effects"][0]["parameters"]["coefficient"]
+    assert low < 0.165 < high  # 0.15 to 0.18
+
+
+def test_what_was_left_out_of_the_rigid_cones_is_one_of_those_that_cannot_be_told_apart() -> None:
+    found = written("cones, rigid, 45 deg")["effects"][0]
+    assert "soil-added-mass-growth" in (found["id"], *found["indistinguishable_from"])
+
+
+@pytest.mark.parametrize("name", ["baseball", "golf-ball", "penetrometer"])
+def test_where_nothing_is_left_out_that_matters_nothing_is_named(name: str) -> None:
+    assert written(name)["verdict"] == "no-mismatch"
 
 
 def test_a_diagnosis_of_real_recordings_is_made_again_as_it_was_written() -> None:

@@ -514,8 +514,14 @@ def test_an_import_keeps_the_channels_that_are_asked_for_and_tells_which_it_left
 
     place = [f"chassis/position_{axis}" for axis in "xyz"]
     usual, all_of_it, one = imported("a"), imported("b", "--channel", "*"), imported("c", "--channel", place[2])
-    assert list(usual.channels) == place
-    assert "chassis/quaternion_w" in usual.notes[-1]
+    # along the table, and of its axes those along which the cube moves: 1.0 and 0.4 m/s here
+    assert list(usual.channels) == place[:2]
+    assert "chassis/position_z, chassis/quaternion_w" in usual.notes[-1]
+    rows = files.cube_rows()
+    rows[:, 1] = 0.1 + 0.2 * (rows[:, 0] - 0.2)
+    files.write_old_pt(tmp_path / "4.pt", files.as_tensor(rows))
+    assert list(imported("f").channels) == place[:1]
+    files.write_old_pt(tmp_path / "4.pt", files.as_tensor(files.cube_rows()))
     assert len(all_of_it.channels) == 7
     assert not any("channels left out" in note for note in all_of_it.notes)
     assert list(one.channels) == place[2:]
