@@ -109,9 +109,12 @@ def report(
     """The answer of a run on standard output; what took part of its time to compile tells no speed."""
     from rollover.criteria import in_words
     from rollover.loads import unconverged
+    from rollover.shipped import origin
 
     out = Console(highlight=False, markup=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
     out.print(run.scenario.title, style="bold")
+    if (made_from := origin(run.scenario)) and made_from.differences:
+        out.print(f"{made_from.in_words}.", style="yellow")
     if run.status == "done":
         speed = (run.stop_time - float(run.recording.time[0])) / run.wall_time if run.wall_time > 0.0 else 0.0
         pace = "most of it compiling, once" if compiled else f"{speed:.2g} x real time"

@@ -21,6 +21,7 @@ import numpy as np
 from rollover.document import content_hash, dump
 from rollover.faults import Fault, InputError
 from rollover.recording import write_parquet
+from rollover.shipped import origin
 
 if TYPE_CHECKING:
     from rollover.loads import PeakLoad
@@ -176,6 +177,7 @@ def _answer(
         {
             "format": FORMAT,
             "title": run.scenario.title,
+            "shipped": None if (made_from := origin(run.scenario)) is None else asdict(made_from),
             "status": run.status,
             "sentence": run.sentence,
             "versions": versions(),

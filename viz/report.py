@@ -15,6 +15,7 @@ from rollover.run import Run
 from rollover.stand import TiltTable
 from viz import plots
 from viz.clearance_view import clearance_figure
+from viz.differences import differences_section
 from viz.entities import series
 from viz.page import Block, Cell, Details, Figure, Footer, Headline, Note, Pairs, Section, State, Table, render
 from viz.plots import Curve, Level
@@ -33,7 +34,7 @@ def page(
     command: str = "rollover run scenario.yaml",
 ) -> str:
     """HTML of a run's report. `answer` is its run.json, `rows` what it was held against."""
-    blocks: list[Block] = [*_warnings(run, answer), *stand_section(run, rows), *_standards(run, rows)]
+    blocks: list[Block] = [*_warnings(run, answer), *differences_section(run.scenario), *stand_section(run, rows), *_standards(run, rows)]
     blocks += [*_peaks(peaks), *_domain(run, peaks)]
     blocks += [*_histories(run, peaks), *_structure(run, rows), *_ledger(run), *_course(run, answer)]
     return render(

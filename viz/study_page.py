@@ -12,6 +12,7 @@ from rollover.study.answers import values_of
 from rollover.study.conduct import Conducted
 from rollover.study.study import Study
 from viz import plots
+from viz.differences import differences_section
 from viz.page import Block, Cases, Cell, Figure, Footer, Headline, Note, Section, Table, render
 from viz.plots import Curve, Level
 from viz.report import series_unit
@@ -28,7 +29,7 @@ COLUMNS_OF_FLAGS = ("flag", "cases", "share", "share at the peak load")
 
 def page(study: Study, done: Conducted, account: Mapping[str, Any], *, command: str) -> str:
     """HTML of a study's account."""
-    blocks: list[Block] = []
+    blocks: list[Block] = differences_section(study.scenario)
     for output in account["outputs"][:MOST_FIGURES]:
         blocks.append(_output(study, done, account, output))
     if rest := account["outputs"][MOST_FIGURES:]:

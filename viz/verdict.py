@@ -13,6 +13,7 @@ from ground.law import Domain
 from rollover.findings import findings
 from rollover.run import Run
 from rollover.stand import TiltTable
+from viz.differences import differences_lines
 from viz.entities import series, shown
 
 
@@ -175,7 +176,7 @@ def title_of(peak: Peak) -> str:
 def verdict(run: Run, peaks: Sequence[Peak], scales: Sequence[str] = ()) -> str:
     """The first page: the load that matters and when, all peaks, what they are worth, the energy ledger."""
     found = ranked(run, peaks)
-    lines = _headline(run, found)
+    lines = [*_headline(run, found), *differences_lines(run.scenario)]
     if found:
         lines += _table(found)
         lines += _domain(run, found)
