@@ -66,8 +66,8 @@ def in_words(rows: Sequence[Criterion]) -> list[str]:
         found.append(f"Not loaded far enough, so no verdict: {', '.join(short)}.")
     if any(row.margin is None for row in rows):
         found.append(
-            "A margin is not stated where a test went only as far as it was told: what more a frame can take shows when it "
-            "is pushed until it fails (initiation.push_on: the name of a load)."
+            "A margin is not stated where a test went only as far as it was told: what more a frame can take shows "
+            "when it is pushed until it fails (initiation.push_on: the name of a load)."
         )
     return found
 
@@ -106,7 +106,7 @@ def _once(run: Run, asked: Sequence[Requirement]) -> list[Requirement]:
 def loaded_from(run: Run) -> str:
     """The side that the ground mostly pushed the ROPS from, by the momentum along each vehicle axis."""
     time = run.recording.time
-    x, y = (np.trapezoid(run.recording[f"rops/force_{axis}"], time) for axis in "xy")
+    x, y = (float(np.trapezoid(run.recording[f"rops/force_{axis}"], time)) for axis in "xy")
     if abs(x) > abs(y):
         return "rear" if x > 0.0 else "front"
     return "right" if y > 0.0 else "left"

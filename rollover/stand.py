@@ -45,8 +45,8 @@ class StaticLoad:
         """Refuse a load with two requirements or none, and a number that nothing places."""
         if None not in (self.energy, self.force) or (self.asks is None and self.energy is self.force is None):
             raise ValueError(
-                f"energy: one of energy and force is needed, got {self.energy!r} and {self.force!r}; one, or `asks` for "
-                "what the code asks of the vehicle"
+                f"energy: one of energy and force is needed, got {self.energy!r} and {self.force!r}; one, or `asks` "
+                "for what the code asks of the vehicle"
             )
         other = "energy" if self.asks == "crush" else "force"
         if self.asks is not None and getattr(self, other) is not None:

@@ -79,7 +79,13 @@ class StaticControl:
         elif self.stage == "pause" and now - self.since >= self.test.pause:
             return self._next_load(now, q)
         if self.stage in ("raise", "hold", "push") and way > self.test.most_deflection:
-            self._reached(now, self._failed(f"deflected by more than {1e3 * self.test.most_deflection:.0f} mm"), way, force, float(m[d.K_WORK]))
+            self._reached(
+                now,
+                self._failed(f"deflected by more than {1e3 * self.test.most_deflection:.0f} mm"),
+                way,
+                force,
+                float(m[d.K_WORK]),
+            )
             self._release(now)
         self._show(q)
         return True

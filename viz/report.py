@@ -34,7 +34,12 @@ def page(
     command: str = "rollover run scenario.yaml",
 ) -> str:
     """HTML of a run's report. `answer` is its run.json, `rows` what it was held against."""
-    blocks: list[Block] = [*_warnings(run, answer), *differences_section(run.scenario), *stand_section(run, rows), *_standards(run, rows)]
+    blocks: list[Block] = [
+        *_warnings(run, answer),
+        *differences_section(run.scenario),
+        *stand_section(run, rows),
+        *_standards(run, rows),
+    ]
     blocks += [*_peaks(peaks), *_domain(run, peaks)]
     blocks += [*_histories(run, peaks), *_structure(run, rows), *_ledger(run), *_course(run, answer)]
     return render(

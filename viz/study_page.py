@@ -66,7 +66,9 @@ def _headline(account: Mapping[str, Any]) -> Headline:
     else:
         low, high = (f"{first[key] * factor:.4g}" for key in ("least", "largest"))
         sentence = f"{first['name']} goes from {low} to {high} {unit}."
-    return Headline(sentence=sentence, detail=f"{failed}{_sentence(account['meaning_of_quantiles'])}{worth}", state=state)
+    return Headline(
+        sentence=sentence, detail=f"{failed}{_sentence(account['meaning_of_quantiles'])}{worth}", state=state
+    )
 
 
 def _output(study: Study, done: Conducted, account: Mapping[str, Any], output: Mapping[str, Any]) -> Section:

@@ -266,7 +266,9 @@ def _domain(run: Run, found: Sequence[Peak]) -> list[str]:
             return ["No element of the ground was touched: its law took no part.", ""]
         return ["All loads lie within the domain in which the ground law was calibrated.", ""]
     known = "uncalibrated" not in concerned
-    heading = "Outside the domain in which the ground law was calibrated" if known else "The ground law is not calibrated"
+    heading = (
+        "Outside the domain in which the ground law was calibrated" if known else "The ground law is not calibrated"
+    )
     lines = [f"**{heading}:**", ""]
     flagged = [title_of(p) for p in found if p.domain_flags]
     for flag, loads in concerned.items():
@@ -284,7 +286,7 @@ def in_words(flag: str, domain: Domain) -> str:
         "contact-area": f"contact area unlike the tested face of {1e4 * domain.area:.3g} cm\N{SUPERSCRIPT TWO}",
         "second-hit": "a second hit on the same rut; virgin soil was tested",
         "oblique-impact": f"impact more than {math.degrees(domain.obliquity_most):.3g} deg off the ground's normal",
-        "uncalibrated": "no measurement stands behind the ground law's numbers (calibration: null, no domain of its own)",
+        "uncalibrated": "no measurement stands behind the ground law's numbers (calibration: null, no own domain)",
         "deep-sinkage": "the ground gave way further than its law covers"
         + (f", {1e3 * domain.sinkage_most:.3g} mm" if math.isfinite(domain.sinkage_most) else " in a patch"),
     }

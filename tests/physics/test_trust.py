@@ -68,7 +68,7 @@ def test_which_laws_know_where_they_were_measured() -> None:
     assert not Hard().domain.calibrated
     assert Hard(calibration=Calibration(source="a test")).domain.calibrated
     assert Hard(calibration=Calibration(source="a test", sinkage_most=1.0)).domain.sinkage_most == NO_LONGER_HARD
-    assert NO_LONGER_HARD == pytest.approx(4.5e-3)
+    assert pytest.approx(4.5e-3) == NO_LONGER_HARD
     assert Domain().calibrated
     assert "hard" in laws()
 

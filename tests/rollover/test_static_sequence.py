@@ -46,7 +46,10 @@ def test_energies_and_forces_follow_the_vehicle(vehicle: str, code: str, by_hand
     # the shipped test goes on by 107/3000, so that 3000 kg end at the measured 5437 J
     pushed = [push.energy or push.force for push in found.values()]
     assert pushed == [None if value is None else pytest.approx(value * 3107 / 3000) for value in by_hand]
-    own = [push.energy or push.force for push in loads(tested(vehicle=f"vehicles/{vehicle}.yaml", initiation__surplus=0)).values()]
+    own = [
+        push.energy or push.force
+        for push in loads(tested(vehicle=f"vehicles/{vehicle}.yaml", initiation__surplus=0)).values()
+    ]
     assert own == [None if value is None else pytest.approx(value) for value in by_hand]
 
 
@@ -59,7 +62,7 @@ def test_mass_alone_moves_the_energies(mass: float) -> None:
 
 
 def test_a_code_can_be_asked_for() -> None:
-    """The utility tractor of 3000 kg by Code 7: 500 + 1500 J, 5250 J, and the second load lengthways is no step of it."""
+    """The utility tractor of 3000 kg by Code 7: 500 + 1500 J, 5250 J; a second load lengthways is no step of it."""
     found = loads(tested(initiation__code="code-7"))
     assert found["rear"].asked is not None
     assert found["rear"].asked.value == pytest.approx(2000.0)
@@ -79,7 +82,7 @@ def test_a_code_can_be_asked_for() -> None:
     ],
 )
 def test_where_no_code_follows_it_is_asked_for(changes: dict[str, Any], words: str) -> None:
-    with pytest.raises(ValueError, match="initiation.code: does not follow") as e:
+    with pytest.raises(ValueError, match=r"initiation\.code: does not follow") as e:
         load("static_rops_test").replaced(changes)
     assert words in str(e.value)
     for choice in ("'code-4' (track of 1.15 m or more", "'code-6' (narrower", "'code-7' (narrower"):
@@ -90,7 +93,9 @@ def test_where_no_code_follows_it_is_asked_for(changes: dict[str, Any], words: s
 def test_the_end_that_carries_more_is_loaded_first() -> None:
     """1.5 of 2.25 m ahead of the rear axle: a third of the mass behind, so Code 4 loads from the front first."""
     heavy = {"vehicle.whole.centre_of_mass": [1.5, 0.0, 0.82]}
-    with pytest.raises(ValueError, match=r"initiation.loads.rear.come_from: .*33 % .*got 'rear'; 'front', or loads: null"):
+    with pytest.raises(
+        ValueError, match=r"initiation.loads.rear.come_from: .*33 % .*got 'rear'; 'front', or loads: null"
+    ):
         load("static_rops_test").replaced(heavy)
     found = loads(load("static_rops_test").replaced({**heavy, "initiation.loads": None}))
     assert list(found) == ["front", "crush-front", "side", "crush-rear"]
@@ -106,7 +111,9 @@ def test_places_of_the_beam() -> None:
     assert found["front"].point == pytest.approx((-0.06, -0.40, 2.46))
     assert found["side"].point == pytest.approx((-0.10, 0.60, 2.46))
     assert found["crush-rear"].point == found["crush-front"].point == pytest.approx((-0.10, 0.0, 2.50))
-    assert loads(tested(initiation__loads__side__come_from="right"))["side"].point == pytest.approx((-0.10, -0.60, 2.46))
+    assert loads(tested(initiation__loads__side__come_from="right"))["side"].point == pytest.approx(
+        (-0.10, -0.60, 2.46)
+    )
     # the roof of the cab from x = -0.5 to 1.2, 1.7 m wide, 2.85 to 3.0 m high
     cab = loads(tested(vehicle="vehicles/large_tractor.yaml"))
     assert cab["rear"].point == pytest.approx((-0.5, 0.85 - 1.7 / 6, 2.925))

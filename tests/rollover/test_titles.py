@@ -83,13 +83,21 @@ def test_titles_name_their_scenario() -> None:
         ),
         ("drop_test", {"ground.law": {"kind": "hard"}}, [("ground.law", "ye-2006", "hard")]),
         ("drop_test", {"gravity": 9.81 + 1e-12}, [("gravity", "9.81", "9.810000000001")]),
-        ("drop_test", {"effects.ground-friction.coefficient": 0.3}, [("effects.ground-friction.coefficient", "none", "0.3")]),
+        (
+            "drop_test",
+            {"effects.ground-friction.coefficient": 0.3},
+            [("effects.ground-friction.coefficient", "none", "0.3")],
+        ),
     ],
 )
 def test_what_differs_from_the_shipped_scenario(name: str, changes: dict[str, Any], told: Any) -> None:
     scenario = load(name)
     if told is None:
-        path = next(leaf.path for leaf in document.paths(scenario) if leaf.path.endswith("angle_deg") or leaf.path.endswith("slope_deg"))
+        path = next(
+            leaf.path
+            for leaf in document.paths(scenario)
+            if leaf.path.endswith("angle_deg") or leaf.path.endswith("slope_deg")
+        )
         value = document.value_at(scenario, path)
         changes, told = {path: 25.0}, [(path, f"{value:.6g}", "25")]
     found = origin(scenario.replaced(changes))
