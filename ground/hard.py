@@ -16,11 +16,17 @@ which a dashpot of fixed strength would not give. 1 + d v >= 1 - e D > 0: never 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Annotated, Literal
 
 from ground.compiled import begin_law, force_law
-from ground.law import HIDDEN, SPEED, GroundLaw
+from ground.law import HIDDEN, SPEED, Domain, GroundLaw
 from ground.quantity import Quantity, parameters
+from ground.reference import REFERENCE_WIDTH
+
+# m: by convention a footing has failed where it settled by a tenth of its width; ground that gives way further under
+# the reference face is not hard, and would neither spring back nor follow a straight line
+NO_LONGER_HARD = 0.1 * REFERENCE_WIDTH
 
 _D = HIDDEN  # hidden state: d in s/m, worked out once for each touch
 _K, _E, _SLOW = 1, 2, 3  # places of the fields in p
@@ -40,6 +46,12 @@ class Hard(GroundLaw):
     hidden = 1
     plastic = False
     memoryless = True
+
+    @property
+    def domain(self) -> Domain:
+        """That of its calibration if it has one; in either case no deeper than hard ground gives way."""
+        known = super().domain
+        return replace(known, sinkage_most=min(known.sinkage_most, NO_LONGER_HARD))
 
     @staticmethod
     @begin_law

@@ -55,6 +55,8 @@ class Domain:
     area: float = math.nan  # m2, footprint; nan: any
     virgin_only: bool = False  # no second hit on the same rut
     obliquity_most: float = math.inf  # rad, angle between approach velocity and ground normal
+    calibrated: bool = True  # False: nothing was measured, or nobody says what
+    sinkage_most: float = math.inf  # m, deepest that was recorded or that the law's own assumption allows
 
     @property
     def vector(self) -> NDArray[np.float64]:
@@ -102,6 +104,7 @@ class Calibration:
             area=math.nan if self.area is None else self.area,
             virgin_only=True,
             obliquity_most=math.radians(10.0),
+            sinkage_most=math.inf if self.sinkage_most is None else self.sinkage_most,
         )
 
 
@@ -138,8 +141,8 @@ class GroundLaw:
 
     @property
     def domain(self) -> Domain:
-        """Where the law's numbers come from."""
-        return Domain() if self.calibration is None else self.calibration.domain
+        """Where the law's numbers come from; a law that has no calibration and states no domain is uncalibrated."""
+        return Domain(calibrated=False) if self.calibration is None else self.calibration.domain
 
 
 def laws() -> dict[str, type[GroundLaw]]:

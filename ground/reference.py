@@ -2,5 +2,6 @@
 
 from __future__ import annotations
 
-REFERENCE_AREA = 0.140 * 0.045  # m2, of its face
+REFERENCE_WIDTH = 0.045  # m, the shorter side of its face
+REFERENCE_AREA = 0.140 * REFERENCE_WIDTH  # m2, of its face
 REFERENCE_MASS = 132.0  # kg

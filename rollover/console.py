@@ -131,11 +131,15 @@ def report(
     compiled: bool = False,
 ) -> None:
     """The answer of a run on standard output; what took part of its time to compile tells no speed."""
+    from rollover.criteria import in_words
     from rollover.ledger import closure
     from rollover.loads import unconverged
+    from rollover.shipped import origin
 
     out = _out()
     out.print(excerpt(run.scenario.title), style="bold")
+    if (made_from := origin(run.scenario)) and made_from.differences:
+        out.print(f"{made_from.in_words}.", style="yellow")
     if run.status == "done":
         speed = (run.stop_time - float(run.recording.time[0])) / run.wall_time if run.wall_time > 0.0 else 0.0
         pace = "most of it compiling, once" if compiled else f"{speed:.2g} x real time"
@@ -149,6 +153,8 @@ def report(
     if rows:
         out.print()
         out.print(_criteria(rows))
+        for sentence in in_words(rows):
+            out.print(sentence)
     if unsure := unconverged(peaks):
         out.print(f"{unsure[0].upper()}{unsure[1:]}.", style="bold yellow")
     closed = closure(run)
@@ -159,7 +165,10 @@ def report(
     if run.domain_flags:
         marked = " Loads marked * were taken there: an extrapolation, not a measured range." if peaks else ""
         flags = ", ".join(run.domain_flags)
-        out.print(f"Outside the ground law's calibrated domain: {flags}.{marked}", style="yellow")
+        heading = "Outside the ground law's calibrated domain"
+        if "uncalibrated" in run.domain_flags:
+            heading = "The ground law is not calibrated: no measurement stands behind its loads. Flags"
+        out.print(f"{heading}: {flags}.{marked}", style="yellow")
     half = answer["half_step"]
     if half is not None and half["status"] != "done":
         out.print(f"At half the step the run failed: {half['sentence']}", style="yellow")
@@ -183,7 +192,7 @@ def _stand(out: Console, run: Run) -> None:
 
 def _criteria(rows: Sequence[Criterion]) -> Table:
     table = Table(box=None, pad_edge=False)
-    styles = {"met": "green", "not met": "bold red", "compared": ""}
+    styles = {"met": "green", "not met": "bold red", "no verdict": "yellow", "compared": ""}
     for heading in ("standard", "requirement", "asked", "simulated", "margin", "half step", "verdict"):
         table.add_column(heading, justify="right" if heading in ("simulated", "margin", "half step") else "left")
     for row in rows:

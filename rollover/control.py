@@ -13,8 +13,10 @@ from rollover.run import Event
 from rollover.scenario import Scenario
 from rollover.stand import PendulumBlow, StaticTest, TiltTable
 from rollover.static_load import StaticControl
+from rollover.static_sequence import sequence
 from rollover.tables import Tables
 from rollover.tilting import TiltControl
+from rollover.vehicle import Vehicle
 
 
 class Control(Protocol):
@@ -35,7 +37,8 @@ def control_of(scenario: Scenario, rig: Rig) -> Control | None:
     """Who runs the scenario's test stand, or None where there is none."""
     begin = scenario.initiation
     if isinstance(begin, StaticTest):
-        return StaticControl(begin, rig)
+        assert isinstance(scenario.vehicle, Vehicle)
+        return StaticControl(begin, sequence(scenario.vehicle, begin), rig)
     if isinstance(begin, PendulumBlow):
         return PendulumControl(begin, rig, scenario.gravity)
     if isinstance(begin, TiltTable):

@@ -7,6 +7,8 @@ A virtual test is judged by the rules of its standard.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from rollover import virtual_tests
@@ -16,13 +18,20 @@ from rollover.initiation import Driving, Standing, TipOver
 from rollover.requirement import Requirement
 from rollover.run import Run
 from rollover.stand import PendulumBlow, StaticTest, TiltTable
-from rollover.standards import STANDARDS, STATIC, Tractor
+from rollover.standards import STANDARDS, STATIC
+from rollover.static_sequence import code_of, sequence, tractor_of
 from rollover.vehicle import Vehicle
 
-__all__ = ["Criterion", "Verdict", "criteria", "rops_share", "tractor_of", "with_half_step"]
+__all__ = ["Criterion", "Verdict", "criteria", "in_words", "rops_share", "tractor_of", "with_half_step"]
 
 # share of the ROPS for a vehicle of 450 kg: on natural clay, on ground a hundred times as stiff, there with soft mounts
 LIGHT_SHARES = (0.16, 0.25, 0.44)
+RATIO_IN_WORDS = (
+    "A ratio above 1 says that the structure took up more energy in this overturn than the static test puts in, at "
+    "least, from that side. It does not say that the structure failed, for the test does not ask how much more it can "
+    "take; nor does a ratio below 1 say that it passed. Whether the operator's space was kept is the distance of the "
+    "clearance zone, which is judged."
+)
 
 
 def criteria(run: Run) -> tuple[Criterion, ...]:
@@ -31,40 +40,76 @@ def criteria(run: Run) -> tuple[Criterion, ...]:
     if not isinstance(vehicle, Vehicle) or run.status == "failed":
         return ()
     tractor = tractor_of(vehicle, folding=True if isinstance(begin, StaticTest) else None)
-    asked = [r for name in run.scenario.loads.standards for r in STANDARDS[name](tractor)]
+    asked = [r for name in _standards(run, vehicle) for r in STANDARDS[name](tractor)]
     if isinstance(begin, TiltTable):
         return tuple(virtual_tests.tilt(run, begin, asked))
     if vehicle.rops is None:
         return ()
     if isinstance(begin, (StaticTest, PendulumBlow)):
-        zone = [_zone(approach) for approach in approaches(run) if approach.what == "structure"]
+        structure = next((approach for approach in approaches(run) if approach.what == "structure"), None)
+        zone = [] if structure is None else [_zone(structure)]
         if isinstance(begin, StaticTest):
-            return (*virtual_tests.static_test(run, begin, asked), *zone)
+            return (*virtual_tests.static_test(run, sequence(vehicle, begin), asked, structure), *zone)
         return (*virtual_tests.blow(run, begin, asked), *zone)
     rows = [_zone(approach) for approach in approaches(run)]
-    rows += [row for requirement in asked if (row := _compared(run, requirement)) is not None]
+    rows += [row for requirement in _once(run, asked) if (row := _compared(run, requirement)) is not None]
     share = rops_share(run) if isinstance(begin, (TipOver, Standing, Driving)) else None
     return (*rows, *([] if share is None else [_share(share)]))
 
 
-def tractor_of(vehicle: Vehicle, *, folding: bool | None = None) -> Tractor:
-    """What the standards ask of a vehicle: its mass without what is attached, wheelbase, rear share, widths.
+def in_words(rows: Sequence[Criterion]) -> list[str]:
+    """What people need to know to read the rows: what a ratio says, and why a verdict or a margin is missing."""
+    found = []
+    if any(row.verdict == "compared" and row.requirement.quantity == "energy" for row in rows):
+        found.append(RATIO_IN_WORDS)
+    if short := [row.requirement.name for row in rows if row.verdict == "no verdict"]:
+        found.append(f"Not loaded far enough, so no verdict: {', '.join(short)}.")
+    if any(row.margin is None for row in rows):
+        found.append(
+            "A margin is not stated where a test went only as far as it was told: what more a frame can take shows "
+            "when it is pushed until it fails (initiation.push_on: the name of a load)."
+        )
+    return found
 
-    A ROPS with hinges tilts or folds, unless `folding` says otherwise.
+
+def _standards(run: Run, vehicle: Vehicle) -> tuple[str, ...]:
+    """Those of the scenario, or the code that the static test follows or that applies; Code 4 where none does."""
+    begin = run.scenario.initiation
+    if run.scenario.loads.standards is not None:
+        return run.scenario.loads.standards
+    if isinstance(begin, StaticTest) and begin.code is not None:
+        return (begin.code,)
+    try:
+        return (code_of(vehicle),)
+    except ValueError:
+        return ("code-4",)
+
+
+def _once(run: Run, asked: Sequence[Requirement]) -> list[Requirement]:
+    """Of each standard one energy, for the side that the frame was loaded from, and one force; the rest as it is.
+
+    A run has one absorbed energy and one greatest force down: beside two requirements each would count twice.
     """
-    x = [wheel.centre[0] for wheel in vehicle.wheels]
-    wheelbase = max(x) - min(x) if x else 0.0
-    sides = [abs(w.centre[1]) + 0.5 * w.tyre.width for w in vehicle.wheels]
-    rops = vehicle.rops
-    share = 1.0 - (vehicle.whole.centre_of_mass[0] - min(x)) / wheelbase if wheelbase > 0.0 else 0.6
-    return Tractor(
-        mass=vehicle.whole.mass,
-        wheelbase=wheelbase or None,
-        rear_share=min(max(share, 0.0), 1.0),
-        width=2.0 * max(sides) if sides else None,
-        rops_width=2.0 * abs(rops.corner[1]) if rops is not None else None,
-        folding=bool(rops is not None and rops.hinges) if folding is None else folding,
-    )
+    side = loaded_from(run)
+    found: list[Requirement] = []
+    for standard in dict.fromkeys(r.standard for r in asked):
+        of = [r for r in asked if r.standard == standard]
+        energies = [r for r in of if r.quantity == "energy"]
+        lengthways = [r for r in energies if set(r.come_from) & {"front", "rear"}]
+        # a code that names one end only still asks for that energy lengthways
+        chosen = [r for r in energies if side in r.come_from] or (lengthways if side in ("front", "rear") else [])
+        keep = [*chosen[:1], *[r for r in of if r.quantity == "force"][:1]]
+        found += [r for r in of if r in keep or r.quantity not in ("energy", "force")]
+    return found
+
+
+def loaded_from(run: Run) -> str:
+    """The side that the ground mostly pushed the ROPS from, by the momentum along each vehicle axis."""
+    time = run.recording.time
+    x, y = (float(np.trapezoid(run.recording[f"rops/force_{axis}"], time)) for axis in "xy")
+    if abs(x) > abs(y):
+        return "rear" if x > 0.0 else "front"
+    return "right" if y > 0.0 else "left"
 
 
 def rops_share(run: Run) -> float | None:
@@ -125,7 +170,9 @@ def _zone(approach: Approach) -> Criterion:
 def _compared(run: Run, requirement: Requirement) -> Criterion | None:
     recording = run.recording
     if requirement.quantity == "energy":
-        note = "absorbed by the structure in all, over what the static test asks: E_dyn/E_standard"
+        side = loaded_from(run)
+        note = f"absorbed by the structure in all, mostly from the {side}, over what the static test asks at least: "
+        note += "E_dyn/E_standard"
         return compared(requirement, float(recording["rops/energy"].max()), note)
     if requirement.quantity == "force":
         force = np.abs(recording["rops/force_z"])

@@ -9,7 +9,7 @@ from typing import Literal
 
 from rollover.requirement import Requirement
 
-Verdict = Literal["met", "not met", "compared"]
+Verdict = Literal["met", "not met", "no verdict", "compared"]
 ROUNDING = 1e-9  # relative; a force that is held at what was asked is what was asked
 
 
@@ -18,13 +18,15 @@ class Criterion:
     """One requirement, the simulated value in its unit, and their relation.
 
     `margin` is (simulated - required)/required, turned round where the requirement is a most; within a range it is 0;
-    of a distance that must stay positive it is the distance itself, m. Positive is good. `met` and `not met` are
-    verdicts, `compared` is none. `at_half_step` is the simulated value at half the step, None if not examined.
+    of a distance that must stay positive it is the distance itself, m. Positive is good. It is None where the simulated
+    value is only how far a test was told to go. `met` and `not met` are verdicts; `no verdict` is a test that was not
+    told to go as far as asked, `compared` is no test. `at_half_step` is the simulated value at half the step, None if
+    not examined.
     """
 
     requirement: Requirement
     simulated: float
-    margin: float
+    margin: float | None
     verdict: Verdict
     note: str
     at_half_step: float | None = None
@@ -48,8 +50,19 @@ def compared(requirement: Requirement, simulated: float, note: str) -> Criterion
 
 def judged(requirement: Requirement, simulated: float, note: str, *, otherwise: bool = True) -> Criterion:
     """A requirement and its verdict; it is not met either where it does not hold `otherwise`."""
-    row = compared(requirement, simulated, note)
-    return replace(row, verdict="met" if otherwise and row.margin >= -ROUNDING else "not met")
+    row, margin = compared(requirement, simulated, note), _margin(requirement, simulated)
+    return replace(row, verdict="met" if otherwise and margin >= -ROUNDING else "not met")
+
+
+def told(requirement: Requirement, simulated: float, given: float, note: str) -> Criterion:
+    """A requirement beside what a test that broke nothing reached: it was told to go as far as `given`, no further."""
+    row = judged(requirement, simulated, note)
+    if row.verdict == "met":
+        return replace(row, margin=None)
+    if given < requirement.value * (1.0 - ROUNDING):
+        note += "; not loaded far enough: no verdict"
+        return replace(row, margin=None, verdict="no verdict", note=note)
+    return row
 
 
 def _margin(requirement: Requirement, simulated: float) -> float:
@@ -87,8 +100,10 @@ def _in_words(row: Criterion) -> tuple[str, str, str]:
         needed = f"{asked.value * factor:.4g} to {asked.upper * factor:.4g} {unit}"
     else:
         needed = f"{'at least' if asked.bound == 'least' else 'at most'} {asked.value * factor:.4g} {unit}"
-    if q == "distance":
+    if q == "distance" and row.margin is not None:
         needed, margin = "stays outside", f"{1e3 * row.margin:+.0f} mm"
+    elif row.margin is None:
+        margin = "not stated"
     elif asked.upper is not None:
         margin = "within" if row.margin == 0.0 else f"{100.0 * row.margin:+.0f} %"
     elif row.verdict == "compared" and asked.value > 0.0:

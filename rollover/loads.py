@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.channels import describe
+from rollover.domain import flag_names
 from rollover.filters import filtered
 from rollover.recording import Recording
 from rollover.run import Run
-from rollover.simulate import flag_names
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -19,6 +19,7 @@ from rollover.excitation import Excitation
 from rollover.filters import least_rate
 from rollover.initiation import Driving, Drop, Initiation, Release, Standing, Throw, TipOver
 from rollover.stand import PendulumBlow, StaticTest, TiltTable
+from rollover.static_sequence import sequence
 from rollover.vehicle import RigidBody, Striker, Vehicle
 
 AnyVehicle = Annotated[Vehicle | Striker | RigidBody, ByKind()]
@@ -85,9 +86,9 @@ class Loads:
 
     cfc: Annotated[Literal[60, 180, 600, 1000], "filter class of the filtered peaks, SAE J211"] = 60
     standards: Annotated[
-        tuple[Literal["code-3", "code-4", "code-6", "code-7", "sae-j1194", "sae-j2194"], ...],
-        "whose requirements the run is held against",
-    ] = ("code-4",)
+        tuple[Literal["code-3", "code-4", "code-6", "code-7", "sae-j1194", "sae-j2194"], ...] | None,
+        "whose requirements the run is held against; null: the OECD code that applies to the vehicle",
+    ] = None
 
 
 @parameters
@@ -173,6 +174,11 @@ def _check_start(vehicle: Vehicle | Striker | RigidBody, start: Initiation) -> N
         return
     if isinstance(start, (StaticTest, PendulumBlow)) and (vehicle.rops is None or not vehicle.rops.members):
         raise ValueError(f"initiation.kind: {start.kind!r} loads a ROPS, got a vehicle without; one with members")
+    if isinstance(start, StaticTest) and isinstance(vehicle, Vehicle):
+        try:
+            sequence(vehicle, start)
+        except ValueError as e:
+            raise ValueError(f"initiation.{e}") from None
     if isinstance(start, Throw):
         if not isinstance(vehicle, RigidBody):
             raise ValueError(f"initiation.kind: only a rigid body is thrown, got {start.kind!r}; vehicle.kind: body")

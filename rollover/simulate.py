@@ -18,6 +18,7 @@ from rollover.bodies import Body
 from rollover.contact import grown
 from rollover.control import Control, control_of
 from rollover.dense import largest
+from rollover.domain import Told, flag_names
 from rollover.effects import read
 from rollover.forces import generalised_forces
 from rollover.frames import matrices, quaternions, rotation_vector
@@ -81,6 +82,7 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
     start_step(live.handle)
     events: list[Event] = []
     seen: set[tuple[int, int]] = set()
+    told = Told([scenario.ground.law, *(patch.law for patch in scenario.ground.patches)])
     touched = isinstance(scenario.initiation, (Standing, Driving))  # what balances before it falls is not at rest
     landed = {(c.TOUCH, b) for b in range(len(bodies))}
     state = {"rows": 0, "last": 0.0, "quiet": 0.0, "next": began + 0.25}
@@ -109,6 +111,7 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
         live.tables.velocity[:] = qd[: len(t.mass)]  # a blow of the control has changed it
         k = int(state["rows"])
         if time >= k * every * h - 1e-9:
+            live.tables.counts[c.FLAGS_NOW] |= told.now(live.tables)
             past.add(now, live.handle, q, qd, qdd)
             if k % track_every == 0:
                 past.add_track(now, live.tables)
@@ -254,11 +257,6 @@ def _result(
         stop_time=float(time[-1]),
         tests=control.results() if control else (),
     )
-
-
-def flag_names(flags: int) -> tuple[str, ...]:
-    """Names of the domain flags in a bit field."""
-    return tuple(name for bit, name in c.FLAG_NAMES.items() if flags & bit)
 
 
 def _released(found: dict[str, Array]) -> float:

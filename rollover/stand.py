@@ -1,6 +1,6 @@
 """Test stands (data): a static test of the ROPS, a pendulum blow, a tilt table. A scenario begins with one of them.
 
-Points are in vehicle axes. Energies and forces are plain numbers; the files say by which formula they were found.
+Points are in vehicle axes. A load of a static test follows from a code and the vehicle, or is given as a number.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from ground.quantity import Label, Quantity, parameters
 from rollover.shapes import Point
 
 From = Literal["front", "rear", "left", "right", "above"]
+Code = Literal["code-4", "code-6", "code-7"]
+Step = Literal["longitudinal", "crush", "side", "second-longitudinal"]
 # unit vector in which a load pushes, by where it comes from; vehicle axes
 DIRECTION: dict[str, Point] = {
     "front": (-1.0, 0.0, 0.0),
@@ -24,30 +26,53 @@ DIRECTION: dict[str, Point] = {
 
 @parameters
 class StaticLoad:
-    """One load of a sequence: pushed until an energy is absorbed, or up to a force that is held."""
+    """One load of a sequence: pushed until an energy is absorbed, or up to a force that is held.
+
+    What a code `asks` follows from the vehicle's mass, and the side and the point from its frame where they are not
+    given. A number given beside it is pushed to instead; what the code asks is still what the load is held against.
+    """
 
     name: Annotated[str, Label("of the load in results and events")]
-    come_from: Annotated[From, "the side that the beam comes from; it pushes the other way"]
-    point: Annotated[Point, Quantity("m", "middle of the beam on the ROPS, vehicle axes, before the test")]
-    energy: Annotated[float | None, Quantity("J", "to be absorbed; or give a force", above=0)] = None
-    force: Annotated[float | None, Quantity("N", "to be reached and held; or give an energy", above=0)] = None
+    asks: Annotated[Step | None, "the step of the code that this load is; null: of none, by energy or force"] = None
+    come_from: Annotated[From | None, "the side that the beam comes from; null: by the code"] = None
+    point: Annotated[
+        Point | None, Quantity("m", "middle of the beam on the ROPS, vehicle axes, before the test; null: by the code")
+    ] = None
+    energy: Annotated[float | None, Quantity("J", "to be absorbed; null: by the code", above=0)] = None
+    force: Annotated[float | None, Quantity("N", "to be reached and held; null: by the code", above=0)] = None
 
     def validate(self) -> None:
-        """Refuse a load with two requirements or none."""
-        if (self.energy is None) == (self.force is None):
-            raise ValueError(f"energy: one of energy and force is needed, got {self.energy!r} and {self.force!r}; one")
+        """Refuse a load with two requirements or none, and a number that nothing places."""
+        if None not in (self.energy, self.force) or (self.asks is None and self.energy is self.force is None):
+            raise ValueError(
+                f"energy: one of energy and force is needed, got {self.energy!r} and {self.force!r}; one, or `asks` "
+                "for what the code asks of the vehicle"
+            )
+        other = "energy" if self.asks == "crush" else "force"
+        if self.asks is not None and getattr(self, other) is not None:
+            raise ValueError(f"{other}: {self.asks!r} is no load of that kind, got {getattr(self, other)!r}; null")
+        if self.asks is None and (self.come_from is None or self.point is None):
+            missing = "come_from" if self.come_from is None else "point"
+            raise ValueError(f"{missing}: not given, got a load of a number of its own; needed, or `asks`")
 
 
 @parameters
 class StaticTest:
     """The chassis is held; a beam on a guide pushes the ROPS load by load, each released before the next.
 
-    The sequence of the static tests for agricultural tractors (OECD Code 4, ISO 5700). The beam is one-sided: it
+    The sequence of the static tests for agricultural tractors (OECD Codes 4, 6 and 7). The beam is one-sided: it
     pushes and never pulls, along its guide only, as a beam on a universal joint does.
     """
 
     kind: Literal["static-test"] = "static-test"
-    loads: tuple[StaticLoad, ...]
+    code: Annotated[Code | None, "by whose formulae; null: the one that applies to frame, track and mass"] = None
+    loads: Annotated[tuple[StaticLoad, ...] | None, "null: the sequence of the code for this vehicle"] = None
+    surplus: Annotated[
+        float, Quantity("1", "share by which each load goes on beyond what the code asks", least=0, most=1)
+    ] = 0.0
+    push_on: Annotated[
+        str | None, "name of the load that goes on until the frame fails, the last one then: its margin is measured"
+    ] = None
     rate: Annotated[float, Quantity("m/s", "of the beam; a standard allows 0.005", above=0, most=1)] = 0.1
     force_rate: Annotated[float, Quantity("N/s", "at which a force is put on and taken off", above=0)] = 1.0e5
     hold: Annotated[float, Quantity("s", "that a force stays on after the deflection stopped", least=0)] = 0.2
@@ -58,7 +83,9 @@ class StaticTest:
     beam_length: Annotated[float, Quantity("m", "of the beam, drawn only", least=0.25, most=0.7)] = 0.5
 
     def validate(self) -> None:
-        """Refuse an empty sequence and loads that share a name."""
+        """Refuse an empty sequence, loads that share a name, and an unknown one to push on."""
+        if self.loads is None:
+            return
         names = [load.name for load in self.loads]
         if not names:
             raise ValueError("loads: none given; at least one load")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -11,7 +11,8 @@ from rollover import devices as d
 from rollover.frames import matrices
 from rollover.rig import Rig
 from rollover.run import Event
-from rollover.stand import DIRECTION, StaticLoad, StaticTest
+from rollover.stand import DIRECTION, StaticTest
+from rollover.static_sequence import Push
 from rollover.tables import O_DEFLECTION, O_ENERGY, O_FORCE, O_POINT, O_WAY, Tables
 
 RECORDED = 0.005  # m between the points of a recorded curve; a standard asks for 0.015 m at most
@@ -29,21 +30,28 @@ def fall(deflection: np.ndarray, force: np.ndarray, share: float = OVERLOAD_STRE
     return float(1.0 - last[-1] / last.max()) if last.max() > 0.0 else 0.0
 
 
+def _asked(load: Push) -> float | None:
+    """What the code asks, or the number of the user's own; J or N."""
+    return load.asked.value if load.asked is not None else load.energy if load.energy is not None else load.force
+
+
 class StaticControl:
     """Stages of each load: push | raise, hold; then retract | lower, pause."""
 
-    def __init__(self, test: StaticTest, rig: Rig) -> None:
-        self.test, self.t, self.bodies = test, rig.tables, rig.bodies
-        self.rops = next(b for b, body in enumerate(rig.bodies) if body.name == "rops")
-        chassis = next(b for b, body in enumerate(rig.bodies) if body.name == "chassis")
+    def __init__(self, test: StaticTest, loads: Sequence[Push], rig: Rig) -> None:
+        self.test, self.loads, self.t, self.bodies = test, loads, rig.tables, rig.bodies
+        self.row = {body.name: b for b, body in enumerate(rig.bodies)}
+        self.loaded = self.row[loads[0].body]
+        chassis = self.row["chassis"]
         self.R = matrices(rig.start.q[None, 6 * chassis + 3 : 6 * chassis + 6])[0]
         self.events: list[Event] = []
         self.found: list[dict[str, Any]] = []
         self.stage: Stage = "pause"
         self.since, self.next = 0.0, 0
         self.curve: list[tuple[float, float]] = []
-        self._aim(test.loads[0])
+        self._aim(loads[0])
         self.first, self.target, self.still, self.force_before = 0.0, 0.0, 0.0, 0.0
+        self.absorbed = False
 
     def after(self, now: float, dt: float, q: Any, qd: Any, t: Tables) -> bool:
         """Move on; False when the sequence is through."""
@@ -57,8 +65,8 @@ class StaticControl:
             self._note(way, force, dt)
         if self.stage == "push":
             self._push(now, way, force, float(m[d.K_WORK]))
-        elif self.stage == "raise" and d.level(f, now) >= f[d.D_MOST]:
-            self._go("hold", now)
+        elif self.stage == "raise" and d.level(f, now) >= self.target:
+            self._raised(now)
         elif self.stage == "hold" and self.still >= self.test.hold:
             self._reached(now, "reached", way, force, float(m[d.K_WORK]))
             self._release(now)
@@ -71,7 +79,13 @@ class StaticControl:
         elif self.stage == "pause" and now - self.since >= self.test.pause:
             return self._next_load(now, q)
         if self.stage in ("raise", "hold", "push") and way > self.test.most_deflection:
-            self._reached(now, "given up: too far", way, force, float(m[d.K_WORK]))
+            self._reached(
+                now,
+                self._failed(f"deflected by more than {1e3 * self.test.most_deflection:.0f} mm"),
+                way,
+                force,
+                float(m[d.K_WORK]),
+            )
             self._release(now)
         self._show(q)
         return True
@@ -94,9 +108,12 @@ class StaticControl:
         self.curve.append((way, force))
 
     def _push(self, now: float, way: float, force: float, energy: float) -> None:
-        load = self.test.loads[self.next - 1]
+        load = self.loads[self.next - 1]
         assert load.energy is not None
-        if energy < self.target:
+        if self.absorbed and force < OVERLOAD_LEAST_FORCE * max(y for _, y in self.curve):
+            self._reached(now, self._failed("the force fell below 0.8 of its greatest"), way, force, energy)
+            self._release(now)
+        if energy < self.target or self.absorbed:
             return
         entry = self.found[-1]
         x, y = np.array(self.curve).T
@@ -113,8 +130,24 @@ class StaticControl:
         if over["required"] and not over["passed"] and extra < OVERLOAD_MOST - 1e-9:
             self.target, self.force_before = self.target + OVERLOAD_STEP * load.energy, force
             return
+        if load.until_failure:
+            self.absorbed = True
+            return
         self._reached(now, "reached", way, force, energy)
         self._release(now)
+
+    def _raised(self, now: float) -> None:
+        """The force that was given is there: hold it, or go on."""
+        if not self.loads[self.next - 1].until_failure:
+            self._go("hold", now)
+        self.absorbed = True
+
+    def _failed(self, how: str) -> str:
+        return f"pushed on until it failed: {how}" if self.absorbed and self._going_on else f"given up: {how}"
+
+    @property
+    def _going_on(self) -> bool:
+        return self.loads[self.next - 1].until_failure
 
     def _release(self, now: float) -> None:
         """Take the load off as it came on."""
@@ -140,18 +173,22 @@ class StaticControl:
             "peak_force": float(y.max()),
             "curve": [*kept, [way, force]],
         }
-        load = self.test.loads[self.next - 1]
+        load = self.loads[self.next - 1]
         detail = f"{load.name} {how}: {energy:.0f} J, {1e3 * way:.0f} mm, {1e-3 * force:.1f} kN"
         self.events.append(Event(time=now, kind="load-reached", subject="rops", place=self._place(), detail=detail))
 
     def _next_load(self, now: float, q: Any) -> bool:
         """Book the permanent set of the load before and begin the next; False if there is none."""
-        if self.found:
+        if self.found and "reached_at" in self.found[-1]:
             self.found[-1]["permanent_set"] = self._along(q) - self.first
-        if self.next == len(self.test.loads):
+        while self.next < len(self.loads) and not (self.loads[self.next].energy or self.loads[self.next].force):
+            skipped = self.loads[self.next]
+            self.found.append(self._entry(skipped, now) | {"status": "not a step of the code"})
+            self.next += 1
+        if self.next == len(self.loads):
             self.stage = "over"
             return False
-        load = self.test.loads[self.next]
+        load = self.loads[self.next]
         self.next += 1
         f, m = self.t.device_f[0], self.t.device_memory[0]
         self._aim(load)
@@ -166,35 +203,40 @@ class StaticControl:
             self._go("push", now)
         else:
             assert load.force is not None
-            kind, f[d.D_START], f[d.D_RATE], f[d.D_MOST] = d.FORCE, 0.0, self.test.force_rate, load.force
+            most = np.inf if load.until_failure else load.force
+            kind, f[d.D_START], f[d.D_RATE], f[d.D_MOST] = d.FORCE, 0.0, self.test.force_rate, most
+            self.target = load.force
             self._go("raise", now)
-        self.t.device_i[0, d.D_KIND], self.t.device_i[0, d.D_BODY] = kind, self.rops
-        self.curve, self.force_before = [(0.0, 0.0)], 0.0
+        self.t.device_i[0, d.D_KIND], self.t.device_i[0, d.D_BODY] = kind, self.loaded
+        self.curve, self.force_before, self.absorbed = [(0.0, 0.0)], 0.0, False
         self.found.append(self._entry(load, now))
         detail = f"{load.name} from {load.come_from}"
         self.events.append(Event(time=now, kind="load-begins", subject="rops", place=self._place(), detail=detail))
         return True
 
-    def _aim(self, load: StaticLoad) -> None:
+    def _aim(self, load: Push) -> None:
         f = self.t.device_f[0]
-        f[d.D_POINT : d.D_POINT + 3] = np.array(load.point) - self.bodies[self.rops].centre
+        self.loaded = self.row[load.body]
+        f[d.D_POINT : d.D_POINT + 3] = np.array(load.point) - self.bodies[self.loaded].centre
         f[d.D_WAY : d.D_WAY + 3] = self.R @ np.array(DIRECTION[load.come_from])
 
-    def _entry(self, load: StaticLoad, now: float) -> dict[str, Any]:
+    def _entry(self, load: Push, now: float) -> dict[str, Any]:
         return {
             "kind": "static-load",
             "name": load.name,
             "come_from": load.come_from,
             "status": "not finished",
             "begun_at": now,
-            "required_energy": load.energy,
-            "required_force": load.force,
+            "required_energy": _asked(load) if load.energy is not None else None,
+            "required_force": _asked(load) if load.force is not None else None,
+            "given": load.energy if load.energy is not None else load.force,
+            "by": None if load.asked is None else f"{load.asked.standard}: {load.asked.formula}",
             "rate": self.test.rate if load.energy is not None else None,
             "overload": {},
         }
 
     def _point(self, q: Any) -> np.ndarray:
-        at = 6 * self.rops
+        at = 6 * self.loaded
         R = matrices(np.asarray(q)[None, at + 3 : at + 6])[0]
         return np.asarray(q[at : at + 3] + R @ self.t.device_f[0, d.D_POINT : d.D_POINT + 3])
 

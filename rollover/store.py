@@ -18,6 +18,7 @@ from rollover.document import content_hash, dump
 from rollover.faults import Fault, InputError
 from rollover.ledger import closure
 from rollover.recording import write_parquet
+from rollover.shipped import origin
 from rollover.writing import hold, own
 from rollover.writing import whole as whole
 
@@ -162,6 +163,7 @@ def _answer(
         {
             "format": FORMAT,
             "title": run.scenario.title,
+            "shipped": None if (made_from := origin(run.scenario)) is None else asdict(made_from),
             "status": run.status,
             "sentence": run.sentence,
             "versions": versions(),

@@ -2,7 +2,8 @@
 
 Only what was tested is judged. A load is held against the requirement of the vehicle's own mass, whatever energy or
 force the scenario gave it: the first requirement of a standard, in its order, that asks for an energy or a force from
-the side that the load came from.
+the side that the load came from. How far a load was told to go is no margin: the margin is what the frame took until
+it failed. It fails where a part of it enters the clearance zone, gives way too far, or holds the force no longer.
 """
 
 from __future__ import annotations
@@ -14,36 +15,43 @@ from typing import Any
 
 import numpy as np
 
-from rollover.criterion import Criterion, compared, judged
+from rollover.clearance import Approach
+from rollover.criterion import ROUNDING, Criterion, compared, judged, told
 from rollover.requirement import Requirement
 from rollover.run import Run
-from rollover.stand import PendulumBlow, StaticLoad, StaticTest, TiltTable
+from rollover.stand import PendulumBlow, StaticTest, TiltTable
 from rollover.standards import STATIC
 from rollover.static_load import OVERLOAD_DROP
+from rollover.static_sequence import Push
 
 HELD = 5.0  # s for which the static tests hold a crush force
 AT_REST = 0.2  # s at the end of a run over which the residual deflection is taken
 
 
-def static_test(run: Run, test: StaticTest, asked: Sequence[Requirement]) -> list[Criterion]:
-    """Energy or force of each load, and the overload rule after a load that was asked for an energy."""
+def static_test(
+    run: Run, loads: Sequence[Push], asked: Sequence[Requirement], structure: Approach | None = None
+) -> list[Criterion]:
+    """Energy or force of each load, and the overload rule after a load that was asked for an energy.
+
+    `structure` is how near the frame came to the clearance zone.
+    """
     found: list[Criterion] = []
     results = {entry["name"]: entry for entry in run.tests}
-    for load, requirement in _pairs(test.loads, asked):
+    for load, requirement in _pairs(loads, asked):
         entry = results.get(load.name, {"status": "never began: the run ended before"})
-        found.append(_load(run, load, entry, requirement))
+        found.append(_load(run, load, entry, requirement, structure))
         if entry.get("overload") and requirement.source == STATIC:
             found.append(_overload(load, entry, requirement))
     return found
 
 
-def _pairs(loads: Sequence[StaticLoad], asked: Sequence[Requirement]) -> list[tuple[StaticLoad, Requirement]]:
+def _pairs(loads: Sequence[Push], asked: Sequence[Requirement]) -> list[tuple[Push, Requirement]]:
     """Each requirement with the first load that it can be asked of and that none before it had."""
-    found: list[tuple[StaticLoad, Requirement]] = []
+    found: list[tuple[Push, Requirement]] = []
     had: set[tuple[str, str]] = set()
     for requirement in asked:
         for load in loads:
-            kind = "energy" if load.energy is not None else "force"
+            kind = "energy" if load.energy is not None else "force" if load.force is not None else "none"
             key = (requirement.standard, load.name)
             if kind == requirement.quantity and load.come_from in requirement.come_from and key not in had:
                 had.add(key)
@@ -52,7 +60,9 @@ def _pairs(loads: Sequence[StaticLoad], asked: Sequence[Requirement]) -> list[tu
     return sorted(found, key=lambda pair: [load.name for load in loads].index(pair[0].name))
 
 
-def _load(run: Run, load: StaticLoad, entry: Mapping[str, Any], requirement: Requirement) -> Criterion:
+def _load(
+    run: Run, load: Push, entry: Mapping[str, Any], requirement: Requirement, structure: Approach | None
+) -> Criterion:
     done = entry["status"] == "reached"
     simulated = float(entry.get(requirement.quantity, 0.0))
     if "reached_at" not in entry and "begun_at" in entry:
@@ -65,11 +75,33 @@ def _load(run: Run, load: StaticLoad, entry: Mapping[str, Any], requirement: Req
     if requirement.quantity == "force" and done:
         assert isinstance(run.scenario.initiation, StaticTest)
         note += f"; held {run.scenario.initiation.hold:g} s after the deflection stopped, the test holds {HELD:g} s"
+    entered = _entered(run, entry, structure)
+    if entered is not None:
+        simulated = min(simulated, float(run.recording[f"device/{requirement.quantity}"][entered]))
+        note += f"; a part of the frame entered the clearance zone at {run.recording.time[entered]:.3f} s"
+        return judged(requirement, simulated, note)
+    if done:
+        return told(requirement, simulated, float(load.energy or load.force or 0.0), note)
+    if load.until_failure and simulated >= requirement.value * (1.0 - ROUNDING):
+        row = judged(requirement, simulated, note)
+        return row if "reached_at" in entry else replace(row, margin=None)
     # an energy is there even where the overload test that followed was given up; a force must stand still
-    return judged(requirement, simulated, note, otherwise=done or requirement.quantity == "energy")
+    return judged(requirement, simulated, note, otherwise=requirement.quantity == "energy")
 
 
-def _overload(load: StaticLoad, entry: Mapping[str, Any], of: Requirement) -> Criterion:
+def _entered(run: Run, entry: Mapping[str, Any], structure: Approach | None) -> int | None:
+    """Row of the recording in which this load first pushed the frame into the clearance zone, None if it did not."""
+    if structure is None or "begun_at" not in entry:
+        return None
+    time = run.recording.time
+    during = (time >= entry["begun_at"]) & (time <= entry.get("reached_at", np.inf)) & (structure.history < 0.0)
+    k = int(np.argmax(during))
+    before = structure.history[k - 1] if k > 0 else 0.0
+    # a frame that an earlier load left in the zone is that load's failure
+    return k if during.any() and before >= 0.0 else None
+
+
+def _overload(load: Push, entry: Mapping[str, Any], of: Requirement) -> Criterion:
     rule = entry["overload"]
     requirement = replace(
         of,
@@ -127,5 +159,7 @@ def tilt(run: Run, table: TiltTable, asked: Sequence[Requirement]) -> list[Crite
             continue
         reached = judged(requirement, math.radians(entry["table_deg"]), f"still stood there, {side} side downhill")
         # a table that stopped too early has shown nothing
-        found.append(reached if reached.verdict == "met" else replace(reached, verdict="compared"))
+        # and one that stopped beyond what is asked has not shown how far it could go
+        met = reached.verdict == "met"
+        found.append(replace(reached, margin=None) if met else replace(reached, verdict="compared"))
     return found

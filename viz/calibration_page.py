@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from rollover.calibrate import Calibration, Estimate, Score
+from viz.differences import differences_section
 from viz.page import Block, Cell, Footer, Headline, Note, Section, Table, render
 
 
@@ -17,7 +18,7 @@ def page(c: Calibration, *, command: str, scenario_hash: str = "", versions: Map
         numeric=(2, 3, 4, 5),
         caption="95 % intervals: quadratic, from the Jacobian, or by profile likelihood where that disagrees.",
     )
-    blocks: list[Block] = [Section(title="Parameters", blocks=[table])]
+    blocks: list[Block] = [*differences_section(c.scenario), Section(title="Parameters", blocks=[table])]
     blocks += [Note(text=f"{w[:1].upper()}{w[1:]}.", warning=True) for w in c.warnings]
     scores = [("fitted", c.training), *([("held out", c.held_out)] if c.held_out is not None else [])]
     rows: list[list[str | Cell]] = [

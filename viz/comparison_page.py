@@ -6,8 +6,10 @@ from collections.abc import Mapping, Sequence
 
 from rollover.misfit import ChannelMisfit, Misfit
 from rollover.rating import Iso18571, NotRateable, Rating, SpragueGeers
+from rollover.scenario import Scenario
 from viz import plots
 from viz.comparison import sentences
+from viz.differences import differences_section
 from viz.entities import series
 from viz.page import Block, Cell, Details, Figure, Footer, Headline, Note, Section, State, Table, render
 from viz.plots import Curve
@@ -21,17 +23,19 @@ def page(
     found: Sequence[Misfit],
     *,
     title: str,
+    scenario: Scenario | None = None,
     command: str,
     scenario_hash: str = "",
     versions: Mapping[str, str] | None = None,
 ) -> str:
     """HTML of one comparison for each recording."""
     blocks: list[Block] = [
+        *(differences_section(scenario) if scenario is not None else []),
         Note(
             text="Each recording is compared at its own stamps with a run under its own conditions, both through the "
             "same filter class. Nothing was shifted in time but a clock in doubt, where that is said. "
             "ISO/TS 18571 and peaks are over the event, from first contact to rest."
-        )
+        ),
     ]
     for each in found:
         blocks.append(Section(title=each.recording, blocks=_recording(each)))

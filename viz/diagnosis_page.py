@@ -11,8 +11,10 @@ from rollover.diagnosis.series import Told, Track
 from rollover.diagnosis.verdict import Place, Score
 from rollover.effects import effects
 from rollover.prechecks import Finding
+from rollover.scenario import Scenario
 from viz import plots
 from viz.diagnosis_words import STATES, answer, label_of, named, predicted_as
+from viz.differences import differences_section
 from viz.entities import series
 from viz.page import Block, Cell, Details, Figure, Footer, Headline, Note, Section, Table, render
 from viz.plots import Curve
@@ -28,6 +30,7 @@ def page(
     told: Sequence[Told],
     *,
     title: str,
+    scenario: Scenario | None = None,
     prechecks: Sequence[tuple[str, Finding]] = (),
     command: str,
     scenario_hash: str = "",
@@ -36,6 +39,7 @@ def page(
 ) -> str:
     """HTML of a diagnosis; `told` are its recordings over time, `prechecks` (recording, finding); `each` draws."""
     blocks = [
+        *(differences_section(scenario) if scenario is not None else []),
         *_found(found),
         *_where(found, told, each),
         *_followed(found, told, each),

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from rollover.criteria import Criterion
+from rollover.criteria import in_words as standards_in_words
 from rollover.findings import findings
 from rollover.ledger import closure
 from rollover.loads import CONVERGED, PeakLoad, leading, load_channels, magnitude
@@ -15,11 +16,12 @@ from rollover.run import Run
 from rollover.stand import TiltTable
 from viz import plots
 from viz.clearance_view import clearance_figure
+from viz.differences import differences_section
 from viz.entities import series
 from viz.page import Block, Cell, Details, Figure, Footer, Headline, Note, Pairs, Section, State, Table, render
 from viz.plots import Curve, Level
 from viz.stand_view import stand_section
-from viz.verdict import filtered, in_words, joules, known, raw, title_of
+from viz.verdict import filtered, in_words, joules, known, raw, rests_on_ground, standing, title_of
 
 ONE_PER_TABLE = 60  # events that are listed
 
@@ -33,7 +35,12 @@ def page(
     command: str = "rollover run scenario.yaml",
 ) -> str:
     """HTML of a run's report. `answer` is its run.json, `rows` what it was held against."""
-    blocks: list[Block] = [*_warnings(run, answer), *stand_section(run, rows), *_standards(run, rows)]
+    blocks: list[Block] = [
+        *_warnings(run, answer),
+        *differences_section(run.scenario),
+        *stand_section(run, rows),
+        *_standards(run, rows),
+    ]
     blocks += [*_peaks(peaks), *_domain(run, peaks)]
     blocks += [*_histories(run, peaks), *_structure(run, rows), *_ledger(run), *_course(run, answer)]
     return render(
@@ -58,8 +65,9 @@ def headline(run: Run, peaks: Sequence[PeakLoad], rows: Sequence[Criterion] = ()
     sentence = f"{title_of(peak)}: at most {raw(peak)} (raw), {filtered(peak) or 'none'} (CFC {peak.cfc})"
     if isinstance(run.scenario.initiation, TiltTable) and found is not None:
         sentence = found.sentence  # what turns there is the weight: no load answers the question
-    parts = ["outside the ground law's calibrated domain" if peak.domain_flags else "inside the calibrated domain"]
-    unsure = bool(peak.domain_flags)
+    parts = [standing(peak.domain_flags) if rests_on_ground(run) else "the ground law took no part"]
+    # what the whole run rests on concerns its answer, also where the peak itself came from a tyre
+    unsure = bool(peak.domain_flags) or "uncalibrated" in run.domain_flags
     change = peak.half_step_change
     if change is None:
         parts.append("convergence was not examined")
@@ -72,6 +80,9 @@ def headline(run: Run, peaks: Sequence[PeakLoad], rows: Sequence[Criterion] = ()
     missed = [row for row in rows if row.verdict == "not met"]
     if missed:
         parts.append("not met: " + ", ".join(row.requirement.name for row in missed))
+    if short := [row for row in rows if row.verdict == "no verdict"]:
+        parts.append("not loaded far enough: no verdict on " + ", ".join(row.requirement.name for row in short))
+        unsure = True
     text = "; ".join(parts)
     state: State = "fail" if missed else "warn" if unsure else "pass"
     return Headline(sentence=f"{sentence}.", detail=f"{text[0].upper()}{text[1:]}.", state=state)
@@ -116,7 +127,7 @@ def _peaks(peaks: Sequence[PeakLoad]) -> list[Block]:
 def _standards(run: Run, rows: Sequence[Criterion]) -> list[Block]:
     if not rows:
         return []
-    states: Mapping[str, Any] = {"met": "pass", "not met": "fail", "compared": "muted"}
+    states: Mapping[str, Any] = {"met": "pass", "not met": "fail", "no verdict": "warn", "compared": "muted"}
     halved = any(row.at_half_step is not None for row in rows)
     cells: list[list[str | Cell]] = []
     for row in rows:
@@ -136,6 +147,7 @@ def _standards(run: Run, rows: Sequence[Criterion]) -> list[Block]:
             "measure (compared, simulated over asked), not a verdict."
         )
         blocks.append(Note(text=text))
+    blocks += [Note(text=sentence, warning="no verdict" in sentence) for sentence in standards_in_words(rows)]
     notes = [Note(text=f"{title(row.requirement.name)}: {row.note}.") for row in rows if row.note]
     return [Section(title="Against standards", blocks=[*blocks, Details(summary="Notes", blocks=notes)])]
 
@@ -143,13 +155,16 @@ def _standards(run: Run, rows: Sequence[Criterion]) -> list[Block]:
 def _domain(run: Run, peaks: Sequence[PeakLoad]) -> list[Block]:
     flags = sorted({*run.domain_flags, *(f for p in peaks for f in p.domain_flags)})
     if not flags:
-        note = Note(text="Every touch of the ground lay within what the ground law was calibrated on.")
+        inside = "Every touch of the ground lay within what the ground law was calibrated on."
+        note = Note(text=inside if rests_on_ground(run) else "No element of the ground was touched.")
         return [Section(title="Calibrated domain", blocks=[note])]
     rows: list[list[str | Cell]] = []
     for flag in flags:
         loads = [title_of(p) for p in peaks if flag in p.domain_flags and p.raw != 0.0]
         rows.append([flag, in_words(flag, run.scenario.ground.law.domain), ", ".join(loads) or "no peak load"])
     text = "Loads that were taken there are an extrapolation of the ground law, not a measured range."
+    if "uncalibrated" in flags:
+        text = "The ground law is not calibrated: no measurement says how far its loads can be trusted."
     table = Table(columns=["flag", "meaning", "concerns"], rows=rows)
     return [Section(title="Calibrated domain", blocks=[Note(text=text, warning=True), table])]
 

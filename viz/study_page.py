@@ -13,9 +13,11 @@ from rollover.study.answers import values_of
 from rollover.study.conduct import Conducted
 from rollover.study.study import Study
 from viz import plots
+from viz.differences import differences_section
 from viz.page import Block, Cases, Cell, Figure, Footer, Headline, Note, Section, Table, render
 from viz.plots import Curve, Level
 from viz.report import series_unit
+from viz.verdict import standing
 
 Array = NDArray[np.float64]
 MOST_POINTS = 1200  # of a scatter plot; the extremes are among them
@@ -28,7 +30,7 @@ COLUMNS_OF_FLAGS = ("flag", "cases", "share", "share at the peak load")
 
 def page(study: Study, done: Conducted, account: Mapping[str, Any], *, command: str) -> str:
     """HTML of a study's account."""
-    blocks: list[Block] = []
+    blocks: list[Block] = differences_section(study.scenario)
     for output in account["outputs"][:MOST_FIGURES]:
         blocks.append(_output(study, done, account, output))
     if rest := account["outputs"][MOST_FIGURES:]:
@@ -55,7 +57,9 @@ def _headline(account: Mapping[str, Any]) -> Headline:
     n, first = account["cases"], account["outputs"][0]
     unit, factor = series_unit(first["unit"])
     failed = f"{n['failed']} of {n['all']} cases failed. " if n["failed"] else f"{n['all']} cases. "
-    state: Any = "warn" if n["failed"] else ""
+    flags = {f["flag"] for f in account["flags"]}
+    state: Any = "warn" if n["failed"] or flags else ""
+    worth = f" {_sentence(standing(flags))} (see the flags below)" if flags else ""
     if not first["cases"]:
         return Headline(sentence="No case has an answer.", detail=failed, state="fail")
     if (e := first["exceedance"]) is not None:
@@ -65,7 +69,9 @@ def _headline(account: Mapping[str, Any]) -> Headline:
     else:
         low, high = (f"{first[key] * factor:.4g}" for key in ("least", "largest"))
         sentence = f"{first['name']} goes from {low} to {high} {unit}."
-    return Headline(sentence=sentence, detail=f"{failed}{_sentence(account['meaning_of_quantiles'])}", state=state)
+    return Headline(
+        sentence=sentence, detail=f"{failed}{_sentence(account['meaning_of_quantiles'])}{worth}", state=state
+    )
 
 
 def _output(study: Study, done: Conducted, account: Mapping[str, Any], output: Mapping[str, Any]) -> Section:
@@ -261,7 +267,8 @@ def _failures(account: Mapping[str, Any]) -> Section:
 
 def _flags(account: Mapping[str, Any]) -> Section:
     rows = [[f["flag"], str(f["cases"]), _percent(f["share"]), _percent(f["share_at_peak"])] for f in account["flags"]]
-    title = "Outside the ground law's calibrated domain"
+    known = all(f["flag"] != "uncalibrated" for f in account["flags"])
+    title = "Outside the ground law's calibrated domain" if known else "The ground law is not calibrated"
     if not rows:
         return Section(title=title, blocks=[Note(text="No case carries a domain flag.")])
     caption = "Of the finished cases: anywhere in the run, and within 50 ms of the peak of the leading load."

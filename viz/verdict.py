@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -14,6 +14,7 @@ from rollover.findings import findings
 from rollover.ledger import closure
 from rollover.run import Run
 from rollover.stand import TiltTable
+from viz.differences import differences_lines
 from viz.entities import series, shown
 
 
@@ -176,7 +177,7 @@ def title_of(peak: Peak) -> str:
 def verdict(run: Run, peaks: Sequence[Peak], scales: Sequence[str] = ()) -> str:
     """The first page: the load that matters and when, all peaks, what they are worth, the energy ledger."""
     found = ranked(run, peaks)
-    lines = _headline(run, found)
+    lines = [*_headline(run, found), *differences_lines(run.scenario)]
     if found:
         lines += _table(found)
         lines += _domain(run, found)
@@ -210,7 +211,9 @@ def _headline(run: Run, found: Sequence[Peak]) -> list[str]:
         worth.append(f"CFC {first.cfc}: **{filtered(first)}**")
     count = len({*run.domain_flags, *(flag for p in found for flag in p.domain_flags)})
     if count:
-        worth.append(f"outside the calibrated domain in {count} {'ways' if count > 1 else 'way'}, see below")
+        ways = f"outside the calibrated domain in {count} {'ways' if count > 1 else 'way'}"
+        calibrated = "uncalibrated" not in run.domain_flags
+        worth.append(f"{ways if calibrated else 'the ground law is not calibrated'}, see below")
     if worth:
         lines += ["; ".join(worth) + ".", ""]
     return lines
@@ -240,6 +243,19 @@ def _table(found: Sequence[Peak]) -> list[str]:
     return [*lines, ""]
 
 
+def standing(flags: Collection[str]) -> str:
+    """How a load stands to what the ground law was measured for, from its domain flags."""
+    if "uncalibrated" in flags:
+        deep = ", and it gave way further than it may" if "deep-sinkage" in flags else ""
+        return f"the ground law is not calibrated{deep}"
+    return "outside the ground law's calibrated domain" if flags else "inside the calibrated domain"
+
+
+def rests_on_ground(run: Run) -> bool:
+    """Whether any element of the ground was touched: else its law took no part."""
+    return bool(np.any(run.recording["ground/force_normal"] > 0.0)) or bool(run.domain_flags)
+
+
 def _domain(run: Run, found: Sequence[Peak]) -> list[str]:
     """Domain flags in words, each with the loads it concerns."""
     concerned: dict[str, list[str]] = {flag: [] for flag in run.domain_flags}
@@ -247,8 +263,14 @@ def _domain(run: Run, found: Sequence[Peak]) -> list[str]:
         for flag in p.domain_flags:
             concerned.setdefault(flag, []).append(title_of(p))
     if not concerned:
+        if not rests_on_ground(run):
+            return ["No element of the ground was touched: its law took no part.", ""]
         return ["All loads lie within the domain in which the ground law was calibrated.", ""]
-    lines = ["**Outside the domain in which the ground law was calibrated:**", ""]
+    known = "uncalibrated" not in concerned
+    heading = (
+        "Outside the domain in which the ground law was calibrated" if known else "The ground law is not calibrated"
+    )
+    lines = [f"**{heading}:**", ""]
     flagged = [title_of(p) for p in found if p.domain_flags]
     for flag, loads in concerned.items():
         # naming all of them would say nothing
@@ -265,6 +287,9 @@ def in_words(flag: str, domain: Domain) -> str:
         "contact-area": f"contact area unlike the tested face of {1e4 * domain.area:.3g} cm\N{SUPERSCRIPT TWO}",
         "second-hit": "a second hit on the same rut; virgin soil was tested",
         "oblique-impact": f"impact more than {math.degrees(domain.obliquity_most):.3g} deg off the ground's normal",
+        "uncalibrated": "no measurement stands behind the ground law's numbers (calibration: null, no own domain)",
+        "deep-sinkage": "the ground gave way further than its law covers"
+        + (f", {1e3 * domain.sinkage_most:.3g} mm" if math.isfinite(domain.sinkage_most) else " in a patch"),
     }
     return words.get(flag, flag.replace("-", " "))
 

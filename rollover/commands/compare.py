@@ -94,6 +94,7 @@ def compare(
         text = page(
             found,
             title=chosen.title,
+            scenario=chosen,
             command=command,
             scenario_hash=about["scenario_hash"],
             versions=store.versions(),

@@ -118,6 +118,7 @@ def diagnose(
                 found,
                 told,
                 title=chosen.title,
+                scenario=chosen,
                 prechecks=findings,
                 command=" ".join(map(shlex.quote, words)),
                 scenario_hash=about["scenario_hash"],

@@ -115,14 +115,14 @@ def _criteria(done: Run, again: Run | None) -> tuple[Criterion, ...]:
 
 
 def _require(rows: Sequence[Criterion], path: str) -> None:
-    """Say which verdicts are not met. Raises `typer.Exit`."""
+    """Say which verdicts are not met, or not given because the test did not go far enough. Raises `typer.Exit`."""
     from rollover import console
 
-    missed = [row for row in rows if row.verdict == "not met"]
+    missed = [row for row in rows if row.verdict in ("not met", "no verdict")]
     for row in missed:
         asked, simulated, _ = row.in_words
         name = f"{row.requirement.standard}: {row.requirement.name}"
-        console.say(f"{path}: not met: {name}, got {simulated}; asked: {asked}. {row.note}")
+        console.say(f"{path}: {row.verdict}: {name}, got {simulated}; asked: {asked}. {row.note}")
     if missed:
         raise typer.Exit(THE_ANSWER_IS_NO)
     count = sum(row.verdict == "met" for row in rows)

@@ -118,12 +118,15 @@ def _name_of(account: Path) -> str:
 
 def _head(name: str, chosen: Study, status: str) -> dict[str, Any]:
     from rollover import document, store
+    from rollover.shipped import origin
     from rollover.study import shelf
 
+    made_from = origin(chosen.scenario)
     return {
         "format": shelf.FORMAT,
         "name": name,
         "title": chosen.title,
+        "differs": made_from.in_words if made_from else "",
         "status": status,
         "scenario_hash": document.content_hash(chosen.scenario),
         "plan": chosen.plan.kind,
@@ -218,7 +221,8 @@ def sentences(account: dict[str, Any]) -> list[str]:
     from viz.report import series_unit
 
     n = account["cases"]
-    lines = [account["title"], f"{n['done']} of {n['all']} cases done, {n['failed']} failed; {account['ran']} run now"]
+    lines = [account["title"], *([account["differs"]] if account.get("differs") else [])]
+    lines += [f"{n['done']} of {n['all']} cases done, {n['failed']} failed; {account['ran']} run now"]
     for each in account["outputs"]:
         unit = series_unit(each["unit"])[0]
         lines.append(f"{each['name']}, {unit}")

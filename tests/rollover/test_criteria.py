@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollover.criteria import criteria, rops_share, tractor_of
+from rollover.criteria import criteria, in_words, rops_share
 from rollover.run import Motion
+from rollover.static_sequence import tractor_of
 from rollover.vehicle import Vehicle
 from tests.physics.scenes import shipped
 from tests.viz import example
@@ -33,6 +34,33 @@ def test_energy_and_force_beside_the_static_test() -> None:
     assert rows["side load"].margin == pytest.approx(8000.0 / 5250.0 - 1.0)
     assert rows["crush, rear"].margin == pytest.approx(-0.75)
     assert rows["side load"].verdict == rows["crush, rear"].verdict == "compared"
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "name"),
+    [(0.0, -9e3, "side load"), (4e3, 1e3, "longitudinal load, rear"), (-4e3, 1e3, "longitudinal load, rear")],
+)
+def test_one_energy_stands_against_one_requirement(x: float, y: float, name: str) -> None:
+    """The energy of the side that the frame was mostly pushed from; Code 4 names one end, its energy holds lengthways."""
+    run = overturn(rops__energy=8000.0, rops__force_x=x, rops__force_y=y, rops__force_z=-15e3)
+    rows = [c for c in criteria(run) if c.requirement.quantity in ("energy", "force")]
+    assert [c.requirement.name for c in rows] == [name, "crush, rear"]
+    two = run.scenario.replaced({"loads.standards": ["code-4", "sae-j1194"]})
+    energies = [c.requirement for c in criteria(replace(run, scenario=two)) if c.requirement.quantity == "energy"]
+    assert [r.standard.split(" / ")[0] for r in energies] == ["OECD Code 4", "SAE J1194"], "one of each standard"
+    [sentence] = in_words(rows)
+    assert "does not say that the structure failed" in sentence
+    assert "nor does a ratio below 1 say that it passed" in sentence
+
+
+def test_an_overturn_stands_beside_the_code_that_applies() -> None:
+    """Track 0.95 m, two posts ahead of the seat: Code 6."""
+    run = overturn(rops__energy=8000.0)
+    narrow = run.scenario.replaced({"vehicle": "vehicles/vineyard_tractor.yaml"})
+    names = {
+        c.requirement.standard for c in criteria(replace(run, scenario=narrow)) if c.requirement.quantity == "energy"
+    }
+    assert names == {"OECD Code 6 / ISO 12003-1"}
 
 
 def test_share_of_the_rops_counts_from_its_landing() -> None:

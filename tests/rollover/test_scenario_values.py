@@ -358,7 +358,7 @@ def test_a_change_reaches_into_what_another_one_brought() -> None:
     assert found.vehicle.rops is not None
     assert found.vehicle.rops.mounts[0].yield_force == (1.0, 2.0, 3.0)
     assert found.vehicle.wheels[2].tyre.friction == 0.3
-    assert found.vehicle.name == "Compact tractor 2 t, two-post rear ROPS"
+    assert found.vehicle.name == "Compact tractor, two-post rear ROPS"
 
 
 def test_a_key_that_the_brought_file_lacks_may_be_set_and_is_checked() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.criteria import Criterion, criteria
+from rollover.criteria import Criterion, criteria, in_words
 from rollover.criterion import with_half_step
 from rollover.findings import findings
 from rollover.requirement import Requirement
@@ -67,7 +67,8 @@ def test_each_load_answers_to_the_requirement_of_the_vehicles_mass() -> None:
         "longitudinal load, rear", "crush, rear", "side load", "crush, front", "second longitudinal load, front"
     ]  # fmt: skip
     assert list(asked.values()) == pytest.approx([4200.0, 60e3, 5250.0, 60e3, 1050.0])
-    assert rows["side load"].margin == pytest.approx(5437.0 / 5250.0 - 1.0)
+    assert rows["side load"].margin is None, "how far it was told to go is no margin"
+    assert rows["side load"].in_words[2] == "not stated"
     assert {row.verdict for row in rows.values()} == {"met"}
     assert rows["distance of the structure"].requirement.quantity == "distance"
     assert "distance of the ground" not in rows, "the tractor stands on its wheels"
@@ -92,6 +93,48 @@ def test_a_force_exactly_as_asked_is_met() -> None:
 def one_load(come_from: str) -> Scenario:
     point = {"name": "one", "come_from": come_from, "point": [-0.1, 0.6, 2.46], "energy": 5250.0}
     return load("static_rops_test").replaced({"initiation.loads": [point]})
+
+
+def test_a_load_that_was_not_told_to_go_far_enough_has_no_verdict() -> None:
+    """4000 J were asked for and reached where the code asks for 5250 J: nothing is known about the frame."""
+    scenario = load("static_rops_test").replaced({"initiation.loads.side.energy": 4000.0})
+    entry = pushed("side", "left", required_energy=5250.0, energy=4001.0, overload=NOT_DUE)
+    run = made(scenario, *SEQUENCE[:2], entry, *SEQUENCE[3:])
+    row = rows_of(run)["side load"]
+    assert (row.verdict, row.margin, row.in_words[2]) == ("no verdict", None, "not stated")
+    assert "not loaded far enough: no verdict" in row.note
+    words = in_words(criteria(run))
+    assert words[0] == "Not loaded far enough, so no verdict: side load."
+    failed = entry | {"energy": 3900.0, "status": "given up: deflected by more than 600 mm"}
+    row = rows_of(made(scenario, failed))["side load"]
+    assert (row.verdict, row.margin) == ("not met", pytest.approx(3900.0 / 5250.0 - 1.0))
+
+
+def test_a_load_fails_where_it_pushes_the_frame_into_the_zone() -> None:
+    """3150 J at the entry, six tenths of what is asked, though the load went on to it; later loads are not blamed."""
+    run = made(load("static_rops_test"))
+    time = run.recording.time
+    n, third = time.size, time.size // 3
+    ahead = np.zeros((n, 3))
+    ahead[third:] = (0.5, 0.3, 0.0)  # the right-hand post stands beside the seat, and stays there
+    side = pushed(
+        "side", "left", begun_at=float(time[5]), reached_at=float(time[2 * third]), energy=5437.0, overload=NOT_DUE
+    )
+    after = pushed(
+        "front",
+        "front",
+        begun_at=float(time[2 * third + 1]),
+        reached_at=float(time[-1]),
+        energy=1087.0,
+        overload=NOT_DUE,
+    )
+    run = made(load("static_rops_test"), side, after, device__energy=np.linspace(0.0, 3150.0 * (n - 1) / third, n))
+    rops = Motion(origin=ahead, quaternion=run.pose["rops"].quaternion)
+    rows = rows_of(replace(run, pose={**run.pose, "rops": rops}))
+    assert rows["side load"].verdict == "not met"
+    assert rows["side load"].margin == pytest.approx(3150.0 / 5250.0 - 1.0, abs=1e-3)
+    assert "entered the clearance zone" in rows["side load"].note
+    assert rows["second longitudinal load, front"].verdict == "met"
 
 
 def test_a_load_that_was_given_up_or_never_ended() -> None:
