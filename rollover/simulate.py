@@ -106,7 +106,7 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
         if (larger := grown(t)) is not t:
             live.tables, live.handle = larger, handle(larger)
         goes_on = control is None or control.after(now, dt, q, qd, live.tables)
-        live.tables.velocity[:] = qd[: len(t.mass)]  # a blow of the control has changed it
+        live.tables.velocity[:] = qd  # a blow of the control has changed it
         k = int(state["rows"])
         if time >= k * every * h - 1e-9:
             past.add(now, live.handle, q, qd, qdd)
