@@ -33,7 +33,7 @@ def coefficients(spectral_radius: float) -> tuple[float, float, float]:
 
 @leaf
 def finish_applied(t: Any, h: float, qd: Any) -> None:
-    """Book the work of the step's forces on its mean velocity; `qd` (6 nb) is that at its end, before any impact."""
+    """Book the work of the step's forces on its mean velocity; `qd` (n,) is that at its end, before any impact."""
     alpha_m, alpha_f, gamma = t.scheme[0], t.scheme[1], t.scheme[2]
     for k in range(ACCOUNTS):
         q, work = t.applied[k], 0.0

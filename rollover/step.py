@@ -14,12 +14,12 @@ from ground.compiled import compiled, inlined, leaf
 from ground.kernel import (
     commit_friction,
 )
-from rollover.applied import finish_applied
+from rollover.applied import A_TANGENT, NOW, finish_applied
 from rollover.devices import finish_devices, keep_poses
 from rollover.elements import finish_elements, settle
 from rollover.forces import along_axle, generalised_forces, read_poses
 from rollover.impact import strike_stop
-from rollover.spin import finish_spins, keep_spins
+from rollover.spin import finish_spins, keep_spins, tread_motion, turn_by_friction
 from rollover.tables import (
     A_IMPACT,
     A_SWING,
@@ -41,7 +41,6 @@ from rollover.tables import (
     E_FORCE_NOW,
     E_FRICTION,
     E_FRICTION_NOW,
-    E_MOVED,
     E_NORMAL,
     E_NORMAL_NOW,
     E_PLACE,
@@ -49,7 +48,6 @@ from rollover.tables import (
     E_SHEAR,
     E_SLIP,
     E_WHERE,
-    FRICTION_WORK,
     HINGE,
     M_ANGLE,
     M_ANGLE_NOW,
@@ -78,7 +76,7 @@ from rollover.tables import (
 )
 from rollover.terms import finish_terms
 from rollover.touch import note_event, touch
-from rollover.vectors import place, to_world
+from rollover.vectors import add_force, place, to_world
 
 
 @compiled
@@ -93,6 +91,7 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
         for k in range(R_NORMAL, R_WEIGHT + 1):
             t.resultant[b, k] = 0.0
     finish_elements(t, h)
+    account_friction(t)
     finish_applied(t, h, qd)
     finish_wheels(t)
     finish_mounts(t)
@@ -106,8 +105,8 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
     if strike(t, bodies):
         read_poses(t.pose, q, qd)
     t.work[COLLISION] += touch(t, bodies, h)
-    t.velocity[:] = bodies
     keep_spins(t, before, qd)
+    t.velocity[:] = qd
     settle(t)
     read_poses(t.pose, q, qd)  # the impact changed the velocities
     keep_poses(t)
@@ -120,13 +119,25 @@ def finish_wheels(t: Any) -> None:
         g = t.wheel_memory[w]
         t.work[TYRE] += g[E_ENERGY_NOW] - g[E_ENERGY]
         t.work[TYRE] += 0.5 * (g[E_DAMPING] + g[E_DAMPING_NOW]) * (g[E_DEPTH_NOW] - g[E_DEPTH])
-        for k in range(3):
-            t.work[FRICTION_WORK] -= 0.5 * (g[E_FRICTION + k] + g[E_FRICTION_NOW + k]) * g[E_MOVED + k]
         grip(t, w)
         hold(g)  # the tread's lowest point moves over the crown: friction takes hold of the new one
         if (g[E_FORCE] > 0.0) != (g[E_FORCE_NOW] > 0.0):
             kind = WHEEL_ON if g[E_FORCE_NOW] > 0.0 else WHEEL_OFF
             note_event(t, kind, w, (g[E_WHERE], g[E_WHERE + 1], g[E_WHERE + 2]), g[E_FORCE_NOW])
+
+
+@compiled
+def account_friction(t: Any) -> None:
+    """Enter the tyres' friction where it acted: on the point of the tread that it took hold of at the step's start."""
+    hold, Q = np.empty(3), t.applied[A_TANGENT, NOW]
+    for w in range(t.wheel_i.size):
+        g, b = t.wheel_memory[w], t.wheel_i[w]
+        f = g[E_FRICTION_NOW], g[E_FRICTION_NOW + 1], g[E_FRICTION_NOW + 2]
+        hold[:] = g[E_ANCHOR : E_ANCHOR + 3]
+        if t.spin_i[w] >= 0 and t.spin_i[w] < Q.size:
+            tread_motion(t, w, g[E_ANCHOR : E_ANCHOR + 3], hold)
+            turn_by_friction(t, w, hold, f, Q)
+        add_force(t.pose[b], b, hold, f[0], f[1], f[2], Q)
 
 
 @leaf

@@ -148,8 +148,8 @@ class Tables(NamedTuple):
     mount_memory: Any  # (nt, SET_COLUMNS)
     axle_memory: Any  # (AXLE_MEMORY,)
     scheme: Any  # (4,) of generalised alpha: alpha_m, alpha_f, gamma; 1 if any ground is `MEMORYLESS`
-    applied: Any  # (2, 3, 6 nb) see rollover.applied
-    velocity: Any  # (6 nb,) of the bodies at the start of the step
+    applied: Any  # (2, 3, n) see rollover.applied; n = 6 nb + turning wheels
+    velocity: Any  # (n,) at the start of the step
     clock: Any  # (3,) length of the step that is tried, time at which forces are tried, s; tries that the step needed
     term_memory: Any  # (ne, terms.TERM_MEMORY)
     pose: Any  # (nb, POSE_COLUMNS)
