@@ -41,10 +41,10 @@ def test_energy_and_force_beside_the_static_test() -> None:
     [(0.0, -9e3, "side load"), (4e3, 1e3, "longitudinal load, rear"), (-4e3, 1e3, "longitudinal load, rear")],
 )
 def test_one_energy_stands_against_one_requirement(x: float, y: float, name: str) -> None:
-    """The energy of the side that the frame was mostly pushed from; Code 4 names one end, its energy holds lengthways."""
+    """The energy of the side that the frame was mostly pushed from; Code 4 names one end for both lengthways."""
     run = overturn(rops__energy=8000.0, rops__force_x=x, rops__force_y=y, rops__force_z=-15e3)
     rows = [c for c in criteria(run) if c.requirement.quantity in ("energy", "force")]
-    assert [c.requirement.name for c in rows] == [name, "crush, rear"]
+    assert sorted(c.requirement.name for c in rows) == ["crush, rear", name]
     two = run.scenario.replaced({"loads.standards": ["code-4", "sae-j1194"]})
     energies = [c.requirement for c in criteria(replace(run, scenario=two)) if c.requirement.quantity == "energy"]
     assert [r.standard.split(" / ")[0] for r in energies] == ["OECD Code 4", "SAE J1194"], "one of each standard"
