@@ -44,7 +44,7 @@ def test_one_energy_stands_against_one_requirement(x: float, y: float, name: str
     """The energy of the side that was pushed most; Code 4 names one end, its energy holds lengthways."""
     run = overturn(rops__energy=8000.0, rops__force_x=x, rops__force_y=y, rops__force_z=-15e3)
     rows = [c for c in criteria(run) if c.requirement.quantity in ("energy", "force")]
-    assert [c.requirement.name for c in rows] == [name, "crush, rear"]
+    assert sorted(c.requirement.name for c in rows) == ["crush, rear", name]
     two = run.scenario.replaced({"loads.standards": ["code-4", "sae-j1194"]})
     energies = [c.requirement for c in criteria(replace(run, scenario=two)) if c.requirement.quantity == "energy"]
     assert [r.standard.split(" / ")[0] for r in energies] == ["OECD Code 4", "SAE J1194"], "one of each standard"

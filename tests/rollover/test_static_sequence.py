@@ -12,7 +12,7 @@ from rollover.static_sequence import Push, code_of, sequence
 from rollover.vehicle import Vehicle
 
 
-def tested(**changes: Any) -> Scenario:
+def scenario_of(**changes: Any) -> Scenario:
     return load("static_rops_test").replaced({k.replace("__", "."): v for k, v in changes.items()})
 
 
@@ -36,7 +36,7 @@ BY_HAND = [
 
 @pytest.mark.parametrize(("vehicle", "code", "by_hand"), BY_HAND)
 def test_energies_and_forces_follow_the_vehicle(vehicle: str, code: str, by_hand: tuple[float | None, ...]) -> None:
-    scenario = tested(vehicle=f"vehicles/{vehicle}.yaml")
+    scenario = scenario_of(vehicle=f"vehicles/{vehicle}.yaml")
     assert isinstance(scenario.vehicle, Vehicle)
     assert code_of(scenario.vehicle) == code
     found = loads(scenario)
@@ -48,14 +48,14 @@ def test_energies_and_forces_follow_the_vehicle(vehicle: str, code: str, by_hand
     assert pushed == [None if value is None else pytest.approx(value * 3107 / 3000) for value in by_hand]
     own = [
         push.energy or push.force
-        for push in loads(tested(vehicle=f"vehicles/{vehicle}.yaml", initiation__surplus=0)).values()
+        for push in loads(scenario_of(vehicle=f"vehicles/{vehicle}.yaml", initiation__surplus=0)).values()
     ]
     assert own == [None if value is None else pytest.approx(value) for value in by_hand]
 
 
 @pytest.mark.parametrize("mass", [2100.0, 4500.0])
 def test_mass_alone_moves_the_energies(mass: float) -> None:
-    found = loads(tested(vehicle__whole__mass=mass))
+    found = loads(scenario_of(vehicle__whole__mass=mass))
     assert found["side"].asked is not None
     assert found["side"].asked.value == pytest.approx(1.75 * mass)
     assert found["side"].energy == pytest.approx(1.75 * mass * 3107 / 3000)
@@ -63,14 +63,14 @@ def test_mass_alone_moves_the_energies(mass: float) -> None:
 
 def test_a_code_can_be_asked_for() -> None:
     """The utility tractor of 3000 kg by Code 7: 500 + 1500 J, 5250 J; a second load lengthways is no step of it."""
-    found = loads(tested(initiation__code="code-7"))
+    found = loads(scenario_of(initiation__code="code-7"))
     assert found["rear"].asked is not None
     assert found["rear"].asked.value == pytest.approx(2000.0)
     assert found["front"].energy is found["front"].asked is None
     # Code 7 loads the side 200 mm ahead of the seat reference point where the frame reaches there, Code 4 300 mm
     roof = {"vehicle": "vehicles/large_tractor.yaml"}
-    assert loads(tested(**roof))["side"].point[0] == pytest.approx(0.25 + 0.300)
-    assert loads(tested(**roof, initiation__code="code-7"))["side"].point[0] == pytest.approx(0.25 + 0.200)
+    assert loads(scenario_of(**roof))["side"].point[0] == pytest.approx(0.25 + 0.300)
+    assert loads(scenario_of(**roof, initiation__code="code-7"))["side"].point[0] == pytest.approx(0.25 + 0.200)
 
 
 @pytest.mark.parametrize(
@@ -100,36 +100,38 @@ def test_the_end_that_carries_more_is_loaded_first() -> None:
     found = loads(load("static_rops_test").replaced({**heavy, "initiation.loads": None}))
     assert list(found) == ["front", "crush-front", "side", "crush-rear"]
     assert found["front"].come_from == "front"
-    folding = loads(tested(vehicle="vehicles/compact_tractor_folding.yaml", initiation__loads=None))
+    folding = loads(scenario_of(vehicle="vehicles/compact_tractor_folding.yaml", initiation__loads=None))
     assert list(folding) == ["rear", "crush-rear", "side", "crush-front", "front"]
 
 
 def test_places_of_the_beam() -> None:
     """Crossbar of 1.2 m, 80 mm thick, at x = -0.10, z = 2.46: a sixth in from its corner is 0.40 m from the middle."""
-    found = loads(tested())
+    found = loads(scenario_of())
     assert found["rear"].point == pytest.approx((-0.14, 0.40, 2.46))
     assert found["front"].point == pytest.approx((-0.06, -0.40, 2.46))
     assert found["side"].point == pytest.approx((-0.10, 0.60, 2.46))
     assert found["crush-rear"].point == found["crush-front"].point == pytest.approx((-0.10, 0.0, 2.50))
-    assert loads(tested(initiation__loads__side__come_from="right"))["side"].point == pytest.approx(
+    assert loads(scenario_of(initiation__loads__side__come_from="right"))["side"].point == pytest.approx(
         (-0.10, -0.60, 2.46)
     )
     # the roof of the cab from x = -0.5 to 1.2, 1.7 m wide, 2.85 to 3.0 m high
-    cab = loads(tested(vehicle="vehicles/large_tractor.yaml"))
+    cab = loads(scenario_of(vehicle="vehicles/large_tractor.yaml"))
     assert cab["rear"].point == pytest.approx((-0.5, 0.85 - 1.7 / 6, 2.925))
     assert cab["crush-rear"].point == pytest.approx((-0.425, 0.0, 3.0))
     assert cab["crush-front"].point == pytest.approx((1.125, 0.0, 3.0))
-    assert {p.body for p in loads(tested(vehicle="vehicles/compact_tractor_folding.yaml")).values()} == {"rops_upper"}
+    assert {p.body for p in loads(scenario_of(vehicle="vehicles/compact_tractor_folding.yaml")).values()} == {
+        "rops_upper"
+    }
 
 
 def test_a_number_of_ones_own() -> None:
     """It is pushed to without a surplus; what the code asks stays what it is held against."""
-    side = loads(tested(initiation__loads__side__energy=4000.0))["side"]
+    side = loads(scenario_of(initiation__loads__side__energy=4000.0))["side"]
     assert side.energy == 4000.0
     assert side.asked is not None
     assert side.asked.value == 5250.0
     with pytest.raises(ValueError, match="'side' is no load of that kind"):
-        tested(initiation__loads__side__force=4000.0)
+        scenario_of(initiation__loads__side__force=4000.0)
     with pytest.raises(ValueError, match="push_on: no such load, got 'top'; one of 'rear'"):
-        tested(initiation__push_on="top")
-    assert list(loads(tested(initiation__push_on="side"))) == ["rear", "crush-rear", "side"]
+        scenario_of(initiation__push_on="top")
+    assert list(loads(scenario_of(initiation__push_on="side"))) == ["rear", "crush-rear", "side"]
