@@ -131,6 +131,7 @@ def report(
     compiled: bool = False,
 ) -> None:
     """The answer of a run on standard output; what took part of its time to compile tells no speed."""
+    from rollover.estimates import in_words
     from rollover.ledger import closure
     from rollover.loads import unconverged
 
@@ -160,6 +161,8 @@ def report(
         marked = " Loads marked * were taken there: an extrapolation, not a measured range." if peaks else ""
         flags = ", ".join(run.domain_flags)
         out.print(f"Outside the ground law's calibrated domain: {flags}.{marked}", style="yellow")
+    if said := in_words(run.scenario.estimates):
+        out.print(f"{said}.", style="yellow")
     half = answer["half_step"]
     if half is not None and half["status"] != "done":
         out.print(f"At half the step the run failed: {half['sentence']}", style="yellow")

@@ -90,7 +90,7 @@ def sentence(motions: Sequence[FreeMotion]) -> str:
     if first.turns:
         motion += f" through {_vector(first.point)} m"
     got = _listed([f"{v:g}" for v in sorted({v for j in first.joints for v in _own(j, alike)})])
-    need = f"more than {max(m.needed for m in alike):.3g} {unit}"
+    need = f"more than {max(m.needed for m in alike):.4g} {unit}"
     if len(paths) == 1:
         told = f"{paths[0]}.{what}: {motion}, got {got} {unit} {way} {axes}; {need}"
     else:

@@ -207,6 +207,15 @@ def _tipped(tip: TipOver, scenario: Scenario, vehicle: Vehicle, bodies: tuple[Bo
     if u is not None and tip.excess_deg > 0.0:
         u[ROLL] += sign * math.radians(tip.excess_deg)
         u = statics.solve(u, fixed=(ROLL,))
+    if u is None and statics.overturns:
+        slope = math.degrees(math.acos(float(t.plane[2])))
+        raise InputError(
+            Fault(
+                path="initiation",
+                message=f"falls over to the {tip.side} before any balance on two wheels, got ground of {slope:.3g} deg; "
+                "a gentler ground.surface, or the other side",
+            )
+        )
     if u is None:
         raise InputError(
             Fault(
