@@ -45,13 +45,16 @@ class FreeMotion:
     joints: tuple[Joint, ...]
 
 
-def free_motions(parts: Mapping[str, MassProperties], joints: Sequence[Joint]) -> tuple[FreeMotion, ...]:
+def free_motions(
+    parts: Mapping[str, MassProperties], joints: Sequence[Joint], gravity: float = STANDARD_GRAVITY
+) -> tuple[FreeMotion, ...]:
     """Motions of the parts that no joint holds; what a joint names and is no part stands still.
 
     Of each part: shift of the joints' middle, and turn times a length L. A motion is free where its stiffness, the
     square of a singular value of the joints' root stiffness, is no more than W/L. L is the parts' radius of gyration
     about the joints' middle and W their weight: their centre of mass lies no further than L from there, a weight W
     at a height h takes W h from the stiffness of a turn, so that below W/L it may fall over instead of standing.
+    Without gravity only what is nothing but round-off is free.
     """
     names = list(parts)
     middle = np.mean([j.connector.position for j in joints], axis=0)
@@ -63,7 +66,7 @@ def free_motions(parts: Mapping[str, MassProperties], joints: Sequence[Joint]) -
     length = math.sqrt(sum(squares) / mass)
     roots = np.concatenate([_root(j, names, middle, length) for j in joints])
     _, sigma, modes = np.linalg.svd(np.vstack([roots, np.zeros((6 * len(names), 6 * len(names)))]))
-    weight = STANDARD_GRAVITY * mass / length
+    weight = gravity * mass / length
     # beyond W/L, what the decomposition itself cannot tell from zero
     least = max(math.sqrt(weight), len(roots) * np.finfo(np.float64).eps * float(sigma[0]))
     free = modes[sigma <= least]
@@ -85,10 +88,7 @@ def sentence(motions: Sequence[FreeMotion]) -> str:
     paths = [j.path for j in first.joints]
     group = paths[0].rpartition(".")[0]
     what, unit, way = ("rotational_stiffness", "N m/rad", "about") if first.turns else ("stiffness", "N/m", "along")
-    axes = _listed([_direction(m.axis) for m in alike])
-    motion = f"{' with '.join(first.parts)} {'turns' if first.turns else 'shifts'} freely {way} {axes}"
-    if first.turns:
-        motion += f" through {_vector(first.point)} m"
+    axes, motion = _listed([_direction(m.axis) for m in alike]), in_words(alike)
     got = _listed([f"{v:g}" for v in sorted({v for j in first.joints for v in _own(j, alike)})])
     need = f"more than {max(m.needed for m in alike):.4g} {unit}"
     if len(paths) == 1:
@@ -98,6 +98,15 @@ def sentence(motions: Sequence[FreeMotion]) -> str:
         told = f"{group}: {motion}, got {what} {got} {unit} {way} {axes} at {names}; {need} together"
     other = f", or a further one of {group} off this {'axis' if len(alike) == 1 else 'point'}" if first.turns else ""
     return f"{told} against its weight{other}"
+
+
+def in_words(alike: Sequence[FreeMotion]) -> str:
+    """What moves freely, about or along which axes; of motions with the same parts and joints."""
+    first, axes = alike[0], _listed([_direction(m.axis) for m in alike])
+    parts = " with ".join(first.parts)
+    if first.turns:
+        return f"{parts} turns freely about {axes} through {_vector(first.point)} m"
+    return f"{parts} shifts freely along {axes}"
 
 
 def _key(m: FreeMotion) -> tuple[object, ...]:

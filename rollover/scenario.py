@@ -15,12 +15,13 @@ from ground.quantity import Quantity, parameters
 from ground.surface import Plane, Surface
 from rollover import document
 from rollover.effects import EFFECTS, entries, nothing
-from rollover.estimates import Estimate, turning_inertia, wheel_estimates
+from rollover.estimates import Estimate, wheel_estimates
 from rollover.excitation import Excitation
 from rollover.filters import least_rate
+from rollover.footing import check_standing, check_turning
 from rollover.initiation import Driving, Drop, Initiation, Release, Standing, Throw, TipOver
 from rollover.stand import PendulumBlow, StaticTest, TiltTable
-from rollover.vehicle import Carrier, RigidBody, Striker, Vehicle, carried
+from rollover.vehicle import RigidBody, Striker, Vehicle
 
 AnyVehicle = Annotated[Vehicle | Striker | RigidBody, ByKind()]
 AnyLaw = Annotated[GroundLaw, ByKind(laws)]  # whatever law stands in the folder `ground`
@@ -200,31 +201,14 @@ def _check_start(vehicle: Vehicle | Striker | RigidBody, start: Initiation) -> N
                 f"initiation.kind: {start.kind!r} needs at least 3 wheels on both sides, "
                 f"got {left} left and {right} right"
             )
-        if isinstance(start, Driving) and isinstance(vehicle, Vehicle):
-            _check_turning(vehicle)
+        if isinstance(vehicle, Vehicle):
+            check_standing(vehicle)
+            if isinstance(start, Driving):
+                check_turning(vehicle)
     elif isinstance(start, (Drop, Release)) and not (
         vehicle.outline or vehicle.wheels or (vehicle.rops and vehicle.rops.members)
     ):
         raise ValueError("vehicle.outline: nothing can touch the ground, got no outline, wheels or ROPS members")
-
-
-def _check_turning(vehicle: Vehicle) -> None:
-    """Refuse wheels that turn with more inertia than the body that they are part of."""
-    carriers: tuple[Carrier, ...] = ("front_axle", "chassis")
-    for carrier in carriers:
-        wheels = [w for w in vehicle.wheels if w.carrier == carrier]
-        if not wheels:
-            continue
-        turning, most = sum(turning_inertia(vehicle, w) for w in wheels), carried(vehicle, carrier).inertia[1]
-        if turning >= most:
-            body = "their axle" if carrier == "front_axle" else "the chassis"
-            unstated = [w.name for w in wheels if w.inertia is None]
-            by_size = ", by the size of their tyres" if unstated else ""
-            cure = f"; state vehicle.wheels.*.inertia of {', '.join(unstated)}" if unstated else ""
-            raise ValueError(
-                f"initiation.kind: the wheels turn with more inertia than {body} has, got {turning:.3g} kg m2"
-                f"{by_size}; less than {most:.3g} kg m2 is allowed{cure}"
-            )
 
 
 def load(path: str | Path) -> Scenario:

@@ -61,7 +61,7 @@ def headings(path: Path) -> dict[str, Node]:
 
 @contextmanager
 def named(path: Path) -> Iterator[None]:
-    """Within it, a fault that knows no file is one of the file `path`, at the line where its value stands there."""
+    """Within it, a fault that knows no file is one of the file `path`, at the line of its value or its base."""
     try:
         yield
     except InputError as e:
@@ -76,9 +76,11 @@ def _placed(fault: Fault, path: Path) -> Fault:
             break
         found = below[step]
         below = found.value if isinstance(found.value, Mapping) else {}
-    if found is None:
-        return replace(fault, file=str(path))
-    return replace(fault, file=found.key.file, line=found.key.line)
+    own = read(path).value
+    base = own.get(BASE) if isinstance(own, Mapping) else None
+    if found is not None and found.key.file != str(path):
+        found = base  # it stands in a file that this one is based on
+    return replace(fault, file=str(path), line=None if found is None else found.key.line)
 
 
 def expand(node: Node, slot: Slot, chain: tuple[Path, ...], path: str = "", under: Node | None = None) -> Node:
