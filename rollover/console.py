@@ -132,6 +132,7 @@ def report(
 ) -> None:
     """The answer of a run on standard output; what took part of its time to compile tells no speed."""
     from rollover.criteria import in_words
+    from rollover.estimates import in_words as estimated
     from rollover.ledger import closure
     from rollover.loads import unconverged
     from rollover.shipped import origin
@@ -169,6 +170,8 @@ def report(
         if "uncalibrated" in run.domain_flags:
             heading = "The ground law is not calibrated: no measurement stands behind its loads. Flags"
         out.print(f"{heading}: {flags}.{marked}", style="yellow")
+    if said := estimated(run.scenario.estimates):
+        out.print(f"{said}.", style="yellow")
     half = answer["half_step"]
     if half is not None and half["status"] != "done":
         out.print(f"At half the step the run failed: {half['sentence']}", style="yellow")

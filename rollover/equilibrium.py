@@ -80,6 +80,7 @@ class Equilibrium:
         self.play = t.mount_f[:, T_PLAY : T_PLAY + 6].copy()
         t.mount_f[:, T_PLAY : T_PLAY + 6] = 0.0
         self.scale = max(-float(self.weight.sum()), 1.0)
+        self.overturns = False  # whether `balance` found it to fall over at every roll that it tried
 
     def guess(self, roll: float = 0.0, axle: float = 0.0) -> Array:
         """Start of a search: rolled against the surface, pitched so that both axles touch, pressed in by the weight."""
@@ -245,12 +246,15 @@ class Equilibrium:
         tilt = -sign * (math.asin(float(from_angles(0.0, 0.0, self.heading)[:, 1] @ self.t.plane[:3])))
         roll = math.atan2(edge, height) - tilt
         value, step = moment(roll), math.radians(3.0)
+        tried = [value] if roll >= 0.0 and not math.isnan(value) else []
         for _ in range(15):
             below = value < 0.0 or math.isnan(value)
             before, roll = (roll, value), roll + (step if below else -step)
             value = moment(roll)
+            tried += [value] if roll >= 0.0 and not math.isnan(value) else []
             if before[1] * value <= 0.0:  # a nan never is
                 return settled if self._between(moment, before, (roll, value)) else None
+        self.overturns = min(tried, default=-1.0) > 0.0
         return None
 
     def _between(self, moment: Callable[[float], float], a: tuple[float, float], b: tuple[float, float]) -> bool:

@@ -19,9 +19,10 @@ from rollover.initiation import Driving, Drop, Release, Standing, Throw, TipOver
 from rollover.posture import ROLL
 from rollover.scenario import Scenario
 from rollover.step import stand
+from rollover.support import closed_form
 from rollover.tables import W_RADIUS, Tables, handle
 from rollover.terms import fall_back
-from rollover.vehicle import Striker, Vehicle
+from rollover.vehicle import Striker, Vehicle, laden
 
 Array = NDArray[np.float64]
 
@@ -174,13 +175,26 @@ def _stood(
     statics = Equilibrium(bodies, t, heading, scenario.gravity, base)
     u = statics.solve(statics.guess()) if len(t.wheel_i) else None
     if u is None:
+        why, cure = _why_not(scenario, t, heading)
         raise InputError(
-            Fault(
-                path="initiation",
-                message="the vehicle does not stand on this surface, got no static equilibrium; 'drop' or 'tip-over'",
-            )
+            Fault(path="initiation", message=f"the vehicle does not stand on this surface, got {why}; {cure}")
         )
     return statics, statics.seated(u)
+
+
+def _why_not(scenario: Scenario, t: Tables, heading: float) -> tuple[str, str]:
+    """Why a vehicle does not stand, and what lets it: by the support of a rigid one on the plane under its wheels."""
+    assert isinstance(scenario.vehicle, Vehicle)
+    x, y, z = (float(c) for c in t.plane[:3])  # the normal leans downhill
+    least = closed_form(scenario.vehicle, math.pi - math.atan2(y, x) + heading).rigid
+    slope = math.acos(min(z, 1.0))
+    if least == 0.0:
+        centre = ", ".join(f"{c:.3g}" for c in laden(scenario.vehicle).centre_of_mass)
+        return f"its centre of mass [{centre}] m outside the feet of its wheels", "another place of it or of a wheel"
+    if least < slope:
+        steep = f"ground of {math.degrees(slope):.3g} deg, which it turns over on from {math.degrees(least):.3g} deg"
+        return steep, "a gentler ground.surface, another heading, or 'drop'"
+    return "no static equilibrium", "'drop' or 'tip-over'"
 
 
 def _driving(driving: Driving, scenario: Scenario, bodies: tuple[Body, ...], t: Tables) -> Start:
@@ -207,6 +221,15 @@ def _tipped(tip: TipOver, scenario: Scenario, vehicle: Vehicle, bodies: tuple[Bo
     if u is not None and tip.excess_deg > 0.0:
         u[ROLL] += sign * math.radians(tip.excess_deg)
         u = statics.solve(u, fixed=(ROLL,))
+    if u is None and statics.overturns:
+        slope = math.degrees(math.acos(float(t.plane[2])))
+        raise InputError(
+            Fault(
+                path="initiation",
+                message=f"falls over to the {tip.side} before any balance on two wheels, got ground of "
+                f"{slope:.3g} deg; a gentler ground.surface, or the other side",
+            )
+        )
     if u is None:
         raise InputError(
             Fault(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ground.quantity import Quantity, parameters
 from rollover.connector import Connector
 from rollover.inertia import MassProperties
+from rollover.mechanism import Joint, free_motions, sentence
 from rollover.provenance import Provenance
 from rollover.shapes import Point, Shape
 
@@ -69,18 +70,30 @@ class Rops:
     provenance: tuple[Provenance, ...] = ()
 
     def validate(self) -> None:
-        """Refuse a frame that nothing holds, or joints that share a name."""
+        """Refuse a frame that nothing holds or that its joints leave a motion, and joints that share a name."""
         for what, joints in (("mounts", self.mounts), ("upper.hinges", self.hinges)):
             names = [m.name for m in joints]
             if not names and (what == "mounts" or self.upper is not None):
                 raise ValueError(f"{what}: none given; at least one")
             if len(set(names)) != len(names):
                 raise ValueError(f"{what}: two share a name, got {names}; each name once")
+        if free := free_motions({name: body for name, (body, _) in self.parts.items()}, self.joints):
+            raise ValueError(sentence(free))
 
     @property
     def hinges(self) -> tuple[Connector, ...]:
         """Between the lower and the upper part, none if the frame is in one part."""
         return self.upper.hinges if self.upper is not None else ()
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """Mounts, then hinges, with the parts that they join."""
+        sides = (("mounts", "chassis", "rops", self.mounts), ("upper.hinges", "rops", "rops_upper", self.hinges))
+        return tuple(
+            Joint(path=f"{path}.{c.name}", below=below, above=above, connector=c)
+            for path, below, above, connectors in sides
+            for c in connectors
+        )
 
     @property
     def connectors(self) -> tuple[Connector, ...]:

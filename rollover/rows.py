@@ -12,6 +12,7 @@ from rollover import tables as c
 from rollover import terms
 from rollover.bodies import Body, loose
 from rollover.effects.vehicle import TankSlosh
+from rollover.estimates import turning_inertia
 from rollover.initiation import Driving
 from rollover.scenario import Scenario
 from rollover.vehicle import RigidBody, Striker, Vehicle, Wheel
@@ -99,10 +100,9 @@ def turning_rows(scenario: Scenario, wheel_f: Array, first: int) -> tuple[Index,
         return spin_i, spin_f, drive
     steer = math.radians(start.steer_deg)
     for w, wheel in enumerate(vehicle.wheels):
-        assert wheel.inertia is not None  # the scenario has seen to it
         spin_i[w] = first + w
         spin_f[w] = [
-            wheel.inertia,
+            turning_inertia(vehicle, wheel),
             start.brake.torque if start.brake and vehicle.on_axle(wheel, start.brake.axle) else 0.0,
             float(start.drive is not None and vehicle.on_axle(wheel, start.drive.axle)),
             float(start.brake is not None and start.brake.against == "ground"),

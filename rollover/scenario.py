@@ -15,8 +15,10 @@ from ground.quantity import Quantity, parameters
 from ground.surface import Plane, Surface
 from rollover import document
 from rollover.effects import EFFECTS, entries, nothing
+from rollover.estimates import Estimate, wheel_estimates
 from rollover.excitation import Excitation
 from rollover.filters import least_rate
+from rollover.footing import check_standing, check_turning
 from rollover.initiation import Driving, Drop, Initiation, Release, Standing, Throw, TipOver
 from rollover.stand import PendulumBlow, StaticTest, TiltTable
 from rollover.static_sequence import sequence
@@ -148,6 +150,13 @@ class Scenario:
         which = "overturns" if kind == "drop" else "drop tests"
         return tuple(f"effects.{e.id}: made for {which}; nothing need feel it here" for e in found)
 
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Values that the run needs and no file states; they are worked out from others."""
+        if isinstance(self.initiation, Driving) and isinstance(self.vehicle, Vehicle):
+            return wheel_estimates(self.vehicle)
+        return ()
+
     def applied(self) -> Scenario:
         """Return this scenario with the values that its effects replace; the effects stay, for their other terms."""
         changed = self
@@ -198,16 +207,10 @@ def _check_start(vehicle: Vehicle | Striker | RigidBody, start: Initiation) -> N
                 f"initiation.kind: {start.kind!r} needs at least 3 wheels on both sides, "
                 f"got {left} left and {right} right"
             )
-        still = [w.name for w in vehicle.wheels if w.inertia is None]
-        if isinstance(start, Driving) and still:
-            raise ValueError(f"initiation.kind: 'driving' needs vehicle.wheels.*.inertia, got none for {still}")
-        axle = vehicle.front_axle
-        turning = sum(w.inertia or 0.0 for w in vehicle.wheels if w.carrier == "front_axle")
-        if isinstance(start, Driving) and axle is not None and turning >= axle.body.inertia[1]:
-            raise ValueError(
-                f"initiation.kind: the front wheels turn with more inertia than their axle has, got {turning:g} kg m2; "
-                f"less than {axle.body.inertia[1]:g} kg m2 is allowed"
-            )
+        if isinstance(vehicle, Vehicle):
+            check_standing(vehicle)
+            if isinstance(start, Driving):
+                check_turning(vehicle)
     elif isinstance(start, (Drop, Release)) and not (
         vehicle.outline or vehicle.wheels or (vehicle.rops and vehicle.rops.members)
     ):

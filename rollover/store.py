@@ -171,6 +171,7 @@ def _answer(
             "wall_time": run.wall_time,
             "stop_time": run.stop_time,
             "domain_flags": run.domain_flags,
+            "estimates": [e.plain for e in run.scenario.estimates],
             "phases": [{"start": start, "name": name} for start, name in run.phases],
             "energy_ledger": run.ledger,
             "energy_released": run.released,

@@ -52,7 +52,13 @@ class Wheel:
         bool, "turns freely and without inertia, else it is locked; 'driving' turns every wheel by its own inertia"
     ] = False
     inertia: Annotated[
-        float | None, Quantity("kg m2", "of all that turns with it, about its axle; part of its carrier's", above=0)
+        float | None,
+        Quantity(
+            "kg m2",
+            "of all that turns with it, about its axle; part of its carrier's; where 'driving' finds null, "
+            "estimated from the tyre's size",
+            above=0,
+        ),
     ] = None
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from rollover.criteria import Criterion
 from rollover.criteria import in_words as standards_in_words
+from rollover.estimates import in_words as estimated
 from rollover.findings import findings
 from rollover.ledger import closure
 from rollover.loads import CONVERGED, PeakLoad, leading, load_channels, magnitude
@@ -89,10 +90,12 @@ def headline(run: Run, peaks: Sequence[PeakLoad], rows: Sequence[Criterion] = ()
 
 
 def _warnings(run: Run, answer: Mapping[str, Any]) -> list[Block]:
-    half = answer.get("half_step")
+    half, blocks = answer.get("half_step"), list[Block]()
     if half and half["status"] != "done":
-        return [Note(text=f"At half the step the run failed: {half['sentence']}", warning=True)]
-    return []
+        blocks.append(Note(text=f"At half the step the run failed: {half['sentence']}", warning=True))
+    if estimates := run.scenario.estimates:
+        blocks.append(Note(text=f"{estimated(estimates)}.", warning=True))
+    return blocks
 
 
 def _peaks(peaks: Sequence[PeakLoad]) -> list[Block]:

@@ -82,7 +82,8 @@ def compare(
     about: dict[str, Any] = {"scenario_hash": document.content_hash(chosen), "recordings": list(measured)}
     store.claim_account(folder, FORMAT, about, [JSON, PAGE, *pictures.values()], force=force)
     _say_compiling()
-    runs = {name: _run(chosen, name, recording) for name, recording in measured.items()}
+    with document.named(path):
+        runs = {name: _run(chosen, name, recording) for name, recording in measured.items()}
     found = _misfits(runs, measured, cfc)
     answer = _answer(about, runs, found)
     by = ["--profile", str(profile)] if profile else []

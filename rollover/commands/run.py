@@ -79,7 +79,8 @@ def run(
 
     folder = out or Path("out", "run", path.stem)
     store.claim(folder, document.content_hash(chosen), force=force)  # before a run that may take minutes
-    done, again = _simulated(chosen, half_step)
+    with document.named(path):
+        done, again = _simulated(chosen, half_step)
     # what a run that broke off reached is in its channels; a peak of it would pass for the peak
     peaks = loads.peak_loads(done, again if again and again.status == "done" else None) if done.status == "done" else ()
     if peaks and ensemble > 1:

@@ -66,7 +66,8 @@ def synthesize(
     target = inside(out, f"{name or path.stem}.csv", file="--name")
     hold(target)  # before a run that may take minutes
     share, sigmas = _noise(noise or [])
-    done = simulate.run(chosen)
+    with document.named(path):
+        done = simulate.run(chosen)
     if done.status == "failed":
         console.say(f"{path}: the simulation failed: {done.sentence}")
         raise typer.Exit(FAILED)

@@ -11,7 +11,7 @@ from typing import Any
 
 from rollover.document.check import check
 from rollover.document.exchange import Itself, exchanged, value_at
-from rollover.document.include import expand, find, headings, shipped_folder
+from rollover.document.include import expand, find, headings, named, shipped_folder
 from rollover.document.replace import parse_setting, replaced
 from rollover.document.resolved import Leaf, content_hash, dump, paths, to_mapping
 from rollover.document.schema import schema
@@ -31,6 +31,7 @@ __all__ = [
     "find",
     "headings",
     "load",
+    "named",
     "parse_setting",
     "paths",
     "read",

@@ -184,8 +184,8 @@ class _Where:
                 node = whole  # a scenario path is one key
                 break
             child = node.value.get(key) if isinstance(node.value, Mapping) else None
-            if isinstance(node.value, tuple) and key.isdecimal() and int(key) < len(node.value):
-                child = node.value[int(key)]
+            if isinstance(node.value, tuple):
+                child = next((e for k, e in enumerate(node.value) if key in (_address(e, k), str(k))), None)
             if child is None:
                 break
             node = child

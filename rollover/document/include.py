@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -56,6 +57,30 @@ def headings(path: Path) -> dict[str, Node]:
             break
         path = _file(base) or path
     return found
+
+
+@contextmanager
+def named(path: Path) -> Iterator[None]:
+    """Within it, a fault that knows no file is one of the file `path`, at the line of its value or its base."""
+    try:
+        yield
+    except InputError as e:
+        raise InputError(*(f if f.file else _placed(f, path) for f in e.faults)) from None
+
+
+def _placed(fault: Fault, path: Path) -> Fault:
+    below: Mapping[str, Node] = headings(path)
+    found: Node | None = None
+    for step in fault.path.split("."):
+        if step not in below:
+            break
+        found = below[step]
+        below = found.value if isinstance(found.value, Mapping) else {}
+    own = read(path).value
+    base = own.get(BASE) if isinstance(own, Mapping) else None
+    if found is not None and found.key.file != str(path):
+        found = base  # it stands in a file that this one is based on
+    return replace(fault, file=str(path), line=None if found is None else found.key.line)
 
 
 def expand(node: Node, slot: Slot, chain: tuple[Path, ...], path: str = "", under: Node | None = None) -> Node:
