@@ -27,7 +27,9 @@ STEEP = {"large_tractor", "light_vehicle", "row_crop_tractor", "vineyard_tractor
 
 def expected(scenario: str, vehicle: str) -> str:
     """Words of the refusal; empty where it is to run."""
-    if vehicle == "acrylic_cube" or (vehicle == "rops_rig" and scenario not in WITHOUT_WHEELS):
+    if vehicle == "acrylic_cube" and scenario in ("pendulum", "static_rops_test"):
+        return "loads a ROPS, got a vehicle without; one with members"
+    if vehicle in ("acrylic_cube", "rops_rig") and scenario not in WITHOUT_WHEELS:
         return "got 0 "
     if scenario == "multiple_roll" and vehicle in STEEP:
         return "falls over to the left before any balance on two wheels, got ground of 33.7 deg; a gentler"
@@ -76,8 +78,10 @@ def test_each_law_goes_under_a_structure_or_asks_for_its_values(kind: str) -> No
         for line in str(e).splitlines():
             assert line.startswith("--set: ground.law.")
             assert ": missing; a number " in line
-        assert kind not in soils  # what has typical values does without
-        return
+        # no coefficients are typical of every soil: a file of the law brings them
+        if kind not in soils:
+            return
+        chosen = base.replaced({"ground.law": soils[kind].as_posix(), **BRIEF})
     run = simulate.run(chosen)
     assert run.status == "done", run.sentence
     assert run.recording["ground/force_normal"].max() > 0.0
@@ -105,7 +109,7 @@ def test_the_notice_stands_in_the_terminal_the_results_and_on_the_page(tmp_path:
     [
         (
             "ground: {surface: {kind: slope, angle_deg: 60.0}}\n",
-            "got ground of 60 deg, which it turns over on from 48.4 deg; a gentler ground.surface",
+            "got ground of 60 deg, which it turns over on from 49.2 deg; a gentler ground.surface",
         ),
         (
             "vehicle: {whole: {centre_of_mass: [2.6, 0.0, 0.8]}}\n",
