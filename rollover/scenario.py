@@ -205,7 +205,7 @@ def _check_start(vehicle: Vehicle | Striker | RigidBody, start: Initiation) -> N
         if len(sides) < 3 or not left or not right:
             raise ValueError(
                 f"initiation.kind: {start.kind!r} needs at least 3 wheels on both sides, "
-                f"got {left} left and {right} right"
+                f"got {left} left and {right} right; a vehicle on wheels, or 'drop'"
             )
         if isinstance(vehicle, Vehicle):
             check_standing(vehicle)

@@ -32,7 +32,7 @@ SPIKE = 63_210.123  # N, one sample long
 
 def tractor() -> Vehicle:
     """A small tractor with a two-post rear frame."""
-    stiff, damp = (4e6, 4e6, 8e6), (4e3, 4e3, 8e3)
+    stiff, damp, turn = (4e6, 4e6, 8e6), (4e3, 4e3, 8e3), (8e5, 8e5, 4e5)
     return Vehicle(
         name="example tractor",
         whole=MassProperties(mass=2600.0, centre_of_mass=(0.85, 0.0, 0.78), inertia=(900.0, 2300.0, 2400.0)),
@@ -52,8 +52,12 @@ def tractor() -> Vehicle:
             frame="two-post-rear",
             body=MassProperties(mass=75.0, centre_of_mass=(-0.2, 0.0, 1.75), inertia=(25.0, 14.0, 14.0)),
             mounts=(
-                Connector(name="left", position=(-0.2, 0.52, 0.95), stiffness=stiff, damping=damp),
-                Connector(name="right", position=(-0.2, -0.52, 0.95), stiffness=stiff, damping=damp),
+                Connector(
+                    name="left", position=(-0.2, 0.52, 0.95), stiffness=stiff, damping=damp, rotational_stiffness=turn
+                ),
+                Connector(
+                    name="right", position=(-0.2, -0.52, 0.95), stiffness=stiff, damping=damp, rotational_stiffness=turn
+                ),
             ),
             members=(
                 Tube(name="left_post", start=(-0.2, 0.52, 0.95), end=(-0.25, 0.55, 2.35), diameter=0.08),
