@@ -79,9 +79,10 @@ def headline(run: Run, peaks: Sequence[PeakLoad], rows: Sequence[Criterion] = ()
 
 def _warnings(run: Run, answer: Mapping[str, Any]) -> list[Block]:
     half = answer.get("half_step")
+    noted: list[Block] = [Note(text=f"{title(run.sentence)}.")] if run.status == "done" and run.sentence else []
     if half and half["status"] != "done":
-        return [Note(text=f"At half the step the run failed: {half['sentence']}", warning=True)]
-    return []
+        return [*noted, Note(text=f"At half the step the run failed: {half['sentence']}", warning=True)]
+    return noted
 
 
 def _peaks(peaks: Sequence[PeakLoad]) -> list[Block]:
