@@ -147,6 +147,8 @@ def report(
         out.print(f"{run.stop_time:g} s simulated in {run.wall_time:.2g} s ({pace})")
     else:
         out.print(f"FAILED: {run.sentence}", style="bold red")
+    if run.status == "done" and run.sentence:
+        out.print(f"{run.sentence[0].upper()}{run.sentence[1:]}.", style="yellow")
     if run.tests:
         _stand(out, run)
     if peaks:

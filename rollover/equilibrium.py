@@ -13,7 +13,7 @@ from rollover.bodies import Body
 from rollover.forces import generalised_forces, tyre_point
 from rollover.frames import from_angles
 from rollover.jacobian import stiffness
-from rollover.posture import AXLE, PARTS, PITCH, ROLL, SWINGS, WITH_CHASSIS, YAW, move, put
+from rollover.posture import AXLE, PARTS, PITCH, ROLL, SLIDE, SWINGS, WITH_CHASSIS, YAW, move, put
 from rollover.step import stand
 from rollover.tables import (
     E_DEPTH_NOW,
@@ -216,6 +216,18 @@ class Equilibrium:
         A = (T @ K @ T.T / self.scale)[np.ix_(free, free)]
         return np.asarray(np.linalg.solve(A + 1e-3 * np.eye(len(free)), r))
 
+    def tilt(self, sign: float) -> float:
+        """How far the surface falls towards a side (1 right, -1 left), rad."""
+        return -sign * math.asin(float(from_angles(0.0, 0.0, self.heading)[:, 1] @ self.t.plane[:3]))
+
+    def held(self) -> Array | None:
+        """Flat on the surface on all wheels, kept from rolling, slipping and turning, the rest in equilibrium; or None.
+
+        The pose in which a vehicle stands that is let go where it cannot stand.
+        """
+        u = self.solve(self.guess(), fixed=(ROLL, SLIDE, SLIDE + 1, YAW))
+        return None if u is None else self.seated(u, fixed=(ROLL, SLIDE, SLIDE + 1, YAW))
+
     def balance(self, sign: float, swing: float) -> Array | None:
         """Unstable equilibrium on the wheels of one side: sign 1 tips to the right, -1 to the left; or None.
 
@@ -243,8 +255,7 @@ class Equilibrium:
             abs(self.bodies[int(b)].centre[1] + f[W_CENTRE + 1]) + f[W_HALF]
             for b, f in zip(self.t.wheel_i, self.t.wheel_f, strict=True)
         )
-        tilt = -sign * (math.asin(float(from_angles(0.0, 0.0, self.heading)[:, 1] @ self.t.plane[:3])))
-        roll = math.atan2(edge, height) - tilt
+        roll = math.atan2(edge, height) - self.tilt(sign)
         value, step = moment(roll), math.radians(3.0)
         tried = [value] if roll >= 0.0 and not math.isnan(value) else []
         for _ in range(15):

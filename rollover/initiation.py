@@ -34,7 +34,10 @@ class Release:
 
 @parameters
 class TipOver:
-    """Let go on two wheels, just past the balance, with the front axle at its stop."""
+    """Let go on two wheels, just past the balance, with the front axle at its stop.
+
+    Where the surface is too steep to stand on there is no balance: then it is let go from rest as it would stand.
+    """
 
     kind: Literal["tip-over"] = "tip-over"
     side: Annotated[Literal["left", "right"], "the side it falls to; on a slope, downhill unless heading turns it"] = (

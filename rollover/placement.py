@@ -27,13 +27,20 @@ from rollover.vehicle import Striker, Vehicle, laden
 Array = NDArray[np.float64]
 
 
+REST = (
+    "there is no static balance on this surface, neither on four wheels nor on two: the vehicle was let go from rest "
+    "in the pose it would stand in, without initiation.excess_deg"
+)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Start:
-    """Generalised coordinates and velocities, (6 nb,) each, and the time at which they hold."""
+    """Generalised coordinates and velocities, (6 nb,) each, the time at which they hold, and a note on the start."""
 
     q: Array
     qd: Array
     time: float
+    note: str = ""  # what a reader of the run has to know of how it began
 
 
 def place(scenario: Scenario, bodies: tuple[Body, ...], t: Tables) -> Start:
@@ -218,6 +225,10 @@ def _tipped(tip: TipOver, scenario: Scenario, vehicle: Vehicle, bodies: tuple[Bo
     statics = Equilibrium(bodies, t, math.radians(tip.heading_deg), scenario.gravity, base)
     swing = vehicle.front_axle.swing if vehicle.front_axle is not None else 0.0
     u = statics.balance(sign, swing)
+    if u is None and statics.tilt(sign) > 0.0 and statics.solve(statics.guess()) is None:
+        held = statics.held()  # steeper than it can stand: there is nothing to tip it over, it only has to be let go
+        if held is not None:
+            return Start(q=statics.coordinates(held), qd=statics.rates(held, sign * tip.roll_rate), time=0.0, note=REST)
     if u is not None and tip.excess_deg > 0.0:
         u[ROLL] += sign * math.radians(tip.excess_deg)
         u = statics.solve(u, fixed=(ROLL,))
@@ -233,7 +244,9 @@ def _tipped(tip: TipOver, scenario: Scenario, vehicle: Vehicle, bodies: tuple[Bo
     if u is None:
         raise InputError(
             Fault(
-                path="initiation", message="no balance on two wheels was found on this surface; change heading or side"
+                path="initiation",
+                message=f"no balance on two wheels was found on this surface, got side {tip.side!r}; "
+                "side or heading_deg so that it falls downhill, or a flatter surface",
             )
         )
     u = statics.seated(u, fixed=(ROLL,))

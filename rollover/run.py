@@ -74,7 +74,7 @@ class Run:
 
     scenario: Scenario
     status: Literal["done", "failed"]
-    sentence: str
+    sentence: str  # why it failed; of one that is done what is special about its start
     recording: Recording
     flags: NDArray[np.int64]  # (n,) bits of the domain flags in force at each row of the recording
     events: tuple[Event, ...]

@@ -151,6 +151,8 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
         sentence = f"{why} ({sentence})"
     mark_warm()
     done = _result(scenario, bodies, live.tables, past, events, control, sentence, clock.perf_counter() - began)
+    if start.note and not done.sentence:
+        done = replace(done, sentence=start.note)
     return done if given is scenario else replace(done, scenario=given)
 
 

@@ -114,7 +114,7 @@ def history(
     with _axes() as (axes, svg):
         _draw(axes, curves)
         _level(axes, levels)
-        _finish(axes, across, label, margins=(0.0, 0.08))
+        finish(axes, across, label, margins=(0.0, 0.08))
         _shade(axes, phases)
     return svg.text
 
@@ -134,7 +134,7 @@ def xy(
         for name, x, y in points:
             axes.plot([x], [y], marker="o", ms=4, ls="", color=COLOURS["limit"])
             axes.annotate(name, (x, y), xytext=(5, -10), textcoords="offset points", color=COLOURS["ink"])
-        _finish(axes, across, label, margins=(0.03, 0.08))
+        finish(axes, across, label, margins=(0.03, 0.08))
     return svg.text
 
 
@@ -145,17 +145,17 @@ def overlay(
 
     It is taken at the stamps of the first.
     """
-    with _canvas(WIDTH, 3.9) as (figure, svg):
+    with canvas(WIDTH, 3.9) as (figure, svg):
         above, below = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [3, 1.3]})
         _draw(above, [_roled(measured, "second"), _roled(simulated, "first")])
-        _finish(above, "", label, margins=(0.0, 0.08))
+        finish(above, "", label, margins=(0.0, 0.08))
         _shade(above, phases)
         good = np.isfinite(simulated.x) & np.isfinite(simulated.y)
         model = np.interp(measured.x, simulated.x[good], simulated.y[good], left=np.nan, right=np.nan)
         rest = model - measured.y if turned else measured.y - model
         _draw(below, [Curve(name="difference" if turned else "residual", x=measured.x, y=rest, role="muted")])
         below.axhline(0.0, color=COLOURS["ink"], lw=0.6)
-        _finish(below, "time, s", "difference" if turned else "residual", margins=(0.0, 0.1))
+        finish(below, "time, s", "difference" if turned else "residual", margins=(0.0, 0.1))
         _shade(below, [(start, "") for start, _ in phases])
     return svg.text
 
@@ -175,13 +175,13 @@ def before_after(
     `unsure` (n,) times the noise is 1 sigma of what a simulation leaves by chance, where that is more. The
     residual's axis is linear up to ten times the noise and logarithmic beyond: both misfits can be read.
     """
-    with _canvas(WIDTH, 4.3, layout=None) as (figure, svg):
+    with canvas(WIDTH, 4.3, layout=None) as (figure, svg):
         above, below = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [3, 1.8], **MARGINS})
         simulated = [_roled(before, "limit"), *([] if after is None else [_roled(after, "first")])]
         x, y = thinned(measured.x, measured.y)  # wide and pale: what covers it can still be told from it
         above.plot(x, y, color=COLOURS["second"], lw=3.2, alpha=0.55, label=measured.name)
         _draw(above, simulated)
-        _finish(above, "", label, margins=(0.0, 0.08))
+        finish(above, "", label, margins=(0.0, 0.08))
         _shade(above, phases)
         for curve in simulated:
             rest = Curve(name=curve.name, x=curve.x, y=(measured.y - curve.y) / noise, role=curve.role)
@@ -197,7 +197,7 @@ def before_after(
         near = [m for m in (0.0, *marks) if low <= m <= high]
         below.set_yticks(near, [f"{m:g}" for m in near], minor=False)
         below.set_yticks([], minor=True)
-        _finish(below, "time, s", "residual / noise", margins=(0.0, 0.1), legend=False)
+        finish(below, "time, s", "residual / noise", margins=(0.0, 0.1), legend=False)
         _shade(below, [(start, "") for start, _ in phases])
     return svg.text
 
@@ -216,7 +216,7 @@ def bars(values: Mapping[str, float], *, label: str, roles: Mapping[str, Role] |
                 f"{v:.4g}", (v, k), xytext=(-4 if left else 4, 0), textcoords="offset points",
                 ha="right" if left else "left", va="center", color=COLOURS["ink"],
             )  # fmt: skip
-        _finish(axes, label, "", margins=(0.14, 0.02))
+        finish(axes, label, "", margins=(0.14, 0.02))
         axes.grid(axis="y", visible=False)
     return svg.text
 
@@ -235,7 +235,7 @@ def tornado(
         axes.axvline(centre, color=COLOURS["ink"], lw=0.8)
         for text, role in (("low end", "second"), ("high end", "first")):
             axes.plot([], [], color=COLOURS[role], lw=5, label=text)
-        _finish(axes, label, "", margins=(0.05, 0.02))
+        finish(axes, label, "", margins=(0.05, 0.02))
         axes.grid(axis="y", visible=False)
     return svg.text
 
@@ -250,13 +250,13 @@ def scatter(
         if line is not None:
             _draw(axes, [line])
         _level(axes, levels)
-        _finish(axes, across, label, margins=(0.04, 0.06))
+        finish(axes, across, label, margins=(0.04, 0.06))
     return svg.text
 
 
 def polar(curves: Sequence[Curve], *, label: str) -> str:
     """Values over a heading: `x` in rad, 0 ahead (up), growing to the left as yaw does, `y` outwards."""
-    with _canvas(4.6, 4.4) as (figure, svg):
+    with canvas(4.6, 4.4) as (figure, svg):
         axes = figure.add_subplot(projection="polar")
         axes.set_theta_zero_location("N")
         for curve in curves:
@@ -272,7 +272,7 @@ def polar(curves: Sequence[Curve], *, label: str) -> str:
 
 def outlines(views: Sequence[View]) -> str:
     """Panels to one scale each, beside one another: ROPS, clearance zone and ground from the front and the side."""
-    with _canvas(WIDTH, 3.6) as (figure, svg):
+    with canvas(WIDTH, 3.6) as (figure, svg):
         for k, view in enumerate(views):
             axes = figure.add_subplot(1, len(views), k + 1)
             for shape in view.shapes:
@@ -285,7 +285,7 @@ def outlines(views: Sequence[View]) -> str:
                 axes.plot(p[:, 0], p[:, 1], color=colour, lw=1.3, ls=style, label=label)
             axes.set_aspect("equal", adjustable="datalim")
             axes.set_title(view.title, fontsize=9, color=COLOURS["ink"])
-            _finish(axes, view.across, view.up, margins=(0.06, 0.06), legend=False)
+            finish(axes, view.across, view.up, margins=(0.06, 0.06), legend=False)
         handles, labels = figure.axes[0].get_legend_handles_labels()
         unique = dict(zip(labels, handles, strict=True))
         if unique:
@@ -336,7 +336,8 @@ def _shade(axes: Any, phases: Sequence[tuple[float, str]]) -> None:
     axes.set_xlim(low, high)
 
 
-def _finish(axes: Any, across: str, label: str, *, margins: tuple[float, float], legend: bool = True) -> None:
+def finish(axes: Any, across: str, label: str, *, margins: tuple[float, float], legend: bool = True) -> None:
+    """Margins, labels, grid and legend of axes, as all figures have them."""
     axes.margins(*margins)
     axes.set_xlabel(across, color=COLOURS["ink"])
     axes.set_ylabel(label, color=COLOURS["ink"])
@@ -355,6 +356,13 @@ def _finish(axes: Any, across: str, label: str, *, margins: tuple[float, float],
         )
 
 
+def shades(low: str, high: str) -> Any:
+    """Colour map from one colour to another."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    return LinearSegmentedColormap.from_list("rollover", [low, high])
+
+
 class _Svg:
     """Text of a figure once it is drawn."""
 
@@ -362,9 +370,10 @@ class _Svg:
 
 
 @contextmanager
-def _canvas(
+def canvas(
     width: float, height: float, layout: Literal["constrained"] | None = "constrained"
 ) -> Iterator[tuple[Any, _Svg]]:
+    """A figure to draw on, inch, and its text once that is done."""
     import matplotlib as mpl
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
@@ -383,5 +392,5 @@ def _canvas(
 
 @contextmanager
 def _axes(width: float = WIDTH, height: float = HEIGHT) -> Iterator[tuple[Any, _Svg]]:
-    with _canvas(width, height) as (figure, svg):
+    with canvas(width, height) as (figure, svg):
         yield figure.add_subplot(), svg

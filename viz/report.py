@@ -90,7 +90,8 @@ def headline(run: Run, peaks: Sequence[PeakLoad], rows: Sequence[Criterion] = ()
 
 
 def _warnings(run: Run, answer: Mapping[str, Any]) -> list[Block]:
-    half, blocks = answer.get("half_step"), list[Block]()
+    half = answer.get("half_step")
+    blocks: list[Block] = [Note(text=f"{title(run.sentence)}.")] if run.status == "done" and run.sentence else []
     if half and half["status"] != "done":
         blocks.append(Note(text=f"At half the step the run failed: {half['sentence']}", warning=True))
     if estimates := run.scenario.estimates:

@@ -9,21 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.ledger import of_cases
+from rollover.study import failures
 from rollover.study.answers import values_of
 from rollover.study.conduct import Conducted
 from rollover.study.study import Study
 from viz import plots
 from viz.differences import differences_section
 from viz.page import Block, Cases, Cell, Figure, Footer, Headline, Note, Section, Table, render
-from viz.plots import Curve, Level
+from viz.plots import Level
 from viz.report import series_unit
+from viz.study_figures import in_order, labels, responses
 from viz.verdict import standing
 
 Array = NDArray[np.float64]
-MOST_POINTS = 1200  # of a scatter plot; the extremes are among them
 MOST_FIGURES = 3  # outputs that are drawn
-MOST_AXES = 6  # axes that are drawn
-BINS = 12  # of the mean along an axis
 MOST_SENTENCES = 30
 COLUMNS_OF_FLAGS = ("flag", "cases", "share", "share at the peak load")
 
@@ -39,6 +38,10 @@ def page(study: Study, done: Conducted, account: Mapping[str, Any], *, command: 
         blocks.append(_reliability(account["reliability"]))
     if account["worst"] is not None:
         blocks.append(_worst(account["worst"]))
+    if said := failures.sentence(account["failures_along"]):
+        blocks.insert(0, Note(text=f"{said}.", warning=True))
+    if count := account["from_rest"]:
+        blocks.append(Note(text=f"{count} cases had no static balance on their surface and began from rest."))
     if (ledger := account.get("ledger")) and ledger["open"]:
         blocks.insert(0, Note(text=f"{of_cases(ledger)}.", warning=True))
     blocks.append(_failures(account))
@@ -66,6 +69,8 @@ def _headline(account: Mapping[str, Any]) -> Headline:
         limit = f"{e['limit'] * factor:.4g} {unit}"
         odds = f"{_percent(e['low_of_all'])} to {_percent(e['high_of_all'])}"
         sentence = f"{first['name']} lies {e['beyond']} {limit} in {_percent(e['probability'])} of cases ({odds})."
+        if e["failed"]:
+            failed += f"{_percent(e['least'])} to {_percent(e['most'])} of all, as the failed ones lie on either side. "
     else:
         low, high = (f"{first[key] * factor:.4g}" for key in ("least", "largest"))
         sentence = f"{first['name']} goes from {low} to {high} {unit}."
@@ -82,11 +87,11 @@ def _output(study: Study, done: Conducted, account: Mapping[str, Any], output: M
     levels = [] if output["limit"] is None else [Level(name="limit", value=output["limit"] * factor)]
     blocks: list[Block] = [_quantiles(output, drawn=account["drawn"])]
     if np.isfinite(y).any():
-        blocks.append(_distribution(y, label, levels, drawn=account["drawn"]))
+        blocks.append(in_order(y, label, levels, drawn=account["drawn"]))
         if output["ends"]:
             blocks.append(_tornado(output, factor, label))
         blocks += _indices(output, factor, unit)
-        blocks += _responses(study, done, y, label, levels)
+        blocks += responses(study, done, y, label, levels)
     return Section(title=output["name"], blocks=blocks)
 
 
@@ -96,16 +101,20 @@ def _quantiles(output: Mapping[str, Any], *, drawn: bool) -> Table:
     rows.append(["standard deviation", _number(output["deviation"], factor), "", ""])
     rows.append(["least", _number(output["least"], factor), "", ""])
     for q in output["quantiles"]:
-        bounds = [_number(q[key], factor, "not bounded" if drawn else "") for key in ("low", "high")]
+        bounds = [_number(q[key], factor, "not bounded") for key in ("low", "high")]
         rows.append([f"{100.0 * q['q']:g} %", _number(q["value"], factor), *bounds])
     rows.append(["largest", _number(output["largest"], factor), "", ""])
     if (e := output["exceedance"]) is not None:
-        name = f"odds {e['beyond']} {e['limit'] * factor:.4g} {unit}: {e['hits']} of {e['cases']}"
+        name = f"probability {e['beyond']} {e['limit'] * factor:.4g} {unit}: {e['hits']} of {e['cases']}"
         rows.append([name, _percent(e["probability"]), _percent(e["low"]), _percent(e["high"])])
         if e["failed"]:
-            every = f"the same, {e['failed']} failed cases on either side"
-            rows.append([every, "", _percent(e["low_of_all"]), _percent(e["high_of_all"])])
-    how = "Intervals by order statistics and Clopper-Pearson." if drawn else "No draws: no intervals, and no odds."
+            counted = f"the same, {e['failed']} failed cases counted as"
+            rows.append([f"{counted} not {e['beyond']}", _percent(e["least"]), _percent(e["low_of_all"]), ""])
+            rows.append([f"{counted} {e['beyond']}", _percent(e["most"]), "", _percent(e["high_of_all"])])
+    if (e := output["beyond_limit"]) is not None:
+        failed = f", {e['failed']} failed" if e["failed"] else ""
+        rows.append([f"{e['beyond']} {e['limit'] * factor:.4g} {unit}", f"{e['hits']} of {e['cases']}{failed}", "", ""])
+    how = "Intervals by order statistics and Clopper-Pearson." if drawn else "The cases of a plan are no draws."
     missing = f"; {output['missing']} have no such measure" if output["missing"] else ""
     return Table(
         columns=(f"{output['name']}, {unit}", "", "interval from", "to"),
@@ -113,15 +122,6 @@ def _quantiles(output: Mapping[str, Any], *, drawn: bool) -> Table:
         numeric=(1, 2, 3),
         caption=f"{output['cases']} cases{missing}. {how}",
     )
-
-
-def _distribution(y: Array, label: str, levels: Sequence[Level], *, drawn: bool) -> Figure:
-    values = np.sort(y[np.isfinite(y)])
-    share = (np.arange(len(values)) + 0.5) / len(values)
-    curve = Curve(name=label, x=100.0 * share, y=values)
-    across = "share of cases below, %" if drawn else "share of the plan's cases below, %"
-    svg = plots.xy([curve], across=across, label=label, levels=levels)
-    return Figure(svg=svg, caption="Every case in order: the quantile function.")
 
 
 def _tornado(output: Mapping[str, Any], factor: float, label: str) -> Figure:
@@ -175,55 +175,6 @@ def _indices(output: Mapping[str, Any], factor: float, unit: str) -> list[Block]
     return found
 
 
-def _responses(study: Study, done: Conducted, y: Array, label: str, levels: Sequence[Level]) -> list[Block]:
-    """The output along each axis: points and their mean; of two axes' grid a curve for each level of the other."""
-    numeric = [a.name for a in study.axes if done.points.columns[a.name].dtype != object][:MOST_AXES]
-    found: list[Block] = []
-    if len(study.axes) == 2 and len(numeric) == 2 and study.plan.kind == "grid":
-        for name, other in (numeric, numeric[::-1]):
-            svg = plots.xy(_curves(done, y, name, other), across=name, label=label, levels=levels)
-            found.append(Figure(svg=svg, caption=f"Along {name}, a curve for each {other}."))
-        return found
-    for name in numeric:
-        x = np.asarray(done.points.columns[name], dtype=float)
-        good = np.isfinite(y)
-        kept = _thinned(x[good], y[good])
-        points = Curve(name="cases", x=x[good][kept], y=y[good][kept], role="muted")
-        svg = plots.scatter([points], across=name, label=label, line=_mean(x[good], y[good]), levels=levels)
-        whole = int(good.sum())
-        count = f"{len(kept)} of {whole} cases, the extremes among them" if len(kept) < whole else "All cases"
-        found.append(Figure(svg=svg, caption=f"{count}; the line is the mean of parts of equal count."))
-    return found
-
-
-def _curves(done: Conducted, y: Array, name: str, other: str) -> list[Curve]:
-    x, z = (np.asarray(done.points.columns[n], dtype=float) for n in (name, other))
-    levels = np.unique(z)
-    if len(levels) > len(plots.CYCLE):
-        levels = levels[np.linspace(0, len(levels) - 1, len(plots.CYCLE)).round().astype(int)]
-    found = []
-    for k, level in enumerate(levels):
-        at = np.flatnonzero(z == level)
-        at = at[np.argsort(x[at])]
-        found.append(Curve(name=f"{other} {level:g}", x=x[at], y=y[at], role=plots.CYCLE[k]))
-    return found
-
-
-def _thinned(x: Array, y: Array) -> NDArray[np.int64]:
-    """At most about `MOST_POINTS` places, evenly along, with the extremes of both."""
-    if len(x) <= MOST_POINTS:
-        return np.arange(len(x))
-    ends = {int(f(v)) for v in (x, y) for f in (np.argmin, np.argmax)}
-    return np.array(sorted({*range(0, len(x), -(-len(x) // MOST_POINTS)), *ends}))
-
-
-def _mean(x: Array, y: Array) -> Curve | None:
-    parts = [p for p in np.array_split(np.argsort(x, kind="stable"), min(BINS, max(1, len(x) // 5))) if len(p)]
-    if len(parts) < 2:
-        return None
-    return Curve(name="mean", x=np.array([x[p].mean() for p in parts]), y=np.array([y[p].mean() for p in parts]))
-
-
 def _reliability(found: Mapping[str, Any]) -> Section:
     if "reason" in found:
         return Section(title="Reliability", blocks=[Note(text=f"No design point: {found['reason']}", warning=True)])
@@ -262,7 +213,22 @@ def _failures(account: Mapping[str, Any]) -> Section:
     columns = ("by", "cases", "points", "in words")
     more = len(account["failures"]) - MOST_SENTENCES
     caption = f"{more} further sentences stand in cases.parquet." if more > 0 else ""
-    return Section(title="Failures", blocks=[Table(columns=columns, rows=rows, numeric=(1,), caption=caption)])
+    blocks: list[Block] = [Table(columns=columns, rows=rows, numeric=(1,), caption=caption)]
+    if tests := account["failures_along"]:
+        cells = [
+            [
+                t["axis"],
+                *(" to ".join(map(_end, t[k])) for k in ("failed", "done")),
+                t["more"],
+                f"{t['p']:.2g}",
+                t["test"],
+            ]
+            for t in tests
+        ]
+        heads = ("axis", "failed cases", "cases done", "failures more frequent", "p", "test")
+        told = f"Failed against other cases, along each axis; level {100 * failures.LEVEL:g} % for all (Bonferroni)."
+        blocks.append(Table(columns=heads, rows=cells, numeric=(4,), caption=told))
+    return Section(title="Failures", blocks=blocks)
 
 
 def _flags(account: Mapping[str, Any]) -> Section:
@@ -278,9 +244,10 @@ def _flags(account: Mapping[str, Any]) -> Section:
 def _cases(study: Study, done: Conducted) -> Cases:
     n = done.points.count
     columns: list[tuple[str, Sequence[Any]]] = [("point", list(range(n)))]
+    told = labels(study)
     for axis in study.axes:
         column = done.points.columns[axis.name]
-        columns.append((axis.name, [v if isinstance(v, str) else float(v) for v in column]))
+        columns.append((told[axis.name], [v if isinstance(v, str) else float(v) for v in column]))
     for name in dict.fromkeys(output.name for output in study.outputs):
         output = next(o for o in study.outputs if o.name == name)
         unit, factor = series_unit(output.unit)

@@ -47,7 +47,7 @@ def study(
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
-    """Run what is missing of a study, then answer: quantiles, odds beyond a limit, sensitivities, the worst case."""
+    """Run what is missing of a study, then answer: ranges, quantiles, odds beyond a limit, sensitivities, the worst."""
     from ground.compiled import is_warm
     from rollover import cluster, console
     from rollover import study as studies
@@ -218,6 +218,7 @@ def sentences(account: dict[str, Any]) -> list[str]:
     """The account in a few lines."""
     from rollover.console import readable
     from rollover.ledger import of_cases
+    from rollover.study import failures
     from viz.report import series_unit
 
     n = account["cases"]
@@ -228,14 +229,24 @@ def sentences(account: dict[str, Any]) -> list[str]:
         lines.append(f"{each['name']}, {unit}")
         if not each["cases"]:
             lines.append("  no case has it")
+        elif not account["drawn"]:
+            least, most = (readable(each[key], each["unit"]) for key in ("least", "largest"))
+            lines.append(f"  {least} to {most} over {each['cases']} cases")
         for q in each["quantiles"]:
             low, value, high = (readable(q[key], each["unit"]) for key in ("low", "value", "high"))
-            bounds = f"   ({low} to {high})" if account["drawn"] else ""
-            lines.append(f"  {100.0 * q['q']:5.4g} %  {value:>9}{bounds}")
+            lines.append(f"  {100.0 * q['q']:5.4g} %  {value:>9}   ({low} to {high})")
         if (e := each["exceedance"]) is not None:
-            span = f"({100.0 * e['low_of_all']:.3g} to {100.0 * e['high_of_all']:.3g} %)"
             limit = readable(e["limit"], each["unit"])
-            lines.append(f"  {e['beyond']} {limit}: {100.0 * e['probability']:.3g} %  {span}")
+            span = f"({100.0 * e['low']:.3g} to {100.0 * e['high']:.3g} %)"
+            lines.append(f"  probability {e['beyond']} {limit}: {100.0 * e['probability']:.3g} %  {span}")
+            if e["failed"]:
+                none, every = f"{100.0 * e['least']:.3g} %", f"{100.0 * e['most']:.3g} %"
+                span = f"({100.0 * e['low_of_all']:.3g} to {100.0 * e['high_of_all']:.3g} %)"
+                low = f"  with {e['failed']} failed cases as not {e['beyond']}: {none}"
+                lines.append(f"{low}, as {e['beyond']}: {every}  {span}")
+        if (e := each["beyond_limit"]) is not None:
+            limit, failed = readable(e["limit"], each["unit"]), f", {e['failed']} failed" if e["failed"] else ""
+            lines.append(f"  {e['beyond']} {limit}: {e['hits']} of {e['cases']} cases{failed}")
         for s in each["sobol"]:
             total = f"total {s['total']:.2f} +- {s['total_half_width']:.2f}"
             lines.append(f"  {s['axis']}: first {s['first']:.2f} +- {s['first_half_width']:.2f}, {total}")
@@ -248,6 +259,10 @@ def sentences(account: dict[str, Any]) -> list[str]:
         )
     if (ledger := account["ledger"])["open"]:
         lines.append(of_cases(ledger))
+    if account["from_rest"]:
+        lines.append(f"{account['from_rest']} cases had no static balance and began from rest")
+    if said := failures.sentence(account["failures_along"]):
+        lines.append(said)
     lines += [f"{f['cases']} failed ({f['failure']}): {f['sentence']}" for f in account["failures"][:5]]
     if (w := account["worst"]) is not None:
         lines.append(f"Worst case: point {w['point']}, written to {w['file']}")

@@ -13,7 +13,7 @@ from rollover.document.check import check
 from rollover.document.exchange import Itself, exchanged, value_at
 from rollover.document.include import expand, find, headings, named, shipped_folder
 from rollover.document.replace import parse_setting, replaced
-from rollover.document.resolved import Leaf, content_hash, dump, paths, to_mapping
+from rollover.document.resolved import Leaf, content_hash, dump, paths, to_mapping, unit_at
 from rollover.document.schema import schema
 from rollover.document.slot import slot_of
 from rollover.document.tree import Node, read
@@ -40,6 +40,7 @@ __all__ = [
     "shipped_folder",
     "slot_of",
     "to_mapping",
+    "unit_at",
     "value_at",
 ]
 

@@ -60,6 +60,29 @@ def paths(thing: Any) -> list[Leaf]:
     return found
 
 
+def unit_at(thing: Any, path: str) -> str:
+    """Unit of the value at a path, "1" for a bare number; empty where there is no quantity."""
+    slot, part = slot_of(type(thing)), thing
+    for step in path.split("."):
+        if is_dataclass(part):
+            inner = slots(type(part)).get(step)
+            part = getattr(part, step, None)
+        elif isinstance(part, (tuple, list)):
+            names = [getattr(item, "name", None) for item in part]
+            at = names.index(step) if step in names else int(step) if step.isdecimal() else len(part)
+            inner = slot.element(at) or slot
+            part = part[at] if at < len(part) else None
+        elif isinstance(part, Mapping):
+            inner, part = slot.child(step) if slot.by_key else slot, part.get(step)
+        else:
+            inner = slot.child(step)
+            part = None
+        if inner is None:
+            return ""
+        slot = inner
+    return slot.unit
+
+
 def _walk(value: Any, slot: Slot, path: str, found: list[Leaf]) -> None:
     if is_dataclass(value):
         kind: Any = type(value)

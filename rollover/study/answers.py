@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.ledger import LIMIT
+from rollover.study import failures, sensitivity
 from rollover.study import plan as plans
-from rollover.study import sensitivity
 from rollover.study.conduct import Conducted
 from rollover.study.shelf import Row
 from rollover.study.study import Output, Study
@@ -41,10 +41,16 @@ def answers(study: Study, done: Conducted) -> dict[str, Any]:
     return {
         "cases": _counts(rows),
         "drawn": drawn,
-        "meaning_of_quantiles": DRAWN.get(study.plan.kind, "over the cases of the plan, which are no draws: no odds"),
+        "meaning_of_quantiles": DRAWN.get(
+            study.plan.kind, "the cases of a plan, which are no draws: they tell the range"
+        ),
+        "from_rest": sum(row.measures.get("start/from_rest", 0.0) > 0.0 for row in rows),
         "outputs": [_output(study, output, done, chosen, drawn) for output in study.outputs],
         "flags": _flags(rows),
         "failures": _failures(rows),
+        "failures_along": failures.along_axes(
+            done.points.columns, np.array([row.status == "failed" for row in rows], dtype=bool)
+        ),
         "ledger": _ledger(rows),
     }
 
@@ -85,8 +91,9 @@ def _output(study: Study, output: Output, done: Conducted, chosen: slice, drawn:
         "deviation": float(good.std(ddof=1)) if len(good) > 1 else None,
         "least": float(good.min()) if len(good) else None,
         "largest": float(good.max()) if len(good) else None,
-        "quantiles": [quantile(good, q, study.confidence, drawn=drawn) for q in study.quantiles] if len(good) else [],
+        "quantiles": [quantile(good, q, study.confidence) for q in study.quantiles] if drawn and len(good) else [],
         "exceedance": exceedance(good, output, failed, study.confidence) if drawn and len(good) else None,
+        "beyond_limit": None if drawn else share(good, output, failed),
         "worst": _worst(output, y, done),
         "ends": _ends(study, done, y),
         "rank_correlation": _ranks(study, done, y) if drawn else [],
@@ -96,16 +103,14 @@ def _output(study: Study, output: Output, done: Conducted, chosen: slice, drawn:
     return found
 
 
-def quantile(values: Array, q: float, confidence: float, *, drawn: bool = True) -> dict[str, Any]:
+def quantile(values: Array, q: float, confidence: float) -> dict[str, Any]:
     """Quantile with its interval by order statistics, which holds for any distribution.
 
     P(x_(l) <= x_q < x_(u)) = sum_{k=l}^{u-1} C(n,k) q^k (1-q)^(n-k) >= confidence; an end that n values do not bound is
-    None. `values` (n,) are independent draws; if they are not `drawn` there is no interval.
+    None. `values` (n,) are independent draws.
     """
     from scipy.stats import binom
 
-    if not drawn:
-        return {"q": q, "value": float(np.quantile(values, q)), "low": None, "high": None}
     n, x = len(values), np.sort(values)
     tail = 0.5 * (1.0 - confidence)
     low, high = int(binom.ppf(tail, n, q)), int(binom.ppf(1.0 - tail, n, q)) + 1
@@ -128,9 +133,10 @@ def clopper_pearson(hits: int, n: int, confidence: float) -> tuple[float, float]
 
 
 def exceedance(values: Array, output: Output, failed: int, confidence: float) -> dict[str, Any] | None:
-    """Odds of lying beyond the limit, with the exact interval of those that are done, and with failed cases either way.
+    """Probability of lying beyond the limit, with its exact interval over the cases that are done, and over all.
 
-    A failed case may lie on either side: `low_of_all` counts none of them, `high_of_all` all.
+    A failed case may lie on either side: the true share of all cases lies between `least`, which counts none of them as
+    beyond, and `most`, which counts all; `low_of_all` and `high_of_all` are the outer ends of those two's intervals.
     """
     if output.limit is None:
         return None
@@ -144,10 +150,26 @@ def exceedance(values: Array, output: Output, failed: int, confidence: float) ->
         "cases": n,
         "failed": failed,
         "probability": hits / n,
+        "least": hits / (n + failed),
+        "most": (hits + failed) / (n + failed),
         "low": low,
         "high": high,
         "low_of_all": clopper_pearson(hits, n + failed, confidence)[0],
         "high_of_all": clopper_pearson(hits + failed, n + failed, confidence)[1],
+    }
+
+
+def share(values: Array, output: Output, failed: int) -> dict[str, Any] | None:
+    """How many cases of a plan that draws nothing lie beyond the limit; `failed` ones may lie on either side."""
+    if output.limit is None or not len(values):
+        return None
+    beyond = values > output.limit if output.beyond == "above" else values < output.limit
+    return {
+        "limit": output.limit,
+        "beyond": output.beyond,
+        "hits": int(beyond.sum()),
+        "cases": len(values),
+        "failed": failed,
     }
 
 

@@ -20,6 +20,7 @@ import numpy as np
 from rollover import document
 from rollover.drop import DropFailedError, DropModel
 from rollover.effects import VARIABLE, effects
+from rollover.initiation import TipOver
 from rollover.ledger import closure
 from rollover.loads import leading as leading_load
 from rollover.loads import load_channels, magnitude, peak_loads
@@ -152,6 +153,8 @@ def _simulated(scenario: Scenario, clearance: bool) -> Found:
             measures[f"{peak.channel}/impulse"] = abs(peak.impulse)
     measures |= _largest(run.recording, ALSO)
     measures |= _of_run(run)
+    if isinstance(run.scenario.initiation, TipOver):
+        measures["start/from_rest"] = float(bool(run.sentence))
     if clearance:
         from rollover.clearance import approaches
 

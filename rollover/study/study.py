@@ -28,6 +28,7 @@ SPECIAL: dict[str, tuple[str, str]] = {
     "clearance/ground": ("m", "least height of the clearance zone above the ground, negative inside"),
     "rops/share": ("1", "energy that the ROPS took over the kinetic energy at its landing"),
     "ledger/residual": ("1", "largest residual of the energy ledger over the energy released"),
+    "start/from_rest": ("1", "1 where a tip-over had no static balance and began from rest, else 0"),
     "time/stop": ("s", "simulated time at the end"),
 }
 ENDINGS = {"raw": "unfiltered", "impulse": "collision impulse"}
@@ -70,8 +71,9 @@ class Output:
     """A number of each case that is asked for: a peak load by its channel (filtered by the scenario's class), or more.
 
     ``rops/force/raw`` is unfiltered, ``rops/force/impulse`` its collision impulse; deflection, energy and sinkage are
-    largest magnitudes; ``clearance/structure``, ``clearance/ground``, ``rops/share``, ``ledger/residual`` and
-    ``time/stop`` are no peaks. With a `limit` the probability of lying beyond it is asked for too.
+    largest magnitudes; ``clearance/structure``, ``clearance/ground``, ``rops/share``, ``ledger/residual``,
+    ``start/from_rest`` and ``time/stop`` are no peaks. With a `limit` the probability of lying beyond it is asked for
+    too.
     """
 
     name: Annotated[str, "channel of a load, or another measure of a case"]
@@ -190,6 +192,13 @@ def unit_of(measure: str) -> str:
     if ending == "impulse":
         return "N s"
     return describe(_described(channel if ending == "raw" else measure)).unit
+
+
+def axis_unit(scenario: Scenario, axis: AnyAxis) -> str:
+    """Unit of an axis' numbers: "1" for a factor, else that of what stands at its paths; empty where none is known."""
+    if axis.apply == "factor":
+        return "1"
+    return next(filter(None, (document.unit_at(scenario, path) for path in axis.paths)), "")
 
 
 def meaning_of(measure: str) -> str:

@@ -15,12 +15,13 @@ from ground.ye import Ye2006
 from rollover.bodies import bodies_of
 from rollover.contact import tables_of
 from rollover.equilibrium import tread_point
+from rollover.faults import InputError
 from rollover.forces import generalised_forces
 from rollover.frames import from_angles, matrices, rotation_vector
 from rollover.inertia import MassProperties
 from rollover.initiation import Drop, Standing
 from rollover.placement import place
-from rollover.scenario import Ground, Scenario, Simulation
+from rollover.scenario import Ground, Scenario, Simulation, load
 from rollover.shapes import Box
 from rollover.simulate import run
 from rollover.tables import E_ENERGY_NOW, handle
@@ -230,3 +231,25 @@ def test_tyre_forces_are_the_gradient_of_their_energy(camber_deg: float) -> None
         assert Q[k] == pytest.approx(-slope, rel=1e-5, abs=1e-3)
         spun = [at(place_at, R @ matrices((s * eps * e)[None])[0])[0] for s in (1.0, -1.0)]
         assert Q[3 + k] == pytest.approx(-(spun[0] - spun[1]) / (2 * eps), rel=1e-5, abs=1e-2)
+
+
+def test_above_the_static_limit_an_overturn_starts_from_rest_as_it_would_stand() -> None:
+    """Below 35 deg this tractor balances on two wheels; above it neither stands nor balances and is let go."""
+    slope = load("side_overturn_slope").replaced({"simulation.duration": 0.4})
+    for angle, side, stands in ((34.0, "left", True), (35.5, "left", False), (50.0, "left", False)):
+        changes = {"ground.surface.angle_deg": angle, "initiation.side": side}
+        done = run(slope.replaced(changes))
+        assert done.status == "done"
+        assert ("no static balance" in done.sentence) is not stands
+        roll, loads = np.degrees(done.recording["chassis/roll"]), done.recording["wheel/rear_left/force_normal"]
+        if not stands:
+            assert roll[0] == pytest.approx(-angle, abs=1e-6), "flat on the slope"
+            assert done.recording["energy/kinetic"][0] == pytest.approx(0.0, abs=1e-9)
+            assert loads[0] > 0.0
+            assert roll[-1] < roll[0] - 1.0, "it tips by itself"
+
+
+def test_away_from_the_slope_there_is_nothing_to_let_go() -> None:
+    steep = load("side_overturn_slope").replaced({"ground.surface.angle_deg": 45.0, "initiation.side": "right"})
+    with pytest.raises(InputError, match=r"side or heading_deg so that it falls downhill"):
+        run(steep)
