@@ -133,9 +133,22 @@ def test_check_and_run_name_the_user_s_file_and_the_motion(tmp_path: Path) -> No
         done = CliRunner().invoke(app, command)
         assert done.exit_code == 2, command
         (told,) = done.stderr.splitlines()
-        assert f"{own}:{line + 1}: " in told or f"{own}:{line}: " in told
+        assert told.startswith(f"{own}:{line + 1}: ")  # the first of the mounts
         assert "mounts: rops turns freely about y through [-0.1, 0, 0.85] m" in told
     assert not (tmp_path / "o").exists()
+
+
+def test_the_line_is_that_of_the_one_joint_s_value(tmp_path: Path) -> None:
+    folded = (SHELF / "rops" / "two_post_folding_2t.yaml").read_text(encoding="utf-8").partition("  hinges:\n")
+    hinge = "    - {name: fold, position: [0, 0, 1.45], stiffness: [1e7, 1e7, 1e7], damping: [0, 0, 0],\n"
+    hinge += "       rotational_stiffness: [1e5, 0, 1e5]}\n"
+    own = tmp_path / "own.yaml"
+    own.write_text(folded[0] + folded[1] + hinge + "  members:" + folded[2].partition("  members:")[2])
+    line = 1 + own.read_text(encoding="utf-8").splitlines().index(hinge.splitlines()[1])
+    done = CliRunner().invoke(app, ["check", str(own)])
+    assert done.stderr.startswith(
+        f"{own}:{line}: upper.hinges.fold.rotational_stiffness: rops_upper turns freely about y"
+    )
 
 
 def standing(changes: Mapping[str, Any]) -> Scenario:
