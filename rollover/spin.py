@@ -8,7 +8,6 @@ carrier feels it through the tread's friction, whose moment the wheel does not t
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -67,7 +66,7 @@ def try_spins(t: Any, Q: Any) -> None:
     share = 0.0
     if driven > 0:
         angle, rate = angle / driven, rate / driven
-        forward = math.copysign(rate, rate * t.drive[D_TORQUE])  # along the torque, which may drive backward
+        forward = -rate if t.drive[D_TORQUE] < 0.0 else rate  # along the torque
         governor = min(max((t.drive[D_RATE] - forward) / (DROOP * t.drive[D_RATE]), 0.0), 1.0)
         share = t.drive[D_TORQUE] * governor / driven
     for w in range(t.spin_i.size):

@@ -187,3 +187,33 @@ def test_a_blow_on_its_carrier_does_not_turn_a_wheel() -> None:
         turned = (after - before)[6 * b + 3 : 6 * b + 6]
         assert abs(turned[1]) > 0.01
         assert after[n + w] - before[n + w] == pytest.approx(-float(turned @ t.wheel_f[w, W_AXIS : W_AXIS + 3]))
+
+
+def spun(**drive: float) -> Run:
+    """A tractor whose rear wheels are driven from rest, nothing holding them."""
+    return run(
+        shipped("rear_overturn").replaced(
+            {
+                "initiation": {"kind": "driving", "speed": 0.0, "drive": {"rise_time": 0.1, **drive}},
+                "simulation.duration": 1.5,
+            }
+        )
+    )
+
+
+def test_a_wheel_that_runs_away_is_named_with_what_is_missing() -> None:
+    """Half a second off the ground at 200 kN m on two wheels of some 100 kg m2: a thousand rad/s."""
+    failed = spun(torque=2e5)
+    assert failed.status == "failed"
+    assert failed.sentence.startswith("wheel rear_left runs away at t = 0.")
+    assert "driven with 200000 N m and no limit; initiation.drive.limit_rate (rad/s) is needed" in failed.sentence
+    rate = float(failed.sentence.split("it turns at ")[1].split(" rad/s")[0])
+    assert rate == pytest.approx(abs(failed.recording["wheel/rear_left/spin"][-1]), rel=0.01)
+
+
+@pytest.mark.parametrize("torque", [2e4, -2e4])
+def test_the_limit_of_the_engine_holds_forward_and_backward(torque: float) -> None:
+    done = spun(torque=torque, limit_rate=8.0)
+    assert done.status == "done"
+    spin = np.abs(done.recording["wheel/rear_left/spin"])
+    assert 7.0 < spin.max() < 9.5
