@@ -386,9 +386,8 @@ def stability(answer: Mapping[str, Any], folder: str) -> None:
         off = ", ".join(row["first_off"])
         table.add_row(f"{row['heading_deg']:g}", *("-" if a is None else f"{a:.2f}" for a in angles), off)
     out.print(table)
-    out.print(
-        "Slopes in degrees; heading 0 uphill, 90 left side downhill. Stiff: closed form at the tyres' outer edges."
-    )
+    meant = "Slopes in degrees; heading 0 uphill, 90 left side downhill. Stiff: closed form at the tyres' outer edges."
+    out.print(meant)
     for part in answer["losses"]:
         share, was, now = 100.0 * part["share"], part["without_deg"], part["with_deg"]
         out.print(f"{part['part']}: takes {share:.1f} % across the slope, {was:.2f} -> {now:.2f} deg")

@@ -214,7 +214,7 @@ def test_a_fault_in_an_included_file_names_that_file() -> None:
         "a mapping (kind: bearing or compaction or fluid-entry or hard or press or treated or ye-2006) "
         "or the name of a .yaml file is needed"
     )
-    assert faults_of(text, soil="- 3\n") == [f"soil.yaml:1: not a mapping, got [3]; {wrong}"]
+    assert faults_of(text, soil="- 3\n") == [f"soil.yaml:1: not a mapping, got a list; {wrong}"]
 
 
 def test_a_circle_of_files_is_found() -> None:
