@@ -249,7 +249,7 @@ def regression(answers: Sequence[Answer], folder: str) -> None:
         out.print(loads)
     for a in answers:
         for note in a.notes:
-            out.print(f"{a.scenario}: {note}", style="yellow")
+            out.print(f"{a.scenario}: {note}", style="yellow", soft_wrap=True)  # a command is copied as it stands
     bad = sum(not a.ok for a in answers)
     updated = sum(a.verdict == "updated" for a in answers)
     verdict = f"{updated} baselines written" if updated else f"{bad} of {len(answers)} scenarios are not as they were"

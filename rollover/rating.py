@@ -95,7 +95,7 @@ class Rating:
 
     `rms` of the residual, in the signal's unit; `nrmse` is that over the measured range, None for a constant one;
     `over_noise` is that over 1 sigma of the noise, None where that is unknown; `deviation` is the measured signal's RMS
-    about its mean; `integral_*` over the samples that
+    about its first value; `integral_*` over the samples that
     exist (the impulse of a force, N s; the change of speed of an acceleration, m/s).
     """
 
@@ -135,7 +135,7 @@ def rate(
         nrmse=rms / span if span > 0.0 else None,
         over_noise=rms / noise if noise is not None and noise > 0.0 else None,
         peak=peak(t, m, s),
-        deviation=float(np.std(m)),
+        deviation=float(np.sqrt(np.mean((m - m[0]) ** 2))),
         integral_measured=float(weight @ m),
         integral_simulated=float(weight @ s),
     )
@@ -251,7 +251,7 @@ def verdict(rating: Rating) -> Verdict:
     Good is what the standard calls good or excellent. A peak's relative error e, less what noise may do to it, is
     graded by the standard's own score of a magnitude error, 1 - e/0.5: fair beyond 10 %, poor beyond 21 %. The RMS of
     the residual is fair beyond sqrt((2 sigma)^2 + (0.05 s)^2), poor beyond the same with 0.21: noise sigma with the
-    coverage factor 2, s the deviation of the measured signal, 5 % the standard's inner corridor.
+    coverage factor 2, s the RMS of the measured signal about where it began, 5 % the standard's inner corridor.
     """
     noise = rating.rms / rating.over_noise if rating.over_noise else 0.0
     found = [_by_residual(rating, noise)]

@@ -80,7 +80,7 @@ def _recording(found: Misfit) -> list[Block]:
         numeric=(2, *range(4, len(COLUMNS) - 1)),
         caption="Z corridor, E_P phase, E_M magnitude, E_S slope of ISO/TS 18571; M, P Sprague-Geers. "
         "Verdict: the worst of the rating, the peak (fair beyond 10 %, poor beyond 21 %, as the standard scores a "
-        "magnitude error) and the residual (fair beyond twice the noise and 5 % of the signal's deviation together, "
+        "magnitude error) and the residual (fair beyond twice the noise and 5 % of the signal's RMS together, "
         "poor with 21 %).",
     )
     blocks: list[Block] = [Note(text=found.title), table]
