@@ -65,7 +65,8 @@ def unit_at(thing: Any, path: str) -> str:
     slot, part = slot_of(type(thing)), thing
     for step in path.split("."):
         if is_dataclass(part):
-            inner = slots(type(part)).get(step)
+            kind: Any = type(part)
+            inner = slots(kind).get(step)
             part = getattr(part, step, None)
         elif isinstance(part, (tuple, list)):
             names = [getattr(item, "name", None) for item in part]

@@ -210,7 +210,7 @@ _OTHER = re.compile(
 )
 
 
-class _Representer(RoundTripRepresenter):
+class _Representer(RoundTripRepresenter):  # type: ignore[misc]  # ruamel has no types
     """Numbers as readers of YAML 1.1 read them too: a float has its point, 1.0e-05."""
 
     def represent_float(self, data: Any) -> Any:
