@@ -14,6 +14,7 @@ from typing import Annotated, Any, TypeVar
 
 import typer
 from typer.core import TyperCommand, TyperGroup
+from typer.models import CommandFunctionType
 
 # what takes long to import is imported by the command that needs it: `rollover --help` answers at once
 from rollover.faults import Fault, InputError
@@ -60,7 +61,7 @@ class Plain(TyperCommand):
 class Commands(typer.Typer):
     """An application whose commands are `Plain`."""
 
-    def command(self, *args: Any, **kwargs: Any) -> Any:
+    def command(self, *args: Any, **kwargs: Any) -> Callable[[CommandFunctionType], CommandFunctionType]:
         """Register a command."""
         return super().command(*args, **{"cls": Plain, **kwargs})
 
