@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import os
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -139,6 +140,12 @@ class Answer:
 def path_of(scenario: Path) -> Path:
     """File of a scenario's baseline."""
     return scenario.parent / FOLDER / f"{scenario.stem}.yaml"
+
+
+def called(scenario: Path) -> str:
+    """How a command line names a scenario: a shipped one by its name, another by its file, quoted for a shell."""
+    shipped = scenario.resolve().parent == document.shipped_folder().resolve()
+    return shlex.quote(scenario.stem if shipped else str(scenario))
 
 
 def read(path: Path) -> Baseline:
@@ -334,7 +341,13 @@ def by_hand(load: Load, starts: int) -> bool:
 
 def texts(folder_of: Mapping[Path, Baseline]) -> dict[Path, str]:
     """What the files of baselines hold."""
-    return {path: document.dump(b, HEAD.format(name=b.scenario)) for path, b in folder_of.items()}
+    return {path: document.dump(b, HEAD.format(name=b.scenario, called=_called(path))) for path, b in folder_of.items()}
+
+
+def _called(path: Path) -> str:
+    """How the scenario of a baseline's file is named on a command line, from the baseline's folder."""
+    name = called(path.parent.parent / path.name)
+    return name if name == path.stem else shlex.quote(f"../{path.name}")
 
 
 def write(folder_of: Mapping[Path, Baseline]) -> None:
@@ -352,7 +365,7 @@ def write(folder_of: Mapping[Path, Baseline]) -> None:
 
 
 HEAD = """Peak loads of {name} as they ought to be.
-`rollover regress {name}` compares them, `--update --reason TEXT` rewrites them. Tolerances are relative. Raise
+`rollover regress {called}` compares them, `--update --reason TEXT` rewrites them. Tolerances are relative. Raise
 one by hand, with the reason, and an update keeps it; below the change at half the step or the scatter it is refused."""
 
 

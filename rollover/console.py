@@ -261,7 +261,7 @@ def regression(answers: Sequence[Answer], folder: str) -> None:
         out.print(loads)
     for a in answers:
         for note in a.notes:
-            out.print(f"{a.scenario}: {note}", style="yellow")
+            out.print(f"{a.scenario}: {note}", style="yellow", soft_wrap=True)  # a command is copied as it stands
     bad = sum(not a.ok for a in answers)
     updated = sum(a.verdict == "updated" for a in answers)
     verdict = f"{updated} baselines written" if updated else f"{bad} of {len(answers)} scenarios are not as they were"
@@ -272,21 +272,32 @@ def regression(answers: Sequence[Answer], folder: str) -> None:
 
 def comparison(found: Sequence[Misfit], folder: str) -> None:
     """How well each recording is followed, a line for each channel."""
-    from rollover.rating import Iso18571, NotRateable
+    from rollover.rating import Iso18571, NotRateable, verdict
 
+    styles = {"good": "", "fair": "yellow", "poor": "bold red"}
     out = _out()
     for each in found:
         out.print(each.recording, style="bold")
         table = Table(box=None, pad_edge=False)
-        for heading in ("channel", "CFC", "ISO 18571", "", "rms/range %", "rms/noise", "peak %", "peak later ms"):
-            table.add_column(heading, justify="left" if heading in ("channel", "") else "right")
+        for heading in (
+            "channel",
+            "CFC",
+            "ISO 18571",
+            "",
+            "rms/range %",
+            "rms/noise",
+            "peak %",
+            "peak later ms",
+            "verdict",
+        ):
+            table.add_column(heading, justify="left" if heading in ("channel", "", "verdict") else "right")
         for c in each.channels:
             first = (c.channel, str(c.cfc or "-"))
             if isinstance(c.rating, NotRateable):
                 table.add_row(*first, "-", c.rating.reason)
                 continue
             iso, peak = c.rating.iso18571, c.rating.peak
-            rated = isinstance(iso, Iso18571)
+            judged = verdict(c.rating)
             table.add_row(
                 *first,
                 f"{iso.overall:.3f}" if isinstance(iso, Iso18571) else "-",
@@ -295,7 +306,8 @@ def comparison(found: Sequence[Misfit], folder: str) -> None:
                 "-" if c.rating.over_noise is None else f"{c.rating.over_noise:.3g}",
                 "-" if peak.relative_error is None else f"{100.0 * peak.relative_error:+.3g}",
                 f"{1e3 * peak.time_error:+.3g}",
-                style="" if rated else "yellow",
+                judged.in_words,
+                style=styles[judged.grade] or ("" if isinstance(iso, Iso18571) else "yellow"),
             )
         out.print(table)
         if each.zero is not None:

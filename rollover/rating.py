@@ -7,7 +7,10 @@ so that the time warp, whose cost and memory grow with the square of the length,
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +29,8 @@ MOST_SHIFT = 0.20
 WARP_WINDOW, MAGNITUDE_LIMIT = 0.10, 0.50
 SLOPE_LIMIT, SLOPE_SPAN = 2.0, 9
 WEIGHTS = {"corridor": 0.4, "phase": 0.2, "magnitude": 0.2, "slope": 0.2}
+BY_BADNESS: tuple[Literal["good", "fair", "poor"], ...] = ("good", "fair", "poor")
+COVERAGE = 2.0  # sigmas of noise that are allowed for: 95 %
 GRADES = ((0.94, "excellent"), (0.80, "good"), (0.58, "fair"))
 
 
@@ -89,7 +94,8 @@ class Rating:
     """All measures of one pair of signals over one stretch.
 
     `rms` of the residual, in the signal's unit; `nrmse` is that over the measured range, None for a constant one;
-    `over_noise` is that over 1 sigma of the noise, None where that is unknown; `integral_*` over the samples that
+    `over_noise` is that over 1 sigma of the noise, None where that is unknown; `deviation` is the measured signal's RMS
+    about its first value; `integral_*` over the samples that
     exist (the impulse of a force, N s; the change of speed of an acceleration, m/s).
     """
 
@@ -100,6 +106,7 @@ class Rating:
     nrmse: float | None
     over_noise: float | None
     peak: Peak
+    deviation: float
     integral_measured: float
     integral_simulated: float
 
@@ -128,6 +135,7 @@ def rate(
         nrmse=rms / span if span > 0.0 else None,
         over_noise=rms / noise if noise is not None and noise > 0.0 else None,
         peak=peak(t, m, s),
+        deviation=float(np.sqrt(np.mean((m - m[0]) ** 2))),
         integral_measured=float(weight @ m),
         integral_simulated=float(weight @ s),
     )
@@ -222,6 +230,55 @@ def iso18571(
 def grade(overall: float) -> str:
     """In words: above 0.94 excellent, above 0.80 good, above 0.58 fair, else poor."""
     return next((name for limit, name in GRADES if overall > limit), "poor")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """The worst of several measures of a pair of signals: how good, and by which measure."""
+
+    grade: Literal["good", "fair", "poor"]
+    measure: str
+
+    @property
+    def in_words(self) -> str:
+        """``fair: peak error``; good by all measures is just that."""
+        return self.grade if self.grade == "good" else f"{self.grade}: {self.measure}"
+
+
+def verdict(rating: Rating) -> Verdict:
+    """The worst of the ISO/TS 18571 rating, the error of the peak and the residual beyond noise and tolerance.
+
+    Good is what the standard calls good or excellent. A peak's relative error e, less what noise may do to it, is
+    graded by the standard's own score of a magnitude error, 1 - e/0.5: fair beyond 10 %, poor beyond 21 %. The RMS of
+    the residual is fair beyond sqrt((2 sigma)^2 + (0.05 s)^2), poor beyond the same with 0.21: noise sigma with the
+    coverage factor 2, s the RMS of the measured signal about where it began, 5 % the standard's inner corridor.
+    """
+    noise = rating.rms / rating.over_noise if rating.over_noise else 0.0
+    found = [_by_residual(rating, noise)]
+    if isinstance(rating.iso18571, Iso18571):
+        found.append(Verdict(grade=_coarse(rating.iso18571.overall), measure="ISO/TS 18571"))
+    if rating.peak.relative_error is not None:
+        beyond = max(0.0, abs(rating.peak.relative_error) - COVERAGE * noise / abs(rating.peak.measured))
+        found.append(Verdict(grade=_coarse(1.0 - beyond / MAGNITUDE_LIMIT), measure="peak error"))
+    return max(found, key=lambda v: BY_BADNESS.index(v.grade))
+
+
+def worst_verdict(verdicts: Sequence[Verdict]) -> Verdict:
+    """The worst of at least one."""
+    return max(verdicts, key=lambda v: BY_BADNESS.index(v.grade))
+
+
+def _by_residual(rating: Rating, noise: float) -> Verdict:
+    poor = MAGNITUDE_LIMIT * (1.0 - GRADES[-1][0])  # 21 %: the magnitude error at which the standard's score is poor
+    beyond = [share for share in (INNER, poor) if rating.rms > math.hypot(COVERAGE * noise, share * rating.deviation)]
+    return Verdict(
+        grade=BY_BADNESS[len(beyond)], measure=f"residual, RMS beyond noise and {100.0 * INNER:g} % tolerance"
+    )
+
+
+def _coarse(score: float) -> Literal["good", "fair", "poor"]:
+    name = grade(score)
+    return "good" if name in ("excellent", "good") else "fair" if name == "fair" else "poor"
 
 
 def corridor(measured: Array, simulated: Array) -> float:

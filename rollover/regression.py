@@ -33,6 +33,7 @@ class Chosen:
 
     files: tuple[Path, ...]
     answers: tuple[Answer, ...] = ()
+    left_out: tuple[Path, ...] = ()  # files of a folder that are no scenarios, such as vehicles
 
 
 Show = Callable[[int, int], None]  # runs done, of all
@@ -42,11 +43,16 @@ def chosen(names: Sequence[str]) -> Chosen:
     """Scenarios by name or file, all of a folder for a folder, all shipped ones for nothing. Raises `InputError`."""
     files: dict[Path, None] = {}
     answers: list[Answer] = []
+    left_out: list[Path] = []
     for name in names or [str(document.shipped_folder())]:
         if (folder := Path(name)).is_dir():
-            found = sorted(folder.glob("*.yaml"))
+            there = sorted(folder.glob("*.yaml"))
+            found = [file for file in there if is_scenario(file)]
+            left_out += [file for file in there if file not in found]
             if not found:
-                raise InputError(Fault(file=name, message="no scenario there; a folder with .yaml files is needed"))
+                raise InputError(
+                    Fault(file=name, message="no scenario there; a folder with scenarios, .yaml files, is needed")
+                )
             files.update(dict.fromkeys(found))
             answers += baselines.strangers(folder)
         else:
@@ -56,7 +62,18 @@ def chosen(names: Sequence[str]) -> Chosen:
         raise InputError(
             Fault(file=twice, message="two scenarios of that name, and results go by names; one at a time")
         )
-    return Chosen(files=tuple(files), answers=tuple(answers))
+    return Chosen(files=tuple(files), answers=tuple(answers), left_out=tuple(left_out))
+
+
+def is_scenario(file: Path) -> bool:
+    """Whether a file is a scenario by its keys; one that cannot be read is taken for one, so that its fault is told."""
+    try:
+        keys = document.headings(file)
+    except InputError:
+        return True
+    form = keys["format"].plain if "format" in keys else "rollover-scenario/"
+    known = {*document.slot_of(Scenario).keys()} - {"format", "title"}
+    return "kind" not in keys and str(form).startswith("rollover-scenario/") and not known.isdisjoint(keys)
 
 
 def compared(
@@ -188,11 +205,11 @@ def _without_runs(file: Path) -> tuple[Answer | None, Path]:
         return None, path
     if reason is not None:
         return Answer(scenario=file.stem, verdict="excluded", sentence=reason), path
-    sentence = (
-        f"no baseline; `rollover regress {file.stem} --update --reason TEXT` makes one, "
+    advice = (
+        f"`rollover regress {baselines.called(file)} --update --reason TEXT` makes one, "
         f"or {baselines.FOLDER}/{baselines.EXCLUDED} says why there is none"
     )
-    return Answer(scenario=file.stem, verdict="missing", sentence=sentence), path
+    return Answer(scenario=file.stem, verdict="missing", sentence="no baseline", notes=(advice,)), path
 
 
 def _work(start: Start) -> Observed:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import os
 import platform
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
@@ -14,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rollover.document import content_hash, dump
+from rollover.document import content_hash, dump, shipped_folder
 from rollover.faults import Fault, InputError
 from rollover.ledger import closure
 from rollover.recording import write_parquet
-from rollover.shipped import origin
+from rollover.shipped import origin as shipped_origin
 from rollover.writing import hold, own
 from rollover.writing import whole as whole
 
@@ -49,30 +50,71 @@ def versions() -> dict[str, str]:
     }
 
 
-def claim(folder: Path, scenario_hash: str, *, force: bool = False) -> Path:
+def origin(path: Path, folder: Path, given: Sequence[str] = ()) -> dict[str, Any]:
+    """What a result in `folder` was made from: the scenario's file as seen from there, and what was set besides."""
+    file, shipped = path.resolve(), shipped_folder().resolve()
+    if file.is_relative_to(shipped):
+        return {"shipped": file.relative_to(shipped).as_posix(), "set": list(given)}
+    try:
+        seen = Path(os.path.relpath(file, folder.resolve()))
+    except ValueError:  # another drive
+        seen = file
+    return {"file": seen.as_posix(), "set": list(given)}
+
+
+def claim(
+    folder: Path,
+    scenario_hash: str,
+    *,
+    force: bool = False,
+    made_from: Mapping[str, Any] | None = None,
+    say: Callable[[str], None] | None = None,
+) -> Path:
     """Resolve a results folder after making sure that it may be written. Raises `InputError`, changes nothing.
 
-    Results of the same scenario and versions may be written again; others only with `force`. A folder that holds
+    Results of the same scenario and versions may be written again, and so may older ones that were made from the same
+    file with the same settings (`made_from`, an `origin`), which is said; others only with `force`. A folder that holds
     anything but results is never touched. A command holds it from here to its end, so that no other writes there.
     """
     target, names = _own_files(folder, (*FILES, VIEWER), RUN)
     if not names or force:
         return target
     found = read_run_json(target)
+    is_own = made_from is not None and found.get("origin") == made_from
     if found.get("scenario_hash") != scenario_hash:
-        title = found.get("title", "")
-        raise _refused(folder, f"holds another run, got {title!r}; --force replaces it, --out leaves it")
-    if found.get("versions") != versions():
-        raise _refused(folder, "holds this run by other versions; --force replaces it, --out leaves it")
+        if not is_own:
+            title = found.get("title", "")
+            raise _refused(folder, f"holds another run, got {title!r}; --force replaces it, --out leaves it")
+        _say_replaced(say, folder, "run", found)
+    elif found.get("versions") != versions():
+        if not is_own:
+            raise _refused(folder, "holds this run by other versions; --force replaces it, --out leaves it")
+        if say is not None:
+            say(f"{folder}: replaces the run of this scenario by other versions")
     return target
 
 
+def _say_replaced(say: Callable[[str], None] | None, folder: Path, what: str, found: Mapping[str, Any]) -> None:
+    if say is not None:
+        old = str(found.get("scenario_hash", ""))[:12]
+        say(f"{folder}: replaces the {what} of this scenario as it was before it was changed (hash {old})")
+
+
 def claim_account(
-    folder: Path, form: str, about: Mapping[str, Any], files: Sequence[str], *, force: bool = False
+    folder: Path,
+    form: str,
+    about: Mapping[str, Any],
+    files: Sequence[str],
+    *,
+    force: bool = False,
+    own_account: Callable[[Mapping[str, Any]], str] | None = None,
+    say: Callable[[str], None] | None = None,
 ) -> Path:
     """Like `claim`, for what other commands write: `files`, the first of them JSON of the format `form`.
 
-    The same command's account of the same things, those that `about` names, is written again without `force`.
+    The same command's account of the same things, those that `about` names, is written again without `force`; so is
+    one that differs in the scenario's hash alone, its `origin` being the same, and one of which `own_account` says in a
+    sentence why it may be replaced. Both are said.
     """
     target, names = _own_files(folder, files, files[0])
     if not names or force:
@@ -81,9 +123,22 @@ def claim_account(
         found = json.loads((target / files[0]).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         found = {}
-    if found.get("format") != form or any(found.get(key) != value for key, value in about.items()):
-        raise _refused(folder, f"holds results of something else; --force replaces {files[0]}, --out leaves it")
-    return target
+    others = {key for key, value in about.items() if found.get(key) != value} if isinstance(found, dict) else {"format"}
+    if others <= {"origin"} and found.get("format") == form:
+        return target
+    if others == {"scenario_hash"} and "origin" in about and found.get("format") == form:
+        _say_replaced(say, folder, "account", found)
+        return target
+    if (
+        isinstance(found, dict)
+        and found.get("format") == form
+        and own_account is not None
+        and (why := own_account(found))
+    ):
+        if say is not None:
+            say(f"{folder}: {why}")
+        return target
+    raise _refused(folder, f"holds results of something else; --force replaces {files[0]}, --out leaves it")
 
 
 def _own_files(folder: Path, files: Sequence[str], first: str) -> tuple[Path, list[str]]:
@@ -112,6 +167,7 @@ def write(
     picture: Callable[[Path], None] | None = None,
     page: Callable[[Mapping[str, Any]], str] | None = None,
     force: bool = False,
+    made_from: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Write a run's folder and return what its run.json says.
 
@@ -120,7 +176,7 @@ def write(
     what run.json says. Whatever happens before that, an interrupt too, leaves nothing behind.
     """
     scenario_hash = content_hash(run.scenario)
-    target = claim(folder, scenario_hash, force=force)
+    target = claim(folder, scenario_hash, force=force, made_from=made_from)
     with whole(target) as part:
         head = f"{run.scenario.title}\nEvery value of the run beside this file; run it again: rollover run {SCENARIO}"
         (part / SCENARIO).write_text(dump(run.scenario, head), encoding="utf-8")
@@ -130,6 +186,8 @@ def write(
             picture(part / PICTURE)
         names = sorted([*(p.name for p in part.iterdir()), RUN, *([PAGE] if page is not None else [])])
         answer = _answer(run, scenario_hash, peaks, criteria, half_step, names)
+        if made_from is not None:
+            answer["origin"] = plain(made_from)
         write_json(part / RUN, answer)
         if page is not None:
             (part / PAGE).write_text(page(answer), encoding="utf-8")
@@ -163,7 +221,7 @@ def _answer(
         {
             "format": FORMAT,
             "title": run.scenario.title,
-            "shipped": None if (made_from := origin(run.scenario)) is None else asdict(made_from),
+            "shipped": None if (shipped := shipped_origin(run.scenario)) is None else asdict(shipped),
             "status": run.status,
             "sentence": run.sentence,
             "versions": versions(),

@@ -187,15 +187,24 @@ def _side(run: Run) -> float:
 
 
 def matching(channels: Sequence[str], plots: _Plots) -> list[tuple[str, list[str]]]:
-    """Title and channels of every plot that has any."""
-    found = [(title, [c for p in patterns for c in channels if fnmatchcase(c, p)]) for title, patterns in plots]
-    return [(title, fitting) for title, fitting in found if fitting]
+    """Title and channels of every plot that has any; one whose channels have several units becomes one for each."""
+    found = []
+    for title, patterns in plots:
+        by_unit: dict[str, list[str]] = {}
+        for channel in (c for p in patterns for c in channels if fnmatchcase(c, p)):
+            by_unit.setdefault(series(channel).unit, []).append(channel)
+        found += [(f"{title.rpartition(', ')[0]}, {unit}", fitting) for unit, fitting in by_unit.items()]
+    return found
 
 
 def lively(run: Run, channels: Sequence[str], plots: _Plots) -> _Plots:
     """The same plots, those in front first that show something."""
-    dull = {title for title, fitting in matching(channels, plots) if all(_dull(run, c) for c in fitting)}
-    return tuple(sorted(plots, key=lambda p: p[0] in dull))
+
+    def is_dull(one: tuple[str, tuple[str, ...]]) -> bool:
+        fitting = [c for _, found in matching(channels, (one,)) for c in found]
+        return bool(fitting) and all(_dull(run, c) for c in fitting)
+
+    return tuple(sorted(plots, key=is_dull))
 
 
 def _dull(run: Run, channel: str) -> bool:
@@ -239,7 +248,7 @@ def _mounts(run: Run, channels: Sequence[str]) -> list[rrb.Container]:
 
 def _moments(run: Run, channels: Sequence[str]) -> list[rrb.Container]:
     """One tab with the moments through mounts and hinges, and how far these turn."""
-    return _joints(run, channels, _MOMENTS, "Moments, kN m")
+    return _joints(run, channels, _MOMENTS, "Moments and turns")
 
 
 def _joints(run: Run, channels: Sequence[str], patterns: tuple[str, ...], title: str) -> list[rrb.Container]:

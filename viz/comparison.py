@@ -9,7 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from rollover.misfit import ChannelMisfit, Misfit
-from rollover.rating import Iso18571, Rating
+from rollover.rating import Iso18571, Rating, verdict, worst_verdict
 from rollover.run import Run
 from viz.blueprint import Beside
 from viz.entities import CYCLE, MEASURED, PHASE, series
@@ -76,6 +76,8 @@ def markdown(found: Misfit) -> str:
         iso, c = worst
         head = f"ISO/TS 18571 {iso.overall:.2f} ({iso.grade}) at worst, {series(c.channel).name}"
     lines = [f"# {head[0].upper()}{head[1:]}", "", found.title, ""]
+    if judged := [verdict(c.rating) for c in found.channels if isinstance(c.rating, Rating)]:
+        lines += [f"Agreement at worst {worst_verdict(judged).in_words}.", ""]
     lines += ["| channel | CFC | ISO/TS 18571 | RMS / noise | peak | peak later |", "|---|---|---|---|---|---|"]
     for c in found.channels:
         lines.append(f"| {series(c.channel).name} | {c.cfc or 'none'} | {' | '.join(_cells(c))} |")

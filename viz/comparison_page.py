@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from rollover.misfit import ChannelMisfit, Misfit
-from rollover.rating import Iso18571, NotRateable, Rating, SpragueGeers
+from rollover.rating import Iso18571, NotRateable, Rating, SpragueGeers, verdict, worst_verdict
 from rollover.scenario import Scenario
 from viz import plots
 from viz.comparison import sentences
@@ -14,9 +14,9 @@ from viz.entities import series
 from viz.page import Block, Cell, Details, Figure, Footer, Headline, Note, Section, State, Table, render
 from viz.plots import Curve
 
-STATES: Mapping[str, State] = {"excellent": "pass", "good": "pass", "fair": "warn", "poor": "fail"}
+STATES: Mapping[str, State] = {"good": "pass", "fair": "warn", "poor": "fail"}
 COLUMNS = ["channel", "CFC", "ISO/TS 18571", "grade", "Z", "E_P", "E_M", "E_S", "M, %", "P, %"]
-COLUMNS += ["RMS / range, %", "RMS / noise", "peak, %", "peak later, ms"]
+COLUMNS += ["RMS / range, %", "RMS / noise", "peak, %", "peak later, ms", "verdict"]
 
 
 def page(
@@ -58,13 +58,22 @@ def headline(found: Sequence[Misfit]) -> Headline:
     noisy = sorted(r.over_noise for r in ratings if isinstance(r, Rating) and r.over_noise is not None)
     recordings = f"{len(found)} recording{'s' if len(found) != 1 else ''}, {len(ratings)} channels"
     detail = f"Residuals are {noisy[0]:.3g} to {noisy[-1]:.3g} times the noise." if noisy else ""
+    state: State = "warn"
+    if worst := [verdict(r) for r in ratings if isinstance(r, Rating)]:
+        judged = worst_verdict(worst)
+        state = STATES[judged.grade]
+        detail = f"{detail} Agreement at worst {judged.in_words}.".strip()
     if not isos:
-        return Headline(sentence=f"{recordings}: none could be rated.", detail=detail, state="warn")
+        return Headline(
+            sentence=f"{recordings}: none could be rated.",
+            detail=detail,
+            state="fail" if state == "fail" else "warn",
+        )
     low, high = isos[0], isos[-1]
     return Headline(
         sentence=f"{recordings}: ISO/TS 18571 {low.overall:.2f} ({low.grade}) to {high.overall:.2f} ({high.grade}).",
         detail=detail,
-        state=STATES[low.grade],
+        state=state,
     )
 
 
@@ -72,8 +81,11 @@ def _recording(found: Misfit) -> list[Block]:
     table = Table(
         columns=COLUMNS,
         rows=[_row(c.channel, c.cfc, c.rating) for c in found.channels],
-        numeric=(2, *range(4, len(COLUMNS))),
-        caption="Z corridor, E_P phase, E_M magnitude, E_S slope of ISO/TS 18571; M, P Sprague-Geers.",
+        numeric=(2, *range(4, len(COLUMNS) - 1)),
+        caption="Z corridor, E_P phase, E_M magnitude, E_S slope of ISO/TS 18571; M, P Sprague-Geers. "
+        "Verdict: the worst of the rating, the peak (fair beyond 10 %, poor beyond 21 %, as the standard scores a "
+        "magnitude error) and the residual (fair beyond twice the noise and 5 % of the signal's RMS together, "
+        "poor with 21 %).",
     )
     blocks: list[Block] = [Note(text=found.title), table]
     why = [
@@ -114,10 +126,11 @@ def _row(channel: str, cfc: int | None, rating: Rating | NotRateable) -> list[st
     if isinstance(rating, NotRateable):
         return [*first, Cell(rating.reason, "muted"), *[""] * (len(COLUMNS) - 3)]
     iso, sg, peak = rating.iso18571, rating.sprague_geers, rating.peak
+    judged = verdict(rating)
     scores: list[str | Cell] = [Cell("not rated", "muted"), "", "", "", "", ""]
     if isinstance(iso, Iso18571):
         parts = (iso.corridor, iso.phase, iso.magnitude, iso.slope)
-        scores = [f"{iso.overall:.3f}", Cell(iso.grade, STATES[iso.grade]), *(f"{p:.3f}" for p in parts)]
+        scores = [f"{iso.overall:.3f}", iso.grade, *(f"{p:.3f}" for p in parts)]
     geers = [f"{100.0 * v:.3g}" for v in (sg.magnitude, sg.phase)] if isinstance(sg, SpragueGeers) else ["", ""]
     return [
         *first,
@@ -127,6 +140,7 @@ def _row(channel: str, cfc: int | None, rating: Rating | NotRateable) -> list[st
         _number(rating.over_noise),
         "" if peak.relative_error is None else f"{100.0 * peak.relative_error:+.3g}",
         f"{1e3 * peak.time_error:+.3g}",
+        Cell(judged.in_words, STATES[judged.grade]),
     ]
 
 

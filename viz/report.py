@@ -176,16 +176,15 @@ def _domain(run: Run, peaks: Sequence[PeakLoad]) -> list[Block]:
 def _histories(run: Run, peaks: Sequence[PeakLoad]) -> list[Block]:
     cfc, time = run.scenario.loads.cfc, run.recording.time
     figures: list[Block] = []
-    wheels: list[Curve] = []
-    mounts: list[Curve] = []
+    shared: dict[tuple[str, str], list[Curve]] = {}  # by what is drawn and its unit: one axis, one quantity
     for channel, parts, _ in load_channels(run.recording):
         s = series(channel)
         if run.tests and not np.any(magnitude(run.recording, parts, None)):
             continue  # on a test stand the ground need not touch a ROPS, nor a device push
         smooth = Curve(name=f"CFC {cfc}", x=time, y=s.factor * magnitude(run.recording, parts, cfc))
         if channel.startswith(("wheel/", "rops/mount/")):
-            group = wheels if channel.startswith("wheel/") else mounts
             if np.any(smooth.y > 0.0):
+                group = shared.setdefault((_quantity(channel), s.unit), [])
                 role = plots.CYCLE[len(group) % len(plots.CYCLE)]
                 group.append(Curve(name=f"{s.name}, CFC {cfc}", x=time, y=smooth.y, role=role))
             continue
@@ -193,10 +192,9 @@ def _histories(run: Run, peaks: Sequence[PeakLoad]) -> list[Block]:
         svg = plots.history(both, label=f"{s.name}, {s.unit}", phases=run.phases)
         text = next((f"; peak {raw(p)} raw" for p in peaks if p.channel == channel), "")
         figures.append(Figure(svg=svg, caption=f"{title(s.name)} over time, raw and CFC {cfc}{text}. Shading: phases."))
-    for name, group in (("Mount loads", mounts), ("Wheel loads", wheels)):
-        if group:
-            svg = plots.history(group, label=f"{name.lower()}, kN", phases=run.phases)
-            figures.append(Figure(svg=svg, caption=f"{name} over time, CFC {cfc}."))
+    for (name, unit), group in sorted(shared.items()):
+        svg = plots.history(group, label=f"{name}, {unit}", phases=run.phases)
+        figures.append(Figure(svg=svg, caption=f"{title(name)} over time, CFC {cfc}."))
     if "striker/velocity_z" in run.recording.channels:
         force, depth = series("ground/force_normal"), series("ground/sinkage")
         curve = Curve(
@@ -207,6 +205,13 @@ def _histories(run: Run, peaks: Sequence[PeakLoad]) -> list[Block]:
         svg = plots.xy([curve], across=f"sinkage, {depth.unit}", label=f"ground force, {force.unit}")
         figures.insert(0, Figure(svg=svg, caption="Force of the ground over sinkage, raw: loading and unloading."))
     return [Section(title="Histories", blocks=figures)]
+
+
+def _quantity(channel: str) -> str:
+    """What is drawn of all wheels or mounts in one figure: mount forces, wheel spin."""
+    part = channel.rpartition("/")[2]
+    whose = "wheel" if channel.startswith("wheel/") else "mount"
+    return f"{whose} {({'force': 'forces', 'force_normal': 'loads', 'moment': 'moments'}).get(part, part)}"
 
 
 def _raw(run: Run, parts: tuple[str, ...], factor: float) -> Curve:

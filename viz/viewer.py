@@ -28,6 +28,11 @@ def viewer_binary() -> Path:
     raise FileNotFoundError("viewer: not found beside the installed rerun-sdk; install a rerun-sdk with its viewer")
 
 
+def has_display() -> bool:
+    """Whether a window can be opened; only X11 and Wayland say where."""
+    return sys.platform in ("darwin", "win32") or any(os.environ.get(k) for k in ("DISPLAY", "WAYLAND_DISPLAY"))
+
+
 def open_viewer(path: Path) -> int:
     """Open a recording and wait until its window is closed; returns the viewer's exit status.
 

@@ -74,7 +74,8 @@ def calibrate(
         "fitted": fit,
         "held_out": sorted(held),
     }
-    store.claim_account(folder, FORMAT, about, [JSON, OVERRIDE, SCENARIO, PAGE], force=force)
+    about["origin"] = store.origin(path, folder, set_ or [])
+    store.claim_account(folder, FORMAT, about, [JSON, OVERRIDE, SCENARIO, PAGE], force=force, say=console.say)
     try:
         found = fitted(
             chosen,

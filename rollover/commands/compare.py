@@ -80,7 +80,8 @@ def compare(
     folder = out or Path("out", "compare", path.stem)
     pictures = _pictures(list(measured))
     about: dict[str, Any] = {"scenario_hash": document.content_hash(chosen), "recordings": list(measured)}
-    store.claim_account(folder, FORMAT, about, [JSON, PAGE, *pictures.values()], force=force)
+    about["origin"] = store.origin(path, folder, set_ or [])
+    store.claim_account(folder, FORMAT, about, [JSON, PAGE, *pictures.values()], force=force, say=console.say)
     _say_compiling()
     with document.named(path):
         runs = {name: _run(chosen, name, recording) for name, recording in measured.items()}

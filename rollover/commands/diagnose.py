@@ -94,7 +94,8 @@ def diagnose(
         "hold_out": held,
         "tolerance": tolerance,
     }
-    store.claim_account(folder, FORMAT, about, FILES, force=force)
+    about["origin"] = store.origin(path, folder, set_ or [])
+    store.claim_account(folder, FORMAT, about, FILES, force=force, say=console.say)
     console.say("asking the sensors first")
     findings = _prechecks(chosen, measured)
     # beside the results folder, which is written whole or not at all: what an interrupted diagnosis had fitted

@@ -13,7 +13,8 @@ from concurrent.futures import BrokenExecutor
 from typing import Annotated, Any, TypeVar
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
+from typer.models import CommandFunctionType
 
 # what takes long to import is imported by the command that needs it: `rollover --help` answers at once
 from rollover.faults import Fault, InputError
@@ -41,8 +42,36 @@ def manual(*examples: str, writes: str, status: str = "") -> str:
     return "\n\n".join([*lines, f"Writes:  {writes}", f"Exit status:  {words}."])
 
 
+def _without_type(params: list[Any]) -> list[Any]:
+    """Parameters, of which those that take no value show no type of one in a help."""
+    for option in params:
+        if getattr(option, "is_flag", False):
+            option.metavar = ""
+    return params
+
+
+class Plain(TyperCommand):
+    """A command in whose help a flag has no type."""
+
+    def get_params(self, ctx: Any) -> Any:
+        """Its parameters, `--help` among them."""
+        return _without_type(super().get_params(ctx))
+
+
+class Commands(typer.Typer):
+    """An application whose commands are `Plain`."""
+
+    def command(self, *args: Any, **kwargs: Any) -> Callable[[CommandFunctionType], CommandFunctionType]:
+        """Register a command."""
+        return super().command(*args, **{"cls": Plain, **kwargs})
+
+
 class Before(TyperGroup):
     """The commands; an option of `rollover` itself that follows one of them is told where it stands."""
+
+    def get_params(self, ctx: Any) -> Any:
+        """Its parameters, `--help` among them."""
+        return _without_type(super().get_params(ctx))
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command that the first word names, of which the rest is for that command."""
@@ -55,7 +84,7 @@ class Before(TyperGroup):
         return name, command, rest
 
 
-app = typer.Typer(
+app = Commands(
     cls=Before,
     help="Vehicle rollover load studies: what the ground does to a ROPS.",
     epilog=manual("run side_overturn", "run --help", writes="each command into its own folder, whole or not at all.")
@@ -69,7 +98,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the answer as JSON o
 Setting = Annotated[
     list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Replace a value; may be repeated.")
 ]
-Force = Annotated[bool, typer.Option("--force", help="Replace another run's results.")]
+Force = Annotated[bool, typer.Option("--force/--no-force", help="Replace another run's results.")]
 
 
 def answering(command: C) -> C:

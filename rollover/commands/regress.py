@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+import shlex
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -53,7 +54,17 @@ def regress(
     choice = regression.chosen(scenarios or [])
     selection = sorted(f.stem for f in choice.files)
     _settled(choice.files, update)
-    store.claim_account(out, FORMAT, {"scenarios": selection}, ACCOUNT, force=force)
+    for file in choice.left_out:
+        console.say(f"{file}: left out, no scenario")
+
+    def overlaps(found: Mapping[str, Any]) -> str:
+        before = {*map(str, found.get("scenarios", []))}
+        shared = before & {*selection}
+        return f"replaces the account of {', '.join(sorted(before))}" if shared else ""
+
+    store.claim_account(
+        out, FORMAT, {"scenarios": selection}, ACCOUNT, force=force, own_account=overlaps, say=console.say
+    )
     if not is_warm():
         console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
     failed: list[Answer] = []
@@ -72,7 +83,7 @@ def regress(
     with updating(out, baselines.texts(new)) as part:
         store.write_json(part / JSON, account)
         store.write_csv(part / CSV, _rows(answers))
-        (part / PAGE).write_text(_page(answers, selection, account["scenario_hash"]), encoding="utf-8")
+        (part / PAGE).write_text(_page(answers, scenarios or [], account["scenario_hash"]), encoding="utf-8")
     if as_json:
         print(json.dumps(account, indent=2))
     else:
@@ -137,7 +148,9 @@ def _rows(answers: list[Answer]) -> list[dict[str, Any]]:
     return [{"scenario": a.scenario, "verdict": a.verdict, **asdict(d)} for a in answers for d in a.differences]
 
 
-def _page(answers: list[Answer], selection: list[str], scenario_hash: str) -> str:
+def _page(answers: list[Answer], names: list[str], scenario_hash: str) -> str:
     from viz.regression import page
 
-    return page(answers, command=" ".join(["rollover regress", *selection]), scenario_hash=scenario_hash)
+    return page(
+        answers, command=" ".join(map(shlex.quote, ["rollover", "regress", *names])), scenario_hash=scenario_hash
+    )

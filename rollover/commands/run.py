@@ -78,7 +78,9 @@ def run(
     from rollover import loads, store
 
     folder = out or Path("out", "run", path.stem)
-    store.claim(folder, document.content_hash(chosen), force=force)  # before a run that may take minutes
+    made_from = store.origin(path, folder, set_ or [])
+    # before a run that may take minutes
+    store.claim(folder, document.content_hash(chosen), force=force, made_from=made_from, say=console.say)
     with document.named(path):
         done, again = _simulated(chosen, half_step)
     # what a run that broke off reached is in its channels; a peak of it would pass for the peak
@@ -96,6 +98,7 @@ def run(
         picture=_picture(done, peaks),
         page=lambda answer: _page(done, peaks, answer, rows, command),
         force=force,
+        made_from=made_from,
     )
     if as_json:
         print(json.dumps(answer, indent=2))

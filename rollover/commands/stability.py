@@ -54,7 +54,8 @@ def stability_(
         chosen = chosen.replaced(settings(set_), origin="--set")
     folder = out or Path("out", "stability", Path(name).stem)
     about: dict[str, Any] = {"scenario_hash": document.content_hash(chosen)}
-    store.claim_account(folder, FORMAT, about, (JSON, PAGE), force=force)
+    about["origin"] = store.origin(_file(name), folder, set_ or [])
+    store.claim_account(folder, FORMAT, about, (JSON, PAGE), force=force, say=console.say)
     if not is_warm():
         console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
     try:
@@ -81,6 +82,19 @@ def stability_(
         console.stability(answer, str(folder))
 
 
+def _file(name: str) -> Path:
+    """File of the scenario or vehicle of that name. Raises `InputError`."""
+    from rollover import document
+
+    try:
+        return document.find(name)
+    except InputError as no_scenario:
+        try:
+            return document.find(name, "vehicles")
+        except InputError as no_vehicle:
+            raise (no_vehicle if "did you mean" in str(no_vehicle) else no_scenario) from None
+
+
 def _scenario(name: str) -> Scenario:
     """The scenario of that name, or a vehicle on level ground."""
     from ground.array import Elements
@@ -90,13 +104,7 @@ def _scenario(name: str) -> Scenario:
     from rollover.initiation import Standing
     from rollover.vehicle import Vehicle
 
-    try:
-        path = document.find(name)
-    except InputError as no_scenario:
-        try:
-            path = document.find(name, "vehicles")
-        except InputError as no_vehicle:
-            raise (no_vehicle if "did you mean" in str(no_vehicle) else no_scenario) from None
+    path = _file(name)
     keys = document.headings(path)
     kind = keys["kind"].plain if "kind" in keys else None
     if kind not in document.slot_of(scenarios.AnyVehicle).kinds:

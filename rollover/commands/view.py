@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -35,13 +36,25 @@ def view(
         if html is not None:
             _page(path, html, force)
             return
-        from viz.viewer import open_viewer
+        from viz.viewer import has_display, open_viewer
 
+        if not has_display():
+            raise InputError(Fault(file=str(path), message=_no_display(results)))
         status = open_viewer(path)
     except FileNotFoundError as e:
         raise InputError(Fault(message=str(e))) from None
     if status != 0:
         raise InputError(Fault(file=str(path), message=f"the viewer could not show it, it ended with status {status}"))
+
+
+def _no_display(results: Path) -> str:
+    """What to do where no window can be opened."""
+    asked = shlex.quote(str(results))
+    return (
+        "no display to open a window on, got neither DISPLAY nor WAYLAND_DISPLAY; "
+        f"`rollover view {asked} --html viewer.html` writes a page to open elsewhere, and in a checkout "
+        "`python -m tests.viz.picture RRD FOLDER/NAME TIME` a picture of an .rrd"
+    )
 
 
 def _recording(results: Path) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,7 +13,8 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
-from ruamel.yaml.scalarstring import DoubleQuotedScalarString
+from ruamel.yaml.representer import RoundTripRepresenter
+from ruamel.yaml.scalarstring import DoubleQuotedScalarString, SingleQuotedScalarString
 
 from rollover.faults import Fault, InputError
 
@@ -193,9 +195,38 @@ def planted(value: Any, place: Place) -> Node:
     return Node(value=value, place=place, key=place)
 
 
+# what a reader of YAML 1.1 takes for something other than text, by its types bool, null, merge, value, int, float
+# (base 60 among them) and timestamp (yaml.org/type)
+_OTHER = re.compile(
+    r"""y|Y|yes|Yes|YES|n|N|no|No|NO|true|True|TRUE|false|False|FALSE|on|On|ON|off|Off|OFF
+    |~|null|Null|NULL|<<|=
+    |[-+]?0b[01_]+ | [-+]?0x[0-9a-fA-F_]+ | [-+]?[0-9][0-9_]*(:[0-5]?[0-9])*
+    |[-+]?([0-9][0-9_]*)?\.[0-9._]*([eE][-+]?[0-9]+)? | [-+]?[0-9][0-9_]*[eE][-+]?[0-9]+
+    |[-+]?[0-9][0-9_]*(:[0-5]?[0-9])+\.[0-9_]*
+    |[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)
+    |[0-9]{4}-[0-9]{1,2}-[0-9]{1,2}(([Tt]|[ \t]+)[0-9]{1,2}:[0-9]{2}:[0-9]{2}(\.[0-9]*)?([ \t]*(Z|[-+][0-9:]+))?)?
+    """,
+    re.VERBOSE,
+)
+
+
+class _Representer(RoundTripRepresenter):  # type: ignore[misc]  # ruamel has no types
+    """Numbers as readers of YAML 1.1 read them too: a float has its point, 1.0e-05."""
+
+    def represent_float(self, data: Any) -> Any:
+        """Scalar node of a float, every bit of it."""
+        node = super().represent_float(data)
+        node.value = node.value if "." in node.value else node.value.replace("e", ".0e", 1)
+        return node
+
+
+_Representer.add_representer(float, _Representer.represent_float)
+
+
 def write(mapping: Mapping[str, Any]) -> str:
-    """YAML 1.2 text of a tree of bare values; lists of scalars stand on one line, floats keep every bit."""
+    """YAML text of a tree of bare values, alike in 1.1 and 1.2; lists of scalars on one line, floats in every bit."""
     yaml = YAML(typ="rt", pure=True)
+    yaml.Representer = _Representer
     yaml.width = 120
     yaml.indent(mapping=2, sequence=4, offset=2)
     stream = io.StringIO()
@@ -205,7 +236,7 @@ def write(mapping: Mapping[str, Any]) -> str:
 
 def _styled(value: Any) -> Any:
     if isinstance(value, Mapping):
-        return CommentedMap({key: _styled(child) for key, child in value.items()})
+        return CommentedMap({_styled(key): _styled(child) for key, child in value.items()})
     if isinstance(value, (list, tuple)):
         styled = CommentedSeq(_styled(child) for child in value)
         if not any(isinstance(child, (Mapping, list, tuple)) for child in value):
@@ -213,4 +244,6 @@ def _styled(value: Any) -> Any:
         return styled
     if isinstance(value, str) and not value.isprintable():
         return DoubleQuotedScalarString(value)  # any other style takes some rare characters for line breaks
+    if isinstance(value, str) and _OTHER.fullmatch(value):
+        return SingleQuotedScalarString(value)
     return value

@@ -123,3 +123,17 @@ def test_a_path_that_leads_nowhere_is_put_right_where_it_goes_wrong(here: Path) 
     assert absent(here / "recordings" / "drop3.csv" / "more") == "no such file", "below a file there is nothing"
     (here / "recordingz").mkdir()
     assert str(wanted) in absent(here / "recordingz_" / "drop3.csv"), "the neighbour that has the rest"
+
+
+@pytest.mark.parametrize("command", [*COMMANDS, ""])
+def test_a_flag_has_no_type_and_what_replaces_can_be_taken_back(command: str) -> None:
+    text = asked(*filter(None, [command]), "--help").output
+    assert "<bool>" not in text
+    assert "--help" in text
+    if "--force" in text:
+        assert re.search(r"--force\s.*--no-force\s", text)
+
+
+def test_what_takes_a_value_still_says_of_which_kind() -> None:
+    assert re.search(r"--ensemble\s+<int", manual_of("run"))
+    assert re.search(r"--set\s+PATH=VALUE", manual_of("run"))

@@ -7,7 +7,18 @@ import math
 import numpy as np
 import pytest
 
-from rollover.rating import Iso18571, NotRateable, Rating, best_shift, grade, iso18571, rate
+from rollover.rating import (
+    Iso18571,
+    NotRateable,
+    Rating,
+    Verdict,
+    best_shift,
+    grade,
+    iso18571,
+    rate,
+    verdict,
+    worst_verdict,
+)
 
 N = 801
 TIME = np.arange(N) * 1e-4  # 80 ms at 10 kHz: what the standard asks for
@@ -183,3 +194,43 @@ def test_a_long_stretch_is_rated_at_a_lower_rate_that_is_stated() -> None:
     # |m - s| = 0.03 |m| is inside the inner corridor throughout; after the warp at most 3 % remain of 50 %
     assert found.corridor == 1.0
     assert 1.0 - 0.03 / 0.5 <= found.magnitude <= 1.0
+
+
+def judged(scale: float, sigma: float, *, bias: float = 0.0, peak: float = 0.0) -> Verdict:
+    """Verdict of a half-sine that is scaled, shifted by a bias and has a peak added, under noise of 1 sigma."""
+    t = np.arange(0.0, 0.2, 1e-4)
+    pulse = np.where(t < 0.1, np.sin(np.pi * t / 0.1), 0.0) * 1e4
+    measured = pulse + np.random.default_rng(4).normal(0.0, sigma, t.size)
+    simulated = scale * pulse + bias + peak * np.exp(-(((t - 0.05) / 1e-3) ** 2))
+    found = rate(t, measured, simulated, noise=sigma)
+    assert isinstance(found, Rating)
+    return verdict(found)
+
+
+def test_the_verdict_is_that_of_the_worst_measure() -> None:
+    assert judged(1.0, 20.0).grade == "good"
+    assert judged(1.0, 800.0).grade == "good", "noise alone is no misfit"
+    # 4 % of magnitude is inside the 5 % tolerance however quiet the sensor; 8 % is not, though the standard says good
+    assert judged(1.04, 5.0).grade == "good"
+    fair = judged(1.08, 5.0)
+    assert (fair.grade, fair.measure[:8]) == ("fair", "residual")
+    assert judged(1.0, 5.0, peak=1500.0).in_words == "fair: peak error"
+    assert judged(1.0, 5.0, peak=3000.0).in_words == "poor: peak error"
+    assert judged(0.5, 5.0).grade == "poor"
+
+
+def test_a_rating_called_good_with_a_residual_of_many_times_the_noise_is_not_green() -> None:
+    t = np.arange(0.0, 0.2, 1e-4)
+    measured = 1e4 * np.where(t < 0.1, np.sin(np.pi * t / 0.1), 0.0)
+    found = rate(t, measured, np.roll(measured, 20), noise=9.0)  # 2 ms late
+    assert isinstance(found, Rating)
+    assert isinstance(found.iso18571, Iso18571)
+    assert found.iso18571.grade in ("good", "excellent")
+    assert found.over_noise is not None
+    assert found.over_noise > 20.0
+    assert verdict(found).grade == "fair"
+
+
+def test_the_worst_of_several_verdicts_is_told() -> None:
+    good, fair = Verdict(grade="good", measure="ISO/TS 18571"), Verdict(grade="fair", measure="peak error")
+    assert worst_verdict([good, fair, good]) is fair

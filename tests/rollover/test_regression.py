@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
 import shutil
 from pathlib import Path
 from typing import Any
@@ -143,7 +145,8 @@ def test_a_missing_baseline_an_unknown_one_and_one_left_out(folder: Path) -> Non
     done = regress(folder)
     assert done.exit_code == 1
     assert "new" in done.stdout
-    assert "no baseline; `rollover regress new --update --reason TEXT` makes one" in done.stdout
+    (advised,) = re.findall(r"`rollover (regress .*? --update) --reason TEXT` makes one", done.stdout)
+    assert Path(shlex.split(advised)[1]) == folder / "new.yaml"
     assert "baselines/gone.yaml: no scenario of that name" in done.stdout
     assert "2 of 4 scenarios are not as they were" in done.stdout
     (folder / "baselines" / "gone.yaml").unlink()
@@ -228,3 +231,30 @@ def test_names_that_make_no_sense(folder: Path) -> None:
     shutil.copy(folder / "drop.yaml", folder / "empty" / "drop.yaml")
     done = regress(folder, folder / "empty" / "drop.yaml")
     assert (done.exit_code, "two scenarios of that name" in done.stderr) == (2, True)
+
+
+def test_the_advised_command_works_as_printed(folder: Path) -> None:
+    (folder / "my new.yaml").write_text((folder / "drop.yaml").read_text())
+    first = regress(folder)
+    assert first.exit_code == 1
+    (advised,) = re.findall(r"`rollover (.*?--reason) TEXT` makes one", first.stdout)
+    done = runner.invoke(app, [*shlex.split(advised), "a first one", "--workers", "0"])
+    assert done.exit_code == 0, done.stderr
+    assert "replaces the account of corner, drop, my new" in done.stderr
+    assert "`rollover regress '../my new.yaml'`" in (folder / "baselines" / "my new.yaml").read_text()
+    assert regress(folder).exit_code == 0
+
+
+def test_what_is_no_scenario_is_left_out_of_a_folder_and_said(folder: Path) -> None:
+    (folder / "tractor.yaml").write_text("kind: vehicle\nname: mine\n")
+    (folder / "clay.yaml").write_text(SOIL.format(scale=1.0))
+    (folder / "plan.yaml").write_text("format: rollover-study/1\ntitle: x\nscenario: drop.yaml\n")
+    choice = regression.chosen([str(folder)])
+    assert [f.stem for f in choice.files] == ["corner", "drop"]
+    assert [f.stem for f in choice.left_out] == ["clay", "plan", "tractor"]
+    (folder / "broken.yaml").write_text("title: [")
+    assert "broken" in [f.stem for f in regression.chosen([str(folder)]).files], "its fault has to be told"
+    for name in ("drop", "corner", "broken"):
+        (folder / f"{name}.yaml").unlink()
+    done = regress(folder)
+    assert (done.exit_code, "no scenario there" in done.stderr) == (2, True)

@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from typer.testing import CliRunner
 
 from rollover import store
+from rollover.cli import app
 from rollover.document import content_hash
 from rollover.faults import InputError
 from rollover.recording import Clock, Recording, Sensor, read_parquet, write_parquet
@@ -200,3 +202,50 @@ def test_how_a_channel_was_measured_survives_too(tmp_path: Path) -> None:
     write_parquet(recording, tmp_path / "c.parquet")
     again = read_parquet(tmp_path / "c.parquet")
     assert (again.clock, again.sensors, again.notes) == (recording.clock, recording.sensors, recording.notes)
+
+
+def test_ones_own_result_of_an_older_scenario_is_replaced_and_that_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("mine.yaml").write_text("base: drop_test.yaml\ntitle: Mine\nsimulation: {duration: 0.05}\n")
+
+    def asked(*words: str) -> Any:
+        return CliRunner().invoke(app, ["run", "--no-half-step", "--out", "out/mine", *words])
+
+    assert asked("mine.yaml").exit_code == 0
+    old = store.read_run_json(Path("out/mine"))["scenario_hash"]
+    Path("mine.yaml").write_text(Path("mine.yaml").read_text().replace("0.05", "0.06"))
+    assert (set_ := asked("mine.yaml", "--set", "initiation.speed=2")).exit_code == 2, set_.stderr
+    done = asked("mine.yaml")
+    assert done.exit_code == 0, done.stderr
+    assert f"replaces the run of this scenario as it was before it was changed (hash {old[:12]})" in done.stderr
+    assert store.read_run_json(Path("out/mine"))["scenario_hash"] != old
+    Path("other").mkdir()
+    Path("other/mine.yaml").write_text("base: drop_test.yaml\ntitle: Theirs\nsimulation: {duration: 0.05}\n")
+    refused = asked("other/mine.yaml")
+    assert refused.exit_code == 2
+    assert "holds another run, got 'Mine'" in refused.stderr
+
+
+def test_an_account_of_an_edited_scenario_is_ones_own_and_of_another_file_is_not(tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    said: list[str] = []
+    about = {"scenario_hash": "a", "recordings": ["d"], "origin": store.origin(tmp_path / "x.yaml", folder)}
+    folder.mkdir()
+    store.write_json(folder / "a.json", {"format": "f/1", **about})
+
+    def claimed(**changes: Any) -> Path:
+        return store.claim_account(folder, "f/1", {**about, **changes}, ["a.json"], say=said.append)
+
+    assert claimed() == folder.resolve()
+    assert said == []
+    claimed(scenario_hash="b")
+    assert len(said) == 1
+    for changes in (
+        {"scenario_hash": "b", "recordings": ["e"]},
+        {"scenario_hash": "b", "origin": store.origin(tmp_path / "y.yaml", folder)},
+        {"scenario_hash": "b", "origin": store.origin(tmp_path / "x.yaml", folder, ["gravity=9"])},
+    ):
+        with pytest.raises(InputError, match="holds results of something else"):
+            claimed(**changes)

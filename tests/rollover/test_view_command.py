@@ -89,3 +89,20 @@ def test_a_viewer_that_does_not_serve_is_one_line(results: Path, monkeypatch: py
     done = view(results, "--html", "drop.html")
     assert (done.exit_code, done.stderr.count("\n")) == (2, 1)
     assert "did not serve its web page" in done.stderr
+
+
+def test_without_a_display_there_are_cures(results: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    opened: list[Path] = []
+    monkeypatch.setattr("viz.viewer.open_viewer", lambda path: opened.append(path) or 0)
+    done = view(results)
+    assert done.exit_code == 2
+    assert opened == []
+    assert done.stderr.count("\n") == 1
+    assert "`rollover view run --html viewer.html`" in done.stderr
+    assert "tests.viz.picture" in done.stderr
+    monkeypatch.setenv("WAYLAND_DISPLAY", "wayland-0")
+    assert view(results).exit_code == 0
+    assert len(opened) == 1

@@ -7,10 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from rollover.baseline import Answer, Difference
+from rollover.channels import CHANNELS
 from rollover.cli import app
 from rollover.criteria import Criterion
 from rollover.loads import PeakLoad, peak_loads
@@ -18,8 +20,9 @@ from rollover.requirement import Requirement
 from rollover.run import Run
 from tests.viz import example
 from tests.viz.html import Parts
+from viz import blueprint, regression, report
 from viz import page as pages
-from viz import regression, report
+from viz.entities import series
 from viz.page import Cell, Details, Footer, Headline, Note, Pairs, Table
 
 ANSWER: dict[str, Any] = {
@@ -204,3 +207,36 @@ def test_pages_print_and_know_the_dark() -> None:
     assert "@media print" in text
     assert "prefers-color-scheme: dark" in text
     assert pages.NOT_APPROVAL not in text
+
+
+def figures(run: Run) -> dict[str, str]:
+    """Caption and text of each figure over time."""
+    section = report._histories(run, peak_loads(run))[0]
+    assert isinstance(section, pages.Section)
+    return {b.caption: b.svg for b in section.blocks if isinstance(b, pages.Figure)}
+
+
+def test_one_axis_has_one_quantity(overturn: Run) -> None:
+    """Spin beside a wheel's load has an axis of its own."""
+    n = overturn.recording.time.size
+    swing = np.sin(np.linspace(0.0, 9.0, n))
+    turned = {f"wheel/{w}/spin": 20.0 + swing for w in ("rear_left", "rear_right")}
+    turned |= {f"rops/mount/left/force_{k}": 1e3 * swing for k in "xyz"}
+    recording = replace(overturn.recording, channels={**overturn.recording.channels, **turned})
+    found = figures(replace(overturn, recording=recording))
+    labels = {"Wheel spin": "wheel spin, deg/s", "Wheel loads": "wheel loads, kN", "Mount forces": "mount forces, kN"}
+    for begins, label in labels.items():
+        svg = next(svg for caption, svg in found.items() if caption.startswith(begins))
+        assert label in svg
+    loads = next(svg for caption, svg in found.items() if caption.startswith("Wheel loads"))
+    assert "spin" not in loads
+
+
+def test_a_plot_of_the_viewer_with_several_units_becomes_several() -> None:
+    names = ["wheel/rear_left/force_normal", "wheel/rear_left/spin", "wheel/rear_right/spin"]
+    assert blueprint.matching(names, (("Wheels, kN", ("wheel/*",)),)) == [
+        ("Wheels, kN", names[:1]),
+        ("Wheels, deg/s", names[1:]),
+    ]
+    for title, fitting in blueprint.matching([*CHANNELS], (*blueprint.TOP, *blueprint.LOADS, *blueprint.MOTION)):
+        assert {series(c).unit for c in fitting} == {title.rpartition(", ")[2]}

@@ -1,0 +1,55 @@
+"""Files that are written say the same to readers of YAML 1.1 and 1.2: numbers are numbers, text stays text."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from ruamel.yaml import YAML
+
+from rollover import document
+from rollover.scenario import load
+
+FLOATS = (1e-05, 1.0, -1e22, 1.5e-7, 0.1 + 0.2, 1e16, 123456789.0, 5e-324, float(np.nextafter(1.0, 2.0)), -0.0)
+TEXTS = (
+    "on",
+    "Off",
+    "yes",
+    "NO",
+    "y",
+    "N",
+    "true",
+    "~",
+    "null",
+    "1_000",
+    "1:30",
+    "190:20:30.15",
+    "010",
+    "0x1f",
+    "0b11",
+)
+TEXTS += ("1e-05", "1e5", "1.5", ".5", "+.inf", ".nan", "2001-12-14", "2001-12-14 21:59:43.10", "<<", "=", "12", "0o14")
+TEXTS += ("plain", "a: b", "# none", "1:99", "drop 3", "-", "")
+
+
+def read(text: str, version: str) -> Any:
+    if version == "1.1":
+        return yaml.safe_load(text)
+    return YAML(typ="safe", pure=True).load(text)
+
+
+@pytest.mark.parametrize("version", ["1.1", "1.2"])
+def test_what_is_written_is_read_alike(version: str) -> None:
+    tree = {"floats": list(FLOATS), "alone": 1e-05, "texts": list(TEXTS), "keys": {t: 1 for t in TEXTS if t}}
+    found = read(document.dump_mapping(tree), version)
+    assert found == tree
+    for given, got in zip(FLOATS, found["floats"], strict=True):
+        assert (type(got), repr(got)) == (float, repr(given))
+
+
+def test_every_shipped_scenario_says_the_same_to_both() -> None:
+    for name in ("side_overturn", "drop_test", "field_upset_side", "static_rops_test"):
+        text = document.dump(load(name))
+        assert read(text, "1.1") == read(text, "1.2"), name
