@@ -19,6 +19,7 @@ from rollover.misfit import misfit
 from rollover.pair import pair, read
 from rollover.proof.tally import tally
 from rollover.recording import Recording
+from rollover.stamps import Zero
 from tests.rollover.diagnosed import sensor_at_fault, told
 from tests.rollover.studies import made_up
 from tests.viz import example
@@ -66,6 +67,8 @@ def calibrated() -> Calibration:
         condition=1.0,
         combinations=(HOSTILE,),
         clocks={HOSTILE: 0.001},
+        clock_errors={HOSTILE: 1e-4},
+        zeros={HOSTILE: Zero(late=0.001, sigma=1e-4, by="onset", why="unknown", channels=(HOSTILE,))},
         clock_sigma=1e-3,
         noise={},
         training=scores,
