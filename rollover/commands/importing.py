@@ -72,7 +72,8 @@ def import_(
         hold(target)
         if at is not None and target.exists() and target.samefile(at):
             raise InputError(Fault(file=str(target), message="would replace the recording that is read; another --out"))
-    taken = [t for t in targets.values() if t.exists()]
+    beside = [t if to == "mme.zip" else t.with_name(f"{spelt[name]}.yaml") for name, t in targets.items()]
+    taken = [t for t in (*targets.values(), *beside) if t.exists()]
     if taken and not force:
         raise InputError(Fault(file=str(taken[0]), message="exists; --force replaces it, --out leaves it"))
     for name in [n for n in made if spelt[n] != n]:

@@ -211,18 +211,17 @@ def test_links_inside_the_file(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["raw/3/t"], file["raw/3/F"] = TIME, 3 * TIME
         file["last"], file["F"] = h5py.SoftLink("raw/3"), h5py.SoftLink("/last/F")
-        file["gone"], file["raw/up"], file["other"] = (
-            h5py.SoftLink("/no"),
-            h5py.SoftLink("/raw"),
-            h5py.ExternalLink("b.h5", "/F"),
-        )
+        file["gone"], file["raw/up"] = h5py.SoftLink("/no"), h5py.SoftLink("/raw")
     columns = {"last/t": "time, unit: s", "F": f"{FORCE}, unit: N"}
     found = named(tmp_path / "a.h5", columns)
     assert found[FORCE] == pytest.approx(3 * TIME)
     said = " ".join(found.notes)
     assert "a link to /no, which is not there: gone" in said
-    assert "a link to the file b.h5: other" in said
     assert "a link to /raw: raw/up" in said
+    with h5py.File(tmp_path / "a.h5", "a") as file:
+        file["other"] = h5py.ExternalLink("b.h5", "/F")
+    with pytest.raises(InputError, match=r"other: a link into another file, 'b.h5' at '/F'"):
+        named(tmp_path / "a.h5", columns)
 
 
 def test_matlab_7_3(tmp_path: Path) -> None:
