@@ -171,7 +171,8 @@ def read_named(
             continue
         for name, file, test in named:
             if name in first:
-                message = f"a second recording by this name, got {name!r}, first {first[name]}; two share a name"
+                message = f"a second recording by this name, got {name!r}, first {first[name]}"
+                message += "; two recordings share a name"
                 faults.append(Fault(file=str(file), message=message))
                 continue
             first[name] = file

@@ -85,7 +85,7 @@ def test_two_recordings_of_one_name_are_refused_before_anything_is_written(tmp_p
     given = [command, *words.get(command, []), tmp_path / "raw", "--profile", profile, "--out", tmp_path / "out"]
     code, said, faults = ask(*given)
     assert (code, said) == (2, "")
-    message = f"a second recording by this name, got 'a', first {tmp_path}/raw/a.csv; two share a name"
+    message = f"a second recording by this name, got 'a', first {tmp_path}/raw/a.csv; two recordings share a name"
     assert faults == f"{tmp_path}/raw/a.lvm: {message}\n"
     assert not (tmp_path / "out").exists()
 
