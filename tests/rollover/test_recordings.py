@@ -142,8 +142,9 @@ def test_cube_tosses() -> None:
     q = np.column_stack([toss[f"chassis/quaternion_{a}"] for a in "wxyz"])
     assert np.linalg.norm(q, axis=1) == pytest.approx(np.ones(len(q)))
     assert (np.sum(q[1:] * q[:-1], axis=1) > 0.9).all()  # no jumps of sign
-    # a body that came to rest on a face: its centre half an edge up, pitch or roll a multiple of 90 deg
-    assert toss["chassis/position_z"][-1] == pytest.approx(0.0524, abs=0.002)
+    # the table is where the cube comes to rest; what comes later than 0.1 s after the first contact is cut off and said
+    assert any("the table is where the cube comes to rest, -1.4 mm from the zero" in note for note in toss.notes)
+    assert any(note.startswith("79 rows from 0.1 s after the first contact on cut off") for note in toss.notes)
     # each begins where and as fast as its conditions say: half of the flight before the first contact, in the scenario
     for recording in found.values():
         scenario = load("cube_toss").replaced(recording.conditions)
@@ -164,20 +165,24 @@ def test_falling_balls() -> None:
     assert len(found) == 14
     assert found["golf-ball-1"].conditions["vehicle.mass"] == pytest.approx(1.62 * 0.0283495, rel=1e-4)
     assert found["whiffle-ball-1-1"].conditions["vehicle.mass"] == pytest.approx(0.0283495, rel=1e-4)
-    assert "vehicle.mass" not in found["volleyball-1"].conditions
+    assert found["volleyball-1"].conditions["vehicle.mass"] == 0.27  # not stated: by the rules of the game
     for drop in found.values():
         assert DropModel(scenario=load("ball_drop").replaced(drop.conditions)).times[0] == 0.0
         assert drop.conditions["initiation.height"] == drop["striker/position_z"][0]
-    assert found["baseball-1"]["striker/position_z"][0] == pytest.approx(47.7, abs=0.1)
+    # the heights' zero is not the ground: all begin at the told 80 m, the shift is said
+    assert found["baseball-1"]["striker/position_z"][0] == 80.0
+    assert any("shifted by +32.301 m" in note for note in found["baseball-1"].notes)  # from 47.699 m
 
 
 def test_penetrometer() -> None:
     found = only("soil-penetrometer")
     assert len(found) == 4
-    for drop in found.values():
+    for name, drop in found.items():
         assert "from a18g" in drop.notes[0]  # the 2 g one is clipped in every drop
-        assert drop.time[0] == pytest.approx(-3.0, abs=0.2)  # zero is at first contact, as far as that can be found
-        assert drop.clock.zero == "unknown"
+        # zero is at first contact, as far as that can be found; the whole record stands where it cannot
+        clean = name != "bLog0D39"
+        assert drop.time[0] == pytest.approx(-0.7 if clean else -3.0, abs=0.01)
+        assert (drop.clock.zero, drop.clock.within) == (("known", 0.01) if clean else ("unknown", None))
         assert load("penetrometer_drop").replaced(drop.conditions)
     speeds = {name: drop.conditions.get("initiation.speed") for name, drop in found.items()}
     assert speeds.pop("bLog0D39") is None  # was handled, not dropped: it says so instead
