@@ -56,6 +56,7 @@ def test_every_command_of_the_readme_works_in_order(tmp_path: Path, monkeypatch:
         monkeypatch.setattr(f"{module}.shipped_folder", lambda: shelf)
     shown: list[Path] = []
     monkeypatch.setattr("viz.viewer.open_viewer", lambda path: (shown.append(path), 0)[1])
+    monkeypatch.setenv("DISPLAY", ":0")  # the viewer is a stand-in: no window is opened
     here = tmp_path / "here"
     here.mkdir()
     (here / "docs").mkdir()
