@@ -83,7 +83,7 @@ def balls(folder: Path, cell: str) -> Path:
     return path
 
 
-@pytest.mark.parametrize("cell", ["../../out", "/tmp/evil", "..", "1/../../x", "a\x1b[31m"])
+@pytest.mark.parametrize("cell", ["../../out", "/elsewhere/x", "..", "1/../../x", "a\x1b[31m"])
 def test_a_cell_that_is_part_of_a_name_leads_nowhere_else(cell: str, tmp_path: Path) -> None:
     source = balls(tmp_path, cell)
     out = tmp_path / "deep" / "out"
