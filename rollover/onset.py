@@ -213,7 +213,8 @@ def _fall(scenario: Scenario, recording: Recording, simulate: Simulate) -> Recor
     contact, step = _contact(scenario) or 0.0, max(FINE, length / 20_000.0)
     first, last = (math.ceil((at - contact) / step) for at in (min(start, 0.0) - length, max(end, length)))
     times: Array = contact + step * np.arange(first, last + 1, dtype=np.float64)
-    times = np.asarray(np.insert(times, -first, contact - BESIDE), dtype=np.float64)  # channels jump there
+    if 0 <= -first <= times.size:  # else it comes after all of them
+        times = np.asarray(np.insert(times, -first, contact - BESIDE), dtype=np.float64)  # channels jump there
     try:
         return as_measured(scenario, DropModel(scenario=scenario).run(times), recording)
     except DropFailedError:

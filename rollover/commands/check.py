@@ -96,10 +96,14 @@ def _recording(
     gravity, clock, notes = 9.81, None, list(recording.notes)
     if scenario is not None:
         from rollover import scenario as scenarios
-        from rollover.onset import timed
+        from rollover.onset import UntoldError, timed
 
         under = scenarios.load(scenario).replaced(recording.conditions, origin=f"{name}: conditions")
-        gravity, clock = under.gravity, timed(name, recording, under).zero
+        gravity = under.gravity
+        try:
+            clock = timed(name, recording, under).zero
+        except UntoldError as e:
+            notes += [fault.message for fault in e.faults]
     first = float(recording.time[0]) if is_far(recording.time) else 0.0
     if clock is not None:
         notes.append(clock.sentence)

@@ -309,3 +309,19 @@ def test_a_comparison_of_nothing_is_refused_with_its_cause(command: tuple[str, .
         assert all(w in done.stderr.splitlines()[-1] for w in words)
         assert name in done.stderr.splitlines()[-1]
         assert not out.exists()
+
+
+def test_a_fall_that_ends_before_the_ground_has_no_onset() -> None:
+    # let go at 80 m, 4.04 s before the ground, recorded for 2 s by a scenario of 3 s
+    scenario = load("ball_drop").replaced({"initiation.height": 80.0, "simulation.duration": 3.0})
+    time = np.arange(0.0, 2.0, 1.0 / 15.0)
+    noise = np.random.default_rng(1).normal(0.0, 0.05, time.size)
+    falling = Recording(
+        title="ball",
+        time=time,
+        channels={"striker/position_z": 80.0 - 4.905 * time**2 + noise},
+        clock=Clock(zero="unknown", within=0.1),
+    )
+    found = timed("ball", falling, scenario)
+    assert found.zero is None
+    assert found.recording is falling
