@@ -21,8 +21,7 @@ SCENARIOS = [p.stem for p in sorted(SHELF.glob("*.yaml")) if isinstance(load(p).
 VEHICLES = [p.stem for p in sorted(SHELF.glob("vehicles/*.yaml"))]
 BRIEF = {"simulation.duration": 0.02}  # s: a start and some steps
 WITHOUT_WHEELS = {"rops_drop", "static_rops_test", "tractor_drop_corner"}  # what a rig without wheels can do
-# slopes of 33.7 deg are beyond the balance of these
-STEEP = {"large_tractor", "light_vehicle", "row_crop_tractor", "vineyard_tractor"}
+STEEP = {"large_tractor"}  # stands on 33.7 deg, and has no balance on two wheels there to tip over from
 
 
 def expected(scenario: str, vehicle: str) -> str:
@@ -33,6 +32,8 @@ def expected(scenario: str, vehicle: str) -> str:
         return "got 0 "
     if scenario == "multiple_roll" and vehicle in STEEP:
         return "falls over to the left before any balance on two wheels, got ground of 33.7 deg; a gentler"
+    if (vehicle, scenario) == ("rops_rig", "static_rops_test"):
+        return "initiation.code: does not follow from the vehicle, got no track, 3000 kg"
     return ""
 
 

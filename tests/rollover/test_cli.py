@@ -351,6 +351,7 @@ def test_view(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         return 0 if len(shown) < 3 else 7
 
     monkeypatch.setattr("viz.viewer.open_viewer", open_viewer)
+    monkeypatch.setenv("DISPLAY", ":0")
     done = rollover("view", str(tmp_path))
     assert (done.exit_code, done.stderr) == (2, f"{tmp_path}: no recording.rrd there; `rollover run` writes one\n")
     picture = tmp_path / "recording.rrd"
