@@ -147,7 +147,7 @@ def test_what_cannot_be_written_is_said_before_the_work(
 
 
 @posix
-@pytest.mark.skipif(hasattr(os, "getuid") and os.getuid() == 0, reason="root may write anywhere")
+@pytest.mark.skipif(hasattr(os, "getuid") and os.getuid() == 0, reason="platform: root may write anywhere")
 def test_a_folder_without_the_right_to_write(tmp_path: Path) -> None:
     folder = tmp_path / "out"
     folder.mkdir(mode=0o555)
