@@ -15,7 +15,17 @@ from numpy.typing import NDArray
 
 from rollover.faults import Fault, InputError
 from rollover.importers.importer import Collection, check_claim, reading
-from rollover.importers.tosses import RATE, read_toss, rows_of_flight, start_of, toss_files, without_jumps
+from rollover.importers.tosses import (
+    RATE,
+    cut_off,
+    pose_channels,
+    read_toss,
+    rows_kept,
+    rows_of_flight,
+    start_of,
+    toss_files,
+    without_jumps,
+)
 from rollover.recording import Clock, Recording
 
 Array = NDArray[np.float64]
@@ -23,7 +33,6 @@ MASS, INERTIA, EDGE = 0.37, 8.1e-4, 0.1048  # kg, kg m2 about each axis, m
 COLUMNS = ("x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz")
 WIDTH = len(COLUMNS) + 6  # of a tensor: the controls behind are all zero
 METRES = np.array([0.5 * EDGE] * 3 + [1.0] * 4 + [0.5 * EDGE] * 3 + [1.0] * 3)  # of a tensor's columns
-AFTER = 0.1  # s after the first contact: what comes later is chance
 LOWEST = 0.005  # m by which the table may lie off the zero of the poses
 ALONG = ("chassis/position_x", "chassis/position_y")
 MOVED = 0.3  # of the longer way along the table, that the cube must move along an axis
@@ -67,7 +76,7 @@ def _toss(file: Path, name: str, rows: Array) -> Recording:
     start = start_of(rows[:, :3], q, rows[0, 7:13], rows_of_flight(lowest))
     table = _table(lowest)
     centre = rows[:, :3] - [0.0, 0.0, table or 0.0]
-    kept = min(start.flight + round(AFTER * RATE) + 1, len(rows))
+    kept = rows_kept(start, len(rows))
     conditions = {**start.conditions(), "vehicle.whole.mass": MASS}
     conditions["initiation.position"][2] -= table or 0.0
     notes = [
@@ -78,17 +87,10 @@ def _toss(file: Path, name: str, rows: Array) -> Recording:
         ),
         "velocities are left out: filtered differences of the tracked poses, not measured by themselves; roll, pitch"
         " and yaw too, they are the quaternion once more and jump",
-        "the start in the conditions is that of a flight fitted to the poses before the first contact"
-        if start.is_fitted
-        else "touches too soon for a flight to be fitted: the start in the conditions is that of the filtered rates",
+        start.note,
     ]
-    if kept < len(rows):
-        notes.append(
-            f"{len(rows) - kept} rows from {AFTER:g} s after the first contact on cut off: tumbling is chaotic, what"
-            " comes later says more of the start than of the physics"
-        )
-    channels = {f"chassis/position_{axis}": centre[:kept, k].copy() for k, axis in enumerate("xyz")}
-    channels |= {f"chassis/quaternion_{axis}": q[:kept, k].copy() for k, axis in enumerate("wxyz")}
+    notes += cut_off(len(rows), kept)
+    channels = pose_channels(centre[:kept], q[:kept])
     return Recording(
         title=f"Cube {name}",
         conditions=conditions,

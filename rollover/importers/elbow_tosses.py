@@ -13,7 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.importers.importer import Collection
-from rollover.importers.tosses import RATE, read_toss, rows_of_flight, start_of, toss_files, without_jumps
+from rollover.importers.tosses import (
+    RATE,
+    cut_off,
+    pose_channels,
+    read_toss,
+    rows_kept,
+    rows_of_flight,
+    start_of,
+    toss_files,
+    without_jumps,
+)
 from rollover.recording import Clock, Recording
 
 Array = NDArray[np.float64]
@@ -22,7 +32,6 @@ MASS, INERTIA = 0.37, 6.167e-4  # kg, kg m2 about each axis: of one link
 LENGTH, SIDE = 0.1, 0.05  # m, of a link: a box along x
 HINGE = np.array([-0.035, 0.06, 0.0])  # m, in the axes of the first link; it turns about y
 SECOND = np.array([0.035, 0.0, 0.0])  # m, centre of the second link from there, in its own axes
-AFTER = 0.1  # s after the first contact: what comes later is chance
 NEAR, SHARP = 0.03, 2  # m over the table in which a corner turns; rows before it does, in which it is slowed already
 WITHIN = 3e-4  # s: the first row is the start
 VELOCITY, SPIN = 0.001, 0.5  # m/s, rad/s: 1 sigma; links on a hinge do not turn as one body
@@ -40,25 +49,18 @@ def _toss(file: Path, name: str, rows: Array) -> Recording:
     centre, lowest = _both(first, q, angle)
     rate = (centre[1] - centre[0]) * RATE
     start = start_of(centre, q, np.concatenate([rate, rows[0, 8:11]]), _flight(lowest))
-    kept = min(start.flight + round(AFTER * RATE) + 1, len(rows))
+    kept = rows_kept(start, len(rows))
     notes = [
         f"two links of {MASS} kg, each a box of {LENGTH} x {SIDE} x {SIDE} m with {INERTIA} kg m2 about each axis; the"
         " second turns about y of the first, about a point 35 mm behind and 60 mm to the left of its centre",
         "the place is that of the centre of mass of both links, worked out from the first one's and the hinge's angle;"
         " the attitude is the first link's; the hinge is on no list of effects: a scenario of one rigid body lacks it",
         "velocities are left out: filtered differences of the tracked poses, not measured by themselves",
-        "the start in the conditions is that of a flight fitted to the poses before the first contact"
-        if start.is_fitted
-        else "touches too soon for a flight to be fitted: the start in the conditions is that of the filtered rates",
+        start.note,
         f"in flight the links turn against each other: {SPIN} rad/s of the angular velocity are in doubt",
     ]
-    if kept < len(rows):
-        notes.append(
-            f"{len(rows) - kept} rows from {AFTER:g} s after the first contact on cut off: tumbling is chaotic, what"
-            " comes later says more of the start than of the physics"
-        )
-    channels = {f"chassis/position_{axis}": centre[:kept, k].copy() for k, axis in enumerate("xyz")}
-    channels |= {f"chassis/quaternion_{axis}": q[:kept, k].copy() for k, axis in enumerate("wxyz")}
+    notes += cut_off(len(rows), kept)
+    channels = pose_channels(centre[:kept], q[:kept])
     channels["rops/hinge/elbow/angle_y"] = angle[:kept].copy()
     return Recording(
         title=f"Two links on a hinge, {name}",

@@ -16,6 +16,7 @@ from rollover.importers.tensors import read_tensor
 
 Array = NDArray[np.float64]
 RATE, GRAVITY = 148.0, 9.81  # Hz, m/s2
+AFTER = 0.1  # s after the first contact: what comes later is chance
 CLEAR, LEAST_FLIGHT = 0.002, 5  # m under the lowest corner; rows before it touches
 UNIT = 0.01  # by which a quaternion's length may be off
 
@@ -77,6 +78,13 @@ class Start:
     flight: int
     is_fitted: bool  # or else as recorded
 
+    @property
+    def note(self) -> str:
+        """Where the start in a recording's conditions is from."""
+        if self.is_fitted:
+            return "the start in the conditions is that of a flight fitted to the poses before the first contact"
+        return "touches too soon for a flight to be fitted: the start in the conditions is that of the filtered rates"
+
     def conditions(self) -> dict[str, Any]:
         """The start of a scenario that throws."""
         return {
@@ -85,6 +93,27 @@ class Start:
             "initiation.quaternion": self.quaternion.tolist(),
             "initiation.angular_velocity": self.angular_velocity.tolist(),
         }
+
+
+def rows_kept(start: Start, rows: int) -> int:
+    """How many rows are kept: those until `AFTER` the first contact."""
+    return min(start.flight + round(AFTER * RATE) + 1, rows)
+
+
+def cut_off(rows: int, kept: int) -> list[str]:
+    """A note of the rows that are not kept, where there are any."""
+    if kept == rows:
+        return []
+    return [
+        f"{rows - kept} rows from {AFTER:g} s after the first contact on cut off: tumbling is chaotic, what"
+        " comes later says more of the start than of the physics"
+    ]
+
+
+def pose_channels(centre: Array, q: Array) -> dict[str, Array]:
+    """Channels of a body's centre (n, 3), m, and of its quaternion (n, 4), w first."""
+    found = {f"chassis/position_{axis}": centre[:, k].copy() for k, axis in enumerate("xyz")}
+    return found | {f"chassis/quaternion_{axis}": q[:, k].copy() for k, axis in enumerate("wxyz")}
 
 
 def start_of(centre: Array, q: Array, rates: Array, flight: int) -> Start:
