@@ -20,6 +20,9 @@ FLOOR = 64 * MB  # bytes that a file of any size may unpack to: eight million nu
 RATIO = 200  # bytes unpacked of a byte: numbers shrink 2 to 20 times, whole channels of zeros beside them some 100
 MOST = 4000 * MB  # bytes of one file: 500 million numbers are more than a recording of one test has
 FILES = 10_000  # in an archive, where a test has a few hundred; each costs a look-up
+IN_ARCHIVE = 1 << 28  # bytes of one file in it, ten million samples as text
+SMALL = 1 << 20  # bytes that a file in an archive may unpack to from any size; beyond, `RATIO`
+KEPT = 256 * MB  # bytes unpacked of an archive that are kept while its files are read one by one
 TEXT = 1 * MB  # characters of YAML beside rows of numbers: the parser takes 1.7 s for them
 ROWS = 16 * MB  # characters of YAML in all: the largest grid of heights, half a million numbers, has 10 million
 VALUES = 30_000  # of one YAML text, aliases in full: 55 us each, 1.7 s; more than 25,000, which that grid counts as
@@ -27,7 +30,7 @@ ROW = 20  # numbers of a row that cost as much as one other value
 CASES = 1_000_000  # of a study, and levels of an axis: half an hour of drop tests, the shortest case of all
 POINTS = 10 * CASES  # cases times axes: 80 MB for each copy of the table
 PROBES = 200  # levels of an axis that are tried when a study is read, 5 ms each
-MEMORY = 8  # bytes that a reader may take per byte that may be claimed: raw, scaled, its stamps, sent, and as many again
+MEMORY = 8  # bytes that a reader may take per byte that may be claimed: raw, scaled, stamps, sent, and as many again
 BASE = 500 * MB  # bytes that a reader takes besides, for what it imports while it reads
 PROCESSOR = 4.0  # s for a small file: the slowest reader takes 0.3 s for one
 PER_MB = 10.0  # s per MB of a file: the slowest, messages in JSON in compressed chunks, takes 3 s
@@ -44,13 +47,15 @@ def factor() -> float:
     except ValueError:
         found = math.nan
     if not 0.0 < found <= 1e6:
-        raise InputError(Fault(file=VARIABLE, message=f"not a factor, got {text!r}; above 0 and at most 1e6, usually 1"))
+        message = f"not a factor, got {text!r}; a number above 0 and at most 1e6, usually 1"
+        raise InputError(Fault(file=VARIABLE, message=message))
     return found
 
 
 def cure(needed: float) -> str:
     """How to allow what needs `needed` times the limit that holds."""
-    return f"if it is known to be sound, {VARIABLE}={math.ceil(factor() * needed * 1.01):d} in the environment allows it"
+    enough = math.ceil(factor() * needed * 1.01)
+    return f"if it is known to be sound, {VARIABLE}={enough} in the environment allows it"
 
 
 def unpacked(size: int) -> int:

@@ -102,5 +102,3 @@ def _size(node: Any, known: dict[int, int]) -> int:
             children = [n for pair in node.value for n in pair] if isinstance(node, MappingNode) else node.value
             known[id(node)] += sum(_size(child, known) for child in children)
     return known[id(node)]
-
-

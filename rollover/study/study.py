@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ground.quantity import Grid as Rows
 from ground.quantity import Quantity, parameters
