@@ -107,7 +107,7 @@ class Children:
     def pool(self) -> Any:
         """The pool of them."""
         if self._pool is None:
-            self._pool = child_pool(self.workers, self._warm_up, bare=self._bare)
+            self._pool = child_pool(self.workers, self._warm_up, self._bare)
         return self._pool
 
     def stop(self) -> None:
@@ -118,8 +118,8 @@ class Children:
             self._pool = None
 
 
-def child_pool(workers: int, warm_up: Callable[[], None] | None = None, *, bare: bool = False) -> Any:
-    """A pool of child processes that takes tasks by ``schedule(packed, ...)``."""
+def child_pool(workers: int, warm_up: Callable[[], None] | None = None, bare: bool = False) -> Any:
+    """A pool of child processes that takes tasks by ``schedule(packed, ...)``; `bare` ones see `Children`."""
     from pebble import ProcessPool
 
     context = _Bare(_context()) if bare else _context()
