@@ -60,7 +60,7 @@ def _opened(path: Path) -> IO[bytes]:
     with path.open("rb") as file:
         start = file.read(6)
     unpack = next((function for mark, function in _PACKED.items() if start.startswith(mark)), None)
-    return path.open("rb") if unpack is None else unpack(path, "rb")  # type: ignore[no-any-return]
+    return path.open("rb") if unpack is None else unpack(path, "rb")
 
 
 def is_tar(path: Path) -> bool:

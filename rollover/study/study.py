@@ -191,7 +191,7 @@ def _tried(levels: NDArray[Any]) -> NDArray[Any]:
     if len(each) <= budget.PROBES:
         return each
     each = np.sort(each)  # words too: what is wrong with one of them is told at its case
-    return each[np.linspace(0, len(each) - 1, budget.PROBES).astype(int)]
+    return np.asarray(each[np.linspace(0, len(each) - 1, budget.PROBES).astype(int)])
 
 
 def unit_of(measure: str) -> str:
