@@ -34,7 +34,7 @@ MEMORY = 8  # bytes that a reader may take per byte that may be claimed: raw, sc
 BASE = 500 * MB  # bytes that a reader takes besides, for what it imports while it reads
 PROCESSOR = 4.0  # s for a small file: the slowest reader takes 0.3 s for one
 PER_MB = 10.0  # s per MB of a file: the slowest, messages in JSON in compressed chunks, takes 3 s
-WALL = 60.0  # s beside the processor's, for a disk or network that is slow and for importing
+WALL = 60.0  # s beside the processor's, for a disk or network that is slow, or a machine that is busy
 
 _TOLD = 10**15  # counts are told up to here: a file may have a number of a thousand digits
 

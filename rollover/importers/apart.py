@@ -24,6 +24,7 @@ V = TypeVar("V")
 
 _children = Children(1, bare=True)
 _alone = threading.Lock()  # the child has one file at a time
+_ready: set[tuple[str, ...]] = set()  # modules that the child has
 atexit.register(_children.stop)
 
 
@@ -66,7 +67,12 @@ def apart(read: Callable[..., V], path: Path, *more: Any, what: str, modules: Se
     )
     wall = budget.wall(size)
     with _alone:
+        if task.modules not in _ready:  # a library may take long to import where the machine is busy
+            list(map_cases(_imported, [task.modules], children=_children))
+            _ready.add(task.modules)
         (outcome,) = map_cases(_work, [task], children=_children, time_limit=wall)
+        if outcome.failure is not None:  # the next child has none of them
+            _ready.clear()
     if outcome.failure is not None:
         raise InputError(Fault(file=str(path), message=_told(outcome.failure, what, task, wall)))
     if isinstance(outcome.value, InputError):
@@ -74,11 +80,15 @@ def apart(read: Callable[..., V], path: Path, *more: Any, what: str, modules: Se
     return outcome.value  # type: ignore[return-value]
 
 
-def _work(task: _Task) -> Any:
-    """In the child: the value, or the faults of the file."""
-    for name in task.modules:
+def _imported(modules: tuple[str, ...]) -> None:
+    for name in modules:
         with suppress(ImportError):  # the reader says so
             importlib.import_module(name)
+
+
+def _work(task: _Task) -> Any:
+    """In the child: the value, or the faults of the file."""
+    _imported(task.modules)  # of a child that has been replaced
     os.environ[budget.VARIABLE] = task.factor
     if task.folder:
         os.chdir(task.folder)
