@@ -8,10 +8,12 @@ from __future__ import annotations
 import multiprocessing
 import os
 import pickle
+import signal
 import sys
 import tempfile
 import threading
 import traceback
+import types
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, wait
@@ -29,6 +31,7 @@ LONGEST_PATH = 60  # of the folder of temporary files, bytes: that of a socket i
 TASKS = 1000  # cases after which a worker is replaced, so that what a case leaks does not grow for ever
 BROKEN = 3  # pools in a row that may break before a case has gone through
 KILLED = -9  # exit code of a process that was ended from outside, as the operating system does when memory runs out
+PROCESSOR_SPENT = -getattr(signal, "SIGXCPU", 1 << 30)  # exit code of a process whose time of the processor was up
 # one thread for each child: cores are shared out among cases, and a sum does not depend on how many there are
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
 
@@ -91,17 +94,20 @@ def map_cases(
 
 
 class Children:
-    """Child processes that are begun with the first case and stay for more than one `map_cases`; see there."""
+    """Child processes that are begun with the first case and stay for more than one `map_cases`; see there.
 
-    def __init__(self, workers: int, warm_up: Callable[[], None] | None = None) -> None:
-        self.workers, self._warm_up = workers, warm_up
+    `bare` children do not know the user's script, which others run again to find the functions in it.
+    """
+
+    def __init__(self, workers: int, warm_up: Callable[[], None] | None = None, *, bare: bool = False) -> None:
+        self.workers, self._warm_up, self._bare = workers, warm_up, bare
         self._pool: Any = None
 
     @property
     def pool(self) -> Any:
         """The pool of them."""
         if self._pool is None:
-            self._pool = child_pool(self.workers, self._warm_up)
+            self._pool = child_pool(self.workers, self._warm_up, self._bare)
         return self._pool
 
     def stop(self) -> None:
@@ -112,12 +118,13 @@ class Children:
             self._pool = None
 
 
-def child_pool(workers: int, warm_up: Callable[[], None] | None = None) -> Any:
-    """A pool of child processes that takes tasks by ``schedule(packed, ...)``."""
+def child_pool(workers: int, warm_up: Callable[[], None] | None = None, bare: bool = False) -> Any:
+    """A pool of child processes that takes tasks by ``schedule(packed, ...)``; `bare` ones see `Children`."""
     from pebble import ProcessPool
 
+    context = _Bare(_context()) if bare else _context()
     return ProcessPool(
-        max_workers=workers, max_tasks=TASKS, context=_context(), initializer=_begin_child, initargs=(warm_up,)
+        max_workers=workers, max_tasks=TASKS, context=context, initializer=_begin_child, initargs=(warm_up,)
     )
 
 
@@ -148,6 +155,32 @@ def _context() -> Any:
     """
     able = "forkserver" in multiprocessing.get_all_start_methods() and len(tempfile.gettempdir()) <= LONGEST_PATH
     return multiprocessing.get_context("forkserver" if able else "spawn")
+
+
+class _Bare:
+    """A context whose processes begin without the user's script: its main module is out of sight for a moment."""
+
+    def __init__(self, context: Any) -> None:
+        self._context = context
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._context, name)
+
+    def Process(self, *args: Any, **kwargs: Any) -> Any:
+        """A process of the context."""
+        process = self._context.Process(*args, **kwargs)
+
+        def start() -> None:
+            del process.start  # the method of its class is back
+            main = sys.modules["__main__"]
+            sys.modules["__main__"] = types.ModuleType("__main__")
+            try:
+                process.start()
+            finally:
+                sys.modules["__main__"] = main
+
+        process.start = start
+        return process
 
 
 def _begin_child(warm_up: Callable[[], None] | None) -> None:
@@ -228,7 +261,7 @@ def _guarded(function: Callable[[C], V], case: C) -> tuple[V | None, Failure | N
 
 def packed(function: Callable[[C], V], case: C, memory_limit: float | None = None) -> bytes:
     """What a child sends back of one case, as bytes for `answer_of`; never raises."""
-    with _limited(memory_limit):
+    with limited(memory_limit):
         answer = _guarded(function, case)
     try:
         return pickle.dumps(answer)
@@ -238,22 +271,33 @@ def packed(function: Callable[[C], V], case: C, memory_limit: float | None = Non
 
 
 @contextmanager
-def _limited(memory_limit: float | None) -> Iterator[None]:
-    """Bound the address space of this process while a case is worked off; what cannot be had is a `MemoryError`."""
-    if memory_limit is None or sys.platform == "win32":
+def limited(memory: float | None, processor: float | None = None) -> Iterator[None]:
+    """Bound what a case takes beyond what this process has: bytes of address space, s of the processor.
+
+    Memory that cannot be had is a `MemoryError`; the process ends where the processor's time is up. Windows has neither
+    limit, macOS does not keep that of memory.
+    """
+    if sys.platform == "win32":
         yield
         return
     import resource
 
-    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-    most = _address_space() + int(memory_limit)
-    if hard != resource.RLIM_INFINITY:
-        most = min(most, hard)
-    resource.setrlimit(resource.RLIMIT_AS, (most, hard))
+    wanted: dict[int, float] = {}
+    if memory is not None and sys.platform != "darwin":
+        wanted[resource.RLIMIT_AS] = _address_space() + memory
+    if processor is not None:
+        used = resource.getrusage(resource.RUSAGE_SELF)
+        wanted[resource.RLIMIT_CPU] = used.ru_utime + used.ru_stime + processor + 1.0  # whole seconds
+        wanted[resource.RLIMIT_CORE] = 0.0  # its end leaves no image of its memory
+    before = {what: resource.getrlimit(what) for what in wanted}
+    for what, most in wanted.items():
+        hard = before[what][1]
+        resource.setrlimit(what, (int(most) if hard == resource.RLIM_INFINITY else min(int(most), hard), hard))
     try:
         yield
     finally:
-        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+        for what, limits in before.items():
+            resource.setrlimit(what, limits)
 
 
 def _address_space() -> int:
@@ -275,6 +319,8 @@ def answer_of(future: Any, time_limit: float | None) -> tuple[Any, Failure | Non
     except TimeoutError:
         return None, Failure(kind="time-limit", sentence=f"took longer than {time_limit:g} s"), float(time_limit or 0.0)
     except ProcessExpired as e:
+        if e.exitcode == PROCESSOR_SPENT:
+            return None, Failure(kind="time-limit", sentence="took more of the processor's time than it may"), 0.0
         hint = ", as when the machine runs out of memory" if e.exitcode == KILLED else ""
         return None, Failure(kind="crash", sentence=f"its process ended with exit code {e.exitcode}{hint}"), 0.0
     except BrokenProcessPool:

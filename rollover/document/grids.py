@@ -20,13 +20,17 @@ def read(file: Path, node: Node, path: str) -> Node:
     name = shown(file)
     if file.suffix == ".npy":
         try:
-            found = np.load(file, allow_pickle=False)
-            grid = np.asarray(found, dtype=float)
+            found = np.load(file, mmap_mode="r", allow_pickle=False)  # its header alone
+            if found.ndim != 2 or found.size > MOST_NODES:
+                what = f"{name} is no grid of numbers, got shape {found.shape}"
+                raise node.place.fault(path, f"{what}; two dimensions and at most {MOST_NODES} numbers are allowed")
+            grid = np.array(found, dtype=float)
+        except InputError:
+            raise
+        except AttributeError:
+            raise node.place.fault(path, f"{name} is no grid of numbers, got several arrays; one .npy array") from None
         except (OSError, ValueError, TypeError, EOFError) as e:
             raise node.place.fault(path, f"{name} is no grid of numbers: {str(e).splitlines()[0]}") from None
-        if grid.ndim != 2 or grid.size > MOST_NODES:
-            what = f"{name} is no grid of numbers, got shape {grid.shape}"
-            raise node.place.fault(path, f"{what}; two dimensions and at most {MOST_NODES} numbers are allowed")
         rows: list[tuple[int | None, list[float]]] = [(None, row) for row in grid.tolist()]
     else:
         rows = list(_rows(file, node, path))

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import io
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,9 +17,10 @@ from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 from ruamel.yaml.representer import RoundTripRepresenter
 from ruamel.yaml.scalarstring import DoubleQuotedScalarString, SingleQuotedScalarString
 
+from rollover import budget
+from rollover.document import yaml_reader
 from rollover.faults import Fault, InputError
 
-MOST_VALUES = 1_000_000  # a few aliases can stand for any number of values
 _TAG = "tag:yaml.org,2002:"
 
 Scalar = str | int | float | bool | None
@@ -64,7 +66,12 @@ class Node:
 def read(path: Path) -> Node:
     """Read a file. Raises `InputError`."""
     start = Place(file=shown(path), line=1, folder=path.parent)
+
+    def refuse(message: str) -> InputError:
+        return replace(start, line=None).fault("", message)
+
     try:
+        budget.check_count(path.stat().st_size, budget.ROWS, refuse, "bytes")
         data = path.read_bytes()
         text = data.decode("utf-8-sig")
     except OSError as e:
@@ -85,18 +92,23 @@ def shown(path: Path) -> str:
 
 def parse(text: str, start: Place) -> Node:
     """Read YAML 1.2 text; `start` names the file, without a line for text that is not from one. Raises `InputError`."""
+    return _parsed(text, start, budget.factor())
+
+
+@functools.lru_cache(maxsize=4)  # a command asks a file what it is before it reads it, and reads its base with it
+def _parsed(text: str, start: Place, _factor: float) -> Node:
 
     def at(line: int) -> Place:
         return start if start.line is None else replace(start, line=line + 1)
 
     try:
-        root = YAML(typ="safe", pure=True).compose(text)
+        root = yaml_reader.compose(text)
         if root is None:
             raise at(0).fault("", "empty, got nothing but comments; a mapping is needed")
-        if _size(root, {}) > MOST_VALUES:
-            raise at(0).fault("", f"too large, got more than {MOST_VALUES} values")
         builder = _Builder(at)
         node = builder.build(root, at(0), "", ())
+    except yaml_reader.TooMuchError as e:
+        raise at(e.line).fault("", str(e)) from None
     except MarkedYAMLError as e:
         mark = e.problem_mark or e.context_mark
         reason = ", ".join(str(part) for part in (e.context, e.problem) if part)
@@ -112,28 +124,14 @@ def parse(text: str, start: Place) -> Node:
     return node
 
 
-def _size(node: Any, known: dict[int, int]) -> int:
-    """How many values a node stands for, aliases counted in full; each node is looked at once."""
-    if id(node) not in known:
-        known[id(node)] = 1  # should it contain itself
-        children = [n for pair in node.value for n in pair] if isinstance(node, MappingNode) else node.value
-        below = children if isinstance(node, (MappingNode, SequenceNode)) else ()
-        known[id(node)] = 1 + sum(_size(child, known) for child in below)
-    return known[id(node)]
-
-
 class _Builder:
     def __init__(self, at: Any) -> None:
         self.at = at
         self.faults: list[Fault] = []
-        self.count = 0
         self.scalars = YAML(typ="safe", pure=True).constructor
 
     def build(self, node: Any, key: Place, path: str, inside: tuple[int, ...]) -> Node:
         place: Place = self.at(node.start_mark.line)
-        self.count += 1
-        if self.count > MOST_VALUES:
-            raise place.fault(path, f"too large, got more than {MOST_VALUES} values")
         if id(node) in inside:
             raise place.fault(path, "contains itself through an alias")
         inside = (*inside, id(node))
@@ -145,15 +143,23 @@ class _Builder:
                 for i, child in enumerate(node.value)
             ]
             return Node(value=tuple(children), place=place, key=key)
+        if node.style == yaml_reader.ROW_STYLE:
+            return Node(value=tuple(self._row(node, place)), place=place, key=key)
         if not node.value and not node.style:
             place = key  # nothing written: the mark stands wherever the next token is
         return Node(value=self._scalar(node, place, path), place=place, key=key)
+
+    def _row(self, node: Any, place: Place) -> Iterator[Node]:
+        first = node.start_mark.line
+        for number, line in yaml_reader.numbers(node):
+            first, place = (first, place) if line == first else (line, self.at(line))
+            yield Node(value=number, place=place, key=place)
 
     def _mapping(self, node: Any, path: str, inside: tuple[int, ...]) -> dict[str, Node]:
         found: dict[str, Node] = {}
         for key_node, child in node.value:
             place = self.at(key_node.start_mark.line)
-            if not isinstance(key_node, ScalarNode):
+            if not isinstance(key_node, ScalarNode) or key_node.style == yaml_reader.ROW_STYLE:
                 raise place.fault(path, "a key is not text, got a list or mapping; keys are plain words")
             key = key_node.value
             below = _join(path, key)

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.budget import Budget
 from rollover.channels import UNITS
 from rollover.importers import cf
 from rollover.importers.columns import Index, channel_of, is_wanted, matrix, no_numbers
-from rollover.importers.importer import check_claim
 from rollover.importers.sidecar import Described
 from rollover.importers.signals import Signal, left_out
 from rollover.importers.steps import even_stamps
@@ -33,12 +33,20 @@ class Array:
     scales: Mapping[int, Array] = field(default_factory=dict)  # axis -> its coordinate
     fill: Any = None  # what the file keeps where nothing was written
     last_axis_first: bool = False  # whether the writer's rows are the file's columns, as MATLAB's
+    part: int = 0  # numbers that are unpacked at a time, be it for one of them
     reason: str = ""  # why it is no numbers
+
+    @property
+    def claim(self) -> int:
+        """Bytes that it takes as it is stored, and as float64."""
+        count = max(int(np.prod(self.shape, dtype=object)), self.part)
+        return count * (int(self.dtype.itemsize) + 8)
 
 
 def signals_of(path: Path, contents: Mapping[str, Array | str], profile: Described | None) -> dict[str, Signal]:
     """Columns of all arrays by name, read where they are wanted. Raises `InputError` for claims beyond the file."""
     signals: dict[str, Signal] = {}
+    claimed = Budget(path)
     for name, thing in contents.items():
         reason = thing if isinstance(thing, str) else thing.reason or no_numbers(thing.dtype)
         if isinstance(thing, str) or reason or 0 in thing.shape:
@@ -47,14 +55,32 @@ def signals_of(path: Path, contents: Mapping[str, Array | str], profile: Describ
         columns = matrix(name, thing.shape, along=_axis_of_time(thing))
         if not columns:
             signals[name] = left_out(f"an array {thing.shape}")
+        wanted = [column for column in columns if is_wanted(profile, column, channel=channel_of(column))]
+        if wanted:
+            claimed.claim(thing.claim, name)
+        if len(wanted) > 1:  # read at once: each column by itself would unpack all of it
+            thing = replace(thing, load=_once(thing.load))
         for at, (column, index) in enumerate(columns.items()):
             channel = channel_of(column)
             signals[column] = Signal(values=np.empty(0), channel=channel)
-            if is_wanted(profile, column, channel=channel):
-                check_claim(path, int(np.prod(thing.shape, dtype=object)))
+            if column in wanted:
+                for scale in thing.scales.values():
+                    claimed.claim(scale.claim, column)
                 found = _signal(thing, index, (at, len(columns)), profile, column)
                 signals[column] = replace(found, channel=channel)
     return signals
+
+
+def _once(load: Callable[[Index], Any]) -> Callable[[Index], Any]:
+    """The same array, loaded whole when a first part of it is."""
+    whole: list[Any] = []
+
+    def part(index: Index) -> Any:
+        if not whole:
+            whole.append(np.asarray(load(())))
+        return whole[0][index]
+
+    return part
 
 
 def _axis_of_time(thing: Array) -> int | None:

@@ -11,6 +11,7 @@ import numpy as np
 from rollover.channels import is_known
 from rollover.importers.sidecar import Described
 
+MOST_COLUMNS = 4096  # of a matrix: more are no channels of one test, and each has a name
 Index = tuple[int | slice, ...]
 
 
@@ -28,12 +29,13 @@ def channel_of(name: str) -> str:
 
 
 def matrix(name: str, shape: Sequence[int], *, along: int | None = None) -> dict[str, Index]:
-    """Columns of an array by name, each with the index that takes it out; none of an array of more than two dimensions.
+    """Columns of an array by name, each with the index that takes it out; none of an array of more than two dimensions
+    or as large as a picture.
 
     Axes of one entry do not count. Samples run along the longer axis, or `along`; columns count from 0: `name[0]`.
     """
     axes = [axis for axis, length in enumerate(shape) if length != 1]
-    if len(axes) > 2:
+    if len(axes) > 2 or sum(shape[axis] > MOST_COLUMNS for axis in axes) > 1:
         return {}
     if len(axes) < 2:
         at = axes[0] if axes else 0

@@ -18,7 +18,10 @@ from numpy.typing import NDArray
 
 from ground.reference import REFERENCE_AREA
 from rollover.faults import Fault, InputError
-from rollover.importers.importer import Collection, check_claim, reading
+from rollover.importers.apart import apart
+from rollover.importers.importer import Collection, reading
+from rollover.importers.mat_claims import check_claims
+from rollover.importers.npz import arrays_of
 from rollover.importers.signals import check_time, check_values
 from rollover.recording import Clock, Recording
 
@@ -85,27 +88,29 @@ def _files(path: Path) -> list[Path]:
 
 def _matrices(file: Path, select: Sequence[str]) -> dict[str, Array]:
     """Matrices by the names of their drops, those that are asked for."""
-
-    def wanted(names: Sequence[str]) -> list[str]:
-        return [n for n in names if _KEY.fullmatch(n) and any(fnmatch(n, pattern) for pattern in select)]
-
     if file.suffix == ".npz":
-        with np.load(file, allow_pickle=False) as found:
-            return {name: np.asarray(found[name], dtype=np.float64) for name in wanted(found.files)}
+        with arrays_of(file) as found:
+            return {name: np.asarray(found[name], dtype=np.float64) for name in _wanted(found.files, select)}
+    return apart(_of_mat, file, tuple(select), what="MATLAB 5", modules=("scipy.io",))
+
+
+def _wanted(names: Sequence[str], select: Sequence[str]) -> list[str]:
+    return [n for n in names if _KEY.fullmatch(n) and any(fnmatch(n, pattern) for pattern in select)]
+
+
+def _of_mat(file: Path, select: Sequence[str]) -> dict[str, Array]:
     from scipy.io import loadmat, whosmat
 
-    about = {name: shape for name, shape, _ in whosmat(str(file))}
-    for shape in about.values():
-        check_claim(file, math.prod(int(n) for n in shape))
-    names = wanted(list(about))
-    table: Mapping[str, Any] = loadmat(str(file), variable_names=names) if names else {}
-    return {name: np.asarray(table[name], dtype=np.float64) for name in names}
+    with reading(file, "cone drops"):
+        check_claims(file)
+        names = _wanted([name for name, _, _ in whosmat(str(file))], select)
+        table: Mapping[str, Any] = loadmat(str(file), variable_names=names) if names else {}
+        return {name: np.asarray(table[name], dtype=np.float64) for name in names}
 
 
 def _drop(file: Path, name: str, rows: Array) -> Recording:
     match = _KEY.fullmatch(name)
     assert match is not None
-    check_claim(file, rows.size)
     kind, angle, height = match[1], int(match[2]), int(match[3]) / 100.0
     if rows.ndim != 2 or rows.shape[1] != 4:
         message = (

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.faults import Fault, InputError
-from rollover.importers.importer import Collection, check_claim, reading
+from rollover.importers.importer import Collection, reading
+from rollover.importers.npz import arrays_of
 from rollover.importers.tosses import (
     RATE,
     cut_off,
@@ -53,12 +54,11 @@ def _read(path: Path, select: Sequence[str]) -> Iterator[tuple[str, Recording]]:
 
 
 def _repackaged(file: Path, select: Sequence[str]) -> Iterator[tuple[str, Recording]]:
-    with reading(file, "cube tosses"), np.load(file, allow_pickle=False) as found:
+    with reading(file, "cube tosses"), arrays_of(file) as found:
         data, length = np.asarray(found["data"]), np.asarray(found["length"])
         if tuple(map(str, found["columns"])) != COLUMNS or data.ndim != 2 or int(length.sum()) != len(data):
             message = "not the cube tosses, got other columns or rows; data, length and columns are needed"
             raise InputError(Fault(file=str(file), message=message))
-        check_claim(file, data.size)
     at = 0
     for i, rows in enumerate(int(n) for n in length):
         name = f"toss{i:03d}"

@@ -4,24 +4,29 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from rollover.importers.apart import apart
 from rollover.importers.arrays import signals_of
 from rollover.importers.hdf5_contents import contents
 from rollover.importers.hdf5_guard import stands_alone
-from rollover.importers.importer import Importer, library, reading, starts_with
+from rollover.importers.importer import Importer, check_library, library, reading, starts_with
 from rollover.importers.sidecar import Described
-from rollover.importers.signals import assemble
+from rollover.importers.signals import Signal, assemble
 from rollover.recording import Recording
 
 _MATLAB_7_3 = (b"MATLAB 7.3", b"\x89HDF\r\n\x1a\n")
 
 
 def _read(path: Path, profile: Described | None) -> Recording:
+    check_library("h5py", "hdf5", path)
+    return assemble(path, apart(_signals, path, profile, what="HDF5", modules=("h5py",)), profile)
+
+
+def _signals(path: Path, profile: Described | None) -> dict[str, Signal]:
     h5py = library("h5py", "hdf5", path)
     with reading(path, "HDF5"), h5py.File(path, "r") as file:
         stands_alone(file, path)
         found = contents(h5py, file, () if profile is None else tuple(profile.columns))
-        signals = signals_of(path, found, profile)
-    return assemble(path, signals, profile)
+        return signals_of(path, found, profile)
 
 
 HDF5 = Importer(

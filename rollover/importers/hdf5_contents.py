@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rollover.budget import Budget
 from rollover.importers.arrays import Array
 from rollover.importers.columns import Index, no_numbers, text
 
+_OBJECT = 500  # bytes of a reference and of what stands for the dataset that it leads to
 _MATLAB_INSIDE = {"#refs#": "contents of MATLAB cells and tables", "#subsystem#": "contents of MATLAB objects"}
 _MATLAB = {"char": "text", "logical": "true or false", "cell": "a MATLAB cell", "struct": "an empty MATLAB structure"}
 _MATLAB_NUMBERS = ("single", "double", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)))
@@ -111,6 +114,7 @@ def _arrays(
                 dtype=kind.base,
                 load=_field_of(dataset, way),
                 around=(attributes, *around),
+                part=_part(dataset) * max(1, dataset.dtype.itemsize // 8),
             )
             for key, (way, kind) in _fields(dataset.dtype).items()
         }
@@ -146,7 +150,13 @@ def _array(h5py: Any, dataset: Any, attributes: Mapping[str, Any], around: Seque
         scales={axis: _array(h5py, scale, _attributes(scale), ()) for axis, scale in coordinates.items()},
         fill=dataset.fillvalue if is_stated and dataset.fillvalue != 0 else None,  # zeros are measured too
         last_axis_first="MATLAB_class" in attributes,
+        part=_part(dataset),
     )
+
+
+def _part(dataset: Any) -> int:
+    """Entries of a chunk, which may be larger than its dataset."""
+    return int(np.prod(dataset.chunks, dtype=object)) if dataset.chunks else 0
 
 
 def _fields(dtype: np.dtype[Any], above: tuple[str, ...] = ()) -> dict[str, tuple[tuple[str, ...], np.dtype[Any]]]:
@@ -173,6 +183,7 @@ def _field_of(dataset: Any, way: tuple[str, ...]) -> Callable[[Index], Any]:
 
 def _of_structs(h5py: Any, file: Any, name: str, dataset: Any) -> dict[str, Array | str]:
     """A field of a MATLAB array of structures: a column for each, or one of all where each holds a single number."""
+    Budget(Path(file.filename)).claim(_OBJECT * dataset.size, name)
     things = [file[reference] for reference in np.asarray(dataset[()]).ravel()]
     above, _, key = name.rpartition("/")
     if not all(isinstance(t, h5py.Dataset) and not no_numbers(t.dtype) for t in things):

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from rollover.faults import Fault, InputError
-from rollover.importers.importer import Importer, check_claim, library, reading, starts_with
+from rollover.importers.apart import apart
+from rollover.importers.importer import Importer, check_claim, check_library, library, reading, starts_with
 from rollover.importers.sidecar import Described
 from rollover.importers.signals import Signal, assemble
 from rollover.recording import Recording
@@ -33,17 +34,24 @@ def read_ide(path: Path, wanted: Collection[str] | None = None) -> dict[str, Sig
 
     Of those that are not in `wanted` only the name. Raises `InputError`.
     """
+    check_library("idelib", "ide", path)
+    return apart(_signals, path, None if wanted is None else tuple(wanted), what="IDE", modules=("idelib",))
+
+
+def _signals(path: Path, wanted: Collection[str] | None) -> dict[str, Signal]:
     idelib = library("idelib", "ide", path)
     with reading(path, "IDE"), idelib.importFile(str(path)) as data:
         _check_whole(path)
         signals: dict[str, Signal] = {}
+        claimed = 0
         for channel, subs in _sessions(data):
             names = {f"{channel.name}/{sub.name or sub.displayName}": sub for sub in subs}
             if wanted is not None and not set(names) & set(wanted):
                 signals |= {name: Signal(values=np.empty(0)) for name in names}
                 continue
             events = channel.getSession()
-            check_claim(path, len(events) * len(names), most_per_byte=2.0)
+            claimed += len(events) * len(names)
+            check_claim(path, claimed, most_per_byte=2.0)
             table = np.asarray(events.arraySlice(), dtype=np.float64)
             time = table[0] * MICROSECOND
             for row, (name, sub) in enumerate(names.items(), start=1):

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import importlib.util
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
+from rollover.budget import Budget
 from rollover.faults import Fault, InputError, hint
 from rollover.importers.sidecar import Described
 from rollover.recording import Recording
-
-MOST_VALUES = 500_000_000  # of one file, 4 GB of float64
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,9 +92,23 @@ def library(name: str, extra: str, path: Path) -> Any:
     try:
         return importlib.import_module(name)
     except ImportError:
-        package = name.partition(".")[0]
-        message = f"needs {package}, which is not installed; pip install 'rollover[{extra}]'"
-        raise InputError(Fault(file=str(path), message=message)) from None
+        raise _missing(name, extra, path) from None
+
+
+def check_library(name: str, extra: str, path: Path) -> None:
+    """Refuse where an optional library is missing, without importing it. Raises `InputError`."""
+    try:
+        found = importlib.util.find_spec(name)
+    except (ImportError, ValueError):  # of a package that is missing, or half there
+        found = None
+    if found is None:
+        raise _missing(name, extra, path)
+
+
+def _missing(name: str, extra: str, path: Path) -> InputError:
+    package = name.partition(".")[0]
+    message = f"needs {package}, which is not installed; pip install 'rollover[{extra}]'"
+    return InputError(Fault(file=str(path), message=message))
 
 
 @contextlib.contextmanager
@@ -102,16 +116,20 @@ def reading(path: Path, what: str) -> Iterator[None]:
     """Turn whatever a library says about a broken file into one line. Raises `InputError`."""
     try:
         yield
-    except InputError:
+    except (InputError, MemoryError):  # how much memory reading may take is told where it is bounded
         raise
     except Exception as e:  # every library has its own
         reason = (str(e).splitlines() or [""])[0][:160] or type(e).__name__
         raise InputError(Fault(file=str(path), message=f"not a readable {what} file: {reason}")) from None
 
 
-def check_claim(path: Path, values: int, *, most_per_byte: float = 1000.0) -> None:
-    """Refuse a file whose header claims more values than it can hold, before anything is made room for."""
+def check_claim(path: Path, values: int, *, most_per_byte: float | None = None) -> None:
+    """Refuse a file whose header claims more values than it may hold, before anything is made room for.
+
+    `most_per_byte` is what a format that packs nothing can hold at most.
+    """
     size = path.stat().st_size
-    if values < 0 or values > MOST_VALUES or values > most_per_byte * size:
-        message = f"claims too much, got {values} values in {size} bytes; at most {MOST_VALUES} values are allowed"
-        raise InputError(Fault(file=str(path), message=message))
+    if values < 0 or (most_per_byte is not None and values > most_per_byte * size):
+        cure = "it is cut off or damaged: a whole file is needed"
+        raise InputError(Fault(file=str(path), message=f"claims too much, got {values} values in {size} bytes; {cure}"))
+    Budget(path).claim(8 * values)

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from rollover.importers.apart import apart
 from rollover.importers.columns import is_wanted, matrix, no_numbers
-from rollover.importers.importer import Importer, check_claim, reading, starts_with
+from rollover.importers.importer import Importer, reading, starts_with
+from rollover.importers.mat_claims import check_claims
 from rollover.importers.sidecar import Described
 from rollover.importers.signals import Signal, assemble, left_out
 from rollover.recording import Recording
@@ -18,12 +20,16 @@ _OPAQUE = "function_workspace"  # under this name MATLAB keeps what its tables a
 
 
 def _read(path: Path, profile: Described | None) -> Recording:
+    return assemble(path, apart(_signals, path, profile, what="MATLAB 5", modules=("scipy.io",)), profile)
+
+
+def _signals(path: Path, profile: Described | None) -> dict[str, Signal]:
     from scipy.io import loadmat, whosmat
 
     with reading(path, "MATLAB 5"):
         kinds = {}
-        for name, shape, kind in whosmat(str(path)):
-            check_claim(path, int(np.prod([int(n) for n in shape], dtype=object)))
+        check_claims(path)
+        for name, _, kind in whosmat(str(path)):
             kinds[str(name)] = kind
         found = loadmat(str(path), mat_dtype=False, squeeze_me=False, struct_as_record=True)
         signals: dict[str, Signal] = {}
@@ -38,7 +44,7 @@ def _read(path: Path, profile: Described | None) -> Recording:
             else:
                 columns = _columns(name, value)
                 signals |= {column: _signal(v, column, profile, numbers.get(column, "")) for column, v in columns}
-    return assemble(path, signals, profile)
+    return signals
 
 
 def _numbers(found: Mapping[str, Any]) -> dict[str, str]:

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from rollover.budget import Budget
+from rollover.importers.apart import apart
 from rollover.importers.columns import is_wanted, matrix, no_numbers, unique
-from rollover.importers.importer import Importer, check_claim, library, reading, starts_with
+from rollover.importers.importer import Importer, check_library, library, reading, starts_with
 from rollover.importers.mdf_conversions import converted
 from rollover.importers.sidecar import Described
 from rollover.importers.signals import Signal, assemble, left_out
@@ -19,10 +21,17 @@ _RUNS_OVER = {2: "angle", 3: "distance", 4: "an index"}  # what a group's master
 
 
 def _read(path: Path, profile: Described | None) -> Recording:
+    check_library("asammdf", "mdf", path)
+    return assemble(path, apart(_all, path, profile, what="MDF", modules=("asammdf",)), profile)
+
+
+def _all(path: Path, profile: Described | None) -> dict[str, Signal]:
     asammdf = library("asammdf", "mdf", path)
     signals: dict[str, Signal] = {}
     with reading(path, "MDF"), asammdf.MDF(str(path)) as file:
-        check_claim(path, sum(int(group.channel_group.cycles_nr) * len(group.channels) for group in file.groups))
+        claimed = Budget(path)
+        for group in file.groups:
+            claimed.claim(_claim(group), _title(group))
         places = [
             (g, c, str(channel.name))
             for g, group in enumerate(file.groups)
@@ -43,7 +52,14 @@ def _read(path: Path, profile: Described | None) -> Recording:
             for column, signal in _signals(file, g, c, name).items():
                 about = base if column == name else ""
                 signals[column] = replace(signal, channel=about, shared=about, clock=clocks.get(g, ""))
-    return assemble(path, signals, profile)
+    return signals
+
+
+def _claim(group: Any) -> int:
+    """Bytes of a group: its records as they are, and each channel and its stamps as numbers."""
+    about = group.channel_group
+    record = int(getattr(about, "samples_byte_nr", 0)) + int(getattr(about, "invalidation_bytes_nr", 0))
+    return int(about.cycles_nr) * (record + 8 * len(group.channels))
 
 
 def _is_part(profile: Described | None, name: str) -> bool:

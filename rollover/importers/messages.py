@@ -11,13 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.faults import Fault, InputError
+from rollover.budget import Budget
+from rollover.faults import InputError
 from rollover.importers import stamps
-from rollover.importers.importer import MOST_VALUES
 from rollover.importers.sidecar import Described
 from rollover.importers.signals import Signal, left_out
 
 _LONGEST = 256  # entries of an array that become columns unasked: joints and wheels are fewer, scans and images more
+_COUNTED = 1000  # values after which their sum is looked at
+_IN_LIST = 40  # bytes that a value takes: a Python number, its place in two lists
 _SECONDS, _NANOSECONDS = ("sec", "secs"), ("nanosec", "nanosecs", "nsec", "nsecs")
 
 
@@ -57,6 +59,7 @@ class Messages:
         self._stamps_in: dict[str, str] = {}  # topic -> the first of its fields that is a stamp
         self._topic_of: dict[str, str] = {}
         self._count = 0
+        self._claimed = Budget(path)
 
     def add(self, topic: str, logged: int, message: Any) -> None:
         """A message, and when it was logged, ns. Raises `InputError`."""
@@ -77,9 +80,8 @@ class Messages:
             if not self._keep(column, name, value, number):
                 continue
             self._count += 1
-            if self._count > MOST_VALUES // 20:  # lists of Python numbers take far more room than an array
-                message = f"too long, got more than {self._count - 1} values; name the columns with --profile"
-                raise InputError(Fault(file=str(self._path), message=message))
+            if self._count % _COUNTED == 0:
+                self._claimed.claim(_COUNTED * _IN_LIST, name)
 
     def signals(self) -> dict[str, Signal]:
         """Columns by name. Raises `InputError` where a message lacks the stamp that a profile goes by."""

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import lzma
 import tarfile
 import zipfile
 import zlib
+from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 from typing import NoReturn
 
+from rollover import budget
 from rollover.faults import Fault, InputError
+from rollover.importers.tar import is_tar, open_tar
 
-MOST_BYTES = 1 << 28  # of one file inside: ten million samples
-MOST_FILES = 10_000
-MOST_RATIO = 200  # numbers as text shrink to a fifth or so
-SMALL = 1 << 20
+Sizes = list[tuple[str, int, int]]  # name, bytes unpacked, bytes packed
+_FAULTS = (OSError, zipfile.BadZipFile, tarfile.TarError, EOFError, zlib.error, lzma.LZMAError, RuntimeError)
 
 
 def names_in(place: Path) -> list[str]:
@@ -22,56 +25,89 @@ def names_in(place: Path) -> list[str]:
         here = [p for p in place.iterdir() if p.is_file()]
         here += [p for sub in place.iterdir() if sub.is_dir() and sub.name.lower() == "channel" for p in sub.iterdir()]
         return [p.relative_to(place).as_posix() for p in here if not _of_a_file_manager(p.name)]
-    try:
-        if zipfile.is_zipfile(place):
-            with zipfile.ZipFile(place) as archive:
-                sizes = [(i.filename, i.file_size, i.compress_size) for i in archive.infolist() if not i.is_dir()]
-        elif tarfile.is_tarfile(place):
-            sizes = _tar_sizes(place)
-        else:
-            _refuse(place, "neither a folder nor a readable zip or tar file")
-    except (OSError, zipfile.BadZipFile, tarfile.TarError, EOFError, zlib.error, NotImplementedError) as e:
-        _refuse(place, f"cannot be read: {e}")
-    if len(sizes) > MOST_FILES:
-        _refuse(place, f"too many files inside, got {len(sizes)}; at most {MOST_FILES}")
-    total = sum(size for _, size, _ in sizes)
-    for name, size, packed in sizes:
-        if size > MOST_BYTES or (size > SMALL and size > MOST_RATIO * max(1, packed)):
-            _refuse(place, f"{name[:80]}: unpacks to {size} bytes from {packed}; at most {MOST_BYTES} are allowed")
-    if total > SMALL and total > MOST_RATIO * place.stat().st_size:
-        _refuse(place, f"unpacks to {total} bytes from {place.stat().st_size}; that is no test")
-    names = [name.replace("\\", "/") for name, _, _ in sizes]
+    names = [_spelt(name) for name, _, _ in _sizes(place)]
     return [name for name in names if not _of_a_file_manager(name)]
 
 
 def content(place: Path, name: str) -> bytes:
     """Bytes of a file inside, never more than allowed. Raises `InputError`."""
+    most = int(budget.factor() * budget.IN_ARCHIVE)
     try:
         if place.is_dir():
-            path = place / name
-            if path.stat().st_size > MOST_BYTES:
-                _refuse(place, f"{name}: {path.stat().st_size} bytes; at most {MOST_BYTES} are allowed")
-            return path.read_bytes()
-        if zipfile.is_zipfile(place):
-            with zipfile.ZipFile(place) as archive, archive.open(_inside(archive.namelist(), name)) as packed:
-                data = packed.read(MOST_BYTES + 1)
-        else:
-            with tarfile.open(place) as tar:
-                member = tar.extractfile(_inside(tar.getnames(), name))
-                data = member.read(MOST_BYTES + 1) if member else b""
-    except (
-        OSError,
-        zipfile.BadZipFile,
-        tarfile.TarError,
-        EOFError,
-        zlib.error,
-        RuntimeError,
-        NotImplementedError,
-    ) as e:
+            if (size := (place / name).stat().st_size) > most:
+                _refuse(place, f"{name}: {size} bytes; at most {most} are allowed; {budget.cure(size / most)}")
+            return (place / name).read_bytes()
+        if sum(size for _, size, _ in _sizes(place)) <= budget.KEPT:
+            return _all(*_as_it_is(place))[name]
+        return next(data for found, data in _contents(place, name) if found == name)
+    except (KeyError, StopIteration):
+        _refuse(place, f"{name}: not in it; a whole archive is needed")
+    except _FAULTS as e:
         _refuse(place, f"{name}: cannot be read: {e}")
-    if len(data) > MOST_BYTES:
-        _refuse(place, f"{name}: unpacks to more than {MOST_BYTES} bytes")
-    return data
+
+
+def _as_it_is(place: Path) -> tuple[Path, int, int]:
+    about = place.stat()
+    return place, about.st_size, about.st_mtime_ns
+
+
+def _sizes(place: Path) -> Sizes:
+    return _checked(*_as_it_is(place), budget.factor())
+
+
+@lru_cache(maxsize=1)  # asked for again with each of its files
+def _checked(place: Path, packed: int, _changed: int, times: float) -> Sizes:
+    """Sizes of the files inside, none of them unpacked. Raises `InputError` for what is too much in all."""
+    try:
+        if zipfile.is_zipfile(place):
+            with zipfile.ZipFile(place) as archive:
+                sizes = [(i.filename, i.file_size, i.compress_size) for i in archive.infolist() if not i.is_dir()]
+        elif is_tar(place):
+            sizes = _tar_sizes(place)
+        else:
+            _refuse(place, "neither a folder nor a readable zip or tar file")
+    except _FAULTS as e:
+        _refuse(place, f"cannot be read: {e}")
+
+    def refuse(message: str) -> InputError:
+        return InputError(Fault(file=str(place), message=message))
+
+    budget.check_count(len(sizes), budget.FILES, refuse, "files inside")
+    total = 0
+    for name, size, part in sizes:
+        total += size
+        most = int(times * min(budget.IN_ARCHIVE, max(budget.SMALL, budget.RATIO * part)))
+        in_all = int(times * max(budget.SMALL, budget.RATIO * packed))
+        if size > most:
+            allowed = f"at most {most} are allowed; {budget.cure(size / most)}"
+            _refuse(place, f"{name[:80]}: unpacks to {size} bytes from {part}; {allowed}")
+        if total > in_all:
+            allowed = f"at most {in_all} are allowed; {budget.cure(total / in_all)}"
+            _refuse(place, f"unpacks to {total} bytes or more from {packed}; {allowed}")
+    return sizes
+
+
+@lru_cache(maxsize=1)  # each file of a tar would unpack what stands before it again
+def _all(place: Path, _size: int, _changed: int) -> dict[str, bytes]:
+    return dict(_contents(place))
+
+
+def _contents(place: Path, only: str = "") -> Iterator[tuple[str, bytes]]:
+    """Name and bytes of one file after the other, or of the first of one name."""
+    if zipfile.is_zipfile(place):
+        with zipfile.ZipFile(place) as archive:
+            for info in archive.infolist():
+                if not info.is_dir() and only in ("", _spelt(info.filename)):
+                    yield _spelt(info.filename), archive.read(info)
+        return
+    with open_tar(place) as tar:
+        for member in tar:
+            if member.isfile() and only in ("", _spelt(member.name)) and (file := tar.extractfile(member)) is not None:
+                yield _spelt(member.name), file.read()
+
+
+def _spelt(name: str) -> str:
+    return name.replace("\\", "/")
 
 
 def _of_a_file_manager(name: str) -> bool:
@@ -79,21 +115,19 @@ def _of_a_file_manager(name: str) -> bool:
     return name.startswith("__MACOSX/") or "/__MACOSX/" in name or name.rpartition("/")[2].startswith("._")
 
 
-def _inside(names: list[str], name: str) -> str:
-    return next(n for n in names if n.replace("\\", "/") == name)
-
-
-def _tar_sizes(place: Path) -> list[tuple[str, int, int]]:
+def _tar_sizes(place: Path) -> Sizes:
     """Sizes of the files in a tar; stops at the first that is too large, before it is unpacked."""
-    found: list[tuple[str, int, int]] = []
+    found: Sizes = []
     whole = place.stat().st_size
-    with tarfile.open(place) as archive:
+    times, total = budget.factor(), 0
+    with open_tar(place) as archive:
         for member in archive:
             if member.isfile():
                 found.append((member.name, member.size, whole))
-            if member.size > MOST_BYTES or len(found) > MOST_FILES:
+                total += member.size
+            if member.size > times * budget.IN_ARCHIVE or len(found) > times * budget.FILES:
                 break
-            if sum(size for _, size, _ in found) > max(SMALL, MOST_RATIO * whole):
+            if total > times * max(budget.SMALL, budget.RATIO * whole):
                 break
     return found
 

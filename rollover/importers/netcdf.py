@@ -5,14 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from rollover.importers.apart import apart
 from rollover.importers.arrays import Array, signals_of
 from rollover.importers.importer import Importer, reading, starts_with
 from rollover.importers.sidecar import Described
-from rollover.importers.signals import assemble
+from rollover.importers.signals import Signal, assemble
 from rollover.recording import Recording
 
 
 def _read(path: Path, profile: Described | None) -> Recording:
+    return assemble(path, apart(_signals, path, profile, what="netCDF", modules=("scipy.io",)), profile)
+
+
+def _signals(path: Path, profile: Described | None) -> dict[str, Signal]:
     from scipy.io import netcdf_file
 
     with reading(path, "netCDF"), netcdf_file(str(path), "r", mmap=False, maskandscale=False) as file:
@@ -20,8 +25,7 @@ def _read(path: Path, profile: Described | None) -> Recording:
             name: _array(file, name) if variable.shape else "a single number"
             for name, variable in file.variables.items()
         }
-        signals = signals_of(path, found, profile)
-    return assemble(path, signals, profile)
+        return signals_of(path, found, profile)
 
 
 def _array(file: Any, name: str) -> Array:

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from rollover.channels import UNITS
 from rollover.faults import Fault, InputError
 from rollover.importers import stamps
+from rollover.importers.apart import apart
 from rollover.importers.columns import is_wanted, no_numbers
-from rollover.importers.importer import Importer, check_claim, library, reading, starts_with
+from rollover.importers.importer import Importer, check_claim, check_library, library, reading, starts_with
 from rollover.importers.sidecar import Described
 from rollover.importers.signals import Signal, assemble, left_out
 from rollover.recording import Recording
@@ -37,6 +38,11 @@ Properties = Mapping[str, Any]
 
 
 def _read(path: Path, profile: Described | None) -> Recording:
+    check_library("nptdms", "tdms", path)
+    return assemble(path, apart(_signals, path, profile, what="TDMS", modules=("nptdms",)), profile)
+
+
+def _signals(path: Path, profile: Described | None) -> dict[str, Signal]:
     nptdms = library("nptdms", "tdms", path)
     signals: dict[str, Signal] = {}
     with reading(path, "TDMS"), nptdms.TdmsFile.open(str(path), raw_timestamps=True) as file:
@@ -55,7 +61,7 @@ def _read(path: Path, profile: Described | None) -> Recording:
                 is_text = channel.data_type.__name__ == "String"
                 reason = "empty" if len(channel) == 0 else "text" if is_text else ""
                 signals[name] = Signal(values=np.empty(0), channel=about, shared=channel.name, left_out=reason)
-    return assemble(path, signals, profile)
+    return signals
 
 
 def _signal(channel: Any, levels: tuple[Properties, ...]) -> Signal:

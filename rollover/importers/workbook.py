@@ -7,9 +7,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from rollover.importers.importer import library, reading
+from rollover.budget import Budget
+from rollover.importers.apart import apart
+from rollover.importers.importer import check_library, library, reading
 
-MOST_UNPACKED = 1 << 26  # bytes of one workbook: those of the published sets have half a megabyte
+IN_CELLS = 5  # bytes in memory of a byte of XML: a cell has some 30 there and 150 as an object
 MOST_EMPTY = 100  # rows without a value, after which a sheet is over; programs write 65536 of them
 
 Row = tuple[Any, ...]
@@ -20,12 +22,17 @@ def read_workbook(path: Path) -> Mapping[str, list[Row]]:
 
     What counts is the content: an `.xlsx` that is named `.xls` is read too.
     """
+    check_library("openpyxl", "xlsx", path)
+    return apart(_rows, path, what="Excel", modules=("openpyxl",))
+
+
+def _rows(path: Path) -> dict[str, list[Row]]:
     openpyxl = library("openpyxl", "xlsx", path)
     with reading(path, "Excel (.xlsx)"), path.open("rb") as file:
         with zipfile.ZipFile(file) as archive:
-            size = sum(info.file_size for info in archive.infolist())
-        if size > MOST_UNPACKED:
-            raise ValueError(f"unpacks to {size} bytes; at most {MOST_UNPACKED} are allowed")
+            claimed = Budget(path)
+            for info in archive.infolist():
+                claimed.claim(IN_CELLS * info.file_size, info.filename)
         file.seek(0)
         book = openpyxl.load_workbook(file, read_only=True, data_only=True)
         return {sheet.title: list(_filled(sheet.iter_rows(values_only=True))) for sheet in book.worksheets}

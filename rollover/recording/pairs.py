@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.budget import Budget
 from rollover.writing import put
 
 KEY = b"rollover"
+IN_LIST = 40  # bytes of a value: in Arrow's table, and as a number of Python in a list
 Column = NDArray[Any] | Sequence[Any]
 
 
@@ -35,10 +37,9 @@ def write_pairs(values: Mapping[str, float], about: Mapping[str, Any], path: Pat
 def read_pairs(path: Path) -> tuple[dict[str, float], dict[str, Any]]:
     """What `write_pairs` wrote, to the last bit. Raises `UnreadableError`."""
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     try:
-        table = pq.ParquetFile(path).read(use_threads=False)
+        table = _opened(path).read(use_threads=False)
         about = json.loads(table.schema.metadata[KEY])
         values = dict(zip(table["name"].to_pylist(), table["value"].to_pylist(), strict=True))
     except (OSError, pa.ArrowException, KeyError, TypeError, ValueError) as e:
@@ -64,14 +65,22 @@ def write_table(
 def read_table(path: Path) -> tuple[dict[str, list[Any]], dict[str, Any]]:
     """Columns as lists, None where there is nothing, and what the table says of itself. Raises `UnreadableError`."""
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     try:
-        table = pq.ParquetFile(path).read()
+        table = _opened(path).read()
         about = json.loads((table.schema.metadata or {}).get(KEY, b"{}"))
         return {name: table[name].to_pylist() for name in table.column_names}, about
     except (OSError, pa.ArrowException, TypeError, ValueError) as e:
         raise UnreadableError(f"{path}: {e}") from None
+
+
+def _opened(path: Path) -> Any:
+    """An open Parquet file, whose claims are within bounds. Raises `InputError`, which is a ``ValueError``."""
+    import pyarrow.parquet as pq
+
+    file = pq.ParquetFile(path)
+    Budget(path).claim(IN_LIST * file.metadata.num_rows * max(1, file.metadata.num_columns))
+    return file
 
 
 def as_numbers(values: Sequence[Any]) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from rollover.channels import describe
 from rollover.faults import Fault, InputError
 from rollover.recording.record import Clock, Recording, Sensor
-from rollover.recording.tables import numbers
+from rollover.recording.tables import numbers, open_parquet
 
 FORMAT = "rollover-channels/1"
 
@@ -55,10 +55,9 @@ def is_run(path: Path) -> bool:
 def read_parquet(path: Path) -> Recording:
     """Read what `write_parquet` wrote, to the last bit. Raises `InputError`."""
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     try:
-        table = pq.ParquetFile(path).read()
+        table = open_parquet(path).read()
     except (OSError, pa.ArrowInvalid) as e:
         raise InputError(Fault(file=str(path), message=f"cannot be read: {str(e).splitlines()[0]}")) from None
     not_a_run = Fault(file=str(path), message=f"not channels of a run; a file of format {FORMAT} is needed")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.budget import Budget
 from rollover.faults import InputError
 from rollover.recording.text_rows import (
     BLOCK,
@@ -28,7 +29,7 @@ from rollover.recording.text_rows import (
 
 Array = NDArray[np.float64]
 
-MOST_VALUES = 500_000_000  # 4 GB of float64: more is no recording of one test
+IN_TABLE = 16  # bytes of a value: in Arrow's table and in numpy's array
 LOOKED_AT = 200  # rows, for how many columns there are where no row holds names
 GAPS = ("", "NaN", "nan", "NAN")
 
@@ -148,14 +149,14 @@ def line_of_row(path: Path, row: int, dialect: Dialect = PLAIN) -> int:
 
 def parquet_names(path: Path) -> list[str]:
     """Names of the columns of a Parquet file. Raises `InputError`."""
-    return list(_parquet(path).schema_arrow.names)
+    return list(open_parquet(path).schema_arrow.names)
 
 
 def read_parquet_columns(path: Path, columns: Sequence[str]) -> dict[str, Array]:
     """Some columns of a Parquet file as numbers. Raises `InputError`."""
     import pyarrow as pa
 
-    file = _parquet(path)
+    file = open_parquet(path)
     for name in columns:
         kind = file.schema_arrow.field(name).type
         if not (pa.types.is_floating(kind) or pa.types.is_integer(kind)):
@@ -208,7 +209,8 @@ def numbers(column: Any) -> Array:
     return np.concatenate([np.zeros(0), *(np.from_dlpack(chunk) for chunk in whole.chunks if len(chunk))])
 
 
-def _parquet(path: Path) -> Any:
+def open_parquet(path: Path) -> Any:
+    """An open Parquet file, of which nothing but what it says of itself is read yet. Raises `InputError`."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -218,9 +220,7 @@ def _parquet(path: Path) -> Any:
         file = pq.ParquetFile(path)
     except (pa.ArrowException, OSError, ValueError) as e:
         refuse(path, f"cannot be read: {str(e).splitlines()[0]}")
-    rows, size = file.metadata.num_rows, path.stat().st_size
-    if rows < 0 or rows * max(1, file.metadata.num_columns) > MOST_VALUES or rows > 100 * size:
-        refuse(path, f"claims too much, got {rows} rows in {size} bytes; at most {MOST_VALUES} values are allowed")
+    Budget(path).claim(IN_TABLE * file.metadata.num_rows * max(1, file.metadata.num_columns))
     return file
 
 

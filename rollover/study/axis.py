@@ -16,6 +16,7 @@ from ground.kinds import ByKind
 from ground.quantity import Label, Quantity, parameters
 from ground.soils import log_scatter
 from ground.ye import MULTIPLE_CORRELATION
+from rollover import budget
 
 Array = NDArray[np.float64]
 EDGE = 1e-12  # u is kept this far from 0 and 1, where a normal has no value
@@ -45,6 +46,10 @@ class Axis:
         """Values of a grid: what the axis lists, or the middles of `count` parts of equal probability."""
         return self.at((np.arange(count) + 0.5) / count)
 
+    def how_many(self, count: int) -> int:
+        """Number of `levels`, known before they are made."""
+        return count
+
 
 @parameters
 class Listed(Axis):
@@ -68,6 +73,10 @@ class Listed(Axis):
     def levels(self, count: int) -> NDArray[Any]:
         """All of them."""
         return np.array(self.values)
+
+    def how_many(self, count: int) -> int:
+        """All of them."""
+        return len(self.values)
 
 
 @parameters
@@ -95,6 +104,10 @@ class Chosen(Axis):
         """All of them."""
         return np.array(self.values, dtype=object)
 
+    def how_many(self, count: int) -> int:
+        """All of them."""
+        return len(self.values)
+
 
 @parameters
 class Range(Axis):
@@ -114,6 +127,7 @@ class Range(Axis):
         _rising(self.low, self.high)
         if self.scale == "log" and self.low <= 0.0:
             raise ValueError(f"low: has no logarithm, got {self.low!r}; more than 0")
+        budget.check_count(self.count, budget.CASES, lambda message: ValueError(f"count: {message}"), "levels")
 
     def at(self, u: Array) -> NDArray[Any]:
         """Low + u (high - low), or that of the logarithms."""
@@ -126,6 +140,10 @@ class Range(Axis):
         found = self.at(np.linspace(0.0, 1.0, self.count))
         found[0], found[-1] = self.low, self.high
         return found
+
+    def how_many(self, count: int) -> int:
+        """`self.count`, whatever a plan says."""
+        return self.count
 
 
 @parameters

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,13 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover import budget
 from rollover.faults import Fault, InputError, hint
 from rollover.study import plan as plans
 from rollover.study import sensitivity
 from rollover.study.axis import EDGE, Array
 from rollover.study.study import Correlation, Study
-
-MOST = 10_000_000  # cases
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,11 +42,9 @@ def points(study: Study) -> Points:
     if isinstance(plan, plans.Table):
         return Points(columns=_read(Path(plan.file), [axis.name for axis in study.axes]))
     if isinstance(plan, plans.Grid):
+        count = math.prod(axis.how_many(plan.levels) for axis in study.axes)
+        _bounded(count, d)  # before a single level is made
         levels = [axis.levels(plan.levels) for axis in study.axes]
-        count = 1
-        for each in levels:
-            count *= len(each)
-        _bounded(count)
         at = np.unravel_index(np.arange(count), [len(each) for each in levels])
         return Points(columns={axis.name: v[k] for axis, v, k in zip(study.axes, levels, at, strict=True)})
     u = _unit(plan, d)
@@ -64,13 +62,13 @@ def _unit(plan: plans.AnyPlan, d: int) -> Array:
     from scipy.stats import qmc
 
     if isinstance(plan, plans.SobolIndices):
-        _bounded(plan.count * (d + 2))
+        _bounded(plan.count * (d + 2), d)
         return sensitivity.sobol_sample(d, plan.count, plan.seed)
     if isinstance(plan, plans.Morris):
-        _bounded(plan.count * (d + 1))
+        _bounded(plan.count * (d + 1), d)
         return sensitivity.morris_sample(d, plan.count, plan.levels, plan.seed)
     assert isinstance(plan, (plans.Random, plans.Lhs, plans.Sobol))
-    _bounded(plan.count)
+    _bounded(plan.count, d)
     if isinstance(plan, plans.Random):
         return np.random.default_rng(plan.seed).random((plan.count, d))
     if isinstance(plan, plans.Lhs):
@@ -80,9 +78,12 @@ def _unit(plan: plans.AnyPlan, d: int) -> Array:
     return np.asarray(drawn[: plan.count])
 
 
-def _bounded(count: int) -> None:
-    if count > MOST:
-        raise InputError(Fault(path="plan", message=f"too many cases, got {count}; at most {MOST}"))
+def _bounded(count: int, axes: int) -> None:
+    def refuse(message: str) -> InputError:
+        return InputError(Fault(path="plan", message=message))
+
+    budget.check_count(count, budget.CASES, refuse, "cases")
+    budget.check_count(count * axes, budget.POINTS, refuse, f"values, of {count} cases on {axes} axes")
 
 
 def _coupled(u: Array, correlation: Correlation, names: list[str]) -> Array:
@@ -120,7 +121,7 @@ def _read(path: Path, names: list[str]) -> dict[str, NDArray[Any]]:
     count = len(found[names[0]])
     if count == 0:
         raise InputError(Fault(file=str(path), message="empty, got a table without rows"))
-    _bounded(count)
+    _bounded(count, len(names))
     for name, column in found.items():
         filled = np.array([bool(w.strip()) for w in column]) if column.dtype == object else np.isfinite(column)
         if not filled.all():

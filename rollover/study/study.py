@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ground.quantity import Grid as Rows
 from ground.quantity import Quantity, parameters
-from rollover import document
+from rollover import budget, document
 from rollover.channels import describe, is_known
 from rollover.faults import Fault, InputError, hint
 from rollover.scenario import Scenario
@@ -171,17 +172,26 @@ class Study:
                 raise ValueError(f"correlation.axes: {name!r} is no distribution, only those can be correlated")
 
     def _check_values(self, i: int, axis: AnyAxis) -> None:
-        """The scenario with the axis at its ends and in its middle, or at all of its levels."""
+        """The scenario with the axis at its ends and in its middle, or at its levels: where they are many, at some."""
         if isinstance(axis, Column):
             return
         base = base_values(self.scenario, axis)
-        for value in axis.at(np.array([1e-3, 0.5, 1.0 - 1e-3])) if axis.drawn else axis.levels(2):
+        for value in axis.at(np.array([1e-3, 0.5, 1.0 - 1e-3])) if axis.drawn else _tried(axis.levels(2)):
             try:
                 self.scenario.replaced(changes(base, axis, value))
             except InputError as e:
                 fault = e.faults[0]
                 what = f"{fault.path}: {fault.message}" if fault.path else fault.message
                 raise ValueError(f"axes.{i}: {axis.name} = {value}: {what}") from None
+
+
+def _tried(levels: NDArray[Any]) -> NDArray[Any]:
+    """Levels without those that are there twice; of very many the ends, and as many as `budget.PROBES` between them."""
+    each = np.array(list(dict.fromkeys(levels.tolist())), dtype=levels.dtype)
+    if len(each) <= budget.PROBES:
+        return each
+    each = np.sort(each)  # words too: what is wrong with one of them is told at its case
+    return np.asarray(each[np.linspace(0, len(each) - 1, budget.PROBES).astype(int)])
 
 
 def unit_of(measure: str) -> str:
