@@ -121,6 +121,7 @@ def check(name: str) -> str:
     path = _found(name)
     keys = document.headings(path)
     kind = keys["kind"].plain if "kind" in keys else None
+    kind = kind if kind is None or isinstance(kind, str) else repr(kind)  # a list is no kind
     if str(keys["format"].plain if "format" in keys else "").startswith("rollover-baseline/"):
         from rollover import baseline  # brings the simulator along, which the other files need not
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,15 +12,19 @@ from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.error import MarkedYAMLError, ReusedAnchorWarning, YAMLError
 from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 from ruamel.yaml.representer import RoundTripRepresenter
 from ruamel.yaml.scalarstring import DoubleQuotedScalarString, SingleQuotedScalarString
 
-from rollover.faults import Fault, InputError
+from rollover.faults import Fault, InputError, cured
 
 MOST_VALUES = 1_000_000  # a few aliases can stand for any number of values
+CURE = "plain values, lists and mappings of them are allowed"
+SYNTAX = "quote text that holds : # [ ] { } & * ! %, and indent with blanks"
 _TAG = "tag:yaml.org,2002:"
+
+warnings.simplefilter("ignore", ReusedAnchorWarning)  # YAML allows it, the later one counts
 
 Scalar = str | int | float | bool | None
 
@@ -34,7 +39,7 @@ class Place:
 
     def fault(self, path: str, message: str) -> InputError:
         """Say that something is wrong here."""
-        return InputError(Fault(file=self.file, line=self.line, path=path, message=message))
+        return InputError(cured(Fault(file=self.file, line=self.line, path=path, message=message), CURE))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,10 +73,14 @@ def read(path: Path) -> Node:
         data = path.read_bytes()
         text = data.decode("utf-8-sig")
     except OSError as e:
-        raise replace(start, line=None).fault("", f"cannot be read: {e.strerror}") from None
+        raise replace(start, line=None).fault(
+            "", f"cannot be read: {e.strerror}; a file that may be read is needed"
+        ) from None
     except UnicodeDecodeError as e:
         line = data.count(b"\n", 0, e.start) + 1
-        raise replace(start, line=line).fault("", f"not UTF-8 text, got byte 0x{data[e.start]:02x}") from None
+        raise replace(start, line=line).fault(
+            "", f"not UTF-8 text, got byte 0x{data[e.start]:02x}; save it as UTF-8"
+        ) from None
     return parse(text, start)
 
 
@@ -100,13 +109,13 @@ def parse(text: str, start: Place) -> Node:
     except MarkedYAMLError as e:
         mark = e.problem_mark or e.context_mark
         reason = ", ".join(str(part) for part in (e.context, e.problem) if part)
-        raise at(mark.line if mark else 0).fault("", f"not valid YAML: {reason}") from None
+        raise at(mark.line if mark else 0).fault("", f"not valid YAML: {reason}; {SYNTAX}") from None
     except YAMLError as e:  # a character that YAML does not allow
         line = text.count("\n", 0, getattr(e, "position", 0))
         reason = getattr(e, "reason", str(e).splitlines()[0])
-        raise at(line).fault("", f"not valid YAML: {reason}") from None
+        raise at(line).fault("", f"not valid YAML: {reason}; printable text is needed") from None
     except RecursionError:
-        raise at(0).fault("", "nested too deeply") from None
+        raise at(0).fault("", "nested too deeply; a few levels are needed") from None
     if builder.faults:
         raise InputError(*builder.faults)
     return node

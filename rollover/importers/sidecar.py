@@ -197,7 +197,7 @@ def read_described(path: Path, kind: type[Sidecar] | type[Profile]) -> Described
         raise InputError(Fault(file=str(path), message=f"too long, got {size} bytes; at most {MOST_BYTES} are allowed"))
     if size and (deep := _DEEP.search(path.read_bytes())):
         line = path.read_bytes()[: deep.start()].count(b"\n") + 1
-        raise InputError(Fault(file=str(path), line=line, message="nested too deeply"))
+        raise InputError(Fault(file=str(path), line=line, message="nested too deeply; a few levels are needed"))
     root = document.read(path)
     if not isinstance(root.value, Mapping):
         raise root.place.fault("", f"not a mapping, got {str(root.plain)[:40]!r}; format, channels are needed")
