@@ -8,7 +8,10 @@ from typing import Any
 
 NUMBER, TEXT, COUNT = "a number", "text", "a whole number"
 _PEAK = {
-    "channel": TEXT, "unit": TEXT, "cfc": COUNT, "domain_flags": [TEXT],
+    "channel": TEXT,
+    "unit": TEXT,
+    "cfc": COUNT,
+    "domain_flags": [TEXT],
     **dict.fromkeys(("raw", "raw_time", "filtered", "filtered_time"), NUMBER),
     **dict.fromkeys(("impulse", "half_step_change", "mean", "scatter"), (NUMBER,)),
     "starts": (COUNT,),

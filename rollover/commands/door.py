@@ -137,8 +137,6 @@ def answering(command: C) -> C:
     @functools.wraps(command)
     def wrapped(*args: Any, **kwargs: Any) -> None:
         said, status = "", 0
-        # what a library's broken object says while it is thrown away helps nobody
-        hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
         try:
             with working() as work:
                 try:
@@ -153,8 +151,6 @@ def answering(command: C) -> C:
             said, status = str(e), WRONG_INPUT
         except KeyboardInterrupt:
             said, status = "Interrupted.", INTERRUPTED
-        finally:
-            sys.unraisablehook = hook
         if status:  # not within `except`, which would keep what was being read
             print(said, file=sys.stderr)
             raise typer.Exit(status)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rollover.boundary import worded
 from rollover.document.tree import Node, Place, planted, shown
 from rollover.faults import InputError
 
@@ -23,7 +24,10 @@ def read(file: Path, node: Node, path: str) -> Node:
             found = np.load(file, allow_pickle=False)
             grid = np.asarray(found, dtype=float)
         except (OSError, ValueError, TypeError, EOFError) as e:
-            raise node.place.fault(path, f"{name} is no grid of numbers: {str(e).splitlines()[0]}") from None
+            raise node.place.fault(
+                path,
+                f"{name} is no grid of numbers: {worded(e)}; rows of numbers, one for each line of the grid, are needed",
+            ) from None
         if grid.ndim != 2 or grid.size > MOST_NODES:
             what = f"{name} is no grid of numbers, got shape {grid.shape}"
             raise node.place.fault(path, f"{what}; two dimensions and at most {MOST_NODES} numbers are allowed")

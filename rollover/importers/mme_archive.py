@@ -8,6 +8,7 @@ import zlib
 from pathlib import Path
 from typing import NoReturn
 
+from rollover.boundary import worded
 from rollover.faults import Fault, InputError
 
 MOST_BYTES = 1 << 28  # of one file inside: ten million samples
@@ -31,7 +32,7 @@ def names_in(place: Path) -> list[str]:
         else:
             _refuse(place, "neither a folder nor a readable zip or tar file")
     except (OSError, zipfile.BadZipFile, tarfile.TarError, EOFError, zlib.error, NotImplementedError) as e:
-        _refuse(place, f"cannot be read: {e}")
+        _refuse(place, f"cannot be read: {worded(e)}")
     if len(sizes) > MOST_FILES:
         _refuse(place, f"too many files inside, got {len(sizes)}; at most {MOST_FILES}")
     total = sum(size for _, size, _ in sizes)
@@ -68,7 +69,7 @@ def content(place: Path, name: str) -> bytes:
         RuntimeError,
         NotImplementedError,
     ) as e:
-        _refuse(place, f"{name}: cannot be read: {e}")
+        _refuse(place, f"{name}: cannot be read: {worded(e)}")
     if len(data) > MOST_BYTES:
         _refuse(place, f"{name}: unpacks to more than {MOST_BYTES} bytes")
     return data
