@@ -26,7 +26,7 @@ def read(file: Path, node: Node, path: str) -> Node:
         except (OSError, ValueError, TypeError, EOFError) as e:
             raise node.place.fault(
                 path,
-                f"{name} is no grid of numbers: {worded(e)}; rows of numbers, one for each line of the grid, are needed",
+                f"{name} is no grid of numbers: {worded(e)}; rows of numbers are needed",
             ) from None
         if grid.ndim != 2 or grid.size > MOST_NODES:
             what = f"{name} is no grid of numbers, got shape {grid.shape}"

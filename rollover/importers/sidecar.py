@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from ground.quantity import Quantity, parameters
 from rollover import document
+from rollover.boundary import worded
 from rollover.channels import describe, factor
 from rollover.document import Node
 from rollover.faults import Fault, InputError
@@ -192,7 +193,9 @@ def read_described(path: Path, kind: type[Sidecar] | type[Profile]) -> Described
     try:
         size = path.stat().st_size
     except (OSError, RuntimeError) as e:
-        raise InputError(Fault(file=str(path), message=f"cannot be read: {getattr(e, 'strerror', e)}")) from None
+        raise InputError(
+            Fault(file=str(path), message=f"cannot be read: {worded(e)}; a file that may be read is needed")
+        ) from None
     if size > MOST_BYTES:
         raise InputError(Fault(file=str(path), message=f"too long, got {size} bytes; at most {MOST_BYTES} are allowed"))
     if size and (deep := _DEEP.search(path.read_bytes())):

@@ -113,7 +113,7 @@ def test_damage_is_read_or_refused_in_whole_lines(
                 assert is_whole(line) == "", line
 
 
-@pytest.mark.parametrize("name", [n for n in VALID if n not in ("ide", "impack", "csv", "mat", "mcap")])
+@pytest.mark.parametrize("name", [n for n in VALID if n not in ("ide", "impack", "csv", "mat", "mcap", "netcdf")])
 def test_what_is_damaged_was_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     monkeypatch.chdir(tmp_path)
     handed, make = VALID[name]
