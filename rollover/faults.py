@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 MOST_SHOWN = 300  # characters of a value in a message
+THERE = "the path of a file that is there is needed"
 MOST_SAID = 1500  # characters of a message, which holds a value or two, what is allowed and a cure
 # what to do instead, behind what is wrong: what is allowed, needed or meant
 _CURE = re.compile(r"; \S|\bdid you mean\b|\b(?:is|are) (?:needed|allowed)\b|\ballowed: |--[a-z]")
@@ -103,14 +104,16 @@ def absent(path: str | Path) -> str:
         try:
             beside = sorted(p.name for p in folder.iterdir())
         except OSError:  # not a folder, or not for us
-            return message
+            return f"{message}; {THERE}"
         rest = path.parts[depth + 1 :]
         there = [Path(folder, name, *rest) for name in nearest(part, beside, most=3)]
         meant = next((str(p) for p in there if p.exists()), None)
         if meant is not None:
             return f"{message}; did you mean {meant!r}?"
-        return f"{message}; the folder {str(folder)!r} is there, {part!r} in it is not" if rest else message
-    return message
+        return (
+            f"{message}; the folder {str(folder)!r} is there, {part!r} in it is not" if rest else f"{message}; {THERE}"
+        )
+    return f"{message}; {THERE}"
 
 
 def hint(word: str, known: Iterable[str], most_listed: int = 16) -> str:
