@@ -104,16 +104,14 @@ def absent(path: str | Path) -> str:
         try:
             beside = sorted(p.name for p in folder.iterdir())
         except OSError:  # not a folder, or not for us
-            return f"{message}; {THERE}"
+            return message
         rest = path.parts[depth + 1 :]
         there = [Path(folder, name, *rest) for name in nearest(part, beside, most=3)]
         meant = next((str(p) for p in there if p.exists()), None)
         if meant is not None:
             return f"{message}; did you mean {meant!r}?"
-        return (
-            f"{message}; the folder {str(folder)!r} is there, {part!r} in it is not" if rest else f"{message}; {THERE}"
-        )
-    return f"{message}; {THERE}"
+        return f"{message}; the folder {str(folder)!r} is there, {part!r} in it is not" if rest else message
+    return message
 
 
 def hint(word: str, known: Iterable[str], most_listed: int = 16) -> str:

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from rollover.commands.door import Force, answering, app, manual
-from rollover.faults import THERE, Fault, InputError, absent
+from rollover.faults import Fault, InputError, absent
 
 
 @app.command(
@@ -71,12 +71,7 @@ def _recording(results: Path) -> Path:
         return found[0]
     if not results.is_file():
         message, _, cure = absent(results).partition("; ")
-        raise InputError(
-            Fault(
-                file=str(results),
-                message=f"{message}; {cure if cure and cure != THERE else '`rollover run` writes results'}",
-            )
-        )
+        raise InputError(Fault(file=str(results), message=f"{message}; {cure or '`rollover run` writes results'}"))
     if results.suffix != ".rrd":
         raise InputError(Fault(file=str(results), message="not a recording for the viewer; an .rrd file is needed"))
     return results

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rollover.boundary import worded
-from rollover.faults import Fault, InputError, absent, hint
+from rollover.faults import THERE, Fault, InputError, absent, cured, hint
 from rollover.importers import iso_mme, plain
 from rollover.importers.cone_drops import CONE_DROPS
 from rollover.importers.csv_profile import CSV
@@ -107,7 +107,7 @@ def _there(path: str | Path) -> Path:
         ) from None
     if not exists:
         what = "cannot be read: a link that leads nowhere" if path.is_symlink() else absent(path)
-        raise InputError(Fault(file=str(path), message=what))
+        raise InputError(cured(Fault(file=str(path), message=what), THERE))
     return path
 
 
