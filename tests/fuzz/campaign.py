@@ -17,7 +17,7 @@ from tests.fuzz.oracle import CLASSES, Verdict, judge
 
 @dataclass(kw_only=True)
 class Done:
-    """What came of a campaign. `finds`: door -> class -> how often; `kinds`: (class, kind) -> how often, and the first."""
+    """What came of a campaign. `finds`: door -> class -> how often; `kinds`: (class, kind) -> how often, the first."""
 
     inputs: Counter[str] = field(default_factory=Counter)
     statuses: dict[str, Counter[int | None]] = field(default_factory=lambda: defaultdict(Counter))

@@ -100,7 +100,7 @@ def raw(data: bytes, rng: Rng) -> bytes:
             whole = number.to_bytes(8, rng.choice(("little", "big")))
             return data[:at] + whole + data[at + 8 :]
         case 7:  # a letter of a text in it
-            words = [m for m in re.finditer(rb"[A-Za-z_]{3,}", data[:20000])]
+            words = list(re.finditer(rb"[A-Za-z_]{3,}", data[:20000]))
             if words:
                 word = rng.choice(words)
                 k = rng.randrange(word.start(), word.end())
@@ -287,11 +287,13 @@ def parquet(data: bytes, rng: Rng) -> bytes:
     i = rng.randrange(len(whole.column_names))
     name, n = whole.column_names[i], whole.num_rows
     others = (
-        pa.array(["a"] * n), pa.array([None] * n), pa.array([[1.0]] * n), pa.array([{"a": 1}] * n), pa.array([True] * n),
+        pa.array(["a"] * n), pa.array([None] * n), pa.array([[1.0]] * n), pa.array([{"a": 1}] * n),
+        pa.array([True] * n),
         pa.array([b"\xff"] * n), pa.array([0] * n, pa.timestamp("ns")), pa.array([0] * n, pa.duration("s")),
         pa.array(["a"] * n).dictionary_encode(), pa.array([2**63 - 1] * n), pa.array([float("nan")] * n),
         pa.array([float("inf")] * n), pa.array([1.0] * n, pa.float16()), pa.array([0] * n, pa.date32()),
-        pa.array([2**64 - 1] * n, pa.uint64()), pa.array([1.0] * n, pa.float32()), pa.array([1] * n, pa.decimal128(38, 2)),
+        pa.array([2**64 - 1] * n, pa.uint64()), pa.array([1.0] * n, pa.float32()),
+        pa.array([1] * n, pa.decimal128(38, 2)),
     )  # fmt: skip
     match rng.randrange(6):
         case 0:

@@ -209,9 +209,14 @@ def recordings() -> list[Door]:
     ]
     doors = [Door(name="recording", seeds=plain, weight=2.0), Door(name="profile", seeds=profiles, weight=1.5)]
     makers: dict[str, tuple[str, Callable[..., bytes]]] = {
-        "mat": ("a.mat", seeds.mat), "tdms": ("a.tdms", seeds.tdms), "mdf": ("a.mf4", seeds.mdf), "hdf5": ("a.h5", seeds.hdf5),
-        "netcdf": ("a.nc", seeds.netcdf), "mcap": ("a.mcap", seeds.mcap), "ide": ("a.ide", seeds.ide),
-    }  # fmt: skip
+        "mat": ("a.mat", seeds.mat),
+        "tdms": ("a.tdms", seeds.tdms),
+        "mdf": ("a.mf4", seeds.mdf),
+        "hdf5": ("a.h5", seeds.hdf5),
+        "netcdf": ("a.nc", seeds.netcdf),
+        "mcap": ("a.mcap", seeds.mcap),
+        "ide": ("a.ide", seeds.ide),
+    }
     columns = {
         "mat": "{t: {channel: time, unit: s}, F: {channel: ground/force_normal, unit: N}}",
         "mcap": "{/cell.force: {channel: ground/force_normal, unit: N}, /cell.effort.0: {channel: ground/sinkage, unit: m}}",
@@ -262,20 +267,30 @@ def recordings() -> list[Door]:
         elif name in texts:
             doors.append(Door(name=f"importer {name}", seeds=texts[name]))
     sets: dict[str, Callable[..., Files]] = {
-        "cube-tosses": seeds.cube, "elbow-tosses": seeds.elbow, "cone-drops": seeds.cones, "falling-balls": seeds.balls,
-        "soil-penetrometer": seeds.penetrometer, "impact-entries": seeds.cube,
-    }  # fmt: skip
+        "cube-tosses": seeds.cube,
+        "elbow-tosses": seeds.elbow,
+        "cone-drops": seeds.cones,
+        "falling-balls": seeds.balls,
+        "soil-penetrometer": seeds.penetrometer,
+        "impact-entries": seeds.cube,
+    }
     for name in COLLECTIONS:
         make_set = sets.get(name, lambda rng=None: {"2mps_sphere_1.ide": seeds.ide(rng)})
         slow = name in ("soil-penetrometer",)
         doors.append(
             Door(
                 name=f"set {name}",
-                seeds=[Seed(name=name, files={f"set/{k}": v for k, v in make_set().items()}, words=["import", "set", "--as", name, *OUT],
-                            odd=lambda rng, m=make_set: {f"set/{k}": v for k, v in m(rng).items()})],  # type: ignore[misc]
+                seeds=[
+                    Seed(
+                        name=name,
+                        files={f"set/{k}": v for k, v in make_set().items()},
+                        words=["import", "set", "--as", name, *OUT],
+                        odd=lambda rng, m=make_set: {f"set/{k}": v for k, v in m(rng).items()},
+                    )
+                ],
                 weight=0.1 if slow else 0.6,
             )
-        )  # fmt: skip
+        )
     return doors
 
 
@@ -368,12 +383,29 @@ def results(folder: Path) -> list[Door]:
     rec = taken("rec")
     side = tuple(k for k in rec if k.endswith(".yaml"))
     diagnosis = [
-        Seed(name="diagnose", files=rec, words=["diagnose", "drop_test", "rec", "--workers", "0", *OUT], touched=(*side, *rec), weight=1.0,
-             options=(("--tolerance", "?0.1"), ("--hold-out", "?drop_test"))),
-        Seed(name="calibrate", files=rec, words=["calibrate", "drop_test", "rec", "--fit", "vehicle.mass", "--starts", "0", *OUT], touched=(*side, *rec)),
-    ]  # fmt: skip
-    account = [Seed(name="regress", files={f"out/{k.partition('/')[2]}": v for k, v in taken("account", but=()).items()},
-                    words=["regress", "drop_test", "--workers", "0", *OUT], touched=("out/regress.json",))]  # fmt: skip
+        Seed(
+            name="diagnose",
+            files=rec,
+            words=["diagnose", "drop_test", "rec", "--workers", "0", *OUT],
+            touched=(*side, *rec),
+            weight=1.0,
+            options=(("--tolerance", "?0.1"), ("--hold-out", "?drop_test")),
+        ),
+        Seed(
+            name="calibrate",
+            files=rec,
+            words=["calibrate", "drop_test", "rec", "--fit", "vehicle.mass", "--starts", "0", *OUT],
+            touched=(*side, *rec),
+        ),
+    ]
+    account = [
+        Seed(
+            name="regress",
+            files={f"out/{k.partition('/')[2]}": v for k, v in taken("account", but=()).items()},
+            words=["regress", "drop_test", "--workers", "0", *OUT],
+            touched=("out/regress.json",),
+        )
+    ]
     return [
         Door(name="results", seeds=runs, weight=1.5),
         Door(name="view", seeds=view, weight=0.02),

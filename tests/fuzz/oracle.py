@@ -27,6 +27,7 @@ from rollover.commands import door
 LONGEST = 5.0  # s of the processor, of one input
 MOST_MEMORY = 1 << 30  # bytes, beyond what the process held before
 ALLOWED = (0, 1, 2, 3)  # of an input; 74 is the machine's, anything else a bug
+TABLES = (".csv", ".parquet")
 CLASSES = ("traceback", "hang", "memory", "outside", "unreadable", "line", "status", "warning")
 
 # a cure: what is allowed, needed, meant, or what to do instead, behind what is wrong
@@ -256,9 +257,7 @@ def _unreadable(out: Path) -> str:
                     result(path)
             elif path.suffix == ".json":
                 json.loads(path.read_text(encoding="utf-8"))
-            elif path.suffix in (".csv", ".parquet") and path.with_suffix(".yaml").exists():
-                read_recording(path)
-            elif path.name.endswith(".mme.zip"):
+            elif path.name.endswith(".mme.zip") or (path.suffix in TABLES and path.with_suffix(".yaml").exists()):
                 read_recording(path)
             elif path.name == "scenario.yaml" or path.name.startswith("scenario-"):
                 catalogue.check(str(path))

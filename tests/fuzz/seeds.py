@@ -503,7 +503,8 @@ def balls(rng: random.Random | None = None) -> Files:
         "Whiffle Ball 1": published.ball_rows({1: fall}),
         "Volleyball": published.ball_rows({1: fall}),
     }
-    table = "ball            weight(oz)  circumference(cm)\nwiffleball1     1           22.8\nvolleyball      ??          ??\n"
+    head = "ball            weight(oz)  circumference(cm)\n"
+    table = head + "wiffleball1     1           22.8\nvolleyball      ??          ??\n"
     if rng is not None:
         rows = sheets["Whiffle Ball 1"]
         row = rows[rng.randrange(len(rows))]

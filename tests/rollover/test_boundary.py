@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from rollover import boundary
-from rollover.faults import InputError, has_cure
+from rollover.faults import Fault, InputError, has_cure
 from rollover.importers import COLLECTIONS, importers, read_recording
 from rollover.importers.importer import Collection, Importer
 from rollover.pair import read as result
@@ -169,17 +169,17 @@ def test_whatever_a_reader_raises(tmp_path: Path, raised: Exception) -> None:
 
 
 def test_what_a_library_says_of_the_file_is_kept_and_a_full_disk_stays_one(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"a\.x: not a readable X file: bad header; a whole, undamaged one is needed"):
-        with boundary.reading("a.x", "X file"):
-            raise ValueError("bad header.\nmore")
+    said = r"a\.x: not a readable X file: bad header; a whole, undamaged one is needed"
+    with pytest.raises(InputError, match=said), boundary.reading("a.x", "X file"):
+        raise ValueError("bad header.\nmore")
     with pytest.raises(OSError, match="No space"), boundary.reading("a.x", "X file"):
         raise OSError(28, "No space left on device")
 
 
 def test_a_fault_without_a_cure_gets_that_of_its_door() -> None:
-    with pytest.raises(InputError, match=r"a\.x: line 3: nothing there; another file"):
-        with boundary.reading("a.x", "X file", cure="another file"):
-            raise InputError(boundary.Fault(file="a.x", message="line 3: nothing there"))
+    said = r"a\.x: line 3: nothing there; another file"
+    with pytest.raises(InputError, match=said), boundary.reading("a.x", "X file", cure="another file"):
+        raise InputError(Fault(file="a.x", message="line 3: nothing there"))
     assert not has_cure("line 3: nothing there")
 
 
@@ -217,13 +217,13 @@ def test_each_value_of_a_run_json_may_be_of_any_type(tmp_path: Path, run_folder:
         for i, odd in enumerate(ODD):
             text = json.dumps({**whole, key: odd})
             folder = put(tmp_path / f"{key}{i}", {**run_folder, "run.json": text.encode()})
+            said = ""
             try:
-                found = pair(good, result(folder))
-                summary(found)
-                assert found.candidate.phases is not None
+                summary(pair(good, result(folder)))
             except InputError as e:
-                refused += 1
-                assert is_whole(str(e)) == "", str(e)
+                said = str(e)
+            refused += bool(said)
+            assert not said or is_whole(said) == "", said
     assert refused > 60
 
 
@@ -238,12 +238,13 @@ def test_metadata_of_other_types(tmp_path: Path, run_folder: Files, key: str) ->
     for i, odd in enumerate(ODD):
         made = table.replace_schema_metadata({"rollover": json.dumps({**about, key: odd})})
         pq.write_table(made, tmp_path / f"{i}.parquet")
+        said = ""
         try:
-            found = read_parquet(tmp_path / f"{i}.parquet")
-            assert isinstance(odd, right), odd
-            assert found.time.size == 11
+            read_parquet(tmp_path / f"{i}.parquet")
         except InputError as e:
-            assert is_whole(str(e)) == "", str(e)
+            said = str(e)
+        assert said or isinstance(odd, right), odd
+        assert not said or is_whole(said) == "", said
 
 
 def test_columns_of_other_types(tmp_path: Path, run_folder: Files) -> None:
@@ -258,11 +259,13 @@ def test_columns_of_other_types(tmp_path: Path, run_folder: Files) -> None:
         for at in (0, 1):
             made = table.set_column(at, table.column_names[at], pa.array(values))
             pq.write_table(made, tmp_path / f"{i}{at}.parquet")
+            said = ""
             try:
                 read_parquet(tmp_path / f"{i}{at}.parquet")
-                assert values[0] is None
             except InputError as e:
-                assert is_whole(str(e)) == "", str(e)
+                said = str(e)
+            assert said or values[0] is None
+            assert not said or is_whole(said) == "", said
 
 
 # ---- the command line
