@@ -319,3 +319,43 @@ def test_gaps_are_gaps(tmp_path: Path) -> None:
         (tmp_path / file).write_bytes(data)
     found = read_recording(tmp_path / "a.csv")
     assert found["ground/force_normal"] == pytest.approx(1e3 * np.sin(300 * seeds.TIME) ** 2, rel=1e-8)
+
+
+# ---- the shelf of a study
+
+
+def test_a_case_that_somebody_else_wrote_is_run_again(tmp_path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    from rollover.study import shelf
+
+    key = "ab" + "0" * 30
+    row = shelf.Row(
+        key=key,
+        status="done",
+        failure="",
+        sentence="",
+        measures={"ground/force_normal": 1.5},
+        domain_flags=("speed",),
+        peak_flags=(),
+        provenance={"wall_time": 0.1},
+    )
+    shelf.keep(tmp_path, row)
+    path = shelf.path_of(tmp_path, key)
+    assert shelf.kept(tmp_path, key) == row
+    table = pq.read_table(path)
+    about = json.loads(table.schema.metadata[b"rollover"])
+    others = [table.set_column(0, "name", pa.array([3])), table.set_column(1, "value", pa.array(["x"]))]
+    others += [table.set_column(1, "value", pa.array([None], pa.float64()))]
+    told = [
+        [],
+        {**about, "key": "other"},
+        {**about, "status": 3},
+        {**about, "sentence": []},
+        {**about, "provenance": 1},
+    ]
+    others += [table.replace_schema_metadata({"rollover": json.dumps(each)}) for each in told]
+    for other in others:
+        pq.write_table(other, path)
+        assert shelf.kept(tmp_path, key) is None
