@@ -11,7 +11,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import TextIO
 
-from tests.fuzz.doors import Door, Seed, an_input, doors
+from tests.fuzz.all_doors import doors
+from tests.fuzz.doors import Door, Seed, an_input
 from tests.fuzz.oracle import CLASSES, Verdict, judge
 
 

@@ -20,7 +20,7 @@ from rollover.importers import COLLECTIONS, importers, read_recording
 from rollover.importers.importer import Collection, Importer
 from rollover.pair import read as result
 from rollover.recording import read_parquet
-from tests.fuzz import seeds
+from tests.fuzz import seeds, sets, texts
 from tests.fuzz.oracle import is_whole
 from tests.rollover.foreign import needs
 
@@ -32,8 +32,8 @@ Files = dict[str, bytes]
 VALID: dict[str, tuple[str, Callable[[], Files]]] = {
     "plain": ("a.csv", lambda: {"a.csv": seeds.csv(seeds.drop_columns()), "a.yaml": seeds.SIDE.encode()}),
     "csv": ("a.txt", lambda: {"a.txt": seeds.csv(seeds.drop_columns())}),
-    "nhtsa": ("v00001", lambda: {f"v00001/{k}": v for k, v in seeds.nhtsa().items()}),
-    "iso-mme": ("a.zip", lambda: {"a.zip": seeds.zipped(seeds.mme_members())}),
+    "nhtsa": ("v00001", lambda: {f"v00001/{k}": v for k, v in texts.nhtsa().items()}),
+    "iso-mme": ("a.zip", lambda: {"a.zip": texts.zipped(texts.mme_members())}),
     "mat": ("a.mat", lambda: {"a.mat": seeds.mat()}),
     "tdms": ("a.tdms", lambda: {"a.tdms": seeds.tdms()}),
     "mdf": ("a.mf4", lambda: {"a.mf4": seeds.mdf()}),
@@ -41,13 +41,13 @@ VALID: dict[str, tuple[str, Callable[[], Files]]] = {
     "netcdf": ("a.nc", lambda: {"a.nc": seeds.netcdf()}),
     "mcap": ("a.mcap", lambda: {"a.mcap": seeds.mcap()}),
     "ide": ("a.ide", lambda: {"a.ide": seeds.ide(random.Random(1))}),
-    "lvm": ("a.lvm", lambda: {"a.lvm": seeds.lvm()}),
-    "dts": ("a.csv", lambda: {"a.csv": seeds.dts()}),
-    "cube-tosses": ("set", lambda: {f"set/{k}": v for k, v in seeds.cube().items()}),
-    "elbow-tosses": ("set", lambda: {f"set/{k}": v for k, v in seeds.elbow().items()}),
-    "falling-balls": ("set", lambda: {f"set/{k}": v for k, v in seeds.balls().items()}),
-    "soil-penetrometer": ("set", lambda: {f"set/{k}": v for k, v in seeds.penetrometer().items()}),
-    "cone-drops": ("set", lambda: {f"set/{k}": v for k, v in seeds.cones().items()}),
+    "lvm": ("a.lvm", lambda: {"a.lvm": texts.lvm()}),
+    "dts": ("a.csv", lambda: {"a.csv": texts.dts()}),
+    "cube-tosses": ("set", lambda: {f"set/{k}": v for k, v in sets.cube().items()}),
+    "elbow-tosses": ("set", lambda: {f"set/{k}": v for k, v in sets.elbow().items()}),
+    "falling-balls": ("set", lambda: {f"set/{k}": v for k, v in sets.balls().items()}),
+    "soil-penetrometer": ("set", lambda: {f"set/{k}": v for k, v in sets.penetrometer().items()}),
+    "cone-drops": ("set", lambda: {f"set/{k}": v for k, v in sets.cones().items()}),
     "impack": ("set", lambda: {"set/2mps_sphere_1.ide": seeds.ide(random.Random(1))}),
 }
 

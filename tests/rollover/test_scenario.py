@@ -153,7 +153,8 @@ ONE_FAULT: dict[str, tuple[str | bytes, str]] = {
     ),
     "indentation": (
         "title: a\n  b: c\n",
-        "bad.yaml:2: not valid YAML: mapping values are not allowed here; quote text that holds : # [ ] { } & * ! %, and indent with blanks",
+        "bad.yaml:2: not valid YAML: mapping values are not allowed here; "
+        "quote text that holds : # [ ] { } & * ! %, and indent with blanks",
     ),
     "two documents": (
         "a: 1\n---\nb: 2\n",
