@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import functools
 import logging
 import os
 import re
@@ -70,7 +69,6 @@ def reading(path: Path | str, what: str, cure: str = CURE) -> Iterator[None]:
 def bounded(function: Callable[Concatenate[Path, P], R], what: str) -> Callable[Concatenate[Path, P], R]:
     """A function that reads a path, its first argument, within `reading`."""
 
-    @functools.wraps(function)
     def within(path: Path, *args: P.args, **kwargs: P.kwargs) -> R:
         with reading(path, what):
             return function(path, *args, **kwargs)
