@@ -69,7 +69,7 @@ def reading(path: Path | str, what: str, cure: str = CURE) -> Iterator[None]:
 def bounded(function: Callable[Concatenate[Path, P], R], what: str) -> Callable[Concatenate[Path, P], R]:
     """A function that reads a path, its first argument, within `reading`."""
 
-    def within(path: Path, *args: P.args, **kwargs: P.kwargs) -> R:
+    def within(path: Path, /, *args: P.args, **kwargs: P.kwargs) -> R:
         with reading(path, what):
             return function(path, *args, **kwargs)
 

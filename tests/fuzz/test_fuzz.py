@@ -16,6 +16,7 @@ for library in ("nptdms", "asammdf", "h5py", "mcap", "idelib", "openpyxl"):
 INPUTS = 2000
 
 
+@pytest.mark.timeout(1800)  # a minute of the processor, of which a busy machine gives little
 def test_two_thousand_inputs(tmp_path: Path) -> None:
     done = campaign(tmp_path, INPUTS, 7)
     assert done.inputs.total() == INPUTS
