@@ -14,7 +14,7 @@ from rollover import channels as table
 from rollover import document
 from rollover import scenario as scenarios
 from rollover.effects import effects as known_effects
-from rollover.faults import Fault, InputError
+from rollover.faults import Fault, InputError, excerpt
 from rollover.rops import Rops
 from rollover.vehicle import Vehicle, pitch_inertia
 
@@ -121,6 +121,9 @@ def check(name: str) -> str:
     path = _found(name)
     keys = document.headings(path)
     kind = keys["kind"].plain if "kind" in keys else None
+    if kind is not None and not isinstance(kind, str):
+        known = (*known_laws(), *document.slot_of(scenarios.AnyVehicle).kinds)
+        raise keys["kind"].place.fault("kind", f"not a word, got {excerpt(repr(kind))}; {', '.join(known)} are allowed")
     if str(keys["format"].plain if "format" in keys else "").startswith("rollover-baseline/"):
         from rollover import baseline  # brings the simulator along, which the other files need not
 

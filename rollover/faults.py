@@ -6,11 +6,14 @@ import difflib
 import re
 import unicodedata
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 MOST_SHOWN = 300  # characters of a value in a message
+THERE = "the path of a file that is there is needed"
 MOST_SAID = 1500  # characters of a message, which holds a value or two, what is allowed and a cure
+# what to do instead, behind what is wrong: what is allowed, needed or meant
+_CURE = re.compile(r"; \S|\bdid you mean\b|\b(?:is|are) (?:needed|allowed)\b|\ballowed: |--[a-z]")
 _JOINERS = "\u200c\u200d"  # without a picture of their own, but Persian and Hindi are not spelt without them
 _QUOTED = re.compile(rf"'[^']{{{MOST_SHOWN},}}'|\"[^\"]{{{MOST_SHOWN},}}\"|[^\s'\"]{{{MOST_SHOWN},}}")
 
@@ -72,6 +75,16 @@ class InputError(ValueError):
 
     def __reduce__(self) -> tuple[type[InputError], tuple[Fault, ...]]:
         return type(self), tuple(self.faults)
+
+
+def has_cure(message: str) -> bool:
+    """Whether a message says what to do, besides what is wrong."""
+    return _CURE.search(message) is not None
+
+
+def cured(fault: Fault, cure: str) -> Fault:
+    """A fault with a cure: its own where it has one."""
+    return fault if has_cure(fault.message) else replace(fault, message=f"{fault.message.rstrip('.')}; {cure}")
 
 
 def nearest(word: str, known: Iterable[str], most: int = 1) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+from collections.abc import Iterable
 from concurrent.futures import BrokenExecutor
 from pathlib import Path
 
@@ -28,6 +29,20 @@ _CURES = {
     errno.ESTALE: "the network's disk has gone; mount it again, or take another --out",
     errno.EPIPE: "whoever was reading has ended",
 }
+
+
+_OF_INPUT = (errno.ENAMETOOLONG, errno.ELOOP, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EACCES, errno.EPERM)
+_NEEDED = "the path of a file that may be read is needed"
+
+
+def refused(fault: BaseException, targets: Iterable[Path]) -> Fault | None:
+    """What is wrong with a path that was to be read; None for a fault of the machine, or of what is being written."""
+    if not isinstance(fault, OSError) or fault.errno not in _OF_INPUT or fault.filename is None or fault.filename2:
+        return None
+    path = Path(os.fsdecode(fault.filename))
+    if any(path.absolute().is_relative_to(target.parent) for target in targets):
+        return None
+    return Fault(file=str(path), message=f"cannot be read: {os.strerror(fault.errno).lower()}; {_NEEDED}")
 
 
 def told(fault: OSError | MemoryError | BrokenExecutor, target: Path | None) -> str:

@@ -6,7 +6,7 @@ Nothing is simulated and nothing is shifted in time: both are read from their re
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover import document, scenario
+from rollover.answer_shape import misfit_of
 from rollover.attitude import beside
 from rollover.faults import Fault, InputError
 from rollover.loads import PeakLoad, leading
@@ -123,6 +124,13 @@ def read(folder: Path) -> Result:
     for name in (SCENARIO, CHANNELS):
         if not (folder / name).is_file():
             raise InputError(Fault(file=str(folder), message=f"no {name} there; run it again with `rollover run`"))
+    if wrong := misfit_of(answer):
+        raise InputError(Fault(file=str(folder / RUN), path=wrong[0], message=wrong[1]))
+    known = {f.name for f in fields(PeakLoad)}
+    for i, peak in enumerate(answer["peak_loads"]):
+        if more := [key for key in peak if key not in known]:
+            message = f"unknown, got {more[0]!r}; {', '.join(sorted(known))} are allowed"
+            raise InputError(Fault(file=str(folder / RUN), path=f"peak_loads.{i}", message=message))
     peaks = tuple(PeakLoad(**{**peak, "domain_flags": tuple(peak["domain_flags"])}) for peak in answer["peak_loads"])
     return Result(
         folder=folder,

@@ -27,6 +27,9 @@ from rollover.vehicle import RigidBody, Striker, Vehicle
 AnyVehicle = Annotated[Vehicle | Striker | RigidBody, ByKind()]
 AnyLaw = Annotated[GroundLaw, ByKind(laws)]  # whatever law stands in the folder `ground`
 
+MOST_STEPS = 100_000_000  # of a run: at 10 us, the least that a step costs, a quarter of an hour
+MOST_ROWS = 5_000_000  # of the channels, of which a tractor has a hundred: 4 GB
+
 
 @parameters
 class Patch:
@@ -73,6 +76,16 @@ class Simulation:
     def validate(self) -> None:
         """Refuse rows that fall between two steps, and a run without any."""
         steps = self.output_step / self.step
+        if not self.duration / self.step <= MOST_STEPS:
+            least = self.duration / MOST_STEPS
+            raise ValueError(
+                f"step: too small for the duration, got {self.step!r} s; at least {least:.3g} s is allowed"
+            )
+        if not self.duration / self.output_step <= MOST_ROWS:
+            least = self.duration / MOST_ROWS
+            raise ValueError(f"output_step: too small, got {self.output_step!r} s; at least {least:.3g} s is allowed")
+        if not steps <= MOST_STEPS:
+            raise ValueError(f"output_step: beyond any duration, got {self.output_step!r} s; at most the duration")
         if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:
             raise ValueError(
                 f"output_step: not a multiple of step ({self.step!r} s), got {self.output_step!r}; "

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rollover.boundary import worded
 from rollover.document import content_hash, dump, shipped_folder
 from rollover.faults import Fault, InputError
 from rollover.ledger import closure
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from rollover.run import Run
 
 FORMAT = "rollover-run/1"
+AGAIN = "`rollover run` writes it anew"
 RUN, SCENARIO, CHANNELS, EVENTS, PICTURE, PAGE = (
     "run.json",
     "scenario.yaml",
@@ -200,9 +202,9 @@ def read_run_json(folder: Path) -> dict[str, Any]:
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise _refused(folder, f"not a results folder, got no {RUN}") from None
-    except (OSError, ValueError) as e:
-        raise _refused(path, f"cannot be read: {e}") from None
+        raise _refused(folder, f"not a results folder, got no {RUN}; {AGAIN}") from None
+    except (OSError, RecursionError, ValueError) as e:
+        raise _refused(path, f"cannot be read: {worded(e)}; {AGAIN}") from None
     if not isinstance(found, dict) or found.get("format") != FORMAT:
         raise _refused(path, f"not the {RUN} of a run; format {FORMAT!r} is needed")
     return found

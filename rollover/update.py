@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from rollover import writing
+from rollover.boundary import worded
 from rollover.faults import Fault, InputError
 
 JOURNAL = ".update.json"
@@ -59,7 +60,7 @@ def finish(journal: Path) -> None:
     except FileNotFoundError:
         return
     except (OSError, ValueError) as e:
-        raise InputError(Fault(file=str(journal), message=f"cannot be read: {e}; remove it to go on")) from None
+        raise InputError(Fault(file=str(journal), message=f"cannot be read: {worded(e)}; remove it to go on")) from None
     moves = _checked(told, journal)
     for made, place in moves:
         with contextlib.suppress(FileNotFoundError):

@@ -12,7 +12,7 @@ import typer
 
 from rollover.commands.door import BROKE, COMPILING, FAILED, AsJson, Force, Setting, answering, app, manual, settings
 from rollover.commands.profiles import profile_of
-from rollover.faults import Fault, InputError, absent
+from rollover.faults import THERE, Fault, InputError, absent, cured
 
 if TYPE_CHECKING:
     from rollover.misfit import Misfit
@@ -131,7 +131,7 @@ def _two_runs(
     if refused:
         raise InputError(Fault(file=refused[0], message="two runs are compared as they are; leave it out"))
     if len(others) == 1 and not Path(others[0]).exists():
-        raise InputError(Fault(file=others[0], message=absent(others[0])))
+        raise InputError(cured(Fault(file=others[0], message=absent(others[0])), THERE))
     if len(others) != 1 or not is_result(others[0]):
         got = " ".join(others)
         message = f"the results of a run, got {got!r} beside them; the results of one other run are needed"

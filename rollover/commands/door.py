@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor
 from typing import Annotated, Any, TypeVar
 
@@ -18,7 +18,7 @@ from typer.models import CommandFunctionType
 
 # what takes long to import is imported by the command that needs it: `rollover --help` answers at once
 from rollover.faults import Fault, InputError
-from rollover.machine import told
+from rollover.machine import refused, told
 from rollover.writing import working
 
 THE_ANSWER_IS_NO, WRONG_INPUT, FAILED, INTERRUPTED, BUG = 1, 2, 3, 130, 70
@@ -73,6 +73,34 @@ class Before(TyperGroup):
         """Its parameters, `--help` among them."""
         return _without_type(super().get_params(ctx))
 
+    def main(
+        self,
+        args: Sequence[str] | None = None,
+        prog_name: str | None = None,
+        complete_var: str | None = None,
+        standalone_mode: bool = True,
+        windows_expand_args: bool = True,
+        **extra: Any,
+    ) -> Any:
+        """Call a command; a line of words that it does not understand is answered in one line."""
+        more = {"complete_var": complete_var, "windows_expand_args": windows_expand_args, **extra}
+        if not standalone_mode:
+            return super().main(args, prog_name, standalone_mode=False, **more)
+        try:
+            status = super().main(args, prog_name, standalone_mode=False, **more)
+        except typer.Abort:
+            print("Interrupted.", file=sys.stderr)
+            sys.exit(INTERRUPTED)
+        except Exception as e:
+            if not hasattr(e, "format_message"):
+                raise
+            if not e.format_message() or type(e).__name__ == "NoArgsIsHelpError":
+                e.show()  # type: ignore[attr-defined]
+            else:
+                print(_usage(e), file=sys.stderr)
+            sys.exit(WRONG_INPUT)
+        sys.exit(status if isinstance(status, int) else 0)
+
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command that the first word names, of which the rest is for that command."""
         name, command, rest = super().resolve_command(ctx, args)
@@ -82,6 +110,14 @@ class Before(TyperGroup):
             if opt in own:
                 ctx.fail(f"{opt} stands before the command: rollover {opt} {own[opt]} {name} ...")
         return name, command, rest
+
+
+def _usage(e: Any) -> Fault:
+    """What is wrong with a command's words, in one line: the command, what is wrong, where it says what is right."""
+    context = getattr(e, "ctx", None)
+    path = context.command_path if context is not None else "rollover"
+    message = " ".join(e.format_message().split()).rstrip(".")
+    return Fault(file=path, message=f"{message[:1].lower()}{message[1:]}; `{path} --help` tells what is allowed")
 
 
 app = Commands(
@@ -109,21 +145,24 @@ def answering(command: C) -> C:
 
     @functools.wraps(command)
     def wrapped(*args: Any, **kwargs: Any) -> None:
+        said, status = "", 0
         try:
             with working() as work:
                 try:
                     command(*args, **kwargs)
                     sys.stdout.flush()  # a full disk may be behind it
                 except (OSError, MemoryError, BrokenExecutor) as e:
+                    if (wrong := refused(e, work.targets)) is not None:
+                        raise InputError(wrong) from None
                     target = next(reversed(work.targets), None)
-                    print(told(e, target), file=sys.stderr)
-                    raise typer.Exit(MACHINE) from None
+                    said, status = told(e, target), MACHINE
         except InputError as e:
-            print(e, file=sys.stderr)
-            raise typer.Exit(WRONG_INPUT) from None
+            said, status = str(e), WRONG_INPUT
         except KeyboardInterrupt:
-            print("Interrupted.", file=sys.stderr)
-            raise typer.Exit(INTERRUPTED) from None
+            said, status = "Interrupted.", INTERRUPTED
+        if status:  # not within `except`, which would keep what was being read
+            print(said, file=sys.stderr)
+            raise typer.Exit(status)
 
     return wrapped  # type: ignore[return-value]
 

@@ -58,7 +58,8 @@ def regress(
         console.say(f"{file}: left out, no scenario")
 
     def overlaps(found: Mapping[str, Any]) -> str:
-        before = {*map(str, found.get("scenarios", []))}
+        named = found.get("scenarios")
+        before = {*map(str, named if isinstance(named, list) else ())}
         shared = before & {*selection}
         return f"replaces the account of {', '.join(sorted(before))}" if shared else ""
 

@@ -54,9 +54,11 @@ def study(
     from rollover.study import reliability, shelf
     from rollover.study.answers import answers
     from rollover.study.conduct import Builder, Way, conduct
+    from rollover.study.design import points
 
     path = studies.find(name)
     chosen = studies.load(path)
+    points(chosen)  # reads the plan's table as well, before anything is written
     if chosen.reliability is not None:
         reliability.installed()
     if scheduler:

@@ -30,6 +30,9 @@ def check(node: Node, kind: Any) -> Any:
         # one line each, in the order of the file; a list that lacks two elements says so once
         unique = dict.fromkeys(sorted(faults, key=lambda f: (f.file or "", f.line or 0)))
         raise InputError(*unique) from None
+    except ArithmeticError:  # of a rule that works with the numbers, each of which is allowed by itself
+        message = "numbers that cannot be worked out together, too large or too small; those of a machine are needed"
+        raise node.place.fault("", message) from None
 
 
 def adapter(kind: Any) -> TypeAdapter[Any]:

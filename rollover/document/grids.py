@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rollover.boundary import worded
 from rollover.document.tree import Node, Place, planted, shown
 from rollover.faults import InputError
 
@@ -30,7 +31,8 @@ def read(file: Path, node: Node, path: str) -> Node:
         except AttributeError:
             raise node.place.fault(path, f"{name} is no grid of numbers, got several arrays; one .npy array") from None
         except (OSError, ValueError, TypeError, EOFError) as e:
-            raise node.place.fault(path, f"{name} is no grid of numbers: {str(e).splitlines()[0]}") from None
+            what = f"{name} is no grid of numbers: {worded(e)}; rows of numbers are needed"
+            raise node.place.fault(path, what) from None
         rows: list[tuple[int | None, list[float]]] = [(None, row) for row in grid.tolist()]
     else:
         rows = list(_rows(file, node, path))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import io
 import re
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,16 +13,20 @@ from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.error import MarkedYAMLError, ReusedAnchorWarning, YAMLError
 from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 from ruamel.yaml.representer import RoundTripRepresenter
 from ruamel.yaml.scalarstring import DoubleQuotedScalarString, SingleQuotedScalarString
 
 from rollover import budget
 from rollover.document import yaml_reader
-from rollover.faults import Fault, InputError
+from rollover.faults import Fault, InputError, cured
 
+CURE = "plain values, lists and mappings of them are allowed"
+SYNTAX = "quote text that holds : # [ ] { } & * ! %, and indent with blanks"
 _TAG = "tag:yaml.org,2002:"
+
+warnings.simplefilter("ignore", ReusedAnchorWarning)  # YAML allows it, the later one counts
 
 Scalar = str | int | float | bool | None
 
@@ -36,7 +41,7 @@ class Place:
 
     def fault(self, path: str, message: str) -> InputError:
         """Say that something is wrong here."""
-        return InputError(Fault(file=self.file, line=self.line, path=path, message=message))
+        return InputError(cured(Fault(file=self.file, line=self.line, path=path, message=message), CURE))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,10 +80,14 @@ def read(path: Path) -> Node:
         data = path.read_bytes()
         text = data.decode("utf-8-sig")
     except OSError as e:
-        raise replace(start, line=None).fault("", f"cannot be read: {e.strerror}") from None
+        raise replace(start, line=None).fault(
+            "", f"cannot be read: {e.strerror}; a file that may be read is needed"
+        ) from None
     except UnicodeDecodeError as e:
         line = data.count(b"\n", 0, e.start) + 1
-        raise replace(start, line=line).fault("", f"not UTF-8 text, got byte 0x{data[e.start]:02x}") from None
+        raise replace(start, line=line).fault(
+            "", f"not UTF-8 text, got byte 0x{data[e.start]:02x}; save it as UTF-8"
+        ) from None
     return parse(text, start)
 
 
@@ -112,13 +121,13 @@ def _parsed(text: str, start: Place, _factor: float) -> Node:
     except MarkedYAMLError as e:
         mark = e.problem_mark or e.context_mark
         reason = ", ".join(str(part) for part in (e.context, e.problem) if part)
-        raise at(mark.line if mark else 0).fault("", f"not valid YAML: {reason}") from None
+        raise at(mark.line if mark else 0).fault("", f"not valid YAML: {reason}; {SYNTAX}") from None
     except YAMLError as e:  # a character that YAML does not allow
         line = text.count("\n", 0, getattr(e, "position", 0))
         reason = getattr(e, "reason", str(e).splitlines()[0])
-        raise at(line).fault("", f"not valid YAML: {reason}") from None
+        raise at(line).fault("", f"not valid YAML: {reason}; printable text is needed") from None
     except RecursionError:
-        raise at(0).fault("", "nested too deeply") from None
+        raise at(0).fault("", "nested too deeply; a few levels are needed") from None
     if builder.faults:
         raise InputError(*builder.faults)
     return node

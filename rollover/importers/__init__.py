@@ -7,7 +7,8 @@ import functools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from rollover.faults import Fault, InputError, absent, hint
+from rollover.boundary import worded
+from rollover.faults import THERE, Fault, InputError, absent, cured, hint
 from rollover.importers import iso_mme, plain
 from rollover.importers.cone_drops import CONE_DROPS
 from rollover.importers.csv_profile import CSV
@@ -101,10 +102,12 @@ def _there(path: str | Path) -> Path:
             path = path / "channels.parquet"
         exists = path.exists()
     except (OSError, RuntimeError) as e:  # a link that leads to itself
-        raise InputError(Fault(file=str(path), message=f"cannot be read: {getattr(e, 'strerror', e)}")) from None
+        raise InputError(
+            Fault(file=str(path), message=f"cannot be read: {worded(e)}; a file that may be read is needed")
+        ) from None
     if not exists:
         what = "cannot be read: a link that leads nowhere" if path.is_symlink() else absent(path)
-        raise InputError(Fault(file=str(path), message=what))
+        raise InputError(cured(Fault(file=str(path), message=what), THERE))
     return path
 
 

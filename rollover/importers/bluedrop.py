@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.boundary import worded
 from rollover.faults import Fault, InputError
 from rollover.importers.workbook import Row, read_workbook
 
@@ -65,7 +66,9 @@ def _numbers(path: Path) -> Array:
     try:
         data = np.frombuffer(path.read_bytes(), dtype=np.uint8)
     except OSError as e:
-        raise InputError(Fault(file=str(path), message=f"cannot be read: {e.strerror}")) from None
+        raise InputError(
+            Fault(file=str(path), message=f"cannot be read: {worded(e)}; a file that may be read is needed")
+        ) from None
     if data.size == 0 or data.size % (WIDTH * BYTES):
         message = f"not a log of the penetrometer, got {data.size} bytes; a multiple of {WIDTH * BYTES}"
         raise InputError(Fault(file=str(path), message=message))

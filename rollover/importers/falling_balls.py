@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.boundary import worded
 from rollover.faults import Fault, InputError
 from rollover.importers.importer import Collection
 from rollover.importers.signals import check_time, check_values
@@ -152,7 +153,9 @@ def _balls(path: Path) -> Mapping[str, tuple[float | None, float | None]]:
     try:
         lines = path.read_text(encoding="utf-8").splitlines()[1:]
     except (OSError, UnicodeDecodeError) as e:
-        raise InputError(Fault(file=str(path), message=f"cannot be read: {getattr(e, 'strerror', e)}")) from None
+        raise InputError(
+            Fault(file=str(path), message=f"cannot be read: {worded(e)}; a text file in UTF-8 is needed")
+        ) from None
     found = {}
     for number, line in enumerate(lines, start=2):
         words = line.split()

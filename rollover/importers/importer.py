@@ -11,6 +11,8 @@ from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
+from rollover import boundary
+from rollover.boundary import bounded
 from rollover.budget import Budget
 from rollover.faults import Fault, InputError, hint
 from rollover.importers.sidecar import Described
@@ -32,6 +34,16 @@ class Importer:
     tests: Callable[[Path], Sequence[str]] | None = None
     read_test: Callable[[Path, Described | None, str], Recording] | None = None
 
+    def __post_init__(self) -> None:
+        """Put every reader behind the boundary, those of other packages too; a file that `sniff` trips over is none."""
+        what = f"{self.name} file"
+        object.__setattr__(self, "sniff", _sure(self.sniff))
+        object.__setattr__(self, "read", bounded(self.read, what))
+        if self.tests is not None:
+            object.__setattr__(self, "tests", bounded(self.tests, what))
+        if self.read_test is not None:
+            object.__setattr__(self, "read_test", bounded(self.read_test, what))
+
 
 @dataclass(frozen=True, kw_only=True)
 class Collection:
@@ -48,10 +60,28 @@ class Collection:
     read: Callable[[Path, Sequence[str]], Iterator[tuple[str, Recording]]]
     channels: Callable[[Recording], Sequence[str]] = lambda _: ("*",)
 
+    def __post_init__(self) -> None:
+        """Put the reader behind the boundary; it has read all before the first is handed over."""
+        read = self.read
+
+        def whole(path: Path, select: Sequence[str]) -> Iterator[tuple[str, Recording]]:
+            return iter(list(read(path, select)))
+
+        object.__setattr__(self, "read", bounded(whole, f"{self.name} set"))
+
     @property
     def source(self) -> str:
         """What a recording says about where it comes from."""
         return f"{self.citation}; {self.where}; licence: {self.licence}"
+
+
+def _sure(sniff: Callable[[Path], bool]) -> Callable[[Path], bool]:
+    def within(path: Path) -> bool:
+        with contextlib.suppress(Exception), boundary.quiet():
+            return sniff(path)
+        return False
+
+    return within
 
 
 def with_channels(recording: Recording, patterns: Sequence[str], file: str) -> Recording:
@@ -111,16 +141,9 @@ def _missing(name: str, extra: str, path: Path) -> InputError:
     return InputError(Fault(file=str(path), message=message))
 
 
-@contextlib.contextmanager
-def reading(path: Path, what: str) -> Iterator[None]:
+def reading(path: Path, what: str) -> contextlib.AbstractContextManager[None]:
     """Turn whatever a library says about a broken file into one line. Raises `InputError`."""
-    try:
-        yield
-    except (InputError, MemoryError):  # how much memory reading may take is told where it is bounded
-        raise
-    except Exception as e:  # every library has its own
-        reason = (str(e).splitlines() or [""])[0][:160] or type(e).__name__
-        raise InputError(Fault(file=str(path), message=f"not a readable {what} file: {reason}")) from None
+    return boundary.reading(path, f"{what} file")
 
 
 def check_claim(path: Path, values: int, *, most_per_byte: float | None = None) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rollover.boundary import worded
 from rollover.budget import Budget
 from rollover.importers.apart import apart
 from rollover.importers.columns import is_wanted, matrix, no_numbers, unique
@@ -94,7 +95,7 @@ def _signals(file: Any, group: int, index: int, name: str) -> dict[str, Signal]:
         except ValueError as e:
             found[column] = left_out(str(e)) if str(e) in _TEXT else Signal(values=np.empty(0), unreadable=str(e))
         except (KeyError, AttributeError, TypeError) as e:  # of a conversion block that lacks what its type needs
-            found[column] = Signal(values=np.empty(0), unreadable=f"its conversion cannot be applied: {e!r}"[:160])
+            found[column] = Signal(values=np.empty(0), unreadable=f"its conversion cannot be applied: {worded(e)}")
         found[column] = replace(found[column], time=time)
     return found
 

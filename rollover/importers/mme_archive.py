@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from rollover import budget
+from rollover.boundary import worded
 from rollover.faults import Fault, InputError
 from rollover.importers.tar import is_tar, open_tar
 
@@ -43,7 +44,7 @@ def content(place: Path, name: str) -> bytes:
     except (KeyError, StopIteration):
         _refuse(place, f"{name}: not in it; a whole archive is needed")
     except _FAULTS as e:
-        _refuse(place, f"{name}: cannot be read: {e}")
+        _refuse(place, f"{name}: cannot be read: {worded(e)}")
 
 
 def _as_it_is(place: Path) -> tuple[Path, int, int]:
@@ -67,7 +68,7 @@ def _checked(place: Path, packed: int, _changed: int, times: float) -> Sizes:
         else:
             _refuse(place, "neither a folder nor a readable zip or tar file")
     except _FAULTS as e:
-        _refuse(place, f"cannot be read: {e}")
+        _refuse(place, f"cannot be read: {worded(e)}")
 
     def refuse(message: str) -> InputError:
         return InputError(Fault(file=str(place), message=message))

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from ground.quantity import Quantity, parameters
 from rollover import document
+from rollover.boundary import worded
 from rollover.channels import describe, factor
 from rollover.document import Node
 from rollover.faults import Fault, InputError
@@ -192,12 +193,14 @@ def read_described(path: Path, kind: type[Sidecar] | type[Profile]) -> Described
     try:
         size = path.stat().st_size
     except (OSError, RuntimeError) as e:
-        raise InputError(Fault(file=str(path), message=f"cannot be read: {getattr(e, 'strerror', e)}")) from None
+        raise InputError(
+            Fault(file=str(path), message=f"cannot be read: {worded(e)}; a file that may be read is needed")
+        ) from None
     if size > MOST_BYTES:
         raise InputError(Fault(file=str(path), message=f"too long, got {size} bytes; at most {MOST_BYTES} are allowed"))
     if size and (deep := _DEEP.search(path.read_bytes())):
         line = path.read_bytes()[: deep.start()].count(b"\n") + 1
-        raise InputError(Fault(file=str(path), line=line, message="nested too deeply"))
+        raise InputError(Fault(file=str(path), line=line, message="nested too deeply; a few levels are needed"))
     root = document.read(path)
     if not isinstance(root.value, Mapping):
         raise root.place.fault("", f"not a mapping, got {str(root.plain)[:40]!r}; format, channels are needed")

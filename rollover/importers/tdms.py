@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.boundary import worded
 from rollover.channels import UNITS
 from rollover.faults import Fault, InputError
 from rollover.importers import stamps
@@ -72,8 +73,10 @@ def _signal(channel: Any, levels: tuple[Properties, ...]) -> Signal:
         return Signal(values=np.empty(0), unreadable=scale)
     try:
         values = channel.read_data(scaled=False) if is_scaled else channel[:]
+    except KeyError as e:
+        return Signal(values=np.empty(0), unreadable=f"its scale cannot be applied: it lacks {str(e)[:80]}")
     except Exception as e:  # of its scale: a sensor type or a property that the reader misses
-        return Signal(values=np.empty(0), unreadable=f"its scale cannot be applied: {type(e).__name__} {e}"[:160])
+        return Signal(values=np.empty(0), unreadable=f"its scale cannot be applied: {worded(e)}")
     if hasattr(values, "seconds"):  # stamps, of which a float would keep 240 ns
         seconds, first = stamps.seconds_from_first(_nanoseconds(values), 1)
         return Signal(values=seconds, unit="s", began=first)
@@ -83,8 +86,10 @@ def _signal(channel: Any, levels: tuple[Properties, ...]) -> Signal:
     properties = levels[0]
     try:
         time = _stamps(properties, values.size)
+    except (ArithmeticError, AttributeError, TypeError) as e:  # of a property of another type
+        return Signal(values=np.empty(0), unreadable=f"its times cannot be worked out: {worded(e)}")
     except ValueError as e:
-        return Signal(values=np.empty(0), unreadable=str(e))
+        return Signal(values=np.empty(0), unreadable=worded(e))
     start = properties.get("wf_start_time")
     began: int | None = None if time is None or start is None else int(_nanoseconds(start))
     is_set = began is not None and began != -_FROM_1904 * stamps.NANO  # LabVIEW writes 1904 where none was set

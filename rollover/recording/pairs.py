@@ -40,9 +40,11 @@ def read_pairs(path: Path) -> tuple[dict[str, float], dict[str, Any]]:
 
     try:
         table = _opened(path).read(use_threads=False)
-        about = json.loads(table.schema.metadata[KEY])
+        about = _mapping(table.schema.metadata[KEY])
+        if table["name"].type != pa.string() or table["value"].type != pa.float64():
+            raise TypeError("name and value: not text and numbers")
         values = dict(zip(table["name"].to_pylist(), table["value"].to_pylist(), strict=True))
-    except (OSError, pa.ArrowException, KeyError, TypeError, ValueError) as e:
+    except (OSError, pa.ArrowException, KeyError, RecursionError, TypeError, ValueError) as e:
         raise UnreadableError(f"{path}: {e}") from None
     return values, about
 
@@ -68,9 +70,9 @@ def read_table(path: Path) -> tuple[dict[str, list[Any]], dict[str, Any]]:
 
     try:
         table = _opened(path).read()
-        about = json.loads((table.schema.metadata or {}).get(KEY, b"{}"))
+        about = _mapping((table.schema.metadata or {}).get(KEY, b"{}"))
         return {name: table[name].to_pylist() for name in table.column_names}, about
-    except (OSError, pa.ArrowException, TypeError, ValueError) as e:
+    except (OSError, pa.ArrowException, RecursionError, TypeError, ValueError) as e:
         raise UnreadableError(f"{path}: {e}") from None
 
 
@@ -81,6 +83,13 @@ def _opened(path: Path) -> Any:
     file = pq.ParquetFile(path)
     Budget(path).claim(IN_LIST * file.metadata.num_rows * max(1, file.metadata.num_columns))
     return file
+
+
+def _mapping(text: bytes) -> dict[str, Any]:
+    found = json.loads(text)
+    if not isinstance(found, dict):
+        raise TypeError(f"not a mapping, got {type(found).__name__}")
+    return found
 
 
 def as_numbers(values: Sequence[Any]) -> NDArray[np.float64]:

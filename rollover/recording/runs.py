@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
+from rollover.boundary import CURE, worded
 from rollover.channels import describe
 from rollover.faults import Fault, InputError
 from rollover.recording.record import Clock, Recording, Sensor
@@ -58,14 +61,19 @@ def read_parquet(path: Path) -> Recording:
 
     try:
         table = open_parquet(path).read()
-    except (OSError, pa.ArrowInvalid) as e:
-        raise InputError(Fault(file=str(path), message=f"cannot be read: {str(e).splitlines()[0]}")) from None
+    except (OSError, pa.ArrowException, ValueError) as e:
+        if isinstance(e, InputError):
+            raise
+        raise InputError(Fault(file=str(path), message=f"cannot be read: {worded(e)}; {CURE}")) from None
     not_a_run = Fault(file=str(path), message=f"not channels of a run; a file of format {FORMAT} is needed")
     try:
         about = json.loads((table.schema.metadata or {}).get(b"rollover", b"{}"))
         if about.pop("format", None) != FORMAT:
             raise InputError(not_a_run)
+        _check(about)
         columns = {name: numbers(table[name]) for name in table.column_names}
+        for name in columns:
+            describe(name)
         about["clock"] = Clock(**about.get("clock", {}))
         about["uncertainty"] = {path: _tuples(sigma) for path, sigma in about.get("uncertainty", {}).items()}
         about["sensors"] = {name: _sensor(values) for name, values in about.get("sensors", {}).items()}
@@ -73,8 +81,26 @@ def read_parquet(path: Path) -> Recording:
         return Recording(time=columns.pop("time"), channels=columns, **about)
     except InputError:
         raise
-    except (AttributeError, KeyError, TypeError, ValueError):  # someone else wrote it
+    except (AttributeError, KeyError, OverflowError, RecursionError, TypeError, ValueError, pa.ArrowException):
+        # someone else wrote it
         raise InputError(not_a_run) from None
+
+
+def _check(about: Any) -> None:
+    """Look at the types of what is told of a run. Raises ``TypeError``."""
+    kinds: dict[str, type | tuple[type, ...]] = {"title": str, "source": str, "notes": list}
+    for key in ("title", "source", "notes", "conditions", "uncertainty", "noise", "cfc", "clock", "sensors"):
+        if key in about and not isinstance(about[key], kinds.get(key, dict)):
+            raise TypeError(key)
+    numbers_of = [*about.get("noise", {}).values(), *about.get("cfc", {}).values()]
+    if not all(isinstance(n, (int, float)) and not isinstance(n, bool) and math.isfinite(n) for n in numbers_of):
+        raise TypeError("noise, cfc")
+    if not all(isinstance(note, str) for note in about.get("notes", ())):
+        raise TypeError("notes")
+    clock = about.get("clock", {})
+    within = clock.get("within")
+    if clock.get("zero", "known") not in ("known", "unknown") or not (within is None or float(within) > 0.0):
+        raise TypeError("clock")
 
 
 def _sensor(values: dict[str, object]) -> Sensor:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.boundary import CURE, worded
 from rollover.budget import Budget
 from rollover.faults import InputError
 from rollover.recording.text_rows import (
@@ -96,7 +97,7 @@ def read_columns(
         _find_cell(path, names, columns, needed, dialect)
         if "Empty CSV" in str(e):
             refuse(path, "empty, got column names and no numbers")
-        refuse(path, f"cannot be read: {str(e).splitlines()[0]}")
+        refuse(path, f"cannot be read: {worded(e)}")
     if table.num_rows == 0:
         refuse(path, "empty, got column names and no numbers")
     text = {name: table.column(name).to_pylist() for name in words}
@@ -165,8 +166,8 @@ def read_parquet_columns(path: Path, columns: Sequence[str]) -> dict[str, Array]
         refuse(path, "empty, got a table without rows")
     try:
         return _numpy(file.read(columns=list(columns)), columns)
-    except (pa.ArrowException, OSError) as e:
-        refuse(path, f"cannot be read: {str(e).splitlines()[0]}")
+    except (pa.ArrowException, OSError, ValueError) as e:
+        refuse(path, f"cannot be read: {worded(e)}; {CURE}")
 
 
 def write_csv(columns: Mapping[str, Array], path: Path, head: str = "") -> None:
@@ -219,7 +220,7 @@ def open_parquet(path: Path) -> Any:
     try:
         file = pq.ParquetFile(path)
     except (pa.ArrowException, OSError, ValueError) as e:
-        refuse(path, f"cannot be read: {str(e).splitlines()[0]}")
+        refuse(path, f"cannot be read: {worded(e)}; {CURE}")
     Budget(path).claim(IN_TABLE * file.metadata.num_rows * max(1, file.metadata.num_columns))
     return file
 

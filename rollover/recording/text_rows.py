@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, NoReturn
 
-from rollover.faults import Fault, InputError
+from rollover.faults import Fault, InputError, cured
 
 LONGEST_LINE = 1 << 16
+CURE = "a table of numbers in UTF-8 is needed; --profile FILE says how another one is written"
 WHITESPACE = "whitespace"  # as a delimiter: any number of blanks and tabs
 BLOCK = 1 << 20
 _BOMS = {codecs.BOM_UTF32_LE: "UTF-32", codecs.BOM_UTF32_BE: "UTF-32", codecs.BOM_UTF16_LE: "UTF-16"}
@@ -205,4 +206,4 @@ def _find_line(path: Path, dialect: Dialect) -> None:
 
 def refuse(path: Path, message: str, line: int | None = None) -> NoReturn:
     """Raise `InputError` with what is wrong with a file, or with one of its lines."""
-    raise InputError(Fault(file=str(path), line=line, message=message)) from None
+    raise InputError(cured(Fault(file=str(path), line=line, message=message), CURE)) from None

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover import budget
+from rollover.boundary import worded
 from rollover.faults import Fault, InputError, hint
 from rollover.study import plan as plans
 from rollover.study import sensitivity
@@ -106,7 +107,9 @@ def _read(path: Path, names: list[str]) -> dict[str, NDArray[Any]]:
         try:
             there, _ = read_table(path)
         except UnreadableError as e:
-            raise InputError(Fault(file=str(path), message=f"cannot be read: {str(e).splitlines()[0]}")) from None
+            raise InputError(
+                Fault(file=str(path), message=f"cannot be read: {worded(e)}; a table of the cases is needed")
+            ) from None
         _present(path, names, list(there))
         found = {
             name: np.array(v, dtype=object) if any(isinstance(x, str) for x in v) else as_numbers(v)

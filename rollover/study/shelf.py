@@ -36,6 +36,7 @@ ACCOUNT, STUDY, CASES, TABLE, PROVENANCE, PLAN, PAGE, WORST, LOCK = (
 FILES = (ACCOUNT, STUDY, CASES, TABLE, PROVENANCE, PLAN, PAGE, WORST, LOCK)
 TOLD = ("finished", "wall_time", "cpu_time", "peak_memory", "host", "process")
 PROVENANCE_UNITS = {"wall_time": "s", "cpu_time": "s", "peak_memory": "B"}
+_TYPES = dict.fromkeys(("wall_time", "cpu_time", "peak_memory", "process"), (int, float))  # of what is told; else text
 
 
 __all__ = [
@@ -175,6 +176,13 @@ def kept(folder: Path, key: str) -> Row | None:
     """Row of a case, None if there is none or its file is damaged: then it is run again."""
     try:
         measures, about = read_pairs(path_of(folder, key))
+        texts = [about[name] for name in ("status", "failure", "sentence")]
+        texts += [*about["domain_flags"], *about["peak_flags"]]
+        told = about["provenance"].items()
+        is_own = about["key"] == key and about["status"] in ("done", "failed")
+        is_own = is_own and all(v is None or isinstance(v, _TYPES.get(name, str)) for name, v in told)
+        if not is_own or None in (*measures, *measures.values()) or not all(isinstance(text, str) for text in texts):
+            return None  # somebody else wrote it
         return Row(
             key=key,
             status=about["status"],
@@ -185,7 +193,7 @@ def kept(folder: Path, key: str) -> Row | None:
             peak_flags=tuple(about["peak_flags"]),
             provenance=about["provenance"],
         )
-    except (UnreadableError, KeyError, TypeError):
+    except (UnreadableError, AttributeError, KeyError, TypeError):
         return None
 
 
@@ -193,7 +201,7 @@ def on_shelf(folder: Path) -> set[str]:
     """Keys of all cases that have a file."""
     found: set[str] = set()
     shelf = folder / CASES
-    for part in sorted(shelf.iterdir()) if shelf.is_dir() else ():
+    for part in sorted(p for p in shelf.iterdir() if p.is_dir()) if shelf.is_dir() else ():
         with os.scandir(part) as entries:
             for e in entries:
                 if e.name.startswith("."):
@@ -209,7 +217,8 @@ def read_plan(folder: Path, about: str) -> list[str] | None:
         columns, told = read_table(folder / PLAN)
     except UnreadableError:
         return None
-    return columns["case"] if told.get("plan") == about and "case" in columns else None
+    keys = columns.get("case", [])
+    return keys if told.get("plan") == about and keys and all(isinstance(key, str) for key in keys) else None
 
 
 def write_plan(folder: Path, about: str, keys: Sequence[str], columns: Mapping[str, Any]) -> None:

@@ -148,22 +148,34 @@ ONE_FAULT: dict[str, tuple[str | bytes, str]] = {
     ),
     "syntax": (
         without("ground:", "ground: ["),
-        "bad.yaml:5: not valid YAML: while parsing a flow sequence, expected ',' or ']', but got '<scalar>'",
+        "bad.yaml:5: not valid YAML: while parsing a flow sequence, expected ',' or ']', but got '<scalar>'; "
+        "quote text that holds : # [ ] { } & * ! %, and indent with blanks",
     ),
-    "indentation": ("title: a\n  b: c\n", "bad.yaml:2: not valid YAML: mapping values are not allowed here"),
+    "indentation": (
+        "title: a\n  b: c\n",
+        "bad.yaml:2: not valid YAML: mapping values are not allowed here; "
+        "quote text that holds : # [ ] { } & * ! %, and indent with blanks",
+    ),
     "two documents": (
         "a: 1\n---\nb: 2\n",
-        "bad.yaml:2: not valid YAML: expected a single document in the stream, but found another document",
+        "bad.yaml:2: not valid YAML: expected a single document in the stream, but found another document; "
+        "quote text that holds : # [ ] { } & * ! %, and indent with blanks",
     ),
-    "control character": (b"a: 1\nb: \x01\n", "bad.yaml:2: not valid YAML: special characters are not allowed"),
-    "not text": (b"a: 1\nb: \xff\n", "bad.yaml:2: not UTF-8 text, got byte 0xff"),
-    "alias to itself": ("title: &a {x: *a}\n", "bad.yaml:1: title.x: contains itself through an alias"),
+    "control character": (
+        b"a: 1\nb: \x01\n",
+        "bad.yaml:2: not valid YAML: special characters are not allowed; printable text is needed",
+    ),
+    "not text": (b"a: 1\nb: \xff\n", "bad.yaml:2: not UTF-8 text, got byte 0xff; save it as UTF-8"),
+    "alias to itself": (
+        "title: &a {x: *a}\n",
+        "bad.yaml:1: title.x: contains itself through an alias; plain values, lists and mappings of them are allowed",
+    ),
     "tag": (
         without("title: Drop", "title: !foo Drop"),
         "bad.yaml:1: title: unknown tag, got !foo; plain values are allowed",
     ),
     "list as key": ("? [1]\n: 2\n", "bad.yaml:1: a key is not text, got a list or mapping; keys are plain words"),
-    "nested": ("[" * 4000, "bad.yaml:1: nested too deeply"),
+    "nested": ("[" * 4000, "bad.yaml:1: nested too deeply; a few levels are needed"),
     "missing vehicle file": (
         without("{kind: striker}", "vehicles/utilty_tractor.yaml"),
         "bad.yaml:2: vehicle: no such file, got 'vehicles/utilty_tractor.yaml'; "

@@ -1,0 +1,67 @@
+"""What the run.json of a results folder must hold for its readers: names and types, looked at before any is used."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+NUMBER, TEXT, COUNT = "a number", "text", "a whole number"
+_PEAK = {
+    "channel": TEXT,
+    "unit": TEXT,
+    "cfc": COUNT,
+    "domain_flags": [TEXT],
+    **dict.fromkeys(("raw", "raw_time", "filtered", "filtered_time"), NUMBER),
+    **dict.fromkeys(("impulse", "half_step_change", "mean", "scatter"), (NUMBER,)),
+    "starts": (COUNT,),
+}
+ANSWER: Mapping[str, Any] = {
+    **dict.fromkeys(("title", "status", "sentence", "scenario_hash"), TEXT),
+    "versions": {},
+    "phases": [{"start": NUMBER, "name": TEXT}],
+    "peak_loads": [_PEAK],
+    "criteria": [{"verdict": TEXT, "requirement": {"standard": TEXT, "name": TEXT}}],
+}
+
+
+def misfit_of(value: Any, shape: Any = ANSWER, path: str = "") -> tuple[str, str] | None:
+    """Path and sentence of the first value that is not of its shape; None where all are.
+
+    A shape is a type's name, a list of one shape for each element, a mapping of those that must be there, or a tuple
+    of one shape where null is allowed as well.
+    """
+    if isinstance(shape, tuple):
+        return None if value is None else misfit_of(value, shape[0], path)
+    if isinstance(shape, list):
+        if not isinstance(value, list):
+            return path, f"not a list, got {_got(value)}; a list is needed"
+        found = (misfit_of(element, shape[0], f"{path}.{i}") for i, element in enumerate(value))
+        return next((f for f in found if f), None)
+    if isinstance(shape, Mapping):
+        if not isinstance(value, dict):
+            return path, f"not a mapping, got {_got(value)}; a mapping is needed"
+        if missing := [key for key in shape if key not in value]:
+            return path, f"lacks {', '.join(missing)}; each is needed"
+        found = (misfit_of(value[key], inner, f"{path}.{key}" if path else key) for key, inner in shape.items())
+        return next((f for f in found if f), None)
+    return None if _is(value, shape) else (path, f"not {shape}, got {_got(value)}; {shape} is needed")
+
+
+def _is(value: Any, shape: str) -> bool:
+    if shape == TEXT:
+        return isinstance(value, str)
+    if isinstance(value, bool) or not isinstance(value, int if shape == COUNT else (int, float)):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # a whole number of hundreds of digits
+        return False
+
+
+def _got(value: Any) -> str:
+    if isinstance(value, (dict, list)):
+        return f"a {'mapping' if isinstance(value, dict) else 'list'} of {len(value)}"
+    if isinstance(value, int) and abs(value) > 1 << 64:  # its digits may be too many to be written
+        return "a whole number beyond 64 bits"
+    return repr(value)[:40]

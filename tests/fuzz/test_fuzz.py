@@ -1,0 +1,81 @@
+"""Two thousand inputs over all doors: each refused in whole lines or done, and nothing else happens."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.fuzz.campaign import campaign, report
+from tests.fuzz.oracle import is_whole, judge
+from tests.rollover.foreign import needs
+
+for library in ("nptdms", "asammdf", "h5py", "mcap", "idelib", "openpyxl"):
+    needs(library)
+
+INPUTS = 2000
+
+
+@pytest.mark.timeout(1800)  # a minute of the processor, of which a busy machine gives little
+def test_two_thousand_inputs(tmp_path: Path) -> None:
+    done = campaign(tmp_path, INPUTS, 7)
+    assert done.inputs.total() == INPUTS
+    # what reads nothing proves nothing: each kind of file is also read, and refused
+    assert sum(status[0] for status in done.statuses.values()) > 0.1 * INPUTS
+    assert sum(status[2] for status in done.statuses.values()) > 0.3 * INPUTS
+    assert not done.kinds, report(done)
+
+
+@pytest.mark.parametrize(
+    ("line", "lacks"),
+    [
+        ("a.csv:3: column F: not a number, got 'x'; a number is needed", ""),
+        ("a.csv: no such file; did you mean 'b.csv'?", ""),
+        ("a.csv: cannot be read", "no cure"),
+        ("cannot be read", "no place"),
+        ("a.h5: not readable: 'NoneType' object has no attribute 'x'; export it anew", "bare text"),
+        ("a.h5: not readable: [Errno 22] Invalid argument; export it anew", "bare text"),
+    ],
+)
+def test_what_a_whole_line_is(line: str, lacks: str) -> None:
+    assert is_whole(line).startswith(lacks)
+    assert bool(is_whole(line)) == bool(lacks)
+
+
+def test_the_judge_sees_what_it_is_to_see(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from rollover import catalogue
+    from tests.fuzz import oracle
+
+    def found() -> dict[str, str]:
+        return dict(judge(tmp_path, ["list", "laws"]).finds)
+
+    assert found() == {}
+    monkeypatch.setitem(catalogue.TABLES, "laws", lambda: 1 / 0)
+    assert "ZeroDivisionError" in found()["traceback"]
+    monkeypatch.setitem(catalogue.TABLES, "laws", lambda: (tmp_path / "beside").write_text("x") and [])
+    assert found()["outside"] == "new: beside"
+
+    def spin() -> list[object]:
+        while True:
+            pass
+
+    monkeypatch.setattr(oracle, "LONGEST", 0.3)
+    monkeypatch.setitem(catalogue.TABLES, "laws", spin)
+    assert "hang" in found()
+
+    def swell() -> list[object]:
+        bytearray(64 << 20)[::4096] = b"x" * (16 << 10)
+        return []
+
+    monkeypatch.setattr(oracle, "MOST_MEMORY", 32 << 20)
+    monkeypatch.setitem(catalogue.TABLES, "laws", swell)
+    assert "memory" in found()
+
+    def leaves() -> list[object]:
+        (tmp_path / "out").mkdir()
+        (tmp_path / "out" / "a.json").write_text("{")
+        return []
+
+    monkeypatch.setitem(catalogue.TABLES, "laws", leaves)
+    assert "unreadable" in found()
+    assert not (tmp_path / "out").exists()
