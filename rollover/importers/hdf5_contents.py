@@ -68,13 +68,15 @@ def _through_links(h5py: Any, file: Any, name: str) -> Any:
             return group
         try:
             link = group.get(steps[0], getlink=True)
-        except (AttributeError, KeyError):  # an array on the way, or nothing of that name
+        except (AttributeError, KeyError):  # an array on the way
             return None
         if isinstance(link, h5py.SoftLink):
             group = file if link.path.startswith("/") else group
             steps = [step for step in link.path.split("/") if step not in ("", ".")] + steps[1:]
-        else:
+        elif link is not None:
             group, steps = group[steps[0]], steps[1:]
+        else:
+            return None
     return None
 
 
