@@ -113,7 +113,8 @@ def _arrow(
     import pyarrow.csv as pc
 
     kinds = {**dict.fromkeys(columns, pa.float64()), **dict.fromkeys(words, pa.string())}
-    with opened(path) as file, _let_go(Numbers(path, file, dialect, needed and (len(names), needed))) as rows:
+    fit = None if needed is None else (len(names), needed)
+    with opened(path) as file, _let_go(Numbers(path, file, dialect, fit)) as rows:
         return pc.read_csv(
             pa.PythonFile(rows.pop(), mode="r"),
             read_options=pc.ReadOptions(column_names=names, block_size=4 * BLOCK),
