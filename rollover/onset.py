@@ -50,6 +50,7 @@ JUMPS = 0.5  # of the jump at a contact, 1 sigma: the mass that moves along is k
 SOON, LEAST = 8e-3, 4  # s after an onset, and samples, that tell when it was
 MODEL = 2e-4  # of a channel's range: what integrators differ by
 PLACES = 601  # zeros that are tried at once
+AT_ONCE = 1_000_000  # samples times zeros, 8 MB an array
 FINE = 2.5e-4  # s, between rows of a fall that onsets are looked up in
 
 
@@ -292,16 +293,17 @@ def _refined(
     jump = (float(made[run.time >= contact][0]) - level) / sigma if channel not in recording.cfc else 0.0
     y = y - y.mean()
 
-    def left(zero: float) -> float:
-        late = (t - zero >= contact).astype(float)
-        c = (np.interp(t - zero, run.time, made) - level) / sigma - jump * late
-        return _left(y, c, jump * late)
+    def left(zeros: Array) -> Array:
+        since_zero = t - zeros[:, None]
+        late = jump * (since_zero >= contact)
+        c = (np.interp(since_zero, run.time, made) - level) / sigma - late
+        return _left(y, c, late)
 
     low, high = about - back, about + step
     mean, sd = about, step
     for _ in range(3):
         places = np.linspace(low, high, PLACES)
-        cost = np.array([left(float(z)) for z in places])
+        cost = np.concatenate([left(some) for some in np.array_split(places, 1 + PLACES * t.size // AT_ONCE)])
         wide = max(float(cost.min()) / max(t.size - 3, 1) / worth, 1.0 / worth)
         p = np.exp(-0.5 * (cost - cost.min()) / wide)
         mean = float(p @ places / p.sum())
@@ -310,15 +312,20 @@ def _refined(
     return mean, max(sd, 1e-9)
 
 
-def _left(y: Array, c: Array, jump: Array) -> float:
-    """What the best amounts of `c` and `jump` (n,) leave of values (n,) without a mean, and what the jump's prior asks.
+def _left(y: Array, c: Array, jump: Array) -> Array:
+    """What the best amounts of `c`, `jump` (m, n) leave of values (n,) without a mean, and what the jump's prior asks.
 
-    Squares over the noise; the amount of `c` is none below zero, that of the jump 1 within `JUMPS`.
+    Squares over the noise (m,); the amount of `c` is none below zero, that of the jump 1 within `JUMPS`.
     """
-    c, jump = c - c.mean(), jump - jump.mean()
-    y = y - jump
-    cc, cj, jj = float(c @ c), float(c @ jump), float(jump @ jump) + JUMPS**-2
-    cy, jy, yy = float(c @ y), float(jump @ y), float(y @ y)
-    least = yy - jy**2 / jj
-    free, along = cc - cj**2 / jj, cy - cj * jy / jj
-    return least - max(along, 0.0) ** 2 / free if free > 1e-12 * cc > 0.0 else least
+    c, jump = c - c.mean(axis=1, keepdims=True), jump - jump.mean(axis=1, keepdims=True)
+    over = y - jump
+
+    def dot(a: Array, b: Array) -> Array:
+        return np.asarray(np.einsum("ij,ij->i", a, b))
+
+    cc, cj, jj = dot(c, c), dot(c, jump), dot(jump, jump) + JUMPS**-2
+    cy, jy = dot(c, over), dot(jump, over)
+    least = dot(over, over) - jy**2 / jj
+    free, along = cc - cj**2 / jj, np.maximum(cy - cj * jy / jj, 0.0)
+    shows = (free > 1e-12 * cc) & (cc > 0.0)
+    return np.asarray(least - np.where(shows, along**2 / np.where(shows, free, 1.0), 0.0))

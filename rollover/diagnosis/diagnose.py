@@ -51,7 +51,7 @@ from rollover.diagnosis.statements import (
     places,
     sentence,
 )
-from rollover.diagnosis.triggers import at_their_zeros
+from rollover.diagnosis.triggers import about_clocks, at_their_zeros
 from rollover.diagnosis.verdict import Degree, Diagnosis, Named
 from rollover.diagnosis.zeros import by_zeros, with_zeros
 from rollover.drop import unfit
@@ -96,7 +96,7 @@ def diagnose(
     is_drop = isinstance(scenario.vehicle, Striker)  # what little errors do to an overturn is chance, see `chaos`
     recordings, rounded = to_the_last_digit(recordings) if is_drop else (recordings, [])
     every, notes = _evidence(scenario, recordings, crew)
-    notes += [*(f"{n}: {zero.sentence}" for n, zero in zeros.items()), *rounded]
+    notes += [*about_clocks(scenario, recordings, zeros), *rounded]
     every = [replace(e, model_error=float(np.hypot(e.model_error, tolerance))) for e in every]
     asked = Asked(scenario=scenario, recordings=dict(recordings), hold_out=hold_out, say=say, crew=crew, began=began)
     some, shared = slips_of(every)

@@ -6,13 +6,14 @@ do. What a zero that is found leaves is no more than that delay, so that the shi
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from rollover.diagnosis.evidence import ALONE, Evidence
 from rollover.diagnosis.simulator import set_up
+from rollover.drop import unfit
 from rollover.faults import Fault, InputError
 from rollover.onset import CLEAR, IN_A_ROW, QUIET, UntoldError, is_apart, is_quiet, timed
 from rollover.recording import Clock, Recording
@@ -55,6 +56,29 @@ def at_their_zeros(
     if faults:
         raise InputError(*faults)
     return found, zeros
+
+
+def about_clocks(
+    scenario: Scenario, recordings: Sequence[tuple[str, Recording]], zeros: Mapping[str, Zero]
+) -> Iterator[str]:
+    """A line on each clock that was set, and on each that is said to be right, is clearly off, and was left so.
+
+    What a diagnosis names may look like a clock, so that one which is stated is not set against its statement.
+    """
+    for name, recording in recordings:
+        if name in zeros:
+            yield f"{name}: {zeros[name].sentence}"
+        elif recording.clock == Clock() and (zero := _found_off(scenario, name, recording)) is not None:
+            yield (
+                f"{name}: {zero.sentence}; left as it is stated to be: `clock: {{zero: unknown}}` in its sidecar or "
+                "profile sets it there"
+            )
+
+
+def _found_off(scenario: Scenario, name: str, recording: Recording) -> Zero | None:
+    """The zero of a clock that is said to be right and is not; None where it is, or where to look takes a full run."""
+    under = set_up(scenario, recording)
+    return None if unfit(under) else timed(name, recording, under).zero
 
 
 def _moved(scenario: Scenario, name: str, recording: Recording) -> tuple[Recording, Zero | None]:

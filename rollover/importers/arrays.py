@@ -124,6 +124,8 @@ def _signal(thing: Array, index: Index, place: tuple[int, int], profile: Describ
     unknown = "" if states_scale else cf.unknown_scale(thing.attributes, thing.dtype)
     try:
         values, notes = cf.decoded(np.asarray(thing.load(index)), thing.attributes, thing.fill)
+        if not states_scale and thing.dtype.kind == "f" and (beside := cf.other_scales(thing.attributes)):
+            notes.append(f"{beside} stands beside its numbers, and is not applied; `scale` of a profile does")
         unit = cf.unit_of(thing.attributes, *place)
         if (since := cf.time_of(values, thing.attributes)) is not None:
             return Signal(values=since[0], unit="s", began=since[1])

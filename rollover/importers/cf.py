@@ -12,9 +12,20 @@ from rollover.importers import stamps
 from rollover.importers.columns import number, text
 
 Attributes = Mapping[str, Any]
+_SPELT = {  # as the conventions have it, from any letters and underscores: Scale_Factor, FillValue, NODATA
+    **{key.replace("_", "").lower(): key for key in ("scale_factor", "add_offset", "_FillValue", "missing_value")},
+    **{key.replace("_", ""): key for key in ("valid_range", "valid_min", "valid_max")},
+    **dict.fromkeys(("nodata", "nodatavalue", "novalue", "nullvalue", "badvalue", "invalidvalue"), "missing_value"),
+}
 _OTHER_SCALES = ("scale", "scaling", "gain", "slope", "factor", "calibration", "sensitivity", "offset", "intercept")
 _NEUTRAL = {"offset": 0.0, "intercept": 0.0}  # of the others it is 1
 _CALENDARS = ("", "standard", "gregorian", "proleptic_gregorian")
+
+
+def spelt(attributes: Attributes) -> dict[str, Any]:
+    """Attributes by the names that the conventions give them; one that is spelt so already stands."""
+    by = {_SPELT.get(key.replace("_", "").lower(), key): value for key, value in attributes.items()}
+    return {**by, **{key: attributes[key] for key in _SPELT.values() if key in attributes}}
 
 
 def unit_of(attributes: Attributes, at: int = 0, count: int = 1) -> str:
@@ -36,6 +47,7 @@ def decoded(raw: NDArray[Any], attributes: Attributes, fill: Any = None) -> tupl
     `fill` is what the file's own layer keeps where nothing was written. Raises ``ValueError`` for attributes that
     are no numbers. Whole numbers without scale or gap stay whole.
     """
+    attributes = spelt(attributes)
     given = {key: attributes[key] for key in attributes if not _is_text_of_no_number(key, attributes[key])}
     raw, signed = _signed(raw, text(attributes.get("_Unsigned", "")).lower())
     gaps: dict[str, NDArray[np.bool_]] = {}
@@ -59,14 +71,19 @@ def decoded(raw: NDArray[Any], attributes: Attributes, fill: Any = None) -> tupl
 
 
 def unknown_scale(attributes: Attributes, dtype: np.dtype[Any]) -> str:
-    """Attributes that look like a scale of packed numbers but belong to no convention, in words; nothing if none."""
-    if dtype.kind not in "iu" or "scale_factor" in attributes or "add_offset" in attributes:
-        return ""
-    found = {key: number(attributes[key]) for key in attributes if key.lower() in _OTHER_SCALES}
-    said = [f"{k} {v:g}" for k, v in found.items() if v is not None and v != _NEUTRAL.get(k.lower(), 1.0)]
+    """Why packed numbers cannot be read beside a scale that belongs to no convention; nothing where they can."""
+    said = other_scales(attributes) if dtype.kind in "iu" else ""
     if not said:
         return ""
-    return f"whole numbers beside {', '.join(said)}, which no convention defines; `scale`, `offset` of a profile say it"
+    return f"whole numbers beside {said}, which no convention defines; `scale`, `offset` of a profile say it"
+
+
+def other_scales(attributes: Attributes) -> str:
+    """Attributes that look like a scale but belong to no convention, in words; nothing beside one that does."""
+    if {"scale_factor", "add_offset"} & spelt(attributes).keys():
+        return ""
+    found = {key: number(attributes[key]) for key in attributes if key.lower() in _OTHER_SCALES}
+    return ", ".join(f"{k} {v:g}" for k, v in found.items() if v is not None and v != _NEUTRAL.get(k.lower(), 1.0))
 
 
 def time_of(values: NDArray[Any], attributes: Attributes) -> tuple[NDArray[np.float64], int] | None:

@@ -67,7 +67,7 @@ def read(path: Path, profile: Described | None) -> Recording:
     text = list(dict.fromkeys([*stamps, *rests]))
     values, words = read_columns(path, [name for name in wanted if name not in text], text, dialect)
     signals = {
-        name: Signal(values=values.pop(name), unit=units.get(name, "").strip()) if name in values else nothing
+        name: _column(values.pop(name), units.get(name, "").strip(), dialect) if name in values else nothing
         for name in names
         if name in wanted or name not in rests
     }
@@ -82,6 +82,15 @@ def read(path: Path, profile: Described | None) -> Recording:
     about = replace(profile.about, clock=clock, notes=(*profile.about.notes, *notes))
     by = replace(profile, about=about, columns=columns)
     return assemble(path, signals, by, line=lambda row: line_of_row(path, row, dialect))
+
+
+def _column(values: np.ndarray, unit: str, dialect: Dialect) -> Signal:
+    """A column of numbers, without those that the profile calls gaps, which a note counts."""
+    numbers = [float(gap.replace(dialect.decimal, ".")) for gap in dialect.gaps if is_number(gap, dialect.decimal)]
+    if numbers:  # -9999 is -9999.000 too
+        values = np.where(np.isin(values, numbers), np.nan, values)
+    missing = int(np.isnan(values).sum()) if dialect.gaps else 0
+    return Signal(values=values, unit=unit, notes=(f"{missing} of {values.size} values are gaps",) if missing else ())
 
 
 def _dialect(path: Path, profile: Described) -> tuple[Dialect, list[str]]:
@@ -99,6 +108,7 @@ def _dialect(path: Path, profile: Described) -> tuple[Dialect, list[str]]:
         between=last - names_row,
         named=names_row > 0,
         loose=True,
+        gaps=how.gaps,
     )
     if how.names_row is None and how.units_row is None and how.data_row is None:
         names, _ = csv_heading(path, dialect)

@@ -28,8 +28,7 @@ def contents(h5py: Any, file: Any, named: Sequence[str]) -> dict[str, Array | st
         for key in group:
             name, link = f"{above}{key}", group.get(key, getlink=True)
             if not isinstance(link, h5py.HardLink):
-                is_inside = isinstance(link, h5py.SoftLink)
-                links[name] = f"a link to {link.path}" if is_inside else f"a link to the file {link.filename}"
+                links[name] = f"a link to {link.path}"
                 continue
             if key in _MATLAB_INSIDE and not above:
                 found[name] = _MATLAB_INSIDE[key]
@@ -55,7 +54,7 @@ def contents(h5py: Any, file: Any, named: Sequence[str]) -> dict[str, Array | st
         if isinstance(thing, h5py.Dataset):
             found.update(_arrays(h5py, file, name, thing, thing.parent, (_attributes(thing.parent), _attributes(file))))
         else:
-            found[name] = what if thing is not None or "file" in what else f"{what}, which is not there"
+            found[name] = what if thing is not None else f"{what}, which is not there"
     for name in named:
         base = name.partition("[")[0].partition(".")[0]
         if name not in found and isinstance(thing := _through_links(h5py, file, base), h5py.Dataset):
@@ -65,19 +64,19 @@ def contents(h5py: Any, file: Any, named: Sequence[str]) -> dict[str, Array | st
 
 
 def _through_links(h5py: Any, file: Any, name: str) -> Any:
-    """What a path leads to inside the file; None where it leads nowhere or out of it."""
+    """What a path leads to; None where it leads nowhere. Links out of the file are refused before, by `hdf5_guard`."""
     group, steps = file, [step for step in name.split("/") if step]
     for _ in range(64):  # as many links as a path may pass, so that circles end
         if not steps:
             return group
         try:
             link = group.get(steps[0], getlink=True)
-        except (AttributeError, KeyError):  # an array on the way, or nothing of that name
+        except (AttributeError, KeyError):  # an array on the way
             return None
         if isinstance(link, h5py.SoftLink):
             group = file if link.path.startswith("/") else group
             steps = [step for step in link.path.split("/") if step not in ("", ".")] + steps[1:]
-        elif isinstance(link, h5py.HardLink):
+        elif link is not None:
             group, steps = group[steps[0]], steps[1:]
         else:
             return None

@@ -84,6 +84,7 @@ class Csv:
     units_row: Annotated[int | None, "which row holds the units, below the names"] = None
     data_row: Annotated[int | None, "which row is the first of numbers; else the one after names and units"] = None
     comment: Annotated[str, "what a comment line begins with"] = "#"
+    gaps: Annotated[tuple[str, ...], "cells that hold no value, such as 'OVER' or '-9999', beside empty ones"] = ()
 
     def validate(self) -> None:
         """Refuse rows out of order, a delimiter of several characters and an encoding that Python does not know."""

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from rollover.channels import factor, is_known
 from rollover.faults import Fault, InputError, nearest
 from rollover.importers import stamps
-from rollover.importers.sidecar import Column, Described, Profile, Sidecar, doubts_of
+from rollover.importers.sidecar import DATE_TIME, Column, Described, Profile, Sidecar, doubts_of
 from rollover.recording import Clock, Recording
 
 Array = NDArray[np.float64]
 RATE_INSTEAD = "; a clock too coarse for its samples: `rate` in Hz in a profile, and no column of time"
+SAME_UNIT = 1e-6  # units differ by more than this, spellings of a constant such as g by less
 SAME_INSTANT = 1e-9  # s: stamps of different clocks that lie closer are one row
 Line = Callable[[int], int | None]  # row of a channel -> line of the file, for messages
 
@@ -199,6 +200,9 @@ def _instants(path: Path, name: str, signal: Signal, by: Described) -> _Stamps:
             return _Stamps(*stamps.seconds_from_first(signal.values, step))
         except ValueError as e:
             raise by.refuse(name, str(e)) from None
+    if is_bare and (got := stamps.clock_digits(signal.values)):
+        message = f"times of day as HHMMSS, not seconds, got {got[1]:.10g} after {got[0]:.10g}; unit: {DATE_TIME}"
+        raise by.refuse(name, f"unit: {message}, of a text file")
     return _Stamps(_si(path, name, replace(signal, values=signal.values.astype(np.float64, copy=False)), by))
 
 
@@ -341,8 +345,17 @@ def _at(path: Path, line: Line, row: int, message: str) -> InputError:
 
 
 def _unit(name: str, signal: Signal, by: Described) -> str:
+    """The unit of a column; the file and the profile may both say it, but not two that differ. Raises `InputError`."""
     column = by.columns[name]
     unit = column.unit if column.unit is not None else signal.unit
+    if column.unit is not None and column.scale == 1.0 and column.offset == 0.0:
+        try:
+            ratio = factor(signal.unit, column.channel) / factor(column.unit, column.channel)
+        except ValueError:
+            ratio = 1.0  # the file states none that fits, such as the volts of an amplifier
+        if signal.unit and abs(ratio - 1.0) > SAME_UNIT:
+            cure = f"leave `unit` out, or where the file is wrong: unit: {signal.unit}, scale: {1.0 / ratio:.6g}"
+            raise by.refuse(name, f"unit: the file states {signal.unit!r}, got {unit!r}; {cure}")
     if column.unit is None:
         try:
             factor(unit, column.channel)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from datetime import UTC, datetime, timedelta
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -83,3 +84,16 @@ def said(began: int) -> str:
     """An instant in words, ISO 8601, UTC."""
     whole, rest = divmod(began, NANO)
     return f"{(_EPOCH + timedelta(seconds=whole)).strftime('%Y-%m-%dT%H:%M:%S')}.{rest:09d}Z"
+
+
+def clock_digits(values: NDArray[Any]) -> tuple[float, float] | None:
+    """Two stamps side by side that are HHMMSS: every minute of them leaps by 40 s; None if these are none."""
+    if values.ndim != 1 or values.size < 3 or not 0.0 <= values[0] < values[-1] < 240_000.0:
+        return None
+    if np.any(values % 100.0 >= 60.0) or np.any(values % 10_000.0 >= 6_000.0):
+        return None
+    at = np.flatnonzero(np.diff(np.floor(values / 100.0)))
+    step = float(np.median(np.diff(values)))
+    leaps = np.diff(values)[at] - np.where(np.diff(np.floor(values / 10_000.0))[at] > 0.0, 4040.0, 40.0)
+    is_one = bool(at.size) and bool(np.all(np.abs(leaps - step) < 0.5 * step))
+    return (float(values[at[0]]), float(values[at[0] + 1])) if is_one else None

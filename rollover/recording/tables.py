@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import contextlib
+import time
+import weakref
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +35,7 @@ Array = NDArray[np.float64]
 
 IN_TABLE = 16  # bytes of a value: in Arrow's table and in numpy's array
 LOOKED_AT = 200  # rows, for how many columns there are where no row holds names
+LONGEST_READ = 5.0  # s, that a thread may take to read one more block
 GAPS = ("", "NaN", "nan", "NAN")
 
 
@@ -111,19 +115,36 @@ def _arrow(
     import pyarrow.csv as pc
 
     kinds = {**dict.fromkeys(columns, pa.float64()), **dict.fromkeys(words, pa.string())}
-    with opened(path) as file:
+    fit = None if needed is None else (len(names), needed)
+    with opened(path) as file, _let_go(Numbers(path, file, dialect, fit)) as rows:
         return pc.read_csv(
-            pa.PythonFile(Numbers(path, file, dialect, None if needed is None else (len(names), needed)), mode="r"),
+            pa.PythonFile(rows.pop(), mode="r"),
             read_options=pc.ReadOptions(column_names=names, block_size=4 * BLOCK),
             parse_options=pc.ParseOptions(delimiter="\t" if dialect.delimiter == WHITESPACE else dialect.delimiter),
             convert_options=pc.ConvertOptions(
                 column_types=kinds,
                 include_columns=list(kinds),
                 decimal_point=dialect.decimal,
-                null_values=list(GAPS),
+                null_values=[*GAPS, *dialect.gaps],
                 strings_can_be_null=True,
             ),
         )
+
+
+@contextlib.contextmanager
+def _let_go(rows: Numbers) -> Iterator[list[Numbers]]:
+    """Rows to be handed over, and no end before the reader's threads hold them no more.
+
+    A reader that has found a fault still reads ahead: a thread that enters Python as it ends takes the process along.
+    """
+    rows_left, handed = weakref.ref(rows), [rows]
+    del rows
+    try:
+        yield handed
+    finally:
+        until = time.monotonic() + LONGEST_READ
+        while rows_left() is not None and time.monotonic() < until:
+            time.sleep(1e-3)
 
 
 def read_words(path: Path, columns: Sequence[str], dialect: Dialect = PLAIN) -> dict[str, list[str]]:
@@ -237,8 +258,10 @@ def _find_cell(path: Path, names: Sequence[str], columns: Sequence[str], needed:
         if len(cells) != len(names):
             refuse(path, f"got {len(cells)} cells; {len(names)} are needed, one a column{cure}", number)
         for i in wanted:
-            if not is_number(cells[i], dialect.decimal):
+            if not is_number(cells[i], dialect.decimal) and cells[i] not in dialect.gaps:
                 message = f"column {names[i]}: not a number, got {cells[i][:40]!r}; a number or an empty cell is needed"
+                if dialect.loose and not cure:
+                    cure = f", or in the profile, where this is none: csv: {{gaps: [{cells[i][:40]!r}]}}"
                 refuse(path, message + cure, number)
 
 

@@ -37,6 +37,7 @@ class Dialect:
     between: int = 0
     named: bool = True
     loose: bool = False
+    gaps: tuple[str, ...] = ()  # cells that hold no value, beside those of `tables.GAPS`
     cure: str = ""  # what a message about a cell should add
 
     @property

@@ -9,7 +9,7 @@ import pytest
 
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.series import series
-from rollover.diagnosis.triggers import from_first_contact
+from rollover.diagnosis.triggers import about_clocks, from_first_contact
 from rollover.faults import InputError
 from rollover.recording import Clock, Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
@@ -50,6 +50,33 @@ def test_a_clock_that_is_known_is_left_as_it_is_while_a_scenario_lasts(clock: Cl
     found, notes = from_first_contact(scenario(), beyond)
     assert all("shares no time with the scenario" in line for line in notes)
     assert max(abs(r.time[0] + 0.03) for _, r in found) < 5e-3
+
+
+@pytest.mark.parametrize("late", [(0.02, -0.05, 0.1), (0.0, 0.3, 0.0), (0.0, 1e-3, -1e-3)])
+def test_a_clock_that_is_said_to_be_right_and_is_not_is_told_with_the_line_that_frees_it(
+    late: tuple[float, float, float],
+) -> None:
+    given = drops(Clock(), late)
+    said = list(about_clocks(scenario(), given, {}))
+    far = [(name, by) for (name, _), by in zip(given, late, strict=True) if abs(by) > 0.01]
+    assert len(said) == len(far)
+    for line, (name, by) in zip(said, far, strict=True):
+        assert line.startswith(f"{name}: its clock is off, which is not stated; the scenario's zero lies at ")
+        assert float(line.split(" at ")[1].split(" s,")[0]) == pytest.approx(by, abs=2e-3)
+        assert line.endswith(
+            "left as it is stated to be: `clock: {zero: unknown}` in its sidecar or profile sets it there"
+        )
+    assert not list(about_clocks(scenario(), drops(Clock(within=0.01), late), {}))  # the fitted shift has room for it
+
+
+def test_a_diagnosis_tells_a_stated_clock_that_is_off_and_is_right_once_it_is_freed() -> None:
+    given = drops(Clock(), (0.03, 0.03, 0.03))
+    kept = diagnose(scenario(), given)
+    assert kept.verdict == "unexplained"
+    assert sum("left as it is stated to be" in note for note in kept.notes) == 3
+    freed = diagnose(scenario(), [(name, replace(r, clock=Clock(zero="unknown"))) for name, r in given])
+    assert freed.verdict == "no-mismatch"
+    assert not any("left as it is" in note for note in freed.notes)
 
 
 def test_what_begins_within_its_blow_is_laid_over_the_simulation() -> None:

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 import struct
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
+from rollover.faults import InputError
+from rollover.importers import COLLECTIONS
+from rollover.recording import Recording
+
+DATA = os.environ.get("ROLLOVER_DATA", "")
 SYSTEM = {
     "protocol_version": 1001,
     "little_endian": True,
@@ -147,3 +154,24 @@ def write_log(path: Path, g: np.ndarray, factors: Mapping[str, tuple[float, floa
     count = (first + np.arange(len(g)) + (1 << 23)) % (1 << 24) - (1 << 23)
     whole = np.concatenate([count[:, None], np.full((len(g), 1), -4194304), np.rint(raw).astype(np.int64)], axis=1)
     path.write_bytes(whole.astype(">i4").view(np.uint8).reshape(-1, 4)[:, 1:].tobytes())
+
+
+def published(name: str) -> Path:
+    """A folder of the owners' files, or a skip that says what is missing."""
+    path = Path(DATA, "published", name)
+    if not DATA or not path.is_dir():
+        pytest.skip(f"needs the published files {name!r}: set ROLLOVER_DATA to the folder that holds published/")
+    return path
+
+
+def read(name: str, folder: Path, *select: str) -> dict[str, Recording]:
+    """Recordings of a set by name."""
+    return dict(COLLECTIONS[name].read(folder, select or ("*",)))
+
+
+def refused(what: Callable[[], object]) -> str:
+    """The one line with which something is refused."""
+    with pytest.raises(InputError) as caught:
+        what()
+    assert len(caught.value.faults) == 1
+    return caught.value.faults[0].message  # without the path, which holds the name of the test

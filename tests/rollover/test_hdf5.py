@@ -79,6 +79,12 @@ def test_units_in_capitals_in_arrays_in_bytes(tmp_path: Path) -> None:
         (np.array([1, 2, -1, 4, -56, 6], "i1"), {"_Unsigned": "true", "add_offset": 1.0}, [2, 3, 256, 5, 201, 7]),
         (np.array([1, 2, 3, -999.9, 5, 6], "f4"), {"missing_value": -999.9}, [1, 2, 3, NAN, 5, 6]),
         (np.array([1, 2, 3, 7, 8, 6], "i4"), {"missing_value": np.array([7, 8], "i4")}, [1, 2, 3, NAN, NAN, 6]),
+        # in other letters than the conventions'
+        (np.array([1, 2, 3, 4, 5, 6], "i2"), {"Scale_Factor": 2.0, "AddOffset": 1.0}, [3, 5, 7, 9, 11, 13]),
+        (np.array([1, 2, 3, 4, 5, 6], "i2"), {"SCALE_FACTOR": 2.0, "FillValue": 2}, [2, NAN, 6, 8, 10, 12]),
+        (np.array([1, -9999, 3, 4, 5, 6], "f8"), {"nodata": -9999.0}, [1, NAN, 3, 4, 5, 6]),
+        (np.array([1, -9999, 3, 4, 5, 6], "i2"), {"NoData_Value": "-9999"}, [1, NAN, 3, 4, 5, 6]),
+        (np.array([1, 2, 3, 4, 5, 6], "i2"), {"scale_factor": 2.0, "ScaleFactor": 5.0}, [2, 4, 6, 8, 10, 12]),
     ],
 )
 def test_packed_numbers(tmp_path: Path, raw: Any, attributes: dict[str, Any], right: list[float]) -> None:
@@ -105,6 +111,9 @@ def test_a_scale_of_no_convention_is_refused_unless_the_profile_states_it(tmp_pa
     assert force(tmp_path / "a.h5", raw, ", scale: 0.25", gain=0.25)[FORCE] == pytest.approx(0.25 * raw)
     assert force(tmp_path / "a.h5", raw.astype(float), gain=0.25)[FORCE] == pytest.approx(raw)  # real: an amplifier's
     assert force(tmp_path / "a.h5", raw, gain=1.0, offset=0)[FORCE] == pytest.approx(raw)
+    said = "F: gain 0.25 stands beside its numbers, and is not applied; `scale` of a profile does"
+    assert said in force(tmp_path / "a.h5", raw.astype(float), gain=0.25).notes
+    assert force(tmp_path / "a.h5", raw, gain=1.0, offset=0).notes == ()
     with pytest.raises(InputError, match=r"channels.F: attribute scale_factor: not one number, got 'half'"):
         force(tmp_path / "a.h5", raw, scale_factor="half")
 

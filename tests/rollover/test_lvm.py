@@ -125,7 +125,7 @@ def test_two_columns_of_x(tmp_path: Path) -> None:
         start=[0.5, "", 7.0],
         time=["13:39:50.5", "", "13:39:50.5"],
     )
-    found = read(tmp_path, text, CHANNELS)
+    found = read(tmp_path, text, CHANNELS.replace("kN", "N"))
     assert found.samples(FORCE)[0] == pytest.approx([0.5, 0.6])
     assert found.samples(SINKAGE)[0] == pytest.approx([7.0, 7.2])
     assert "1 of 3 columns left out, text: Comment" in found.notes

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 import re
+import time
+import weakref
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +18,8 @@ from hypothesis import strategies as st
 from rollover.faults import InputError
 from rollover.importers import read_recording
 from rollover.recording import Recording
+from rollover.recording.tables import read_csv
+from rollover.recording.text_rows import Dialect, Numbers
 
 G = 9.80665
 X, FORCE = "chassis/acceleration_x", "rops/force"
@@ -191,3 +196,93 @@ def test_what_stands_in_the_file_is_read_or_named(
     for channel, values in wanted.items():
         assert found[channel] == pytest.approx([np.nan if v is None else v for v in values], nan_ok=True, abs=0)
     assert left_out(found) == {"B" if named else "3"}
+
+
+# ---- cells without a value, units stated twice, digits of a clock
+
+
+@pytest.mark.parametrize(
+    ("cell", "gap"), [("OVER", "OVER"), ("#N/A", "#N/A"), ("-9999.000", "-9999"), ("1e30", "1E+30"), (" OVL", " OVL")]
+)
+def test_cells_that_the_profile_calls_gaps_are_gaps_and_counted(tmp_path: Path, cell: str, gap: str) -> None:
+    text = f"t,F\n0.0,1\n0.1,{cell}\n0.2,3\n0.3,\n"
+    channels = "  t: {channel: time, unit: s}\n  F: {channel: rops/force, unit: N}\n"
+    found = read(tmp_path, "a.csv", text, channels, f"gaps: ['OL', {gap!r}]")
+    assert found[FORCE] == pytest.approx([1.0, math.nan, 3.0, math.nan], nan_ok=True)
+    assert found.notes == ("F: 2 of 4 values are gaps",)
+
+
+def test_a_word_among_numbers_is_refused_with_the_line_that_makes_it_a_gap(tmp_path: Path) -> None:
+    channels = "  t: {channel: time, unit: s}\n  F: {channel: rops/force, unit: N}\n"
+    with pytest.raises(InputError, match=r"a.csv:3: column F: not a number, got 'OVER'; .*csv: \{gaps: \['OVER'\]\}"):
+        read(tmp_path, "a.csv", "t,F\n0.0,1\n0.1,OVER\n0.2,3\n", channels)
+
+
+@pytest.mark.parametrize(("name", "unit", "other"), [("Kraft [kN]", "N", "kN"), ("F (N)", "kN", "N")])
+def test_two_units_of_one_column_are_refused_with_both(tmp_path: Path, name: str, unit: str, other: str) -> None:
+    channels = f'  t: {{channel: time, unit: s}}\n  "{name}": {{channel: rops/force, unit: {unit}}}\n'
+    text = f"t,{name}\n0.0,1\n0.1,2\n"
+    with pytest.raises(InputError, match=rf"unit: the file states '{other}', got '{unit}'; leave `unit` out") as e:
+        read(tmp_path, "a.csv", text, channels)
+    # the cure for a file that is wrong, as it is printed, gives the profile's unit
+    cure = re.search(r"where the file is wrong: (unit: .*)$", str(e.value))
+    assert cure is not None
+    factor = {"N": 1.0, "kN": 1e3}[unit]
+    found = read(tmp_path, "a.csv", text, channels.replace(f"unit: {unit}", cure[1]))
+    assert found[FORCE] == pytest.approx([factor, 2.0 * factor])
+    of_file = {"N": 1.0, "kN": 1e3}[other]
+    assert read(tmp_path, "a.csv", text, channels.replace(f", unit: {unit}", ""))[FORCE][0] == of_file
+
+
+def test_a_unit_that_fits_nothing_is_no_second_one(tmp_path: Path) -> None:
+    channels = '  "t [s]": {channel: time, unit: s}\n  "F [V]": {channel: rops/force, unit: kN}\n'
+    assert read(tmp_path, "a.csv", "t [s],F [V]\n0.0,1\n0.1,2\n", channels)[FORCE].tolist() == [1000.0, 2000.0]
+
+
+@pytest.mark.parametrize(
+    ("first", "rate"), [("13:25:59.88", 100), ("09:59:59.0", 20), ("23:56:30.5", 1), ("00:00:58.7", 1000)]
+)
+def test_digits_of_a_clock_are_no_seconds(tmp_path: Path, first: str, rate: int) -> None:
+    """VBOX and GPS loggers write 132559.99 and then 132600.00: 40 s that nobody waited for."""
+    h, m, s = first.split(":")
+    begun = int(h) * 3600 + int(m) * 60 + float(s)
+    at = [begun + k / rate for k in range(2000 if rate > 100 else 200)]
+    digits = [f"{int(t // 3600):02d}{int(t % 3600 // 60):02d}{t % 60:06.3f}" for t in at]
+    assert any(d[-6:-4] == "00" for d in digits[1:])
+    text = "time x\n" + "".join(f"{d} {k % 7}\n" for k, d in enumerate(digits))
+    channels = "  time: {channel: time, unit: s}\n  x: {channel: rops/force, unit: N}\n"
+    with pytest.raises(InputError, match=r"channels.time: unit: times of day as HHMMSS, not seconds, got .* date-time"):
+        read(tmp_path, "a.vbo", text, channels, "delimiter: whitespace")
+    found = read(tmp_path, "a.vbo", text, channels.replace("unit: s", "unit: date-time"), "delimiter: whitespace")
+    assert found.time == pytest.approx(np.array(at) - begun, abs=1.1e-3)
+
+
+@pytest.mark.parametrize("start", [132559.88, 100.0, 5958.0])
+def test_seconds_with_a_gap_are_seconds(tmp_path: Path, start: float) -> None:
+    at = start + np.concatenate([np.arange(0, 12), np.arange(5000, 5200)]) * 0.01
+    text = "time,x\n" + "".join(f"{t:.3f},{k % 7}\n" for k, t in enumerate(at))
+    channels = "  time: {channel: time, unit: s}\n  x: {channel: rops/force, unit: N}\n"
+    assert read(tmp_path, "a.csv", text, channels).time == pytest.approx(at, abs=1e-3)
+
+
+def test_a_reader_that_has_found_a_fault_holds_nothing_any_more(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its threads, still at work as the process ends, would abort it (status 134 beside the message)."""
+    held: list[weakref.ref[Numbers]] = []
+    made = Numbers.__init__
+
+    def note(self: Numbers, *args: Any) -> None:
+        made(self, *args)
+        held.append(weakref.ref(self))
+
+    monkeypatch.setattr(Numbers, "__init__", note)
+    (tmp_path / "a.csv").write_text("t,F\n" + "0.5,1\n" * 50 + "Max,3000\n")
+    alive = 0
+    for _ in range(200):  # a tenth of them stood before
+        with pytest.raises(InputError, match=r"a.csv:52: column t: not a number, got 'Max'"):
+            read_csv(tmp_path / "a.csv", ["t", "F"], Dialect(loose=True))
+        alive += any(h() is not None for h in held)
+        time.sleep(0.002)
+        held.clear()
+    assert alive == 0
