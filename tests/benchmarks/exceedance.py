@@ -1,8 +1,9 @@
 """The study over the static limit against brute force: independent draws by NumPy, each run by itself, counted by hand.
 
-    python -m tests.benchmarks.exceedance [RUNS] [WORKERS]
+    python -m tests.benchmarks.exceedance [RUNS] [WORKERS] [CASES]
 
-RUNS (1000) brute-force runs beside the 256 cases of `slope_side_overturn`, on WORKERS (2) processes. Nothing of a study
+RUNS (1000) brute-force runs beside CASES (256, as shipped) of `slope_side_overturn`, on WORKERS (2) processes.
+Nothing of a study
 is used for them: no plan, no axes, no store, no statistics of its own; an error of any of these shows as a difference.
 """
 
@@ -13,6 +14,7 @@ import tempfile
 import time
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +29,7 @@ from rollover.scenario import load
 from rollover.study import shelf
 from rollover.study.answers import answers
 from rollover.study.conduct import Way, conduct
+from rollover.study.plan import Random
 
 SLOPES, SCATTER, FRICTION, DURATION = (25.0, 40.0), 0.2714, (0.13, 0.5, 0.85), 2.6  # as the study's file says them
 LIMIT = 25e3  # N
@@ -61,9 +64,9 @@ def peak(values: tuple[float, float, float]) -> tuple[float, bool, float]:
     return found if run.status == "done" else float("nan"), bool(run.sentence), time.process_time() - began
 
 
-def by_study(folder: Path, workers: int) -> tuple[dict[str, Any], float]:
+def by_study(folder: Path, workers: int, cases: int) -> tuple[dict[str, Any], float]:
     """Answers of the study, and its CPU seconds."""
-    study = studies.load("slope_side_overturn")
+    study = replace(studies.load("slope_side_overturn"), plan=Random(count=cases, seed=1))
     done = conduct(study, folder, Way(workers=workers))
     told, _ = read_table(folder / shelf.PROVENANCE)
     return answers(study, done), float(as_numbers(told["cpu_time"]).sum())
@@ -97,9 +100,9 @@ def report(account: dict[str, Any], brute: Sequence[tuple[float, bool, float]]) 
 def main() -> None:
     """Run both and print the comparison."""
     given = [int(v) for v in sys.argv[1:]]
-    runs, workers = (*given, *(1000, 2)[len(given) :])
+    runs, workers, cases = (*given, *(1000, 2, 256)[len(given) :])
     with tempfile.TemporaryDirectory() as folder:
-        account, spent = by_study(Path(folder), workers)
+        account, spent = by_study(Path(folder), workers, cases)
     with ProcessPoolExecutor(workers) as pool:
         brute = list(pool.map(peak, drawn(runs), chunksize=5))
     print(report(account, brute))
