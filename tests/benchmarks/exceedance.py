@@ -3,8 +3,7 @@
     python -m tests.benchmarks.exceedance [RUNS] [WORKERS] [CASES]
 
 RUNS (1000) brute-force runs beside CASES (256, as shipped) of `slope_side_overturn`, on WORKERS (2) processes.
-Nothing of a study
-is used for them: no plan, no axes, no store, no statistics of its own; an error of any of these shows as a difference.
+Nothing of a study is used for them: no plan, no axes, no store, no statistics; an error of these is a difference.
 """
 
 from __future__ import annotations
