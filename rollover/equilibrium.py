@@ -35,6 +35,7 @@ from rollover.tables import (
 Array = NDArray[np.float64]
 TOLERANCE = 1e-7  # of forces and moments over the weight
 FREE = 1.0  # m or rad: a play that no part of a ROPS leaves
+BEYOND, STEP = math.radians(15.0), math.radians(1.0)  # of the inward search: from past the stiff balance, in degrees
 
 
 def tread_point(t: Tables, bodies: tuple[Body, ...], w: int, R: Array) -> Array:
@@ -249,13 +250,7 @@ class Equilibrium:
             settled = found
             return sign * float(self.residual(found)[ROLL])
 
-        # where a rigid vehicle balances on its outer edges, a little less; tyres and axle move it by some degrees
-        height = sum(b.inertia.mass * b.centre[2] for b in self.bodies) / sum(b.inertia.mass for b in self.bodies)
-        edge = max(
-            abs(self.bodies[int(b)].centre[1] + f[W_CENTRE + 1]) + f[W_HALF]
-            for b, f in zip(self.t.wheel_i, self.t.wheel_f, strict=True)
-        )
-        roll = math.atan2(edge, height) - self.tilt(sign)
+        roll = self._rigid() - self.tilt(sign)  # a little less than where it balances
         value, step = moment(roll), math.radians(3.0)
         tried = [value] if roll >= 0.0 and not math.isnan(value) else []
         for _ in range(15):
@@ -267,6 +262,48 @@ class Equilibrium:
                 return settled if self._between(moment, before, (roll, value)) else None
         self.overturns = min(tried, default=-1.0) > 0.0
         return None
+
+    def outermost(self, sign: float, swing: float) -> Array | None:
+        """The balance with the axle on its stop, sought from beyond it inwards; or None.
+
+        Just below the static limit poses that follow from each other jump between the free axle and its stop, and the
+        last balance merges with the end of the stop: where every pose overturns, the one that does least is given.
+        """
+        settled: Array | None = None
+
+        def moment(roll: float) -> float:
+            nonlocal settled
+            start = self.guess(sign * roll, -sign * min(roll, 1.01 * swing)) if settled is None else settled.copy()
+            start[ROLL] = self.level[0] + sign * roll
+            found = self.solve(start, fixed=(ROLL,))
+            if found is None or abs(found[PITCH] - self.level[1]) > 0.5:
+                return math.nan
+            settled = found
+            return sign * float(self.residual(found)[ROLL])
+
+        roll = max(self._rigid() - self.tilt(sign), swing) + BEYOND
+        outer, least, pose = (math.nan, math.nan), math.inf, None
+        while roll > swing:
+            inner = (roll, moment(roll))
+            if inner[1] < 0.0 < outer[1]:
+                return settled if self._between(moment, inner, outer) else None
+            if 0.0 < inner[1] < least:
+                least, pose = inner[1], settled
+            outer, roll = inner, roll - STEP
+        return pose
+
+    def tips(self, u: Array, sign: float) -> bool:
+        """Whether a pose goes on rolling to the side that it leans to, rather than back."""
+        return sign * float(self.residual(u)[ROLL]) > 0.0
+
+    def _rigid(self) -> float:
+        """Angle (rad) at which a rigid vehicle balances on its outer edges; tyres and axle move it by some degrees."""
+        height = sum(b.inertia.mass * b.centre[2] for b in self.bodies) / sum(b.inertia.mass for b in self.bodies)
+        edge = max(
+            abs(self.bodies[int(b)].centre[1] + f[W_CENTRE + 1]) + f[W_HALF]
+            for b, f in zip(self.t.wheel_i, self.t.wheel_f, strict=True)
+        )
+        return math.atan2(edge, height)
 
     def _between(self, moment: Callable[[float], float], a: tuple[float, float], b: tuple[float, float]) -> bool:
         """Close in on the zero between two points by the Illinois variant of false position."""

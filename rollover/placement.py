@@ -213,6 +213,16 @@ def _driving(driving: Driving, scenario: Scenario, bodies: tuple[Body, ...], t: 
     return Start(q=q, qd=np.concatenate([statics.forward(u, driving.speed, driving.sideways), rates]), time=0.0)
 
 
+def _beyond(statics: Equilibrium, balance: Array | None, sign: float, excess_deg: float) -> Array | None:
+    """The pose so far beyond a balance; None without one, and where it would roll back: then it was no balance."""
+    if balance is None or excess_deg == 0.0:
+        return balance
+    u = balance.copy()
+    u[ROLL] += sign * math.radians(excess_deg)
+    found = statics.solve(u, fixed=(ROLL,))
+    return found if found is not None and statics.tips(found, sign) else None
+
+
 def _tipped(tip: TipOver, scenario: Scenario, vehicle: Vehicle, bodies: tuple[Body, ...], t: Tables) -> Start:
     if not vehicle.wheels:
         raise InputError(
@@ -229,9 +239,9 @@ def _tipped(tip: TipOver, scenario: Scenario, vehicle: Vehicle, bodies: tuple[Bo
         held = statics.held()  # steeper than it can stand: there is nothing to tip it over, it only has to be let go
         if held is not None:
             return Start(q=statics.coordinates(held), qd=statics.rates(held, sign * tip.roll_rate), time=0.0, note=REST)
-    if u is not None and tip.excess_deg > 0.0:
-        u[ROLL] += sign * math.radians(tip.excess_deg)
-        u = statics.solve(u, fixed=(ROLL,))
+    u = _beyond(statics, u, sign, tip.excess_deg)
+    if u is None:
+        u = _beyond(statics, statics.outermost(sign, swing), sign, tip.excess_deg)
     if u is None and statics.overturns:
         slope = math.degrees(math.acos(float(t.plane[2])))
         raise InputError(

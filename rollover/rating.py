@@ -31,6 +31,7 @@ SLOPE_LIMIT, SLOPE_SPAN = 2.0, 9
 WEIGHTS = {"corridor": 0.4, "phase": 0.2, "magnitude": 0.2, "slope": 0.2}
 BY_BADNESS: tuple[Literal["good", "fair", "poor"], ...] = ("good", "fair", "poor")
 COVERAGE = 2.0  # sigmas of noise that are allowed for: 95 %
+# limits of the standard's grades: recalled, no free statement of them was found; the scores are held against a package
 GRADES = ((0.94, "excellent"), (0.80, "good"), (0.58, "fair"))
 
 
@@ -228,7 +229,7 @@ def iso18571(
 
 
 def grade(overall: float) -> str:
-    """In words: above 0.94 excellent, above 0.80 good, above 0.58 fair, else poor."""
+    """In words: above 0.94 excellent, above 0.80 good, above 0.58 fair, else poor (recalled)."""
     return next((name for limit, name in GRADES if overall > limit), "poor")
 
 

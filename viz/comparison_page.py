@@ -15,8 +15,8 @@ from viz.page import Block, Cell, Details, Figure, Footer, Headline, Note, Secti
 from viz.plots import Curve
 
 STATES: Mapping[str, State] = {"good": "pass", "fair": "warn", "poor": "fail"}
-COLUMNS = ["channel", "CFC", "ISO/TS 18571", "grade", "Z", "E_P", "E_M", "E_S", "M, %", "P, %"]
-COLUMNS += ["RMS / range, %", "RMS / noise", "peak, %", "peak later, ms", "verdict"]
+COLUMNS = ["channel", "verdict", "CFC", "ISO/TS 18571", "grade", "Z", "E_P", "E_M", "E_S", "M, %", "P, %"]
+COLUMNS += ["RMS / range, %", "RMS / noise", "peak, %", "peak later, ms"]
 
 
 def page(
@@ -81,7 +81,7 @@ def _recording(found: Misfit) -> list[Block]:
     table = Table(
         columns=COLUMNS,
         rows=[_row(c.channel, c.cfc, c.rating) for c in found.channels],
-        numeric=(2, *range(4, len(COLUMNS) - 1)),
+        numeric=(3, *range(5, len(COLUMNS))),
         caption="Z corridor, E_P phase, E_M magnitude, E_S slope of ISO/TS 18571; M, P Sprague-Geers. "
         "Verdict: the worst of the rating, the peak (fair beyond 10 %, poor beyond 21 %, as the standard scores a "
         "magnitude error) and the residual (fair beyond twice the noise and 5 % of the signal's RMS together, "
@@ -122,9 +122,9 @@ def _recording(found: Misfit) -> list[Block]:
 
 
 def _row(channel: str, cfc: int | None, rating: Rating | NotRateable) -> list[str | Cell]:
-    first: list[str | Cell] = [channel, "none" if cfc is None else str(cfc)]
+    used = "none" if cfc is None else str(cfc)
     if isinstance(rating, NotRateable):
-        return [*first, Cell(rating.reason, "muted"), *[""] * (len(COLUMNS) - 3)]
+        return [channel, Cell(rating.reason, "muted"), used, *[""] * (len(COLUMNS) - 3)]
     iso, sg, peak = rating.iso18571, rating.sprague_geers, rating.peak
     judged = verdict(rating)
     scores: list[str | Cell] = [Cell("not rated", "muted"), "", "", "", "", ""]
@@ -133,14 +133,15 @@ def _row(channel: str, cfc: int | None, rating: Rating | NotRateable) -> list[st
         scores = [f"{iso.overall:.3f}", iso.grade, *(f"{p:.3f}" for p in parts)]
     geers = [f"{100.0 * v:.3g}" for v in (sg.magnitude, sg.phase)] if isinstance(sg, SpragueGeers) else ["", ""]
     return [
-        *first,
+        channel,
+        Cell(judged.in_words, STATES[judged.grade]),
+        used,
         *scores,
         *geers,
         _number(rating.nrmse, 100.0),
         _number(rating.over_noise),
         "" if peak.relative_error is None else f"{100.0 * peak.relative_error:+.3g}",
         f"{1e3 * peak.time_error:+.3g}",
-        Cell(judged.in_words, STATES[judged.grade]),
     ]
 
 

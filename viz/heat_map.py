@@ -40,6 +40,7 @@ def heat_map(x: NDArray[Any], y: NDArray[Any], values: NDArray[np.float64], *, a
         bar = figure.colorbar(mesh, ax=axes)
         bar.set_label(label, color=COLOURS["ink"])
         bar.outline.set_visible(False)
+        bar.solids.set_rasterized(False)  # as shapes: the page allows no images within pictures
         finish(axes, across, up, margins=(0.0, 0.0))
         axes.grid(visible=False)
     return svg.text

@@ -42,7 +42,7 @@ def page(
         *stand_section(run, rows),
         *_standards(run, rows),
     ]
-    blocks += [*_peaks(peaks), *_domain(run, peaks)]
+    blocks += [*_peaks(run, peaks), *_domain(run, peaks)]
     blocks += [*_histories(run, peaks), *_structure(run, rows), *_ledger(run), *_course(run, answer)]
     return render(
         title=run.scenario.title,
@@ -99,10 +99,11 @@ def _warnings(run: Run, answer: Mapping[str, Any]) -> list[Block]:
     return blocks
 
 
-def _peaks(peaks: Sequence[PeakLoad]) -> list[Block]:
+def _peaks(run: Run, peaks: Sequence[PeakLoad]) -> list[Block]:
     shown = [p for p in peaks if p.raw != 0.0]
     if not shown:
         return []
+    within = "inside" if rests_on_ground(run) else "ground not touched"
     ensemble = any(p.scatter is not None for p in shown)
     columns = ["load", "unit", "raw", "at, s", f"CFC {shown[0].cfc}", "at, s", "impulse, N s", "half step"]
     columns += [f"mean of {shown[0].starts}", "scatter"] if ensemble else []
@@ -118,7 +119,7 @@ def _peaks(peaks: Sequence[PeakLoad]) -> list[Block]:
         if ensemble:
             row += ["" if p.mean is None else number(p.mean, s.factor)]
             row += ["" if p.scatter is None else _percent(p.scatter)]
-        row.append(Cell(", ".join(p.domain_flags) or "inside", "warn" if p.domain_flags else ""))
+        row.append(Cell(", ".join(p.domain_flags) or within, "warn" if p.domain_flags else ""))
         rows.append(row)
     caption = (
         "Largest magnitudes. Collisions at restitution 0 show in no force history: their momentum stands under "

@@ -62,7 +62,7 @@ def _headline(account: Mapping[str, Any]) -> Headline:
     failed = f"{n['failed']} of {n['all']} cases failed. " if n["failed"] else f"{n['all']} cases. "
     flags = {f["flag"] for f in account["flags"]}
     state: Any = "warn" if n["failed"] or flags else ""
-    worth = f" {_sentence(standing(flags))} (see the flags below)" if flags else ""
+    worth = f" {_sentence(standing(flags))}" if flags else ""
     if not first["cases"]:
         return Headline(sentence="No case has an answer.", detail=failed, state="fail")
     if (e := first["exceedance"]) is not None:
@@ -97,6 +97,7 @@ def _output(study: Study, done: Conducted, account: Mapping[str, Any], output: M
 
 def _quantiles(output: Mapping[str, Any], *, drawn: bool) -> Table:
     unit, factor = series_unit(output["unit"])
+    known = "" if unit == "1" else f" {unit}"
     rows: list[list[str | Cell]] = [["mean", _number(output["mean"], factor), "", ""]]
     rows.append(["standard deviation", _number(output["deviation"], factor), "", ""])
     rows.append(["least", _number(output["least"], factor), "", ""])
@@ -105,7 +106,7 @@ def _quantiles(output: Mapping[str, Any], *, drawn: bool) -> Table:
         rows.append([f"{100.0 * q['q']:g} %", _number(q["value"], factor), *bounds])
     rows.append(["largest", _number(output["largest"], factor), "", ""])
     if (e := output["exceedance"]) is not None:
-        name = f"probability {e['beyond']} {e['limit'] * factor:.4g} {unit}: {e['hits']} of {e['cases']}"
+        name = f"probability {e['beyond']} {e['limit'] * factor:.4g}{known}: {e['hits']} of {e['cases']}"
         rows.append([name, _percent(e["probability"]), _percent(e["low"]), _percent(e["high"])])
         if e["failed"]:
             counted = f"the same, {e['failed']} failed cases counted as"
@@ -113,11 +114,11 @@ def _quantiles(output: Mapping[str, Any], *, drawn: bool) -> Table:
             rows.append([f"{counted} {e['beyond']}", _percent(e["most"]), "", _percent(e["high_of_all"])])
     if (e := output["beyond_limit"]) is not None:
         failed = f", {e['failed']} failed" if e["failed"] else ""
-        rows.append([f"{e['beyond']} {e['limit'] * factor:.4g} {unit}", f"{e['hits']} of {e['cases']}{failed}", "", ""])
+        rows.append([f"{e['beyond']} {e['limit'] * factor:.4g}{known}", f"{e['hits']} of {e['cases']}{failed}", "", ""])
     how = "Intervals by order statistics and Clopper-Pearson." if drawn else "The cases of a plan are no draws."
     missing = f"; {output['missing']} have no such measure" if output["missing"] else ""
     return Table(
-        columns=(f"{output['name']}, {unit}", "", "interval from", "to"),
+        columns=(f"{output['name']}{known and ','}{known}", "", "interval from", "to"),
         rows=rows,
         numeric=(1, 2, 3),
         caption=f"{output['cases']} cases{missing}. {how}",

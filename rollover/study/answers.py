@@ -18,6 +18,7 @@ from rollover.study.shelf import Row
 from rollover.study.study import Output, Study
 
 Array = NDArray[np.float64]
+COUNTED = ("start/from_rest",)  # 0 or 1 in each case: a share, without quantiles
 ENDS = 0.2  # share of the cases that stand for an axis' low and high end
 
 DRAWN = {
@@ -77,7 +78,7 @@ def _independent(study: Study, n: int) -> slice:
 
 
 def _output(study: Study, output: Output, done: Conducted, chosen: slice, drawn: bool) -> dict[str, Any]:
-    y = values_of(output, done.rows)
+    y, counted = values_of(output, done.rows), output.name in COUNTED
     part, failed = y[chosen], sum(row.status == "failed" for row in done.rows[chosen])
     good = part[np.isfinite(part)]
     found: dict[str, Any] = {
@@ -91,7 +92,9 @@ def _output(study: Study, output: Output, done: Conducted, chosen: slice, drawn:
         "deviation": float(good.std(ddof=1)) if len(good) > 1 else None,
         "least": float(good.min()) if len(good) else None,
         "largest": float(good.max()) if len(good) else None,
-        "quantiles": [quantile(good, q, study.confidence) for q in study.quantiles] if drawn and len(good) else [],
+        "quantiles": [quantile(good, q, study.confidence) for q in study.quantiles]
+        if drawn and len(good) and not counted
+        else [],
         "exceedance": exceedance(good, output, failed, study.confidence) if drawn and len(good) else None,
         "beyond_limit": None if drawn else share(good, output, failed),
         "worst": _worst(output, y, done),
