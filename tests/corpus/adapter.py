@@ -149,8 +149,10 @@ def _is_there(name: Mapping[str, Any], truth: Mapping[str, Any]) -> bool:
     if truth["kind"] == "negligible":
         return False
     return any(
-        e["id"] in name["set"]
-        and (not e["channel"] or not name["channel"] or e["id"] != name["id"] or e["channel"] == name["channel"])
+        (
+            e["id"] in name["set"]
+            and (not e["channel"] or not name["channel"] or e["id"] != name["id"] or e["channel"] == name["channel"])
+        )
         or name["id"] in e["near"]
         for e in truth["effects"]
     )

@@ -1,4 +1,4 @@
-"""A process that works off entries of the corpus: `python -m tests.corpus.work LINES ID...`, a line of JSON for each."""
+"""A process that works off entries of the corpus: `python -m tests.corpus.work LINES ID...`, one line for each."""
 
 from __future__ import annotations
 
