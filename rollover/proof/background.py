@@ -56,6 +56,7 @@ class Background:
     lasts: tuple[float, ...]
     swing: Frame
     size: float = 0.0
+    until: tuple[float, ...] = ()  # s, to which its size is taken: the first of two ways down, with and without it
 
     def frame(self, times: Array, channel: str) -> Array:
         """Share by which a channel reads off at times (n,), s."""
@@ -84,8 +85,8 @@ def drawn_share(seed: int, index: int) -> float:
 def background(seed: int, index: int, share: float, rigs: Sequence[Rig], plain: Sequence[Descent]) -> Background:
     """The discrepancy of a case, of a size by which force is off by `share` of its range.
 
-    Root mean square over the ways down of all drops, against `plain` ones of the same `rigs` without it. Raises
-    ``ValueError`` where no size comes that far.
+    Root mean square over the ways down of all drops, against `plain` ones of the same `rigs` without it, up to where
+    the first of the two turns. Raises ``ValueError`` where no size comes that far.
     """
     random = np.random.default_rng([seed, index, _STREAM])
     family = ("waves", "bumps")[int(random.integers(2))]
@@ -103,14 +104,16 @@ def background(seed: int, index: int, share: float, rigs: Sequence[Rig], plain: 
     times = [np.linspace(0.0, end, PLACES) for end in lasts]
     bare = [drop.channels(t)[FORCE] for drop, t in zip(plain, times, strict=True)]
     span = max(float(f.max()) for f in bare)
-    for _ in range(12):
-        squares = 0.0
+    for _ in range(20):
+        squares, until = [], []
         for i, (rig, t, f) in enumerate(zip(rigs, times, bare, strict=True)):
-            there = descend(found.about(rig, i), -1e-6, float(t[-1]) + 1e-4).channels(t)[FORCE]
-            squares += float(np.mean((there * (1.0 + found.frame(t, FORCE)) - f) ** 2))
-        size = math.sqrt(squares / len(times)) / span
+            drop = descend(found.about(rig, i), -1e-6, float(t[-1]) + 1e-4)
+            until.append(min(drop.deepest()[0], found.lasts[i]))
+            read = drop.channels(t)[FORCE] * (1.0 + found.frame(t, FORCE))
+            squares.append((read - f)[t <= until[-1]] ** 2)
+        size = math.sqrt(float(np.mean(np.concatenate(squares)))) / span
         if abs(size / share - 1.0) < CLOSE:
-            return found
+            return replace(found, until=tuple(until))
         found = replace(found, size=found.size * min(max(share / size, 0.3), 3.0))
     raise ValueError(f"background: {share:g} of the range of the force cannot be reached")
 

@@ -224,9 +224,9 @@ def _off(
     found = {}
     for c in held.channels:
         apart = []
-        for shot, one, two, lasts in zip(held.shots, bare, shown, around.lasts, strict=True):
+        for shot, one, two, until in zip(held.shots, bare, shown, around.until, strict=True):
             t, moved = one.times - shot.late, two.values[c] - one.values[c]
-            apart.append(moved[(t >= 0.0) & (t <= lasts) & np.isfinite(moved)])
+            apart.append(moved[(t >= 0.0) & (t <= until) & np.isfinite(moved)])
         share = np.concatenate(apart) / spread_of(bare, c)
         found[c] = {"rms": float(np.sqrt(np.mean(share**2))), "most": float(np.max(np.abs(share)))}
     return found
