@@ -88,10 +88,6 @@ def plan(
         if id not in library.EFFECTS and id not in outside.OUTSIDE:
             raise ValueError(f"effects: no such effect, got {id!r}; {', '.join([*library.EFFECTS, *outside.OUTSIDE])}")
     background = _checked(background, kinds)
-    if "foreign-form" in kinds and effects and not any(e in foreign.EFFECTS for e in effects):
-        raise ValueError(
-            f"effects: none has a foreign form, got {', '.join(effects)}; {', '.join(foreign.EFFECTS)} have"
-        )
     random = np.random.default_rng([seed, _PLAN])
     shares = dict.fromkeys(kinds, 1.0) if kinds else dict(KINDS)
     if effects and not kinds:
@@ -114,7 +110,11 @@ def plan(
     for i, kind in enumerate(of_kind):
         ids: tuple[str, ...] = ()
         if kind in turns:
-            ids = (next(turns[kind]),)
+            id = next(turns[kind], None)
+            if id is None:
+                able = ", ".join(foreign.EFFECTS if kind == "foreign-form" else library.EFFECTS)
+                raise ValueError(f"effects: none of kind {kind}, got {', '.join(effects)}; {able} are allowed")
+            ids = (id,)
         elif kind == "pair":
             ids = _two(random, listed)
         elif kind == "negligible":
@@ -129,9 +129,8 @@ def _checked(background: float | str | None, kinds: Sequence[str]) -> float | st
         return DRAWN if "background" in kinds else None
     if background == DRAWN or (isinstance(background, float) and LEAST <= background <= LARGEST):
         return background
-    raise ValueError(
-        f"background: got {background}; {DRAWN} or a share of the range from {LEAST} to {LARGEST} is allowed"
-    )
+    allowed = f"{DRAWN} and {LEAST:g} to {LARGEST:g} are allowed"
+    raise ValueError(f"background: no share of the force's range, got {background}; {allowed}")
 
 
 def _share(background: float | str | None, seed: int, index: int) -> float:
