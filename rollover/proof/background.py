@@ -25,6 +25,7 @@ Course = Callable[[float], float]  # of the time over that of the deepest point
 DRAWN = "drawn"  # in place of a share: one of its own for each case
 SHARES = (0.01, 0.10)  # of the range of the force, within which it is drawn
 MOST = 0.8  # share of the ground's force that it never passes, so that the ground presses still
+FADES = 0.5  # of the way down, over which it dies out behind the deepest point: what rests does not wander
 PLACES = 200  # of each way down, at which its size is taken
 CLOSE = 0.005  # of its size, within which it is as asked for
 _STREAM = 77  # of random numbers: what else is in a case stays as it is without
@@ -63,11 +64,13 @@ class Background:
         return self.size * self.swing(times, channel)
 
     def about(self, rig: Rig, drop: int) -> Rig:
-        """The rig of that drop with it."""
+        """The rig of that drop with it; behind the deepest point it dies out."""
         course, lasts = self.courses[drop], self.lasts[drop]
 
         def off(t: float) -> float:
-            return MOST * math.tanh(self.size * course(max(t, 0.0) / lasts) / MOST)
+            at = max(t, 0.0) / lasts
+            fades = math.exp(-(((at - 1.0) / FADES) ** 2)) if at > 1.0 else 1.0
+            return MOST * math.tanh(fades * self.size * course(at) / MOST)
 
         return replace(rig, background=off)
 
@@ -85,9 +88,14 @@ def drawn_share(seed: int, index: int) -> float:
 def background(seed: int, index: int, share: float, rigs: Sequence[Rig], plain: Sequence[Descent]) -> Background:
     """The discrepancy of a case, of a size by which force is off by `share` of its range.
 
-    Root mean square over the ways down of all drops, against `plain` ones of the same `rigs` without it, up to where
-    the first of the two turns. Raises ``ValueError`` where no size comes that far.
+    Root mean square over the ways down of all drops, each of the same weight, against `plain` ones of the same `rigs`
+    without it, up to where the first of the two turns. Raises ``ValueError`` where no size comes that far.
     """
+    return _sized(unsized(seed, index, plain), share, rigs, plain)
+
+
+def unsized(seed: int, index: int, plain: Sequence[Descent]) -> Background:
+    """The courses of a case, each of a root mean square of one, and the frame's swing."""
     random = np.random.default_rng([seed, index, _STREAM])
     family = ("waves", "bumps")[int(random.integers(2))]
     draw = {"waves": _waves, "bumps": _bumps}[family]
@@ -100,8 +108,12 @@ def background(seed: int, index: int, share: float, rigs: Sequence[Rig], plain: 
         shares={FORCE: float(random.uniform(0.2, 0.8)), ACCELERATION: float(random.uniform(0.2, 0.8))},
     )
     lasts = tuple(drop.deepest()[0] for drop in plain)
-    found = Background(family=family, common=common, courses=courses, lasts=lasts, swing=swing, size=2.0 * share)
-    times = [np.linspace(0.0, end, PLACES) for end in lasts]
+    return Background(family=family, common=common, courses=courses, lasts=lasts, swing=swing)
+
+
+def _sized(found: Background, share: float, rigs: Sequence[Rig], plain: Sequence[Descent]) -> Background:
+    found = replace(found, size=2.0 * share)
+    times = [np.linspace(0.0, end, PLACES) for end in found.lasts]
     bare = [drop.channels(t)[FORCE] for drop, t in zip(plain, times, strict=True)]
     span = max(float(f.max()) for f in bare)
     for _ in range(20):
@@ -110,8 +122,8 @@ def background(seed: int, index: int, share: float, rigs: Sequence[Rig], plain: 
             drop = descend(found.about(rig, i), -1e-6, float(t[-1]) + 1e-4)
             until.append(min(drop.deepest()[0], found.lasts[i]))
             read = drop.channels(t)[FORCE] * (1.0 + found.frame(t, FORCE))
-            squares.append((read - f)[t <= until[-1]] ** 2)
-        size = math.sqrt(float(np.mean(np.concatenate(squares)))) / span
+            squares.append(float(np.mean((read - f)[t <= until[-1]] ** 2)))
+        size = math.sqrt(float(np.mean(squares))) / span
         if abs(size / share - 1.0) < CLOSE:
             return replace(found, until=tuple(until))
         found = replace(found, size=found.size * min(max(share / size, 0.3), 3.0))

@@ -48,7 +48,7 @@ def _gibson(random: Random, s: Setting, id: str) -> Change:
 
 def _pan(random: Random, s: Setting, id: str) -> Change:
     """A thin hard pan over softer soil: what it adds dies out below its top."""
-    top, r, length = _top(random, s), ratio(random, 0.1, 1.3), uniform(random, 0.02, 0.08)
+    top, r, length = _top(random, s), ratio(random, 0.1, 1.3), uniform(random, 0.06, 0.2)
 
     def law(t: float, z: float, v: float, force: float) -> float:
         return force * (1.0 + (r - 1.0) * math.exp(-(z - top) / length)) if z > top else force

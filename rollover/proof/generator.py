@@ -222,12 +222,14 @@ def _off(
     """How far a background moves each channel on the ways down, as a share of the channel's range."""
     found = {}
     for c in held.channels:
-        apart = []
+        squares, most = [], 0.0
         for shot, one, two, until in zip(held.shots, bare, shown, around.until, strict=True):
             t, moved = one.times - shot.late, two.values[c] - one.values[c]
-            apart.append(moved[(t >= 0.0) & (t <= until) & np.isfinite(moved)])
-        share = np.concatenate(apart) / spread_of(bare, c)
-        found[c] = {"rms": float(np.sqrt(np.mean(share**2))), "most": float(np.max(np.abs(share)))}
+            moved = moved[(t >= 0.0) & (t <= until) & np.isfinite(moved)] / spread_of(bare, c)
+            if moved.size:
+                squares.append(float(np.mean(moved**2)))
+                most = max(most, float(np.max(np.abs(moved))))
+        found[c] = {"rms": float(np.sqrt(np.mean(squares))) if squares else 0.0, "most": most}
     return found
 
 
