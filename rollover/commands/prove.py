@@ -134,7 +134,20 @@ def sentences(summary: dict[str, Any]) -> list[str]:
         "  called by a listed name that is not even near": summary["outside"]["wrong"],
         "Intervals that hold the true value": summary["coverage"],
     }
+    if (real := summary["real"]) is not None:
+        said |= {
+            "Foreign forms and backgrounds: in the set, of all": real["of_all"]["in_set"],
+            "  first, of all": real["of_all"]["first"],
+            "  in the set, of those larger than the background": real["stronger_than_background"]["in_set"],
+            "  called by another name": real["called"]["another_name"],
+            "  a background alone called by a name": real["background_alone"]["false_name"],
+            "  a background alone called unexplained": real["background_alone"]["unexplained"],
+        }
     lines = [f"{what:<50} {_share(found)}" for what, found in said.items() if found["of"]]
+    if (given := summary["probabilities"]) is not None and given["cases"]:
+        scores = f"Brier score {given['brier']:.3f}, log score {given['log']:.3f}"
+        slope = "" if given["slope"] is None else f", slope {given['slope']:.2f}"
+        lines.append(f"{'Probabilities, of ' + str(given['cases']) + ' cases':<50} {scores}{slope}")
     if summary["failed"]:
         lines.append(f"{'Diagnoses that failed':<50} {len(summary['failed'])}")
     return lines

@@ -192,13 +192,17 @@ def make(order: Order) -> Case:
 
     off = None if around is None else _off(around, held, bare, nothing)
 
-    def against(other: list[Reading]) -> dict[str, Any]:
-        shown, without = [m.values for m in made], [o.values for o in other]
-        found = strength(times, shown, without, sigma, worth)
+    def between(
+        shown: Sequence[Reading], other: Sequence[Reading], over: Mapping[str, float] = sigma
+    ) -> dict[str, Any]:
+        return strength(times, [m.values for m in shown], [o.values for o in other], over, worth)
+
+    def against(other: Sequence[Reading]) -> dict[str, Any]:
+        found = between(made, other)
         if off is None:
             return found
         size = {c: max(off[c]["rms"] * spread_of(bare, c), 1e-9 * sigma[c]) for c in held.channels}
-        return found | {"over_background": strength(times, shown, without, size, worth)["over_noise"]}
+        return found | {"over_background": between(made, other, size)["over_noise"]}
 
     each = []
     for k in range(len(changes)):
@@ -207,6 +211,9 @@ def make(order: Order) -> Case:
     truth = _truth(order, held, changes, each, against(nothing) if changes else None, sigma, recordings)
     if around is not None:
         truth["background"] = around.told(order.background) | {"channels": off}
+        if changes:  # of the mean square of what is missing, over the noise
+            whole, rest = (between(shown, bare)["signal_to_noise"] ** 2 for shown in (made, nothing))
+            truth["explains"] = 1.0 - rest / whole if whole > 0.0 else None
     return Case(name=order.name, scenario=_scenario(held), recordings=recordings, truth=truth)
 
 
