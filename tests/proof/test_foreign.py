@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 
 from rollover.proof import campaign, foreign, library
 from rollover.proof.campaign import ACCELERATION, DEPTH, FORCE, PLACE, SPEED, Shot
-from rollover.proof.descent import LOADING, Descent, descend
+from rollover.proof.descent import LINE, LOADING, Descent, descend
 from rollover.proof.forms import Form
 from rollover.proof.generator import Order, make, plan
 from rollover.proof.instruments import Fault, Instruments
@@ -80,7 +80,7 @@ def test_a_plan_of_foreign_forms_takes_turns_and_refuses_what_has_none() -> None
 # What the ground presses with on the way down, written from the docstrings: (told, z, v, F of the plain ground) -> N
 LAWS: dict[str, Callable[[Mapping[str, float], float, float, float], float]] = {
     "hunt-crossley": lambda p, z, v, f: f + p["chi"] * z**1.5 * v,
-    "kelvin-voigt-with-cut-off": lambda p, z, v, f: f + p["most"] * min(v / p["speed"], 1.0),
+    "kelvin-voigt-with-cut-off": lambda p, z, v, f: f + p["most"] * float(np.clip(v / p["speed"], -1.0, 1.0)),
     "eyring": lambda p, z, v, f: f + p["scale"] * math.asinh(v / p["speed"]),
     "embedded-dashpot": lambda p, z, v, f: f + p["dashpot"] * v * (1.0 + z / p["height"]),
     "arsinh-rate": lambda p, z, v, f: f * (1.0 + p["gain"] * math.asinh(v / p["speed"]) / 2.302585093),
@@ -344,3 +344,23 @@ def test_no_instrument_is_off_by_the_products_own_law(id: str, form: Form) -> No
         "sensor-clipping": [[level] for level in (0.55, 0.7, 0.85)],
     }.get(id, [[0.02 * (float(np.mean(off)) if id == "sensor-bias" else 1.0)]])
     assert apart(off, own, starts) > (0.015 if id == "sensor-lag" else 0.03)
+
+
+def test_a_dashpot_of_both_ways_brakes_the_way_back_and_never_pulls() -> None:
+    """M a + m_b1 a = m g - max(line + chi z^1.5 v, 0): less than the line while it rises."""
+    forms = foreign.FORMS["soil-viscous-damping"]
+    for name in ("hunt-crossley", "kelvin-voigt-with-cut-off"):
+        change = drawn("soil-viscous-damping", next(f for f in forms if f.name == name), 3)
+        drop = dropped(change, recovery=0.2, unloading_ratio=0.05)
+        stage = next(s for s in drop.stages if s.mode == LINE and s.end - s.start > 2e-3)
+        h, lowest = 2e-5, math.inf
+        for t in np.linspace(stage.start + 5e-4, stage.end - 5e-4, 25).tolist():
+            z = -drop.channels(t + h * np.arange(-1.0, 2.0))[PLACE]
+            v, a = (z[2] - z[0]) / (2.0 * h), (z[2] - 2.0 * z[1] + z[0]) / h**2
+            line = stage.line
+            assert line is not None
+            straight = min(line.force - line.stiffness * (line.depth - z[1]) + line.dashpot * v, line.force)
+            presses = max(LAWS[name](change.told, z[1], v, max(straight, 0.0)), 0.0)
+            assert (132.0 + stage.moving(z[1])) * a == pytest.approx(132.0 * 9.81 - presses, abs=4.0 + 2e-3 * presses)
+            lowest = min(lowest, presses - straight)
+        assert lowest < -5.0, "on the way back it takes from the line"
