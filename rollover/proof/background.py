@@ -145,7 +145,7 @@ def _waves(random: np.random.Generator) -> Course:
 
     def course(x: float) -> float:
         at = x + warp * math.sin(math.pi * x) / math.pi
-        return sum(h * math.cos(w * at + p) for h, w, p in parts)
+        return float(sum(h * math.cos(w * at + p) for h, w, p in parts))
 
     return _even(course)
 
@@ -158,7 +158,7 @@ def _bumps(random: np.random.Generator) -> Course:
     parts = list(zip(heights.tolist(), places.tolist(), widths.tolist(), strict=True))
 
     def course(x: float) -> float:
-        return sum(h / math.cosh(min((x - c) / w, 300.0)) ** 2 for h, c, w in parts)
+        return float(sum(h / math.cosh(min((x - c) / w, 300.0)) ** 2 for h, c, w in parts))
 
     return _even(course)
 

@@ -19,7 +19,7 @@ def _hunt_crossley(random: Random, s: Setting, id: str) -> Change:
     chi = strength(random) / (0.1**1.5 * USUAL)
 
     def law(t: float, z: float, v: float, force: float) -> float:
-        return max(force + chi * max(z, 0.0) ** 1.5 * v, min(force, 0.0))
+        return max(force + chi * math.pow(max(z, 0.0), 1.5) * v, min(force, 0.0))
 
     return resisting(id, {"chi": chi}, "speed", law, returning=law)
 
@@ -71,7 +71,7 @@ def _herschel_bulkley(random: Random, s: Setting, id: str) -> Change:
     eta, n = log_uniform(random, 0.02, 0.4), uniform(random, 0.25, 0.5)
 
     def law(t: float, z: float, v: float, force: float) -> float:
-        return force * (1.0 + eta * max(v, 0.0) ** n)
+        return force * (1.0 + eta * math.pow(max(v, 0.0), n))
 
     return resisting(id, {"viscosity": eta, "index": n}, "speed", law)
 

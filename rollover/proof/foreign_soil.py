@@ -117,7 +117,7 @@ def _power(random: Random, s: Setting, id: str) -> Change:
     p = _more(random) / math.log(50.0)  # at 0.1 m by the share that was drawn
 
     def law(t: float, z: float, v: float, force: float) -> float:
-        return force * (max(z, 1e-6) / 0.002) ** p
+        return force * math.pow(max(z, 1e-6) / 0.002, p)
 
     return resisting(id, {"power": p}, "depth", law, "parameter")
 

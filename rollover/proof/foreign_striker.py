@@ -126,7 +126,7 @@ def _drag(power: float) -> Form:
         factor = log_uniform(random, 3.0, 80.0) / 3.0**power
 
         def push(t: float, x: float, v: float) -> float:
-            return -factor * math.copysign(abs(v) ** power, v)
+            return -factor * math.copysign(math.pow(abs(v), power), v)
 
         return physics(id, {"factor": factor, "power": power}, "speed", push=push)
 

@@ -110,11 +110,11 @@ def plan(
     for i, kind in enumerate(of_kind):
         ids: tuple[str, ...] = ()
         if kind in turns:
-            id = next(turns[kind], None)
-            if id is None:
+            turn = next(turns[kind], None)
+            if turn is None:
                 able = ", ".join(foreign.EFFECTS if kind == "foreign-form" else library.EFFECTS)
                 raise ValueError(f"effects: none of kind {kind}, got {', '.join(effects)}; {able} are allowed")
-            ids = (id,)
+            ids = (turn,)
         elif kind == "pair":
             ids = _two(random, listed)
         elif kind == "negligible":
