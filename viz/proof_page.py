@@ -7,6 +7,7 @@ from typing import Any
 
 from viz.counts import Share, confusion, shares
 from viz.page import Block, Cell, Details, Figure, Footer, Headline, Note, Pairs, Section, State, Table, render
+from viz.proof_real import sections
 
 WRONG = 0.10  # share of false alarms, at the upper end of its interval, from which on the page warns
 COVERAGE = (0.90, 0.99)  # where the share of 95 % intervals that hold the truth should lie
@@ -26,7 +27,7 @@ def page(account: Mapping[str, Any], *, command: str, versions: Mapping[str, str
     """HTML of a proof from its prove.json."""
     summary = account["summary"]
     blocks = [*_answers(summary), *_false_alarms(summary), *_confusion(summary), *_groups(summary)]
-    blocks += [*_values(summary), *_failures(account), *_seal(account)]
+    blocks += [*sections(summary), *_values(summary), *_failures(account), *_seal(account)]
     seal = account["seal"]["digest"]
     return render(
         title=f"Blind proof of the diagnosis: {summary['cases']} concealed cases, seed {account['seed']}",
@@ -78,7 +79,7 @@ def _false_alarms(summary: Mapping[str, Any]) -> list[Block]:
         Figure(
             svg=shares([s for s in found if s.of]),
             caption="False alarms: null has nothing hidden, decoy something that no channel shows, negligible an "
-            "effect far below the noise.",
+            "effect far below the noise, background nothing but a background.",
         )
     ]
     p = summary["p_values"]

@@ -37,7 +37,19 @@ def prove(
     ] = None,
     kinds: Annotated[
         list[str] | None,
-        typer.Option(metavar="KIND", help="Only null, decoy, negligible, single, pair, outside, scatter, other-form."),
+        typer.Option(
+            metavar="KIND",
+            help="Only null, decoy, negligible, single, pair, outside, scatter, other-form, foreign-form (an effect by "
+            "another law of the literature), background (nothing but a background); may be repeated.",
+        ),
+    ] = None,
+    background: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SHARE",
+            help="A smooth discrepancy on every case: rms share of the force's range (0.03), or drawn (0.01 to 0.1); "
+            "drawn with --kinds background.",
+        ),
     ] = None,
     time_limit: Annotated[float, typer.Option(help="Wall time for each diagnosis, s.", min=1.0)] = 600.0,
     force: Force = False,
@@ -49,6 +61,7 @@ def prove(
 
     about = {"cases": cases, "seed": seed, "kinds": kinds or [], "effects": effects or []}
     about |= {"rig": rig} if rig != "drop" else {}
+    about |= {"background": _share_of(background)} if background is not None else {}
     store.claim_account(out, examine.FORMAT, about, ACCOUNT, force=force)
 
     def tell(seal: Seal) -> None:
@@ -62,6 +75,7 @@ def prove(
                 rig=rig,
                 kinds=about["kinds"],  # type: ignore[arg-type]
                 effects=about["effects"],  # type: ignore[arg-type]
+                background=about.get("background"),  # type: ignore[arg-type]
                 workers=workers,
                 time_limit=time_limit,
                 diagnosis=examine.DIAGNOSIS,
@@ -91,9 +105,19 @@ def prove(
         raise typer.Exit(FAILED)
 
 
+def _share_of(text: str) -> float | str:
+    """A number where it is one."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
 def _command(cases: int, seed: int, about: dict[str, Any]) -> str:
     words = ["rollover", "prove", "--cases", str(cases), "--seed", str(seed)]
     words += [word for name in ("effects", "kinds") for value in about[name] for word in (f"--{name}", value)]
+    words += ["--background", str(about["background"])] if "background" in about else []
+    words += ["--rig", about["rig"]] if "rig" in about else []
     return " ".join(words)
 
 
@@ -110,7 +134,20 @@ def sentences(summary: dict[str, Any]) -> list[str]:
         "  called by a listed name that is not even near": summary["outside"]["wrong"],
         "Intervals that hold the true value": summary["coverage"],
     }
+    if (real := summary["real"]) is not None:
+        said |= {
+            "Foreign forms and backgrounds: in the set, of all": real["of_all"]["in_set"],
+            "  first, of all": real["of_all"]["first"],
+            "  in the set, of those larger than the background": real["stronger_than_background"]["in_set"],
+            "  called by another name": real["called"]["another_name"],
+            "  a background alone called by a name": real["background_alone"]["false_name"],
+            "  a background alone called unexplained": real["background_alone"]["unexplained"],
+        }
     lines = [f"{what:<50} {_share(found)}" for what, found in said.items() if found["of"]]
+    if (given := summary["probabilities"]) is not None and given["cases"]:
+        scores = f"Brier score {given['brier']:.3f}, log score {given['log']:.3f}"
+        slope = "" if given["slope"] is None else f", slope {given['slope']:.2f}"
+        lines.append(f"{'Probabilities, of ' + str(given['cases']) + ' cases':<50} {scores}{slope}")
     if summary["failed"]:
         lines.append(f"{'Diagnoses that failed':<50} {len(summary['failed'])}")
     return lines

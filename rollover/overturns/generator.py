@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.overturns import library
+from rollover.overturns import foreign, library
 from rollover.overturns.library import Change
 from rollover.overturns.outside import OUTSIDE
 from rollover.proof.campaign import log_uniform
@@ -27,6 +27,7 @@ from rollover.simulate import run
 Array = NDArray[np.float64]
 
 KINDS: dict[str, float] = {"null": 0.20, "negligible": 0.05, "single": 0.55, "pair": 0.10, "outside": 0.10}
+MORE_KINDS = ("foreign-form",)  # asked for by name only
 CHANNELS = (
     *(f"chassis/acceleration_{axis}" for axis in "xyz"),
     *(f"chassis/angular_velocity_{axis}" for axis in "xyz"),
@@ -81,8 +82,9 @@ def plan(count: int, seed: int, kinds: Sequence[str] = (), effects: Sequence[str
     Raises ``ValueError`` for a kind or an effect that there is none of, and for pairs of less than two effects.
     """
     for kind in kinds:
-        if kind not in KINDS:
-            raise ValueError(f"kinds: no such kind of overturns, got {kind!r}; {', '.join(KINDS)} are allowed")
+        if kind not in KINDS and kind not in MORE_KINDS:
+            known = ", ".join((*KINDS, *MORE_KINDS))
+            raise ValueError(f"kinds: no such kind of overturns, got {kind!r}; {known} are allowed")
     for id in effects:
         if id not in library.EFFECTS and id not in OUTSIDE:
             raise ValueError(f"effects: none of overturns, got {id!r}; {', '.join([*library.EFFECTS, *OUTSIDE])}")
@@ -97,12 +99,17 @@ def plan(count: int, seed: int, kinds: Sequence[str] = (), effects: Sequence[str
     if len(listed) < 2 and "pair" in shares:
         raise ValueError(f"effects: a pair needs two, got {', '.join(effects)}")
     outside = [id for id in OUTSIDE if id in effects] or list(OUTSIDE)
-    turns: dict[str, list[str]] = {"single": [], "pair": [], "outside": []}
+    formed = [id for id in foreign.EFFECTS if id in effects or not effects]
+    if "foreign-form" in shares and not formed:
+        able = ", ".join(foreign.EFFECTS)
+        raise ValueError(f"effects: none of kind foreign-form, got {', '.join(effects)}; {able} are allowed")
+    among = {"single": listed, "pair": listed, "outside": outside, "foreign-form": formed}
+    turns: dict[str, list[str]] = {kind: [] for kind in among}
     orders = []
     for i, kind in enumerate(of_kind[k] for k in random.permutation(len(of_kind))):
         ids: tuple[str, ...] = tuple(library.NEGLIGIBLE) if kind == "negligible" else ()
-        for _ in range({"pair": 2, "single": 1, "outside": 1}.get(kind, 0)):
-            ids += (_next(turns[kind], outside if kind == "outside" else listed, ids, random),)
+        for _ in range(2 if kind == "pair" else int(kind in among)):
+            ids += (_next(turns[kind], among[kind], ids, random),)
         orders.append(Order(index=i, seed=seed, kind=kind, ids=ids))
     return orders
 
@@ -125,6 +132,7 @@ def make(order: Order) -> Case:
     nothing = [_read(shot, solved, ()) for shot, solved in zip(shots, plain, strict=True)]
     spans = {c: max(float(np.ptp(one[c])) for one in nothing) for c in CHANNELS}
     draws = {**library.EFFECTS, **library.NEGLIGIBLE, **OUTSIDE}
+    draws = draws if order.kind != "foreign-form" else foreign.EFFECTS
     changes: tuple[Change, ...] = ()
     for id in order.ids:
         free = {c: span for c, span in spans.items() if c not in [one.channel for one in changes]}

@@ -41,6 +41,8 @@ class Change:
     fault: Fault = field(default_factory=Fault)
     depends_on: str = ""
     near: tuple[str, ...] = ()
+    form: str = ""
+    source: str = ""
 
     @property
     def moves(self) -> bool:

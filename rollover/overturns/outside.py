@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -45,8 +46,9 @@ def _fault(
     def drawn(random: Random, spans: Mapping[str, float]) -> Change:
         channel = str(random.choice(sorted(spans)))
         told = draw(random, spans[channel])
+        wrong: dict[str, Any] = dict(told)
         return Change(
-            id=id, kind="outside", told=told, channel=channel, fault=Fault(**told), depends_on=depends_on, near=near
+            id=id, kind="outside", told=told, channel=channel, fault=Fault(**wrong), depends_on=depends_on, near=near
         )
 
     return drawn

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rollover.proof.line import Line, line_back, met_again
 from rollover.proof.rig import RAMP, Curve, Rig, branches, loading_curve
 
 Array = NDArray[np.float64]
@@ -44,25 +45,11 @@ class DescentError(RuntimeError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Line:
-    """The way back: F = min(force - stiffness (z - depth) ..., force) with a dashpot; it ends in the rut."""
-
-    depth: float
-    force: float
-    stiffness: float
-    dashpot: float = 0.0
-
-    @property
-    def rut(self) -> float:
-        """Depth at which nothing presses any more, m."""
-        return max(self.depth - self.force / self.stiffness, 0.0) if self.stiffness > 0.0 else 0.0
-
-
-@dataclass(frozen=True, kw_only=True)
 class Stage:
     """From `start` to `end` (s) under one set of equations; `soil` is m_b1 at `origin`, kg, and grows by `growth`.
 
-    `way` is that of the guide's friction, None where it goes by the speed.
+    Where it `gathers` it grows as the rig's own law says. `way` is that of the guide's friction, None where it goes by
+    the speed.
     """
 
     rig: Rig
@@ -75,11 +62,18 @@ class Stage:
     curve: Curve | None
     line: Line | None
     way: float | None = None
+    gathers: bool = False
     state: Callable[[ArrayLike], Array]
 
     def moving(self, x: float) -> float:
         """m_b1 at depth x, kg."""
+        if self.gathers and self.rig.gather is not None:
+            return self.soil + max(self.rig.gather(x)[0] - self.rig.gather(self.origin)[0], 0.0)
         return self.soil + self.growth * max(x - self.origin, 0.0)
+
+    def grows(self, x: float) -> float:
+        """dm_b1/dx at depth x, kg/m."""
+        return self.rig.gather(x)[1] if self.gathers and self.rig.gather is not None else self.growth
 
     def ground(self, t: float, x: float, v: float, memory: float) -> float:
         """What the soil's spring presses with, N."""
@@ -90,16 +84,10 @@ class Stage:
             assert self.curve is not None
             force = self.curve(t, x, v)
         else:
-            line = self.line
-            assert line is not None
-            force = min(line.force - line.stiffness * (line.depth - x) + line.dashpot * v, line.force)
-            gap = line.rut - x
-            least = 0.0
-            if rig.pull > 0.0:
-                if gap > 0.0:
-                    force = min(force, 0.0)
-                least = -rig.pull * max(0.0, 1.0 - max(gap, 0.0) / rig.reach)
-            force = max(force, least)
+            assert self.line is not None
+            force = self.line.presses(rig, x, v)
+        if rig.background is not None and force > 0.0:
+            force *= 1.0 + rig.background(t)
         return max(force + memory, 0.0) if memory else force
 
     def rates(self, t: float, y: Array) -> list[float]:
@@ -116,19 +104,25 @@ class Stage:
         rig = self.rig
         total = rig.nose + self.moving(x)
         v = p / total
-        force = self.ground(t, x, v, memory)
+        bristle = rig.bristle
+        force = self.ground(t, x, v, memory if bristle is None else 0.0)
         share = rig.nose / rig.mass
         outer = rig.nose * rig.gravity - share * _resistance(rig, v, self.way)
         if rig.push is not None:
             outer += rig.push(t, x, v)
-        ab = 0.0
+        ab = fading = 0.0
+        if bristle is not None:
+            rubs, fading = bristle.force(v, memory)
+            outer -= rubs
         if self.way == HELD:
             return [0.0, 0.0, 0.0, 0.0, -memory / rig.relaxation], (0.0, 0.0, x, 0.0, 0.0, force)
         if rig.spring > 0.0:
             between = rig.spring * (xb - x) + rig.dashpot * (vb - v)
+            if rig.joint is not None:
+                between = rig.joint(xb - x, vb - v)
             outer += between
             ab = rig.gravity - _resistance(rig, vb, None) / rig.mass - between / (rig.mass - rig.nose)
-        thrown = self.growth * v * v if self.mode == LOADING and v > 0.0 else 0.0
+        thrown = self.grows(x) * v * v if self.mode == LOADING and v > 0.0 else 0.0
         a = (outer - force - thrown) / total
         if rig.side_load:
             # friction side_load m |a| against the motion, solved for a
@@ -136,7 +130,6 @@ class Stage:
             a *= total / (total + turned)
         if rig.spring <= 0.0:
             ab, vb = a, v
-        fading = 0.0
         if rig.relaxing:
             fading = rig.relaxing * v - memory / rig.relaxation if self.mode != FREE else -memory / rig.relaxation
         seen = (v, a, xb if rig.spring > 0.0 else x, vb, ab, force + thrown + self.moving(x) * a)
@@ -197,9 +190,9 @@ def descend(rig: Rig, start: float, end: float) -> Descent:
     start = min(start, -1e-6)
     stages = [_approach(rig, start)]
     t, x, v = 0.0, 0.0, rig.speed
-    xb, vb, memory = 0.0, rig.speed, 0.0
+    xb, vb, memory = 0.0, rig.speed, 0.0 if rig.bristle is None else rig.bristle.steady(rig.speed)
     line: Line | None = None
-    growing = rig.growth > 0.0
+    growing = rig.grows
     impulse = lost = 0.0
     mode, soil, origin = FREE, 0.0, 0.0
     curve: Curve | None = None
@@ -208,7 +201,7 @@ def descend(rig: Rig, start: float, end: float) -> Descent:
         if len(stages) > MOST_STAGES:
             raise DescentError(f"no end after {MOST_STAGES} stages, at {t:.6g} s")
         if touching:  # restitution 0: nose and soil go on together
-            curve, soil, growing = loading_curve(rig, v), rig.fraction * rig.mass, rig.growth > 0.0
+            curve, soil, growing = loading_curve(rig, v), rig.fraction * rig.mass, rig.grows
             shared = v * rig.nose / (rig.nose + soil)
             impulse += rig.nose * (v - shared)
             lost += 0.5 * v * shared * soil  # (8) with k_s = 0
@@ -216,10 +209,12 @@ def descend(rig: Rig, start: float, end: float) -> Descent:
             vb = v if rig.spring <= 0.0 else vb
             origin, mode = x, LOADING
             if line is not None:
-                line = _met_again(line, curve, t)
+                line = met_again(line, curve, t)
                 mode, x = LINE, max(x, line.rut)
         growth = rig.growth if growing and mode == LOADING else 0.0
-        stage, happened = _stage(rig, mode, t, end, (x, v, xb, vb, memory), soil, growth, origin, curve, line)
+        gathers = growing and mode == LOADING and rig.gather is not None
+        at = (x, v, xb, vb, memory)
+        stage, happened = _stage(rig, mode, t, end, at, soil, growth, origin, curve, line, gathers)
         stages.append(stage)
         y = stage.state(stage.end).tolist()
         t, x, xb, vb, memory = stage.end, y[0], y[2], y[3], y[4]
@@ -227,9 +222,9 @@ def descend(rig: Rig, start: float, end: float) -> Descent:
         soil, origin = stage.moving(x), max(x, origin)
         if happened == "deepest":
             assert curve is not None
-            line = _line(rig, curve, t, x, 0.0)
+            line = line_back(rig, curve, t, x, 0.0)
             critical = 2.0 * math.sqrt(line.stiffness * (rig.mass + soil))
-            line = _line(rig, curve, t, x, rig.unloading_ratio * critical)
+            line = line_back(rig, curve, t, x, rig.unloading_ratio * critical)
             mode, x, v = LINE, x - NUDGE, 0.0
         elif happened == "deeper":
             mode, x, origin = LOADING, x + NUDGE, x
@@ -249,30 +244,13 @@ def descend(rig: Rig, start: float, end: float) -> Descent:
     return Descent(rig=rig, stages=tuple(stages), impulse=impulse, lost=lost)
 
 
-def _line(rig: Rig, curve: Curve, t: float, depth: float, dashpot: float) -> Line:
-    force = curve(t, depth, 0.0)
-    return Line(depth=depth, force=force, stiffness=force / (rig.recovery * depth), dashpot=dashpot)
-
-
-def _met_again(line: Line, curve: Curve, t: float) -> Line:
-    """The line of a rut up to where it meets another hit's loading curve."""
-    from scipy.optimize import brentq
-
-    def over(depth: float) -> float:
-        return line.stiffness * (depth - line.rut) - curve(t, depth, 0.0)
-
-    far = line.depth
-    while over(far) < 0.0:
-        far += line.depth - line.rut
-    depth = float(brentq(over, line.rut, far, xtol=1e-13))
-    return replace(line, depth=depth, force=line.stiffness * (depth - line.rut))
-
-
 def _approach(rig: Rig, start: float) -> Stage:
     """Free fall, solved backwards from the first contact, as one block: a dashpot run backwards explodes."""
     from scipy.integrate import solve_ivp
 
     rig = replace(rig, spring=0.0)
+    if (bristle := rig.bristle) is not None:  # a state run backwards explodes as well: it has settled there
+        rig = replace(rig, bristle=None, push=lambda t, x, v: -bristle.force(v, bristle.steady(v))[0])
     common: dict[str, Any] = {
         "rig": rig, "mode": FREE, "start": start, "end": 0.0, "soil": 0.0, "growth": 0.0, "origin": 0.0,
         "curve": None, "line": None,
@@ -294,13 +272,14 @@ def _stage(
     origin: float,
     curve: Curve | None,
     line: Line | None,
+    gathers: bool,
 ) -> tuple[Stage, str]:
     """Integrate to the next event and say which it was."""
     from scipy.integrate import solve_ivp
 
     common: dict[str, Any] = {
         "rig": rig, "mode": mode, "start": t, "soil": soil, "growth": growth, "origin": origin, "curve": curve,
-        "line": line,
+        "line": line, "gathers": gathers,
     }  # fmt: skip
     bare = Stage(**common, end=end, state=lambda t: np.zeros(5))
     x, v, xb, vb, memory = at
@@ -340,7 +319,7 @@ def _stage(
             return float(bare.motion(t, *np.asarray(y).tolist())[1][5]) + rig.pull
 
         if held(t, np.array(state)) < 0.0:  # the soil cannot be pulled along: it stays
-            common["soil"], common["growth"] = 0.0, 0.0
+            common["soil"], common["growth"], common["gathers"] = 0.0, 0.0, False
             bare = Stage(**common, end=end, state=bare.state)
             state[1] = v * rig.nose
         else:

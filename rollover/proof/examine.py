@@ -75,6 +75,7 @@ def prove(
     rig: str = "drop",
     kinds: Sequence[str] = (),
     effects: Sequence[str] = (),
+    background: float | str | None = None,
     workers: int | None = None,
     time_limit: float | None = None,
     diagnosis: str = DIAGNOSIS,
@@ -83,14 +84,17 @@ def prove(
 ) -> Proof:
     """Make, seal, diagnose, open, score. `on_seal` is called before the first diagnosis, `show` after each case.
 
-    `rig` is one of `RIGS`.
+    `rig` is one of `RIGS`; a `background` (share of the range, or ``drawn``) is put on every case, of drops only.
 
     Cases stand in a temporary folder, the truth in another one until it is opened. Raises ``ValueError`` for what
     cannot be planned and ``RuntimeError`` if a case cannot be made.
     """
     if rig not in RIGS:
         raise ValueError(f"rig: no such rig, got {rig!r}; {', '.join(RIGS)} are allowed")
-    orders: list[Order] = importlib.import_module(RIGS[rig]).plan(count, seed, kinds, effects)
+    if background is not None and rig != "drop":
+        raise ValueError(f"background: of drops only, got it with the rig {rig!r}")
+    more = {} if background is None else {"background": background}
+    orders: list[Order] = importlib.import_module(RIGS[rig]).plan(count, seed, kinds, effects, **more)
     with scratch() as given, scratch() as kept:
         folders = [Path(given) / order.name for order in orders]
         truths: dict[int, dict[str, Any]] = {}
@@ -125,6 +129,7 @@ def prove(
         "rig": rig,
         "kinds": list(kinds),
         "effects": list(effects),
+        **more,
         "seal": seal.public(),
         "summary": tally(rows),
         "rows": rows,

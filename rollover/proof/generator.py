@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.proof import campaign, library, outside
+from rollover.proof import campaign, foreign, library, outside
+from rollover.proof.background import DRAWN, Background, drawn_share
+from rollover.proof.background import background as discrepancy
 from rollover.proof.campaign import ACCELERATION, DEPTH, FORCE, PLACE, SPEED, Campaign, Shot
 from rollover.proof.descent import CHANNELS, Descent, descend
-from rollover.proof.instruments import PAD, Fault, Instruments, channel_filter
 from rollover.proof.library import Change, Setting
-from rollover.proof.rig import Rig
+from rollover.proof.readings import REBOUND, Reading, instruments_of, measured, rig_of, span, spread_of
 from rollover.proof.strength import entry, strength
 from rollover.recording import Clock, Recording
 
@@ -34,10 +35,10 @@ KINDS: dict[str, float] = {
     "pair": 0.12,
     "outside": 0.12,
 }
-MORE_KINDS = ("scatter", "other-form")  # asked for by name only
-REBOUND = {"recovery": 0.1, "damping_ratio": 0.1}  # what the scenario knows where the ground is said to spring back
+MORE_KINDS = ("scatter", "other-form", "foreign-form", "background")  # asked for by name only
 TYPICAL = {FORCE: 3500.0, DEPTH: 0.35, PLACE: 0.5, SPEED: 3.5, ACCELERATION: 25.0}
 NULLS_SAY_NOTHING = (*KINDS, *MORE_KINDS, "truth", "concealed", "proof", "effect", "outside", "clean")
+LEAST, LARGEST = 0.001, 0.3  # of a background that may be asked for, share of the range of the force
 _PLAN = 2**32 - 1
 
 
@@ -49,6 +50,7 @@ class Order:
     seed: int
     kind: str
     ids: tuple[str, ...] = ()
+    background: float = 0.0  # share of the range of the force by which a smooth discrepancy is off; 0: none
 
     @property
     def name(self) -> str:
@@ -66,10 +68,17 @@ class Case:
     truth: Mapping[str, Any]
 
 
-def plan(count: int, seed: int, kinds: Sequence[str] = (), effects: Sequence[str] = ()) -> list[Order]:
+def plan(
+    count: int,
+    seed: int,
+    kinds: Sequence[str] = (),
+    effects: Sequence[str] = (),
+    background: float | str | None = None,
+) -> list[Order]:
     """Orders of a proof: shares of `KINDS` (or even ones of `kinds`), each effect as often as any other, shuffled.
 
-    `effects` keeps only cases about these; ids of `library.EFFECTS` and `outside.OUTSIDE`. Raises ``ValueError``.
+    `effects` keeps only cases about these; ids of `library.EFFECTS` and `outside.OUTSIDE`. With a `background` (share
+    of the range, or `DRAWN`), or `background` among the kinds, every case has one. Raises ``ValueError``.
     """
     known = (*KINDS, *MORE_KINDS)
     for kind in kinds:
@@ -78,6 +87,7 @@ def plan(count: int, seed: int, kinds: Sequence[str] = (), effects: Sequence[str
     for id in effects:
         if id not in library.EFFECTS and id not in outside.OUTSIDE:
             raise ValueError(f"effects: no such effect, got {id!r}; {', '.join([*library.EFFECTS, *outside.OUTSIDE])}")
+    background = _checked(background, kinds)
     random = np.random.default_rng([seed, _PLAN])
     shares = dict.fromkeys(kinds, 1.0) if kinds else dict(KINDS)
     if effects and not kinds:
@@ -93,23 +103,44 @@ def plan(count: int, seed: int, kinds: Sequence[str] = (), effects: Sequence[str
     turns = {
         "single": _turns(random, named),
         "other-form": _turns(random, named),
+        "foreign-form": _turns(random, [e for e in foreign.EFFECTS if e in effects or not effects]),
         "outside": _turns(random, [e for e in outside.OUTSIDE if e in effects or not effects] or list(outside.OUTSIDE)),
     }
     orders = []
     for i, kind in enumerate(of_kind):
         ids: tuple[str, ...] = ()
         if kind in turns:
-            ids = (next(turns[kind]),)
+            turn = next(turns[kind], None)
+            if turn is None:
+                able = ", ".join(foreign.EFFECTS if kind == "foreign-form" else library.EFFECTS)
+                raise ValueError(f"effects: none of kind {kind}, got {', '.join(effects)}; {able} are allowed")
+            ids = (turn,)
         elif kind == "pair":
             ids = _two(random, listed)
         elif kind == "negligible":
             ids = (str(random.choice(["air-drag", "soil-adhesion", "soil-inertial-drag", "guide-friction"])),)
-        orders.append(Order(index=i, seed=seed, kind=kind, ids=ids))
+        orders.append(Order(index=i, seed=seed, kind=kind, ids=ids, background=_share(background, seed, i)))
     return orders
 
 
+def _checked(background: float | str | None, kinds: Sequence[str]) -> float | str | None:
+    """A share that is one, `DRAWN`, or none."""
+    if background is None:
+        return DRAWN if "background" in kinds else None
+    if background == DRAWN or (isinstance(background, float) and LEAST <= background <= LARGEST):
+        return background
+    allowed = f"{DRAWN} and {LEAST:g} to {LARGEST:g} are allowed"
+    raise ValueError(f"background: no share of the force's range, got {background}; {allowed}")
+
+
+def _share(background: float | str | None, seed: int, index: int) -> float:
+    if isinstance(background, str):
+        return drawn_share(seed, index)
+    return background or 0.0
+
+
 def _turns(random: np.random.Generator, ids: list[str]) -> Iterator[str]:
-    while True:
+    while ids:
         yield from (ids[i] for i in random.permutation(len(ids)))
 
 
@@ -140,12 +171,17 @@ def make(order: Order) -> Case:
         held = replace(
             held, shots=tuple(replace(s, scatter=float(np.exp(random.normal(0, spread)))) for s in held.shots)
         )
-    plain = [descend(_rig(held, shot, ()), *_span(shot)) for shot in held.shots]
+    plain = [descend(rig_of(held, shot, ()), *span(shot)) for shot in held.shots]
     setting = _setting(held, plain, order.kind == "other-form")
     changes = tuple(_drawn(random, order, id, setting) for id in order.ids)
-    made = _measured(held, changes, plain if not changes else None)
-    nothing = _measured(held, (), plain)
-    noise = {c: held.noise(c, _spread(made, c)) for c in held.channels}
+    around = None
+    if order.background:
+        rigs = [rig_of(held, shot, ()) for shot in held.shots]
+        around = discrepancy(order.seed, order.index, order.background, rigs, plain)
+    bare = measured(held, (), plain)
+    nothing = bare if around is None else measured(held, (), None, around)
+    made = measured(held, changes, None, around) if changes else nothing
+    noise = {c: held.noise(c, spread_of(made, c)) for c in held.channels}
     recordings = tuple(
         _recorded(i, held, shot, reading, changes, {c: noise[c] for c in held.channels}, random)
         for i, (shot, reading) in enumerate(zip(held.shots, made, strict=True))
@@ -154,23 +190,31 @@ def make(order: Order) -> Case:
     worth = [{c: noise[c].independence(1.0 / shot.rate) for c in held.channels} for shot in held.shots]
     times = [reading.times for reading in made]
 
-    def against(other: list[Reading]) -> dict[str, Any]:
-        return strength(times, [m.values for m in made], [o.values for o in other], sigma, worth)
+    off = None if around is None else _off(around, held, bare, nothing)
+
+    def between(
+        shown: Sequence[Reading], other: Sequence[Reading], over: Mapping[str, float] = sigma
+    ) -> dict[str, Any]:
+        return strength(times, [m.values for m in shown], [o.values for o in other], over, worth)
+
+    def against(other: Sequence[Reading]) -> dict[str, Any]:
+        found = between(made, other)
+        if off is None:
+            return found
+        size = {c: max(off[c]["rms"] * spread_of(bare, c), 1e-9 * sigma[c]) for c in held.channels}
+        return found | {"over_background": between(made, other, size)["over_noise"]}
 
     each = []
     for k in range(len(changes)):
         rest = changes[:k] + changes[k + 1 :]
-        each.append(against(_measured(held, rest) if rest else nothing))
+        each.append(against(measured(held, rest, None, around) if rest else nothing))
     truth = _truth(order, held, changes, each, against(nothing) if changes else None, sigma, recordings)
+    if around is not None:
+        truth["background"] = around.told(order.background) | {"channels": off}
+        if changes:  # of the mean square of what is missing, over the noise
+            whole, rest = (between(shown, bare)["signal_to_noise"] ** 2 for shown in (made, nothing))
+            truth["explains"] = 1.0 - rest / whole if whole > 0.0 else None
     return Case(name=order.name, scenario=_scenario(held), recordings=recordings, truth=truth)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Reading:
-    """One drop as its instruments show it without noise; stamps in the recorder's time."""
-
-    times: Array
-    values: dict[str, Array]
 
 
 def _needs(random: np.random.Generator, id: str) -> tuple[str, ...]:
@@ -179,77 +223,28 @@ def _needs(random: np.random.Generator, id: str) -> tuple[str, ...]:
     return (str(random.choice([FORCE, DEPTH, ACCELERATION])),) if id.startswith(("sensor-", "outside:")) else ()
 
 
-def _span(shot: Shot) -> tuple[float, float]:
-    return shot.start - 3.0 * PAD, shot.end + 3.0 * PAD
-
-
-def _rig(held: Campaign, shot: Shot, changes: Sequence[Change]) -> Rig:
-    rig = Rig(speed=shot.speed, stiffness=shot.scatter)
-    if held.rebounds:
-        rig = replace(rig, recovery=REBOUND["recovery"], unloading_ratio=REBOUND["damping_ratio"])
-    for change in changes:
-        rig = replace(rig, **change.rig)
-        rig = replace(rig, **{name: getattr(rig, name) * factor for name, factor in change.factors.items()})
-        if change.speed_power:
-            rig = replace(rig, stiffness=rig.stiffness * (shot.speed / 2.0) ** change.speed_power)
-    return rig
-
-
-def _instruments(changes: Sequence[Change]) -> Instruments:
-    faults: dict[str, Fault] = {}
-    for change in changes:
-        if change.fault:
-            faults[change.channel] = replace(faults.get(change.channel, Fault()), **change.fault)
-    return Instruments(faults=faults)
-
-
-def _measured(held: Campaign, changes: Sequence[Change], solved: Sequence[Descent] | None = None) -> list[Reading]:
-    """Every drop without noise, but behind its filters and with what range and resolution do to it."""
-    instruments = _instruments(changes)
-    found = []
-    for i, shot in enumerate(held.shots):
-        drop = solved[i] if solved is not None else descend(_rig(held, shot, changes), *_span(shot))
-        stamps = _stamps(shot, i)
-        values = {}
-        for channel in held.channels:
-            if channel in held.cfc:
-                step, pad = 1.0 / shot.rate, int(PAD * shot.rate)
-                wide = stamps[0] - shot.late + step * np.arange(-pad, stamps.size + pad)
-                values[channel] = channel_filter(instruments.read(drop, wide, channel), step, held.cfc[channel])[
-                    pad : pad + stamps.size
-                ]
-            else:
-                values[channel] = instruments.read(drop, stamps - shot.late, channel)
-            silent = np.random.default_rng(i)  # where contacts are loose
-            values[channel] = instruments.limited(values[channel], stamps, channel, silent)
-            for name, start, end in shot.gaps:
-                if name == channel:
-                    values[channel] = np.where((stamps >= start) & (stamps < end), np.nan, values[channel])
-        found.append(Reading(times=stamps, values=values))
+def _off(
+    around: Background, held: Campaign, bare: Sequence[Reading], shown: Sequence[Reading]
+) -> dict[str, dict[str, float]]:
+    """How far a background moves each channel on the ways down, as a share of the channel's range."""
+    found = {}
+    for c in held.channels:
+        squares, most = [], 0.0
+        for shot, one, two, until in zip(held.shots, bare, shown, around.until, strict=True):
+            t, moved = one.times - shot.late, two.values[c] - one.values[c]
+            moved = moved[(t >= 0.0) & (t <= until) & np.isfinite(moved)] / spread_of(bare, c)
+            if moved.size:
+                squares.append(float(np.mean(moved**2)))
+                most = max(most, float(np.max(np.abs(moved))))
+        found[c] = {"rms": float(np.sqrt(np.mean(squares))) if squares else 0.0, "most": most}
     return found
 
 
-def _stamps(shot: Shot, index: int) -> Array:
-    """Time stamps of a recording, s, in the recorder's time."""
-    count = int((shot.end - shot.start) * shot.rate) + 1
-    t = shot.start + shot.late + np.arange(count) / shot.rate
-    if shot.uneven:
-        stray = np.random.default_rng([index, count, int(1e6 * shot.speed)])
-        t = t + stray.uniform(-shot.uneven, shot.uneven, count) / shot.rate
-    return np.asarray(np.round(t, 9))
-
-
-def _spread(made: Sequence[Reading], channel: str) -> float:
-    """Range of a channel over all recordings."""
-    low = min(float(np.nanmin(m.values[channel])) for m in made)
-    return max(float(np.nanmax(m.values[channel])) for m in made) - low
-
-
 def _setting(held: Campaign, plain: Sequence[Descent], other_forms: bool) -> Setting:
-    made = _measured(held, (), plain)
+    made = measured(held, (), plain)
     return Setting(
         depths=tuple(d.deepest()[1] for d in plain),
-        spans={c: _spread(made, c) for c in held.channels},
+        spans={c: spread_of(made, c) for c in held.channels},
         peaks={c: max(float(np.nanmax(np.abs(m.values[c]))) for m in made) for c in held.channels},
         channels=held.channels,
         other_forms=other_forms,
@@ -257,7 +252,8 @@ def _setting(held: Campaign, plain: Sequence[Descent], other_forms: bool) -> Set
 
 
 def _drawn(random: np.random.Generator, order: Order, id: str, setting: Setting) -> Change:
-    change = {**library.EFFECTS, **outside.OUTSIDE}[id](random, setting)
+    known = foreign.EFFECTS if order.kind == "foreign-form" else {**library.EFFECTS, **outside.OUTSIDE}
+    change = known[id](random, setting)
     if order.kind == "negligible" and id == "soil-inertial-drag":
         return replace(change, told={"coefficient": 0.002}, rig={"drag": 0.5 * 0.002 * 1800.0 * 0.0063})
     if order.kind == "negligible" and id == "guide-friction":
@@ -275,7 +271,7 @@ def _recorded(
     random: np.random.Generator,
 ) -> Recording:
     """The reading with its noise, as a file would hold it."""
-    instruments = _instruments(changes)
+    instruments = instruments_of(changes)
     channels = {}
     for channel in CHANNELS:
         if channel not in held.channels:

@@ -6,6 +6,7 @@ Clocks are read off the solution itself, not shifted samples; the lag is solved 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +16,9 @@ from numpy.typing import NDArray
 from rollover.proof.descent import Descent
 
 Array = NDArray[np.float64]
+Response = Callable[[Array, Array], Array]  # (x, grid) -> y at the grid's times (n,), s
+Frame = Callable[[Array, str], Array]  # (times, channel) -> share by which it is off (n,)
+Bend = Callable[[Array, Array], Array]  # (values, times) -> values (n,)
 PAD = 0.06  # s before and behind a record that a filter sees, so that the record has no filter's edge in it
 
 
@@ -39,6 +43,8 @@ class Fault:
     curved: float = 0.0  # y = x (1 + curved |x|)
     dropouts: float = 0.0  # per second, of `lasting` s, in which the channel reads nothing
     lasting: float = 0.003
+    response: Response | None = None  # in place of the lag's differential equation
+    bend: Bend | None = None  # of what is read, before gain and bias
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,9 +94,15 @@ def _power(step: float, cfc: int) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class Instruments:
-    """Faults by channel."""
+    """Faults by channel, and what the frame of the rig adds to all of them."""
 
     faults: dict[str, Fault] = field(default_factory=dict)
+    frame: Frame | None = None
+
+    def _shown(self, descent: Descent, times: Array, channel: str) -> Array:
+        """What reaches the sensor: the frame that it stands on gives way."""
+        values = descent.channels(times)[channel]
+        return values if self.frame is None else values * (1.0 + self.frame(times, channel))
 
     def read(self, descent: Descent, times: Array, channel: str) -> Array:
         """What a channel's sensor gives at times (n,) of a drop, without noise and range."""
@@ -100,10 +112,13 @@ class Instruments:
             grid = np.arange(at.min() - PAD, at.max() + 1e-4, min(1e-4, fault.lag / 4.0))
             # the steepest edge is the first contact: a point on either side of it
             grid = np.union1d(grid, [-1e-9, 1e-9])
-            x = descent.channels(np.clip(grid, descent.stages[0].start, None))[channel]
-            values = np.interp(at, grid, _late(x, grid, fault.lag, fault.second_order))
+            x = self._shown(descent, np.clip(grid, descent.stages[0].start, None), channel)
+            late = _late(x, grid, fault.lag, fault.second_order) if fault.response is None else fault.response(x, grid)
+            values = np.interp(at, grid, late)
         else:
-            values = descent.channels(at)[channel]
+            values = self._shown(descent, at, channel)
+        if fault.bend is not None:
+            values = fault.bend(values, times)
         warmth = fault.warming / (1.0 + np.exp(-(times - fault.middle) / fault.width)) if fault.warming else 0.0
         values = values * fault.gain * (1.0 + warmth) * (1.0 + fault.curved * np.abs(values)) + fault.bias
         if fault.hum:
@@ -128,12 +143,12 @@ def _late(x: Array, t: Array, tau: float, beta: float) -> Array:
     1/(beta tau^2 (s - p)(s - q)) = (q/(1 - s/p) - p/(1 - s/q))/(q - p), as beta tau^2 p q = 1.
     """
     if beta == 0.0:
-        return np.asarray(_lagged(x, t, tau))
+        return np.asarray(lagged(x, t, tau))
     p, q = np.roots([beta * tau * tau, tau, 1.0]).astype(complex)
-    return np.asarray(np.real((q * _lagged(x, t, -1.0 / p) - p * _lagged(x, t, -1.0 / q)) / (q - p)))
+    return np.asarray(np.real((q * lagged(x, t, -1.0 / p) - p * lagged(x, t, -1.0 / q)) / (q - p)))
 
 
-def _lagged(x: Array, t: Array, tau: complex) -> NDArray[Any]:
+def lagged(x: Array, t: Array, tau: complex) -> NDArray[Any]:
     """Solve tau dy/dt = x - y for x that is straight between its samples; settled at the start."""
     h = np.diff(t)
     fade = np.exp(-h / tau)

@@ -43,10 +43,12 @@ class Change:
     rig: Mapping[str, Any] = field(default_factory=dict)
     factors: Mapping[str, float] = field(default_factory=dict)  # numbers of the rig that are multiplied
     channel: str = ""
-    fault: Mapping[str, float] = field(default_factory=dict)
+    fault: Mapping[str, Any] = field(default_factory=dict)
     speed_power: float = 0.0  # the ground's stiffness grows with this power of the speed (outside)
     depends_on: str = ""
     near: tuple[str, ...] = ()  # listed effects that an unlisted one resembles
+    form: str = ""  # the law of the literature by which it acts, where that is not the usual one
+    source: str = ""  # of that law
 
 
 Draw = Callable[[Random, Setting], Change]

@@ -17,6 +17,26 @@ RAMP = 2e-5  # m/s over which friction changes its sign where a stage does not s
 Push = Callable[[float, float, float], float]  # (t, x, v) -> N, downward
 Resist = Callable[[float, float, float, float], float]  # (t, z, v, F) -> F
 Curve = Callable[[float, float, float], float]  # (t, z, v) -> N
+Gather = Callable[[float], tuple[float, float]]  # z -> kg of soil that was gathered on the way there, kg/m
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bristle:
+    """Friction with a state, LuGre: s' = v - stiffness |v| s/g(v), F = stiffness s + damping s' + viscous v."""
+
+    stiffness: float  # N/m
+    damping: float  # N s/m
+    viscous: float  # N s/m
+    level: Callable[[float], float]  # g(v), N, at |v|
+
+    def steady(self, v: float) -> float:
+        """Deflection s (m) where v (m/s) has lasted."""
+        return math.copysign(self.level(abs(v)) / self.stiffness, v)
+
+    def force(self, v: float, deflection: float) -> tuple[float, float]:
+        """Friction against v (N) and the rate of the deflection (m/s)."""
+        rate = v - self.stiffness * abs(v) * deflection / self.level(abs(v))
+        return self.stiffness * deflection + self.damping * rate + self.viscous * v, rate
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,12 +80,25 @@ class Rig:
     relaxing: float = 0.0  # N/m, spring of a Maxwell branch of the soil
     relaxation: float = 1.0  # s, its time
     push: Push | None = None
-    resist: Resist | None = None
+    resist: Resist | None = None  # on the way down
+    returning: Resist | None = None  # on the way back
+    breaks: tuple[float, ...] = ()  # depths at which `resist` leaps or has a kink, m
+    gather: Gather | None = None  # soil that joins in place of `growth`
+    unloading: Callable[[float], float] | None = None  # share of the force at a share of the way back; 1 at 1, 0 at 0
+    holding: Callable[[float], float] | None = None  # share of `pull` at a gap over `reach`; none: 1 - it
+    joint: Callable[[float, float], float] | None = None  # (closing m, m/s) -> N between body and nose, for `spring`
+    bristle: Bristle | None = None
+    background: Callable[[float], float] | None = None  # t -> what the ground's force is off by, a share of it
 
     @property
     def nose(self) -> float:
         """Mass that meets the ground first, kg."""
         return self.mass * self.nose_share if self.spring > 0.0 else self.mass
+
+    @property
+    def grows(self) -> bool:
+        """Whether soil joins on the way down."""
+        return self.growth > 0.0 or self.gather is not None
 
     def steps(self) -> tuple[float, ...]:
         """Depths at which the curve jumps, m."""
@@ -74,7 +107,7 @@ class Rig:
             found.append(self.layer_depth)
         if self.crust_ratio != 1.0 and self.crust_width == 0.0 and self.crust_remains < 1.0:
             found.append(self.crust_depth)
-        return tuple(found)
+        return (*found, *self.breaks)
 
 
 def branches(touch_speed: float) -> tuple[float, float, float]:

@@ -6,6 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from rollover.proof.graded import graded
+from rollover.proof.probabilities import name_of, scored
+
 NOTHING = ("no-mismatch", "cannot-tell")
 VERDICTS = ("no-mismatch", "cannot-tell", "parameter", "sensor", "missing-physics", "unexplained")
 FELT = 0.05  # share of an effect's evidence from which on a channel is one that feels it
@@ -22,7 +25,8 @@ def score(truth: Mapping[str, Any], diagnosis: Mapping[str, Any] | None, seconds
 
     `detected` says whether any mismatch was claimed; `first`, `in_set` and `alone` whether the strongest true effect
     was named first, was in the set offered (with what it is indistinguishable from), and was the whole set; `claimed`
-    the id named first. Values that do not apply are None.
+    the id named first; grades, shares and probabilities stand there where the diagnosis gives them. Values that do not
+    apply are None.
     """
     effects = list(truth["effects"]) if truth["kind"] != "negligible" else []
     effects.sort(key=lambda e: -float(e["signal_to_noise"]))
@@ -56,6 +60,8 @@ def score(truth: Mapping[str, Any], diagnosis: Mapping[str, Any] | None, seconds
     }
     row |= _names(effects, named, detected, remaining)
     row |= _where(effects, found, detected, [r["title"] for r in truth["recordings"]])
+    row |= graded(truth, found, effects)
+    row["probabilities"] = scored(found.get("probabilities"), name_of(effects))
     row["parameters"] = [p for e in effects for p in _parameters(e, named)]
     return row
 

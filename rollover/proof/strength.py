@@ -85,9 +85,20 @@ class Concealed(Protocol):
     def near(self) -> tuple[str, ...]:
         """Listed effects that an unlisted one resembles."""
 
+    @property
+    def form(self) -> str:
+        """The law by which it acts, empty for the usual one."""
+
+    @property
+    def source(self) -> str:
+        """Of that law."""
+
 
 def entry(change: Concealed, found: Mapping[str, Any]) -> dict[str, Any]:
     """What the sealed truth says of one effect; `found` is its strength."""
+    more: dict[str, Any] = {"form": change.form, "source": change.source} if change.form else {}
+    if "over_background" in found:
+        more["over_background"] = float(found["over_background"])
     return {
         "id": change.id,
         "kind": change.kind,
@@ -99,4 +110,5 @@ def entry(change: Concealed, found: Mapping[str, Any]) -> dict[str, Any]:
         "signal_to_noise": float(found["signal_to_noise"]),
         "channels": found["channels"],
         "where": found["where"],
+        **more,
     }

@@ -2,34 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
+from rollover.proof.counts import Row, counted, mean, median, quantile, share
+from rollover.proof.graded import real
+from rollover.proof.probabilities import reliability
 
-Row = Mapping[str, Any]
 STRENGTHS = ((0.0, 5.0), (5.0, 20.0), (20.0, 100.0), (100.0, 500.0), (500.0, float("inf")))  # signal to noise
 NOISES = ((0.0, 0.005), (0.005, 0.01), (0.01, 0.02), (0.02, 1.0))  # of the range
-NULLS = ("null", "decoy", "negligible")
+NULLS = ("null", "decoy", "negligible", "background")
+ONE = ("single", "other-form", "foreign-form")  # kinds of one effect
 NOBODY = "nothing"
-
-
-def share(hits: int, of: int, level: float = 0.95) -> dict[str, Any]:
-    """Share with its exact binomial (Clopper-Pearson) interval; None of none."""
-    if of == 0:
-        return {"hits": 0, "of": 0, "share": None, "low": None, "high": None}
-    from scipy.stats import beta
-
-    tail = 0.5 * (1.0 - level)
-    low = float(beta.ppf(tail, hits, of - hits + 1)) if hits else 0.0
-    high = float(beta.ppf(1.0 - tail, hits + 1, of - hits)) if hits < of else 1.0
-    return {"hits": hits, "of": of, "share": hits / of, "low": low, "high": high}
-
-
-def counted(rows: Iterable[Row], key: str) -> dict[str, Any]:
-    """Share of the rows whose `key` is true, of those where it applies."""
-    applies = [bool(row[key]) for row in rows if row[key] is not None]
-    return share(sum(applies), len(applies))
 
 
 def uniformity(p_values: Sequence[float]) -> dict[str, Any]:
@@ -44,28 +28,29 @@ def uniformity(p_values: Sequence[float]) -> dict[str, Any]:
 
 def tally(rows: Sequence[Row]) -> dict[str, Any]:
     """All cases together; see the keys. A failed diagnosis counts as nothing detected, and is listed."""
-    singles = [r for r in rows if r["kind"] in ("single", "other-form")]
+    singles = [r for r in rows if r["kind"] in ONE]
     pairs = [r for r in rows if r["kind"] == "pair"]
     outside = [r for r in rows if r["kind"] == "outside"]
     nulls = [r for r in rows if r["kind"] in NULLS]
     parameters = [p for r in rows for p in r["parameters"]]
     sets = [len(r["set"]) for r in singles if r["detected"] and r["set"]]
     errors = [p["error"] for p in parameters if p["error"] is not None]
+    bare = [r for r in nulls if r["kind"] != "negligible" and not r.get("background")]
     return {
         "cases": len(rows),
         "failed": [r["case"] for r in rows if r["failed"]],
         "false_alarms": counted(nulls, "false_alarm"),
         "false_alarms_by_kind": {k: counted([r for r in nulls if r["kind"] == k], "false_alarm") for k in NULLS},
-        "p_values": uniformity([r["p_value"] for r in nulls if r["p_value"] is not None and r["kind"] != "negligible"]),
+        "p_values": uniformity([r["p_value"] for r in bare if r["p_value"] is not None]),
         "detected": counted(singles, "detected"),
         "named_first": counted(singles, "first"),
         "in_set": counted(singles, "in_set"),
         "alone_and_right": counted(singles, "alone"),
-        "set_size": {"mean": _mean(sets), "median": _median(sets)},
+        "set_size": {"mean": mean(sets), "median": median(sets)},
         "verdict_right": counted(rows, "verdict_right"),
         "channel_right": counted(rows, "channel_right"),
         "place_right": counted(rows, "place_right"),
-        "parameter_error": {"of": len(errors), "median": _median(errors), "p90": _quantile(errors, 0.9)},
+        "parameter_error": {"of": len(errors), "median": median(errors), "p90": quantile(errors, 0.9)},
         "coverage": counted(parameters, "covers"),
         "held_out": _held_out(singles),
         "two_effects": {
@@ -84,9 +69,11 @@ def tally(rows: Sequence[Row]) -> dict[str, Any]:
         "by_noise": _by(singles, lambda r: _bin(r["noise_share"], NOISES), _row),
         "by_recordings": _by(singles, lambda r: str(r["recordings"]), _row),
         "confusion": confusion(rows),
+        "real": real(rows, NULLS),
+        "probabilities": reliability(rows),
         "misses": [_miss(r) for r in rows if _is_wrong(r)],
         "seconds": {
-            "median": _median([r["seconds"] for r in rows]),
+            "median": median([r["seconds"] for r in rows]),
             "most": max((r["seconds"] for r in rows), default=None),
         },
     }
@@ -145,9 +132,9 @@ def _row(rows: Sequence[Row]) -> dict[str, Any]:
         "first": counted(rows, "first"),
         "in_set": counted(rows, "in_set"),
         "alone": counted(rows, "alone"),
-        "parameter_error": _median(errors),
+        "parameter_error": median(errors),
         "coverage": counted(found, "covers"),
-        "signal_to_noise": _median([r["signal_to_noise"] for r in rows]),
+        "signal_to_noise": median([r["signal_to_noise"] for r in rows]),
     }
 
 
@@ -157,7 +144,7 @@ def _outside_row(rows: Sequence[Row]) -> dict[str, Any]:
         "cases": len(rows),
         **{claim: sum(_is_claim(r, claim) for r in rows) for claim in claims},
         "dependence_right": counted(rows, "dependence_right"),
-        "signal_to_noise": _median([r["signal_to_noise"] for r in rows]),
+        "signal_to_noise": median([r["signal_to_noise"] for r in rows]),
     }
 
 
@@ -176,7 +163,7 @@ def _held_out(rows: Sequence[Row]) -> dict[str, Any]:
         for r in rows
         if r["claimed"] and r["held_out"]["before"] and r["held_out"]["after"] is not None
     ]
-    return {"of": len(ratios), "median_ratio": _median(ratios), "worse": sum(ratio > 1.0 for ratio in ratios)}
+    return {"of": len(ratios), "median_ratio": median(ratios), "worse": sum(ratio > 1.0 for ratio in ratios)}
 
 
 def _is_wrong(row: Row) -> bool:
@@ -188,15 +175,3 @@ def _is_wrong(row: Row) -> bool:
 def _miss(row: Row) -> dict[str, Any]:
     keys = ("case", "kind", "truth", "verdict", "claimed", "set", "named", "signal_to_noise", "over_noise", "claim")
     return {key: row[key] for key in keys}
-
-
-def _mean(values: Sequence[float]) -> float | None:
-    return float(np.mean(values)) if values else None
-
-
-def _median(values: Sequence[float]) -> float | None:
-    return float(np.median(values)) if values else None
-
-
-def _quantile(values: Sequence[float], at: float) -> float | None:
-    return float(np.quantile(values, at)) if values else None

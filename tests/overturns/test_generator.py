@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rollover.effects import EFFECTS
-from rollover.overturns import generator, library
+from rollover.overturns import foreign, generator, library
 from rollover.overturns.generator import CHANNELS, make, plan
 from rollover.overturns.outside import OUTSIDE
 from rollover.proof import examine
@@ -44,6 +44,38 @@ def test_a_plan_takes_every_effect_in_turn() -> None:
 def test_what_there_are_no_overturns_of_is_refused(kinds: list[str], effects: list[str]) -> None:
     with pytest.raises(ValueError, match=r"are allowed|none of overturns"):
         plan(3, 1, kinds, effects)
+
+
+def test_a_yield_in_another_form_is_written_into_the_mounts_and_told() -> None:
+    """Forces of mounts drawn apart: hardening lifts them behind the yield, a rate too, two yields bend twice."""
+    assert {o.ids for o in plan(3, 3, ["foreign-form"])} == {("rops-plasticity",)}
+    with pytest.raises(ValueError, match="none of kind foreign-form, got slope"):
+        plan(3, 1, ["foreign-form"], ["slope"])
+    for form in foreign.FORMS["rops-plasticity"]:
+        change = form(np.random.default_rng(2))
+        tractor = generator._base().replaced(dict(change.values)).vehicle
+        force, elastic = [], 0.0
+        for u in np.linspace(0.0, 0.08, 400):
+            total = 0.0
+            for mount in tractor.rops.mounts:
+                k, most, tangent = mount.stiffness[1], mount.yield_force[1], mount.hardening[1]
+                total += min(k * u, most + tangent * (k * u - most) if k * u > most else k * u)
+                elastic = max(elastic, k)
+            force.append(total)
+        slopes = np.round(np.diff(force) / np.diff(np.linspace(0.0, 0.08, 400)) / elastic, 3)
+        different = len({float(s) for s in slopes if np.sum(slopes == s) > 3})
+        rate = tractor.rops.mounts[0].rate_factor
+        if change.form == "hardening":
+            assert slopes[-1] == pytest.approx(2.0 * change.told["tangent"], abs=1e-3)
+        elif change.form == "one-by-one":
+            assert (different, max(force)) == (3, pytest.approx(change.told["yield_force"]))
+        else:
+            assert rate is not None
+            assert (rate.rate, rate.exponent, rate.gauge_length) == (40.4, 5.0, change.told["gauge_length"])
+    order = Order(index=0, seed=5, kind="foreign-form", ids=("rops-plasticity",))
+    (effect,) = make(order).truth["effects"]
+    assert effect["form"] in ("hardening", "by-rate", "one-by-one")
+    assert effect["source"]
 
 
 def test_pairs_are_two_and_what_is_outside_comes_in_turn() -> None:

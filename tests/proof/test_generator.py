@@ -97,6 +97,32 @@ def test_a_folder_is_what_a_diagnosis_reads(some: list[Case], tmp_path: Path) ->
                 np.testing.assert_array_equal(recording[channel], made[channel])
 
 
+# what older kinds drew and made before foreign forms and backgrounds came: sums of the samples, each channel over its
+# largest, of the parameters, and the strength
+BEFORE: dict[tuple[int, str, tuple[str, ...]], tuple[float, float, float]] = {
+    (0, "null", ()): (9935.793924, 0.0, 0.0),
+    (1, "single", ("soil-elastic-rebound",)): (2179.805824, 0.6026052204, 1045.4039),
+    (2, "pair", ("soil-added-mass-growth", "sensor-lag")): (10321.21683, 2.439317723, 19.194219),
+    (3, "outside", ("outside:memory",)): (6193.255207, 26711.41994, 3561.6297),
+    (4, "other-form", ("soil-crust",)): (28963.18912, 1.033347508, 161.33466),
+    (5, "single", ("structural-compliance",)): (25555.89155, 646019.3814, 5704.0847),
+    (6, "single", ("soil-adhesion",)): (11759.99184, 6271.5704, 147.23316),
+    (8, "scatter", ()): (20184.40003, 0.0, 0.0),
+}
+
+
+@pytest.mark.parametrize("which", BEFORE, ids=lambda which: f"{which[1]} {'+'.join(which[2])}".strip())
+def test_a_seed_makes_the_case_that_it_made_before_newer_kinds_came(which: tuple[int, str, tuple[str, ...]]) -> None:
+    index, kind, ids = which
+    case = make(Order(index=index, seed=51, kind=kind, ids=ids))
+    samples = [values for r in case.recordings for values in r.channels.values()]
+    found = sum(float(np.nansum(np.abs(v)) / np.nanmax(np.abs(v))) for v in samples)
+    parameters = sum(v for e in case.truth["effects"] for v in e["parameters"].values())
+    assert (found, parameters, case.truth["signal_to_noise"]) == pytest.approx(BEFORE[which], rel=1e-7)
+    assert not {"background", "explains"} & set(case.truth)
+    assert all("form" not in e and "over_background" not in e for e in case.truth["effects"])
+
+
 def test_a_null_is_the_paper_with_noise() -> None:
     drawn = (make(Order(index=i, seed=2, kind="null")) for i in range(40))
     case = next(

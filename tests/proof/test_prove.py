@@ -82,6 +82,30 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert "--force" in other.stderr
 
 
+def test_a_background_is_asked_for_told_and_part_of_what_the_folder_is_about(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(examine, "DIAGNOSIS", BY_HAND + "says_nothing")
+    out = tmp_path / "proof"
+    asked = ["prove", "--cases", "1", "--kinds", "background", "--workers", "0", "--out", str(out)]
+    answer = CliRunner().invoke(app, [*asked, "--background", "0.03"])
+    assert answer.exit_code == 0, answer.output
+    assert "a background alone called by a name" in answer.output
+    account = json.loads((out / "prove.json").read_text())
+    assert account["background"] == 0.03
+    assert account["summary"]["real"]["background_alone"]["false_name"]["of"] == 1
+    (truth,) = opened(account["seal"]["digest"], out / "truth.json")
+    assert truth["background"]["share"] == 0.03
+    assert "--kinds background --background 0.03" in (out / "report.html").read_text()
+    other = CliRunner().invoke(app, [*asked, "--background", "drawn"])
+    assert (other.exit_code, "--force" in other.stderr) == (2, True)
+    for share, rig in (("2", "drop"), ("some", "drop"), ("0.03", "overturn")):
+        wrong = CliRunner().invoke(app, ["prove", "--background", share, "--rig", rig, "--out", str(tmp_path / "no")])
+        assert wrong.exit_code == 2
+        assert "rollover prove: background: " in wrong.stderr
+    assert not (tmp_path / "no").exists()
+
+
 def test_diagnoses_that_fail_are_listed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(examine, "DIAGNOSIS", BY_HAND + "fails")
     answer = CliRunner().invoke(app, ["prove", *QUICK, "--out", str(tmp_path / "proof")])

@@ -117,3 +117,22 @@ def test_a_confusion_is_red_and_what_is_right_green() -> None:
         ("limit", "0.40", "mass: 1 of 4 named slope"),
         ("third", "0.85", "nothing: 2 of 2 named nothing"),
     ]
+
+
+def test_what_is_real_and_how_sure_it_was_stand_there_when_there_is_any(account: dict[str, Any]) -> None:
+    assert "Foreign forms" not in made(account).said
+    assert "Probabilities over names" not in made(account).said
+    formed = {"form": "force-stays", "background": 0.03, "over_background": 2.0, "grades": ["part"]}
+    given = {"flaw": "", "truth": "soil-crust", "brier": 0.08, "log": 0.22, "pairs": [[0.8, True], [0.2, False]]}
+    rows = [
+        row("case-0001", "foreign-form", "soil-crust", "soil-crust", **formed, probabilities=given),
+        row("case-0002", "foreign-form", "soil-crust", "mass", **formed),
+        row("case-0003", "background", "", "mass", background=0.03),
+    ]
+    found = made({**account, "rows": rows, "summary": tally(rows)})
+    assert ["soil-crust, force-stays", "2", "2", "1", "1", "1", "1", "50"] in found.rows
+    assert ["part", "1", "1"] in found.rows
+    assert "1 cases: Brier score 0.080, log score 0.220, slope 1.67." in found.said
+    svg = found.text.partition('aria-label="reliability')[2].partition("</svg>")[0]
+    dots = [(float(x), float(y)) for x, y in re.findall(r'<circle cx="([\d.]+)" cy="([\d.]+)"', svg)]
+    assert dots == [pytest.approx((44 + 260 * 0.2, 44 + 260), abs=0.1), pytest.approx((44 + 260 * 0.8, 44), abs=0.1)]
