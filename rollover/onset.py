@@ -295,7 +295,7 @@ def _refined(
 
     def left(zeros: Array) -> Array:
         since_zero = t - zeros[:, None]
-        late = jump * (since_zero >= contact)
+        late = jump * (since_zero >= contact).astype(np.float64)
         c = (np.interp(since_zero, run.time, made) - level) / sigma - late
         return _left(y, c, late)
 
