@@ -96,8 +96,8 @@ def register(kind: Any) -> Any:
 def _sources_hash() -> str:
     root = Path(__file__).resolve().parent.parent
     digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
-    for folder in ("ground", "rollover", "rollover/diagnosis"):
-        for path in sorted((root / folder).glob("*.py")):
+    for folder in ("ground", "rollover"):
+        for path in sorted((root / folder).rglob("*.py")):
             text = path.read_bytes()
             # all of ground/: its constants are frozen into the laws' kernels, also those of files that compile nothing
             if folder == "ground" or b"compiled" in text:

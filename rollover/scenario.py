@@ -13,16 +13,16 @@ from ground.kinds import ByKey, ByKind
 from ground.law import GroundLaw, laws
 from ground.quantity import Quantity, parameters
 from ground.surface import Plane, Surface
-from rollover import document
 from rollover.effects import EFFECTS, entries, nothing
-from rollover.estimates import Estimate, wheel_estimates
-from rollover.excitation import Excitation
-from rollover.filters import least_rate
-from rollover.footing import check_standing, check_turning
-from rollover.initiation import Driving, Drop, Initiation, Release, Standing, Throw, TipOver
-from rollover.stand import PendulumBlow, StaticTest, TiltTable
-from rollover.static_sequence import sequence
-from rollover.vehicle import RigidBody, Striker, Vehicle
+from rollover.recording.filters import least_rate
+from rollover.spec import document
+from rollover.spec.estimates import Estimate, wheel_estimates
+from rollover.spec.excitation import Excitation
+from rollover.spec.footing import check_standing, check_turning
+from rollover.spec.initiation import Driving, Drop, Initiation, Release, Standing, Throw, TipOver
+from rollover.spec.stand import PendulumBlow, StaticTest, TiltTable
+from rollover.spec.standards.static_sequence import sequence
+from rollover.spec.vehicle import RigidBody, Striker, Vehicle
 
 AnyVehicle = Annotated[Vehicle | Striker | RigidBody, ByKind()]
 AnyLaw = Annotated[GroundLaw, ByKind(laws)]  # whatever law stands in the folder `ground`

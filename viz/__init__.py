@@ -2,7 +2,7 @@
 
 import os
 
-# what the recorder would say of a file that it cannot write, `viz.saved` finds out and raises, in one line
+# what the recorder would say of a file that it cannot write, `viz.recordings.saved` finds out and raises, in one line
 os.environ.setdefault("RUST_LOG", "off")
 
 DISTRIBUTION = "rollover"  # marker: other distributions own this import name too

@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.detect import Mismatch
-from rollover.diagnosis.evidence import Evidence
-from rollover.diagnosis.explain import SURE, confusion
-from rollover.diagnosis.fit import Judge
-from rollover.diagnosis.holdout import Held, held_out
-from rollover.diagnosis.intervals import intervals
-from rollover.diagnosis.remainder import NEGLIGIBLE
-from rollover.diagnosis.selection import Explanation, strongest
-from rollover.diagnosis.settle import PARTS, in_shorter_steps
-from rollover.diagnosis.verdict import Considered, Named, Place, Verdict
+from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.fit.cross_validation import Held, held_out
+from rollover.diagnosis.fit.ensemble_mean import PARTS, in_shorter_steps
+from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.inference.adequacy import NEGLIGIBLE
+from rollover.diagnosis.inference.intervals import intervals
+from rollover.diagnosis.inference.lack_of_fit import SURE, Mismatch
+from rollover.diagnosis.result import Considered, Named, Place, Verdict
+from rollover.diagnosis.selection.decision import Explanation, strongest
+from rollover.diagnosis.selection.forward_step import confusion
 from rollover.effects import EFFECTS
 
 NOTABLE = 0.1  # of an interval

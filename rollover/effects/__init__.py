@@ -18,8 +18,8 @@ from typing import Any
 from ground.settings import ForceTerm
 from rollover.effects import empirical, ground, parameter, sensor, striker, vehicle
 from rollover.effects.effect import EFFECTS, Effect, Form, Heard, Search, nothing, possible, spoken, units_of
-from rollover.faults import Fault, InputError
 from rollover.recording import Recording
+from rollover.system.errors import Fault, InputError
 
 __all__ = [
     "EFFECTS",

@@ -8,8 +8,8 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 from ground.quantity import parameters, quantities
 from ground.settings import ForceTerm
-from rollover.channels import describe, is_known
 from rollover.recording import Recording
+from rollover.spec.channels import describe, is_known
 
 EFFECTS: dict[str, type[Effect]] = {}
 
@@ -57,7 +57,7 @@ class Effect:
 
     At `null` it changes nothing, by not one bit: a number, or None where the scenario's own value then holds.
     A class gives one of: `places` and `force_terms` (the ground's loading curve), `changes` (values of the scenario),
-    `read` (what a sensor makes of a channel); terms on the bodies are read by `rollover.terms`.
+    `read` (what a sensor makes of a channel); terms on the bodies are read by `rollover.kernels.terms`.
     """
 
     id: ClassVar[str] = ""

@@ -14,7 +14,7 @@ from ground import kernel as k
 from ground.law import REFERENCE_AREA
 from ground.quantity import Quantity, parameters
 from rollover.effects.effect import Effect, Form, Search
-from rollover.vehicle import Striker
+from rollover.spec.vehicle import Striker
 
 FORCE = ("ground/force_normal", "striker/acceleration_z")
 SPEED = "a resistance of the ground that grows with speed"

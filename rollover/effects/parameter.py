@@ -10,8 +10,8 @@ from ground import kernel as k
 from ground.quantity import Quantity, parameters
 from ground.surface import Plane, Slope
 from rollover.effects.effect import Effect, Kind, Search
-from rollover.initiation import Drop
-from rollover.vehicle import Striker
+from rollover.spec.initiation import Drop
+from rollover.spec.vehicle import Striker
 
 
 @parameters

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from ground.compiled import compiled
 from ground.quantity import Quantity, parameters
-from rollover.channels import describe, is_known
 from rollover.effects.effect import CHANNELS_OWN, Effect, Heard, Kind, Search
 from rollover.recording import Recording
+from rollover.spec.channels import describe, is_known
 
 Array = NDArray[np.float64]
 OTHER_UNIT = 5.0  # times as far as is simulated, from which on a channel may be in another unit than it says

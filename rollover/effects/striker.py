@@ -9,8 +9,8 @@ from typing import Annotated, Any, ClassVar
 from ground.quantity import Quantity, parameters
 from rollover.effects.effect import Effect, Form, Search
 from rollover.effects.ground import CLINGS, clinging
-from rollover.initiation import Release
-from rollover.vehicle import Striker
+from rollover.spec.initiation import Release
+from rollover.spec.vehicle import Striker
 
 AIR_DENSITY = 1.204  # kg/m3 at 20 degrees and 1013 hPa
 AIR_VISCOSITY = 1.51e-5  # m2/s

@@ -8,8 +8,8 @@ from typing import Annotated, Any, ClassVar
 
 from ground.quantity import Quantity, parameters
 from rollover.effects.effect import Effect, Search
-from rollover.shapes import Point
-from rollover.vehicle import Vehicle
+from rollover.spec.shapes import Point
+from rollover.spec.vehicle import Vehicle
 
 
 @parameters

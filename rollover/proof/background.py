@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.proof.campaign import ACCELERATION, FORCE, log_uniform
-from rollover.proof.descent import Descent, descend
+from rollover.proof.reference_solver import Descent, descend
 from rollover.proof.rig import Rig
 
 Array = NDArray[np.float64]

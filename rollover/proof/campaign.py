@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rollover.proof.descent import CHANNELS
 from rollover.proof.instruments import Noise
+from rollover.proof.reference_solver import CHANNELS
 
 FORCE, DEPTH, PLACE, SPEED, ACCELERATION = CHANNELS
 CLASSES = (60, 180, 600)

@@ -18,10 +18,10 @@ from rollover.proof import campaign, foreign, library, outside
 from rollover.proof.background import DRAWN, Background, drawn_share
 from rollover.proof.background import background as discrepancy
 from rollover.proof.campaign import ACCELERATION, DEPTH, FORCE, PLACE, SPEED, Campaign, Shot
-from rollover.proof.descent import CHANNELS, Descent, descend
+from rollover.proof.effect_size import entry, strength
 from rollover.proof.library import Change, Setting
 from rollover.proof.readings import REBOUND, Reading, instruments_of, measured, rig_of, span, spread_of
-from rollover.proof.strength import entry, strength
+from rollover.proof.reference_solver import CHANNELS, Descent, descend
 from rollover.recording import Clock, Recording
 
 Array = NDArray[np.float64]

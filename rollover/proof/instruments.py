@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.proof.descent import Descent
+from rollover.proof.reference_solver import Descent
 
 Array = NDArray[np.float64]
 Response = Callable[[Array, Array], Array]  # (x, grid) -> y at the grid's times (n,), s

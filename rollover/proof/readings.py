@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from rollover.proof.background import Background
 from rollover.proof.campaign import Campaign, Shot
-from rollover.proof.descent import Descent, descend
 from rollover.proof.instruments import PAD, Fault, Instruments, channel_filter
 from rollover.proof.library import Change
+from rollover.proof.reference_solver import Descent, descend
 from rollover.proof.rig import Rig
 
 Array = NDArray[np.float64]

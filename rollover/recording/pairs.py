@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.budget import Budget
-from rollover.writing import put
+from rollover.system.budget import Budget
+from rollover.system.writing import put
 
 KEY = b"rollover"
 IN_LIST = 40  # bytes of a value: in Arrow's table, and as a number of Python in a list

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ground.quantity import Quantity, parameters
-from rollover.frames import from_angles
+from rollover.spec.frames import from_angles
 
 Array = NDArray[np.float64]
 Point = tuple[float, float, float]

@@ -8,11 +8,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from rollover.boundary import CURE, worded
-from rollover.channels import describe
-from rollover.faults import Fault, InputError
 from rollover.recording.record import Clock, Recording, Sensor
 from rollover.recording.tables import numbers, open_parquet
+from rollover.spec.channels import describe
+from rollover.system.boundary import CURE, worded
+from rollover.system.errors import Fault, InputError
 
 FORMAT = "rollover-channels/1"
 

@@ -12,9 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.boundary import CURE, worded
-from rollover.budget import Budget
-from rollover.faults import InputError
 from rollover.recording.text_rows import (
     BLOCK,
     PLAIN,
@@ -30,6 +27,9 @@ from rollover.recording.text_rows import (
     take,
     told_apart,
 )
+from rollover.system.boundary import CURE, worded
+from rollover.system.budget import Budget
+from rollover.system.errors import InputError
 
 Array = NDArray[np.float64]
 

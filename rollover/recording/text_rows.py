@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, NoReturn
 
-from rollover.faults import Fault, InputError, cured
+from rollover.system.errors import Fault, InputError, cured
 
 LONGEST_LINE = 1 << 16
 CURE = "a table of numbers in UTF-8 is needed; --profile FILE says how another one is written"

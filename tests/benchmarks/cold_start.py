@@ -20,7 +20,7 @@ RUN = """
 import time
 began = time.perf_counter()
 from rollover.scenario import load
-from rollover.simulate import run
+from rollover.dynamics.simulate import run
 status = run(load("side_overturn")).status
 print(status, time.perf_counter() - began, time.process_time())
 """

@@ -13,11 +13,11 @@ import time
 
 import numpy as np
 
-from rollover.calibrate import calibrate, simulator
-from rollover.objective import parameter
+from rollover.calibration.calibrate import calibrate, simulator
+from rollover.calibration.objective import parameter
+from rollover.comparison.synthesis import synthetic
 from rollover.recording import Recording
 from rollover.scenario import load
-from rollover.synthesis import synthetic
 
 SPEEDS = (1.5, 2.2, 2.9, 3.5)
 CHANNELS = ("ground/force_normal", "ground/sinkage", "striker/acceleration_z")

@@ -27,11 +27,11 @@ from dataclasses import dataclass
 from typing import Any
 from unittest import mock
 
-from rollover import model, simulate
-from rollover.frames import angles
-from rollover.loads import peak_loads
-from rollover.run import Run
+from rollover.assessment.loads import peak_loads
+from rollover.dynamics import model, simulate
+from rollover.dynamics.result import Run
 from rollover.scenario import Scenario, load
+from rollover.spec.frames import angles
 from tests.benchmarks.limit import loop
 from tests.benchmarks.rigid import Fall, fall
 

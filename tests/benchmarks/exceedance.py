@@ -20,15 +20,15 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest, fisher_exact
 
-from rollover import simulate
-from rollover import study as studies
-from rollover.loads import peak_loads
+from rollover import studies
+from rollover.assessment.loads import peak_loads
+from rollover.dynamics import simulate
 from rollover.recording import as_numbers, read_table
 from rollover.scenario import load
-from rollover.study import shelf
-from rollover.study.answers import answers
-from rollover.study.conduct import Way, conduct
-from rollover.study.plan import Random
+from rollover.studies import case_store
+from rollover.studies.plan import Random
+from rollover.studies.runner import Way, conduct
+from rollover.studies.summary import answers
 
 SLOPES, SCATTER, FRICTION, DURATION = (25.0, 40.0), 0.2714, (0.13, 0.5, 0.85), 2.6  # as the study's file says them
 LIMIT = 25e3  # N
@@ -67,7 +67,7 @@ def by_study(folder: Path, workers: int, cases: int) -> tuple[dict[str, Any], fl
     """Answers of the study, and its CPU seconds."""
     study = replace(studies.load("slope_side_overturn"), plan=Random(count=cases, seed=1))
     done = conduct(study, folder, Way(workers=workers))
-    told, _ = read_table(folder / shelf.PROVENANCE)
+    told, _ = read_table(folder / case_store.PROVENANCE)
     return answers(study, done), float(as_numbers(told["cpu_time"]).sum())
 
 

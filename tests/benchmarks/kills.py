@@ -15,8 +15,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from rollover import writing
-from rollover.update import JOURNAL, finish, update
+from rollover.system import writing
+from rollover.system.transaction import JOURNAL, finish, update
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -12,9 +12,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rollover.ledger import LIMIT, closure
+from rollover.assessment.ledger import LIMIT, closure
+from rollover.dynamics.simulate import run
 from rollover.scenario import Scenario
-from rollover.simulate import run
 from tests.physics.throws import overturn, throw
 
 

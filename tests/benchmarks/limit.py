@@ -20,15 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ground.compiled import compiled
-from rollover import model, simulate
-from rollover.contact import grown
-from rollover.forces import added_mass, generalised_forces
-from rollover.impact import constraints
+from rollover.dynamics import model, simulate
+from rollover.dynamics.assembly import grown
+from rollover.kernels.forces import added_mass, generalised_forces
+from rollover.kernels.impact import constraints
+from rollover.kernels.step import end_of_step
+from rollover.kernels.tables import ACTIVE, EVENTS, OMEGA, OUTSIDE, SLOTS, Tables, handle
+from rollover.kernels.vectors import cross, relative_angle, to_body, to_world
+from rollover.kernels.vectors import place as place_of
 from rollover.scenario import Scenario
-from rollover.step import end_of_step
-from rollover.tables import ACTIVE, EVENTS, OMEGA, OUTSIDE, SLOTS, Tables, handle
-from rollover.vectors import cross, relative_angle, to_body, to_world
-from rollover.vectors import place as place_of
 
 Array = NDArray[np.float64]
 DRIFT_RATE = 100.0  # 1/s, Baumgarte's: errors of the pivot fade within some ten steps
@@ -192,7 +192,7 @@ class CaughtError(Exception):
 
 
 def caught(scenario: Scenario) -> dict[str, Any]:
-    """What `rollover.simulate` hands to its solver: bodies, tables, start and step; nothing of it is done twice."""
+    """What `rollover.dynamics.simulate` hands to its solver: bodies, tables, start, step; nothing is done twice."""
     with mock.patch.object(model, "solve", side_effect=CaughtError) as solve, suppress(CaughtError):
         simulate.run(scenario)
     return dict(solve.call_args.kwargs)
@@ -220,7 +220,7 @@ class Loop:
 
 
 def loop(scenario: Scenario) -> Loop:
-    """The scenario's tables and start, as `rollover.simulate` makes them."""
+    """The scenario's tables and start, as `rollover.dynamics.simulate` makes them."""
     given = caught(scenario)
     return Loop(
         tables=given["live"].tables,

@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.commands.prove import sentences
-from rollover.drop import DropFailedError, DropModel
-from rollover.filters import filtered
-from rollover.importers import read_recording
-from rollover.proof.examine import prove
+from rollover.cli.commands.prove import sentences
+from rollover.dynamics.drop_test import DropFailedError, DropModel
+from rollover.proof.runner import prove
 from rollover.recording import Recording
+from rollover.recording.filters import filtered
+from rollover.recording.importers import read_recording
 from rollover.scenario import load
 
 Array = NDArray[np.float64]

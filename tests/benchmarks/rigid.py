@@ -17,12 +17,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.bodies import Body
-from rollover.frames import matrices
-from rollover.placement import Start
+from rollover.dynamics.bodies import Body
+from rollover.dynamics.placement import Start
 from rollover.scenario import Scenario
-from rollover.shapes import Box, Disc, Tube
-from rollover.vehicle import Striker
+from rollover.spec.frames import matrices
+from rollover.spec.shapes import Box, Disc, Tube
+from rollover.spec.vehicle import Striker
 from tests.benchmarks.limit import caught
 
 Array = NDArray[np.float64]

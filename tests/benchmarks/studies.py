@@ -20,15 +20,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from rollover import simulate
-from rollover import study as studies
+from rollover import studies
+from rollover.dynamics import simulate
 from rollover.recording import as_numbers, read_table
-from rollover.study import shelf
-from rollover.study.answers import answers
-from rollover.study.case import _peak_memory, _simulated, warm_up
-from rollover.study.conduct import Builder, Conducted, Way, conduct
-from rollover.study.design import points
-from rollover.study.plan import Random
+from rollover.studies import case_store
+from rollover.studies.case import _peak_memory, _simulated, warm_up
+from rollover.studies.design import points
+from rollover.studies.plan import Random
+from rollover.studies.runner import Builder, Conducted, Way, conduct
+from rollover.studies.summary import answers
 from tests.rollover.studies import made_up
 
 COUNTS = (1000, 3000, 10_000)
@@ -99,7 +99,7 @@ def overturns(cases: int, workers: int, scheduler: str, folder: Path) -> Conduct
         done = conduct(study, folder, Way(workers=workers, scheduler=scheduler))
     if any(row.status != "done" for row in done.rows):
         raise RuntimeError(next(row.sentence for row in done.rows if row.status != "done"))
-    told, _ = read_table(folder / shelf.PROVENANCE)
+    told, _ = read_table(folder / case_store.PROVENANCE)
     return Conduct(
         way=scheduler or "here",
         cases=cases,
@@ -109,7 +109,7 @@ def overturns(cases: int, workers: int, scheduler: str, folder: Path) -> Conduct
         case_wall=float(as_numbers(told["wall_time"]).sum()),
         memory=float(max(told["peak_memory"])),
         parent=_peak_memory(),
-        table=(folder / shelf.TABLE).read_bytes(),
+        table=(folder / case_store.TABLE).read_bytes(),
     )
 
 
@@ -141,16 +141,16 @@ def rows(count: int, folder: Path) -> dict[str, float]:
     builder = Builder(study)
     builder.key(done.points.row(0))
     step("key", lambda: [builder.key(done.points.row(k)) for k in range(count)])
-    step("keep", lambda: [shelf.keep(folder, row) for row in full])
-    step("read", lambda: [shelf.kept(folder, row.key) for row in full])
-    step("table", lambda: shelf.compact(folder, study, done.keys, done.points.columns, full))
+    step("keep", lambda: [case_store.keep(folder, row) for row in full])
+    step("read", lambda: [case_store.kept(folder, row.key) for row in full])
+    step("table", lambda: case_store.compact(folder, study, done.keys, done.points.columns, full))
     again = Conducted(points=done.points, keys=done.keys, rows=full, ran=count)
     account = step("answers", lambda: answers(study, again))
     found["page"] = _page(study, again, account, folder, count)
-    cases = folder / shelf.CASES
+    cases = folder / case_store.CASES
     found["disk"] = sum(p.stat().st_blocks * 512 for p in cases.rglob("*.parquet")) / count
-    found["table bytes"] = (folder / shelf.TABLE).stat().st_size / count
-    found["page bytes"] = (folder / shelf.PAGE).stat().st_size / count
+    found["table bytes"] = (folder / case_store.TABLE).stat().st_size / count
+    found["page bytes"] = (folder / case_store.PAGE).stat().st_size / count
     return found
 
 
@@ -163,13 +163,13 @@ def _filled(measures: Mapping[str, float]) -> dict[str, float]:
 
 def _page(study: Any, done: Conducted, account: dict[str, Any], folder: Path, count: int) -> float:
     from tests.viz.test_study_page import account as headed
-    from viz.study_page import page
+    from viz.pages.study import page
 
     whole = {**headed(study, done), **account}
     began = time.process_time()
     text = page(study, done, whole, command="rollover study")
     spent = 1e3 * (time.process_time() - began) / count
-    (folder / shelf.PAGE).write_text(text, encoding="utf-8")
+    (folder / case_store.PAGE).write_text(text, encoding="utf-8")
     return spent
 
 
@@ -227,7 +227,7 @@ def report_rows() -> list[dict[str, float]]:
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             each = rows(count, folder)
-            opened = opening(folder / shelf.PAGE)
+            opened = opening(folder / case_store.PAGE)
         cells = "  ".join(f"{each[k]:6.3f}" for k in ("key", "keep", "read", "table", "answers", "page"))
         sizes = ", ".join(f"{k} {each[k]:.0f}" for k in ("disk", "table bytes", "page bytes"))
         print(f"{count:6d}                    {cells}   {sizes}; opens in {opened:.2f} s")

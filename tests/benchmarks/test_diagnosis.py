@@ -22,16 +22,16 @@ import pytest
 from numpy.typing import NDArray
 
 from rollover.diagnosis import Diagnosis, diagnose
-from rollover.diagnosis.account import recordings_in
-from rollover.diagnosis.bins import simulated
-from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.clocks import align
-from rollover.diagnosis.evidence import evidence_of
-from rollover.diagnosis.fit import Judge
-from rollover.diagnosis.simulator import set_up
-from rollover.diagnosis.weak import Balance, balances
-from rollover.proof.folder import write_case
+from rollover.diagnosis.data.dataset import evidence_of
+from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.forward.averaging import simulated
+from rollover.diagnosis.forward.forward_model import set_up
+from rollover.diagnosis.inference.weak_form import Balance, balances
+from rollover.diagnosis.io import recordings_in
 from rollover.proof.generator import Order, make
+from rollover.proof.handover import write_case
 from rollover.scenario import load
 
 Array = NDArray[np.float64]

@@ -23,9 +23,9 @@ import hashlib, json, sys, time
 import ground.compiled as c
 if sys.argv[1] == "counting":
     c.leaf = c.inlined = c.compiled
-from rollover.drop import DropModel
+from rollover.dynamics.drop_test import DropModel
 from rollover.scenario import load
-from rollover.simulate import run
+from rollover.dynamics.simulate import run
 
 def told(make, count):
     made, best = make(), float("inf")

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from rollover.diagnosis.evidence import Signal
-from rollover.diagnosis.fit import Block
-from rollover.drop import DropModel
+from rollover.diagnosis.data.dataset import Signal
+from rollover.diagnosis.fit.levenberg_marquardt import Block
+from rollover.dynamics.drop_test import DropModel
 from rollover.recording import Recording
 from rollover.scenario import Scenario
 from tests.physics.scenes import shipped

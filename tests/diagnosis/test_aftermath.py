@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.diagnosis import explain, looks
-from rollover.diagnosis.aftermath import LASTING, left_aside, shortened, soon, up_to
-from rollover.diagnosis.bins import Averaged
-from rollover.diagnosis.blocks import Fitted
-from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.crew import Crew
-from rollover.diagnosis.evidence import Evidence, Signal
-from rollover.diagnosis.fit import Judge
-from rollover.diagnosis.gate import Gate
-from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.overturn import AHEAD, RunSimulator
+from rollover.diagnosis.data.dataset import Evidence, Signal
+from rollover.diagnosis.fit.jobs import Crew
+from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.fit.linearisation import Fitted
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.forward.averaging import Averaged
+from rollover.diagnosis.forward.full_run import AHEAD, RunSimulator
+from rollover.diagnosis.noise.truncation import LASTING, left_aside, shortened, soon, up_to
+from rollover.diagnosis.selection import forward_step, scan
+from rollover.diagnosis.selection.context import Inquiry
+from rollover.diagnosis.selection.score_test import Gate
 from rollover.effects import Search
 from rollover.recording import Recording
 from tests.physics.scenes import shipped
@@ -197,8 +197,8 @@ def test_looks_and_first_fits_are_made_soon_after_the_blow_and_fits_of_all(monke
         asked.append(("look", judge, base.blocks[0].residual.size))
         return Gate(score=0.0, scores={}, null=np.zeros(10), detectable={})
 
-    monkeypatch.setattr(looks, "gate", gated)
-    looked = looks.look(judge, base, [], [[0], [1]])
+    monkeypatch.setattr(scan, "gate", gated)
+    looked = scan.look(judge, base, [], [[0], [1]])
 
     def screened(inquiry: Inquiry, base: Fitted, *_: object) -> list[Any]:
         asked.append(("screen", inquiry.judge, base.blocks[0].residual.size))
@@ -212,11 +212,11 @@ def test_looks_and_first_fits_are_made_soon_after_the_blow_and_fits_of_all(monke
         asked.append(("fits", judge, len(jobs)))
         return [None for _ in jobs]
 
-    monkeypatch.setattr(explain, "screen", screened)
-    monkeypatch.setattr(explain, "_first_fits", fitted)
+    monkeypatch.setattr(forward_step, "screen", screened)
+    monkeypatch.setattr(forward_step, "_first_fits", fitted)
     monkeypatch.setattr(Crew, "fits", fits)
     inquiry = Inquiry(judge=judge, candidates=(), groups=[[0], [1]], phases=[], say=lambda _: None, crew=Crew())
-    assert explain.step(inquiry, base, looked) is None
+    assert forward_step.step(inquiry, base, looked) is None
     rows = near.evidence[0].count
     assert asked[-3:] == [("screen", near, rows), ("first", near, rows), ("fits", judge, 1)]
     assert {(name, id(who), n) for name, who, n in asked[:-3]} == {("look", id(near), rows)}

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from rollover.diagnosis import colour, diagnose
-from rollover.diagnosis.approach import along, cosines, is_louder, is_recorders, is_shared, is_slow
-from rollover.diagnosis.evidence import Evidence, Signal
+from rollover.diagnosis import diagnose
+from rollover.diagnosis.data.dataset import Evidence, Signal
+from rollover.diagnosis.noise import autoregression
+from rollover.diagnosis.noise.drift import along, cosines, is_louder, is_recorders, is_shared, is_slow
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario, signal
 
 N, BEFORE = 400, 60
@@ -125,16 +126,18 @@ def test_a_long_memory_reaches_where_a_short_one_does_not() -> None:
     rng, levels = np.random.default_rng(3), []
     for _ in range(20):
         series = [pink(rng) + 0.5 * rng.standard_normal(N) for _ in range(6)]
-        short, long = colour.autoregression(series), colour.long_memory(series)
-        levels.append((colour.level_of(*short), colour.level_of(*long), len(long[1])))
+        short, long = autoregression.autoregression(series), autoregression.long_memory(series)
+        levels.append((autoregression.level_of(*short), autoregression.level_of(*long), len(long[1])))
     low, high, reach = np.mean(levels, axis=0)
-    assert reach > 1.5 * colour.LONGEST
+    assert reach > 1.5 * autoregression.LONGEST
     assert high > 1.3 * low
     for a in (0.0, 0.5, 0.9):
         series = [lfilter([1.0], [1.0, -a], rng.standard_normal(N)) for _ in range(6)]
         # its standard error by the memory's, sqrt((1 - a^2)/n)/(1 - a): 2, 4 and 9 %; within 2.5 of these
         error = np.sqrt((1.0 + a) / ((1.0 - a) * 6 * N))
-        assert colour.level_of(*colour.long_memory(series)) == pytest.approx(1.0 / (1.0 - a), rel=2.5 * error)
+        assert autoregression.level_of(*autoregression.long_memory(series)) == pytest.approx(
+            1.0 / (1.0 - a), rel=2.5 * error
+        )
 
 
 @pytest.mark.parametrize(("of", "seed"), [(0.7, 0), (1.0, 1)])

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover import simulate
-from rollover.attitude import ANGLES, QUATERNION
-from rollover.diagnosis.bins import compared
-from rollover.diagnosis.evidence import Evidence, evidence_of
-from rollover.diagnosis.readings import without_spikes
-from rollover.diagnosis.slips import slips_of
+from rollover.comparison.synthesis import synthetic
+from rollover.diagnosis.data.dataset import Evidence, evidence_of
+from rollover.diagnosis.data.inconsistent import slips_of
+from rollover.diagnosis.data.quantisation import without_spikes
+from rollover.diagnosis.forward.averaging import compared
+from rollover.dynamics import simulate
 from rollover.recording import Recording
+from rollover.recording.attitude import ANGLES, QUATERNION
 from rollover.scenario import Scenario
-from rollover.synthesis import synthetic
 from tests.physics.scenes import shipped
 from tests.rollover.attitudes import OTHERWISE, within_half_a_turn
 

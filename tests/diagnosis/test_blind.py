@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from rollover.diagnosis import Diagnosis, diagnose
-from rollover.diagnosis.account import account
+from rollover.diagnosis.io import account
 from rollover.proof.generator import Case, Order, make
 from rollover.proof.score import score
 from rollover.scenario import load

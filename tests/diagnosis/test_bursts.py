@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rollover.diagnosis import bursts, colour
-from rollover.diagnosis.bursts import too_often, without_bursts
-from rollover.diagnosis.detect import mismatch_of
-from rollover.diagnosis.fit import Block
+from rollover.diagnosis.fit.levenberg_marquardt import Block
+from rollover.diagnosis.inference.lack_of_fit import mismatch_of
+from rollover.diagnosis.noise import autoregression, outliers
+from rollover.diagnosis.noise.outliers import too_often, without_bursts
 from tests.diagnosis.test_chaos import SIGMA, STEP, N, evidence
 
 
@@ -34,10 +34,10 @@ def test_noise_is_that_beside_the_bursts() -> None:
     """They leave no window quiet: by windows it would be several times as large."""
     rng = np.random.default_rng(2)
     several = [evidence(loose(rng)) for _ in range(4)]
-    for e in colour.quiet(several, [e.signals[0].values for e in several]):
+    for e in autoregression.quiet(several, [e.signals[0].values for e in several]):
         # 15 % of the samples are the middle of their neighbours, which is quieter: 6 % low, and 3 % of so few samples
         assert e.signals[0].noise == pytest.approx(SIGMA, rel=0.1)
-    for e in colour.whole(several, [loose(rng, lasting=1) for _ in several]):
+    for e in autoregression.whole(several, [loose(rng, lasting=1) for _ in several]):
         assert e.signals[0].noise == SIGMA  # as it was held
 
 
@@ -56,12 +56,12 @@ def test_rare_bursts_are_a_mismatch_though_they_are_rough() -> None:
     found = []
     for many in (0, 6):
         off = SIGMA * rng.standard_normal(N)
-        off[rng.permutation(N)[:many]] += 1.5 * bursts.FAR * SIGMA * rng.choice([-1.0, 1.0], many)
+        off[rng.permutation(N)[:many]] += 1.5 * outliers.FAR * SIGMA * rng.choice([-1.0, 1.0], many)
         e = evidence(off)
         block = Block(residual=e.whitened(off), J=np.zeros((N, 0)), slope=np.zeros(N), shift=0.0, prior=1e-3)
         found.append(mismatch_of([e], [block], [((times[0], "rest"),)]).p_value)
     assert found[0] > 0.05
     assert found[1] > 0.01  # as few as any recorder may have
-    off[rng.permutation(N)[:24]] += 1.5 * bursts.FAR * SIGMA * rng.choice([-1.0, 1.0], 24)
+    off[rng.permutation(N)[:24]] += 1.5 * outliers.FAR * SIGMA * rng.choice([-1.0, 1.0], 24)
     block = Block(residual=e.whitened(off), J=np.zeros((N, 0)), slope=np.zeros(N), shift=0.0, prior=1e-3)
     assert mismatch_of([e], [block], [((times[0], "rest"),)]).p_value < 1e-9

@@ -9,8 +9,12 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from rollover.diagnosis import chaos
-from rollover.diagnosis.chaos import (
+from rollover.diagnosis.data.dataset import Evidence, Signal
+from rollover.diagnosis.fit.levenberg_marquardt import Block
+from rollover.diagnosis.forward.forward_model import simulator_of
+from rollover.diagnosis.inference.lack_of_fit import mismatch_of
+from rollover.diagnosis.noise import ensemble
+from rollover.diagnosis.noise.ensemble import (
     STATE,
     Course,
     alike,
@@ -23,10 +27,6 @@ from rollover.diagnosis.chaos import (
     unseen,
     weighted,
 )
-from rollover.diagnosis.detect import mismatch_of
-from rollover.diagnosis.evidence import Evidence, Signal
-from rollover.diagnosis.fit import Block
-from rollover.diagnosis.simulator import simulator_of
 from rollover.recording import Recording
 from tests.physics.scenes import shipped
 
@@ -71,7 +71,7 @@ def test_a_sample_counts_by_its_noise_and_its_scatter() -> None:
     found = weighted(e, [alternating, {CHANNEL: -alternating[CHANNEL]}]).signals[0].weight
     assert found is not None
     inside = slice(110, N)
-    np.testing.assert_allclose(found[inside], SIGMA / np.sqrt(SIGMA**2 + chaos.FEW * 0.5**2), rtol=1e-12)
+    np.testing.assert_allclose(found[inside], SIGMA / np.sqrt(SIGMA**2 + ensemble.FEW * 0.5**2), rtol=1e-12)
     np.testing.assert_array_equal(found[:95], 1.0)
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rollover.diagnosis.chassis import degrees_of
-from rollover.diagnosis.evidence import Evidence, evidence_of
-from rollover.diagnosis.overturn import RunSimulator
+from rollover.diagnosis.data.dataset import Evidence, evidence_of
+from rollover.diagnosis.forward.full_run import RunSimulator
+from rollover.diagnosis.inference.chassis import degrees_of
 from rollover.recording import Recording
 from rollover.scenario import Scenario
-from rollover.vehicle import chassis_of
+from rollover.spec.vehicle import chassis_of
 from tests.physics.scenes import shipped
 
 ALONG = tuple(f"chassis/acceleration_{axis}" for axis in "xyz")

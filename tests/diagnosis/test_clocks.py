@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollover.diagnosis.candidates import coordinate
-from rollover.diagnosis.clocks import BELIEVED, align, by_clock, by_first_contact, mistimed
-from rollover.diagnosis.evidence import Evidence, evidence_of
-from rollover.diagnosis.fit import Judge
-from rollover.diagnosis.gate import followed, gate
-from rollover.diagnosis.ranges import candidates_of
-from rollover.diagnosis.refine import ended
-from rollover.diagnosis.simulator import DropSimulator, simulator_of
-from rollover.drop import DropModel
+from rollover.diagnosis.data.dataset import Evidence, evidence_of
+from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.fit.local_search import ended
+from rollover.diagnosis.fit.parameterisation import coordinate, followed
+from rollover.diagnosis.fit.time_shift import BELIEVED, align, by_clock, by_first_contact, mistimed
+from rollover.diagnosis.forward.forward_model import DropSimulator, simulator_of
+from rollover.diagnosis.selection.candidates import candidates_of
+from rollover.diagnosis.selection.score_test import gate
+from rollover.dynamics.drop_test import DropModel
 from rollover.effects import spoken
 from rollover.recording import Clock
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario

@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from rollover.diagnosis import colour, diagnose
-from rollover.diagnosis.blocks import Block
-from rollover.diagnosis.colour import Rest, quiet, rests, unlike
-from rollover.diagnosis.detect import mismatch_of
-from rollover.diagnosis.evidence import Evidence, Signal
-from rollover.filters import filtered
+from rollover.diagnosis import diagnose
+from rollover.diagnosis.data.dataset import Evidence, Signal
+from rollover.diagnosis.fit.linearisation import Block
+from rollover.diagnosis.inference.lack_of_fit import mismatch_of
+from rollover.diagnosis.noise import autoregression
+from rollover.diagnosis.noise.autoregression import Rest, quiet, rests, unlike
 from rollover.recording import Recording
+from rollover.recording.filters import filtered
 from tests.diagnosis.drops import recorded as dropped
 from tests.diagnosis.drops import scenario as drop
 
@@ -78,7 +79,7 @@ def test_noise_that_no_filter_made_is_taken_for_even() -> None:
 
 def test_without_a_filter_that_can_be_the_noise_s_own_it_is_taken_for_even(monkeypatch: pytest.MonkeyPatch) -> None:
     """None declared, one too wide for the rate, averages, a longer memory, none weighed; whatever the memory says."""
-    monkeypatch.setattr(colour, "AGREES", 1e3)
+    monkeypatch.setattr(autoregression, "AGREES", 1e3)
     e = recorded(behind(np.random.default_rng(5)))
     assert rests([e])[0][CHANNEL].correlation is not None
     others = [
@@ -155,5 +156,5 @@ def test_only_noise_that_is_louder_in_all_it_holds_is_taken_for_noise(loud: floa
     s = replace(e.signals[0], at_rest=(1.0, (0.34,)))
     for seed in range(20):
         random = np.random.default_rng([6, seed])
-        sigma, ar = colour.autoregression([markov(random, loud, 0.34) + pulses(random, slow)])
-        assert (colour.slower([(0, 0, s, sigma, ar)]) == set()) is taken, seed
+        sigma, ar = autoregression.autoregression([markov(random, loud, 0.34) + pulses(random, slow)])
+        assert (autoregression.slower([(0, 0, s, sigma, ar)]) == set()) is taken, seed

@@ -13,7 +13,7 @@ from rollover.diagnosis import account, diagnose
 from rollover.recording import Recording
 from tests.diagnosis.drops import DEPTH, FORCE, recorded, scenario
 
-diagnosing = importlib.import_module("rollover.diagnosis.diagnose")
+diagnosing = importlib.import_module("rollover.diagnosis.pipeline")
 Recordings = list[tuple[str, Recording]]
 SPEEDS = (1.5, 2.5)
 

@@ -9,21 +9,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rollover.diagnosis import colour
-from rollover.diagnosis import dependence as dependence_of
-from rollover.diagnosis.bins import simulated
-from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.clocks import align
-from rollover.diagnosis.depend import ACCELERATION, DEPTH, SPEED, TIME
-from rollover.diagnosis.dependence import IMPACT, VALUE, Dependence, dependence, dependence_of_one, ways
-from rollover.diagnosis.detect import mismatch_of
-from rollover.diagnosis.evidence import Evidence, evidence_of
-from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.lines import lines, without
-from rollover.diagnosis.phases import drop_phases
-from rollover.diagnosis.response import channels_of, pushed
-from rollover.diagnosis.simulator import set_up
-from rollover.diagnosis.straight import is_any_curve, is_pliant
+from rollover.diagnosis.data.dataset import Evidence, evidence_of
+from rollover.diagnosis.data.phases import drop_phases
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.forward.averaging import simulated
+from rollover.diagnosis.forward.forward_model import set_up
+from rollover.diagnosis.inference import drop_dependence as dependence_of
+from rollover.diagnosis.inference.bases import ACCELERATION, DEPTH, SPEED, TIME
+from rollover.diagnosis.inference.drop_dependence import IMPACT, VALUE, Dependence, dependence, dependence_of_one, ways
+from rollover.diagnosis.inference.lack_of_fit import mismatch_of
+from rollover.diagnosis.inference.residual_force import channels_of, pushed
+from rollover.diagnosis.noise import autoregression
+from rollover.diagnosis.noise.spectral_lines import lines, without
+from rollover.diagnosis.selection.flexibility import is_any_curve, is_pliant
 from rollover.effects import Search
 from rollover.proof.generator import Order, make
 from rollover.recording import Clock, Recording
@@ -43,7 +43,7 @@ def base_of(own: Scenario, recordings: Sequence[tuple[str, Recording]]) -> tuple
     align(judge)
     first = judge.fit((), (), rounds=2)
     assert first is not None
-    judge.weigh(colour.quiet(evidence, judge.residuals(first)))
+    judge.weigh(autoregression.quiet(evidence, judge.residuals(first)))
     base = judge.fit((), ())
     assert base is not None
     return judge, base
@@ -202,11 +202,11 @@ def test_noise_with_a_memory_is_weighed_by_all_that_is_left_and_a_drift_is_not()
     drift = white + 4.0 * np.tile(1.0 / (1.0 + np.exp(-(np.arange(n) - 200.0) / 15.0)), 3)
     for misfit, ar, kept in ((slow, (0.5,), False), (white, (), False), (drift, (), True)):
         before = held(misfit, 1.0, ar)
-        after = colour.whole(before, list(misfit.reshape(3, n)))
+        after = autoregression.whole(before, list(misfit.reshape(3, n)))
         assert (after[0].signals[0] is before[0].signals[0]) == kept
-    assert sum(colour.whole(held(slow, 1.0, (0.5,)), list(slow.reshape(3, n)))[0].signals[0].ar) == pytest.approx(
-        0.6, abs=0.08
-    )
+    assert sum(
+        autoregression.whole(held(slow, 1.0, (0.5,)), list(slow.reshape(3, n)))[0].signals[0].ar
+    ) == pytest.approx(0.6, abs=0.08)
 
 
 def test_levels_that_are_off_are_no_memory_of_the_noise_however_often_it_is_weighed() -> None:
@@ -221,7 +221,7 @@ def test_levels_that_are_off_are_no_memory_of_the_noise_however_often_it_is_weig
         # weighed once before, by what one effect had left
         again = [replace(e, signals=(replace(e.signals[0], noise=1.4, ar=(0.85,)),)) for e in before]
         for evidence in (before, again):
-            after = colour.whole(evidence, list(misfit.reshape(3, n)))
+            after = autoregression.whole(evidence, list(misfit.reshape(3, n)))
             assert (after[0].signals[0] is evidence[0].signals[0]) == kept
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.digits import decimals, to_the_last_digit
+from rollover.diagnosis.data.rounding import decimals, to_the_last_digit
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 

@@ -7,25 +7,25 @@ import sys
 import numpy as np
 import pytest
 
-import rollover.diagnosis.diagnose  # noqa: F401  (the module, behind the function of its name)
+import rollover.diagnosis.pipeline  # noqa: F401  (the module, behind the function of its name)
 from ground.empirical import TERMS, shape
 from ground.law import REFERENCE_AREA
 from rollover.diagnosis import account, diagnose, diagnosed_text
-from rollover.diagnosis.account import diagnosed_scenario
-from rollover.diagnosis.clocks import align
-from rollover.diagnosis.empirical import best_subsets, proposed
-from rollover.diagnosis.evidence import evidence_of, left_out
-from rollover.diagnosis.fit import Judge
-from rollover.diagnosis.ranges import candidates_of
-from rollover.diagnosis.simulator import set_up, simulator_of
-from rollover.diagnosis.weak import Balance, _tests, balances
-from rollover.drop import DropModel
+from rollover.diagnosis.data.dataset import evidence_of, left_out
+from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.forward.forward_model import set_up, simulator_of
+from rollover.diagnosis.inference.residual_law import best_subsets, proposed
+from rollover.diagnosis.inference.weak_form import Balance, _tests, balances
+from rollover.diagnosis.io import diagnosed_scenario
+from rollover.diagnosis.selection.candidates import candidates_of
+from rollover.dynamics.drop_test import DropModel
 from rollover.effects.empirical import Empirical
 from rollover.recording import Recording
 from rollover.scenario import load
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
-asked = sys.modules["rollover.diagnosis.diagnose"]
+asked = sys.modules["rollover.diagnosis.pipeline"]
 
 
 @pytest.mark.parametrize(

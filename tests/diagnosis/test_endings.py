@@ -10,14 +10,14 @@ from typing import cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis import endings
-from rollover.diagnosis.blocks import Block
-from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.crew import Job
-from rollover.diagnosis.effort import DROPS
-from rollover.diagnosis.explain import Step
-from rollover.diagnosis.fit import Fitted
-from rollover.diagnosis.inquiry import Inquiry
+from rollover.diagnosis.fit.jobs import Job
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted
+from rollover.diagnosis.fit.linearisation import Block
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.fit.step import Step
+from rollover.diagnosis.forward.budget import DROPS
+from rollover.diagnosis.selection import simplification
+from rollover.diagnosis.selection.context import Inquiry
 from rollover.effects import Search
 
 FIRST = "soil-viscous-damping"
@@ -49,7 +49,7 @@ def test_rivals_are_begun_anew_beside_what_the_best_was_followed_to() -> None:
         return [fitted(job.candidates[-1].id, 4.0, job.start) for job in jobs]
 
     best, rival = fitted("mass", 1.0, (0.7, 0.3)), fitted("guide-friction", 9.0, (0.2, 0.4))
-    after = endings._with_rivals(cast(Inquiry, SimpleNamespace(fits=fits)), step(best, rival))
+    after = simplification._with_rivals(cast(Inquiry, SimpleNamespace(fits=fits)), step(best, rival))
     assert asked == [("guide-friction", (0.7, 0.4))]
     assert [f.left for f in after.rivals] == [1.0, 4.0]
 
@@ -68,8 +68,8 @@ def test_rivals_are_begun_anew_beside_what_the_best_holds_in_the_form_that_it_ha
     found = step(best, stood)
     found = replace(found, base=replace(found.base, candidates=(bent,), x=(0.2, 0.5)))
     there = cast(Inquiry, SimpleNamespace(fits=fits, candidates=[]))
-    endings._with_rivals(there, found)
-    endings.simpler(there, found)
+    simplification._with_rivals(there, found)
+    simplification.simpler(there, found)
     assert asked == [(2, (0.7, 0.4)), (2, (0.7, 0.4))]
 
 
@@ -87,7 +87,7 @@ def test_a_layer_from_the_surface_on_is_a_stiffness(depth: float, leaves: float,
     layer, stuck = fitted("soil-layer", 4.0, (0.7, depth, 0.3)), fitted("soil-stiffness", 90.0, (0.2, 0.4))
     as_many, far = fitted("soil-crust", 50.0, (0.2, 0.4, 0.4)), fitted("mass", 500.0, (0.2, 0.4))
     found = step(layer, as_many, stuck, far)
-    after = endings.simpler(cast(Inquiry, SimpleNamespace(fits=fits, candidates=[])), found)
+    after = simplification.simpler(cast(Inquiry, SimpleNamespace(fits=fits, candidates=[])), found)
     assert asked == ([(0.7, 0.4)] if depth == 0.0 else [])
     assert (after is not None) == taken
     if after is not None:
@@ -116,7 +116,7 @@ def test_a_layer_is_tried_as_the_stiffness_that_it_becomes(leaves: float, taken:
     first = stiff if is_held else mass
     best = Fitted(candidates=(first, layer), x=(0.7, 0.5, 0.2), blocks=(left(4.0, 3),))
     inquiry = cast(Inquiry, SimpleNamespace(fits=fits, candidates=[layer, stiff, mass]))
-    after = endings.simpler(inquiry, step(best))
+    after = simplification.simpler(inquiry, step(best))
     assert asked == ([] if is_held else [pytest.approx((0.7, 0.4), rel=1e-12)])  # rounding
     assert (after is not None) == (taken and not is_held)
     if after is not None:
@@ -148,7 +148,7 @@ def test_what_was_bent_to_do_anothers_work_is_straight_beside_it(leaves: float, 
 
     best = made((wide, other), (0.25, 0.6, 0.5, 0.7))
     found = replace(step(best), rivals=(best,))
-    after = endings._straightened(cast(Inquiry, SimpleNamespace(fits=fits, candidates=[layer, rate])), found)
+    after = simplification._straightened(cast(Inquiry, SimpleNamespace(fits=fits, candidates=[layer, rate])), found)
     assert begun == [(0.25, 0.5), (0.25, 0.5, 0.7), (0.25, 0.6, 0.5)]
     assert (after is None) == (not straight)
     if after is not None:
@@ -163,15 +163,17 @@ def test_what_draws_any_curve_is_not_followed_but_straightened(
     traced: list[Fitted] = []
     best = fitted("soil-layer", 4.0, (0.7, 0.3))
     judge = SimpleNamespace(effort=SimpleNamespace(thrifty=False), evidence=[])
-    monkeypatch.setattr(endings, "mismatch_of", lambda *_: SimpleNamespace(p_value=1e-9))
-    monkeypatch.setattr(endings, "is_any_curve", lambda _: is_a_curve)
-    monkeypatch.setattr(endings, "traced_too", lambda _, f: traced.append(f) or f)
+    monkeypatch.setattr(simplification, "mismatch_of", lambda *_: SimpleNamespace(p_value=1e-9))
+    monkeypatch.setattr(simplification, "is_any_curve", lambda _: is_a_curve)
+    monkeypatch.setattr(simplification, "traced_too", lambda _, f: traced.append(f) or f)
     for name in ("timed", "polish", "ended"):
-        monkeypatch.setattr(endings, name, lambda _, f: f)
-    monkeypatch.setattr(endings, "simpler", lambda *_: None)
+        monkeypatch.setattr(simplification, name, lambda _, f: f)
+    monkeypatch.setattr(simplification, "simpler", lambda *_: None)
     straight = step(fitted("soil-stiffness", 4.0, (0.7, 0.3)))
-    monkeypatch.setattr(endings, "_straightened", lambda *_: straight)
-    found, _ = endings.followed(cast(Inquiry, SimpleNamespace(judge=judge, phases=[], candidates=[])), step(best))
+    monkeypatch.setattr(simplification, "_straightened", lambda *_: straight)
+    found, _ = simplification.followed(
+        cast(Inquiry, SimpleNamespace(judge=judge, phases=[], candidates=[])), step(best)
+    )
     assert found is straight
     assert traced == ([] if is_a_curve else [best])
 
@@ -192,7 +194,10 @@ def test_a_damping_is_tried_as_the_drag_that_it_becomes_with_the_square_of_the_s
     mass = Candidate(id="mass", kind="parameter", family="", search={"added": Search(-1, 1)})
     block = Block(residual=np.ones(4), J=np.zeros((4, 3)), slope=np.zeros(4), shift=0.0, prior=1.0)
     best = Fitted(candidates=(mass, damping), x=(0.7, 0.22, 0.99), blocks=(block,))
-    assert endings.simpler(cast(Inquiry, SimpleNamespace(fits=fits, candidates=[damping, drag])), step(best)) is None
+    assert (
+        simplification.simpler(cast(Inquiry, SimpleNamespace(fits=fits, candidates=[damping, drag])), step(best))
+        is None
+    )
     assert [job.candidates for job in asked] == [(mass, drag)]
     assert asked[0].start == pytest.approx((0.7, 2.0 * 22.0 / (1800.0 * 0.140 * 0.045) / 50.0), rel=1e-12)  # rounding
 
@@ -215,9 +220,9 @@ def test_two_thresholds_in_one_place_are_a_threshold_and_a_stiffness(
     others = [replace(plain, kind="sensor"), replace(plain, search={"a": Search(0, 1), "b": Search(0, 1)})]
     best, rival = fitted("soil-crust", 5.0, (0.7, 0.4, 0.3)), fitted("mass", 9.0, (0.7, 0.2))
     there = cast(Inquiry, SimpleNamespace(fits=fits, candidates=[plain, *others, best.candidates[0]], judge=None))
-    found = endings.plainer(there, step(best, rival))
+    found = simplification.plainer(there, step(best, rival))
     assert {j.candidates[-1].id for j in asked} == {"soil-stiffness"}
-    ways = [("fit", endings.SOON), ("fit", None), ("polish", None)]
+    ways = [("fit", simplification.SOON), ("fit", None), ("polish", None)]
     assert [(j.how, j.rounds) for j in asked] == ways[: 2 + taken]
     assert asked[0].start[:-1] == (0.7,)
     assert (found is not None) is taken
@@ -244,7 +249,7 @@ def test_of_two_thresholds_either_may_be_the_one_that_is_a_stiffness(family: str
 
     judge = SimpleNamespace(fit=lambda c, x, **_: left(c, x, 400.0), effort=DROPS)
     there = cast(Inquiry, SimpleNamespace(fits=fits, candidates=[layer, crust, plain], judge=judge))
-    found = endings.plainer(there, step(left((layer, crust), (0.4, 0.5, 0.3, 0.6), 5.0)))
+    found = simplification.plainer(there, step(left((layer, crust), (0.4, 0.5, 0.3, 0.6), 5.0)))
     assert (found is not None) is taken
     if found is not None:
         assert [c.id for c in found.fitted.candidates] == ["soil-crust", "soil-stiffness"]
@@ -257,7 +262,7 @@ def test_an_effect_by_itself_is_not_given_for_a_plainer_one() -> None:
     both = fitted("soil-crust", 5.0, (0.7, 0.4, 0.3))
     alone = replace(both, candidates=both.candidates[1:], x=both.x[1:])
     there = cast(Inquiry, SimpleNamespace(candidates=[both.candidates[0]], judge=None))
-    assert endings.plainer(there, step(alone)) is None
+    assert simplification.plainer(there, step(alone)) is None
 
 
 @pytest.mark.parametrize(("reaches", "known"), [(5.5, 40.0), (5.5, None), (50.0, 40.0)])
@@ -286,7 +291,7 @@ def test_what_mirrors_the_last_effect_competes_with_it(reaches: float, known: fl
     best = left((stiff, crust), (0.5, 0.4, 0.75), 5.0)
     rivals = [] if known is None else [left((stiff, layer), (0.5, 0.4, 0.5), known)]
     there = cast(Inquiry, SimpleNamespace(fits=fits, free=lambda _: [layer]))
-    found = endings.mirrored(there, step(best, *rivals))
+    found = simplification.mirrored(there, step(best, *rivals))
     assert found.fitted is best
     if known is not None and reaches > known:
         assert [f.left for f in found.rivals] == pytest.approx([5.0, known])

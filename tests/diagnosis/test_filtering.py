@@ -9,10 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 from rollover import scenario
-from rollover.diagnosis.bins import MOST_ROWS, simulated, thinned
-from rollover.diagnosis.filtering import rows_of
-from rollover.diagnosis.leaps import LEAP_IN
-from rollover.diagnosis.simulator import DropSimulator
+from rollover.diagnosis.forward.averaging import MOST_ROWS, simulated, thinned
+from rollover.diagnosis.forward.discontinuities import LEAP_IN
+from rollover.diagnosis.forward.filtering import rows_of
+from rollover.diagnosis.forward.forward_model import DropSimulator
 from rollover.recording import Recording
 
 FAST = np.arange(-1000, 4001) * 1e-4  # 10 kHz

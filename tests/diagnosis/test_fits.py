@@ -13,15 +13,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.diagnosis import diagnose, diagnosed_text, fit
-from rollover.diagnosis.bins import simulated
-from rollover.diagnosis.candidates import Candidate, coordinate
-from rollover.diagnosis.crew import Crew, Job, work
-from rollover.diagnosis.evidence import evidence_of
-from rollover.diagnosis.fit import Block, Judge, shift_of
-from rollover.diagnosis.leaps import about_jumps
-from rollover.diagnosis.otherwise import _best_middle
-from rollover.diagnosis.ranges import candidates_of
+from rollover.diagnosis import diagnose, diagnosed_text
+from rollover.diagnosis.data.dataset import evidence_of
+from rollover.diagnosis.fit import levenberg_marquardt
+from rollover.diagnosis.fit.jobs import Crew, Job, work
+from rollover.diagnosis.fit.levenberg_marquardt import Block, Judge, shift_of
+from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
+from rollover.diagnosis.forward.averaging import simulated
+from rollover.diagnosis.forward.discontinuities import about_jumps
+from rollover.diagnosis.selection.candidates import candidates_of
+from rollover.diagnosis.selection.restarts import _best_middle
 from rollover.scenario import load
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
@@ -305,18 +306,18 @@ def test_far_from_the_noise_a_fit_ends_where_a_round_gains_a_trifle(monkeypatch:
     judge = judge_of(recorded(LAYER, 3, speeds=(1.2, 2.2, 3.2)))
     ends: dict[tuple[str, float], tuple[tuple[float, ...], float, int]] = {}
     for key, start in (("soil-rate-hardening", (0.5,)), ("soil-layer", (0.6, 0.6))):
-        for trifling in (0.0, fit.TRIFLING):
-            monkeypatch.setattr(fit, "TRIFLING", trifling)
+        for trifling in (0.0, levenberg_marquardt.TRIFLING):
+            monkeypatch.setattr(levenberg_marquardt, "TRIFLING", trifling)
             own = judge.bare()
             found = own.fit((candidate(judge, key),), start)
             assert found is not None
             ends[key, trifling] = found.x, found.left, own.simulations
-    (x, left, made), (y, more, fewer) = (ends["soil-rate-hardening", t] for t in (0.0, fit.TRIFLING))
+    (x, left, made), (y, more, fewer) = (ends["soil-rate-hardening", t] for t in (0.0, levenberg_marquardt.TRIFLING))
     assert fewer < made
     assert left <= more < 1.005 * left
     assert y == pytest.approx(x, abs=0.02)
-    (x, left, _), (y, more, _) = (ends["soil-layer", t] for t in (0.0, fit.TRIFLING))
-    assert more == pytest.approx(left, abs=fit.ENOUGH)
+    (x, left, _), (y, more, _) = (ends["soil-layer", t] for t in (0.0, levenberg_marquardt.TRIFLING))
+    assert more == pytest.approx(left, abs=levenberg_marquardt.ENOUGH)
     assert y == pytest.approx(x, abs=1e-3)
 
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.bins import simulated
-from rollover.diagnosis.evidence import evidence_of
-from rollover.diagnosis.flat_tops import cut_off
-from rollover.diagnosis.ranges import candidates_of
-from rollover.diagnosis.readings import digitised
+from rollover.diagnosis.data.dataset import evidence_of
+from rollover.diagnosis.data.quantisation import digitised
+from rollover.diagnosis.forward.averaging import simulated
+from rollover.diagnosis.inference.clipping import cut_off
+from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.recording import Recording
 from tests.diagnosis.drops import FORCE, recorded, scenario
 

@@ -10,9 +10,9 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis import forms
-from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.fit import Fitted, Judge
+from rollover.diagnosis.fit import model_variants
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.effects import Search
 from tests.diagnosis.drops import linear_blocks
 
@@ -42,15 +42,15 @@ def test_of_fits_that_lead_to_one_place_one_is_followed(ends: tuple[float, ...],
     begun, whole = (0.2, 0.4, 0.6), []
 
     def fit(_: Any, x: Sequence[float], *, rounds: int | None = None, **how: Any) -> Fitted:
-        if rounds == forms.SHORT:
+        if rounds == model_variants.SHORT:
             return fitted(BENT, x, 10.0 + x[1])
-        if rounds == forms.FURTHER:
+        if rounds == model_variants.FURTHER:
             return fitted(BENT, (0.3, ends[begun.index(x[1])]), 9.0 + 0.1 * x[1])
         whole.append(x[1])
         return fitted(BENT, x, 8.0)
 
     judge, start = cast(Judge, SimpleNamespace(fit=fit)), fitted(DAMPING, (0.3,), 30.0)
-    best = forms._best_of(judge, start, BENT, [(0.3, v) for v in begun], [b.total for b in start.blocks])
+    best = model_variants._best_of(judge, start, BENT, [(0.3, v) for v in begun], [b.total for b in start.blocks])
     assert whole == followed
     assert best is not None
     assert best.x == (0.3, followed[0])
@@ -73,14 +73,14 @@ def test_of_short_fits_on_their_way_to_one_place_one_is_gone_on_with(
     begun: list[float] = []
 
     def fit(_: Any, x: Sequence[float], *, rounds: int | None = None, **how: Any) -> Fitted:
-        if rounds == forms.SHORT:
+        if rounds == model_variants.SHORT:
             return fitted(BENT, x, dict(near)[x[1]])
-        if rounds == forms.FURTHER:
+        if rounds == model_variants.FURTHER:
             begun.append(x[1])
         return fitted(BENT, x, 9.0)
 
     judge, start = cast(Judge, SimpleNamespace(fit=fit)), fitted(DAMPING, (0.3,), 30.0)
-    forms._best_of(judge, start, BENT, [(0.3, v) for v, _ in near], [b.total for b in start.blocks])
+    model_variants._best_of(judge, start, BENT, [(0.3, v) for v, _ in near], [b.total for b in start.blocks])
     assert begun == gone_on_with
 
 
@@ -95,11 +95,11 @@ def test_far_from_noise_a_shape_is_followed_if_it_soon_takes_part(left: float, s
     whole = []
 
     def fit(_: Any, x: Sequence[float], *, rounds: int | None = None, **how: Any) -> Fitted:
-        whole.extend([] if rounds == forms.SHORT else [x])
+        whole.extend([] if rounds == model_variants.SHORT else [x])
         return fitted(BENT, x, soon)
 
     judge, start = cast(Judge, SimpleNamespace(fit=fit)), fitted(DAMPING, (0.3,), left)
-    best = forms._best_of(judge, start, BENT, [(0.3, 0.4)], [b.total for b in start.blocks])
+    best = model_variants._best_of(judge, start, BENT, [(0.3, 0.4)], [b.total for b in start.blocks])
     assert (best is not None) is bool(whole) is is_followed
 
 
@@ -110,15 +110,15 @@ def test_where_few_recordings_lead_astray_all_are_fitted_from_where_the_usual_sh
     least = [60.0]
 
     def fit(candidates: Sequence[Candidate], x: Sequence[float], **how: Any) -> Fitted:
-        if how.get("rounds") == forms.SHORT:
+        if how.get("rounds") == model_variants.SHORT:
             return fitted(candidates[-1], x, 20.0 if tuple(x) == stands else 10.0)
         least[:] = [1.0] if tuple(x) == stands else least
         return fitted(candidates[-1], x, 30.0 if len(x) == 1 else least[0])
 
-    found = forms.shaped(cast(Judge, SimpleNamespace(fit=fit)), start, [b.total for b in start.blocks])
+    found = model_variants.shaped(cast(Judge, SimpleNamespace(fit=fit)), start, [b.total for b in start.blocks])
     assert found is not None
     assert len(found.x) == 2
-    assert forms.is_noise(found)
+    assert model_variants.is_noise(found)
 
 
 @pytest.mark.parametrize(
@@ -140,13 +140,13 @@ def test_a_shape_is_gone_on_with_if_it_comes_near_what_another_explanation_leave
 
     def fit(_: Any, x: Sequence[float], *, rounds: int | None = None, **how: Any) -> Fitted:
         made.extend([] if rounds else [x])
-        return fitted(BENT, x, soon if rounds == forms.SHORT else then)
+        return fitted(BENT, x, soon if rounds == model_variants.SHORT else then)
 
     start, lead = fitted(DAMPING, (0.3,), 6.0), fitted(DAMPING, (0.3,), leaves)
     size = sum(b.residual.size for b in lead.blocks)
     scale = leaves * size / lead.total  # blocks of chance: what they leave is nearly their number
     judge = cast(Judge, SimpleNamespace(fit=lambda *a, **k: _scaled(fit(*a, **k), scale)))
-    forms._best_of(judge, _scaled(start, scale), BENT, [(0.3, 0.4)], [scale * b.total for b in lead.blocks])
+    model_variants._best_of(judge, _scaled(start, scale), BENT, [(0.3, 0.4)], [scale * b.total for b in lead.blocks])
     assert len(made) == whole
 
 

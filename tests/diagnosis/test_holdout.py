@@ -11,11 +11,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis.explain import _by_fits
-from rollover.diagnosis.fit import Judge
-from rollover.diagnosis.holdout import held_out, refitted
-from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.lookout import at_each
+from rollover.diagnosis.fit.cross_validation import held_out, refitted
+from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.fit.scan_jobs import at_each
+from rollover.diagnosis.selection.context import Inquiry
+from rollover.diagnosis.selection.forward_step import _by_fits
 from tests.diagnosis.drops import FORCE, recorded
 from tests.diagnosis.test_fits import GAIN, candidate, judge_of
 

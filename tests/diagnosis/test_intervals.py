@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.diagnosis import intervals as stated
-from rollover.diagnosis.blocks import Block
-from rollover.diagnosis.candidates import Candidate, coordinate
-from rollover.diagnosis.effort import DROPS
-from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.readings import digitised
+from rollover.diagnosis.data.quantisation import digitised
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.linearisation import Block
+from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
+from rollover.diagnosis.forward.budget import DROPS
+from rollover.diagnosis.inference import intervals as stated
 from rollover.effects import EFFECTS, Search, possible
 from rollover.proof.generator import make, plan
 from rollover.recording import Recording

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.diagnosis import pairs
-from rollover.diagnosis.explain import Step
-from rollover.diagnosis.gate import Gate, gate
-from rollover.diagnosis.joint import MOST, jointly
+from rollover.diagnosis.fit.step import Step
+from rollover.diagnosis.selection import pairs
+from rollover.diagnosis.selection.pair_score import MOST, jointly
+from rollover.diagnosis.selection.score_test import Gate, gate
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded
 from tests.diagnosis.test_fits import candidate, judge_of
 from tests.diagnosis.test_pairs import DAMPING, GRADUAL, MASS, NOSE, fitted, inquiry, screened

@@ -10,18 +10,19 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis import lasting as believed
-from rollover.diagnosis import one_by_one
-from rollover.diagnosis.blocks import Block, Fitted
-from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.chaos import Course
-from rollover.diagnosis.effort import DROPS, RUNS, Effort
-from rollover.diagnosis.explain import Step, _chosen
-from rollover.diagnosis.fit import Judge
-from rollover.diagnosis.gate import Gate
-from rollover.diagnosis.holdout import foretold, held_out
-from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.lasting import (
+from rollover.diagnosis.fit.cross_validation import foretold, held_out
+from rollover.diagnosis.fit.ensemble_mean import left_of_means
+from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.fit.linearisation import Block, Fitted
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.fit.step import Screened, Step
+from rollover.diagnosis.forward.budget import DROPS, RUNS, Effort
+from rollover.diagnosis.noise.ensemble import Course
+from rollover.diagnosis.result import Interval
+from rollover.diagnosis.selection import ensemble_validation as believed
+from rollover.diagnosis.selection import stepwise
+from rollover.diagnosis.selection.context import Inquiry
+from rollover.diagnosis.selection.ensemble_validation import (
     astray,
     backed,
     before_the_blow,
@@ -33,9 +34,9 @@ from rollover.diagnosis.lasting import (
     unbent,
     unforgiven,
 )
-from rollover.diagnosis.screening import Screened, kin
-from rollover.diagnosis.settle import left_of_means
-from rollover.diagnosis.verdict import Interval
+from rollover.diagnosis.selection.forward_step import _chosen
+from rollover.diagnosis.selection.score_test import Gate
+from rollover.diagnosis.selection.screening import kin
 from rollover.effects import Search
 from tests.diagnosis.test_settle import CHANNEL, SLOPE, TIME, N, Rough, candidate, evidence
 
@@ -146,7 +147,7 @@ def test_where_runs_scatter_what_is_missing_for_sure_is_looked_for_though_slopes
     assert base is not None
     assert fitted is not None
     found = Step(base=base, fitted=fitted, p_value=p, rivals=(fitted,))
-    assert one_by_one.is_beyond_chance(found, judge, 4 * [[(0.0, "rest")]]) is goes_on
+    assert stepwise.is_beyond_chance(found, judge, 4 * [[(0.0, "rest")]]) is goes_on
 
 
 @pytest.mark.parametrize(("others", "in_full"), [(0, False), (1, False), (2, False), (3, True), (4, True)])
@@ -196,13 +197,13 @@ def test_what_admits_a_step_speaks_for_its_best(monkeypatch: pytest.MonkeyPatch,
     In a step that another one led it is none of the rivals.
     """
     seen: list[int] = []
-    monkeypatch.setattr(one_by_one, "lasting", lambda _judge, found, _groups: seen.append(len(found.rivals)))
+    monkeypatch.setattr(stepwise, "lasting", lambda _judge, found, _groups: seen.append(len(found.rivals)))
     null = np.sort(np.random.default_rng(0).standard_normal((4000, 10)).max(axis=1) ** 2)
     score = float(np.quantile(null, 1.0 - (0.06 if p > 0.005 or not kept else p)))
     one = Fitted(candidates=(candidate("slope", "physics", "a"),), x=(0.5,), blocks=())
     looked = Gate(score=score, scores={"slope": score}, null=null, detectable={})
     inquiry: Any = SimpleNamespace(judge=SimpleNamespace(effort=RUNS), groups=[])
-    one_by_one.upheld(inquiry, Step(base=one, fitted=one, p_value=p, rivals=(one,)), looked)
+    stepwise.upheld(inquiry, Step(base=one, fitted=one, p_value=p, rivals=(one,)), looked)
     assert seen == [kept]
 
 
@@ -360,12 +361,12 @@ def test_other_courses_are_counted_otherwise_where_nothing_lasts(
         seen.append(judge.straying)
         return looked
 
-    monkeypatch.setattr(one_by_one, "look", looks)
-    monkeypatch.setattr(one_by_one, "step", lambda *_: made)
-    monkeypatch.setattr(one_by_one, "lasting", lambda *_: made if lasts else None)
-    monkeypatch.setattr(one_by_one, "moves", lambda *_: 1.0)
+    monkeypatch.setattr(stepwise, "look", looks)
+    monkeypatch.setattr(stepwise, "step", lambda *_: made)
+    monkeypatch.setattr(stepwise, "lasting", lambda *_: made if lasts else None)
+    monkeypatch.setattr(stepwise, "moves", lambda *_: 1.0)
     inquiry = Inquiry(judge=judge, candidates=[], groups=[], phases=[], say=lambda _: None, crew=cast(Any, None))
-    found = one_by_one.counted_otherwise(inquiry, current)
+    found = stepwise.counted_otherwise(inquiry, current)
     able = others > 1 or not straying
     assert seen == [not straying] * able
     assert (found is not None) == (able and lasts)

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.diagnosis.crew import Crew, Job
-from rollover.diagnosis.effort import DROPS, RUNS
-from rollover.diagnosis.explain import lent_by
-from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.looks import look
-from rollover.diagnosis.refine import without
+from rollover.diagnosis.fit.jobs import Crew, Job
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.local_search import without
+from rollover.diagnosis.forward.budget import DROPS, RUNS
+from rollover.diagnosis.selection.forward_step import lent_by
+from rollover.diagnosis.selection.scan import look
 from tests.diagnosis.test_looks import judge_of as looks_of
 from tests.diagnosis.test_slopes import CHANNEL, MASS, SIGMA, SLOPE, TIME, Late, evidence
 

@@ -10,15 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.diagnosis import looks, selection
-from rollover.diagnosis.blocks import Block, Fitted
-from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.chaos import STATE, Course
-from rollover.diagnosis.effort import RUNS
-from rollover.diagnosis.evidence import Evidence, Signal
-from rollover.diagnosis.fit import Judge
-from rollover.diagnosis.gate import CLOSER, VISIBLE, Gate, _at_odds, _best_along, _visible, gate
-from rollover.diagnosis.screening import _begun_at, promising
+from rollover.diagnosis.data.dataset import Evidence, Signal
+from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.fit.linearisation import Block, Fitted
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.forward.budget import RUNS
+from rollover.diagnosis.noise.ensemble import STATE, Course
+from rollover.diagnosis.selection import decision
+from rollover.diagnosis.selection import scan as looks
+from rollover.diagnosis.selection.score_test import CLOSER, VISIBLE, Gate, _at_odds, _best_along, _visible, gate
+from rollover.diagnosis.selection.screening import _begun_at, promising
 from rollover.effects import Search
 from rollover.recording import Recording
 from tests.diagnosis import test_fits
@@ -269,7 +270,7 @@ def test_what_was_refuted_tells_nothing() -> None:
     judge, base = judge_of((0.0,) * 4, (2.0,) * 4)
     looked = gate(judge, base, [SLOPE])
     before: Any = type("M", (), {"p_value": 0.3})()
-    found = selection.Explanation(
+    found = decision.Explanation(
         base=base, fitted=base, parts=(), looked=looked, detectable={}, before=before, after=before
     )
     assert found.p_value < 1e-6
@@ -291,7 +292,7 @@ def test_of_two_tests_the_smaller_p_value_is_uniform_for_the_shares_of_errors_th
     def told(before: float, look: float) -> float:
         one: Any = SimpleNamespace(p_value=before)
         other: Any = SimpleNamespace(p_value=lambda: look)
-        found = selection.Explanation(
+        found = decision.Explanation(
             base=base, fitted=base, parts=(), looked=other, detectable={}, before=one, after=one
         )
         return found.p_value

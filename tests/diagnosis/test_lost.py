@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.lost import lost
-from rollover.filters import filtered
-from rollover.prechecks import prechecks
-from rollover.prechecks.finding import trace
-from rollover.prechecks.leaps import across, leaping, of_a_blow
+from rollover.diagnosis.inference.lost_samples import lost
 from rollover.recording import Recording
+from rollover.recording.checks import prechecks
+from rollover.recording.checks.finding import trace
+from rollover.recording.checks.leaps import across, leaping, of_a_blow
+from rollover.recording.filters import filtered
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
-diagnosing = importlib.import_module("rollover.diagnosis.diagnose")
+diagnosing = importlib.import_module("rollover.diagnosis.pipeline")
 RATE, N = 1000.0, 600
 TIME = np.arange(N) / RATE
 PHASES = [((0.0, "approach"), (0.3, "impact"))] * 3

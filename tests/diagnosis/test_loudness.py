@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.loudness import SPREAD, with_loudness
-from rollover.diagnosis.simulator import simulator_of
-from rollover.diagnosis.whitening import Whitening
+from rollover.diagnosis.data.whitening import Whitening
+from rollover.diagnosis.forward.forward_model import simulator_of
+from rollover.diagnosis.noise.heteroscedasticity import SPREAD, with_loudness
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario, signal
 from tests.diagnosis.test_chaos import BLOW, blown
@@ -62,7 +62,7 @@ def test_noise_alone_does_not_grow_with_itself() -> None:
 @pytest.mark.parametrize("cfc", [None, 180])
 @pytest.mark.parametrize("rate", [500.0, 5000.0])
 def test_an_even_noise_or_a_filter_is_not_taken_for_it(rate: float, cfc: int | None) -> None:
-    from rollover.filters import filtered
+    from rollover.recording.filters import filtered
 
     made = recorded({"effects.soil-crust.thickness": 0.03}, seed=2, noise=0.01, rate=rate, channels=CHANNELS)
     if cfc is not None and rate > 10.0 * cfc:

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.diagnosis import settle
-from rollover.diagnosis.blocks import Block
-from rollover.diagnosis.explain import Step
-from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.settle import settled
+from rollover.diagnosis.fit import ensemble_mean
+from rollover.diagnosis.fit.ensemble_mean import settled
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.linearisation import Block
+from rollover.diagnosis.fit.step import Step
 from tests.diagnosis.test_slopes import CHANNEL, MASS, SLOPE, TIME, Scattering, evidence
 
 
@@ -63,13 +63,13 @@ def begun_at(x: float, values: np.ndarray) -> tuple[Judge, Step]:
 def steps(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """Places to which it was moved."""
     made: list[Any] = []
-    onward = settle._onward
+    onward = ensemble_mean._onward
 
     def counted(judge: Judge, old: Fitted, dx: np.ndarray) -> Any:
         made.append(onward(judge, old, dx))
         return made[-1]
 
-    monkeypatch.setattr(settle, "_onward", counted)
+    monkeypatch.setattr(ensemble_mean, "_onward", counted)
     return made
 
 
@@ -121,11 +121,11 @@ def test_the_whole_way_is_gone_unless_a_share_of_it_leaves_clearly_less(
         asked.append(round(x[0], 9))
         return lefts[len(asked) - 1], [s + 1.0 for s in shifts]
 
-    monkeypatch.setattr(settle, "_met", met)
+    monkeypatch.setattr(ensemble_mean, "_met", met)
     judge: Any = SimpleNamespace(made_ahead=lambda points: announced.extend(round(x[0], 9) for _, _, x in points))
     block = Block(residual=np.full(4, 5.0), J=np.zeros((4, 1)), slope=np.zeros(4), shift=0.0, prior=1.0)
     old = Fitted(candidates=(SLOPE,), x=(0.5,), blocks=(block,))
-    there = settle._onward(judge, old, np.array([0.1]))
+    there = ensemble_mean._onward(judge, old, np.array([0.1]))
     assert asked == announced == [0.6, 0.55, 0.65][: len(lefts)]
     assert there == (None if found is None else ([pytest.approx(found)], [1.0]))
 

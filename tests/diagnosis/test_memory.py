@@ -7,8 +7,9 @@ from functools import partial
 import numpy as np
 import pytest
 
-from rollover.diagnosis import diagnose, simulations
-from rollover.diagnosis.memory import Memory
+from rollover.diagnosis import diagnose
+from rollover.diagnosis.fit import cache
+from rollover.diagnosis.fit.notebook import Memory
 from tests.diagnosis.drops import recorded, scenario
 
 
@@ -33,7 +34,7 @@ def test_the_older_half_is_let_go_of() -> None:
 def test_an_answer_is_the_same_with_little_room(monkeypatch: pytest.MonkeyPatch) -> None:
     layer = {"effects.soil-layer.depth": 0.1, "effects.soil-layer.stiffness_ratio": 1.5}
     whole = diagnose(scenario(), recorded(layer, 4))
-    monkeypatch.setattr(simulations, "Memory", partial(Memory, most=40_000))
+    monkeypatch.setattr(cache, "Memory", partial(Memory, most=40_000))
     short = diagnose(scenario(), recorded(layer, 4))
     (one,), (other,) = whole.effects, short.effects
     assert (one.id, short.sentence) == (other.id, whole.sentence)

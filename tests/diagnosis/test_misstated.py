@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.evidence import Evidence, evidence_of
-from rollover.diagnosis.misstated import misstated
-from rollover.diagnosis.simulator import simulator_of
+from rollover.diagnosis.data.dataset import Evidence, evidence_of
+from rollover.diagnosis.forward.forward_model import simulator_of
+from rollover.diagnosis.inference.wrong_condition import misstated
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rollover.diagnosis.secant import narrowed
+from rollover.diagnosis.fit.finite_differences import narrowed
 
 
 def test_what_moves_a_recording_far_beyond_its_noise_is_told_over_a_narrower_step() -> None:

@@ -9,15 +9,15 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis import lasting, selection
-from rollover.diagnosis.blocks import Block
-from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.effort import DROPS, RUNS, Effort
-from rollover.diagnosis.explain import Step
-from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.selection import MOST
-from rollover.diagnosis.verdict import Interval
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.linearisation import Block
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.fit.step import Step
+from rollover.diagnosis.forward.budget import DROPS, RUNS, Effort
+from rollover.diagnosis.result import Interval
+from rollover.diagnosis.selection import decision, ensemble_validation
+from rollover.diagnosis.selection.context import Inquiry
+from rollover.diagnosis.selection.decision import MOST
 from rollover.effects import Search
 
 
@@ -58,14 +58,14 @@ def test_beside_effects_in_another_form_the_last_one_is_looked_for_anew(
         found = of(*kept, answers[first.id])
         return Step(base=of(*kept), fitted=found, p_value=0.0, rivals=(found,))
 
-    monkeypatch.setattr(selection, "instead", instead)
-    monkeypatch.setattr(selection, "without_needless", lambda _, f, *__: f)
+    monkeypatch.setattr(decision, "instead", instead)
+    monkeypatch.setattr(decision, "without_needless", lambda _, f, *__: f)
     judge = SimpleNamespace(again=lambda f: f, effort=DROPS)
     taken = [
         Step(base=of(), fitted=of(beside), p_value=0.0),
         Step(base=of(beside), fitted=of(held, CRUST), p_value=0.0),
     ]
-    parts = selection._needed(cast(Inquiry, SimpleNamespace(judge=judge)), taken)
+    parts = decision._needed(cast(Inquiry, SimpleNamespace(judge=judge)), taken)
     assert parts is not None
     assert looked == asked
     assert {c.id for c in parts[-1].fitted.candidates} == {"soil-layer", answers.get("soil-crust", CRUST)[0]}
@@ -93,11 +93,11 @@ def test_of_full_runs_what_is_surely_there_is_not_tried_without_and_the_fit_with
         assert bare == effort.thrifty
         return left(of(CRUST), 9.0 - k)
 
-    monkeypatch.setattr(selection, "without", without)
-    monkeypatch.setattr(selection, "surely_there", lambda *_: surely)
+    monkeypatch.setattr(decision, "without", without)
+    monkeypatch.setattr(decision, "surely_there", lambda *_: surely)
     base, held = left(of(beside), 8.0), left(of(("soil-layer", ("a",)), CRUST), 1.0)
     judge = cast(Any, SimpleNamespace(again=lambda f: f, effort=effort))
-    assert selection.without_needless(judge, held, base) is held
+    assert decision.without_needless(judge, held, base) is held
     assert asked == fitted_again
 
 
@@ -117,21 +117,21 @@ def test_the_strongest_is_that_without_which_most_is_left(monkeypatch: pytest.Mo
         assert shifts == [0.0]
         return {"soil-layer": 3.0, "soil-crust": None}[candidates[0].id]  # without the layer no run is to be had
 
-    monkeypatch.setattr(selection, "left_at", left_at)
-    monkeypatch.setattr(selection, "without", lambda _, f, k, rounds: left(of(CRUST), 2.0 - k))
+    monkeypatch.setattr(decision, "left_at", left_at)
+    monkeypatch.setattr(decision, "without", lambda _, f, k, rounds: left(of(CRUST), 2.0 - k))
     judge = cast(Any, SimpleNamespace(effort=effort))
     held = replace(left(of(LAYER, CRUST), 1.0), x=(0.1, 0.2, 0.3, 0.4))
-    assert selection.strongest(judge, left(of(), 9.0), held).id == "soil-layer"
+    assert decision.strongest(judge, left(of(), 9.0), held).id == "soil-layer"
     assert asked == ([(["soil-crust"], [0.3, 0.4]), (["soil-layer"], [0.1, 0.2])] if effort.thrifty else [])
 
 
 def test_what_is_not_needed_goes_and_the_rest_has_slopes_again(monkeypatch: pytest.MonkeyPatch) -> None:
     rest, again = left(of(LAYER), 1.0), left(of(LAYER), 1.0)
-    monkeypatch.setattr(selection, "without", lambda *_, **__: rest)
-    monkeypatch.setattr(selection, "surely_there", lambda *_: {0})
+    monkeypatch.setattr(decision, "without", lambda *_, **__: rest)
+    monkeypatch.setattr(decision, "surely_there", lambda *_: {0})
     for effort, found in ((RUNS, again), (DROPS, rest)):
         judge = cast(Any, SimpleNamespace(again=lambda f: again if f is rest else f, effort=effort))
-        assert selection.without_needless(judge, left(of(LAYER, CRUST), 1.0)) is found
+        assert decision.without_needless(judge, left(of(LAYER, CRUST), 1.0)) is found
 
 
 MASS, SPEED, RATE, DRAG = ((i, ("a",)) for i in ("mass", "impact-speed", "soil-rate-hardening", "soil-inertial-drag"))
@@ -167,12 +167,12 @@ def test_as_many_effects_as_may_be_that_are_given_for_others_again_and_again_exp
         left = [(c.id, tuple(c.search)) for c in f.candidates if len(looked) < 2 or c.id != needless]
         return of(*left)
 
-    monkeypatch.setattr(selection, "instead", instead)
-    monkeypatch.setattr(selection, "without_needless", without_needless)
+    monkeypatch.setattr(decision, "instead", instead)
+    monkeypatch.setattr(decision, "without_needless", without_needless)
     judge = SimpleNamespace(again=lambda f: f, effort=DROPS)
     order = (LAYER, CRUST, MASS)
     taken = [Step(base=of(*order[:k]), fitted=of(*order[: k + 1]), p_value=0.0) for k in range(MOST)]
-    parts = selection._needed(cast(Inquiry, SimpleNamespace(judge=judge)), taken)
+    parts = decision._needed(cast(Inquiry, SimpleNamespace(judge=judge)), taken)
     assert looked == asked
     assert (None if parts is None else {c.id for c in parts[-1].fitted.candidates}) == found
 
@@ -192,12 +192,12 @@ def test_effects_that_will_be_refused_are_not_looked_for_anew(
 ) -> None:
     held = of(LAYER, CRUST, MASS)
     fitted = of(*(LAYER, CRUST, MASS)[:count])
-    monkeypatch.setattr(selection, "matters", lambda *_: matters)
-    monkeypatch.setattr(selection, "is_tolerated", lambda *_: False)
-    monkeypatch.setattr(selection, "without_needless", lambda *_: of(LAYER, CRUST) if needless else held)
+    monkeypatch.setattr(decision, "matters", lambda *_: matters)
+    monkeypatch.setattr(decision, "is_tolerated", lambda *_: False)
+    monkeypatch.setattr(decision, "without_needless", lambda *_: of(LAYER, CRUST) if needless else held)
     judge = cast(Any, SimpleNamespace(again=lambda f: f, effort=DROPS))
     left = cast(Any, SimpleNamespace(p_value=p_value))
-    assert selection.is_open_to_be_named(judge, fitted, left) == is_open
+    assert decision.is_open_to_be_named(judge, fitted, left) == is_open
 
 
 @pytest.mark.parametrize(
@@ -225,11 +225,11 @@ def test_what_ends_with_others_than_it_began_with_has_a_step_for_each(
         Step(base=of(CRUST), fitted=of(CRUST, LAYER), p_value=0.0),
     ]
     ended = Step(base=of(LAYER), fitted=both, p_value=0.0, rivals=(both,))
-    monkeypatch.setattr(selection, "instead", instead)
-    monkeypatch.setattr(selection, "_needed", lambda *_: needed)
-    monkeypatch.setattr(selection, "followed", lambda *_: (ended, None))
+    monkeypatch.setattr(decision, "instead", instead)
+    monkeypatch.setattr(decision, "_needed", lambda *_: needed)
+    monkeypatch.setattr(decision, "followed", lambda *_: (ended, None))
     judge = SimpleNamespace(again=lambda f: f, effort=DROPS)
-    parts = selection._ended(cast(Inquiry, SimpleNamespace(judge=judge)), needed)
+    parts = decision._ended(cast(Inquiry, SimpleNamespace(judge=judge)), needed)
     assert parts is not None
     assert [s.fitted.candidates[-1].id for s in parts] == ["soil-layer", "soil-stiffness"]
     assert parts[-1].fitted is both
@@ -245,8 +245,10 @@ def test_what_is_surely_there_keeps_ten_times_its_interval_away_from_none(monkey
     fitted = Fitted(candidates=(layer, friction, layer), x=(0.5, 0.5, 0.5), blocks=())
     found = [{"stiffness_ratio": within(1.95, 2.05)}, {"coefficient": within(1.95, 2.05)}]
     found.append({"stiffness_ratio": within(1.8, 2.2)})
-    monkeypatch.setattr(lasting, "intervals", lambda _, f, sides: found if f is fitted and sides == {} else None)
-    assert lasting.surely_there(Judge([]), fitted) == {0}
+    monkeypatch.setattr(
+        ensemble_validation, "intervals", lambda _, f, sides: found if f is fitted and sides == {} else None
+    )
+    assert ensemble_validation.surely_there(Judge([]), fitted) == {0}
 
 
 def within(low: float, high: float) -> Interval:

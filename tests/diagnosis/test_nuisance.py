@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.candidates import coordinate
-from rollover.diagnosis.clocks import align
-from rollover.diagnosis.evidence import Evidence, doubted, evidence_of, groups_of, left_out
-from rollover.diagnosis.fit import Judge
-from rollover.diagnosis.nuisance import doubts, eased
-from rollover.diagnosis.ranges import candidates_of, size_of
-from rollover.diagnosis.repeats import with_scatter
-from rollover.diagnosis.simulator import set_up, simulator_of
-from rollover.drop import DropModel
-from rollover.faults import InputError
-from rollover.importers import read_recording, write_recording
+from rollover.diagnosis.data.condition_uncertainty import doubts, eased
+from rollover.diagnosis.data.dataset import Evidence, doubted, evidence_of, groups_of, left_out
+from rollover.diagnosis.data.repeatability import with_scatter
+from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.fit.parameterisation import coordinate
+from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.forward.forward_model import set_up, simulator_of
+from rollover.diagnosis.selection.candidates import candidates_of, size_of
+from rollover.dynamics.drop_test import DropModel
 from rollover.recording import Clock, Recording
+from rollover.recording.importers import read_recording, write_recording
+from rollover.system.errors import InputError
 from tests.diagnosis.drops import DEPTH, FORCE, recorded, scenario
 from tests.physics.scenes import shipped
 

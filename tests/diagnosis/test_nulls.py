@@ -11,16 +11,16 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import kstest
 
-from rollover.diagnosis import colour
-from rollover.diagnosis.detect import mismatch_of
-from rollover.diagnosis.evidence import Evidence, evidence_of
-from rollover.diagnosis.fit import Judge
-from rollover.diagnosis.gate import gate
-from rollover.diagnosis.phases import drop_phases
-from rollover.diagnosis.ranges import candidates_of
-from rollover.diagnosis.simulator import Simulator, simulator_of
-from rollover.filters import filtered
+from rollover.diagnosis.data.dataset import Evidence, evidence_of
+from rollover.diagnosis.data.phases import drop_phases
+from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.forward.forward_model import Simulator, simulator_of
+from rollover.diagnosis.inference.lack_of_fit import mismatch_of
+from rollover.diagnosis.noise import autoregression
+from rollover.diagnosis.selection.candidates import candidates_of
+from rollover.diagnosis.selection.score_test import gate
 from rollover.recording import Recording
+from rollover.recording.filters import filtered
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, scenario
 
 DRAWS = 40
@@ -68,7 +68,7 @@ def test_p_values_are_uniform_where_there_is_only_noise(memory: float) -> None:
             np.concatenate([s.values - r.channels[s.channel][s.rows] for s in e.signals])
             for e, (r, _) in zip(evidence, drops, strict=True)
         ]
-        judge = Judge(colour.whole(evidence, misfit))
+        judge = Judge(autoregression.whole(evidence, misfit))
         base = judge.fit((), (), rounds=1)
         assert base is not None
         phases = [drop_phases(e) for e in judge.evidence]
@@ -83,7 +83,7 @@ def test_p_values_are_uniform_where_there_is_only_noise(memory: float) -> None:
 @pytest.mark.parametrize("memory", [0.0, 0.5, 0.9])
 def test_level_and_memory_of_the_noise_come_from_all_recordings_together(memory: float) -> None:
     rng = np.random.default_rng(11)
-    sigma, ar = colour.autoregression([2.0 * noise(rng, 300, memory) for _ in range(6)])
+    sigma, ar = autoregression.autoregression([2.0 * noise(rng, 300, memory) for _ in range(6)])
     assert sigma == pytest.approx(2.0, rel=0.12)
     assert sum(ar) == pytest.approx(memory, abs=0.08)
 
@@ -104,7 +104,7 @@ def test_a_memory_is_told_without_bias_though_each_recording_has_a_level() -> No
             np.concatenate([span * noise(rng, s.rows.size, 0.8) for s, span in zip(e.signals, spans, strict=True)])
             for e in evidence
         ]
-        told = colour.whole(colour.quiet(evidence, misfit), misfit)
+        told = autoregression.whole(autoregression.quiet(evidence, misfit), misfit)
         found += [sum(s.ar) for s in told[0].signals]
     assert np.mean(found) == pytest.approx(0.8, abs=0.0025)
 
@@ -112,7 +112,7 @@ def test_a_memory_is_told_without_bias_though_each_recording_has_a_level() -> No
 def test_noise_behind_a_filter_is_as_strong_where_it_is_slow_as_elsewhere_once_whitened() -> None:
     rng = np.random.default_rng(23)
     series = [behind_a_filter(rng, 1200) for _ in range(6)]
-    sigma, ar = colour.autoregression(series)
+    sigma, ar = autoregression.autoregression(series)
     slow, all_ = 0.0, 0.0
     for _ in range(40):
         w = lfilter([1.0, *(-a for a in ar)], [1.0], behind_a_filter(rng, 1200))[len(ar) :]
@@ -126,7 +126,7 @@ def test_hum_is_not_taken_for_the_memory_of_noise() -> None:
     rng = np.random.default_rng(12)
     t = np.arange(600)
     series = [3.0 * np.sin(0.3 * t + k) + 0.1 * rng.standard_normal(600) for k in range(4)]
-    _, ar = colour.autoregression(series)
+    _, ar = autoregression.autoregression(series)
     roots = np.roots([1.0, *(-a for a in ar)])
     assert not np.any((np.abs(roots) > 0.9) & (np.abs(roots.imag) > 0.0))
 
@@ -146,7 +146,7 @@ def test_after_a_blow_nothing_is_quiet() -> None:
     for e in evidence:
         each = [np.where(e.recording.time[s.rows] < 0.1, 1.0, 3.0) * spans[s.channel] for s in e.signals]
         misfit.append(np.concatenate([size * rng.standard_normal(size.size) for size in each]))
-    for e in colour.quiet(evidence, misfit):
+    for e in autoregression.quiet(evidence, misfit):
         for s in e.signals:
             assert s.noise == pytest.approx(spans[s.channel], rel=0.15), s.channel
 
@@ -155,7 +155,7 @@ def test_quiet_noise_is_found_beneath_a_misfit_many_times_as_large() -> None:
     rng, drops = np.random.default_rng(13), silent()
     evidence = noisy(drops, rng, 0.0)
     off = [np.concatenate([0.7 * s.values for s in e.signals]) for e in evidence]  # a scenario that says a third
-    for e, before in zip(colour.quiet(evidence, off), evidence, strict=True):
+    for e, before in zip(autoregression.quiet(evidence, off), evidence, strict=True):
         for s, b in zip(e.signals, before.signals, strict=True):
             true = 0.01 * float(np.ptp(b.values))
             assert 0.6 * true < s.noise < 2.0 * true, s.channel

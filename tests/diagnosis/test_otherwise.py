@@ -9,19 +9,19 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis.bins import simulated
-from rollover.diagnosis.blocks import Block
-from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.clocks import align
-from rollover.diagnosis.crew import Crew, Job, work
-from rollover.diagnosis.evidence import evidence_of
-from rollover.diagnosis.explain import SOON, _from_base
-from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.gate import Gate
-from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.otherwise import begun_otherwise, clocked_alike
-from rollover.diagnosis.ranges import candidates_of
-from rollover.diagnosis.screening import is_far, screen
+from rollover.diagnosis.data.dataset import evidence_of
+from rollover.diagnosis.fit.jobs import Crew, Job, work
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.linearisation import Block
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.forward.averaging import simulated
+from rollover.diagnosis.selection.candidates import candidates_of
+from rollover.diagnosis.selection.context import Inquiry
+from rollover.diagnosis.selection.forward_step import SOON, _from_base
+from rollover.diagnosis.selection.restarts import begun_otherwise, clocked_alike
+from rollover.diagnosis.selection.score_test import Gate
+from rollover.diagnosis.selection.screening import is_far, screen
 from rollover.effects import Search
 from tests.diagnosis.drops import linear_blocks, recorded, scenario
 

@@ -9,20 +9,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover import simulate
-from rollover.diagnosis import overturn, simulations
-from rollover.diagnosis.evidence import evidence_of
-from rollover.diagnosis.fit import Judge
-from rollover.diagnosis.marks import phases_of
-from rollover.diagnosis.overturn import RunSimulator
-from rollover.diagnosis.phases import phases_of as phases
-from rollover.diagnosis.settle import left_of_means, rescattered
-from rollover.diagnosis.simulator import DropSimulator, simulator_of
-from rollover.execute import Children
-from rollover.filters import filtered
-from rollover.measured import at_sensor
+from rollover.comparison.instruments import at_sensor
+from rollover.diagnosis.data.dataset import evidence_of
+from rollover.diagnosis.data.phases import phases_of as phases
+from rollover.diagnosis.fit import cache
+from rollover.diagnosis.fit.ensemble_mean import left_of_means, rescattered
+from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.forward import full_run
+from rollover.diagnosis.forward.forward_model import DropSimulator, simulator_of
+from rollover.diagnosis.forward.full_run import RunSimulator
+from rollover.diagnosis.forward.run_phases import phases_of
+from rollover.dynamics import simulate
 from rollover.recording import Clock, Recording, Sensor
+from rollover.recording.filters import filtered
 from rollover.scenario import Scenario
+from rollover.system.processes import Children
 from tests.physics.scenes import shipped
 
 ROLL, Z = "chassis/angular_velocity_x", "chassis/position_z"
@@ -133,8 +134,8 @@ def test_a_run_that_fails_predicts_nothing() -> None:
 
 def test_a_run_that_loses_its_way_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     simulator = RunSimulator(toss(), recording(Z, until=4.0))
-    monkeypatch.setattr(overturn, "LEAST_TIME", 0.0)
-    monkeypatch.setattr(overturn, "SLOWEST", 0.0)
+    monkeypatch.setattr(full_run, "LEAST_TIME", 0.0)
+    monkeypatch.setattr(full_run, "SLOWEST", 0.0)
     assert simulator.predict({}, 0.0) is not None
 
     def endless(_: Scenario, *, progress: Any) -> Any:
@@ -150,10 +151,10 @@ def test_runs_made_side_by_side_are_those_made_one_by_one() -> None:
     alone, helped = (RunSimulator(toss(), recording("chassis/acceleration_z")) for _ in range(2))
     children = Children(2)
     try:
-        overturn.made_ahead(None, [(helped, changes) for changes in paths])
+        full_run.made_ahead(None, [(helped, changes) for changes in paths])
         assert helped.runs == 0  # nobody to make them
         wrong = {"ground.friction.coefficient": -1.0}
-        overturn.made_ahead(children, [(helped, changes) for changes in (*paths, *paths, wrong)])
+        full_run.made_ahead(children, [(helped, changes) for changes in (*paths, *paths, wrong)])
     finally:
         children.stop()
     assert helped.runs == len(paths)
@@ -201,7 +202,7 @@ def test_phases_are_cut_to_the_recording() -> None:
 def test_neighbours_stray_after_the_first_contact_only() -> None:
     simulator = RunSimulator(toss(), recording(Z, ROLL, until=0.5))
     strays = simulator.strays()
-    assert len(strays) == len(overturn.NEIGHBOURS)
+    assert len(strays) == len(full_run.NEIGHBOURS)
     assert simulator.runs == 1 + len(strays)
     time = simulator.recording.time
     touch = next(at for at, name in simulator.marks() if name == "impact")
@@ -213,10 +214,10 @@ def test_neighbours_stray_after_the_first_contact_only() -> None:
 def test_all_neighbours_may_be_run_in_shorter_steps() -> None:
     simulator = RunSimulator(toss(), recording(Z))
     own = simulator.scenario.simulation.step
-    steps = {simulator.scenario.replaced(simulator._beside(n, 4)).simulation.step for n in overturn.NEIGHBOURS}
+    steps = {simulator.scenario.replaced(simulator._beside(n, 4)).simulation.step for n in full_run.NEIGHBOURS}
     assert steps == {own / 4}
-    steps = {simulator.scenario.replaced(simulator._beside(n)).simulation.step for n in overturn.NEIGHBOURS}
-    assert steps == {own / n.parts for n in overturn.NEIGHBOURS}
+    steps = {simulator.scenario.replaced(simulator._beside(n)).simulation.step for n in full_run.NEIGHBOURS}
+    assert steps == {own / n.parts for n in full_run.NEIGHBOURS}
 
 
 @pytest.mark.parametrize("parts", [1, 4])
@@ -227,20 +228,20 @@ def test_runs_that_scatter_is_told_by_are_made_at_once_for_all_recordings_the_lo
     drop = DropSimulator(shipped("drop_test"), recording("ground/sinkage"))
     runs = [RunSimulator(toss(), recording(Z, until=until)) for until in (0.1, 0.2)]
     changes = {FRICTION: 0.3}
-    wanted = overturn.neighbours_of([runs[0], drop, runs[1]], changes, parts)
+    wanted = full_run.neighbours_of([runs[0], drop, runs[1]], changes, parts)
     steps = [toss().replaced(dict(one)).simulation.step for _, one in wanted]
     assert steps == sorted(steps)
     asked: list[tuple[Any, Mapping[str, Any]]] = []
     monkeypatch.setattr(RunSimulator, "predict", lambda own, values, _: asked.append((own, values)) or {})
     for own in runs:
         own.strays(changes, parts=parts)
-    assert len(wanted) == len(asked) == 2 * (1 + len(overturn.NEIGHBOURS))
+    assert len(wanted) == len(asked) == 2 * (1 + len(full_run.NEIGHBOURS))
     assert all(any(own is other and one == values for other, one in wanted) for own, values in asked)
 
 
 def test_scatter_is_asked_for_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[int] = []
-    monkeypatch.setattr(simulations, "made_ahead", lambda _, wanted: made.append(len(list(wanted))))
+    monkeypatch.setattr(cache, "made_ahead", lambda _, wanted: made.append(len(list(wanted))))
     empty = recording(Z, until=0.5)
     made_of = replace(empty, channels={Z: np.interp(empty.time, run().time, run()[Z])})
     own = RunSimulator(toss(), made_of)
@@ -252,7 +253,7 @@ def test_scatter_is_asked_for_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     made.clear()
     rescattered(judge, nothing, 4)
     left_of_means(judge, nothing)
-    assert [n for n in made if n > 1] == 2 * [1 + len(overturn.NEIGHBOURS)]
+    assert [n for n in made if n > 1] == 2 * [1 + len(full_run.NEIGHBOURS)]
 
 
 def test_the_motion_is_told_though_it_was_not_recorded() -> None:

@@ -14,7 +14,7 @@ MAKE = (
     "import json, sys\n"
     "import numpy as np\n"
     "from pathlib import Path\n"
-    "from rollover.importers import write_recording\n"
+    "from rollover.recording.importers import write_recording\n"
     "from tests.diagnosis.drops import recorded\n"
     "hidden, out = json.loads(sys.argv[1]), Path(sys.argv[2])\n"
     "changes = {f'effects.soil-roots.{k}': v for k, v in hidden.items()}\n"

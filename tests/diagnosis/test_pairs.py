@@ -9,16 +9,15 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis import pairs
-from rollover.diagnosis.candidates import Candidate, coordinate
-from rollover.diagnosis.crew import Crew
-from rollover.diagnosis.explain import Step
-from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.gate import Gate
-from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.phases import phases_of
-from rollover.diagnosis.screening import Screened
-from rollover.diagnosis.thresholds import has_threshold, placed_beside
+from rollover.diagnosis.data.phases import phases_of
+from rollover.diagnosis.fit.jobs import Crew
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
+from rollover.diagnosis.fit.step import Screened, Step
+from rollover.diagnosis.fit.threshold_scan import has_threshold, placed_beside
+from rollover.diagnosis.selection import pairs
+from rollover.diagnosis.selection.context import Inquiry
+from rollover.diagnosis.selection.score_test import Gate
 from rollover.effects import Search
 from tests.diagnosis.drops import linear_blocks, recorded
 from tests.diagnosis.test_fits import candidate, judge_of

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollover.diagnosis.chaos import Course
-from rollover.diagnosis.evidence import Evidence
-from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.quantities import dependency
+from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.inference.vehicle_dependence import dependency
+from rollover.diagnosis.noise.ensemble import Course
 from tests.diagnosis.test_chassis import ABOUT, ALONG, thrown
 
 SPEEDS = (0.4, 0.8, 1.2)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rollover.diagnosis.ranges import candidates_of, size_of
+from rollover.diagnosis.selection.candidates import candidates_of, size_of
 from rollover.effects import EFFECTS, Search
 from tests.diagnosis.drops import scenario
 from tests.physics.scenes import shipped

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.blocks import Block, Fitted, turned
-from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.evidence import Evidence, evidence_of
-from rollover.diagnosis.explain import moves
-from rollover.diagnosis.holdout import held_out
-from rollover.diagnosis.readings import digitised, resolution, without_spikes
-from rollover.diagnosis.simulator import simulator_of
+from rollover.diagnosis.data.dataset import Evidence, evidence_of
+from rollover.diagnosis.data.quantisation import digitised, resolution, without_spikes
+from rollover.diagnosis.fit.cross_validation import held_out
+from rollover.diagnosis.fit.linearisation import Block, Fitted, turned
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.forward.forward_model import simulator_of
+from rollover.diagnosis.selection.forward_step import moves
 from rollover.effects import Search
 from rollover.recording import Recording
 from tests.diagnosis.drops import DEPTH, FORCE, linear_blocks, recorded, scenario, signal

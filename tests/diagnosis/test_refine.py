@@ -10,30 +10,31 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis import diagnose, fit, otherwise, refine, thresholds
-from rollover.diagnosis.bins import simulated
-from rollover.diagnosis.candidates import coordinate, coordinates
-from rollover.diagnosis.clocks import align
-from rollover.diagnosis.crew import Crew
-from rollover.diagnosis.evidence import evidence_of
-from rollover.diagnosis.explain import Step
-from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.forms import shaped
-from rollover.diagnosis.gate import Gate
-from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.intervals import intervals
-from rollover.diagnosis.otherwise import _combed
-from rollover.diagnosis.pairs import two_by_two
-from rollover.diagnosis.phases import phases_of
-from rollover.diagnosis.ranges import candidates_of
-from rollover.diagnosis.refine import ended, timed
-from rollover.diagnosis.screening import Screened
-from rollover.diagnosis.thresholds import stretches, traced
+from rollover.comparison.synthesis import synthetic
+from rollover.diagnosis import diagnose
+from rollover.diagnosis.data.dataset import evidence_of
+from rollover.diagnosis.data.phases import phases_of
+from rollover.diagnosis.fit import levenberg_marquardt, local_search, threshold_scan
+from rollover.diagnosis.fit.jobs import Crew
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.local_search import ended, timed
+from rollover.diagnosis.fit.model_variants import shaped
+from rollover.diagnosis.fit.parameterisation import coordinate, coordinates
+from rollover.diagnosis.fit.step import Screened, Step
+from rollover.diagnosis.fit.threshold_scan import stretches, traced
+from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.forward.averaging import simulated
+from rollover.diagnosis.inference.intervals import intervals
+from rollover.diagnosis.selection import restarts
+from rollover.diagnosis.selection.candidates import candidates_of
+from rollover.diagnosis.selection.context import Inquiry
+from rollover.diagnosis.selection.pairs import two_by_two
+from rollover.diagnosis.selection.restarts import _combed
+from rollover.diagnosis.selection.score_test import Gate
+from rollover.dynamics.simulate import run
 from rollover.effects import EFFECTS
 from rollover.proof.generator import Case, make, plan
 from rollover.scenario import load
-from rollover.simulate import run
-from rollover.synthesis import synthetic
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 from tests.diagnosis.test_fits import candidate, judge_of
 from tests.physics.scenes import shipped
@@ -85,7 +86,7 @@ def test_a_nose_that_was_fitted_beside_a_wrong_frequency_is_found_by_what_it_rin
     (found,) = _combed(inquiry, [astray], looked, [b.shift for b in astray.blocks])
     assert found.left < 1.2 * sum(e.count for e in judge.evidence)
     assert found.candidates[-1].values(found.x) == pytest.approx(true, rel=0.01)
-    monkeypatch.setattr(otherwise, "_in_chords", lambda *_: [])
+    monkeypatch.setattr(restarts, "_in_chords", lambda *_: [])
     (near,) = _combed(inquiry, [astray], looked, [b.shift for b in astray.blocks])
     assert near.left > 10.0 * found.left
 
@@ -320,7 +321,7 @@ def test_a_fit_is_ended_finely_whatever_others_may_leave(monkeypatch: pytest.Mon
     judge = judge_of(recorded(hidden, 2, speeds=(1.6, 2.6), channels=CHANNELS, rate=1500.0, noise=0.005))
     c, begun = candidate(judge, "soil-viscous-damping"), (0.05,)
     usual = judge.fit((c,), begun)
-    monkeypatch.setattr(fit, "ENOUGH", 1e5)
+    monkeypatch.setattr(levenberg_marquardt, "ENOUGH", 1e5)
     coarse, fine = judge.fit((c,), begun), judge.fit((c,), begun, finely=True)
     assert usual is not None
     assert coarse is not None
@@ -343,7 +344,7 @@ def test_a_place_is_gone_on_with_if_it_soon_leaves_less_than_where_the_fit_stand
         return None if left is None else SimpleNamespace(x=(x[0] + 0.01,), total=left)
 
     judge = cast(Judge, SimpleNamespace(fit=short))
-    found = thresholds._soonest(judge, fitted, [(0.1,), (0.2,), (0.3,), (0.4,)], (0, 2))
+    found = threshold_scan._soonest(judge, fitted, [(0.1,), (0.2,), (0.3,), (0.4,)], (0, 2))
     assert [round(x, 9) for (x,) in found] == [0.21, 0.41]
     assert asked == 5 * [(0, 2)]
 
@@ -366,5 +367,5 @@ def test_a_recording_whose_clock_is_in_another_dip_is_tried_where_it_began(
         return SimpleNamespace(total=left, shift=shift, prior=1e-3)
 
     judge = cast(Judge, SimpleNamespace(block=block, shifts=[began]))
-    found = refine._tried(judge, 0, (), (), block(0, (), (), 9e-4, 0.0, clock=False))
-    assert found.shift == pytest.approx(met, abs=refine.SHORTEST)
+    found = local_search._tried(judge, 0, (), (), block(0, (), (), 9e-4, 0.0, clock=False))
+    assert found.shift == pytest.approx(met, abs=local_search.SHORTEST)

@@ -11,17 +11,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover import simulate
-from rollover.diagnosis import diagnose, overturn
-from rollover.diagnosis.candidates import Candidate, physical
-from rollover.diagnosis.effort import RUNS
-from rollover.diagnosis.overturn import RunSimulator
-from rollover.diagnosis.ranges import candidates_of
-from rollover.diagnosis.series import series
-from rollover.document import value_at
-from rollover.execute import Children
+from rollover.diagnosis import diagnose
+from rollover.diagnosis.fit.parameterisation import Candidate, physical
+from rollover.diagnosis.forward import full_run
+from rollover.diagnosis.forward.budget import RUNS
+from rollover.diagnosis.forward.full_run import RunSimulator
+from rollover.diagnosis.overlay import series
+from rollover.diagnosis.selection.candidates import candidates_of
+from rollover.dynamics import simulate
 from rollover.recording import Recording
 from rollover.scenario import Scenario
+from rollover.spec.document import value_at
+from rollover.system.processes import Children
 from tests.physics.scenes import shipped
 
 CHANNELS = ("chassis/position_x", "chassis/position_z", "chassis/angular_velocity_y", "chassis/velocity_x")
@@ -32,7 +33,7 @@ FEW = ("ground-friction", "soil-stiffness", "slope", "sensor-gain", "sensor-scal
 @pytest.fixture
 def _few_rivals(monkeypatch: pytest.MonkeyPatch) -> None:
     """Five effects compete: all of them would take minutes."""
-    module = sys.modules["rollover.diagnosis.diagnose"]
+    module = sys.modules["rollover.diagnosis.pipeline"]
 
     def few(*given: Any) -> list[Candidate]:
         return [c for c in candidates_of(*given) if c.id in FEW]
@@ -73,7 +74,7 @@ def test_friction_that_was_left_out_is_named_and_fitted(monkeypatch: pytest.Monk
     assert found.after["held_out"].nrmse < 0.8 * found.before["held_out"].nrmse
     shown, children = series(toss(), given, found), Children(2)
     with monkeypatch.context() as patch:
-        patch.setattr(RunSimulator, "_run", lambda own, _, changes: own._known[overturn._key(changes)])
+        patch.setattr(RunSimulator, "_run", lambda own, _, changes: own._known[full_run._key(changes)])
         try:
             side_by_side = series(toss(), given, found, children)  # no run is made here
         finally:

@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from rollover.diagnosis.blocks import Block
-from rollover.diagnosis.chaos import Course
-from rollover.diagnosis.roughness import over_roughness
+from rollover.diagnosis.fit.linearisation import Block
+from rollover.diagnosis.inference.local_quadratic import over_roughness
+from rollover.diagnosis.noise.ensemble import Course
 
 Array = NDArray[np.float64]
 DUE = 1.96**2

@@ -9,20 +9,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.commands.diagnose import in_words
+from rollover.cli.commands.diagnose import in_words
 from rollover.diagnosis import statements
-from rollover.diagnosis.blocks import Block, Fitted
-from rollover.diagnosis.chaos import Course
-from rollover.diagnosis.evidence import evidence_of
-from rollover.diagnosis.holdout import Held
-from rollover.diagnosis.phases import drop_phases
-from rollover.diagnosis.scores import before_a_blow
-from rollover.diagnosis.simulator import simulator_of
+from rollover.diagnosis.data.dataset import evidence_of
+from rollover.diagnosis.data.phases import drop_phases
+from rollover.diagnosis.fit.cross_validation import Held
+from rollover.diagnosis.fit.linearisation import Block, Fitted
+from rollover.diagnosis.forward.forward_model import simulator_of
+from rollover.diagnosis.inference.scores import before_a_blow
+from rollover.diagnosis.noise.ensemble import Course
+from rollover.diagnosis.result import Interval, Named
 from rollover.diagnosis.statements import sentence
-from rollover.diagnosis.verdict import Interval, Named
 from rollover.effects import EFFECTS, units_of
 from rollover.effects.sensor import SensorBias, SensorClipping
-from rollover.prechecks import Finding
+from rollover.recording.checks import Finding
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
 

@@ -9,18 +9,19 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis import colour, explain, one_by_one, pairs, selection
-from rollover.diagnosis.blocks import Block
-from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.clocks import align
-from rollover.diagnosis.detect import Cell, Mismatch
-from rollover.diagnosis.effort import DROPS
-from rollover.diagnosis.explain import Step
-from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.gate import Gate
-from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.ranges import candidates_of
-from rollover.diagnosis.selection import MOST, Explanation, by_the_first, decided
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.linearisation import Block
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.fit.step import Step
+from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.forward.budget import DROPS
+from rollover.diagnosis.inference.lack_of_fit import Cell, Mismatch
+from rollover.diagnosis.noise import autoregression
+from rollover.diagnosis.selection import decision, forward_step, pairs, stepwise
+from rollover.diagnosis.selection.candidates import candidates_of
+from rollover.diagnosis.selection.context import Inquiry
+from rollover.diagnosis.selection.decision import MOST, Explanation, by_the_first, decided
+from rollover.diagnosis.selection.score_test import Gate
 from rollover.effects import Search
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded
 from tests.diagnosis.test_fits import judge_of
@@ -61,11 +62,11 @@ def explanation(count: int, p_value: float) -> Explanation:
 def judged(monkeypatch: pytest.MonkeyPatch) -> dict[str, float]:
     """Held-out misfit by label; everything that is left matters."""
     misfits = {"as it is": 20.0, "soil-crust": 3.5}
-    monkeypatch.setattr(selection, "matters", lambda *_: True)
-    monkeypatch.setattr(selection, "is_tolerated", lambda *_: False)
-    monkeypatch.setattr(selection, "strongest", lambda *one: one[2].candidates[0])
-    monkeypatch.setattr(selection, "held_out", lambda f, _: SimpleNamespace(total=misfits.get(f.label, 1.0)))
-    monkeypatch.setattr(selection, "mismatch_of", lambda *_: left(1e-9))
+    monkeypatch.setattr(decision, "matters", lambda *_: True)
+    monkeypatch.setattr(decision, "is_tolerated", lambda *_: False)
+    monkeypatch.setattr(decision, "strongest", lambda *one: one[2].candidates[0])
+    monkeypatch.setattr(decision, "held_out", lambda f, _: SimpleNamespace(total=misfits.get(f.label, 1.0)))
+    monkeypatch.setattr(decision, "mismatch_of", lambda *_: left(1e-9))
     return misfits
 
 
@@ -102,8 +103,8 @@ def test_what_can_be_bent_to_a_curve_must_leave_no_one_place_either(
 def test_what_an_effect_too_slight_for_a_name_explains_whole_is_no_mismatch(
     moved: float, remaining: float, verdict: str, judged: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(selection, "moves", lambda *_: moved)
-    monkeypatch.setattr(selection, "mismatch_of", lambda *_: left(remaining))
+    monkeypatch.setattr(decision, "moves", lambda *_: moved)
+    monkeypatch.setattr(decision, "mismatch_of", lambda *_: left(remaining))
     one = explanation(1, 1e-9)
     found = decided(
         cast(Judge, SimpleNamespace(evidence=(), effort=DROPS)), replace(one, parts=(), fitted=one.base), [], []
@@ -141,13 +142,13 @@ def test_what_may_be_nothing_is_another_effects_work_only_if_that_does_it(
     ]
     fitted = judge.fit(both, (*both[0].starts()[0], 0.5))
     assert fitted is not None
-    judge.weigh(colour.whole(judge.evidence, judge.residuals(fitted)))  # by what is left, as a step is
+    judge.weigh(autoregression.whole(judge.evidence, judge.residuals(fitted)))  # by what is left, as a step is
     found: Any = SimpleNamespace(fitted=judge.again(fitted))
     doubtful = {"sensor-clock-offset"}
-    assert selection.done_by_others(judge, found, doubtful) == (doubtful if done else set())
-    assert selection.done_by_others(judge, found, set()) == set()
+    assert decision.done_by_others(judge, found, doubtful) == (doubtful if done else set())
+    assert decision.done_by_others(judge, found, set()) == set()
     monkeypatch.setattr(Judge, "per_error", 1e6)
-    assert selection.done_by_others(judge, found, doubtful) == doubtful
+    assert decision.done_by_others(judge, found, doubtful) == doubtful
 
 
 @pytest.mark.parametrize(("channels", "named"), [(("a", "a"), 0), (("a", "b"), 2), ((None, None), 2), ((None, "a"), 2)])
@@ -169,7 +170,7 @@ def test_one_that_takes_nearly_all_is_named_with_what_it_leaves_itself(
 ) -> None:
     """20 times the noise before: of the excess 0.3 or 1.3 % is left, of what is structured 0.1 or 2 %."""
     judged["soil-crust"] = misfit
-    monkeypatch.setattr(selection, "mismatch_of", lambda *_: left(1e-9, structure))
+    monkeypatch.setattr(decision, "mismatch_of", lambda *_: left(1e-9, structure))
     judge: Any = SimpleNamespace(evidence=(), effort=DROPS)
     found, verdict = decided(judge, explanation(2, 1e-4), [], [])
     assert verdict == ("missing-physics" if named else "unexplained")
@@ -203,7 +204,7 @@ def test_what_leaves_no_more_than_is_tolerated_is_named(
     judged: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Errors of a model are smooth, and so has structure what lies within them."""
-    monkeypatch.setattr(selection, "is_tolerated", lambda _, f: f.label == "soil-crust")
+    monkeypatch.setattr(decision, "is_tolerated", lambda _, f: f.label == "soil-crust")
     for held_out, named, expected in ((1.1, 1, "missing-physics"), (3.5, 0, "unexplained")):
         judged["soil-crust"] = held_out
         found, verdict = decided(cast(Judge, SimpleNamespace(evidence=(), effort=DROPS)), explanation(1, 1e-9), [], [])
@@ -215,7 +216,7 @@ def test_a_simpler_rival_that_meets_all_recordings_as_well_is_named_beside(
     more: float, numbers: int, named: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Held out it does worse by far; to all recordings it leaves 3 (or 5) more than the best's 100, of 1000."""
-    monkeypatch.setattr(explain, "worse", lambda *_: (9.0, 9.0))
+    monkeypatch.setattr(forward_step, "worse", lambda *_: (9.0, 9.0))
 
     def fitted(id: str, left: float, many: int) -> Fitted:
         search = {f"a{k}": Search(0, 1) for k in range(many)}
@@ -227,7 +228,7 @@ def test_a_simpler_rival_that_meets_all_recordings_as_well_is_named_beside(
 
     base, best = fitted("none", 1000.0, 0), fitted("soil-viscous-damping", 100.0, 2)
     rival = fitted("soil-inertial-drag", 100.0 + more, numbers)
-    found = explain.confusion(Step(base=base, fitted=best, p_value=0.0, rivals=(best, rival)), [])
+    found = forward_step.confusion(Step(base=base, fitted=best, p_value=0.0, rivals=(best, rival)), [])
     assert found == ([best, rival] if named else [best])
 
 
@@ -239,15 +240,15 @@ def test_errors_of_conditions_beside_an_effect_count_where_they_leave_chance_alo
     weighed: list[str] = []
     found, again = step(1), step(2).fitted
     judge = cast(Judge, SimpleNamespace(evidence="as it is", weigh=weighed.append))
-    monkeypatch.setattr(one_by_one, "is_doubtful", lambda _: True)
-    monkeypatch.setattr(one_by_one, "is_enough", lambda _judge, _fit, what: what.p_value > 0.001)
-    monkeypatch.setattr(one_by_one, "conditioned", lambda *_: again)
-    monkeypatch.setattr(one_by_one, "mismatch_of", lambda *_: left(beside))
-    after, remaining = one_by_one.as_conditioned(judge, found, left(1e-9), [])
+    monkeypatch.setattr(stepwise, "is_doubtful", lambda _: True)
+    monkeypatch.setattr(stepwise, "is_enough", lambda _judge, _fit, what: what.p_value > 0.001)
+    monkeypatch.setattr(stepwise, "conditioned", lambda *_: again)
+    monkeypatch.setattr(stepwise, "mismatch_of", lambda *_: left(beside))
+    after, remaining = stepwise.as_conditioned(judge, found, left(1e-9), [])
     assert (after.fitted is again) == taken
     assert remaining.p_value == (beside if taken else 1e-9)
     assert weighed == ([] if taken else ["as it is"])
-    same, _ = one_by_one.as_conditioned(judge, found, left(0.4), [])
+    same, _ = stepwise.as_conditioned(judge, found, left(0.4), [])
     assert same is found, "nothing is left to be eased"
 
 
@@ -305,7 +306,7 @@ def test_effects_beside_which_a_sensor_reads_a_curve_are_not_named_together(
     alone: float, named: list[str], judged: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They leave no more than chance over all, and what is looked for itself: one that takes nearly all is named."""
-    monkeypatch.setattr(selection, "is_a_curve", lambda *_: True)
+    monkeypatch.setattr(decision, "is_a_curve", lambda *_: True)
     judged["soil-crust"] = alone
     found, verdict = decided(cast(Judge, SimpleNamespace(evidence=(), effort=DROPS)), explanation(2, 0.4), [], [])
     assert [s.fitted.candidates[-1].id for s in found.parts] == named
@@ -326,11 +327,11 @@ def test_a_third_effect_is_not_looked_for_that_would_have_to_take_far_more_than_
     before: float, after: float, unlikely: bool
 ) -> None:
     base, current = leaving(before), leaving(after)
-    last = explain.Step(base=base, fitted=current, p_value=0.0)
+    last = forward_step.Step(base=base, fitted=current, p_value=0.0)
     judge = cast(Judge, SimpleNamespace(effort=SimpleNamespace(thrifty=False)))
-    assert one_by_one.is_unlikely(judge, last, current) is unlikely
+    assert stepwise.is_unlikely(judge, last, current) is unlikely
     # a full run costs much, and a third is rare there
-    assert not one_by_one.is_unlikely(cast(Judge, SimpleNamespace(effort=SimpleNamespace(thrifty=True))), last, current)
+    assert not stepwise.is_unlikely(cast(Judge, SimpleNamespace(effort=SimpleNamespace(thrifty=True))), last, current)
 
 
 @pytest.mark.parametrize(
@@ -346,7 +347,7 @@ def test_two_that_leave_a_small_part_of_much_may_have_a_third_beside_them(
     before: float, after: float, thrifty: bool, hopeless: bool
 ) -> None:
     judge = cast(Judge, SimpleNamespace(effort=SimpleNamespace(thrifty=thrifty)))
-    assert one_by_one.is_hopeless(judge, leaving(before), leaving(after)) is hopeless
+    assert stepwise.is_hopeless(judge, leaving(before), leaving(after)) is hopeless
 
 
 def leaving(squares: float) -> Fitted:

@@ -10,17 +10,18 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis import intervals as intervals_of
-from rollover.diagnosis import overturn, settle
-from rollover.diagnosis.blocks import GENTLE, Block, Fitted
-from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.effort import DROPS, RUNS, Effort
-from rollover.diagnosis.evidence import Evidence, Signal
-from rollover.diagnosis.explain import Step
-from rollover.diagnosis.fit import Judge
-from rollover.diagnosis.intervals import intervals, scattered, unshaped
-from rollover.diagnosis.overturn import CENTRE, NEIGHBOURS, Made, Making, RunSimulator
-from rollover.diagnosis.settle import along, rescattered, settled, step_of_means
+from rollover.diagnosis.data.dataset import Evidence, Signal
+from rollover.diagnosis.fit import ensemble_mean
+from rollover.diagnosis.fit.ensemble_mean import along, rescattered, settled, step_of_means
+from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.fit.linearisation import GENTLE, Block, Fitted
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.fit.step import Step
+from rollover.diagnosis.forward import full_run
+from rollover.diagnosis.forward.budget import DROPS, RUNS, Effort
+from rollover.diagnosis.forward.full_run import CENTRE, NEIGHBOURS, Made, Making, RunSimulator
+from rollover.diagnosis.inference import intervals as intervals_of
+from rollover.diagnosis.inference.intervals import intervals, scattered, unshaped
 from rollover.diagnosis.statements import by_steps
 from rollover.effects import Search
 from rollover.recording import Recording
@@ -42,7 +43,7 @@ def a_toss(monkeypatch: pytest.MonkeyPatch, off: Mapping[tuple[float, ...], floa
         run = Recording(title="run", time=time, channels={CHANNEL: size * np.sin(40.0 * time) + time})
         return Made((making.scenario, run), (), 0.01)
 
-    monkeypatch.setattr(overturn, "make", run)
+    monkeypatch.setattr(full_run, "make", run)
     return simulator
 
 
@@ -53,7 +54,7 @@ def test_the_run_that_is_like_most_others_stands_for_all(monkeypatch: pytest.Mon
     chosen = simulator.scenario.ground.elements.centre
     assert chosen != own
     made = simulator.runs
-    assert made == len(overturn.ELSEWHERE) + len(NEIGHBOURS)  # one neighbour is one of the places
+    assert made == len(full_run.ELSEWHERE) + len(NEIGHBOURS)  # one neighbour is one of the places
     found = simulator.predict({}, 0.0)
     assert found is not None
     assert np.max(found[CHANNEL]) < 2.0
@@ -268,7 +269,7 @@ def test_a_value_is_that_of_shorter_steps(size: float, monkeypatch: pytest.Monke
     fitted = judge.fit((SLOPE,), (0.3,))
     assert fitted is not None
     assert fitted.x[0] == pytest.approx(0.4 - LAG, abs=3e-3)
-    fine = settle.in_shorter_steps(judge, fitted)
+    fine = ensemble_mean.in_shorter_steps(judge, fitted)
     for e in every:  # all others are run in the scenario's own
         assert (
             np.max(np.abs(np.mean([d[CHANNEL] for d in e.simulator.strays()], axis=0))) < 0.25 * 20.0 * LAG
@@ -276,10 +277,10 @@ def test_a_value_is_that_of_shorter_steps(size: float, monkeypatch: pytest.Monke
     if not size:  # nothing scatters: nothing is known of what steps do
         assert fine is fitted
         return
-    assert fine.x[0] == pytest.approx(0.4 - LAG / settle.PARTS, abs=3e-3)
+    assert fine.x[0] == pytest.approx(0.4 - LAG / ensemble_mean.PARTS, abs=3e-3)
     by_itself, whole = intervals(judge, fine, {})[0]["angle"], intervals(judge, fine, {}, fitted)[0]["angle"]
     more = np.sqrt((whole.high - whole.value) ** 2 - (by_itself.high - by_itself.value) ** 2)
-    assert more == pytest.approx(1.96 * (fine.x[0] - fitted.x[0]) / (settle.PARTS - 1), rel=1e-6)
+    assert more == pytest.approx(1.96 * (fine.x[0] - fitted.x[0]) / (ensemble_mean.PARTS - 1), rel=1e-6)
     assert whole.low < 0.4 < whole.high
     assert (by_itself.as_simulated, whole.as_simulated) == (None, fitted.x[0])
     # how rough the misfit of runs is counts where an interval is stated, not where a side of it is asked for

@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.diagnosis.bins import simulated
-from rollover.diagnosis.candidates import coordinate
-from rollover.diagnosis.evidence import evidence_of
-from rollover.diagnosis.fit import Judge
-from rollover.diagnosis.leaps import LEAP_IN
-from rollover.diagnosis.ranges import candidates_of
-from rollover.diagnosis.simulator import SHORTEST, STEP, DropSimulator, set_up, simulator_of
-from rollover.drop import DropModel
+from rollover.diagnosis.data.dataset import evidence_of
+from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.fit.parameterisation import coordinate
+from rollover.diagnosis.forward.averaging import simulated
+from rollover.diagnosis.forward.discontinuities import LEAP_IN
+from rollover.diagnosis.forward.forward_model import SHORTEST, STEP, DropSimulator, set_up, simulator_of
+from rollover.diagnosis.selection.candidates import candidates_of
+from rollover.dynamics.drop_test import DropModel
 from rollover.effects.empirical import Empirical
-from rollover.initiation import Drop
 from rollover.recording import Recording
+from rollover.spec.initiation import Drop
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
 ENOUGH = 1e-4  # of the range, root mean square: half of what counts as an error of the model

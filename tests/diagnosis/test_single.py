@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from rollover.diagnosis.series import single
-from rollover.filters import filtered
+from rollover.diagnosis.overlay import single
+from rollover.recording.filters import filtered
 
 
 @pytest.mark.parametrize("many", [2, 5, 9, 20])

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis import slips as slipping
-from rollover.diagnosis.crew import Crew
-from rollover.diagnosis.slips import Slip, slips_of
+from rollover.diagnosis.data import inconsistent as slipping
+from rollover.diagnosis.data.inconsistent import Slip, slips_of
+from rollover.diagnosis.fit.jobs import Crew
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
-diagnosing = importlib.import_module("rollover.diagnosis.diagnose")
+diagnosing = importlib.import_module("rollover.diagnosis.pipeline")
 CHANNELS = (FORCE, DEPTH, ACCELERATION)
 LAYER = {"effects.soil-layer.depth": 0.05, "effects.soil-layer.stiffness_ratio": 2.0}
 Drops = list[tuple[str, Recording]]

@@ -9,15 +9,16 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis.candidates import Candidate, coordinate
-from rollover.diagnosis.crew import Crew, Job, linearised
-from rollover.diagnosis.effort import DROPS, RUNS, Effort
-from rollover.diagnosis.evidence import Evidence, Signal
-from rollover.diagnosis.explain import _first_fits
-from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.gate import Gate
-from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.screening import Screened, screen
+from rollover.diagnosis.data.dataset import Evidence, Signal
+from rollover.diagnosis.fit.jobs import Crew, Job, linearised
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
+from rollover.diagnosis.fit.step import Screened
+from rollover.diagnosis.forward.budget import DROPS, RUNS, Effort
+from rollover.diagnosis.selection.context import Inquiry
+from rollover.diagnosis.selection.forward_step import _first_fits
+from rollover.diagnosis.selection.score_test import Gate
+from rollover.diagnosis.selection.screening import screen
 from rollover.effects import Search
 from rollover.recording import Recording
 

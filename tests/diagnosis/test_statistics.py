@@ -12,15 +12,16 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import kstest
 
-from rollover.diagnosis.bins import thinned
-from rollover.diagnosis.candidates import Candidate, coordinate
-from rollover.diagnosis.detect import mismatch_of
-from rollover.diagnosis.effort import DROPS
-from rollover.diagnosis.evidence import Evidence
-from rollover.diagnosis.fit import GENTLE, Block, Fitted, Judge
-from rollover.diagnosis.gate import freed, null_of_the_best, p_value
-from rollover.diagnosis.holdout import held_out
-from rollover.diagnosis.intervals import intervals
+from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.fit.cross_validation import held_out
+from rollover.diagnosis.fit.levenberg_marquardt import GENTLE, Block, Fitted, Judge
+from rollover.diagnosis.fit.linearisation import freed
+from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
+from rollover.diagnosis.forward.averaging import thinned
+from rollover.diagnosis.forward.budget import DROPS
+from rollover.diagnosis.inference.intervals import intervals
+from rollover.diagnosis.inference.lack_of_fit import mismatch_of
+from rollover.diagnosis.selection.score_test import null_of_the_best, p_value
 from rollover.effects import Search
 from rollover.recording import Recording
 from tests.diagnosis.drops import FORCE, linear_blocks, recorded, signal

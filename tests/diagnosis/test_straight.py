@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollover.diagnosis import diagnose, selection
-from rollover.diagnosis.candidates import coordinate
-from rollover.diagnosis.straight import BENT, bow, drift, is_a_curve, is_one_line, square
+from rollover.diagnosis import diagnose
+from rollover.diagnosis.fit.parameterisation import coordinate
+from rollover.diagnosis.selection import decision
+from rollover.diagnosis.selection.flexibility import BENT, bow, drift, is_a_curve, is_one_line, square
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 from tests.diagnosis.test_fits import GAIN, candidate, judge_of
 
@@ -76,7 +77,7 @@ def test_gain_and_offset_that_meet_a_curved_sensor_are_refused(monkeypatch: pyte
     assert not is_one_line(beside.candidates)
     assert not is_one_line([both[0], candidate(judge, f"sensor-bias:{DEPTH}")])
     assert not is_a_curve(judge, replace(beside, candidates=(mass, mass))), "of no line"
-    monkeypatch.setattr(selection, "is_a_curve", lambda *_: True)
+    monkeypatch.setattr(decision, "is_a_curve", lambda *_: True)
     found = diagnose(scenario(), recorded(GAIN, speeds=(1.2, 2.2, 3.2)))
     assert (found.verdict, found.effects) == ("unexplained", ())
 

@@ -9,15 +9,15 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis import looks
-from rollover.diagnosis.blocks import Fitted
-from rollover.diagnosis.candidates import BESIDE, Candidate
-from rollover.diagnosis.crew import Crew, Job
-from rollover.diagnosis.effort import RUNS
-from rollover.diagnosis.explain import _smoothly
-from rollover.diagnosis.fit import Judge
-from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.screening import screen
+from rollover.diagnosis.fit.jobs import Crew, Job
+from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.fit.linearisation import Fitted
+from rollover.diagnosis.fit.parameterisation import BESIDE, Candidate
+from rollover.diagnosis.forward.budget import RUNS
+from rollover.diagnosis.selection import scan
+from rollover.diagnosis.selection.context import Inquiry
+from rollover.diagnosis.selection.forward_step import _smoothly
+from rollover.diagnosis.selection.screening import screen
 from rollover.effects import Search
 from tests.diagnosis import test_chaos
 from tests.diagnosis.test_chaos import STEP
@@ -51,7 +51,7 @@ def tipped(size: float) -> tuple[Judge, Fitted]:
 def test_what_only_a_strong_effect_does_is_found_though_a_little_of_it_tells_nothing() -> None:
     judge, base = tipped(20.0)
     mass, groups = MASS, [[r] for r in range(4)]
-    found = looks.look(judge, base, [mass, SLOPE], groups)
+    found = scan.look(judge, base, [mass, SLOPE], groups)
     assert found.scores["mass"] > 100.0 * found.scores["slope"]
     assert found.far == {"slope": ((0.95,),)}  # a mass leaves 0.91^2 of it, more than is followed
     assert found.leading[0] == "slope"
@@ -61,17 +61,17 @@ def test_what_only_a_strong_effect_does_is_found_though_a_little_of_it_tells_not
     assert (0.95,) in begun.starts
     assert screen(inquiry, base, [SLOPE], [0, 1], [0.0] * 4, replace(found, far={}))[0].starts != begun.starts
     judge.straying = True
-    assert looks.look(judge, base, [mass, SLOPE], groups).far == {}  # of what strays so far, chance may be all
+    assert scan.look(judge, base, [mass, SLOPE], groups).far == {}  # of what strays so far, chance may be all
 
 
 def test_where_known_runs_must_do_no_strong_effect_is_tried() -> None:
     judge, base = tipped(20.0)
     groups = [[r] for r in range(4)]
-    looks.look(judge, base, [MASS, SLOPE], groups, base, [0, 1])
+    scan.look(judge, base, [MASS, SLOPE], groups, base, [0, 1])
     known = judge.simulations
-    assert looks.look(judge, base, [MASS, SLOPE], groups, base, [0, 1]).far == {}
+    assert scan.look(judge, base, [MASS, SLOPE], groups, base, [0, 1]).far == {}
     assert judge.simulations == known
-    assert list(looks.look(judge, base, [MASS, SLOPE], groups).far) == ["slope"]
+    assert list(scan.look(judge, base, [MASS, SLOPE], groups).far) == ["slope"]
     assert judge.simulations > known
 
 
@@ -80,15 +80,15 @@ def test_what_leaves_more_of_the_worst_recording_is_tried_in_no_other(monkeypatc
     judge, base = tipped(20.0)
     judge.measured[2] = 1.5 * judge.measured[2]
     asked: dict[int, set[float]] = {1: set(), 2: set()}
-    left_at = looks.left_at
+    left_at = scan.left_at
 
     def counted(judge: Judge, candidates: Any, x: Any, shifts: Any, use: Any) -> float | None:
         for r in use:
             asked[r] |= {round(float(v), 9) for v in x}
         return left_at(judge, candidates, x, shifts, use)
 
-    monkeypatch.setattr(looks, "left_at", counted)
-    assert looks.strongly(judge, base, [SLOPE], [1, 2]) == {"slope": ((0.95,),)}
+    monkeypatch.setattr(scan, "left_at", counted)
+    assert scan.strongly(judge, base, [SLOPE], [1, 2]) == {"slope": ((0.95,),)}
     assert asked[2] == {round(x, 9) for (x,) in SLOPE.strong()}
     assert asked[1] == {0.95}
 
@@ -100,9 +100,9 @@ def test_what_leaves_less_of_it_in_full_or_forgiven_is_tried_in_all(
     def left_at(judge: Judge, candidates: Any, x: Any, *_: Any) -> float:
         return 10.0 if not x else 30.0 if x != (0.95,) else forgiven if judge.straying else full
 
-    monkeypatch.setattr(looks, "left_at", left_at)
+    monkeypatch.setattr(scan, "left_at", left_at)
     judge, base = tipped(20.0)
-    assert looks.strongly(judge, base, [SLOPE], [1, 2]) == ({} if full == forgiven else {"slope": ((0.95,),)})
+    assert scan.strongly(judge, base, [SLOPE], [1, 2]) == ({} if full == forgiven else {"slope": ((0.95,),)})
 
 
 def test_a_strong_effect_is_fitted_with_other_courses_forgiven_and_compared_in_full() -> None:
@@ -180,7 +180,7 @@ def test_a_limit_begins_where_something_gives_way_though_less_is_left_where_noth
     blocks = [replace(b, residual=w - known) for b, w in zip(base.blocks, judge.measured, strict=True)]
     base = replace(base, blocks=tuple(blocks))
     inquiry = Inquiry(judge=judge, candidates=(limit,), groups=[], phases=[], say=lambda _: None, crew=Crew())
-    looked = replace(looks.look(judge, base, [limit], [[r] for r in range(4)]), far={})
+    looked = replace(scan.look(judge, base, [limit], [[r] for r in range(4)]), far={})
     found = screen(inquiry, base, [limit], [0, 1], [0.0] * 4, looked)[0]
     nothing_yields = [x for x in limit.probes() if abs(x[0] - neutral) < 0.1]
     assert nothing_yields

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.series import series
-from rollover.diagnosis.triggers import about_clocks, from_first_contact
-from rollover.faults import InputError
+from rollover.diagnosis.data.onset import about_clocks, from_first_contact
+from rollover.diagnosis.overlay import series
 from rollover.recording import Clock, Recording
+from rollover.system.errors import InputError
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
 LATE = (0.4, -0.1, 7.0)  # s

@@ -9,19 +9,19 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis import way_down
-from rollover.diagnosis.candidates import Candidate
-from rollover.diagnosis.crew import Crew
-from rollover.diagnosis.detect import Mismatch
-from rollover.diagnosis.diagnose import _evidence, diagnose
-from rollover.diagnosis.effort import DROPS
-from rollover.diagnosis.explain import Step
-from rollover.diagnosis.fit import Fitted, Judge
-from rollover.diagnosis.inquiry import Inquiry
-from rollover.diagnosis.one_by_one import Taken
-from rollover.diagnosis.phases import drop_phases
+from rollover.diagnosis.data.phases import drop_phases
+from rollover.diagnosis.fit.jobs import Crew
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.fit.step import Step
+from rollover.diagnosis.forward.budget import DROPS
+from rollover.diagnosis.inference.lack_of_fit import Mismatch
+from rollover.diagnosis.pipeline import _evidence, diagnose
+from rollover.diagnosis.selection import truncated_start
+from rollover.diagnosis.selection.context import Inquiry
+from rollover.diagnosis.selection.stepwise import Taken
 from rollover.effects import Search
-from rollover.proof.descent import descend
+from rollover.proof.reference_solver import descend
 from rollover.proof.rig import Rig
 from rollover.recording import Recording
 from rollover.scenario import load
@@ -95,40 +95,40 @@ def test_what_explains_the_way_down_is_a_beginning_if_it_leads_to_far_less(
     weighed: list[Any] = []
     judge = SimpleNamespace(evidence=["whole"], effort=DROPS, simulations=3, weigh=weighed.append)
     early = SimpleNamespace(evidence=["cut"], fit=lambda *_: fit((), 900.0), simulations=4)
-    monkeypatch.setattr(way_down, "_cut", lambda *_: "cut")
-    monkeypatch.setattr(way_down, "Judge", lambda _: early)
-    monkeypatch.setattr(way_down, "align", lambda _: None)
-    monkeypatch.setattr(way_down, "one_by_one", one_by_one)
+    monkeypatch.setattr(truncated_start, "_cut", lambda *_: "cut")
+    monkeypatch.setattr(truncated_start, "Judge", lambda _: early)
+    monkeypatch.setattr(truncated_start, "align", lambda _: None)
+    monkeypatch.setattr(truncated_start, "one_by_one", one_by_one)
     back = {"moves": np.inf}
-    monkeypatch.setattr(way_down, "moving_back", lambda *_: back["moves"])
+    monkeypatch.setattr(truncated_start, "moving_back", lambda *_: back["moves"])
     whole = Inquiry(
         judge=cast(Any, judge), candidates=(), groups=[], phases=[()], say=lambda _: None,
         crew=cast(Any, SimpleNamespace(fits=lambda _judge, jobs, _say: [fit(j.candidates, 5_000.0) for j in jobs])),
     )  # fmt: skip
-    found = way_down.down_first(whole, before)
+    found = truncated_start.down_first(whole, before)
     assert found is (there if better else before)
     ways = [[], ["soil-layer"], ["soil-elastic-rebound"], ["soil-elastic-rebound"]]
     assert asked == ways[: 4 if above < 60.0 else 1], "the way down, as it springs back, the first rise, the whole"
     assert judge.simulations == (15 if above < 60.0 else 7)
     assert weighed == ([["whole"]] if over_all > 900.0 else []), "as it was before a way that led nowhere"
     little = taken(base, fit((MASS,), 60.0))
-    assert way_down.down_first(whole, little) is little
+    assert truncated_start.down_first(whole, little) is little
     back["moves"] = 50.0
-    assert way_down.down_first(whole, before) is before, "what rests as simulated is no reason for ten thousand"
+    assert truncated_start.down_first(whole, before) is before, "what rests as simulated is no reason for ten thousand"
 
 
 def test_the_way_down_ends_before_the_deepest_point() -> None:
     evidence, _ = _evidence(load("drop_test"), recordings({}), Crew())
     phases = drop_phases(evidence[0])
-    cut = way_down._cut(evidence[0], phases, 0.9)
+    cut = truncated_start._cut(evidence[0], phases, 0.9)
     assert cut is not None
     deepest = descend(Rig(speed=SPEEDS[0]), -0.1, 0.8).deepest()[0]
     for before, after in zip(evidence[0].signals, cut.signals, strict=True):
         last = evidence[0].recording.time[after.rows[-1]]
         assert 0.8 * deepest < last < deepest
         np.testing.assert_array_equal(before.values[: after.rows.size], after.values)
-    assert way_down._cut(evidence[0], ((-0.05, "approach"),), 0.9) is None
-    assert way_down._cut(evidence[0], ((-0.05, "free-fall"), (-0.045, "peak")), 0.9) is None, "five samples"
+    assert truncated_start._cut(evidence[0], ((-0.05, "approach"),), 0.9) is None
+    assert truncated_start._cut(evidence[0], ((-0.05, "free-fall"), (-0.045, "peak")), 0.9) is None, "five samples"
 
 
 @pytest.mark.parametrize(
@@ -147,10 +147,10 @@ def test_what_holds_what_fell_into_it_moves_nothing_on_the_way_back(rig: dict[st
     phases = [drop_phases(e) for e in evidence]
     asking = Inquiry(judge=judge, candidates=(), groups=[], phases=phases, say=lambda _: None, crew=Crew())
     beyond = base.left - sum(b.residual.size for b in base.blocks)
-    moved = way_down.moving_back(asking, base)
-    assert moved > 0.1 * beyond if is_back else abs(moved) < 0.1 * way_down.BACK * beyond
-    early = [way_down._cut(e, p, way_down.ENDS[0]) for e, p in zip(evidence, phases, strict=True)]
+    moved = truncated_start.moving_back(asking, base)
+    assert moved > 0.1 * beyond if is_back else abs(moved) < 0.1 * truncated_start.BACK * beyond
+    early = [truncated_start._cut(e, p, truncated_start.ENDS[0]) for e, p in zip(evidence, phases, strict=True)]
     cut = Judge([e for e in early if e is not None])
     above = cut.fit((), ())
     assert above is not None
-    assert way_down.moving_back(replace(asking, judge=cut), above) == np.inf, "nothing tells of it"
+    assert truncated_start.moving_back(replace(asking, judge=cut), above) == np.inf, "nothing tells of it"

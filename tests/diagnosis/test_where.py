@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rollover.diagnosis.candidates import coordinate, physical
-from rollover.diagnosis.evidence import evidence_of
-from rollover.diagnosis.phases import drop_phases
-from rollover.diagnosis.ranges import candidates_of
-from rollover.diagnosis.simulator import simulator_of
+from rollover.diagnosis.data.dataset import evidence_of
+from rollover.diagnosis.data.phases import drop_phases
+from rollover.diagnosis.fit.parameterisation import coordinate, physical
+from rollover.diagnosis.forward.forward_model import simulator_of
+from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.effects import Search
 from tests.diagnosis import drops
 from tests.diagnosis.drops import recorded, scenario

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from rollover.diagnosis.evidence import Evidence
-from rollover.diagnosis.whitening import Noise, Whitening
-from rollover.noise import grown
+from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.data.whitening import Noise, Whitening
 from rollover.recording import Recording
+from rollover.recording.noise_floor import grown
 from tests.diagnosis.drops import FORCE, signal
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from rollover.diagnosis import diagnose_folder
-from rollover.proof.folder import write_case
 from rollover.proof.generator import make, plan
+from rollover.proof.handover import write_case
 
 
 @pytest.mark.parametrize(

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.crew import Crew
-from rollover.diagnosis.evidence import Evidence
-from rollover.diagnosis.zeros import WAVES, Zero, _differ, _own, _stand
+from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.fit.jobs import Crew
+from rollover.diagnosis.noise.offsets import WAVES, Zero, _differ, _own, _stand
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
-diagnosing = importlib.import_module("rollover.diagnosis.diagnose")
+diagnosing = importlib.import_module("rollover.diagnosis.pipeline")
 CHANNELS = (FORCE, DEPTH, ACCELERATION)
 SPEEDS = (1.1, 1.6, 2.1, 2.6, 3.1, 3.6)
 LAYER = {"effects.soil-layer.depth": 0.05, "effects.soil-layer.stiffness_ratio": 1.3}

@@ -182,7 +182,7 @@ TO = (("--to", "parquet"), ("--to", "mme.zip"), ("--channel", "?*"), ("--select"
 
 def recordings() -> list[Door]:
     """Our own recordings, profiles, and one door for each importer and each published set of the tables."""
-    from rollover.importers import COLLECTIONS, importers
+    from rollover.recording.importers import COLLECTIONS, importers
 
     own = {"drop_1.csv": seeds.csv(seeds.drop_columns()), "drop_1.yaml": seeds.SIDE.encode()}
     packed = {"a.parquet": seeds.parquet(), "a.yaml": seeds.SIDE.encode()}

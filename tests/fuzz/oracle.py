@@ -22,7 +22,7 @@ from typing import Any
 
 import typer.main
 
-from rollover.commands import door
+from rollover.cli.commands import common
 
 LONGEST = 5.0  # s of the processor, of one input
 MOST_MEMORY = 1 << 30  # bytes, beyond what the process held before
@@ -59,7 +59,7 @@ def command() -> Any:
     """The command `rollover`, built once."""
     global _command
     if _command is None:
-        _command = typer.main.get_command(door.app)
+        _command = typer.main.get_command(common.app)
     return _command
 
 
@@ -148,7 +148,7 @@ def judge(folder: Path, words: Sequence[str], out: str = "out", *, whole: bool =
         faults.extend(" ".join(map(str, what)).split("\n"))
         print(*what, file=file)
 
-    door.print = told  # type: ignore[attr-defined]
+    common.print = told  # type: ignore[attr-defined]
     began = process_time()
     sys.unraisablehook = lambda _: None  # as the command itself does
     try:
@@ -173,7 +173,7 @@ def judge(folder: Path, words: Sequence[str], out: str = "out", *, whole: bool =
         finds.append(("traceback", f"{type(e).__name__} {_where(e.__traceback__)}"))
         stderr.write(traceback.format_exc())
     finally:
-        del door.print  # type: ignore[attr-defined]
+        del common.print  # type: ignore[attr-defined]
         seconds = process_time() - began
         os.chdir(here)
     memory = max(0, _status("VmHWM") - held)
@@ -244,11 +244,11 @@ def _changed(before: dict[str, tuple[int, int]], after: dict[str, tuple[int, int
 
 def _unreadable(out: Path) -> str:
     """Why something that was written cannot be read back, by the project's own readers."""
-    from rollover import catalogue
-    from rollover.faults import InputError
-    from rollover.importers import read_recording
-    from rollover.pair import is_result
-    from rollover.pair import read as result
+    from rollover.cli import catalogue
+    from rollover.comparison.run_pair import is_result
+    from rollover.comparison.run_pair import read as result
+    from rollover.recording.importers import read_recording
+    from rollover.system.errors import InputError
 
     for path in sorted(out.rglob("*")) if out.is_dir() else ():
         try:

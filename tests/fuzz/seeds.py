@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rollover.document import shipped_folder
+from rollover.spec.document import shipped_folder
 
 Files = dict[str, bytes]
 FORCE, SINKAGE, ACCELERATION = "ground/force_normal", "ground/sinkage", "chassis/acceleration_x"

@@ -43,7 +43,7 @@ def test_what_a_whole_line_is(line: str, lacks: str) -> None:
 
 
 def test_the_judge_sees_what_it_is_to_see(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from rollover import catalogue
+    from rollover.cli import catalogue
     from tests.fuzz import oracle
 
     def found() -> dict[str, str]:

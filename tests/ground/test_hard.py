@@ -11,8 +11,8 @@ from scipy.integrate import quad, solve_ivp
 
 from ground.hard import Hard
 from ground.law import HIDDEN, evaluate, touched
-from rollover.simulate import run
-from rollover.vehicle import Striker
+from rollover.dynamics.simulate import run
+from rollover.spec.vehicle import Striker
 from tests.physics.scenes import drop
 
 

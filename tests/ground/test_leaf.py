@@ -10,11 +10,11 @@ import pytest
 
 from ground.compiled import compiled, leaf
 from ground.kernel import AREA, COLUMNS, LINE_C, LINE_F, LINE_K, LINE_Z, STATE_COLUMNS, normal_force
-from rollover.drop import DropModel
-from rollover.nose import accelerate
+from rollover.dynamics.drop_test import DropModel
+from rollover.kernels.striker import accelerate
+from rollover.kernels.tables import Tables, handle
+from rollover.kernels.vectors import to_world
 from rollover.scenario import load
-from rollover.tables import Tables, handle
-from rollover.vectors import to_world
 
 
 @leaf

@@ -10,8 +10,8 @@ import pytest
 from ground.no_data import missing
 from ground.relief import STEEPEST
 from ground.surface import Heightmap
-from rollover.faults import InputError
 from rollover.scenario import load
+from rollover.system.errors import InputError
 
 SPACING = (0.5, 0.5)
 

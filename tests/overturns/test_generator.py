@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from rollover.effects import EFFECTS
-from rollover.overturns import foreign, generator, library
-from rollover.overturns.generator import CHANNELS, make, plan
-from rollover.overturns.outside import OUTSIDE
-from rollover.proof import examine
-from rollover.proof.folder import write_case
+from rollover.proof import runner
 from rollover.proof.generator import Order
+from rollover.proof.handover import write_case
+from rollover.proof.overturns import foreign, generator, library
+from rollover.proof.overturns.generator import CHANNELS, make, plan
+from rollover.proof.overturns.outside import OUTSIDE
 from rollover.scenario import Scenario, load
 from tests.physics.scenes import shipped
 
@@ -197,11 +197,11 @@ def test_what_is_outside_shows_and_is_told_as_such(id: str) -> None:
 
 def test_a_rig_that_there_is_not_is_refused() -> None:
     with pytest.raises(ValueError, match="rig: no such rig, got 'sled'; drop, overturn are allowed"):
-        examine.prove(1, 1, rig="sled")
+        runner.prove(1, 1, rig="sled")
 
 
 def test_overturns_are_sealed_handed_over_and_scored_like_drops() -> None:
-    proof = examine.prove(
+    proof = runner.prove(
         1, 6, rig="overturn", kinds=["null"], workers=0, diagnosis="tests.proof.diagnoses:says_nothing"
     )
     assert proof.account["rig"] == "overturn"

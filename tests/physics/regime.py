@@ -19,9 +19,9 @@ import sys
 
 import numpy as np
 
-from rollover.frames import from_angles
+from rollover.dynamics.simulate import run
 from rollover.scenario import Scenario
-from rollover.simulate import run
+from rollover.spec.frames import from_angles
 from tests.physics.scenes import shipped
 
 PUBLISHED_DEG = 25.0  # one model, of another tractor

@@ -9,11 +9,11 @@ from ground.friction import Coulomb
 from ground.law import GroundLaw
 from ground.surface import Plane, Surface
 from ground.ye import Ye2006
-from rollover.inertia import MassProperties
-from rollover.initiation import Drop, Initiation
 from rollover.scenario import Ground, Scenario, Simulation, load
-from rollover.shapes import Box
-from rollover.vehicle import Striker, Vehicle
+from rollover.spec.inertia import MassProperties
+from rollover.spec.initiation import Drop, Initiation
+from rollover.spec.shapes import Box
+from rollover.spec.vehicle import Striker, Vehicle
 
 SHIPPED = Path(__file__).parents[2] / "scenarios"
 

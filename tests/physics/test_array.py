@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from ground.kernel import COLUMNS
-from rollover.bodies import bodies_of
-from rollover.contact import tables_of
-from rollover.initiation import Drop
-from rollover.loads import peak_loads
-from rollover.run import Run
-from rollover.simulate import run
+from rollover.assessment.loads import peak_loads
+from rollover.dynamics.assembly import tables_of
+from rollover.dynamics.bodies import bodies_of
+from rollover.dynamics.result import Run
+from rollover.dynamics.simulate import run
+from rollover.spec.initiation import Drop
 from tests.ground.reference_drop import solve
 from tests.physics.scenes import block, drop, shipped
 

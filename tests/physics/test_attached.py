@@ -7,17 +7,17 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rollover.bodies import bodies_of
-from rollover.clearance import protected_margin
-from rollover.contact import tables_of
-from rollover.criteria import LIGHT_SHARES, rops_share
-from rollover.forces import generalised_forces
-from rollover.frames import from_angles, rotation_vector
-from rollover.inertia import MassProperties
-from rollover.shapes import Box
-from rollover.simulate import run
-from rollover.tables import E_DEPTH_NOW, E_ENERGY_NOW, E_FORCE_NOW, handle
-from rollover.vehicle import Attached, Vehicle, carried, chassis_of, laden
+from rollover.assessment.clearance import protected_margin
+from rollover.assessment.criteria import LIGHT_SHARES, rops_share
+from rollover.dynamics.assembly import tables_of
+from rollover.dynamics.bodies import bodies_of
+from rollover.dynamics.simulate import run
+from rollover.kernels.forces import generalised_forces
+from rollover.kernels.tables import E_DEPTH_NOW, E_ENERGY_NOW, E_FORCE_NOW, handle
+from rollover.spec.frames import from_angles, rotation_vector
+from rollover.spec.inertia import MassProperties
+from rollover.spec.shapes import Box
+from rollover.spec.vehicle import Attached, Vehicle, carried, chassis_of, laden
 from tests.physics.scenes import shipped
 
 

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rollover.bodies import bodies_of
-from rollover.contact import tables_of
-from rollover.forces import generalised_forces
-from rollover.frames import from_angles, rotation_vector
-from rollover.impact import constraints
-from rollover.inertia import MassProperties, combined
+from rollover.dynamics.assembly import tables_of
+from rollover.dynamics.bodies import bodies_of
+from rollover.dynamics.simulate import run
+from rollover.kernels.forces import generalised_forces
+from rollover.kernels.impact import constraints
+from rollover.kernels.step import end_of_step, start_step
+from rollover.kernels.tables import AXLE, M_IMPULSE, Tables, handle
 from rollover.scenario import Scenario
-from rollover.simulate import run
-from rollover.step import end_of_step, start_step
-from rollover.tables import AXLE, M_IMPULSE, Tables, handle
-from rollover.vehicle import FrontAxle, Vehicle
+from rollover.spec.frames import from_angles, rotation_vector
+from rollover.spec.inertia import MassProperties, combined
+from rollover.spec.vehicle import FrontAxle, Vehicle
 from tests.physics.scenes import shipped
 
 Array = NDArray[np.float64]

@@ -9,12 +9,13 @@ import pytest
 from typer.testing import CliRunner
 
 from ground.law import laws
-from rollover import document, simulate
-from rollover.cli import app
-from rollover.faults import InputError
-from rollover.rig import set_up
+from rollover.cli.main import app
+from rollover.dynamics import simulate
+from rollover.dynamics.setup import set_up
 from rollover.scenario import AnyLaw, Scenario, load
-from rollover.vehicle import Vehicle
+from rollover.spec import document
+from rollover.spec.vehicle import Vehicle
+from rollover.system.errors import InputError
 
 SHELF = document.shipped_folder()
 SCENARIOS = [p.stem for p in sorted(SHELF.glob("*.yaml")) if isinstance(load(p).vehicle, Vehicle)]

@@ -11,17 +11,13 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import fsolve
 
-from rollover import document
-from rollover.bodies import bodies_of
-from rollover.connector import Connector, RateFactor
-from rollover.connectors import try_axis
-from rollover.contact import tables_of
-from rollover.forces import generalised_forces
-from rollover.frames import from_angles, rotation_vector
-from rollover.rops import Rops
-from rollover.simulate import run
-from rollover.step import finish_mounts, start_step
-from rollover.tables import (
+from rollover.dynamics.assembly import tables_of
+from rollover.dynamics.bodies import bodies_of
+from rollover.dynamics.simulate import run
+from rollover.kernels.compliant_joints import try_axis
+from rollover.kernels.forces import generalised_forces
+from rollover.kernels.step import finish_mounts, start_step
+from rollover.kernels.tables import (
     MOUNT_COLUMNS,
     ROPS,
     S_DELTA_NOW,
@@ -35,6 +31,10 @@ from rollover.tables import (
     Tables,
     handle,
 )
+from rollover.spec import document
+from rollover.spec.connector import Connector, RateFactor
+from rollover.spec.frames import from_angles, rotation_vector
+from rollover.spec.rops import Rops
 from tests.physics.scenes import SHIPPED, shipped
 
 Array = NDArray[np.float64]

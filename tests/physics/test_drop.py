@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from ground.ye import CO_MOVING_FRACTIONS
-from rollover.loads import peak_loads
-from rollover.run import Run
-from rollover.simulate import run
+from rollover.assessment.loads import peak_loads
+from rollover.dynamics.result import Run
+from rollover.dynamics.simulate import run
 from tests.ground.reference_drop import solve
 from tests.physics.scenes import drop, shipped
 

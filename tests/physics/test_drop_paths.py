@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.drop import DropModel, simulate_drop, unfit
+from rollover.dynamics.drop_test import DropModel, simulate_drop, unfit
+from rollover.dynamics.result import Run
+from rollover.dynamics.simulate import run
 from rollover.effects import EFFECTS
-from rollover.run import Run
 from rollover.scenario import Scenario
-from rollover.simulate import run
 from tests.ground.reference_drop import solve
 from tests.ground.test_laws_contract import EXAMPLES
 from tests.physics.scenes import drop, shipped
@@ -83,7 +83,7 @@ def test_a_force_that_rises_steeply_has_not_jumped(monkeypatch: pytest.MonkeyPat
     fall = DropModel(scenario=scene({f"effects.structural-compliance.{name}": v for name, v in stiff.items()}))
     told = []
     for beside in (1e-9, 1e-11):
-        monkeypatch.setattr("rollover.drop.BESIDE", beside)
+        monkeypatch.setattr("rollover.dynamics.drop_test.BESIDE", beside)
         instants, apart = fall.track(0.46).jumps
         told.append((instants, apart[:, 0]))
     (wide, sizes), (close, same) = told

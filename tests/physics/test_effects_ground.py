@@ -16,7 +16,7 @@ from scipy.linalg import expm
 
 from ground.law import REFERENCE_AREA
 from ground.ye import Ye2006
-from rollover.drop import DropModel, simulate_drop
+from rollover.dynamics.drop_test import DropModel, simulate_drop
 from tests.physics.scenes import drop, shipped
 
 Array = NDArray[np.float64]

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.bodies import bodies_of
-from rollover.contact import tables_of
-from rollover.forces import generalised_forces
-from rollover.initiation import Drop
-from rollover.run import Run
+from rollover.dynamics.assembly import tables_of
+from rollover.dynamics.bodies import bodies_of
+from rollover.dynamics.result import Run
+from rollover.dynamics.simulate import run
+from rollover.kernels.forces import generalised_forces
+from rollover.kernels.tables import handle
 from rollover.scenario import Scenario
-from rollover.simulate import run
-from rollover.tables import handle
+from rollover.spec.initiation import Drop
 from tests.physics.scenes import block, shipped
 
 g = 9.81

@@ -12,9 +12,9 @@ import pytest
 
 from ground.compaction import Compaction
 from ground.press import Press
-from rollover.excitation import Blows, Harmonic
-from rollover.run import Run
-from rollover.simulate import run
+from rollover.dynamics.result import Run
+from rollover.dynamics.simulate import run
+from rollover.spec.excitation import Blows, Harmonic
 from tests.physics.scenes import drop, shipped
 
 

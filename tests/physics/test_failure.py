@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rollover.simulate import run
+from rollover.dynamics.simulate import run
 from tests.physics.scenes import drop, shipped
 
 

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from ground.fluid import FluidEntry, cone_rate
 from ground.law import REFERENCE_AREA
-from rollover.drop import DropModel, simulate_drop
+from rollover.dynamics.drop_test import DropModel, simulate_drop
+from rollover.dynamics.simulate import run
 from rollover.scenario import Scenario
-from rollover.simulate import run
-from rollover.vehicle import Striker
+from rollover.spec.vehicle import Striker
 from tests.physics.scenes import drop, shipped
 
 Array = NDArray[np.float64]

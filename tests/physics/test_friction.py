@@ -9,8 +9,8 @@ import pytest
 
 from ground.kernel import commit_friction, friction_force
 from ground.surface import Slope
-from rollover.initiation import Drop
-from rollover.simulate import run
+from rollover.dynamics.simulate import run
+from rollover.spec.initiation import Drop
 from tests.physics.scenes import block
 
 ANGLE = 20.0

@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from ground.kernel import BODY, MASS_B, NORMAL, OWNER_R
-from rollover.bodies import bodies_of
-from rollover.contact import tables_of
-from rollover.forces import generalised_forces
-from rollover.frames import from_angles, rotation_vector
-from rollover.initiation import Drop
+from rollover.dynamics.assembly import tables_of
+from rollover.dynamics.bodies import bodies_of
+from rollover.kernels.forces import generalised_forces
+from rollover.kernels.step import end_of_step, start_step
+from rollover.kernels.tables import ACTIVE, COLLISION, R_IMPULSE, Tables, handle
 from rollover.scenario import Scenario
-from rollover.step import end_of_step, start_step
-from rollover.tables import ACTIVE, COLLISION, R_IMPULSE, Tables, handle
+from rollover.spec.frames import from_angles, rotation_vector
+from rollover.spec.initiation import Drop
 from tests.physics.scenes import block, shipped
 
 Array = NDArray[np.float64]
@@ -145,9 +145,9 @@ def test_effective_mass_at_the_upper_corner() -> None:
     t = tables_of(scenario, bodies)
     whole = np.diag([mass] * 3 + [1300.0, 3000.0, 3300.0])
     t = t._replace(mass=whole, inverse=np.linalg.inv(whole))
-    from rollover.impact import mobility
-    from rollover.tables import ROT
-    from rollover.vectors import depth_row
+    from rollover.kernels.impact import mobility
+    from rollover.kernels.tables import ROT
+    from rollover.kernels.vectors import depth_row
 
     t.pose[0, ROT : ROT + 9] = from_angles(roll, 0.0, 0.0).ravel()
     J = np.zeros(6)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from ground.kernel import AREA, COLUMNS, LOADING, MODE, STATE_COLUMNS, commit, normal_force
 from ground.law import REFERENCE_AREA, GroundLaw, touched
 from ground.settings import settings as kernel_settings
-from rollover.simulate import run
+from rollover.dynamics.simulate import run
 from tests.ground.test_laws_contract import EXAMPLES
 from tests.physics.scenes import drop
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover import simulate
-from rollover.ledger import LIMIT, closure
-from rollover.run import Run
-from rollover.simulate import run
-from rollover.step import end_of_step
+from rollover.assessment.ledger import LIMIT, closure
+from rollover.dynamics import simulate
+from rollover.dynamics.result import Run
+from rollover.dynamics.simulate import run
+from rollover.kernels.step import end_of_step
 from tests.physics.scenes import shipped
 from tests.physics.throws import overturn, throw
 

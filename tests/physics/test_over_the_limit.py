@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rollover import simulate
-from rollover import study as studies
-from rollover.placement import REST
+from rollover import studies
+from rollover.assessment.stability import stability_angles
+from rollover.dynamics import simulate
+from rollover.dynamics.placement import REST
 from rollover.scenario import load
-from rollover.stability import stability_angles
-from rollover.study.answers import answers
-from rollover.study.conduct import Way, conduct
+from rollover.studies.runner import Way, conduct
+from rollover.studies.summary import answers
 
 # deg, from where poses that follow from each other used to jump to where the vehicle stands no more
 BANDS = [

@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollover import devices as d
-from rollover.forces import generalised_forces
-from rollover.rig import set_up
-from rollover.run import Run
-from rollover.simulate import run
-from rollover.stand import PendulumBlow
-from rollover.tables import handle
+from rollover.dynamics.result import Run
+from rollover.dynamics.setup import set_up
+from rollover.dynamics.simulate import run
+from rollover.kernels import stand_devices as d
+from rollover.kernels.forces import generalised_forces
+from rollover.kernels.tables import handle
+from rollover.spec.stand import PendulumBlow
 from tests.physics.scenes import shipped
 
 

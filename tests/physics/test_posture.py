@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rollover.dense import largest
-from rollover.frames import from_angles
-from rollover.posture import AXLE, PARTS, PITCH, ROLL, SLIDE, SWINGS, WITH_CHASSIS, YAW, move, put, vector_of
+from rollover.dynamics.posture import AXLE, PARTS, PITCH, ROLL, SLIDE, SWINGS, WITH_CHASSIS, YAW, move, put, vector_of
+from rollover.kernels.dense import largest
+from rollover.spec.frames import from_angles
 
 HEADING = 0.4
 NORMAL = np.array([0.1, -0.2, 0.97]) / np.linalg.norm([0.1, -0.2, 0.97])

@@ -6,8 +6,8 @@ import hashlib
 import subprocess
 import sys
 
-from rollover.run import Run
-from rollover.simulate import run
+from rollover.dynamics.result import Run
+from rollover.dynamics.simulate import run
 from tests.physics.scenes import shipped
 
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from rollover import document
-from rollover.faults import InputError
-from rollover.inertia import MassProperties, combined
+from rollover.assessment.stability import StabilityAngle, losses, stability_angles
+from rollover.dynamics.support import closed_form, turning_slope
 from rollover.scenario import AnyVehicle, Scenario
-from rollover.stability import StabilityAngle, losses, stability_angles
-from rollover.support import closed_form, turning_slope
-from rollover.vehicle import Attached, Vehicle
+from rollover.spec import document
+from rollover.spec.inertia import MassProperties, combined
+from rollover.spec.vehicle import Attached, Vehicle
+from rollover.system.errors import InputError
 from tests.physics.scenes import SHIPPED, shipped
 from tests.physics.test_tipping import HP, A, H, L, M, S, rigid_tractor
 
@@ -258,7 +258,7 @@ def test_what_parts_cost() -> None:
 
 def test_the_same_as_the_tilt_table() -> None:
     """The dynamic tilt table lifts, meets the stop and overturns within half a degree of the statics."""
-    from rollover.simulate import run
+    from rollover.dynamics.simulate import run
 
     scenario = shipped("tilt_table").replaced({"initiation.from_deg": 34.3, "simulation.duration": 9.0})
     (table,) = run(scenario).tests

@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover import devices as d
-from rollover.control import control_of
-from rollover.forces import generalised_forces
-from rollover.rig import set_up
-from rollover.run import Run
+from rollover.dynamics.result import Run
+from rollover.dynamics.setup import set_up
+from rollover.dynamics.simulate import run
+from rollover.dynamics.stands.control import control_of
+from rollover.dynamics.stands.static_load import StaticControl, fall
+from rollover.kernels import stand_devices as d
+from rollover.kernels.forces import generalised_forces
+from rollover.kernels.tables import handle
 from rollover.scenario import Scenario
-from rollover.simulate import run
-from rollover.stand import StaticTest
-from rollover.static_load import StaticControl, fall
-from rollover.tables import handle
+from rollover.spec.stand import StaticTest
 from tests.physics.scenes import shipped
 
 

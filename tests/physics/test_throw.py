@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rollover.faults import InputError
-from rollover.run import Run
+from rollover.dynamics.result import Run
+from rollover.dynamics.simulate import run
 from rollover.scenario import Scenario
-from rollover.simulate import run
+from rollover.system.errors import InputError
 from tests.physics.scenes import shipped
 
 HALF = 0.0524  # m, half the cube's edge

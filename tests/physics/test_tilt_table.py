@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from rollover.simulate import run
-from rollover.stand import TiltTable
-from rollover.vehicle import Vehicle, chassis_of
+from rollover.dynamics.simulate import run
+from rollover.spec.stand import TiltTable
+from rollover.spec.vehicle import Vehicle, chassis_of
 from tests.physics.scenes import shipped
 from tests.physics.test_tipping import HP, A, H, L, S, rigid_tractor
 

@@ -12,20 +12,20 @@ from ground.array import CoMovingMass, Elements
 from ground.friction import Coulomb
 from ground.surface import Slope
 from ground.ye import Ye2006
-from rollover.bodies import bodies_of
-from rollover.contact import tables_of
-from rollover.equilibrium import tread_point
-from rollover.faults import InputError
-from rollover.forces import generalised_forces
-from rollover.frames import from_angles, matrices, rotation_vector
-from rollover.inertia import MassProperties
-from rollover.initiation import Drop, Standing
-from rollover.placement import place
+from rollover.dynamics.assembly import tables_of
+from rollover.dynamics.bodies import bodies_of
+from rollover.dynamics.equilibrium import tread_point
+from rollover.dynamics.placement import place
+from rollover.dynamics.simulate import run
+from rollover.kernels.forces import generalised_forces
+from rollover.kernels.tables import E_ENERGY_NOW, handle
 from rollover.scenario import Ground, Scenario, Simulation, load
-from rollover.shapes import Box
-from rollover.simulate import run
-from rollover.tables import E_ENERGY_NOW, handle
-from rollover.vehicle import FrontAxle, Tyre, Vehicle, Wheel
+from rollover.spec.frames import from_angles, matrices, rotation_vector
+from rollover.spec.inertia import MassProperties
+from rollover.spec.initiation import Drop, Standing
+from rollover.spec.shapes import Box
+from rollover.spec.vehicle import FrontAxle, Tyre, Vehicle, Wheel
+from rollover.system.errors import InputError
 
 # the utility tractor of the closed forms: half support width at the tyres' outer edges, m
 M, L, A, H, HP, S = 3000.0, 2.25, 0.90, 0.82, 0.55, 0.96

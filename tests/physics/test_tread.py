@@ -10,11 +10,11 @@ import pytest
 from numpy.typing import NDArray
 
 from ground.surface import Bank, Heightmap, Kerb, Ramp, Slope, Sum, Surface
-from rollover.bodies import bodies_of
-from rollover.contact import tables_of
-from rollover.forces import read_poses, try_wheels
-from rollover.frames import from_angles, matrices, rotation_vector
-from rollover.tables import E_DAMPING_NOW, E_DEPTH_NOW, E_ENERGY_NOW, E_FORCE_NOW, W_BOTTOM, W_C, W_KZ, handle
+from rollover.dynamics.assembly import tables_of
+from rollover.dynamics.bodies import bodies_of
+from rollover.kernels.forces import read_poses, try_wheels
+from rollover.kernels.tables import E_DAMPING_NOW, E_DEPTH_NOW, E_ENERGY_NOW, E_FORCE_NOW, W_BOTTOM, W_C, W_KZ, handle
+from rollover.spec.frames import from_angles, matrices, rotation_vector
 from tests.physics.scenes import shipped
 
 Array = NDArray[np.float64]

@@ -10,14 +10,14 @@ import pytest
 from ground.hard import NO_LONGER_HARD, Hard
 from ground.law import Calibration, Domain, laws
 from ground.ye import Ye2006
-from rollover.criteria import criteria, in_words
-from rollover.loads import peak_loads
-from rollover.run import Run
-from rollover.simulate import run
-from rollover.stand import StaticTest
+from rollover.assessment.criteria import criteria, in_words
+from rollover.assessment.loads import peak_loads
+from rollover.dynamics.result import Run
+from rollover.dynamics.simulate import run
+from rollover.spec.stand import StaticTest
 from tests.physics.scenes import shipped
-from viz.report import headline, page
-from viz.verdict import verdict
+from viz.content.verdict import verdict
+from viz.pages.report import headline, page
 
 
 @functools.cache

@@ -12,16 +12,16 @@ from ground.array import Elements
 from ground.kernel import CELL
 from ground.surface import Bank, Heightmap, Slope, Surface
 from ground.ye import Ye2006
-from rollover import contact
-from rollover.faults import InputError
-from rollover.forces import read_poses
-from rollover.initiation import Drop
-from rollover.rig import set_up
-from rollover.run import Run
+from rollover.dynamics import assembly
+from rollover.dynamics.result import Run
+from rollover.dynamics.setup import set_up
+from rollover.dynamics.simulate import run
+from rollover.kernels.broad_phase import search
+from rollover.kernels.forces import read_poses
+from rollover.kernels.tables import handle
 from rollover.scenario import load
-from rollover.search import search
-from rollover.simulate import run
-from rollover.tables import handle
+from rollover.spec.initiation import Drop
+from rollover.system.errors import InputError
 from tests.physics.scenes import block
 
 ANGLE = 20.0
@@ -103,7 +103,7 @@ def test_what_is_nowhere_near_the_ground_is_passed_over_and_nothing_else(monkeyp
     """A tractor pushed into a bank in many attitudes: by pieces of its patches as by patches whole."""
     scenario, found = load("bank_overturn").applied(), []
     for piece in (0.2, 100.0):
-        monkeypatch.setattr(contact, "PIECE", piece)
+        monkeypatch.setattr(assembly, "PIECE", piece)
         rig = set_up(scenario)
         q, random, own = rig.start.q.copy(), np.random.default_rng(5), []
         for _ in range(12):
@@ -139,10 +139,10 @@ def test_two_soils_side_by_side_are_each_its_own() -> None:
 
 
 def test_a_patch_that_lies_over_two_elements() -> None:
-    from rollover.bodies import bodies_of
-    from rollover.contact import tables_of
-    from rollover.search import law_of
-    from rollover.tables import handle
+    from rollover.dynamics.assembly import tables_of
+    from rollover.dynamics.bodies import bodies_of
+    from rollover.kernels.broad_phase import law_of
+    from rollover.kernels.tables import handle
 
     patch = {"low": [0.0, 0.0], "high": [0.2, 0.1], "law": Ye2006(stiffness_scale=3.0)}
     scenario = block(Drop(speed=1.0)).replaced(

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from rollover.bodies import bodies_of
-from rollover.contact import tables_of
-from rollover.run import Run
+from rollover.dynamics.assembly import tables_of
+from rollover.dynamics.bodies import bodies_of
+from rollover.dynamics.result import Run
+from rollover.dynamics.simulate import run
+from rollover.kernels.tables import W_AXIS, handle
+from rollover.kernels.wheel_spin import keep_spins
 from rollover.scenario import Scenario
-from rollover.simulate import run
-from rollover.spin import keep_spins
-from rollover.tables import W_AXIS, handle
 from tests.physics.regime import climbing, direction
 from tests.physics.scenes import shipped
 

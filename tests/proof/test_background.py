@@ -11,9 +11,9 @@ import pytest
 from rollover.proof import campaign
 from rollover.proof.background import Background, background, drawn_share, unsized
 from rollover.proof.campaign import ACCELERATION, DEPTH, FORCE, PLACE, SPEED
-from rollover.proof.descent import CHANNELS, LOADING, Descent, descend
 from rollover.proof.generator import Order, make, plan
 from rollover.proof.readings import measured, rig_of, span
+from rollover.proof.reference_solver import CHANNELS, LOADING, Descent, descend
 from rollover.proof.rig import Rig, loading_curve
 
 SPEEDS = (1.4, 2.0, 2.7, 3.3)

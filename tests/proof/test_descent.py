@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.proof.descent import CHANNELS, FREE, HELD, LOADING, Descent, descend
+from rollover.proof.reference_solver import CHANNELS, FREE, HELD, LOADING, Descent, descend
 from rollover.proof.rig import Rig, loading_curve
 from tests.ground.reference_drop import solve
 

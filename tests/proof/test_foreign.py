@@ -15,12 +15,12 @@ from scipy.optimize import least_squares
 
 from rollover.proof import campaign, foreign, library
 from rollover.proof.campaign import ACCELERATION, DEPTH, FORCE, PLACE, SPEED, Shot
-from rollover.proof.descent import LINE, LOADING, Descent, descend
 from rollover.proof.forms import Form
 from rollover.proof.generator import Order, make, plan
 from rollover.proof.instruments import Fault, Instruments
 from rollover.proof.library import Change, Setting
 from rollover.proof.readings import rig_of
+from rollover.proof.reference_solver import LINE, LOADING, Descent, descend
 from rollover.proof.rig import FACE, Rig, loading_curve
 
 Array = NDArray[np.float64]

@@ -10,18 +10,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover import filters, scenario
-from rollover.importers import read_recording
-from rollover.noise import noise_floor
+from rollover import scenario
 from rollover.proof import library, outside
 from rollover.proof.campaign import ACCELERATION, DEPTH, FORCE, PLACE, SPEED
-from rollover.proof.descent import descend
-from rollover.proof.folder import fingerprint, write_case
+from rollover.proof.effect_size import strength
 from rollover.proof.generator import KINDS, NULLS_SAY_NOTHING, Case, Order, make, plan
+from rollover.proof.handover import fingerprint, write_case
 from rollover.proof.instruments import Fault, Instruments, Noise, channel_filter
 from rollover.proof.library import Setting
+from rollover.proof.reference_solver import descend
 from rollover.proof.rig import Rig
-from rollover.proof.strength import strength
+from rollover.recording import filters
+from rollover.recording.importers import read_recording
+from rollover.recording.noise_floor import noise_floor
 
 IDS = (*library.EFFECTS, *outside.OUTSIDE)
 SETTING = Setting(

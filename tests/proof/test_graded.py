@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.commands.prove import sentences
+from rollover.cli.commands.prove import sentences
 from rollover.proof.probabilities import reliability, scored
 from rollover.proof.score import score
-from rollover.proof.tally import tally
+from rollover.proof.summary import tally
 from tests.proof.test_score import effect, said, truth
 
 BEHIND = {"background": {"share": 0.03}}

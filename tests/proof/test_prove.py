@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from rollover.commands.door import app
-from rollover.execute import map_cases
-from rollover.proof import examine
-from rollover.proof.examine import prove
-from rollover.proof.seal import opened
+from rollover.cli.commands.common import app
+from rollover.proof import runner
+from rollover.proof.commitment import opened
+from rollover.proof.runner import prove
+from rollover.system.processes import map_cases
 
 BY_HAND = "tests.proof.diagnoses:"
 QUICK = ["--cases", "2", "--kinds", "null", "--kinds", "single", "--effects", "mass", "--workers", "0"]
@@ -42,7 +42,7 @@ def test_answers_go_to_their_own_cases(monkeypatch: pytest.MonkeyPatch) -> None:
     def backwards(*args: Any, **kwargs: Any) -> Any:
         return reversed(list(map_cases(*args, **kwargs)))
 
-    monkeypatch.setattr(examine, "map_cases", backwards)
+    monkeypatch.setattr(runner, "map_cases", backwards)
     proof = prove(2, 4, kinds=["null"], workers=0, diagnosis=BY_HAND + "says_nothing")
     assert {name: found["folder"] for name, found in proof.diagnoses.items()} == {n: n for n in proof.diagnoses}
 
@@ -61,7 +61,7 @@ def test_a_diagnosis_that_changes_its_recordings_is_no_proof() -> None:
 
 
 def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(examine, "DIAGNOSIS", BY_HAND + "says_nothing")
+    monkeypatch.setattr(runner, "DIAGNOSIS", BY_HAND + "says_nothing")
     out = tmp_path / "proof"
     answer = CliRunner().invoke(app, ["prove", *QUICK, "--out", str(out), "--json"])
     assert answer.exit_code == 0, answer.output
@@ -85,7 +85,7 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_background_is_asked_for_told_and_part_of_what_the_folder_is_about(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(examine, "DIAGNOSIS", BY_HAND + "says_nothing")
+    monkeypatch.setattr(runner, "DIAGNOSIS", BY_HAND + "says_nothing")
     out = tmp_path / "proof"
     asked = ["prove", "--cases", "1", "--kinds", "background", "--workers", "0", "--out", str(out)]
     answer = CliRunner().invoke(app, [*asked, "--background", "0.03"])
@@ -107,7 +107,7 @@ def test_a_background_is_asked_for_told_and_part_of_what_the_folder_is_about(
 
 
 def test_diagnoses_that_fail_are_listed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(examine, "DIAGNOSIS", BY_HAND + "fails")
+    monkeypatch.setattr(runner, "DIAGNOSIS", BY_HAND + "fails")
     answer = CliRunner().invoke(app, ["prove", *QUICK, "--out", str(tmp_path / "proof")])
     assert answer.exit_code == 3
     assert "RuntimeError: no idea" in answer.stderr

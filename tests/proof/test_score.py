@@ -9,7 +9,7 @@ from scipy.stats import binom
 
 from rollover.proof.counts import counted, share
 from rollover.proof.score import score
-from rollover.proof.tally import confusion, table, tally, uniformity
+from rollover.proof.summary import confusion, table, tally, uniformity
 
 FORCE, DEPTH = "ground/force_normal", "ground/sinkage"
 

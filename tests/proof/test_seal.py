@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from rollover.faults import InputError
-from rollover.proof.seal import digest, opened, sealed, write_truth
+from rollover.proof.commitment import digest, opened, sealed, write_truth
+from rollover.system.errors import InputError
 
 TRUTHS = [{"case": "case-0001", "kind": "single", "effects": [{"id": "soil-crust", "parameters": {"ratio": 1.25}}]}]
 

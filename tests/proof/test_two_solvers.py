@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from rollover import scenario
-from rollover.drop import DropModel
-from rollover.proof.descent import descend
+from rollover.dynamics.drop_test import DropModel
+from rollover.proof.reference_solver import descend
 from rollover.proof.rig import FACE, Rig
 
 T = np.linspace(-0.05, 0.6, 651)

@@ -28,10 +28,10 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from ground.fluid import cone_rate
-from rollover.drop import DropModel
-from rollover.importers import COLLECTIONS
-from rollover.importers.cone_drops import BODY, CLIPS, RADIUS, G
+from rollover.dynamics.drop_test import DropModel
 from rollover.recording import Recording
+from rollover.recording.importers import COLLECTIONS
+from rollover.recording.importers.cone_drops import BODY, CLIPS, RADIUS, G
 from rollover.scenario import load
 
 Array = NDArray[np.float64]

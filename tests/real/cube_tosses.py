@@ -26,10 +26,10 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from rollover.importers.cube_tosses import METRES, WIDTH
-from rollover.importers.tosses import read_toss, toss_files
+from rollover.dynamics.simulate import run
+from rollover.recording.importers.cube_tosses import METRES, WIDTH
+from rollover.recording.importers.tosses import read_toss, toss_files
 from rollover.scenario import Scenario, load
-from rollover.simulate import run
 
 Array = NDArray[np.float64]
 RATE, HALF, GRAVITY = 148.0, 0.0524, 9.81  # Hz, m, m/s2

@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from rollover.drop import DropModel
-from rollover.importers import COLLECTIONS
+from rollover.dynamics.drop_test import DropModel
 from rollover.recording import Recording
+from rollover.recording.importers import COLLECTIONS
 from rollover.scenario import load
 
 Array = NDArray[np.float64]

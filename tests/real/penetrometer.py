@@ -16,10 +16,10 @@ import numpy as np
 
 from ground.drops import loading
 from ground.penetration import FORMS, Fitted, chosen, fit_form, fit_forms, numbers_of
-from rollover.drop import DropModel
-from rollover.identification import drops_of
-from rollover.importers import COLLECTIONS
+from rollover.calibration.ground_law import drops_of
+from rollover.dynamics.drop_test import DropModel
 from rollover.recording import Recording
+from rollover.recording.importers import COLLECTIONS
 from rollover.scenario import load
 
 BUOYANCY = 2.473e-3 * 1025.0 * 9.81  # N, 2.473 l in sea water

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from ground.bearing import Bearing
 from ground.penetration import chosen
-from rollover.cli import app
+from rollover.cli.main import app
 from rollover.scenario import load
 from tests.real import cone_drops, cube_tosses, diagnoses, falling_balls, penetrometer
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rollover.attitude import ANGLES, QUATERNION
 from rollover.recording import Recording
+from rollover.recording.attitude import ANGLES, QUATERNION
 
 TURN = 2.0 * math.pi
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from rollover.diagnosis import Diagnosis
-from rollover.diagnosis.series import Told, Track
-from rollover.diagnosis.verdict import Considered, Interval, Named, Place, Score
+from rollover.diagnosis.overlay import Told, Track
+from rollover.diagnosis.result import Considered, Interval, Named, Place, Score
 
 FORCE = "ground/force_normal"
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rollover.dynamics.result import ContactForce, Event, GroundTrack, Motion, Run
 from rollover.recording import Recording
-from rollover.run import ContactForce, Event, GroundTrack, Motion, Run
 from rollover.scenario import Scenario
 
 TEXT = """\
@@ -26,7 +26,7 @@ simulation:
 
 @dataclass(frozen=True, kw_only=True)
 class Peak:
-    """What `rollover.loads.PeakLoad` has."""
+    """What `rollover.assessment.loads.PeakLoad` has."""
 
     channel: str = "ground/force_normal"
     unit: str = "N"

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rollover.importers import read_recording
 from rollover.recording import Recording
+from rollover.recording.importers import read_recording
 
 CASES = Path(__file__).parent / "cases"
 FORCE, SINKAGE = "ground/force_normal", "ground/sinkage"

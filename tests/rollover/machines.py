@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from rollover.cli import app
-from rollover.importers import write_recording
+from rollover.cli.main import app
 from rollover.recording import Recording
+from rollover.recording.importers import write_recording
 from tests.rollover import studies
 
 WRONG, MACHINE = 2, 74

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.faults import InputError
-from rollover.importers import COLLECTIONS
 from rollover.recording import Recording
+from rollover.recording.importers import COLLECTIONS
+from rollover.system.errors import InputError
 
 DATA = os.environ.get("ROLLOVER_DATA", "")
 SYSTEM = {

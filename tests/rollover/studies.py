@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rollover import study as studies
-from rollover.study import Study
-from rollover.study.conduct import Conducted
-from rollover.study.design import points
-from rollover.study.shelf import Row
+from rollover import studies
+from rollover.studies import Study
+from rollover.studies.case_store import Row
+from rollover.studies.design import points
+from rollover.studies.runner import Conducted
 
 ROOT = Path(__file__).resolve().parents[2]
 EFFECTS = ROOT / "tests" / "rollover" / "faulty_effect.py"

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover import budget
-from rollover.execute import map_cases
-from rollover.faults import Fault, InputError
-from rollover.importers.apart import apart
+from rollover.recording.importers.apart import apart
+from rollover.system import budget
+from rollover.system.errors import Fault, InputError
+from rollover.system.processes import map_cases
 
 
 def reader(path: Path, wish: str = "") -> Any:
@@ -128,7 +128,7 @@ def test_a_child_reads_by_itself(file: Path) -> None:
 SCRIPT = """
 import sys
 sys.path[:0] = {path!r}
-from rollover.importers import read_recording
+from rollover.recording.importers import read_recording
 print("begins", flush=True)
 print(read_recording("a.h5")["ground/force_normal"].tolist(), "h5py" in sys.modules)
 """

@@ -12,19 +12,19 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rollover import simulate
-from rollover.attitude import ANGLES, QUATERNION, beside, continuous
-from rollover.calibrate import simulator
-from rollover.channels import CHANNELS
-from rollover.frames import angles as angles_of
-from rollover.frames import from_angles, one_branch, other_branch, rotation_vector
-from rollover.misfit import Misfit, estimated_noise, misfit, summary
-from rollover.objective import Objective, case, parameter
-from rollover.pair import Result, difference, pair
-from rollover.prechecks import prechecks
+from rollover.calibration.calibrate import simulator
+from rollover.calibration.objective import Objective, case, parameter
+from rollover.comparison.misfit import Misfit, estimated_noise, misfit, summary
+from rollover.comparison.run_pair import Result, difference, pair
+from rollover.comparison.synthesis import synthetic
+from rollover.dynamics import simulate
+from rollover.dynamics.result import Run
 from rollover.recording import Recording
-from rollover.run import Run
-from rollover.synthesis import synthetic
+from rollover.recording.attitude import ANGLES, QUATERNION, beside, continuous
+from rollover.recording.checks import prechecks
+from rollover.spec.channels import CHANNELS
+from rollover.spec.frames import angles as angles_of
+from rollover.spec.frames import from_angles, one_branch, other_branch, rotation_vector
 from tests.physics.scenes import shipped
 from tests.rollover.attitudes import (
     OTHERWISE,

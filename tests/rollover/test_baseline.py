@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rollover import baseline as baselines
-from rollover import document, regression
-from rollover.baseline import Baseline, Load, against, allowed, drawn_up
-from rollover.ensemble import Extreme, Spread, neighbours
-from rollover.faults import InputError
 from rollover.scenario import load
+from rollover.spec import document
+from rollover.studies import baseline as baselines
+from rollover.studies import regression
+from rollover.studies.baseline import Baseline, Load, against, allowed, drawn_up
+from rollover.studies.ensemble import Extreme, Spread, neighbours
+from rollover.system.errors import InputError
 
 
 def start(force: float, *, impulse: float = 12.0, quiet: float = 0.0) -> tuple[Extreme, ...]:

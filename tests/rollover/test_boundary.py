@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover import boundary
-from rollover.faults import Fault, InputError, has_cure
-from rollover.importers import COLLECTIONS, importers, read_recording
-from rollover.importers.importer import Collection, Importer
-from rollover.pair import read as result
+from rollover.comparison.run_pair import read as result
 from rollover.recording import read_parquet
+from rollover.recording.importers import COLLECTIONS, importers, read_recording
+from rollover.recording.importers.importer import Collection, Importer
+from rollover.system import boundary
+from rollover.system.errors import Fault, InputError, has_cure
 from tests.fuzz import seeds, sets, texts
 from tests.fuzz.oracle import is_whole
 from tests.rollover.foreign import needs
@@ -188,12 +188,12 @@ def test_a_fault_without_a_cure_gets_that_of_its_door() -> None:
 
 @pytest.fixture(scope="module")
 def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Files:
-    from rollover import store
+    from rollover.assessment import results
     from rollover.scenario import load
     from tests.rollover.example import Peak, run_of
 
     folder = tmp_path_factory.mktemp("run") / "one"
-    store.write(folder, run_of(load("drop_test")), [Peak()])  # type: ignore[list-item]
+    results.write(folder, run_of(load("drop_test")), [Peak()])  # type: ignore[list-item]
     return {p.name: p.read_bytes() for p in folder.iterdir()}
 
 
@@ -208,7 +208,7 @@ def put(folder: Path, files: Files) -> Path:
 
 
 def test_each_value_of_a_run_json_may_be_of_any_type(tmp_path: Path, run_folder: Files) -> None:
-    from rollover.pair import pair, summary
+    from rollover.comparison.run_pair import pair, summary
 
     whole = json.loads(run_folder["run.json"])
     good = result(put(tmp_path / "good", run_folder))
@@ -328,7 +328,7 @@ def test_a_case_that_somebody_else_wrote_is_run_again(tmp_path: Path) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    from rollover.study import shelf
+    from rollover.studies import case_store as shelf
 
     key = "ab" + "0" * 30
     row = shelf.Row(

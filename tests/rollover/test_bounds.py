@@ -17,14 +17,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover import budget, document, scenario
-from rollover.document import tree
-from rollover.faults import InputError
-from rollover.importers import COLLECTIONS, mat_claims, mme_archive, read_recording, tar
-from rollover.importers.npz import arrays_of
+from rollover import scenario
+from rollover.recording.importers import COLLECTIONS, mat_claims, mme_archive, read_recording, tar
+from rollover.recording.importers.npz import arrays_of
 from rollover.recording.tables import write_parquet_columns
-from rollover.study import load
-from rollover.study.design import points
+from rollover.spec import document
+from rollover.spec.document import tree
+from rollover.studies import load
+from rollover.studies.design import points
+from rollover.system import budget
+from rollover.system.errors import InputError
 
 RAISED = f"{budget.VARIABLE}="
 h5py_missing = importlib.util.find_spec("h5py") is None
@@ -124,7 +126,7 @@ def test_a_row_of_numbers_is_what_it_was(text: str, monkeypatch: pytest.MonkeyPa
     """Values, their types and their lines are those of one value after the other."""
     import re
 
-    from rollover.document import yaml_reader
+    from rollover.spec.document import yaml_reader
 
     def told(node: tree.Node) -> Any:
         below = node.value.values() if isinstance(node.value, dict) else node.value
@@ -321,7 +323,7 @@ def test_mat_claims_are_summed_in_structures_and_cells(
 
 
 def test_a_sound_mat_file_claims_what_it_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from rollover.importers.mat_claims import Budget
+    from rollover.recording.importers.mat_claims import Budget
 
     summed: list[int] = []
     monkeypatch.setattr(Budget, "claim", lambda self, count, at="": summed.append(count))
@@ -348,8 +350,8 @@ def test_hdf5_claims_are_summed_over_columns_with_chunks_that_are_not_there(tmp_
 
 def test_columns_of_a_matrix_are_unpacked_once(tmp_path: Path) -> None:
     """Each by itself would unpack the chunk that all of them lie in."""
-    from rollover.importers import read_profile
-    from rollover.importers.arrays import Array, signals_of
+    from rollover.recording.importers import read_profile
+    from rollover.recording.importers.arrays import Array, signals_of
 
     data = np.arange(80.0)[:, None] + np.arange(30.0) / 1000.0
     loads: list[Any] = []
@@ -364,7 +366,7 @@ def test_columns_of_a_matrix_are_unpacked_once(tmp_path: Path) -> None:
 
 
 def test_a_picture_is_no_columns_and_is_left_out(tmp_path: Path, cheap: None) -> None:
-    from rollover.importers.columns import matrix
+    from rollover.recording.importers.columns import matrix
 
     assert matrix("m", (2**31, 2**31)) == {}
     assert len(matrix("m", (2**31, 4))) == 4

@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from rollover.calibrate import Calibration, calibrate
-from rollover.determined import Z95, determine
-from rollover.faults import InputError
-from rollover.objective import Objective, Parameter, case, correlation_time, parameter
+from rollover.calibration.calibrate import Calibration, calibrate
+from rollover.calibration.identifiability import Z95, determine
+from rollover.calibration.objective import Objective, Parameter, case, correlation_time, parameter
 from rollover.recording import Recording
 from rollover.scenario import Scenario
+from rollover.system.errors import InputError
 from tests.rollover.twin import drop, recorded, scene
 
 STIFFNESS, MASS = "ground.law.stiffness_scale=0.3:3", "vehicle.mass=90:200"

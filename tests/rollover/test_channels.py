@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rollover.channels import CHANNELS, UNITS, describe, factor, is_known, to_si
+from rollover.spec.channels import CHANNELS, UNITS, describe, factor, is_known, to_si
 
 # the fixed channels of the product: extended at will, never renamed or dropped
 FIXED = {

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollover.clearance import approaches, protected_margin, signed_distance
-from rollover.frames import from_angles
-from rollover.rops import ClearanceZone
-from rollover.run import Motion
-from rollover.vehicle import Vehicle
+from rollover.assessment.clearance import approaches, protected_margin, signed_distance
+from rollover.dynamics.result import Motion
+from rollover.spec.frames import from_angles
+from rollover.spec.rops import ClearanceZone
+from rollover.spec.vehicle import Vehicle
 from tests.physics.scenes import shipped
 from tests.viz import example
 

@@ -14,12 +14,14 @@ import pytest
 from typer.testing import CliRunner
 
 import viz
-from rollover import document, simulate, store
-from rollover.channels import CHANNELS
-from rollover.cli import app
-from rollover.criterion import Criterion, compared, judged
-from rollover.requirement import Requirement
+from rollover.assessment import results
+from rollover.assessment.criterion import Criterion, compared, judged
+from rollover.cli.main import app
+from rollover.dynamics import simulate
 from rollover.scenario import Scenario, load
+from rollover.spec import document
+from rollover.spec.channels import CHANNELS
+from rollover.spec.standards.requirement import Requirement
 from tests.rollover.example import TEXT, Peak, run_of
 
 runner = CliRunner()
@@ -61,17 +63,17 @@ def bench(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Bench:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(simulate, "run", bench.run)
     monkeypatch.setattr("ground.compiled.is_warm", lambda: True)
-    loads, log = types.ModuleType("rollover.loads"), types.ModuleType("viz.log")
+    loads, log = types.ModuleType("rollover.assessment.loads"), types.ModuleType("viz.recordings.log")
     loads.peak_loads = bench.peak_loads  # type: ignore[attr-defined]
     loads.unconverged = lambda peaks: bench.unconverged  # type: ignore[attr-defined]
     log.write_rrd = lambda run, path, peaks: path.write_bytes(b"rrd")  # type: ignore[attr-defined]
-    report = types.ModuleType("viz.report")
+    report = types.ModuleType("viz.pages.report")
     report.page = lambda run, peaks, answer, rows, command: f"<p>{command}</p>"  # type: ignore[attr-defined]
     for module in (loads, log, report):
         monkeypatch.setitem(sys.modules, module.__name__, module)
-    monkeypatch.setattr("rollover.loads", loads, raising=False)
+    monkeypatch.setattr("rollover.assessment.loads", loads, raising=False)
     monkeypatch.setattr(
-        "rollover.criteria.criteria", lambda run: bench.rows.pop(0) if len(bench.rows) > 1 else bench.rows[0]
+        "rollover.assessment.criteria.criteria", lambda run: bench.rows.pop(0) if len(bench.rows) > 1 else bench.rows[0]
     )
     monkeypatch.setattr(viz, "log", log, raising=False)
     monkeypatch.setattr(viz, "report", report, raising=False)
@@ -99,7 +101,7 @@ def test_run_writes_results_and_prints_peaks(bench: Bench) -> None:
     done = rollover("run", "drop_test")
     assert done.exit_code == 0, done.stderr
     folder = Path("out/run/drop_test")
-    assert sorted(p.name for p in folder.iterdir()) == sorted(store.FILES)
+    assert sorted(p.name for p in folder.iterdir()) == sorted(results.FILES)
     assert [s.simulation.step for s in bench.asked] == [0.0002, 0.0001]
     assert bench.asked[0] == load("drop_test")
     assert "ground/force_normal *" in done.stdout
@@ -116,7 +118,7 @@ def test_run_prints_and_keeps_what_it_is_held_against(bench: Bench) -> None:
     for word in ("OECD Code 4", "at least 5.25 kJ", "5.513 kJ", "+5.0 %", "0.2 %", "met"):
         assert word in line
     assert "all 1 verdicts are met" in done.stderr
-    [row] = store.read_run_json(Path("out/run/drop_test"))["criteria"]
+    [row] = results.read_run_json(Path("out/run/drop_test"))["criteria"]
     wanted = {"clause": "energy, load from the side", "source": "the code", "confidence": "seen", "value": 5250.0}
     assert {key: row["requirement"][key] for key in wanted} == wanted
     assert (row["simulated"], row["verdict"], row["note"]) == (5512.5, "met", "load 'side' reached")
@@ -132,7 +134,7 @@ def test_require_says_no_by_name(bench: Bench) -> None:
     said = "not met: OECD Code 4 / ISO 5700: side load, got 4.2 kJ; asked: at least 5.25 kJ. given up\n"
     assert done.stderr.endswith(said)
     assert done.stderr.count("not met") == 1
-    assert store.read_run_json(Path("out/run/drop_test"))["criteria"][0]["verdict"] == "not met"
+    assert results.read_run_json(Path("out/run/drop_test"))["criteria"][0]["verdict"] == "not met"
     as_json = rollover("run", "drop_test", "--require", "--json")
     assert as_json.exit_code == 1
     assert json.loads(as_json.stdout)["criteria"][1]["verdict"] == "compared"
@@ -156,7 +158,7 @@ def test_a_run_that_is_not_converged_is_said(bench: Bench) -> None:
 def test_run_as_json_prints_nothing_else(bench: Bench) -> None:
     done = rollover("run", "drop_test", "--json", "--out", "here")
     assert done.exit_code == 0
-    assert json.loads(done.stdout) == store.read_run_json(Path("here"))
+    assert json.loads(done.stdout) == results.read_run_json(Path("here"))
     assert done.stderr == ""
 
 
@@ -168,7 +170,7 @@ def test_run_sets_values_and_leaves_out_the_half_step(bench: Bench) -> None:
     assert done.exit_code == 0
     assert bench.asked == [load("drop_test").replaced({"initiation.speed": 2.0, "title": "A b"})]
     assert bench.halves == [False]
-    assert store.read_run_json(Path("out/run/drop_test"))["half_step"] is None
+    assert results.read_run_json(Path("out/run/drop_test"))["half_step"] is None
 
 
 @pytest.mark.parametrize(
@@ -212,7 +214,7 @@ def test_a_failed_run_is_3_with_its_results(bench: Bench) -> None:
     assert done.stderr.endswith("drop_test.yaml: the simulation failed: diverged at t = 0.0100 s\n")
     assert (json.loads(done.stdout)["status"], json.loads(done.stdout)["peak_loads"]) == ("failed", [])
     assert len(bench.asked) == 1  # no half step after a failure
-    assert store.read_run_json(Path("out/run/drop_test"))["sentence"] == bench.sentence
+    assert results.read_run_json(Path("out/run/drop_test"))["sentence"] == bench.sentence
 
 
 def test_a_half_step_that_fails_is_told_and_not_compared(bench: Bench) -> None:
@@ -225,7 +227,7 @@ def test_a_half_step_that_fails_is_told_and_not_compared(bench: Bench) -> None:
 
 def test_without_rerun_everything_but_the_picture_is_written(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(viz, "log")
-    monkeypatch.delitem(sys.modules, "viz.log")
+    monkeypatch.delitem(sys.modules, "viz.recordings.log")
     monkeypatch.setitem(sys.modules, "rerun", None)  # importing it fails as where it is not installed
     done = rollover("run", "drop_test")
     assert done.exit_code == 0, done.output
@@ -255,7 +257,7 @@ def test_the_first_run_says_that_it_compiles(bench: Bench, monkeypatch: pytest.M
 
 
 def test_progress_in_lines_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    from rollover import console
+    from rollover.cli import console
 
     with console.progress("simulating", -0.5, 3.0) as show:
         show(0.1, 1.0)  # too short to speak of
@@ -350,7 +352,7 @@ def test_view(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         shown.append(path)
         return 0 if len(shown) < 3 else 7
 
-    monkeypatch.setattr("viz.viewer.open_viewer", open_viewer)
+    monkeypatch.setattr("viz.recordings.viewer.open_viewer", open_viewer)
     monkeypatch.setenv("DISPLAY", ":0")
     done = rollover("view", str(tmp_path))
     assert (done.exit_code, done.stderr) == (2, f"{tmp_path}: no recording.rrd there; `rollover run` writes one\n")

@@ -7,16 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from rollover import study as studies
-from rollover.faults import InputError
-from rollover.study import shelf
-from rollover.study.conduct import Way, conduct
+from rollover import studies
+from rollover.studies import case_store
+from rollover.studies.runner import Way, conduct
+from rollover.system.errors import InputError
 from tests.rollover.odd import odd
 from tests.rollover.studies import drops
 
 
 def test_without_the_extra_there_is_a_cure(monkeypatch: pytest.MonkeyPatch) -> None:
-    from rollover.cluster import map_on_cluster
+    from rollover.studies.cluster import map_on_cluster
 
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match=r"pip install 'rollover\[cluster\]'"):
@@ -25,7 +25,7 @@ def test_without_the_extra_there_is_a_cure(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_slurm_without_its_extra_has_a_cure(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed", reason="the extra cluster is not installed")
-    from rollover.cluster import map_on_cluster
+    from rollover.studies.cluster import map_on_cluster
 
     monkeypatch.setitem(sys.modules, "dask_jobqueue", None)
     with pytest.raises(InputError, match=r"pip install 'rollover\[slurm\]'"):
@@ -34,7 +34,7 @@ def test_slurm_without_its_extra_has_a_cure(monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_an_address_without_a_scheduler(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed", reason="the extra cluster is not installed")
-    from rollover import cluster
+    from rollover.studies import cluster
 
     monkeypatch.setattr(cluster, "PATIENCE", 0.5)
     with pytest.raises(InputError, match=r"--scheduler tcp://127.0.0.1:9: no scheduler answers"):
@@ -43,7 +43,7 @@ def test_an_address_without_a_scheduler(monkeypatch: pytest.MonkeyPatch) -> None
 
 def test_what_goes_wrong_costs_one_case_and_so_does_a_lost_worker() -> None:
     pytest.importorskip("distributed", reason="the extra cluster is not installed")
-    from rollover.cluster import map_on_cluster
+    from rollover.studies.cluster import map_on_cluster
 
     cases = [2, "raise", "die", "hang", "worker", *range(10, 14)]
     found = {o.index: o for o in map_on_cluster(odd, cases, address="local", workers=2, time_limit=8.0)}
@@ -61,7 +61,7 @@ def test_what_goes_wrong_costs_one_case_and_so_does_a_lost_worker() -> None:
 
 def test_what_waited_beside_the_case_that_killed_its_worker_is_done() -> None:
     pytest.importorskip("distributed", reason="the extra cluster is not installed")
-    from rollover.cluster import map_on_cluster
+    from rollover.studies.cluster import map_on_cluster
 
     found = {o.index: o for o in map_on_cluster(odd, ["worker", 10, 11], address="local", workers=1)}
     assert sorted(found) == [0, 1, 2]
@@ -75,5 +75,5 @@ def test_the_same_study_gives_the_same_table(tmp_path: Path) -> None:
     study = studies.load(drops(tmp_path))
     for name, way in (("here", Way(workers=0)), ("cluster", Way(workers=2, scheduler="local"))):
         assert conduct(study, tmp_path / name, way).ran == 20
-    tables = [(tmp_path / name / shelf.TABLE).read_bytes() for name in ("here", "cluster")]
+    tables = [(tmp_path / name / case_store.TABLE).read_bytes() for name in ("here", "cluster")]
     assert tables[0] == tables[1]

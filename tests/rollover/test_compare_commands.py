@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from rollover.cli import app
-from rollover.importers import read_recording
+from rollover.cli.main import app
+from rollover.comparison.synthesis import synthetic, usual
 from rollover.recording import Recording
+from rollover.recording.importers import read_recording
 from rollover.scenario import load
-from rollover.synthesis import synthetic, usual
 
 
 def rollover(*words: object) -> Result:
@@ -102,7 +102,7 @@ def test_compare_writes_its_folder(folder: Path, tmp_path: Path) -> None:
 
 def answers_first_in_the_viewer(path: Path) -> None:
     """The layout names what was logged; the rating and the recording's own phases stand in it."""
-    from viz.verify import blueprint_queries, check_rrd, read_column
+    from viz.recordings.verify import blueprint_queries, check_rrd, read_column
 
     assert check_rrd(path) == []
     rules = dict(blueprint_queries(path))

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rollover.faults import InputError
-from rollover.importers import names_of_tests, read_recording
 from rollover.recording import Recording
+from rollover.recording.importers import names_of_tests, read_recording
+from rollover.system.errors import InputError
 
 G = 9.80665
 X, Z = "chassis/acceleration_x", "chassis/acceleration_z"

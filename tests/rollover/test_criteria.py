@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollover.criteria import criteria, in_words, rops_share
-from rollover.run import Motion
-from rollover.static_sequence import tractor_of
-from rollover.vehicle import Vehicle
+from rollover.assessment.criteria import criteria, in_words, rops_share
+from rollover.dynamics.result import Motion
+from rollover.spec.standards.static_sequence import tractor_of
+from rollover.spec.vehicle import Vehicle
 from tests.physics.scenes import shipped
 from tests.viz import example
 

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rollover.faults import InputError
-from rollover.importers import read_recording
-from rollover.importers.date_times import NotAStampError, is_moment, moment, spelt
 from rollover.recording import Recording
+from rollover.recording.importers import read_recording
+from rollover.recording.importers.date_times import NotAStampError, is_moment, moment, spelt
+from rollover.system.errors import InputError
 
 HOUR = 3_600 * 10**9
 

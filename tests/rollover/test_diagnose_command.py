@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from rollover.cli import app
+from rollover.cli.main import app
 from rollover.diagnosis import Diagnosis, account
-from rollover.diagnosis.series import series
-from rollover.document import find
-from rollover.drop import DropModel
-from rollover.importers import read_recording, write_recording
+from rollover.diagnosis.overlay import series
+from rollover.dynamics.drop_test import DropModel
 from rollover.recording import Recording
+from rollover.recording.importers import read_recording, write_recording
 from rollover.scenario import load
+from rollover.spec.document import find
 from tests.rollover.diagnosed import nothing_found, sensor_at_fault
 
 SPEEDS = (1.0, 2.0, 3.0)
@@ -198,7 +198,9 @@ def test_the_page_says_it_all(done: tuple[Path, Result], folder: Path) -> None:
 
 
 def test_the_picture_is_whole(done: tuple[Path, Result]) -> None:
-    verify = pytest.importorskip("viz.verify", reason="no rerun wheel for this platform", exc_type=ImportError)
+    verify = pytest.importorskip(
+        "viz.recordings.verify", reason="no rerun wheel for this platform", exc_type=ImportError
+    )
     assert verify.check_rrd(done[0] / "diagnosis.rrd") == []
 
 

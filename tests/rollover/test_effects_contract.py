@@ -16,13 +16,13 @@ import numpy as np
 import pytest
 
 from ground.quantity import quantities
-from rollover.channels import is_known
-from rollover.drop import DropModel, simulate_drop
+from rollover.dynamics.drop_test import DropModel, simulate_drop
+from rollover.dynamics.simulate import run
 from rollover.effects import Effect, Heard, effects, nothing
-from rollover.faults import InputError
 from rollover.recording import Recording
 from rollover.scenario import Scenario
-from rollover.simulate import run
+from rollover.spec.channels import is_known
+from rollover.system.errors import InputError
 from tests.physics.scenes import shipped
 
 # ids and parameters that users and recordings rely on
@@ -232,7 +232,7 @@ def test_an_effect_of_ones_own_is_one_short_file_and_keeps_every_promise() -> No
         "contract.test_an_effect_at_its_null_changes_no_bit_of_a_drop(roots)\n"
         "contract.test_the_numbers_of_an_effect_have_units_bounds_and_ranges_to_search(roots)\n"
         "contract.test_naming_one_parameter_switches_an_effect_on(roots)\n"
-        "from rollover.drop import DropModel\n"
+        "from rollover.dynamics.drop_test import DropModel\n"
         "model = DropModel(scenario=contract.dropped())\n"
         "t = np.array([0.008])\n"
         "own = model.with_({'effects.soil-roots.stiffness': 3e4, 'effects.soil-roots.depth': 0.3})\n"
@@ -289,7 +289,7 @@ def test_an_id_given_twice_is_an_error() -> None:
 
 
 def test_the_listing_shows_what_each_effect_is() -> None:
-    from rollover import catalogue
+    from rollover.cli import catalogue
 
     rows = {row["id"]: row for row in catalogue.effects()}
     assert set(rows) == set(effects())

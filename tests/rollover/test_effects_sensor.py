@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from rollover.drop import DropModel
+from rollover.dynamics.drop_test import DropModel
+from rollover.dynamics.simulate import run
 from rollover.effects import read
 from rollover.effects.sensor import (
     SensorBias,
@@ -20,7 +21,6 @@ from rollover.effects.sensor import (
     SensorScale,
 )
 from rollover.recording import Recording
-from rollover.simulate import run
 from tests.physics.scenes import drop, shipped
 
 FORCE = "ground/force_normal"

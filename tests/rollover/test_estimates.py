@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from rollover.estimates import in_words
-from rollover.faults import InputError
 from rollover.scenario import Scenario, load
+from rollover.spec.estimates import in_words
+from rollover.system.errors import InputError
 
 
 def driven(vehicle: str) -> Scenario:

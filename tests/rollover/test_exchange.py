@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from rollover.document import exchanged
 from rollover.effects import EFFECTS
 from rollover.scenario import Scenario, load
+from rollover.spec.document import exchanged
 
 DROP, OVERTURN = "drop_test", "side_overturn"
 LAYER = {"effects.soil-layer.depth": 0.05, "effects.soil-layer.stiffness_ratio": 2.0}

@@ -16,8 +16,8 @@ from typing import Any
 
 import pytest
 
-from rollover import execute
-from rollover.execute import map_cases
+from rollover.system import processes
+from rollover.system.processes import map_cases
 
 
 def odd(case: Any) -> Any:
@@ -70,7 +70,7 @@ def test_memory_beyond_the_limit_is_a_failure_and_the_child_goes_on() -> None:
 ORPHAN = """
 import sys
 from pathlib import Path
-from rollover.execute import map_cases
+from rollover.system.processes import map_cases
 from tests.rollover.odd import odd
 if __name__ == "__main__":
     list(map_cases(odd, [Path(sys.argv[1])], workers=1))
@@ -98,7 +98,7 @@ def test_a_case_that_hangs_ends_with_its_parent(tmp_path: Path) -> None:
 
 SERVED = """
 import os
-from rollover.execute import THREADS, begin_server, map_cases
+from rollover.system.processes import THREADS, begin_server, map_cases
 from tests.rollover.odd import imported
 if __name__ == "__main__":
     begin_server("colorsys")
@@ -117,7 +117,7 @@ def test_children_have_what_their_server_imported_beside(tmp_path: Path, folder:
     script.write_text(SERVED)
     if folder:
         (tmp_path / folder).mkdir(parents=True)
-    usual = {name: value for name, value in os.environ.items() if name not in execute.THREADS}
+    usual = {name: value for name, value in os.environ.items() if name not in processes.THREADS}
     env = {**usual, "PYTHONPATH": str(Path(__file__).resolve().parents[2])}
     env |= {"TMPDIR": str(tmp_path / folder)} if folder else {}
     done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, env=env, check=True)
@@ -143,7 +143,7 @@ def test_a_child_is_warmed_up_before_its_first_case() -> None:
 
 
 def test_children_that_are_kept_work_off_a_second_batch() -> None:
-    children = execute.Children(1)
+    children = processes.Children(1)
     first, second = ([o.value for o in map_cases(whoever, [0], children=children)] for _ in range(2))
     assert first == second != [os.getpid()]
     children.stop()
@@ -154,8 +154,8 @@ def test_children_that_are_kept_work_off_a_second_batch() -> None:
 
 def test_a_pool_whose_idle_child_is_ended_is_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
     made = []
-    pool_of = execute.child_pool
-    monkeypatch.setattr(execute, "child_pool", lambda *given: made.append(pool_of(*given)) or made[-1])
+    pool_of = processes.child_pool
+    monkeypatch.setattr(processes, "child_pool", lambda *given: made.append(pool_of(*given)) or made[-1])
 
     def slowly() -> Iterator[int]:
         yield 2

@@ -16,15 +16,16 @@ import pytest
 
 from ground.array import Elements
 from ground.soils import soils
-from rollover import catalogue, document
 from rollover import scenario as scenarios
-from rollover import study as studies
-from rollover.document import Leaf
-from rollover.provenance import Provenance
-from rollover.rops import Rops
+from rollover import studies
+from rollover.cli import catalogue
 from rollover.scenario import Scenario, load, schema
-from rollover.shapes import Tube
-from rollover.vehicle import Striker, Vehicle, chassis_of, pitch_inertia
+from rollover.spec import document
+from rollover.spec.document import Leaf
+from rollover.spec.provenance import Provenance
+from rollover.spec.rops import Rops
+from rollover.spec.shapes import Tube
+from rollover.spec.vehicle import Striker, Vehicle, chassis_of, pitch_inertia
 
 FOLDER = document.shipped_folder()
 FILES = sorted(path for path in FOLDER.rglob("*.yaml") if path.name != "excluded.yaml")

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rollover.filters import CLASSES, ISO_6487, J211, attenuation, filtered, least_rate
+from rollover.recording.filters import CLASSES, ISO_6487, J211, attenuation, filtered, least_rate
 
 STEP = 1e-4
 

@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from rollover.cli import app
-from rollover.faults import InputError
-from rollover.importers import name_of, read_named, read_profile, read_recording, write_recording
-from rollover.importers.conditions import MOST_PARTS, matched, parts_of
+from rollover.cli.main import app
+from rollover.recording.importers import name_of, read_named, read_profile, read_recording, write_recording
+from rollover.recording.importers.conditions import MOST_PARTS, matched, parts_of
+from rollover.system.errors import InputError
 
 PROFILE = """\
 format: rollover-profile/1

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rollover.frames import angles, from_angles, matrices, quaternions, rotation_vector
+from rollover.spec.frames import angles, from_angles, matrices, quaternions, rotation_vector
 
 ANGLE = st.floats(-3.1, 3.1)
 

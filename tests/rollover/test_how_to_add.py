@@ -105,7 +105,7 @@ def test_an_importer_is_listed_and_reads(tmp_path: Path) -> None:
     assert "labbook" in python(copy, "-c", MAIN, "list", "importers")
     (copy / "drop7.txt").write_text("#labbook Drop 7\n0 0 0\n1 0.5 1.5\n2 0.9 2.9\n")
     reads = (
-        "from rollover.importers import read_recording as r; d = r('drop7.txt');"
+        "from rollover.recording.importers import read_recording as r; d = r('drop7.txt');"
         "print(d.title, *d.time, *d['ground/force_normal'], *d['ground/sinkage'], sep='|')"
     )
     title, *numbers = python(copy, "-c", reads).strip().split("|")

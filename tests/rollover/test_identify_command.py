@@ -10,10 +10,10 @@ import pytest
 from typer.testing import CliRunner
 
 from ground.ye import Ye2006
-from rollover import document
-from rollover.cli import app
+from rollover.cli.main import app
 from rollover.recording import Recording, write_parquet
 from rollover.scenario import AnyLaw, load
+from rollover.spec import document
 from tests.ground.recorded_drops import TRUTH, recorded
 
 

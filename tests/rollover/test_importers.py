@@ -13,11 +13,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rollover.faults import InputError
-from rollover.importers import importers, read_recording, write_recording
-from rollover.importers import mme_codes as codes
-from rollover.importers.polarity import J211_TO_ISO8855, sign, turned
 from rollover.recording import Recording
+from rollover.recording.importers import importers, read_recording, write_recording
+from rollover.recording.importers import mme_codes as codes
+from rollover.recording.importers.polarity import J211_TO_ISO8855, sign, turned
+from rollover.system.errors import InputError
 
 TIME = np.arange(200) * 1e-3 - 0.05
 FORCE = 40.0 * np.sin(30.0 * TIME)

@@ -1,4 +1,4 @@
-"""What a file may name, and how little of a foreign file a message shows; see rollover/document/README.md."""
+"""What a file may name, and how little of a foreign file a message shows; see rollover/spec/document/README.md."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rollover.faults import InputError
-from rollover.importers import read_recording
+from rollover.recording.importers import read_recording
 from rollover.scenario import load
+from rollover.system.errors import InputError
 
 SECRET = "root:x:0:0:secret"
 PROFILE = """format: rollover-profile/1

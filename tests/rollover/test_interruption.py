@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from rollover import interruption, model
-from rollover.simulate import run
+from rollover.dynamics import interrupts, model
+from rollover.dynamics.simulate import run
 from tests.physics.scenes import shipped
 
 
@@ -20,7 +20,7 @@ class StoppedError(Exception):
 
 
 @pytest.mark.parametrize("callback", ["generalised_forces", "stiffness", "added_mass"])
-@pytest.mark.parametrize("number", interruption.SIGNALS)
+@pytest.mark.parametrize("number", interrupts.SIGNALS)
 def test_a_signal_within_a_callback_ends_the_run_and_is_no_failure(
     callback: str, number: signal.Signals, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -53,7 +53,7 @@ def handled(number: signal.Signals) -> Iterator[Callable[..., None]]:
 
 
 def twice_within() -> None:
-    with interruption.held() as waiting:
+    with interrupts.held() as waiting:
         signal.raise_signal(signal.SIGINT)
         signal.raise_signal(signal.SIGINT)
         assert waiting == [signal.SIGINT, signal.SIGINT]
@@ -61,7 +61,7 @@ def twice_within() -> None:
 
 def test_who_listened_before_listens_again() -> None:
     with handled(signal.SIGINT) as stop:
-        with interruption.held() as waiting:
+        with interrupts.held() as waiting:
             assert signal.getsignal(signal.SIGINT) is not stop
         assert waiting == []
         assert signal.getsignal(signal.SIGINT) is stop
@@ -72,7 +72,7 @@ def test_who_listened_before_listens_again() -> None:
 def test_what_has_no_handler_stays_as_it_is() -> None:
     before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
     try:
-        with interruption.held() as waiting:
+        with interrupts.held() as waiting:
             signal.raise_signal(signal.SIGTERM)
         assert waiting == []
         assert signal.getsignal(signal.SIGTERM) is signal.SIG_IGN
@@ -84,7 +84,7 @@ def test_in_another_thread_nothing_is_held() -> None:
     found: list[object] = []
 
     def there() -> None:
-        with interruption.held():
+        with interrupts.held():
             found.append(signal.getsignal(signal.SIGINT))
 
     thread = threading.Thread(target=there)

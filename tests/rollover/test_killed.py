@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rollover import writing
-from rollover.faults import InputError
-from rollover.importers import read_recording, write_recording
 from rollover.recording import Recording
+from rollover.recording.importers import read_recording, write_recording
+from rollover.system import writing
+from rollover.system.errors import InputError
 from tests.rollover.disks import Disk
 from tests.rollover.machines import (
     WRONG,
@@ -34,9 +34,9 @@ def test_a_second_start_is_told_of_the_first(name: str, tmp_path: Path) -> None:
     words, _ = commands(tmp_path)[name]
     target = tmp_path / "out" / ("d.csv" if name == "synthesize" else "a")
     if name == "study":
-        from rollover.study import shelf
+        from rollover.studies import case_store
 
-        with shelf.locked(target):
+        with case_store.locked(target):
             result = other_process(words)
     else:
         with writing.working():
@@ -121,7 +121,7 @@ def test_killed_a_hundred_times_while_it_writes(tmp_path: Path) -> None:
 
 
 def update(folder: Path, out: Path, texts: dict[str, str], account: str) -> None:
-    from rollover.update import update as updating
+    from rollover.system.transaction import update as updating
 
     with updating(out, {folder / name: text for name, text in texts.items()}) as part:
         (part / "regress.json").write_text(account)
@@ -132,7 +132,7 @@ def update(folder: Path, out: Path, texts: dict[str, str], account: str) -> None
 def test_baselines_and_their_account_change_in_one_stroke(
     name: str, killed_at: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from rollover.update import JOURNAL, finish
+    from rollover.system.transaction import JOURNAL, finish
 
     folder, out = tmp_path / "baselines", tmp_path / "out" / "regress"
     update(folder, out, {"a.yaml": "1", "b.yaml": "1"}, "first")
@@ -175,7 +175,7 @@ def test_a_full_disk_leaves_all_baselines_as_they_were(tmp_path: Path, monkeypat
 
 
 def test_a_journal_of_somebody_else_moves_nothing(tmp_path: Path) -> None:
-    from rollover.update import JOURNAL, finish
+    from rollover.system.transaction import JOURNAL, finish
 
     (tmp_path / "mine").write_text("mine")
     journal = tmp_path / "baselines" / JOURNAL

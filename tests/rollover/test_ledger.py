@@ -10,18 +10,19 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from rollover import console, ledger, store
-from rollover.cli import app
-from rollover.commands.study import sentences
-from rollover.ledger import closure
+from rollover.assessment import ledger, results
+from rollover.assessment.ledger import closure
+from rollover.cli import console
+from rollover.cli.commands.study import sentences
+from rollover.cli.main import app
+from rollover.dynamics.result import Run
 from rollover.recording import Recording
-from rollover.run import Run
-from rollover.study.answers import answers
+from rollover.studies.summary import answers
 from tests.rollover.studies import made_up
 from tests.viz.example import overturn
-from viz import report
-from viz.study_page import page as study_page
-from viz.verdict import verdict
+from viz.content.verdict import verdict
+from viz.pages import report
+from viz.pages.study import page as study_page
 
 runner = CliRunner()
 
@@ -42,7 +43,7 @@ def widened(run: Run, most: float) -> Run:
 
 
 def told(run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> tuple[dict[str, float], str, str, str]:
-    answer = store.write(tmp_path / "out", run, [], force=True)
+    answer = results.write(tmp_path / "out", run, [], force=True)
     console.report(run, [], [], answer, "out")
     pages = report.page(run, [], answer, rows=[], command="rollover run")
     return answer["ledger"], capsys.readouterr().out, pages, verdict(run, [])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rollover.loads import PeakLoad, leading, unconverged
+from rollover.assessment.loads import PeakLoad, leading, unconverged
 
 
 def peak(channel: str, raw: float = 1e3, change: float | None = 0.001) -> PeakLoad:

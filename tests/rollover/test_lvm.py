@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rollover.faults import InputError
-from rollover.importers import read_recording
 from rollover.recording import Recording
+from rollover.recording.importers import read_recording
+from rollover.system.errors import InputError
 
 STEP = 1.953125e-5
 FORCE, SINKAGE, X = "ground/force_normal", "ground/sinkage", "chassis/acceleration_x"

@@ -12,8 +12,9 @@ from typing import Any
 
 import pytest
 
-from rollover import store, writing
-from rollover.machine import told
+from rollover.assessment import results
+from rollover.system import writing
+from rollover.system.refusals import told
 from tests.rollover.disks import Disk
 from tests.rollover.machines import (
     MACHINE,
@@ -98,8 +99,8 @@ def test_what_cannot_be_written_is_said_before_the_work(
     disk = Disk(tmp_path / "out", monkeypatch)
     disk.reason = errno.EROFS
     disk.full(1)
-    monkeypatch.setattr("rollover.simulate.run", lambda *a, **k: pytest.fail("it was simulated first"))
-    monkeypatch.setattr("rollover.study.conduct.conduct", lambda *a, **k: pytest.fail("it was worked out first"))
+    monkeypatch.setattr("rollover.dynamics.simulate.run", lambda *a, **k: pytest.fail("it was simulated first"))
+    monkeypatch.setattr("rollover.studies.runner.conduct", lambda *a, **k: pytest.fail("it was worked out first"))
     result = rollover(*words)
     assert result.exit_code == WRONG
     assert len(result.stderr.splitlines()) == 1
@@ -148,13 +149,13 @@ def test_out_removed_while_it_is_filled_is_one_line(tmp_path: Path, monkeypatch:
     import shutil
 
     words, _ = commands(tmp_path)["run"]
-    real = store.write_json
+    real = results.write_json
 
     def removed(path: Path, value: Any) -> None:
         shutil.rmtree(tmp_path / "out", ignore_errors=True)
         real(path, value)
 
-    monkeypatch.setattr(store, "write_json", removed)
+    monkeypatch.setattr(results, "write_json", removed)
     result = rollover(*words)
     assert result.exit_code == MACHINE
     assert "out/a: no such file or directory: it was there and has been removed meanwhile" in result.stderr
@@ -204,6 +205,6 @@ def test_the_door_turns_it_into_a_status_and_not_a_bug(fault: Any, monkeypatch: 
     def breaks(*_: Any, **__: Any) -> None:
         raise fault
 
-    monkeypatch.setattr("rollover.catalogue.check", breaks)
+    monkeypatch.setattr("rollover.cli.catalogue.check", breaks)
     result = rollover("check", "drop_test")
     assert (result.exit_code, len(result.stderr.splitlines())) == (MACHINE, 1)

@@ -249,8 +249,8 @@ CASES: dict[str, tuple[Callable[[Path], str], str]] = {
 ASK = """
 import sys, time, resource
 sys.path[:0] = {path!r}
-from rollover.faults import InputError
-from rollover.importers import read_recording
+from rollover.system.errors import InputError
+from rollover.recording.importers import read_recording
 import pyarrow.csv, pyarrow.parquet, scipy.io, numpy
 try:
     import nptdms, h5py, mcap.reader

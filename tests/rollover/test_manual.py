@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from rollover.cli import app
-from rollover.faults import absent
+from rollover.cli.main import app
+from rollover.system.errors import absent
 
 WIDE = {"COLUMNS": "400", "TERM": "dumb", "NO_COLOR": "1"}
 COMMANDS = sorted(c.name or c.callback.__name__ for c in app.registered_commands if c.callback)

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rollover.faults import InputError
-from rollover.importers import read_recording
+from rollover.recording.importers import read_recording
+from rollover.system.errors import InputError
 from tests.rollover.foreign import CASES, FORCE, SINKAGE, left_out, named, peak
 
 TIME = np.arange(6) * 0.1

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.faults import InputError
-from rollover.importers import read_recording
-from rollover.importers.mdf_conversions import computed
+from rollover.recording.importers import read_recording
+from rollover.recording.importers.mdf_conversions import computed
+from rollover.system.errors import InputError
 from tests.rollover.foreign import CASES, FORCE, SINKAGE, left_out, named, needs, peak
 
 needs("asammdf")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rollover.faults import InputError
-from rollover.measured import at_sensor, at_sensors
+from rollover.comparison.instruments import at_sensor, at_sensors
 from rollover.recording import Recording, Sensor
+from rollover.system.errors import InputError
 
 G, SPIN, RATE, N = 9.81, 6.0, 4.0, 2001
 CENTRE = (0.3, 0.0, 0.9)

@@ -10,14 +10,14 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from rollover import document
-from rollover.cli import app
-from rollover.connector import Connector
-from rollover.faults import InputError
-from rollover.inertia import MassProperties
-from rollover.mechanism import STANDARD_GRAVITY, FreeMotion, Joint, free_motions
-from rollover.rops import Rops
+from rollover.cli.main import app
 from rollover.scenario import Scenario, load
+from rollover.spec import document
+from rollover.spec.connector import Connector
+from rollover.spec.inertia import MassProperties
+from rollover.spec.mechanism import STANDARD_GRAVITY, FreeMotion, Joint, free_motions
+from rollover.spec.rops import Rops
+from rollover.system.errors import InputError
 
 SHELF = document.shipped_folder() / "vehicles"
 # 80 kg half a metre above the middle of its mounts

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollover import alignment
-from rollover.filters import filtered
-from rollover.misfit import Misfit, contact, estimated_noise, misfit
-from rollover.rating import Rating
+from rollover.comparison import alignment
+from rollover.comparison.misfit import Misfit, contact, estimated_noise, misfit
+from rollover.comparison.rating import Rating
+from rollover.dynamics.result import Event, Run
 from rollover.recording import Recording, Sensor
-from rollover.run import Event, Run
+from rollover.recording.filters import filtered
 from tests.rollover.example import run_of
 from tests.rollover.twin import NOISE, drop, recorded, scene
 

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rollover.cli import app
-from rollover.faults import InputError
-from rollover.importers import names_of_tests, read_recording
+from rollover.cli.main import app
 from rollover.recording import Recording
+from rollover.recording.importers import names_of_tests, read_recording
+from rollover.system.errors import InputError
 
 CASES = Path(__file__).parent / "cases"
 Z, X = "chassis/acceleration_z", "chassis/acceleration_x"

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from rollover import console
-from rollover.cli import app
-from rollover.faults import Fault, InputError
-from rollover.importers import read_recording, write_recording
-from rollover.names import distinct, inside, spelt
+from rollover.cli import console
+from rollover.cli.main import app
 from rollover.recording import Recording
+from rollover.recording.importers import read_recording, write_recording
+from rollover.system.errors import Fault, InputError
+from rollover.system.names import distinct, inside, spelt
 
 BAD = [
     "",
@@ -112,7 +112,7 @@ def test_two_cells_that_would_be_one_file_are_not_one(tmp_path: Path) -> None:
 def test_a_name_on_the_command_line_stays_in_out_too(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rollover.simulate.run", lambda *a, **k: pytest.fail("it was simulated first"))
+    monkeypatch.setattr("rollover.dynamics.simulate.run", lambda *a, **k: pytest.fail("it was simulated first"))
     result = rollover("synthesize", "drop_test", "--out", tmp_path / "out", "--name", name)
     assert result.exit_code == 2
     assert result.stderr.startswith("--name: not a file's name")
@@ -120,7 +120,7 @@ def test_a_name_on_the_command_line_stays_in_out_too(
 
 
 def test_what_a_process_left_beside_recordings_is_none(tmp_path: Path) -> None:
-    from rollover.importers import recordings_at
+    from rollover.recording.importers import recordings_at
 
     made = Recording(title="d", time=np.arange(3.0), channels={"ground/sinkage": np.arange(3.0)})
     write_recording(made, tmp_path / "d.csv")

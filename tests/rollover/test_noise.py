@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from rollover.filters import filtered
-from rollover.noise import noise_floor
+from rollover.recording.filters import filtered
+from rollover.recording.noise_floor import noise_floor
 
 N, STEP = 20_000, 1e-4
 

@@ -17,19 +17,20 @@ from typer.testing import CliRunner
 
 from ground.drops import loading
 from ground.identify import identify
-from rollover import identification, simulate
-from rollover.calibrate import calibrate
-from rollover.cli import app
-from rollover.drop import DropModel
-from rollover.faults import InputError
-from rollover.importers.plain import write
-from rollover.misfit import estimated_noise
-from rollover.objective import parameter
-from rollover.onset import KNOWN, SURE, timed
+from rollover.calibration import ground_law
+from rollover.calibration.calibrate import calibrate
+from rollover.calibration.objective import parameter
+from rollover.cli.main import app
+from rollover.comparison.misfit import estimated_noise
+from rollover.comparison.onset import KNOWN, SURE, timed
+from rollover.comparison.synthesis import synthetic, usual
+from rollover.dynamics import simulate
+from rollover.dynamics.drop_test import DropModel
 from rollover.recording import Clock, Recording
+from rollover.recording.importers.plain import write
+from rollover.recording.time_stamps import from_first, is_far
 from rollover.scenario import Scenario, load
-from rollover.stamps import from_first, is_far
-from rollover.synthesis import synthetic, usual
+from rollover.system.errors import InputError
 
 FORCE, DEPTH, ACCELERATION = "ground/force_normal", "ground/sinkage", "striker/acceleration_z"
 UNKNOWN = Clock(zero="unknown")
@@ -189,7 +190,7 @@ def test_a_vehicle_that_is_like_nothing_simulated_is_refused(overturn: tuple[Sce
 
 def identified(recordings: Mapping[str, Recording]) -> dict[str, tuple[float, float | None, float | None]]:
     scenario = load("drop_test")
-    drops, refused = identification.drops_of(identification.settled(recordings, scenario).recordings, scenario)
+    drops, refused = ground_law.drops_of(ground_law.settled(recordings, scenario).recordings, scenario)
     assert not refused
     return {c.name: (c.value, c.low, c.high) for c in identify(drops).coefficients}
 
@@ -218,8 +219,8 @@ def test_a_depth_that_is_integrated_is_as_unsure_as_its_zero() -> None:
     """An accelerometer alone: 0.5 ms at 3 m/s are 1.5 mm of depth; a depth gauge says itself where the surface is."""
     for channels, more in (((ACCELERATION,), 1.5e-3**2), ((ACCELERATION, DEPTH), 0.0)):
         made = drop(channels=channels)
-        one = identification.drop_of("d", made, load("drop_test"))
-        told = identification.drop_of("d", replace(made, clock=Clock(within=0.5e-3)), load("drop_test"))
+        one = ground_law.drop_of("d", made, load("drop_test"))
+        told = ground_law.drop_of("d", replace(made, clock=Clock(within=0.5e-3)), load("drop_test"))
         least, most = (loading(d, 0.1).covariance[0, 0] for d in (one, told))
         assert most - least == pytest.approx(more, rel=1e-9)
 

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rollover import store
-from rollover.cli import app
-from rollover.criterion import judged
-from rollover.faults import InputError
-from rollover.loads import PeakLoad
-from rollover.pair import difference, pair, read
-from rollover.requirement import Requirement
-from rollover.run import Run
+from rollover.assessment import results
+from rollover.assessment.criterion import judged
+from rollover.assessment.loads import PeakLoad
+from rollover.cli.main import app
+from rollover.comparison.run_pair import difference, pair, read
+from rollover.dynamics.result import Run
+from rollover.spec.standards.requirement import Requirement
+from rollover.system.errors import InputError
 from tests.viz import example
 
 ZONE = Requirement(
@@ -52,7 +52,7 @@ def peak(channel: str, value: float, step: float | None = 0.01) -> PeakLoad:
 
 def written(folder: Path, run: Run, peaks: tuple[PeakLoad, ...], distance: float = 0.1, picture: Any = None) -> Path:
     rows = [asdict(judged(ZONE, distance, ""))]
-    store.write(folder, run, peaks, criteria=rows, picture=picture)
+    results.write(folder, run, peaks, criteria=rows, picture=picture)
     return folder
 
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter, sosfilt
 
-from rollover.drop import DropModel
-from rollover.prechecks import noise_floors, prechecks
+from rollover.dynamics.drop_test import DropModel
 from rollover.recording import Recording
+from rollover.recording.checks import noise_floors, prechecks
 from tests.physics.scenes import shipped
 
 G, MASS, SPEED, STIFFNESS = 9.81, 132.0, 3.0, 9000.0

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rollover import store
+from rollover.assessment import results
 from rollover.recording import runs
 from rollover.scenario import load
 from tests.rollover.example import run_of
@@ -38,7 +38,8 @@ def test_a_diagnosis_reads_its_recordings_without_what_it_does_not_need(tmp_path
     recording = run_of(load("drop_test")).recording
     runs.write_parquet(recording, tmp_path / "run.parquet")
     code = (
-        "import sys, rollover.diagnosis.warm\nfrom pathlib import Path\nfrom rollover.importers import read_recording\n"
+        "import sys, rollover.diagnosis.fit.warmup\nfrom pathlib import Path\n"
+        "from rollover.recording.importers import read_recording\n"
         f"found = read_recording(Path({str(tmp_path / 'run.parquet')!r}))\n"
         "print(found.time.size, sorted({'exudyn', 'matplotlib', 'pandas', 'rerun', 'scipy.stats'} & set(sys.modules)))"
     )
@@ -47,7 +48,7 @@ def test_a_diagnosis_reads_its_recordings_without_what_it_does_not_need(tmp_path
 
 
 def test_a_bug_shows_its_traceback_and_is_neither_of_the_answers() -> None:
-    code = "import rollover.catalogue as c\nc.TABLES['laws'] = lambda: 1 / 0\n" + MAIN.format(
+    code = "import rollover.cli.catalogue as c\nc.TABLES['laws'] = lambda: 1 / 0\n" + MAIN.format(
         arguments="'list', 'laws'"
     )
     done = python(code)
@@ -75,7 +76,7 @@ def picture(path):
     time.sleep(60.0)
 
 from pathlib import Path
-import rollover.catalogue as c
+import rollover.cli.catalogue as c
 c.TABLES["laws"] = lambda: store.write(Path("out/slow"), run_of(load("drop_test")), (), picture=picture)
 """
 
@@ -116,4 +117,4 @@ def test_a_foreign_package_of_our_name_is_named(tmp_path: Path, name: str) -> No
 def test_the_version_is_that_of_the_distribution() -> None:
     import rollover as package
 
-    assert store.versions()["rollover"] == package.__version__
+    assert results.versions()["rollover"] == package.__version__

@@ -10,9 +10,9 @@ import pytest
 from scipy.io import loadmat, savemat
 from typer.testing import CliRunner
 
-from rollover.cli import app
-from rollover.importers import COLLECTIONS, read_recording
+from rollover.cli.main import app
 from rollover.recording import Recording
+from rollover.recording.importers import COLLECTIONS, read_recording
 from tests.rollover import published_files as files
 from tests.rollover.published_files import published, read, refused
 

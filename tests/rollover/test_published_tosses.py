@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rollover.importers.tensors import read_tensor
-from rollover.importers.tosses import RATE
+from rollover.recording.importers.tensors import read_tensor
+from rollover.recording.importers.tosses import RATE
 from tests.rollover import published_files as files
 from tests.rollover.published_files import published, read, refused
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rollover.rating import (
+from rollover.comparison.rating import (
     Iso18571,
     NotRateable,
     Rating,

@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from rollover.cli import app
-from rollover.document import shipped_folder
+from rollover.cli.main import app
+from rollover.spec.document import shipped_folder
 from tests.viz.picture import has_software_driver
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -52,10 +52,10 @@ def test_every_command_of_the_readme_works_in_order(tmp_path: Path, monkeypatch:
     shutil.copytree(shipped_folder(), shelf)  # one of the lines writes a baseline anew,
     stale = shelf / "baselines" / "drop_test.yaml"  # of which nothing is new on the machine that made it
     stale.write_text(stale.read_text().replace("numpy ", "numpy 0."))
-    for module in ("rollover.document.include", "rollover.document"):
+    for module in ("rollover.spec.document.include", "rollover.spec.document"):
         monkeypatch.setattr(f"{module}.shipped_folder", lambda: shelf)
     shown: list[Path] = []
-    monkeypatch.setattr("viz.viewer.open_viewer", lambda path: (shown.append(path), 0)[1])
+    monkeypatch.setattr("viz.recordings.viewer.open_viewer", lambda path: (shown.append(path), 0)[1])
     monkeypatch.setenv("DISPLAY", ":0")  # the viewer is a stand-in: no window is opened
     here = tmp_path / "here"
     here.mkdir()

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rollover.cli import app
-from rollover.importers import read_recording, write_recording
+from rollover.cli.main import app
 from rollover.recording import Recording
+from rollover.recording.importers import read_recording, write_recording
 
 PROFILE = """\
 format: rollover-profile/1

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rollover.drop import DropModel
-from rollover.faults import InputError
-from rollover.importers import COLLECTIONS, read_recording, write_recording
+from rollover.dynamics.drop_test import DropModel
 from rollover.recording import Clock, Recording, Sensor, write_parquet
+from rollover.recording.importers import COLLECTIONS, read_recording, write_recording
 from rollover.scenario import load
+from rollover.system.errors import InputError
 
 TABLE = """\
 # a drop

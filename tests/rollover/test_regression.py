@@ -14,12 +14,12 @@ from typer.testing import CliRunner
 
 from ground.law import GroundLaw
 from ground.ye import Ye2006
-from rollover import baseline as baselines
-from rollover import regression
-from rollover.baseline import against
-from rollover.cli import app
-from rollover.ensemble import measured, neighbours
+from rollover.cli.main import app
 from rollover.scenario import load
+from rollover.studies import baseline as baselines
+from rollover.studies import regression
+from rollover.studies.baseline import against
+from rollover.studies.ensemble import measured, neighbours
 
 runner = CliRunner()
 DROP = """\

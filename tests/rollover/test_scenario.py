@@ -8,9 +8,10 @@ import pytest
 
 from ground.surface import Plane, Slope
 from ground.ye import Ye2006
-from rollover import catalogue, document
-from rollover.faults import InputError
+from rollover.cli import catalogue
 from rollover.scenario import AnyVehicle, load
+from rollover.spec import document
+from rollover.system.errors import InputError
 from tests.rollover.example import TEXT
 
 SPEED = "a number greater than 0 and at most 20 m/s is allowed"

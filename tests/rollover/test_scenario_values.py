@@ -21,12 +21,12 @@ from ruamel.yaml import YAML
 from ground.quantity import Quantity, parameters
 from ground.surface import Slope
 from ground.ye import Ye2006
-from rollover import document
-from rollover.document import content_hash, dump, paths, to_mapping
 from rollover.effects import EFFECTS
-from rollover.faults import InputError
 from rollover.scenario import Scenario, load
-from rollover.vehicle import Striker, Vehicle
+from rollover.spec import document
+from rollover.spec.document import content_hash, dump, paths, to_mapping
+from rollover.spec.vehicle import Striker, Vehicle
+from rollover.system.errors import InputError
 from tests.rollover.example import TEXT
 from tests.rollover.test_scenario import faults_of
 

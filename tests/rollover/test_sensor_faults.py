@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rollover import simulate
-from rollover.cli import app
-from rollover.importers import write_recording
-from rollover.prechecks import Finding, instant, prechecks, shared_rails, when
+from rollover.cli.main import app
+from rollover.comparison.synthesis import synthetic
+from rollover.dynamics import simulate
 from rollover.recording import Clock, Recording
+from rollover.recording.checks import Finding, instant, prechecks, shared_rails, when
+from rollover.recording.importers import write_recording
 from rollover.scenario import load
-from rollover.synthesis import synthetic
 
 F, S, A, P = "ground/force_normal", "ground/sinkage", "striker/acceleration_z", "striker/position_z"
 ROLL = ("chassis/roll", "chassis/angular_velocity_x", "chassis/acceleration_y", "chassis/acceleration_z", "rops/force")

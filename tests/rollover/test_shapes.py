@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rollover.shapes import Box, Disc, Points, Tube, cone, sample
+from rollover.spec.shapes import Box, Disc, Points, Tube, cone, sample
 
 
 @pytest.mark.parametrize("spacing", [0.5, 0.07, 0.02])

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rollover.faults import InputError
-from rollover.importers.sidecar import Column, Described, Profile
-from rollover.importers.signals import Signal, assemble, left_out
 from rollover.recording import Recording
+from rollover.recording.importers.sidecar import Column, Described, Profile
+from rollover.recording.importers.signals import Signal, assemble, left_out
+from rollover.system.errors import InputError
 
 FORCE, SINKAGE = "ground/force_normal", "ground/sinkage"
 FIRST, LATER = np.array([0.0, 0.1, 0.2]), np.array([0.5, 0.6])

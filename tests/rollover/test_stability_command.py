@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
-from rollover.cli import app
+from rollover.cli.main import app
 
 
 def rollover(*words: object) -> Result:

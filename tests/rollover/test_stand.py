@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import pytest
 
-from rollover.channels import describe
-from rollover.excitation import Harmonic
+from rollover.assessment.results import read_run_json, write
 from rollover.scenario import load
-from rollover.stand import Lashing, StaticLoad, StaticTest, TiltTable
-from rollover.store import read_run_json, write
+from rollover.spec.channels import describe
+from rollover.spec.excitation import Harmonic
+from rollover.spec.stand import Lashing, StaticLoad, StaticTest, TiltTable
 from tests.rollover.example import run_of
 
 

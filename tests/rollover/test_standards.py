@@ -6,8 +6,7 @@ import math
 
 import pytest
 
-from rollover.earth_moving import excavator, piece_at
-from rollover.standards import (
+from rollover.spec.standards.codes import (
     MACHINES,
     STANDARDS,
     Tractor,
@@ -22,6 +21,7 @@ from rollover.standards import (
     pitch_inertia_of_both_formulae,
     side_height,
 )
+from rollover.spec.standards.iso_3471 import excavator, piece_at
 
 
 def by_name(rows: tuple, name: str):

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from rollover.scenario import Scenario, load
-from rollover.stand import StaticTest
-from rollover.static_sequence import Push, code_of, sequence
-from rollover.vehicle import Vehicle
+from rollover.spec.stand import StaticTest
+from rollover.spec.standards.static_sequence import Push, code_of, sequence
+from rollover.spec.vehicle import Vehicle
 
 
 def scenario_of(**changes: Any) -> Scenario:

@@ -14,12 +14,12 @@ import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
-from rollover import store
-from rollover.cli import app
-from rollover.document import content_hash
-from rollover.faults import InputError
+from rollover.assessment import results
+from rollover.cli.main import app
 from rollover.recording import Clock, Recording, Sensor, read_parquet, write_parquet
 from rollover.scenario import load
+from rollover.spec.document import content_hash
+from rollover.system.errors import InputError
 from tests.rollover.example import Peak, run_of
 
 PEAKS: Any = (Peak(),)
@@ -40,10 +40,10 @@ def test_what_a_run_writes(folder: Path) -> None:
     def picture(path: Path) -> None:
         path.write_bytes(b"rrd")
 
-    answer = store.write(folder, run, PEAKS, half_step=run, picture=picture)
+    answer = results.write(folder, run, PEAKS, half_step=run, picture=picture)
     assert names(folder) == ["channels.parquet", "events.json", "recording.rrd", "run.json", "scenario.yaml"]
     assert names(folder.parent) == ["drop"]
-    assert answer == json.loads((folder / "run.json").read_text()) == store.read_run_json(folder)
+    assert answer == json.loads((folder / "run.json").read_text()) == results.read_run_json(folder)
     assert answer["files"] == names(folder)
     assert (answer["status"], answer["wall_time"], answer["domain_flags"]) == ("done", 0.5, ["speed"])
     assert answer["scenario_hash"] == content_hash(run.scenario)
@@ -99,13 +99,13 @@ def test_nothing_is_left_of_a_write_that_breaks_off(folder: Path, reason: type[B
         raise reason
 
     with pytest.raises(reason):
-        store.write(folder, run_of(load("drop_test")), PEAKS, picture=picture)
+        results.write(folder, run_of(load("drop_test")), PEAKS, picture=picture)
     assert names(folder.parent) == []
 
 
 def test_a_write_that_breaks_off_leaves_the_earlier_results(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = run_of(load("drop_test"))
-    before = store.write(folder, run, PEAKS)
+    before = results.write(folder, run, PEAKS)
     rename, calls = os.rename, []
 
     def breaks_the_second_time(a: Path, b: Path) -> None:
@@ -116,62 +116,62 @@ def test_a_write_that_breaks_off_leaves_the_earlier_results(folder: Path, monkey
 
     monkeypatch.setattr(os, "rename", breaks_the_second_time)
     with pytest.raises(KeyboardInterrupt):
-        store.write(folder, replace(run, sentence="later"), PEAKS)
+        results.write(folder, replace(run, sentence="later"), PEAKS)
     assert len(calls) == 3
-    assert store.read_run_json(folder) == before
+    assert results.read_run_json(folder) == before
     assert names(folder.parent) == ["drop"]
 
 
 def test_the_same_run_is_written_again_and_another_only_by_force(folder: Path) -> None:
     run = run_of(load("drop_test"))
     other = run_of(run.scenario.replaced({"initiation.speed": 2.0}))
-    store.write(folder, run, PEAKS)
-    store.write(folder, replace(run, wall_time=0.7), PEAKS)
-    assert store.read_run_json(folder)["wall_time"] == 0.7
+    results.write(folder, run, PEAKS)
+    results.write(folder, replace(run, wall_time=0.7), PEAKS)
+    assert results.read_run_json(folder)["wall_time"] == 0.7
     title = run.scenario.title
     got = re.escape(repr(title))
     with pytest.raises(InputError, match=f"holds another run, got {got}; --force replaces it, --out leaves it$"):
-        store.write(folder, other, PEAKS)
-    assert store.read_run_json(folder)["scenario_hash"] == content_hash(run.scenario)
-    store.write(folder, other, PEAKS, force=True)
-    assert store.read_run_json(folder)["scenario_hash"] == content_hash(other.scenario)
+        results.write(folder, other, PEAKS)
+    assert results.read_run_json(folder)["scenario_hash"] == content_hash(run.scenario)
+    results.write(folder, other, PEAKS, force=True)
+    assert results.read_run_json(folder)["scenario_hash"] == content_hash(other.scenario)
 
 
 def test_results_of_other_versions_are_another_run(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = run_of(load("drop_test"))
-    store.write(folder, run, PEAKS)
-    monkeypatch.setattr(store, "versions", lambda: {"rollover": "next"})
+    results.write(folder, run, PEAKS)
+    monkeypatch.setattr(results, "versions", lambda: {"rollover": "next"})
     with pytest.raises(InputError, match="holds this run by other versions"):
-        store.claim(folder, content_hash(run.scenario))
-    assert store.claim(folder, content_hash(run.scenario), force=True) == folder.resolve()
+        results.claim(folder, content_hash(run.scenario))
+    assert results.claim(folder, content_hash(run.scenario), force=True) == folder.resolve()
 
 
 def test_a_folder_with_anything_else_is_never_touched(folder: Path) -> None:
     run = run_of(load("drop_test"))
-    store.write(folder, run, PEAKS)
+    results.write(folder, run, PEAKS)
     (folder / "notes.txt").write_text("mine")
     for force in (False, True):
         with pytest.raises(InputError, match=r"holds files that are not results, got 'notes\.txt'; another --out"):
-            store.write(folder, run, PEAKS, force=force)
+            results.write(folder, run, PEAKS, force=force)
     assert (folder / "notes.txt").read_text() == "mine"
     (folder.parent / "file").write_text("mine")
     with pytest.raises(InputError, match="not a folder, but a file; another --out is needed"):
-        store.claim(folder.parent / "file", "", force=True)
+        results.claim(folder.parent / "file", "", force=True)
 
 
 def test_a_link_to_a_folder_stays_a_link(folder: Path, tmp_path: Path) -> None:
     run = run_of(load("drop_test"))
-    store.write(folder, run, PEAKS)
+    results.write(folder, run, PEAKS)
     link = tmp_path / "link"
     link.symlink_to(folder, target_is_directory=True)
-    store.write(link, replace(run, wall_time=0.7), PEAKS)
+    results.write(link, replace(run, wall_time=0.7), PEAKS)
     assert link.is_symlink()
-    assert store.read_run_json(folder)["wall_time"] == 0.7
+    assert results.read_run_json(folder)["wall_time"] == 0.7
 
 
 def test_a_failed_run_is_written_with_its_sentence(folder: Path) -> None:
     run = run_of(load("drop_test"), "diverged at t = 0.01 s")
-    answer = store.write(folder, run, ())
+    answer = results.write(folder, run, ())
     assert (answer["status"], answer["sentence"]) == ("failed", "diverged at t = 0.01 s")
     assert len(read_parquet(folder / "channels.parquet").time) == 11
 
@@ -189,7 +189,7 @@ def test_reading_what_is_not_a_run(tmp_path: Path, text: str | None, message: st
     if text is not None:
         (tmp_path / "run.json").write_text(text)
     with pytest.raises(InputError) as caught:
-        store.read_run_json(tmp_path)
+        results.read_run_json(tmp_path)
     assert message in str(caught.value)
 
 
@@ -216,13 +216,13 @@ def test_ones_own_result_of_an_older_scenario_is_replaced_and_that_is_said(
         return CliRunner().invoke(app, ["run", "--no-half-step", "--out", "out/mine", *words])
 
     assert asked("mine.yaml").exit_code == 0
-    old = store.read_run_json(Path("out/mine"))["scenario_hash"]
+    old = results.read_run_json(Path("out/mine"))["scenario_hash"]
     Path("mine.yaml").write_text(Path("mine.yaml").read_text().replace("0.05", "0.06"))
     assert (set_ := asked("mine.yaml", "--set", "initiation.speed=2")).exit_code == 2, set_.stderr
     done = asked("mine.yaml")
     assert done.exit_code == 0, done.stderr
     assert f"replaces the run of this scenario as it was before it was changed (hash {old[:12]})" in done.stderr
-    assert store.read_run_json(Path("out/mine"))["scenario_hash"] != old
+    assert results.read_run_json(Path("out/mine"))["scenario_hash"] != old
     Path("other").mkdir()
     Path("other/mine.yaml").write_text("base: drop_test.yaml\ntitle: Theirs\nsimulation: {duration: 0.05}\n")
     refused = asked("other/mine.yaml")
@@ -233,12 +233,12 @@ def test_ones_own_result_of_an_older_scenario_is_replaced_and_that_is_said(
 def test_an_account_of_an_edited_scenario_is_ones_own_and_of_another_file_is_not(tmp_path: Path) -> None:
     folder = tmp_path / "out"
     said: list[str] = []
-    about = {"scenario_hash": "a", "recordings": ["d"], "origin": store.origin(tmp_path / "x.yaml", folder)}
+    about = {"scenario_hash": "a", "recordings": ["d"], "origin": results.origin(tmp_path / "x.yaml", folder)}
     folder.mkdir()
-    store.write_json(folder / "a.json", {"format": "f/1", **about})
+    results.write_json(folder / "a.json", {"format": "f/1", **about})
 
     def claimed(**changes: Any) -> Path:
-        return store.claim_account(folder, "f/1", {**about, **changes}, ["a.json"], say=said.append)
+        return results.claim_account(folder, "f/1", {**about, **changes}, ["a.json"], say=said.append)
 
     assert claimed() == folder.resolve()
     assert said == []
@@ -246,8 +246,8 @@ def test_an_account_of_an_edited_scenario_is_ones_own_and_of_another_file_is_not
     assert len(said) == 1
     for changes in (
         {"scenario_hash": "b", "recordings": ["e"]},
-        {"scenario_hash": "b", "origin": store.origin(tmp_path / "y.yaml", folder)},
-        {"scenario_hash": "b", "origin": store.origin(tmp_path / "x.yaml", folder, ["gravity=9"])},
+        {"scenario_hash": "b", "origin": results.origin(tmp_path / "y.yaml", folder)},
+        {"scenario_hash": "b", "origin": results.origin(tmp_path / "x.yaml", folder, ["gravity=9"])},
     ):
         with pytest.raises(InputError, match="holds results of something else"):
             claimed(**changes)

@@ -13,21 +13,22 @@ from scipy.stats import binom, spearmanr
 from typer.testing import CliRunner
 
 from ground.soils import log_scatter
-from rollover import document, simulate
-from rollover import study as studies
-from rollover.cli import app
-from rollover.drop import DropModel
-from rollover.faults import InputError
-from rollover.loads import peak_loads
+from rollover import studies
+from rollover.assessment.loads import peak_loads
+from rollover.cli.main import app
+from rollover.dynamics import simulate
+from rollover.dynamics.drop_test import DropModel
 from rollover.recording import read_table
 from rollover.scenario import load
-from rollover.study import shelf
-from rollover.study.answers import clopper_pearson, exceedance, quantile
-from rollover.study.axis import LogNormal, Normal, SoilScatter, Triangular
-from rollover.study.case import work
-from rollover.study.conduct import Builder, Conducted, Way, conduct
-from rollover.study.design import points
-from rollover.study.study import Output, Study
+from rollover.spec import document
+from rollover.studies import case_store
+from rollover.studies.axis import LogNormal, Normal, SoilScatter, Triangular
+from rollover.studies.case import work
+from rollover.studies.design import points
+from rollover.studies.runner import Builder, Conducted, Way, conduct
+from rollover.studies.study import Output, Study
+from rollover.studies.summary import clopper_pearson, exceedance, quantile
+from rollover.system.errors import InputError
 from tests.rollover.studies import drops
 
 runner = CliRunner()
@@ -215,8 +216,8 @@ def test_a_case_is_the_run_of_its_scenario() -> None:
 def drops_full() -> Study:
     base = load("drop_test").replaced({"simulation.step": 0.001, "simulation.output_step": 0.001})
     speed = {"kind": "uniform", "name": "speed", "paths": ("initiation.speed",), "low": 1.0, "high": 3.5}
-    from rollover.study.axis import Uniform
-    from rollover.study.plan import Lhs
+    from rollover.studies.axis import Uniform
+    from rollover.studies.plan import Lhs
 
     return Study(
         title="Drops",
@@ -244,22 +245,22 @@ def test_a_changed_study_runs_only_what_is_new(tmp_path: Path) -> None:
     assert conducted(tmp_path, grid, few)[1].ran == 0
     study, done = conducted(tmp_path, grid, more)
     assert done.ran == 2
-    table, about = read_table(tmp_path / "out" / shelf.TABLE)
+    table, about = read_table(tmp_path / "out" / case_store.TABLE)
     assert table["speed"] == [2.0, 2.0, 3.0, 3.0, 1.0, 1.0]
     assert table["ground/sinkage"] == [row.measures["ground/sinkage"] for row in done.rows]
     assert about["title"] == study.title
-    told, _ = read_table(tmp_path / "out" / shelf.PROVENANCE)
+    told, _ = read_table(tmp_path / "out" / case_store.PROVENANCE)
     assert told["case"] == table["case"]
     assert all("exudyn" in v for v in told["versions"])
 
 
 def test_a_damaged_file_is_run_again(tmp_path: Path) -> None:
     _, done = conducted(tmp_path)
-    path = shelf.path_of(tmp_path / "out", done.keys[4])
+    path = case_store.path_of(tmp_path / "out", done.keys[4])
     path.write_bytes(path.read_bytes()[:100])
-    before = (tmp_path / "out" / shelf.TABLE).read_bytes()
+    before = (tmp_path / "out" / case_store.TABLE).read_bytes()
     assert conducted(tmp_path)[1].ran == 1
-    assert (tmp_path / "out" / shelf.TABLE).read_bytes() == before
+    assert (tmp_path / "out" / case_store.TABLE).read_bytes() == before
 
 
 def test_a_point_that_is_no_scenario_is_a_row_and_failed_ones_are_retried(tmp_path: Path) -> None:
@@ -280,7 +281,7 @@ def test_a_point_that_is_no_scenario_is_a_row_and_failed_ones_are_retried(tmp_pa
 
 def test_the_table_is_read_by_others(tmp_path: Path) -> None:
     _, done = conducted(tmp_path)
-    path = tmp_path / "out" / shelf.TABLE
+    path = tmp_path / "out" / case_store.TABLE
     sinkage = [row.measures["ground/sinkage"] for row in done.rows]
     read = {
         "pandas": lambda m: m.read_parquet(path)["ground/sinkage"].tolist(),
@@ -358,11 +359,11 @@ def test_the_worst_case_repeats(tmp_path: Path) -> None:
     assert answer.exit_code == 0, answer.stderr
     account = json.loads(answer.stdout)
     worst = account["worst"]
-    table, _ = read_table(out / shelf.TABLE)
+    table, _ = read_table(out / case_store.TABLE)
     peaks = table["ground/force_normal"]
     assert worst["point"] == int(np.argmax(peaks))
     again = runner.invoke(
-        app, ["run", str(out / shelf.WORST), "--out", str(tmp_path / "again"), "--no-half-step", "--json"]
+        app, ["run", str(out / case_store.WORST), "--out", str(tmp_path / "again"), "--no-half-step", "--json"]
     )
     assert again.exit_code == 0, again.stderr
     told = json.loads(again.stdout)

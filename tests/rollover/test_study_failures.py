@@ -9,18 +9,19 @@ import numpy as np
 import pytest
 from scipy.stats import mannwhitneyu
 
-from rollover import document, store
-from rollover import study as studies
-from rollover.commands.study import sentences
-from rollover.study.answers import answers
-from rollover.study.conduct import Conducted
-from rollover.study.design import points
-from rollover.study.failures import along_axes, sentence
-from rollover.study.shelf import Row
-from rollover.study.study import axis_unit
+from rollover import studies
+from rollover.assessment import results
+from rollover.cli.commands.study import sentences
+from rollover.spec import document
+from rollover.studies.case_store import Row
+from rollover.studies.design import points
+from rollover.studies.failures import along_axes, sentence
+from rollover.studies.runner import Conducted
+from rollover.studies.study import axis_unit
+from rollover.studies.summary import answers
 from tests.rollover.studies import drops
 from tests.viz.html import Parts
-from viz.study_page import page
+from viz.pages.study import page
 
 GRID = """\
 title: A grid of slopes and speeds
@@ -55,9 +56,13 @@ def done(study: Any, failed: Any) -> Conducted:
 
 
 def told(study: Any, conducted: Conducted) -> tuple[dict[str, Any], str]:
-    head = {"title": study.title, "scenario_hash": document.content_hash(study.scenario), "versions": store.versions()}
+    head = {
+        "title": study.title,
+        "scenario_hash": document.content_hash(study.scenario),
+        "versions": results.versions(),
+    }
     account = {**head, **answers(study, conducted), "reliability": None, "worst": None, "ran": 0}
-    plain: dict[str, Any] = store.plain(account)
+    plain: dict[str, Any] = results.plain(account)
     return plain, page(study, conducted, plain, command="rollover study x")
 
 

@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover import study as studies
-from rollover.drop import DropModel
-from rollover.loads import magnitude
+from rollover import studies
+from rollover.assessment.loads import magnitude
+from rollover.dynamics.drop_test import DropModel
 from rollover.recording import read_table
 from rollover.scenario import load
-from rollover.study import shelf
-from rollover.study.conduct import Way, conduct
+from rollover.studies import case_store
+from rollover.studies.runner import Way, conduct
 from tests.rollover.studies import EFFECTS, ROOT, faulty
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "killpg"), reason="platform: needs process groups")
@@ -56,7 +56,7 @@ def finished(process: subprocess.Popen[str]) -> dict[str, Any]:
 
 def files(out: Path) -> dict[str, tuple[int, int]]:
     """Case files with what changes when one is written again."""
-    found = {p.name: p.stat() for p in (out / shelf.CASES).glob("*/[!.]*.parquet")}
+    found = {p.name: p.stat() for p in (out / case_store.CASES).glob("*/[!.]*.parquet")}
     return {name: (s.st_ino, s.st_mtime_ns) for name, s in found.items()}
 
 
@@ -74,7 +74,7 @@ def sixty(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Path
 
 def test_four_faults_cost_four_rows(sixty: tuple[Path, Path]) -> None:
     _, out = sixty
-    table, _ = read_table(out / shelf.TABLE)
+    table, _ = read_table(out / case_store.TABLE)
     assert table["point"] == list(range(60))
     assert [k for k, status in enumerate(table["status"]) if status == "failed"] == sorted(FAULTS)
     assert [table["failure"][k] for k in sorted(FAULTS)] == ["crash", "time-limit", "memory-limit", "error"]
@@ -114,7 +114,7 @@ def test_killed_three_times_it_ends_with_the_same_table(sixty: tuple[Path, Path]
     account = finished(begun(study, out, "--json"))
     assert account["ran"] == 60 - len(seen)
     assert {name: files(out)[name] for name in seen} == seen
-    assert read_table(out / shelf.TABLE) == read_table(reference / shelf.TABLE)
-    assert (out / shelf.TABLE).read_bytes() == (reference / shelf.TABLE).read_bytes()
+    assert read_table(out / case_store.TABLE) == read_table(reference / case_store.TABLE)
+    assert (out / case_store.TABLE).read_bytes() == (reference / case_store.TABLE).read_bytes()
     assert account["cases"] == {"all": 60, "done": 56, "failed": 4}
     assert conduct(studies.load(study), out, Way(workers=0)).ran == 0

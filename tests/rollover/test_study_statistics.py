@@ -11,10 +11,10 @@ import pytest
 from scipy.special import ndtr
 from typer.testing import CliRunner
 
-from rollover.cli import app
-from rollover.faults import InputError
-from rollover.study import sensitivity
-from rollover.study.study import Reliability
+from rollover.cli.main import app
+from rollover.studies import sensitivity
+from rollover.studies.study import Reliability
+from rollover.system.errors import InputError
 from tests.rollover.studies import drops
 
 
@@ -43,7 +43,7 @@ def test_morris_effects_of_a_plane() -> None:
 
 def test_reliability_of_a_plane_in_spite_of_noise() -> None:
     pytest.importorskip("openturns", reason="the extra reliability is not installed")
-    from rollover.study.reliability import form_and_importance_sampling
+    from rollover.studies.reliability import form_and_importance_sampling
 
     def g(u: np.ndarray) -> np.ndarray:
         return np.asarray(0.8 * u[:, 0] + 0.6 * u[:, 1] - 2.9 + 0.01 * np.sin(40.0 * u[:, 0]))
@@ -76,7 +76,7 @@ def test_reliability_of_a_study(tmp_path: Path) -> None:
 
 
 def test_without_the_extra_there_is_a_cure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from rollover.study.reliability import installed
+    from rollover.studies.reliability import installed
 
     monkeypatch.setitem(sys.modules, "openturns", None)
     with pytest.raises(InputError, match=r"pip install 'rollover\[reliability\]'"):

@@ -15,11 +15,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rollover.faults import InputError
-from rollover.importers import read_recording
 from rollover.recording import Recording
+from rollover.recording.importers import read_recording
 from rollover.recording.tables import read_csv
 from rollover.recording.text_rows import Dialect, Numbers
+from rollover.system.errors import InputError
 
 G = 9.80665
 X, FORCE = "chassis/acceleration_x", "rops/force"

@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from rollover import document
+from rollover.assessment.shipped import origin
 from rollover.scenario import AnyVehicle, load
-from rollover.shipped import origin
-from rollover.study import load as load_study
+from rollover.spec import document
+from rollover.studies import load as load_study
 
 SHELF = document.shipped_folder()
 SCENARIOS = sorted(SHELF.glob("*.yaml"))

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rollover.channels import UNITS, factor
-from rollover.units import key
+from rollover.spec.channels import UNITS, factor
+from rollover.spec.units import key
 
 G = 9.80665
 OF = {

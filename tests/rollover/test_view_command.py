@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from rollover import store
-from rollover.cli import app
+from rollover.assessment import results as store
+from rollover.cli.main import app
 from tests.viz import example
 
 
@@ -28,7 +28,7 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
         calls.append({"recording": recording, **about})
         path.write_text("page")
 
-    monkeypatch.setattr("viz.web_page.write_page", write_page)
+    monkeypatch.setattr("viz.pages.web_page.write_page", write_page)
     return calls
 
 
@@ -85,7 +85,7 @@ def test_a_viewer_that_does_not_serve_is_one_line(results: Path, monkeypatch: py
     def silent(*words: Any, **about: Any) -> None:
         raise OSError("viewer: it did not serve its web page on this machine")
 
-    monkeypatch.setattr("viz.web_page.write_page", silent)
+    monkeypatch.setattr("viz.pages.web_page.write_page", silent)
     done = view(results, "--html", "drop.html")
     assert (done.exit_code, done.stderr.count("\n")) == (2, 1)
     assert "did not serve its web page" in done.stderr
@@ -96,7 +96,7 @@ def test_without_a_display_there_are_cures(results: Path, monkeypatch: pytest.Mo
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     opened: list[Path] = []
-    monkeypatch.setattr("viz.viewer.open_viewer", lambda path: opened.append(path) or 0)
+    monkeypatch.setattr("viz.recordings.viewer.open_viewer", lambda path: opened.append(path) or 0)
     done = view(results)
     assert done.exit_code == 2
     assert opened == []

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.criteria import Criterion, criteria, in_words
-from rollover.criterion import with_half_step
-from rollover.findings import findings
-from rollover.requirement import Requirement
-from rollover.run import Motion, Run
+from rollover.assessment.criteria import Criterion, criteria, in_words
+from rollover.assessment.criterion import with_half_step
+from rollover.assessment.stand_results import findings
+from rollover.dynamics.result import Motion, Run
 from rollover.scenario import Scenario, load
-from rollover.standards import STATIC
+from rollover.spec.standards.codes import STATIC
+from rollover.spec.standards.requirement import Requirement
 from tests.viz import example
 
 NOT_DUE = {"fall": 0.0, "required": False, "extra_energy": 0.0, "passed": None}
@@ -273,7 +273,7 @@ def test_a_verdict_that_turns_at_half_the_step_is_told() -> None:
 def test_in_words(
     quantity: Any, unit: str, value: float, upper: float | None, simulated: float, words: tuple[str, str, str]
 ) -> None:
-    from rollover.criterion import compared
+    from rollover.assessment.criterion import compared
 
     requirement = Requirement(
         standard="s", name="n", formula="f", clause="c", quantity=quantity, unit=unit, value=value, upper=upper,

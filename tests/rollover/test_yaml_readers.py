@@ -9,8 +9,8 @@ import pytest
 import yaml
 from ruamel.yaml import YAML
 
-from rollover import document
 from rollover.scenario import load
+from rollover.spec import document
 
 FLOATS = (1e-05, 1.0, -1e22, 1.5e-7, 0.1 + 0.2, 1e16, 123456789.0, 5e-324, float(np.nextafter(1.0, 2.0)), -0.0)
 TEXTS = (

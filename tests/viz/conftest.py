@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rollover.run import Run
+from rollover.dynamics.result import Run
 from tests.viz import example
 
 
@@ -22,7 +22,7 @@ def drop() -> Run:
 
 @pytest.fixture(scope="session")
 def overturn_rrd(overturn: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    log = pytest.importorskip("viz.log", reason="no rerun wheel for this platform", exc_type=ImportError)
+    log = pytest.importorskip("viz.recordings.log", reason="no rerun wheel for this platform", exc_type=ImportError)
     path = tmp_path_factory.mktemp("rrd") / "overturn.rrd"
     log.write_rrd(overturn, path, peaks=example.peaks(overturn))
     return path
@@ -30,7 +30,7 @@ def overturn_rrd(overturn: Run, tmp_path_factory: pytest.TempPathFactory) -> Pat
 
 @pytest.fixture(scope="session")
 def drop_rrd(drop: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    log = pytest.importorskip("viz.log", reason="no rerun wheel for this platform", exc_type=ImportError)
+    log = pytest.importorskip("viz.recordings.log", reason="no rerun wheel for this platform", exc_type=ImportError)
     path = tmp_path_factory.mktemp("rrd") / "drop.rrd"
     log.write_rrd(drop, path)
     return path

@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 from ground.array import Elements
 from ground.surface import Slope
 from ground.ye import Ye2006
-from rollover.connector import Connector
-from rollover.inertia import MassProperties
-from rollover.initiation import Drop, TipOver
+from rollover.dynamics.result import ContactForce, Event, GroundTrack, Motion, Run
 from rollover.recording import Recording
-from rollover.rops import ClearanceZone, Rops
-from rollover.run import ContactForce, Event, GroundTrack, Motion, Run
 from rollover.scenario import Ground, Scenario, Simulation
-from rollover.shapes import Box, Tube
-from rollover.vehicle import FrontAxle, Striker, Tyre, Vehicle, Wheel
+from rollover.spec.connector import Connector
+from rollover.spec.inertia import MassProperties
+from rollover.spec.initiation import Drop, TipOver
+from rollover.spec.rops import ClearanceZone, Rops
+from rollover.spec.shapes import Box, Tube
+from rollover.spec.vehicle import FrontAxle, Striker, Tyre, Vehicle, Wheel
 
 Floats = NDArray[np.float64]
 REAR = Tyre(radius=0.71, width=0.42, vertical_stiffness=3e5, lateral_stiffness=1.5e5)
@@ -340,7 +340,7 @@ def drop(speed: float = 3.0) -> Run:
 
 @dataclass(frozen=True, kw_only=True)
 class Peak:
-    """What `rollover.loads.PeakLoad` has."""
+    """What `rollover.assessment.loads.PeakLoad` has."""
 
     channel: str
     unit: str

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viz.viewer import viewer_binary
+from viz.recordings.viewer import viewer_binary
 
 KEPT = Path(__file__).resolve().parents[2] / "out" / "pictures"  # for people to look at after the tests
 DRIVERS = Path("/usr/share/vulkan/icd.d")

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.prechecks import Finding
+from rollover.recording.checks import Finding
 from tests.rollover.diagnosed import FORCE, nothing_found, sensor_at_fault, told
 from tests.viz.html import Parts
-from viz.diagnosis_page import page, ranked
-from viz.diagnosis_words import answer, markdown
+from viz.content.diagnosis_words import answer, markdown, ranked
+from viz.pages.diagnosis import page
 
 FLAT = Finding(
     check="clipping", channel=FORCE, start=0.1, end=0.12, value=3e3, unit="N", error=None, sentence="a flat top"
@@ -117,8 +117,8 @@ def test_residuals_are_over_the_noise() -> None:
 @pytest.mark.parametrize("with_after", [True, False])
 def test_the_recording_for_the_viewer(with_after: bool, tmp_path: Path) -> None:
     pytest.importorskip("rerun", reason="no rerun wheel for this platform", exc_type=ImportError)
-    from viz.diagnosis import write_diagnosis
-    from viz.verify import check_rrd, read_column, read_entities
+    from viz.recordings.diagnosis import write_diagnosis
+    from viz.recordings.verify import check_rrd, read_column, read_entities
 
     path = tmp_path / "diagnosis.rrd"
     found = sensor_at_fault() if with_after else nothing_found()

@@ -8,8 +8,8 @@ import sys
 
 import pytest
 
-from rollover.channels import CHANNELS
-from viz.entities import WHEEL, escaped, force_path, series
+from rollover.spec.channels import CHANNELS
+from viz.content.entities import WHEEL, escaped, force_path, series
 
 NAMES = [
     name.replace("NAME", who)
@@ -60,7 +60,8 @@ def test_names_are_escaped_so_that_no_two_meet() -> None:
 
 def test_only_log_draw_blueprint_stream_and_verify_need_the_sdk() -> None:
     code = (
-        "import sys, viz.entities, viz.scene, viz.terrain, viz.verdict, viz.viewer; "
+        "import sys, viz.content.entities, viz.recordings.scene, viz.recordings.terrain; "
+        "import viz.content.verdict, viz.recordings.viewer; "
         "sys.exit(any(m.partition('.')[0] == 'rerun' for m in sys.modules))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover import store
-from rollover.baseline import Answer
-from rollover.calibrate import Calibration, Estimate, Score, Scores
-from rollover.loads import peak_loads
-from rollover.misfit import misfit
-from rollover.pair import pair, read
-from rollover.proof.tally import tally
+from rollover.assessment import results
+from rollover.assessment.loads import peak_loads
+from rollover.calibration.calibrate import Calibration, Estimate, Score, Scores
+from rollover.comparison.misfit import misfit
+from rollover.comparison.run_pair import pair, read
+from rollover.proof.summary import tally
 from rollover.recording import Recording
-from rollover.stamps import Zero
+from rollover.recording.time_stamps import Zero
+from rollover.studies.baseline import Answer
 from tests.rollover.diagnosed import sensor_at_fault, told
 from tests.rollover.studies import made_up
 from tests.viz import example
@@ -27,12 +27,15 @@ from tests.viz.browser import CHROMIUM, has_browser
 from tests.viz.html import Parts
 from tests.viz.test_proof_page import row
 from tests.viz.test_study_page import account as made_account
-from viz import calibration_page, comparison_page, diagnosis_page, pair_page, proof_page, regression, report, study_page
-from viz.embedded import embedded, in_script, policy
-from viz.page import Cases, Details, Figure, Footer, Headline, Note, Pairs, Section, Table, render
-from viz.plots import Curve, history
-from viz.web_page import Viewer
-from viz.web_page import page as viewer_page
+from viz.content.blocks import Cases, Details, Figure, Footer, Headline, Note, Pairs, Section, Table
+from viz.content.embedded import embedded, in_script, policy
+from viz.figures.plots import Curve, history
+from viz.pages import calibration, comparison, diagnosis, proof, regression, report
+from viz.pages import pair as pair_page
+from viz.pages import study as study_page
+from viz.pages.page import render
+from viz.pages.web_page import Viewer
+from viz.pages.web_page import page as viewer_page
 
 RUN = "document.documentElement.dataset.marked='yes'"
 MARKS = (
@@ -94,21 +97,21 @@ def page_of(kind: str, folder: Path) -> str:
         force = {n: 1.1 * v for n, v in run.recording.channels.items() if n.startswith("ground/f")}
         measured = Recording(title=HOSTILE, time=run.recording.time, channels=force, notes=(HOSTILE,))
         found = misfit(run, measured, name=HOSTILE, noise=lambda r, c: 20.0)
-        return comparison_page.page([found], title=HOSTILE, command=HOSTILE, **ABOUT)
+        return comparison.page([found], title=HOSTILE, command=HOSTILE, **ABOUT)
     if kind == "two runs":
         for name, run in (("was", example.drop()), ("now", example.drop(2.0))):
-            store.write(folder / name, replace(run, scenario=replace(run.scenario, title=HOSTILE)), peak_loads(run))
+            results.write(folder / name, replace(run, scenario=replace(run.scenario, title=HOSTILE)), peak_loads(run))
         return pair_page.page(
             pair(read(folder / "was"), read(folder / "now")), command=HOSTILE, versions={"a": HOSTILE}
         )
     if kind == "diagnose":
         found = replace(sensor_at_fault(), notes=(HOSTILE,), sentence=HOSTILE)
         shown = tuple(replace(t, recording=HOSTILE) for t in told())
-        return diagnosis_page.page(found, shown, title=HOSTILE, command=HOSTILE, **ABOUT)
+        return diagnosis.page(found, shown, title=HOSTILE, command=HOSTILE, **ABOUT)
     if kind == "prove":
         rows = [row(HOSTILE, "single", "mass", "mass"), row("case-0002", "null", "", HOSTILE)]
         account = {"seed": 7, "summary": tally(rows), "rows": rows, "seal": {"digest": HOSTILE, "algorithm": HOSTILE}}
-        return proof_page.page(account, command=HOSTILE, versions={HOSTILE: HOSTILE})
+        return proof.page(account, command=HOSTILE, versions={HOSTILE: HOSTILE})
     if kind == "regress":
         answer_ = Answer(scenario=HOSTILE, verdict="failed", sentence=HOSTILE, notes=(HOSTILE,))
         return regression.page([answer_], command=HOSTILE, scenario_hash=HOSTILE)
@@ -117,7 +120,7 @@ def page_of(kind: str, folder: Path) -> str:
         study = replace(study, title=HOSTILE)
         return study_page.page(study, done, made_account(study, done), command=HOSTILE)
     if kind == "calibrate":
-        return calibration_page.page(calibrated(), command=HOSTILE, **ABOUT)
+        return calibration.page(calibrated(), command=HOSTILE, **ABOUT)
     if kind == "viewer":
         script = "var wasm_bindgen = async () => {}; // WebHandle </SCRIPT><script>" + RUN
         return viewer_page(b"rrd", Viewer(script=script, program=b""), title=HOSTILE, footer=HOSTILE)

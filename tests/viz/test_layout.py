@@ -10,16 +10,18 @@ import numpy as np
 import pytest
 
 from ground.surface import Bank, Ditch, Kerb, Slope, Sum, height
-from rollover.initiation import Release
-from rollover.run import Run
+from rollover.dynamics.result import Run
+from rollover.spec.initiation import Release
 from tests.viz import example
-from viz.edges import edges
-from viz.scene import parts, path_of_centre
-from viz.verdict import newtons, verdict
+from viz.content.verdict import newtons, verdict
+from viz.recordings.edges import edges
+from viz.recordings.scene import parts, path_of_centre
 
-blueprint = pytest.importorskip("viz.blueprint", reason="no rerun wheel for this platform", exc_type=ImportError)
+blueprint = pytest.importorskip(
+    "viz.recordings.blueprint", reason="no rerun wheel for this platform", exc_type=ImportError
+)
 
-from viz.verify import read_column  # noqa: E402
+from viz.recordings.verify import read_column  # noqa: E402
 
 OUTER = (-4.0, 6.0, -5.0, 7.0)
 

@@ -11,21 +11,21 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rollover.run import GroundTrack, Run
-from rollover.vehicle import Vehicle
+from rollover.dynamics.result import GroundTrack, Run
+from rollover.spec.vehicle import Vehicle
 from tests.viz import example
-from viz.entities import force_path, series
-from viz.scene import rotation
-from viz.viewer import viewer_binary
+from viz.content.entities import force_path, series
+from viz.recordings.scene import rotation
+from viz.recordings.viewer import viewer_binary
 
-log = pytest.importorskip("viz.log", reason="no rerun wheel for this platform", exc_type=ImportError)
+log = pytest.importorskip("viz.recordings.log", reason="no rerun wheel for this platform", exc_type=ImportError)
 rr = pytest.importorskip("rerun", reason="no rerun wheel for this platform")
 
 from rerun.chunk import RrdReader  # noqa: E402
 
-from viz.draw import picture, upright_to  # noqa: E402
-from viz.stream import stamps  # noqa: E402
-from viz.verify import blueprint_queries, check_rrd, read_column, read_entities  # noqa: E402
+from viz.recordings.draw import picture, upright_to  # noqa: E402
+from viz.recordings.stream import stamps  # noqa: E402
+from viz.recordings.verify import blueprint_queries, check_rrd, read_column, read_entities  # noqa: E402
 
 RECORDINGS = ("overturn_rrd", "drop_rrd")
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollover.diagnosis.series import Track, _scatter
-from rollover.diagnosis.verdict import Diagnosis
+from rollover.diagnosis.overlay import Track, _scatter
+from rollover.diagnosis.result import Diagnosis
 from tests.rollover.diagnosed import sensor_at_fault, told
-from viz.diagnosis import PHASES
-from viz.diagnosis_page import page
-from viz.diagnosis_words import label_of
+from viz.content.diagnosis_words import label_of
+from viz.pages.diagnosis import page
+from viz.recordings.diagnosis import PHASES
 
 
 def test_a_misfit_is_held_against_noise_and_scatter() -> None:

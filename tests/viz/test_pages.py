@@ -9,20 +9,21 @@ from typing import Any
 
 import pytest
 
-from rollover import store
-from rollover.baseline import Answer, Difference
-from rollover.loads import peak_loads
-from rollover.misfit import misfit
-from rollover.pair import pair, read
-from rollover.proof.tally import tally
+from rollover.assessment import results
+from rollover.assessment.loads import peak_loads
+from rollover.comparison.misfit import misfit
+from rollover.comparison.run_pair import pair, read
+from rollover.proof.summary import tally
 from rollover.recording import Recording
+from rollover.studies.baseline import Answer, Difference
 from tests.rollover.diagnosed import sensor_at_fault, told
 from tests.viz import example
 from tests.viz.browser import CHROMIUM, has_browser
 from tests.viz.html import Parts
 from tests.viz.test_proof_page import row
 from tests.viz.test_study_page import written
-from viz import comparison_page, diagnosis_page, pair_page, proof_page, regression, report
+from viz.pages import comparison, diagnosis, proof, regression, report
+from viz.pages import pair as pair_page
 
 KINDS = ("run", "compare", "two runs", "diagnose", "prove", "regress", "study")
 HASH = "c0ffee" * 10 + "beef"
@@ -44,20 +45,20 @@ def page_of(kind: str, folder: Path) -> str:
         }
         measured = Recording(title="Drop", time=run.recording.time, channels=channels)
         found = misfit(run, measured, name="drop 1", noise=lambda r, c: 20.0)
-        return comparison_page.page([found], title="Drop", command="rollover compare drop_test rec/d3.csv", **about)
+        return comparison.page([found], title="Drop", command="rollover compare drop_test rec/d3.csv", **about)
     if kind == "two runs":
         for name, run in (("was", example.drop()), ("now", example.drop(2.0))):
-            store.write(folder / name, run, peak_loads(run))
+            results.write(folder / name, run, peak_loads(run))
         found_pair = pair(read(folder / "was"), read(folder / "now"))
         return pair_page.page(found_pair, command="rollover compare was now", versions=VERSIONS)
     if kind == "diagnose":
-        return diagnosis_page.page(
+        return diagnosis.page(
             sensor_at_fault(), told(), title="Drop", command="rollover diagnose drop_test rec", **about
         )
     if kind == "prove":
         rows = [row("case-0001", "single", "mass", "mass"), row("case-0002", "null", "", "soil-layer")]
         account = {"seed": 7, "summary": tally(rows), "rows": rows, "seal": {"digest": HASH, "algorithm": "sha256"}}
-        return proof_page.page(account, command="rollover prove --cases 2", versions=VERSIONS)
+        return proof.page(account, command="rollover prove --cases 2", versions=VERSIONS)
     if kind == "study":
         return written(folder, 24).read_text(encoding="utf-8")
     load = Difference(

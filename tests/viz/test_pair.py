@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rollover import store
-from rollover.pair import Pair, pair, read
+from rollover.assessment import results
+from rollover.comparison.run_pair import Pair, pair, read
 from tests.viz import example
 from tests.viz.picture import has_software_driver, kept, pictures, pixels
-from viz.entities import series
+from viz.content.entities import series
 
-log = pytest.importorskip("viz.log", reason="no rerun wheel for this platform", exc_type=ImportError)
+log = pytest.importorskip("viz.recordings.log", reason="no rerun wheel for this platform", exc_type=ImportError)
 
-from viz.pair import BASELINE, CANDIDATE, write_pair  # noqa: E402
-from viz.verify import blueprint_queries, check_rrd, read_column, read_entities  # noqa: E402
+from viz.recordings.pair import BASELINE, CANDIDATE, write_pair  # noqa: E402
+from viz.recordings.verify import blueprint_queries, check_rrd, read_column, read_entities  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def two(tmp_path_factory: pytest.TempPathFactory) -> tuple[Pair, Path]:
         force = (1.0 + 0.02 * slope) * run.recording["rops/force"]
         run.recording.channels["rops/force"][:] = force
         peaks: tuple[object, ...] = example.peaks(run)
-        store.write(root / name, run, peaks, picture=lambda path, run=run: log.write_rrd(run, path))  # type: ignore
+        results.write(root / name, run, peaks, picture=lambda path, run=run: log.write_rrd(run, path))  # type: ignore
     found = pair(read(root / "was"), read(root / "now"))
     write_pair(found, root / "pair.rrd")
     return found, root / "pair.rrd"
@@ -78,7 +78,7 @@ def test_the_first_tab_answers_and_both_scenes_are_in_it(two: tuple[Pair, Path])
 
 def test_without_a_recording_there_is_no_picture(two: tuple[Pair, Path], tmp_path: Path) -> None:
     found, _ = two
-    store.write(tmp_path / "bare", example.overturn(), ())
+    results.write(tmp_path / "bare", example.overturn(), ())
     with pytest.raises(FileNotFoundError, match=r"bare: no recording.rrd there"):
         write_pair(pair(found.baseline, read(tmp_path / "bare")), tmp_path / "pair.rrd")
     assert [p.name for p in tmp_path.iterdir()] == ["bare"]

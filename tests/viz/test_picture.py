@@ -10,7 +10,7 @@ import pytest
 
 from tests.viz import example
 from tests.viz.picture import has_software_driver, kept, picture_of_view, pictures, pixels
-from viz.entities import SIMULATED
+from viz.content.entities import SIMULATED
 
 pytestmark = pytest.mark.skipif(
     not has_software_driver(), reason="no software Vulkan driver (mesa-vulkan-drivers): pictures cannot be made here"
@@ -30,7 +30,7 @@ def test_the_viewer_draws_it_without_complaint(
 
 def test_a_peak_of_one_sample_is_drawn_as_high_as_a_long_one(tmp_path: Path) -> None:
     """Thirty thousand samples on some five hundred pixels: a plateau, then one sample of the same height."""
-    log = pytest.importorskip("viz.log", reason="no rerun wheel for this platform", exc_type=ImportError)
+    log = pytest.importorskip("viz.recordings.log", reason="no rerun wheel for this platform", exc_type=ImportError)
     time = np.round(np.arange(0.0, 3.0, 1e-4), 9)
     force = np.zeros(time.size)
     force[3000:6000] = 80e3

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from viz import plots
-from viz.plots import COLOURS, Curve, Level, Outline, View, thinned
+from viz.figures import plots
+from viz.figures.plots import COLOURS, Curve, Level, Outline, View, thinned
 
 Array = NDArray[np.float64]
 T = np.linspace(0.0, 4.0, 401)

@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from rollover.proof.tally import tally
+from rollover.proof.summary import tally
 from tests.viz.html import Parts
-from viz.counts import Share, confusion, shares
-from viz.proof_page import page
+from viz.figures.counts import Share, confusion, shares
+from viz.pages.proof import page
 
 
 def row(case: str, kind: str, truth: str, claimed: str | None, **more: Any) -> dict[str, Any]:

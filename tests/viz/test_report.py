@@ -11,19 +11,20 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rollover.baseline import Answer, Difference
-from rollover.channels import CHANNELS
-from rollover.cli import app
-from rollover.criteria import Criterion
-from rollover.loads import PeakLoad, peak_loads
-from rollover.requirement import Requirement
-from rollover.run import Run
+from rollover.assessment.criteria import Criterion
+from rollover.assessment.loads import PeakLoad, peak_loads
+from rollover.cli.main import app
+from rollover.dynamics.result import Run
+from rollover.spec.channels import CHANNELS
+from rollover.spec.standards.requirement import Requirement
+from rollover.studies.baseline import Answer, Difference
 from tests.viz import example
 from tests.viz.html import Parts
-from viz import blueprint, regression, report
-from viz import page as pages
-from viz.entities import series
-from viz.page import Cell, Details, Footer, Headline, Note, Pairs, Table
+from viz.content.blocks import Cell, Details, Footer, Headline, Note, Pairs, Table
+from viz.content.entities import series
+from viz.pages import page as pages
+from viz.pages import regression, report
+from viz.recordings import blueprint
 
 ANSWER: dict[str, Any] = {
     "scenario_hash": "abc123",

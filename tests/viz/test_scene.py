@@ -8,15 +8,15 @@ import math
 import numpy as np
 import pytest
 
-from rollover.inertia import MassProperties
-from rollover.initiation import Throw, TipOver
-from rollover.run import Run
+from rollover.dynamics.result import Run
 from rollover.scenario import load
-from rollover.shapes import Disc, Point, Points
-from rollover.vehicle import Attached, RigidBody, Striker, Vehicle
+from rollover.spec.inertia import MassProperties
+from rollover.spec.initiation import Throw, TipOver
+from rollover.spec.shapes import Disc, Point, Points
+from rollover.spec.vehicle import Attached, RigidBody, Striker, Vehicle
 from tests.viz import example
-from viz.scene import extent, parts, path_of_centre, rotation
-from viz.solids import Balls, Block, Hull, Rod
+from viz.recordings.scene import extent, parts, path_of_centre, rotation
+from viz.recordings.solids import Balls, Block, Hull, Rod
 
 
 def by_path(run: Run) -> dict[str, object]:
@@ -124,7 +124,9 @@ def test_ball_around_the_run_holds_every_wheel_in_every_frame(overturn: Run) -> 
 
 @pytest.mark.parametrize(("side", "sign"), [("left", 1.0), ("right", -1.0)])
 def test_the_eye_is_where_the_vehicle_falls_to(overturn: Run, side: str, sign: float) -> None:
-    blueprint = pytest.importorskip("viz.blueprint", reason="no rerun wheel for this platform", exc_type=ImportError)
+    blueprint = pytest.importorskip(
+        "viz.recordings.blueprint", reason="no rerun wheel for this platform", exc_type=ImportError
+    )
     start = TipOver(side=side, heading_deg=90.0)
     run = dataclasses.replace(overturn, scenario=dataclasses.replace(overturn.scenario, initiation=start))
     towards = blueprint._seen_from(run)
@@ -135,7 +137,7 @@ def test_the_eye_is_where_the_vehicle_falls_to(overturn: Run, side: str, sign: f
 
 
 def test_arrows_stay_in_the_picture(overturn: Run) -> None:
-    draw = pytest.importorskip("viz.draw", reason="no rerun wheel for this platform", exc_type=ImportError)
+    draw = pytest.importorskip("viz.recordings.draw", reason="no rerun wheel for this platform", exc_type=ImportError)
     force = overturn.contact["rops"].force
     own = extent(overturn, at=0)[1]
     longest = np.linalg.norm(force, axis=1).max() / draw.picture(overturn).force
@@ -148,7 +150,7 @@ def test_arrows_stay_in_the_picture(overturn: Run) -> None:
 
 
 def test_soil_is_brightest_where_most_ruts_are_deep(overturn: Run) -> None:
-    draw = pytest.importorskip("viz.draw", reason="no rerun wheel for this platform", exc_type=ImportError)
+    draw = pytest.importorskip("viz.recordings.draw", reason="no rerun wheel for this platform", exc_type=ImportError)
     sinkage = np.zeros((overturn.track.time.size, overturn.track.element.size))
     sinkage[-1] = 0.03
     sinkage[-1, 0] = 0.4

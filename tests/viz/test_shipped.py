@@ -8,16 +8,17 @@ from typing import Any
 
 import pytest
 
-from rollover import loads, simulate
-from rollover.document import shipped_folder
+from rollover.assessment import loads
+from rollover.dynamics import simulate
 from rollover.scenario import load
+from rollover.spec.document import shipped_folder
 from tests.viz.picture import complaints_of, has_software_driver, headless_viewer, kept, pixels, settled
 from tests.viz.picture import load as show
-from viz.viewer import viewer_binary
+from viz.recordings.viewer import viewer_binary
 
-log = pytest.importorskip("viz.log", reason="no rerun wheel for this platform", exc_type=ImportError)
+log = pytest.importorskip("viz.recordings.log", reason="no rerun wheel for this platform", exc_type=ImportError)
 
-from viz.verify import check_rrd  # noqa: E402
+from viz.recordings.verify import check_rrd  # noqa: E402
 
 SCENARIOS = sorted(path.stem for path in shipped_folder().glob("*.yaml"))
 KEPT = {"side_overturn": 2.4, "drop_test": 0.2, "static_rops_test": 4.0, "rear_overturn": 1.13}  # name -> s

@@ -7,20 +7,20 @@ import functools
 import numpy as np
 import pytest
 
-from rollover.criteria import criteria
-from rollover.loads import peak_loads
-from rollover.run import Run
+from rollover.assessment.criteria import criteria
+from rollover.assessment.loads import peak_loads
+from rollover.dynamics.result import Run
+from rollover.dynamics.simulate import run
 from rollover.scenario import load
-from rollover.simulate import run
 from tests.viz.html import Parts
 from tests.viz.test_report import ANSWER
-from viz.log import write_rrd
-from viz.page import Figure
-from viz.report import headline, page
-from viz.scene import extent, parts, rotation
-from viz.solids import Block
-from viz.stand_view import stand_section
-from viz.verdict import verdict
+from viz.content.blocks import Figure
+from viz.content.verdict import verdict
+from viz.figures.stand_view import stand_section
+from viz.pages.report import headline, page
+from viz.recordings.log import write_rrd
+from viz.recordings.scene import extent, parts, rotation
+from viz.recordings.solids import Block
 
 
 @functools.cache

@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover import document, store
-from rollover.study.answers import answers
+from rollover.assessment import results
+from rollover.spec import document
+from rollover.studies.summary import answers
 from tests.rollover.studies import made_up
 from tests.viz.html import Parts
-from viz.page import Cases, Footer, Headline, render
-from viz.study_page import page
+from viz.content.blocks import Cases, Footer, Headline
+from viz.pages.page import render
+from viz.pages.study import page
 
 CASES = 240
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -24,10 +26,14 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 def account(study: Any, done: Any) -> dict[str, Any]:
     """What the command writes, but for the parts that need a folder."""
-    head = {"title": study.title, "scenario_hash": document.content_hash(study.scenario), "versions": store.versions()}
+    head = {
+        "title": study.title,
+        "scenario_hash": document.content_hash(study.scenario),
+        "versions": results.versions(),
+    }
     found = {**head, **answers(study, done), "reliability": None}
     found["worst"] = {**found["outputs"][0]["worst"], "file": "worst.yaml"}
-    plain: dict[str, Any] = store.plain(found)
+    plain: dict[str, Any] = results.plain(found)
     return plain
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ground.array import Elements
 from ground.surface import Plane, Slope, normal
-from rollover.run import GroundTrack
-from viz.terrain import BEYOND, SOIL, corner, cut_open, frames, nice, ramp, terrain, thinned
+from rollover.dynamics.result import GroundTrack
+from viz.recordings.terrain import BEYOND, SOIL, corner, cut_open, frames, nice, ramp, terrain, thinned
 
 ARRAY = Elements(length=2.0, width=1.0, centre=(0.5, -0.2), spacing=(0.1, 0.05))  # 20 x 20
 TOUCHED = np.array([5 * 20 + 7, 5 * 20 + 8, 12 * 20 + 19, 0], dtype=np.int64)  # two side by side, two on the rim

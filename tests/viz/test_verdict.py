@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from ground.ye import Ye2006
-from rollover.run import Run
+from rollover.dynamics.result import Run
 from tests.viz import example
-from viz.verdict import amount, in_words, joules, ranked, verdict
+from viz.content.verdict import amount, in_words, joules, ranked, verdict
 
 
 def test_the_load_that_matters_comes_first(overturn: Run) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from viz import viewer
+from viz.recordings import viewer
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="platform: the stand-in is a shell script")
 
@@ -54,7 +54,7 @@ def test_the_binary_is_the_viewer_itself() -> None:
 def test_the_window_does_not_outlive_the_command(number: int, tmp_path: Path) -> None:
     note = tmp_path / "child"
     child = f"import os, time; open({str(note)!r}, 'w').write(str(os.getpid())); time.sleep(60)"
-    code = f"import sys; from viz.viewer import wait_for; wait_for([sys.executable, '-c', {child!r}])"
+    code = f"import sys; from viz.recordings.viewer import wait_for; wait_for([sys.executable, '-c', {child!r}])"
     # whoever starts the tests behind a shell has the interrupt ignored, and children inherit that
     code = f"import signal; signal.signal(signal.SIGINT, signal.default_int_handler); {code}"
     parent = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL)

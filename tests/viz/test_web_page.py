@@ -12,8 +12,8 @@ import pytest
 
 from tests.viz.browser import has_browser, opened
 from tests.viz.picture import kept, pixels
-from viz import web_page
-from viz.web_page import Viewer, page, write_page
+from viz.pages import web_page
+from viz.pages.web_page import Viewer, page, write_page
 
 HOSTILE = 'a "b" </script> <!-- & @@script@@'
 STAND_IN = Viewer(script='say("</script>"); // WebHandle <!-- @@title@@', program=gzip.compress(b"\0asm..."))

@@ -1,0 +1,78 @@
+"""How well the energy ledger of a run closes: its largest residual over the energy released, and what cures it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rollover.dynamics.result import Run
+
+LIMIT = 0.005  # a load goes with the root of an energy at most linearly: 0.5 % of it is 0.25 to 0.5 % of a load
+
+
+@dataclass(frozen=True, kw_only=True)
+class Closure:
+    """Shares of the energy released: the largest residual at any time, `at` (s), and that at the end; `step` in s.
+
+    Not a number where nothing was released or no ledger was kept.
+    """
+
+    largest: float
+    at: float
+    end: float
+    step: float
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether the ledger stays open by more than `LIMIT`."""
+        return self.largest > LIMIT
+
+    @property
+    def sentence(self) -> str:
+        """In words; empty where there is no number."""
+        if not math.isfinite(self.largest):
+            return ""
+        return (
+            f"Energy ledger: at most {_percent(self.largest)} of the energy released is unaccounted for "
+            f"(at {self.at:.3f} s; {_percent(self.end)} at the end)"
+        )
+
+    @property
+    def warning(self) -> str:
+        """What is wrong and its cure; empty where nothing is."""
+        if not self.is_wide:
+            return ""
+        return (
+            f"the energy ledger does not close: {_percent(self.largest)} of the energy released is unaccounted for at "
+            f"{self.at:.3f} s, more than {_percent(LIMIT)}; a smaller simulation.step than {self.step:g} s is needed"
+        )
+
+
+def closure(run: Run) -> Closure:
+    """How well the ledger of a run closes; of one that failed, as far as it came."""
+    step = run.scenario.simulation.step
+    if not run.released > 0.0 or "energy/residual" not in run.recording.channels:
+        return Closure(largest=math.nan, at=math.nan, end=math.nan, step=step)
+    share = np.abs(run.recording["energy/residual"]) / run.released
+    if not np.isfinite(share).any():
+        return Closure(largest=math.nan, at=math.nan, end=math.nan, step=step)
+    k = int(np.nanargmax(np.where(np.isfinite(share), share, np.nan)))
+    return Closure(largest=float(share[k]), at=float(run.recording.time[k]), end=float(share[-1]), step=step)
+
+
+def of_cases(ledger: Mapping[str, Any]) -> str:
+    """In how many cases of a study the ledger stays open, by what its account says, and the cure."""
+    most = _percent(ledger["largest_residual"])
+    return (
+        f"The energy ledger does not close in {ledger['open']} cases: up to {most} of the "
+        f"energy released is unaccounted for (point {ledger['at_point']}), more than {_percent(ledger['limit'])}; "
+        "a smaller simulation.step is needed"
+    )
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %"

@@ -1,0 +1,96 @@
+"""What a scenario keeps of the shipped one that it was made from, and what differs: told wherever its title stands.
+
+A title is the name of a shipped scenario, and it stays when values are replaced: it finds the file again.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rollover.scenario import Scenario, load
+from rollover.spec import document
+
+MOST_IN_WORDS = 12  # differences that are told one by one on a terminal
+WHOLE = ("kind", "name")  # a part with another kind or name is another part, told as one
+
+
+@dataclass(frozen=True, kw_only=True)
+class Difference:
+    """A value by its path, as shipped and now, in words; a part that was exchanged is told as one."""
+
+    path: str
+    shipped: str
+    now: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Origin:
+    """The shipped scenario by its name, and what differs from it."""
+
+    name: str
+    differences: tuple[Difference, ...]
+
+    @property
+    def in_words(self) -> str:
+        """One line; empty where nothing differs."""
+        if not self.differences:
+            return ""
+        told = [f"{d.path}: {d.shipped} -> {d.now}" for d in self.differences[:MOST_IN_WORDS]]
+        more = len(self.differences) - len(told)
+        return f"Differs from the shipped {self.name}: " + "; ".join(told) + (f"; {more} more" if more else "")
+
+
+def origin(scenario: Scenario) -> Origin | None:
+    """The shipped scenario with this title and what differs; None for a scenario with a title of its own."""
+    path = _files().get(scenario.title)
+    if path is None:
+        return None
+    was, now = _leaves(_shipped(path)), _leaves(scenario)
+    changed = [p for p in [*was, *(p for p in now if p not in was)] if was.get(p) != now.get(p)]
+    parts = [p.rpartition(".")[0] for p in changed if p.rpartition(".")[2] in WHOLE and p in was and p in now]
+    found: dict[str, Difference] = {}
+    for p in changed:
+        above = next((part for part in sorted(parts, key=len) if part and p.startswith(f"{part}.")), None)
+        key = next((f"{above}.{word}" for word in WHOLE if f"{above}.{word}" in changed), p) if above else p
+        name = above or p
+        before, after = _shown(was.get(key)), _shown(now.get(key))
+        if before == after:  # to the last digit
+            before, after = repr(was.get(key)), repr(now.get(key))
+        found.setdefault(name, Difference(path=name, shipped=before, now=after))
+    return Origin(name=path.stem, differences=tuple(found.values()))
+
+
+def _leaves(scenario: Scenario) -> dict[str, Any]:
+    """Every value by its path; what is not given and what is empty are one."""
+    leaves = ((leaf.path, leaf.value) for leaf in document.paths(scenario) if leaf.path != "title")
+    return {path: value for path, value in leaves if not _nothing(value)}
+
+
+def _nothing(value: Any) -> bool:
+    return value is None or (isinstance(value, (tuple, list, Mapping)) and not value)
+
+
+def _shown(value: Any) -> str:
+    if _nothing(value):
+        return "none"
+    if isinstance(value, (tuple, list)):
+        return f"[{', '.join(_shown(v) for v in value)}]"
+    if isinstance(value, float):
+        return f"{value + 0.0:.6g}"
+    return str(value)
+
+
+@functools.cache
+def _files() -> Mapping[str, Path]:
+    """Title of each shipped scenario -> its file."""
+    files = sorted(document.shipped_folder().glob("*.yaml"))
+    return {str(document.headings(path)["title"].plain): path for path in files}
+
+
+@functools.cache
+def _shipped(path: Path) -> Scenario:
+    return load(path)

@@ -1,0 +1,1 @@
+"""Parameters from recordings: least squares, identifiability, ground laws from force and sinkage."""

@@ -1,0 +1,183 @@
+"""What exists: shipped files, laws, effects, channels, paths; and whether a file is in order."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from ground.law import laws as known_laws
+from ground.quantity import quantities
+from rollover import scenario as scenarios
+from rollover.effects import effects as known_effects
+from rollover.spec import channels as table
+from rollover.spec import document
+from rollover.spec.rops import Rops
+from rollover.spec.vehicle import Vehicle, pitch_inertia
+from rollover.system.errors import Fault, InputError, excerpt
+
+Row = dict[str, Any]
+
+
+def files(folder: str) -> list[Row]:
+    """Shipped files of a folder, each with the first sentence of its opening comment."""
+    shelf = document.shipped_folder() / folder
+    return [{"name": path.stem, "is": headline(path)} for path in sorted(shelf.glob("*.yaml"))]
+
+
+def headline(path: Path) -> str:
+    """First paragraph of the comment that a file opens with, up to its first full stop."""
+    lines = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        if not line.startswith("#") or not line.strip("# "):
+            break
+        lines.append(line.strip("# "))
+    first, stop, _ = " ".join(lines).partition(". ")
+    return first.rstrip(".") if stop else first
+
+
+def vehicles() -> list[Row]:
+    """Shipped vehicles, with their pitch inertia about the rear axle beside what pendulum tests expect."""
+    shelf = document.shipped_folder() / "vehicles"
+    found = []
+    for row in files("vehicles"):
+        vehicle = document.load(shelf / f"{row['name']}.yaml", scenarios.AnyVehicle)
+        inertia = pitch_inertia(vehicle) if isinstance(vehicle, Vehicle) else None
+        found.append({**row, "pitch": "" if inertia is None else pitch_line(*inertia)})
+    return found
+
+
+def pitch_line(about: float, anchor: float) -> str:
+    """A pitch inertia about the rear axle against 0.378 M L^2, as vehicle files state it."""
+    change = 100.0 * (about / anchor - 1.0)
+    return (
+        f"pitch inertia about the rear axle {about:.0f} kg m2 against 0.378 M L^2 = {anchor:.0f} kg m2, {change:+.1f} %"
+    )
+
+
+def laws() -> list[Row]:
+    """Ground laws by kind."""
+    return [{"kind": kind, "is": _first_line(law)} for kind, law in known_laws().items()]
+
+
+def effects() -> list[Row]:
+    """Effects by id."""
+    known: dict[str, Any] = dict(known_effects())
+    return [
+        {"id": name, "kind": effect.kind, "parameters": _numbers(effect), "is": _first_line(effect)}
+        for name, effect in known.items()
+    ]
+
+
+def _numbers(effect: Any) -> str:
+    """Parameters of an effect with their defaults: ``depth 0.25 m, stiffness_ratio 3``."""
+    units = quantities(effect)
+    typical = {f.name: getattr(effect(), f.name) for f in fields(effect)}
+    words = [
+        f"{name} {text(list(value) if isinstance(value, tuple) else value)}"
+        + (f" {units[name].unit}" if name in units and units[name].unit != "1" and value is not None else "")
+        for name, value in typical.items()
+    ]
+    return ", ".join(words)
+
+
+def channels() -> list[Row]:
+    """All channels with their units."""
+    return [vars(channel) for channel in table.CHANNELS.values()]
+
+
+def importers() -> list[Row]:
+    """File formats that `rollover import` reads, and published sets of recordings."""
+    from rollover.recording.importers import COLLECTIONS
+    from rollover.recording.importers import importers as known
+
+    formats = [{"name": i.name, "is": i.meaning, "where": ""} for i in known().values()]
+    return formats + [
+        {"name": c.name, "is": c.meaning, "where": f"{c.where}, {c.licence}"} for c in COLLECTIONS.values()
+    ]
+
+
+def paths(name: str) -> list[Row]:
+    """Every value of a scenario with the path by which it is replaced."""
+    return [leaf._asdict() for leaf in document.paths(scenarios.load(name))]
+
+
+TABLES: dict[str, Callable[[], list[Row]]] = {
+    "scenarios": lambda: files(""),
+    "studies": lambda: files("studies"),
+    "vehicles": vehicles,
+    "soils": lambda: files("soils"),
+    "laws": laws,
+    "effects": effects,
+    "channels": channels,
+    "importers": importers,
+}
+
+
+def check(name: str) -> str:
+    """Validate a scenario, study, vehicle, ROPS, soil or baseline file and say which it is. Raises `InputError`."""
+    path = _found(name)
+    keys = document.headings(path)
+    kind = keys["kind"].plain if "kind" in keys else None
+    if kind is not None and not isinstance(kind, str):
+        known = (*known_laws(), *document.slot_of(scenarios.AnyVehicle).kinds)
+        raise keys["kind"].place.fault("kind", f"not a word, got {excerpt(repr(kind))}; {', '.join(known)} are allowed")
+    if str(keys["format"].plain if "format" in keys else "").startswith("rollover-baseline/"):
+        from rollover.studies import baseline  # brings the simulator along, which the other files need not
+
+        baseline.read(path)
+        return "baseline"
+    if str(keys["format"].plain if "format" in keys else "").startswith("rollover-study/") or "axes" in keys:
+        from rollover import studies as study
+        from rollover.studies.design import points
+
+        points(study.load(path))  # reads the plan's table as well
+        return "study"
+    for what, annotation, meant in (
+        ("soil", scenarios.AnyLaw, kind in known_laws()),
+        ("vehicle", scenarios.AnyVehicle, kind in document.slot_of(scenarios.AnyVehicle).kinds),
+        ("rops", Rops, "mounts" in keys),
+    ):
+        if meant:
+            document.load(path, annotation)
+            return what
+    if kind is None and not set(keys) & set(document.slot_of(scenarios.Scenario).keys()) - {"title"}:
+        raise InputError(Fault(file=str(path), line=1, path="kind", message=_which_kind(keys)))
+    scenarios.load(path)
+    return "scenario"
+
+
+def _which_kind(keys: Iterable[str]) -> str:
+    """Ask what a file without a `kind` is; the kind whose keys it has most of comes first."""
+    slots = {"a vehicle": document.slot_of(scenarios.AnyVehicle), "a soil": document.slot_of(scenarios.AnyLaw)}
+    found = {
+        f"{kind} ({what})": len(set(keys) & set(slot.keys(kind))) for what, slot in slots.items() for kind in slot.kinds
+    }
+    words = ", ".join(sorted(found, key=lambda word: -found[word]))
+    return f"missing, got {', '.join(keys) or 'nothing'}; {words}, or `vehicle`, `ground` ... of a scenario, are needed"
+
+
+def _found(name: str) -> Path:
+    """A file, or a shipped scenario or study of that name. Raises `InputError` that speaks of scenarios."""
+    try:
+        return document.find(name)
+    except InputError:
+        study = document.shipped_folder() / "studies" / f"{name}.yaml"
+        if study.is_file():
+            return study
+        raise
+
+
+def text(value: Any) -> str:
+    """A value as a file would have it."""
+    if isinstance(value, bool) or value is None:
+        return {True: "true", False: "false", None: "null"}[value]
+    if isinstance(value, list):
+        return f"[{', '.join(map(text, value))}]"
+    return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
+
+
+def _first_line(thing: type) -> str:
+    return (inspect.getdoc(thing) or "").partition("\n")[0]

@@ -1,0 +1,189 @@
+"""`rollover calibrate`: parameters of a scenario from recordings."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rollover.cli.commands.common import BROKE, AsJson, Force, Setting, answering, app, manual, settings
+from rollover.system.errors import Fault, InputError
+
+if TYPE_CHECKING:
+    from rollover.calibration.calibrate import Calibration
+
+FORMAT = "rollover-calibrate/1"
+JSON, OVERRIDE, SCENARIO, PAGE = "calibrate.json", "override.yaml", "scenario-calibrated.yaml", "report.html"
+
+
+@app.command(
+    epilog=manual(
+        "calibrate drop_test rec/d2.csv rec/d3.csv --fit vehicle.mass --fit ground.law.stiffness_scale=0.3:3",
+        writes="calibrate.json, override.yaml, scenario-calibrated.yaml (it runs), report.html.",
+        status=BROKE,
+    )
+)
+@answering
+def calibrate(
+    scenario: Annotated[str, typer.Argument(help="A scenario file, or the name of a shipped one.")],
+    recordings: Annotated[
+        list[str], typer.Argument(help="Recordings with their conditions, or folders of them.", metavar="RECORDING...")
+    ],
+    fit: Annotated[
+        list[str], typer.Option("--fit", metavar="PATH[=LOW:HIGH]", help="A value to be fitted; may be repeated.")
+    ],
+    hold_out: Annotated[
+        list[str] | None, typer.Option("--hold-out", metavar="NAME", help="A recording to judge by; may be repeated.")
+    ] = None,
+    set_: Setting = None,
+    channel: Annotated[list[str] | None, typer.Option("--channel", help="Use these channels only.")] = None,
+    clock_sigma: Annotated[float, typer.Option(help="Prior of each recording's clock offset, s.", min=0.0)] = 1e-3,
+    starts: Annotated[int, typer.Option(help="Random starts that are looked at.", min=0)] = 8,
+    seed: Annotated[int, typer.Option(help="Of the random starts.")] = 0,
+    profile: Annotated[Path | None, typer.Option(help="What the columns of foreign files are.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/calibrate/NAME")] = None,
+    workers: Annotated[int, typer.Option(help="Starts followed at once; 0 for this process.", min=0)] = 0,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Fit values of a scenario to recordings, with intervals, and say what the recordings cannot determine."""
+    from rollover import scenario as scenarios
+    from rollover.assessment import results
+    from rollover.calibration.calibrate import calibrate as fitted
+    from rollover.calibration.objective import parameter
+    from rollover.cli import console
+    from rollover.cli.commands.compare import read
+    from rollover.comparison.misfit import estimated_noise
+    from rollover.spec import document
+
+    path = document.find(scenario)
+    chosen = scenarios.load(path)
+    if set_:
+        chosen = chosen.replaced(settings(set_), origin="--set")
+    parameters = [parameter(chosen, text) for text in fit]
+    if len({p.path for p in parameters}) < len(parameters):
+        raise InputError(Fault(file="--fit", message="a path given twice; once is allowed"))
+    measured = read(recordings, profile)
+    held = _held_out(list(measured), hold_out or [])
+    folder = out or Path("out", "calibrate", path.stem)
+    about: dict[str, Any] = {
+        "scenario_hash": document.content_hash(chosen),
+        "recordings": list(measured),
+        "fitted": fit,
+        "held_out": sorted(held),
+    }
+    about["origin"] = results.origin(path, folder, set_ or [])
+    results.claim_account(folder, FORMAT, about, [JSON, OVERRIDE, SCENARIO, PAGE], force=force, say=console.say)
+    try:
+        found = fitted(
+            chosen,
+            {name: r for name, r in measured.items() if name not in held},
+            parameters,
+            held_out={name: r for name, r in measured.items() if name in held},
+            noise=estimated_noise,
+            clock_sigma=clock_sigma,
+            channels=channel,
+            starts=starts,
+            seed=seed,
+            workers=workers,
+        )
+    except InputError:
+        raise
+    except ValueError as e:
+        raise InputError(Fault(file=str(path), message=str(e))) from None
+    answer = _answer(about, found)
+    with results.whole(folder) as part:
+        results.write_json(part / JSON, answer)
+        _write_scenario(part, folder, path, settings(set_ or []), found)
+        from viz.pages.calibration import page
+
+        options = [*_options(fit, hold_out), *(["--profile", str(profile)] if profile else [])]
+        command = " ".join(map(shlex.quote, ["rollover", "calibrate", scenario, *recordings, *options]))
+        text = page(found, command=command, scenario_hash=about["scenario_hash"], versions=results.versions())
+        (part / PAGE).write_text(text, encoding="utf-8")
+    if as_json:
+        print(json.dumps(results.plain(answer), indent=2))
+    else:
+        console.calibration(found, str(folder))
+
+
+def _held_out(names: list[str], given: list[str]) -> set[str]:
+    from rollover.system.errors import hint
+
+    for name in given:
+        if name not in names:
+            raise InputError(Fault(file="--hold-out", message=f"no such recording, got {name!r}; {hint(name, names)}"))
+    if set(names) <= set(given):
+        raise InputError(Fault(file="--hold-out", message=f"nothing left to fit, got all of {', '.join(names)}"))
+    return set(given)
+
+
+def _options(fit: list[str], hold_out: list[str] | None) -> list[str]:
+    return [
+        part for name, texts in (("--fit", fit), ("--hold-out", hold_out or [])) for t in texts for part in (name, t)
+    ]
+
+
+def _write_scenario(part: Path, folder: Path, base: Path, given: dict[str, Any], found: Calibration) -> None:
+    """What was fitted by path, and the scenario with it: laid over the file it came from where that is possible."""
+    from rollover import scenario as scenarios
+    from rollover.spec import document
+
+    head = "Fitted values by path."
+    (part / OVERRIDE).write_text(f"# {head}\n" + document.dump_mapping(found.override), encoding="utf-8")
+    target = part / SCENARIO
+    short = "# Calibrated; every other value is that of the base.\n"
+    if not given and not any(step.isdecimal() for p in found.override for step in p.split(".")):
+        shipped = base.resolve().parent == document.shipped_folder().resolve()
+        name = base.name if shipped else Path(os.path.relpath(base.resolve(), folder.resolve())).as_posix()
+        target.write_text(short + document.dump_mapping({"base": name, **_nested(found.override)}), encoding="utf-8")
+        try:
+            # read back from where it will stand: a sibling of the folder that is swapped in has the same parents
+            if document.content_hash(scenarios.load(target)) == document.content_hash(found.calibrated):
+                return
+        except InputError:
+            pass
+    target.write_text(document.dump(found.calibrated, f"{found.calibrated.title}\nCalibrated."), encoding="utf-8")
+
+
+def _nested(values: dict[str, float]) -> dict[str, Any]:
+    tree: dict[str, Any] = {}
+    for path, value in values.items():
+        *above, last = path.split(".")
+        at = tree
+        for step in above:
+            at = at.setdefault(step, {})
+        at[last] = value
+    return tree
+
+
+def _answer(about: dict[str, Any], c: Calibration) -> dict[str, Any]:
+    from rollover.assessment import results
+    from rollover.comparison.misfit import summary
+
+    return {
+        "format": FORMAT,
+        **about,
+        "versions": results.versions(),
+        "parameters": {e.path: summary(e) for e in c.estimates},
+        "correlation": c.correlation,
+        "condition": c.condition,
+        "combinations": list(c.combinations),
+        "clock_offsets": dict(c.clocks),
+        "clock_errors": dict(c.clock_errors),
+        "clocks": {name: zero.answer for name, zero in c.zeros.items()},
+        "clock_sigma": c.clock_sigma,
+        "noise": {name: dict(of) for name, of in c.noise.items()},
+        "fit": {"training": summary(c.training), "held_out": None if c.held_out is None else summary(c.held_out)},
+        "samples": c.samples,
+        "independent_samples": c.independent,
+        "outliers": c.outliers,
+        "widening": c.widening,
+        "starts_agreeing": list(c.starts_agreeing),
+        "warnings": list(c.warnings),
+        "override": c.override,
+    }

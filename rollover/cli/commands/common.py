@@ -1,0 +1,180 @@
+"""What all commands share: the application, exit status, options, and how wrong input is answered.
+
+Exit status: 0 done, 1 the answer is no, 2 the input is wrong, 3 the simulation failed, 74 the machine failed (a disk
+that is full, memory that is not there), 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import functools
+import sys
+from collections.abc import Callable, Sequence
+from concurrent.futures import BrokenExecutor
+from typing import Annotated, Any, TypeVar
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+from typer.models import CommandFunctionType
+
+# what takes long to import is imported by the command that needs it: `rollover --help` answers at once
+from rollover.system.errors import Fault, InputError
+from rollover.system.refusals import refused, told
+from rollover.system.writing import working
+
+THE_ANSWER_IS_NO, WRONG_INPUT, FAILED, INTERRUPTED, BUG = 1, 2, 3, 130, 70
+MACHINE = 74  # as sysexits.h has it: an error of input or output
+COMPILING = 25  # s, roughly, on two cores
+
+C = TypeVar("C", bound=Callable[..., None])
+
+DONE, NO, WRONG = "0 done", "1 the answer is no", "2 the input is wrong: a line for each fault, nothing written"
+BROKE = "3 a simulation failed: time, cause, last good state"
+MACHINERY = "74 the machine failed (disk, memory): what stood there stays"
+
+
+def manual(*examples: str, writes: str, status: str = "") -> str:
+    """Lines below a command's options: how it is called, what it writes, and what its exit status says.
+
+    `status` names what 1 and 3 mean where the command can end with them, parted by semicolons.
+    """
+    lines = [f"Example:  rollover {example}" for example in examples]
+    words = "; ".join([*sorted([DONE, WRONG, *filter(None, status.split("; "))]), MACHINERY])
+    return "\n\n".join([*lines, f"Writes:  {writes}", f"Exit status:  {words}."])
+
+
+def _without_type(params: list[Any]) -> list[Any]:
+    """Parameters, of which those that take no value show no type of one in a help."""
+    for option in params:
+        if getattr(option, "is_flag", False):
+            option.metavar = ""
+    return params
+
+
+class Plain(TyperCommand):
+    """A command in whose help a flag has no type."""
+
+    def get_params(self, ctx: Any) -> Any:
+        """Its parameters, `--help` among them."""
+        return _without_type(super().get_params(ctx))
+
+
+class Commands(typer.Typer):
+    """An application whose commands are `Plain`."""
+
+    def command(self, *args: Any, **kwargs: Any) -> Callable[[CommandFunctionType], CommandFunctionType]:
+        """Register a command."""
+        return super().command(*args, **{"cls": Plain, **kwargs})
+
+
+class Before(TyperGroup):
+    """The commands; an option of `rollover` itself that follows one of them is told where it stands."""
+
+    def get_params(self, ctx: Any) -> Any:
+        """Its parameters, `--help` among them."""
+        return _without_type(super().get_params(ctx))
+
+    def main(
+        self,
+        args: Sequence[str] | None = None,
+        prog_name: str | None = None,
+        complete_var: str | None = None,
+        standalone_mode: bool = True,
+        windows_expand_args: bool = True,
+        **extra: Any,
+    ) -> Any:
+        """Call a command; a line of words that it does not understand is answered in one line."""
+        more = {"complete_var": complete_var, "windows_expand_args": windows_expand_args, **extra}
+        if not standalone_mode:
+            return super().main(args, prog_name, standalone_mode=False, **more)
+        try:
+            status = super().main(args, prog_name, standalone_mode=False, **more)
+        except typer.Abort:
+            print("Interrupted.", file=sys.stderr)
+            sys.exit(INTERRUPTED)
+        except Exception as e:
+            if not hasattr(e, "format_message"):
+                raise
+            if not e.format_message() or type(e).__name__ == "NoArgsIsHelpError":
+                e.show()  # type: ignore[attr-defined]
+            else:
+                print(_usage(e), file=sys.stderr)
+            sys.exit(WRONG_INPUT)
+        sys.exit(status if isinstance(status, int) else 0)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that the first word names, of which the rest is for that command."""
+        name, command, rest = super().resolve_command(ctx, args)
+        known = {opt for option in command.params for opt in option.opts} if command else set()  # `prove` has its own
+        own = {opt: o.metavar for o in self.params for opt in o.opts if o.metavar and opt not in known}
+        for opt in (word.partition("=")[0] for word in rest):
+            if opt in own:
+                ctx.fail(f"{opt} stands before the command: rollover {opt} {own[opt]} {name} ...")
+        return name, command, rest
+
+
+def _usage(e: Any) -> Fault:
+    """What is wrong with a command's words, in one line: the command, what is wrong, where it says what is right."""
+    context = getattr(e, "ctx", None)
+    path = context.command_path if context is not None else "rollover"
+    message = " ".join(e.format_message().split()).rstrip(".")
+    return Fault(file=path, message=f"{message[:1].lower()}{message[1:]}; `{path} --help` tells what is allowed")
+
+
+app = Commands(
+    cls=Before,
+    help="Vehicle rollover load studies: what the ground does to a ROPS.",
+    epilog=manual("run side_overturn", "run --help", writes="each command into its own folder, whole or not at all.")
+    + f" Some commands also end with {NO}, or with {BROKE}.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+AsJson = Annotated[bool, typer.Option("--json", help="Print the answer as JSON on standard output.")]
+Setting = Annotated[
+    list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Replace a value; may be repeated.")
+]
+Force = Annotated[bool, typer.Option("--force/--no-force", help="Replace another run's results.")]
+
+
+def answering(command: C) -> C:
+    """Turn wrong input, a fault of the machine and an interrupt into a line and their exit status.
+
+    Any other exception is a bug and stays one. What the command held to write there is let go.
+    """
+
+    @functools.wraps(command)
+    def wrapped(*args: Any, **kwargs: Any) -> None:
+        said, status = "", 0
+        try:
+            with working() as work:
+                try:
+                    command(*args, **kwargs)
+                    sys.stdout.flush()  # a full disk may be behind it
+                except (OSError, MemoryError, BrokenExecutor) as e:
+                    if (wrong := refused(e, work.targets)) is not None:
+                        raise InputError(wrong) from None
+                    target = next(reversed(work.targets), None)
+                    said, status = told(e, target), MACHINE
+        except InputError as e:
+            said, status = str(e), WRONG_INPUT
+        except KeyboardInterrupt:
+            said, status = "Interrupted.", INTERRUPTED
+        if status:  # not within `except`, which would keep what was being read
+            print(said, file=sys.stderr)
+            raise typer.Exit(status)
+
+    return wrapped  # type: ignore[return-value]
+
+
+def settings(given: list[str], option: str = "--set") -> dict[str, Any]:
+    """Path -> value of each `--set PATH=VALUE`, or of what `option` reads likewise. Raises `InputError`."""
+    from rollover.spec import document
+
+    settings: dict[str, Any] = {}
+    for text in given:
+        path, value = document.parse_setting(text, option)
+        if path in settings:
+            raise InputError(Fault(file=option, path=path, message="given twice; once is allowed"))
+        settings[path] = value
+    return settings

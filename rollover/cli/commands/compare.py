@@ -1,0 +1,277 @@
+"""`rollover compare`: measured against simulated."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rollover.cli.commands.common import (
+    BROKE,
+    COMPILING,
+    FAILED,
+    AsJson,
+    Force,
+    Setting,
+    answering,
+    app,
+    manual,
+    settings,
+)
+from rollover.cli.commands.profiles import profile_of
+from rollover.system.errors import THERE, Fault, InputError, absent, cured
+
+if TYPE_CHECKING:
+    from rollover.comparison.misfit import Misfit
+    from rollover.comparison.run_pair import Pair
+    from rollover.dynamics.result import Run
+    from rollover.recording import Recording
+    from rollover.scenario import Scenario
+
+FORMAT, PAIR = "rollover-compare/1", "rollover-compare-runs/1"
+JSON, PAGE, PICTURE = "compare.json", "report.html", "compare.rrd"
+
+
+@app.command(
+    epilog=manual(
+        "compare drop_test rec/d3.csv",
+        "compare out/run/side_overturn out/vineyard",
+        writes="compare.json, report.html, compare.rrd (one for each recording; two runs in one).",
+        status=BROKE,
+    )
+)
+@answering
+def compare(
+    scenario: Annotated[
+        str,
+        typer.Argument(
+            help="A scenario file, the name of a shipped one, or a run's results.", metavar="SCENARIO_OR_DIR"
+        ),
+    ],
+    recordings: Annotated[
+        list[str],
+        typer.Argument(
+            help="Recordings with their conditions, or folders of them; beside results another run's.",
+            metavar="RECORDING...",
+        ),
+    ],
+    set_: Setting = None,
+    cfc: Annotated[
+        int | None,
+        typer.Option(
+            help="Filter class for both sides, refused where one is too slow", show_default="loads.cfc if possible"
+        ),
+    ] = None,
+    profile: Annotated[Path | None, typer.Option(help="What the columns of foreign files are.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/compare/NAME")] = None,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Compare recordings with runs under their conditions: rated, by channel and phase.
+
+    Nothing is shifted in time but a clock in doubt, to the zero that the recording shows.
+    """
+    from rollover import scenario as scenarios
+    from rollover.assessment import results
+    from rollover.cli import console
+    from rollover.comparison.run_pair import is_result
+    from rollover.spec import document
+
+    if is_result(scenario):
+        refused = {"--set": set_, "--cfc": cfc, "--profile": profile}
+        _two_runs(scenario, recordings, [name for name, given in refused.items() if given], out, force, as_json)
+        return
+    path = document.find(scenario)
+    chosen = scenarios.load(path)
+    if set_:
+        chosen = chosen.replaced(settings(set_), origin="--set")
+    measured = read(recordings, profile)
+    folder = out or Path("out", "compare", path.stem)
+    pictures = _pictures(list(measured))
+    about: dict[str, Any] = {"scenario_hash": document.content_hash(chosen), "recordings": list(measured)}
+    about["origin"] = results.origin(path, folder, set_ or [])
+    results.claim_account(folder, FORMAT, about, [JSON, PAGE, *pictures.values()], force=force, say=console.say)
+    _say_compiling()
+    with document.named(path):
+        runs = {name: _run(chosen, name, recording) for name, recording in measured.items()}
+    found = _misfits(runs, measured, cfc)
+    answer = _answer(about, runs, found)
+    by = ["--profile", str(profile)] if profile else []
+    command = " ".join(map(shlex.quote, ["rollover", "compare", scenario, *recordings, *by]))
+    with results.whole(folder) as part:
+        results.write_json(part / JSON, answer)
+        from viz.pages.comparison import page
+
+        text = page(
+            found,
+            title=chosen.title,
+            scenario=chosen,
+            command=command,
+            scenario_hash=about["scenario_hash"],
+            versions=results.versions(),
+        )
+        (part / PAGE).write_text(text, encoding="utf-8")
+        draw = _picture()
+        for each in found if draw is not None else ():
+            assert draw is not None
+            draw(runs[each.recording], each, part / pictures[each.recording])
+    if as_json:
+        print(json.dumps(results.plain(answer), indent=2))
+    else:
+        console.comparison(found, str(folder))
+    failed = [name for name, run in runs.items() if run.status == "failed"]
+    for name in failed:
+        console.say(f"{name}: the simulation failed: {runs[name].sentence}")
+    if failed:
+        raise typer.Exit(FAILED)
+
+
+def _two_runs(
+    baseline: str, others: list[str], refused: list[str], out: Path | None, force: bool, as_json: bool
+) -> None:
+    """A baseline's results against a candidate's. Raises `InputError`."""
+    from rollover.assessment import results
+    from rollover.cli import console
+    from rollover.comparison.run_pair import is_result, pair, summary
+    from rollover.comparison.run_pair import read as result
+    from viz.content.pair_words import answer as in_words
+    from viz.content.pair_words import markdown
+    from viz.pages.pair import page
+
+    if refused:
+        raise InputError(Fault(file=refused[0], message="two runs are compared as they are; leave it out"))
+    if len(others) == 1 and not Path(others[0]).exists():
+        raise InputError(cured(Fault(file=others[0], message=absent(others[0])), THERE))
+    if len(others) != 1 or not is_result(others[0]):
+        got = " ".join(others)
+        message = f"the results of a run, got {got!r} beside them; the results of one other run are needed"
+        raise InputError(Fault(file=baseline, message=message))
+    found = pair(result(Path(baseline)), result(Path(others[0])))
+    folder = out or Path("out", "compare", Path(others[0]).resolve().name)
+    about = {side: getattr(found, side).answer["scenario_hash"] for side in ("baseline", "candidate")}
+    results.claim_account(folder, PAIR, {"hashes": about}, [JSON, PAGE, PICTURE], force=force)
+    answer = {"format": PAIR, "hashes": about, **summary(found), "answer": in_words(found)}
+    command = " ".join(map(shlex.quote, ["rollover", "compare", baseline, *others]))
+    with results.whole(folder) as part:
+        results.write_json(part / JSON, answer)
+        (part / PAGE).write_text(page(found, command=command, versions=results.versions()), encoding="utf-8")
+        _draw_pair(found, part / PICTURE)
+    if as_json:
+        print(json.dumps(results.plain(answer), indent=2))
+    else:
+        console.tell(markdown(found))
+        console.say(f"Results: {folder}")
+
+
+def _draw_pair(found: Pair, path: Path) -> None:
+    from rollover.cli import console
+
+    try:
+        from viz.recordings.pair import write_pair
+
+        write_pair(found, path)
+    except FileNotFoundError as e:
+        console.say(f"{e}; {path.name} was not written")
+    except ImportError as e:
+        if (e.name or "").partition(".")[0] != "rerun":
+            raise
+        console.say(f"No rerun wheel for this platform: {path.name} was not written.")
+
+
+def read(paths: list[str], profile: Path | None) -> dict[str, Recording]:
+    """Recordings by name, those in folders too. Raises `InputError` for all faults at once, and for one name twice."""
+    from rollover.recording.importers import read_named
+
+    return {name: recording for name, (_, recording) in read_named(paths, profile_of(profile)).items()}
+
+
+def _say_compiling() -> None:
+    from ground.compiled import is_warm
+    from rollover.cli import console
+
+    if not is_warm():
+        console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
+
+
+def _run(scenario: Scenario, name: str, recording: Recording) -> Run:
+    from rollover.cli import console
+    from rollover.dynamics import simulate
+
+    under = scenario.replaced(recording.conditions, origin=f"{name}: conditions")
+    lead = getattr(under.initiation, "lead_time", 0.0)
+    with console.progress(f"simulating {name}", -lead, under.simulation.duration) as show:
+        return simulate.run(under, progress=show)
+
+
+def _misfits(runs: Mapping[str, Run], measured: Mapping[str, Recording], cfc: int | None) -> list[Misfit]:
+    """Each recording against its run. Raises `InputError` for all at once of which nothing can be compared."""
+    found, faults = [], []
+    for name, recording in measured.items():
+        try:
+            found.append(_misfit(runs[name], recording, name, cfc))
+        except InputError as e:
+            faults += e.faults
+    if faults:
+        raise InputError(*faults)
+    return found
+
+
+def _misfit(run: Run, recording: Recording, name: str, cfc: int | None) -> Misfit:
+    from dataclasses import replace
+
+    from rollover.comparison.misfit import estimated_noise, misfit
+    from rollover.comparison.onset import timed
+
+    wanted = run.scenario.loads.cfc if cfc is None else cfc
+    at = timed(name, recording, run.scenario, lambda _: run.recording)
+    try:
+        found = misfit(run, at.recording, name=name, cfc=wanted, at_least=cfc is not None, noise=estimated_noise)
+    except ValueError as e:
+        raise InputError(Fault(file=name, message=str(e))) from None
+    if not found.channels:
+        why = "; ".join(f"{channel}: {reason}" for channel, reason in found.skipped.items())
+        message = f"nothing to compare, got {why}; one channel that both have at one time is needed"
+        raise InputError(Fault(file=name, message=message))
+    return replace(found, zero=at.zero)
+
+
+def _answer(about: Mapping[str, Any], runs: Mapping[str, Run], found: list[Misfit]) -> dict[str, Any]:
+    from rollover.assessment import results
+    from rollover.comparison.misfit import summary
+
+    return {
+        "format": FORMAT,
+        **about,
+        "versions": results.versions(),
+        "comparisons": [
+            {**summary(each), "status": runs[each.recording].status, "sentence": runs[each.recording].sentence}
+            for each in found
+        ],
+    }
+
+
+def _pictures(names: list[str]) -> dict[str, str]:
+    """A picture for each recording; a single one has the plain name."""
+    from rollover.system.names import distinct
+
+    if len(names) == 1:
+        return dict.fromkeys(names, PICTURE)
+    made = distinct((f"compare-{name}" for name in names), ".rrd", file="rollover compare")
+    return {name: f"{made[f'compare-{name}']}.rrd" for name in names}
+
+
+def _picture() -> Callable[[Run, Misfit, Path], None] | None:
+    from rollover.cli import console
+
+    try:
+        from viz.recordings.comparison import write_comparison
+    except ImportError as e:
+        if (e.name or "").partition(".")[0] != "rerun":
+            raise
+        console.say(f"No rerun wheel for this platform: {PICTURE} was not written.")
+        return None
+    return write_comparison

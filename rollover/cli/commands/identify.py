@@ -1,0 +1,156 @@
+"""`rollover identify`: a ground law from recorded drops."""
+
+from __future__ import annotations
+
+import json
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rollover.cli.commands.common import AsJson, Force, Setting, answering, app, manual, settings
+from rollover.cli.commands.profiles import profile_of
+from rollover.system.errors import Fault, InputError
+
+SOIL, ANSWER = "soil.yaml", "identify.json"
+
+
+class Form(StrEnum):
+    """Which law is identified."""
+
+    ye = "ye-2006"
+    bearing = "bearing"
+
+
+class StrikerMass(StrEnum):
+    """Which mass stands in eq (5), as `ground.striker_mass` of a scenario."""
+
+    reference = "reference"
+    effective = "effective"
+
+
+@app.command(
+    "identify",
+    epilog=manual(
+        "identify rec/d2.csv rec/d3.csv --out out/soil",
+        writes="identify.json, a soil file that a scenario can name, report.html.",
+    ),
+)
+@answering
+def identify_(
+    recordings: Annotated[
+        list[str], typer.Argument(help="Recorded drops, or folders of them.", metavar="RECORDING...")
+    ],
+    scenario: Annotated[str, typer.Option(help="Whose striker fell, unless a recording says otherwise.")] = "drop_test",
+    set_: Setting = None,
+    form: Annotated[Form | None, typer.Option("--law", help="Law", show_default="ye-2006; bearing for a cone")] = None,
+    fraction: Annotated[
+        float | None, typer.Option(min=0.0, max=10.0, help="m_b1/m_s", show_default="the scenario's co-moving mass")
+    ] = None,
+    striker_mass: Annotated[StrikerMass, typer.Option(help="m_s in eq (5).")] = StrikerMass.reference,
+    buoyancy: Annotated[float, typer.Option(min=0.0, help="Of the striker in what it falls through, N.")] = 0.0,
+    terminal_speed: Annotated[
+        bool, typer.Option("--terminal-speed", help="It fell at terminal speed: take the drag from there.")
+    ] = False,
+    keep: Annotated[bool, typer.Option("--keep", help="Published values for what the drops cannot determine.")] = False,
+    profile: Annotated[Path | None, typer.Option(help="What the columns of foreign files are.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/identify/NAME")] = None,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Identify a ground law from drops: stiffness over depth, coefficients with intervals, a soil file."""
+    from rollover import scenario as scenarios
+    from rollover.calibration import ground_law
+    from rollover.cli import console
+    from rollover.recording.importers import name_of, read_named
+    from rollover.spec import document
+    from rollover.spec.vehicle import Striker
+    from rollover.system.writing import hold
+
+    chosen = scenarios.load(document.find(scenario))
+    if set_:
+        chosen = chosen.replaced(settings(set_), origin="--set")
+    found = {
+        name: (recording, _digest(at)) for name, (at, recording) in read_named(recordings, profile_of(profile)).items()
+    }
+    folder = out or Path("out", "identify", name_of(Path(recordings[0])))
+    if not folder.exists() or folder.is_dir():
+        hold(folder)
+    _claim(folder, force)
+    is_cone = isinstance(chosen.vehicle, Striker) and chosen.vehicle.nose == "cone"
+    wanted = form or (Form.bearing if is_cone else Form.ye)
+    given = {name: recording for name, (recording, _) in found.items()}
+    settled = ground_law.settled(given, chosen)
+    drops, unusable = ground_law.drops_of(settled.recordings, chosen, buoyancy=buoyancy, terminal=terminal_speed)
+    refused = [*settled.refused, *unusable]
+    zeros = {**settled.zeros, **ground_law.zeros_of(drops, given)}
+    sources = sorted({recording.source for recording, _ in found.values() if recording.source})
+    answer = ground_law.identified(
+        drops,
+        {name: digest for name, (_, digest) in found.items()},
+        form=wanted.value,
+        fraction=chosen.ground.co_moving_mass.share if fraction is None else fraction,
+        law_mass=striker_mass.value,
+        keep=keep,
+        source="; ".join(sources) or "recorded drops",
+    )
+    clocks = {name: zero.answer for name, zero in zeros.items()}
+    timed = [f"{name}: {zero.sentence}" for name, zero in zeros.items()]
+    report = {
+        **answer.answer,
+        "clocks": clocks,
+        "refused": refused,
+        "remarks": [*timed, *answer.remarks],
+    }
+    _write(folder, document.dump(answer.law, ground_law.head(answer)), report)
+    for reason in refused:
+        console.say(f"left out: {reason}")
+    if as_json:
+        print(json.dumps(report, indent=2))
+        return
+    widths = [max(map(len, column)) for column in zip(*answer.table, strict=True)]
+    for row in answer.table:
+        console.tell("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+    for remark in (*timed, *answer.remarks):
+        console.tell(remark)
+    console.tell(f"Soil: {folder / SOIL}")
+
+
+def _digest(path: Path) -> str:
+    """SHA-256 of a recording's file: of a run's folder its channels, of another one all files with their names."""
+    import hashlib
+
+    path = path / "channels.parquet" if (path / "channels.parquet").is_file() else path
+    if path.is_file():
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    every = hashlib.sha256()
+    for file in sorted(p for p in path.rglob("*") if p.is_file()):
+        every.update(f"{file.relative_to(path).as_posix()}\0".encode() + hashlib.sha256(file.read_bytes()).digest())
+    return every.hexdigest()
+
+
+def _claim(folder: Path, force: bool) -> None:
+    if not folder.exists():
+        return
+    from rollover.system.writing import own
+
+    there = [p.name for p in folder.iterdir() if not own(folder.resolve(), p.name)] if folder.is_dir() else []
+    foreign = [name for name in there if name not in (SOIL, ANSWER)] if folder.is_dir() else [folder.name]
+    if foreign:
+        raise InputError(
+            Fault(file=str(folder), message=f"holds files that are not results, got {foreign[0]!r}; another --out")
+        )
+    if there and not force:
+        raise InputError(
+            Fault(file=str(folder), message="holds an identification; --force replaces it, --out leaves it")
+        )
+
+
+def _write(folder: Path, soil: str, report: dict[str, object]) -> None:
+    """Both files, or none."""
+    from rollover.system.writing import whole
+
+    with whole(folder) as part:
+        (part / SOIL).write_text(soil, encoding="utf-8")
+        (part / ANSWER).write_text(json.dumps(report, indent=2, allow_nan=False) + "\n", encoding="utf-8")

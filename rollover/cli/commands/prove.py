@@ -1,0 +1,159 @@
+"""`rollover prove`: the blind proof of the diagnosis."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rollover.cli.commands.common import FAILED, AsJson, Force, answering, app, manual
+from rollover.system.errors import Fault, InputError
+
+if TYPE_CHECKING:
+    from rollover.proof.commitment import Seal
+
+JSON, SEAL, TRUTH, DIAGNOSES, PAGE = "prove.json", "seal.json", "truth.json", "diagnoses.jsonl", "report.html"
+ACCOUNT = (JSON, SEAL, TRUTH, DIAGNOSES, PAGE)
+
+
+@app.command(
+    epilog=manual(
+        "prove --cases 50 --seed 1",
+        writes="prove.json, report.html, seal.json, truth.json, diagnoses.jsonl.",
+        status="3 every diagnosis failed",
+    )
+)
+@answering
+def prove(
+    cases: Annotated[int, typer.Option(help="How many concealed campaigns of tests.", min=1)] = 50,
+    seed: Annotated[int, typer.Option(help="Another seed, other cases; the same seed, the same ones.", min=0)] = 1,
+    out: Annotated[Path, typer.Option(help="Folder of the full account.")] = Path("out/prove"),
+    workers: Annotated[int | None, typer.Option(help="Cases at once", show_default="number of cores", min=0)] = None,
+    rig: Annotated[str, typer.Option(help="What is tested: drop, or overturn (minutes a case).")] = "drop",
+    effects: Annotated[
+        list[str] | None, typer.Option(metavar="ID", help="Only cases about this effect; may be repeated.")
+    ] = None,
+    kinds: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KIND",
+            help="Only null, decoy, negligible, single, pair, outside, scatter, other-form, foreign-form (an effect by "
+            "another law of the literature), background (nothing but a background); may be repeated.",
+        ),
+    ] = None,
+    background: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SHARE",
+            help="A smooth discrepancy on every case: rms share of the force's range (0.03), or drawn (0.01 to 0.1); "
+            "drawn with --kinds background.",
+        ),
+    ] = None,
+    time_limit: Annotated[float, typer.Option(help="Wall time for each diagnosis, s.", min=1.0)] = 600.0,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Make concealed cases (drops by an independent solver), seal the truth, diagnose them, open the seal and score."""
+    from rollover.assessment import results
+    from rollover.cli import console
+    from rollover.proof import runner
+
+    about = {"cases": cases, "seed": seed, "kinds": kinds or [], "effects": effects or []}
+    about |= {"rig": rig} if rig != "drop" else {}
+    about |= {"background": _share_of(background)} if background is not None else {}
+    results.claim_account(out, runner.FORMAT, about, ACCOUNT, force=force)
+
+    def tell(seal: Seal) -> None:
+        console.say(f"Sealed: the truth of {seal.cases} cases has the hash {seal.digest}; the diagnosis starts now.")
+
+    with console.counting("cases") as show:
+        try:
+            proof = runner.prove(
+                cases,
+                seed,
+                rig=rig,
+                kinds=about["kinds"],  # type: ignore[arg-type]
+                effects=about["effects"],  # type: ignore[arg-type]
+                background=about.get("background"),  # type: ignore[arg-type]
+                workers=workers,
+                time_limit=time_limit,
+                diagnosis=runner.DIAGNOSIS,
+                on_seal=tell,
+                show=show,
+            )
+        except ValueError as e:
+            raise InputError(Fault(file="rollover prove", message=str(e))) from None
+    account = results.plain({**proof.account, "versions": results.versions()})
+    with results.whole(out) as part:
+        results.write_json(part / JSON, account)
+        results.write_json(part / SEAL, proof.seal.public())
+        truth = {"salt": proof.seal.salt, "truths": proof.truths}
+        (part / TRUTH).write_text(json.dumps({"format": "rollover-truths/1", **truth}, indent=1), encoding="utf-8")
+        lines = (json.dumps(results.plain({"case": name, **found})) for name, found in proof.diagnoses.items())
+        (part / DIAGNOSES).write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+        from viz.pages.proof import page
+
+        text = page(account, command=_command(cases, seed, about), versions=account["versions"])
+        (part / PAGE).write_text(text, encoding="utf-8")
+    if as_json:
+        print(json.dumps(account, indent=2))
+    else:
+        console.tell("\n".join([*sentences(account["summary"]), f"Written to {out}"]))
+    if not proof.diagnoses:
+        console.say(f"Every diagnosis failed; the first: {account['rows'][0]['failure']}")
+        raise typer.Exit(FAILED)
+
+
+def _share_of(text: str) -> float | str:
+    """A number where it is one."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def _command(cases: int, seed: int, about: dict[str, Any]) -> str:
+    words = ["rollover", "prove", "--cases", str(cases), "--seed", str(seed)]
+    words += [word for name in ("effects", "kinds") for value in about[name] for word in (f"--{name}", value)]
+    words += ["--background", str(about["background"])] if "background" in about else []
+    words += ["--rig", about["rig"]] if "rig" in about else []
+    return " ".join(words)
+
+
+def sentences(summary: dict[str, Any]) -> list[str]:
+    """The account in a few lines."""
+    said = {
+        "False alarms where nothing was": summary["false_alarms"],
+        "One effect: detected": summary["detected"],
+        "  of those, named first": summary["named_first"],
+        "  in the set offered": summary["in_set"],
+        "  alone and right": summary["alone_and_right"],
+        "Two effects: both named": summary["two_effects"]["both"],
+        "Unlisted: called unexplained": summary["outside"]["unexplained"],
+        "  called by a listed name that is not even near": summary["outside"]["wrong"],
+        "Intervals that hold the true value": summary["coverage"],
+    }
+    if (real := summary["real"]) is not None:
+        said |= {
+            "Foreign forms and backgrounds: in the set, of all": real["of_all"]["in_set"],
+            "  first, of all": real["of_all"]["first"],
+            "  in the set, of those larger than the background": real["stronger_than_background"]["in_set"],
+            "  called by another name": real["called"]["another_name"],
+            "  a background alone called by a name": real["background_alone"]["false_name"],
+            "  a background alone called unexplained": real["background_alone"]["unexplained"],
+        }
+    lines = [f"{what:<50} {_share(found)}" for what, found in said.items() if found["of"]]
+    if (given := summary["probabilities"]) is not None and given["cases"]:
+        scores = f"Brier score {given['brier']:.3f}, log score {given['log']:.3f}"
+        slope = "" if given["slope"] is None else f", slope {given['slope']:.2f}"
+        lines.append(f"{'Probabilities, of ' + str(given['cases']) + ' cases':<50} {scores}{slope}")
+    if summary["failed"]:
+        lines.append(f"{'Diagnoses that failed':<50} {len(summary['failed'])}")
+    return lines
+
+
+def _share(found: dict[str, Any]) -> str:
+    low, high = 100.0 * found["low"], 100.0 * found["high"]
+    return f"{found['hits']:4d} of {found['of']:4d}   ({low:.0f} to {high:.0f} % at 95 %)"

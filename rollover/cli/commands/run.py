@@ -1,0 +1,182 @@
+"""`rollover run`: one scenario."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rollover.cli.commands.common import (
+    BROKE,
+    COMPILING,
+    FAILED,
+    NO,
+    THE_ANSWER_IS_NO,
+    AsJson,
+    Force,
+    Setting,
+    answering,
+    app,
+    manual,
+    settings,
+)
+
+if TYPE_CHECKING:
+    from rollover.assessment.criteria import Criterion
+    from rollover.assessment.loads import PeakLoad
+    from rollover.dynamics.result import Run
+    from rollover.scenario import Scenario
+
+
+@app.command(
+    epilog=manual(
+        "run side_overturn --set vehicle=vehicles/vineyard_tractor.yaml --out out/vineyard",
+        "run drop_test --set initiation.speed=3.5 --json",
+        writes="run.json (status, versions, hash, peak loads, criteria), scenario.yaml, channels.parquet, events.json, "
+        "report.html, recording.rrd.",
+        status=f"{NO}: a criterion is not met under --require; {BROKE}",
+    )
+)
+@answering
+def run(
+    scenario: Annotated[str, typer.Argument(help="A scenario file, or the name of a shipped one.")],
+    set_: Setting = None,
+    out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/run/NAME")] = None,
+    force: Force = False,
+    half_step: Annotated[
+        bool, typer.Option("--half-step/--no-half-step", help="Run again at half the step to see what it changes.")
+    ] = True,
+    ensemble: Annotated[
+        int,
+        typer.Option(help="Starts that nobody could tell apart, for mean and scatter of each load.", min=1, max=100),
+    ] = 1,
+    require: Annotated[
+        bool, typer.Option("--require", help="Exit with 1 if a criterion of loads.standards is not met.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Simulate one scenario: results, peak loads and a recording to look at."""
+    from ground.compiled import is_warm
+    from rollover.cli import console
+    from rollover.spec import document
+
+    path = document.find(scenario)
+    from rollover import scenario as scenarios
+
+    chosen = scenarios.load(path)
+    if set_:
+        chosen = chosen.replaced(settings(set_), origin="--set")
+    for line in chosen.idle:
+        console.say(f"{path}: {line}")
+    compiles = not is_warm()
+    if compiles:
+        console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
+    from rollover.assessment import loads, results
+
+    folder = out or Path("out", "run", path.stem)
+    made_from = results.origin(path, folder, set_ or [])
+    # before a run that may take minutes
+    results.claim(folder, document.content_hash(chosen), force=force, made_from=made_from, say=console.say)
+    with document.named(path):
+        done, again = _simulated(chosen, half_step)
+    # what a run that broke off reached is in its channels; a peak of it would pass for the peak
+    peaks = loads.peak_loads(done, again if again and again.status == "done" else None) if done.status == "done" else ()
+    if peaks and ensemble > 1:
+        peaks = _with_scatter(peaks, chosen, ensemble)
+    rows = _criteria(done, again)
+    command = " ".join(["rollover", "run", scenario, *(f"--set {shlex.quote(s)}" for s in set_ or [])])
+    answer = results.write(
+        folder,
+        done,
+        peaks,
+        criteria=[asdict(row) for row in rows],
+        half_step=again,
+        picture=_picture(done, peaks),
+        page=lambda answer: _page(done, peaks, answer, rows, command),
+        force=force,
+        made_from=made_from,
+    )
+    if as_json:
+        print(json.dumps(answer, indent=2))
+    else:
+        console.report(done, peaks, rows, answer, str(folder), compiled=compiles)
+    if done.status == "failed":
+        console.say(f"{path}: the simulation failed: {done.sentence}")
+        raise typer.Exit(FAILED)
+    if require:
+        _require(rows, str(path))
+
+
+def _criteria(done: Run, again: Run | None) -> tuple[Criterion, ...]:
+    from rollover.assessment.criteria import criteria, with_half_step
+
+    rows = criteria(done)
+    return with_half_step(rows, criteria(again)) if rows and again and again.status == "done" else rows
+
+
+def _require(rows: Sequence[Criterion], path: str) -> None:
+    """Say which verdicts are not met, or not given because the test did not go far enough. Raises `typer.Exit`."""
+    from rollover.cli import console
+
+    missed = [row for row in rows if row.verdict in ("not met", "no verdict")]
+    for row in missed:
+        asked, simulated, _ = row.in_words
+        name = f"{row.requirement.standard}: {row.requirement.name}"
+        console.say(f"{path}: {row.verdict}: {name}, got {simulated}; asked: {asked}. {row.note}")
+    if missed:
+        raise typer.Exit(THE_ANSWER_IS_NO)
+    count = sum(row.verdict == "met" for row in rows)
+    answer = f"all {count} verdicts are met" if count else "nothing to judge, no verdict was given"
+    console.say(f"{path}: {answer}.")
+
+
+def _simulated(scenario: Scenario, half_step: bool) -> tuple[Run, Run | None]:
+    from rollover.cli import console
+    from rollover.dynamics import simulate
+
+    lead = getattr(scenario.initiation, "lead_time", 0.0)
+    times = scenario.simulation
+    with console.progress("simulating", -lead, times.duration) as show:
+        done = simulate.run(scenario, progress=show)
+    if not half_step or done.status == "failed":
+        return done, None
+    finer = scenario.replaced({"simulation.step": 0.5 * times.step})
+    with console.progress("again at half the step", -lead, times.duration) as show:
+        return done, simulate.run(finer, progress=show)
+
+
+def _with_scatter(peaks: Sequence[PeakLoad], scenario: Scenario, starts: int) -> tuple[PeakLoad, ...]:
+    from rollover.cli import console
+    from rollover.studies.ensemble import FailedRunError, with_scatter
+
+    try:
+        return with_scatter(peaks, scenario, starts)
+    except FailedRunError as e:
+        console.say(f"No scatter: {e}")
+        return tuple(peaks)
+
+
+def _page(
+    done: Run, peaks: Sequence[PeakLoad], answer: Mapping[str, Any], rows: Sequence[Criterion], command: str
+) -> str:
+    from viz.pages import report
+
+    return report.page(done, peaks, answer, rows=rows, command=command)
+
+
+def _picture(done: Run, peaks: Sequence[PeakLoad]) -> Callable[[Path], None] | None:
+    from rollover.cli import console
+
+    try:
+        from viz.recordings import log
+    except ImportError as e:
+        if (e.name or "").partition(".")[0] != "rerun":
+            raise
+        console.say("No rerun wheel for this platform: recording.rrd was not written.")
+        return None
+    return lambda path: log.write_rrd(done, path, peaks=peaks)

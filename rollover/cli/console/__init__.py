@@ -1,0 +1,22 @@
+"""What people read while a command works and when it is done: progress, tables, sentences. The only home of rich."""
+
+from rollover.cli.console.recordings import calibration, comparison, diagnosis, stability
+from rollover.cli.console.runs import regression, report
+from rollover.cli.console.terminal import EVERY, QUIET, Plain, counting, progress, readable, say, tell
+
+__all__ = [
+    "EVERY",
+    "QUIET",
+    "Plain",
+    "calibration",
+    "comparison",
+    "counting",
+    "diagnosis",
+    "progress",
+    "readable",
+    "regression",
+    "report",
+    "say",
+    "stability",
+    "tell",
+]

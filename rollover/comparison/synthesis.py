@@ -1,0 +1,78 @@
+"""Recordings made from a simulation as instruments would have made them: sampled, filtered, late, with white noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from rollover.recording import Recording
+from rollover.recording.filters import filtered
+from rollover.system.errors import hint
+
+DROP = ("ground/force_normal", "ground/sinkage", "striker/acceleration_z")
+SIDEWAYS = (
+    "chassis/roll",
+    "chassis/angular_velocity_x",
+    "chassis/acceleration_y",
+    "chassis/acceleration_z",
+    "rops/force",
+)
+BACKWARD = (
+    "chassis/pitch",
+    "chassis/angular_velocity_y",
+    "chassis/acceleration_x",
+    "chassis/acceleration_z",
+    "rops/force",
+)
+
+
+def usual(simulated: Recording) -> tuple[str, ...]:
+    """Channels that such a test usually records: of a vehicle those of the axis it turns about, x or y."""
+    if DROP[-1] in simulated.channels:
+        return DROP
+    x, y = (float(np.ptp(simulated[kind[1]])) for kind in (SIDEWAYS, BACKWARD))
+    return tuple(c for c in (BACKWARD if y > x else SIDEWAYS) if c in simulated.channels)
+
+
+def synthetic(
+    simulated: Recording,
+    *,
+    channels: Sequence[str],
+    rate: float,
+    share: float = 0.005,
+    sigmas: Mapping[str, float] | None = None,
+    cfc: int | None = None,
+    late: float = 0.0,
+    seed: int = 0,
+    conditions: Mapping[str, Any] | None = None,
+) -> Recording:
+    """Record some channels at `rate` Hz with white Gaussian noise.
+
+    1 sigma is `share` of a channel's range, or what `sigmas` says in SI; it is stated in the recording. `cfc` is
+    applied to the signal before the noise comes in; `late` s by which the clock is late. The same `seed` gives the
+    same recording. Raises ``ValueError`` for a channel that was not simulated and a rate too low for the class.
+    """
+    given = dict(sigmas or {})
+    for name in (*channels, *given):
+        if name not in simulated.channels:
+            raise ValueError(f"channel: not simulated, got {name!r}; {hint(name, simulated.channels)}")
+    step = float(np.median(np.diff(simulated.time)))
+    count = int(np.floor((simulated.time[-1] - simulated.time[0]) * rate + 1e-6)) + 1
+    time = simulated.time[0] + np.arange(count) / rate
+    made, noise = {}, {}
+    for k, name in enumerate(channels):
+        values = simulated[name] if cfc is None else filtered(simulated[name], step, cfc)
+        noise[name] = given.get(name, share * float(np.ptp(values)))
+        random = np.random.default_rng([seed, k]).normal(size=count)
+        made[name] = np.interp(time, simulated.time, values) + noise[name] * random
+    return Recording(
+        title=f"Synthetic recording of: {simulated.title}",
+        source=f"rollover synthesize, seed {seed}",
+        time=np.round(time + late, 9),
+        channels=made,
+        conditions=dict(conditions or {}),
+        noise={name: sigma for name, sigma in noise.items() if sigma > 0.0},
+        cfc=dict.fromkeys(channels, cfc) if cfc is not None else {},
+    )

@@ -1,0 +1,1 @@
+"""Recordings as a dataset: whitening, onsets, quantisation, doubts about their conditions."""

@@ -1,0 +1,72 @@
+"""What a recording's conditions leave uncertain, profiled out of the comparison.
+
+With N (n, q) what one standard deviation of each uncertain condition does to the whitened samples, a misfit has the
+covariance 1 + N N' in place of 1. With N = U S V',
+
+    w -> (1 + N N')^-1/2 w = w - U (1 - (1 + S^2)^-1/2) U'w                                                    (D5)
+
+has the covariance 1 again: what an error of the conditions would do counts little, all else as before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.recording import Doubt
+from rollover.scenario import Scenario
+from rollover.spec.document import paths
+from rollover.system.errors import Fault, InputError, hint
+
+Array = NDArray[np.float64]
+LEAST = 1e-9  # of the largest: directions below are rounding
+
+
+@dataclass(frozen=True, kw_only=True)
+class Eased:
+    """(D5): directions U (n, q) of unit length, and the share of each that is taken out (q,)."""
+
+    directions: Array
+    shares: Array
+
+    def __call__(self, values: Array) -> Array:
+        """Whitened misfit or its derivatives, (n,) or (n, m), freed of what the conditions leave uncertain."""
+        if self.shares.size == 0:
+            return values
+        inside = self.shares[:, None] * (self.directions.T @ values.reshape(values.shape[0], -1))
+        return np.asarray(values - (self.directions @ inside).reshape(values.shape))
+
+
+def eased(columns: Array) -> Eased:
+    """From N (n, q), columns of what 1 sigma of each condition does."""
+    if columns.shape[1] == 0:
+        return Eased(directions=columns, shares=np.zeros(0))
+    U, S, _ = np.linalg.svd(columns, full_matrices=False)
+    kept = LEAST * max(float(S.max(initial=0.0)), 1e-300) < S
+    return Eased(directions=U[:, kept], shares=1.0 - 1.0 / np.sqrt(1.0 + S[kept] ** 2))
+
+
+def doubts(scenario: Scenario, uncertainty: Mapping[str, Doubt], origin: str = "") -> list[dict[str, Any]]:
+    """Values to exchange for an error of one standard deviation, one mapping for each uncertain number.
+
+    Raises `InputError` for a path that the scenario does not have, or that is no number or list of as many.
+    """
+    if not uncertainty:
+        return []
+    known = {leaf.path: leaf.value for leaf in paths(scenario)}
+    found: list[dict[str, Any]] = []
+    for path, sigma in uncertainty.items():
+        value = known.get(path)
+        each = sigma if isinstance(sigma, tuple) else (sigma,)
+        many = value if isinstance(value, list) else [value]
+        if len(many) != len(each) or not all(isinstance(v, (int, float)) for v in many):
+            message = f"uncertainty: not a number of the scenario, or not as many, got {value!r}; {hint(path, known)}"
+            raise InputError(Fault(file=origin, path=path, message=message))
+        for k, one in enumerate(each):
+            moved = [v + one * (j == k) for j, v in enumerate(many)]
+            found.append({path: tuple(moved) if isinstance(value, list) else moved[0]})
+    return found

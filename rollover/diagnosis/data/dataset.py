@@ -1,0 +1,354 @@
+"""What one recording is worth: its channels over their noise, whitened, and the phases of the test it went through."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.data.condition_uncertainty import Eased, doubts, eased
+from rollover.diagnosis.data.whitening import Noise, Whitening
+from rollover.diagnosis.forward.discontinuities import JUMPS, LEAP_IN, SHOWS, about_leaps, beside_leaps, forgiven
+from rollover.diagnosis.forward.forward_model import Simulator
+from rollover.recording import Recording
+from rollover.recording.noise_floor import LENGTH, USUAL, NoiseFloor, grown, noise_floor
+from rollover.scenario import Scenario
+from rollover.system.errors import Fault
+
+Array = NDArray[np.float64]
+
+MODEL_ERROR = 2e-4  # of a channel's range: what integrators differ by is no mismatch
+ALONE = 0.02  # s, prior of the time shift of a recording whose clock has no zero
+CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is believed
+MANY = 10  # quiet windows from which on a memory of two samples is told
+ROUGH = 0.5  # times the noise, from which on another error has a large part
+CORNER = 2.0775  # corner frequency over the filter class, forward and backward, Hz
+NOTHING: Mapping[str, Array] = MappingProxyType({})
+SHIFT = 1e-3  # s, prior of the time shift of a recording whose zero is known
+
+
+@dataclass(frozen=True, kw_only=True)
+class Signal:
+    """One channel of a recording: where it has values, its noise (SI), colour, and range."""
+
+    channel: str
+    rows: NDArray[np.int64]
+    values: Array
+    sigma: float
+    noise: float
+    ar: tuple[float, ...]
+    span: float
+    scatter: float = 0.0  # between runs of one condition, SI
+    step: float = 0.0  # of its digits, where noise does not hide it, SI
+    end: float = 0.0  # of its range, where values pile up, SI; 0: none is seen
+    zero: float = 0.0  # that was taken off its values, SI
+    zero_error: float = 0.0  # standard error of that; 0: none was
+    weight: Array | None = None  # (n,), below 1 where the model itself is not sure
+    level: Array | None = None  # (n,), noise over `noise` where it grows with the value
+    at_rest: tuple[float, tuple[float, ...]] | None = None  # noise and colour of its quiet stretches, once told
+
+    def cut(self, inside: NDArray[np.bool_]) -> Signal:
+        """The samples that are `inside` (n,)."""
+        weight, level = (None if v is None else v[inside] for v in (self.weight, self.level))
+        return replace(self, rows=self.rows[inside], values=self.values[inside], weight=weight, level=level)
+
+    @property
+    def quiet(self) -> tuple[float, tuple[float, ...]]:
+        """Noise and colour of its quiet stretches; those that are held before these are told."""
+        return self.at_rest or (self.noise, self.ar)
+
+    @property
+    def loudness(self) -> Array | float:
+        """Noise over `noise`, (n,); 1 where it is the same throughout."""
+        return 1.0 if self.level is None else self.level
+
+    @property
+    def spread(self) -> Noise:
+        """What its samples are whitened by; the noise alone grows with the value, not what a model may be off by."""
+        rest = max(self.sigma**2 - self.noise**2, 0.0)
+        loud = None if self.level is None else np.sqrt((self.noise * self.level) ** 2 + rest)
+        return Noise(count=self.rows.size, sigma=self.sigma, ar=self.ar, loud=loud, weight=self.weight)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Inside:
+    """Samples (n,) of a stack: the first and the last of the signal of each, and the least leap from each."""
+
+    first: NDArray[np.int64]
+    last: NDArray[np.int64]
+    least: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evidence:
+    """One recording made ready: signals, their simulator, and the prior of its time shift (s)."""
+
+    name: str
+    recording: Recording
+    simulator: Simulator
+    signals: tuple[Signal, ...]
+    shift_prior: float
+    condition: str
+    strays: tuple[Array, ...] = ()  # stacked, SI: what runs that nobody could tell apart differ by
+    model_error: float = MODEL_ERROR  # of a channel's range
+    averaged: int = 1  # samples in one
+    blow: float = np.inf  # s, after which a run may take another course
+    doubtful: tuple[Mapping[str, Any], ...] = ()  # values exchanged for 1 sigma of each uncertain condition
+    doubts: Array | None = None  # what that does to the stack, SI, (n, q)
+
+    def cut(self, inside: Sequence[NDArray[np.bool_]]) -> Evidence:
+        """The samples of each signal that are `inside` (n,) of it."""
+        rows = np.concatenate(list(inside))
+        return replace(
+            self,
+            signals=tuple(s.cut(those) for s, those in zip(self.signals, inside, strict=True)),
+            strays=tuple(d[rows] for d in self.strays),
+            doubts=None if self.doubts is None else self.doubts[rows],
+        )
+
+    @cached_property
+    def eased(self) -> Eased:
+        """What takes the uncertain conditions, and zeros, out of a whitened misfit."""
+        columns = [] if self.doubts is None else list(self.doubts.T)
+        for s, part in self.spans():
+            if s.zero_error > 0.0:
+                columns.append(np.zeros(self.count))
+                columns[-1][part] = s.zero_error
+        if not columns:
+            return eased(np.zeros((self.count, 0)))
+        return eased(np.stack([self.whitened(column) for column in columns], axis=1))
+
+    @cached_property
+    def expected(self) -> float | None:
+        """Sum of squares that noise and scatter alone leave of the weighed samples; None where none is weighed."""
+        return None if all(s.weight is None for s in self.signals) else self.by_chance(np.s_[:])
+
+    def by_chance(self, rows: slice | NDArray[np.bool_]) -> float:
+        """Sum of squares that noise and scatter alone leave of some samples."""
+        scatter = [float(np.sum(self.whitened(stray)[rows] ** 2)) for stray in self.strays]
+        return float(np.sum(self.due[rows])) + (float(np.mean(scatter)) if scatter else 0.0)
+
+    @cached_property
+    def due(self) -> Array:
+        """Squares (n,) that noise alone leaves of the weighed samples: 1 where they count in full."""
+        return np.concatenate([np.ones(s.rows.size) if s.weight is None else s.weight**2 for s in self.signals])
+
+    @cached_property
+    def early(self) -> NDArray[np.bool_]:
+        """Samples (n,) before the blow: what is left there is no matter of the course that a run took."""
+        return np.concatenate([self.recording.time[s.rows] < self.blow for s in self.signals])
+
+    def is_rough(self, s: Signal) -> bool:
+        """Whether a scatter between runs, or a tolerance that was asked for, has a large part in the error.
+
+        Such an error is one for the whole signal, not one for each sample: within its size it is nothing.
+        """
+        known = s.scatter > 0.0 or self.model_error > MODEL_ERROR
+        return known and float(np.hypot(s.scatter, self.model_error * s.span)) > ROUGH * s.noise
+
+    @property
+    def count(self) -> int:
+        """Number of samples of all signals."""
+        return sum(s.rows.size for s in self.signals)
+
+    def stacked(self, predicted: Mapping[str, Array]) -> Array:
+        """Predicted channels at the samples, in units of the noise and whitened, one signal after another."""
+        return self.whitened(self.raw(predicted))
+
+    def raw(self, predicted: Mapping[str, Array]) -> Array:
+        """Predicted channels at the samples, one signal after another, SI."""
+        return np.concatenate([predicted[s.channel][s.rows] for s in self.signals])
+
+    def whitened(self, raw: Array) -> Array:
+        """Stacked samples in units of the noise and whitened."""
+        return self._whitening(raw)
+
+    @cached_property
+    def _whitening(self) -> Whitening:
+        return Whitening([s.spread for s in self.signals])
+
+    def measured(self) -> Array:
+        """The same of the measurement."""
+        return self.whitened(self.values)
+
+    def leaps(self, raw: Array, predicted: Mapping[str, Array] = NOTHING) -> NDArray[np.int64]:
+        """Samples (stacked) about which a prediction leaps, and means within which it is `predicted` to."""
+        own = self._inside
+        found: NDArray[np.bool_] = about_leaps(raw, own.least, own.first, own.last)
+        for s, part in self.spans():
+            size = predicted.get(LEAP_IN + s.channel)
+            if size is not None:
+                found[part] |= size[s.rows] > (SHOWS if self.averaged > 1 else JUMPS) * s.sigma
+        return np.flatnonzero(found)
+
+    @cached_property
+    def _inside(self) -> _Inside:
+        """Where the signals of the stack begin and end, and what is a leap in each."""
+        spans = self.spans()
+        first = np.concatenate([np.full(p.stop - p.start, p.start) for _, p in spans])
+        last = np.concatenate([np.full(p.stop - p.start, p.stop - 1) for _, p in spans])
+        sigma = np.concatenate([np.full(p.stop - p.start, s.sigma if s.rows.size >= 5 else np.inf) for s, p in spans])
+        least = np.where(np.arange(first.size) + 2 <= last, SHOWS * sigma, np.inf)
+        return _Inside(first=first, last=last, least=least)
+
+    def forgiven(self, raw: Array, leaps: NDArray[np.int64]) -> Array:
+        """Predicted samples (stacked, SI) about a leap, moved towards the measured ones within their neighbours.
+
+        On which side of a leap a sample lies is decided by clocks, not by physics.
+        """
+        if not leaps.size:
+            return raw
+        moved: Array = forgiven(raw, leaps, self.values, self._inside.first, self._inside.last)
+        return moved
+
+    def worth(self, leaps: NDArray[np.int64]) -> Array:
+        """Weights (n,) of whitened samples: those whose past was forgiven are as wide as the noise itself."""
+        found: Array = beside_leaps(leaps, *self._memories) if leaps.size else np.ones(self.count)
+        return found
+
+    @cached_property
+    def _memories(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+        """Of the signal of each sample (n,): the last one, how many its noise remembers, and what that makes of one."""
+        sizes = [s.rows.size for s in self.signals]
+        orders = np.repeat([len(s.ar) for s in self.signals], sizes)
+        return self._inside.last, orders, np.repeat([1.0 / grown(s.ar) for s in self.signals], sizes)
+
+    def spans(self) -> list[tuple[Signal, slice]]:
+        """Each signal with its place in the stack."""
+        return self._spans
+
+    @cached_property
+    def _spans(self) -> list[tuple[Signal, slice]]:
+        found, at = [], 0
+        for s in self.signals:
+            found.append((s, slice(at, at + s.rows.size)))
+            at += s.rows.size
+        return found
+
+    @cached_property
+    def values(self) -> Array:
+        """The measured samples, one signal after another, SI."""
+        return np.concatenate([s.values for s in self.signals])
+
+
+def doubted(e: Evidence, scenario: Scenario) -> Evidence:
+    """The evidence with what its conditions leave uncertain; `scenario` is under them. Raises `InputError`."""
+    return doubted_beside(replace(e, doubtful=tuple(doubts(scenario, e.recording.uncertainty, e.name))), {})
+
+
+def doubted_beside(e: Evidence, beside: Mapping[str, Any], shift: float = 0.0) -> Evidence:
+    """The same with that as it is beside values that are exchanged: there an error of a condition does something else.
+
+    `shift` is the recording's time shift there, s.
+    """
+    base = e.simulator.predict(beside, shift)
+    moved = [e.simulator.predict({**beside, **one}, shift) for one in e.doubtful]
+    columns = [e.raw(m) - e.raw(base) for m in moved if m is not None and base is not None]
+    return replace(e, doubts=np.stack(columns, axis=1)) if columns else e
+
+
+def evidence_of(name: str, recording: Recording, simulator: Simulator, averaged: int = 1) -> Evidence | None:
+    """Make a recording ready; None if it shares no channel with the simulation. Channels that never move are left out.
+
+    Noise is estimated from each channel itself; where it is too short for that, the noise that the recording states.
+    """
+    predicted = simulator.predict({}, 0.0)
+    if predicted is None:
+        return None
+    signals = []
+    for channel, values in recording.channels.items():
+        rows = np.flatnonzero(np.isfinite(values))[:: _oversampling(recording, channel)]
+        if channel not in predicted or rows.size < 8 or not np.all(np.isfinite(predicted[channel][rows])):
+            continue
+        y = values[rows]
+        if np.ptp(y) == 0.0:
+            continue  # an instrument that was not plugged in, or stuck
+        span = float(max(np.ptp(predicted[channel][rows]), np.ptp(y)))
+        if span <= 0.0:
+            continue
+        noise, ar = _noise(y - predicted[channel][rows], y, recording.noise.get(channel))
+        sigma = float(np.hypot(noise, MODEL_ERROR * span))
+        if noise < sigma * 0.7:
+            ar = ()  # the model's error is not coloured as the noise is
+        signals.append(Signal(channel=channel, rows=rows, values=y, sigma=sigma, noise=noise, ar=ar, span=span))
+    if not signals:
+        return None
+    loose = recording.clock.zero == "unknown"
+    step = float(np.median(np.diff(recording.time))) if recording.time.size > 1 else 0.0
+    return Evidence(
+        name=name,
+        recording=recording,
+        simulator=simulator,
+        signals=tuple(signals),
+        shift_prior=recording.clock.within or (ALONE if loose else SHIFT + 0.5 * step),
+        condition=condition_of(recording.conditions),
+        averaged=averaged,
+    )
+
+
+def foreign_to(simulator: Simulator, name: str, recording: Recording) -> list[Fault]:
+    """That nothing that was recorded is simulated, where that is so."""
+    made = simulator.predict({}, 0.0)
+    if made is None or made.keys() & recording.channels.keys():
+        return []
+    message = f"no channel that this scenario simulates, got {', '.join(recording.channels)}; one of them at least"
+    return [Fault(file=name, message=message)]
+
+
+def _oversampling(recording: Recording, channel: str) -> int:
+    """Of how many samples behind a channel filter one is new: those of twice its corner frequency tell all."""
+    if channel not in recording.cfc or recording.time.size < 2:
+        return 1
+    rate = 1.0 / float(np.median(np.diff(recording.time)))
+    return max(1, int(rate / (2.0 * CORNER * recording.cfc[channel])))
+
+
+def _noise(residual: Array, values: Array, stated: float | None) -> tuple[float, tuple[float, ...]]:
+    """Noise (1 sigma) and its colour, from the misfit; from the channel itself where that shows clearly less."""
+    if values.size < LENGTH:
+        return (stated if stated is not None else by_differences(residual)), ()
+    best, other = (_floor(v) for v in (residual, values))
+    if other.sigma < CLEARLY * best.sigma:
+        best = other
+    return best.sigma, best.ar
+
+
+def _floor(values: Array) -> NoiseFloor:
+    """Noise floor with as short a memory as the samples can tell: longer ones are made of chance."""
+    one = noise_floor(values, order=1, strides=(1,))
+    return noise_floor(values, order=2, strides=(1,)) if one.windows >= MANY else one
+
+
+def by_differences(values: Array) -> float:
+    """Noise of a short series from its second differences: sd = 1.4826 median|d2|/sqrt(6)."""
+    if values.size < 5:
+        return 0.0
+    d = np.diff(values, 2)
+    return float(USUAL * np.median(np.abs(d - np.median(d))) / np.sqrt(6.0))
+
+
+def condition_of(conditions: Mapping[str, Any]) -> str:
+    """Name of the condition that a recording was run under: recordings alike share it."""
+    return ", ".join(
+        f"{path}={value:g}" if isinstance(value, float) else f"{path}={value}"
+        for path, value in sorted(conditions.items())
+    )
+
+
+def left_out(evidence: Sequence[Evidence]) -> list[list[int]]:
+    """What is left out in turn: one condition after another, or one recording after another if all share one."""
+    groups = groups_of(evidence)
+    return groups if len(groups) > 1 else [[k] for k in range(len(evidence))]
+
+
+def groups_of(evidence: Sequence[Evidence]) -> list[list[int]]:
+    """Places of the recordings that share a condition, one list for each condition."""
+    found: dict[str, list[int]] = {}
+    for k, e in enumerate(evidence):
+        found.setdefault(e.condition or e.name, []).append(k)
+    return list(found.values())

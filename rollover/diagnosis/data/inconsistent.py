@@ -1,0 +1,170 @@
+"""Slips of the pen: channels that stand in another unit than is stated, or with the opposite sign.
+
+Of what was measured, m, and what the simulation says, s, at the time shift at which the two are most alike,
+
+    a = m's / s's        r = m's / (|m| |s|)
+
+a is the factor between them, r how alike they are. No effect turns a channel round or makes 9.81 times as much of it in
+one recording: where |r| is near 1 and a, over what it is in the other recordings, is what the other sign or another
+unit makes, that is what happened. Such a channel tells nothing of what is missing, and what it misses would drown the
+rest: it is left aside, which is said. Where neighbouring runs (`chaos`) are no more alike, none can tell. What all
+recordings of a channel are too large by is its gain or scale, which is fitted; only if nothing is found beside that is
+it left aside too.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import ClassVar
+
+import numpy as np
+
+from rollover.diagnosis.data.dataset import Evidence, Signal
+from rollover.effects import spoken
+from rollover.effects.sensor import is_length
+from rollover.spec.channels import UNITS, describe
+
+ALIKE = 0.7  # |r|, from which on two signals are one but for a factor and what is missing
+NEAR = 0.25  # of its logarithm, that a factor may be off by what is missing
+USUALLY = 0.6  # of that, that all recordings of a channel may be off by
+PLACES = np.linspace(-3.0, 3.0, 61)  # times its prior, where a time shift is looked for
+UNIT = 5.0  # times, or one part of, that a unit must make to be told from what is missing: ground 3 times as stiff
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Aside(ABC):
+    """What is left aside as no recording of what it states: a channel, or all of a recording as a channel shows."""
+
+    evidence: Evidence
+    signal: Signal
+
+    summary: ClassVar[str]
+
+    @abstractmethod
+    def says(self) -> str:
+        """The sentence on it."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Slip(Aside):
+    """A channel of a recording that reads `factor` times what is simulated, as `cause` would have it."""
+
+    factor: float
+    cause: str
+
+    summary = "Channels stand in another unit than is stated, or with the opposite sign."
+
+    def says(self) -> str:
+        """The sentence on it."""
+        return (
+            f"{self.evidence.name}: {self.signal.channel} reads {spoken(self.factor)} times what is simulated, as if "
+            f"{self.cause}; it was left aside."
+        )
+
+
+def slips_of(every: Sequence[Evidence]) -> tuple[list[Slip], list[Slip]]:
+    """Slips that only some recordings of a channel have, and those that all of them share."""
+    met: dict[str, list[tuple[Evidence, Signal, float]]] = {}
+    for e in every:
+        made = e.simulator.predict({}, 0.0) or {}
+        for s in e.signals:
+            factor = factor_of(e, s, made[s.channel]) if s.channel in made else None
+            if factor is not None:
+                met.setdefault(s.channel, []).append((e, s, factor))
+    found = []
+    for each in met.values():
+        beside = _beside(each[0][1].channel, float(np.median([abs(factor) for *_, factor in each])))
+        found += [slip for one in each if (slip := _slip(*one, beside)) is not None and not _is_chance(slip)]
+    shared = [slip for slip in found if _is_shared(slip, found, every)]
+    return [slip for slip in found if slip not in shared], shared
+
+
+def _is_chance(slip: Slip) -> bool:
+    """Whether runs that nobody could tell apart are less alike in its channel than a slip would have to be.
+
+    Of an overturn straight backward, which way the vehicle falls at its end.
+    """
+    simulator, channel, rows = slip.evidence.simulator, slip.signal.channel, slip.signal.rows
+    strays = simulator.strays()
+    made = simulator.predict({}, 0.0)
+    if made is None or not strays:
+        return False
+    apart = float(np.median([np.sum(d[channel][rows] ** 2) for d in strays]))
+    return apart > (1.0 - ALIKE**2) * float(np.sum(made[channel][rows] ** 2))
+
+
+def without(every: Sequence[Evidence], slips: Sequence[Slip]) -> list[Evidence]:
+    """The evidence without channels that are misread by a slip, nor recordings of nothing else."""
+    aside = {(slip.evidence.name, slip.signal.channel) for slip in slips}
+    left = [replace(e, signals=tuple(s for s in e.signals if (e.name, s.channel) not in aside)) for e in every]
+    return [e for e in left if e.signals] if aside else list(every)
+
+
+def by_slips(found: Sequence[Aside]) -> str:
+    """What stands behind a verdict where channels were left aside; nothing where none was."""
+    return "".join(f" {slip.says()}" for slip in found)
+
+
+def factor_of(e: Evidence, s: Signal, made: np.ndarray) -> float | None:
+    """How many times what is simulated a signal reads, where the two are alike; None if nowhere."""
+    time, m, best = e.recording.time[s.rows], s.values, (0.0, 0.0)
+    size = float(np.linalg.norm(m))
+    for shift in PLACES * e.shift_prior:
+        p = np.interp(time - shift, time, made[s.rows])
+        power = float(p @ p)
+        if size > 0.0 and power > 0.0:
+            best = max(best, (abs(float(m @ p)) / (size * power**0.5), float(m @ p) / power))
+    return best[1] if best[0] > ALIKE else None
+
+
+def _beside(channel: str, usual: float) -> float:
+    """Factor that is no slip's, of what the recordings of a channel usually are off by: what is missing makes it.
+
+    Where it is near no slip's, all of it.
+    """
+    known = (1.0, *(abs(cause) for cause, _ in _causes(describe(channel).unit)))
+    near = min(known, key=lambda one: _off(usual, one))
+    return usual / near if _off(usual, near) < USUALLY else usual
+
+
+def _slip(e: Evidence, s: Signal, factor: float, beside: float) -> Slip | None:
+    near = min(_causes(describe(s.channel).unit), key=lambda cause: _off(factor / beside, cause[0]))
+    if _off(factor / beside, near[0]) > NEAR:
+        return None
+    return Slip(evidence=e, signal=s, factor=factor, cause=near[1])
+
+
+def _is_shared(slip: Slip, found: Sequence[Slip], every: Sequence[Evidence]) -> bool:
+    """Whether all recordings of its channel are off by one factor, and that may be a gain: no scale is negative."""
+    channel = slip.signal.channel
+    heard = sum(s.channel == channel for e in every for s in e.signals)
+    alike = sum((f.signal.channel, f.cause) == (channel, slip.cause) for f in found)
+    return alike == heard and (slip.factor > 0.0 or not is_length(channel))
+
+
+def _off(factor: float, other: float) -> float:
+    """How far a factor is from another, of its logarithm; infinite for one of the other sign."""
+    return abs(math.log(factor / other)) if factor * other > 0.0 else math.inf
+
+
+@cache
+def _causes(unit: str) -> tuple[tuple[float, str], ...]:
+    """(factor, what makes it) of each slip that a channel of this unit may have, the usual units first."""
+    return tuple(_each(unit))
+
+
+def _each(unit: str) -> Iterator[tuple[float, str]]:
+    yield -1.0, "its sign were the opposite one"
+    sizes: dict[float, str] = {}
+    for name, size in UNITS.get(unit, {}).items():
+        sizes.setdefault(size, name)
+    for size, name in sizes.items():
+        if max(size, 1.0 / size) < UNIT:
+            continue
+        for sign, turned in ((1.0, ""), (-1.0, ", and its sign the opposite one")):
+            yield sign / size, f"it were in {name} and not in the unit stated{turned}"
+            yield sign * size, f"it had been converted from {name} once too often{turned}"

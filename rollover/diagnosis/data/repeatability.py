@@ -1,0 +1,108 @@
+"""Scatter from one run to the next: what recordings of one condition differ by, no model can predict.
+
+Where a condition was recorded more than once, half the variance of the difference of two recordings is what one of
+them strays from their mean; what the noise of each does not explain of it is scatter. A condition recorded once is
+given the median scatter of the others, as a share of the range.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.data.dataset import Evidence, groups_of
+
+Array = NDArray[np.float64]
+TICK, FINER, PLACES = 1e-3, (1e-4, 1e-5), 21  # s, by which time shifts are tried; then, so many, beside the best
+LATE = 0.1  # s that a clock may be late which says that it is right: then it is the clock that is to be named
+WIDTH = 3.0  # times its prior that a time shift may be
+LEAPS = 3  # samples beside a leap
+SHOWS = 1.2  # times the noise, from which on there is scatter
+WORTH_SAYING, CONTRADICTING = 0.02, 0.1  # of the range
+LEAST = 16  # samples in common, below which nothing is said
+
+
+def with_scatter(found: Sequence[Evidence]) -> list[Evidence]:
+    """The evidence with the scatter of each channel, where any condition was recorded more than once."""
+    apart: dict[tuple[int, str], list[float]] = {}
+    for group in groups_of(found):
+        for a, b in combinations(group, 2):
+            for s in found[a].signals:
+                power = _difference(found[a], found[b], s.channel)
+                if power is not None:
+                    for r in (a, b):
+                        apart.setdefault((r, s.channel), []).append(power)
+    own: dict[tuple[int, str], float] = {}
+    shares: dict[str, list[float]] = {}
+    for group in groups_of(found):
+        # the least noise of those alike: the others' may hold what they differ by
+        noise: dict[str, float] = {}
+        for s in (s for r in group for s in found[r].signals):
+            noise[s.channel] = min(s.noise, noise.get(s.channel, np.inf))
+        here = [(r, s) for r in group for s in found[r].signals if (r, s.channel) in apart]
+        for r, s in here:
+            power, floor = float(np.mean(apart[r, s.channel])), noise[s.channel] ** 2
+            own[r, s.channel] = float(np.sqrt(power - floor)) if power > SHOWS**2 * floor else 0.0
+            shares.setdefault(s.channel, []).append(own[r, s.channel] / s.span)
+    usual = {channel: float(np.median(values)) for channel, values in shares.items()}
+    return [
+        replace(
+            e,
+            signals=tuple(
+                replace(
+                    s,
+                    scatter=float(np.hypot(s.scatter, own.get((r, s.channel), usual.get(s.channel, 0.0) * s.span))),
+                )
+                for s in e.signals
+            ),
+        )
+        for r, e in enumerate(found)
+    ]
+
+
+def differing(found: Sequence[Evidence], share: float = WORTH_SAYING) -> list[str]:
+    """Repeats that differ by more than noise and more than a share of the range, a line for each condition, channel."""
+    lines = []
+    for group in groups_of(found):
+        for s in found[group[0]].signals if len(group) > 1 else ():
+            most = max(
+                (t.scatter / t.span for r in group for t in found[r].signals if t.channel == s.channel), default=0.0
+            )
+            if most > share:
+                names = ", ".join(found[r].name for r in group)
+                lines.append(f"{names}: one condition, yet {s.channel} differ by {100.0 * most:.1f} % of the range")
+    return lines
+
+
+def against_itself(verdict: str, contrary: Sequence[str]) -> str:
+    """What a sentence goes on with where recordings contradict each other."""
+    if verdict != "cannot-tell" or not contrary:
+        return ""
+    return f" They contradict each other: {contrary[0]}."
+
+
+def _difference(a: Evidence, b: Evidence, channel: str) -> float | None:
+    """Half the mean square of what two recordings of a channel differ by, at their best time shift."""
+    x, y = (next((s for s in e.signals if s.channel == channel), None) for e in (a, b))
+    if x is None or y is None:
+        return None
+    t, u = a.recording.time[x.rows], b.recording.time[y.rows]
+
+    def left(shift: float) -> float:
+        inside = (t - shift >= u[0]) & (t - shift <= u[-1])
+        if inside.sum() < max(LEAST, 0.8 * min(t.size, u.size)):
+            return np.inf
+        apart = (x.values[inside] - np.interp(t[inside] - shift, u, y.values)) ** 2
+        # a leap lies between two samples of each, and not at the same place
+        return float(np.mean(np.sort(apart)[: apart.size - LEAPS]))
+
+    wide = max(WIDTH * float(np.hypot(a.shift_prior, b.shift_prior)), LATE)
+    shifts = np.arange(-wide, wide + TICK, TICK)
+    for finer in FINER:
+        shifts = min(shifts, key=left) + finer * (np.arange(PLACES) - PLACES // 2)
+    power = min(map(left, shifts))
+    return 0.5 * power if np.isfinite(power) else None

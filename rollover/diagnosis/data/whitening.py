@@ -1,0 +1,74 @@
+"""Compiled: the stacked samples of a recording in units of their noise, and whitened."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ground.compiled import leaf
+from rollover.recording.noise_floor import grown
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Noise:
+    """Of one signal: samples, sigma (SI), autoregression; `loud` (n,), SI, where its own, and `weight` (n,), if any."""
+
+    count: int
+    sigma: float
+    ar: tuple[float, ...]
+    loud: Array | None
+    weight: Array | None
+
+
+class Whitening:
+    """Whitens stacks of some signals, one after another."""
+
+    def __init__(self, signals: Sequence[Noise]) -> None:
+        self.ends = np.cumsum([s.count for s in signals], dtype=np.int64)
+        self._sigma = np.array([s.sigma for s in signals], dtype=np.float64)
+        self._ar = np.zeros((len(signals), max((len(s.ar) for s in signals), default=0)))
+        self._orders = np.array([len(s.ar) for s in signals], dtype=np.int64)
+        self._gains = np.array([grown(s.ar) for s in signals], dtype=np.float64)
+        for k, s in enumerate(signals):
+            self._ar[k, : len(s.ar)] = s.ar
+        self._loud = np.concatenate([np.zeros(s.count) if s.loud is None else s.loud for s in signals])
+        self._weight = np.concatenate([np.ones(s.count) if s.weight is None else s.weight for s in signals])
+
+    def __call__(self, raw: Array) -> Array:
+        """Stacked samples (n,), or columns of them (n, m), SI, whitened: as white noise of variance 1 where noise."""
+        if raw.ndim == 2:
+            return np.stack([self(column) for column in np.ascontiguousarray(raw.T)], axis=1)
+        out = np.empty(raw.size)
+        into(
+            np.ascontiguousarray(raw, dtype=np.float64), self.ends, self._sigma, self._loud, self._weight,
+            self._orders, self._ar, self._gains, out,
+        )  # fmt: skip
+        return out
+
+
+@leaf
+def into(raw: Any, ends: Any, sigma: Any, loud: Any, weight: Any, orders: Any, ar: Any, gains: Any, out: Any) -> None:
+    """y_i = w g (x_i - sum_j a_j x_i-j), x = raw/sigma, or raw/loud where that is not 0, g of the autoregression."""
+    first = 0
+    for k in range(ends.size):
+        last, order = ends[k], orders[k]
+        for i in range(first, last):
+            out[i] = raw[i] / sigma[k]
+            if loud[i] != 0.0:
+                out[i] = out[i] * sigma[k] / loud[i]
+        if order > 0:
+            for i in range(last - 1, first + order - 1, -1):
+                for j in range(order):
+                    out[i] -= ar[k, j] * out[i - 1 - j]
+                out[i] *= gains[k]
+            for i in range(first, min(first + order, last)):
+                out[i] = 0.0  # no past to whiten with
+        for i in range(first, last):
+            out[i] *= weight[i]
+        first = last

@@ -1,0 +1,1 @@
+"""Parameters fitted to recordings: linearisation, least squares, time shifts, scans, cross-validation."""

@@ -1,0 +1,161 @@
+"""What recordings are predicted to be, at any point: simulated once, remembered, and made ahead side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.fit.finite_differences import Point, beside, in_step, in_time, looked_at, wider
+from rollover.diagnosis.fit.notebook import Memory
+from rollover.diagnosis.fit.parameterisation import Candidate, each_with_own, key_at
+from rollover.diagnosis.forward.budget import DROPS
+from rollover.diagnosis.forward.full_run import full_runs, made_ahead, neighbours_of
+from rollover.system.processes import Children
+
+Array = NDArray[np.float64]
+NONE = np.zeros(0, dtype=np.int64)
+
+
+class Simulations:
+    """Evidence with a memory of what was simulated: the same values are never simulated twice."""
+
+    def __init__(self, evidence: Sequence[Evidence]) -> None:
+        self.evidence = tuple(evidence)
+        self.effort = max((e.simulator.effort for e in self.evidence), key=lambda e: e.thrifty, default=DROPS)
+        self.simulations = 0
+        self._pinned = False
+        self._raw, self._known = Memory(), Memory()
+        self._leaps: dict[tuple[object, ...], NDArray[np.int64]] = {}
+
+    def weigh(self, evidence: Sequence[Evidence]) -> None:
+        """Take the same recordings with another noise: nothing is simulated again."""
+        self.evidence = tuple(evidence)
+        self._known = Memory()
+
+    @property
+    def is_helped(self) -> bool:
+        """Whether there are children to make full runs."""
+        return self._children is not None
+
+    @property
+    def _children(self) -> Children | None:
+        runs = full_runs(self.evidence[0].simulator) if self.evidence else None
+        return None if runs is None else runs.children
+
+    def made_ahead(self, wanted: Iterable[tuple[int, Sequence[Candidate], Sequence[float]]]) -> None:
+        """Make full runs of (recording, candidates, x) side by side where there are children to do it."""
+        made_ahead(self._children, ((self.evidence[r].simulator, self.changes(c, x)) for r, c, x in wanted))
+
+    def made_scattered(self, changes: Mapping[str, object], parts: int = 1) -> None:
+        """Make what all recordings' runs with `changes` and their neighbours' are, as `strays` asks for them."""
+        made_ahead(self._children, neighbours_of([e.simulator for e in self.evidence], changes, parts))
+
+    def made_beside(
+        self,
+        use: Sequence[int],
+        candidates: Sequence[Candidate],
+        x: Sequence[float],
+        shifts: Sequence[float],
+        nudge: float,
+        first: int = 0,
+    ) -> None:
+        """Make those of a place and of all that slopes ask for, from a `nudge` beside it and coordinate `first` on.
+
+        Where runs scatter one step after another is too narrow to tell: all of one width are made before the next.
+        """
+        self.made_ahead(beside(use, candidates, x, nudge, first))
+        if self._pinned or not self.is_helped:
+            return
+        at, width, todo = (candidates, x), nudge, []
+        for r, shift in zip(use, shifts, strict=True):
+            off = self._off(r, at, shift)
+            todo += [(r, k, off) for k in range(first, len(x)) if off is not None]
+        while todo:
+            todo = [(r, k, o) for r, k, o in todo if wider(self.evidence[r], o, at, k, width, self.effort.wide)]
+            width *= 2.0
+            self.made_ahead((r, candidates, there) for r, k, _ in todo for there in looked_at(at, k, width))
+
+    def _off(self, r: int, at: Point, shift: float) -> Callable[[Point], Array | None] | None:
+        """What the prediction of recording r differs by from a point to another, as clocks would have it."""
+        raw = self.raw(r, *at, shift)
+        if raw is None:
+            return None
+        slope = self._in_time(r, *at, shift, raw)
+        return lambda end: self.moved(r, at, end, shift, slope)
+
+    def predicted(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
+        """Stacked prediction of recording r; None where the simulation fails or a value is out of bounds."""
+        key = key_at(r, candidates, x, shift)
+        if key not in self._known:
+            raw = self.raw(r, candidates, x, shift)
+            self._known[key] = None if raw is None else self.evidence[r].whitened(raw)
+        return self._known[key]
+
+    def raw(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
+        """The same in SI, before the noise comes in."""
+        if (key := key_at(r, candidates, x, shift)) not in self._raw:
+            self._raw[key] = self._simulated(r, candidates, x, shift)
+        return self._raw[key]
+
+    def _simulated(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
+        self.simulations += 1
+        found = self._made(r, candidates, x, shift)
+        if found is None:
+            return None
+        y, predicted = found
+        leaps = self.evidence[r].leaps(y, predicted)
+        if leaps.size:
+            self._leaps[key_at(r, candidates, x, shift)] = leaps
+        return self.evidence[r].forgiven(y, leaps)
+
+    def edged(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
+        """Stacked prediction of recording r, SI, with its leaps as they are; not remembered. None if it fails."""
+        found = self._made(r, candidates, x, shift)
+        return None if found is None else found[0]
+
+    def _made(
+        self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float
+    ) -> tuple[Array, dict[str, Array]] | None:
+        """What recording r is predicted to be, stacked (SI) and by channel; None if that fails."""
+        try:
+            found = self.evidence[r].simulator.predict(self.changes(candidates, x), shift)
+        except ValueError:
+            return None
+        if found is None:
+            return None
+        y = self.evidence[r].raw(found)
+        return (y, found) if np.all(np.isfinite(y)) else None
+
+    @staticmethod
+    def changes(candidates: Sequence[Candidate], x: Sequence[float]) -> dict[str, object]:
+        """Values to exchange in the scenario."""
+        found: dict[str, object] = {}
+        ids = [c.id for c in candidates]
+        for k, (c, own) in enumerate(each_with_own(candidates)):
+            found |= c.changes(x[own], 1 + ids[:k].count(c.id))
+        return found
+
+    def _in_time(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float, raw: Array) -> Array:
+        """dy/dtau (n,) of recording r, SI, `raw` y there."""
+        changes, later = self.changes(candidates, x), self.effort.later
+        return in_time(self.evidence[r], changes, shift, raw, later, both=self.effort.thrifty)
+
+    def moved(self, r: int, before: Point, after: Point, shift: float, slope: Array | None = None) -> Array | None:
+        """How the prediction of recording r differs between two points, whitened; nothing where either leaps.
+
+        A leap that moves past a sample is no slope, and what is forgiven there follows the measurement. With `slope`,
+        dy/dtau (n,) before, SI, the two are compared as a clock would have them, see `in_step`.
+        """
+        first, last = self.raw(r, *before, shift), self.raw(r, *after, shift)
+        if first is None or last is None:
+            return None
+        if slope is not None:
+            last = in_step(self.evidence[r], first, last, slope, lambda d: self.edged(r, *after, shift + d))
+        d = last - first
+        for point in (before, after):
+            d[self._leaps.get(key_at(r, *point, shift), NONE)] = 0.0
+        e = self.evidence[r]
+        return e.eased(e.worth(self._leaps.get(key_at(r, *before, shift), NONE)) * e.whitened(d))

@@ -1,0 +1,326 @@
+"""Fits as jobs: worked off here or in child processes, and kept in a file until the diagnosis is done.
+
+A job depends on nothing but the recordings, their noise and its own start, so that the answer is the same for any
+number of workers, and a diagnosis that was interrupted takes up what it had fitted.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import pickle
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, TypeVar, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.fit.finite_differences import beside
+from rollover.diagnosis.fit.levenberg_marquardt import Block, Fitted, Judge
+from rollover.diagnosis.fit.local_search import polish, timed
+from rollover.diagnosis.fit.model_variants import in_form, shaped
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.fit.scan_jobs import at_each
+from rollover.diagnosis.fit.threshold_scan import Stretch, traced
+from rollover.system.processes import Children, begin_server, map_cases
+from rollover.system.writing import scratch
+
+WARM = "rollover.diagnosis.fit.warmup"
+Progress = Callable[[str], None]
+T = TypeVar("T")
+R = TypeVar("R")
+How = Literal["fit", "polish", "shape", "time", "trace"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """A fit to be made: `only` some recordings, from time `shifts` (s) of these; see `Judge.fit`.
+
+    One of few `rounds` is a first look: it ends without slopes.
+    "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too or takes it in another
+    `form`, "time" tries out the time shifts, "trace" begins anew where it sets in, over a `stretch`. A shape or form
+    that comes nowhere near what the best fit `leaves` of each recording is not gone on with. `lent` as in `Judge.fit`.
+    """
+
+    how: How = "fit"
+    candidates: tuple[Candidate, ...]
+    start: tuple[float, ...]
+    shifts: tuple[float, ...]
+    only: tuple[int, ...] | None = None
+    rounds: int | None = None  # as many as a whole fit may take
+    width: int = 0
+    pinned: bool = False
+    form: Candidate | None = None
+    stretch: Stretch | None = None
+    leaves: tuple[float, ...] | None = None
+    lent: tuple[NDArray[np.float64], ...] | None = None
+
+    def key(self, about: str) -> str:
+        """Hash of what is fitted and from where, with `about` for all else that it depends on."""
+        every = (*self.candidates, *(() if self.form is None else (self.form,)))
+        names = [(c.key, sorted(c.search.items()), sorted(c.form.items())) for c in every]
+        ways = self.how, self.only, self.rounds, self.width, self.pinned, self.stretch, self.leaves
+        told = hashlib.sha256(repr((about, names, self.start, self.shifts, ways)).encode())
+        for J in self.lent or ():
+            told.update(J.tobytes())
+        return told.hexdigest()
+
+    @property
+    def recordings(self) -> tuple[int, ...]:
+        """Places of the recordings."""
+        return tuple(range(len(self.shifts))) if self.only is None else self.only
+
+    def beginning(self, nudges: Sequence[float]) -> Iterator[tuple[int, Sequence[Candidate], Sequence[float]]]:
+        """(recording, candidates, x) of the runs that a fit begins with."""
+        first = self.lent[0].shape[1] if self.lent else 0
+        return beside(self.recordings, self.candidates, self.start, nudges[min(self.width, len(nudges) - 1)], first)
+
+
+class Crew:
+    """Works off jobs: in this process, or in `workers` children where more than one is asked for.
+
+    `notebook` is a file that holds what is done, by key; `close` removes it.
+    """
+
+    def __init__(self, workers: int = 1, notebook: Path | None = None, about: str = "") -> None:
+        self.workers, self.notebook, self.about = workers, notebook, about
+        self.children = Children(workers)
+        if workers > 1:
+            begin_server(WARM)
+        self._scratch = ExitStack()
+        self._folder: Path | None = None  # what children read
+        self._beginning: list[Any] = []  # what tells that the children are there
+        self._done: dict[str, dict[str, Any] | None] = {}
+        if notebook is not None and notebook.is_file() and not notebook.is_symlink():
+            for line in notebook.read_text(encoding="utf-8").splitlines():
+                try:
+                    row = json.loads(line)
+                    self._done[row["key"]] = row["fit"]
+                except (ValueError, KeyError, TypeError):
+                    continue  # the line at which it was interrupted
+
+    def __enter__(self) -> Crew:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.children.stop()
+        self._scratch.close()
+
+    def begin(self, judge: Judge) -> None:
+        """Begin the children, if any, while this process goes on: each makes a run, so that it has all it needs."""
+        if self.workers > 1 and not judge.effort.thrifty:
+            told = self._told(judge, self._about(judge))
+            self._beginning = [self.children.pool.schedule(_begun, args=(told,)) for _ in range(self.workers)]
+
+    def is_there(self) -> bool:
+        """Whether the children have begun."""
+        return bool(self._beginning) and all(b.done() for b in self._beginning)
+
+    def close(self) -> None:
+        """All is done: nothing needs to be taken up again."""
+        if self.notebook is not None:
+            self.notebook.unlink(missing_ok=True)
+
+    def fits(self, judge: Judge, jobs: Sequence[Job], say: Progress = lambda _: None) -> list[Fitted | None]:
+        """Fits in the order of the jobs; None where nothing could be simulated."""
+        about = self._about(judge)
+        found: list[Fitted | None] = [None] * len(jobs)
+        keys = [job.key(about) for job in jobs]
+        todo = [k for k, key in enumerate(keys) if key not in self._done]
+        for k, key in enumerate(keys):
+            if key in self._done:
+                found[k] = _rebuilt(judge, jobs[k], self._done[key])
+        done = 0
+
+        def ended(k: int, fitted: Fitted | None) -> None:
+            nonlocal done
+            found[k], done = fitted, done + 1
+            self._note(keys[k], fitted)
+            say(f"fitted {jobs[k].candidates[-1].key}, {done} of {len(todo)}")
+
+        # full runs are made side by side for each fit in turn, and kept here
+        if judge.effort.thrifty:
+            begun = [job for k, job in enumerate(jobs) if k in todo and job.how == "fit"]
+            judge.made_ahead(point for job in begun for point in job.beginning(judge.effort.nudges))
+        while done < len(todo) and not (len(todo) - done > 1 and self.is_there()):
+            k = todo[done]
+            ended(k, work(judge, jobs[k]))
+        if done == len(todo):
+            return found
+        told, rest = self._told(judge, about), todo[done:]
+        outcomes = map_cases(_worked, [(told, jobs[k]) for k in rest], children=self.children)
+        for outcome in outcomes:
+            k = rest[outcome.index]
+            if outcome.failure is not None:
+                raise RuntimeError(f"a fit of {jobs[k].candidates[-1].key}: {outcome.failure.sentence}")
+            fitted, made = outcome.value if outcome.value is not None else (None, 0)
+            judge.simulations += made
+            ended(k, fitted)
+        return found
+
+    def looks(self, judge: Judge, look: Callable[[Judge, T], R], things: Sequence[T]) -> list[R]:
+        """What a `look` at each thing tells, in their order: here, or spread over the children once they are there.
+
+        `look` and what it returns are sent to them: a function of a module, or a partial of one.
+        """
+        if judge.effort.thrifty or len(things) < 2 or not self.is_there():
+            return at_each(judge, look, things)
+        told = self._told(judge, self._about(judge))
+        shares = [list(things)[k :: 2 * self.workers] for k in range(2 * self.workers)]
+        found: dict[int, R] = {}
+        for start, (seen, made) in enumerate(self.each(_looked, [(told, look, share) for share in shares if share])):
+            judge.simulations += made
+            found |= {start + 2 * self.workers * k: one for k, one in enumerate(seen)}
+        return [found[k] for k in range(len(things))]
+
+    def each(self, function: Callable[[T], R], things: Sequence[T]) -> list[R]:
+        """What a function of a module makes of each thing, in their order: here, or in the children once there."""
+        if not self.is_there():
+            return [function(thing) for thing in things]
+        found: dict[int, R] = {}
+        for outcome in map_cases(function, things, children=self.children):
+            if outcome.failure is not None:
+                name = getattr(function, "__name__", "a child").strip("_")
+                raise RuntimeError(f"{name}: {outcome.failure.sentence}")
+            found[outcome.index] = cast(R, outcome.value)
+        return [found[k] for k in range(len(things))]
+
+    def _about(self, judge: Judge) -> str:
+        """What all fits depend on beside their jobs."""
+        return f"{self.about} {_fingerprint(judge)}"
+
+    def _told(self, judge: Judge, about: str) -> Path:
+        """A file with the judge for children to read, once each: megabytes for each of a thousand jobs take long."""
+        if self._folder is None:
+            self._folder = self._scratch.enter_context(scratch())
+        path = Path(self._folder, hashlib.sha256(f"{about} {judge.shifts}".encode()).hexdigest())
+        if not path.exists():
+            path.write_bytes(pickle.dumps(judge.bare()))
+        return path
+
+    def _note(self, key: str, fitted: Fitted | None) -> None:
+        row: dict[str, Any] | None = None
+        if fitted is not None:
+            form = dict(fitted.candidates[-1].form) if fitted.candidates else {}
+            row = {"x": list(fitted.x), "shifts": [b.shift for b in fitted.blocks], "form": form}
+        self._done[key] = row
+        if self.notebook is not None:
+            self.notebook.parent.mkdir(parents=True, exist_ok=True)
+            with open(self.notebook, "a", encoding="utf-8", opener=_no_link) as file:
+                file.write(json.dumps({"key": key, "fit": row}) + "\n")
+
+
+def _no_link(path: str, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0), 0o644)
+
+
+def work(judge: Judge, job: Job) -> Fitted | None:
+    """Work off one job."""
+    if job.how == "fit":
+        return judge.fit(
+            job.candidates,
+            job.start,
+            rounds=job.rounds,
+            only=job.only,
+            shifts=job.shifts,
+            width=job.width,
+            pinned=job.pinned,
+            bare=job.rounds is not None,
+            lent=job.lent,
+        )
+    begun = linearised(judge, job.candidates, job.start, job.shifts, job.recordings)
+    if begun is None:
+        return None
+    leaves = [b.total for b in begun.blocks] if job.leaves is None else job.leaves
+    if job.how == "shape":
+        return shaped(judge, begun, leaves) if job.form is None else in_form(judge, begun, job.form, leaves)
+    if job.stretch is not None:
+        return traced(judge, begun, job.stretch)
+    ways: dict[str, Callable[[Judge, Fitted], Fitted | None]] = {"polish": polish, "time": timed}
+    return ways[job.how](judge, begun)
+
+
+def _fingerprint(judge: Judge) -> str:
+    """Hash of the recordings as they are held: their samples, their noise, and whether they may have strayed."""
+    total = hashlib.sha256(repr(judge.straying).encode())
+    for e in judge.evidence:
+        total.update(repr((e.name, e.shift_prior)).encode())
+        total.update(b"" if e.doubts is None else e.doubts.tobytes())
+        for s in e.signals:
+            total.update(
+                repr((s.channel, s.sigma, s.ar, s.zero_error)).encode() + s.values.tobytes() + s.rows.tobytes()
+            )
+            if s.weight is not None:
+                total.update(s.weight.tobytes())
+    return total.hexdigest()
+
+
+_held: dict[Path, Judge] = {}  # in a child: what it simulated for the job before
+
+
+def _begun(told: Path) -> None:
+    _kept(told).fit((), (), rounds=1)
+
+
+def _worked(case: tuple[Path, Job]) -> tuple[Fitted | None, int]:
+    told, job = case
+    judge = _kept(told)
+    before = judge.simulations
+    return work(judge, job), judge.simulations - before
+
+
+def _looked(case: tuple[Path, Callable[[Judge, Any], Any], list[Any]]) -> tuple[list[Any], int]:
+    told, look, things = case
+    judge = _kept(told)
+    before = judge.simulations
+    return at_each(judge, look, things), judge.simulations - before
+
+
+def _kept(told: Path) -> Judge:
+    """The judge of a file, with what it simulated before."""
+    if told not in _held:
+        _held.clear()
+        _held[told] = pickle.loads(told.read_bytes())
+    return _held[told]
+
+
+def _rebuilt(judge: Judge, job: Job, row: dict[str, Any] | None) -> Fitted | None:
+    if row is None:
+        return None
+    candidates = list(job.candidates)
+    if candidates and row["form"] != candidates[-1].form:
+        candidates[-1] = next(c for c in candidates[-1].forms() if c.form == row["form"])
+    elif len(row["x"]) > len(job.start):
+        candidates[-1] = candidates[-1].whole()
+    is_bare = job.how == "fit" and job.rounds is not None  # it ended without slopes
+    return linearised(judge, candidates, row["x"], row["shifts"], job.recordings, bare=is_bare)
+
+
+def linearised(
+    judge: Judge,
+    candidates: Sequence[Candidate],
+    x: Sequence[float],
+    shifts: Sequence[float],
+    recordings: Sequence[int] | None = None,
+    *,
+    bare: bool = False,
+) -> Fitted | None:
+    """A fit to all recordings or some as it stands at x and these time shifts (s); None if nothing can be simulated.
+
+    A `bare` one has no slopes.
+    """
+    blocks: list[Block] = []
+    use = range(len(shifts)) if recordings is None else recordings
+    nudge = 0.0 if bare else judge.effort.fine
+    if not bare:
+        judge.made_beside(use, candidates, x, shifts, nudge)
+    for r, shift in zip(use, shifts, strict=True):
+        block = judge.block(r, candidates, x, shift, nudge)
+        if block is None:
+            return None
+        blocks.append(block)
+    return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=tuple(blocks))

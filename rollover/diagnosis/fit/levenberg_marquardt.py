@@ -1,0 +1,376 @@
+"""Least squares of effects over several recordings by simulation, the time shift of each profiled out: (D1)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.fit.cache import NONE, Simulations
+from rollover.diagnosis.fit.finite_differences import Point, moved_to, narrowed, secant, valley_at
+from rollover.diagnosis.fit.linearisation import GENTLE, Block, Fitted, bounded, shift_of, total_of
+from rollover.diagnosis.fit.parameterisation import Candidate, key_at
+from rollover.diagnosis.noise.ensemble import course
+from rollover.diagnosis.noise.truncation import soon
+
+Array = NDArray[np.float64]
+FAR = 3.0  # misfit over the noise from which on a step may be lengthened
+STRIDE, STRIDES = 2.0, 6  # by what factor, how often
+TRIES = 4  # of a step, each damped more
+NEAR = 2.0  # misfit over the noise, up to which slopes are those of the place itself
+KEPT = 0.7  # of the gain that slopes promise, which a step must make for those of what is held to be kept
+SLOW = 0.01  # of what is left, that a step must gain for the same
+SHORTER = (0.5, 0.0)  # of the way of a time shift, tried where all of it leads nowhere
+ENOUGH, FINELY = 0.3, 1e-3  # gain of a round below which a search narrows; where a fit is ended
+TRIFLING = 1e-3  # of what is left beyond the noise: the same of drops, where much is
+PROMISING, HARDLY = 0.3, 0.1  # of such a gain, and of what is enough where more is left, that slopes must promise
+NOISE_LEFT = 1.04  # misfit over the noise that needs no further search
+
+
+class Judge(Simulations):
+    """Recordings held against what is simulated of them."""
+
+    def __init__(self, evidence: Sequence[Evidence]) -> None:
+        super().__init__(evidence)
+        self.measured = [e.measured() for e in self.evidence]
+        self.shifts = [0.0] * len(self.evidence)
+        self.straying = True  # whether a recording may have taken another course than its run
+        self._near: Judge | None = None
+
+    def bare(self) -> Judge:
+        """The same without what was simulated, to be sent to another process."""
+        other = Judge(self.evidence)
+        other.shifts = list(self.shifts)
+        return other
+
+    def weigh(self, evidence: Sequence[Evidence]) -> None:
+        """Take the same recordings with another noise: nothing is simulated again, fits must be made anew."""
+        super().weigh(evidence)
+        self.measured = [e.measured() for e in self.evidence]
+
+    def near(self) -> Judge:
+        """One that sees of the same recordings what comes `soon`; itself where none goes on for long after its blow."""
+        if not self.effort.thrifty:
+            return self
+        evidence = [soon(e) for e in self.evidence]
+        if all(a is b for a, b in zip(evidence, self.evidence, strict=True)):
+            return self
+        if self._near is None or [e.count for e in self._near.evidence] != [e.count for e in evidence]:
+            self._near = Judge(evidence)
+        else:
+            self._near.weigh(evidence)
+        self._near.shifts, self._near.straying, self._near._pinned = list(self.shifts), self.straying, self._pinned
+        return self._near
+
+    def beginning(self, base: Fitted) -> tuple[Judge, Fitted]:
+        """Who is `near`, and a base as that one sees it, by the slopes that it has."""
+        near = self.near()
+        if near is self:
+            return self, base
+        blocks = []
+        for r, (b, e, cut) in enumerate(zip(base.blocks, self.evidence, near.evidence, strict=True)):
+            both = zip(e.signals, cut.signals, strict=True)
+            seen = np.concatenate([np.arange(s.rows.size) < short.rows.size for s, short in both])
+            blocks.append(near.block(r, base.candidates, base.x, b.shift, self.effort.fine, b.plain_J[seen]))
+        known = tuple(b for b in blocks if b is not None)
+        return near, replace(base, blocks=known) if len(known) == len(blocks) else near.again(base)
+
+    @contextmanager
+    def held(self, *, straying: bool | None = None, pinned: bool | None = None) -> Iterator[None]:
+        """Within it recordings may or may not have taken another course, clocks whose zero is known stay or do not.
+
+        Far from an explanation a shift eats what is missing.
+        """
+        before = self.straying, self._pinned
+        self.straying, self._pinned = (b if v is None else v for v, b in zip((straying, pinned), before, strict=True))
+        try:
+            yield
+        finally:
+            self.straying, self._pinned = before
+
+    def again(self, fitted: Fitted) -> Fitted:
+        """A fit where it stands, linearised anew under the noise as it is held now."""
+        fine, shifts = self.effort.fine, [b.shift for b in fitted.blocks]
+        self.made_beside(range(len(shifts)), fitted.candidates, fitted.x, shifts, fine)
+        blocks = [self.block(r, fitted.candidates, fitted.x, b.shift, fine) for r, b in enumerate(fitted.blocks)]
+        kept = [new if new is not None else old for new, old in zip(blocks, fitted.blocks, strict=True)]
+        return Fitted(candidates=fitted.candidates, x=fitted.x, blocks=tuple(kept))
+
+    def recounted(self, fitted: Fitted) -> Fitted:
+        """A fit where it stands by the slopes that it has, where nothing but what samples count has changed."""
+        each = enumerate(fitted.blocks)
+        new = [self.block(r, fitted.candidates, fitted.x, b.shift, self.effort.fine, b.plain_J) for r, b in each]
+        return replace(fitted, blocks=tuple(b or old for b, old in zip(new, fitted.blocks, strict=True)))
+
+    def is_beside(self, x: Sequence[float], there: Sequence[float]) -> bool:
+        """Whether a place is as near to another as the step is wide over which slopes are told where a fit ends."""
+        return max((abs(a - b) for a, b in zip(x, there, strict=True)), default=0.0) < self.effort.fine
+
+    @property
+    def per_error(self) -> float:
+        """Samples that share one error: those of a signal where a scatter or a tolerance prevails, else 1."""
+        signals = [s for e in self.evidence for s in e.signals]
+        if not all(e.is_rough(s) for e in self.evidence for s in e.signals):
+            return 1.0
+        return sum(s.rows.size for s in signals) / len(signals)
+
+    def residuals(self, fitted: Fitted) -> list[Array]:
+        """Measured less predicted, stacked, SI, of each recording."""
+        raws = [self.raw(r, fitted.candidates, fitted.x, b.shift) for r, b in enumerate(fitted.blocks)]
+        return [np.zeros(e.count) if y is None else e.values - y for e, y in zip(self.evidence, raws, strict=True)]
+
+    def block(
+        self,
+        r: int,
+        candidates: Sequence[Candidate],
+        x: Sequence[float],
+        shift: float,
+        nudge: float,
+        known: Array | None = None,
+        *,
+        clock: bool = True,
+    ) -> Block | None:
+        """Recording r linearised at x by differences over `nudge`: no Jacobian for 0, no slope in time without `clock`.
+
+        `known` (n, k) are the first k columns of the Jacobian where those of an earlier place will do.
+        """
+        y = self.predicted(r, candidates, x, shift)
+        if y is None:
+            return None
+        e, raw = self.evidence[r], self.raw(r, candidates, x, shift)
+        assert raw is not None
+        leaps = self._leaps.get(key_at(r, candidates, x, shift), NONE)
+        J = np.zeros((y.size, len(x)))
+        if known is not None:
+            J[:, : known.shape[1]] = known
+        clock = clock and not (self._pinned and e.recording.clock.zero != "unknown")
+        slope = np.zeros_like(raw)
+        if clock:
+            slope = self._in_time(r, candidates, x, shift, raw)
+
+        worth = e.worth(leaps)
+        residual = e.eased(worth * (self.measured[r] - y))
+        far = max(1.0, float(np.sqrt(np.mean(residual * residual)))) if 0.0 < nudge <= self.effort.fine else np.inf
+        far = far if far < NEAR else np.inf  # from afar a wide step leads over ripples
+
+        def off(end: Point) -> Array | None:
+            return self.moved(r, (candidates, x), end, shift, None if self._pinned else slope)
+
+        def off_by(k: int) -> Callable[[float], Array | None]:
+            at = (candidates, x)
+            return lambda step: self.moved(r, at, (candidates, moved_to(at, k, x[k] + step)), shift)
+
+        for k in range(0 if known is None else known.shape[1], len(x) if nudge else 0):
+            if self.effort.wide:
+                widest = 0.0 if self._pinned else self.effort.wide  # a first fit is short
+                column = secant(e, off, (candidates, x), k, nudge, widest)
+                if column is None:
+                    return None
+                valley = valley_at((candidates, x), k)
+                J[:, k] = column if valley is None else column - valley[1] * J[:, valley[0]]
+                continue
+            column = narrowed(off_by(k), nudge if x[k] < 0.5 else -nudge, far)
+            if column is None:
+                return None
+            J[:, k] = column
+        slope[leaps] = 0.0
+        slope = e.eased(worth * e.whitened(slope)) if clock else slope
+        counts = course(e, residual) if self.straying else None
+        if counts is not None:
+            residual, J, slope = counts.samples * residual, counts.samples[:, None] * J, counts.samples * slope
+        return Block(
+            residual=residual, J=J, slope=slope, shift=shift, prior=e.shift_prior, course=counts, expected=e.expected,
+            forgiven=self.straying,
+        )  # fmt: skip
+
+    def clocked(
+        self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float, rounds: int
+    ) -> Block | None:
+        """Recording r at x without slopes, its time shift moved to where it is met best: no run more, of full runs."""
+        found = self.block(r, candidates, x, shift, 0.0)
+        for _ in range(rounds):
+            if self._pinned or found is None:
+                break
+            new = self.block(r, candidates, x, found.shift + shift_of(found, np.zeros(len(x))), 0.0)
+            if new is None or new.total >= found.total:
+                break
+            found = new
+        return found
+
+    def _on_trial(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Block | None:
+        """Recording r where a step leads: what is left there is all that is asked for, unless its clock moves on."""
+        if self.effort.clocked:
+            return self.clocked(r, candidates, x, shift, self.effort.clocked)
+        return self.block(r, candidates, x, shift, 0.0, clock=False)
+
+    def _less_far(
+        self, r: int, candidates: Sequence[Candidate], x: Sequence[float], before: Block, after: Block | None
+    ) -> Block | None:
+        """The same with its time shift gone less far, or not at all, where edges left more after it than before."""
+        if after is None or after.total <= before.total:
+            return after
+        later = after.shift - before.shift
+        found = [self.block(r, candidates, x, before.shift + f * later, 0.0, clock=False) for f in SHORTER if later]
+        return min([after, *(b for b in found if b is not None)], key=lambda b: b.total)
+
+    def fit(
+        self,
+        candidates: Sequence[Candidate],
+        start: Sequence[float],
+        *,
+        rounds: int | None = None,
+        only: Sequence[int] | None = None,
+        shifts: Sequence[float] | None = None,
+        width: int = 0,
+        pinned: bool = False,
+        bare: bool = False,
+        finely: bool = False,
+        lent: Sequence[Array] | None = None,
+    ) -> Fitted | None:
+        """Levenberg-Marquardt on (D1) from a start within the unit box; None if nothing can be simulated there.
+
+        `pinned` as in `held`. A `bare` one ends without slopes, where only what it leaves is asked for; one that is
+        made `finely` where a round gains next to nothing, others where it gains less than tells two apart. `lent` are
+        the first slopes (n, k) of each recording to begin with, as a fit of fewer effects has them; it ends with its
+        own.
+        """
+        with self.held(pinned=pinned):
+            return self._fit(candidates, start, rounds, only, shifts, width, bare, FINELY if finely else ENOUGH, lent)
+
+    def _fit(
+        self,
+        candidates: Sequence[Candidate],
+        start: Sequence[float],
+        rounds: int | None,
+        only: Sequence[int] | None,
+        shifts: Sequence[float] | None,
+        width: int,
+        bare: bool,
+        least: float,
+        lent: Sequence[Array] | None,
+    ) -> Fitted | None:
+        use = list(range(len(self.evidence))) if only is None else list(only)
+        nudges = self.effort.nudges
+        rounds, width = self.effort.rounds if rounds is None else rounds, min(width, len(nudges) - 1)
+        x = [float(v) for v in start]
+        shifts = [self.shifts[r] for r in use] if shifts is None else list(shifts)
+        fixed = len(x) - len(candidates[-1].search) if candidates else 0
+        known: Sequence[Array | None] = [None] * len(use) if lent is None else lent
+        self.made_beside(use, candidates, x, shifts, nudges[width], 0 if lent is None else lent[0].shape[1])
+        found = [self.block(r, candidates, x, s, nudges[width], J) for r, s, J in zip(use, shifts, known, strict=True)]
+        if any(b is None for b in found):
+            return None
+        blocks: list[Block] = [b for b in found if b is not None]
+        best, damping = total_of(blocks), 1e-3
+        borrowed = lent is not None  # whether slopes are those of another place
+        told = x  # where all were last worked out
+        for turn in range(rounds):
+            A, b = np.zeros((len(x), len(x))), np.zeros(len(x))
+            for block in blocks:
+                Ar, br, _ = block.normal()
+                A, b = A + Ar, b + br
+            improved, enough, total = False, max(least, FINELY * 1e-2 * best, self.effort.least), best
+            if least > FINELY and not self.effort.thrifty:
+                enough = max(enough, TRIFLING * (best - sum(k.residual.size for k in blocks)))
+            due = 0.0  # gain of a step by these slopes
+            for _ in range(TRIES):
+                dx = bounded(A, b, np.array(x), damping)
+                trial = [float(v) for v in np.clip(np.array(x) + dx, 0.0, 1.0)]
+                moved = np.array(trial) - np.array(x)
+                due = 2.0 * float(b @ moved) - float(moved @ A @ moved)
+                if width and due < max(PROMISING * least, HARDLY * enough):
+                    break  # nothing more is to be had, by these slopes
+                steps = [shift_of(block, moved) for block in blocks]
+                self.made_ahead((r, candidates, trial) for r in use)
+                after = [
+                    self._on_trial(r, candidates, trial, block.shift + d)
+                    for r, block, d in zip(use, blocks, steps, strict=True)
+                ]
+                if all(a is not None for a in after):
+                    total = total_of([a for a in after if a is not None])
+                    if total >= best and not self.effort.clocked:
+                        each = zip(use, blocks, after, strict=True)
+                        after = [self._less_far(r, candidates, trial, block, a) for r, block, a in each]
+                        total = total_of([a for a in after if a is not None])
+                    if total < best:
+                        improved = True
+                        if total > FAR**2 * sum(k.residual.size for k in blocks):
+                            trial, after, total = self._further(use, candidates, x, trial, after, total)
+                        break
+                damping = max(30.0 * damping, 1e-2)
+            gain = best - total if improved else 0.0
+            if improved:
+                x, best, damping = trial, total, 0.1 * damping
+                shifts = [a.shift for a in after if a is not None]
+            fresh = gain < enough
+            if fresh:
+                # what slopes of another place promise no more those of this one may
+                width, damping = width if borrowed else width + 1, 1e-3
+            last = width >= len(nudges)
+            if last and not improved and len(nudges) == 1:
+                break
+            is_bare = bare and (last or turn + 1 == rounds)
+            nudge = 0.0 if is_bare else self.effort.fine if last else nudges[width]
+            # what is held already moves little: its slopes are worked out anew only where the search narrows, or where
+            # they lead astray or not far, as those of another place along a valley do; where a run is dear a short fit
+            # keeps all that foretold well, and another ends with those of a place beside it
+            slow = gain < KEPT * due or gain < SLOW * best
+            anew = fresh or (slow and not self.effort.thrifty)
+            kept = 0 if anew else len(x) if bare and self.effort.thrifty and not slow else fixed
+            if last and self.effort.thrifty and told is not None and self.is_beside(x, told):
+                kept = len(x)
+            elif anew and not is_bare:
+                told = x
+            borrowed = self.effort.thrifty and ((borrowed and not anew) or 0 < kept == len(x))
+            if not is_bare:
+                self.made_beside(use, candidates, x, shifts, nudge, kept)
+            again = [
+                self.block(r, candidates, x, s, nudge, None if not kept or is_bare else block.plain_J[:, :kept])
+                for r, s, block in zip(use, shifts, blocks, strict=True)
+            ]
+            if any(b is None for b in again):
+                return None
+            blocks = [b for b in again if b is not None]
+            if is_bare:
+                return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=tuple(blocks))
+            if last:
+                break
+        if width < len(nudges) and (borrowed or nudges[width] != self.effort.fine):
+            self.made_beside(use, candidates, x, shifts, self.effort.fine)
+            ended = [self.block(r, candidates, x, s, self.effort.fine) for r, s in zip(use, shifts, strict=True)]
+            if all(b is not None for b in ended):
+                blocks = [b for b in ended if b is not None]
+        return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=tuple(blocks))
+
+    def _further(
+        self,
+        use: Sequence[int],
+        candidates: Sequence[Candidate],
+        x: Sequence[float],
+        trial: list[float],
+        after: list[Block | None],
+        total: float,
+    ) -> tuple[list[float], list[Block | None], float]:
+        """Go on the way of a step as long as that helps: events that come too late count for more than their slope."""
+        dx = np.array(trial) - np.array(x)
+        for _ in range(STRIDES):
+            dx = STRIDE * dx
+            there = [float(v) for v in np.clip(np.array(x) + dx, 0.0, 1.0)]
+            self.made_ahead((r, candidates, there) for r in use)
+            found = [
+                self._on_trial(r, candidates, there, b.shift) for r, b in zip(use, after, strict=True) if b is not None
+            ]
+            if there == trial or any(b is None for b in found):
+                break
+            left = total_of([b for b in found if b is not None])
+            if left >= total:
+                break
+            trial, after, total = there, list(found), left
+        return trial, after, total
+
+
+__all__ = ["GENTLE", "Block", "Fitted", "Judge", "shift_of"]

@@ -1,0 +1,269 @@
+"""Fits followed on where differences mislead: along crooked valleys, over edges in time, behind cliffs."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.data.dataset import doubted_beside
+from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.fit.linearisation import WIDEST, Block, Fitted
+from rollover.diagnosis.fit.parameterisation import Candidate, coordinate, each_with_own, physical
+
+Array = NDArray[np.float64]
+TEETH, COMBED, BESIDE = 11, 0.05, 20  # places on a first coordinate, within so much of its fit; on the other, over all
+WAVES, OCTAVES = 57, 0.225  # frequencies, within so much of a coordinate of its fit: three octaves
+QUIETLY = (0.3, 0.5)  # coordinates of a damping that lets it ring
+SPREAD = (np.arange(6) + 0.5) / 6  # places of a shape that goes along with them
+STARTS, APART = 3, 0.06  # of the best places, so far apart
+SCANNED = (np.arange(40) + 0.5) / 40  # places of a shape
+TICK, SHORTEST, NARROWER = 8e-5, 5e-6, 0.4  # s, by which a time shift is tried to either side; then less, by a factor
+BEHIND = 2.0  # times what another explanation leaves, beyond which none is gone on with
+TRIED = 40  # at most so many
+ROUNDS = 3  # of a fit with the errors of the conditions as they act beside it
+TWICE, LITTLE = 2, 1.0  # how often; a gain that is not worth another time
+
+
+def left_at(
+    judge: Judge,
+    candidates: Sequence[Candidate],
+    x: Sequence[float],
+    shifts: Sequence[float],
+    only: Sequence[int] | None = None,
+) -> float | None:
+    """What is left of all recordings or `only` some at x, with time shifts (s) of all; None if a run fails."""
+    blocks = blocks_at(judge, candidates, x, shifts, only)
+    return None if blocks is None else sum(b.normal()[2] for b in blocks)
+
+
+def blocks_at(
+    judge: Judge,
+    candidates: Sequence[Candidate],
+    x: Sequence[float],
+    shifts: Sequence[float],
+    only: Sequence[int] | None = None,
+    *,
+    clock: bool = True,
+) -> list[Block] | None:
+    """Recordings at x and these time shifts (s), without slopes but a clock's; None where one cannot be simulated."""
+    use = range(len(shifts)) if only is None else only
+    found = [judge.block(r, candidates, x, shifts[r], 0.0, clock=clock) for r in use]
+    blocks = [b for b in found if b is not None]
+    return blocks if len(blocks) == len(found) else None
+
+
+def by_what_is_left(
+    judge: Judge,
+    candidates: Sequence[Candidate],
+    places: Sequence[tuple[float, ...]],
+    shifts: Sequence[float],
+    only: Sequence[int] | None = None,
+) -> list[tuple[float, ...]]:
+    """Those places that can be simulated, the one that leaves least of all recordings or `only` some first."""
+    met = [(there, x) for x in places if (there := left_at(judge, candidates, x, shifts, only)) is not None]
+    return [x for _, x in sorted(met)]
+
+
+def polish(judge: Judge, fitted: Fitted, size: float = 0.02, most: int = 45) -> Fitted:
+    """Follow a crooked valley by a simplex: where a threshold is crossed, differences mislead; never worse."""
+    from scipy.optimize import minimize
+
+    shifts = [b.shift for b in fitted.blocks]
+
+    def left(x: Array) -> float:
+        inside = [float(v) for v in np.clip(x, 0.0, 1.0)]
+        out = float(np.sum(np.abs(x - np.array(inside))))
+        there = left_at(judge, fitted.candidates, inside, shifts)
+        return 1e300 if there is None else there * (1.0 + out)
+
+    start = np.array(fitted.x)
+    simplex = np.vstack(
+        [start, *(start + size * (1.0 if v < 0.9 else -1.0) * np.eye(start.size)[k] for k, v in enumerate(start))]
+    )
+    found = minimize(
+        left, start, method="Nelder-Mead", options={"initial_simplex": simplex, "maxfev": most, "xatol": 1e-4}
+    )
+    again = judge.fit(fitted.candidates, np.clip(found.x, 0.0, 1.0), rounds=3, shifts=shifts, width=2)
+    return again if again is not None and again.left < fitted.left else fitted
+
+
+def teeth(fitted: Fitted) -> list[tuple[float, ...]]:
+    """Places all along the second parameter of the last effect of a fit, beside where its first one stands.
+
+    What hops leaves a misfit full of cliffs: a frequency is found soon, what damps it may lie far off behind one.
+    """
+    at = len(fitted.x) - 2
+    firsts = np.clip(fitted.x[at] + COMBED * np.linspace(-1.0, 1.0, TEETH), 0.0, 1.0)
+    return [(*fitted.x[:at], float(a), float(b)) for a in firsts for b in (np.arange(BESIDE) + 0.5) / BESIDE]
+
+
+def chords(last: Candidate, own: Sequence[float]) -> tuple[Candidate, list[tuple[float, ...]]]:
+    """The last effect of a fit along its shape, and places all along its frequency and its shape, little damped.
+
+    One that was fitted beside a wrong frequency hardly rings any more: what it rings by is not to be seen from there.
+    """
+    whole = replace(last.whole(), along=tuple(last.shapes))
+    firsts = np.clip(own[0] + OCTAVES * np.linspace(-1.0, 1.0, WAVES), 0.0, 1.0)
+    shapes = itertools.product(*(SPREAD for _ in last.shapes))
+    return whole, [(float(a), b, *map(float, shape)) for shape in shapes for a in firsts for b in QUIETLY]
+
+
+def apart(met: Sequence[tuple[float, tuple[float, ...]]]) -> list[tuple[float, ...]]:
+    """Of places, each with what it leaves, the best that are not beside each other."""
+    chosen: list[tuple[float, ...]] = []
+    for _, x in sorted(met):
+        if len(chosen) < STARTS and all(max(abs(a - b) for a, b in zip(x, c, strict=True)) > APART for c in chosen):
+            chosen.append(x)
+    return chosen
+
+
+def along_shapes(last: Candidate, x: Sequence[float]) -> list[tuple[float, ...]]:
+    """Places beside x all along each parameter of the shape of its last effect, the others as they usually are.
+
+    A recording in which a face lets go, or does not, is met within a narrow stretch alone.
+    """
+    at = len(x)
+    begun = (*x[: at - len(last.search)], *last.with_shapes(x[-len(last.search) :])[0])
+    return [(*begun[:k], float(v), *begun[k + 1 :]) for k in range(at, len(begun)) for v in SCANNED]
+
+
+def least_of(
+    judge: Judge, thing: tuple[Sequence[Candidate], Sequence[tuple[float, ...]]], *, shifts: Sequence[float]
+) -> tuple[float, tuple[float, ...]] | None:
+    """What is left of all recordings at that of some places where it is least, and this; None if all runs fail."""
+    candidates, places = thing
+    least, best = np.inf, None
+    for x in places:
+        left = 0.0
+        for r, shift in enumerate(shifts):
+            block = judge.block(r, candidates, x, shift, 0.0)
+            left += np.inf if block is None else block.normal()[2]
+            if left >= least:
+                break
+        else:
+            least, best = left, x
+    return None if best is None else (least, best)
+
+
+def timed(judge: Judge, fitted: Fitted) -> Fitted:
+    """The fit with each time shift tried out to either side: edges make its slope crooked; never worse.
+
+    Where one channel has a clock of its own all shifts are tried against that first: the edges of the channel stay.
+    """
+    best = fitted
+    for _ in range(TWICE):
+        x, shifts = _against(judge, best)
+        moved = [judge.block(r, best.candidates, x, s, 0.0, clock=False) for r, s in enumerate(shifts)]
+        blocks = [b if b is None else _tried(judge, r, best.candidates, x, b) for r, b in enumerate(moved)]
+        shifts = [s if b is None else b.shift for s, b in zip(shifts, blocks, strict=True)]
+        again = judge.fit(best.candidates, x, rounds=3, shifts=shifts, width=2)
+        if again is None or again.left > best.left - LITTLE:
+            break
+        best = again
+    return best
+
+
+def ended(judge: Judge, fitted: Fitted) -> Fitted:
+    """The fit gone on with over narrow steps as long as that gains: its rounds may have been too few; never worse."""
+    best = fitted
+    for _ in range(TWICE):
+        again = judge.fit(best.candidates, best.x, shifts=[b.shift for b in best.blocks], width=2, finely=True)
+        if again is None or again.left > best.left:
+            break
+        is_there = again.left > best.left - LITTLE
+        best = again
+        if is_there:
+            break
+    return best
+
+
+def _against(judge: Judge, fitted: Fitted) -> tuple[tuple[float, ...], list[float]]:
+    """Coordinates, and time shifts (s) of all, moved against the clock of each channel that has one of its own."""
+    best, left = (fitted.x, [b.shift for b in fitted.blocks]), fitted.total
+    for c, own in each_with_own(fitted.candidates):
+        if c.id != "sensor-clock-offset":
+            continue
+        k, step, search = own.start, TICK, c.search["offset"]
+        while step > SHORTEST:
+            for d in (step, -step):
+                moved = coordinate(physical(best[0][k], search) - d, search)
+                x, shifts = (*best[0][:k], moved, *best[0][k + 1 :]), [s + d for s in best[1]]
+                blocks = blocks_at(judge, fitted.candidates, x, shifts, clock=False) if 0.0 < moved < 1.0 else None
+                there = np.inf if blocks is None else sum(b.total for b in blocks)
+                if there < left:
+                    best, left = (x, shifts), there
+                    break
+            else:
+                step *= NARROWER
+    return best
+
+
+def _tried(judge: Judge, r: int, candidates: Sequence[Candidate], x: Sequence[float], block: Block) -> Block:
+    """Recording r at a time shift beside which none is better, nor its clock's as stated, nor the one it began with.
+
+    Edges leave one of many recordings in a dip that is a millisecond off.
+    """
+    for there in (0.0, judge.shifts[r]):
+        other = judge.block(r, candidates, x, there, 0.0, clock=False)
+        block = other if other is not None and other.total < block.total else block
+    step, tried = TICK, 0
+    while step > SHORTEST and tried < TRIED:
+        for there in (block.shift + step, block.shift - step):
+            tried += 1
+            other = judge.block(r, candidates, x, there, 0.0, clock=False)
+            if other is not None and other.total < block.total and abs(there) < WIDEST * other.prior:
+                block = other
+                break
+        else:
+            step *= NARROWER
+    return block
+
+
+def is_doubtful(judge: Judge) -> bool:
+    """Whether conditions leave something uncertain whose work beside an effect is worth its runs."""
+    return not judge.effort.thrifty and any(e.doubts is not None for e in judge.evidence)
+
+
+def conditioned(judge: Judge, fitted: Fitted) -> Fitted:
+    """The fit again with what the conditions leave uncertain as it acts beside it, recordings weighed by that.
+
+    What an error of a condition does was seen on the scenario as it is: a mass in doubt moves a spike there, and
+    beside a spring that was found its frequency.
+    """
+    for _ in range(ROUNDS):
+        beside = judge.changes(fitted.candidates, fitted.x)
+        shifts = [b.shift for b in fitted.blocks]
+        judge.weigh([doubted_beside(e, beside, s) for e, s in zip(judge.evidence, shifts, strict=True)])
+        again = judge.fit(fitted.candidates, fitted.x, shifts=shifts, width=1)
+        fitted = again or judge.again(fitted)
+    return fitted
+
+
+def few_of(f: Fitted) -> list[int]:
+    """The recordings that a fit meets worst, best and in the middle."""
+    ranked = sorted(range(len(f.blocks)), key=lambda r: f.blocks[r].normal()[2] / f.blocks[r].residual.size)
+    return sorted({ranked[0], ranked[len(ranked) // 2], ranked[-1]})
+
+
+def shifts_told(shifts: Sequence[float], short: Fitted, few: Sequence[int]) -> tuple[float, ...]:
+    """Time shifts (s) of all recordings: as fitted to the few that a short fit was made to, elsewhere as given."""
+    told = {r: block.shift for r, block in zip(few, short.blocks, strict=True)}
+    return tuple(told.get(r, s) for r, s in enumerate(shifts))
+
+
+def but_one(fitted: Fitted, k: int) -> tuple[list[Candidate], list[int]]:
+    """The effects of a fit but its k-th, and the places of their coordinates."""
+    others = [(c, own) for j, (c, own) in enumerate(each_with_own(fitted.candidates)) if j != k]
+    return [c for c, _ in others], [at for _, own in others for at in range(own.start, own.stop)]
+
+
+def without(judge: Judge, fitted: Fitted, k: int, rounds: int = 8, *, bare: bool = False) -> Fitted | None:
+    """The explanation fitted again without its k-th effect; `bare` as in `Judge.fit`."""
+    rest, columns = but_one(fitted, k)
+    x, shifts = [fitted.x[at] for at in columns], [b.shift for b in fitted.blocks]
+    lent = [b.plain_J[:, columns] for b in fitted.blocks] if judge.effort.thrifty else None
+    return judge.fit(rest, x, rounds=rounds, shifts=shifts, bare=bare, lent=lent)

@@ -1,0 +1,154 @@
+"""An effect's shape and its other forms: fits of what is usually held, and of another law in its place."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rollover.diagnosis.fit.levenberg_marquardt import NOISE_LEFT, Judge
+from rollover.diagnosis.fit.linearisation import Fitted
+from rollover.diagnosis.fit.local_search import BEHIND, STARTS, by_what_is_left, few_of, polish, shifts_told
+from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
+
+WORTH = 12.0  # gain that pays for a shape
+SHORT = 4  # rounds of a fit that tells where to begin
+ABREAST = 1.5  # times what the best of short fits leaves, up to which others are followed
+FAR = 2.0  # misfit over the noise, from which on much is left
+SOON = 0.95  # times what an effect leaves as it is, that the shape which it has must then leave after a short fit
+THERE = 0.003  # of a coordinate, within which two short fits came to one place
+AS_MUCH = 0.01  # of what it leaves, within which another one near it is on the way to one place with it
+ASTRAY = 1.2  # times what another explanation leaves, above which a crooked valley is not followed
+FURTHER, ALIKE = 3, 0.1  # rounds of all recordings, after which fits within so much of a coordinate go to one place
+# of the samples, by which a short fit, and one gone on with, may leave more than another explanation that leaves noise
+NEARBY, NEARER = 0.5, 0.35
+BESIDE_FORM = np.linspace(-0.1, 0.05, 13)  # of a coordinate: where a threshold of another form may lie
+ELSEWHERE = (0.2, 0.35, 0.5, 0.65, 0.8)  # coordinates of a number that only this form has
+
+
+def shaped(judge: Judge, f: Fitted, leaves: Sequence[float]) -> Fitted | None:
+    """The fit with the shape of its last effect, begun where short fits from some places leave least; None if none.
+
+    None too where these come nowhere near what another explanation `leaves` of each recording; so in another form. On
+    the way the usual shape may be met better than before: what is abrupt is a cliff that a smooth one leads around. It
+    is returned where the other does not pay.
+    """
+    if not f.candidates[-1].shapes:
+        return None
+    last, at = f.candidates[-1], len(f.x) - len(f.candidates[-1].search)
+    along = replace(last.whole(), along=tuple(last.shapes))
+    places = [(*f.x[:at], *start) for start in last.with_shapes(f.x[at:])]
+    found = _best_of(judge, f, along, places, leaves)
+    if found is None:
+        return None
+    if found.left > f.left:  # the few led to where the others are not met: all of them, from where the fit stands
+        onward = judge.fit((*f.candidates[:-1], along), places[0], shifts=[b.shift for b in f.blocks])
+        found = min((one for one in (found, onward) if one is not None), key=lambda one: one.left)
+    if found.left > _reach_of_all(f, leaves):
+        return None
+    found = found if is_noise(found) or found.left > ASTRAY * sum(leaves) else polish(judge, found)
+    (whole, x), shifts = found.candidates[-1].plain(found.own), [b.shift for b in found.blocks]
+    bent = judge.fit((*f.candidates[:-1], whole), (*found.x[:at], *x), shifts=shifts, width=2)
+    own = dict(zip(found.candidates[-1].search, found.own, strict=True))
+    usual = judge.fit(f.candidates, (*found.x[:at], *(own[name] for name in last.search)), shifts=shifts, width=2)
+    if bent is None or usual is None:
+        return bent or usual
+    return usual if usual.left < bent.left + enough(bent.left, sum(b.residual.size for b in bent.blocks)) else bent
+
+
+def in_form(judge: Judge, f: Fitted, last: Candidate, leaves: Sequence[float]) -> Fitted | None:
+    """The fit with its last effect in another form, begun where it leaves least.
+
+    A threshold lies elsewhere in another form; what is fitted instead of another number is looked for over its range.
+    """
+    known, at, shifts = f.candidates[-1].values(f.own), len(f.x) - len(f.own), [b.shift for b in f.blocks]
+    axes: list[list[float]] = []
+    for name, search in last.search.items():
+        there = coordinate(known[name], search) if name in known else None
+        several = [there + float(d) for d in BESIDE_FORM] if there is not None and not axes else [there]
+        axes.append(list(ELSEWHERE) if there is None else [v for v in several if v is not None and 0.0 < v < 1.0])
+    places = [(*f.x[:at], *own) for own in itertools.product(*axes)]
+    met = by_what_is_left(judge, (*f.candidates[:-1], last), places, shifts, few_of(f))
+    found = _best_of(judge, f, last, met[: 2 * STARTS], leaves)
+    return found if found is not None and found.left < _reach_of_all(f, leaves) else None
+
+
+def enough(left: float, size: int) -> float:
+    """The gain that pays for a shape where so much is left of so many samples."""
+    return WORTH * max(1.0, left / size)
+
+
+def is_noise(fitted: Fitted) -> bool:
+    """Whether a fit needs no further search."""
+    return fitted.left < NOISE_LEFT**2 * sum(b.residual.size for b in fitted.blocks)
+
+
+def _best_of(
+    judge: Judge, f: Fitted, last: Candidate, places: Sequence[tuple[float, ...]], leaves: Sequence[float]
+) -> Fitted | None:
+    """The best fit with another last effect from some places.
+
+    Short fits to the recordings that are met worst, best and in the middle tell where to begin, and a few rounds of
+    all which of these lead to one place; None if none can be made, or where much more than noise is left and none soon
+    takes a part of that: a shape that is the right one does. What then comes nowhere near what another explanation
+    `leaves` is returned as it stands.
+    """
+    candidates, few = (*f.candidates[:-1], last), few_of(f)
+    at = [f.blocks[r].shift for r in few]
+    short = [judge.fit(candidates, x, rounds=SHORT, shifts=at, only=few, bare=True) for x in places]
+    # fitted alone these soon leave less than beside all others
+    own = sum(f.blocks[r].total for r in few)
+    most = min(ABREAST * own, reach([leaves[r] for r in few], sum(f.blocks[r].residual.size for r in few), NEARBY))
+    if sum(leaves) > FAR**2 * sum(b.residual.size for b in f.blocks):
+        most = min(most, SOON * own)
+    begun: list[Fitted] = []
+    for one in sorted((one for one in short if one is not None and one.total < most), key=lambda one: one.total):
+        if begun and one.total > ABREAST * begun[0].total:
+            break
+        if len(begun) < STARTS and not any(_is_there(one, other) for other in begun):
+            begun.append(one)
+    begun = [one for k, one in enumerate(begun) if not any(_is_one_valley(one, other) for other in begun[:k])]
+    held = [b.shift for b in f.blocks]
+    again = [
+        judge.fit(candidates, one.x, shifts=shifts_told(held, one, few), rounds=FURTHER, bare=True) for one in begun
+    ]
+    best: Fitted | None = None
+    done: list[Fitted] = []
+    most = _reach_of_all(f, leaves)
+    for one in sorted((one for one in again if one is not None), key=lambda one: one.total):
+        if one.total > most:
+            return best or one
+        if any(_is_there(one, other, ALIKE) for other in done) or (best and one.total > ABREAST * best.left):
+            continue
+        done.append(one)
+        ended = judge.fit(candidates, one.x, shifts=[b.shift for b in one.blocks])
+        best = min((f for f in (best, ended) if f is not None), key=lambda f: f.left, default=None)
+        if best is not None and is_noise(best):
+            break
+    return best
+
+
+def reach(leaves: Sequence[float], size: int, part: float) -> float:
+    """What a fit on its way may leave that is to meet as well as another, which `leaves` so much of each recording.
+
+    As far again from the noise as that is, or `part` of the samples.
+    """
+    left = sum(leaves)
+    return left + max((BEHIND - 1.0) * (left - size), part * size)
+
+
+def _reach_of_all(f: Fitted, leaves: Sequence[float]) -> float:
+    """The same of a fit to all recordings that was gone on with."""
+    return reach(leaves, sum(b.residual.size for b in f.blocks), NEARER)
+
+
+def _is_one_valley(one: Fitted, other: Fitted) -> bool:
+    """Whether two short fits are on their way to one place, and as far."""
+    return _is_there(one, other, ALIKE) and abs(one.total - other.total) < AS_MUCH * other.total
+
+
+def _is_there(one: Fitted, other: Fitted, within: float = THERE) -> bool:
+    """Whether two fits ended in one place."""
+    return max(abs(a - b) for a, b in zip(one.x, other.x, strict=True)) < within

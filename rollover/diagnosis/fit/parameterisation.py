@@ -1,0 +1,342 @@
+"""An effect as it is looked for: what is fitted of it, over which ranges, and where looks and fits begin."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.forward.forward_model import EDGES
+from rollover.effects import EFFECTS, Search, nth
+
+Array = NDArray[np.float64]
+
+PLACES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of a shape, at which a fit of it begins
+BESIDE = 0.01  # of a coordinate: how far from its zero an effect is looked at
+FURTHER = (0.08, 0.16, 0.3)  # of a coordinate: how far a clock is looked at
+THRESHOLDS = 10  # places at which something that has no zero is looked at
+ONE = (5,)
+SEVERAL = (8, 4, 3)  # places on the axes of an effect's parameters
+WIDE = 0.08  # of a coordinate: a step off what changes nothing, where each place costs a full run
+LIMITS = (0.12, 0.3)  # more places of what may be a limit
+STRONG, ENDS = (0.35, 0.9), (0.0, 1.0)  # of the way from what changes nothing to an end
+SPREAD = (0.12, 0.3, 0.6)  # places of a depth, a length: where nothing is known to change nothing
+LIMIT_NAMES = ("limit", "yield_force", "stiffness", "angle")  # what acts the more the lower it is
+EDGE = 0.01  # of a coordinate, that a start keeps from its ends
+STEEP = 2.0  # tangent of the tilt at which a load slides
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """An effect with the parameters that are fitted, where to look for them, and the channel of a sensor effect."""
+
+    id: str
+    kind: str
+    family: str
+    search: Mapping[str, Search]
+    channel: str | None = None
+    neutral: tuple[float | None, ...] | None = None  # coordinates that change nothing; given where a place costs a run
+    shapes: Mapping[str, Search] = field(default_factory=dict)  # fitted only where what is left asks for them
+    fixed: Mapping[str, Any] = field(default_factory=dict)  # parameters that are not fitted
+    form: Mapping[str, float] = field(default_factory=dict)  # those of them that make another form of the same effect
+    own: Mapping[str, float] = field(default_factory=dict)  # the scenario's values, where no number is an effect's null
+    places: tuple[tuple[float, ...], ...] = ()  # where it is looked at, if not wherever its `probes` are
+    along: tuple[str, ...] = ()  # of a fitted shape, at whose default all other coordinates are held: `Effect.bent`
+
+    @property
+    def key(self) -> str:
+        """Id, with the channel of a sensor effect and what is not fitted."""
+        told = [str(v) for v in self.fixed.values()]
+        return ":".join([self.id, *([] if self.channel is None else [self.channel]), *told])
+
+    @cached_property
+    def token(self) -> tuple[object, ...]:
+        """What tells the meaning of its coordinates from that of any other's."""
+        return (self.key, len(self.search), self.along, *self.form.items())
+
+    @property
+    def is_placed(self) -> bool:
+        """Whether a parameter says where or when it acts: one that changes nothing nowhere."""
+        return self.neutral is not None and len(self.search) > 1 and None in self.neutral
+
+    @property
+    def is_narrow(self) -> bool:
+        """Whether it tells only near its place."""
+        return bool(EFFECTS[self.id].narrow)
+
+    @property
+    def is_sudden(self) -> bool:
+        """Whether it does something at the least of its strength already."""
+        return EFFECTS[self.id].is_sudden
+
+    @property
+    def rings(self) -> bool:
+        """Whether it rings, by a frequency and a damping."""
+        return EFFECTS[self.id].is_abrupt and {"stiffness", "damping"} <= self.search.keys()
+
+    @property
+    def is_bent(self) -> bool:
+        """Whether it is fitted in another shape or form than its usual one."""
+        return bool(self.form) or not set(self.search).isdisjoint(EFFECTS[self.id].shapes)
+
+    def is_fine(self, k: int) -> bool:
+        """Whether the k-th parameter is that place: looked at in many, and over less about each."""
+        return self.is_narrow and list(self.search)[k] == "travel"
+
+    def valley(self, x: Sequence[float], k: int) -> tuple[int, float] | None:
+        """Which coordinate follows the k-th one along the valley of a narrow effect at x, and how fast; else None.
+
+        At a tilt theta a load slides by s, proportional to tan theta - mu, until a given moment:
+        d ln s / d mu = -1/(tan theta - mu). Along that it meets its wall no sooner and no later.
+        """
+        names = list(self.search)
+        if not self.is_narrow or names[k] != "friction":
+            return None
+        travel, friction = self.search["travel"], self.search["friction"]
+        slope = -(friction.high - friction.low) / (STEEP - physical(x[k], friction))
+        return names.index("travel"), slope / math.log(travel.high / travel.low)
+
+    def changes(self, x: Sequence[float], number: int = 1) -> dict[str, Any]:
+        """Values to exchange in the scenario for coordinates x, each from 0 (low) to 1 (high).
+
+        `number` counts effects of this id, each on its own channel.
+        """
+        key = nth(self.id, number)
+        found: dict[str, Any] = {} if self.channel is None else {f"effects.{key}.channel": self.channel}
+        found |= {f"effects.{key}.{name}": value for name, value in (*self.fixed.items(), *self.form.items())}
+        return found | {f"effects.{key}.{name}": value for name, value in self.values(x).items()}
+
+    def values(self, x: Sequence[float]) -> dict[str, float]:
+        """Parameters by name for coordinates x."""
+        found: Mapping[str, float] = {n: physical(v, s) for v, (n, s) in zip(x, self.search.items(), strict=True)}
+        for name in self.along:
+            found = EFFECTS[self.id].bent({**found, name: getattr(EFFECTS[self.id](), name)}, name, found[name])
+        return dict(found)
+
+    def strength(self, x: Sequence[float]) -> float:
+        """How many times as strong as it usually is, by the parameter that is furthest from changing nothing."""
+        usual, nulls = EFFECTS[self.id](), EFFECTS[self.id].null
+        found = []
+        for name, value in self.values(x).items():
+            null, own = nulls.get(name), getattr(usual, name)
+            if null is not None and own is not None and own != null:
+                found.append(abs((value - null) / (own - null)))
+        return max(found, default=1.0)
+
+    def starts(self) -> list[tuple[float, ...]]:
+        """Coordinates to look at first; the first of two parameters, a depth or a frequency, in the finer steps."""
+        if self.neutral is not None:
+            return self._beside(self.neutral)
+        axes = []
+        for s, many in zip(self.search.values(), ONE if len(self.search) == 1 else SEVERAL, strict=False):
+            inside = [(k + 0.5) / many for k in range(many)]
+            if len(self.search) == 1 and s.scale == "linear" and s.low < 0.0 < s.high:
+                middle, near = -s.low / (s.high - s.low), (0.05, 0.4)
+                inside = [middle + f * (1.0 - middle) for f in near] + [middle - f * middle for f in near]
+            elif len(self.search) == 1 and s.scale == "log" and s.low < 1.0 < s.high and s.high / s.low < 20.0:
+                middle = math.log(1.0 / s.low) / math.log(s.high / s.low)
+                near = (0.1, 0.5)
+                inside = [middle + f * (1.0 - middle) for f in near] + [middle - f * middle for f in near]
+            axes.append(inside)
+        return list(itertools.product(*axes))
+
+    def _beside(self, neutral: tuple[float | None, ...]) -> list[tuple[float, ...]]:
+        """Few coordinates: a step to either side of what changes nothing, places spread where nothing is known to."""
+        known = [k for k, n in enumerate(neutral) if n is not None]
+        if len(known) == len(neutral):
+            at = [float(n) for n in neutral if n is not None]
+            steps = [(k, sign * WIDE) for k in known for sign in (1.0, -1.0)]
+            beside = [tuple(a + (d if a + d < 1.0 else -d) * (j == k) for j, a in enumerate(at)) for k, d in steps]
+            # what the scenario has may be far above what ever acts: a yield force, a stop
+            is_limit = len(at) == 1 and None in EFFECTS[self.id].null.values()
+            return [*beside, *((x,) for x in LIMITS if is_limit)]
+        axes, narrow = [], EFFECTS[self.id].narrow
+        for n, (name, search) in zip(neutral, self.search.items(), strict=True):
+            if n is not None:
+                axes.append([min(n + 2.0 * WIDE, 0.9)])
+            elif name in narrow:
+                axes.append(list(narrow[name]))
+            elif EFFECTS[self.id].null.get(name) == 0.0 or any(len(a) > 1 for a in axes):
+                # a strength, or more than one place: what is usual shows the direction
+                usual = coordinate(getattr(EFFECTS[self.id](), name), search)
+                axes.append([min(max(usual, WIDE), 1.0 - WIDE)])
+            else:
+                axes.append(list(SPREAD))
+        return list(itertools.product(*axes))
+
+    def strong(self) -> list[tuple[float, ...]]:
+        """Coordinates where the effect is strong, one parameter at a time, and its `probes`; none where runs are cheap.
+
+        Where it acts, if that is a parameter, is spread as in `probes`; what begins at no strength at all has one end.
+        """
+        if self.neutral is None:
+            return []
+        beside = self._beside(self.neutral)
+        ways = [(k, end, way, n) for k, n in enumerate(self.neutral) if n is not None for end in ENDS for way in STRONG]
+        if not ways:
+            nulls = EFFECTS[self.id].null
+            ways = [(k, 1.0, STRONG[-1], 0.0) for k, name in enumerate(self.search) if nulls.get(name) == 0.0][:1]
+        found = list(beside)
+        for place in beside:
+            usual = [p if n is None else n for p, n in zip(place, self.neutral, strict=True)]
+            found += [(*usual[:k], n + way * (end - n), *usual[k + 1 :]) for k, end, way, n in ways]
+        return list(dict.fromkeys(found))
+
+    def plain(self, x: Sequence[float]) -> tuple[Candidate, tuple[float, ...]]:
+        """The same with nothing `along` its shape, and the coordinates at which that is what this one is at x."""
+        return replace(self, along=()), coordinates(self.values(x), self.search)
+
+    def bent(self, x: Sequence[float]) -> tuple[Candidate, tuple[float, ...]]:
+        """The same along its shape as far as that is fitted, and its coordinates there: the way back from `plain`."""
+        kind, values = EFFECTS[self.id], self.values(x)
+        names = tuple(name for name in self.search if name in kind.shapes)
+        for name in names:
+            values = {**kind.bent(values, name, getattr(kind(), name)), name: values[name]}
+        return replace(self, along=names), coordinates(values, self.search)
+
+    def whole(self) -> Candidate:
+        """The same effect with its shape fitted too."""
+        return replace(self, search={**self.search, **self.shapes}, shapes={})
+
+    def forms(self) -> list[Candidate]:
+        """The same effect in its other forms, which are not fitted; none where it has a form or its shape is fitted."""
+        if self.is_bent:
+            return []
+        found = []
+        for form in EFFECTS[self.id].forms:
+            search = {name: s for name, s in self.search.items() if name not in form.fixed}
+            found.append(replace(self, form=form.fixed, search={**search, **form.search}, shapes={}))
+        return found
+
+    def with_shapes(self, x: Sequence[float]) -> list[tuple[float, ...]]:
+        """Coordinates of `whole` at which its fit may begin: the shape's default, and others."""
+        kind: Any = EFFECTS[self.id]()
+        default = [_begun(getattr(kind, n), s) for n, s in self.shapes.items()]
+        places = [tuple(default), *itertools.product(*[PLACES] * len(default))]
+        return [(*x, *place) for place in places]
+
+    def probes(self) -> list[tuple[float, ...]]:
+        """Coordinates to span the directions in which it begins: small where it has a zero, or spread, or `places`."""
+        if self.places:
+            return list(self.places)
+        if self.neutral is not None:
+            return self._beside(self.neutral)
+        axes: list[list[float]] = []
+        for name, s in self.search.items():
+            null = EFFECTS[self.id].null.get(name)
+            at = coordinate(null, s) if isinstance(null, (int, float)) and (s.scale != "log" or null > 0.0) else None
+            if at is not None and 0.0 < at < 1.0:
+                axes.append([at + BESIDE])
+            elif null is not None:
+                axes.append([0.1, 0.6])
+            else:
+                many = (THRESHOLDS if len(self.search) > 1 else 4) if not axes else 1
+                told = [] if s.told is None else [coordinate(s.told, s)]
+                axes.append([(k + 0.5) / many for k in range(many)] + told)
+        return list(itertools.product(*axes))
+
+    def further(self) -> list[tuple[float, ...]]:
+        """Coordinates of a clock that is far off: an edge moved by more than it is wide is no multiple of a small move.
+
+        None of what else there is. Where runs are dear these cost none.
+        """
+        if self.id not in EDGES:
+            return []
+        name, s = next(iter(self.search.items()))
+        null = EFFECTS[self.id].null[name]
+        if null is None or not s.low < null < s.high:
+            return []
+        return [(coordinate(null, s) + sign * f,) for f in FURTHER for sign in (1.0, -1.0)]
+
+
+def each_with_own(candidates: Sequence[Candidate]) -> Iterator[tuple[Candidate, slice]]:
+    """Each of several candidates with where its own coordinates lie among those of all."""
+    at = 0
+    for c in candidates:
+        yield c, slice(at, at + len(c.search))
+        at += len(c.search)
+
+
+def akin(candidates: Iterable[Candidate], to: Iterable[Candidate]) -> list[Candidate]:
+    """Candidates that act somewhere, of the family of one that does.
+
+    A depth, a length: one is taken for the other where a look shows little of its place.
+    """
+    families = {c.family for c in to if c.is_placed}
+    return [c for c in candidates if c.is_placed and c.family in families]
+
+
+def is_one_sensor(candidates: Sequence[Candidate]) -> bool:
+    """Whether several effects are all of one sensor."""
+    return len(candidates) > 1 and len({c.channel for c in candidates}) == 1 and candidates[0].channel is not None
+
+
+def _begun(value: float | None, search: Search) -> float:
+    """Coordinate at which the fit of a shape begins: its default, if that is inside; what has none begins low."""
+    if value is None or (search.scale == "log" and value <= 0.0):
+        return 0.02
+    return min(max(coordinate(value, search), 0.02), 0.98)
+
+
+def physical(x: float, search: Search) -> float:
+    """Value of a parameter for its coordinate."""
+    if search.scale == "log":
+        return float(search.low * (search.high / search.low) ** x)
+    return float(search.low + x * (search.high - search.low))
+
+
+def key_at(r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> tuple[object, ...]:
+    """What tells a simulation of recording r at x from any other, its time shift (s) to the nanosecond."""
+    return (r, tuple([c.token for c in candidates]), tuple([round(float(v), 12) for v in x]), round(shift, 9))
+
+
+def coordinates(values: Mapping[str, float], search: Mapping[str, Search]) -> tuple[float, ...]:
+    """Coordinates of values by name, those out of range at its end."""
+    return tuple(min(max(coordinate(values[name], s), 0.0), 1.0) for name, s in search.items())
+
+
+def coordinate(value: float, search: Search) -> float:
+    """Coordinate of a value."""
+    if search.scale == "log":
+        return math.log(value / search.low) / math.log(search.high / search.low)
+    return (value - search.low) / (search.high - search.low)
+
+
+def yardstick(id: str, names: Collection[str]) -> tuple[str, float]:
+    """The parameter that says how strong an effect is, of those fitted, and its value at no effect.
+
+    The first that has a number for its null; otherwise the first of all, and 0.
+    """
+    for name, null in EFFECTS[id].null.items():
+        if name in names and isinstance(null, (int, float)):
+            return name, float(null)
+    return next(iter(names)), 0.0
+
+
+def zero_of(c: Candidate) -> tuple[str, float | None]:
+    """The parameter of `yardstick` and its value at no effect, which the scenario may say; None where none is known."""
+    name, null = yardstick(c.id, c.search)
+    return name, c.own.get(name) if EFFECTS[c.id].null.get(name) is None else null
+
+
+def is_limit(c: Candidate) -> bool:
+    """Whether an effect is the stronger the lower its first parameter is, without a number at which it is none."""
+    name, zero = zero_of(c)
+    return zero is None and name in LIMIT_NAMES
+
+
+def followed(c: Candidate, x: Sequence[float], factor: float) -> tuple[float, ...] | None:
+    """Coordinates at which an effect is `factor` times as strong as at x; None for one without a zero to go from."""
+    name, null = yardstick(c.id, c.search)
+    if EFFECTS[c.id].null.get(name) is None:
+        return None
+    search, at = c.search[name], list(c.search).index(name)
+    value = null + factor * (physical(x[at], search) - null)
+    inside = coordinate(min(max(value, search.low), search.high), search)
+    return (*x[:at], min(max(inside, EDGE), 1.0 - EDGE), *x[at + 1 :])

@@ -1,0 +1,59 @@
+"""One step of a selection: the effect that is added to a base, and the candidates that competed for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from rollover.diagnosis.fit.cross_validation import foretold, held_out, refitted
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.fit.scan_jobs import Looks, at_each
+
+Groups = Sequence[Sequence[int]]  # recordings that are held out together
+Phases = Sequence[Sequence[tuple[float, str]]]  # of each recording: when each phase begins, and its name
+
+
+@dataclass(frozen=True, kw_only=True)
+class Screened:
+    """A candidate looked at on a few recordings: the best starts, what is left there, the gain of its best direction.
+
+    `nrmse` is what a first fit leaves over the noise, 0 where there was none.
+    """
+
+    candidate: Candidate
+    starts: tuple[tuple[float, ...], ...]
+    left: float
+    potential: float
+    nrmse: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step:
+    """One effect added to a base: the best, its p-value (of the best of all by chance), and all that competed."""
+
+    base: Fitted
+    fitted: Fitted
+    p_value: float
+    rivals: tuple[Fitted, ...] = ()
+    screened: tuple[Screened, ...] = ()
+
+    def again(self, judge: Judge) -> Step:
+        """The same under the noise as it is held now."""
+        return self._each(judge.again)
+
+    def foretold(self, judge: Judge, groups: Groups, looks: Looks = at_each) -> Step:
+        """The same with what its fits foretell by runs, where slopes do not hold for long; of drops its best alone."""
+        if judge.effort.thrifty:
+            return self._each(lambda f: foretold(judge, f, groups))
+        return self.moved_to(refitted(judge, self.fitted, groups, held_out(self.base, groups).total, looks))
+
+    def _each(self, made: Callable[[Fitted], Fitted]) -> Step:
+        """The same with something made of each fit; its best stays one of its rivals."""
+        rivals = tuple(made(f) for f in self.rivals)
+        best = next((new for new, old in zip(rivals, self.rivals, strict=True) if old is self.fitted), None)
+        return replace(self, base=made(self.base), fitted=best or made(self.fitted), rivals=rivals)
+
+    def moved_to(self, new: Fitted) -> Step:
+        """The same with another fit of its best, among the rivals too."""
+        return replace(self, fitted=new, rivals=tuple(new if f is self.fitted else f for f in self.rivals))

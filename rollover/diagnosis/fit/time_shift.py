@@ -1,0 +1,239 @@
+"""When a recording's clock began: by all that was recorded, or by its first contact alone.
+
+A time shift that is fitted to a whole recording bends towards whatever the simulation misses. The first contact hardly
+depends on that: an error of the model grows with the force, so that samples after it are trusted to `TRUSTED` of what
+they have changed since the start, and none later than `SOON`.
+
+It is sought before by what hardly asks for a model: until then a body falls, then it does something else (`onset`).
+
+A clock that is off by far more than it is said to be leaves a recording that nothing explains, and that meets the
+simulation at another time altogether (`mistimed`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.data.dataset import Evidence, Signal
+from rollover.diagnosis.data.onset import first_shown
+from rollover.diagnosis.fit.finite_differences import Point
+from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.fit.linearisation import Fitted
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.fit.scan_jobs import Looks, at_each
+from rollover.effects import spoken
+
+Array = NDArray[np.float64]
+WIDTH = 3.0  # times its prior, within which a time shift is sought
+PLACES = 241  # time shifts that are tried
+NEAR, AT_THE_END = 1e-3, 0.9  # s, about a first contact found without a model; of that, from which on it ends there
+QUIET = 2.0  # noise units, that the middle sample of a fall may miss
+SOON, LEAST = 8e-3, 4  # s after the first contact, and samples, that tell of it
+TRUSTED = 0.1  # of a change of a channel, by which the model may be off
+BELIEVED = 2.0  # times its prior: a shift beyond is the model's fault, where the clock's zero is known
+FURTHEST = 0.25  # s, that a clock may be off where it should not be
+MOST = 0.5  # of a recording that must be left to compare
+MEETS, BEFORE = 2.0, 4.0  # times the noise's power, that is left there at most, and of that, at least where it stands
+FALLS = 30.0  # times less than where it stands: as good, for rows that are means about another contact
+# s that no physics imitates: beyond, so many times less will do beside what is missing; and as far aside, so many more
+ASIDE, FALLS_FAR, SHARP = 0.02, 10.0, 1.5
+UNKNOWN = 1e30  # power of what cannot be compared
+
+Made = Callable[[float], Array | None]
+Cost = Callable[[Array, float], float]
+
+
+def align(judge: Judge) -> None:
+    """Begin with the time shift at which each recording meets the scenario best."""
+    for r, e in enumerate(judge.evidence):
+        found = _best(judge, r, partial(judge.raw, r, (), ()), partial(_whole, judge, r), _places(e))
+        judge.shifts[r] = judge.shifts[r] if found is None else found
+
+
+def by_first_contact(
+    judge: Judge, candidates: Sequence[Candidate], x: Sequence[float], looks: Looks = at_each
+) -> list[float | None]:
+    """Time shift (s) of each recording by its first contact; None where nothing comes of it."""
+    return looks(judge, partial(_by_contact, beside=(candidates, x)), range(len(judge.evidence)))
+
+
+def _by_contact(judge: Judge, r: int, *, beside: Point) -> float | None:
+    # leaps as they are: these are what tells the time
+    e = judge.evidence[r]
+    at = _first_contact(judge, r, partial(judge.edged, r, *beside))
+    known = e.recording.clock.zero != "unknown"
+    return None if at is None or (known and abs(at) > BELIEVED * e.shift_prior) else at
+
+
+def _first_contact(judge: Judge, r: int, made: Made) -> float | None:
+    """Time shift (s) of recording r by its first contact: found without a model, then beside there by the model."""
+    e = judge.evidence[r]
+    places = _places(e)
+    places = places[places + e.simulator.contact > e.recording.time[LEAST]]  # what never fell tells of no contact
+    if not (np.isfinite(e.simulator.contact) and places.size):
+        return None
+    about = _best(judge, r, made, partial(onset, judge, r), places)
+    if about is None or not _falls(judge, r, made(about), about):
+        return None
+    at = _best(judge, r, made, partial(_early, judge, r), about + NEAR * np.linspace(-1.0, 1.0, PLACES))
+    return about if at is None or abs(at - about) > AT_THE_END * NEAR else at  # the model leads away from it
+
+
+def mistimed(judge: Judge, fitted: Fitted, looks: Looks = at_each) -> list[tuple[str, float]]:
+    """Recordings that would meet a fit if they came later by a shift (s) far beyond what their clocks may be off by."""
+    found = looks(judge, partial(_elsewhere, fitted=fitted), range(len(judge.evidence)))
+    return [(e.name, at) for e, at in zip(judge.evidence, found, strict=True) if at is not None]
+
+
+def is_all_by_clocks(judge: Judge, fitted: Fitted, looks: Looks = at_each) -> bool:
+    """Whether such shifts are all that separates the recordings from a fit: each else is met as it stands."""
+    late = {name for name, _ in mistimed(judge, fitted, looks)}
+    others = [b for e, b in zip(judge.evidence, fitted.blocks, strict=True) if e.name not in late]
+    return bool(late) and all(b.normal()[2] < MEETS * b.residual.size for b in others)
+
+
+def by_clock(found: Sequence[tuple[str, float]]) -> str:
+    """What of `mistimed` stands behind the verdict."""
+    each = [f"{spoken(abs(s) * 1e3)} ms {'late' if s > 0.0 else 'early'} ({name})" for name, s in found]
+    if not each:
+        return ""
+    return (
+        " The simulation would meet these recordings, or come far nearer to them, if their clocks were off by far more "
+        f"than they are said to be: {', '.join(each)}. Check what started them; a `clock` of `{{zero: unknown}}` or "
+        "`{within: SECONDS}` in a sidecar allows for it."
+    )
+
+
+def _elsewhere(judge: Judge, r: int, *, fitted: Fitted) -> float | None:
+    """Time shift (s), however large, at which recording r meets a fit far better than where it stands; None if none.
+
+    Beside that it is met far worse: what rests long before and after is met by any clock in most of its samples.
+    """
+    e, made = judge.evidence[r], partial(judge.raw, r, fitted.candidates, fitted.x)
+    falls = not judge.effort.thrifty  # a drop is known at any time
+
+    def left(shift: float) -> float:
+        raw = made(float(shift))
+        return UNKNOWN if raw is None else _left(e, raw, float(shift), whole=falls)
+
+    about = _best(judge, r, made, partial(_left, e), np.arange(-FURTHEST, FURTHEST, min(e.shift_prior, ASIDE)))
+    shown = [at for at in first_shown(e) if abs(at) > ASIDE] if falls else []
+    starts = [*([] if about is None else [about]), *shown]
+    if not starts:
+        return None
+    there, least = min((_lowest(left, start, e.shift_prior) for start in starts), key=lambda found: found[1])
+    here = left(fitted.blocks[r].shift)
+    bound = max(min(MEETS, here / BEFORE), here / (FALLS_FAR if abs(there) > ASIDE else FALLS))
+    if least >= bound or min(left(there - ASIDE), left(there + ASIDE)) < SHARP * least:
+        return None
+    return there
+
+
+def _lowest(left: Callable[[float], float], start: float, width: float) -> tuple[float, float]:
+    """Time shift (s) beside a first one that leaves least, and what it leaves."""
+    from scipy.optimize import minimize_scalar
+
+    beside = start + width * np.arange(-6.0, 4.0)
+    about = beside[int(np.argmin([left(float(s)) for s in beside]))]
+    there = minimize_scalar(left, bounds=about + width * np.array([-1.0, 1.0]), method="bounded")
+    return float(there.x), float(there.fun)
+
+
+def _left(e: Evidence, raw: Array, shift: float, *, whole: bool = False) -> float:
+    """Power over the noise of what a run leaves that comes `shift` (s) late; `UNKNOWN` where most of it is.
+
+    `whole` says that a run is known at all stamps, however late.
+    """
+    signals, known = [], np.zeros(raw.size, dtype=bool)
+    for s, part in e.spans():
+        time = e.recording.time[s.rows]
+        known[part] = whole | ((time - shift >= time[0]) & (time - shift <= time[-1]))
+        signals.append(s if s.weight is None else replace(s, weight=np.interp(time - shift, time, s.weight)))
+    if known.mean() < MOST or not np.all(np.isfinite(raw[known])):
+        return UNKNOWN
+    moved = replace(e, signals=tuple(signals))
+    misfit = np.where(known, np.concatenate([s.values for s in signals]) - e.forgiven(raw, e.leaps(raw)), 0.0)
+    left = moved.whitened(misfit)[known]
+    return float(left @ left / np.sum(moved.due[known]))
+
+
+def _places(e: Evidence) -> Array:
+    """Time shifts (s) that a recording's may be."""
+    return np.asarray(WIDTH * e.shift_prior * np.linspace(-1.0, 1.0, PLACES))
+
+
+def _best(judge: Judge, r: int, made: Made, cost: Cost, shifts: Array) -> float | None:
+    """One run moved along the stamps tells where to look among `shifts` (s); the best places are then simulated."""
+    e = judge.evidence[r]
+    raw = made(0.0)
+    if raw is None:
+        return None
+    rough = []
+    for s in shifts:
+        moved = raw.copy()
+        for signal, part in e.spans():
+            time = e.recording.time[signal.rows]
+            moved[part] = np.interp(time - s, time, raw[part])
+        rough.append(cost(moved, float(s)))
+    near = shifts[int(np.argmin(rough))] + np.linspace(-2.0, 2.0, 5) * float(shifts[1] - shifts[0])
+    there = [made(float(s)) for s in near]
+    left = [np.inf if y is None else cost(y, float(s)) for s, y in zip(near, there, strict=True)]
+    return float(near[int(np.argmin(left))])
+
+
+def _whole(judge: Judge, r: int, raw: Array, shift: float) -> float:
+    """What is left of recording r by all its samples."""
+    e = judge.evidence[r]
+    return float(np.sum(e.eased(judge.measured[r] - e.whitened(raw)) ** 2)) + (shift / e.shift_prior) ** 2
+
+
+def onset(judge: Judge, r: int, raw: Array, shift: float) -> float:
+    """-2 ln of the likelihood that recording r falls until its contact, `shift` (s) late, and is something else then.
+
+    Before, what it misses is noise; thereafter it may be as large as what is predicted, and larger at times: a Cauchy
+    distribution of that width.
+    """
+    e = judge.evidence[r]
+    total = (shift / e.shift_prior) ** 2
+    for s, part in e.spans():
+        late = e.recording.time[s.rows] > e.simulator.contact + shift
+        z = (s.values - raw[part]) / s.sigma
+        wide = np.hypot(1.0, (raw[part] - raw[part][0]) / s.sigma)
+        each = np.where(late, 2.0 * np.log(wide) + 2.0 * np.log1p((z / wide) ** 2), z**2)
+        total += _worth(s) * float(np.sum(each))
+    return total
+
+
+def _falls(judge: Judge, r: int, raw: Array | None, shift: float) -> bool:
+    """Whether what recording r shows before its contact, `shift` (s) late, is a fall: it may have begun too late."""
+    e = judge.evidence[r]
+    if raw is None:
+        return False
+    z = [
+        ((s.values - raw[part]) / s.sigma)[e.recording.time[s.rows] <= e.simulator.contact + shift]
+        for s, part in e.spans()
+    ]
+    return bool(np.median(np.abs(np.concatenate([np.zeros(1), *z]))) < QUIET)
+
+
+def _worth(s: Signal) -> float:
+    """What a sample of a coloured noise is worth of one of a white one."""
+    return max(1.0 - sum(s.ar), 0.05) / (1.0 + max(sum(s.ar), 0.0))
+
+
+def _early(judge: Judge, r: int, raw: Array, shift: float) -> float:
+    """What is left of it by those up to shortly after the first contact, coloured ones for what they are worth."""
+    e = judge.evidence[r]
+    total = (shift / e.shift_prior) ** 2
+    for s, part in e.spans():
+        time = e.recording.time[s.rows] - shift - e.simulator.contact
+        after = time[time > 0.0][LEAST - 1 : LEAST]
+        inside = time < max([SOON, *after])  # a record may end before
+        sigma = np.hypot(s.sigma, TRUSTED * (raw[part] - raw[part][0]))
+        total += _worth(s) * float(np.sum((((s.values - raw[part]) / sigma)[inside]) ** 2))
+    return total

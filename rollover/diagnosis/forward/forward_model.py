@@ -1,0 +1,250 @@
+"""What the scenario predicts for a recording, at the recording's own stamps and behind its own filters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from functools import cached_property
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.forward.budget import DROPS, Effort
+from rollover.diagnosis.forward.discontinuities import LEAP_IN, about_jumps
+from rollover.diagnosis.forward.filtering import Rows, behind_filters, rows_of
+from rollover.diagnosis.forward.full_run import SENSORS, RunSimulator
+from rollover.dynamics.drop_test import BESIDE, DropFailedError, DropModel, Track, channels_of, unfit
+from rollover.effects import every, read
+from rollover.recording import Recording
+from rollover.scenario import Scenario
+from rollover.spec.document import exchanged
+from rollover.spec.initiation import Drop
+
+Array = NDArray[np.float64]
+T = TypeVar("T")
+EDGES = ("sensor-lag", "sensor-clock-offset", "sensor-clock-drift")
+# s: longest step of a drop, within 6e-5 of the range; and of one with abrupt effects, within 8e-4 where it rings
+STEP, SHORT = 2e-3, 1e-3
+SHORTEST = 2e-4  # s: with a force term of one's own, which may jump where nothing knows of it
+KEPT, TRACKS = 128, 16  # of one recording: what it is predicted to be, and falls that this is read from
+MARGIN = 0.02  # s, by which a fall is longer than it is asked for: clocks move on
+
+
+class Simulator(Protocol):
+    """One recording's test, ready to be run with values exchanged by path."""
+
+    def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
+        """Channels (n,) at the recording's stamps less `shift` (s); None if the simulation fails."""
+
+    def strays(
+        self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1
+    ) -> list[dict[str, Array]]:
+        """What runs with `changes` that nobody could tell apart differ by, (n,) at the stamps less `shift`, s.
+
+        Each step of theirs is one of at least `parts` of the scenario's.
+        """
+
+    def settle(self) -> None:
+        """Of runs that nobody could tell apart take the one that is the most like all."""
+
+    def until(self, n: int) -> Simulator:
+        """The same for the first n stamps."""
+
+    def marks(self) -> tuple[tuple[float, str], ...]:
+        """(start s, name) of the phases of the scenario as it is; empty if the recording itself tells."""
+
+    def state(self, shift: float) -> Mapping[str, Array]:
+        """Motion of the scenario as it is, recorded or not, (n,) each; empty if it cannot be simulated."""
+
+    @property
+    def contact(self) -> float:
+        """When a scenario as it is first touches the ground, s; infinite if it never does or none can tell."""
+
+    @property
+    def effort(self) -> Effort:
+        """How much may be simulated."""
+
+
+def blow_of(simulator: Simulator) -> float:
+    """When the scenario as it is first hits the ground with more than its wheels, s; infinite if it never does."""
+    return next((at for at, name in simulator.marks() if name == "impact"), np.inf)
+
+
+class DropSimulator:
+    """A drop test by its own integrator: two milliseconds a run."""
+
+    effort = DROPS
+
+    def __init__(self, scenario: Scenario, recording: Recording, *, leaps: bool = True) -> None:
+        self.model = DropModel(scenario=scenario)
+        self.recording = recording
+        self.leaps = leaps  # whether it says how far channels leap
+        self._raw: dict[tuple[Any, ...], dict[str, Array]] = {}
+        self._models: dict[tuple[Any, ...], DropModel] = {}
+        self._tracks: dict[tuple[Any, ...], Track] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What is sent to another process: not the runs."""
+        bare = DropModel(scenario=self.model.scenario)
+        stores: dict[str, Any] = {"_raw": {}, "_models": {}, "_tracks": {}}
+        return {"model": bare, "recording": self.recording, "leaps": self.leaps, **stores}
+
+    def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
+        """See `Simulator`; ``ValueError`` for a value out of bounds passes."""
+        physical = {path: value for path, value in changes.items() if not path.startswith(f"effects.{SENSORS}")}
+        read_by = self._model({path: value for path, value in changes.items() if path not in physical})
+        sensors = {name: e for name, e in read_by.scenario.effects.items() if name.startswith(SENSORS)}
+        try:
+            channels = self._run(physical, self.rows.times, shift)
+            if sensors:
+                channels = {**channels, **self._edges(physical, shift, sensors)}
+                run = Recording(title=self.recording.title, time=self.rows.times, channels=channels)
+                channels = dict(read({n: e for n, e in sensors.items() if e.id not in EDGES}, run).channels)
+        except DropFailedError:
+            return None
+        found = behind_filters(channels, self.recording, self.rows)
+        return found | self._leaps(physical, shift, sensors) if self.leaps else found
+
+    def strays(
+        self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1
+    ) -> list[dict[str, Array]]:
+        """See `Simulator`: one striker on its guide has no neighbours."""
+        del changes, shift, parts
+        return []
+
+    def settle(self) -> None:
+        """See `Simulator`."""
+
+    def until(self, n: int) -> DropSimulator:
+        """See `Simulator`."""
+        return DropSimulator(self.model.scenario, self.recording.until(n), leaps=self.leaps)
+
+    def marks(self) -> tuple[tuple[float, str], ...]:
+        """See `Simulator`."""
+        return ()
+
+    def state(self, shift: float) -> Mapping[str, Array]:
+        """See `Simulator`."""
+        try:
+            return self._model({}).motion(self.recording.time - shift)
+        except DropFailedError:
+            return {}
+
+    def _leaps(self, physical: Mapping[str, Any], shift: float, sensors: Mapping[str, Any]) -> dict[str, Array]:
+        """How far channels that nothing smooths leap about each stamp, under `LEAP_IN` and their names."""
+        time = self.recording.time
+        instants, rows = self._track(physical, float(time[-1] - shift) if time.size else 0.0).jumps
+        if not instants.size:
+            return {}
+        lags, *clocks = ({e.channel: e for e in every(sensors, name)} for name in EDGES)
+        made = channels_of(rows, self._sharp.difference(lags))
+        return {
+            LEAP_IN + name: about_jumps(_own(time, name, *clocks) - shift, instants, sizes)
+            for name, sizes in made.items()
+            if sizes.any()
+        }
+
+    def _edges(self, physical: Mapping[str, Any], shift: float, sensors: Mapping[str, Any]) -> dict[str, Array]:
+        """Channels behind a lag or with a clock of their own: what these make of a leap lies between the rows."""
+        lags, offsets, drifts = ({e.channel: e for e in every(sensors, name)} for name in EDGES)
+        found = {}
+        for channel in {*lags, *offsets, *drifts} & set(self.recording.channels):
+            own = _own(self.rows.times, channel, offsets, drifts)
+            key = channel, offsets.get(channel), drifts.get(channel)
+            if channel not in lags:
+                found[channel] = self._run(physical, own, shift, key)[channel]
+                continue
+            beside = self.contact + shift + np.array([-BESIDE, BESIDE])
+            fine = np.concatenate([own, 0.5 * (own[1:] + own[:-1]), beside[(beside > own[0]) & (beside < own[-1])]])
+            dense, where = np.unique(fine, return_inverse=True)
+            raw = {channel: self._run(physical, dense, shift, (*key, "dense"))[channel]}
+            late = lags[channel].read(Recording(title=self.recording.title, time=dense, channels=raw))
+            found[channel] = late[channel][where[: own.size]]
+        return found
+
+    @cached_property
+    def _sharp(self) -> frozenset[str]:
+        """Channels that nothing smooths."""
+        return frozenset(self.recording.channels).difference(self.recording.cfc)
+
+    @cached_property
+    def rows(self) -> Rows:
+        """Times at which the drop is made."""
+        return rows_of(self.recording)
+
+    @cached_property
+    def contact(self) -> float:
+        """See `Simulator`."""
+        start = self.model.scenario.initiation
+        if isinstance(start, Drop):
+            return 0.0
+        times = np.arange(0.0, self.model.scenario.simulation.duration, 1e-4)
+        below = self.model.motion(times)["ground/sinkage"] > 0.0
+        return float(times[np.argmax(below)]) if below.any() else np.inf
+
+    def _run(
+        self, physical: Mapping[str, Any], times: Array, shift: float, key: tuple[Any, ...] = ()
+    ) -> dict[str, Array]:
+        """The drop before instruments at `times` less `shift`, which `key` stands for beside it."""
+        values = (*sorted(physical.items()), *key, shift)
+        if values not in self._raw:
+            at = times - shift
+            rows = self._track(physical, float(at[-1]) if at.size else 0.0).rows(at)
+            self._keep(self._raw, values, channels_of(rows, self.recording.channels), KEPT)
+        return self._raw[values]
+
+    def _track(self, physical: Mapping[str, Any], until: float) -> Track:
+        """The fall with values exchanged, at least up to a time (s): neither a clock nor a sensor asks for another."""
+        key = tuple(sorted(physical.items()))
+        found = self._tracks.pop(key, None)
+        if found is None or found.until < until:
+            found = self._model(physical).track(until + MARGIN)
+        self._keep(self._tracks, key, found, TRACKS)
+        return found
+
+    def _model(self, changes: Mapping[str, Any]) -> DropModel:
+        """The drop with values exchanged, its steps as short as it asks for."""
+        key = tuple(sorted(changes.items()))
+        if key not in self._models:
+            own = exchanged(self.model.scenario, changes) if changes else self.model.scenario
+            has_own = own.ground.law.advance is not None  # states of its own are second order in the step
+            is_abrupt = has_own or any(effect.is_abrupt for effect in own.effects.values())
+            may_jump = any(effect.force_terms() and not effect.is_smooth for effect in own.effects.values())
+            step = SHORTEST if may_jump else SHORT if is_abrupt else STEP
+            self._keep(self._models, key, DropModel(scenario=own, step=step), KEPT)
+        return self._models[key]
+
+    @staticmethod
+    def _keep(store: dict[tuple[Any, ...], T], key: tuple[Any, ...], value: T, most: int) -> None:
+        """Put into a store of the last so many."""
+        if len(store) >= most:
+            store.pop(next(iter(store)))
+        store[key] = value
+
+
+def _own(time: Array, channel: str, offsets: Mapping[str, Any], drifts: Mapping[str, Any]) -> Array:
+    """Times (s) of a channel by its own clock."""
+    own = time - offsets[channel].offset if channel in offsets else time
+    return (1.0 - drifts[channel].drift) * own if channel in drifts else own
+
+
+def simulator_of(scenario: Scenario, recording: Recording, *, leaps: bool = True) -> Simulator:
+    """The quickest simulator that a scenario admits; the recording's conditions are put in by path.
+
+    `leaps` as in `DropSimulator`. Raises `InputError` for a condition that the scenario does not know.
+    """
+    own = set_up(scenario, recording)
+    return RunSimulator(own, recording) if unfit(own) else DropSimulator(own, recording, leaps=leaps)
+
+
+def set_up(scenario: Scenario, recording: Recording) -> Scenario:
+    """The scenario under a recording's conditions; what these leave as it is, is the same. Raises `InputError`."""
+    if not recording.conditions:
+        return scenario
+    found = scenario.replaced(dict(recording.conditions), origin=recording.title)
+    own = {f.name: (getattr(scenario, f.name), getattr(found, f.name)) for f in fields(found)}
+    return replace(found, **{name: old for name, (old, new) in own.items() if new == old})
+
+
+__all__ = ["DropSimulator", "RunSimulator", "Simulator", "blow_of", "set_up", "simulator_of"]

@@ -1,0 +1,1 @@
+"""What the residuals say: lack of fit, intervals, dependence, residual laws, faults of recordings."""

@@ -1,0 +1,237 @@
+"""Is there any mismatch at all, and where: smooth structure of the whitened residual against its own roughness.
+
+For a cell (recording, channel, phase) the residual w, its time shift and a slow basis of K cosines Q (orthonormal, the
+shift's slope taken out): F = (|Q'w|^2/K)/((|w|^2 - |Q'w|^2)/(n - K - 1)) has an F distribution if w is nothing but
+noise, whatever the noise's level. Cells are judged together by the sum of all, and each by Holm's step-down rule.
+
+Where runs scatter, samples are weighed (D3), and of S = |Q'w|^2 noise and scatter d alone leave
+
+    M = tr(Q'W^2 Q) + mean_k |Q'd_k|^2                                                                          (D14)
+
+d_k what neighbours differ by, each weighed by what the others scatter, as the recording is; the first term times what
+whitening leaves of slow noise (`colour.Rest`). Where another course is forgiven, both count after the blow for what
+they would in a recording that differs by d_k (D9). S/M then has nu = 2 M^2/var S degrees of freedom, var S from the
+noise, from noise and scatter together, and from how far the neighbours of a recording differ in all its cells at once;
+M is known as well as so few neighbours tell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.fit.linearisation import Block
+from rollover.diagnosis.noise.autoregression import Rest, hums, rests
+from rollover.diagnosis.noise.ensemble import FEW, SENT, is_other, shares, too_many, unseen
+from rollover.diagnosis.noise.outliers import too_often
+from rollover.diagnosis.noise.spectral_lines import basis as line
+
+Array = NDArray[np.float64]
+SURE = 1e-3  # p-value below which there is a mismatch
+LOUD = 4.0  # times the noise's power, above which what is rough is no noise
+MOST_WAVES = 12  # of the slow basis of a cell
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cell:
+    """One recording, channel and phase: rows of the stack, its p-value (alone), and its excess over the noise."""
+
+    recording: int
+    channel: str
+    phase: str
+    start: float
+    end: float
+    rows: NDArray[np.int64]
+    p_value: float
+    excess: float
+    structured: float
+    waves: int
+    rough: float
+    noise: tuple[float, float]  # what noise alone leaves of `structured`, and of `rough`
+    strayed: Array = field(default_factory=lambda: np.zeros((0, 2)))  # (k, 2): and each neighbour
+
+    @property
+    def expected(self) -> float:
+        """(D14); as many as there are waves where runs do not scatter."""
+        return self.noise[0] + (float(self.strayed[:, 0].mean()) if len(self.strayed) else 0.0)
+
+    @property
+    def rest(self) -> float:
+        """The same of what is rough."""
+        return self.noise[1] + (float(self.strayed[:, 1].mean()) if len(self.strayed) else 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mismatch:
+    """All cells, the p-value of "nothing but noise", and the familywise p-values of the cells.
+
+    `telling` are the cells that it is judged by: not those after a blow of a recording that took another course.
+    """
+
+    cells: tuple[Cell, ...]
+    telling: tuple[Cell, ...] = ()
+    p_value: float
+    adjusted: tuple[float, ...]
+
+    @property
+    def structure(self) -> float:
+        """Sum of squares of what is slow, beyond what chance leaves of it."""
+        return sum(c.structured - c.expected for c in self.cells)
+
+    def shares(self) -> list[tuple[Cell, float]]:
+        """Cells with their share of all excess, largest first; shares add up to 1 (or there are none)."""
+        total = sum(max(c.excess, 0.0) for c in self.cells)
+        if total <= 0.0:
+            return []
+        found = [(c, max(c.excess, 0.0) / total) for c in self.cells]
+        return sorted(found, key=lambda pair: -pair[1])
+
+
+def mismatch_of(
+    evidence: Sequence[Evidence], blocks: Sequence[Block], phases: Sequence[Sequence[tuple[float, str]]]
+) -> Mismatch:
+    """Judge the residuals at a fitted point; `phases` are (start, name) for each recording."""
+    cells: list[Cell] = []
+    strays = [unseen(e) for e in evidence]
+    worth = [_worth(e, block, apart) for e, block, apart in zip(evidence, blocks, strays, strict=True)]
+    humming, colours = hums(evidence, [b.valued for b in blocks]), rests(evidence)
+    for r, (e, block) in enumerate(zip(evidence, blocks, strict=True)):
+        for signal, part in e.spans():
+            time = e.recording.time[signal.rows]
+            for k, (start, name) in enumerate(phases[r]):
+                end = phases[r][k + 1][0] if k + 1 < len(phases[r]) else np.inf
+                inside = np.flatnonzero((time >= start) & (time < end))
+                if inside.size >= 4:
+                    rows = inside + part.start
+                    hum, rest, due = humming[signal.channel], colours[r][signal.channel], None
+                    if signal.weight is not None:
+                        due = Expected(signal.weight[inside], rest, strays[r][:, rows], worth[r][:, rows])
+                    cells.append(_cell(r, signal.channel, name, time[inside], rows, block, hum, due))
+    # after a blow a recording that took another course tells nothing by itself
+    other = [is_other(b.course) for b in blocks]
+    telling = [c for c in cells if not (other[c.recording] and c.start >= evidence[c.recording].blow)]
+    # within half a step of its digits a channel tells nothing, however alike neighbouring samples err
+    stepped = {(r, s.channel) for r, e in enumerate(evidence) for s in e.signals if s.step > 0.0}
+    telling = [c for c in telling if c.excess > 0.0 or (c.recording, c.channel) not in stepped]
+    by_channel: dict[str, list[Array]] = {}
+    for c in telling:
+        by_channel.setdefault(c.channel, []).append(blocks[c.recording].valued[c.rows])
+    p = min(_p_value(telling, len(blocks)), too_often(np.concatenate(w) for w in by_channel.values()))
+    sent = too_many(sum(other), len(other))
+    p = min(p, sent) if sent <= SENT else p  # one may, not all of them: whole numbers, and no p-value until they tell
+    return Mismatch(cells=tuple(cells), telling=tuple(telling), p_value=p, adjusted=_holm([c.p_value for c in cells]))
+
+
+class Expected(NamedTuple):
+    """What a cell's misfit is held against where samples are weighed: weights (n,), the noise's spectrum, neighbours.
+
+    By what these differ, whitened, (k, n), and what samples count with each, its root (k, n).
+    """
+
+    weight: Array
+    rest: Rest
+    strays: Array
+    worth: Array
+
+    def left(self, Q: Array, waves: int) -> tuple[tuple[float, float], Array]:
+        """What noise leaves in the columns of `Q` (n, m) and beside them, and what each neighbour adds, (k, 2)."""
+        slow, noise = float(np.sum((Q * self.weight[:, None]) ** 2)), float(self.weight @ self.weight)
+        shape = float(np.mean(self.rest.at(np.arange(waves) / (2.0 * self.weight.size))))
+        apart, fewer = self.worth * self.strays, (self.worth**2 - 1.0) * self.weight**2
+        along = np.sum((apart @ Q) ** 2, axis=1) + shape * fewer @ np.sum(Q**2, axis=1)
+        beside = np.sum(apart**2, axis=1) + np.sum(fewer, axis=1) - along
+        return (shape * slow, noise - shape * slow), np.stack([along, beside], axis=1)
+
+
+def _worth(e: Evidence, block: Block, strays: Array) -> Array:
+    """(k, n): roots of what samples count where a recording goes as one of the `strays` does."""
+    if not block.forgiven:
+        return np.ones(strays.shape)
+    return np.where(e.early, 1.0, np.sqrt(shares(e, strays))[:, None])
+
+
+def _p_value(cells: Sequence[Cell], clocks: int) -> float:
+    """p-value of what is slow in several cells together, beside as many `clocks` that were fitted."""
+    from scipy.special import fdtrc
+
+    structured = sum(c.structured for c in cells)
+    waves = sum(c.waves for c in cells)
+    rough = sum(c.rough for c in cells)
+    count = sum(c.rows.size for c in cells) - waves - clocks
+    if not waves or count <= 0:
+        return 1.0
+    if all(c.noise[0] == c.waves for c in cells):
+        # noise may be underrated, but not by so much: what is rough and far beyond it is no noise either
+        return float(fdtrc(waves, count, (structured / waves) / min(max(rough / count, 1e-300), LOUD)))
+    expected = sum(c.expected for c in cells)
+    variance = sum(2.0 * c.noise[0] * (1.0 + 2.0 * (c.expected - c.noise[0]) / c.waves) for c in cells)
+    unsure = 2.0 * expected**2 / count
+    for r in {c.recording for c in cells}:
+        each = [c.strayed[:, 0] for c in cells if c.recording == r and len(c.strayed)]
+        apart = np.sum(each, axis=0) if each else np.zeros(1)
+        if apart.size > 1:
+            scatter = FEW * float(np.var(apart, ddof=1))
+            variance += scatter
+            unsure += scatter / apart.size  # a mean is known as well as so many tell
+    level = min(max(rough / max(sum(c.rest for c in cells), 1e-300), 1.0), LOUD)
+    known = 2.0 * expected**2 / unsure
+    return float(fdtrc(2.0 * expected**2 / variance, known, structured / expected / level))
+
+
+def _cell(
+    r: int,
+    channel: str,
+    phase: str,
+    time: Array,
+    rows: NDArray[np.int64],
+    block: Block,
+    humming: tuple[float, ...],
+    due: Expected | None,
+) -> Cell:
+    from scipy.special import fdtrc
+
+    w, s = block.valued[rows], block.slope[rows]
+    n = rows.size
+    waves = int(min(MOST_WAVES, max(1, n // 6)))
+    phase_of = (np.arange(n) + 0.5) / n
+    basis = np.cos(np.pi * phase_of[:, None] * np.arange(waves))
+    heard = tuple(f for f in humming if f * (time[-1] - time[0]) > 1.0 and n > waves + 4 * len(humming))
+    if heard:
+        basis = np.hstack([basis, line(time, heard)])
+        waves += 2 * len(heard)
+    taken = s[:, None] / np.sqrt(block.weight)
+    # what the recording's own time shift explains is no structure
+    basis = basis - taken @ (taken.T @ basis)
+    Q, _ = np.linalg.qr(basis)
+    inside = Q.T @ w
+    structured, rough = float(inside @ inside), float(w @ w - inside @ inside)
+    free = max(n - waves - 1, 1)
+    found = Cell(
+        recording=r, channel=channel, phase=phase, start=float(time[0]), end=float(time[-1]), rows=rows, p_value=1.0,
+        excess=float(w @ w) - n, structured=structured, waves=waves, rough=max(rough, 0.0),
+        noise=(float(waves), float(n - waves)),
+    )  # fmt: skip
+    if due is not None:
+        noise, strayed = due.left(Q, waves)
+        found = replace(found, noise=noise, strayed=strayed)
+        excess = float(w @ w) - found.expected - found.rest
+        return replace(found, excess=excess, p_value=_p_value([found], 1))
+    if n <= waves + 1:
+        return found
+    return replace(found, p_value=float(fdtrc(waves, free, (structured / waves) / max(rough / free, 1e-300))))
+
+
+def _holm(p: Sequence[float]) -> tuple[float, ...]:
+    """Holm's adjusted p-values."""
+    order = np.argsort(p)
+    adjusted = np.ones(len(p))
+    worst = 0.0
+    for rank, k in enumerate(order):
+        worst = max(worst, min(1.0, (len(p) - rank) * p[k]))
+        adjusted[k] = worst
+    return tuple(float(v) for v in adjusted)

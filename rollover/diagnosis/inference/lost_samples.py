@@ -1,0 +1,49 @@
+"""Samples that were lost, as of a contact that opens: recordings show them by themselves, no candidate makes up for it.
+
+Where the signal is small they hide in the noise, and where runs scatter they count for little. But a channel that has
+noise is not nothing to the last digit again and again, and behind its filter none leaps from one sample to the next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from rollover.diagnosis.data.phases import placed
+from rollover.diagnosis.result import Place
+from rollover.recording import Recording
+from rollover.recording.checks.finding import trace
+from rollover.recording.checks.leaps import leaping
+from rollover.recording.checks.samples import stuck
+
+AGAIN = 2  # places of one channel, at least
+
+
+def lost(
+    names: Sequence[str], recordings: Sequence[Recording], phases: Sequence[Sequence[tuple[float, str]]]
+) -> tuple[Place, ...]:
+    """Where channels break off: read exactly nothing for several samples, or leap as their filters let none, again."""
+    found: dict[str, list[tuple[int, float, float]]] = {}
+    for r, recording in enumerate(recordings):
+        for channel in recording.channels:
+            found.setdefault(channel, []).extend((r, *where) for where in _breaks(recording, channel))
+    often = {channel: breaks for channel, breaks in found.items() if len(breaks) >= AGAIN}
+    return placed(names, phases, ((c, *where, "time") for c, breaks in often.items() for where in breaks))
+
+
+def _breaks(recording: Recording, channel: str) -> Iterator[tuple[float, float]]:
+    """(start, end), s, of each run of exact zeros, and of each leap."""
+    told = trace(recording, channel)
+    if told is None:
+        return
+    yield from ((f.start, f.end) for f in stuck(told, "") if f.value == 0.0)
+    yield from ((float(told.time[k - 1]), float(told.time[k])) for k in leaping(told, recording.cfc.get(channel)))
+
+
+def by_loss(places: Sequence[Place]) -> str:
+    """The sentence on what recordings lost."""
+    channels = dict.fromkeys(p.channel for p in places)
+    said = " and ".join(f"{c} breaks off in {sum(p.channel == c for p in places)} places" for c in channels)
+    return (
+        f"{said}: it reads exactly 0, or leaps as its filter lets no signal. A contact opens, or samples were lost, "
+        "which no candidate explains."
+    )

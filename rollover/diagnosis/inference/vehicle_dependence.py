@@ -1,0 +1,126 @@
+"""What the misfit of a vehicle's motion depends on: one channel, regressed on one quantity of the motion after another.
+
+What is missing moves all that comes after it, and after a blow chance does: so it is the whitened misfit w of the
+chassis' channel that misses most that is explained, samples for what they count in the fit, by a function of a quantity
+q common to all recordings, piecewise linear. Of a rate of turn also what has grown with it, integral f(q) dt: a moment
+that acts. A quantity's share is what its function, fitted to all other conditions, takes from the excess of w'w over
+the noise where that condition is left out; a second one has what it adds to the first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.inference.bases import TIME, hats
+from rollover.diagnosis.inference.chassis import ABOUT, ALONG
+
+Array = NDArray[np.float64]
+STATE = ("chassis/roll", "chassis/pitch", "chassis/velocity_y", "chassis/velocity_z", "chassis/angular_velocity_x")
+FURTHER = ("ground/sinkage", "axle/front/angle")  # where there is ground to sink into, and an axle
+KNOTS = 7
+MOST = 2  # quantities
+WORTH = 0.05  # of the excess, that a second one must add
+
+
+@dataclass(frozen=True, kw_only=True)
+class Seen:
+    """One recording of a channel: whitened misfit (n,), quantities (n,) by name, its condition, what noise leaves."""
+
+    recording: int
+    condition: str
+    part: slice
+    misfit: Array
+    of: dict[str, Array]
+    noise: float
+
+
+def dependency(judge: Judge, base: Fitted) -> tuple[tuple[str, float], ...]:
+    """Quantities with their shares, which add up to at most 1, the first the one that predicts most; () if none does.
+
+    Empty where no instrument sits at the chassis' centre of mass, or where it misses by no more than noise does.
+    """
+    channels = [f"{stem}{axis}" for stem in (ALONG, ABOUT) for axis in "xyz"]
+    every = {channel: _seen(judge, base, channel) for channel in channels}
+    excess = {c: sum(float(s.misfit @ s.misfit) - s.noise for s in seen) for c, seen in every.items() if seen}
+    most = max(excess, key=lambda c: excess[c], default=None)
+    if most is None or excess[most] <= 0.0:
+        return ()
+    seen = every[most]
+    models = [(name, _columns(judge, base, seen, name, grown)) for name, grown in _ways(seen, most.startswith(ABOUT))]
+    held: list[Array] | None = None
+    shares: list[tuple[str, float]] = []
+    for _ in range(MOST):
+        before = sum(share for _, share in shares)
+        taken = [name for name, _ in shares]
+        tried = []
+        for name, columns in models:
+            if name not in taken:
+                both = columns if held is None else [np.hstack(pair) for pair in zip(held, columns, strict=True)]
+                tried.append((min(_predicted(seen, both) / excess[most], 1.0) - before, name, both))
+        added, name, columns = max(tried, key=lambda one: one[0])
+        if added <= (WORTH if shares else 0.0):
+            break
+        shares.append((name, added))
+        held = columns
+    return tuple(shares)
+
+
+def _seen(judge: Judge, base: Fitted, channel: str) -> list[Seen]:
+    """A channel in the recordings that have it at the chassis' centre of mass."""
+    found = []
+    for r, (e, block) in enumerate(zip(judge.evidence, base.blocks, strict=True)):
+        if channel in e.recording.sensors:
+            continue
+        for s, part in e.spans():
+            if s.channel == channel and (state := e.simulator.state(block.shift)):
+                counts = np.ones(s.rows.size) if s.weight is None else s.weight
+                counts = counts if block.course is None else counts * block.course.samples[part]
+                of = {TIME: e.recording.time[s.rows]}
+                of |= {c: state[c][s.rows] for c in (*STATE, *FURTHER) if c in state}
+                found.append(
+                    Seen(
+                        recording=r, condition=e.condition or e.name, part=part, misfit=block.residual[part], of=of,
+                        noise=float(counts @ counts),
+                    )
+                )  # fmt: skip
+    return found
+
+
+def _ways(seen: Sequence[Seen], turns: bool) -> list[tuple[str, bool]]:
+    """Quantities that all recordings have, as they are and, of what `turns`, as what grows with them."""
+    shared = [name for name in seen[0].of if all(name in s.of for s in seen)]
+    return [(name, grown) for name in shared for grown in ((False, True) if turns else (False,))]
+
+
+def _columns(judge: Judge, base: Fitted, seen: Sequence[Seen], name: str, grown: bool) -> list[Array]:
+    """What functions of a quantity do to the whitened channel, (n, k) each."""
+    knots = np.unique(np.quantile(np.concatenate([s.of[name] for s in seen]), np.linspace(0.0, 1.0, KNOTS)))
+    found = []
+    for s in seen:
+        basis, e = hats(s.of[name], knots), judge.evidence[s.recording]
+        if grown:
+            basis = np.cumsum(basis, axis=0) * float(np.median(np.diff(s.of[TIME])))
+        raw = np.zeros((e.count, basis.shape[1]))
+        raw[s.part] = basis
+        found.append(base.blocks[s.recording].counted(e.whitened(raw))[s.part])
+    return found
+
+
+def _predicted(seen: Sequence[Seen], columns: Sequence[Array]) -> float:
+    """What functions fitted to all other conditions take from the squares of each that is left out, summed."""
+    less = 0.0
+    for left in sorted({s.condition for s in seen}):
+        out = [k for k, s in enumerate(seen) if s.condition == left]
+        rest = [k for k in range(len(seen)) if k not in out] or out
+        weights = np.linalg.lstsq(
+            np.vstack([columns[k] for k in rest]), np.concatenate([seen[k].misfit for k in rest]), rcond=1e-8
+        )[0]
+        for k in out:
+            miss = seen[k].misfit - columns[k] @ weights
+            less += float(seen[k].misfit @ seen[k].misfit) - float(miss @ miss)
+    return less

@@ -1,0 +1,126 @@
+"""A drop that was not made at the speed that its sidecar states: it contradicts the others.
+
+With the speed v that is stated, and a how many times what is simulated the ground gives way (`slips`),
+
+    ln a = b0 + b1 ln v + d        b0, b1 by the other recordings        (M1)
+
+What all recordings lack, or read too large, lies on that line. One that is off it was dropped faster or more slowly
+than it states, or met what the others do not. In the first case another speed is all that it takes: each drop
+is met best at some speed, what is missing makes of these a line as well, and at its own it misses the simulation by
+little more than the others do at theirs. Which is wrong, the drop or what is stated, nobody can tell: such a
+recording is left aside, which is said.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rollover.diagnosis.data.dataset import Evidence, Signal
+from rollover.diagnosis.data.inconsistent import Aside, factor_of
+from rollover.diagnosis.fit.time_shift import WIDTH
+from rollover.effects import spoken
+
+SPEED, DEPTH = "initiation.speed", "ground/sinkage"
+FEWEST = 4  # recordings: three on a line, and the one beside it
+LEAST, SURE = 0.15, 5.0  # of d, at least, and over its error
+STEADY = 0.015  # of the error of ln a, at least
+OTHER, FURTHEST = 0.1, 0.8  # of its logarithm, that the speed is another, at least and at most
+ALIKE, FALLS = 4.0, 4.0  # times the power that the others miss, at most, and less than at the stated speed, at least
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Misstated(Aside):
+    """A recording that was made at another `speed` (m/s) than it states, as its sinkage, `signal`, shows first."""
+
+    speed: float
+
+    summary = "What is stated of a recording is not what was tested."
+
+    def says(self) -> str:
+        """The sentence on it."""
+        stated = spoken(_speed(self.evidence))
+        return (
+            f"{self.evidence.name}: beside the others it is a drop at about {self.speed:.2g} m/s, not at the stated "
+            f"{stated} m/s; it was left aside."
+        )
+
+
+def misstated(every: Sequence[Evidence]) -> list[Misstated]:
+    """The one recording, if any, that contradicts the speed that it states and all others."""
+    known = [e for e in every if _speed(e) > 0.0 and np.isfinite(e.simulator.contact)]
+    if not FEWEST <= len(known) == len(every):
+        return []
+    told = [(e, s, a) for e in known for s in e.signals if s.channel == DEPTH and (a := _factor(e, s)) > 0.0]
+    if len(told) < FEWEST:
+        return []
+    x, y = np.log([_speed(e) for e, *_ in told]), np.log([a for *_, a in told])
+    off = [_off(r, x, y) for r in range(x.size)]
+    r = int(np.argmax([abs(d) / error for d, error in off]))
+    d, error = off[r]
+    if abs(d) < max(LEAST, SURE * error):
+        return []
+    e, signal, _ = told[r]
+    best = [_dropped(other) for other, *_ in told]
+    more, _ = _off(r, x, np.array([log_ for log_, _ in best]))
+    _, left = best[r]
+    stated = _missed(e, _speed(e))
+    alike = left < ALIKE * max(power for k, (_, power) in enumerate(best) if k != r)
+    if more * d < 0.0 or abs(more) < OTHER or not alike or left > stated / FALLS:
+        return []
+    return [Misstated(evidence=e, signal=signal, speed=_speed(e) * math.exp(more))]
+
+
+def _dropped(e: Evidence) -> tuple[float, float]:
+    """Logarithm of the speed, over the stated one, at which a recording is met best, and what is left there."""
+    from scipy.optimize import minimize_scalar
+
+    def left(log_: float) -> float:
+        return _missed(e, _speed(e) * math.exp(log_))
+
+    about = min(np.linspace(-FURTHEST, FURTHEST, 9), key=left)
+    beside = about + FURTHEST / 4.0 * np.array([-1.0, 1.0])
+    found = minimize_scalar(left, bounds=beside, method="bounded", options={"xatol": 3e-3})
+    return float(found.x), float(found.fun)
+
+
+def _missed(e: Evidence, speed: float) -> float:
+    """Power over the noise that a recording misses the simulation at a speed (m/s) by, at its best time shift."""
+    from scipy.optimize import minimize_scalar
+
+    def left(shift: float) -> float:
+        made = e.simulator.predict({SPEED: speed}, float(shift))
+        if made is None:
+            return math.inf
+        misfit = np.concatenate([s.values - made[s.channel][s.rows] for s in e.signals])
+        return float(np.mean(e.whitened(misfit) ** 2)) + (shift / e.shift_prior) ** 2 / misfit.size
+
+    wide = WIDTH * e.shift_prior
+    return float(minimize_scalar(left, bounds=(-wide, wide), method="bounded", options={"maxiter": 12}).fun)
+
+
+def _off(r: int, x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """d of (M1) of recording r, and its standard error by how far the others lie off their line."""
+    rest = np.arange(x.size) != r
+    if np.ptp(x[rest]) == 0.0:
+        return 0.0, math.inf
+    A = np.column_stack([np.ones(x.size), x])
+    line, *_ = np.linalg.lstsq(A[rest], y[rest], rcond=None)
+    left = y[rest] - A[rest] @ line
+    scatter = max(STEADY, math.sqrt(float(left @ left) / (left.size - 2)))
+    wide = float(A[r] @ np.linalg.solve(A[rest].T @ A[rest], A[r]))
+    return float(y[r] - A[r] @ line), scatter * math.sqrt(1.0 + wide)
+
+
+def _factor(e: Evidence, s: Signal) -> float:
+    """How many times what is simulated a signal reads; 0 where the two are not alike."""
+    made = (e.simulator.predict({}, 0.0) or {}).get(s.channel)
+    return 0.0 if made is None else factor_of(e, s, made) or 0.0
+
+
+def _speed(e: Evidence) -> float:
+    stated = e.recording.conditions.get(SPEED)
+    return float(stated) if isinstance(stated, (int, float)) else 0.0

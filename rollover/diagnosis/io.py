@@ -1,0 +1,130 @@
+"""A diagnosis as its files: diagnosis.json, and the scenario with what was found switched on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from rollover.assessment.results import plain, versions
+from rollover.diagnosis.fit.jobs import Crew
+from rollover.diagnosis.pipeline import diagnose
+from rollover.diagnosis.result import Diagnosis, Interval, Law, Named, Place, Score
+from rollover.effects import nth
+from rollover.recording import Recording
+from rollover.recording.importers import read_named
+from rollover.scenario import Scenario, load
+from rollover.spec.document import dump
+
+FORMAT = "rollover-diagnosis/1"
+JSON, SCENARIO, PAGE, PICTURE = "diagnosis.json", "scenario-diagnosed.yaml", "report.html", "diagnosis.rrd"
+FILES = (JSON, SCENARIO, PAGE, PICTURE)
+
+
+def account(
+    found: Diagnosis, about: Mapping[str, Any] | None = None, prechecks: Sequence[Mapping[str, Any]] = ()
+) -> dict[str, Any]:
+    """What diagnosis.json says, bare JSON values; `about` names what was asked, `prechecks` what sensors gave away."""
+    depends = dict.fromkeys(("depends_on",), found.depends_on)
+    answer: dict[str, Any] = plain(
+        {
+            "format": FORMAT,
+            **(about or {}),
+            "verdict": found.verdict,
+            "sentence": found.sentence,
+            "remaining": {
+                "significant": found.remaining_significant,
+                "p_value": found.remaining_p_value,
+                "where": [asdict(p) for p in found.remaining_where],
+                **(depends if found.remaining_significant and not found.effects else {"depends_on": None}),
+            },
+            "smallest_detectable": {k: v for k, v in found.smallest_detectable.items() if isfinite(v)},
+            "significance": {"p_value": found.p_value, "noise": dict(found.noise)},
+            "where": [_place(p) for p in found.where],
+            "depends_on": found.depends_on,
+            "dependencies": [{"on": name, "share": share} for name, share in found.dependencies],
+            "degrees_of_freedom": [asdict(d) for d in found.degrees],
+            "effects": [_effect(e) for e in found.effects],
+            "fit": {
+                "training": _fit(found, "training", found.training),
+                "held_out": _fit(found, "held_out", found.held_out),
+                "recordings": [{"name": n, "before": a, "after": b} for n, a, b in found.per_recording],
+            },
+            **({} if found.empirical is None else {"empirical": _law(found.empirical)}),
+            "candidates": [asdict(c) for c in found.candidates],
+            "simulations": found.simulations,
+            "seconds": found.seconds,
+            "prechecks": list(prechecks),
+            "clocks": {name: zero.answer for name, zero in found.clocks.items()},
+            "notes": list(found.notes),
+            "versions": versions(),
+        }
+    )
+    return answer
+
+
+def _place(place: Place) -> dict[str, Any]:
+    return asdict(place)
+
+
+def _effect(effect: Named) -> dict[str, Any]:
+    return {
+        "id": effect.id,
+        "kind": effect.kind,
+        **({} if effect.channel is None else {"channel": effect.channel}),
+        "statement": effect.statement,
+        "parameters": {name: _interval(i) for name, i in effect.parameters.items()},
+        "p_value": effect.p_value,
+        "indistinguishable_from": list(effect.indistinguishable_from),
+        "discriminating_test": effect.discriminating_test,
+    }
+
+
+def _interval(interval: Interval) -> dict[str, Any]:
+    return {k: v for k, v in asdict(interval).items() if v is not None}
+
+
+def _law(law: Law) -> dict[str, Any]:
+    return {
+        "law": law.law,
+        "terms": [{"term": t.term, "depends_on": t.depends_on, "coefficient": _interval(t.force)} for t in law.terms],
+        "held_out_gain": law.held_out_gain,
+        "standard_error": law.standard_error,
+        "held_out": {"before": {"nrmse": law.before}, "after": {"nrmse": law.after}},
+        "settings": dict(law.settings),
+    }
+
+
+def _fit(found: Diagnosis, which: str, names: tuple[str, ...]) -> dict[str, Any]:
+    def score(scores: Mapping[str, Score]) -> dict[str, Any]:
+        return asdict(scores[which]) if which in scores else {}
+
+    return {"recordings": list(names), "before": score(found.before), "after": score(found.after)}
+
+
+def diagnosed_scenario(scenario: Scenario, found: Diagnosis) -> Scenario:
+    """The scenario with the found effects, or the law found by regression, switched on and fitted."""
+    ids = [e.id for e in found.effects]
+    changes = {f"effects.{nth(e.id, 1 + ids[:k].count(e.id))}": dict(e.settings) for k, e in enumerate(found.effects)}
+    if found.empirical is not None:
+        changes["effects.empirical"] = dict(found.empirical.settings)
+    return scenario.replaced(changes, origin="diagnosis") if changes else scenario
+
+
+def diagnosed_text(scenario: Scenario, found: Diagnosis) -> str:
+    """scenario-diagnosed.yaml: `rollover run` accepts it."""
+    return dump(diagnosed_scenario(scenario, found), f"{scenario.title}\nDiagnosed: {found.sentence}")
+
+
+def recordings_in(folder: Path) -> list[tuple[str, Recording]]:
+    """Name and recording of each table in a folder, by name. Raises `InputError`."""
+    return [(name, recording) for name, (_, recording) in read_named([folder]).items()]
+
+
+def diagnose_folder(folder: Path, out: Path | None = None, workers: int = 1) -> dict[str, Any]:
+    """Diagnose a folder that holds scenario.yaml and its recordings; returns what diagnosis.json says."""
+    del out
+    with Crew(workers) as crew:
+        return account(diagnose(load(folder / "scenario.yaml"), recordings_in(folder), crew=crew))

@@ -1,0 +1,1 @@
+"""Noise of the recordings: autocorrelation, drift, lines, outliers, offsets, scatter of ensembles."""

@@ -1,0 +1,347 @@
+"""Level and colour of the noise of each channel, from all recordings of one recorder together.
+
+Recordings at the same rate, behind the same filter class, share a channel's noise; each alone is too short to tell a
+long memory. First from the quiet stretches; where an explanation leaves little more than that, from all it leaves.
+Neither takes a line in the spectrum for noise, nor a misfit that is much slower than what is quiet: both are something.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.data.dataset import Evidence, Signal, by_differences
+from rollover.diagnosis.forward.forward_model import blow_of
+from rollover.diagnosis.noise.drift import is_recorders
+from rollover.diagnosis.noise.outliers import LOUDER, without_bursts
+from rollover.diagnosis.noise.spectral_lines import lines, without
+from rollover.recording.filters import attenuation, least_rate
+from rollover.recording.noise_floor import LENGTH, NoiseFloor, grown, noise_floor
+
+Array = NDArray[np.float64]
+Member = tuple[int, int, Signal, slice]  # a recording, the place of a signal of it, that, and its part of the stack
+Told = tuple[int, int, Signal, float, tuple[float, ...]]  # the same with a noise and its memory
+Memory = Callable[[Sequence[Array]], tuple[float, tuple[float, ...]]]
+ALIKE = 0.05  # of the logarithm of the rate: recordings so close were taken alike
+CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is believed
+OWN = 1.5  # times the common noise: beyond, a recording has its own
+UNLIKE = 4.0  # standard errors by which levels differ that are not one recorder's
+SURELY = 4  # quiet windows from which on that is believed
+ENOUGH = 2 * SURELY * LENGTH  # samples that have as many
+UNSURE_LEVEL, BY_CHANCE = 1.6, 1e-4  # standard error of ln sigma by sqrt(n); p-value of levels that are not alike
+LONGEST = 8  # samples of memory
+AKAIKE = 2.0  # what a coefficient costs by Akaike: octaves far off say little each, and count
+OCTAVES = (1, 2, 4, 8, 16, 32, 64)  # samples that the memory of a noise of 1/f reaches back
+NOT_COLOURED = 0.7  # of the whole error that is noise: below, the model's own error prevails, which is no process
+RINGING = 0.9  # largest complex root
+SLOWER = 0.4  # of the logarithm of the slow noise's level, by which a misfit may exceed what is quiet
+CHANCE = 4.0  # standard errors that come to that
+LONG = 0.7  # memory that windows of 48 samples tell too short: by this
+UNSURE = 0.8  # of what a misfit may exceed it by, for each sample of such a memory
+STEADY = 0.995  # largest root of a memory
+AGREES = 2.0  # standard errors within which a memory is that of a filter
+BANDS = 2048  # frequencies that the noise behind a filter is summed over
+
+
+def quiet(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evidence]:
+    """The evidence with its noise from the quiet stretches of the misfits (SI, stacked), recordings alike together."""
+    found = [list(e.signals) for e in evidence]
+    humming = hums(evidence, residuals)
+    for members in alike(evidence):
+        misfits, values = [], []
+        for r, _, s, part in members:
+            told = _before_the_blow(evidence[r], s)
+            without_hum = _cleaned(evidence[r], s, residuals[r][part], humming)
+            misfits.append((without_hum / s.loudness)[told])
+            values.append(((s.values - residuals[r][part] + without_hum) / s.loudness)[told])
+        sizes = unlike(misfits, values)
+        misfits, values = ([v / size for v, size in zip(each, sizes, strict=True)] for each in (misfits, values))
+        common = _quieter(misfits, values)
+        if common is None:
+            continue  # too short: what each says by itself stands
+        for (r, k, s, _), misfit, value, size in zip(members, misfits, values, sizes, strict=True):
+            own = _quieter([misfit], [value])
+            loud = own is not None and own.windows >= SURELY and own.sigma > OWN * common.sigma
+            best = own if own is not None and loud else common
+            found[r][k] = replace(s, noise=best.sigma * size, ar=best.ar)
+    found = [
+        [replace(with_noise(s, s.noise, s.ar, e.model_error), at_rest=(s.noise, s.ar)) for s in f]
+        for e, f in zip(evidence, found, strict=True)
+    ]
+    return [replace(e, signals=tuple(s)) for e, s in zip(evidence, found, strict=True)]
+
+
+def unlike(misfits: Sequence[Array], values: Sequence[Array]) -> Array:
+    """How many times as loud each of several short recordings is as they are on the whole, (n,); 1 if chance makes it.
+
+    An amplifier may have been set for each test. What has many windows tells its own noise by these; by second
+    differences few samples tell it too, ln sigma to 1.6/sqrt(n), and hardly anything else that is in a channel.
+    """
+    from scipy.special import chdtrc
+
+    even = np.ones(len(misfits))
+    if max((v.size for v in misfits), default=0) < LENGTH or all(v.size >= ENOUGH for v in misfits):
+        return even
+    levels = np.array([min(map(by_differences, both)) for both in zip(misfits, values, strict=True)])
+    if len(misfits) == 1 or levels.min() <= 0.0:
+        return even
+    worth = np.array([v.size for v in misfits]) / UNSURE_LEVEL**2
+    apart = np.log(levels) - np.average(np.log(levels), weights=worth)
+    return np.exp(apart) if chdtrc(len(misfits) - 1, float(worth @ apart**2)) < BY_CHANCE else even
+
+
+def _before_the_blow(e: Evidence, s: Signal) -> slice:
+    """Samples that tell a noise: after a blow what chance makes of a run is quiet nowhere; all if these are too few."""
+    n = int(np.searchsorted(e.recording.time[s.rows], blow_of(e.simulator)))
+    return slice(n if n >= LENGTH else None)
+
+
+def whole(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evidence]:
+    """The evidence with its noise from all of the misfits: an autoregression by least squares, recordings together."""
+    found = [list(e.signals) for e in evidence]
+    humming = hums(evidence, residuals)
+    shared: list[tuple[list[Member], list[Array]]] = []
+    for members in alike(evidence):
+        members = [m for m in members if not evidence[m[0]].is_rough(m[2])]
+        parts = [_cleaned(evidence[r], s, residuals[r][part], humming) / s.loudness for r, _, s, part in members]
+        # what comes now and then is no noise
+        if members and not any(is_bursting(m[2], part, _level(part)) for m, part in zip(members, parts, strict=True)):
+            shared.append((members, parts))
+    told = [one for both in shared for one in _told(*both, autoregression)]
+    slow = slower(told)
+    misfits: dict[str, list[tuple[Evidence, Signal, Array]]] = {}
+    for members, parts in shared:
+        each = ((evidence[r], s, p) for (r, _, s, _), p in zip(members, parts, strict=True))
+        misfits.setdefault(members[0][2].channel, []).extend(each)
+    far = {channel for channel, every in misfits.items() if is_recorders(every)}
+    if slow <= far:
+        told = [one for one in told if one[2].channel not in far]
+        told += [one for both in shared if both[0][0][2].channel in far for one in _told(*both, long_memory)]
+        slow = set()
+    for r, k, s, sigma, ar in told:
+        if s.channel not in slow:
+            found[r][k] = with_noise(s, sigma, ar, evidence[r].model_error)
+    return [replace(e, signals=tuple(s)) for e, s in zip(evidence, found, strict=True)]
+
+
+def _told(members: Sequence[Member], parts: Sequence[Array], memory: Memory) -> list[Told]:
+    """Noise of recordings alike by what each leaves: one colour of all, and one level unless they clearly differ."""
+    levels = np.array([_level(p) for p in parts])
+    _, ar = memory([p / level for p, level in zip(parts, levels, strict=True)])
+    # of one recorder unless they differ by more than so few samples can, each worth less for its memory
+    worth = np.array([p.size for p in parts]) * max(1.0 - sum(ar), 0.02) / (1.0 + max(sum(ar), 0.0))
+    common = float(np.sqrt(np.sum(levels**2 * worth) / worth.sum()))
+    if not np.any(np.abs(np.log(levels / common)) > UNLIKE / np.sqrt(2.0 * worth)):
+        levels = np.full(levels.size, common)  # a level of each by itself would make the memory too short
+    sigma, ar = memory([p / level for p, level in zip(parts, levels, strict=True)])
+    # where samples are weighed what is left is the model's error as well
+    each = zip(members, levels, strict=True)
+    return [(r, k, s, sigma * float(level), ar) for (r, k, s, _), level in each if s.weight is None]
+
+
+def _level(misfit: Array) -> float:
+    return max(float(np.sqrt(np.mean(misfit**2))), 1e-300)
+
+
+def hums(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> dict[str, tuple[float, ...]]:
+    """Lines (Hz) in the misfits of each channel."""
+    found: dict[str, tuple[list[Array], list[Array]]] = {}
+    for e, residual in zip(evidence, residuals, strict=True):
+        for s, part in e.spans():
+            times, misfits = found.setdefault(s.channel, ([], []))
+            times.append(e.recording.time[s.rows])
+            misfits.append(residual[part])
+    return {channel: lines(*both) for channel, both in found.items()}
+
+
+def _cleaned(e: Evidence, s: Signal, misfit: Array, humming: Mapping[str, tuple[float, ...]]) -> Array:
+    """A misfit without the lines of its channel."""
+    return without(e.recording.time[s.rows], misfit, humming[s.channel])
+
+
+def slower(told: Sequence[Told]) -> set[str]:
+    """Channels whose misfits are so much slower than their quiet stretches that they are no noise."""
+    by: dict[str, list[tuple[float, float, int]]] = {}
+    for _, _, s, sigma, ar in told:
+        noise, own = s.quiet
+        if noise > 0.0 and sigma > 0.0:
+            more = np.log(level_of(sigma, ar) / level_of(noise, own))
+            # what is only louder was not quiet there: all of it, what is rough too
+            more -= max(np.log(sigma / grown(ar) / (noise / grown(own))), 0.0)
+            by.setdefault(s.channel, []).append((float(more), min(max(sum(own), 0.0), STEADY), s.rows.size))
+    slow = set()
+    for channel, each in by.items():
+        weights = [float(n) for *_, n in each]
+        allowed = [tolerated(memory, sum(weights)) for _, memory, _ in each]
+        if np.average([m for m, *_ in each], weights=weights) > np.average(allowed, weights=weights):
+            slow.add(channel)
+    return slow
+
+
+def tolerated(memory: float, count: float) -> float:
+    """Logarithm by which slow noise may exceed what quiet stretches say of it: sigma sqrt((1 + a)/(1 - a)).
+
+    A memory a, told by `count` samples with a standard error of sqrt((1 - a^2)/count), moves that by its (1 - a)th.
+    """
+    if memory > LONG:
+        return SLOWER * (1.0 + UNSURE * memory / (1.0 - memory))
+    return SLOWER + CHANCE * float(np.sqrt((1.0 + memory) / ((1.0 - memory) * max(count, 1.0))))
+
+
+def is_bursting(s: Signal, misfit: Array, level: float) -> bool:
+    """Whether a misfit (n,) is much less beside its bursts; digits that leap are none."""
+    return s.step == 0.0 and level > LOUDER * float(np.sqrt(np.mean(without_bursts(misfit) ** 2)))
+
+
+def level_of(sigma: float, ar: tuple[float, ...]) -> float:
+    """Level of what is slow in a noise: sqrt of its spectral density at no frequency, per sample."""
+    return sigma / grown(ar) / max(1.0 - sum(ar), 1.0 - STEADY)
+
+
+def alike(evidence: Sequence[Evidence]) -> list[list[Member]]:
+    """Signals (recording, place, signal, its part of the stack) of one channel that share a recorder.
+
+    The same rate, as many samples averaged, the same filter class.
+    """
+    groups: list[tuple[tuple[str, int | None, int], float, list[Member]]] = []
+    for r, e in enumerate(evidence):
+        for k, (s, part) in enumerate(e.spans()):
+            what = (s.channel, e.recording.cfc.get(s.channel), e.averaged)
+            rate = -float(np.log(np.median(np.diff(e.recording.time[s.rows]))))
+            for other, at, members in groups:
+                if other == what and abs(at - rate) < ALIKE:
+                    members.append((r, k, s, part))
+                    break
+            else:
+                groups.append((what, rate, [(r, k, s, part)]))
+    return [members for _, _, members in groups]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rest:
+    """Spectrum of what whitening leaves of a noise, 1 where it leaves it white; `correlation` is the noise's own.
+
+    The short memory that few quiet windows tell is not all that a filter does: behind CFC 60 at 250 Hz it leaves a
+    tenth less of what is slow than of all.
+    """
+
+    correlation: Array | None = None  # (k,), of lags 0, 1, ...
+    ar: tuple[float, ...] = ()
+
+    def at(self, frequencies: Array) -> Array:
+        """Power at frequencies (m,), cycles per sample, over its mean at all of them."""
+        if self.correlation is None:
+            return np.ones(frequencies.size)
+        both = np.concatenate([self.correlation[:0:-1], self.correlation])
+        whitening = np.array([1.0, *(-a for a in self.ar)])
+        left = np.convolve(both, np.convolve(whitening, whitening[::-1]))[both.size // 2 + len(self.ar) :]
+        return np.asarray(
+            1.0 + 2.0 * np.cos(2.0 * np.pi * np.outer(frequencies, np.arange(1, left.size))) @ (left[1:] / left[0])
+        )
+
+
+def rests(evidence: Sequence[Evidence]) -> list[dict[str, Rest]]:
+    """What is left of each recording's noises by channel: of white noise behind the filter class that is declared.
+
+    Only where samples are weighed: elsewhere noise is held against its own roughness, not against what is expected.
+    """
+    found: list[dict[str, Rest]] = [{s.channel: Rest() for s in e.signals} for e in evidence]
+    for members in alike(evidence):
+        told = sum(int(evidence[r].early[part].sum()) for r, _, _, part in members)
+        for r, _, s, _ in members:
+            e = evidence[r]
+            cfc = e.recording.cfc.get(s.channel)
+            if s.weight is None or cfc is None or e.averaged > 1 or len(s.ar) != 1:
+                continue
+            step = float(np.median(np.diff(e.recording.time)))
+            if 1.0 / step < least_rate(cfc):
+                continue
+            filtered = _correlation(step, float(np.median(np.diff(s.rows))), cfc)
+            if abs(s.ar[0] - filtered[1]) * np.sqrt(told) < AGREES:
+                found[r][s.channel] = Rest(correlation=filtered, ar=s.ar)
+    return found
+
+
+@functools.lru_cache(maxsize=64)
+def _correlation(step: float, every: float, cfc: int) -> Array:
+    """Autocorrelation (LONGEST + 1,) of white noise behind a filter class, of so many samples one, `step` s apart."""
+    f = (np.arange(BANDS) + 0.5) / (2.0 * BANDS * step)
+    power = np.array([attenuation(float(v), step, cfc) for v in f]) ** 2
+    covariance = np.cos(2.0 * np.pi * every * step * np.outer(np.arange(LONGEST + 1), f)) @ power
+    return np.asarray(covariance / covariance[0])
+
+
+def autoregression(series: Sequence[Array], most: int = LONGEST) -> tuple[float, tuple[float, ...]]:
+    """Standard deviation and coefficients of one autoregression behind several series; its order by BIC."""
+    most = min(most, max(0, min(v.size for v in series) // 8))
+    return _driven(series, [(k, k) for k in range(1, most + 1)])
+
+
+def long_memory(series: Sequence[Array]) -> tuple[float, tuple[float, ...]]:
+    """The same of a noise of 1/f: one coefficient for lag 1, for 2, for 3 and 4, for 5 to 8 and on, twice as far each.
+
+    Heterogeneous autoregression, Corsi (2009), in octaves.
+    """
+    most = min(v.size for v in series) // 8
+    return _driven(series, [(k // 2 + 1, k) for k in OCTAVES if k <= most], AKAIKE)
+
+
+def _driven(
+    series: Sequence[Array], lags: Sequence[tuple[int, int]], dear: float | None = None
+) -> tuple[float, tuple[float, ...]]:
+    """An autoregression on means of the past over `lags` (first, last), on so many of the first as BIC asks for.
+
+    Or as a criterion in which each costs as `dear`.
+    """
+    most = lags[-1][1] if lags else 0
+    sums = [np.concatenate([[0.0], np.cumsum(v)]) for v in series]
+    past = [
+        np.concatenate([v[most - last : v.size - last] for v in series])
+        if first == last
+        else np.concatenate([c[most - first + 1 : c.size - first] - c[most - last : c.size - last - 1] for c in sums])
+        / (last - first + 1)
+        for first, last in lags
+    ]
+    y = np.concatenate([v[most:] for v in series])
+    n = y.size
+    best: tuple[float, float, tuple[float, ...]] | None = None
+    for order in range(len(lags) + 1):
+        X = np.stack(past[:order], axis=1) if order else np.zeros((n, 0))
+        b = np.linalg.lstsq(X, y, rcond=None)[0] if order else np.zeros(0)
+        a = np.concatenate([np.full(k - j + 1, v / (k - j + 1)) for v, (j, k) in zip(b, lags, strict=False)] or [b])
+        roots = np.roots([1.0, *(-a)])
+        if order and (np.max(np.abs(roots)) > STEADY or np.any((np.abs(roots) > RINGING) & (np.abs(roots.imag) > 0.0))):
+            continue  # no process, or one that rings at one frequency: hum is no noise
+        power = float(np.mean((y - X @ b) ** 2)) * n / max(n - order, 1)
+        score = n * np.log(max(power, 1e-300)) + order * (np.log(n) if dear is None else dear)
+        if best is None or score < best[0]:
+            fair = 1.0 + 2.0 / n if order == 1 else 1.0  # least squares makes the memory too short by 2/n of itself
+            best = (score, power, tuple(float(v) for v in fair * a))
+    assert best is not None
+    return float(np.sqrt(best[1])) * grown(best[2]), best[2]
+
+
+def with_noise(s: Signal, noise: float, ar: tuple[float, ...], model_error: float) -> Signal:
+    """The signal held against another noise."""
+    sigma = float(np.hypot(np.hypot(noise, model_error * s.span), s.scatter))
+    return replace(s, noise=noise, sigma=sigma, ar=ar if noise >= NOT_COLOURED * sigma else ())
+
+
+def _quieter(misfits: Sequence[Array], own: Sequence[Array]) -> NoiseFloor | None:
+    """Noise of misfits, or of the channels themselves where that shows clearly less; None of too little."""
+    if sum(v.size // LENGTH for v in misfits) < 1:
+        return None
+    best, other = _floor(misfits), _floor(own)
+    best = other if other.sigma < CLEARLY * best.sigma else best
+    beside = _floor([without_bursts(v) for v in misfits])
+    return beside if 0.0 < LOUDER * beside.sigma < best.sigma else best
+
+
+def _floor(values: Sequence[Array]) -> NoiseFloor:
+    """Level and memory of the quiet windows of several series, none across two, counted from their ends."""
+    joined = np.concatenate([v[v.size % LENGTH :] for v in values if v.size >= LENGTH])
+    return noise_floor(joined, order=1, strides=(1,))

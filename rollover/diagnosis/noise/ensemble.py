@@ -1,0 +1,204 @@
+"""How far a simulation can be trusted, sample by sample: the scatter of neighbours that nobody could tell apart.
+
+After some contacts an overturn depends on where the grid's elements lie and on how long a step is. What neighbours
+differ by there is no mismatch. With scatter s(t) beside the noise sigma, each sample counts
+
+    w(t) = sigma / sqrt(sigma^2 + c L s(t)^2)                                                                  (D3)
+
+of what it would: L samples of the scatter go together, so that each of them is worth 1/L of one that stands alone;
+c makes up for the few neighbours.
+
+Few neighbours do not show every course that a run may take. One that takes another after a blow begins it anew from a
+state of d = 14 numbers, place and speed of the chassis in six degrees of freedom and of the front axle in one, which
+nobody knows the size of. What such a state leaves beyond the E that is expected, x, has the likelihood of d normal
+numbers of unknown variance,
+
+    -2 ln p = E + d ln(1 + x/d)                                                                                (D9)
+
+in place of E + x. Another course shows in all channels: x is E (m - 1), m the middle one of what the channels leave
+over what they are expected to. What one channel leaves alone is not forgiven. A change of x changes (D9) by
+
+    w = d / (d + x)                                                                                           (D11)
+
+of itself, far less than (D9) is of E + x: sums of squares are of samples times sqrt(w), and what (D9) is beyond them is
+added. Such a sum lies above (D9) wherever it does not touch it, so that what lowers it lowers (D9) by more:
+
+    g becomes -d ln(1 - g/d)                                                                                  (D12)
+
+for a sum that falls by g, up to all of x; so much is gained along a straight line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.data.dataset import Evidence, Signal
+from rollover.diagnosis.forward.forward_model import blow_of
+
+Array = NDArray[np.float64]
+WINDOW = 0.02  # s, over which the neighbours' squares are averaged: what is off by a little in time is off in size
+FEW = 1.5  # c, for six neighbours
+LONGEST = 0.1  # s, that scatter goes together
+UNTOUCHED = 0.99  # weights all above need no mention
+STATE = 14  # d
+ALONE = 3  # channels below which none is told from a course
+OTHER = 0.5  # of what it would count, below which a recording took another course
+OFTEN = 0.15  # of recordings that may
+SENT = 0.02  # p-value of so many recordings on other courses, below which chance alone sends fewer there
+OTHERS = 2  # neighbours at least that tell how far one more may go
+FAR = 9.0  # times the middle power of neighbours, beyond which one took another course
+
+
+def weighted(e: Evidence, strays: Sequence[Mapping[str, Array]]) -> Evidence:
+    """The evidence with each sample's weight (D3); `strays` are the neighbours' deviations at its stamps."""
+    blow = blow_of(e.simulator)
+    strays = alike(e, strays, blow)
+    if not strays:
+        return e
+    signals = tuple(_weighted(e, s, np.stack([d[s.channel][s.rows] for d in strays])) for s in e.signals)
+    stacked = [e.raw(d) for d in strays]
+    return replace(e, signals=signals, strays=tuple(d for d in stacked if np.all(np.isfinite(d))), blow=blow)
+
+
+def alike(e: Evidence, strays: Sequence[Mapping[str, Array]], blow: float) -> list[Mapping[str, Array]]:
+    """Neighbours without those that took a clearly other course after the `blow` (s): (D9) is for these."""
+    late = [(s, s.rows[e.recording.time[s.rows] >= blow]) for s in e.signals]
+    power = [sum(float(np.nansum((d[s.channel][rows] / s.sigma) ** 2)) for s, rows in late) for d in strays]
+    most = FAR * float(np.median(power)) if power else 0.0
+    return [d for d, p in zip(strays, power, strict=True) if p <= most]
+
+
+def _weighted(e: Evidence, s: Signal, strays: Array) -> Signal:
+    """A signal with its weights; `strays` (k, n), SI."""
+    strays = strays[np.all(np.isfinite(strays), axis=1)]
+    if not len(strays):
+        return s
+    time = e.recording.time[s.rows]
+    scatter = averaged(np.mean(strays**2, axis=0), time)
+    together = min(memory(strays), max(1.0, LONGEST / float(np.median(np.diff(time)))))
+    weight = s.sigma / np.sqrt(s.sigma**2 + FEW * together * scatter)
+    return s if weight.min() > UNTOUCHED else replace(s, weight=weight)
+
+
+def averaged(squares: Array, time: Array) -> Array:
+    """Running mean of (n,) over `WINDOW`, centred, fewer values at the ends."""
+    half = max(1, round(0.5 * WINDOW / float(np.median(np.diff(time)))))
+    sums = np.concatenate([[0.0], np.cumsum(squares)])
+    k = np.arange(squares.size)
+    low, high = np.maximum(k - half, 0), np.minimum(k + half + 1, squares.size)
+    return np.asarray((sums[high] - sums[low]) / (high - low))
+
+
+def memory(strays: Array) -> float:
+    """How many samples of deviations (k, n) go together: (1 + rho)/(1 - rho), rho from one sample to the next."""
+    power = float(np.sum(strays**2))
+    if power <= 0.0:
+        return 1.0
+    rho = float(np.sum(strays[:, 1:] * strays[:, :-1])) / power
+    return max(1.0, (1.0 + rho) / max(1.0 - rho, 1e-3))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Course:
+    """What samples count in sums of squares where a run took another course, and what is added to such a sum.
+
+    `samples` (n,) are the roots of (D11), 1 before the blow; `share` is (D9) over the plain sum of what comes after.
+    """
+
+    samples: Array
+    share: float
+    more: float
+
+    @property
+    def late(self) -> NDArray[np.bool_]:
+        """Samples (n,) after the blow."""
+        return self.samples < 1.0
+
+    @property
+    def slope(self) -> float:
+        """(D11)."""
+        return float(self.samples.min()) ** 2
+
+
+def course(e: Evidence, residual: Array) -> Course | None:
+    """How a whitened misfit (n,) counts by (D9); None where all samples count in full."""
+    found = _beyond(e, residual**2)
+    if found is None:
+        return None
+    expected, beyond, inside = found
+    share = _share(expected, beyond)
+    slope = STATE / (STATE + beyond)
+    left = float(np.sum(residual[inside] ** 2))
+    return Course(samples=np.where(inside, np.sqrt(slope), 1.0), share=share, more=(share - slope) * left)
+
+
+def unseen(e: Evidence) -> Array:
+    """Neighbours (k, n), whitened, each weighed by what the others scatter: the recording is none of them either."""
+    found = []
+    for k, stray in enumerate(e.strays):
+        others = [d for j, d in enumerate(e.strays) if j != k]
+        alone = tuple(
+            _weighted(e, replace(s, weight=None), np.stack([d[part] for d in others])) if len(others) >= OTHERS else s
+            for s, part in e.spans()
+        )
+        found.append(e.eased(replace(e, signals=alone).whitened(stray)))
+    return np.array(found).reshape(-1, e.count)
+
+
+def shares(e: Evidence, strays: Array) -> Array:
+    """(k,): what a recording that differs as neighbours (k, n) do would count after the blow, of its sum of squares."""
+    found = [_beyond(e, e.due + stray**2) for stray in strays]
+    return np.array([1.0 if f is None else _share(f[0], f[1]) for f in found])
+
+
+def _share(expected: float, beyond: float) -> float:
+    """(D9) over the plain sum of squares."""
+    return float((expected + STATE * np.log1p(beyond / STATE)) / (expected + beyond))
+
+
+def _beyond(e: Evidence, squares: Array) -> tuple[float, float, NDArray[np.bool_]] | None:
+    """E and x of (D9), and the samples after the blow, of squares (n,) of a misfit; None where x is not above 0.
+
+    None too of a recording that begins after it: nothing shows that it came to the blow as its run did.
+    """
+    if len(e.signals) < ALONE or not any(s.weight is not None for s in e.signals) or not e.early.any():
+        return None
+    over, expected, inside = [], 0.0, np.zeros(squares.size, dtype=bool)
+    for s, part in e.spans():
+        later = e.recording.time[s.rows] >= e.blow
+        if not later.any():
+            continue
+        inside[part] = later
+        own = max(float(np.sum(e.due[part][later])), 1.0)
+        over.append(float(np.sum(squares[part][later])) / own)
+        expected += own
+    if len(over) < ALONE:
+        return None
+    left = float(np.sum(squares[inside]))
+    beyond = min(float(np.median(over)) * expected, left) - expected  # never more than there is
+    return (expected, beyond, inside) if beyond > 0.0 else None
+
+
+def gained(less: Array, slope: float) -> Array:
+    """(D12): gains by sums of squares (m,) that fall by `less` where they count `slope` (D11); all where that is 1."""
+    if slope == 1.0:
+        return less
+    most = (1.0 - slope) * STATE  # all of x
+    within = np.minimum(less, most)
+    return np.asarray(-STATE * np.log1p(-within / STATE) + (less - within) / slope)
+
+
+def is_other(found: Course | None) -> bool:
+    """Whether a recording took a clearly other course than its run."""
+    return found is not None and found.share < OTHER
+
+
+def too_many(others: int, of: int) -> float:
+    """p-value of so many recordings that took another course, where each may in `OFTEN` of all cases."""
+    from scipy.special import bdtrc
+
+    return float(bdtrc(others - 1, of, OFTEN)) if others else 1.0

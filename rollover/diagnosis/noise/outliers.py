@@ -1,0 +1,45 @@
+"""Noise of a channel whose misfit comes in bursts: a loose contact leaves no window quiet, and is no noise for that."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.recording.noise_floor import LENGTH, USUAL
+
+Array = NDArray[np.float64]
+ABOUT = 13  # samples, that a value is compared with the middle one of
+FAR = 5.0  # times the usual distance from it, beyond which a sample is in a burst
+LOUDER = 1.5  # times the noise beside bursts, from which on they are no noise
+FEWEST = 0.7  # of the samples, that lie beside the bursts
+RARE = 0.01  # of a channel's samples, that may lie far off by any noise
+
+
+def without_bursts(values: Array) -> Array:
+    """Evenly spaced values (n,), those far from their neighbours replaced by the middle one of these.
+
+    As they are where so many lie far off that these are the rule.
+    """
+    from scipy.ndimage import median_filter
+
+    if values.size < LENGTH:
+        return values
+    middle = median_filter(values, ABOUT, mode="nearest")
+    apart = np.abs(values - middle)
+    usual = USUAL * float(np.median(apart))
+    far = apart > FAR * usual
+    return np.where(far, middle, values) if usual > 0.0 and far.mean() < 1.0 - FEWEST else values
+
+
+def too_often(channels: Iterable[Array]) -> float:
+    """p-value of as many samples far off, of noise units (n,) of each channel, were one in a hundred so by chance."""
+    from scipy.special import bdtrc
+
+    found = []
+    for w in channels:
+        if w.size:
+            far = np.abs(w) > FAR * max(1.0, USUAL * float(np.median(np.abs(w))))
+            found.append(float(bdtrc(far.sum() - 1, w.size, RARE)))
+    return min([1.0, *(len(found) * p for p in found)])

@@ -1,0 +1,77 @@
+"""What comes long after a blow: the end of a long recording costs most of a run.
+
+Where it hardly counts it is left aside, and looks at many candidates do without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.data.dataset import Evidence
+
+LASTING = 0.6  # s after the blow that are always kept
+SHORT = 0.1  # s that are not worth cutting off
+COUNTS = 0.3  # of what it would, on the average, from which on the end is kept
+BEYOND = 3.0  # times what noise and scatter leave, that the end is missed by and kept
+FEWEST = 8  # samples of a signal
+
+
+def shortened(e: Evidence, *, alone: bool = False) -> Evidence:
+    """The evidence without its end, where that counts little: long after a blow neighbours differ as effects do.
+
+    As it is where samples are not weighed, and where the end counts or differs by more than chance does. Of a recording
+    that is `alone` nothing after the blow is kept: whether an effect or another course of the run did it, only a second
+    one could tell.
+    """
+    time, end = e.recording.time, e.blow + (0.0 if alone else LASTING)
+    if not time[-1] > end + SHORT:
+        return e
+    late = np.concatenate([time[s.rows] > end for s in e.signals])
+    if not alone and (float(np.mean(e.due[late])) > COUNTS or _differs(e, late)):
+        return e
+    return up_to(e, end) or e
+
+
+def soon(e: Evidence) -> Evidence:
+    """The evidence up to `LASTING` after the blow, the simulation's and the recording's; itself if it is no longer.
+
+    What happens later hangs on what happened until then. The recording's is when half of its channels have gone half of
+    their range.
+    """
+    time = e.recording.time
+    gone = [time[s.rows[np.argmax(2.0 * np.abs(s.values - s.values[0]) >= np.ptp(s.values))]] for s in e.signals]
+    end = max(e.blow, float(np.median(gone))) + LASTING
+    return (up_to(e, end) or e) if time[-1] > end + SHORT else e
+
+
+def up_to(e: Evidence, end: float, beyond: float = 0.0) -> Evidence | None:
+    """What was recorded up to an end (s); None where a signal has too little of it.
+
+    Its runs go on for `beyond` (s): a filter looks ahead.
+    """
+    time = e.recording.time
+    kept = [time[s.rows] <= end for s in e.signals]
+    if any(inside.sum() < FEWEST for inside in kept):
+        return None
+    n = int(np.searchsorted(time, end + beyond, side="right"))
+    return replace(e.cut(kept), recording=e.recording.until(n), simulator=e.simulator.until(n))
+
+
+def _differs(e: Evidence, late: NDArray[np.bool_]) -> bool:
+    """Whether the scenario as it is misses an end by more than noise and scatter do."""
+    predicted = e.simulator.predict({}, 0.0)
+    if predicted is None:
+        return False
+    missed = (e.measured() - e.stacked(predicted))[late]
+    return float(missed @ missed) > BEYOND * e.by_chance(late)
+
+
+def left_aside(every: Sequence[Evidence], found: Sequence[Evidence]) -> list[str]:
+    """The ends of recordings that do not count, in sentences."""
+    ends = {e.name: float(e.recording.time[-1]) for e in every}
+    cut = [(e.name, float(e.recording.time[-1])) for e in found if float(e.recording.time[-1]) < ends[e.name]]
+    return [f"{name}: what comes after {at:.2f} s depends on chance and was left aside" for name, at in cut]

@@ -1,0 +1,140 @@
+"""What a diagnosis says (data only)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from rollover.recording.time_stamps import Zero
+
+Verdict = Literal["no-mismatch", "parameter", "sensor", "missing-physics", "unexplained", "cannot-tell"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """Where: a recording, channel, phase and interval (s), its share of the misfit, and what it depends on there."""
+
+    recording: str
+    channel: str
+    phase: str
+    start: float
+    end: float
+    share: float
+    depends_on: str | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Degree:
+    """A degree of freedom of a body: residual force (N) or moment (N m), rms over all recordings, share of the misfit.
+
+    `axis` is "along y" or "about x", body axes; shares of all degrees add up to 1.
+    """
+
+    body: str
+    axis: str
+    unit: str
+    rms: float
+    share: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Interval:
+    """A fitted parameter with its 95 % interval, in SI; `at_bound` where the search ended at an end of its range.
+
+    `as_simulated` is the value that the scenario's own steps ask for, where shorter ones ask for another.
+    """
+
+    value: float
+    low: float
+    high: float
+    unit: str
+    at_bound: bool = False
+    as_simulated: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Named:
+    """An effect that was found, with what it cannot be told apart from and how to."""
+
+    id: str
+    kind: str
+    statement: str
+    parameters: Mapping[str, Interval]
+    settings: Mapping[str, Any]
+    channel: str | None
+    p_value: float
+    indistinguishable_from: tuple[str, ...]
+    discriminating_test: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Score:
+    """How well some recordings are met: misfit over the noise, ISO/TS 18571 (mean), error of the peak force."""
+
+    nrmse: float
+    iso18571: float | None
+    peak_force_error: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Considered:
+    """A candidate, its held-out gain ln(E_before/E_after) over the best explanation without it, and why (not)."""
+
+    id: str
+    channel: str | None
+    held_out_gain: float
+    reason: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class LawTerm:
+    """One term of a law found by regression: its shape, what that depends on, and its force (N at the scales)."""
+
+    term: str
+    depends_on: str
+    force: Interval
+
+
+@dataclass(frozen=True, kw_only=True)
+class Law:
+    """A law without a name that predicts held-out recordings: gain ln(E_before/E_after) with its standard error."""
+
+    terms: tuple[LawTerm, ...]
+    law: str
+    held_out_gain: float
+    standard_error: float
+    before: float
+    after: float
+    settings: Mapping[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Diagnosis:
+    """The whole answer."""
+
+    verdict: Verdict
+    sentence: str
+    p_value: float
+    noise: Mapping[str, float]
+    where: tuple[Place, ...]
+    effects: tuple[Named, ...]
+    remaining_significant: bool
+    remaining_p_value: float
+    remaining_where: tuple[Place, ...]
+    depends_on: str | None
+    dependencies: tuple[tuple[str, float], ...]
+    smallest_detectable: Mapping[str, float]
+    training: tuple[str, ...]
+    held_out: tuple[str, ...]
+    before: Mapping[str, Score]  # "training" and "held_out"
+    after: Mapping[str, Score]
+    per_recording: tuple[tuple[str, float, float], ...]  # name, held-out misfit over the noise before and after
+    candidates: tuple[Considered, ...]
+    simulations: int
+    seconds: float
+    degrees: tuple[Degree, ...] = ()
+    notes: tuple[str, ...] = ()
+    clocks: Mapping[str, Zero] = field(default_factory=dict)  # zeros that were found, of clocks in doubt
+    grids: Mapping[str, tuple[float, ...]] = field(default_factory=dict)  # of full runs: centre of the elements, m
+    empirical: Law | None = None  # where no effect explains the mismatch

@@ -1,0 +1,1 @@
+"""Which effects: screening, score tests, stepwise and pairwise search, decision."""

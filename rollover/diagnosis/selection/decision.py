@@ -1,0 +1,327 @@
+"""From the scenario as it is to an explanation: effects added one by one, tried without, and the verdict they bear."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rollover.diagnosis.fit.cross_validation import held_out
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.linearisation import at_an_end, turned
+from rollover.diagnosis.fit.local_search import but_one, left_at, without
+from rollover.diagnosis.fit.parameterisation import Candidate, each_with_own, is_one_sensor
+from rollover.diagnosis.fit.step import Groups, Phases, Step
+from rollover.diagnosis.inference.adequacy import NEGLIGIBLE, is_enough, is_tolerated, matters
+from rollover.diagnosis.inference.lack_of_fit import SURE, Mismatch, mismatch_of
+from rollover.diagnosis.result import Verdict
+from rollover.diagnosis.selection.context import Inquiry
+from rollover.diagnosis.selection.ensemble_validation import NEEDED, surely_there, unforgiven
+from rollover.diagnosis.selection.flexibility import MOST, is_a_curve, is_any_curve, is_one_line, is_pliant
+from rollover.diagnosis.selection.forward_step import NEARLY_NOISE, moves
+from rollover.diagnosis.selection.pairs import instead, two_by_two
+from rollover.diagnosis.selection.score_test import Gate
+from rollover.diagnosis.selection.simplification import MANY, followed, mirrored
+from rollover.diagnosis.selection.stepwise import as_conditioned, one_by_one
+from rollover.diagnosis.selection.truncated_start import down_first
+
+SCATTERED = 0.05  # share of all errors that the look at candidates may make where runs scatter
+CERTAIN = 1.0 - 1e-12  # largest p-value whose logarithm is taken
+PARTLY = 0.005  # of the excess over the noise that one effect may leave, were it structured, and still be named
+LITTLE = 0.1  # of the excess over the noise, that effects must take which leave far more than noise
+AGAIN = 1  # times that one of as many effects as may be is given for a better one, beyond which any would do
+HARDLY_MORE = 1.2  # times a tolerance, that an explanation leaves of held-out recordings
+
+
+@dataclass(frozen=True, kw_only=True)
+class Explanation:
+    """What was selected: the base, the fit (the base itself if nothing), a step for each of its effects.
+
+    Each step's base is the fit without that effect, so that its rivals competed beside all the others. `first` is the
+    first step, taken or not; `looked` what all candidates scored beside the base; `detectable` the strength at which
+    each would have shown, beside the explanation for those that are not in it.
+    """
+
+    base: Fitted
+    fitted: Fitted
+    parts: tuple[Step, ...]
+    looked: Gate
+    detectable: Mapping[str, float]
+    before: Mismatch
+    after: Mismatch
+    first: Step | None = None
+    refuted: bool = False  # whether the best candidate's gain did not outlast the scatter of its own runs
+    settled: bool = True  # whether as many effects as may be are these, and not any that can be bent to what is there
+
+    def refused(self) -> Explanation:
+        """The same with nothing held to be found."""
+        return replace(self, parts=(), fitted=self.base, after=self.before)
+
+    @property
+    def p_value(self) -> float:
+        """Of "nothing but noise": min over two tests of 1 - (1 - p)^(1/a), a their shares of all errors (Sidak).
+
+        The omnibus test's p and the best candidate's, half each; where runs scatter nearly all is the first one's: the
+        second is rarely small by chance there, as weights and neighbours lower every score. A candidate that was looked
+        at closer and refuted tells nothing.
+        """
+        if self.refuted:
+            return self.before.p_value
+        share = SCATTERED if any(b.expected is not None for b in self.base.blocks) else 0.5
+        tests = ((self.before.p_value, 1.0 - share), (self.looked.p_value(), share))
+        return float(min(-np.expm1(np.log1p(-min(p, CERTAIN)) / a) for p, a in tests))
+
+
+def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
+    """Forward selection of up to three effects, each beyond chance, then each tried without and against its rivals.
+
+    Where that ends with less than all, the way down is explained first, and effects are tried two by two.
+    """
+    judge, groups, phases = inquiry.judge, inquiry.groups, inquiry.phases
+    found = down_first(inquiry, one_by_one(inquiry, base))
+    base, taken, left, current = found.base, list(found.steps), found.left, found.fitted
+    is_whole = is_enough(judge, current, left)
+    is_open = not (judge.effort.thrifty or found.paired) and (not is_whole or len(taken) == MOST)
+    if found.first is not None and is_open:
+        # two that leave what chance leaves are preferred to three that do
+        both = two_by_two(inquiry, taken or [found.first], found.at_first, current, is_whole=is_whole)
+        if both is not None:
+            (taken, left), current = both, both[0][-1].fitted
+            is_whole = is_enough(judge, current, left)
+    is_open = is_whole and len(taken) > 1 and is_open_to_be_named(judge, current, left)
+    needed = _ended(inquiry, taken) if is_open else _one_each(inquiry, taken)
+    parts = [s.again(judge) for s in taken] if needed is None else needed
+    if is_open and needed is not None and not judge.effort.thrifty:
+        parts = [mirrored(inquiry, s) for s in needed]
+    base = unforgiven(judge, base) if taken and judge.effort.thrifty else judge.again(base)
+    parts = [s.foretold(judge, groups, inquiry.crew.looks) for s in parts]
+    current = parts[-1].fitted if parts else base
+    return Explanation(
+        base=base,
+        fitted=current,
+        parts=tuple(parts),
+        looked=found.at_first,
+        detectable={**found.at_first.detectable, **found.looked.detectable},
+        before=found.before,
+        after=mismatch_of(judge.evidence, current.blocks, phases),
+        first=None if found.first is None else found.first.again(judge).foretold(judge, groups, inquiry.crew.looks),
+        refuted=found.refuted,
+        settled=needed is not None,
+    )
+
+
+def is_open_to_be_named(judge: Judge, fitted: Fitted, left: Mismatch) -> bool:
+    """Whether several effects may be named: as many as may be leave no more than `decided` asks, or one is needless."""
+    if judge.effort.thrifty or len(fitted.candidates) < MOST or left.p_value > MANY:
+        return True
+    if not matters(judge, fitted, left) or is_tolerated(judge, fitted):
+        return True
+    return len(without_needless(judge, judge.again(fitted)).candidates) < MOST
+
+
+def _ended(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
+    """Steps of the effects that are needed, as `_needed`, the last one's fit followed to its end."""
+    needed = _needed(inquiry, taken)
+    return None if needed is None else _one_each(inquiry, [*needed[:-1], followed(inquiry, needed[-1])[0]])
+
+
+def _one_each(inquiry: Inquiry, steps: Sequence[Step]) -> list[Step]:
+    """Steps of all effects of the last one's fit, again, that one at last; none of none.
+
+    What came there in the place of another is looked for once more, so that it has rivals too.
+    """
+    known = {s.fitted.candidates[-1].key: s.again(inquiry.judge) for s in steps}
+    if not steps:
+        return []
+    *others, last = known[steps[-1].fitted.candidates[-1].key].fitted.candidates
+    found: list[Step] = []
+    current = known[last.key].fitted
+    for c in others:
+        back = None if c.key in known else instead(inquiry, current)
+        current = turned(current)
+        if back is not None and back.fitted.candidates[-1].key == c.key:
+            known[c.key] = back
+        elif c.key not in known:
+            base, rivals = (known[last.key].base, ()) if back is None else (back.base, back.rivals)
+            known[c.key] = Step(base=base, fitted=current, p_value=known[last.key].p_value, rivals=(current, *rivals))
+        found.append(known[c.key])
+    return [*found, known[last.key]]
+
+
+def _needed(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
+    """Steps of the effects that are needed: each dropped if that costs no more than chance, or given to a better one.
+
+    Beside a better one others may not be needed any more. Returned in such an order that the last one's fit is the
+    whole explanation; every step's fit is. None where as many as may be are given for others again and again: that any
+    which can be bent to it will do explains nothing.
+    """
+    judge = inquiry.judge
+    last = taken[-1]
+    current = without_needless(judge, judge.again(last.fitted), last.base)
+    if (judge.effort.thrifty or is_any_curve(current.candidates)) and len(current.candidates) == len(taken):
+        return _one_each(inquiry, taken)  # the second will be refused, whichever came first
+    parts: list[Step] = []
+    exchanged = 0
+    while len(parts) < len(current.candidates):
+        whole = len(parts) == len(current.candidates) - 1 and not is_elsewhere(last)
+        whole = whole and current.candidates[0].key == last.fitted.candidates[-1].key
+        if whole and {c.token for c in current.candidates} == {c.token for c in last.fitted.candidates}:
+            parts.append(last)  # found beside just these others
+            break
+        found, taken_out = instead(inquiry, current), current.candidates[0].key
+        if found is None:
+            return _one_each(inquiry, taken)
+        current = without_needless(judge, found.fitted)
+        if found.fitted.candidates[-1].key != taken_out and exchanged < MOST:
+            parts, exchanged = [], exchanged + 1  # those before were looked for beside what is no more
+            if exchanged > AGAIN and len(current.candidates) == MOST:
+                return None
+        parts = [*parts, found] if len(current.candidates) == len(found.fitted.candidates) else []
+    return [s.again(judge) for s in parts]
+
+
+def is_elsewhere(last: Step) -> bool:
+    """Whether the other effects are no more what they were as the last one and its rivals were looked for beside them.
+
+    What was bent to do the last one's work as well left little to those that have less to bend.
+    """
+    return [c.token for c in last.base.candidates] != [c.token for c in last.fitted.candidates[:-1]]
+
+
+def without_needless(judge: Judge, fitted: Fitted, base: Fitted | None = None) -> Fitted:
+    """The explanation without those of its effects that may be dropped for no more than chance.
+
+    `base` is the fit beside which the last one was found. Of full runs, those that are surely there are not tried.
+    """
+    while len(fitted.candidates) > 1:
+        losses: list[tuple[float, int, Fitted | None]] = [(np.inf, -1, None)]
+        surely = surely_there(judge, fitted) if judge.effort.thrifty else set()
+        for k in {*range(len(fitted.candidates))} - surely:
+            rest = _rest(judge, fitted, k, base)
+            losses.append((rest.left - fitted.left if rest is not None else np.inf, k, rest))
+        loss, _, rest = min(losses, key=lambda one: one[0])
+        phi = max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks))
+        if rest is None or loss / phi > NEEDED:
+            break
+        fitted = judge.again(rest) if judge.effort.thrifty else rest
+    return fitted
+
+
+def _rest(judge: Judge, fitted: Fitted, k: int, base: Fitted | None) -> Fitted | None:
+    """The explanation without its k-th effect, fitted again unless that is the `base` of full runs: these cost much.
+
+    Of these it ends without slopes.
+    """
+    others = [c.token for j, c in enumerate(fitted.candidates) if j != k]
+    if judge.effort.thrifty and base is not None and [c.token for c in base.candidates] == others:
+        return judge.again(base)
+    return without(judge, fitted, k, bare=judge.effort.thrifty)
+
+
+def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) -> tuple[Explanation, Verdict]:
+    """The verdict; what does not explain is not named.
+
+    Several effects are named only if together they leave nothing but noise, or what was said to be tolerated; as many
+    as may be, or two of one sensor, or of a soil that is bent, more surely so: they can be bent to more. One alone also
+    where it takes nearly all.
+    """
+    held, is_curved = found.fitted.candidates, is_a_curve(judge, found.fitted)
+    if not found.settled or is_any_curve(held) or (is_curved and is_one_line(held)):
+        return found.refused(), "unexplained"
+    is_bending = len(found.parts) == MOST or is_one_sensor(held) or is_pliant(held)
+    is_whole = found.after.p_value > (MANY if is_bending else SURE)
+    if is_bending and not judge.effort.thrifty:
+        # what is bent to a curve nearly everywhere leaves what it cannot be bent to in one place
+        is_whole = is_whole and min(found.after.adjusted, default=1.0) > SURE
+    is_whole = is_whole or not matters(judge, found.fitted, found.after)
+    start, ahead = held_out(found.base, groups).total, held_out(found.fitted, groups).total
+    is_whole = is_whole and not (ahead > NEARLY_NOISE and takes_little(found, groups)) and not is_curved
+    # what a tolerance allows has structure too
+    is_whole = is_whole or (is_tolerated(judge, found.fitted) and ahead < HARDLY_MORE)
+    if found.parts and is_whole and ahead < start:
+        return found, _kind(strongest(judge, found.base, found.fitted))
+    if found.first is not None and found.parts:
+        one = found.first
+        end = held_out(one.fitted, groups).total
+        inside = not any(at_an_end(v) for v in one.fitted.x)
+        after = mismatch_of(judge.evidence, one.fitted.blocks, phases)
+        is_nearly_all = end**2 - 1.0 < PARTLY * (start**2 - 1.0) and after.structure <= PARTLY * found.before.structure
+        if is_nearly_all and inside:
+            return replace(found, parts=(one,), fitted=one.fitted, after=after), _kind(one.fitted.candidates[-1])
+    significant = found.before.p_value < SURE and matters(judge, found.base, found.before)
+    significant = significant and not is_tolerated(judge, found.base) and not is_slight(judge, found.first, phases)
+    verdict: Verdict = "unexplained" if significant or found.parts else "no-mismatch"
+    return found.refused(), verdict
+
+
+def takes_little(found: Explanation, groups: Groups, share: float = LITTLE) -> bool:
+    """Whether an explanation takes less than a share of what was beyond the noise in held-out recordings."""
+    start, ahead = held_out(found.base, groups).total, held_out(found.fitted, groups).total
+    return start**2 - ahead**2 < share * (start**2 - 1.0)
+
+
+def done_by_others(judge: Judge, found: Explanation, ids: Collection[str]) -> set[str]:
+    """Of effects that may be nothing by their intervals, those whose work the others do, in any shape of theirs.
+
+    A shape that was not fitted widens an interval as far as slopes say. Of full runs, where a fit costs much, all are.
+    """
+    if judge.effort.thrifty:
+        return set(ids)
+    fitted, done = found.fitted, set()
+    phi = judge.per_error * max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks))
+    shifts = [b.shift for b in fitted.blocks]
+    for k, c in enumerate(fitted.candidates):
+        if c.id not in ids:
+            continue
+        others = [(o, fitted.x[own]) for j, (o, own) in enumerate(each_with_own(fitted.candidates)) if j != k]
+        fits = [without(judge, fitted, k)]
+        for j, (other, x) in enumerate(others):
+            for place in other.with_shapes(x) if other.shapes else ():
+                way = [*others[:j], (other.whole(), place), *others[j + 1 :]]
+                fits.append(judge.fit([o for o, _ in way], [v for _, at in way for v in at], shifts=shifts))
+        if min((f.left for f in fits if f is not None), default=np.inf) - fitted.left < NEEDED * phi:
+            done.add(c.id)
+    return done
+
+
+def by_the_first(judge: Judge, found: Explanation, nothing: Collection[str], phases: Phases) -> Explanation:
+    """The explanation by its first effect alone, where that is none of those that may be `nothing`; else refused.
+
+    Of one that was all there is, its gain is refuted with it.
+    """
+    one = found.first
+    if one is None or one.fitted.candidates[-1].id in nothing:
+        return replace(found.refused(), refuted=found.refuted or len(found.parts) == 1)
+    one = one.again(judge)
+    one, after = as_conditioned(judge, one, mismatch_of(judge.evidence, one.fitted.blocks, phases), phases)
+    return replace(found, parts=(one,), fitted=one.fitted, after=after)
+
+
+def _kind(c: Candidate) -> Verdict:
+    return "missing-physics" if c.kind == "physics" else "parameter" if c.kind == "parameter" else "sensor"
+
+
+def strongest(judge: Judge, base: Fitted, fitted: Fitted) -> Candidate:
+    """The effect without which most would be left; of full runs, where fits are dear, with the others as they stand."""
+    best, loss = fitted.candidates[0], -np.inf
+    for k, c in enumerate(fitted.candidates):
+        if len(fitted.candidates) == 1:
+            return c
+        if judge.effort.thrifty:
+            others, columns = but_one(fitted, k)
+            left = left_at(judge, others, [fitted.x[at] for at in columns], [b.shift for b in fitted.blocks])
+        else:
+            rest = without(judge, fitted, k, rounds=4)
+            left = rest.left if rest is not None else None
+        left = base.left if left is None else left
+        if left > loss:
+            best, loss = c, left
+    return best
+
+
+def is_slight(judge: Judge, first: Step | None, phases: Phases) -> bool:
+    """Whether all that separates simulation and recordings is the work of an effect that moves nothing worth a name."""
+    if first is None or moves(judge, first.base, first.fitted) >= NEGLIGIBLE:
+        return False
+    return mismatch_of(judge.evidence, first.fitted.blocks, phases).p_value > SURE

@@ -1,0 +1,314 @@
+"""Fits begun otherwise than from a first look: behind cliffs, with another shape of an effect, with other clocks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from rollover.diagnosis.fit.cross_validation import held_out
+from rollover.diagnosis.fit.jobs import How, Job
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.linearisation import Block
+from rollover.diagnosis.fit.local_search import (
+    BEHIND,
+    LITTLE,
+    along_shapes,
+    apart,
+    chords,
+    few_of,
+    least_of,
+    left_at,
+    teeth,
+)
+from rollover.diagnosis.fit.model_variants import WORTH, enough, is_noise
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.fit.threshold_scan import is_clock, stretches
+from rollover.diagnosis.inference.lack_of_fit import mismatch_of
+from rollover.diagnosis.selection.context import Inquiry
+from rollover.diagnosis.selection.score_test import Gate
+
+RUGGED = 2.0  # misfit over the noise that the best leaves, from which on there may be something behind a cliff
+LEADS = 1.5  # times what the best leaves, up to which it is looked for
+MOSTLY = 0.25  # of what the middle recording is left with by the best, below which an effect is the better one there
+PROMISED = 0.5  # of the best score: what has it, and gains less than half of its own, may have another shape
+TIED = 1.2  # times what the best leaves, up to which time shifts are tried out
+BY_CHANCE = 0.01  # p-value of what is left, above which no other form of an effect is looked for
+TOLD = 2e-5  # s, by which time shifts are told apart
+PARTS = 4  # into which places are split for those who look
+HEARD = 60  # places of what rings, of all that one recording was asked for, that a few are
+FOLLOWED: tuple[How, ...] = ("polish", "time")  # how what rings is gone on with
+# of what the base leaves beyond the noise, that an effect must take before its shape is fitted too; of what the best
+# takes, before its time shifts are tried out
+LEAST = 0.1
+SHAPED = 4.0  # times what the best leaves, up to which an effect's shape is fitted too
+
+
+def begun_otherwise(
+    inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: Gate, shifts: Sequence[float]
+) -> list[Fitted]:
+    """The fits, best first, with those that another beginning or another shape makes of what did not come far."""
+    count = sum(b.residual.size for b in base.blocks)
+    if fits[0].left > RUGGED**2 * count:
+        return _but_for_some(inquiry, base, _combed(inquiry, fits, looked, shifts), looked, shifts)
+    return _as_promised(inquiry, base, fits, looked, shifts)
+
+
+def _as_promised(
+    inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: Gate, shifts: Sequence[float]
+) -> list[Fitted]:
+    """The fits, best first, with those whose slopes lead and whose usual shape does not bear them out."""
+    gains = {f.candidates[-1].key: base.left - f.left for f in one_each(fits)}
+    places = []
+    for c in (c for c in inquiry.free(base) if c.shapes):
+        score = looked.scores.get(c.key, 0.0)
+        if score > max(PROMISED * looked.score, WORTH) and gains.get(c.key, 0.0) < PROMISED * score:
+            places.append((c, (*base.x, *looked.starts.get(c.key, c.starts())[0])))
+    return _with_shapes(inquiry, base, fits, places, shifts)
+
+
+def _combed(inquiry: Inquiry, fits: Sequence[Fitted], looked: Gate, shifts: Sequence[float]) -> list[Fitted]:
+    """The fits, best first, the best that rings begun anew along its damping and its frequency.
+
+    It leads by what it leaves, or by its score: its frequency may have been found beside a wrong damping.
+    """
+    near = [f for f in fits if f.left < LEADS * fits[0].left or f.candidates[-1].key == looked.best]
+    old = next((f for f in near if f.candidates[-1].rings and len(f.own) == 2), None)
+    if old is None:
+        return list(fits)
+    few = few_of(old)
+    begun = [(old.candidates, x) for x in apart(_met(inquiry, old.candidates, teeth(old), shifts, few))]
+    begun += _in_chords(inquiry, old, shifts, few)
+    made = inquiry.fits([Job(candidates=c, start=x, shifts=tuple(shifts), width=1) for c, x in begun])
+    new = _plainest([f for f in made if f is not None] or [old], sum(b.residual.size for b in old.blocks))
+    for how in FOLLOWED:
+        new = inquiry.fits([from_there(new, how)])[0] or new
+    better = new if new.left < old.left else old
+    return sorted([better, *(f for f in fits if f is not old)], key=lambda f: f.left)
+
+
+def _in_chords(
+    inquiry: Inquiry, old: Fitted, shifts: Sequence[float], few: Sequence[int]
+) -> list[tuple[tuple[Candidate, ...], tuple[float, ...]]]:
+    """Where what rings last in a fit leaves least at all frequencies and shapes: first of the recording met worst."""
+    *beside, last = old.candidates
+    at = old.x[: len(old.x) - len(old.own)]
+    whole, places = chords(last, old.own)
+    candidates, worst = (*beside, whole), max(few, key=lambda r: old.blocks[r].total)
+    heard = _met(inquiry, candidates, [(*at, *own) for own in places], shifts, (worst,))[:HEARD]
+    plain = [whole.plain(x[len(at) :]) for x in apart(_met(inquiry, candidates, [x for _, x in heard], shifts, few))]
+    return [((*beside, c), (*at, *own)) for c, own in plain]
+
+
+def _met(
+    inquiry: Inquiry,
+    candidates: Sequence[Candidate],
+    places: Sequence[tuple[float, ...]],
+    shifts: Sequence[float],
+    few: Sequence[int],
+) -> list[tuple[float, tuple[float, ...]]]:
+    """What is left of `few` recordings at those of some places that can be simulated, with these, the least first."""
+    look = partial(_left_of, candidates=tuple(candidates), shifts=tuple(shifts), few=tuple(few))
+    met = zip(inquiry.looks(look, places), places, strict=True)
+    return sorted((there, x) for there, x in met if there is not None)
+
+
+def _left_of(
+    judge: Judge,
+    x: tuple[float, ...],
+    *,
+    candidates: Sequence[Candidate],
+    shifts: Sequence[float],
+    few: Sequence[int],
+) -> float | None:
+    """What is left of `few` recordings at x; None if a run fails."""
+    return left_at(judge, candidates, x, shifts, few)
+
+
+def _but_for_some(
+    inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: Gate, shifts: Sequence[float]
+) -> list[Fitted]:
+    """The fits, best first, with those whose shape may be wrong for a few recordings alone, fitted together with it.
+
+    Such a one meets most recordings far better than the best does, by the middle one, and leaves a few altogether: a
+    face that is held lets go or does not.
+    """
+    able = [c for c in inquiry.free(base) if c.shapes]
+    begun = [tuple((*base.x, *start) for start in (*looked.starts.get(c.key, ()), *c.starts())) for c in able]
+    most = MOSTLY * _middle(fits[0].blocks)
+    look = partial(_best_middle, beside=base.candidates, shifts=tuple(shifts), most=most)
+    met = zip(able, inquiry.looks(look, list(zip(able, begun, strict=True))), strict=True)
+    places = [(c, x) for c, x in met if x is not None]
+    return _with_shapes(inquiry, base, fits, places, shifts)
+
+
+def _with_shapes(
+    inquiry: Inquiry,
+    base: Fitted,
+    fits: Sequence[Fitted],
+    places: Sequence[tuple[Candidate, tuple[float, ...]]],
+    shifts: Sequence[float],
+) -> list[Fitted]:
+    """The fits, best first, with those of candidates fitted together with their shapes from places beside the base.
+
+    They are begun where least is left all along each parameter of the shape. One that comes nowhere near what the best
+    fit leaves is not gone on with.
+    """
+    sets = [((*base.candidates, c.whole()), along_shapes(c, x)) for c, x in places]
+    parts = [(candidates, tuple(every[k::PARTS])) for candidates, every in sets for k in range(PARTS)]
+    met = inquiry.looks(partial(least_of, shifts=tuple(shifts)), parts)
+    jobs = []
+    for k, (candidates, _) in enumerate(sets):
+        least = min((one for one in met[k * PARTS : (k + 1) * PARTS] if one is not None), default=None)
+        if least is not None:
+            jobs.append(Job(candidates=candidates, start=least[1], shifts=tuple(shifts), width=1))
+    begun = [f for f in inquiry.fits(jobs) if f is not None]
+    near = [f for f in begun if f.left <= BEHIND * fits[0].left]
+    followed = zip(inquiry.fits([from_there(f, "polish") for f in near]), near, strict=True)
+    others = [f for f in begun if not any(f is one for one in near)]
+    return sorted([*fits, *others, *(new or old for new, old in followed)], key=lambda f: f.left)
+
+
+def _best_middle(
+    judge: Judge,
+    begun: tuple[Candidate, tuple[tuple[float, ...], ...]],
+    *,
+    beside: tuple[Candidate, ...],
+    shifts: tuple[float, ...],
+    most: float,
+) -> tuple[float, ...] | None:
+    """Where a candidate leaves least of the middle recording of those places; None if nowhere less than `most`."""
+    c, places = begun
+    met = [(left, x) for x in places if (left := _middle_at(judge, (*beside, c), x, shifts, most)) is not None]
+    return min(met)[1] if met else None
+
+
+def _middle_at(
+    judge: Judge, candidates: Sequence[Candidate], x: tuple[float, ...], shifts: Sequence[float], most: float
+) -> float | None:
+    """What the middle recording leaves per sample at x; None from `most` on, or where one cannot be simulated."""
+    left: list[float] = []
+    for r, shift in enumerate(shifts):
+        block = judge.block(r, candidates, x, shift, 0.0)
+        if block is None:
+            return None
+        left.append(_per_sample(block))
+        # with so many beyond twice the most the middle one, or the mean of two, is beyond it
+        if 2 * sum(v >= 2.0 * most for v in left) >= len(shifts):
+            return None
+    middle = float(np.median(left))
+    return middle if middle < most else None
+
+
+def _middle(blocks: Sequence[Block]) -> float:
+    """What the middle one of several recordings leaves per sample."""
+    return float(np.median([_per_sample(b) for b in blocks]))
+
+
+def _per_sample(block: Block) -> float:
+    """What is left of a recording per sample."""
+    return block.normal()[2] / block.residual.size
+
+
+def shaped_too(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
+    """The fits with shapes fitted too where that pays, best first; other forms if the best leaves more than chance.
+
+    Of an effect that takes next to nothing from what the base leaves no shape or form will take it all.
+    """
+    lead = min(fits, key=lambda f: f.left)
+    best, size = lead.left, sum(b.residual.size for b in fits[0].blocks)
+    held = [held_out(f, inquiry.groups).total ** 2 for f in fits]
+    is_whole = mismatch_of(inquiry.judge.evidence, lead.blocks, inquiry.phases).p_value > BY_CHANCE
+    ways: list[tuple[int, Job]] = []
+    for k, (f, ahead) in enumerate(zip(fits, held, strict=True)):
+        is_near = f.left < SHAPED * best or ahead < SHAPED * min(held)
+        if not is_near or base.left - f.left < LEAST * (base.left - size):
+            continue
+        jobs = [from_there(f, "shape")] if f.candidates[-1].shapes else []
+        jobs += [] if is_whole else [replace(from_there(f, "shape"), form=c) for c in f.candidates[-1].forms()]
+        ways += [(k, replace(job, leaves=tuple(b.total for b in lead.blocks))) for job in jobs]
+    made: dict[int, list[Fitted]] = {}
+    for (k, _), new in zip(ways, _polished(inquiry, inquiry.fits([job for _, job in ways]), best), strict=True):
+        if new is not None:
+            made.setdefault(k, []).append(new)
+    found = list(fits)
+    for k, several in made.items():
+        new = _plainest(several, size)
+        if new.left < fits[k].left - enough(best, size):
+            found[k] = new
+    return sorted(found, key=lambda f: f.left)
+
+
+def _polished(inquiry: Inquiry, fits: Sequence[Fitted | None], best: float) -> list[Fitted | None]:
+    """Fits, those in another form that come near the best of all and leave more than noise followed on."""
+    least = min([best, *(f.left for f in fits if f is not None)])
+    near = [f for f in fits if f is not None and f.candidates[-1].form and f.left < LEADS * least and not is_noise(f)]
+    followed = inquiry.fits([from_there(f, "polish") for f in near])
+    better = {id(old): new for old, new in zip(near, followed, strict=True)}
+    return [better.get(id(f)) or f for f in fits]
+
+
+def _plainest(fits: Sequence[Fitted], size: int) -> Fitted:
+    """Of an effect in several forms the one that asks for least, of those that meet all as well."""
+    least = min(f.left for f in fits)
+    near = [f for f in fits if f.left < least + enough(least, size)]
+    return min(near, key=lambda f: (len(f.x), bool(f.candidates[-1].form), f.left))
+
+
+def timed_too(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
+    """The fits, the near ones with their time shifts tried out, and clocks all along their range, best first.
+
+    Beside what is hardly met at all everything is near: an effect must gain a share of what the best does.
+    """
+    least = min(f.left for f in fits)
+    near = [f for f in fits if f.left < TIED * least and base.left - f.left >= LEAST * (base.left - least)]
+    others = [f for f in fits if not any(f is one for one in near)]
+    traced = [traced_too(inquiry, f) if is_clock(f) else f for f in near]
+    timed = [new or f for new, f in zip(inquiry.fits([from_there(f, "time") for f in traced]), traced, strict=True)]
+    return sorted(clocked_alike(inquiry, timed) + others, key=lambda f: f.left)
+
+
+def clocked_alike(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
+    """The fits; some recordings at the time shifts of the one that leaves least, where that is better; never worse.
+
+    Edges leave a shift in the first dip of many, and a recording's clock is the same whatever is missing.
+    """
+    if len(fits) < 2:
+        return list(fits)
+    lead = min(fits, key=lambda f: f.left)
+    shifts = [_shifts_beside(inquiry.judge, f, lead) for f in fits]
+    jobs = {k: replace(from_there(fits[k], "time"), shifts=s) for k, s in enumerate(shifts) if s is not None}
+    found = dict(zip(jobs, inquiry.fits(list(jobs.values())), strict=True))
+    return [min((f, found.get(k) or f), key=lambda one: one.left) for k, f in enumerate(fits)]
+
+
+def _shifts_beside(judge: Judge, fitted: Fitted, lead: Fitted) -> tuple[float, ...] | None:
+    """Time shifts (s) of all recordings, those of `lead` where they leave less; None if they do nowhere."""
+    shifts = [b.shift for b in fitted.blocks]
+    for r, (own, other) in enumerate(zip(fitted.blocks, lead.blocks, strict=True)):
+        if abs(other.shift - own.shift) > TOLD:
+            there = judge.block(r, fitted.candidates, fitted.x, other.shift, 0.0, clock=False)
+            if there is not None and there.total < own.total - LITTLE:
+                shifts[r] = other.shift
+    return tuple(shifts) if any(s != b.shift for s, b in zip(shifts, fitted.blocks, strict=True)) else None
+
+
+def traced_too(inquiry: Inquiry, fitted: Fitted) -> Fitted:
+    """The fit, or a better one begun where a threshold of its last effect lies elsewhere."""
+    begun = inquiry.fits([replace(from_there(fitted, "trace"), stretch=s) for s in stretches(fitted)])
+    return min([fitted, *(f for f in begun if f is not None)], key=lambda f: f.left)
+
+
+def from_there(f: Fitted, how: How) -> Job:
+    """What is made of a fit where it stands."""
+    return Job(how=how, candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks))
+
+
+def one_each(fits: Sequence[Fitted]) -> list[Fitted]:
+    """The best fit of each candidate."""
+    best: dict[str, Fitted] = {}
+    for f in sorted(fits, key=lambda f: f.left):
+        best.setdefault(f.candidates[-1].key, f)
+    return list(best.values())

@@ -1,0 +1,223 @@
+"""What a step leads to where its fit is followed to the end, and whether an effect of fewer numbers ends there too."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from rollover.diagnosis.fit.jobs import Job
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.linearisation import turned
+from rollover.diagnosis.fit.local_search import ended, polish, timed, without
+from rollover.diagnosis.fit.parameterisation import Candidate, coordinates, each_with_own
+from rollover.diagnosis.fit.step import Step
+from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
+from rollover.diagnosis.selection.context import Inquiry
+from rollover.diagnosis.selection.flexibility import is_any_curve
+from rollover.diagnosis.selection.forward_step import NEARLY_NOISE, SOON, is_at_an_end
+from rollover.diagnosis.selection.restarts import LEADS, from_there, traced_too
+from rollover.effects import EFFECTS
+
+MANY = 0.05  # p-value of what as many effects as may be leave, below which they are no explanation
+BESIDE = 3  # rivals of a step that are begun anew beside a better fit of what came before
+SIMPLER = 4  # rivals of fewer numbers that are begun anew beside a fit at an end of its range
+PLAINER = 3  # effects of fewer numbers, of all, that are gone on with after a short fit
+TELLS = 10.8  # chi-square of one number, p = 0.001
+
+
+def followed(inquiry: Inquiry, found: Step) -> tuple[Step, Mismatch]:
+    """A step and what it leaves; where that is little more than noise, its fit followed to the end; never worse.
+
+    Beside a kink, or a sample that a clock carries over a leap, or in the valley that two effects share, a fit may end
+    too early. One effect's is followed only if what it leaves is in doubt, or if it is met better with its threshold
+    elsewhere.
+    """
+    judge, phases, old = inquiry.judge, inquiry.phases, found.fitted
+    left = mismatch_of(judge.evidence, old.blocks, phases)
+    is_near = old.left < NEARLY_NOISE**2 * sum(b.residual.size for b in old.blocks)
+    if judge.effort.thrifty or not is_near:
+        return found, left
+    if not is_any_curve(old.candidates):  # as they stand these will be refused, however well they fit
+        new = traced_too(inquiry, old)
+        if new.left < old.left or len(old.candidates) > 1 or left.p_value < MANY:
+            new = timed(judge, polish(judge, new))
+        new = ended(judge, new)
+        if new.left < old.left:
+            found = _with_rivals(inquiry, found.moved_to(new))
+            left = mismatch_of(judge.evidence, new.blocks, phases)
+    for simple in (simpler, _straightened, plainer):
+        other = simple(inquiry, found)
+        if other is not None:
+            found, left = other, mismatch_of(judge.evidence, other.fitted.blocks, phases)
+    return found, left
+
+
+def simpler(inquiry: Inquiry, found: Step) -> Step | None:
+    """A step by an effect of fewer numbers that does as well; else None.
+
+    One that its own becomes at an end of its range, as a layer from the surface on is a stiffness; or any where one of
+    its own tells nothing, as it stands at such an end. What has fewer numbers is begun beside what stands beside it.
+    """
+    best, beside, shared = found.fitted, *_shared(found.fitted)
+    begun = list(_become(inquiry, best))
+    if is_at_an_end(best):
+        able = sorted(found.rivals, key=lambda f: f.left)
+        able = [f for f in able if len(f.own) < len(best.own) and f.left < found.base.left][:SIMPLER]
+        begun += [((*beside, f.candidates[-1]), f.own) for f in able]
+    shifts = tuple(b.shift for b in best.blocks)
+    jobs = [Job(candidates=candidates, start=(*shared, *own), shifts=shifts, width=1) for candidates, own in begun]
+    one = min((f for f in inquiry.fits(jobs) if f is not None), key=lambda f: f.left, default=None)
+    if one is None or not _is_as_good(one, best):
+        return None
+    return _led_by(one, found)
+
+
+def _shared(fitted: Fitted) -> tuple[tuple[Candidate, ...], tuple[float, ...]]:
+    """What a fit holds beside its last effect, in the forms that it has there, and where that stands."""
+    return fitted.candidates[:-1], tuple(fitted.x[: len(fitted.x) - len(fitted.own)])
+
+
+def _become(inquiry: Inquiry, best: Fitted) -> Iterator[tuple[tuple[Candidate, ...], tuple[float, ...]]]:
+    """What the last effect of a fit becomes at an end of its range, beside the others, and where that would stand."""
+    *others, last = best.candidates
+    values, kinds = last.values(best.own), EFFECTS[last.id].becomes
+    for c in inquiry.candidates:
+        there = {p: values[own] * times for p, (own, times) in kinds.get(c.id, {}).items() if own in values}
+        if there.keys() >= c.search.keys() and c.key not in {o.key for o in others}:
+            yield (*others, c), coordinates(there, c.search)
+
+
+def _with_rivals(inquiry: Inquiry, found: Step) -> Step:
+    """A step with its nearest rivals begun anew beside what they share with its best, which was followed alone."""
+    best, beside, shared = found.fitted, *_shared(found.fitted)
+    if not beside:
+        return found
+    shifts, near = tuple(b.shift for b in best.blocks), sorted(found.rivals, key=lambda f: f.left)[:BESIDE]
+    begun = [f for f in near if f is not best]
+    jobs = [Job(candidates=(*beside, f.candidates[-1]), start=(*shared, *f.own), shifts=shifts, width=1) for f in begun]
+    better = {id(f): again for f, again in zip(begun, inquiry.fits(jobs), strict=True) if again is not None}
+    rivals = (min(f, better.get(id(f), f), key=lambda one: one.left) for f in found.rivals)
+    return replace(found, rivals=tuple(rivals))
+
+
+def _straightened(inquiry: Inquiry, found: Step) -> Step | None:
+    """A step of several effects with those in their usual shape that need no other beside each other; None if none.
+
+    What had to be bent to do another's work as well is straight again once that stands beside it.
+    """
+    best, usual = found.fitted, {c.key: c for c in inquiry.candidates}
+    bent = [k for k, c in enumerate(best.candidates) if c.is_bent and usual[c.key].search.keys() <= c.search.keys()]
+    if len(best.candidates) < 2 or not bent:
+        return None
+    shifts, ways = tuple(b.shift for b in best.blocks), [bent, *([k] for k in bent if len(bent) > 1)]
+    jobs = [Job(candidates=c, start=x, shifts=shifts, width=1) for c, x in (unbent(best, usual, w) for w in ways)]
+    fits = [f for f in inquiry.fits(jobs) if f is not None and _is_as_good(f, best)]
+    if not fits:
+        return None
+    return _led_by(min(fits, key=lambda f: (len(f.x), f.left)), found)
+
+
+def plainer(inquiry: Inquiry, found: Step) -> Step | None:
+    """A step by any effect of fewer numbers, but a sensor's, that does as well beside the others; None if none.
+
+    Two thresholds in one place do the work of one and a stiffness: of either. The way there is crooked: all others move
+    with it, beside that which does most of the work less far.
+    """
+    made = (_plainer_last(inquiry, way) for way in _ways(inquiry.judge, found))
+    return next((new for new in made if new is not None), None)
+
+
+def _ways(judge: Judge, found: Step) -> Iterator[Step]:
+    """A step, and of two effects of one family, of several numbers each, the same with the first for its last."""
+    yield found
+    each = found.fitted.candidates
+    if len(each) == 2 and len({c.family for c in each}) == 1 and all(len(c.search) > 1 for c in each):
+        around = turned(found.fitted)
+        base = without(judge, around, 1)
+        if base is not None:
+            yield Step(base=base, fitted=around, p_value=found.p_value, rivals=(around,))
+
+
+def _plainer_last(inquiry: Inquiry, found: Step) -> Step | None:
+    best, beside, shared = found.fitted, *_shared(found.fitted)
+    held = {c.key for c in best.candidates}
+    able = [c for c in inquiry.candidates if c.kind != "sensor" and len(c.search) < len(best.own) and c.key not in held]
+    if not beside or not able:
+        return None
+    shifts = tuple(b.shift for b in best.blocks)
+    jobs = [Job(candidates=(*beside, c), start=(*shared, *c.probes()[0]), shifts=shifts, rounds=SOON) for c in able]
+    short = sorted((f for f in inquiry.fits(jobs) if f is not None), key=lambda f: f.total)[:PLAINER]
+    whole = inquiry.fits([from_there(f, "fit") for f in short])
+    one = min((f for f in whole if f is not None), key=lambda f: f.left, default=None)
+    if one is None or one.left > LEADS * best.left:
+        return None
+    one = inquiry.fits([from_there(one, "polish")])[0] or one
+    return _led_by(one, found) if _is_as_good(one, best) else None
+
+
+def mirrored(inquiry: Inquiry, found: Step) -> Step:
+    """A step of several effects with what mirrors its last one among its rivals, begun where it would do the same.
+
+    The others have to move for that, so far that no look comes there.
+    """
+    for new in mirror_images(inquiry, found.fitted, *_shared(found.fitted)):
+        known = [f for f in found.rivals if f.candidates[-1].key == new.candidates[-1].key]
+        if all(new.left < f.left for f in known):
+            others = (f for f in found.rivals if not any(f is one for one in known))
+            found = replace(found, rivals=(*others, new))
+    return found
+
+
+def mirror_images(
+    inquiry: Inquiry, fitted: Fitted, beside: Sequence[Candidate], shared: Sequence[float]
+) -> list[Fitted]:
+    """Fits of what mirrors the last effect of a fit beside some others from `shared`, which are led there first."""
+    last, shifts = fitted.candidates[-1], tuple(b.shift for b in fitted.blocks)
+    begun = list(_mirrors(last, fitted.own, inquiry.free(fitted))) if beside else []
+    held = [replace(c, search={}, fixed={**c.fixed, **c.values(own)}) for c, own in begun]
+    jobs = [Job(candidates=(c, *beside), start=tuple(shared), shifts=shifts) for c in held]
+    led = [(c, own, f) for (c, own), f in zip(begun, inquiry.fits(jobs), strict=True) if f is not None]
+    jobs = [
+        Job(candidates=(*beside, c), start=(*f.x, *own), shifts=tuple(b.shift for b in f.blocks)) for c, own, f in led
+    ]
+    return [f for f in inquiry.fits(jobs) if f is not None]
+
+
+def _mirrors(
+    last: Candidate, own: Sequence[float], candidates: Sequence[Candidate]
+) -> Iterator[tuple[Candidate, tuple[float, ...]]]:
+    """What does the same as an effect beside another stiffness of all the ground, and where it would stand."""
+    values = last.values(own)
+    for c in candidates:
+        there = {p: values[n] ** to for p, (n, to) in EFFECTS[last.id].mirrors.get(c.id, {}).items() if n in values}
+        if there and there.keys() >= c.search.keys():
+            yield c, coordinates(there, c.search)
+
+
+def unbent(
+    fitted: Fitted, usual: Mapping[str, Candidate], which: Sequence[int]
+) -> tuple[tuple[Candidate, ...], tuple[float, ...]]:
+    """Effects of a fit, `which` of them in their usual shape, and where they stand."""
+    candidates: list[Candidate] = []
+    x: list[float] = []
+    for k, (c, own) in enumerate(each_with_own(fitted.candidates)):
+        if k in which:
+            values, c = c.values(fitted.x[own]), usual[c.key]
+            x += coordinates(values, c.search)
+        else:
+            x += fitted.x[own]
+        candidates.append(c)
+    return tuple(candidates), tuple(x)
+
+
+def _led_by(new: Fitted, found: Step) -> Step:
+    """A step with another fit for its best, which is none of its rivals any more, nor is what was of that effect."""
+    same = new.candidates[-1].key
+    others = (f for f in found.rivals if f is not found.fitted and f.candidates[-1].key != same)
+    return replace(found, fitted=new, rivals=(new, *others))
+
+
+def _is_as_good(simple: Fitted, best: Fitted) -> bool:
+    """Whether a fit of fewer numbers leaves hardly more than the best."""
+    phi = max(1.0, best.left / sum(b.residual.size for b in best.blocks))
+    return simple.left < best.left + phi * TELLS * (len(best.x) - len(simple.x))

@@ -1,0 +1,223 @@
+"""Effects one after another, each beside those before it, as long as they gain more than chance does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeGuard
+
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.local_search import conditioned, is_doubtful, timed
+from rollover.diagnosis.fit.step import Phases, Step
+from rollover.diagnosis.fit.time_shift import is_all_by_clocks
+from rollover.diagnosis.inference.adequacy import NEGLIGIBLE, is_enough, is_tolerated
+from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
+from rollover.diagnosis.noise.ensemble import is_other
+from rollover.diagnosis.selection.context import Inquiry
+from rollover.diagnosis.selection.ensemble_validation import SPOKEN, astray, backed, begun_anew, lasting
+from rollover.diagnosis.selection.flexibility import MOST, is_any_curve
+from rollover.diagnosis.selection.forward_step import does, moves, step, weighed
+from rollover.diagnosis.selection.pairs import two_by_two, with_another_first
+from rollover.diagnosis.selection.scan import look, look_again
+from rollover.diagnosis.selection.score_test import Gate
+from rollover.diagnosis.selection.simplification import followed
+
+CHANCE = 0.005  # p-value of the best of all candidates that admits one
+BY_SCATTER = 0.1  # the same where runs scatter and there is a mismatch: fits decide, and gains that last
+PART = 0.25  # of what moves something, that a part of more must move
+# misfit over the noise that two effects leave and a third is not looked for, and the share of what was beyond the
+# noise that is little all the same, of drops and of full runs, of which a third effect asks for many
+HOPELESS, HARDLY_ANY = 2.0, (0.1, 0.01)
+# times what the second effect took, that two leave beyond the noise and no third is looked for: it would have to take
+# that, and the one that takes more comes first
+UNLIKELY = 3.0
+SEVERAL = 2  # recordings on another course, after which they are not forgiven if a candidate scores beyond chance
+ABLE = 0.7  # of what there was beyond the noise, above which two leave so much that no exchange of one will end it
+
+
+@dataclass(frozen=True, kw_only=True)
+class Taken:
+    """The base, the steps taken beside it, the fit with all of them (the base itself if none), and what it leaves.
+
+    `first` is the first step, taken or not; `at_first` what all candidates scored beside the base, `looked` beside the
+    last fit; `refuted` whether the best candidate's gain did not outlast the scatter of its own runs; `paired` whether
+    all were tried two by two.
+    """
+
+    base: Fitted
+    steps: tuple[Step, ...]
+    fitted: Fitted
+    before: Mismatch
+    left: Mismatch
+    first: Step | None
+    at_first: Gate
+    looked: Gate
+    refuted: bool = False
+    paired: bool = False
+
+    @property
+    def count(self) -> int:
+        """Number of samples."""
+        return sum(b.residual.size for b in self.base.blocks)
+
+
+def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = (), *, pairs: bool = True) -> Taken:
+    """Up to three effects, one after another beside the base; it goes on from the steps `begun`, if any.
+
+    Two that leave more than noise are given for the best of all `pairs`, if these are to be tried.
+    """
+    judge, candidates, groups, phases = inquiry.judge, inquiry.candidates, inquiry.groups, inquiry.phases
+    count = sum(b.residual.size for b in base.blocks)
+    clocked = begun_anew if judge.effort.thrifty else timed
+    base = clocked(judge, base)  # what a clock leaves is no noise,
+    if weighed(judge, base, phases):
+        base = judge.again(base)
+    base = clocked(judge, base)  # and no effect's gain
+    before = mismatch_of(judge.evidence, base.blocks, phases)
+    base = astray(judge, base)
+    inquiry.say(f"looking at {len(candidates)} candidates, which of them could matter")
+    looked = first_look = look(judge, base, candidates, groups, looks=inquiry.crew.looks)
+
+    def beside(fitted: Fitted, left: Mismatch) -> Gate:
+        known = base if is_enough(judge, fitted, left) else None
+        return look_again(judge, fitted, known, inquiry.free(fitted), groups, first_look, inquiry.crew.looks)
+
+    current, left = base, before
+    taken = list(begun)
+    first = taken[0] if taken else None
+    if taken:
+        current = taken[-1].fitted
+        left = mismatch_of(judge.evidence, current.blocks, phases)
+        looked = beside(current, left)
+    refuted = paired = False
+    for _ in range(MOST - len(begun)):
+        if is_tolerated(judge, current):
+            break
+        if looked.p_value() > CHANCE and is_enough(judge, current, left):
+            break
+        if not taken and not judge.effort.thrifty and is_all_by_clocks(judge, base, inquiry.crew.looks):
+            break
+        tried = step(inquiry, current, looked)
+        first = first or tried
+        if not is_beyond_chance(tried, judge, phases):
+            break
+        found = upheld(inquiry, tried, looked)
+        if found is None and not taken:
+            found = counted_otherwise(inquiry, current)
+            first = found or first
+        if found is None:
+            refuted = not taken
+            break
+        found, left = as_conditioned(judge, *followed(inquiry, found), phases)
+        taken.append(found)
+        current = found.fitted
+        if not judge.straying:
+            current = astray(judge, current)
+            left = mismatch_of(judge.evidence, current.blocks, phases)
+        if len(taken) == 2 and not is_enough(judge, current, left):
+            # of two that are strong the first may have been taken for something else
+            other = None
+            if pairs and not judge.effort.thrifty:
+                other, paired = two_by_two(inquiry, taken, first_look, current), True
+            elif judge.effort.thrifty and current.left - count < ABLE * (base.left - count):
+                other = with_another_first(inquiry, taken, current)
+            if other is not None:
+                (taken, left), current = other, other[0][-1].fitted
+        is_lost = len(taken) > 1 and (is_hopeless(judge, base, current) or is_unlikely(judge, taken[-1], current))
+        if is_lost or is_any_curve(current.candidates):
+            break
+        looked = beside(current, left)
+    if not judge.straying:
+        judge.straying, current = True, judge.again(current)
+        left = mismatch_of(judge.evidence, current.blocks, phases)
+    return Taken(
+        base=base,
+        steps=tuple(taken),
+        fitted=current,
+        before=before,
+        left=left,
+        first=first,
+        at_first=first_look,
+        looked=looked,
+        refuted=refuted,
+        paired=paired,
+    )
+
+
+def is_hopeless(judge: Judge, base: Fitted, current: Fitted) -> bool:
+    """Whether two effects leave far more than noise, and no small part of what there was beyond it."""
+    count, hardly_any = sum(b.residual.size for b in current.blocks), HARDLY_ANY[judge.effort.thrifty]
+    return current.left > HOPELESS**2 * count and current.left - count > hardly_any * (base.left - count)
+
+
+def is_unlikely(judge: Judge, last: Step, current: Fitted) -> bool:
+    """Whether a third effect, of drops, would have to take far more than the second did for nothing to be left."""
+    beyond = current.left - sum(b.residual.size for b in current.blocks)
+    return not judge.effort.thrifty and beyond > UNLIKELY * max(last.base.left - current.left, 0.0)
+
+
+def is_beyond_chance(found: Step | None, judge: Judge, phases: Phases) -> TypeGuard[Step]:
+    """Whether a step gains more than the best of all candidates does by chance, and moves something by it.
+
+    An effect that moves things itself is none to be left out because others can be bent to nearly all of it, nor is a
+    part of what is not negligible as a whole. Where runs scatter, slopes say less than the fits do: what is missing for
+    sure is looked for though the best slopes could be chance.
+    """
+    if found is None or found.p_value > (BY_SCATTER if judge.effort.thrifty else CHANCE):
+        return False
+    if found.p_value > CHANCE and not is_missed(found.base, judge, phases):
+        return False
+    moved = moves(judge, found.base, found.fitted)
+    if moved >= NEGLIGIBLE or moved < PART * NEGLIGIBLE or judge.effort.thrifty:
+        return moved >= NEGLIGIBLE
+    if found.base.candidates and does(judge, found.fitted) >= NEGLIGIBLE:
+        return True
+    return is_missed(found.base, judge, phases)
+
+
+def is_missed(fitted: Fitted, judge: Judge, phases: Phases) -> bool:
+    """Whether a fit surely leaves something that matters."""
+    return not is_enough(judge, fitted, mismatch_of(judge.evidence, fitted.blocks, phases))
+
+
+def upheld(inquiry: Inquiry, found: Step, looked: Gate) -> Step | None:
+    """A step as it is to be taken; None where runs scatter and its gain does not outlast that."""
+    judge = inquiry.judge
+    spoken = SPOKEN if found.p_value <= CHANCE else BY_SCATTER  # what admitted the step speaks for its best
+    return lasting(judge, backed(found, looked, spoken), inquiry.groups) if judge.effort.thrifty else found
+
+
+def counted_otherwise(inquiry: Inquiry, current: Fitted) -> Step | None:
+    """A step with recordings on another course counted in full where they were forgiven, or forgiven; None if none.
+
+    Chance could have sent several there, but so could what is missing; and where they went there may hide what shows
+    before. If nothing lasts they are counted as they were.
+    """
+    judge = inquiry.judge
+    before = judge.straying
+    if before and sum(is_other(b.course) for b in current.blocks) < SEVERAL:
+        return None
+    judge.straying = not before
+    base = judge.again(current)
+    looked = look(judge, base, inquiry.candidates, inquiry.groups)
+    tried = step(inquiry, base, looked)
+    found = upheld(inquiry, tried, looked) if is_beyond_chance(tried, judge, inquiry.phases) else None
+    if found is None:
+        judge.straying = before
+    return found
+
+
+def as_conditioned(judge: Judge, found: Step, left: Mismatch, phases: Phases) -> tuple[Step, Mismatch]:
+    """A step and what it leaves; with the errors of the conditions as they act beside it if that leaves chance alone.
+
+    Else these stay as they act on the scenario as it is: a wrong effect would bend them too.
+    """
+    if is_enough(judge, found.fitted, left) or not is_doubtful(judge):
+        return found, left
+    before = judge.evidence
+    new = conditioned(judge, found.fitted)
+    there = mismatch_of(judge.evidence, new.blocks, phases)
+    if is_enough(judge, new, there):
+        return found.moved_to(new), there
+    judge.weigh(before)
+    return found, left

@@ -1,0 +1,116 @@
+"""The way down first: what acts only behind the deepest point is no reason for what is seen before it.
+
+Where much is missing on the way back, as of ground that springs, no effect of the way down meets a recording well, and
+one that meets neither may lead. Up to the deepest point it is out of sight. What bounces comes down again at other
+times with another spring, and fits to several such blows end at the wrong ones: the first rise comes before them, and
+before what holds the face as it lifts off comes what it springs back by.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.data.phases import AROUND_PEAK, PEAK
+from rollover.diagnosis.fit.jobs import Job
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.step import Step
+from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.noise.truncation import up_to
+from rollover.diagnosis.selection.context import Inquiry
+from rollover.diagnosis.selection.forward_step import NEARLY_NOISE
+from rollover.diagnosis.selection.pairs import is_better
+from rollover.diagnosis.selection.stepwise import HOPELESS, Taken, one_by_one
+
+BEYOND = 0.05  # s that are simulated after an end, for filters that look ahead
+RIVALS = 5  # that are held against the best over the whole way
+# of the time to the deepest point: before it, as the ground springs back, and before what bounces comes down again
+ENDS = (1.0 - AROUND_PEAK, 1.2, 2.0)
+# of the time to the deepest point, after which what rests does not move any more; how near to its deepest that is; and
+# of what is left beyond the noise, that must move there for the way back to be a reason
+AT_REST, DEEPEST, BACK = 1.2, 0.999, 0.02
+
+
+def down_first(inquiry: Inquiry, found: Taken) -> Taken:
+    """What was found, or a better one begun with what explains the way down alone; only where much is left."""
+    judge, base = inquiry.judge, found.base
+    if judge.effort.thrifty or found.fitted.left < HOPELESS**2 * found.count:
+        return found
+    if moving_back(inquiry, base) < BACK * (found.fitted.left - found.count):
+        return found  # it came to rest as the simulation does, wherever that was
+    steps: Sequence[Step] = ()
+    for end in ENDS:
+        above = _until(inquiry, end, steps)
+        if above is None or not above.steps or above.fitted.left > NEARLY_NOISE**2 * above.count:
+            break
+        steps = above.steps
+    begun, held = _over_all(inquiry, base, steps), judge.evidence
+    if not begun:
+        return found
+    other = one_by_one(inquiry, base, begun)
+    if is_better(other.fitted, other.left, found.fitted):
+        return other
+    judge.weigh(held)
+    return found
+
+
+def moving_back(inquiry: Inquiry, base: Fitted) -> float:
+    """What a fit leaves beyond the noise where both it and the recordings are past the deepest point, about its mean.
+
+    Ground that holds what fell into it leaves an offset there, whatever is missing on the way down. Infinite where
+    nothing was recorded there.
+    """
+    found, count = 0.0, 0
+    for e, block, phases in zip(inquiry.judge.evidence, base.blocks, inquiry.phases, strict=True):
+        depth = e.simulator.state(block.shift).get("ground/sinkage")
+        peaks = [start for start, name in phases if name == PEAK]
+        if depth is None or not peaks:
+            return np.inf
+        own = float(e.recording.time[int(np.argmax(depth >= DEEPEST * depth.max()))])
+        rest = AT_REST * max(peaks[0] / (1.0 - AROUND_PEAK), own)
+        for signal, part in e.spans():
+            late = block.plain_residual[part][e.recording.time[signal.rows] > rest]
+            if late.size:
+                found, count = found + float(np.sum((late - late.mean()) ** 2)) - late.size, count + late.size
+    return found if count else np.inf
+
+
+def _until(inquiry: Inquiry, end: float, steps: Sequence[Step]) -> Taken | None:
+    """What explains recordings up to an end, of the time to the deepest point, going on from steps; None if nothing."""
+    some = [_cut(e, phases, end) for e, phases in zip(inquiry.judge.evidence, inquiry.phases, strict=True)]
+    early = Judge([e for e in some if e is not None])
+    if len(early.evidence) < len(some):
+        return None
+    inquiry.say(f"up to {end:g} of the way down first")
+    align(early)
+    bare, above = early.fit((), ()), replace(inquiry, judge=early)
+    found = one_by_one(above, bare, _over_all(above, bare, steps), pairs=False) if bare is not None else None
+    inquiry.judge.simulations += early.simulations
+    return found
+
+
+def _cut(e: Evidence, phases: Sequence[tuple[float, str]], end: float) -> Evidence | None:
+    """What was recorded before an end; None where a signal has too little of it."""
+    peaks = [start for start, name in phases if name == PEAK]
+    if not peaks:
+        return None
+    return up_to(e, end * peaks[0] / (1.0 - AROUND_PEAK), BEYOND)
+
+
+def _over_all(inquiry: Inquiry, base: Fitted, steps: Sequence[Step]) -> list[Step]:
+    """The steps with their best and nearest rivals fitted over the whole way, each beside the one before."""
+    made: list[Step] = []
+    beside = base
+    for s in steps:
+        near = [s.fitted, *sorted((f for f in s.rivals if f is not s.fitted), key=lambda f: f.left)[:RIVALS]]
+        jobs = [Job(candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks)) for f in near]
+        best, *rivals = inquiry.fits(jobs)
+        if best is None:
+            return []
+        others = tuple(f for f in rivals if f is not None)
+        made.append(replace(s, base=beside, fitted=best, rivals=(best, *others)))
+        beside = best
+    return made

@@ -1,0 +1,1 @@
+"""Test stands as constraints and loads of the system: static loading, pendulum, tilt table, exciter."""

@@ -1,0 +1,46 @@
+"""Angles that turn over from +180 to -180 degrees: said as information; all else is asked of them unwrapped."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from rollover.recording.checks.finding import Finding, Trace
+from rollover.recording.noise_floor import noise_floor
+from rollover.spec.channels import describe
+
+CLOSE = 8.0  # noise levels, by which a step may miss a whole turn
+TURN = 2.0 * math.pi
+QUICK = 0.5  # rad a sample: a step that misses a turn by more is no wrap
+
+
+def wraps(t: Trace) -> Iterator[Finding]:
+    """Whole turns in a trace as it was read, not unwrapped."""
+    if describe(t.channel).unit != "rad" or float(np.ptp(t.values)) > TURN * 1.001:
+        return
+    steps = np.diff(t.values)
+    over = np.flatnonzero(np.abs(steps) > 0.5 * TURN)
+    if not over.size:
+        return
+    whole = np.unwrap(t.values)
+    floor = noise_floor(whole)
+    usual = float(np.quantile(np.abs(np.diff(whole)), 0.99))
+    missed = np.abs(np.abs(steps[over]) - TURN)
+    lone = np.isin(over + 1, over) & (np.sign(steps[over]) * np.sign(steps[np.minimum(over + 1, steps.size - 1)]) < 0.0)
+    if np.any(missed > min(QUICK, CLOSE * floor.sigma + 3.0 * usual + 1e-6)) and lone.any():
+        return  # a sample that is off by half a turn and comes back
+    end = math.degrees(float(np.abs(t.values).max()))
+    span = "0 and 360" if float(t.values.min()) > -0.1 and end > 270.0 else "+-180"
+    yield Finding(
+        check="wrap-around",
+        channel=t.channel,
+        start=float(t.time[over[0]]),
+        end=float(t.time[over[-1] + 1]),
+        value=float(over.size),
+        unit="",
+        error=None,
+        sentence=f"wrapped at {span} degrees in {over.size} place{'s' if over.size > 1 else ''}: "
+        "a wrap-around of the angle's range, information and no fault",
+    )

@@ -1,0 +1,63 @@
+"""Stamps of samples at even steps, from the attributes that loggers and LabVIEW write beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.recording.importers import stamps
+from rollover.recording.importers.columns import number, text
+
+_STEPS: tuple[str, ...] = (
+    "dt",
+    "wf_increment",
+    "delta_t",
+    "time_step",
+    "sample_interval",
+    "sampling_interval",
+    "sample_period",
+)
+_STEPS += ("sampling_period",)
+_RATES = ("sample_rate", "sampling_rate", "samplerate", "fs", "sample_frequency", "sampling_frequency")
+_STARTS = ("t0", "wf_start_offset", "wf_start_time")
+_SAME = 1e-6  # relative: what a rate of six digits differs from its step
+
+
+def even_stamps(around: Iterable[Mapping[str, Any]], count: int) -> tuple[NDArray[np.float64] | None, int | None]:
+    """Stamps of `count` samples in s, and the instant in ns since 1970 that they count from, where one is said.
+
+    `around` are the attributes of the array, of its group, and so on outward: the innermost that says a thing holds.
+    Raises ``ValueError`` where they contradict each other.
+    """
+    levels = [{key.lower(): value for key, value in level.items()} for level in around]
+    step = next((found for level in levels if (found := _step(level)) is not None), None)
+    if step is None:
+        return None, None
+    offset, began = 0.0, None
+    for key in _STARTS:
+        value = next((level[key] for level in levels if key in level), None)
+        if value is None:
+            continue
+        start = number(value)
+        if start is None:
+            began = stamps.instant(text(value))
+        elif abs(start) > stamps.CALENDAR:
+            began = stamps.seconds_from_first(np.array([start]), stamps.NANO)[1]
+        else:
+            offset += start
+    return np.asarray(offset + step * np.arange(count), dtype=np.float64), began
+
+
+def _step(level: Mapping[str, Any]) -> float | None:
+    steps = {key: number(level[key]) for key in _STEPS if key in level}
+    steps |= {key: 1.0 / rate for key in _RATES if key in level and (rate := number(level[key]))}
+    wrong = next((key for key, step in steps.items() if step is None or not 0.0 < step < np.inf), None)
+    if wrong is not None:
+        raise ValueError(f"attribute {wrong}: no step of time, got {level[wrong]!r}; a number above 0")
+    found = [step for step in steps.values() if step is not None]
+    if found and max(found) > min(found) * (1.0 + _SAME):
+        raise ValueError(f"two steps of time, got {', '.join(f'{k} {s:g} s' for k, s in steps.items())}; one")
+    return found[0] if found else None

@@ -1,0 +1,51 @@
+"""Sheets of an Excel workbook as rows of plain values; the only home of openpyxl."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from rollover.recording.importers.apart import apart
+from rollover.recording.importers.importer import check_library, library, reading
+from rollover.system.budget import Budget
+
+IN_CELLS = 5  # bytes in memory of a byte of XML: a cell has some 30 there and 150 as an object
+MOST_EMPTY = 100  # rows without a value, after which a sheet is over; programs write 65536 of them
+
+Row = tuple[Any, ...]
+
+
+def read_workbook(path: Path) -> Mapping[str, list[Row]]:
+    """Rows of each sheet by its name, numbers as they were last worked out. Raises `InputError`.
+
+    What counts is the content: an `.xlsx` that is named `.xls` is read too.
+    """
+    check_library("openpyxl", "xlsx", path)
+    return apart(_rows, path, what="Excel", modules=("openpyxl",))
+
+
+def _rows(path: Path) -> dict[str, list[Row]]:
+    openpyxl = library("openpyxl", "xlsx", path)
+    with reading(path, "Excel (.xlsx)"), path.open("rb") as file:
+        with zipfile.ZipFile(file) as archive:
+            claimed = Budget(path)
+            for info in archive.infolist():
+                claimed.claim(IN_CELLS * info.file_size, info.filename)
+        file.seek(0)
+        book = openpyxl.load_workbook(file, read_only=True, data_only=True)
+        return {sheet.title: list(_filled(sheet.iter_rows(values_only=True))) for sheet in book.worksheets}
+
+
+def _filled(rows: Iterator[Row]) -> Iterator[Row]:
+    """Rows with a value in them."""
+    empty = 0
+    for row in rows:
+        if all(value is None for value in row):
+            empty += 1
+            if empty > MOST_EMPTY:
+                return
+            continue
+        empty = 0
+        yield row

@@ -1,0 +1,55 @@
+"""The door between files and parameter classes: strict reading, replacing by path, writing back.
+
+It serves any class made with `ground.quantity.parameters`; `rollover.scenario` uses it for scenarios.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rollover.spec.document.check import check
+from rollover.spec.document.exchange import Itself, exchanged, value_at
+from rollover.spec.document.include import expand, find, headings, named, shipped_folder
+from rollover.spec.document.replace import parse_setting, replaced
+from rollover.spec.document.resolved import Leaf, content_hash, dump, paths, to_mapping, unit_at
+from rollover.spec.document.schema import schema
+from rollover.spec.document.slot import slot_of
+from rollover.spec.document.tree import Node, read
+from rollover.spec.document.tree import write as dump_mapping
+
+__all__ = [
+    "Itself",
+    "Leaf",
+    "Node",
+    "check",
+    "content_hash",
+    "dump",
+    "dump_mapping",
+    "exchanged",
+    "find",
+    "headings",
+    "load",
+    "named",
+    "parse_setting",
+    "paths",
+    "read",
+    "replaced",
+    "schema",
+    "shipped_folder",
+    "slot_of",
+    "to_mapping",
+    "unit_at",
+    "value_at",
+]
+
+
+def load(path: str | Path, kind: Any) -> Any:
+    """Object of a parameter class (or of an annotation that offers several) from a file. Raises `InputError`."""
+    path = Path(path)
+    slot = slot_of(kind)
+    root = read(path)
+    if not isinstance(root.value, Mapping):
+        raise root.place.fault("", f"not a mapping, got {root.plain!r}; {slot.allowed()} is needed")
+    return check(expand(root, slot, (path.resolve(),)), kind)

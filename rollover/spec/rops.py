@@ -1,0 +1,109 @@
+"""The roll-over protective structure: members, mounts and hinges, clearance zone (data only)."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ground.quantity import Quantity, parameters
+from rollover.spec.connector import Connector
+from rollover.spec.inertia import MassProperties
+from rollover.spec.mechanism import Joint, free_motions, sentence
+from rollover.spec.provenance import Provenance
+from rollover.spec.shapes import Point, Shape
+
+
+@parameters
+class ClearanceZone:
+    """The operator's space, after the static test of Code 4: upright planes, then leaning in towards the top."""
+
+    seat_reference_point: Annotated[Point, Quantity("m", "vehicle axes")]
+    half_width: Annotated[float, Quantity("m", "of the upright planes", above=0)] = 0.250
+    shoulder_height: Annotated[float, Quantity("m", "where the planes begin to lean", above=0)] = 0.300
+    height: Annotated[float, Quantity("m", "of the zone above the reference point", above=0)] = 0.900
+    top_half_width: Annotated[float, Quantity("m", above=0)] = 0.150
+    front_reach: Annotated[float, Quantity("m", "ahead of the reference point", above=0)] = 0.550
+    rear_reach: Annotated[float, Quantity("m", "behind the reference point, to the seat back", least=0)] = 0.0
+
+    def corners(self) -> NDArray[np.float64]:
+        """Corners in vehicle axes, (12, 3): rear ring of six, then front ring of six, each bottom to top."""
+        x, y, z = self.seat_reference_point
+        ring = [
+            (-self.half_width, 0.0),
+            (-self.half_width, self.shoulder_height),
+            (-self.top_half_width, self.height),
+            (self.top_half_width, self.height),
+            (self.half_width, self.shoulder_height),
+            (self.half_width, 0.0),
+        ]
+        return np.array([(x + dx, y + dy, z + dz) for dx in (-self.rear_reach, self.front_reach) for dy, dz in ring])
+
+
+@parameters
+class Upper:
+    """The upper part of a frame in two parts: a body of its own on hinges.
+
+    A fold, a plastic hinge at a post's foot, a weld at mid-height: what the hinges' axes let through.
+    """
+
+    body: MassProperties
+    hinges: Annotated[tuple[Connector, ...], "between the lower and the upper part"]
+    members: Annotated[tuple[Shape, ...], "tubes and boxes of the upper part that can touch the ground"]
+
+
+@parameters
+class Rops:
+    """A frame on its mounts, in one part or two; the frame is rigid, the sway of its posts is in mounts and hinges."""
+
+    frame: Literal["two-post-rear", "two-post-front", "four-post", "cab"]
+    body: Annotated[MassProperties, "of the frame; without its upper part if there is one"]
+    mounts: Annotated[tuple[Connector, ...], "between the chassis and the frame"]
+    members: Annotated[tuple[Shape, ...], "tubes and boxes that can touch the ground"]
+    upper: Upper | None = None
+    corner: Annotated[Point, Quantity("m", "upper corner whose deflection is reported; the left one, y > 0")]
+    other_corners: Annotated[
+        tuple[Point, ...], "further upper corners, left ones, m; of all, the loaded one is reported"
+    ] = ()
+    clearance_zone: ClearanceZone | None = None
+    provenance: tuple[Provenance, ...] = ()
+
+    def validate(self) -> None:
+        """Refuse a frame that nothing holds or that its joints leave a motion, and joints that share a name."""
+        for what, joints in (("mounts", self.mounts), ("upper.hinges", self.hinges)):
+            names = [m.name for m in joints]
+            if not names and (what == "mounts" or self.upper is not None):
+                raise ValueError(f"{what}: none given; at least one")
+            if len(set(names)) != len(names):
+                raise ValueError(f"{what}: two share a name, got {names}; each name once")
+        if free := free_motions({name: body for name, (body, _) in self.parts.items()}, self.joints):
+            raise ValueError(sentence(free))
+
+    @property
+    def hinges(self) -> tuple[Connector, ...]:
+        """Between the lower and the upper part, none if the frame is in one part."""
+        return self.upper.hinges if self.upper is not None else ()
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """Mounts, then hinges, with the parts that they join."""
+        sides = (("mounts", "chassis", "rops", self.mounts), ("upper.hinges", "rops", "rops_upper", self.hinges))
+        return tuple(
+            Joint(path=f"{path}.{c.name}", below=below, above=above, connector=c)
+            for path, below, above, connectors in sides
+            for c in connectors
+        )
+
+    @property
+    def connectors(self) -> tuple[Connector, ...]:
+        """Mounts, then hinges."""
+        return self.mounts + self.hinges
+
+    @property
+    def parts(self) -> dict[str, tuple[MassProperties, tuple[Shape, ...]]]:
+        """Bodies of the frame by name, from below: mass properties and members."""
+        found = {"rops": (self.body, self.members)}
+        if self.upper is not None:
+            found["rops_upper"] = (self.upper.body, self.upper.members)
+        return found

@@ -1,0 +1,1 @@
+"""Codes for roll-over protective structures: formulae, clauses, requirements, loading sequences."""

@@ -1,0 +1,250 @@
+"""What falls or rolls: a vehicle with wheels, front axle and ROPS, a rigid body, or a striker on a guide (data only).
+
+Vehicle axes (ISO 8855): x forward, y left, z up; origin on level ground below the middle of the rear axle.
+Masses and inertias of a vehicle are those of the whole, as they are measured; what the axle and the ROPS weigh
+is taken off to find the chassis. Attached masses (ballast, driver, implement) come on top of the whole.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, ClassVar, Literal
+
+from ground.quantity import Label, Quantity, parameters
+from rollover.spec.inertia import MassProperties, combined, cuboid
+from rollover.spec.provenance import Provenance
+from rollover.spec.rops import Rops
+from rollover.spec.shapes import Point, Shape
+
+
+@parameters
+class Tyre:
+    """A crowned tread on radial and lateral springs in series, a dashpot, Coulomb friction; never pulls.
+
+    Section R - c (2y/w)^2; stiffness 1/k = cos^2(camber)/k_z + sin^2(camber)/k_y at its lowest point.
+    """
+
+    radius: Annotated[float, Quantity("m", "unloaded, in the middle of the tread", above=0)]
+    width: Annotated[float, Quantity("m", "tread", above=0)]
+    crown: Annotated[float, Quantity("m", "how far the shoulders lie below the middle", above=0)] = 0.03
+    side_wall: Annotated[
+        float, Quantity("1", "share of the radius up to which the side wall bears on the ground", above=0, most=1)
+    ] = 0.7
+    vertical_stiffness: Annotated[float, Quantity("N/m", "k_z", above=0)]
+    vertical_damping: Annotated[float, Quantity("N s/m", least=0)] = 0.0
+    lateral_stiffness: Annotated[float, Quantity("N/m", "k_y, also of the stick spring", above=0)]
+    friction: Annotated[float, Quantity("1", "mu between tyre and ground", least=0, most=2)] = 0.8
+    bottoming: Annotated[
+        float | None, Quantity("1", "deflection at which the rim bottoms, as a share of the radius", above=0, most=1)
+    ] = None
+    bottoming_stiffness: Annotated[float, Quantity("N/m", "added to k_z once the rim bottoms", least=0)] = 0.0
+
+
+@parameters
+class Wheel:
+    """A tyre at its place, locked or turning freely."""
+
+    name: Annotated[str, Label("front_left, front_right, rear_left, rear_right")]
+    centre: Annotated[Point, Quantity("m", "wheel centre, vehicle axes")]
+    tyre: Tyre
+    carrier: Literal["chassis", "front_axle"] = "chassis"
+    rolls: Annotated[
+        bool, "turns freely and without inertia, else it is locked; 'driving' turns every wheel by its own inertia"
+    ] = False
+    inertia: Annotated[
+        float | None,
+        Quantity(
+            "kg m2",
+            "of all that turns with it, about its axle; part of its carrier's; where 'driving' finds null, "
+            "estimated from the tyre's size",
+            above=0,
+        ),
+    ] = None
+
+
+@parameters
+class FrontAxle:
+    """A beam that swings about a longitudinal pivot between two stops."""
+
+    pivot: Annotated[Point, Quantity("m", "a point of the pivot axis, vehicle axes")]
+    body: MassProperties
+    swing_deg: Annotated[float, Quantity("deg", "free swing to either side", above=0, most=45)]
+    stop_stiffness: Annotated[float, Quantity("N m/rad", above=0)]
+    stop_damping: Annotated[float, Quantity("N m s/rad", least=0)] = 0.0
+    stop: Annotated[
+        Literal["compliant", "impact"],
+        "how a stop is met: on its spring and dashpot, or by an exchange of momentum, after which they hold",
+    ] = "compliant"
+    stop_restitution: Annotated[float, Quantity("1", "of an impact on a stop", least=0, most=1)] = 0.0
+
+    @property
+    def swing(self) -> float:
+        """Free swing to either side, rad."""
+        return math.radians(self.swing_deg)
+
+
+Carrier = Literal["chassis", "front_axle", "rops"]
+
+
+@parameters
+class Attached:
+    """What a vehicle carries: ballast, implement, driver, filled tank; fixed to the body that carries it.
+
+    Its inertia about its centre of mass is given, or that of a solid cuboid of the given size.
+    """
+
+    name: Annotated[str, Label()]
+    mass: Annotated[float, Quantity("kg", above=0)]
+    centre_of_mass: Annotated[Point, Quantity("m", "vehicle axes")]
+    inertia: Annotated[Point | None, Quantity("kg m2", "Ixx, Iyy, Izz about its centre of mass", above=0)] = None
+    size: Annotated[
+        Point | None, Quantity("m", "edges of a cuboid along x, y, z, in place of the inertia", above=0)
+    ] = None
+    carried_by: Carrier = "chassis"
+    outline: Annotated[tuple[Shape, ...], "what of it can touch the ground"] = ()
+
+    def validate(self) -> None:
+        """Refuse an inertia given twice or not at all."""
+        if (self.inertia is None) == (self.size is None):
+            raise ValueError("inertia: give either inertia or size, got both or none; one of them")
+        self.body  # noqa: B018  raises for an inertia that no body can have
+
+    @property
+    def body(self) -> MassProperties:
+        """Its mass properties."""
+        if self.size is not None:
+            return cuboid(self.mass, self.centre_of_mass, self.size)
+        assert self.inertia is not None
+        return MassProperties(mass=self.mass, centre_of_mass=self.centre_of_mass, inertia=self.inertia)
+
+
+@parameters
+class Vehicle:
+    """A tractor, or a rig made of some of its parts."""
+
+    kind: Literal["vehicle"] = "vehicle"
+    name: str
+    whole: Annotated[MassProperties, "of the vehicle with axle and ROPS, without what is attached"]
+    wheels: tuple[Wheel, ...] = ()
+    front_axle: FrontAxle | None = None
+    rops: Rops | None = None
+    outline: Annotated[tuple[Shape, ...], "what of the chassis can touch the ground: bonnet, fenders, mass block"] = ()
+    attached: Annotated[tuple[Attached, ...], "masses beyond the whole: ballast, implement, driver, tank"] = ()
+    contact_spacing: Annotated[float, Quantity("m", "of the contact points on outlines and members", above=0)] = 0.03
+    provenance: tuple[Provenance, ...] = ()
+
+    def validate(self) -> None:
+        """Refuse parts that do not fit together."""
+        names = [w.name for w in self.wheels]
+        if len(set(names)) != len(names):
+            raise ValueError(f"wheels: two wheels share a name, got {names}; each name once")
+        if self.front_axle is None and any(w.carrier == "front_axle" for w in self.wheels):
+            raise ValueError(
+                "wheels: a wheel is carried by 'front_axle' but there is none; give front_axle or 'chassis'"
+            )
+        for a in self.attached:
+            if (a.carried_by == "front_axle" and self.front_axle is None) or (a.carried_by == "rops" and not self.rops):
+                raise ValueError(f"attached.{a.name}.carried_by: there is none, got {a.carried_by!r}; 'chassis'")
+        masses = [a.name for a in self.attached]
+        if len(set(masses)) != len(masses):
+            raise ValueError(f"attached: two masses share a name, got {masses}; each name once")
+        chassis_of(self)
+
+    def on_axle(self, wheel: Wheel, axle: str) -> bool:
+        """Whether a wheel belongs to the "front", the "rear" or "all" of the axles."""
+        xs = [w.centre[0] for w in self.wheels]
+        is_front = wheel.carrier == "front_axle" or wheel.centre[0] > 0.5 * (min(xs) + max(xs)) + 1e-9
+        return axle == "all" or is_front == (axle == "front")
+
+
+@parameters
+class Striker:
+    """The striker of the drop rig (Ye 2006, Fig. 5): a block on a vertical guide, flat face or a cone's tip down."""
+
+    kind: Literal["striker"] = "striker"
+    name: str = "striker"
+    mass: Annotated[float, Quantity("kg", above=0)] = 132.0
+    face_length: Annotated[float, Quantity("m", "along x", above=0)] = 0.140
+    face_width: Annotated[float, Quantity("m", "along y", above=0)] = 0.045
+    nose: Annotated[Literal["flat", "cone"], "a cone replaces the face: its area grows with the depth"] = "flat"
+    nose_radius: Annotated[float, Quantity("m", "of the cone's base", above=0)] = 0.04375
+    nose_height: Annotated[float, Quantity("m", "of the cone", above=0)] = 0.0755
+    contact_spacing: Annotated[float, Quantity("m", "of the contact points on the face", above=0)] = 0.0225
+
+
+@parameters
+class RigidBody:
+    """One free rigid body, such as a thrown block: mass properties and what of it can touch the ground."""
+
+    kind: Literal["body"] = "body"
+    name: str
+    whole: MassProperties
+    outline: Annotated[tuple[Shape, ...], "what can touch the ground; on hard ground the corners, as points"]
+    contact_spacing: Annotated[float, Quantity("m", "of the contact points on outlines", above=0)] = 0.03
+    provenance: tuple[Provenance, ...] = ()
+
+    # a body is a chassis with nothing on it
+    wheels: ClassVar[tuple[Wheel, ...]] = ()
+    front_axle: ClassVar[None] = None
+    rops: ClassVar[None] = None
+    attached: ClassVar[tuple[Attached, ...]] = ()
+
+    def validate(self) -> None:
+        """Refuse a body that nothing could stop."""
+        if not self.outline:
+            raise ValueError("outline: nothing can touch the ground, got no shape; at least one")
+
+
+def chassis_of(vehicle: Vehicle | RigidBody) -> MassProperties:
+    """Mass properties of the chassis: the whole less front axle and ROPS, without attached masses.
+
+    Raises ``ValueError`` if the parts weigh more than the whole or leave an inertia that no body can have.
+    """
+    whole = vehicle.whole
+    if isinstance(vehicle, RigidBody):
+        return whole
+    parts = [] if vehicle.front_axle is None else [vehicle.front_axle.body]
+    if vehicle.rops is not None:
+        parts += [body for body, _ in vehicle.rops.parts.values()]
+    heavy = sum(p.mass for p in parts)
+    if whole.mass <= heavy:
+        raise ValueError(
+            f"whole.mass: front axle and ROPS weigh more than the vehicle, got {whole.mass:g} kg; "
+            f"greater than {heavy:g} kg is allowed"
+        )
+    try:
+        return combined([whole], less=parts)
+    except ValueError as e:
+        raise ValueError(f"whole.inertia: leaves the chassis, without front axle and ROPS, an impossible {e}") from None
+
+
+def carried(vehicle: Vehicle | RigidBody, carrier: Carrier) -> MassProperties:
+    """Mass properties of a body of the vehicle with the masses that it carries."""
+    if carrier == "chassis":
+        own = chassis_of(vehicle)
+    else:
+        part = vehicle.front_axle if carrier == "front_axle" else vehicle.rops
+        assert part is not None
+        own = part.body
+    extra = [a.body for a in vehicle.attached if a.carried_by == carrier]
+    return combined([own, *extra]) if extra else own
+
+
+def laden(vehicle: Vehicle | RigidBody) -> MassProperties:
+    """Mass properties of the vehicle with everything that is attached to it."""
+    return combined([vehicle.whole, *(a.body for a in vehicle.attached)]) if vehicle.attached else vehicle.whole
+
+
+def pitch_inertia(vehicle: Vehicle) -> tuple[float, float] | None:
+    """I about the rear axle = Iyy + m (a^2 + (h - r)^2) of the whole, and 0.378 M L^2, kg m2; None without axles.
+
+    The second is where the two formulae of the pendulum test of OECD Code 3 for a rear impact agree, H = 2.165e-8 M L^2
+    and H = 5.73e-2 I (mm); a tractor far from it has an unusual pitch inertia, or a wrong one.
+    """
+    sides = [w for w in vehicle.wheels if w.carrier == "chassis"], [w for w in vehicle.wheels if w.carrier != "chassis"]
+    if not all(sides):
+        return None
+    rear, front = sides[0][0].centre, sides[1][0].centre
+    m, (x, _, z) = vehicle.whole.mass, vehicle.whole.centre_of_mass
+    about = vehicle.whole.inertia[1] + m * ((x - rear[0]) ** 2 + (z - rear[2]) ** 2)
+    return about, 0.378 * m * (front[0] - rear[0]) ** 2

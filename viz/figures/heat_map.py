@@ -1,0 +1,46 @@
+"""A map of one number over two axes of a grid."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viz.figures.plots import COLOURS, canvas, finish, shades
+
+PAPER, WHITE = "#dfeaf6", "#ffffff"  # of the least value and of numbers on dark cells
+MOST_NUMBERS = 120  # cells up to which each carries its number
+
+
+def heat_map(x: NDArray[Any], y: NDArray[Any], values: NDArray[np.float64], *, across: str, up: str, label: str) -> str:
+    """Cells of equal size at the levels of x and y (n,), numbers or words, coloured by `values` (n,), NaN crossed."""
+    columns, rows = (list(dict.fromkeys(sorted(v.tolist()) if v.dtype != object else v.tolist())) for v in (x, y))
+    cells = np.full((len(rows), len(columns)), np.nan)
+    for a, b, value in zip(x.tolist(), y.tolist(), values, strict=True):
+        cells[rows.index(b), columns.index(a)] = value
+    low, high = float(np.nanmin(cells)), float(np.nanmax(cells))
+    with canvas(4.6, 3.2) as (figure, svg):
+        axes = figure.add_subplot()
+        colours = shades(PAPER, COLOURS["first"])
+        mesh = axes.pcolormesh(cells, cmap=colours, vmin=low, vmax=high, edgecolors=COLOURS["grid"], linewidth=0.4)
+        for (i, j), value in np.ndenumerate(cells):
+            if not np.isfinite(value):
+                axes.plot([j + 0.5], [i + 0.5], ls="", marker="x", color=COLOURS["limit"])
+            elif cells.size <= MOST_NUMBERS:
+                dark = high > low and value > 0.5 * (low + high)
+                axes.text(
+                    j + 0.5, i + 0.5, f"{value:.3g}", ha="center", va="center", fontsize=7,
+                    color=WHITE if dark else COLOURS["ink"],
+                )  # fmt: skip
+        for axis, levels in ((axes.xaxis, columns), (axes.yaxis, rows)):
+            step = max(1, -(-len(levels) // 12))
+            told = [v if isinstance(v, str) else f"{v:.4g}" for v in levels]
+            axis.set_ticks([k + 0.5 for k in range(0, len(levels), step)], told[::step])
+        bar = figure.colorbar(mesh, ax=axes)
+        bar.set_label(label, color=COLOURS["ink"])
+        bar.outline.set_visible(False)
+        bar.solids.set_rasterized(False)  # as shapes: the page allows no images within pictures
+        finish(axes, across, up, margins=(0.0, 0.0))
+        axes.grid(visible=False)
+    return svg.text

@@ -1,0 +1,166 @@
+"""The page of a comparison: how well each recording is followed, channel by channel and phase by phase."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from rollover.comparison.misfit import ChannelMisfit, Misfit
+from rollover.comparison.rating import Iso18571, NotRateable, Rating, SpragueGeers, verdict, worst_verdict
+from rollover.scenario import Scenario
+from viz.content.blocks import Block, Cell, Details, Figure, Footer, Headline, Note, Section, State, Table
+from viz.content.differences import differences_section
+from viz.content.entities import series
+from viz.figures import plots
+from viz.figures.plots import Curve
+from viz.pages.page import render
+from viz.recordings.comparison import sentences
+
+STATES: Mapping[str, State] = {"good": "pass", "fair": "warn", "poor": "fail"}
+COLUMNS = ["channel", "verdict", "CFC", "ISO/TS 18571", "grade", "Z", "E_P", "E_M", "E_S", "M, %", "P, %"]
+COLUMNS += ["RMS / range, %", "RMS / noise", "peak, %", "peak later, ms"]
+
+
+def page(
+    found: Sequence[Misfit],
+    *,
+    title: str,
+    scenario: Scenario | None = None,
+    command: str,
+    scenario_hash: str = "",
+    versions: Mapping[str, str] | None = None,
+) -> str:
+    """HTML of one comparison for each recording."""
+    blocks: list[Block] = [
+        *(differences_section(scenario) if scenario is not None else []),
+        Note(
+            text="Each recording is compared at its own stamps with a run under its own conditions, both through the "
+            "same filter class. Nothing was shifted in time but a clock in doubt, where that is said. "
+            "ISO/TS 18571 and peaks are over the event, from first contact to rest."
+        ),
+    ]
+    for each in found:
+        blocks.append(Section(title=each.recording, blocks=_recording(each)))
+    return render(
+        title=title,
+        subtitle="Measured against simulated",
+        headline=headline(found),
+        blocks=blocks,
+        footer=Footer(command=command, scenario_hash=scenario_hash, versions=versions),
+    )
+
+
+def headline(found: Sequence[Misfit]) -> Headline:
+    """The span of the ratings and of the residuals."""
+    ratings = [c.rating for m in found for c in m.channels]
+    isos = sorted(
+        (r.iso18571 for r in ratings if isinstance(r, Rating) and isinstance(r.iso18571, Iso18571)),
+        key=lambda iso: iso.overall,
+    )
+    noisy = sorted(r.over_noise for r in ratings if isinstance(r, Rating) and r.over_noise is not None)
+    recordings = f"{len(found)} recording{'s' if len(found) != 1 else ''}, {len(ratings)} channels"
+    detail = f"Residuals are {noisy[0]:.3g} to {noisy[-1]:.3g} times the noise." if noisy else ""
+    state: State = "warn"
+    if worst := [verdict(r) for r in ratings if isinstance(r, Rating)]:
+        judged = worst_verdict(worst)
+        state = STATES[judged.grade]
+        detail = f"{detail} Agreement at worst {judged.in_words}.".strip()
+    if not isos:
+        return Headline(
+            sentence=f"{recordings}: none could be rated.",
+            detail=detail,
+            state="fail" if state == "fail" else "warn",
+        )
+    low, high = isos[0], isos[-1]
+    return Headline(
+        sentence=f"{recordings}: ISO/TS 18571 {low.overall:.2f} ({low.grade}) to {high.overall:.2f} ({high.grade}).",
+        detail=detail,
+        state=state,
+    )
+
+
+def _recording(found: Misfit) -> list[Block]:
+    table = Table(
+        columns=COLUMNS,
+        rows=[_row(c.channel, c.cfc, c.rating) for c in found.channels],
+        numeric=(3, *range(5, len(COLUMNS))),
+        caption="Z corridor, E_P phase, E_M magnitude, E_S slope of ISO/TS 18571; M, P Sprague-Geers. "
+        "Verdict: the worst of the rating, the peak (fair beyond 10 %, poor beyond 21 %, as the standard scores a "
+        "magnitude error) and the residual (fair beyond twice the noise and 5 % of the signal's RMS together, "
+        "poor with 21 %).",
+    )
+    blocks: list[Block] = [Note(text=found.title), table]
+    why = [
+        Note(text=f"{c.channel}: not rated by ISO/TS 18571: {reason}")
+        for c in found.channels
+        if (reason := _reason(c.rating))
+    ]
+    blocks += why + [Note(text=f"{line[:1].upper()}{line[1:]}.") for line in sentences(found)]
+    blocks += [_figure(c, found) for c in found.channels]
+    rows: list[list[str | Cell]] = [
+        [
+            c.channel,
+            cell.phase,
+            f"{cell.start:.4f}",
+            f"{cell.end:.4f}",
+            str(cell.samples),
+            f"{100.0 * cell.share:.1f}",
+            _number(cell.rating.over_noise) if isinstance(cell.rating, Rating) else "",
+            _number(cell.rating.iso18571.overall)
+            if isinstance(cell.rating, Rating) and isinstance(cell.rating.iso18571, Iso18571)
+            else "",
+        ]
+        for c in found.channels
+        for cell in c.cells
+    ]
+    columns = ["channel", "phase", "from, s", "to, s", "samples", "share, %", "RMS / noise", "ISO/TS 18571"]
+    phases = Table(
+        columns=columns,
+        rows=rows,
+        numeric=range(2, len(columns)),
+        caption="Share: of the recording's squared residual over noise.",
+    )
+    return [*blocks, Details(summary="By phase", blocks=[phases])]
+
+
+def _row(channel: str, cfc: int | None, rating: Rating | NotRateable) -> list[str | Cell]:
+    used = "none" if cfc is None else str(cfc)
+    if isinstance(rating, NotRateable):
+        return [channel, Cell(rating.reason, "muted"), used, *[""] * (len(COLUMNS) - 3)]
+    iso, sg, peak = rating.iso18571, rating.sprague_geers, rating.peak
+    judged = verdict(rating)
+    scores: list[str | Cell] = [Cell("not rated", "muted"), "", "", "", "", ""]
+    if isinstance(iso, Iso18571):
+        parts = (iso.corridor, iso.phase, iso.magnitude, iso.slope)
+        scores = [f"{iso.overall:.3f}", iso.grade, *(f"{p:.3f}" for p in parts)]
+    geers = [f"{100.0 * v:.3g}" for v in (sg.magnitude, sg.phase)] if isinstance(sg, SpragueGeers) else ["", ""]
+    return [
+        channel,
+        Cell(judged.in_words, STATES[judged.grade]),
+        used,
+        *scores,
+        *geers,
+        _number(rating.nrmse, 100.0),
+        _number(rating.over_noise),
+        "" if peak.relative_error is None else f"{100.0 * peak.relative_error:+.3g}",
+        f"{1e3 * peak.time_error:+.3g}",
+    ]
+
+
+def _reason(rating: Rating | NotRateable) -> str:
+    if isinstance(rating, NotRateable):
+        return rating.reason
+    return rating.iso18571.reason if isinstance(rating.iso18571, NotRateable) else ""
+
+
+def _figure(c: ChannelMisfit, found: Misfit) -> Figure:
+    s = series(c.channel)
+    measured = Curve(name="measured", x=c.time, y=c.measured * s.factor)
+    simulated = Curve(name="simulated", x=c.time, y=c.simulated * s.factor)
+    label = f"{s.name}, {s.unit}" if s.unit else c.channel
+    how = "unfiltered" if c.cfc is None else f"both CFC {c.cfc}"
+    svg = plots.overlay(measured, simulated, label=label, phases=found.phases)
+    return Figure(svg=svg, caption=f"{c.channel}, {how}, {c.rate:.5g} Hz; below, measured less simulated.")
+
+
+def _number(value: float | None, factor: float = 1.0) -> str:
+    return "" if value is None else f"{value * factor:.3g}"

@@ -1,0 +1,129 @@
+"""Measured over simulated in the viewer, on the run's own layout: the same plots, the residual, both contacts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from rollover.comparison.misfit import ChannelMisfit, Misfit
+from rollover.comparison.rating import Iso18571, Rating, verdict, worst_verdict
+from rollover.dynamics.result import Run
+from viz.content.entities import CYCLE, MEASURED, PHASE, series
+from viz.recordings.blueprint import Beside
+from viz.recordings.log import write_rrd
+from viz.recordings.stream import Stream, colour
+
+
+def write_comparison(run: Run, found: Misfit, path: Path) -> None:
+    """Write a run with a recording over it, whole or not at all; the recording keeps its own stamps."""
+    views = [] if not found.channels else [_residuals(found)]
+    phase = "phase_measured" if found.phases else ""
+    shown = Beside(answer="/report/comparison", title="Measured against simulated", views=views, phase=phase)
+    write_rrd(run, path, beside=lambda out: _beside(out, found), shown=shown)
+
+
+def _residuals(found: Misfit) -> rrb.TimeSeriesView:
+    known = all(c.noise for c in found.channels)
+    return rrb.TimeSeriesView(
+        origin="/residual",
+        contents=["+ /residual/**"],
+        name="Measured less simulated, over the noise" if known else "Measured less simulated, over noise or 1 %",
+        axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
+        plot_legend=rrb.PlotLegend("RightTop"),
+    )
+
+
+def _beside(out: Stream, found: Misfit) -> None:
+    min_max = rr.components.AggregationPolicy.MinMax
+    for k, c in enumerate(found.channels):
+        s, own = series(c.channel), CYCLE[k % len(CYCLE)]  # two channels in one plot are told apart
+        measured = rr.SeriesLines(
+            names=[f"{s.legend}, measured"], colors=colour(MEASURED), widths=[1.5], aggregation_policy=min_max
+        )
+        residual = rr.SeriesLines(names=[s.name], colors=colour(own), widths=[1.0], aggregation_policy=min_max)
+        out.static(s.simulated, rr.SeriesLines.from_fields(names=[f"{s.legend}, simulated"]))
+        out.static(s.measured, measured)
+        out.static(s.residual, residual)
+        _columns(out, s.measured, c, c.measured * s.factor)
+        _columns(out, s.residual, c, c.residual / (c.noise or 0.01 * float(np.ptp(c.measured)) or 1.0))
+    marks = [(at, phase if phase in PHASE else "impact") for at, phase in found.phases]
+    out.static(
+        "phase_measured", rr.StateConfiguration(values=list(PHASE), labels=list(PHASE), colors=colour(*PHASE.values()))
+    )
+    out.columns(
+        "phase_measured", np.array([at for at, _ in marks]), rr.StateChange.columns(state=[name for _, name in marks])
+    )
+    out.static("report/comparison", rr.TextDocument(markdown(found), media_type=rr.MediaType.MARKDOWN))
+
+
+def _columns(out: Stream, path: str, c: ChannelMisfit, values: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
+    """Values with a gap where the recording has one: a line is not drawn over it."""
+    step = np.diff(c.time)
+    breaks = np.flatnonzero(step > 2.5 * float(np.median(step))) + 1
+    time = np.insert(c.time, breaks, c.time[breaks] - 1e-6)
+    out.columns(path, time, rr.Scalars.columns(scalars=np.insert(values, breaks, np.nan)))
+
+
+def markdown(found: Misfit) -> str:
+    """The worst rating as the answer, a line for each channel, and what else is to be known."""
+    rated = [(iso, c) for c in found.channels if (iso := _iso(c)) is not None]
+    worst = min(rated, key=lambda pair: pair[0].overall, default=None)
+    head = "none of the channels could be rated"
+    if worst is not None:
+        iso, c = worst
+        head = f"ISO/TS 18571 {iso.overall:.2f} ({iso.grade}) at worst, {series(c.channel).name}"
+    lines = [f"# {head[0].upper()}{head[1:]}", "", found.title, ""]
+    if judged := [verdict(c.rating) for c in found.channels if isinstance(c.rating, Rating)]:
+        lines += [f"Agreement at worst {worst_verdict(judged).in_words}.", ""]
+    lines += ["| channel | CFC | ISO/TS 18571 | RMS / noise | peak | peak later |", "|---|---|---|---|---|---|"]
+    for c in found.channels:
+        lines.append(f"| {series(c.channel).name} | {c.cfc or 'none'} | {' | '.join(_cells(c))} |")
+    return "\n".join([*lines, "", *(f"- {line}" for line in sentences(found))])
+
+
+def _iso(c: ChannelMisfit) -> Iso18571 | None:
+    iso = c.rating.iso18571 if isinstance(c.rating, Rating) else None
+    return iso if isinstance(iso, Iso18571) else None
+
+
+def _cells(c: ChannelMisfit) -> list[str]:
+    if not isinstance(c.rating, Rating):
+        return [c.rating.reason, "", "", ""]
+    iso, peak = _iso(c), c.rating.peak
+    return [
+        "not rated" if iso is None else f"{iso.overall:.3f} {iso.grade}",
+        "" if c.rating.over_noise is None else f"{c.rating.over_noise:.3g}",
+        "" if peak.relative_error is None else f"{100.0 * peak.relative_error:+.3g} %",
+        f"{1e3 * peak.time_error:+.3g} ms",
+    ]
+
+
+def sentences(found: Misfit) -> list[str]:
+    """What is to be known about a comparison besides its numbers."""
+    lines = [] if found.zero is None else [f"{found.zero.sentence}; it was set to it"]
+    if found.contact_measured is not None and found.contact_simulated is not None:
+        lines.append(
+            f"first contact: measured {_instant(found.contact_measured)}, simulated {_instant(found.contact_simulated)}"
+        )
+    if found.clock is not None:
+        c = found.clock
+        lines.append(
+            f"the recording's clock agrees best when taken {1e3 * c.offset:+.3g} +- {1e3 * c.sigma:.2g} ms late; "
+            f"setting it, which was not done, would remove {100.0 * c.gain:.0f} % of the squared residual"
+        )
+        if c.at_limit:
+            lines.append("that is the end of the window that was searched: the clocks may be further apart")
+    if found.energy_measured is not None and found.energy_simulated is not None:
+        lines.append(
+            f"work that the ground took: measured {found.energy_measured:.4g} J, "
+            f"simulated {found.energy_simulated:.4g} J"
+        )
+    lines += [f"{channel}: left out, {why}" for channel, why in found.skipped.items()]
+    return [*lines, *found.notes]
+
+
+def _instant(time: float) -> str:
+    return f"{round(time, 4) + 0.0:.4f} s"  # + 0.0: a tiny negative time is not -0.0000
