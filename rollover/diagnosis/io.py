@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rollover.assessment.results import plain, versions
-from rollover.diagnosis.fit.jobs import Crew
+from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.pipeline import diagnose
 from rollover.diagnosis.result import Diagnosis, Interval, Law, Named, Place, Score
 from rollover.effects import nth
@@ -126,5 +126,5 @@ def recordings_in(folder: Path) -> list[tuple[str, Recording]]:
 def diagnose_folder(folder: Path, out: Path | None = None, workers: int = 1) -> dict[str, Any]:
     """Diagnose a folder that holds scenario.yaml and its recordings; returns what diagnosis.json says."""
     del out
-    with Crew(workers) as crew:
-        return account(diagnose(load(folder / "scenario.yaml"), recordings_in(folder), crew=crew))
+    with Executor(workers) as executor:
+        return account(diagnose(load(folder / "scenario.yaml"), recordings_in(folder), executor=executor))

@@ -14,17 +14,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import Evidence, Signal, evidence_of
+from rollover.diagnosis.data.dataset import Dataset, Signal, dataset_of
 from rollover.diagnosis.data.onset import from_first_contact
 from rollover.diagnosis.data.phases import phases_of
-from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.averaging import on_one_branch, referred, simulated
 from rollover.diagnosis.forward.forward_model import Simulator, simulator_of
 from rollover.diagnosis.forward.full_run import CENTRE, full_runs, made_ahead
 from rollover.diagnosis.io import diagnosed_scenario
 from rollover.diagnosis.noise.ensemble import averaged
-from rollover.diagnosis.noise.heteroscedasticity import with_loudness
+from rollover.diagnosis.noise.heteroscedasticity import with_variance_model
 from rollover.diagnosis.result import Diagnosis
 from rollover.recording import Recording
 from rollover.scenario import Scenario
@@ -121,25 +121,25 @@ def _told(
     for runs in full:
         runs.children = children
     made_ahead(children, [(runs, {}) for runs in full])
-    ready = [(whole, evidence_of(name, thin, simulator, many)) for thin, simulator, whole, many in made]
-    (simulator, evidence), (last, best) = ready[0], ready[-1]
-    if evidence is None:
+    ready = [(whole, dataset_of(name, thin, simulator, many)) for thin, simulator, whole, many in made]
+    (simulator, dataset), (last, best) = ready[0], ready[-1]
+    if dataset is None:
         return None
-    (evidence,), thinner = with_loudness([evidence]), evidence.recording
-    at = _shift(evidence if diagnosed is None or best is None else best)
+    (dataset,), thinner = with_variance_model([dataset]), dataset.recording
+    at = _shift(dataset if diagnosed is None or best is None else best)
     before = simulator.predict({}, at)
     if before is None:
         return None
     after = None if diagnosed is None else last.predict({}, at)
-    strays = last.strays({}, at)
+    perturbed = last.perturbed({}, at)
     tracks = []
-    for signal in evidence.signals:
+    for signal in dataset.signals:
         channel = signal.channel
         there = np.isfinite(recording.channels[channel])
         stamps, measured = recording.time[there], recording.channels[channel][there]
         met = before[channel][there] if after is None else after[channel][there]
-        times = single(measured - met, signal.sigma, evidence.averaged) / signal.sigma
-        both = (_scatter([d[channel][there] for d in strays], stamps), _louder(signal, thinner.time, stamps, times))
+        times = single(measured - met, signal.sigma, dataset.averaged) / signal.sigma
+        both = (_scatter([d[channel][there] for d in perturbed], stamps), _louder(signal, thinner.time, stamps, times))
         more = [s for s in both if s is not None]
         tracks.append(
             Track(
@@ -156,10 +156,10 @@ def _told(
         recording=name,
         title=recording.title,
         held_out=held_out,
-        phases=phases_of(evidence),
+        phases=phases_of(dataset),
         shift=at,
         tracks=tuple(tracks),
-        condition=evidence.condition,
+        condition=dataset.condition,
     )
 
 
@@ -171,9 +171,9 @@ def _simulators(
     return thin, simulator, simulator if many == 1 else referred(simulator_of(scenario, recording), reference), many
 
 
-def _scatter(strays: Sequence[Array], time: Array) -> Array | None:
+def _scatter(perturbed: Sequence[Array], time: Array) -> Array | None:
     """1 sigma (n,) of what neighbouring runs differ by; None where there are none."""
-    whole = [d for d in strays if np.all(np.isfinite(d))]
+    whole = [d for d in perturbed if np.all(np.isfinite(d))]
     return np.sqrt(averaged(np.mean(np.square(whole), axis=0), time)) if whole else None
 
 
@@ -197,11 +197,11 @@ def single(residual: Array, sigma: float, many: int) -> float:
     return float(np.hypot(sigma, np.sqrt(np.median(within) / (1.0 - 2.0 / (9.0 * (many - 1))) ** 3)))
 
 
-def _shift(evidence: Evidence) -> float:
+def _shift(dataset: Dataset) -> float:
     """Time shift at which a simulation meets its recording best, within `WIDEST` of its prior, s."""
-    judge = Judge([evidence])
-    align(judge)
-    fitted = judge.fit((), ())
-    best = judge.shifts[0] if fitted is None else fitted.blocks[0].shift
-    most = WIDEST * evidence.shift_prior
+    problem = Problem([dataset])
+    align(problem)
+    fitted = problem.fit((), ())
+    best = problem.shifts[0] if fitted is None else fitted.blocks[0].shift
+    most = WIDEST * dataset.shift_prior
     return float(np.clip(best, -most, most))

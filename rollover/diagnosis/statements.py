@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cross_validation import Held, held_out
 from rollover.diagnosis.fit.ensemble_mean import PARTS, in_shorter_steps
-from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.inference.adequacy import NEGLIGIBLE
 from rollover.diagnosis.inference.intervals import intervals
@@ -25,17 +25,17 @@ UNSURE = 3.0  # times the error of a recording's clock, up to which a channel al
 SMALL = 0.2  # of a strength: an interval of its logarithm that goes down so far is one of a few times chance
 
 
-def named(judge: Judge, found: Explanation, groups: Sequence[Sequence[int]]) -> tuple[Named, ...]:
+def named(problem: Problem, found: Explanation, groups: Sequence[Sequence[int]]) -> tuple[Named, ...]:
     """Effects of an explanation with their intervals and look-alikes, the strongest first.
 
     Values are those of shorter steps, where runs are integrated: what the scenario's steps take for it is no property
     of what was recorded.
     """
-    fitted, held = found.fitted, judge.evidence
-    fine = in_shorter_steps(judge, fitted)
-    told = intervals(judge, fine, coarse=fitted)
+    fitted, held = found.fitted, problem.dataset
+    fine = in_shorter_steps(problem, fitted)
+    told = intervals(problem, fine, coarse=fitted)
     if fine is not fitted:
-        judge.weigh(held)
+        problem.with_noise_model(held)
     settings = {c.key: s for c, s in zip(fitted.candidates, told, strict=True)}
     by_key = {s.fitted.candidates[-1].key: s for s in found.parts}
     effects = []
@@ -45,7 +45,7 @@ def named(judge: Judge, found: Explanation, groups: Sequence[Sequence[int]]) -> 
         values: dict[str, Any] = {name: i.value for name, i in parameters.items()}
         if c.channel is not None:
             values["channel"] = c.channel
-        alike = (f.candidates[-1] for f in confusion(by_key[c.key], groups, judge.per_error))
+        alike = (f.candidates[-1] for f in confusion(by_key[c.key], groups, problem.samples_per_error))
         rivals = [r for r in alike if r.key not in settings]  # what was named too is told apart by being beside it
         effect = kind(**values)
         same = {id: said for id, said in effect.same_as().items() if id not in settings}
@@ -54,7 +54,7 @@ def named(judge: Judge, found: Explanation, groups: Sequence[Sequence[int]]) -> 
             Named(
                 id=c.id,
                 kind=c.kind,
-                statement=" ".join([effect.says(), *same.values(), *_or_the_other(judge, c, values)]),
+                statement=" ".join([effect.says(), *same.values(), *_or_the_other(problem, c, values)]),
                 parameters=parameters,
                 settings=values,
                 channel=c.channel,
@@ -63,16 +63,16 @@ def named(judge: Judge, found: Explanation, groups: Sequence[Sequence[int]]) -> 
                 discriminating_test=tests[0] if tests else next(iter(kind.rivals.values()), ""),
             )
         )
-    first = strongest(judge, found.base, fitted)
+    first = strongest(problem, found.base, fitted)
     return tuple(sorted(effects, key=lambda n: (n.id, n.channel) != (first.id, first.channel)))
 
 
-def _or_the_other(judge: Judge, c: Candidate, values: Mapping[str, Any]) -> list[str]:
+def _or_the_other(problem: Problem, c: Candidate, values: Mapping[str, Any]) -> list[str]:
     """What is to be said of a channel that comes late by no more than the clocks are unsure of, beside one other."""
-    others = {s.channel for e in judge.evidence for s in e.signals} - {c.channel}
+    others = {s.channel for e in problem.dataset for s in e.signals} - {c.channel}
     if c.id != "sensor-clock-offset" or len(others) != 1:
         return []
-    if abs(values["offset"]) > UNSURE * min(e.shift_prior for e in judge.evidence):
+    if abs(values["offset"]) > UNSURE * min(e.shift_prior for e in problem.dataset):
         return []
     way = "early" if values["offset"] > 0.0 else "late"
     return [f"Of two channels nobody can tell which: {others.pop()} may come as much too {way}."]
@@ -96,7 +96,7 @@ def is_none(effect: Named) -> bool:
     return bool(known) and all(may_be(p, null) for p, null in known.items())
 
 
-def may_be_nothing(effects: Sequence[Named], scattering: bool) -> set[str]:
+def interval_contains_null(effects: Sequence[Named], scattering: bool) -> set[str]:
     """Ids of those that may be none of what they are said to be: their gain is another's, or chance of the runs.
 
     One alone has no other's gain: where runs are not `scattering` it is there, only how strong it is cannot be told. So
@@ -107,7 +107,7 @@ def may_be_nothing(effects: Sequence[Named], scattering: bool) -> set[str]:
     return {e.id for e in effects if is_none(e)}
 
 
-def of_no_ground(found: Sequence[Evidence]) -> str:
+def of_no_ground(found: Sequence[Dataset]) -> str:
     """What a sentence goes on with where no recording reaches the first contact that is simulated."""
     contacts = [e.simulator.contact for e in found]
     ends = [max(float(e.recording.time[s.rows[-1]]) for s in e.signals) for e in found]
@@ -177,11 +177,11 @@ def closest(found: Explanation, groups: Sequence[Sequence[int]]) -> str:
     return f" The closest, {last.id}{of}, leaves {end:.2f} times the noise, and in that there is structure."
 
 
-def places(mismatch: Mismatch, evidence: Sequence[Evidence], depends: str | None) -> tuple[Place, ...]:
+def places(mismatch: Mismatch, dataset: Sequence[Dataset], depends: str | None) -> tuple[Place, ...]:
     """Where the misfit is more than noise, largest share first."""
     return tuple(
         Place(
-            recording=evidence[c.recording].name,
+            recording=dataset[c.recording].name,
             channel=c.channel,
             phase=c.phase,
             start=c.start,
@@ -194,10 +194,10 @@ def places(mismatch: Mismatch, evidence: Sequence[Evidence], depends: str | None
     )  # fmt: skip
 
 
-def noise(evidence: Sequence[Evidence]) -> dict[str, float]:
+def noise(dataset: Sequence[Dataset]) -> dict[str, float]:
     """Noise (1 sigma, SI) of each channel, the median of the recordings."""
     found: dict[str, list[float]] = {}
-    for e in evidence:
+    for e in dataset:
         for s in e.signals:
             found.setdefault(s.channel, []).append(s.noise)
     return {name: float(np.median(values)) for name, values in found.items()}
@@ -209,42 +209,46 @@ def sentence(
     p_value: float,
     first: Held,
     last: Held,
-    evidence: Sequence[Evidence],
+    dataset: Sequence[Dataset],
     early: tuple[float | None, float | None] = (None, None),
     *,
     remains: bool = False,
-    foretold: bool = True,
+    cross_validated: bool = True,
 ) -> str:
-    """The verdict in a few sentences; `early` is the misfit before the first blow without and with the effects.
+    """The verdict in a few sentences; `early` is the misfit before the first impact without and with the effects.
 
-    `remains` says that these are not all that separates simulation and recordings, `foretold` that some recordings
-    were held out, as none can be of one condition.
+    `remains` says that these are not all that separates simulation and recordings, `cross_validated` that some
+    recordings were held out, as none can be of one condition.
     """
     if verdict == "no-mismatch" and p_value < SURE:
-        is_rough = any(e.is_rough(s) for e in evidence for s in e.signals)
-        beyond = " beyond what is tolerated or repeats differ by" if is_rough else ""
+        model_error_dominates = any(e.model_error_dominates(s) for e in dataset for s in e.signals)
+        beyond = " beyond what is tolerated or repeats differ by" if model_error_dominates else ""
         return (
-            f"Simulation and {len(evidence)} recordings differ by more than noise (p = {p_value:.2g}), but by less "
+            f"Simulation and {len(dataset)} recordings differ by more than noise (p = {p_value:.2g}), but by less "
             f"than {NEGLIGIBLE:.1%} of any channel's range{beyond}."
         )
     if verdict == "no-mismatch":
-        return f"Simulation and {len(evidence)} recordings agree within the noise (p = {p_value:.2g})."
+        return f"Simulation and {len(dataset)} recordings agree within the noise (p = {p_value:.2g})."
     if verdict == "cannot-tell":
         return "These recordings are too weak to show even typical effects: nothing can be said."
     if verdict == "unexplained":
         return (
             f"Simulation and recordings differ ({first.total:.1f} times the noise), and no candidate explains it"
-            f"{' on recordings that were held out' if foretold else ''}."
+            f"{' on recordings that were held out' if cross_validated else ''}."
         )
     said = " ".join(e.statement for e in effects)
     rivals = sorted({r for e in effects for r in e.indistinguishable_from})
-    also = "" if foretold else " Of one condition nothing can be held out: that is the misfit of what was fitted."
+    also = (
+        "" if cross_validated else " Of one condition nothing can be held out: that is the misfit of what was fitted."
+    )
     also += " What is left of it has structure: this is not the whole." if remains else ""
     also += f" Not told apart by these recordings: {', '.join(rivals)}." if rivals else ""
-    misfit = "held-out misfit" if foretold else "misfit"
+    misfit = "held-out misfit" if cross_validated else "misfit"
     falls = f"{said} With it the {misfit} falls from {first.total:.1f} to {last.total:.2f} times the noise"
     without, with_ = early
     if without is None or with_ is None:
         return f"{falls}.{also}"
-    blow = f"before the first blow, where none scatters, the misfit is {with_:.2f} times the noise for {without:.1f}"
-    return f"{falls} and the scatter of runs; {blow}.{also}"
+    first_impact = (
+        f"before the first blow, where none scatters, the misfit is {with_:.2f} times the noise for {without:.1f}"
+    )
+    return f"{falls} and the scatter of runs; {first_impact}.{also}"

@@ -22,8 +22,8 @@ import pytest
 from numpy.typing import NDArray
 
 from rollover.diagnosis import Diagnosis, diagnose
-from rollover.diagnosis.data.dataset import evidence_of
-from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.data.dataset import dataset_of
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.averaging import simulated
@@ -86,7 +86,7 @@ def by_sindy(means: Array, force: Array) -> tuple[Array, str]:
     return found, " + ".join(names) or "nothing"
 
 
-def gains(judge: Judge, every: list[Balance], method: Method) -> tuple[float, float, str]:
+def gains(problem: Problem, every: list[Balance], method: Method) -> tuple[float, float, str]:
     """ln(E_before/E_after) in recorded channels and in means of the force, conditions left out; what the whole says."""
     scale = np.array([max(float(b.depth.max()) for b in every), max(float(b.speed.max()) for b in every)])
     means = [b.weights @ powers(np.stack([b.depth, b.speed], axis=1) / scale) for b in every]
@@ -104,10 +104,10 @@ def gains(judge: Judge, every: list[Balance], method: Method) -> tuple[float, fl
         for k, b in enumerate(every):
             if b.condition == condition:
                 squares[1] += np.sum(b.force**2), np.sum((b.force - means[k] @ c) ** 2)
-        for r, e in enumerate(judge.evidence):
+        for r, e in enumerate(problem.evidence):
             if (e.condition or e.name) == condition:
-                without = judge.clocked(r, (), (), judge.shifts[r], ROUNDS)
-                beside = judge.clocked(r, (law,), (), judge.shifts[r], ROUNDS)
+                without = problem.clocked(r, (), (), problem.shifts[r], ROUNDS)
+                beside = problem.clocked(r, (law,), (), problem.shifts[r], ROUNDS)
                 squares[0] += without.total, np.inf if beside is None else beside.total
     found = 0.5 * np.log(squares[:, 0] / squares[:, 1])
     words = method(np.concatenate(means), np.concatenate([b.force for b in every]))[1]
@@ -133,17 +133,17 @@ def test_a_diagnosis_beside_pysindy_and_a_polynomial(kind: str, effect: str) -> 
     began = time.process_time()
     found = diagnose(scenario, recordings)
     spent = time.process_time() - began
-    every = [evidence_of(name, *simulated(scenario, r)) for name, r in recordings]
+    every = [dataset_of(name, *simulated(scenario, r)) for name, r in recordings]
     kept = [e for e in every if e is not None]
     forces = balances([set_up(scenario, e.recording) for e in kept], kept)
     assert len(forces) > 2  # a way down that is too short for windows has none
-    judge = Judge(kept)
-    align(judge)
+    problem = Problem(kept)
+    align(problem)
     gain, says = told(found)
     rows = [("diagnose", gain, np.nan, says, 1.0)]
     for name, method in (("pysindy", by_sindy), ("polynomial", by_squares)):
         began = time.process_time()
-        rows.append((name, *gains(judge, forces, method), (time.process_time() - began) / spent))
+        rows.append((name, *gains(problem, forces, method), (time.process_time() - began) / spent))
     print(f"\n{effect or kind}: {found.simulations} simulations, {1e3 * spent / found.simulations:.2f} ms of CPU each")
     for name, value, force, words, share in rows:
         of_force = "" if np.isnan(force) else f"(of the force {force:+.2f})"

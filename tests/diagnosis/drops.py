@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rollover.diagnosis.data.dataset import Signal
-from rollover.diagnosis.fit.levenberg_marquardt import Block
+from rollover.diagnosis.fit.levenberg_marquardt import ResidualBlock
 from rollover.dynamics.drop_test import DropModel
 from rollover.recording import Recording
 from rollover.scenario import Scenario
@@ -44,14 +44,14 @@ def recorded(
     return found
 
 
-def linear_blocks(rng: np.random.Generator, count: int, n: int, truth: np.ndarray) -> list[Block]:
+def linear_blocks(rng: np.random.Generator, count: int, n: int, truth: np.ndarray) -> list[ResidualBlock]:
     """Recordings of a linear model w = J x + s tau + noise of unit size, tau within its prior."""
     blocks = []
     for _ in range(count):
         J, s = rng.standard_normal((n, truth.size)), rng.standard_normal(n)
         tau = rng.normal(0.0, 0.3)
         residual = J @ truth + s * tau + rng.standard_normal(n)
-        blocks.append(Block(residual=residual, J=J, slope=s, shift=0.0, prior=0.3))
+        blocks.append(ResidualBlock(residual=residual, J=J, slope=s, shift=0.0, prior=0.3))
     return blocks
 
 

@@ -8,36 +8,36 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.diagnosis.data.dataset import Evidence, Signal
-from rollover.diagnosis.fit.jobs import Crew
-from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.data.dataset import Dataset, Signal
+from rollover.diagnosis.fit.jobs import Executor
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.forward.averaging import Averaged
 from rollover.diagnosis.forward.full_run import AHEAD, RunSimulator
-from rollover.diagnosis.noise.truncation import LASTING, left_aside, shortened, soon, up_to
+from rollover.diagnosis.noise.truncation import VALIDATED, left_aside, shortened, soon, up_to
 from rollover.diagnosis.selection import forward_step, scan
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.score_test import Gate
+from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.effects import Search
 from rollover.recording import Recording
 from tests.physics.scenes import shipped
 
 CHANNEL = "chassis/acceleration_z"
-STEP, END, BLOW = 0.002, 2.0, 0.5
+STEP, END, IMPACT = 0.002, 2.0, 0.5
 
 
-def evidence(counts: float, *, cfc: int | None = None, off: float = 0.0) -> Evidence:
-    """A long recording of a toss, whose samples count so much after the blow, and are off by that at the end."""
+def dataset(counts: float, *, cfc: int | None = None, off: float = 0.0) -> Dataset:
+    """A long recording of a toss, whose samples count so much after the impact, and are off by that at the end."""
     time = np.arange(0.0, END, STEP)
     scenario = shipped("cube_toss").replaced({"simulation.duration": END + 0.1})
     cfcs = {} if cfc is None else {CHANNEL: cfc}
     empty = Recording(title="toss", time=time, channels={CHANNEL: np.zeros(time.size)}, cfc=cfcs)
     there = RunSimulator(scenario, empty).predict({}, 0.0)
     assert there is not None
-    made = replace(empty, channels={CHANNEL: there[CHANNEL] + off * (time > BLOW + LASTING)})
+    made = replace(empty, channels={CHANNEL: there[CHANNEL] + off * (time > IMPACT + VALIDATED)})
     rows = np.arange(0, time.size, 2)
-    weight = np.where(time[rows] < BLOW, 1.0, counts)
+    weight = np.where(time[rows] < IMPACT, 1.0, counts)
     signal = Signal(
         channel=CHANNEL,
         rows=rows,
@@ -49,60 +49,64 @@ def evidence(counts: float, *, cfc: int | None = None, off: float = 0.0) -> Evid
         weight=weight,
         level=1.0 + time[rows],
     )
-    return Evidence(
+    return Dataset(
         name="toss", recording=made, simulator=RunSimulator(scenario, made), signals=(signal,), shift_prior=1e-3,
-        condition="", strays=(np.arange(rows.size, dtype=float),), blow=BLOW,
+        condition="", perturbed=(np.arange(rows.size, dtype=float),), first_impact=IMPACT,
     )  # fmt: skip
 
 
 def test_an_end_that_hardly_counts_isleft_aside() -> None:
-    whole = evidence(0.3)
+    whole = dataset(0.3)
     found = shortened(whole)
-    assert found.recording.time[-1] == pytest.approx(BLOW + LASTING, abs=STEP)
+    assert found.recording.time[-1] == pytest.approx(IMPACT + VALIDATED, abs=STEP)
     (signal,) = found.signals
     assert signal.weight is not None
     n = signal.rows.size
-    assert n == np.count_nonzero(whole.recording.time[whole.signals[0].rows] <= BLOW + LASTING)
+    assert n == np.count_nonzero(whole.recording.time[whole.signals[0].rows] <= IMPACT + VALIDATED)
     np.testing.assert_array_equal(signal.values, whole.signals[0].values[:n])
     assert signal.weight.size == n
     np.testing.assert_array_equal(signal.level, 1.0 + found.recording.time[signal.rows])
     assert found.measured().size == n
-    np.testing.assert_array_equal(found.strays[0], np.arange(n))
+    np.testing.assert_array_equal(found.perturbed[0], np.arange(n))
     assert isinstance(found.simulator, RunSimulator)
-    assert found.simulator.scenario.simulation.duration < BLOW + LASTING + 0.05
+    assert found.simulator.scenario.simulation.duration < IMPACT + VALIDATED + 0.05
     assert left_aside([whole], [found]) == ["toss: what comes after 1.10 s depends on chance and was left aside"]
 
 
 def test_an_end_that_counts_is_kept() -> None:
-    for e in (evidence(0.9), replace(evidence(0.3), blow=np.inf), replace(evidence(0.3), blow=END - LASTING)):
+    for e in (
+        dataset(0.9),
+        replace(dataset(0.3), first_impact=np.inf),
+        replace(dataset(0.3), first_impact=END - VALIDATED),
+    ):
         assert shortened(e) is e
-    plain = evidence(0.3)
+    plain = dataset(0.3)
     assert shortened(replace(plain, signals=(replace(plain.signals[0], weight=None),))).recording.time.size == 1000
 
 
 @pytest.mark.parametrize(("off", "is_kept"), [(0.0, False), (1.5, False), (2.5, True)])
 def test_an_end_that_hardly_counts_is_kept_where_it_differs_by_more_than_chance(off: float, is_kept: bool) -> None:
     """Samples of noise 1 that count 0.3, of runs that differ by 1: (0.3 off)^2 against 3 (0.3^2 + 0.3^2)."""
-    whole = evidence(0.3, off=off)
+    whole = dataset(0.3, off=off)
     one = np.ones(whole.signals[0].rows.size)
     even = replace(whole.signals[0], level=one)
-    found = shortened(replace(whole, signals=(even,), strays=(one, -one)))
+    found = shortened(replace(whole, signals=(even,), perturbed=(one, -one)))
     assert (found.recording.time.size == whole.recording.time.size) == is_kept
 
 
 def test_of_one_recording_alone_nothing_after_the_blow_counts() -> None:
-    whole = evidence(0.9)
+    whole = dataset(0.9)
     found = shortened(whole, alone=True)
-    assert found.recording.time[-1] == pytest.approx(BLOW, abs=STEP)
-    without = replace(whole, blow=np.inf)
+    assert found.recording.time[-1] == pytest.approx(IMPACT, abs=STEP)
+    without = replace(whole, first_impact=np.inf)
     assert shortened(without, alone=True) is without
 
 
 def test_a_shorter_run_is_the_same_run_and_its_filter_looks_ahead() -> None:
-    whole = evidence(0.3, cfc=60)
+    whole = dataset(0.3, cfc=60)
     found = shortened(whole)
     assert isinstance(found.simulator, RunSimulator)
-    assert found.simulator.scenario.simulation.duration >= BLOW + LASTING + AHEAD
+    assert found.simulator.scenario.simulation.duration >= IMPACT + VALIDATED + AHEAD
     long, short = whole.simulator.predict({}, 0.0), found.simulator.predict({}, 0.0)
     assert long is not None
     assert short is not None
@@ -112,7 +116,7 @@ def test_a_shorter_run_is_the_same_run_and_its_filter_looks_ahead() -> None:
 
 
 def test_means_of_samples_are_shortened_too() -> None:
-    whole = evidence(0.3)
+    whole = dataset(0.3)
     assert isinstance(whole.simulator, RunSimulator)
     starts = np.arange(0, whole.recording.time.size, 2)
     means = Averaged(inner=whole.simulator, starts=starts, counts=np.full(starts.size, 2), many=2)
@@ -125,20 +129,22 @@ def test_means_of_samples_are_shortened_too() -> None:
     assert predicted[CHANNEL].size == found.recording.time.size == found.simulator.starts.size
 
 
-def a_step_at(moment: float) -> Evidence:
+def a_step_at(moment: float) -> Dataset:
     """A recording whose samples count in full, and whose channel has moved by a half at a moment, later by all."""
-    whole = evidence(1.0)
+    whole = dataset(1.0)
     (signal,) = whole.signals
     time = whole.recording.time[signal.rows]
     moved = 0.6 * (time >= moment) + 0.4 * (time >= moment + 0.3)
     return replace(whole, signals=(replace(signal, values=moved),))
 
 
-@pytest.mark.parametrize(("moved", "blow", "end"), [(0.2, 0.5, 1.1), (0.8, 0.5, 1.4), (1.4, 0.5, END), (0.2, 1.4, END)])
+@pytest.mark.parametrize(
+    ("moved", "first_impact", "end"), [(0.2, 0.5, 1.1), (0.8, 0.5, 1.4), (1.4, 0.5, END), (0.2, 1.4, END)]
+)
 def test_looks_see_what_comes_soon_after_the_blow_of_simulation_and_recording(
-    moved: float, blow: float, end: float
+    moved: float, first_impact: float, end: float
 ) -> None:
-    whole = replace(a_step_at(moved), blow=blow)
+    whole = replace(a_step_at(moved), first_impact=first_impact)
     found = soon(whole)
     assert found.recording.time[-1] == pytest.approx(min(end, END - STEP), abs=STEP)  # stamps are a step apart
     assert (found is whole) == (end == END)  # 1.4 + LASTING is the end
@@ -146,34 +152,34 @@ def test_looks_see_what_comes_soon_after_the_blow_of_simulation_and_recording(
 
 
 def test_who_looks_soon_after_the_blow_holds_recordings_as_they_are_held() -> None:
-    judge = Judge([evidence(0.9)])
-    near = judge.near()
-    assert near is not judge
+    problem = Problem([dataset(0.9)])
+    near = problem.near()
+    assert near is not problem
     assert near.near() is near
-    assert near.evidence[0].count < judge.evidence[0].count
+    assert near.dataset[0].count < problem.dataset[0].count
     assert near.predicted(0, (), (), 0.0) is not None
-    judge.straying, judge.shifts = False, [0.01]
-    (signal,) = judge.evidence[0].signals
-    judge.weigh([replace(judge.evidence[0], signals=(replace(signal, sigma=2.0),))])
-    assert judge.near() is near
-    assert (near.straying, near.shifts, near.evidence[0].signals[0].sigma) == (False, [0.01], 2.0)
-    simulator = judge.evidence[0].simulator
+    problem.heavy_tailed, problem.shifts = False, [0.01]
+    (signal,) = problem.dataset[0].signals
+    problem.with_noise_model([replace(problem.dataset[0], signals=(replace(signal, sigma=2.0),))])
+    assert problem.near() is near
+    assert (near.heavy_tailed, near.shifts, near.dataset[0].signals[0].sigma) == (False, [0.01], 2.0)
+    simulator = problem.dataset[0].simulator
     assert isinstance(simulator, RunSimulator)
     made = simulator.runs
     assert near.predicted(0, (), (), 0.0) is not None
     assert simulator.runs == made >= 1  # what it makes is counted, once
-    short = evidence(0.9)
-    alone = Judge([up_to(short, BLOW + 0.1) or short])
+    short = dataset(0.9)
+    alone = Problem([up_to(short, IMPACT + 0.1) or short])
     assert alone.near() is alone
 
 
 def test_who_looks_soon_after_the_blow_has_the_slopes_of_the_whole_as_far_as_it_sees() -> None:
     friction = Candidate(id="ground-friction", kind="physics", family="", search={"coefficient": Search(0.1, 0.6)})
-    judge = Judge([evidence(0.9, cfc=60)])
-    base = judge.fit((friction,), (0.2,), rounds=0, width=1)
+    problem = Problem([dataset(0.9, cfc=60)])
+    base = problem.fit((friction,), (0.2,), rounds=0, width=1)
     assert base is not None
-    near, seen = judge.beginning(base)
-    simulator = judge.evidence[0].simulator
+    near, seen = problem.beginning(base)
+    simulator = problem.dataset[0].simulator
     assert isinstance(simulator, RunSimulator)
     made = simulator.runs
     own = near.again(base)
@@ -182,41 +188,43 @@ def test_who_looks_soon_after_the_blow_has_the_slopes_of_the_whole_as_far_as_it_
     for block, other in zip(seen.blocks, own.blocks, strict=True):
         np.testing.assert_array_equal(block.residual, other.residual)
         np.testing.assert_allclose(block.J, other.J, rtol=1e-6, atol=1e-6 * float(np.abs(other.J).max()))
-    short = Judge([up_to(judge.evidence[0], BLOW + 0.1) or judge.evidence[0]])
+    short = Problem([up_to(problem.dataset[0], IMPACT + 0.1) or problem.dataset[0]])
     assert short.beginning(base) == (short, base)
 
 
 def test_looks_and_first_fits_are_made_soon_after_the_blow_and_fits_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
-    judge = Judge([evidence(0.9), evidence(0.9)])
-    base = judge.fit((), ())
+    problem = Problem([dataset(0.9), dataset(0.9)])
+    base = problem.fit((), ())
     assert base is not None
-    near = judge.near()
-    asked: list[tuple[str, Judge, int]] = []
+    near = problem.near()
+    asked: list[tuple[str, Problem, int]] = []
 
-    def gated(judge: Judge, base: Fitted, *_: object, **__: object) -> Gate:
-        asked.append(("look", judge, base.blocks[0].residual.size))
-        return Gate(score=0.0, scores={}, null=np.zeros(10), detectable={})
+    def gated(problem: Problem, base: Fitted, *_: object, **__: object) -> ScoreTest:
+        asked.append(("look", problem, base.blocks[0].residual.size))
+        return ScoreTest(score=0.0, scores={}, null=np.zeros(10), detectable={})
 
     monkeypatch.setattr(scan, "gate", gated)
-    looked = scan.look(judge, base, [], [[0], [1]])
+    looked = scan.look(problem, base, [], [[0], [1]])
 
     def screened(inquiry: Inquiry, base: Fitted, *_: object) -> list[Any]:
-        asked.append(("screen", inquiry.judge, base.blocks[0].residual.size))
+        asked.append(("screen", inquiry.problem, base.blocks[0].residual.size))
         return []
 
     def fitted(inquiry: Inquiry, base: Fitted, *_: object) -> tuple[list[Any], list[Fitted]]:
-        asked.append(("first", inquiry.judge, base.blocks[0].residual.size))
+        asked.append(("first", inquiry.problem, base.blocks[0].residual.size))
         return [], [base]
 
-    def fits(crew: Crew, judge: Judge, jobs: list[Any], *_: object) -> list[None]:
-        asked.append(("fits", judge, len(jobs)))
-        return [None for _ in jobs]
+    def fits(executor: Executor, problem: Problem, tasks: list[Any], *_: object) -> list[None]:
+        asked.append(("fits", problem, len(tasks)))
+        return [None for _ in tasks]
 
     monkeypatch.setattr(forward_step, "screen", screened)
     monkeypatch.setattr(forward_step, "_first_fits", fitted)
-    monkeypatch.setattr(Crew, "fits", fits)
-    inquiry = Inquiry(judge=judge, candidates=(), groups=[[0], [1]], phases=[], say=lambda _: None, crew=Crew())
+    monkeypatch.setattr(Executor, "fits", fits)
+    inquiry = Inquiry(
+        problem=problem, candidates=(), groups=[[0], [1]], phases=[], say=lambda _: None, executor=Executor()
+    )
     assert forward_step.step(inquiry, base, looked) is None
-    rows = near.evidence[0].count
-    assert asked[-3:] == [("screen", near, rows), ("first", near, rows), ("fits", judge, 1)]
+    rows = near.dataset[0].count
+    assert asked[-3:] == [("screen", near, rows), ("first", near, rows), ("fits", problem, 1)]
     assert {(name, id(who), n) for name, who, n in asked[:-3]} == {("look", id(near), rows)}

@@ -12,7 +12,7 @@ import pytest
 from scipy.signal import lfilter
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.data.dataset import Evidence, Signal
+from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.noise.drift import along, cosines, is_louder, is_recorders, is_shared, is_slow
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario, signal
@@ -32,7 +32,7 @@ def pink(rng: np.random.Generator, n: int = N) -> np.ndarray:
     return np.asarray((found / found.std())[at : at + n])
 
 
-Told = list[tuple[Evidence, Signal, np.ndarray]]
+Told = list[tuple[Dataset, Signal, np.ndarray]]
 
 
 def told(misfits: Sequence[np.ndarray], sigma: float = 1.0) -> Told:

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from rollover.comparison.synthesis import synthetic
-from rollover.diagnosis.data.dataset import Evidence, evidence_of
-from rollover.diagnosis.data.inconsistent import slips_of
+from rollover.diagnosis.data.dataset import Dataset, dataset_of
+from rollover.diagnosis.data.inconsistent import inconsistencies_of
 from rollover.diagnosis.data.quantisation import without_spikes
 from rollover.diagnosis.forward.averaging import compared
 from rollover.dynamics import simulate
@@ -41,10 +41,10 @@ def recorded(name: str) -> Recording:
     return synthetic(made, channels=(*ANGLES, *QUATERNION), rate=150.0, seed=4)
 
 
-def evidence(name: str, recording: Recording) -> tuple[Evidence, np.ndarray]:
+def dataset(name: str, recording: Recording) -> tuple[Dataset, np.ndarray]:
     """What `diagnose` makes of a recording, and what it predicts with another friction."""
     _, thin, simulator, averaged = compared(scene(name), without_spikes(recording)[0])
-    found = evidence_of("r", thin, simulator, averaged)
+    found = dataset_of("r", thin, simulator, averaged)
     there = simulator.predict({FRICTION: 0.31}, 0.001)
     assert found is not None
     assert there is not None
@@ -52,14 +52,14 @@ def evidence(name: str, recording: Recording) -> tuple[Evidence, np.ndarray]:
 
 
 @cache
-def as_it_is(name: str) -> tuple[Evidence, np.ndarray]:
-    return evidence(name, recorded(name))
+def as_it_is(name: str) -> tuple[Dataset, np.ndarray]:
+    return dataset(name, recorded(name))
 
 
 @pytest.mark.parametrize("otherwise", OTHERWISE)
 @pytest.mark.parametrize("name", SCENES)
 def test_the_evidence_is_the_same(name: str, otherwise: Callable[[Recording], Recording]) -> None:
-    (found, there), (expected, there_too) = evidence(name, otherwise(recorded(name))), as_it_is(name)
+    (found, there), (expected, there_too) = dataset(name, otherwise(recorded(name))), as_it_is(name)
     assert [s.channel for s in found.signals] == [s.channel for s in expected.signals] == [*ANGLES, *QUATERNION]
     for one, other in zip(found.signals, expected.signals, strict=True):
         np.testing.assert_allclose(one.values, other.values, atol=1e-9)
@@ -79,7 +79,7 @@ def test_near_the_lock_a_later_run_is_no_other_attitude() -> None:
     now, later = simulator.predict({}, 0.0), simulator.predict({}, 1e-3)
     assert now is not None
     assert later is not None
-    # (A2) makes of a turn at most 1/0.366 times as much, and rates rise at a blow
+    # (A2) makes of a turn at most 1/0.366 times as much, and rates rise at an impact
     assert max(float(np.nanmax(np.abs(later[a] - now[a]))) for a in ANGLES) < 3.0 * 6e-3 / 0.366
 
 
@@ -88,5 +88,5 @@ def test_an_opposite_sign_of_a_wrapped_roll_is_found() -> None:
     roll = replace(made, channels={ROLL: made[ROLL]}, noise={})
     away = within_half_a_turn(replace(roll, channels={ROLL: -made[ROLL]}))
     for recording, said in ((within_half_a_turn(roll), []), (away, [-1.0])):
-        some, shared = slips_of([evidence("multiple_roll", recording)[0]])
+        some, shared = inconsistencies_of([dataset("multiple_roll", recording)[0]])
         assert [s.factor for s in (*some, *shared)] == pytest.approx(said, abs=0.01)

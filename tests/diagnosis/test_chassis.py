@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rollover.diagnosis.data.dataset import Evidence, evidence_of
+from rollover.diagnosis.data.dataset import Dataset, dataset_of
 from rollover.diagnosis.forward.full_run import RunSimulator
 from rollover.diagnosis.inference.chassis import degrees_of
 from rollover.recording import Recording
@@ -23,19 +23,19 @@ def toss(speed: float) -> Scenario:
     )
 
 
-def thrown(speed: float, off: dict[str, str]) -> tuple[Scenario, Evidence]:
+def thrown(speed: float, off: dict[str, str]) -> tuple[Scenario, Dataset]:
     """A toss, recorded in flight, with `off`: channel -> what is added to it."""
     time = np.arange(0.0, 0.16, 0.001)
     own = toss(speed)
-    bare = Recording(title="r", time=time, channels=dict.fromkeys((*ALONG, *ABOUT), np.zeros(time.size)))
-    simulator = RunSimulator(own, bare)
+    no_jacobian = Recording(title="r", time=time, channels=dict.fromkeys((*ALONG, *ABOUT), np.zeros(time.size)))
+    simulator = RunSimulator(own, no_jacobian)
     run, state = simulator.predict({}, 0.0), simulator.state(0.0)
     assert run is not None
     rng = np.random.default_rng(int(100 * speed))
     added = {c: eval(text, {"t": time, "state": state, "np": np}) for c, text in off.items()}
     made = {c: run[c] + added.get(c, 0.0) + rng.normal(0.0, 0.01, time.size) for c in (*ALONG, *ABOUT)}
     recording = Recording(title="r", time=time, channels=made)
-    found = evidence_of(f"v{speed}", recording, RunSimulator(own, recording))
+    found = dataset_of(f"v{speed}", recording, RunSimulator(own, recording))
     assert found is not None
     return own, found
 
@@ -63,11 +63,17 @@ def test_a_moment_is_the_inertia_times_what_the_turn_speeds_up_by() -> None:
 
 def test_instruments_elsewhere_are_no_forces_on_the_chassis() -> None:
     own, e = thrown(0.7, {})
-    bare = Recording(title="r", time=e.recording.time, channels={"chassis/position_z": np.zeros(e.recording.time.size)})
-    there = evidence_of(
+    no_jacobian = Recording(
+        title="r", time=e.recording.time, channels={"chassis/position_z": np.zeros(e.recording.time.size)}
+    )
+    there = dataset_of(
         "r",
-        Recording(title="r", time=bare.time, channels={"chassis/position_z": np.linspace(0.0, 0.3, bare.time.size)}),
-        RunSimulator(own, bare),
+        Recording(
+            title="r",
+            time=no_jacobian.time,
+            channels={"chassis/position_z": np.linspace(0.0, 0.3, no_jacobian.time.size)},
+        ),
+        RunSimulator(own, no_jacobian),
     )
     assert there is not None
     assert degrees_of([own], [there], [0.0]) == ()

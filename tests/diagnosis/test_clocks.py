@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollover.diagnosis.data.dataset import Evidence, evidence_of
-from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.data.dataset import Dataset, dataset_of
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.local_search import ended
 from rollover.diagnosis.fit.parameterisation import coordinate, followed
 from rollover.diagnosis.fit.time_shift import BELIEVED, align, by_clock, by_first_contact, mistimed
 from rollover.diagnosis.forward.forward_model import DropSimulator, simulator_of
 from rollover.diagnosis.selection.candidates import candidates_of
-from rollover.diagnosis.selection.score_test import gate
+from rollover.diagnosis.selection.score_test import score_test
 from rollover.dynamics.drop_test import DropModel
 from rollover.effects import spoken
 from rollover.recording import Clock
@@ -24,49 +24,49 @@ HARDPAN = {"effects.soil-layer.depth": 0.08, "effects.soil-layer.stiffness_ratio
 CRUST = {"effects.soil-crust.thickness": 0.06, "effects.soil-crust.stiffness_ratio": 0.75}
 
 
-def judge_of(changes: dict[str, object], *, late: float = 0.0, rate: float = 1000.0, noise: float = 0.003) -> Judge:
+def judge_of(changes: dict[str, object], *, late: float = 0.0, rate: float = 1000.0, noise: float = 0.003) -> Problem:
     """Three drops whose clocks are late by `late` more than `recorded` makes them by chance."""
-    found: list[Evidence] = []
+    found: list[Dataset] = []
     for name, r in recorded(changes, 3, channels=(FORCE, DEPTH, ACCELERATION), rate=rate, noise=noise):
         moved = replace(r, time=r.time + late)
-        one = evidence_of(name, moved, simulator_of(scenario(), moved))
+        one = dataset_of(name, moved, simulator_of(scenario(), moved))
         assert one is not None
         found.append(one)
-    return Judge(found)
+    return Problem(found)
 
 
-def without_zero(judge: Judge, since: float = -np.inf) -> Judge:
+def without_zero(problem: Problem, since: float = -np.inf) -> Problem:
     """The same recordings from `since` (s) on, by clocks that have no zero."""
     found = []
-    for e in judge.evidence:
+    for e in problem.dataset:
         inside, clock = e.recording.time > since, replace(e.recording.clock, zero="unknown")
         channels = {c: v[inside] for c, v in e.recording.channels.items()}
         r = replace(e.recording, time=e.recording.time[inside], channels=channels, clock=clock)
-        one = evidence_of(e.name, r, simulator_of(scenario(), r))
+        one = dataset_of(e.name, r, simulator_of(scenario(), r))
         assert one is not None
         found.append(one)
-    return Judge(found)
+    return Problem(found)
 
 
-def known(judge: Judge, changes: dict[str, object]) -> np.ndarray:
+def known(problem: Problem, changes: dict[str, object]) -> np.ndarray:
     """Time shifts by fits of the truth itself, s."""
     id = next(iter(changes)).split(".")[1]
-    c = {c.id: c for c in candidates_of(judge.evidence, (), "drop")}[id]
+    c = {c.id: c for c in candidates_of(problem.dataset, (), "drop")}[id]
     x = [coordinate(float(str(changes[f"effects.{id}.{n}"])), s) for n, s in c.search.items()]
-    fitted = judge.fit((c,), x, shifts=[0.0] * len(judge.evidence))
+    fitted = problem.fit((c,), x, shifts=[0.0] * len(problem.dataset))
     assert fitted is not None
     return np.array([b.shift for b in fitted.blocks])
 
 
 @pytest.mark.parametrize("missing", [HARDPAN, CRUST], ids=["hardpan", "crust"])
 def test_the_first_contact_is_not_bent_by_what_the_simulation_misses(missing: dict[str, object]) -> None:
-    judge = judge_of(missing, late=0.5e-3)
-    truth = known(judge, missing)
-    align(judge)
-    base = judge.fit((), ())
+    problem = judge_of(missing, late=0.5e-3)
+    truth = known(problem, missing)
+    align(problem)
+    base = problem.fit((), ())
     assert base is not None
     bent = np.array([b.shift for b in base.blocks]) - truth
-    early = np.array([np.nan if v is None else v for v in by_first_contact(judge, (), ())]) - truth
+    early = np.array([np.nan if v is None else v for v in by_first_contact(problem, (), ())]) - truth
     assert np.abs(bent).max() > 0.6e-3  # a whole recording's shift eats part of it
     assert np.abs(early).max() < 0.25e-3
 
@@ -75,12 +75,12 @@ def test_the_first_contact_is_not_bent_by_what_the_simulation_misses(missing: di
 def test_the_onset_of_contact_is_found_whatever_happens_then(late: float) -> None:
     """A striker that gives way rings from the first instant, and its recorder's clock has no zero."""
     ringing = {"effects.structural-compliance.stiffness": 1.9e6, "effects.structural-compliance.damping": 1400.0}
-    judge = without_zero(judge_of(ringing, late=late))
-    align(judge)
-    base = judge.fit((), ())
+    problem = without_zero(judge_of(ringing, late=late))
+    align(problem)
+    base = problem.fit((), ())
     assert base is not None
     bent = np.array([b.shift for b in base.blocks]) - late
-    early = np.array([np.nan if v is None else v for v in by_first_contact(judge, (), ())]) - late
+    early = np.array([np.nan if v is None else v for v in by_first_contact(problem, (), ())]) - late
     assert np.abs(bent).max() > 2e-3
     assert np.abs(early).max() < 1.3e-3  # the clocks themselves stray by half a millisecond
 
@@ -90,23 +90,23 @@ def test_a_recording_that_began_in_the_ground_tells_of_no_contact() -> None:
 
 
 def test_a_clock_that_would_have_to_be_far_off_is_not_believed_where_its_zero_is_known() -> None:
-    judge = judge_of({}, late=5.0e-3)
+    problem = judge_of({}, late=5.0e-3)
     loose = []
-    for e in judge.evidence:
+    for e in problem.dataset:
         clock = replace(e.recording.clock, zero="unknown")
         loose.append(replace(e, recording=replace(e.recording, clock=clock)))
-    told = [np.nan if v is None else v for v in by_first_contact(Judge(loose), (), ())]
+    told = [np.nan if v is None else v for v in by_first_contact(Problem(loose), (), ())]
     far = [abs(v) > BELIEVED * e.shift_prior for v, e in zip(told, loose, strict=True)]
     assert any(far)
-    assert [v is None for v in by_first_contact(judge, (), ())] == far
+    assert [v is None for v in by_first_contact(problem, (), ())] == far
 
 
 def test_the_slope_of_a_clock_is_that_of_the_simulation() -> None:
     """Against central differences of the model itself, in the smooth part of the loading."""
-    judge = judge_of({}, rate=500.0)
-    block = judge.block(0, (), (), 0.0, 0.0)
+    problem = judge_of({}, rate=500.0)
+    block = problem.block(0, (), (), 0.0, 0.0)
     assert block is not None
-    e = judge.evidence[0]
+    e = problem.dataset[0]
     speed = e.recording.conditions["initiation.speed"]
     model = DropModel(scenario=scenario(), step=1e-3).with_({"initiation.speed": speed})
     time, h = e.recording.time, 1e-5
@@ -118,7 +118,7 @@ def test_the_slope_of_a_clock_is_that_of_the_simulation() -> None:
 
 def test_one_fall_serves_every_clock() -> None:
     """A shift, or a channel with a clock of its own, reads the same fall again; one far off makes it longer."""
-    e = judge_of({}).evidence[0]
+    e = judge_of({}).dataset[0]
     assert isinstance(e.simulator, DropSimulator)
     stiffer, scenario = {"effects.soil-stiffness.scale": 1.1}, e.simulator.model.scenario
     simulator = DropSimulator(scenario, e.recording)
@@ -143,30 +143,30 @@ def test_one_fall_serves_every_clock() -> None:
 
 def test_fits_from_two_places_end_at_one() -> None:
     """A soil a thousandth softer than its law: followed to its end, from wherever it began, a fit leaves the same."""
-    judge = judge_of({"effects.soil-stiffness.scale": 0.9987}, noise=0.0005)
-    candidate = {c.id: c for c in candidates_of(judge.evidence, (), "drop")}["soil-stiffness"]
-    align(judge)
-    ends = [judge.fit((candidate,), (start,)) for start in (0.40, 0.5, 0.62)]
-    left = [ended(judge, f).left for f in ends if f is not None]
+    problem = judge_of({"effects.soil-stiffness.scale": 0.9987}, noise=0.0005)
+    candidate = {c.id: c for c in candidates_of(problem.dataset, (), "drop")}["soil-stiffness"]
+    align(problem)
+    ends = [problem.fit((candidate,), (start,)) for start in (0.40, 0.5, 0.62)]
+    left = [ended(problem, f).left for f in ends if f is not None]
     assert len(left) == 3
     assert max(left) - min(left) < 0.01
 
 
 def test_the_score_test_leads_to_where_the_effect_is() -> None:
     mild = {**HARDPAN, "effects.soil-layer.stiffness_ratio": 1.05}
-    judge = judge_of(mild)
-    candidates = [c for c in candidates_of(judge.evidence, (), "drop") if c.id == "soil-layer"]
-    shifts = known(judge, mild)
-    base = judge.fit((), (), shifts=shifts.tolist(), rounds=0)
+    problem = judge_of(mild)
+    candidates = [c for c in candidates_of(problem.dataset, (), "drop") if c.id == "soil-layer"]
+    shifts = known(problem, mild)
+    base = problem.fit((), (), shifts=shifts.tolist(), rounds=0)
     assert base is not None
-    starts = gate(judge, base, candidates).starts["soil-layer"]
+    starts = score_test(problem, base, candidates).starts["soil-layer"]
     values = [candidates[0].values(x) for x in starts]
     assert any(abs(v["depth"] - 0.08) < 0.025 and 1.03 < v["stiffness_ratio"] < 1.07 for v in values), values
 
 
 def test_a_way_from_no_effect_is_followed_in_the_parameter_itself() -> None:
-    judge = judge_of({})
-    by_id = {c.key: c for c in candidates_of(judge.evidence, (), "drop")}
+    problem = judge_of({})
+    by_id = {c.key: c for c in candidates_of(problem.dataset, (), "drop")}
     layer = by_id["soil-layer"]
     x = layer.probes()[0]
     there = followed(layer, x, 30.0)
@@ -178,22 +178,22 @@ def test_a_way_from_no_effect_is_followed_in_the_parameter_itself() -> None:
     assert followed(clip, clip.probes()[0], 3.0) is None
 
 
-def one_late(judge: Judge, late: float) -> Judge:
+def one_late(problem: Problem, late: float) -> Problem:
     """The same, with the clock of the second recording off by `late` (s) more, and said to be right."""
-    second = judge.evidence[1]
+    second = problem.dataset[1]
     moved = replace(second.recording, time=second.recording.time + late)
-    one = evidence_of(second.name, moved, simulator_of(scenario(), moved))
+    one = dataset_of(second.name, moved, simulator_of(scenario(), moved))
     assert one is not None
-    return Judge([judge.evidence[0], one, *judge.evidence[2:]])
+    return Problem([problem.dataset[0], one, *problem.dataset[2:]])
 
 
 @pytest.mark.parametrize("late", [0.05, -0.03])
 def test_a_clock_that_is_far_off_is_told_by_where_the_simulation_meets_the_recording(late: float) -> None:
-    judge = one_late(judge_of({}), late)
-    base = judge.fit((), (), rounds=3)
+    problem = one_late(judge_of({}), late)
+    base = problem.fit((), (), rounds=3)
     assert base is not None
-    [(name, found)] = mistimed(judge, base)
-    assert name == judge.evidence[1].name
+    [(name, found)] = mistimed(problem, base)
+    assert name == problem.dataset[1].name
     assert found == pytest.approx(late, abs=2e-3)  # what `recorded` makes it late by itself is up to 1.5 ms
     said = by_clock([(name, found)])
     assert f"{spoken(abs(found) * 1e3)} ms {'late' if late > 0 else 'early'} ({name})" in said
@@ -201,22 +201,22 @@ def test_a_clock_that_is_far_off_is_told_by_where_the_simulation_meets_the_recor
 
 @pytest.mark.parametrize("missing", [{}, HARDPAN, {"effects.soil-stiffness.scale": 2.0}])
 def test_no_clock_is_blamed_for_what_the_simulation_misses(missing: dict[str, object]) -> None:
-    judge = judge_of(missing)
-    base = judge.fit((), (), rounds=3)
+    problem = judge_of(missing)
+    base = problem.fit((), (), rounds=3)
     assert base is not None
-    assert mistimed(judge, base) == []
+    assert mistimed(problem, base) == []
     assert by_clock([]) == ""
 
 
-def cut_at(judge: Judge, until: float) -> Judge:
+def cut_at(problem: Problem, until: float) -> Problem:
     """The second recording alone, without what comes after `until` (s)."""
-    e = judge.evidence[1]
+    e = problem.dataset[1]
     rows = np.flatnonzero(e.recording.time < until)
     kept = {c: v[rows] for c, v in e.recording.channels.items()}
     cut = replace(e.recording, time=e.recording.time[rows], channels=kept)
-    one = evidence_of(e.name, cut, simulator_of(scenario(), cut))
+    one = dataset_of(e.name, cut, simulator_of(scenario(), cut))
     assert one is not None
-    return Judge([one])
+    return Problem([one])
 
 
 @pytest.mark.parametrize(("until", "told"), [(0.18, [0.15]), (0.14, [])])
@@ -230,26 +230,26 @@ def test_a_clock_is_told_by_a_contact_however_short_and_not_without_one(until: f
 
 @pytest.mark.parametrize("late", [0.4, -0.1, 7.0])
 def test_a_clock_is_told_beside_what_is_missing_however_far_off_it_is(late: float) -> None:
-    """What rests long before or after its blow is met by most samples at many a clock: 0.4 s was called 0.243."""
-    judge = one_late(judge_of({"effects.soil-viscous-damping.damping": 250.0}), late)
-    base = judge.fit((), (), rounds=3)
+    """What rests long before or after its impact is met by most samples at many a clock: 0.4 s was called 0.243."""
+    problem = one_late(judge_of({"effects.soil-viscous-damping.damping": 250.0}), late)
+    base = problem.fit((), (), rounds=3)
     assert base is not None
-    [(name, found)] = mistimed(judge, base)
-    assert name == judge.evidence[1].name
+    [(name, found)] = mistimed(problem, base)
+    assert name == problem.dataset[1].name
     assert found == pytest.approx(late, abs=0.016)  # no more than the damping bends it
 
 
 def test_what_is_at_rest_tells_no_time() -> None:
     """Recorded from 0.25 s after its contact on, by a clock 0.25 s early: most of it is met by any earlier one."""
-    judge = judge_of({})
-    e = judge.evidence[1]
+    problem = judge_of({})
+    e = problem.dataset[1]
     rows = np.flatnonzero(e.recording.time > 0.25)
     kept = {c: v[rows] for c, v in e.recording.channels.items()}
     for clock in (e.recording.clock, Clock(within=8.0)):
         resting = replace(e.recording, time=e.recording.time[rows] - 0.25, channels=kept, clock=clock)
-        one = evidence_of(e.name, resting, simulator_of(scenario(), resting))
+        one = dataset_of(e.name, resting, simulator_of(scenario(), resting))
         assert one is not None
-        alone = Judge([one])
+        alone = Problem([one])
         base = alone.fit((), (), rounds=0)
         assert base is not None
         assert mistimed(alone, base) == []
@@ -260,18 +260,20 @@ def test_milliseconds_that_are_many_are_spoken_in_full() -> None:
 
 
 def test_a_channel_that_comes_far_too_early_is_looked_at_there_where_runs_are_dear() -> None:
-    """A blow of 20 ms that one channel shows 30 ms early: what a millisecond would do has nothing to do with it."""
-    judge = judge_of({"effects.sensor-clock-offset.channel": ACCELERATION, "effects.sensor-clock-offset.offset": -0.03})
-    base = judge.fit((), (), rounds=3)
+    """An impact of 20 ms that one channel shows 30 ms early: what a millisecond would do has nothing to do with it."""
+    problem = judge_of(
+        {"effects.sensor-clock-offset.channel": ACCELERATION, "effects.sensor-clock-offset.offset": -0.03}
+    )
+    base = problem.fit((), (), rounds=3)
     assert base is not None
-    every = candidates_of(judge.evidence, (), "drop")
+    every = candidates_of(problem.dataset, (), "drop")
     [c] = [c for c in every if c.key == f"sensor-clock-offset:{ACCELERATION}"]
-    near = gate(judge, base, [c])
-    judge.effort = replace(judge.effort, thrifty=True)
-    far = gate(judge, base, [c])
+    near = score_test(problem, base, [c])
+    problem.effort = replace(problem.effort, is_ensemble=True)
+    far = score_test(problem, base, [c])
     truth = coordinate(-0.03, c.search["offset"])
     assert far.score > 5.0 * near.score
-    # 5 ms, a quarter of the blow: from there a fit goes to it
+    # 5 ms, a quarter of the impact: from there a fit goes to it
     assert far.starts[c.key][0][0] == pytest.approx(truth, abs=0.05)
     assert near.starts[c.key][0][0] != pytest.approx(truth, abs=0.15)
     assert {c.id for c in every if c.further()} == {"sensor-clock-offset", "sensor-clock-drift"}
@@ -279,9 +281,9 @@ def test_a_channel_that_comes_far_too_early_is_looked_at_there_where_runs_are_de
 
 def test_a_record_that_ends_at_the_contact_tells_no_first_contact_and_is_no_crash() -> None:
     ended = [
-        evidence_of(n, r, simulator_of(scenario(), r))
+        dataset_of(n, r, simulator_of(scenario(), r))
         for n, r in recorded({}, 3, channels=(ACCELERATION, "striker/position_z"), rate=1000.0, until=0.001)
     ]
-    judge = Judge([e for e in ended if e is not None])
-    assert len(judge.evidence) == 3
-    assert all(at is None or abs(at) < 0.03 for at in by_first_contact(judge, (), ()))
+    problem = Problem([e for e in ended if e is not None])
+    assert len(problem.dataset) == 3
+    assert all(at is None or abs(at) < 0.03 for at in by_first_contact(problem, (), ()))

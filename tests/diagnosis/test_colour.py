@@ -11,8 +11,8 @@ import pytest
 from scipy.signal import lfilter
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.data.dataset import Evidence, Signal
-from rollover.diagnosis.fit.linearisation import Block
+from rollover.diagnosis.data.dataset import Dataset, Signal
+from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.noise.autoregression import Rest, quiet, rests, unlike
@@ -33,14 +33,14 @@ class Still:
         return []
 
 
-def recorded(values: np.ndarray) -> Evidence:
+def recorded(values: np.ndarray) -> Dataset:
     """A recording at `RATE`, said to be behind CFC 60, whose noise is told as diagnoses tell it."""
     time = np.arange(values.size) / RATE
     recording = Recording(title="r", time=time, channels={CHANNEL: values}, cfc={CHANNEL: 60})
     rows = np.arange(0, values.size, EVERY)
     signal = Signal(channel=CHANNEL, rows=rows, values=values[rows], sigma=1.0, noise=1.0, ar=(), span=100.0)
     simulator: Any = Still()
-    e = Evidence(name="r", recording=recording, simulator=simulator, signals=(signal,), shift_prior=1e-3, condition="r")
+    e = Dataset(name="r", recording=recording, simulator=simulator, signals=(signal,), shift_prior=1e-3, condition="r")
     [e] = quiet([e], [signal.values])
     # runs of it scatter somewhere, so that its level is known and not asked of its own roughness
     return replace(e, signals=tuple(replace(s, weight=np.full(s.rows.size, 0.98)) for s in e.signals))
@@ -51,10 +51,10 @@ def behind(random: np.random.Generator) -> np.ndarray:
     return filtered(random.standard_normal(N + 400), 1.0 / RATE, 60)[200 : N + 200]
 
 
-def slow(e: Evidence) -> tuple[float, float]:
+def slow(e: Dataset) -> tuple[float, float]:
     """What is slow in a recording of nothing but noise, and what is expected of it."""
     w = e.whitened(e.signals[0].values)
-    block = Block(residual=w, J=np.zeros((w.size, 0)), slope=np.zeros(w.size), shift=0.0, prior=1e-3)
+    block = ResidualBlock(residual=w, J=np.zeros((w.size, 0)), slope=np.zeros(w.size), shift=0.0, prior=1e-3)
     starts = tuple((float(t), f"part {k}") for k, t in enumerate(np.arange(0.0, e.recording.time[-1], 0.256)))
     cells = mismatch_of([e], [block], [starts]).cells
     return sum(c.structured for c in cells), sum(c.expected for c in cells)

@@ -114,7 +114,10 @@ def test_recordings_that_contradict_each_other_are_not_explained() -> None:
 @pytest.mark.parametrize(
     ("detectable", "is_weak"),
     [
-        ({"payload-shift": 400.0, "tank-slosh": 400.0, "mount-play": 1e-5}, False),  # a pendulum's blow, no ground acts
+        (
+            {"payload-shift": 400.0, "tank-slosh": 400.0, "mount-play": 1e-5},
+            False,
+        ),  # a pendulum's impact, no ground acts
         ({"payload-shift": 400.0, "tank-slosh": 400.0, "mount-play": 1.0}, True),
         ({"payload-shift": 400.0, "soil-adhesion": 1e6, "soil-viscous-damping": 10.0}, True),
         ({"payload-shift": 10.0, "soil-adhesion": 1e6, "soil-viscous-damping": 10.0}, False),

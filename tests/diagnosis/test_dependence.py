@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rollover.diagnosis.data.dataset import Evidence, evidence_of
+from rollover.diagnosis.data.dataset import Dataset, dataset_of
 from rollover.diagnosis.data.phases import drop_phases
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.averaging import simulated
@@ -23,7 +23,7 @@ from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.inference.residual_force import channels_of, pushed
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.noise.spectral_lines import lines, without
-from rollover.diagnosis.selection.flexibility import is_any_curve, is_pliant
+from rollover.diagnosis.selection.flexibility import is_over_flexible, is_pliant
 from rollover.effects import Search
 from rollover.proof.generator import Order, make
 from rollover.recording import Clock, Recording
@@ -35,23 +35,23 @@ from tests.diagnosis.test_nulls import noise
 THREE = (drops.FORCE, drops.DEPTH, drops.ACCELERATION)
 
 
-def base_of(own: Scenario, recordings: Sequence[tuple[str, Recording]]) -> tuple[Judge, Fitted]:
+def base_of(own: Scenario, recordings: Sequence[tuple[str, Recording]]) -> tuple[Problem, Fitted]:
     """The scenario as it is beside recordings, their noise from quiet stretches."""
-    found = [evidence_of(name, *simulated(own, r)) for name, r in recordings]
-    evidence: list[Evidence] = [e for e in found if e is not None]
-    judge = Judge(evidence)
-    align(judge)
-    first = judge.fit((), (), rounds=2)
+    found = [dataset_of(name, *simulated(own, r)) for name, r in recordings]
+    dataset: list[Dataset] = [e for e in found if e is not None]
+    problem = Problem(dataset)
+    align(problem)
+    first = problem.fit((), (), rounds=2)
     assert first is not None
-    judge.weigh(autoregression.quiet(evidence, judge.residuals(first)))
-    base = judge.fit((), ())
+    problem.with_noise_model(autoregression.quiet(dataset, problem.residuals(first)))
+    base = problem.fit((), ())
     assert base is not None
-    return judge, base
+    return problem, base
 
 
 def told(own: Scenario, recordings: Sequence[tuple[str, Recording]]) -> Dependence:
-    judge, base = base_of(own, recordings)
-    return dependence(judge, [set_up(own, e.recording) for e in judge.evidence], base)
+    problem, base = base_of(own, recordings)
+    return dependence(problem, [set_up(own, e.recording) for e in problem.dataset], base)
 
 
 def test_a_constant_push_on_a_spring_swings_about_where_it_would_rest() -> None:
@@ -70,16 +70,16 @@ def test_a_force_does_to_every_channel_what_the_simulation_says() -> None:
     """(D6) against the integrator: viscous damping of 400 N s/m."""
     own, damping = scenario(), 400.0
     made = recorded({"effects.soil-viscous-damping.damping": damping}, channels=THREE, rate=2000.0, noise=1e-3)
-    judge, base = base_of(own, made)
-    for d in ways(judge, [set_up(own, r) for _, r in made], base)[1]:
-        moved = channels_of(d.way, d.way.moved(damping * d.way.speed[:, None], "ground"), d.evidence, d.shift)[d.rows]
+    problem, base = base_of(own, made)
+    for d in ways(problem, [set_up(own, r) for _, r in made], base)[1]:
+        moved = channels_of(d.way, d.way.moved(damping * d.way.speed[:, None], "ground"), d.dataset, d.shift)[d.rows]
         s, w = d.slope[d.rows], d.residual[d.rows]
         left = w - moved[:, 0]
         left = left - s * float(s @ left) / float(s @ s + d.prior**-2)
         at = np.flatnonzero(d.rows)
-        for signal, part in d.evidence.spans():
+        for signal, part in d.dataset.spans():
             # the force leaps at the contact: on which side a sample lies there is the clock's
-            late = d.evidence.recording.time[signal.rows] - d.shift > 0.003
+            late = d.dataset.recording.time[signal.rows] - d.shift > 0.003
             rows = np.isin(at, part.start + np.flatnonzero(late))
             assert rows.sum() > 20
             most = 0.03 * np.linalg.norm(moved[rows]) + 1.3 * np.sqrt(rows.sum())
@@ -116,15 +116,15 @@ def test_the_way_down_is_told_by_the_first_contact_where_a_base_ate_what_is_miss
     """Nobody timed these drops, and a base is 30 ms late: from there no slope leads over the edge of the contact."""
     hidden = {f"effects.soil-layer.{n}": v for n, v in {"stiffness_ratio": 0.6, "depth": 0.05, "width": 0.02}.items()}
     made = recorded(hidden, 5, speeds=(1.2, 1.8, 2.6, 3.2), channels=THREE, rate=1000.0, noise=0.005)
-    judge, _ = base_of(scenario(), [(n, replace(r, clock=Clock(zero="unknown"))) for n, r in made])
-    blocks = [judge.block(r, (), (), 0.03, 0.0) for r in range(len(made))]
+    problem, _ = base_of(scenario(), [(n, replace(r, clock=Clock(zero="unknown"))) for n, r in made])
+    blocks = [problem.block(r, (), (), 0.03, 0.0) for r in range(len(made))]
     base = Fitted(candidates=(), x=(), blocks=tuple(b for b in blocks if b is not None))
-    scenarios = [set_up(scenario(), e.recording) for e in judge.evidence]
+    scenarios = [set_up(scenario(), e.recording) for e in problem.dataset]
 
     def worst() -> float:
-        return max(d.score / d.rows.sum() for d in ways(judge, scenarios, base)[1])
+        return max(d.score / d.rows.sum() for d in ways(problem, scenarios, base)[1])
 
-    assert all(abs(d.shift) < 1.5e-3 for d in ways(judge, scenarios, base)[1])
+    assert all(abs(d.shift) < 1.5e-3 for d in ways(problem, scenarios, base)[1])
     assert worst() < 0.3  # of what noise leaves, beyond it
     monkeypatch.setattr(dependence_of, "by_first_contact", lambda *_: [None] * len(made))
     assert worst() > 3.0
@@ -146,9 +146,9 @@ def test_a_channel_that_goes_its_own_way_is_told_by_what_the_others_leave() -> N
     """y = x (1 + 0.3 x/x_max) of one channel; the same that drops out; and a force, which moves them all."""
 
     def of_one(made: Sequence[tuple[str, Recording]]) -> Dependence | None:
-        judge, base = base_of(scenario(), made)
-        phases = [drop_phases(e) for e in judge.evidence]
-        return dependence_of_one(judge, base, mismatch_of(judge.evidence, base.blocks, phases))
+        problem, base = base_of(scenario(), made)
+        phases = [drop_phases(e) for e in problem.dataset]
+        return dependence_of_one(problem, base, mismatch_of(problem.dataset, base.blocks, phases))
 
     rng, curved, loose = np.random.default_rng(3), [], []
     for name, r in recorded({}, channels=THREE, rate=1000.0, noise=0.005):
@@ -184,11 +184,11 @@ def test_a_line_is_found_in_coloured_noise_and_nothing_where_there_is_none(memor
     assert alarms <= 1
 
 
-def held(misfit: np.ndarray, quiet: float, ar: tuple[float, ...], count: int = 3) -> list[Evidence]:
+def held(misfit: np.ndarray, quiet: float, ar: tuple[float, ...], count: int = 3) -> list[Dataset]:
     """Recordings of one channel whose noise was said to be `quiet` with a memory of `ar`."""
     name, r = recorded({}, speeds=(2.0,), rate=1000.0, channels=(drops.FORCE,))[0]
     n = misfit.size // count
-    one = evidence_of(name, *simulated(scenario(), r))
+    one = dataset_of(name, *simulated(scenario(), r))
     assert one is not None
     s = replace(one.signals[0], rows=np.arange(n), values=np.zeros(n), noise=quiet, sigma=quiet, ar=ar)
     recording = replace(r, time=np.arange(n) * 1e-3, channels={drops.FORCE: np.zeros(n)})
@@ -220,9 +220,9 @@ def test_levels_that_are_off_are_no_memory_of_the_noise_however_often_it_is_weig
         ]
         # weighed once before, by what one effect had left
         again = [replace(e, signals=(replace(e.signals[0], noise=1.4, ar=(0.85,)),)) for e in before]
-        for evidence in (before, again):
-            after = autoregression.whole(evidence, list(misfit.reshape(3, n)))
-            assert (after[0].signals[0] is evidence[0].signals[0]) == kept
+        for dataset in (before, again):
+            after = autoregression.whole(dataset, list(misfit.reshape(3, n)))
+            assert (after[0].signals[0] is dataset[0].signals[0]) == kept
 
 
 def test_a_hum_is_a_mismatch_however_fast_and_its_channel_is_named() -> None:
@@ -230,13 +230,13 @@ def test_a_hum_is_a_mismatch_however_fast_and_its_channel_is_named() -> None:
     made = []
     for name, r in recorded({}, channels=THREE, rate=1000.0, noise=0.005):
         size = 0.01 * float(np.ptp(r.channels[drops.DEPTH]))
-        hum = size * np.sin(2.0 * np.pi * 130.0 * r.time)
-        made.append((name, replace(r, channels={**r.channels, drops.DEPTH: r.channels[drops.DEPTH] + hum})))
-    judge, base = base_of(scenario(), made)
-    found = mismatch_of(judge.evidence, base.blocks, [drop_phases(e) for e in judge.evidence])
+        line_spectrum = size * np.sin(2.0 * np.pi * 130.0 * r.time)
+        made.append((name, replace(r, channels={**r.channels, drops.DEPTH: r.channels[drops.DEPTH] + line_spectrum})))
+    problem, base = base_of(scenario(), made)
+    found = mismatch_of(problem.dataset, base.blocks, [drop_phases(e) for e in problem.dataset])
     assert found.p_value < 1e-6
     assert found.shares()[0][0].channel == drops.DEPTH
-    for s in (s for e in judge.evidence for s in e.signals if s.channel == drops.DEPTH):
+    for s in (s for e in problem.dataset for s in e.signals if s.channel == drops.DEPTH):
         assert s.noise < 0.007 * s.span  # what hums was left out of it
 
 
@@ -245,21 +245,21 @@ def test_three_effects_of_one_sensor_or_of_the_soil_are_any_curve_and_two_are_no
         return Candidate(id=id, kind="sensor", family="", search={}, channel=channel)
 
     three = [on(id, drops.DEPTH) for id in ("sensor-scale", "sensor-clipping", "sensor-bias")]
-    assert is_any_curve(three)
-    assert not is_any_curve(three[:2])
-    assert not is_any_curve([*three[:2], on("sensor-bias", drops.FORCE)])
+    assert is_over_flexible(three)
+    assert not is_over_flexible(three[:2])
+    assert not is_over_flexible([*three[:2], on("sensor-bias", drops.FORCE)])
     soil = [on("soil-layer", None), on("soil-rate-hardening", None), on("soil-stiffness", None)]
-    assert is_any_curve(soil)
-    assert not is_any_curve([*soil[:2], on("mass", None)])
+    assert is_over_flexible(soil)
+    assert not is_over_flexible([*soil[:2], on("mass", None)])
     back = [on("soil-elastic-rebound", None), on("soil-adhesion", None)]
-    assert not is_any_curve([soil[0], *back]), "the way back is another curve than the way down"
-    assert not is_any_curve([*soil[:2], back[0]])
+    assert not is_over_flexible([soil[0], *back]), "the way back is another curve than the way down"
+    assert not is_over_flexible([*soil[:2], back[0]])
     shaped = replace(soil[1], search={"per_decade": Search(0.01, 0.5), "reference_speed": Search(0.01, 1.0)})
-    assert not is_any_curve([soil[0], shaped])
+    assert not is_over_flexible([soil[0], shaped])
     bent = [replace(soil[0], form={"onset": 1.0}), shaped]
-    assert is_any_curve(bent)
-    assert is_any_curve([*bent, on("sensor-clipping", drops.FORCE)])
-    assert not is_any_curve([shaped])
+    assert is_over_flexible(bent)
+    assert is_over_flexible([*bent, on("sensor-clipping", drops.FORCE)])
+    assert not is_over_flexible([shaped])
     assert is_pliant([soil[0], shaped])
     assert not is_pliant(soil)
     assert not is_pliant([shaped, on("mass", None)])

@@ -11,8 +11,8 @@ import rollover.diagnosis.pipeline  # noqa: F401  (the module, behind the functi
 from ground.empirical import TERMS, shape
 from ground.law import REFERENCE_AREA
 from rollover.diagnosis import account, diagnose, diagnosed_text
-from rollover.diagnosis.data.dataset import evidence_of, left_out
-from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.data.dataset import dataset_of, left_out
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.forward_model import set_up, simulator_of
 from rollover.diagnosis.inference.residual_law import best_subsets, proposed
@@ -75,12 +75,12 @@ def test_an_unknown_term_is_one_line() -> None:
 
 def test_windows_take_means_and_derivatives_by_parts() -> None:
     t = np.linspace(0.0, 0.2, 400)
-    phi, curved = _tests(t)
+    dispersion, curved = _tests(t)
     dt = np.gradient(t)
-    assert len(phi) > 10
-    assert phi @ dt == pytest.approx(np.ones(len(phi)), rel=2e-3)
+    assert len(dispersion) > 10
+    assert dispersion @ dt == pytest.approx(np.ones(len(dispersion)), rel=2e-3)
     z = 0.3 * np.sin(9.0 * t)
-    assert curved @ (dt * z) == pytest.approx((phi * dt) @ (-81.0 * z), abs=0.02 * 24.3)
+    assert curved @ (dt * z) == pytest.approx((dispersion * dt) @ (-81.0 * z), abs=0.02 * 24.3)
 
 
 def fallen(name: str, force: float, noise: float) -> list[Balance]:
@@ -124,7 +124,7 @@ def test_residual_forces_in_windows_are_the_force_that_was_added() -> None:
             noise=2e-4,
             speeds=(2.0, 3.0),
         )
-        found = [evidence_of(name, r, simulator_of(own, r)) for name, r in made]
+        found = [dataset_of(name, r, simulator_of(own, r)) for name, r in made]
         kept = [e for e in found if e is not None]
         for b in balances([set_up(own, e.recording) for e in kept], kept):
             off = b.force - b.weights @ (800.0 * b.speed)
@@ -198,11 +198,11 @@ def test_physics_that_nobody_listed_is_given_as_a_law_that_predicts(
 
 def test_no_law_is_made_of_noise() -> None:
     made = recorded({}, 7, speeds=(1.5, 2.0, 2.5, 3.0), channels=(FORCE, DEPTH, ACCELERATION), rate=1000.0)
-    found = [e for e in (evidence_of(n, r, simulator_of(scenario(), r)) for n, r in made) if e is not None]
-    judge = Judge(found)
-    align(judge)
-    base = judge.fit((), ())
+    found = [e for e in (dataset_of(n, r, simulator_of(scenario(), r)) for n, r in made) if e is not None]
+    problem = Problem(found)
+    align(problem)
+    base = problem.fit((), ())
     assert base is not None
     sets = [set_up(scenario(), e.recording) for e in found]
     assert len(balances(sets, found)) == 4
-    assert proposed(judge, base, sets, found, left_out(found)) is None
+    assert proposed(problem, base, sets, found, left_out(found)) is None

@@ -10,9 +10,9 @@ from typing import cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis.fit.jobs import Job
+from rollover.diagnosis.fit.jobs import Task
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted
-from rollover.diagnosis.fit.linearisation import Block
+from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.forward.budget import DROPS
@@ -29,7 +29,9 @@ def fitted(last: str, left: float, x: tuple[float, ...]) -> Fitted:
     first = Candidate(id=FIRST, kind="physics", family="", search={"a": Search(0, 1)})
     candidates = (first, Candidate(id=last, kind="physics", family="", search=own))
     zero = np.zeros(4)
-    block = Block(residual=zero + np.sqrt(left / 4.0), J=np.zeros((4, len(x))), slope=zero, shift=0.0, prior=1.0)
+    block = ResidualBlock(
+        residual=zero + np.sqrt(left / 4.0), J=np.zeros((4, len(x))), slope=zero, shift=0.0, prior=1.0
+    )
     return Fitted(candidates=candidates, x=x, blocks=(block,))
 
 
@@ -44,9 +46,9 @@ def test_rivals_are_begun_anew_beside_what_the_best_was_followed_to() -> None:
     """A threshold that was followed beside the best alone leaves its rivals where they were."""
     asked: list[tuple[str, tuple[float, ...]]] = []
 
-    def fits(jobs: Sequence[Job]) -> list[Fitted | None]:
-        asked.extend((job.candidates[-1].id, job.start) for job in jobs)
-        return [fitted(job.candidates[-1].id, 4.0, job.start) for job in jobs]
+    def fits(tasks: Sequence[Task]) -> list[Fitted | None]:
+        asked.extend((task.candidates[-1].id, task.start) for task in tasks)
+        return [fitted(task.candidates[-1].id, 4.0, task.start) for task in tasks]
 
     best, rival = fitted("mass", 1.0, (0.7, 0.3)), fitted("guide-friction", 9.0, (0.2, 0.4))
     after = simplification._with_rivals(cast(Inquiry, SimpleNamespace(fits=fits)), step(best, rival))
@@ -58,9 +60,9 @@ def test_rivals_are_begun_anew_beside_what_the_best_holds_in_the_form_that_it_ha
     """A damping that stood in two numbers beside its rivals was straightened beside the best."""
     asked: list[tuple[int, tuple[float, ...]]] = []
 
-    def fits(jobs: Sequence[Job]) -> list[Fitted | None]:
-        asked.extend((sum(len(c.search) for c in job.candidates), job.start) for job in jobs)
-        return [fitted(job.candidates[-1].id, 4.0, job.start) for job in jobs]
+    def fits(tasks: Sequence[Task]) -> list[Fitted | None]:
+        asked.extend((sum(len(c.search) for c in task.candidates), task.start) for task in tasks)
+        return [fitted(task.candidates[-1].id, 4.0, task.start) for task in tasks]
 
     best, rival = fitted("soil-layer", 1.0, (0.7, 0.0, 0.3)), fitted("guide-friction", 9.0, (0.2, 0.4))
     bent = replace(rival.candidates[0], search={"a": Search(0, 1), "b": Search(0, 1)})
@@ -80,9 +82,9 @@ def test_a_layer_from_the_surface_on_is_a_stiffness(depth: float, leaves: float,
     """At an end of its range a number tells nothing; what has none is begun beside what stands beside the layer."""
     asked: list[tuple[float, ...]] = []
 
-    def fits(jobs: Sequence[Job]) -> list[Fitted | None]:
-        asked.extend(job.start for job in jobs)
-        return [fitted(job.candidates[-1].id, leaves, job.start) for job in jobs]
+    def fits(tasks: Sequence[Task]) -> list[Fitted | None]:
+        asked.extend(task.start for task in tasks)
+        return [fitted(task.candidates[-1].id, leaves, task.start) for task in tasks]
 
     layer, stuck = fitted("soil-layer", 4.0, (0.7, depth, 0.3)), fitted("soil-stiffness", 90.0, (0.2, 0.4))
     as_many, far = fitted("soil-crust", 50.0, (0.2, 0.4, 0.4)), fitted("mass", 500.0, (0.2, 0.4))
@@ -101,13 +103,13 @@ def test_a_layer_is_tried_as_the_stiffness_that_it_becomes(leaves: float, taken:
     """A ratio of 0.5 + 0.2 (2 - 0.5) = 0.8 is a scale of 0.8, at 0.4 from 0 to 2, unless that is held beside it."""
     asked: list[tuple[float, ...]] = []
 
-    def fits(jobs: Sequence[Job]) -> list[Fitted | None]:
-        asked.extend(job.start for job in jobs)
-        return [replace(best, candidates=job.candidates, x=job.start, blocks=(left(leaves, 2),)) for job in jobs]
+    def fits(tasks: Sequence[Task]) -> list[Fitted | None]:
+        asked.extend(task.start for task in tasks)
+        return [replace(best, candidates=task.candidates, x=task.start, blocks=(left(leaves, 2),)) for task in tasks]
 
-    def left(much: float, p: int) -> Block:
+    def left(much: float, p: int) -> ResidualBlock:
         zero = np.zeros(4)
-        return Block(residual=zero + np.sqrt(much / 4.0), J=np.zeros((4, p)), slope=zero, shift=0.0, prior=1.0)
+        return ResidualBlock(residual=zero + np.sqrt(much / 4.0), J=np.zeros((4, p)), slope=zero, shift=0.0, prior=1.0)
 
     search = {"depth": Search(0, 0.4), "stiffness_ratio": Search(0.5, 2)}
     layer = Candidate(id="soil-layer", kind="physics", family="", search=search)
@@ -137,14 +139,16 @@ def test_what_was_bent_to_do_anothers_work_is_straight_beside_it(leaves: float, 
         left = {(): 4.0, ("first",): 90.0, ("last",): 6.0, ("first", "last"): leaves}[unbent]
         left = 99.0 if leaves == 99.0 and unbent else left
         zero = np.zeros(4)
-        block = Block(residual=zero + np.sqrt(left / 4.0), J=np.zeros((4, len(x))), slope=zero, shift=0.0, prior=1.0)
+        block = ResidualBlock(
+            residual=zero + np.sqrt(left / 4.0), J=np.zeros((4, len(x))), slope=zero, shift=0.0, prior=1.0
+        )
         return Fitted(candidates=candidates, x=x, blocks=(block,))
 
     begun: list[tuple[float, ...]] = []
 
-    def fits(jobs: Sequence[Job]) -> list[Fitted | None]:
-        begun.extend(job.start for job in jobs)
-        return [made(job.candidates, job.start) for job in jobs]
+    def fits(tasks: Sequence[Task]) -> list[Fitted | None]:
+        begun.extend(task.start for task in tasks)
+        return [made(task.candidates, task.start) for task in tasks]
 
     best = made((wide, other), (0.25, 0.6, 0.5, 0.7))
     found = replace(step(best), rivals=(best,))
@@ -162,7 +166,7 @@ def test_what_draws_any_curve_is_not_followed_but_straightened(
     """However well it fits it would be refused as it stands."""
     traced: list[Fitted] = []
     best = fitted("soil-layer", 4.0, (0.7, 0.3))
-    judge = SimpleNamespace(effort=SimpleNamespace(thrifty=False), evidence=[])
+    problem = SimpleNamespace(effort=SimpleNamespace(is_ensemble=False), dataset=[])
     monkeypatch.setattr(simplification, "mismatch_of", lambda *_: SimpleNamespace(p_value=1e-9))
     monkeypatch.setattr(simplification, "is_any_curve", lambda _: is_a_curve)
     monkeypatch.setattr(simplification, "traced_too", lambda _, f: traced.append(f) or f)
@@ -172,7 +176,7 @@ def test_what_draws_any_curve_is_not_followed_but_straightened(
     straight = step(fitted("soil-stiffness", 4.0, (0.7, 0.3)))
     monkeypatch.setattr(simplification, "_straightened", lambda *_: straight)
     found, _ = simplification.followed(
-        cast(Inquiry, SimpleNamespace(judge=judge, phases=[], candidates=[])), step(best)
+        cast(Inquiry, SimpleNamespace(problem=problem, phases=[], candidates=[])), step(best)
     )
     assert found is straight
     assert traced == ([] if is_a_curve else [best])
@@ -180,11 +184,11 @@ def test_what_draws_any_curve_is_not_followed_but_straightened(
 
 def test_a_damping_is_tried_as_the_drag_that_it_becomes_with_the_square_of_the_speed() -> None:
     """1/2 C rho A v^2 = d v^2: C = 2 d/(rho A), whatever a drag that was fitted from afar came to."""
-    asked: list[Job] = []
+    asked: list[Task] = []
 
-    def fits(jobs: Sequence[Job]) -> list[Fitted | None]:
-        asked.extend(jobs)
-        return [None for _ in jobs]
+    def fits(tasks: Sequence[Task]) -> list[Fitted | None]:
+        asked.extend(tasks)
+        return [None for _ in tasks]
 
     damping = Candidate(
         id="soil-viscous-damping", kind="physics", family="",
@@ -192,13 +196,13 @@ def test_a_damping_is_tried_as_the_drag_that_it_becomes_with_the_square_of_the_s
     )  # fmt: skip
     drag = Candidate(id="soil-inertial-drag", kind="physics", family="", search={"coefficient": Search(0.0, 50.0)})
     mass = Candidate(id="mass", kind="parameter", family="", search={"added": Search(-1, 1)})
-    block = Block(residual=np.ones(4), J=np.zeros((4, 3)), slope=np.zeros(4), shift=0.0, prior=1.0)
+    block = ResidualBlock(residual=np.ones(4), J=np.zeros((4, 3)), slope=np.zeros(4), shift=0.0, prior=1.0)
     best = Fitted(candidates=(mass, damping), x=(0.7, 0.22, 0.99), blocks=(block,))
     assert (
         simplification.simpler(cast(Inquiry, SimpleNamespace(fits=fits, candidates=[damping, drag])), step(best))
         is None
     )
-    assert [job.candidates for job in asked] == [(mass, drag)]
+    assert [task.candidates for task in asked] == [(mass, drag)]
     assert asked[0].start == pytest.approx((0.7, 2.0 * 22.0 / (1800.0 * 0.140 * 0.045) / 50.0), rel=1e-12)  # rounding
 
 
@@ -210,16 +214,16 @@ def test_two_thresholds_in_one_place_are_a_threshold_and_a_stiffness(
 
     Sensors are not asked, nor what has as many numbers; the best of those that are is followed along its valley.
     """
-    asked: list[Job] = []
+    asked: list[Task] = []
 
-    def fits(jobs: Sequence[Job]) -> list[Fitted | None]:
-        asked.extend(jobs)
-        return [fitted(j.candidates[-1].id, polished if j.how == "polish" else leaves, j.start) for j in jobs]
+    def fits(tasks: Sequence[Task]) -> list[Fitted | None]:
+        asked.extend(tasks)
+        return [fitted(j.candidates[-1].id, polished if j.how == "polish" else leaves, j.start) for j in tasks]
 
     plain = Candidate(id="soil-stiffness", kind="parameter", family="", search={"a": Search(0, 1)})
     others = [replace(plain, kind="sensor"), replace(plain, search={"a": Search(0, 1), "b": Search(0, 1)})]
     best, rival = fitted("soil-crust", 5.0, (0.7, 0.4, 0.3)), fitted("mass", 9.0, (0.7, 0.2))
-    there = cast(Inquiry, SimpleNamespace(fits=fits, candidates=[plain, *others, best.candidates[0]], judge=None))
+    there = cast(Inquiry, SimpleNamespace(fits=fits, candidates=[plain, *others, best.candidates[0]], problem=None))
     found = simplification.plainer(there, step(best, rival))
     assert {j.candidates[-1].id for j in asked} == {"soil-stiffness"}
     ways = [("fit", simplification.SOON), ("fit", None), ("polish", None)]
@@ -244,11 +248,11 @@ def test_of_two_thresholds_either_may_be_the_one_that_is_a_stiffness(family: str
         block = fitted("mass", squares, (0.5, *x)[: len(x)]).blocks[0]
         return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=(block,))
 
-    def fits(jobs: Sequence[Job]) -> list[Fitted | None]:
-        return [left(j.candidates, j.start, 6.0 if j.candidates[0] == crust else 90.0) for j in jobs]
+    def fits(tasks: Sequence[Task]) -> list[Fitted | None]:
+        return [left(j.candidates, j.start, 6.0 if j.candidates[0] == crust else 90.0) for j in tasks]
 
-    judge = SimpleNamespace(fit=lambda c, x, **_: left(c, x, 400.0), effort=DROPS)
-    there = cast(Inquiry, SimpleNamespace(fits=fits, candidates=[layer, crust, plain], judge=judge))
+    problem = SimpleNamespace(fit=lambda c, x, **_: left(c, x, 400.0), effort=DROPS)
+    there = cast(Inquiry, SimpleNamespace(fits=fits, candidates=[layer, crust, plain], problem=problem))
     found = simplification.plainer(there, step(left((layer, crust), (0.4, 0.5, 0.3, 0.6), 5.0)))
     assert (found is not None) is taken
     if found is not None:
@@ -261,12 +265,12 @@ def test_an_effect_by_itself_is_not_given_for_a_plainer_one() -> None:
     """Beside nothing all of fewer numbers were tried before it."""
     both = fitted("soil-crust", 5.0, (0.7, 0.4, 0.3))
     alone = replace(both, candidates=both.candidates[1:], x=both.x[1:])
-    there = cast(Inquiry, SimpleNamespace(candidates=[both.candidates[0]], judge=None))
+    there = cast(Inquiry, SimpleNamespace(candidates=[both.candidates[0]], problem=None))
     assert simplification.plainer(there, step(alone)) is None
 
 
-@pytest.mark.parametrize(("reaches", "known"), [(5.5, 40.0), (5.5, None), (50.0, 40.0)])
-def test_what_mirrors_the_last_effect_competes_with_it(reaches: float, known: float | None) -> None:
+@pytest.mark.parametrize(("profile_extents", "known"), [(5.5, 40.0), (5.5, None), (50.0, 40.0)])
+def test_what_mirrors_the_last_effect_competes_with_it(profile_extents: float, known: float | None) -> None:
     """A layer that a look beside the stiffness left at 40 leaves 5.5 where the stiffness has gone along."""
     two, stiff = (
         Search(0.01, 1, "log"),
@@ -284,17 +288,20 @@ def test_what_mirrors_the_last_effect_competes_with_it(reaches: float, known: fl
             candidates=tuple(candidates), x=tuple(x), blocks=fitted("mass", squares, (0.5, *x)[: len(x)]).blocks
         )
 
-    def fits(jobs: Sequence[Job]) -> list[Fitted | None]:
+    def fits(tasks: Sequence[Task]) -> list[Fitted | None]:
         # where the layer is held, the stiffness goes along
-        return [left(j.candidates, j.start if j.candidates[-1].id == "soil-layer" else (0.9,), reaches) for j in jobs]
+        return [
+            left(j.candidates, j.start if j.candidates[-1].id == "soil-layer" else (0.9,), profile_extents)
+            for j in tasks
+        ]
 
     best = left((stiff, crust), (0.5, 0.4, 0.75), 5.0)
     rivals = [] if known is None else [left((stiff, layer), (0.5, 0.4, 0.5), known)]
     there = cast(Inquiry, SimpleNamespace(fits=fits, free=lambda _: [layer]))
     found = simplification.mirrored(there, step(best, *rivals))
     assert found.fitted is best
-    if known is not None and reaches > known:
+    if known is not None and profile_extents > known:
         assert [f.left for f in found.rivals] == pytest.approx([5.0, known])
     else:
-        assert [f.left for f in found.rivals] == pytest.approx([5.0, reaches])
+        assert [f.left for f in found.rivals] == pytest.approx([5.0, profile_extents])
         assert found.rivals[-1].x == pytest.approx((0.9, 0.4, 0.25), rel=1e-12)  # rounding: a logarithm and back

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rollover import scenario
 from rollover.diagnosis.forward.averaging import MOST_ROWS, simulated, thinned
-from rollover.diagnosis.forward.discontinuities import LEAP_IN
+from rollover.diagnosis.forward.discontinuities import DISCONTINUITY_IN
 from rollover.diagnosis.forward.filtering import rows_of
 from rollover.diagnosis.forward.forward_model import DropSimulator
 from rollover.recording import Recording
@@ -49,7 +49,7 @@ def test_what_is_kept_of_fast_rows_reads_as_these_do(
 ) -> None:
     """1 kHz asks for ten times the rows, of which CFC 180 needs two: its filter's own error is that of its rate."""
     found = predicted(FAST[kept])
-    for name, values in ((c, v) for c, v in whole.items() if not c.startswith(LEAP_IN)):
+    for name, values in ((c, v) for c, v in whole.items() if not c.startswith(DISCONTINUITY_IN)):
         off = np.abs(found[name] - values[kept]) / np.ptp(values)
         if name == "ground/sinkage":
             assert np.max(off) == 0.0, "no filter, no other rows"

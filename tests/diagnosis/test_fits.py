@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose, diagnosed_text
-from rollover.diagnosis.data.dataset import evidence_of
+from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.fit import levenberg_marquardt
-from rollover.diagnosis.fit.jobs import Crew, Job, work
-from rollover.diagnosis.fit.levenberg_marquardt import Block, Judge, shift_of
+from rollover.diagnosis.fit.jobs import Executor, Task, work
+from rollover.diagnosis.fit.levenberg_marquardt import Problem, ResidualBlock, shift_of
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.forward.discontinuities import about_jumps
@@ -30,18 +30,18 @@ LAYER = {"effects.soil-layer.depth": 0.08, "effects.soil-layer.stiffness_ratio":
 GAIN = {"effects.sensor-gain.channel": FORCE, "effects.sensor-gain.gain": 1.05}
 
 
-def judge_of(recordings: Sequence[Any]) -> Judge:
-    found = [evidence_of(name, *simulated(scenario(), r)) for name, r in recordings]
-    return Judge([e for e in found if e is not None])
+def judge_of(recordings: Sequence[Any]) -> Problem:
+    found = [dataset_of(name, *simulated(scenario(), r)) for name, r in recordings]
+    return Problem([e for e in found if e is not None])
 
 
-def candidate(judge: Judge, key: str) -> Candidate:
-    return next(c for c in candidates_of(judge.evidence, (), "drop") if c.key == key)
+def candidate(problem: Problem, key: str) -> Candidate:
+    return next(c for c in candidates_of(problem.dataset, (), "drop") if c.key == key)
 
 
 def test_a_leap_is_forgiven_within_a_sample_and_not_beyond() -> None:
-    judge = judge_of(recorded({}, speeds=(2.0,), noise=1e-3))
-    e = judge.evidence[0]
+    problem = judge_of(recorded({}, speeds=(2.0,), noise=1e-3))
+    e = problem.dataset[0]
     signal, part = next((s, p) for s, p in e.spans() if s.channel == DEPTH)
     raw = np.concatenate([s.values for s in e.signals])
     at = part.start + 50
@@ -55,15 +55,15 @@ def test_a_leap_is_forgiven_within_a_sample_and_not_beyond() -> None:
     moved[k] = measured[part]
 
     other = replace(e, signals=tuple(replace(s, values=v) for s, v in zip(e.signals, moved, strict=True)))
-    leaps = other.leaps(stepped)
-    assert {at - 1, at} <= set(leaps.tolist())
-    left = (measured - other.forgiven(stepped, leaps))[part]
+    discontinuities = other.discontinuities(stepped)
+    assert {at - 1, at} <= set(discontinuities.tolist())
+    left = (measured - other.masked(stepped, discontinuities))[part]
     assert np.max(np.abs(left)) < 1e-12
     late = measured.copy()
     late[at : at + 9] = 0.0
     moved[k] = late[part]
     other = replace(e, signals=tuple(replace(s, values=v) for s, v in zip(e.signals, moved, strict=True)))
-    left = (late - other.forgiven(stepped, leaps))[part]
+    left = (late - other.masked(stepped, discontinuities))[part]
     assert np.max(np.abs(left)) == pytest.approx(signal.span)
 
 
@@ -80,50 +80,50 @@ def test_a_nose_that_meets_the_ground_again_is_forgiven_at_any_clock() -> None:
         "effects.structural-compliance.damping": 78.0,
         "effects.structural-compliance.nose_share": 0.074,
     }
-    judge = judge_of(recorded(ringing, speeds=(2.0,), noise=3e-3, rate=900.0))
-    c = candidate(judge, "structural-compliance").whole()
+    problem = judge_of(recorded(ringing, speeds=(2.0,), noise=3e-3, rate=900.0))
+    c = candidate(problem, "structural-compliance").whole()
     x = tuple(coordinate(ringing[f"effects.{c.id}.{p}"], s) for p, s in c.search.items())
-    shifts = judge.shifts[0] + np.arange(-1.0e-3, 1.0e-3, 5e-5)
-    blocks = [judge.block(0, (c,), x, float(s), 0.0) for s in shifts]
+    shifts = problem.shifts[0] + np.arange(-1.0e-3, 1.0e-3, 5e-5)
+    blocks = [problem.block(0, (c,), x, float(s), 0.0) for s in shifts]
     left = np.array([b.total for b in blocks if b is not None])
     assert np.max(np.abs(np.diff(left))) < 0.2 * np.ptp(left)
 
 
 def test_a_clock_goes_less_far_where_all_of_its_way_leaves_more() -> None:
-    judge = judge_of(recorded({}, speeds=(2.0,), noise=3e-3))
-    before = judge.block(0, (), (), judge.shifts[0], 0.0)
+    problem = judge_of(recorded({}, speeds=(2.0,), noise=3e-3))
+    before = problem.block(0, (), (), problem.shifts[0], 0.0)
     assert before is not None
-    far, near = (judge.block(0, (), (), before.shift + d, 0.0) for d in (8e-3, 1e-6))
-    back = judge._less_far(0, (), (), before, far)
+    far, near = (problem.block(0, (), (), before.shift + d, 0.0) for d in (8e-3, 1e-6))
+    back = problem._less_far(0, (), (), before, far)
     assert back is not None
     assert back.shift == before.shift
-    assert judge._less_far(0, (), (), replace(before, residual=2.0 * before.residual), near) is near
-    assert judge._less_far(0, (), (), before, None) is None
+    assert problem._less_far(0, (), (), replace(before, residual=2.0 * before.residual), near) is near
+    assert problem._less_far(0, (), (), before, None) is None
 
 
 def test_a_block_says_whether_another_course_would_have_counted_for_less() -> None:
-    judge = judge_of(recorded({}, speeds=(2.0,), noise=1e-3))
-    for straying in (True, False):
-        judge.straying = straying
-        found = judge.block(0, (), (), 0.0, judge.effort.fine)
+    problem = judge_of(recorded({}, speeds=(2.0,), noise=1e-3))
+    for heavy_tailed in (True, False):
+        problem.heavy_tailed = heavy_tailed
+        found = problem.block(0, (), (), 0.0, problem.effort.fine)
         assert found is not None
-        assert found.forgiven is straying
+        assert found.masked is heavy_tailed
 
 
 @pytest.mark.parametrize("late", [-50.0, 50.0])
 def test_time_shifts_stay_where_their_clock_can_be(late: float) -> None:
     slope = np.linspace(-1.0, 1.0, 40)
-    block = Block(residual=late * slope, J=np.zeros((40, 0)), slope=slope, shift=0.5, prior=1.0)
-    free = Block(residual=0.1 * slope, J=np.zeros((40, 0)), slope=slope, shift=0.0, prior=1.0)
+    block = ResidualBlock(residual=late * slope, J=np.zeros((40, 0)), slope=slope, shift=0.5, prior=1.0)
+    free = ResidualBlock(residual=0.1 * slope, J=np.zeros((40, 0)), slope=slope, shift=0.0, prior=1.0)
     assert 0.5 + shift_of(block, np.zeros(0)) == pytest.approx(np.sign(late) * 4.0)
     assert 0.0 < shift_of(free, np.zeros(0)) < 0.1
 
 
 def test_a_stiffness_far_off_is_found_from_every_start() -> None:
-    judge = judge_of(recorded({"effects.soil-stiffness.scale": 1.4}, speeds=(1.2, 3.2), noise=5e-3))
-    c = candidate(judge, "soil-stiffness")
+    problem = judge_of(recorded({"effects.soil-stiffness.scale": 1.4}, speeds=(1.2, 3.2), noise=5e-3))
+    c = candidate(problem, "soil-stiffness")
     for start in c.starts():
-        fitted = judge.fit((c,), start)
+        fitted = problem.fit((c,), start)
         assert fitted is not None
         assert c.values(fitted.x)["scale"] == pytest.approx(1.4, rel=0.01), start
 
@@ -134,7 +134,7 @@ def test_a_first_fit_ends_without_slopes_and_where_it_would_with_them() -> None:
     c = candidate(judge_of(recordings), "soil-stiffness")
     whole, first = judge_of(recordings), judge_of(recordings)
     a = whole.fit((c,), c.starts()[0], rounds=2, shifts=(0.0, 0.0))
-    b = work(first, Job(candidates=(c,), start=c.starts()[0], shifts=(0.0, 0.0), rounds=2))
+    b = work(first, Task(candidates=(c,), start=c.starts()[0], shifts=(0.0, 0.0), rounds=2))
     assert a is not None
     assert b is not None
     assert (b.x, [one.shift for one in b.blocks]) == (a.x, [one.shift for one in a.blocks])
@@ -147,26 +147,26 @@ def test_a_first_fit_ends_without_slopes_and_where_it_would_with_them() -> None:
 @pytest.mark.parametrize("workers", [2])
 def test_any_number_of_workers_gives_the_same_fits(workers: int) -> None:
     recordings = recorded(GAIN, speeds=(1.2, 3.2))
-    jobs = []
+    tasks = []
     for key in (f"sensor-gain:{FORCE}", "soil-stiffness"):
         c = candidate(judge_of(recordings), key)
-        jobs.append(Job(candidates=(c,), start=c.starts()[0], shifts=(0.0, 0.0), rounds=3))
-    alone = Crew().fits(judge_of(recordings), jobs)
+        tasks.append(Task(candidates=(c,), start=c.starts()[0], shifts=(0.0, 0.0), rounds=3))
+    alone = Executor().fits(judge_of(recordings), tasks)
     look = partial(_best_middle, beside=(), shifts=(0.0, 0.0), most=math.inf)
-    things = [(job.candidates[0], job.candidates[0].starts()) for job in (*jobs, jobs[0])]
-    seen = Crew().looks(judge_of(recordings), look, things)
-    with Crew(workers) as many:
-        assert many.fits(judge_of(recordings), jobs)[0] is not None  # in this process: none has begun
+    things = [(task.candidates[0], task.candidates[0].starts()) for task in (*tasks, tasks[0])]
+    seen = Executor().parallel_map(judge_of(recordings), look, things)
+    with Executor(workers) as many:
+        assert many.fits(judge_of(recordings), tasks)[0] is not None  # in this process: none has begun
         assert many.children._pool is None
-    with Crew(workers) as many:
+    with Executor(workers) as many:
         many.begin(judge_of(recordings))
         while not many.is_there():
             time.sleep(0.1)
-        judge = judge_of(recordings)
-        together = many.fits(judge, jobs)
-        assert many.looks(judge, look, things) == seen
+        problem = judge_of(recordings)
+        together = many.fits(problem, tasks)
+        assert many.parallel_map(problem, look, things) == seen
         assert many.each(math.factorial, range(9)) == [math.factorial(k) for k in range(9)]
-        assert not judge._raw  # nothing was simulated here
+        assert not problem._raw  # nothing was simulated here
         assert many.children._pool is not None
         with pytest.raises(RuntimeError, match=r"factorial: ValueError"):
             many.each(math.factorial, [1, -1])
@@ -180,23 +180,23 @@ def test_any_number_of_workers_gives_the_same_fits(workers: int) -> None:
 
 def test_what_was_fitted_is_taken_up_again(tmp_path: Path) -> None:
     recordings = recorded(GAIN, speeds=(1.2, 3.2))
-    judge = judge_of(recordings)
-    c = candidate(judge, f"sensor-gain:{FORCE}")
-    job = Job(candidates=(c,), start=c.starts()[0], shifts=(0.0, 0.0))
+    problem = judge_of(recordings)
+    c = candidate(problem, f"sensor-gain:{FORCE}")
+    task = Task(candidates=(c,), start=c.starts()[0], shifts=(0.0, 0.0))
     notebook = tmp_path / "fits"
-    first = Crew(notebook=notebook).fits(judge, [job])[0]
+    first = Executor(notebook=notebook).fits(problem, [task])[0]
     with notebook.open("a") as file:
         file.write('{"key": "broken off he')
     other = judge_of(recordings)
-    other_crew = Crew(notebook=notebook)
-    again = other_crew.fits(other, [job])[0]
+    other_crew = Executor(notebook=notebook)
+    again = other_crew.fits(other, [task])[0]
     assert first is not None
     assert again is not None
     assert again.x == first.x
     assert again.left == pytest.approx(first.left, rel=1e-12)
-    assert other.simulations < judge.simulations
-    assert Crew(notebook=notebook, about="another scenario")._done.keys() == other_crew._done.keys()
-    assert job.key("another") not in other_crew._done
+    assert other.simulations < problem.simulations
+    assert Executor(notebook=notebook, about="another scenario")._done.keys() == other_crew._done.keys()
+    assert task.key("another") not in other_crew._done
     other_crew.close()
     assert not notebook.exists()
 
@@ -277,18 +277,18 @@ def test_the_form_of_an_effect_is_found_with_it(id: str, hidden: dict[str, Any],
 def test_a_fit_in_another_form_is_taken_up_from_the_notebook(tmp_path: Path) -> None:
     """A power has two numbers where a logarithm has one: what was fitted is told by its form, not by how many."""
     power = {"effects.soil-rate-hardening." + n: v for n, v in (("per_decade", 0.0), ("power", 0.3))}
-    judge = judge_of(recorded(power, 13, speeds=(1.2, 2.4, 3.4), noise=0.002))
-    rate = candidate(judge, "soil-rate-hardening")
-    begun = judge.fit((rate,), (0.5,))
+    problem = judge_of(recorded(power, 13, speeds=(1.2, 2.4, 3.4), noise=0.002))
+    rate = candidate(problem, "soil-rate-hardening")
+    begun = problem.fit((rate,), (0.5,))
     assert begun is not None
     shifts, form = tuple(b.shift for b in begun.blocks), rate.forms()[0]
-    job = Job(how="shape", candidates=(rate,), start=begun.x, shifts=shifts, form=form)
+    task = Task(how="shape", candidates=(rate,), start=begun.x, shifts=shifts, form=form)
     found = []
     for _ in range(2):
-        with Crew(notebook=tmp_path / "notes") as one:
-            before = judge.simulations
-            found += one.fits(judge, [job])
-            made = judge.simulations - before
+        with Executor(notebook=tmp_path / "notes") as one:
+            before = problem.simulations
+            found += one.fits(problem, [task])
+            made = problem.simulations - before
     first, again = found
     assert first is not None
     assert again is not None
@@ -303,13 +303,13 @@ def test_far_from_the_noise_a_fit_ends_where_a_round_gains_a_trifle(monkeypatch:
 
     What is met is fitted as far as ever.
     """
-    judge = judge_of(recorded(LAYER, 3, speeds=(1.2, 2.2, 3.2)))
+    problem = judge_of(recorded(LAYER, 3, speeds=(1.2, 2.2, 3.2)))
     ends: dict[tuple[str, float], tuple[tuple[float, ...], float, int]] = {}
     for key, start in (("soil-rate-hardening", (0.5,)), ("soil-layer", (0.6, 0.6))):
         for trifling in (0.0, levenberg_marquardt.TRIFLING):
             monkeypatch.setattr(levenberg_marquardt, "TRIFLING", trifling)
-            own = judge.bare()
-            found = own.fit((candidate(judge, key),), start)
+            own = problem.no_jacobian()
+            found = own.fit((candidate(problem, key),), start)
             assert found is not None
             ends[key, trifling] = found.x, found.left, own.simulations
     (x, left, made), (y, more, fewer) = (ends["soil-rate-hardening", t] for t in (0.0, levenberg_marquardt.TRIFLING))
@@ -323,14 +323,14 @@ def test_far_from_the_noise_a_fit_ends_where_a_round_gains_a_trifle(monkeypatch:
 
 def test_a_strength_is_told_in_what_is_usual() -> None:
     """A gain's usual error is 3 %, an axis is turned by 0.05 rad; a threshold that nothing is null of says nothing."""
-    judge = judge_of(recorded({}, speeds=(2.0,), channels=(FORCE, ACCELERATION)))
+    problem = judge_of(recorded({}, speeds=(2.0,), channels=(FORCE, ACCELERATION)))
     cases = {
         f"sensor-gain:{ACCELERATION}": (0.97, 1.0),
         f"sensor-misalignment:{ACCELERATION}": (0.25, 5.0),
         f"sensor-clipping:{ACCELERATION}": (50.0, 1.0),
     }
     for key, (value, times) in cases.items():
-        c = candidate(judge, key)
+        c = candidate(problem, key)
         [search] = c.search.values()
         assert c.strength([coordinate(value, search)]) == pytest.approx(times, rel=1e-9)
 
@@ -360,10 +360,10 @@ def test_one_condition_alone_says_that_nothing_was_held_out() -> None:
 
 def test_a_rebound_is_looked_for_from_what_the_law_springs_back_by_itself() -> None:
     recordings = recorded({"effects.soil-elastic-rebound.recovery": 0.0222}, speeds=(1.5, 3.0), noise=5e-3)
-    judge = judge_of(recordings)
+    problem = judge_of(recordings)
     own = scenario().ground.law.recovery
-    c = next(c for c in candidates_of(judge.evidence, (), "drop", scenario()) if c.key == "soil-elastic-rebound")
+    c = next(c for c in candidates_of(problem.dataset, (), "drop", scenario()) if c.key == "soil-elastic-rebound")
     assert c.search["recovery"].low == own > 0.0
-    fits = [f for start in c.starts()[:8] if (f := judge.fit((c,), start)) is not None]  # the lowest it may be
+    fits = [f for start in c.starts()[:8] if (f := problem.fit((c,), start)) is not None]  # the lowest it may be
     best = min(fits, key=lambda f: f.left)
     assert c.values(best.x)["recovery"] == pytest.approx(0.0222, rel=0.02)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.data.dataset import evidence_of
+from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.data.quantisation import digitised
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.inference.clipping import cut_off
@@ -74,6 +74,6 @@ def test_a_range_that_cuts_off_little_is_named_where_all_else_agrees() -> None:
 
 def test_a_limit_is_looked_for_where_values_end_too() -> None:
     made, end = cut(0.8)
-    found = digitised([evidence_of(n, *simulated(scenario(), r)) for n, r in made], [r for _, r in made])
+    found = digitised([dataset_of(n, *simulated(scenario(), r)) for n, r in made], [r for _, r in made])
     limit = next(c for c in candidates_of(found, (), "drop") if c.key == f"sensor-clipping:{FORCE}")
     assert any(limit.values(x)["limit"] == pytest.approx(end) for x in limit.probes())

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.fit import model_variants
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.effects import Search
 from tests.diagnosis.drops import linear_blocks
@@ -49,8 +49,8 @@ def test_of_fits_that_lead_to_one_place_one_is_followed(ends: tuple[float, ...],
         whole.append(x[1])
         return fitted(BENT, x, 8.0)
 
-    judge, start = cast(Judge, SimpleNamespace(fit=fit)), fitted(DAMPING, (0.3,), 30.0)
-    best = model_variants._best_of(judge, start, BENT, [(0.3, v) for v in begun], [b.total for b in start.blocks])
+    problem, start = cast(Problem, SimpleNamespace(fit=fit)), fitted(DAMPING, (0.3,), 30.0)
+    best = model_variants._best_of(problem, start, BENT, [(0.3, v) for v in begun], [b.total for b in start.blocks])
     assert whole == followed
     assert best is not None
     assert best.x == (0.3, followed[0])
@@ -79,8 +79,8 @@ def test_of_short_fits_on_their_way_to_one_place_one_is_gone_on_with(
             begun.append(x[1])
         return fitted(BENT, x, 9.0)
 
-    judge, start = cast(Judge, SimpleNamespace(fit=fit)), fitted(DAMPING, (0.3,), 30.0)
-    model_variants._best_of(judge, start, BENT, [(0.3, v) for v, _ in near], [b.total for b in start.blocks])
+    problem, start = cast(Problem, SimpleNamespace(fit=fit)), fitted(DAMPING, (0.3,), 30.0)
+    model_variants._best_of(problem, start, BENT, [(0.3, v) for v, _ in near], [b.total for b in start.blocks])
     assert begun == gone_on_with
 
 
@@ -98,15 +98,15 @@ def test_far_from_noise_a_shape_is_followed_if_it_soon_takes_part(left: float, s
         whole.extend([] if rounds == model_variants.SHORT else [x])
         return fitted(BENT, x, soon)
 
-    judge, start = cast(Judge, SimpleNamespace(fit=fit)), fitted(DAMPING, (0.3,), left)
-    best = model_variants._best_of(judge, start, BENT, [(0.3, 0.4)], [b.total for b in start.blocks])
+    problem, start = cast(Problem, SimpleNamespace(fit=fit)), fitted(DAMPING, (0.3,), left)
+    best = model_variants._best_of(problem, start, BENT, [(0.3, 0.4)], [b.total for b in start.blocks])
     assert (best is not None) is bool(whole) is is_followed
 
 
 def test_where_few_recordings_lead_astray_all_are_fitted_from_where_the_usual_shape_stands() -> None:
     """From other places short fits to three recordings leave least, and whole ones from there far more than before."""
     usual = replace(DAMPING, shapes={"exponent": Search(0, 1)})
-    start, stands = fitted(usual, (0.3,), 30.0), usual.with_shapes((0.3,))[0]
+    start, stands = fitted(usual, (0.3,), 30.0), usual.with_secondary((0.3,))[0]
     least = [60.0]
 
     def fit(candidates: Sequence[Candidate], x: Sequence[float], **how: Any) -> Fitted:
@@ -115,7 +115,7 @@ def test_where_few_recordings_lead_astray_all_are_fitted_from_where_the_usual_sh
         least[:] = [1.0] if tuple(x) == stands else least
         return fitted(candidates[-1], x, 30.0 if len(x) == 1 else least[0])
 
-    found = model_variants.shaped(cast(Judge, SimpleNamespace(fit=fit)), start, [b.total for b in start.blocks])
+    found = model_variants.shaped(cast(Problem, SimpleNamespace(fit=fit)), start, [b.total for b in start.blocks])
     assert found is not None
     assert len(found.x) == 2
     assert model_variants.is_noise(found)
@@ -145,8 +145,8 @@ def test_a_shape_is_gone_on_with_if_it_comes_near_what_another_explanation_leave
     start, lead = fitted(DAMPING, (0.3,), 6.0), fitted(DAMPING, (0.3,), leaves)
     size = sum(b.residual.size for b in lead.blocks)
     scale = leaves * size / lead.total  # blocks of chance: what they leave is nearly their number
-    judge = cast(Judge, SimpleNamespace(fit=lambda *a, **k: _scaled(fit(*a, **k), scale)))
-    model_variants._best_of(judge, _scaled(start, scale), BENT, [(0.3, 0.4)], [scale * b.total for b in lead.blocks])
+    problem = cast(Problem, SimpleNamespace(fit=lambda *a, **k: _scaled(fit(*a, **k), scale)))
+    model_variants._best_of(problem, _scaled(start, scale), BENT, [(0.3, 0.4)], [scale * b.total for b in lead.blocks])
     assert len(made) == whole
 
 

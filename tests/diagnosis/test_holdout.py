@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.fit.cross_validation import held_out, refitted
-from rollover.diagnosis.fit.levenberg_marquardt import Judge
-from rollover.diagnosis.fit.scan_jobs import at_each
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.scan_jobs import serial_map
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.forward_step import _by_fits
 from tests.diagnosis.drops import FORCE, recorded
@@ -22,30 +22,30 @@ from tests.diagnosis.test_fits import GAIN, candidate, judge_of
 
 def test_held_out_recordings_are_foretold_by_fits_where_slopes_mislead() -> None:
     """Slopes a hundred times too flat send the fit without a recording far off: by 0.01 J'w/(0.01 |J|)^2."""
-    judge = judge_of(recorded(GAIN, 12, speeds=(1.2, 2.2, 3.2)))
-    fitted = judge.fit((candidate(judge, "sensor-gain:" + FORCE),), (0.5,))
+    problem = judge_of(recorded(GAIN, 12, speeds=(1.2, 2.2, 3.2)))
+    fitted = problem.fit((candidate(problem, "sensor-gain:" + FORCE),), (0.5,))
     assert fitted is not None
     groups = [[0], [1], [2]]
-    assert refitted(judge, fitted, groups) is fitted
+    assert refitted(problem, fitted, groups) is fitted
     pulled = [b.residual + 3.0 * b.J[:, 0] / np.linalg.norm(b.J) for b in fitted.blocks[1:]]
     misled = [replace(b, J=0.01 * b.J, residual=w) for b, w in zip(fitted.blocks[1:], pulled, strict=True)]
     flat = replace(fitted, blocks=(fitted.blocks[0], *misled))
     assert held_out(flat, groups).total > 2.0
-    foretold = refitted(judge, flat, groups)
-    assert foretold.x == fitted.x
-    assert held_out(foretold, groups).total == pytest.approx(held_out(fitted, groups).total, rel=0.01)
-    assert refitted(judge, flat, groups[:1]) is flat
+    cross_validated = refitted(problem, flat, groups)
+    assert cross_validated.x == fitted.x
+    assert held_out(cross_validated, groups).total == pytest.approx(held_out(fitted, groups).total, rel=0.01)
+    assert refitted(problem, flat, groups[:1]) is flat
     ahead = held_out(fitted, groups).total
-    assert refitted(judge, fitted, groups, ahead + 1e-6) is fitted
-    again = refitted(judge, fitted, groups, ahead - 1e-6)  # no better than without it, by its slopes
-    assert again.foretold is not None
+    assert refitted(problem, fitted, groups, ahead + 1e-6) is fitted
+    again = refitted(problem, fitted, groups, ahead - 1e-6)  # no better than without it, by its slopes
+    assert again.cross_validated is not None
     assert held_out(again, groups).total == pytest.approx(ahead, rel=0.01)
 
 
 def test_what_leaves_least_is_foretold_by_fits_where_by_slopes_another_foretells_better() -> None:
     """Of a threshold slopes may foretell less than a fit does, and no less than 1.2 times what it leaves."""
-    judge = judge_of(recorded(GAIN, 12, speeds=(1.2, 2.2, 3.2)))
-    fitted = judge.fit((candidate(judge, "sensor-gain:" + FORCE),), (0.5,))
+    problem = judge_of(recorded(GAIN, 12, speeds=(1.2, 2.2, 3.2)))
+    fitted = problem.fit((candidate(problem, "sensor-gain:" + FORCE),), (0.5,))
     assert fitted is not None
     groups, ahead = [[0], [1], [2]], held_out(fitted, [[0], [1], [2]]).left.sum()
     way = [b.J[:, 0] / np.linalg.norm(b.J) for b in fitted.blocks]
@@ -54,19 +54,21 @@ def test_what_leaves_least_is_foretold_by_fits_where_by_slopes_another_foretells
     ]
     lead = replace(fitted, blocks=(fitted.blocks[0], *flat))
     rival = replace(fitted, blocks=tuple(replace(b, residual=1.01 * b.residual) for b in lead.blocks))
-    rival = replace(rival, foretold=tuple(1.01 * b.total for b in fitted.blocks))
+    rival = replace(rival, cross_validated=tuple(1.01 * b.total for b in fitted.blocks))
     assert lead.left < rival.left
     assert held_out(rival, groups).left.sum() < held_out(lead, groups).left.sum() < 1.2**2 * lead.left
     asked: list[Any] = []
 
-    def looks(judge: Judge, look: Any, things: Sequence[Any]) -> list[Any]:
+    def parallel_map(problem: Problem, look: Any, things: Sequence[Any]) -> list[Any]:
         asked.append(list(things))
-        return at_each(judge, pickle.loads(pickle.dumps(look)), things)  # as it is sent to children
+        return serial_map(problem, pickle.loads(pickle.dumps(look)), things)  # as it is sent to children
 
-    inquiry = cast(Inquiry, SimpleNamespace(judge=judge, groups=groups, crew=SimpleNamespace(looks=looks)))
+    inquiry = cast(
+        Inquiry, SimpleNamespace(problem=problem, groups=groups, executor=SimpleNamespace(parallel_map=parallel_map))
+    )
     new, beside = _by_fits(inquiry, [lead, rival])
     assert beside is rival
-    assert new.foretold is not None
+    assert new.cross_validated is not None
     assert held_out(new, groups).left.sum() == pytest.approx(ahead, rel=0.01)
     assert asked == [groups]
     assert _by_fits(inquiry, [fitted, rival])[0] is fitted  # it foretells best as it is

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.data.quantisation import digitised
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
-from rollover.diagnosis.fit.linearisation import Block
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
 from rollover.diagnosis.forward.budget import DROPS
 from rollover.diagnosis.inference import intervals as stated
@@ -23,11 +23,11 @@ from rollover.recording import Recording
 from tests.diagnosis.drops import FORCE, recorded
 from tests.diagnosis.test_fits import candidate, judge_of
 from tests.diagnosis.test_refine import judge_of_case
-from tests.diagnosis.test_slopes import CHANNEL, LOAD, Late, blow, evidence
+from tests.diagnosis.test_slopes import CHANNEL, LOAD, Late, dataset, first_impact
 
 
-def fit(judge: Judge, c: Candidate) -> Fitted:
-    found = judge.fit((c,), c.starts()[0])
+def fit(problem: Problem, c: Candidate) -> Fitted:
+    found = problem.fit((c,), c.starts()[0])
     assert found is not None
     return found
 
@@ -35,12 +35,12 @@ def fit(judge: Judge, c: Candidate) -> Fitted:
 def test_an_exponent_that_was_not_fitted_widens_the_interval_of_the_strength() -> None:
     """c v^0.9 fitted as c v: at 2 m/s, 7 % of the strength goes to the exponent, more than the noise leaves open."""
     changes = {"effects.soil-viscous-damping.damping": 60.0, "effects.soil-viscous-damping.exponent": 0.9}
-    judge = judge_of(recorded(changes, speeds=(1.0, 1.5, 2.0), noise=0.01))
-    c = candidate(judge, "soil-viscous-damping")
+    problem = judge_of(recorded(changes, speeds=(1.0, 1.5, 2.0), noise=0.01))
+    c = candidate(problem, "soil-viscous-damping")
     assert set(c.shapes) == {"exponent"}
-    fitted = fit(judge, c)
-    bare = replace(fitted, candidates=(replace(c, shapes={}),))
-    wide, narrow = (stated.intervals(judge, f)[0]["damping"] for f in (fitted, bare))
+    fitted = fit(problem, c)
+    no_jacobian = replace(fitted, candidates=(replace(c, shapes={}),))
+    wide, narrow = (stated.intervals(problem, f)[0]["damping"] for f in (fitted, no_jacobian))
     assert wide.low <= 60.0 <= wide.high
     assert wide.high - wide.low > 1.5 * (narrow.high - narrow.low)
     assert wide.value == narrow.value
@@ -56,20 +56,20 @@ def test_an_interval_reaches_as_far_as_the_misfit_stays_low(flatter: float) -> N
     way -= w * (w @ way) / (w @ w)  # the misfit is least where the fit is
     way /= np.sqrt(way @ way)
 
-    def block(_r: int, _c: object, x: list[float], _s: float, _n: float) -> Block:
+    def block(_r: int, _c: object, x: list[float], _s: float, _n: float) -> ResidualBlock:
         there = w - J / flatter * (x[0] - 0.5) * way
-        return Block(residual=there, J=J * way[:, None], slope=np.zeros(n), shift=0.0, prior=1e-3)
+        return ResidualBlock(residual=there, J=J * way[:, None], slope=np.zeros(n), shift=0.0, prior=1e-3)
 
-    def clocked(r: int, c: object, x: list[float], s: float, _rounds: int) -> Block:
+    def clocked(r: int, c: object, x: list[float], s: float, _rounds: int) -> ResidualBlock:
         return block(r, c, x, s, 0.0)
 
-    judge: Any = SimpleNamespace(clocked=clocked, block=block, evidence=(), effort=DROPS, made_ahead=lambda _: None)
+    problem: Any = SimpleNamespace(clocked=clocked, block=block, dataset=(), effort=DROPS, made_ahead=lambda _: None)
     candidate = Candidate(id="mass", kind="parameter", family="", search={"added": Search(0, 1)})
     fitted = Fitted(candidates=(candidate,), x=(0.5,), blocks=(block(0, None, [0.5], 0.0, 0.0),))
-    found = stated.reaches(judge, fitted, np.array([1.0 / J]), 1.0)
+    found = stated.profile_extents(problem, fitted, np.array([1.0 / J]), 1.0)
     assert found == pytest.approx(np.full((1, 2), flatter), rel=1e-12)  # rounding: the misfit is a parabola
     for sides, looked in (({0: (1.0,)}, (0.0, 1.0)), ({0: (-1.0,)}, (1.0, 0.0)), ({}, (0.0, 0.0))):
-        found = stated.reaches(judge, fitted, np.array([1.0 / J]), 1.0, sides)
+        found = stated.profile_extents(problem, fitted, np.array([1.0 / J]), 1.0, sides)
         assert found == pytest.approx(1.0 + (flatter - 1.0) * np.array([looked]), rel=1e-12)
 
 
@@ -87,16 +87,16 @@ def test_where_misfits_are_rough_an_interval_reaches_as_far_as_places_beside_the
     way -= w * (w @ way) / (w @ w)
     way /= np.sqrt(way @ way)
 
-    def clocked(_r: int, _c: object, x: list[float], _s: float, _rounds: int) -> Block:
+    def clocked(_r: int, _c: object, x: list[float], _s: float, _rounds: int) -> ResidualBlock:
         asked.append(x[0])
         there = (0.5 if x[0] == start else 1.0) * w - J / 3.0 * (x[0] - start) * way
-        return Block(residual=there, J=J * way[:, None], slope=np.zeros(n), shift=0.0, prior=1e-3)
+        return ResidualBlock(residual=there, J=J * way[:, None], slope=np.zeros(n), shift=0.0, prior=1e-3)
 
-    judge: Any = SimpleNamespace(clocked=clocked, made_ahead=list)
+    problem: Any = SimpleNamespace(clocked=clocked, made_ahead=list)
     candidate = Candidate(id="mass", kind="parameter", family="", search={"added": Search(0, 1)})
     fitted = Fitted(candidates=(candidate,), x=(start,), blocks=(clocked(0, None, [start], 0.0, 0),))
     asked.clear()
-    assert stated.rough_reaches(judge, fitted, np.array([1.0 / J]), 1.0) == pytest.approx(
+    assert stated.quadratic_extents(problem, fitted, np.array([1.0 / J]), 1.0) == pytest.approx(
         np.full((1, 2), 3.0), rel=1e-9
     )
     assert len(asked) == places
@@ -113,7 +113,7 @@ def test_an_interval_looks_behind_the_ripples_of_a_threshold(
     """
     seen = []
 
-    def misfit(judge: Any, fitted: Fitted, way: np.ndarray) -> float:
+    def misfit(problem: Any, fitted: Fitted, way: np.ndarray) -> float:
         x = np.array(fitted.x) + way
         seen.append(x)
         far = way[0] / 0.04
@@ -122,13 +122,13 @@ def test_an_interval_looks_behind_the_ripples_of_a_threshold(
     monkeypatch.setattr(stated, "_misfit", misfit)
     fitted: Any = SimpleNamespace(x=(start, 0.95))
     way = np.array([0.04, 0.03])
-    assert stated._over_ripples(SimpleNamespace(), fitted, way, 0, 103.84) == pytest.approx(reached)  # type: ignore[arg-type]
+    assert stated._over_local_minima(SimpleNamespace(), fitted, way, 0, 103.84) == pytest.approx(reached)  # type: ignore[arg-type]
     assert all(np.all((x >= 0.0) & (x <= 1.0 + 1e-12)) for x in seen if x[0] <= 1.0)
 
 
 def test_the_thresholds_of_effects_with_their_shape_are_looked_behind() -> None:
-    judge = judge_of(recorded({}, speeds=(2.0,)))
-    layer, mass = candidate(judge, "soil-layer"), candidate(judge, "mass")
+    problem = judge_of(recorded({}, speeds=(2.0,)))
+    layer, mass = candidate(problem, "soil-layer"), candidate(problem, "mass")
     for candidates, expected in (
         ((layer,), set()),
         ((layer.whole(),), {0, 1, 2}),
@@ -143,21 +143,21 @@ def test_an_interval_along_a_crooked_valley_holds(tmp_path: Path) -> None:
     """Stiffness and the share of the nose make up for each other, and not along a straight line."""
     case = make(next(order for order in plan(63, 20263016, ["single"]) if order.index == 25))
     true = case.truth["effects"][0]["parameters"]
-    judge = judge_of_case(case, tmp_path)
-    c = candidate(judge, "structural-compliance").whole()
+    problem = judge_of_case(case, tmp_path)
+    c = candidate(problem, "structural-compliance").whole()
     ended = {"stiffness": 3.72118e6, "damping": 75.34, "nose_share": 0.18632}
-    fitted = judge.fit((c,), [coordinate(ended[name], s) for name, s in c.search.items()], width=2)
+    fitted = problem.fit((c,), [coordinate(ended[name], s) for name, s in c.search.items()], width=2)
     assert fitted is not None
-    found = stated.intervals(judge, fitted)[0]
+    found = stated.intervals(problem, fitted)[0]
     for name in ("stiffness", "nose_share"):
         assert found[name].low <= true[name] <= found[name].high
 
 
 @pytest.mark.parametrize(
-    ("reaches", "begun", "end"), [(3.0, 1.0, 3.0), (3.0, 2.0, 3.0), (3.0, 3.5, 3.5), (1.0, 1.0, 1.0)]
+    ("profile_extents", "begun", "end"), [(3.0, 1.0, 3.0), (3.0, 2.0, 3.0), (3.0, 3.5, 3.5), (1.0, 1.0, 1.0)]
 )
-def test_an_interval_follows_a_crooked_valley(reaches: float, begun: float, end: float) -> None:
-    """With the others fitted anew the misfit is a parabola that rises by what is due `reaches` times 0.04 off.
+def test_an_interval_follows_a_crooked_valley(profile_extents: float, begun: float, end: float) -> None:
+    """With the others fitted anew the misfit is a parabola that rises by what is due `profile_extents` times 0.04 off.
 
     What a straight way has reached already stays reached.
     """
@@ -166,12 +166,12 @@ def test_an_interval_follows_a_crooked_valley(reaches: float, begun: float, end:
     def fit(candidates: list[Candidate], x: list[float], **_: Any) -> Any:
         at = candidates[0].fixed["stiffness"]
         held_at.append((at, x))
-        return SimpleNamespace(left=100.0 + due * ((at - 0.5) / (0.04 * reaches)) ** 2, x=(0.1,), blocks=())
+        return SimpleNamespace(left=100.0 + due * ((at - 0.5) / (0.04 * profile_extents)) ** 2, x=(0.1,), blocks=())
 
     c = Candidate(id="a", kind="physics", family="", search={"stiffness": Search(0, 1), "nose_share": Search(0, 1)})
     fitted: Any = SimpleNamespace(candidates=(c,), x=(0.5, 0.2), blocks=())
-    judge: Any = SimpleNamespace(fit=fit)
-    assert stated._along_valley(judge, fitted, 0, 0.04, (100.0, due), begun) == pytest.approx(end, rel=1e-9)
+    problem: Any = SimpleNamespace(fit=fit)
+    assert stated._along_ridge(problem, fitted, 0, 0.04, (100.0, due), begun) == pytest.approx(end, rel=1e-9)
     assert held_at[0] == (pytest.approx(0.5 + begun * stated.ALONG * 0.04), [0.2])
     assert all(x == [0.1] for _, x in held_at[1:])  # each from where the last one ended
 
@@ -180,10 +180,10 @@ def test_recordings_that_disagree_widen_an_interval_as_student_says() -> None:
     """w_r = J x_r, x_r normal about the truth: the mean of R over its own scatter is t of R - 1, 95 % of it inside."""
     rng = np.random.default_rng(6)
     J, inside = rng.standard_normal((40, 1)), []
-    own: Any = SimpleNamespace(strays=())
+    own: Any = SimpleNamespace(perturbed=())
     for _ in range(4000):
         each = rng.standard_normal(4)
-        blocks = [Block(residual=x * J[:, 0], J=J, slope=np.zeros(40), shift=0.0, prior=1e-3) for x in each]
+        blocks = [ResidualBlock(residual=x * J[:, 0], J=J, slope=np.zeros(40), shift=0.0, prior=1e-3) for x in each]
         inverse = 1.0 / np.array([[4.0 * float(J[:, 0] @ J[:, 0])]])
         sd = np.sqrt(stated.disagreeing([own] * 4, blocks, inverse)[0])
         inside.append(abs(each.mean()) < stated.TWO_SIDED * sd)
@@ -196,14 +196,19 @@ def test_what_full_runs_do_not_tell_lies_in_its_range_and_is_possible() -> None:
 
     class Indifferent(Late):
         def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
-            return {CHANNEL: blow(0.01 * np.log(float(changes["effects.payload-shift.travel"]) / 0.15) + shift)}
+            return {CHANNEL: first_impact(0.01 * np.log(float(changes["effects.payload-shift.travel"]) / 0.15) + shift)}
 
-    judge = Judge(
-        [evidence(blow(0.0) + 0.01 * np.random.default_rng(1).standard_normal(blow(0.0).size), Indifferent())]
+    problem = Problem(
+        [
+            dataset(
+                first_impact(0.0) + 0.01 * np.random.default_rng(1).standard_normal(first_impact(0.0).size),
+                Indifferent(),
+            )
+        ]
     )
-    fitted = judge.fit((LOAD,), (np.log(0.15 / 0.02) / np.log(50.0), 0.5), rounds=0)
+    fitted = problem.fit((LOAD,), (np.log(0.15 / 0.02) / np.log(50.0), 0.5), rounds=0)
     assert fitted is not None
-    (found,) = stated.intervals(judge, fitted)
+    (found,) = stated.intervals(problem, fitted)
     assert found["friction"].low == 0.0
     assert found["friction"].high == pytest.approx(0.5 + 1.96 * 12.0**-0.5, rel=0.01)
     assert found["travel"].low < 0.15 < found["travel"].high
@@ -214,14 +219,18 @@ def test_what_tells_nothing_of_a_depth_ends_a_range_beyond_where_it_is_looked_fo
 
     class Deep(Late):
         def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
-            return {CHANNEL: blow(0.01 * np.log(float(changes.get("effects.soil-layer.stiffness_ratio", 1.0))) + shift)}
+            return {
+                CHANNEL: first_impact(
+                    0.01 * np.log(float(changes.get("effects.soil-layer.stiffness_ratio", 1.0))) + shift
+                )
+            }
 
-    layer = candidate(Judge([evidence(blow(0.0), Deep())]), "soil-layer")
-    judge = Judge([evidence(blow(0.01 * np.log(2.0)), Deep())])
+    layer = candidate(Problem([dataset(first_impact(0.0), Deep())]), "soil-layer")
+    problem = Problem([dataset(first_impact(0.01 * np.log(2.0)), Deep())])
     begun = [coordinate(v, s) for v, s in zip((0.1, 2.0), layer.search.values(), strict=True)]
-    fitted = judge.fit((layer,), begun, rounds=0)
+    fitted = problem.fit((layer,), begun, rounds=0)
     assert fitted is not None
-    (found,) = stated.intervals(judge, fitted)
+    (found,) = stated.intervals(problem, fitted)
     search = layer.search["depth"]
     assert found["depth"].low == pytest.approx(search.low**2 / search.high)
     assert found["depth"].high == pytest.approx(search.high**2 / search.low)
@@ -235,10 +244,10 @@ def test_a_number_of_an_effect_stays_where_it_can_be() -> None:
     assert possible(EFFECTS["slope"], "angle", -0.1) == -0.1
 
 
-def read(recordings: list[tuple[str, Recording]]) -> Judge:
+def read(recordings: list[tuple[str, Recording]]) -> Problem:
     """Recordings made ready as a diagnosis does: many samples averaged, what the recorder makes of each kept."""
-    made = judge_of(recordings).evidence
-    return Judge(digitised(made, [r for _, r in recordings]))
+    made = judge_of(recordings).dataset
+    return Problem(digitised(made, [r for _, r in recordings]))
 
 
 @pytest.mark.parametrize("rate", [300.0, 9000.0])  # of the faster several samples are averaged into one
@@ -249,17 +258,17 @@ def test_an_end_of_a_range_is_read_off_where_samples_pile_up(limit: float, rate:
     for name, r in recorded({}, noise=0.02, rate=rate, until=0.25):
         channels = {**r.channels, FORCE: np.clip(r[FORCE], -limit, limit)}
         recordings.append((name, replace(r, channels=channels)))
-    judge = read(recordings)
-    assert (judge.evidence[0].averaged > 1) == (rate > 5000.0)
-    fitted = fit(judge, candidate(judge, f"sensor-clipping:{FORCE}"))
-    found = stated.intervals(judge, fitted)[0]["limit"]
+    problem = read(recordings)
+    assert (problem.dataset[0].averaged > 1) == (rate > 5000.0)
+    fitted = fit(problem, candidate(problem, f"sensor-clipping:{FORCE}"))
+    found = stated.intervals(problem, fitted)[0]["limit"]
     assert found.value == limit
     assert found.low < limit < found.high < 1.002 * limit
 
 
 def test_a_peak_that_is_met_once_is_no_end_of_a_range() -> None:
-    judge = read(recorded({}, noise=0.02))
-    assert stated.end_of(judge.evidence, FORCE) is None
+    problem = read(recorded({}, noise=0.02))
+    assert stated.end_of(problem.dataset, FORCE) is None
 
 
 def test_where_slopes_tell_nothing_an_interval_ends_where_too_much_is_left() -> None:
@@ -275,7 +284,7 @@ def test_where_slopes_tell_nothing_an_interval_ends_where_too_much_is_left() -> 
     other = Candidate(id="mass", kind="parameter", family="", search={"b": Search(0, 1)})
     pull = Candidate(id="soil-adhesion", kind="physics", family="", search={"a": Search(0, 1)})
     zero = np.zeros(4)
-    block = Block(residual=np.ones(4), J=np.zeros((4, 2)), slope=zero, shift=0.0, prior=1.0)
+    block = ResidualBlock(residual=np.ones(4), J=np.zeros((4, 2)), slope=zero, shift=0.0, prior=1.0)
     fitted = Fitted(candidates=(other, pull), x=(0.2, 0.6), blocks=(block,))
     wide = np.array([[0.01, 0.01], [10.0, 10.0]])
     found = stated._within_range(SimpleNamespace(fit=fit), fitted, wide, 1.0)  # type: ignore[arg-type]

@@ -11,7 +11,7 @@ import pytest
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.selection import pairs
 from rollover.diagnosis.selection.pair_score import MOST, jointly
-from rollover.diagnosis.selection.score_test import Gate, gate
+from rollover.diagnosis.selection.score_test import ScoreTest, score_test
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded
 from tests.diagnosis.test_fits import candidate, judge_of
 from tests.diagnosis.test_pairs import DAMPING, GRADUAL, MASS, NOSE, fitted, inquiry, screened
@@ -73,13 +73,13 @@ def test_of_two_owners_the_best_two_directions_count_and_none_joins_itself() -> 
 def test_a_gate_leads_to_two_that_hide_each_other() -> None:
     """Friction and a co-moving mass that grows push against each other: alone the second gains hardly anything."""
     hidden = {"effects.guide-friction.force": 60.0, "effects.soil-added-mass-growth.rate": 20.0}
-    judge = judge_of(
+    problem = judge_of(
         recorded(hidden, 5, speeds=(1.5, 2.0, 2.5, 3.0), channels=(FORCE, DEPTH, ACCELERATION), rate=600.0, noise=0.02)
     )
-    kinds = [candidate(judge, key) for key in ("guide-friction", "soil-added-mass-growth", "mass", "soil-stiffness")]
-    base = judge.fit((), ())
+    kinds = [candidate(problem, key) for key in ("guide-friction", "soil-added-mass-growth", "mass", "soil-stiffness")]
+    base = problem.fit((), ())
     assert base is not None
-    looked = gate(judge, base, kinds)
+    looked = score_test(problem, base, kinds)
     assert looked.scores["soil-added-mass-growth"] < 0.5 * looked.score
     (one, x), (other, y) = looked.both[0]
     assert {one, other} == {"guide-friction", "soil-added-mass-growth"}
@@ -100,7 +100,7 @@ def test_slopes_lead_to_two_near_the_noise_and_any_curve_is_not_tried(monkeypatc
         screened=tuple(screened(c) for c in (DAMPING, NOSE)),
     )  # fmt: skip
     both = ((("soil-viscous-damping", (0.7,)), ("mass", (0.2,))),)
-    looked = Gate(
+    looked = ScoreTest(
         score=9.0, scores={"mass": 9.0, "soil-viscous-damping": 1.0}, null=np.zeros(9), detectable={}, both=both
     )
     asking = inquiry(asked)
@@ -112,7 +112,7 @@ def test_slopes_lead_to_two_near_the_noise_and_any_curve_is_not_tried(monkeypatc
         asked.clear()
         monkeypatch.setattr(pairs, "is_far", lambda *_, far=far: far)
         assert pairs.best_pair(asking, [first], looked) is None
-        tried = [(tuple(c.id for c in job.candidates), job.start) for job in asked if job.rounds == 2]
+        tried = [(tuple(c.id for c in task.candidates), task.start) for task in asked if task.rounds == 2]
         names = {frozenset(ids) for ids, _ in tried}
         assert frozenset(("soil-layer", "soil-crust")) not in names
         assert frozenset(("mass", "soil-layer")) in names

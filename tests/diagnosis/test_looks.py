@@ -1,4 +1,4 @@
-"""What decides whether there is anything where runs depend on chance: recordings at odds, looks before the blow."""
+"""What decides whether there is anything where runs depend on chance: recordings at odds, looks before the impact."""
 
 from __future__ import annotations
 
@@ -10,15 +10,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.diagnosis.data.dataset import Evidence, Signal
-from rollover.diagnosis.fit.levenberg_marquardt import Judge
-from rollover.diagnosis.fit.linearisation import Block, Fitted
+from rollover.diagnosis.data.dataset import Dataset, Signal
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.forward.budget import RUNS
-from rollover.diagnosis.noise.ensemble import STATE, Course
+from rollover.diagnosis.noise.ensemble import STATE, HeavyTail
 from rollover.diagnosis.selection import decision
-from rollover.diagnosis.selection import scan as looks
-from rollover.diagnosis.selection.score_test import CLOSER, VISIBLE, Gate, _at_odds, _best_along, _visible, gate
+from rollover.diagnosis.selection import scan as parallel_map
+from rollover.diagnosis.selection.score_test import (
+    CLOSER,
+    VISIBLE,
+    ScoreTest,
+    _at_odds,
+    _best_along,
+    _visible,
+    score_test,
+)
 from rollover.diagnosis.selection.screening import _begun_at, promising
 from rollover.effects import Search
 from rollover.recording import Recording
@@ -27,12 +35,12 @@ from tests.diagnosis.drops import FORCE, recorded
 from tests.diagnosis.test_fits import candidate
 
 CHANNEL = "chassis/acceleration_y"
-N, BLOW = 80, 0.16
+N, IMPACT = 80, 0.16
 TIME = 0.004 * np.arange(N)
 
 
 class Wave:
-    """y = x sin before the blow; after it whatever the course says, times x."""
+    """y = x sin before the impact; after it whatever the course says, times x."""
 
     effort = RUNS
 
@@ -42,38 +50,41 @@ class Wave:
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
         self.runs += 1
         x = changes.get("effects.slope.angle", 0.0)
-        return {CHANNEL: x * np.where(TIME < BLOW, np.sin(30.0 * TIME), self.after * np.cos(90.0 * TIME))}
+        return {CHANNEL: x * np.where(TIME < IMPACT, np.sin(30.0 * TIME), self.after * np.cos(90.0 * TIME))}
 
 
 SLOPE = Candidate(id="slope", kind="parameter", family="x", search={"angle": Search(-100.0, 100.0)}, neutral=(0.5,))
 
 
-def judge_of(after: tuple[float, ...], amplitudes: tuple[float, ...], *, blow: float = BLOW) -> tuple[Judge, Fitted]:
-    """Recordings with so much of the wave before the blow, and noise; and the base."""
+def judge_of(
+    after: tuple[float, ...], amplitudes: tuple[float, ...], *, first_impact: float = IMPACT
+) -> tuple[Problem, Fitted]:
+    """Recordings with so much of the wave before the impact, and noise; and the base."""
     rng = np.random.default_rng(5)
-    evidence = []
+    dataset = []
     for r, (a, much) in enumerate(zip(after, amplitudes, strict=True)):
         simulator: Any = Wave(a)
-        values = much * np.where(TIME < BLOW, np.sin(30.0 * TIME), 0.0) + rng.standard_normal(N)
+        values = much * np.where(TIME < IMPACT, np.sin(30.0 * TIME), 0.0) + rng.standard_normal(N)
         signal = Signal(channel=CHANNEL, rows=np.arange(N), values=values, sigma=1.0, noise=1.0, ar=(), span=10.0)
         recording = Recording(title="r", time=TIME, channels={CHANNEL: values})
-        evidence.append(
-            Evidence(
+        dataset.append(
+            Dataset(
                 name=f"r{r}",
                 recording=recording,
                 simulator=simulator,
                 signals=(signal,),
                 shift_prior=1e-3,
                 condition="",
-                strays=(0.1 * rng.standard_normal(N),),
-                blow=blow,
+                perturbed=(0.1 * rng.standard_normal(N),),
+                first_impact=first_impact,
             )
         )
-    judge = Judge(evidence)
+    problem = Problem(dataset)
     blocks = tuple(
-        Block(residual=w, J=np.zeros((N, 0)), slope=np.zeros(N), shift=0.0, prior=1e-3) for w in judge.measured
+        ResidualBlock(residual=w, J=np.zeros((N, 0)), slope=np.zeros(N), shift=0.0, prior=1e-3)
+        for w in problem.measured
     )
-    return judge, Fitted(candidates=(), x=(), blocks=blocks)
+    return problem, Fitted(candidates=(), x=(), blocks=blocks)
 
 
 def test_recordings_that_agree_count_in_full_and_one_alone_hardly() -> None:
@@ -91,24 +102,24 @@ def test_recordings_that_agree_count_in_full_and_one_alone_hardly() -> None:
 
 
 def test_an_effect_of_all_recordings_beats_one_that_a_single_course_asks_for() -> None:
-    judge, base = judge_of((0.0,) * 4, (2.0,) * 4)
-    everywhere = gate(judge, base, [SLOPE])
-    judge, base = judge_of((0.0,) * 4, (4.0, 0.0, 0.0, 0.0))  # as much in all
-    alone = gate(judge, base, [SLOPE])
+    problem, base = judge_of((0.0,) * 4, (2.0,) * 4)
+    everywhere = score_test(problem, base, [SLOPE])
+    problem, base = judge_of((0.0,) * 4, (4.0, 0.0, 0.0, 0.0))  # as much in all
+    alone = score_test(problem, base, [SLOPE])
     assert everywhere.score > 100.0
     assert alone.score < 0.1 * everywhere.score
 
 
 def test_what_an_effect_does_before_the_blow_is_looked_at_by_itself() -> None:
-    """After the blow the run with the effect goes ten times as far the wrong way."""
-    judge, base = judge_of((10.0,) * 4, (2.0,) * 4)
-    with_ = gate(judge, base, [SLOPE])
-    blind, base = judge_of((10.0,) * 4, (2.0,) * 4, blow=np.inf)
-    assert with_.score > 10.0 * gate(blind, base, [SLOPE]).score
+    """After the impact the run with the effect goes ten times as far the wrong way."""
+    problem, base = judge_of((10.0,) * 4, (2.0,) * 4)
+    with_ = score_test(problem, base, [SLOPE])
+    blind, base = judge_of((10.0,) * 4, (2.0,) * 4, first_impact=np.inf)
+    assert with_.score > 10.0 * score_test(blind, base, [SLOPE]).score
     assert with_.score > 100.0
-    judge, base = judge_of((10.0,) * 4, (2.0,) * 4)
+    problem, base = judge_of((10.0,) * 4, (2.0,) * 4)
     faint = replace(SLOPE, search={"angle": Search(-0.2 * VISIBLE, 0.2 * VISIBLE)})  # its step shows nothing by itself
-    assert gate(judge, base, [faint]).score < 0.1 * with_.score
+    assert score_test(problem, base, [faint]).score < 0.1 * with_.score
 
 
 def test_few_recordings_choose_who_is_looked_at_on_more(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -116,19 +127,19 @@ def test_few_recordings_choose_who_is_looked_at_on_more(monkeypatch: pytest.Monk
     at: dict[str, Any] = {}
     begun = {RUNS.few: {"c3": ((0.3,),)}, RUNS.looked_at: {"c3": ((0.4,),), "c4": ((0.6,),)}}
 
-    def looked(_: Judge, base: Fitted, candidates: Any, only: Any, beside: Any) -> Gate:
+    def looked(_: Problem, base: Fitted, candidates: Any, only: Any, beside: Any) -> ScoreTest:
         asked.append((len(only), [c.key for c in candidates]))
         at.update({c.key: c.places for c in candidates})
         scores = {c.key: 90.0 - int(c.key[1:]) for c in candidates}
-        return Gate(
+        return ScoreTest(
             score=max(scores.values()), scores=scores, null=np.full(10, float(len(only))), detectable=scores,
             places={"c2": ((0.7,), (0.1,))}, starts=begun[len(only)],
         )  # fmt: skip
 
-    monkeypatch.setattr(looks, "gate", looked)
-    judge, base = judge_of((0.0,) * 5, (0.0,) * 5)
+    monkeypatch.setattr(parallel_map, "score_test", looked)
+    problem, base = judge_of((0.0,) * 5, (0.0,) * 5)
     every = [replace(SLOPE, id=f"c{k}") for k in range(30)] + [replace(SLOPE, id="c77", kind="sensor")]
-    found = looks.look(judge, base, every, [[r] for r in range(5)])
+    found = parallel_map.look(problem, base, every, [[r] for r in range(5)])
     assert [n for n, _ in asked] == [RUNS.few, RUNS.looked_at]
     assert len(asked[0][1]) == 31
     assert asked[1][1] == [f"c{k}" for k in range(RUNS.shortlist)] + ["c77"]
@@ -149,12 +160,12 @@ def test_a_look_says_where_an_effect_told_most() -> None:
             return {CHANNEL: np.zeros(N) if x is None else 9.0 * np.sin(30.0 * TIME + 6.0 * x)}
 
     every = tuple((round(0.02 * k, 2),) for k in range(12))
-    judge, base = judge_of((0.0, 0.0), (0.0, 0.0), blow=np.inf)
+    problem, base = judge_of((0.0, 0.0), (0.0, 0.0), first_impact=np.inf)
     simulator: Any = Turned(0.0)
-    judge = Judge([replace(e, simulator=simulator) for e in judge.evidence])
+    problem = Problem([replace(e, simulator=simulator) for e in problem.dataset])
     block = replace(base.blocks[0], residual=50.0 * np.sin(30.0 * TIME + 6.0 * 0.145))
     turned = replace(SLOPE, search={"angle": Search(0.0, 1.0)}, places=every)
-    found = gate(judge, replace(base, blocks=(block, block)), [turned])
+    found = score_test(problem, replace(base, blocks=(block, block)), [turned])
     nearest = sorted(every, key=lambda x: abs(x[0] - 0.145))
     assert found.places[turned.key] == tuple(nearest[:CLOSER])
 
@@ -165,20 +176,20 @@ def test_of_places_where_an_effect_may_act_the_best_two_begin_fits() -> None:
     assert _begun_at(placed, met) == ((0.1,), (0.9,))
 
 
-@pytest.mark.parametrize(("straying", "kept"), [(True, 5.0), (False, 40.0)])
+@pytest.mark.parametrize(("heavy_tailed", "kept"), [(True, 5.0), (False, 40.0)])
 def test_what_led_on_few_recordings_is_tried_where_all_count_in_full(
-    straying: bool, kept: float, monkeypatch: pytest.MonkeyPatch
+    heavy_tailed: bool, kept: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """40 by two recordings, 5 by four: where each may take another course four tell more than two, else the better."""
 
-    def looked(_: Judge, base: Fitted, candidates: Any, only: Any, beside: Any) -> Gate:
+    def looked(_: Problem, base: Fitted, candidates: Any, only: Any, beside: Any) -> ScoreTest:
         scores = {c.key: 40.0 if len(only) == RUNS.few else 5.0 for c in candidates}
-        return Gate(score=max(scores.values()), scores=scores, null=np.ones(10), detectable={})
+        return ScoreTest(score=max(scores.values()), scores=scores, null=np.ones(10), detectable={})
 
-    monkeypatch.setattr(looks, "gate", looked)
-    judge, base = judge_of((0.0,) * 4, (0.0,) * 4)
-    judge.straying = straying
-    found = looks.look(judge, base, [SLOPE], [[r] for r in range(4)])
+    monkeypatch.setattr(parallel_map, "score_test", looked)
+    problem, base = judge_of((0.0,) * 4, (0.0,) * 4)
+    problem.heavy_tailed = heavy_tailed
+    found = parallel_map.look(problem, base, [SLOPE], [[r] for r in range(4)])
     assert found.scores["slope"] == kept
     assert found.score == 5.0  # what is claimed is claimed by all
 
@@ -187,31 +198,31 @@ def test_what_leads_where_other_courses_are_forgiven_is_tried_first(monkeypatch:
     """In full c0 to c9 score best in turn, forgiven c5 and then c7, and c8 by chance: these take turns."""
     asked: list[tuple[bool, set[str]]] = []
 
-    def looked(judge: Judge, base: Fitted, candidates: Any, only: Any, beside: Any) -> Gate:
-        asked.append((judge.straying, {c.key for c in candidates}))
+    def looked(problem: Problem, base: Fitted, candidates: Any, only: Any, beside: Any) -> ScoreTest:
+        asked.append((problem.heavy_tailed, {c.key for c in candidates}))
         scores = {c.key: 90.0 - int(c.key[1:]) for c in candidates}
-        if judge.straying:
+        if problem.heavy_tailed:
             scores = {c.key: {"c5": 70.0, "c7": 400.0, "c8": 0.1}.get(c.key, 0.0) for c in candidates}
         null = np.sort(np.random.default_rng(0).chisquare(1, 1000))
-        return Gate(score=max(scores.values()), scores=scores, null=null, detectable={})
+        return ScoreTest(score=max(scores.values()), scores=scores, null=null, detectable={})
 
-    monkeypatch.setattr(looks, "gate", looked)
-    monkeypatch.setattr(looks, "strongly", lambda *_: {})
-    judge, base = judge_of((0.0,) * 4, (0.0,) * 4)
-    judge.straying, judge.effort = False, replace(judge.effort, leaders=3)
+    monkeypatch.setattr(parallel_map, "score_test", looked)
+    monkeypatch.setattr(parallel_map, "strongly", lambda *_: {})
+    problem, base = judge_of((0.0,) * 4, (0.0,) * 4)
+    problem.heavy_tailed, problem.effort = False, replace(problem.effort, leaders=3)
     every = [replace(SLOPE, id=f"c{k}", kind="sensor" if k == 9 else "parameter") for k in range(10)]
-    found = looks.look(judge, base, every, [[r] for r in range(4)])
-    assert not judge.straying
+    found = parallel_map.look(problem, base, every, [[r] for r in range(4)])
+    assert not problem.heavy_tailed
     assert found.leading == ("c7", "c5")
     assert [c.key for c in found.ranked(every)][:5] == ["c7", "c5", "c0", "c1", "c2"]  # c7 is first of both
     late = replace(found, scores={**found.scores, "c7": 1.0})
     assert [c.key for c in late.ranked(every)][:5] == ["c7", "c0", "c5", "c1", "c2"]
     assert (found.scores["c7"], found.scores["c0"]) == (400.0, 90.0)
     assert found.score == 90.0  # what is claimed is claimed in full
-    assert all("c9" not in keys for straying, keys in asked if straying)
-    judge.straying = True
+    assert all("c9" not in keys for heavy_tailed, keys in asked if heavy_tailed)
+    problem.heavy_tailed = True
     asked.clear()
-    assert looks.look(judge, base, every, [[r] for r in range(4)]).leading == ()
+    assert parallel_map.look(problem, base, every, [[r] for r in range(4)]).leading == ()
     assert len(asked) == 2
 
 
@@ -219,7 +230,7 @@ def test_some_that_move_the_vehicle_are_always_looked_at_closer() -> None:
     """Twenty sensors score more than what makes them all wrong at once."""
     every = [replace(SLOPE, id=f"c{k}", kind="sensor" if k < 20 else "parameter", channel=None) for k in range(30)]
     scores = {c.key: 90.0 - int(c.key[1:]) for c in every}
-    found = promising(every, Gate(score=90.0, scores=scores, null=np.zeros(10), detectable={}), RUNS)
+    found = promising(every, ScoreTest(score=90.0, scores=scores, null=np.zeros(10), detectable={}), RUNS)
     assert RUNS.scored is not None
     assert [c.key for c in found][: RUNS.scored] == [f"c{k}" for k in range(RUNS.scored)]
     assert [c.key for c in found[RUNS.scored :]] == [f"c{k}" for k in range(20, 20 + RUNS.promising)]
@@ -227,48 +238,56 @@ def test_some_that_move_the_vehicle_are_always_looked_at_closer() -> None:
 
 def test_directions_may_be_those_beside_another_fit() -> None:
     """The misfit of an explanation along what runs beside the base say, and no run is made but those that are known."""
-    judge, base = judge_of((0.0,) * 4, (2.0,) * 4)
-    wave = 2.0 * np.where(TIME < BLOW, np.sin(30.0 * TIME), 0.0)
+    problem, base = judge_of((0.0,) * 4, (2.0,) * 4)
+    wave = 2.0 * np.where(TIME < IMPACT, np.sin(30.0 * TIME), 0.0)
     left = tuple(replace(b, residual=b.residual - wave) for b in base.blocks)
     fitted = Fitted(candidates=(replace(SLOPE, id="other"),), x=(0.51,), blocks=left)
-    known = gate(judge, base, [SLOPE], (0, 1))
-    made = sum(e.simulator.runs for e in judge.evidence if isinstance(e.simulator, Wave))
-    found = gate(judge, fitted, [SLOPE], known.only, base)
+    known = score_test(problem, base, [SLOPE], (0, 1))
+    made = sum(e.simulator.runs for e in problem.dataset if isinstance(e.simulator, Wave))
+    found = score_test(problem, fitted, [SLOPE], known.only, base)
     assert known.only == (0, 1)
-    assert sum(e.simulator.runs for e in judge.evidence if isinstance(e.simulator, Wave)) == made
+    assert sum(e.simulator.runs for e in problem.dataset if isinstance(e.simulator, Wave)) == made
     assert 0.0 < found.score < 0.1 * known.score  # most is explained
 
 
-@pytest.mark.parametrize(("hint", "thrifty", "looks_made"), [(0.9, True, 1), (0.01, True, 2), (0.9, False, 1)])
+@pytest.mark.parametrize(("hint", "is_ensemble", "looks_made"), [(0.9, True, 1), (0.01, True, 2), (0.9, False, 1)])
 def test_no_look_is_made_beside_an_explanation_where_known_runs_tell_nothing(
-    hint: float, thrifty: bool, looks_made: int, monkeypatch: pytest.MonkeyPatch
+    hint: float, is_ensemble: bool, looks_made: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[tuple[Any, Any]] = []
 
     def looked(
-        _: Judge, base: Fitted, candidates: Any, groups: Any, beside: Any = None, few: Any = (), looks: Any = ()
-    ) -> Gate:
+        _: Problem,
+        base: Fitted,
+        candidates: Any,
+        groups: Any,
+        beside: Any = None,
+        few: Any = (),
+        parallel_map: Any = (),
+    ) -> ScoreTest:
         asked.append((beside, few))
         null = np.sort(np.random.default_rng(0).chisquare(1, 1000))
-        return Gate(score=float(np.quantile(null, 1.0 - hint)), scores={}, null=null, detectable={})
+        return ScoreTest(score=float(np.quantile(null, 1.0 - hint)), scores={}, null=null, detectable={})
 
-    monkeypatch.setattr(looks, "look", looked)
-    judge, base = judge_of((0.0,) * 4, (2.0,) * 4)
-    judge.effort = replace(judge.effort, thrifty=thrifty)
-    first = Gate(score=0.0, scores={}, null=np.zeros(10), detectable={}, only=(0, 2))
-    looks.look_again(judge, base, base, [SLOPE], [[r] for r in range(4)], first)
+    monkeypatch.setattr(parallel_map, "look", looked)
+    problem, base = judge_of((0.0,) * 4, (2.0,) * 4)
+    problem.effort = replace(problem.effort, is_ensemble=is_ensemble)
+    first = ScoreTest(score=0.0, scores={}, null=np.zeros(10), detectable={}, only=(0, 2))
+    parallel_map.look_again(problem, base, base, [SLOPE], [[r] for r in range(4)], first)
     assert len(asked) == looks_made
-    assert asked[0] == ((base, (0, 2)) if thrifty else (None, ()))
+    assert asked[0] == ((base, (0, 2)) if is_ensemble else (None, ()))
     if looks_made == 2:
         assert asked[1] == (None, ())
     asked.clear()
-    looks.look_again(judge, base, None, [SLOPE], [[r] for r in range(4)], first)  # where the rest is structured
+    parallel_map.look_again(
+        problem, base, None, [SLOPE], [[r] for r in range(4)], first
+    )  # where the rest is structured
     assert asked == [(None, ())]
 
 
 def test_what_was_refuted_tells_nothing() -> None:
-    judge, base = judge_of((0.0,) * 4, (2.0,) * 4)
-    looked = gate(judge, base, [SLOPE])
+    problem, base = judge_of((0.0,) * 4, (2.0,) * 4)
+    looked = score_test(problem, base, [SLOPE])
     before: Any = type("M", (), {"p_value": 0.3})()
     found = decision.Explanation(
         base=base, fitted=base, parts=(), looked=looked, detectable={}, before=before, after=before
@@ -307,20 +326,20 @@ def test_of_two_tests_the_smaller_p_value_is_uniform_for_the_shares_of_errors_th
 
 def test_a_limit_shows_up_to_the_largest_that_was_tried_and_shows() -> None:
     """A force cell that ends at three quarters of its range shows, at more than the range it does not."""
-    judge = test_fits.judge_of(recorded({}, noise=0.01, speeds=(1.5, 2.5)))
-    base = judge.fit((), ())
+    problem = test_fits.judge_of(recorded({}, noise=0.01, speeds=(1.5, 2.5)))
+    base = problem.fit((), ())
     assert base is not None
-    cell = candidate(judge, f"sensor-clipping:{FORCE}")
-    strength = candidate(judge, "soil-viscous-damping")
-    found = gate(judge, base, [cell, strength]).detectable
-    span = max(s.span for e in judge.evidence for s in e.signals if s.channel == FORCE)
+    cell = candidate(problem, f"sensor-clipping:{FORCE}")
+    strength = candidate(problem, "soil-viscous-damping")
+    found = score_test(problem, base, [cell, strength]).detectable
+    span = max(s.span for e in problem.dataset for s in e.signals if s.channel == FORCE)
     assert 0.4 * span < found[cell.key] < span
     assert 0.0 < found[strength.key] < 50.0
     assert _visible(cell, (0.5,), 0.9 * VISIBLE) is None
     assert _visible(cell, (0.5,), 1.1 * VISIBLE) == cell.values((0.5,))["limit"]
-    bare = replace(candidate(judge, "co-moving-mass"), own={})
-    assert "co-moving-mass" not in gate(judge, base, [bare]).detectable
-    known = gate(judge, base, [replace(bare, own={"fraction": 0.1})]).detectable["co-moving-mass"]
+    no_jacobian = replace(candidate(problem, "co-moving-mass"), own={})
+    assert "co-moving-mass" not in score_test(problem, base, [no_jacobian]).detectable
+    known = score_test(problem, base, [replace(no_jacobian, own={"fraction": 0.1})]).detectable["co-moving-mass"]
     assert 0.0 < known < 0.1
 
 
@@ -332,12 +351,15 @@ def test_a_look_goes_as_far_along_a_direction_as_gains_most() -> None:
     late = np.arange(n) >= 30
     wave = np.where(late, np.sin(0.7 * np.arange(n)), 0.0)
     wave /= np.sqrt(wave @ wave)
-    other = Course(samples=np.where(late, np.sqrt(slope), 1.0), share=0.1, more=0.0)
+    other = HeavyTail(samples=np.where(late, np.sqrt(slope), 1.0), share=0.1, more=0.0)
     left = np.where(late, np.sqrt(slope) * np.sqrt(expected + beyond) * wave, rng.standard_normal(n))
     as_seen = np.where(late, np.sqrt(slope), 1.0) * wave  # a direction counts as the samples do
     none: Any = {"J": np.zeros((n, 0)), "slope": np.zeros(n), "shift": 0.0, "prior": 1e-3}
     little = 0.05 * wave
-    blocks = [Block(residual=left, course=other, **none), Block(residual=30.0 * little + rng.normal(size=n), **none)]
+    blocks = [
+        ResidualBlock(residual=left, heavy_tail=other, **none),
+        ResidualBlock(residual=30.0 * little + rng.normal(size=n), **none),
+    ]
     D = np.concatenate([as_seen, little])[:, None]
     size = float(np.sqrt(D[:, 0] @ D[:, 0]))
     misfit = np.concatenate([b.residual for b in blocks])

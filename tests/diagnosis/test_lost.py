@@ -33,8 +33,8 @@ def made(values: np.ndarray, time: np.ndarray = TIME) -> Recording:
     return Recording(title="one", time=time, channels={ACCELERATION: values}, cfc={ACCELERATION: 60})
 
 
-def blow() -> np.ndarray:
-    """All of a blow of 20 m/s2 s in one sample, a step of 30 m/s2, and a push of 0.05 s."""
+def first_impact() -> np.ndarray:
+    """All of an impact of 20 m/s2 s in one sample, a step of 30 m/s2, and a push of 0.05 s."""
     x = np.zeros(N)
     x[300] = 20.0 * RATE / 10.0
     x[400:] = 30.0
@@ -57,9 +57,9 @@ def spiked(v: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("done", [lambda v: v, clipped, digits, spiked])
 def test_no_signal_behind_a_filter_leaps(done: Callable[[np.ndarray], np.ndarray]) -> None:
-    """A blow of no duration, a step, a push; at the end of a range, in steps of twenty times the noise, with spikes."""
+    """An impact of no duration, a step, a push; at the end of a range, in steps of 20 times the noise, with spikes."""
     for seed in range(20):
-        told = trace(made(done(behind(blow(), seed))), ACCELERATION)
+        told = trace(made(done(behind(first_impact(), seed))), ACCELERATION)
         assert told is not None
         assert leaping(told, 60).size == 0, seed
 
@@ -68,7 +68,7 @@ def test_gaps_are_no_leaps() -> None:
     for seed in range(20):
         keep = np.ones(N, dtype=bool)
         keep[295:305] = keep[395:405] = False
-        told = trace(made(behind(blow(), seed)[keep], TIME[keep]), ACCELERATION)
+        told = trace(made(behind(first_impact(), seed)[keep], TIME[keep]), ACCELERATION)
         assert told is not None
         assert leaping(told, 60).size == 0, seed
 
@@ -76,7 +76,7 @@ def test_gaps_are_no_leaps() -> None:
 def test_a_contact_that_opens_makes_leaps_to_and_fro() -> None:
     """For 12 ms twice, where the signal is 20 m/s2 and 7 m/s2: four leaps, each before the sample that is the first."""
     for seed in range(20):
-        values = behind(blow(), seed)
+        values = behind(first_impact(), seed)
         for k in (190, 440):
             values[k : k + 12] = 0.1 * np.random.default_rng(seed).standard_normal(12)
         told = trace(made(values), ACCELERATION)
@@ -98,7 +98,7 @@ def test_two_samples_about_a_leap_lie_off_by_nearly_half_of_it() -> None:
 
 
 def test_where_channels_break_off_again_they_are_said_to() -> None:
-    whole = [made(behind(blow(), seed)) for seed in range(3)]
+    whole = [made(behind(first_impact(), seed)) for seed in range(3)]
     assert lost("abc", whole, PHASES) == ()
     holed = whole[1][ACCELERATION].copy()
     holed[100:105] = holed[320:324] = 0.0

@@ -10,11 +10,11 @@ import pytest
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.data.whitening import Whitening
 from rollover.diagnosis.forward.forward_model import simulator_of
-from rollover.diagnosis.noise.heteroscedasticity import SPREAD, with_loudness
+from rollover.diagnosis.noise.heteroscedasticity import SPREAD, with_variance_model
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario, signal
-from tests.diagnosis.test_chaos import BLOW, blown
 from tests.diagnosis.test_chaos import CHANNELS as CHASSIS
+from tests.diagnosis.test_chaos import IMPACT, blown
 from tests.diagnosis.test_fits import judge_of
 from tests.physics.scenes import shipped
 
@@ -37,7 +37,7 @@ def louder(recordings: list[tuple[str, Recording]], seed: int) -> list[tuple[str
 
 def test_its_law_is_told_from_the_samples_alone() -> None:
     quiet = recorded({"effects.soil-crust.thickness": 0.03}, noise=0.0, rate=2000.0, channels=CHANNELS)
-    for e, (_, clean) in zip(with_loudness(judge_of(louder(quiet, 1)).evidence), quiet, strict=True):
+    for e, (_, clean) in zip(with_variance_model(judge_of(louder(quiet, 1)).dataset), quiet, strict=True):
         for s in e.signals:
             y = clean[s.channel][s.rows]
             true = 1.0 + SHARE / FLOOR * np.abs(y) / most(quiet, s.channel)
@@ -56,7 +56,7 @@ def test_noise_alone_does_not_grow_with_itself() -> None:
         (name, replace(r, channels={**r.channels, FORCE: rng.normal(size=r.time.size)}))
         for name, r in recorded({}, noise=0.01, rate=2000.0, channels=CHANNELS)
     ]
-    assert all(s.level is None for e in with_loudness(judge_of(made).evidence) for s in e.signals)
+    assert all(s.level is None for e in with_variance_model(judge_of(made).dataset) for s in e.signals)
 
 
 @pytest.mark.parametrize("cfc", [None, 180])
@@ -77,7 +77,7 @@ def test_an_even_noise_or_a_filter_is_not_taken_for_it(rate: float, cfc: int | N
             )
             for name, r in made
         ]
-    assert all(s.level is None for e in with_loudness(judge_of(made).evidence) for s in e.signals)
+    assert all(s.level is None for e in with_variance_model(judge_of(made).dataset) for s in e.signals)
 
 
 def test_it_is_no_mismatch_and_hides_none() -> None:
@@ -103,13 +103,13 @@ def test_what_a_model_may_be_off_by_does_not_grow_with_the_noise() -> None:
 
 
 def test_contacts_after_a_blow_are_no_noise() -> None:
-    """Twice the noise of a motion after the blow, where values are large, in an overturn and in anything else."""
+    """Twice the noise of a motion after the impact, where values are large, in an overturn and in anything else."""
     rng = np.random.default_rng(3)
     e = blown(CHASSIS)
     n, time = e.signals[0].rows.size, e.recording.time
-    after = time >= BLOW
+    after = time >= IMPACT
     values = np.where(after, 5.0 + np.sin(20.0 * time), 0.1) + np.where(after, 0.3, 0.05) * rng.standard_normal(n)
     found = replace(e, signals=tuple(replace(s, values=values) for s in e.signals))
-    assert all(s.level is None for s in with_loudness([found])[0].signals)
+    assert all(s.level is None for s in with_variance_model([found])[0].signals)
     elsewhere = simulator_of(shipped("drop_test"), e.recording)
-    assert all(s.level is not None for s in with_loudness([replace(found, simulator=elsewhere)])[0].signals)
+    assert all(s.level is not None for s in with_variance_model([replace(found, simulator=elsewhere)])[0].signals)

@@ -12,10 +12,10 @@ import pytest
 
 from rollover.diagnosis.fit import ensemble_mean
 from rollover.diagnosis.fit.ensemble_mean import settled
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
-from rollover.diagnosis.fit.linearisation import Block
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.fit.step import Step
-from tests.diagnosis.test_slopes import CHANNEL, MASS, SLOPE, TIME, Scattering, evidence
+from tests.diagnosis.test_slopes import CHANNEL, MASS, SLOPE, TIME, Scattering, dataset
 
 
 def test_an_explanation_that_is_far_from_the_mean_goes_more_than_one_step() -> None:
@@ -27,11 +27,11 @@ def test_an_explanation_that_is_far_from_the_mean_goes_more_than_one_step() -> N
             chance = np.random.default_rng([k, round(1e9 * x)]).standard_normal(TIME.size)
             return {CHANNEL: 20.0 * x**2 * np.sin(30.0 * (TIME - shift)) + 0.05 * chance}
 
-    judge = Judge([evidence(Bent().predict({"effects.slope.angle": 0.6}, 0.0)[CHANNEL], Bent()) for _ in range(2)])
-    base, far = judge.fit((), ()), judge.fit((SLOPE,), (0.2,), rounds=0)
+    problem = Problem([dataset(Bent().predict({"effects.slope.angle": 0.6}, 0.0)[CHANNEL], Bent()) for _ in range(2)])
+    base, far = problem.fit((), ()), problem.fit((SLOPE,), (0.2,), rounds=0)
     assert base is not None
     assert far is not None
-    found = settled(judge, Step(base=base, fitted=far, p_value=0.0, rivals=(far,)))
+    found = settled(problem, Step(base=base, fitted=far, p_value=0.0, rivals=(far,)))
     assert found.fitted.x[0] == pytest.approx(0.6, abs=0.01)
     assert found.rivals == (found.fitted,)
 
@@ -50,13 +50,13 @@ class Straight(Scattering):
         return {CHANNEL: 20.0 * x * np.sin(30.0 * (TIME - shift)) + 0.05 * chance}
 
 
-def begun_at(x: float, values: np.ndarray) -> tuple[Judge, Step]:
+def begun_at(x: float, values: np.ndarray) -> tuple[Problem, Step]:
     """Two recordings, and a fit that was not made, at x."""
-    judge = Judge([evidence(values, Straight()) for _ in range(2)])
-    base, off = judge.fit((), ()), judge.fit((SLOPE,), (x,), rounds=0)
+    problem = Problem([dataset(values, Straight()) for _ in range(2)])
+    base, off = problem.fit((), ()), problem.fit((SLOPE,), (x,), rounds=0)
     assert base is not None
     assert off is not None
-    return judge, Step(base=base, fitted=off, p_value=0.0, rivals=(off,))
+    return problem, Step(base=base, fitted=off, p_value=0.0, rivals=(off,))
 
 
 @pytest.fixture
@@ -65,8 +65,8 @@ def steps(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     made: list[Any] = []
     onward = ensemble_mean._onward
 
-    def counted(judge: Judge, old: Fitted, dx: np.ndarray) -> Any:
-        made.append(onward(judge, old, dx))
+    def counted(problem: Problem, old: Fitted, dx: np.ndarray) -> Any:
+        made.append(onward(problem, old, dx))
         return made[-1]
 
     monkeypatch.setattr(ensemble_mean, "_onward", counted)
@@ -78,8 +78,8 @@ def test_an_explanation_that_is_not_the_whole_is_not_moved_for_little(
     missing: float, least: int, steps: list[Any]
 ) -> None:
     """Begun 0.02 off: (0.4/1)^2 of what cos(400 t) beside it leaves, (0.4/4)^2 of what four times that does."""
-    judge, off = begun_at(0.58, 12.0 * np.sin(30.0 * TIME) + missing * np.cos(400.0 * TIME))
-    found = settled(judge, off).fitted.x
+    problem, off = begun_at(0.58, 12.0 * np.sin(30.0 * TIME) + missing * np.cos(400.0 * TIME))
+    found = settled(problem, off).fitted.x
     assert len(steps) >= least if least else (len(steps), found) == (0, (0.58,))
 
 
@@ -87,16 +87,16 @@ def test_an_explanation_that_is_not_the_whole_is_not_moved_for_little(
 def test_slopes_are_told_anew_beyond_the_step_over_which_they_were_told(
     begun: float, is_beside: bool, steps: list[Any]
 ) -> None:
-    judge, off = begun_at(begun, 12.0 * np.sin(30.0 * TIME))
-    found = settled(judge, off).fitted
+    problem, off = begun_at(begun, 12.0 * np.sin(30.0 * TIME))
+    found = settled(problem, off).fitted
     assert found.x[0] == pytest.approx(0.6, abs=2e-3)
     assert len(steps) > 1
-    asked = judge.evidence[0].simulator.asked  # type: ignore[attr-defined]
+    asked = problem.dataset[0].simulator.asked  # type: ignore[attr-defined]
     (first,), _ = steps[0]
     assert first != found.x[0]
-    assert (round(first + judge.effort.fine, 9) in asked) != is_beside
-    assert round(found.x[0] + judge.effort.fine, 9) in asked  # what it ends with are its own
-    for block, other in zip(found.blocks, judge.again(found).blocks, strict=True):
+    assert (round(first + problem.effort.fine, 9) in asked) != is_beside
+    assert round(found.x[0] + problem.effort.fine, 9) in asked  # what it ends with are its own
+    for block, other in zip(found.blocks, problem.again(found).blocks, strict=True):
         np.testing.assert_array_equal(block.J, other.J)
 
 
@@ -122,22 +122,22 @@ def test_the_whole_way_is_gone_unless_a_share_of_it_leaves_clearly_less(
         return lefts[len(asked) - 1], [s + 1.0 for s in shifts]
 
     monkeypatch.setattr(ensemble_mean, "_met", met)
-    judge: Any = SimpleNamespace(made_ahead=lambda points: announced.extend(round(x[0], 9) for _, _, x in points))
-    block = Block(residual=np.full(4, 5.0), J=np.zeros((4, 1)), slope=np.zeros(4), shift=0.0, prior=1.0)
+    problem: Any = SimpleNamespace(made_ahead=lambda points: announced.extend(round(x[0], 9) for _, _, x in points))
+    block = ResidualBlock(residual=np.full(4, 5.0), J=np.zeros((4, 1)), slope=np.zeros(4), shift=0.0, prior=1.0)
     old = Fitted(candidates=(SLOPE,), x=(0.5,), blocks=(block,))
-    there = ensemble_mean._onward(judge, old, np.array([0.1]))
+    there = ensemble_mean._onward(problem, old, np.array([0.1]))
     assert asked == announced == [0.6, 0.55, 0.65][: len(lefts)]
     assert there == (None if found is None else ([pytest.approx(found)], [1.0]))
 
 
 def test_rivals_of_an_explanation_are_not_run_once_more_where_it_settles() -> None:
-    judge, off = begun_at(0.58, 12.0 * np.sin(30.0 * TIME))
-    rival = judge.fit((MASS,), (0.3,), rounds=0)
+    problem, off = begun_at(0.58, 12.0 * np.sin(30.0 * TIME))
+    rival = problem.fit((MASS,), (0.3,), rounds=0)
     assert rival is not None
-    assert all(e.signals[0].weight is None for e in judge.evidence)
-    found = settled(judge, replace(off, rivals=(off.fitted, rival)))
+    assert all(e.signals[0].weight is None for e in problem.dataset)
+    found = settled(problem, replace(off, rivals=(off.fitted, rival)))
     assert found.fitted.x[0] == pytest.approx(0.6, abs=2e-3)
     assert found.rivals[0] is found.fitted
     assert found.rivals[1] is rival
-    assert all(e.signals[0].weight is not None for e in judge.evidence)  # what it stands beside is held under that
-    np.testing.assert_array_equal(found.base.blocks[0].residual, judge.again(off.base).blocks[0].residual)
+    assert all(e.signals[0].weight is not None for e in problem.dataset)  # what it stands beside is held under that
+    np.testing.assert_array_equal(found.base.blocks[0].residual, problem.again(off.base).blocks[0].residual)

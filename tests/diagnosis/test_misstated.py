@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.data.dataset import Evidence, evidence_of
+from rollover.diagnosis.data.dataset import Dataset, dataset_of
 from rollover.diagnosis.forward.forward_model import simulator_of
-from rollover.diagnosis.inference.wrong_condition import misstated
+from rollover.diagnosis.inference.wrong_condition import wrong_conditions
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
@@ -30,8 +30,8 @@ def stating(made: Recordings, which: int, times: float) -> Recordings:
     return [*made[:which], (name, wrong), *made[which + 1 :]]
 
 
-def evidence(made: Recordings) -> list[Evidence]:
-    found = [evidence_of(name, r, simulator_of(scenario(), r)) for name, r in made]
+def dataset(made: Recordings) -> list[Dataset]:
+    found = [dataset_of(name, r, simulator_of(scenario(), r)) for name, r in made]
     assert all(e is not None for e in found)
     return [e for e in found if e is not None]
 
@@ -40,9 +40,9 @@ def evidence(made: Recordings) -> list[Evidence]:
 @pytest.mark.parametrize(("which", "times"), [(1, 1.5), (4, 0.7), (0, 1.3)])
 def test_the_speed_that_was_dropped_at_is_told(missing: dict[str, Any], which: int, times: float) -> None:
     """Beside what is missing too, and to what that bends it: a tenth."""
-    every = evidence(stating(drops(missing), which, times))
-    [found] = misstated(every)
-    assert found.evidence is every[which]
+    every = dataset(stating(drops(missing), which, times))
+    [found] = wrong_conditions(every)
+    assert found.dataset is every[which]
     assert found.speed == pytest.approx(SPEEDS[which], rel=0.1)
     assert f"not at the stated {SPEEDS[which] / times:.3g} m/s; it was left aside" in found.says()
 
@@ -61,7 +61,7 @@ def test_the_speed_that_was_dropped_at_is_told(missing: dict[str, Any], which: i
     ],
 )
 def test_what_ground_and_sensors_do_is_no_other_speed(missing: dict[str, Any]) -> None:
-    assert misstated(evidence(drops(missing))) == []
+    assert wrong_conditions(dataset(drops(missing))) == []
 
 
 @pytest.mark.parametrize("which", [1, 4])
@@ -69,12 +69,12 @@ def test_another_mass_in_one_drop_is_no_other_speed(which: int) -> None:
     """Another speed leaves a quarter of what it misses, but far more than the others leave."""
     made = drops({})
     made[which] = drops({"vehicle.mass": 110.0})[which]
-    assert misstated(evidence(made)) == []
+    assert wrong_conditions(dataset(made)) == []
 
 
 def test_of_three_drops_none_is_apart_and_two_are_no_one() -> None:
-    assert misstated(evidence(stating(drops({}, SPEEDS[:3]), 1, 1.5))) == []
-    assert misstated(evidence(stating(stating(drops({}), 1, 1.5), 3, 0.6))) == []
+    assert wrong_conditions(dataset(stating(drops({}, SPEEDS[:3]), 1, 1.5))) == []
+    assert wrong_conditions(dataset(stating(stating(drops({}), 1, 1.5), 3, 0.6))) == []
 
 
 @pytest.mark.parametrize(("missing", "named"), [(DAMPING, ["soil-viscous-damping"]), ({}, [])])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rollover.diagnosis.fit.finite_differences import narrowed
+from rollover.diagnosis.fit.finite_differences import step_reduced
 
 
 def test_what_moves_a_recording_far_beyond_its_noise_is_told_over_a_narrower_step() -> None:
@@ -19,7 +19,11 @@ def test_what_moves_a_recording_far_beyond_its_noise_is_told_over_a_narrower_ste
         asked.append(step)
         return np.array([200.0 * np.tanh(step / 1e-3)])
 
-    close, wide, narrow = narrowed(moved, 5e-3, 1.0), narrowed(moved, 5e-3, 100.0), narrowed(moved, -1e-5, 1.0)
+    close, wide, narrow = (
+        step_reduced(moved, 5e-3, 1.0),
+        step_reduced(moved, 5e-3, 100.0),
+        step_reduced(moved, -1e-5, 1.0),
+    )
     assert close is not None
     assert wide is not None
     assert narrow is not None
@@ -28,7 +32,7 @@ def test_what_moves_a_recording_far_beyond_its_noise_is_told_over_a_narrower_ste
     assert narrow[0] == pytest.approx(2e5, rel=1e-3)
     there = pytest.approx(5e-3 / 200.0, rel=1e-3)
     assert asked == [5e-3, there, pytest.approx(-5e-3 / 200.0, rel=1e-3), 5e-3, -1e-5]
-    assert narrowed(lambda _: None, 5e-3, 1.0) is None
+    assert step_reduced(lambda _: None, 5e-3, 1.0) is None
 
 
 @pytest.mark.parametrize(("edge", "steps"), [(-1e-5, 3), (-1e-3, 2), (1e-5, 2)])
@@ -40,7 +44,7 @@ def test_an_edge_that_just_lies_there_is_no_slope(edge: float, steps: int) -> No
         asked.append(step)
         return np.array([2e4 * step + 20.0 * np.sign(edge) * (abs(step) > abs(edge) and step * edge > 0.0)])
 
-    found = narrowed(moved, -5e-3, 1.0)
+    found = step_reduced(moved, -5e-3, 1.0)
     assert found is not None
     assert found[0] == pytest.approx(2e4, rel=1e-9)
     assert len(asked) == steps

@@ -9,8 +9,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
-from rollover.diagnosis.fit.linearisation import Block
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.forward.budget import DROPS, RUNS, Effort
@@ -51,21 +51,21 @@ def test_beside_effects_in_another_form_the_last_one_is_looked_for_anew(
     """
     looked: list[str] = []
 
-    def instead(_: Any, current: Fitted) -> Step:
+    def swapped(_: Any, current: Fitted) -> Step:
         first, *rest = current.candidates
         looked.append(first.id)
         kept = [(c.id, tuple(c.search)) for c in rest]
         found = of(*kept, answers[first.id])
         return Step(base=of(*kept), fitted=found, p_value=0.0, rivals=(found,))
 
-    monkeypatch.setattr(decision, "instead", instead)
-    monkeypatch.setattr(decision, "without_needless", lambda _, f, *__: f)
-    judge = SimpleNamespace(again=lambda f: f, effort=DROPS)
+    monkeypatch.setattr(decision, "swapped", swapped)
+    monkeypatch.setattr(decision, "backward_elimination", lambda _, f, *__: f)
+    problem = SimpleNamespace(again=lambda f: f, effort=DROPS)
     taken = [
         Step(base=of(), fitted=of(beside), p_value=0.0),
         Step(base=of(beside), fitted=of(held, CRUST), p_value=0.0),
     ]
-    parts = decision._needed(cast(Inquiry, SimpleNamespace(judge=judge)), taken)
+    parts = decision._retained(cast(Inquiry, SimpleNamespace(problem=problem)), taken)
     assert parts is not None
     assert looked == asked
     assert {c.id for c in parts[-1].fitted.candidates} == {"soil-layer", answers.get("soil-crust", CRUST)[0]}
@@ -88,22 +88,22 @@ def test_of_full_runs_what_is_surely_there_is_not_tried_without_and_the_fit_with
     """Without either 9 per sample more is left: both are needed."""
     asked: list[int] = []
 
-    def without(_: Any, fitted: Fitted, k: int, *, bare: bool = False) -> Fitted:
+    def without(_: Any, fitted: Fitted, k: int, *, no_jacobian: bool = False) -> Fitted:
         asked.append(k)
-        assert bare == effort.thrifty
+        assert no_jacobian == effort.is_ensemble
         return left(of(CRUST), 9.0 - k)
 
     monkeypatch.setattr(decision, "without", without)
-    monkeypatch.setattr(decision, "surely_there", lambda *_: surely)
+    monkeypatch.setattr(decision, "significant_by_wald", lambda *_: surely)
     base, held = left(of(beside), 8.0), left(of(("soil-layer", ("a",)), CRUST), 1.0)
-    judge = cast(Any, SimpleNamespace(again=lambda f: f, effort=effort))
-    assert decision.without_needless(judge, held, base) is held
+    problem = cast(Any, SimpleNamespace(again=lambda f: f, effort=effort))
+    assert decision.backward_elimination(problem, held, base) is held
     assert asked == fitted_again
 
 
 def left(fitted: Fitted, much: float) -> Fitted:
     """A fit that leaves so much of each of four samples."""
-    block = Block(residual=np.full(4, much), J=np.zeros((4, 0)), slope=np.zeros(4), shift=0.0, prior=1.0)
+    block = ResidualBlock(residual=np.full(4, much), J=np.zeros((4, 0)), slope=np.zeros(4), shift=0.0, prior=1.0)
     return replace(fitted, blocks=(block,))
 
 
@@ -119,19 +119,19 @@ def test_the_strongest_is_that_without_which_most_is_left(monkeypatch: pytest.Mo
 
     monkeypatch.setattr(decision, "left_at", left_at)
     monkeypatch.setattr(decision, "without", lambda _, f, k, rounds: left(of(CRUST), 2.0 - k))
-    judge = cast(Any, SimpleNamespace(effort=effort))
+    problem = cast(Any, SimpleNamespace(effort=effort))
     held = replace(left(of(LAYER, CRUST), 1.0), x=(0.1, 0.2, 0.3, 0.4))
-    assert decision.strongest(judge, left(of(), 9.0), held).id == "soil-layer"
-    assert asked == ([(["soil-crust"], [0.3, 0.4]), (["soil-layer"], [0.1, 0.2])] if effort.thrifty else [])
+    assert decision.strongest(problem, left(of(), 9.0), held).id == "soil-layer"
+    assert asked == ([(["soil-crust"], [0.3, 0.4]), (["soil-layer"], [0.1, 0.2])] if effort.is_ensemble else [])
 
 
 def test_what_is_not_needed_goes_and_the_rest_has_slopes_again(monkeypatch: pytest.MonkeyPatch) -> None:
     rest, again = left(of(LAYER), 1.0), left(of(LAYER), 1.0)
     monkeypatch.setattr(decision, "without", lambda *_, **__: rest)
-    monkeypatch.setattr(decision, "surely_there", lambda *_: {0})
+    monkeypatch.setattr(decision, "significant_by_wald", lambda *_: {0})
     for effort, found in ((RUNS, again), (DROPS, rest)):
-        judge = cast(Any, SimpleNamespace(again=lambda f: again if f is rest else f, effort=effort))
-        assert decision.without_needless(judge, left(of(LAYER, CRUST), 1.0)) is found
+        problem = cast(Any, SimpleNamespace(again=lambda f: again if f is rest else f, effort=effort))
+        assert decision.backward_elimination(problem, left(of(LAYER, CRUST), 1.0)) is found
 
 
 MASS, SPEED, RATE, DRAG = ((i, ("a",)) for i in ("mass", "impact-speed", "soil-rate-hardening", "soil-inertial-drag"))
@@ -156,23 +156,23 @@ def test_as_many_effects_as_may_be_that_are_given_for_others_again_and_again_exp
 ) -> None:
     looked: list[str] = []
 
-    def instead(_: Any, current: Fitted) -> Step:
+    def swapped(_: Any, current: Fitted) -> Step:
         first, *rest = current.candidates
         kept = [(c.id, tuple(c.search)) for c in rest]
         new = of(*kept, answers[len(looked)])
         looked.append(first.id)
         return Step(base=of(*kept), fitted=new, p_value=0.0, rivals=(new,))
 
-    def without_needless(_: Any, f: Fitted, *__: Any) -> Fitted:
+    def backward_elimination(_: Any, f: Fitted, *__: Any) -> Fitted:
         left = [(c.id, tuple(c.search)) for c in f.candidates if len(looked) < 2 or c.id != needless]
         return of(*left)
 
-    monkeypatch.setattr(decision, "instead", instead)
-    monkeypatch.setattr(decision, "without_needless", without_needless)
-    judge = SimpleNamespace(again=lambda f: f, effort=DROPS)
+    monkeypatch.setattr(decision, "swapped", swapped)
+    monkeypatch.setattr(decision, "backward_elimination", backward_elimination)
+    problem = SimpleNamespace(again=lambda f: f, effort=DROPS)
     order = (LAYER, CRUST, MASS)
     taken = [Step(base=of(*order[:k]), fitted=of(*order[: k + 1]), p_value=0.0) for k in range(MOST)]
-    parts = decision._needed(cast(Inquiry, SimpleNamespace(judge=judge)), taken)
+    parts = decision._retained(cast(Inquiry, SimpleNamespace(problem=problem)), taken)
     assert looked == asked
     assert (None if parts is None else {c.id for c in parts[-1].fitted.candidates}) == found
 
@@ -194,10 +194,10 @@ def test_effects_that_will_be_refused_are_not_looked_for_anew(
     fitted = of(*(LAYER, CRUST, MASS)[:count])
     monkeypatch.setattr(decision, "matters", lambda *_: matters)
     monkeypatch.setattr(decision, "is_tolerated", lambda *_: False)
-    monkeypatch.setattr(decision, "without_needless", lambda *_: of(LAYER, CRUST) if needless else held)
-    judge = cast(Any, SimpleNamespace(again=lambda f: f, effort=DROPS))
+    monkeypatch.setattr(decision, "backward_elimination", lambda *_: of(LAYER, CRUST) if needless else held)
+    problem = cast(Any, SimpleNamespace(again=lambda f: f, effort=DROPS))
     left = cast(Any, SimpleNamespace(p_value=p_value))
-    assert decision.is_open_to_be_named(judge, fitted, left) == is_open
+    assert decision.is_open_to_be_named(problem, fitted, left) == is_open
 
 
 @pytest.mark.parametrize(
@@ -214,22 +214,22 @@ def test_what_ends_with_others_than_it_began_with_has_a_step_for_each(
     """A crust with a layer on it is followed to a layer on another stiffness: none of the steps was the layer's."""
     looked: list[str] = []
 
-    def instead(_: Any, current: Fitted) -> Step | None:
+    def swapped(_: Any, current: Fitted) -> Step | None:
         looked.append(current.candidates[0].id)
         found = None if back is None else of(STIFFNESS, back)
         return None if found is None else Step(base=of(STIFFNESS), fitted=found, p_value=0.0, rivals=(found,))
 
     crust, both = of(LAYER, CRUST), of(LAYER, STIFFNESS)
-    needed = [
+    retained = [
         Step(base=of(LAYER), fitted=crust, p_value=0.0),
         Step(base=of(CRUST), fitted=of(CRUST, LAYER), p_value=0.0),
     ]
     ended = Step(base=of(LAYER), fitted=both, p_value=0.0, rivals=(both,))
-    monkeypatch.setattr(decision, "instead", instead)
-    monkeypatch.setattr(decision, "_needed", lambda *_: needed)
+    monkeypatch.setattr(decision, "swapped", swapped)
+    monkeypatch.setattr(decision, "_retained", lambda *_: retained)
     monkeypatch.setattr(decision, "followed", lambda *_: (ended, None))
-    judge = SimpleNamespace(again=lambda f: f, effort=DROPS)
-    parts = decision._ended(cast(Inquiry, SimpleNamespace(judge=judge)), needed)
+    problem = SimpleNamespace(again=lambda f: f, effort=DROPS)
+    parts = decision._ended(cast(Inquiry, SimpleNamespace(problem=problem)), retained)
     assert parts is not None
     assert [s.fitted.candidates[-1].id for s in parts] == ["soil-layer", "soil-stiffness"]
     assert parts[-1].fitted is both
@@ -248,7 +248,7 @@ def test_what_is_surely_there_keeps_ten_times_its_interval_away_from_none(monkey
     monkeypatch.setattr(
         ensemble_validation, "intervals", lambda _, f, sides: found if f is fitted and sides == {} else None
     )
-    assert ensemble_validation.surely_there(Judge([]), fitted) == {0}
+    assert ensemble_validation.significant_by_wald(Problem([]), fitted) == {0}
 
 
 def within(low: float, high: float) -> Interval:

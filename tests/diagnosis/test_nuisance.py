@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.data.condition_uncertainty import doubts, eased
-from rollover.diagnosis.data.dataset import Evidence, doubted, evidence_of, groups_of, left_out
+from rollover.diagnosis.data.condition_uncertainty import doubts, marginalised
+from rollover.diagnosis.data.dataset import Dataset, dataset_of, doubted, groups_of, left_out
 from rollover.diagnosis.data.repeatability import with_scatter
-from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.parameterisation import coordinate
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.forward_model import set_up, simulator_of
@@ -29,7 +29,7 @@ SPEEDS = (1.5, 2.2, 3.0)
 OFF = (1.02, 0.975, 1.03)  # what the speeds were over what was written down
 
 
-def misstated(changes: dict[str, float], sigma: float) -> list[tuple[str, Recording]]:
+def wrong_conditions(changes: dict[str, float], sigma: float) -> list[tuple[str, Recording]]:
     """Drops whose speeds were written down wrongly, and how uncertain they are said to be, m/s."""
     found = []
     for seed, (speed, off) in enumerate(zip(SPEEDS, OFF, strict=True)):
@@ -39,10 +39,10 @@ def misstated(changes: dict[str, float], sigma: float) -> list[tuple[str, Record
     return found
 
 
-def evidence(recordings: list[tuple[str, Recording]]) -> list[Evidence]:
+def dataset(recordings: list[tuple[str, Recording]]) -> list[Dataset]:
     found = []
     for name, r in recordings:
-        one = evidence_of(name, r, simulator_of(scenario(), r))
+        one = dataset_of(name, r, simulator_of(scenario(), r))
         assert one is not None
         found.append(doubted(one, set_up(scenario(), r)))
     return found
@@ -52,27 +52,27 @@ def test_what_is_eased_has_the_covariance_of_noise_alone() -> None:
     N = np.random.default_rng(2).normal(0.0, 3.0, (40, 3))
     values, vectors = np.linalg.eigh(np.eye(40) + N @ N.T)
     wanted = vectors @ np.diag(values**-0.5) @ vectors.T
-    assert eased(N)(np.eye(40)) == pytest.approx(wanted, abs=1e-12)
+    assert marginalised(N)(np.eye(40)) == pytest.approx(wanted, abs=1e-12)
     w = np.random.default_rng(3).normal(size=40)
-    assert eased(np.zeros((40, 0)))(w) is w
+    assert marginalised(np.zeros((40, 0)))(w) is w
 
 
 def test_speeds_that_are_uncertain_explain_what_they_can_and_no_more() -> None:
     left = {}
     for sigma in (0.0, 0.06):
-        found = evidence(misstated({}, sigma))
-        judge = Judge(found)
-        align(judge)
-        base = judge.fit((), ())
+        found = dataset(wrong_conditions({}, sigma))
+        problem = Problem(found)
+        align(problem)
+        base = problem.fit((), ())
         assert base is not None
         left[sigma] = np.sqrt(base.left / sum(e.count for e in found))
     assert left[0.0] > 1.6
     assert left[0.06] < 1.15
-    missing = evidence(
-        misstated({"effects.soil-crust.stiffness_ratio": 3.0, "effects.soil-crust.thickness": 0.06}, 0.06)
+    missing = dataset(
+        wrong_conditions({"effects.soil-crust.stiffness_ratio": 3.0, "effects.soil-crust.thickness": 0.06}, 0.06)
     )
-    judge = Judge(missing)
-    base = judge.fit((), ())
+    problem = Problem(missing)
+    base = problem.fit((), ())
     assert base is not None
     assert np.sqrt(base.left / sum(e.count for e in missing)) > 1.4 * left[0.06]  # a crust is no error of the speed
 
@@ -81,10 +81,10 @@ def test_an_effect_is_fitted_better_beside_speeds_that_are_wrong(monkeypatch: py
     monkeypatch.setattr(sys.modules[__name__], "OFF", (1.04, 1.03, 1.05))
     truth, off = 0.2, {}
     for sigma in (0.0, 0.08):
-        found = evidence(misstated({"effects.co-moving-mass.fraction": truth}, sigma))
-        judge = Judge(found)
+        found = dataset(wrong_conditions({"effects.co-moving-mass.fraction": truth}, sigma))
+        problem = Problem(found)
         c = next(c for c in candidates_of(found, (), "drop", None, size_of(scenario())) if c.id == "co-moving-mass")
-        one = judge.fit((c,), [coordinate(0.12, c.search["fraction"])])
+        one = problem.fit((c,), [coordinate(0.12, c.search["fraction"])])
         assert one is not None
         off[sigma] = abs(c.values(one.x)["fraction"] - truth)
     assert off[0.0] > 0.08  # all speeds were higher than written down, which a small mass of the soil looks like
@@ -105,30 +105,30 @@ def test_each_number_of_a_list_is_uncertain_by_itself_and_a_wrong_path_is_one_li
 def test_repeats_that_differ_are_scatter_and_what_was_done_once_is_given_it() -> None:
     one = recorded({}, 1, speeds=(2.0, 3.0), noise=0.003)
     stiff = recorded({"effects.soil-stiffness.scale": 1.15}, 2, speeds=(2.0,), noise=0.003)
-    found = with_scatter(evidence([*one, ("again", stiff[0][1])]))
+    found = with_scatter(dataset([*one, ("again", stiff[0][1])]))
     shares = [{s.channel: s.scatter / s.span for s in e.signals} for e in found]
     sinkage = [r.channels[DEPTH] for r in (one[0][1], stiff[0][1])]
     apart = np.sqrt(0.5 * np.mean((sinkage[0] - np.interp(one[0][1].time, stiff[0][1].time, sinkage[1])) ** 2))
     assert shares[0][DEPTH] == pytest.approx(apart / np.ptp(sinkage[0]), rel=0.15)
     assert shares[1][DEPTH] == pytest.approx(0.5 * (shares[0][DEPTH] + shares[2][DEPTH]), rel=1e-9)
-    alike = with_scatter(evidence([*one, ("again", recorded({}, 3, speeds=(2.0,), noise=0.003)[0][1])]))
+    alike = with_scatter(dataset([*one, ("again", recorded({}, 3, speeds=(2.0,), noise=0.003)[0][1])]))
     assert max(s.scatter / s.span for e in alike for s in e.signals if s.channel == FORCE) < 0.004
-    assert all(s.scatter == 0.0 for e in with_scatter(evidence(one)) for s in e.signals)
+    assert all(s.scatter == 0.0 for e in with_scatter(dataset(one)) for s in e.signals)
 
 
 def test_repeats_whose_clocks_are_apart_do_not_differ_by_their_leaps() -> None:
     """Accelerations that jump between two samples, 60 ms apart in time: neither is scatter."""
     channels = (DEPTH, "striker/acceleration_z")
     one, two = (recorded({}, seed, speeds=(3.0,), channels=channels, noise=0.003)[0][1] for seed in (1, 2))
-    found = with_scatter(evidence([("one", one), ("late", replace(two, time=two.time + 0.06))]))
+    found = with_scatter(dataset([("one", one), ("late", replace(two, time=two.time + 0.06))]))
     assert [s.scatter for e in found for s in e.signals] == [0.0] * 4
 
 
 def test_recordings_of_one_condition_are_left_out_one_by_one() -> None:
-    found = evidence([*recorded({}, 1, speeds=(2.0,)), *recorded({}, 2, speeds=(2.0,))])
+    found = dataset([*recorded({}, 1, speeds=(2.0,)), *recorded({}, 2, speeds=(2.0,))])
     assert groups_of(found) == [[0, 1]]
     assert left_out(found) == [[0], [1]]
-    assert left_out(evidence(recorded({}, 1, speeds=(2.0, 3.0)))) == [[0], [1]]
+    assert left_out(dataset(recorded({}, 1, speeds=(2.0, 3.0)))) == [[0], [1]]
 
 
 def test_what_a_tolerance_covers_is_no_mismatch() -> None:
@@ -150,7 +150,7 @@ def test_a_recording_says_what_it_leaves_uncertain(suffix: str, tmp_path: Path) 
     again = read_recording(tmp_path / f"one{suffix}")
     assert again.uncertainty == doubt
     assert again.clock == told.clock
-    e = evidence_of("one", again, simulator_of(scenario(), again))
+    e = dataset_of("one", again, simulator_of(scenario(), again))
     assert e is not None
     assert e.shift_prior == 0.004
 
@@ -196,7 +196,7 @@ def test_shapes_are_looked_for_where_they_have_a_part() -> None:
     """Growth dies out behind a cone's base; a ball's drag has its crisis at Reynolds numbers of 1e5 to 4e5."""
 
     def shapes(name: str, r: Recording, effect: str) -> dict[str, tuple[float, float]]:
-        e = evidence_of("one", r, simulator_of(shipped(name), r))
+        e = dataset_of("one", r, simulator_of(shipped(name), r))
         assert e is not None
         (one,) = [c for c in candidates_of([e], (), "drop", shipped(name)) if c.id == effect]
         return {n: (s.low, s.high) for n, s in one.shapes.items()}

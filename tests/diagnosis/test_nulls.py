@@ -11,14 +11,14 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import kstest
 
-from rollover.diagnosis.data.dataset import Evidence, evidence_of
+from rollover.diagnosis.data.dataset import Dataset, dataset_of
 from rollover.diagnosis.data.phases import drop_phases
-from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.forward.forward_model import Simulator, simulator_of
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.selection.candidates import candidates_of
-from rollover.diagnosis.selection.score_test import gate
+from rollover.diagnosis.selection.score_test import score_test
 from rollover.recording import Recording
 from rollover.recording.filters import filtered
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, scenario
@@ -48,11 +48,11 @@ def silent() -> list[tuple[Recording, Simulator]]:
     return found
 
 
-def noisy(drops: Sequence[tuple[Recording, Simulator]], rng: np.random.Generator, memory: float) -> list[Evidence]:
+def noisy(drops: Sequence[tuple[Recording, Simulator]], rng: np.random.Generator, memory: float) -> list[Dataset]:
     found = []
     for k, (r, simulator) in enumerate(drops):
         channels = {c: y + 0.01 * np.ptp(y) * noise(rng, y.size, memory) for c, y in r.channels.items()}
-        one = evidence_of(f"r{k}", replace(r, channels=channels), simulator)
+        one = dataset_of(f"r{k}", replace(r, channels=channels), simulator)
         assert one is not None
         found.append(replace(one, shift_prior=1e-8))  # clocks are right: every draw meets the same simulations
     return found
@@ -63,18 +63,18 @@ def test_p_values_are_uniform_where_there_is_only_noise(memory: float) -> None:
     rng, drops = np.random.default_rng(7), silent()
     omnibus, best = [], []
     for _ in range(DRAWS):
-        evidence = noisy(drops, rng, memory)
+        dataset = noisy(drops, rng, memory)
         misfit = [
             np.concatenate([s.values - r.channels[s.channel][s.rows] for s in e.signals])
-            for e, (r, _) in zip(evidence, drops, strict=True)
+            for e, (r, _) in zip(dataset, drops, strict=True)
         ]
-        judge = Judge(autoregression.whole(evidence, misfit))
-        base = judge.fit((), (), rounds=1)
+        problem = Problem(autoregression.whole(dataset, misfit))
+        base = problem.fit((), (), rounds=1)
         assert base is not None
-        phases = [drop_phases(e) for e in judge.evidence]
-        omnibus.append(mismatch_of(judge.evidence, base.blocks, phases).p_value)
-        few = [c for c in candidates_of(evidence, (), "drop") if c.kind == "sensor" and c.id != "sensor-lag"]
-        best.append(gate(judge, base, few).p_value())
+        phases = [drop_phases(e) for e in problem.dataset]
+        omnibus.append(mismatch_of(problem.dataset, base.blocks, phases).p_value)
+        few = [c for c in candidates_of(dataset, (), "drop") if c.kind == "sensor" and c.id != "sensor-lag"]
+        best.append(score_test(problem, base, few).p_value())
     assert kstest(omnibus, "uniform").pvalue > 0.01
     assert kstest(best, "uniform").pvalue > 0.01
     assert min(omnibus + best) > 1e-4
@@ -98,13 +98,13 @@ def test_a_memory_is_told_without_bias_though_each_recording_has_a_level() -> No
     rng, drops = np.random.default_rng(19), silent()
     found = []
     for _ in range(60):
-        evidence = noisy(drops, rng, 0.0)
-        spans = [0.01 * s.span for s in evidence[0].signals]
+        dataset = noisy(drops, rng, 0.0)
+        spans = [0.01 * s.span for s in dataset[0].signals]
         misfit = [
             np.concatenate([span * noise(rng, s.rows.size, 0.8) for s, span in zip(e.signals, spans, strict=True)])
-            for e in evidence
+            for e in dataset
         ]
-        told = autoregression.whole(autoregression.quiet(evidence, misfit), misfit)
+        told = autoregression.whole(autoregression.quiet(dataset, misfit), misfit)
         found += [sum(s.ar) for s in told[0].signals]
     assert np.mean(found) == pytest.approx(0.8, abs=0.0025)
 
@@ -140,22 +140,22 @@ def test_after_a_blow_nothing_is_quiet() -> None:
             return ((-0.04, "tipping"), (0.1, "impact"))
 
     blown: Any = Blown()
-    evidence = [replace(e, simulator=blown) for e in noisy(silent(), rng, 0.0)]
-    spans = {s.channel: 0.01 * s.span for s in evidence[0].signals}
+    dataset = [replace(e, simulator=blown) for e in noisy(silent(), rng, 0.0)]
+    spans = {s.channel: 0.01 * s.span for s in dataset[0].signals}
     misfit = []
-    for e in evidence:
+    for e in dataset:
         each = [np.where(e.recording.time[s.rows] < 0.1, 1.0, 3.0) * spans[s.channel] for s in e.signals]
         misfit.append(np.concatenate([size * rng.standard_normal(size.size) for size in each]))
-    for e in autoregression.quiet(evidence, misfit):
+    for e in autoregression.quiet(dataset, misfit):
         for s in e.signals:
             assert s.noise == pytest.approx(spans[s.channel], rel=0.15), s.channel
 
 
 def test_quiet_noise_is_found_beneath_a_misfit_many_times_as_large() -> None:
     rng, drops = np.random.default_rng(13), silent()
-    evidence = noisy(drops, rng, 0.0)
-    off = [np.concatenate([0.7 * s.values for s in e.signals]) for e in evidence]  # a scenario that says a third
-    for e, before in zip(autoregression.quiet(evidence, off), evidence, strict=True):
+    dataset = noisy(drops, rng, 0.0)
+    off = [np.concatenate([0.7 * s.values for s in e.signals]) for e in dataset]  # a scenario that says a third
+    for e, before in zip(autoregression.quiet(dataset, off), dataset, strict=True):
         for s, b in zip(e.signals, before.signals, strict=True):
             true = 0.01 * float(np.ptp(b.values))
             assert 0.6 * true < s.noise < 2.0 * true, s.channel

@@ -9,10 +9,10 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis.data.dataset import evidence_of
-from rollover.diagnosis.fit.jobs import Crew, Job, work
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
-from rollover.diagnosis.fit.linearisation import Block
+from rollover.diagnosis.data.dataset import dataset_of
+from rollover.diagnosis.fit.jobs import Executor, Task, work
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.averaging import simulated
@@ -20,7 +20,7 @@ from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.forward_step import SOON, _from_base
 from rollover.diagnosis.selection.restarts import begun_otherwise, clocked_alike
-from rollover.diagnosis.selection.score_test import Gate
+from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.screening import is_far, screen
 from rollover.effects import Search
 from tests.diagnosis.drops import linear_blocks, recorded, scenario
@@ -41,17 +41,17 @@ def begun(promised: float, gained: float) -> list[str]:
 
     asked: list[str] = []
 
-    def looks(look: Any, things: list[Any]) -> list[Any]:
+    def parallel_map(look: Any, things: list[Any]) -> list[Any]:
         """Least is left at the last of the places."""
         assert sum(len(places) for _, places in things) == (40 if things else 0)
         return [(1.0 if x[1] > 0.98 else 2.0, x) for _, (*_, x) in things]
 
-    def fits(jobs: list[Any]) -> list[None]:
-        asked.extend(f"{j.how} {j.candidates[-1].id} {sorted(j.candidates[-1].search)} {j.start}" for j in jobs)
-        return [None] * len(jobs)
+    def fits(tasks: list[Any]) -> list[None]:
+        asked.extend(f"{j.how} {j.candidates[-1].id} {sorted(j.candidates[-1].search)} {j.start}" for j in tasks)
+        return [None] * len(tasks)
 
-    inquiry = SimpleNamespace(free=lambda _: [PLAIN, SHAPED], fits=fits, looks=looks)
-    looked = Gate(
+    inquiry = SimpleNamespace(free=lambda _: [PLAIN, SHAPED], fits=fits, parallel_map=parallel_map)
+    looked = ScoreTest(
         score=40.0, scores={"mass": 40.0, "soil-adhesion": promised}, null=np.zeros(9), detectable={},
         starts={"soil-adhesion": ((0.7,),)},
     )  # fmt: skip
@@ -71,17 +71,19 @@ def test_what_is_sudden_is_looked_at_in_all_its_places_and_not_where_its_slopes_
     """The least of adhesion does something already: what moves along stays on the face."""
     known = {"effects.soil-elastic-rebound.recovery": 0.1, "effects.soil-elastic-rebound.damping_ratio": 0.1}
     made = recorded({**known, "effects.soil-adhesion.stress": 4.6e4}, speeds=(1.5, 2.5), rate=1000.0, noise=0.1)
-    found = [evidence_of(name, *simulated(scenario().replaced(known), r)) for name, r in made]
-    judge = Judge([e for e in found if e is not None])
-    align(judge)
-    base = judge.fit((), ())
+    found = [dataset_of(name, *simulated(scenario().replaced(known), r)) for name, r in made]
+    problem = Problem([e for e in found if e is not None])
+    align(problem)
+    base = problem.fit((), ())
     assert base is not None
-    assert not is_far(judge, base)  # from there all places are looked at
-    c = next(c for c in candidates_of(judge.evidence, (), "drop") if c.id == "soil-adhesion")
+    assert not is_far(problem, base)  # from there all places are looked at
+    c = next(c for c in candidates_of(problem.dataset, (), "drop") if c.id == "soil-adhesion")
     led = replace(c, id="soil-crust")  # any that is not
     assert (c.is_sudden, led.is_sudden) == (True, False)
-    looked = Gate(score=9.0, scores={c.key: 9.0}, null=np.zeros(9), detectable={}, starts={c.key: ((0.01,),)})
-    inquiry = Inquiry(judge=judge, candidates=(c,), groups=[[0], [1]], phases=[], say=lambda _: None, crew=Crew())
+    looked = ScoreTest(score=9.0, scores={c.key: 9.0}, null=np.zeros(9), detectable={}, starts={c.key: ((0.01,),)})
+    inquiry = Inquiry(
+        problem=problem, candidates=(c,), groups=[[0], [1]], phases=[], say=lambda _: None, executor=Executor()
+    )
     (seen,) = screen(inquiry, base, [c], [0, 1], [b.shift for b in base.blocks], looked)
     nearest = min(c.starts(), key=lambda x: abs(np.log(c.values(x)["stress"] / 4.6e4)))
     assert seen.starts[0] == nearest
@@ -102,65 +104,67 @@ def test_what_rings_and_scored_most_is_combed_though_its_fit_went_astray(score: 
     )
     asked: list[str] = []
 
-    def fits(jobs: list[Any]) -> list[None]:
-        asked.extend(f"{j.how} {j.candidates[-1].id}" for j in jobs)
-        return [None] * len(jobs)
+    def fits(tasks: list[Any]) -> list[None]:
+        asked.extend(f"{j.how} {j.candidates[-1].id}" for j in tasks)
+        return [None] * len(tasks)
 
-    inquiry = SimpleNamespace(free=lambda _: [PLAIN, rings], fits=fits, looks=lambda look, things: [None] * len(things))
-    looked = Gate(score=50.0, scores={"mass": 40.0, rings.key: score}, null=np.zeros(9), detectable={})
+    inquiry = SimpleNamespace(
+        free=lambda _: [PLAIN, rings], fits=fits, parallel_map=lambda look, things: [None] * len(things)
+    )
+    looked = ScoreTest(score=50.0, scores={"mass": 40.0, rings.key: score}, null=np.zeros(9), detectable={})
     assert begun_otherwise(cast(Inquiry, inquiry), best, [best, astray], looked, (0.0, 0.0)) == [best, astray]
     assert asked == ["polish structural-compliance", "time structural-compliance"] * combed
 
 
 def test_a_recordings_clock_is_that_of_the_fit_that_leaves_least_where_another_ended_in_a_dip() -> None:
     made = recorded({}, speeds=(1.5, 2.5), rate=1000.0, noise=0.01)
-    found = [evidence_of(name, *simulated(scenario(), r)) for name, r in made]
-    judge = Judge([e for e in found if e is not None])
-    align(judge)
+    found = [dataset_of(name, *simulated(scenario(), r)) for name, r in made]
+    problem = Problem([e for e in found if e is not None])
+    align(problem)
 
     def clocked(c: Candidate, *late: float) -> Fitted:
-        blocks = [judge.block(r, (c,), (0.5,), judge.shifts[r] + s, 0.0) for r, s in enumerate(late)]
+        blocks = [problem.block(r, (c,), (0.5,), problem.shifts[r] + s, 0.0) for r, s in enumerate(late)]
         return Fitted(candidates=(c,), x=(0.5,), blocks=tuple(b for b in blocks if b is not None))
 
     lead, late = clocked(PLAIN, 0.0, 0.0), clocked(replace(PLAIN, own={"added": 0.0}), 0.0, 2e-3)
     alike = clocked(PLAIN, 1e-5, 0.0)
-    asked: list[Job] = []
+    asked: list[Task] = []
 
-    def fits(jobs: list[Job]) -> list[Fitted | None]:
-        asked.extend(jobs)
-        return [work(judge, job) for job in jobs]
+    def fits(tasks: list[Task]) -> list[Fitted | None]:
+        asked.extend(tasks)
+        return [work(problem, task) for task in tasks]
 
-    inquiry = cast(Inquiry, SimpleNamespace(judge=judge, fits=fits))
+    inquiry = cast(Inquiry, SimpleNamespace(problem=problem, fits=fits))
     assert clocked_alike(inquiry, []) == []  # nothing is near where each leaves more than the base
     kept, moved, same = clocked_alike(inquiry, [lead, late, alike])
     assert kept is lead
     assert same is alike
-    assert [(job.how, job.shifts) for job in asked] == [("time", tuple(judge.shifts))]
-    assert abs(moved.blocks[1].shift - judge.shifts[1]) < 1e-4
+    assert [(task.how, task.shifts) for task in asked] == [("time", tuple(problem.shifts))]
+    assert abs(moved.blocks[1].shift - problem.shifts[1]) < 1e-4
     assert moved.left < late.left
 
 
 def test_what_was_led_astray_is_begun_anew_and_gone_on_with_if_it_soon_gains() -> None:
     """The base leaves 400 and the best 200: one comes to 290 in a few rounds and to 250 in the end, one to 310."""
-    asked: list[Job] = []
+    asked: list[Task] = []
 
     def fitted(id: str, left: float, x: tuple[float, ...]) -> Fitted:
         c = replace(PLAIN, id=id)
-        block = Block(
+        block = ResidualBlock(
             residual=np.full(4, np.sqrt(left / 4.0)), J=np.zeros((4, len(x))), slope=np.zeros(4), shift=0.0, prior=1.0
         )
         return Fitted(candidates=(PLAIN, c)[-len(x) :], x=x, blocks=(block,))
 
-    def fits(jobs: list[Job]) -> list[Fitted]:
-        asked.extend(jobs)
+    def fits(tasks: list[Task]) -> list[Fitted]:
+        asked.extend(tasks)
         ends = {("inertia", SOON): 290.0, ("inertia", None): 250.0, ("air-drag", SOON): 310.0}
-        return [fitted(j.candidates[-1].id, ends[j.candidates[-1].id, j.rounds], j.start) for j in jobs]
+        return [fitted(j.candidates[-1].id, ends[j.candidates[-1].id, j.rounds], j.start) for j in tasks]
 
     base = fitted("mass", 400.0, (0.5,))
     astray = [fitted("inertia", 900.0, (0.4, 0.9)), fitted("air-drag", 700.0, (0.4, 0.8))]
-    judge = SimpleNamespace(again=lambda f: f)
-    inquiry = cast(Inquiry, SimpleNamespace(fits=fits, judge=judge))
-    looked = Gate(score=1.0, scores={}, null=np.zeros(1), detectable={}, starts={"inertia": ((0.7,),)})
+    problem = SimpleNamespace(again=lambda f: f)
+    inquiry = cast(Inquiry, SimpleNamespace(fits=fits, problem=problem))
+    looked = ScoreTest(score=1.0, scores={}, null=np.zeros(1), detectable={}, starts={"inertia": ((0.7,),)})
     found = _from_base(inquiry, base, [fitted("slope", 200.0, (0.5, 0.2)), *astray], looked)
     assert [(f.candidates[-1].id, f.left) for f in found] == [("inertia", 250.0), ("air-drag", 310.0)]
     assert [j.start for j in asked] == [(0.5, 0.7), (0.5, 0.8), (0.5, 0.7)]

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from rollover.comparison.instruments import at_sensor
-from rollover.diagnosis.data.dataset import evidence_of
+from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.data.phases import phases_of as phases
 from rollover.diagnosis.fit import cache
 from rollover.diagnosis.fit.ensemble_mean import left_of_means, rescattered
-from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.forward import full_run
 from rollover.diagnosis.forward.forward_model import DropSimulator, simulator_of
 from rollover.diagnosis.forward.full_run import RunSimulator
@@ -190,7 +190,7 @@ def test_phases_of_an_overturn_are_those_of_its_forces() -> None:
 
 def test_phases_are_cut_to_the_recording() -> None:
     made = recording(Z, until=0.4)
-    found = evidence_of(
+    found = dataset_of(
         "toss", replace(made, channels={Z: np.linspace(0.1, 0.0, made.time.size)}), RunSimulator(toss(), made)
     )
     assert found is not None
@@ -201,41 +201,41 @@ def test_phases_are_cut_to_the_recording() -> None:
 
 def test_neighbours_stray_after_the_first_contact_only() -> None:
     simulator = RunSimulator(toss(), recording(Z, ROLL, until=0.5))
-    strays = simulator.strays()
-    assert len(strays) == len(full_run.NEIGHBOURS)
-    assert simulator.runs == 1 + len(strays)
+    perturbed = simulator.perturbed()
+    assert len(perturbed) == len(full_run.PERTURBATIONS)
+    assert simulator.runs == 1 + len(perturbed)
     time = simulator.recording.time
     touch = next(at for at, name in simulator.marks() if name == "impact")
-    for stray in strays:
-        assert np.max(np.abs(stray[Z][time < touch])) < 1e-6
-    assert max(np.max(np.abs(s[ROLL][time > touch])) for s in strays) > 1e-4
+    for perturbed_run in perturbed:
+        assert np.max(np.abs(perturbed_run[Z][time < touch])) < 1e-6
+    assert max(np.max(np.abs(s[ROLL][time > touch])) for s in perturbed) > 1e-4
 
 
 def test_all_neighbours_may_be_run_in_shorter_steps() -> None:
     simulator = RunSimulator(toss(), recording(Z))
     own = simulator.scenario.simulation.step
-    steps = {simulator.scenario.replaced(simulator._beside(n, 4)).simulation.step for n in full_run.NEIGHBOURS}
+    steps = {simulator.scenario.replaced(simulator._beside(n, 4)).simulation.step for n in full_run.PERTURBATIONS}
     assert steps == {own / 4}
-    steps = {simulator.scenario.replaced(simulator._beside(n)).simulation.step for n in full_run.NEIGHBOURS}
-    assert steps == {own / n.parts for n in full_run.NEIGHBOURS}
+    steps = {simulator.scenario.replaced(simulator._beside(n)).simulation.step for n in full_run.PERTURBATIONS}
+    assert steps == {own / n.parts for n in full_run.PERTURBATIONS}
 
 
 @pytest.mark.parametrize("parts", [1, 4])
 def test_runs_that_scatter_is_told_by_are_made_at_once_for_all_recordings_the_longest_first(
     parts: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """All that `strays` asks for; a drop has none."""
+    """All that `perturbed` asks for; a drop has none."""
     drop = DropSimulator(shipped("drop_test"), recording("ground/sinkage"))
     runs = [RunSimulator(toss(), recording(Z, until=until)) for until in (0.1, 0.2)]
     changes = {FRICTION: 0.3}
-    wanted = full_run.neighbours_of([runs[0], drop, runs[1]], changes, parts)
+    wanted = full_run.perturbations_of([runs[0], drop, runs[1]], changes, parts)
     steps = [toss().replaced(dict(one)).simulation.step for _, one in wanted]
     assert steps == sorted(steps)
     asked: list[tuple[Any, Mapping[str, Any]]] = []
     monkeypatch.setattr(RunSimulator, "predict", lambda own, values, _: asked.append((own, values)) or {})
     for own in runs:
-        own.strays(changes, parts=parts)
-    assert len(wanted) == len(asked) == 2 * (1 + len(full_run.NEIGHBOURS))
+        own.perturbed(changes, parts=parts)
+    assert len(wanted) == len(asked) == 2 * (1 + len(full_run.PERTURBATIONS))
     assert all(any(own is other and one == values for other, one in wanted) for own, values in asked)
 
 
@@ -245,15 +245,15 @@ def test_scatter_is_asked_for_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     empty = recording(Z, until=0.5)
     made_of = replace(empty, channels={Z: np.interp(empty.time, run().time, run()[Z])})
     own = RunSimulator(toss(), made_of)
-    found = evidence_of("toss", made_of, own)
+    found = dataset_of("toss", made_of, own)
     assert found is not None
-    judge = Judge([found])
-    nothing = judge.fit((), (), rounds=0)
+    problem = Problem([found])
+    nothing = problem.fit((), (), rounds=0)
     assert nothing is not None
     made.clear()
-    rescattered(judge, nothing, 4)
-    left_of_means(judge, nothing)
-    assert [n for n in made if n > 1] == 2 * [1 + len(full_run.NEIGHBOURS)]
+    rescattered(problem, nothing, 4)
+    left_of_means(problem, nothing)
+    assert [n for n in made if n > 1] == 2 * [1 + len(full_run.PERTURBATIONS)]
 
 
 def test_the_motion_is_told_though_it_was_not_recorded() -> None:

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.data.phases import phases_of
-from rollover.diagnosis.fit.jobs import Crew
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.jobs import Executor
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
 from rollover.diagnosis.fit.step import Screened, Step
 from rollover.diagnosis.fit.threshold_scan import has_threshold, placed_beside
 from rollover.diagnosis.selection import pairs
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.score_test import Gate
+from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.effects import Search
 from tests.diagnosis.drops import linear_blocks, recorded
 from tests.diagnosis.test_fits import candidate, judge_of
@@ -48,11 +48,11 @@ def screened(c: Candidate) -> Screened:
 def inquiry(asked: list[Any]) -> Inquiry:
     """Answers each job with a fit that leaves nothing but chance, and notes it."""
 
-    def fits(jobs: list[Any]) -> list[Fitted]:
-        asked.extend(jobs)
-        return [fitted((*j.candidates[:-1], j.candidates[-1].whole()), 1.0) for j in jobs]
+    def fits(tasks: list[Any]) -> list[Fitted]:
+        asked.extend(tasks)
+        return [fitted((*j.candidates[:-1], j.candidates[-1].whole()), 1.0) for j in tasks]
 
-    return cast(Inquiry, SimpleNamespace(fits=fits, judge=SimpleNamespace(again=lambda f: f, evidence=()), phases=()))
+    return cast(Inquiry, SimpleNamespace(fits=fits, problem=SimpleNamespace(again=lambda f: f, dataset=()), phases=()))
 
 
 def test_what_took_another_form_alone_is_tried_in_its_usual_one_beside_others() -> None:
@@ -62,7 +62,7 @@ def test_what_took_another_form_alone_is_tried_in_its_usual_one_beside_others() 
         base=fitted((), 30.0), fitted=alone, p_value=0.0, rivals=(alone, fitted((MASS,), 4.0)),
         screened=(screened(DAMPING), screened(MASS)),
     )  # fmt: skip
-    looked = Gate(score=9.0, scores={"mass": 9.0}, null=np.zeros(9), detectable={})
+    looked = ScoreTest(score=9.0, scores={"mass": 9.0}, null=np.zeros(9), detectable={})
     found = pairs._partners(inquiry([]), first, (), looked, pairs.SCORED)
     assert [(c.id, c.form, x) for c, x in found] == [
         ("soil-viscous-damping", {"damping": 0.0}, (0.5,)),
@@ -78,7 +78,7 @@ def test_what_is_bent_and_does_not_lead_is_tried_in_its_usual_form_as_well() -> 
         base=fitted((), 30.0), fitted=lead, p_value=0.0, rivals=(lead, bent),
         screened=(screened(DAMPING), screened(MASS)),
     )  # fmt: skip
-    looked = Gate(score=9.0, scores={"mass": 9.0}, null=np.zeros(9), detectable={})
+    looked = ScoreTest(score=9.0, scores={"mass": 9.0}, null=np.zeros(9), detectable={})
     found = pairs._partners(inquiry([]), first, (), looked, pairs.SCORED)
     assert [(c.id, c.form) for c, _ in found] == [
         ("mass", {}),
@@ -198,7 +198,7 @@ def test_what_is_stiffer_above_is_tried_as_what_is_softer_below(
 RATE, DEPTH = 0.05, 0.13  # per decade, m
 
 
-def layered(ratio: float, depth: float = DEPTH) -> Judge:
+def layered(ratio: float, depth: float = DEPTH) -> Problem:
     """Ground that hardens by its rate and is so many times as stiff below a depth, met three times."""
     hidden = {
         "effects.soil-rate-hardening.per_decade": RATE,
@@ -211,18 +211,18 @@ def layered(ratio: float, depth: float = DEPTH) -> Judge:
 @pytest.mark.parametrize(("ratio", "lost"), [(0.7, 500.0), (1.3, 0.0)])
 def test_what_sets_in_somewhere_is_begun_where_it_helps_beside_the_other(ratio: float, lost: float) -> None:
     """Alone a softer layer ends elsewhere than under ground that hardens: from there a fit of both leads nowhere."""
-    judge = layered(ratio)
-    rate, layer = candidate(judge, "soil-rate-hardening"), candidate(judge, "soil-layer")
+    problem = layered(ratio)
+    rate, layer = candidate(problem, "soil-rate-hardening"), candidate(problem, "soil-layer")
     shifts, few = [0.0] * 3, [0, 1, 2]
-    hardening = judge.fit((rate,), (0.6,), shifts=shifts, pinned=True)
-    alone = judge.fit((layer,), (0.3, 0.5), shifts=shifts, pinned=True)
+    hardening = problem.fit((rate,), (0.6,), shifts=shifts, fixed_shifts=True)
+    alone = problem.fit((layer,), (0.3, 0.5), shifts=shifts, fixed_shifts=True)
     assert hardening is not None
     assert alone is not None
-    begun = placed_beside(judge, (rate, hardening.x, layer), few=few, shifts=shifts)
+    begun = placed_beside(problem, (rate, hardening.x, layer), few=few, shifts=shifts)
     assert begun is not None
     assert begun[:1] == hardening.x
     assert begun[1] == pytest.approx(coordinate(DEPTH, layer.search["depth"]), abs=0.1)
-    led = [judge.fit((rate, layer), x, shifts=shifts) for x in (begun, (*hardening.x, *alone.x))]
+    led = [problem.fit((rate, layer), x, shifts=shifts) for x in (begun, (*hardening.x, *alone.x))]
     assert led[0] is not None
     assert led[1] is not None
     count = sum(b.residual.size for b in led[0].blocks)
@@ -233,18 +233,18 @@ def test_what_sets_in_somewhere_is_begun_where_it_helps_beside_the_other(ratio: 
 def test_of_the_places_beside_another_one_that_leaves_least_is_taken() -> None:
     """Two more are reached by the fastest drop, and leave more."""
     shallow = 0.07
-    judge = layered(0.7, shallow)
-    rate, layer = candidate(judge, "soil-rate-hardening"), candidate(judge, "soil-layer")
-    begun = placed_beside(judge, (rate, (0.1,), layer), few=[0, 1, 2], shifts=[0.0] * 3)
+    problem = layered(0.7, shallow)
+    rate, layer = candidate(problem, "soil-rate-hardening"), candidate(problem, "soil-layer")
+    begun = placed_beside(problem, (rate, (0.1,), layer), few=[0, 1, 2], shifts=[0.0] * 3)
     assert begun is not None
     assert begun[1] == pytest.approx(coordinate(shallow, layer.search["depth"]), abs=0.1)
 
 
 def test_what_sets_in_somewhere_says_how_strong_it_is_and_where() -> None:
-    judge = layered(1.3)
+    problem = layered(1.3)
     able = ("soil-layer", "soil-crust")
     others = ("soil-rate-hardening", "structural-compliance", "mass")
-    assert [has_threshold(candidate(judge, i)) for i in (*able, *others)] == [True, True, False, False, False]
+    assert [has_threshold(candidate(problem, i)) for i in (*able, *others)] == [True, True, False, False, False]
 
 
 def test_what_led_and_what_sets_in_somewhere_are_placed_two_by_two(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -254,11 +254,11 @@ def test_what_led_and_what_sets_in_somewhere_are_placed_two_by_two(monkeypatch: 
     partners = [(MASS, (0.1,)), (DAMPING, (0.2,)), (layer, (0.3, 0.4)), (bent, (0.5, 0.6)), (PROPORTION, (0.7,))]
     tried: list[Any] = []
 
-    def looks(look: Any, ways: list[Any]) -> list[Any]:
+    def parallel_map(look: Any, ways: list[Any]) -> list[Any]:
         tried.append((look.keywords, [(a.id, x, c.id) for a, x, c in ways]))
         return [None, *((*x, 0.8, 0.9) for _, x, _ in ways[1:])]
 
-    asking = cast(Inquiry, SimpleNamespace(looks=looks))
+    asking = cast(Inquiry, SimpleNamespace(parallel_map=parallel_map))
     found = pairs._placed_anew(asking, partners, [0, 2], [1e-3, 0.0, 0.0])
     ways = [
         ("mass", (0.1,), "soil-layer"),
@@ -274,18 +274,18 @@ def test_what_led_and_what_sets_in_somewhere_are_placed_two_by_two(monkeypatch: 
 
 def test_a_pair_of_which_one_is_placed_beside_the_other() -> None:
     """The hardening does not lead and the layer ended elsewhere alone: together they are all there is."""
-    judge = layered(0.7)
-    rate, layer, stiffer = (candidate(judge, i) for i in ("soil-rate-hardening", "soil-layer", "soil-stiffness"))
-    base = judge.fit((), ())
+    problem = layered(0.7)
+    rate, layer, stiffer = (candidate(problem, i) for i in ("soil-rate-hardening", "soil-layer", "soil-stiffness"))
+    base = problem.fit((), ())
     assert base is not None
-    alone = [judge.fit((c,), x, shifts=[0.0] * 3) for c, x in ((stiffer, (0.5,)), (rate, (0.6,)))]
+    alone = [problem.fit((c,), x, shifts=[0.0] * 3) for c, x in ((stiffer, (0.5,)), (rate, (0.6,)))]
     led = [f for f in alone if f is not None]
     lost = Screened(candidate=layer, starts=((0.05, 0.9),), left=9.0, potential=0.0)
     first = Step(base=base, fitted=led[0], p_value=0.0, rivals=tuple(led), screened=(lost,))
-    looked = Gate(score=9.0, scores={"soil-layer": 9.0}, null=np.zeros(9), detectable={})
+    looked = ScoreTest(score=9.0, scores={"soil-layer": 9.0}, null=np.zeros(9), detectable={})
     asking = Inquiry(
-        judge=judge, candidates=[rate, layer, stiffer], groups=[], phases=[phases_of(e) for e in judge.evidence],
-        say=lambda _: None, crew=Crew(),
+        problem=problem, candidates=[rate, layer, stiffer], groups=[], phases=[phases_of(e) for e in problem.dataset],
+        say=lambda _: None, executor=Executor(),
     )  # fmt: skip
     best = pairs.best_pair(asking, [first], looked)
     assert best is not None
@@ -331,9 +331,9 @@ def test_three_are_given_for_two_only_where_the_third_is_not_needed(
     monkeypatch.setattr(pairs, "best_pair", lambda *_: found)
     monkeypatch.setattr(pairs, "followed", lambda _, one: (one, SimpleNamespace(p_value=1e-6)))
     monkeypatch.setattr(pairs, "is_enough", lambda *_: False)
-    monkeypatch.setattr(pairs, "weighed", lambda *_: True)
+    monkeypatch.setattr(pairs, "reweighted", lambda *_: True)
     monkeypatch.setattr(pairs, "mismatch_of", lambda *_: SimpleNamespace(p_value=0.4))
-    both = pairs.two_by_two(inquiry([]), [found], cast(Gate, None), fitted((MASS,), 1.0), is_whole=True)
+    both = pairs.best_subsets(inquiry([]), [found], cast(ScoreTest, None), fitted((MASS,), 1.0), is_whole=True)
     assert (both is not None) == taken
 
 
@@ -352,22 +352,24 @@ def test_a_pair_that_leaves_nearly_noise_tells_of_it(
 ) -> None:
     """Quiet stretches alone tell of a noise that is a little too small: two that are all there is left structure."""
     found = Step(base=fitted((), 30.0), fitted=fitted((MASS,), 2.0), p_value=0.0)
-    weighed: list[Any] = []
+    reweighted: list[Any] = []
 
-    def weigh(_judge: Any, fit: Fitted, _phases: Any) -> bool:
-        weighed.append(fit)
+    def with_noise_model(_judge: Any, fit: Fitted, _phases: Any) -> bool:
+        reweighted.append(fit)
         return is_noise
 
     monkeypatch.setattr(pairs, "best_pair", lambda *_: found)
     monkeypatch.setattr(pairs, "followed", lambda _, one: (one, SimpleNamespace(p_value=p_value)))
     monkeypatch.setattr(pairs, "is_enough", lambda _judge, _fit, left: left.p_value > 0.001)
-    monkeypatch.setattr(pairs, "weighed", weigh)
+    monkeypatch.setattr(pairs, "reweighted", with_noise_model)
     monkeypatch.setattr(pairs, "mismatch_of", lambda *_: SimpleNamespace(p_value=0.4))
     asking = inquiry([])
-    asking.judge.evidence, asking.judge.weigh = ("quiet",), weighed.append  # type: ignore[assignment,method-assign]
-    both = pairs.two_by_two(
-        asking, [found], cast(Gate, None), fitted((MASS,), 1.8 if is_whole else 2.5), is_whole=is_whole
+    asking.problem.dataset, asking.problem.with_noise_model = ("quiet",), reweighted.append  # type: ignore[assignment,method-assign]
+    both = pairs.best_subsets(
+        asking, [found], cast(ScoreTest, None), fitted((MASS,), 1.8 if is_whole else 2.5), is_whole=is_whole
     )
     assert (None if both is None else both[1].p_value) == told
     tried = [] if p_value > 0.001 else [found.fitted]
-    assert weighed == [*tried, *([("quiet",)] if both is None else [])], "the noise is as it was if they are not taken"
+    assert reweighted == [*tried, *([("quiet",)] if both is None else [])], (
+        "the noise is as it was if they are not taken"
+    )

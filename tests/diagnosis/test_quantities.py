@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollover.diagnosis.data.dataset import Evidence
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.data.dataset import Dataset
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.inference.vehicle_dependence import dependency
-from rollover.diagnosis.noise.ensemble import Course
+from rollover.diagnosis.noise.ensemble import HeavyTail
 from tests.diagnosis.test_chassis import ABOUT, ALONG, thrown
 
 SPEEDS = (0.4, 0.8, 1.2)
@@ -19,17 +19,17 @@ FALLING = "np.abs(state['chassis/velocity_z'])"
 
 def told(off: dict[str, str], speeds: tuple[float, ...] = SPEEDS) -> list[tuple[str, float]]:
     """What tosses depend on that were recorded with `off` added."""
-    judge, base = judged([thrown(v, off)[1] for v in speeds])
-    found = dependency(judge, base)
+    problem, base = judged([thrown(v, off)[1] for v in speeds])
+    found = dependency(problem, base)
     assert sum(share for _, share in found) <= 1.0
     return list(found)
 
 
-def judged(evidence: list[Evidence]) -> tuple[Judge, Fitted]:
-    judge = Judge(evidence)
-    base = judge.fit((), (), shifts=[0.0] * len(evidence), rounds=0)
+def judged(dataset: list[Dataset]) -> tuple[Problem, Fitted]:
+    problem = Problem(dataset)
+    base = problem.fit((), (), shifts=[0.0] * len(dataset), rounds=0)
     assert base is not None
-    return judge, base
+    return problem, base
 
 
 def test_what_a_force_is_a_function_of_predicts_it_in_conditions_left_out() -> None:
@@ -59,31 +59,33 @@ def test_a_second_quantity_has_what_it_adds() -> None:
 def test_nothing_depends_on_anything_where_there_is_only_noise() -> None:
     found = told({})
     assert not found or found[0][1] < 0.3
-    judge, base = judged([thrown(v, {})[1] for v in SPEEDS])
+    problem, base = judged([thrown(v, {})[1] for v in SPEEDS])
     less = tuple(replace(b, residual=0.5 * b.residual) for b in base.blocks)
-    assert dependency(judge, replace(base, blocks=less)) == ()  # less than noise leaves
+    assert dependency(problem, replace(base, blocks=less)) == ()  # less than noise leaves
 
 
 @pytest.mark.parametrize("weight", [0.0, 1.0])
 def test_samples_count_for_what_they_count_in_the_fit(weight: float) -> None:
     """The second half of each recording goes its own way: where it counts nothing the first half tells."""
     gone = f"4.0 * {FALLING} + 6.0 * (t > 0.08) * np.sin(40.0 * t * {{v}} + 3.0 * {{v}})"
-    evidence = []
+    dataset = []
     for v in SPEEDS:
         e = thrown(v, {ALONG[1]: gone.format(v=v)})[1]
         counts = np.where(e.recording.time > 0.08, weight, 1.0)
-        evidence.append(replace(e, signals=tuple(replace(s, weight=counts[s.rows]) for s in e.signals)))
-    found = dict(dependency(*judged(evidence)))
+        dataset.append(replace(e, signals=tuple(replace(s, weight=counts[s.rows]) for s in e.signals)))
+    found = dict(dependency(*judged(dataset)))
     assert (found.get("chassis/velocity_z", 0.0) > 0.9) == (weight == 0.0)
 
 
 def test_columns_count_after_another_course_as_the_misfit_does() -> None:
-    judge, base = judged([thrown(v, {ALONG[1]: f"4.0 * {FALLING}"})[1] for v in SPEEDS])
+    problem, base = judged([thrown(v, {ALONG[1]: f"4.0 * {FALLING}"})[1] for v in SPEEDS])
     blocks = []
-    for e, b in zip(judge.evidence, base.blocks, strict=True):
+    for e, b in zip(problem.dataset, base.blocks, strict=True):
         late = np.concatenate([e.recording.time[s.rows] > 0.05 for s in e.signals])
         counts = np.where(late, 0.3, 1.0)
-        blocks.append(replace(b, residual=counts * b.residual, course=Course(samples=counts, share=0.1, more=0.0)))
-    found = dependency(judge, replace(base, blocks=tuple(blocks)))
+        blocks.append(
+            replace(b, residual=counts * b.residual, heavy_tail=HeavyTail(samples=counts, share=0.1, more=0.0))
+        )
+    found = dependency(problem, replace(base, blocks=tuple(blocks)))
     assert found[0][0] == "chassis/velocity_z"
     assert found[0][1] > 0.95

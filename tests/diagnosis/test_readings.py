@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.data.dataset import Evidence, evidence_of
+from rollover.diagnosis.data.dataset import Dataset, dataset_of
 from rollover.diagnosis.data.quantisation import digitised, resolution, without_spikes
 from rollover.diagnosis.fit.cross_validation import held_out
-from rollover.diagnosis.fit.linearisation import Block, Fitted, turned
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, turned
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.forward.forward_model import simulator_of
 from rollover.diagnosis.selection.forward_step import moves
@@ -56,7 +56,7 @@ def test_coarse_digits_are_no_mismatch_and_hide_no_large_one() -> None:
 def test_noise_makes_the_rounding_of_each_sample_its_own(noise: float, shared: float) -> None:
     """Widrow: with s of noise before a step d, exp(-2 pi^2 s^2/d^2) of what rounding does is left on the average."""
     name, r = recorded({}, speeds=(2.0,), noise=0.0, rate=1000.0)[0]
-    one = evidence_of(name, r, simulator_of(scenario(), r))
+    one = dataset_of(name, r, simulator_of(scenario(), r))
     assert one is not None
     step = 0.02 * float(np.ptp(r[FORCE]))
     noisy = r[FORCE] + noise * step * np.random.default_rng(5).standard_normal(r.time.size)
@@ -70,12 +70,12 @@ def test_noise_makes_the_rounding_of_each_sample_its_own(noise: float, shared: f
 def test_a_digit_that_flips_beside_an_edge_is_no_noise_of_its_own() -> None:
     """Of two recordings of one channel the quieter one tells how much noise there is before the steps."""
     name, r = recorded({}, speeds=(2.0,), noise=0.0, rate=1000.0)[0]
-    one = evidence_of(name, r, simulator_of(scenario(), r))
+    one = dataset_of(name, r, simulator_of(scenario(), r))
     assert one is not None
     step = 0.02 * float(np.ptp(r[FORCE]))
     rough = replace(r, channels={**r.channels, FORCE: np.round(r[FORCE] / step) * step})
 
-    def seen(noise: float) -> Evidence:
+    def seen(noise: float) -> Dataset:
         return replace(one, signals=tuple(replace(s, noise=noise * step) for s in one.signals))
 
     both = digitised([seen(0.0), seen(0.5)], [rough, rough])
@@ -141,10 +141,12 @@ def test_within_half_a_step_of_its_digits_nothing_has_moved() -> None:
     for share, told in ((0.4, 0.0), (0.6, 0.6 / 20.0)):
         s = replace(signal(values, 0.1), step=1.0, span=20.0)
         e: Any = SimpleNamespace(spans=lambda s=s: [(s, slice(0, 100))])
-        judge: Any = SimpleNamespace(evidence=[e])
+        problem: Any = SimpleNamespace(dataset=[e])
         blocks = [
-            Block(residual=np.full(100, off / 0.1), J=np.zeros((100, 0)), slope=np.zeros(100), shift=0.0, prior=1.0)
+            ResidualBlock(
+                residual=np.full(100, off / 0.1), J=np.zeros((100, 0)), slope=np.zeros(100), shift=0.0, prior=1.0
+            )
             for off in (share, 0.0)
         ]
         base, fitted = (Fitted(candidates=(), x=(), blocks=(b,)) for b in blocks)
-        assert moves(judge, base, fitted) == pytest.approx(told)
+        assert moves(problem, base, fitted) == pytest.approx(told)

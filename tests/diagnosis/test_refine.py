@@ -12,11 +12,11 @@ import pytest
 
 from rollover.comparison.synthesis import synthetic
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.data.dataset import evidence_of
+from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.data.phases import phases_of
 from rollover.diagnosis.fit import levenberg_marquardt, local_search, threshold_scan
-from rollover.diagnosis.fit.jobs import Crew
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.jobs import Executor
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.local_search import ended, timed
 from rollover.diagnosis.fit.model_variants import shaped
 from rollover.diagnosis.fit.parameterisation import coordinate, coordinates
@@ -28,9 +28,9 @@ from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.selection import restarts
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.pairs import two_by_two
+from rollover.diagnosis.selection.pairs import best_subsets
 from rollover.diagnosis.selection.restarts import _combed
-from rollover.diagnosis.selection.score_test import Gate
+from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.dynamics.simulate import run
 from rollover.effects import EFFECTS
 from rollover.proof.generator import Case, make, plan
@@ -42,10 +42,10 @@ from tests.physics.scenes import shipped
 CHANNELS = (FORCE, DEPTH, ACCELERATION)
 
 
-def judge_of_case(case: Case, folder: Path) -> Judge:
+def judge_of_case(case: Case, folder: Path) -> Problem:
     path = folder / "scenario.yaml"
     path.write_text(case.scenario, encoding="utf-8")
-    return Judge([evidence_of(str(k), *simulated(load(path), r)) for k, r in enumerate(case.recordings)])
+    return Problem([dataset_of(str(k), *simulated(load(path), r)) for k, r in enumerate(case.recordings)])
 
 
 def test_a_damping_behind_a_cliff_is_found() -> None:
@@ -53,16 +53,21 @@ def test_a_damping_behind_a_cliff_is_found() -> None:
     true = {"stiffness": 1.888e6, "damping": 1372.0}
     hidden = {f"effects.structural-compliance.{name}": value for name, value in true.items()}
     speeds = (1.13, 2.4, 2.8, 1.98, 1.6, 3.1)
-    judge = judge_of(recorded(hidden, 1, speeds=speeds, channels=CHANNELS, rate=1500.0, noise=0.005))
-    c = candidate(judge, "structural-compliance")
-    count = sum(e.count for e in judge.evidence)
-    led_astray = judge.fit((c,), (0.5625, 0.2), shifts=[0.0] * len(speeds))
+    problem = judge_of(recorded(hidden, 1, speeds=speeds, channels=CHANNELS, rate=1500.0, noise=0.005))
+    c = candidate(problem, "structural-compliance")
+    count = sum(e.count for e in problem.dataset)
+    led_astray = problem.fit((c,), (0.5625, 0.2), shifts=[0.0] * len(speeds))
     assert led_astray is not None
     assert led_astray.left > 4.0 * count
     inquiry = Inquiry(
-        judge=judge, candidates=[c], groups=[[0], [1, 2, 3, 4, 5]], phases=[], say=lambda _: None, crew=Crew()
+        problem=problem,
+        candidates=[c],
+        groups=[[0], [1, 2, 3, 4, 5]],
+        phases=[],
+        say=lambda _: None,
+        executor=Executor(),
     )
-    looked = Gate(score=9.0, scores={c.key: 9.0}, null=np.zeros(9), detectable={})
+    looked = ScoreTest(score=9.0, scores={c.key: 9.0}, null=np.zeros(9), detectable={})
     (found,) = _combed(inquiry, [led_astray], looked, [b.shift for b in led_astray.blocks])
     assert found.left < 1.2 * count
     assert c.values(found.x)["stiffness"] == pytest.approx(true["stiffness"], rel=0.02)
@@ -76,15 +81,19 @@ def test_a_nose_that_was_fitted_beside_a_wrong_frequency_is_found_by_what_it_rin
     true = {"stiffness": 3.619e6, "damping": 385.3, "nose_share": 0.2545}
     hidden = {f"effects.structural-compliance.{name}": value for name, value in true.items()}
     speeds = (1.13, 1.6, 2.4)
-    judge = judge_of(recorded(hidden, 1, speeds=speeds, channels=CHANNELS, rate=1500.0, noise=0.005))
-    c = candidate(judge, "structural-compliance")
-    astray = judge.fit((c,), coordinates({"stiffness": 6.4e6, "damping": 8000.0}, c.search), shifts=[0.0] * len(speeds))
+    problem = judge_of(recorded(hidden, 1, speeds=speeds, channels=CHANNELS, rate=1500.0, noise=0.005))
+    c = candidate(problem, "structural-compliance")
+    astray = problem.fit(
+        (c,), coordinates({"stiffness": 6.4e6, "damping": 8000.0}, c.search), shifts=[0.0] * len(speeds)
+    )
     assert astray is not None
-    assert astray.left > 10.0 * sum(e.count for e in judge.evidence)
-    inquiry = Inquiry(judge=judge, candidates=[c], groups=[[0], [1, 2]], phases=[], say=lambda _: None, crew=Crew())
-    looked = Gate(score=9.0, scores={c.key: 9.0}, null=np.zeros(9), detectable={})
+    assert astray.left > 10.0 * sum(e.count for e in problem.dataset)
+    inquiry = Inquiry(
+        problem=problem, candidates=[c], groups=[[0], [1, 2]], phases=[], say=lambda _: None, executor=Executor()
+    )
+    looked = ScoreTest(score=9.0, scores={c.key: 9.0}, null=np.zeros(9), detectable={})
     (found,) = _combed(inquiry, [astray], looked, [b.shift for b in astray.blocks])
-    assert found.left < 1.2 * sum(e.count for e in judge.evidence)
+    assert found.left < 1.2 * sum(e.count for e in problem.dataset)
     assert found.candidates[-1].values(found.x) == pytest.approx(true, rel=0.01)
     monkeypatch.setattr(restarts, "_in_chords", lambda *_: [])
     (near,) = _combed(inquiry, [astray], looked, [b.shift for b in astray.blocks])
@@ -96,45 +105,45 @@ def test_the_clock_of_a_channel_is_followed_against_all_others(tmp_path: Path) -
     case = make(next(order for order in plan(63, 20262911, ["single"]) if order.index == 45))
     (truth,) = case.truth["effects"]
     assert (truth["id"], truth["channel"]) == ("sensor-clock-offset", FORCE)
-    judge = judge_of_case(case, tmp_path)
-    c = candidate(judge, f"sensor-clock-offset:{FORCE}")
+    problem = judge_of_case(case, tmp_path)
+    c = candidate(problem, f"sensor-clock-offset:{FORCE}")
     begun = (coordinate(0.006138, c.search["offset"]),)
-    stopped = judge.fit((c,), begun, shifts=[1.43e-4] * len(case.recordings), width=2)
+    stopped = problem.fit((c,), begun, shifts=[1.43e-4] * len(case.recordings), width=2)
     assert stopped is not None
-    found = timed(judge, stopped)
-    right = judge.fit((c,), (coordinate(truth["parameters"]["offset"], c.search["offset"]),), width=2)
+    found = timed(problem, stopped)
+    right = problem.fit((c,), (coordinate(truth["parameters"]["offset"], c.search["offset"]),), width=2)
     assert right is not None
     assert found.left < right.left + 5.0 < stopped.left - 40.0
     assert c.values(found.x)["offset"] == pytest.approx(truth["parameters"]["offset"], abs=3e-5)
 
 
 def test_a_fit_whose_rounds_were_too_few_is_gone_on_with() -> None:
-    judge = judge_of(recorded({"effects.soil-layer.stiffness_ratio": 1.3, "effects.soil-layer.depth": 0.12}, 6))
-    c = candidate(judge, "soil-layer")
-    short = judge.fit((c,), (0.62, 0.4), rounds=2)
-    whole = judge.fit((c,), (0.62, 0.4), width=1)
+    problem = judge_of(recorded({"effects.soil-layer.stiffness_ratio": 1.3, "effects.soil-layer.depth": 0.12}, 6))
+    c = candidate(problem, "soil-layer")
+    short = problem.fit((c,), (0.62, 0.4), rounds=2)
+    whole = problem.fit((c,), (0.62, 0.4), width=1)
     assert short is not None
     assert whole is not None
     assert short.left > whole.left + 20.0
-    assert ended(judge, short).left < whole.left + 2.0
-    assert ended(judge, whole).left <= whole.left
+    assert ended(problem, short).left < whole.left + 2.0
+    assert ended(problem, whole).left <= whole.left
 
 
 def test_a_nose_is_found_along_the_valley_of_its_frequency(tmp_path: Path) -> None:
     """Little damping: hundreds of radians of ringing know k/(s (1 - s)) long before they know either."""
     case = make(next(order for order in plan(63, 20262913, ["single"]) if order.index == 7))
     true = case.truth["effects"][0]["parameters"]
-    judge = judge_of_case(case, tmp_path)
-    c = candidate(judge, "structural-compliance")
+    problem = judge_of_case(case, tmp_path)
+    c = candidate(problem, "structural-compliance")
     share = EFFECTS[c.id].bent(true, "nose_share", 0.1)
-    plain = judge.fit((c,), [coordinate(share[name], s) for name, s in c.search.items()])
+    plain = problem.fit((c,), [coordinate(share[name], s) for name, s in c.search.items()])
     assert plain is not None
-    assert plain.left > 4.0 * sum(e.count for e in judge.evidence)
-    found = shaped(judge, plain, [b.total for b in plain.blocks])
+    assert plain.left > 4.0 * sum(e.count for e in problem.dataset)
+    found = shaped(problem, plain, [b.total for b in plain.blocks])
     assert found is not None
-    assert found.left < 1.1 * sum(e.count for e in judge.evidence)
+    assert found.left < 1.1 * sum(e.count for e in problem.dataset)
     assert found.candidates[-1].along == ()
-    for name, told in intervals(judge, found)[0].items():
+    for name, told in intervals(problem, found)[0].items():
         assert told.low <= true[name] <= told.high
         assert told.high - told.low < 0.05 * true[name]
 
@@ -147,8 +156,8 @@ def test_what_goes_along_with_the_share_of_a_nose_keeps_frequency_and_damping() 
     for name in ("stiffness", "damping"):
         w = [n[name] / (n["nose_share"] * (1.0 - n["nose_share"])) for n in (before, after)]
         assert w[1] == pytest.approx(w[0], rel=1e-12)
-    judge = judge_of(recorded({}, speeds=(2.0,)))
-    whole = replace(candidate(judge, "structural-compliance").whole(), along=("nose_share",))
+    problem = judge_of(recorded({}, speeds=(2.0,)))
+    whole = replace(candidate(problem, "structural-compliance").whole(), along=("nose_share",))
     x = (0.4, 0.5, 0.6)
     plain, there = whole.plain(x)
     assert plain.changes(there) == pytest.approx(whole.changes(x), rel=1e-12)
@@ -161,20 +170,20 @@ def test_what_goes_along_with_the_share_of_a_nose_keeps_frequency_and_damping() 
 def test_how_much_of_a_striker_its_nose_is_is_found_where_nobody_weighed_it() -> None:
     true = {"stiffness": 1e6, "damping": 500.0, "nose_share": 0.2}
     hidden = {f"effects.structural-compliance.{name}": value for name, value in true.items()}
-    judge = judge_of(recorded(hidden, 3, speeds=(1.2, 2.0, 2.8), channels=CHANNELS, rate=1500.0, noise=0.005))
-    c = candidate(judge, "structural-compliance")
-    count = sum(e.count for e in judge.evidence)
+    problem = judge_of(recorded(hidden, 3, speeds=(1.2, 2.0, 2.8), channels=CHANNELS, rate=1500.0, noise=0.005))
+    c = candidate(problem, "structural-compliance")
+    count = sum(e.count for e in problem.dataset)
     begun = [coordinate(true[name], s) for name, s in c.search.items()]
-    plain = judge.fit((c,), begun, shifts=[0.0] * 3)
+    plain = problem.fit((c,), begun, shifts=[0.0] * 3)
     assert plain is not None
     assert plain.left > 2.0 * count
-    found = shaped(judge, plain, [b.total for b in plain.blocks])
+    found = shaped(problem, plain, [b.total for b in plain.blocks])
     assert found is not None
     assert found.left < 1.1 * count
     told = found.candidates[-1].values(found.x)
     assert told == {name: pytest.approx(value, rel=0.05) for name, value in true.items()}
-    weighed = scenario().replaced({"effects.structural-compliance": {"nose_share": 0.2, "stiffness": None}})
-    by_key = {c.key: c for c in candidates_of(judge.evidence, (), "drop", weighed)}
+    reweighted = scenario().replaced({"effects.structural-compliance": {"nose_share": 0.2, "stiffness": None}})
+    by_key = {c.key: c for c in candidates_of(problem.dataset, (), "drop", reweighted)}
     assert by_key["structural-compliance"].shapes == {}
 
 
@@ -182,17 +191,17 @@ def test_a_threshold_is_found_though_a_fit_ended_at_another() -> None:
     """A crust that is hardly stiffer: ends elsewhere are nearly as good, and no slope leads from one to the other."""
     true = {"thickness": 0.065, "stiffness_ratio": 1.02}
     hidden = {f"effects.soil-crust.{name}": value for name, value in true.items()}
-    judge = judge_of(recorded(hidden, 2, speeds=(1.2, 1.8, 2.4, 3.0), channels=CHANNELS, rate=1500.0, noise=0.004))
-    c = candidate(judge, "soil-crust")
+    problem = judge_of(recorded(hidden, 2, speeds=(1.2, 1.8, 2.4, 3.0), channels=CHANNELS, rate=1500.0, noise=0.004))
+    c = candidate(problem, "soil-crust")
     begun = [coordinate(v, s) for v, s in zip((0.092, 1.01), c.search.values(), strict=True)]
-    ended = judge.fit((c,), begun, width=1)
+    ended = problem.fit((c,), begun, width=1)
     assert ended is not None
     assert abs(c.values(ended.x)["thickness"] - true["thickness"]) > 0.004
-    found = min((traced(judge, ended, s) for s in stretches(ended)), key=lambda f: f.left)
+    found = min((traced(problem, ended, s) for s in stretches(ended)), key=lambda f: f.left)
     assert found.left < ended.left - 100.0
     assert c.values(found.x)["thickness"] == pytest.approx(true["thickness"], rel=0.01)
     assert c.values(found.x)["stiffness_ratio"] == pytest.approx(true["stiffness_ratio"], abs=0.001)
-    assert all(traced(judge, found, s).left <= found.left for s in stretches(found))
+    assert all(traced(problem, found, s).left <= found.left for s in stretches(found))
 
 
 def test_a_clock_is_tried_all_along_its_range(tmp_path: Path) -> None:
@@ -200,27 +209,27 @@ def test_a_clock_is_tried_all_along_its_range(tmp_path: Path) -> None:
     case = make(next(order for order in plan(63, 20263014, ["single"]) if order.index == 1))
     (truth,) = case.truth["effects"]
     assert (truth["id"], truth["channel"]) == ("sensor-clock-drift", FORCE)
-    judge = judge_of_case(case, tmp_path)
-    c = candidate(judge, f"sensor-clock-drift:{FORCE}")
-    stopped = judge.fit((c,), (coordinate(truth["parameters"]["drift"] / 6.0, c.search["drift"]),), rounds=0)
+    problem = judge_of_case(case, tmp_path)
+    c = candidate(problem, f"sensor-clock-drift:{FORCE}")
+    stopped = problem.fit((c,), (coordinate(truth["parameters"]["drift"] / 6.0, c.search["drift"]),), rounds=0)
     assert stopped is not None
-    found = min((traced(judge, stopped, s) for s in stretches(stopped)), key=lambda f: f.left)
+    found = min((traced(problem, stopped, s) for s in stretches(stopped)), key=lambda f: f.left)
     assert found.left < 0.9 * stopped.left
     assert c.values(found.x)["drift"] == pytest.approx(truth["parameters"]["drift"], rel=0.02)
 
 
 def test_what_rings_is_traced_along_the_valley_of_its_frequency(tmp_path: Path) -> None:
     case = make(next(order for order in plan(63, 20263016, ["single"]) if order.index == 25))
-    judge = judge_of_case(case, tmp_path)
-    c = candidate(judge, "structural-compliance").whole()
+    problem = judge_of_case(case, tmp_path)
+    c = candidate(problem, "structural-compliance").whole()
     ended = {"stiffness": 3.68794e6, "damping": 75.98, "nose_share": 0.184108}
     x = [coordinate(ended[name], s) for name, s in c.search.items()]
-    stopped = judge.fit((c,), x, rounds=0, shifts=[0.0] * len(case.recordings))
+    stopped = problem.fit((c,), x, rounds=0, shifts=[0.0] * len(case.recordings))
     assert stopped is not None
     bent, own = c.bent(x)
     assert bent.plain(own)[1] == pytest.approx(x)
     assert [k for k, _, _ in stretches(stopped)] == [2, 2]
-    found = min((traced(judge, stopped, s) for s in stretches(stopped)), key=lambda f: f.left)
+    found = min((traced(problem, stopped, s) for s in stretches(stopped)), key=lambda f: f.left)
     assert found.left < stopped.left - 20.0
     share = case.truth["effects"][0]["parameters"]["nose_share"]
     assert c.values(found.x)["nose_share"] == pytest.approx(share, rel=0.006)
@@ -263,14 +272,14 @@ def test_what_is_abrupt_is_led_around_its_cliffs_by_its_smooth_shape(tmp_path: P
     """A crust whose end leaps past samples: a fit that is stuck far from the truth comes there, another stays."""
     case = make(plan(63, 20263301, ("single",))[43])
     [true] = [e["parameters"] for e in case.truth["effects"]]
-    judge = judge_of_case(case, tmp_path)
-    align(judge)
-    c = candidate(judge, "soil-crust")
+    problem = judge_of_case(case, tmp_path)
+    align(problem)
+    c = candidate(problem, "soil-crust")
     gains = []
     for begun in ((0.8125, 0.875), (0.0625, 0.125)):
-        stuck = judge.fit((c,), begun)
+        stuck = problem.fit((c,), begun)
         assert stuck is not None
-        found = shaped(judge, stuck, [b.total for b in stuck.blocks])
+        found = shaped(problem, stuck, [b.total for b in stuck.blocks])
         assert found is not None
         assert found.candidates == (c,), "its usual shape"
         gains.append(stuck.left - found.left)
@@ -283,27 +292,29 @@ def test_what_is_abrupt_is_led_around_its_cliffs_by_its_smooth_shape(tmp_path: P
 def test_two_effects_of_which_neither_comes_first_are_tried_together() -> None:
     """A heavier striker on a guide that rubs: a stiffness and the mass led, and friction beside the first."""
     hidden = {"effects.mass.added": 2.3, "effects.guide-friction.force": 31.0}
-    judge = judge_of(recorded(hidden, 1, speeds=(1.4, 2.0, 2.6, 3.2), rate=1000.0, noise=0.003, channels=CHANNELS))
-    c = {name: candidate(judge, name) for name in ("mass", "soil-stiffness", "guide-friction")}
-    base = judge.fit((), ())
-    stiffer, heavier = (judge.fit((c[name],), c[name].starts()[0]) for name in ("soil-stiffness", "mass"))
+    problem = judge_of(recorded(hidden, 1, speeds=(1.4, 2.0, 2.6, 3.2), rate=1000.0, noise=0.003, channels=CHANNELS))
+    c = {name: candidate(problem, name) for name in ("mass", "soil-stiffness", "guide-friction")}
+    base = problem.fit((), ())
+    stiffer, heavier = (problem.fit((c[name],), c[name].starts()[0]) for name in ("soil-stiffness", "mass"))
     assert base is not None
     assert stiffer is not None
     assert heavier is not None
-    beside = judge.fit((*stiffer.candidates, c["guide-friction"]), (*stiffer.x, *c["guide-friction"].starts()[0]))
+    beside = problem.fit((*stiffer.candidates, c["guide-friction"]), (*stiffer.x, *c["guide-friction"].starts()[0]))
     assert beside is not None
-    count = sum(e.count for e in judge.evidence)
+    count = sum(e.count for e in problem.dataset)
     assert min(stiffer.left, heavier.left, beside.left) > 1.5 * count
     first = Step(base=base, fitted=stiffer, p_value=0.0, rivals=(stiffer, heavier))
     then = Step(base=stiffer, fitted=beside, p_value=0.0, rivals=(beside,))
-    looked = Gate(score=9.0, scores={"guide-friction": 9.0}, null=np.zeros(9), detectable={})
+    looked = ScoreTest(score=9.0, scores={"guide-friction": 9.0}, null=np.zeros(9), detectable={})
     guide = Screened(candidate=c["guide-friction"], starts=tuple(c["guide-friction"].starts()), left=9.0, potential=0.0)
-    phases = [phases_of(e) for e in judge.evidence]
-    inquiry = Inquiry(judge=judge, candidates=[*c.values()], groups=[], phases=phases, say=lambda _: None, crew=Crew())
-    alone = two_by_two(inquiry, [replace(first, screened=(guide,))], looked, stiffer)
+    phases = [phases_of(e) for e in problem.dataset]
+    inquiry = Inquiry(
+        problem=problem, candidates=[*c.values()], groups=[], phases=phases, say=lambda _: None, executor=Executor()
+    )
+    alone = best_subsets(inquiry, [replace(first, screened=(guide,))], looked, stiffer)
     assert alone is not None  # what scored most need not have led anything
     assert alone[0][-1].fitted.label == "mass + guide-friction"
-    found = two_by_two(inquiry, [first, then], looked, beside)
+    found = best_subsets(inquiry, [first, then], looked, beside)
     assert found is not None
     (one, both), left = found
     assert one.fitted.label == "mass"
@@ -318,17 +329,17 @@ def test_two_effects_of_which_neither_comes_first_are_tried_together() -> None:
 def test_a_fit_is_ended_finely_whatever_others_may_leave(monkeypatch: pytest.MonkeyPatch) -> None:
     """Rounds that gain less than tells two fits apart are saved, until a fit is the last one."""
     hidden = {"effects.soil-viscous-damping.damping": 900.0}
-    judge = judge_of(recorded(hidden, 2, speeds=(1.6, 2.6), channels=CHANNELS, rate=1500.0, noise=0.005))
-    c, begun = candidate(judge, "soil-viscous-damping"), (0.05,)
-    usual = judge.fit((c,), begun)
+    problem = judge_of(recorded(hidden, 2, speeds=(1.6, 2.6), channels=CHANNELS, rate=1500.0, noise=0.005))
+    c, begun = candidate(problem, "soil-viscous-damping"), (0.05,)
+    usual = problem.fit((c,), begun)
     monkeypatch.setattr(levenberg_marquardt, "ENOUGH", 1e5)
-    coarse, fine = judge.fit((c,), begun), judge.fit((c,), begun, finely=True)
+    coarse, fine = problem.fit((c,), begun), problem.fit((c,), begun, finely=True)
     assert usual is not None
     assert coarse is not None
     assert fine is not None
     assert fine.left - 1e-6 < usual.left < fine.left + 1.0
     assert coarse.left > fine.left + 1.0
-    assert ended(judge, coarse).left < fine.left + 0.05
+    assert ended(problem, coarse).left < fine.left + 0.05
 
 
 def test_a_place_is_gone_on_with_if_it_soon_leaves_less_than_where_the_fit_stands() -> None:
@@ -343,8 +354,8 @@ def test_a_place_is_gone_on_with_if_it_soon_leaves_less_than_where_the_fit_stand
         left = leaves[x[0]]
         return None if left is None else SimpleNamespace(x=(x[0] + 0.01,), total=left)
 
-    judge = cast(Judge, SimpleNamespace(fit=short))
-    found = threshold_scan._soonest(judge, fitted, [(0.1,), (0.2,), (0.3,), (0.4,)], (0, 2))
+    problem = cast(Problem, SimpleNamespace(fit=short))
+    found = threshold_scan._soonest(problem, fitted, [(0.1,), (0.2,), (0.3,), (0.4,)], (0, 2))
     assert [round(x, 9) for (x,) in found] == [0.21, 0.41]
     assert asked == 5 * [(0, 2)]
 
@@ -366,6 +377,6 @@ def test_a_recording_whose_clock_is_in_another_dip_is_tried_where_it_began(
         left = min(k + min(abs(shift - dip) / 1e-4, 1.0) for k, dip in enumerate(dips)) + 10.0
         return SimpleNamespace(total=left, shift=shift, prior=1e-3)
 
-    judge = cast(Judge, SimpleNamespace(block=block, shifts=[began]))
-    found = local_search._tried(judge, 0, (), (), block(0, (), (), 9e-4, 0.0, clock=False))
+    problem = cast(Problem, SimpleNamespace(block=block, shifts=[began]))
+    found = local_search._tried(problem, 0, (), (), block(0, (), (), 9e-4, 0.0, clock=False))
     assert found.shift == pytest.approx(met, abs=local_search.SHORTEST)

@@ -133,9 +133,9 @@ def test_values_are_found_by_their_paths() -> None:
 
 
 def test_full_runs_are_looked_at_sparingly() -> None:
-    assert RUNS.thrifty
+    assert RUNS.is_ensemble
     assert RUNS.few < 3
-    assert min(RUNS.nudges) > 0.005  # below, chance decides
+    assert min(RUNS.fd_steps) > 0.005  # below, chance decides
 
 
 def test_a_wrong_speed_is_looked_for_in_what_drops_alone() -> None:

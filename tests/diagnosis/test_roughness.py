@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from rollover.diagnosis.fit.linearisation import Block
+from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.inference.local_quadratic import over_roughness
-from rollover.diagnosis.noise.ensemble import Course
+from rollover.diagnosis.noise.ensemble import HeavyTail
 
 Array = NDArray[np.float64]
 DUE = 1.96**2
@@ -24,15 +24,15 @@ ACROSS = np.where(np.arange(N) % 2 == 0, 1.0, -1.0) / np.sqrt(N)
 DIP = np.where(np.arange(N) % 4 < 2, 1.0, -1.0) / np.sqrt(N)  # at right angles to both
 
 
-def block(left: Array, **also: Any) -> Block:
+def block(left: Array, **also: Any) -> ResidualBlock:
     known = {"J": np.zeros((left.size, 0)), "slope": np.zeros(left.size), "shift": 0.0, "prior": 1.0}
-    return Block(residual=left, **(known | also))
+    return ResidualBlock(residual=left, **(known | also))
 
 
 def runs(
     of: Callable[[float], list[Array] | None], seen: list[float]
-) -> Callable[[Sequence[float]], list[list[Block] | None]]:
-    def met(places: Sequence[float]) -> list[list[Block] | None]:
+) -> Callable[[Sequence[float]], list[list[ResidualBlock] | None]]:
+    def met(places: Sequence[float]) -> list[list[ResidualBlock] | None]:
         seen.extend(places)
         found = [of(t) for t in places]
         return [None if left is None else [block(w) for w in left] for left in found]
@@ -119,13 +119,13 @@ def test_samples_count_alike_at_all_places_and_no_clock_does() -> None:
     late = np.arange(N) >= N // 2
     clock = ACROSS * 1e3
 
-    def met(places: Sequence[float]) -> list[list[Block] | None]:
-        found: list[list[Block] | None] = []
+    def met(places: Sequence[float]) -> list[list[ResidualBlock] | None]:
+        found: list[list[ResidualBlock] | None] = []
         for t in places:
             counts = np.where(late, 0.3 if t > 1.5 else 0.6, 1.0)
             plain = 1.96 * t / 3.0 * ALONG + t * clock
-            course = Course(samples=counts, share=1.0, more=0.0)
-            found.append([block(counts * plain, slope=counts * clock, prior=1e6, course=course)])
+            heavy_tail = HeavyTail(samples=counts, share=1.0, more=0.0)
+            found.append([block(counts * plain, slope=counts * clock, prior=1e6, heavy_tail=heavy_tail)])
         return found
 
     assert over_roughness(met, [1.96 * DIP], DUE) == pytest.approx((3.0 / np.sqrt(0.68),) * 2, rel=1e-9)

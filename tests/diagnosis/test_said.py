@@ -11,13 +11,13 @@ import pytest
 
 from rollover.cli.commands.diagnose import in_words
 from rollover.diagnosis import statements
-from rollover.diagnosis.data.dataset import evidence_of
+from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.data.phases import drop_phases
 from rollover.diagnosis.fit.cross_validation import Held
-from rollover.diagnosis.fit.linearisation import Block, Fitted
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.forward.forward_model import simulator_of
-from rollover.diagnosis.inference.scores import before_a_blow
-from rollover.diagnosis.noise.ensemble import Course
+from rollover.diagnosis.inference.scores import before_an_impact
+from rollover.diagnosis.noise.ensemble import HeavyTail
 from rollover.diagnosis.result import Interval, Named
 from rollover.diagnosis.statements import sentence
 from rollover.effects import EFFECTS, units_of
@@ -39,7 +39,7 @@ def test_phases_need_no_depth_gauge() -> None:
     speeds = {"speeds": (2.0,), "channels": (FORCE, ACCELERATION, DEPTH), "rate": 1000.0}
     (name, r), *_ = recorded({}, 4, **speeds)  # type: ignore[arg-type]
     blind = recorded({}, 4, **{**speeds, "channels": (FORCE, ACCELERATION)})[0][1]  # type: ignore[arg-type]
-    found = [evidence_of(name, one, simulator_of(scenario(), one)) for one in (r, blind)]
+    found = [dataset_of(name, one, simulator_of(scenario(), one)) for one in (r, blind)]
     with_depth, without = ({n: at for at, n in drop_phases(e)} for e in found if e is not None)
     assert list(without) == ["free-fall", "first-contact", "loading", "peak", "unloading", "rest"]
     assert without["peak"] == pytest.approx(with_depth["peak"], rel=0.05)
@@ -55,39 +55,39 @@ def test_what_lies_within_a_tolerance_is_not_said_to_be_small() -> None:
     """5 % of a range for a noise of 0.1 %: a misfit of 4 % is tolerated."""
     nothing = Held(left=np.ones(1), count=np.ones(1))
     ((name, r),) = recorded({}, 4, speeds=(2.0,), channels=(FORCE,), noise=1e-3)
-    exact = evidence_of(name, r, simulator_of(scenario(), r))
+    exact = dataset_of(name, r, simulator_of(scenario(), r))
     assert exact is not None
     for e, ends in ((exact, "channel's range."), (replace(exact, model_error=0.05), "tolerated or repeats differ by.")):
         assert sentence("no-mismatch", (), 1e-9, nothing, nothing, [e]).endswith(ends)
 
 
 def test_what_runs_that_scatter_miss_is_told_before_the_blow_too() -> None:
-    """3 and 4 times the noise before the blow, nearly nothing behind it: sqrt((9 + 16)/2), whatever counts how much."""
+    """3 and 4 times the noise before the impact, nearly nothing behind: sqrt((9 + 16)/2), whatever counts how much."""
     early = np.arange(80) < 40
     none: Any = {"J": np.zeros((80, 0)), "slope": np.zeros(80), "shift": 0.0, "prior": 1e-3}
     samples = np.where(early, 0.5, 0.1)
-    other = Course(samples=samples, share=0.1, more=0.0)
+    other = HeavyTail(samples=samples, share=0.1, more=0.0)
     blocks = (
-        Block(residual=np.where(early, 3.0, 0.01), **none),
-        Block(residual=np.where(early, 4.0, 0.01) * samples, course=other, **none),
+        ResidualBlock(residual=np.where(early, 3.0, 0.01), **none),
+        ResidualBlock(residual=np.where(early, 4.0, 0.01) * samples, heavy_tail=other, **none),
     )
     fitted = Fitted(candidates=(), x=(), blocks=blocks)
     scattering: Any = [SimpleNamespace(expected=50.0, early=early), SimpleNamespace(expected=None, early=early)]
-    assert before_a_blow(scattering, fitted) == pytest.approx(np.sqrt(12.5))
-    assert before_a_blow(scattering[1:], fitted) is None  # a drop
+    assert before_an_impact(scattering, fitted) == pytest.approx(np.sqrt(12.5))
+    assert before_an_impact(scattering[1:], fitted) is None  # a drop
     at_once: Any = [SimpleNamespace(expected=50.0, early=~(early | ~early))] * 2
-    assert before_a_blow(at_once, fitted) is None
+    assert before_an_impact(at_once, fitted) is None
 
 
 @pytest.mark.parametrize(("told", "said"), [(11, None), (12, 3.0)])
 def test_of_few_samples_before_the_blow_nothing_is_said(told: int, said: float | None) -> None:
-    """Two recordings of so many samples before the blow, and as many at the start, which have no past: 24 in all."""
+    """Two recordings of so many samples before the impact, and as many at the start, which have no past: 24 in all."""
     early = np.arange(80) < 2 * told
     residual = np.where(np.arange(80) < told, 0.0, 3.0)
     none: Any = {"J": np.zeros((80, 0)), "slope": np.zeros(80), "shift": 0.0, "prior": 1e-3}
-    fitted = Fitted(candidates=(), x=(), blocks=(Block(residual=residual, **none),) * 2)
+    fitted = Fitted(candidates=(), x=(), blocks=(ResidualBlock(residual=residual, **none),) * 2)
     scattering: Any = [SimpleNamespace(expected=50.0, early=early)] * 2
-    assert before_a_blow(scattering, fitted) == said
+    assert before_an_impact(scattering, fitted) == said
 
 
 def test_a_misfit_that_scatter_takes_part_in_or_that_is_not_all_met_is_said_to_be_one() -> None:
@@ -100,9 +100,9 @@ def test_a_misfit_that_scatter_takes_part_in_or_that_is_not_all_met_is_said_to_b
     assert plain == "The ground is inclined. With it the held-out misfit falls from 1.2 to 0.80 times the noise."
     more = sentence("parameter", [tilted], 0.0, first, last, [], remains=True)
     assert more == plain + " What is left of it has structure: this is not the whole."
-    one = sentence("parameter", [tilted], 0.0, first, last, [], foretold=False)
+    one = sentence("parameter", [tilted], 0.0, first, last, [], cross_validated=False)
     assert one.startswith(plain.replace("held-out ", "") + " Of one condition nothing can be held out")
-    unexplained = sentence("unexplained", (), 0.0, first, last, [], foretold=False)
+    unexplained = sentence("unexplained", (), 0.0, first, last, [], cross_validated=False)
     assert unexplained.endswith("no candidate explains it.")
     said = sentence("parameter", [tilted], 0.0, first, last, [], (6.94, 1.02))
     assert said.startswith(plain[:-1] + " and the scatter of runs; before the first blow")
@@ -126,13 +126,13 @@ def test_an_effect_whose_numbers_may_all_be_null_may_be_nothing() -> None:
     assert not statements.is_none(effect("rops-plasticity", yield_force=(-1.0, 1e6)))  # a limit has no null
     # an overturn without anything in it had named this, on what its runs make of chance
     growth, faster = effect("soil-added-mass-growth", rate=(0.12, 2118.0)), effect("impact-speed", scale=(1.01, 1.09))
-    assert statements.may_be_nothing([growth], True) == {"soil-added-mass-growth"}
-    assert statements.may_be_nothing([growth], False) == set()  # a drop has no neighbours to be one of
-    assert statements.may_be_nothing([faster, growth], False) == {"soil-added-mass-growth"}
-    assert statements.may_be_nothing([faster], True) == set()
+    assert statements.interval_contains_null([growth], True) == {"soil-added-mass-growth"}
+    assert statements.interval_contains_null([growth], False) == set()  # a drop has no neighbours to be one of
+    assert statements.interval_contains_null([faster, growth], False) == {"soil-added-mass-growth"}
+    assert statements.interval_contains_null([faster], True) == set()
     adhesion = effect("soil-adhesion", stress=(0.003, 1.6e9))  # that it acts is sure, how strongly is not
-    assert statements.may_be_nothing([adhesion], True) == set()
-    assert statements.may_be_nothing([faster, adhesion], True) == {"soil-adhesion"}
+    assert statements.interval_contains_null([adhesion], True) == set()
+    assert statements.interval_contains_null([faster, adhesion], True) == {"soil-adhesion"}
 
 
 def test_an_effect_that_is_named_is_no_look_alike_of_another(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -144,7 +144,7 @@ def test_an_effect_that_is_named_is_no_look_alike_of_another(monkeypatch: pytest
 
     both = fit("soil-stiffness", "inertia")
     told = [{"scale": SimpleNamespace(value=1.2)}, {"scale": SimpleNamespace(value=0.9)}]
-    judge: Any = SimpleNamespace(per_error=1.0, weigh=lambda _: None, evidence=())
+    problem: Any = SimpleNamespace(samples_per_error=1.0, with_noise_model=lambda _: None, dataset=())
     found: Any = SimpleNamespace(
         fitted=both,
         base=None,
@@ -156,7 +156,7 @@ def test_an_effect_that_is_named_is_no_look_alike_of_another(monkeypatch: pytest
     monkeypatch.setattr(
         statements, "strongest", lambda *given: one("soil-stiffness" if given[1:] == (None, both) else "inertia")
     )
-    each = statements.named(judge, found, ())
+    each = statements.named(problem, found, ())
     assert [e.id for e in each] == ["soil-stiffness", "inertia"]
     assert all(e.indistinguishable_from == ("soil-crust",) for e in each)
 

@@ -9,8 +9,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
-from rollover.diagnosis.fit.linearisation import Block
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.fit.time_shift import align
@@ -21,7 +21,7 @@ from rollover.diagnosis.selection import decision, forward_step, pairs, stepwise
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.decision import MOST, Explanation, by_the_first, decided
-from rollover.diagnosis.selection.score_test import Gate
+from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.effects import Search
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded
 from tests.diagnosis.test_fits import judge_of
@@ -39,13 +39,13 @@ def left(p_value: float, structure: float = 0.0) -> Mismatch:
 
 def step(count: int) -> Step:
     candidates = [Candidate(id=i, kind="physics", family="", search={"a": Search(0, 1)}) for i in IDS[:count]]
-    bare = Fitted(candidates=(), x=(), blocks=())
-    return Step(base=bare, fitted=Fitted(candidates=tuple(candidates), x=(0.5,) * count, blocks=()), p_value=0.0)
+    no_jacobian = Fitted(candidates=(), x=(), blocks=())
+    return Step(base=no_jacobian, fitted=Fitted(candidates=tuple(candidates), x=(0.5,) * count, blocks=()), p_value=0.0)
 
 
 def explanation(count: int, p_value: float) -> Explanation:
     parts = tuple(step(k + 1) for k in range(count))
-    looked = Gate(score=99.0, scores={}, null=np.zeros(10), detectable={})
+    looked = ScoreTest(score=99.0, scores={}, null=np.zeros(10), detectable={})
     return Explanation(
         base=parts[0].base,
         fitted=parts[-1].fitted,
@@ -77,7 +77,7 @@ def test_as_many_effects_as_may_be_must_leave_what_chance_leaves(
     count: int, p_value: float, named: int, judged: dict[str, float]
 ) -> None:
     found, verdict = decided(
-        cast(Judge, SimpleNamespace(evidence=(), effort=DROPS)), explanation(count, p_value), [], []
+        cast(Problem, SimpleNamespace(dataset=(), effort=DROPS)), explanation(count, p_value), [], []
     )
     assert len(found.parts) == named
     assert verdict == ("missing-physics" if named else "unexplained")
@@ -90,10 +90,10 @@ def test_what_can_be_bent_to_a_curve_must_leave_no_one_place_either(
     """All places together hide one: chi-square of 960 takes no note of 50 beyond the 12 of one."""
     found = explanation(MOST, 0.4)
     found = replace(found, after=replace(found.after, adjusted=(0.9, local)))
-    judge = cast(Judge, SimpleNamespace(evidence=(), effort=DROPS))
-    assert len(decided(judge, found, [], [])[0].parts) == named
+    problem = cast(Problem, SimpleNamespace(dataset=(), effort=DROPS))
+    assert len(decided(problem, found, [], [])[0].parts) == named
     fewer = explanation(2, 0.4)
-    assert len(decided(judge, replace(fewer, after=found.after), [], [])[0].parts) == 2
+    assert len(decided(problem, replace(fewer, after=found.after), [], [])[0].parts) == 2
 
 
 @pytest.mark.parametrize(
@@ -107,19 +107,19 @@ def test_what_an_effect_too_slight_for_a_name_explains_whole_is_no_mismatch(
     monkeypatch.setattr(decision, "mismatch_of", lambda *_: left(remaining))
     one = explanation(1, 1e-9)
     found = decided(
-        cast(Judge, SimpleNamespace(evidence=(), effort=DROPS)), replace(one, parts=(), fitted=one.base), [], []
+        cast(Problem, SimpleNamespace(dataset=(), effort=DROPS)), replace(one, parts=(), fitted=one.base), [], []
     )
     assert (found[0].parts, found[1]) == ((), verdict)
 
 
 def test_the_gain_of_one_effect_that_may_be_nothing_tells_nothing_either() -> None:
     """The p-value is that of the misfit then; of several, others may have gained what it seemed to."""
-    judge = cast(Judge, SimpleNamespace(evidence=(), effort=DROPS))
+    problem = cast(Problem, SimpleNamespace(dataset=(), effort=DROPS))
     one, two = (replace(explanation(count, 0.4), before=left(0.2)) for count in (1, 2))
     assert one.p_value < 1e-6  # of 99 that the best candidate scores
-    refused = by_the_first(judge, one, {IDS[0]}, [])
+    refused = by_the_first(problem, one, {IDS[0]}, [])
     assert (refused.parts, refused.fitted, refused.p_value) == ((), one.base, 0.2)
-    assert by_the_first(judge, two, {IDS[0]}, []).p_value == two.p_value
+    assert by_the_first(problem, two, {IDS[0]}, []).p_value == two.p_value
 
 
 @pytest.mark.parametrize(("second_order", "offset", "done"), [(0.0, -4e-4, False), (0.25, 0.0, True)])
@@ -134,21 +134,23 @@ def test_what_may_be_nothing_is_another_effects_work_only_if_that_does_it(
     clock = {"channel": ACCELERATION, "offset": offset}
     changes = {f"effects.sensor-lag.{k}": v for k, v in lag.items()}
     changes |= {f"effects.sensor-clock-offset.{k}": v for k, v in clock.items()} if offset else {}
-    judge = judge_of(recorded(changes, speeds=(1.5, 2.5), channels=(FORCE, DEPTH, ACCELERATION), noise=0.001))
-    align(judge)
-    able = candidates_of(judge.evidence, (), "drop")
+    problem = judge_of(recorded(changes, speeds=(1.5, 2.5), channels=(FORCE, DEPTH, ACCELERATION), noise=0.001))
+    align(problem)
+    able = candidates_of(problem.dataset, (), "drop")
     both = [
         next(c for c in able if (c.id, c.channel) == (id, ACCELERATION)) for id in ("sensor-lag", "sensor-clock-offset")
     ]
-    fitted = judge.fit(both, (*both[0].starts()[0], 0.5))
+    fitted = problem.fit(both, (*both[0].starts()[0], 0.5))
     assert fitted is not None
-    judge.weigh(autoregression.whole(judge.evidence, judge.residuals(fitted)))  # by what is left, as a step is
-    found: Any = SimpleNamespace(fitted=judge.again(fitted))
+    problem.with_noise_model(
+        autoregression.whole(problem.dataset, problem.residuals(fitted))
+    )  # by what is left, as a step is
+    found: Any = SimpleNamespace(fitted=problem.again(fitted))
     doubtful = {"sensor-clock-offset"}
-    assert decision.done_by_others(judge, found, doubtful) == (doubtful if done else set())
-    assert decision.done_by_others(judge, found, set()) == set()
-    monkeypatch.setattr(Judge, "per_error", 1e6)
-    assert decision.done_by_others(judge, found, doubtful) == doubtful
+    assert decision.done_by_others(problem, found, doubtful) == (doubtful if done else set())
+    assert decision.done_by_others(problem, found, set()) == set()
+    monkeypatch.setattr(Problem, "per_error", 1e6)
+    assert decision.done_by_others(problem, found, doubtful) == doubtful
 
 
 @pytest.mark.parametrize(("channels", "named"), [(("a", "a"), 0), (("a", "b"), 2), ((None, None), 2), ((None, "a"), 2)])
@@ -158,8 +160,8 @@ def test_two_of_one_sensor_must_leave_what_chance_leaves(
     found = explanation(2, 0.002)
     candidates = tuple(replace(c, channel=k) for c, k in zip(found.fitted.candidates, channels, strict=True))
     found = replace(found, fitted=replace(found.fitted, candidates=candidates))
-    judge: Any = SimpleNamespace(evidence=(), effort=DROPS)
-    assert len(decided(judge, found, [], [])[0].parts) == named
+    problem: Any = SimpleNamespace(dataset=(), effort=DROPS)
+    assert len(decided(problem, found, [], [])[0].parts) == named
 
 
 @pytest.mark.parametrize(
@@ -171,8 +173,8 @@ def test_one_that_takes_nearly_all_is_named_with_what_it_leaves_itself(
     """20 times the noise before: of the excess 0.3 or 1.3 % is left, of what is structured 0.1 or 2 %."""
     judged["soil-crust"] = misfit
     monkeypatch.setattr(decision, "mismatch_of", lambda *_: left(1e-9, structure))
-    judge: Any = SimpleNamespace(evidence=(), effort=DROPS)
-    found, verdict = decided(judge, explanation(2, 1e-4), [], [])
+    problem: Any = SimpleNamespace(dataset=(), effort=DROPS)
+    found, verdict = decided(problem, explanation(2, 1e-4), [], [])
     assert verdict == ("missing-physics" if named else "unexplained")
     if named:
         assert found.fitted.label == "soil-crust"
@@ -196,7 +198,7 @@ def test_what_predicts_held_out_recordings_hardly_better_is_not_named(
 ) -> None:
     """Whatever it leaves of those that it was fitted to."""
     judged |= {"as it is": start, "soil-crust": ahead}
-    found, verdict = decided(cast(Judge, SimpleNamespace(evidence=(), effort=DROPS)), explanation(1, 0.4), [], [])
+    found, verdict = decided(cast(Problem, SimpleNamespace(dataset=(), effort=DROPS)), explanation(1, 0.4), [], [])
     assert (len(found.parts), verdict) == (named, "missing-physics" if named else "unexplained")
 
 
@@ -207,7 +209,7 @@ def test_what_leaves_no_more_than_is_tolerated_is_named(
     monkeypatch.setattr(decision, "is_tolerated", lambda _, f: f.label == "soil-crust")
     for held_out, named, expected in ((1.1, 1, "missing-physics"), (3.5, 0, "unexplained")):
         judged["soil-crust"] = held_out
-        found, verdict = decided(cast(Judge, SimpleNamespace(evidence=(), effort=DROPS)), explanation(1, 1e-9), [], [])
+        found, verdict = decided(cast(Problem, SimpleNamespace(dataset=(), effort=DROPS)), explanation(1, 1e-9), [], [])
         assert (len(found.parts), verdict) == (named, expected)
 
 
@@ -221,7 +223,7 @@ def test_a_simpler_rival_that_meets_all_recordings_as_well_is_named_beside(
     def fitted(id: str, left: float, many: int) -> Fitted:
         search = {f"a{k}": Search(0, 1) for k in range(many)}
         candidate = Candidate(id=id, kind="physics", family="", search=search)
-        block = Block(
+        block = ResidualBlock(
             residual=np.array([np.sqrt(left)]), J=np.zeros((1, many)), slope=np.zeros(1), shift=0.0, prior=1.0
         )
         return Fitted(candidates=(candidate,), x=(0.5,) * many, blocks=(block,))
@@ -237,18 +239,18 @@ def test_errors_of_conditions_beside_an_effect_count_where_they_leave_chance_alo
     beside: float, taken: bool, judged: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A wrong effect would bend them too: then they stay as they act on the scenario as it is."""
-    weighed: list[str] = []
+    reweighted: list[str] = []
     found, again = step(1), step(2).fitted
-    judge = cast(Judge, SimpleNamespace(evidence="as it is", weigh=weighed.append))
+    problem = cast(Problem, SimpleNamespace(dataset="as it is", with_noise_model=reweighted.append))
     monkeypatch.setattr(stepwise, "is_doubtful", lambda _: True)
     monkeypatch.setattr(stepwise, "is_enough", lambda _judge, _fit, what: what.p_value > 0.001)
     monkeypatch.setattr(stepwise, "conditioned", lambda *_: again)
     monkeypatch.setattr(stepwise, "mismatch_of", lambda *_: left(beside))
-    after, remaining = stepwise.as_conditioned(judge, found, left(1e-9), [])
+    after, remaining = stepwise.as_conditioned(problem, found, left(1e-9), [])
     assert (after.fitted is again) == taken
     assert remaining.p_value == (beside if taken else 1e-9)
-    assert weighed == ([] if taken else ["as it is"])
-    same, _ = stepwise.as_conditioned(judge, found, left(0.4), [])
+    assert reweighted == ([] if taken else ["as it is"])
+    same, _ = stepwise.as_conditioned(problem, found, left(0.4), [])
     assert same is found, "nothing is left to be eased"
 
 
@@ -267,7 +269,7 @@ def test_beside_what_rings_in_tune_the_other_of_a_pair_is_looked_for_anew(
             for i, own in searches.items()
         )
         zero = np.zeros(4)
-        block = Block(residual=zero + np.sqrt(left / 4.0), J=np.zeros((4, 3)), slope=zero, shift=0.0, prior=1.0)
+        block = ResidualBlock(residual=zero + np.sqrt(left / 4.0), J=np.zeros((4, 3)), slope=zero, shift=0.0, prior=1.0)
         return Fitted(candidates=candidates, x=(0.1, 0.2, 0.3), blocks=(block,))
 
     def stepped(fit: Fitted) -> Step:
@@ -275,29 +277,29 @@ def test_beside_what_rings_in_tune_the_other_of_a_pair_is_looked_for_anew(
 
     asked: list[str] = []
 
-    def instead(_: Any, current: Fitted) -> Step:
+    def swapped(_: Any, current: Fitted) -> Step:
         asked.append(current.candidates[-1].id)
         return stepped(pair("mass", other))
 
     found = stepped(pair("soil-layer", 80.0))
-    judge = SimpleNamespace(again=lambda f: f, evidence=())
+    problem = SimpleNamespace(again=lambda f: f, dataset=())
     monkeypatch.setattr(pairs, "best_pair", lambda *_: found)
     monkeypatch.setattr(pairs, "followed", lambda _, one: (one, left(p_value)))
     monkeypatch.setattr(pairs, "is_enough", lambda _judge, _fit, what: what.p_value > 0.001)
-    monkeypatch.setattr(pairs, "instead", instead)
-    monkeypatch.setattr(pairs, "weighed", lambda *_: False)
-    asking = cast(Inquiry, SimpleNamespace(judge=judge, phases=()))
-    both = pairs.two_by_two(asking, [found], cast(Gate, None), pair("mass", 1e4))
+    monkeypatch.setattr(pairs, "swapped", swapped)
+    monkeypatch.setattr(pairs, "reweighted", lambda *_: False)
+    asking = cast(Inquiry, SimpleNamespace(problem=problem, phases=()))
+    both = pairs.best_subsets(asking, [found], cast(ScoreTest, None), pair("mass", 1e4))
     assert both is not None
     assert both[0][-1].fitted.candidates[-1].id == ("mass" if exchanged else "soil-layer")
     assert asked == ([] if p_value > 0.001 else ["structural-compliance"])
 
 
 def test_effects_that_may_be_any_others_are_not_named(judged: dict[str, float]) -> None:
-    judge = cast(Judge, SimpleNamespace(evidence=(), effort=DROPS))
+    problem = cast(Problem, SimpleNamespace(dataset=(), effort=DROPS))
     found = explanation(MOST, 0.4)
-    assert len(decided(judge, found, [], [])[0].parts) == MOST
-    refused, verdict = decided(judge, replace(found, settled=False), [], [])
+    assert len(decided(problem, found, [], [])[0].parts) == MOST
+    refused, verdict = decided(problem, replace(found, settled=False), [], [])
     assert (refused.parts, verdict) == ((), "unexplained")
 
 
@@ -308,7 +310,7 @@ def test_effects_beside_which_a_sensor_reads_a_curve_are_not_named_together(
     """They leave no more than chance over all, and what is looked for itself: one that takes nearly all is named."""
     monkeypatch.setattr(decision, "is_a_curve", lambda *_: True)
     judged["soil-crust"] = alone
-    found, verdict = decided(cast(Judge, SimpleNamespace(evidence=(), effort=DROPS)), explanation(2, 0.4), [], [])
+    found, verdict = decided(cast(Problem, SimpleNamespace(dataset=(), effort=DROPS)), explanation(2, 0.4), [], [])
     assert [s.fitted.candidates[-1].id for s in found.parts] == named
     assert verdict == ("missing-physics" if named else "unexplained")
 
@@ -328,14 +330,16 @@ def test_a_third_effect_is_not_looked_for_that_would_have_to_take_far_more_than_
 ) -> None:
     base, current = leaving(before), leaving(after)
     last = forward_step.Step(base=base, fitted=current, p_value=0.0)
-    judge = cast(Judge, SimpleNamespace(effort=SimpleNamespace(thrifty=False)))
-    assert stepwise.is_unlikely(judge, last, current) is unlikely
+    problem = cast(Problem, SimpleNamespace(effort=SimpleNamespace(is_ensemble=False)))
+    assert stepwise.is_unlikely(problem, last, current) is unlikely
     # a full run costs much, and a third is rare there
-    assert not stepwise.is_unlikely(cast(Judge, SimpleNamespace(effort=SimpleNamespace(thrifty=True))), last, current)
+    assert not stepwise.is_unlikely(
+        cast(Problem, SimpleNamespace(effort=SimpleNamespace(is_ensemble=True))), last, current
+    )
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "thrifty", "hopeless"),
+    ("before", "after", "is_ensemble", "hopeless"),
     [
         (2040.0, 300.0, False, True),  # of 40 samples, 2.7 times the noise: 260 of 2000 are left
         (3040.0, 300.0, False, False),  # of 3000 that is little: a third effect of three may be no more
@@ -344,14 +348,14 @@ def test_a_third_effect_is_not_looked_for_that_would_have_to_take_far_more_than_
     ],
 )
 def test_two_that_leave_a_small_part_of_much_may_have_a_third_beside_them(
-    before: float, after: float, thrifty: bool, hopeless: bool
+    before: float, after: float, is_ensemble: bool, hopeless: bool
 ) -> None:
-    judge = cast(Judge, SimpleNamespace(effort=SimpleNamespace(thrifty=thrifty)))
-    assert stepwise.is_hopeless(judge, leaving(before), leaving(after)) is hopeless
+    problem = cast(Problem, SimpleNamespace(effort=SimpleNamespace(is_ensemble=is_ensemble)))
+    assert stepwise.is_hopeless(problem, leaving(before), leaving(after)) is hopeless
 
 
 def leaving(squares: float) -> Fitted:
     """A fit of nothing to 40 samples that leaves so much."""
     residual = np.full(40, np.sqrt(squares / 40.0))
-    block = Block(residual=residual, J=np.zeros((40, 0)), slope=np.zeros(40), shift=0.0, prior=1.0)
+    block = ResidualBlock(residual=residual, J=np.zeros((40, 0)), slope=np.zeros(40), shift=0.0, prior=1.0)
     return Fitted(candidates=(), x=(), blocks=(block,))

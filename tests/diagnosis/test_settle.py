@@ -10,16 +10,16 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis.data.dataset import Evidence, Signal
+from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.fit import ensemble_mean
 from rollover.diagnosis.fit.ensemble_mean import along, rescattered, settled, step_of_means
-from rollover.diagnosis.fit.levenberg_marquardt import Judge
-from rollover.diagnosis.fit.linearisation import GENTLE, Block, Fitted
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import GENTLE, Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.forward import full_run
 from rollover.diagnosis.forward.budget import DROPS, RUNS, Effort
-from rollover.diagnosis.forward.full_run import CENTRE, NEIGHBOURS, Made, Making, RunSimulator
+from rollover.diagnosis.forward.full_run import CENTRE, PERTURBATIONS, Made, Making, RunSimulator
 from rollover.diagnosis.inference import intervals as intervals_of
 from rollover.diagnosis.inference.intervals import intervals, scattered, unshaped
 from rollover.diagnosis.statements import by_steps
@@ -54,12 +54,12 @@ def test_the_run_that_is_like_most_others_stands_for_all(monkeypatch: pytest.Mon
     chosen = simulator.scenario.ground.elements.centre
     assert chosen != own
     made = simulator.runs
-    assert made == len(full_run.ELSEWHERE) + len(NEIGHBOURS)  # one neighbour is one of the places
+    assert made == len(full_run.ELSEWHERE) + len(PERTURBATIONS)  # one neighbour is one of the places
     found = simulator.predict({}, 0.0)
     assert found is not None
     assert np.max(found[CHANNEL]) < 2.0
     assert simulator.runs == made  # it is known already
-    assert max(np.max(np.abs(s[CHANNEL])) for s in simulator.strays()) > 3.0  # the other way is a neighbour now
+    assert max(np.max(np.abs(s[CHANNEL])) for s in simulator.perturbed()) > 3.0  # the other way is a neighbour now
 
 
 def test_a_run_like_the_others_stays(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -83,25 +83,25 @@ def test_phases_are_those_of_the_run_that_stands_for_all() -> None:
 
 def test_a_shape_that_is_not_fitted_widens_an_interval(monkeypatch: pytest.MonkeyPatch) -> None:
     """y = 20 (x + f) sin t with f from 0 to 1 unknown: x is known to sqrt(1/12) and no better."""
-    judge = Judge([evidence(4, 0.0)])
+    problem = Problem([dataset(4, 0.0)])
     alone = replace(SLOPE, shapes={"other": Search(0.0, 1.0)})
     monkeypatch.setattr(Candidate, "with_shapes", lambda self, x: [(*x, 0.5)])
-    block = judge.block(0, (SLOPE,), (0.4,), 0.0, judge.effort.fine)
+    block = problem.block(0, (SLOPE,), (0.4,), 0.0, problem.effort.fine)
     assert block is not None
     inverse = np.linalg.inv(block.J.T @ block.J)
-    found = unshaped(judge, Fitted(candidates=(alone,), x=(0.4,), blocks=(block,)), inverse)
+    found = unshaped(problem, Fitted(candidates=(alone,), x=(0.4,), blocks=(block,)), inverse)
     assert found[0] == pytest.approx(1.0 / 12.0, rel=0.05)
-    assert unshaped(judge, Fitted(candidates=(SLOPE,), x=(0.4,), blocks=(block,)), inverse) == 0.0
+    assert unshaped(problem, Fitted(candidates=(SLOPE,), x=(0.4,), blocks=(block,)), inverse) == 0.0
 
 
 def test_no_neighbour_is_the_run_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     simulator = a_toss(monkeypatch, {})
-    place = simulator._place(NEIGHBOURS[0].place)
+    place = simulator._place(PERTURBATIONS[0].place)
     simulator.scenario = simulator.scenario.replaced({CENTRE: place})
     plain = simulator.scenario
-    others = [plain.replaced(simulator._beside(one)) for one in NEIGHBOURS]
+    others = [plain.replaced(simulator._beside(one)) for one in PERTURBATIONS]
     assert all(one != plain for one in others)
-    assert len({repr(one) for one in others}) == len(NEIGHBOURS)
+    assert len({repr(one) for one in others}) == len(PERTURBATIONS)
     assert sorted({round(plain.simulation.step / one.simulation.step) for one in others}) == [1, 2, 3]
     assert any(one.vehicle.contact_spacing < plain.vehicle.contact_spacing for one in others)  # type: ignore[union-attr]
 
@@ -125,7 +125,7 @@ class Rough:
         chance = np.convolve(rng.standard_normal(N + 6), np.ones(7) / np.sqrt(7.0), mode="valid")
         return {CHANNEL: 20.0 * x * np.sin(30.0 * (TIME - shift)) + self.size * chance}
 
-    def strays(
+    def perturbed(
         self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1
     ) -> list[dict[str, np.ndarray]]:
         values = dict(changes or {})
@@ -134,7 +134,7 @@ class Rough:
         return [{CHANNEL: self.predict(each, shift)[CHANNEL] - base} for each in several]
 
 
-def evidence(seed: int, size: float, values: np.ndarray | None = None, effort: Effort = RUNS) -> Evidence:
+def dataset(seed: int, size: float, values: np.ndarray | None = None, effort: Effort = RUNS) -> Dataset:
     simulator = Rough(seed, size)
     simulator.effort = effort
     signal = Signal(
@@ -142,10 +142,10 @@ def evidence(seed: int, size: float, values: np.ndarray | None = None, effort: E
         ar=(), span=10.0,
     )  # fmt: skip
     recording = Recording(title="r", time=TIME, channels={CHANNEL: signal.values})
-    strays = tuple(s[CHANNEL] for s in simulator.strays()) if size else ()
-    return Evidence(
+    perturbed = tuple(s[CHANNEL] for s in simulator.perturbed()) if size else ()
+    return Dataset(
         name="r", recording=recording, simulator=cast(Any, simulator), signals=(signal,), shift_prior=1e-3,
-        condition="r", strays=strays,
+        condition="r", perturbed=perturbed,
     )  # fmt: skip
 
 
@@ -156,9 +156,9 @@ def candidate(id: str, kind: str, name: str) -> Candidate:
 SLOPE, GAIN = candidate("slope", "parameter", "angle"), candidate("sensor-gain", "sensor", "gain")
 
 
-def gradient(judge: Judge, c: Candidate) -> float:
+def gradient(problem: Problem, c: Candidate) -> float:
     """dy/dx along sin, over its true value of 20."""
-    block = judge.block(0, (c,), (0.4,), 0.0, judge.effort.fine)
+    block = problem.block(0, (c,), (0.4,), 0.0, problem.effort.fine)
     assert block is not None
     wave = np.sin(30.0 * TIME) / 0.1
     return float(block.J[:, 0] @ wave / (wave @ wave)) / 20.0
@@ -166,31 +166,31 @@ def gradient(judge: Judge, c: Candidate) -> float:
 
 def test_a_slope_among_runs_that_scatter_is_that_of_a_wide_step() -> None:
     """Squares of J beyond those of the slope are chance's: 2 N (size/step)^2 one-sided over 0.008, and next to none."""
-    judge = Judge([evidence(3, 0.1)])
-    assert gradient(judge, SLOPE) == pytest.approx(1.0, abs=0.1)
-    block = judge.block(0, (SLOPE,), (0.4,), 0.0, judge.effort.fine)
+    problem = Problem([dataset(3, 0.1)])
+    assert gradient(problem, SLOPE) == pytest.approx(1.0, abs=0.1)
+    block = problem.block(0, (SLOPE,), (0.4,), 0.0, problem.effort.fine)
     assert block is not None
     true = float(np.sum((20.0 * np.sin(30.0 * TIME) / 0.1) ** 2))
     assert float(block.J[:, 0] @ block.J[:, 0]) < 1.3 * true
-    narrow = Judge([evidence(3, 0.1, effort=replace(DROPS, nudges=(8e-3,)))]).block(0, (SLOPE,), (0.4,), 0.0, 8e-3)
+    narrow = Problem([dataset(3, 0.1, effort=replace(DROPS, fd_steps=(8e-3,)))]).block(0, (SLOPE,), (0.4,), 0.0, 8e-3)
     assert narrow is not None
     assert float(narrow.J[:, 0] @ narrow.J[:, 0]) > 1.5 * true
 
 
 def test_what_moves_little_is_looked_at_over_a_wider_step_but_for_sensors() -> None:
     seen: list[float] = []
-    judge = Judge([evidence(3, 0.5)])
-    predict = judge.evidence[0].simulator.predict
+    problem = Problem([dataset(3, 0.5)])
+    predict = problem.dataset[0].simulator.predict
 
     def watched(changes: Mapping[str, Any], shift: float) -> Any:
         seen.extend(float(v) for k, v in changes.items() if k.startswith("effects."))
         return predict(changes, shift)
 
-    judge.evidence[0].simulator.predict = watched  # type: ignore[method-assign]
-    gradient(judge, SLOPE)
+    problem.dataset[0].simulator.predict = watched  # type: ignore[method-assign]
+    gradient(problem, SLOPE)
     assert max(seen) - min(seen) == pytest.approx(8.0 * RUNS.fine)
     seen.clear()
-    gradient(judge, GAIN)
+    gradient(problem, GAIN)
     assert max(seen) - min(seen) < 0.02
 
 
@@ -205,10 +205,10 @@ def test_a_step_to_the_mean_of_neighbours_holds_what_it_says() -> None:
             d = rng.standard_normal((8, 1)) @ J.T * 0.4 + 0.3 * rng.standard_normal((8, N))  # along J above all
             slope = np.zeros(N)
             residual = d[0] - d[1] + 0.05 * rng.standard_normal(N)
-            blocks.append(Block(residual=residual, J=J, slope=slope, shift=0.0, prior=1e-3))
-            one = evidence(0, 0.0)
+            blocks.append(ResidualBlock(residual=residual, J=J, slope=slope, shift=0.0, prior=1e-3))
+            one = dataset(0, 0.0)
             signal = replace(one.signals[0], sigma=1.0)
-            every.append(replace(one, signals=(signal,), strays=tuple(d[k] - d[1] for k in range(2, 8))))
+            every.append(replace(one, signals=(signal,), perturbed=tuple(d[k] - d[1] for k in range(2, 8))))
         A = sum(b.J.T @ b.J for b in blocks) + GENTLE * np.eye(1)
         dx = step_of_means(every, blocks)
         sd = np.sqrt(scattered(every, blocks, np.linalg.inv(A)))
@@ -223,8 +223,8 @@ def test_a_step_to_the_mean_of_neighbours_holds_what_it_says() -> None:
 def test_a_time_shift_takes_its_part_of_a_deviation() -> None:
     rng = np.random.default_rng(1)
     J, slope = rng.standard_normal((N, 1)), rng.standard_normal(N)
-    block = Block(residual=np.zeros(N), J=J, slope=1e3 * slope, shift=0.0, prior=1.0)
-    e = evidence(0, 0.0)
+    block = ResidualBlock(residual=np.zeros(N), J=J, slope=1e3 * slope, shift=0.0, prior=1.0)
+    e = dataset(0, 0.0)
     e = replace(e, signals=(replace(e.signals[0], sigma=1.0),))
     assert abs(along(block, e, slope)[0]) < 1e-3
     across = J[:, 0] - slope * float(slope @ J[:, 0]) / float(slope @ slope)
@@ -233,16 +233,16 @@ def test_a_time_shift_takes_its_part_of_a_deviation() -> None:
 
 def test_the_scatter_is_that_of_runs_with_the_explanation() -> None:
     """Strays that the scenario's own runs have are replaced by those at the fitted point, and weights with them."""
-    judge = Judge([evidence(5, 0.2, 6.0 * np.sin(30.0 * TIME))])
-    fitted = judge.fit((SLOPE,), (0.3,), rounds=1)
+    problem = Problem([dataset(5, 0.2, 6.0 * np.sin(30.0 * TIME))])
+    fitted = problem.fit((SLOPE,), (0.3,), rounds=1)
     assert fitted is not None
-    before = judge.evidence[0].strays
-    rescattered(judge, fitted)
-    after = judge.evidence[0].strays
-    expected = judge.evidence[0].simulator.strays(judge.changes((SLOPE,), fitted.x), fitted.blocks[0].shift)
+    before = problem.dataset[0].perturbed
+    rescattered(problem, fitted)
+    after = problem.dataset[0].perturbed
+    expected = problem.dataset[0].simulator.perturbed(problem.changes((SLOPE,), fitted.x), fitted.blocks[0].shift)
     np.testing.assert_array_equal(np.stack(after), np.stack([s[CHANNEL] for s in expected]))
     assert not np.array_equal(np.stack(before), np.stack(after))
-    weight = judge.evidence[0].signals[0].weight
+    weight = problem.dataset[0].signals[0].weight
     assert weight is not None
     assert np.all(weight < 0.6)
 
@@ -263,43 +263,43 @@ def test_a_value_is_that_of_shorter_steps(size: float, monkeypatch: pytest.Monke
     """Measured at 0.4: fitted 0.4 - LAG, 0.4 - LAG/4 by steps of a quarter; LAG/4 more is another standard error."""
     every = []
     for r in range(4):
-        e = evidence(30 + r, size, 8.0 * np.sin(30.0 * TIME))
+        e = dataset(30 + r, size, 8.0 * np.sin(30.0 * TIME))
         every.append(replace(e, simulator=cast(Any, Stepped(30 + r, size))))
-    judge = Judge(every)
-    fitted = judge.fit((SLOPE,), (0.3,))
+    problem = Problem(every)
+    fitted = problem.fit((SLOPE,), (0.3,))
     assert fitted is not None
     assert fitted.x[0] == pytest.approx(0.4 - LAG, abs=3e-3)
-    fine = ensemble_mean.in_shorter_steps(judge, fitted)
+    fine = ensemble_mean.in_shorter_steps(problem, fitted)
     for e in every:  # all others are run in the scenario's own
         assert (
-            np.max(np.abs(np.mean([d[CHANNEL] for d in e.simulator.strays()], axis=0))) < 0.25 * 20.0 * LAG
+            np.max(np.abs(np.mean([d[CHANNEL] for d in e.simulator.perturbed()], axis=0))) < 0.25 * 20.0 * LAG
         )  # 0.75 in shorter ones
     if not size:  # nothing scatters: nothing is known of what steps do
         assert fine is fitted
         return
     assert fine.x[0] == pytest.approx(0.4 - LAG / ensemble_mean.PARTS, abs=3e-3)
-    by_itself, whole = intervals(judge, fine, {})[0]["angle"], intervals(judge, fine, {}, fitted)[0]["angle"]
+    by_itself, whole = intervals(problem, fine, {})[0]["angle"], intervals(problem, fine, {}, fitted)[0]["angle"]
     more = np.sqrt((whole.high - whole.value) ** 2 - (by_itself.high - by_itself.value) ** 2)
     assert more == pytest.approx(1.96 * (fine.x[0] - fitted.x[0]) / (ensemble_mean.PARTS - 1), rel=1e-6)
     assert whole.low < 0.4 < whole.high
     assert (by_itself.as_simulated, whole.as_simulated) == (None, fitted.x[0])
     # how rough the misfit of runs is counts where an interval is stated, not where a side of it is asked for
     monkeypatch.setattr(intervals_of, "rough_reaches", lambda *_: np.full((1, 2), 50.0))
-    assert intervals(judge, fine, {}, fitted)[0]["angle"] == whole
-    rough = intervals(judge, fine, None, fitted)[0]["angle"]
+    assert intervals(problem, fine, {}, fitted)[0]["angle"] == whole
+    rough = intervals(problem, fine, None, fitted)[0]["angle"]
     assert rough.high - rough.low > 5.0 * (whole.high - whole.low)
     # what it tells is not asked of means of runs; where slopes are right, nor where it does not tell, it counts not
     asked: list[Any] = []
 
-    def reaches(*given: Any) -> np.ndarray:
+    def profile_extents(*given: Any) -> np.ndarray:
         asked.append(given[4])
         return np.ones((1, 2))
 
-    monkeypatch.setattr(intervals_of, "reaches", reaches)
-    assert intervals(judge, fine, None, fitted)[0]["angle"] == rough
+    monkeypatch.setattr(intervals_of, "profile_extents", profile_extents)
+    assert intervals(problem, fine, None, fitted)[0]["angle"] == rough
     for far in (0.0, np.nan):
         monkeypatch.setattr(intervals_of, "rough_reaches", lambda *_, far=far: np.full((1, 2), far))
-        assert intervals(judge, fine, None, fitted)[0]["angle"] == whole
+        assert intervals(problem, fine, None, fitted)[0]["angle"] == whole
     assert asked == [{}, {}, {0: (-1.0, 1.0)}]
     told = [cast(Any, SimpleNamespace(id="slope", parameters={"angle": i})) for i in (by_itself, whole)]
     assert by_steps(told) == [
@@ -316,17 +316,17 @@ def test_parameters_hold_though_runs_scatter() -> None:
         rng = np.random.default_rng([seed, 7])
         every = []
         for r in range(4):
-            e = evidence(100 * seed + r, 0.3)
+            e = dataset(100 * seed + r, 0.3)
             true = e.simulator.predict({"effects.slope.angle": 0.37, "neighbour": 99}, 0.0)
             assert true is not None
-            every.append(evidence(100 * seed + r, 0.3, true[CHANNEL] + 0.1 * rng.standard_normal(N)))
-        judge = Judge(every)
-        base, fitted = judge.fit((), ()), judge.fit((SLOPE,), (0.3,))
+            every.append(dataset(100 * seed + r, 0.3, true[CHANNEL] + 0.1 * rng.standard_normal(N)))
+        problem = Problem(every)
+        base, fitted = problem.fit((), ()), problem.fit((SLOPE,), (0.3,))
         assert base is not None
         assert fitted is not None
-        found = settled(judge, Step(base=base, fitted=fitted, p_value=0.0, rivals=(fitted,)))
+        found = settled(problem, Step(base=base, fitted=fitted, p_value=0.0, rivals=(fitted,)))
         assert found.rivals == (found.fitted,)
-        interval = intervals(judge, found.fitted)[0]["angle"]
+        interval = intervals(problem, found.fitted)[0]["angle"]
         hits.append(interval.low <= 0.37 <= interval.high)
         widths.append(interval.high - interval.low)
     assert np.mean(hits) > 0.87
@@ -344,14 +344,14 @@ def test_a_move_does_not_leap_to_another_course() -> None:
     every = []
     for r in range(4):
         true = Rough(r, 0.02).predict({"effects.slope.angle": 0.374, "neighbour": 99}, 0.0)[CHANNEL]
-        one = evidence(r, 0.02, true)
+        one = dataset(r, 0.02, true)
         every.append(replace(one, simulator=cast(Any, Leaping(r, 0.02))))
-    judge = Judge(every)
-    blocks = [judge.block(r, (SLOPE,), (0.30,), 0.0, 0.02) for r in range(4)]
+    problem = Problem(every)
+    blocks = [problem.block(r, (SLOPE,), (0.30,), 0.0, 0.02) for r in range(4)]
     fitted = Fitted(candidates=(SLOPE,), x=(0.30,), blocks=tuple(b for b in blocks if b is not None))
-    assert fitted.x[0] + step_of_means(judge.evidence, fitted.blocks)[0] == pytest.approx(0.374, abs=0.005)
-    base = judge.fit((), ())
+    assert fitted.x[0] + step_of_means(problem.dataset, fitted.blocks)[0] == pytest.approx(0.374, abs=0.005)
+    base = problem.fit((), ())
     assert base is not None
-    found = settled(judge, Step(base=base, fitted=fitted, p_value=0.0, rivals=(fitted,)))
+    found = settled(problem, Step(base=base, fitted=fitted, p_value=0.0, rivals=(fitted,)))
     assert not 0.365 < found.fitted.x[0] < 0.385
-    assert found.fitted.left < judge.again(fitted).left
+    assert found.fitted.left < problem.again(fitted).left

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.diagnosis.data.dataset import evidence_of
-from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.data.dataset import dataset_of
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.parameterisation import coordinate
 from rollover.diagnosis.forward.averaging import simulated
-from rollover.diagnosis.forward.discontinuities import LEAP_IN
+from rollover.diagnosis.forward.discontinuities import DISCONTINUITY_IN
 from rollover.diagnosis.forward.forward_model import SHORTEST, STEP, DropSimulator, set_up, simulator_of
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.dynamics.drop_test import DropModel
@@ -142,13 +142,13 @@ def test_a_clock_of_its_own_is_simulated_at_its_own_stamps() -> None:
     assert np.array_equal(late[FORCE], shifted[FORCE])
     assert np.array_equal(late[DEPTH], plain[DEPTH]), name
     # and what leaps in it leaps there: on which side a sample lies is this clock's to say
-    assert np.any(late[LEAP_IN + FORCE] > 0.0)
-    assert np.array_equal(late[LEAP_IN + FORCE], shifted[LEAP_IN + FORCE])
-    assert not np.array_equal(late[LEAP_IN + FORCE], plain[LEAP_IN + FORCE])
+    assert np.any(late[DISCONTINUITY_IN + FORCE] > 0.0)
+    assert np.array_equal(late[DISCONTINUITY_IN + FORCE], shifted[DISCONTINUITY_IN + FORCE])
+    assert not np.array_equal(late[DISCONTINUITY_IN + FORCE], plain[DISCONTINUITY_IN + FORCE])
     lag = {"effects.sensor-lag.channel": FORCE, "effects.sensor-lag.time": 0.002}
     behind = simulator.predict(lag, 0.0)
     assert behind is not None
-    assert LEAP_IN + FORCE not in behind  # which makes a kink of it
+    assert DISCONTINUITY_IN + FORCE not in behind  # which makes a kink of it
 
 
 def test_a_clock_that_drifts_is_forgiven_for_the_side_of_a_contact_that_a_sample_lies_on() -> None:
@@ -158,14 +158,14 @@ def test_a_clock_that_drifts_is_forgiven_for_the_side_of_a_contact_that_a_sample
     model = DropModel(scenario=scenario(), step=2e-4).with_({"initiation.speed": 1.4})
     runs = {FORCE: model.run(0.997 * time)[FORCE], DEPTH: model.run(time)[DEPTH]}
     channels = {c: v + 3e-3 * np.ptp(v) * rng.normal(size=v.size) for c, v in runs.items()}
-    one = evidence_of(name, *simulated(scenario(), replace(made, time=time, channels=channels)))
+    one = dataset_of(name, *simulated(scenario(), replace(made, time=time, channels=channels)))
     assert one is not None
-    judge = Judge([one])
-    c = next(c for c in candidates_of(judge.evidence, (), "drop") if c.key == f"sensor-clock-drift:{FORCE}")
+    problem = Problem([one])
+    c = next(c for c in candidates_of(problem.dataset, (), "drop") if c.key == f"sensor-clock-drift:{FORCE}")
     there = (coordinate(0.003, c.search["drift"]),)
 
     def left(shift: float) -> float:
-        e, raw = judge.evidence[0], judge.raw(0, (c,), there, shift)
+        e, raw = problem.dataset[0], problem.raw(0, (c,), there, shift)
         assert raw is not None
         return float(np.sum((e.measured() - e.whitened(raw)) ** 2))
 

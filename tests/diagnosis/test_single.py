@@ -22,12 +22,12 @@ def test_single_samples_of_a_coloured_noise_are_not_louder_by_the_root_of_their_
 
 
 def test_behind_a_filter_class_and_beside_what_is_missing_at_a_contact() -> None:
-    """CFC 600 at 10 kHz: a tenth of the samples, at the blow, hold a misfit of twenty times the noise."""
+    """CFC 600 at 10 kHz: a tenth of the samples, at the impact, hold a misfit of twenty times the noise."""
     noise = filtered(np.random.default_rng(1).standard_normal(5000), 1e-4, 600)
     means = noise.reshape(-1, 10).mean(axis=1)
-    blow = np.zeros(5000)
-    blow[1000:1500] = 20.0 * np.std(noise) * np.sin(np.linspace(0.0, 40.0, 500))
-    assert single(noise + blow, float(np.std(means)), 10) == pytest.approx(np.std(noise), rel=0.1)
+    first_impact = np.zeros(5000)
+    first_impact[1000:1500] = 20.0 * np.std(noise) * np.sin(np.linspace(0.0, 40.0, 500))
+    assert single(noise + first_impact, float(np.std(means)), 10) == pytest.approx(np.std(noise), rel=0.1)
 
 
 def test_where_nothing_is_averaged_the_noise_is_that_of_the_samples() -> None:

@@ -13,8 +13,8 @@ import pytest
 
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.data import inconsistent as slipping
-from rollover.diagnosis.data.inconsistent import Slip, slips_of
-from rollover.diagnosis.fit.jobs import Crew
+from rollover.diagnosis.data.inconsistent import Inconsistency, inconsistencies_of
+from rollover.diagnosis.fit.jobs import Executor
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
@@ -77,17 +77,17 @@ def test_where_nothing_else_was_recorded_it_is_what_cannot_be_told() -> None:
     assert found.sentence.count("its sign were the opposite one") == 3
 
 
-def slips(made: Drops) -> tuple[list[Slip], list[Slip]]:
-    every, _ = diagnosing._evidence(scenario(), made, Crew())
-    return slips_of(every)
+def inconsistencies(made: Drops) -> tuple[list[Inconsistency], list[Inconsistency]]:
+    every, _ = diagnosing._dataset(scenario(), made, Executor())
+    return inconsistencies_of(every)
 
 
 @pytest.mark.parametrize("factor", [0.6, 1.4, math.pi, 4.4482])
 def test_no_other_factor_is_a_slip(factor: float) -> None:
     """Of a force: 1.4 may be a gain, nobody writes forces down in 1/pi N, and pounds may be ground that is harder."""
     made = recorded({}, 4, speeds=(1.5, 2.0, 2.5), channels=CHANNELS)
-    assert slips(mistaken(made, FORCE, factor)) == ([], [])
-    assert len(slips(mistaken(made, FORCE, 9.80665))[0]) == 1
+    assert inconsistencies(mistaken(made, FORCE, factor)) == ([], [])
+    assert len(inconsistencies(mistaken(made, FORCE, 9.80665))[0]) == 1
 
 
 def test_what_goes_its_own_way_is_no_slip() -> None:
@@ -95,19 +95,21 @@ def test_what_goes_its_own_way_is_no_slip() -> None:
     made = mistaken(recorded({}, 4, speeds=(1.5, 2.0, 2.5), channels=CHANNELS), FORCE, -1.0)
     other = np.roll(made[1][1][FORCE], 40) * 0.8
     made[1] = (made[1][0], replace(made[1][1], channels={**made[1][1].channels, FORCE: made[1][1][FORCE] + other}))
-    assert slips(made) == ([], [])
+    assert inconsistencies(made) == ([], [])
 
 
 @pytest.mark.parametrize(("apart", "is_slip"), [(0.6, True), (0.8, False)])
 def test_what_neighbouring_runs_do_as_well_is_no_slip(apart: float, is_slip: bool) -> None:
     """Runs that nobody could tell apart, by so much of a channel: 0.71 of it leave |r| = 0.7."""
     made = mistaken(recorded({}, 4, speeds=(1.5, 2.0, 2.5), channels=CHANNELS), FORCE, -1.0)
-    every, _ = diagnosing._evidence(scenario(), made, Crew())
+    every, _ = diagnosing._dataset(scenario(), made, Executor())
     there = every[1].simulator.predict({}, 0.0)
     assert there is not None
-    strays = [{FORCE: size * apart * there[FORCE]} for size in (-1.0, 1.0, 0.0, 3.0, -1.0)]
-    every[1] = replace(every[1], simulator=SimpleNamespace(predict=every[1].simulator.predict, strays=lambda: strays))
-    assert [slip.signal.channel for slip in slips_of(every)[0]] == [FORCE] * is_slip
+    perturbed = [{FORCE: size * apart * there[FORCE]} for size in (-1.0, 1.0, 0.0, 3.0, -1.0)]
+    every[1] = replace(
+        every[1], simulator=SimpleNamespace(predict=every[1].simulator.predict, perturbed=lambda: perturbed)
+    )
+    assert [inconsistency.signal.channel for inconsistency in inconsistencies_of(every)[0]] == [FORCE] * is_slip
 
 
 def test_ground_that_is_three_times_as_stiff_makes_no_feet_of_metres() -> None:
@@ -131,6 +133,6 @@ def test_ground_that_is_three_times_as_stiff_makes_no_feet_of_metres() -> None:
 def test_a_scale_is_never_negative(channel: str, factor: float, shared: bool) -> None:
     """A channel turned round in all recordings has a negative gain; a length or an angle has none: it is left aside."""
     every: list[Any] = [SimpleNamespace(name=name, signals=(SimpleNamespace(channel=channel),)) for name in "ab"]
-    found = [Slip(evidence=e, signal=e.signals[0], factor=factor, cause="such") for e in every]
+    found = [Inconsistency(dataset=e, signal=e.signals[0], factor=factor, cause="such") for e in every]
     assert slipping._is_shared(found[0], found, every) is shared
     assert not slipping._is_shared(found[0], found[:1], every)

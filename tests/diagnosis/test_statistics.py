@@ -12,10 +12,10 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import kstest
 
-from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cross_validation import held_out
-from rollover.diagnosis.fit.levenberg_marquardt import GENTLE, Block, Fitted, Judge
-from rollover.diagnosis.fit.linearisation import freed
+from rollover.diagnosis.fit.levenberg_marquardt import GENTLE, Fitted, Problem, ResidualBlock
+from rollover.diagnosis.fit.linearisation import without_shift
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
 from rollover.diagnosis.forward.averaging import thinned
 from rollover.diagnosis.forward.budget import DROPS
@@ -27,10 +27,10 @@ from rollover.recording import Recording
 from tests.diagnosis.drops import FORCE, linear_blocks, recorded, signal
 
 
-def pretend(values: np.ndarray, sigma: float, ar: tuple[float, ...] = ()) -> Evidence:
+def pretend(values: np.ndarray, sigma: float, ar: tuple[float, ...] = ()) -> Dataset:
     time = np.arange(values.size) * 1e-3
     recording = Recording(title="r", time=time, channels={FORCE: values})
-    return Evidence(
+    return Dataset(
         name="r", recording=recording, simulator=cast(Any, None), signals=(signal(values, sigma, ar),),
         shift_prior=1e-3, condition="",
     )  # fmt: skip
@@ -56,7 +56,7 @@ def test_p_values_of_the_mismatch_are_uniform_on_noise(ar: tuple[float, ...]) ->
         e = pretend(x, sigma, ar)
         slope = np.sin(np.arange(x.size) / 20.0)
         w = e.stacked({FORCE: x})
-        block = Block(residual=w, J=np.zeros((w.size, 0)), slope=slope, shift=0.0, prior=1e-3)
+        block = ResidualBlock(residual=w, J=np.zeros((w.size, 0)), slope=slope, shift=0.0, prior=1e-3)
         found.append(mismatch_of([e], [block], phases).p_value)
     assert kstest(found, "uniform").pvalue > 0.01
 
@@ -65,7 +65,7 @@ def test_a_slow_wave_in_one_phase_is_found_there() -> None:
     x = np.random.default_rng(6).standard_normal(240)
     x[120:] += 1.5 * np.sin(np.arange(120) / 25.0)
     e = pretend(x, 1.0)
-    block = Block(residual=x, J=np.zeros((240, 0)), slope=np.zeros(240), shift=0.0, prior=1e-3)
+    block = ResidualBlock(residual=x, J=np.zeros((240, 0)), slope=np.zeros(240), shift=0.0, prior=1e-3)
     found = mismatch_of([e], [block], [((0.0, "calm"), (0.12, "wavy"))])
     assert found.p_value < 1e-6
     assert found.shares()[0][0].phase == "wavy"
@@ -124,21 +124,22 @@ def test_freed_directions_are_measured_as_the_shift_leaves_them() -> None:
     v = rng.standard_normal((30, 1))
     # |v|^2 less what a time shift with its prior takes: v'(1 + sd^2 s s')^-1 v
     expected = float(v[:, 0] @ np.linalg.solve(np.eye(30) + 0.09 * np.outer(b.slope, b.slope), v[:, 0]))
-    assert float(np.sum(freed(v, b) ** 2)) == pytest.approx(expected, rel=1e-9)
+    assert float(np.sum(without_shift(v, b) ** 2)) == pytest.approx(expected, rel=1e-9)
 
 
 def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
     rng = np.random.default_rng(8)
     inside = []
-    bare = SimpleNamespace(signals=(), strays=())
-    judge = cast(
+    no_jacobian = SimpleNamespace(signals=(), perturbed=())
+    problem = cast(
         Any,
         SimpleNamespace(
-            evidence=(bare, bare, bare), measured=(), per_error=1.0, effort=DROPS, made_ahead=lambda _: None,
-            _pinned=False,
+            dataset=(no_jacobian, no_jacobian, no_jacobian), measured=(), samples_per_error=1.0, effort=DROPS,
+            made_ahead=lambda _: None,
+            _fixed_shifts=False,
         ),
     )  # fmt: skip
-    judge.clocked = partial(Judge.clocked, judge)
+    problem.clocked = partial(Problem.clocked, problem)
     truth = np.array([0.02, -0.03])
     for _ in range(250):
         blocks = linear_blocks(rng, 3, 40, truth)
@@ -149,7 +150,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
 
         def block(
             r: int, _c: object, x: list[float], shift: float, _n: float, fitted: Fitted = fitted
-        ) -> Block:  # as linear as it was made
+        ) -> ResidualBlock:  # as linear as it was made
             b = fitted.blocks[r]
             off = b.J @ (np.array(x) - np.array(fitted.x)) + b.slope * (shift - b.shift)
             return replace(b, residual=b.residual - off, shift=shift)
@@ -162,8 +163,8 @@ def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
             d = coordinate(value, candidate().search[name]) - fitted.x[k]
             return SimpleNamespace(left=fitted.left + d * d / np.linalg.inv(curved)[k, k])
 
-        judge.block, judge.fit = block, fit
-        found = intervals(judge, fitted)[0]
+        problem.block, problem.fit = block, fit
+        found = intervals(problem, fitted)[0]
         for i, t in zip(found.values(), 0.5 + truth, strict=True):
             inside.append(i.low <= t <= i.high)
     assert 0.92 < np.mean(inside) < 0.98

@@ -31,52 +31,52 @@ def curved(curvature: float, seed: int, noise: float, rate: float) -> list:  # t
 @pytest.mark.parametrize("seed", range(4))
 def test_of_a_true_gain_nothing_curved_is_left(seed: int) -> None:
     """Chi-square of one degree of freedom: above 11 in one of a thousand."""
-    judge = judge_of(recorded(GAIN, seed, speeds=SPEEDS, noise=0.02, rate=1500.0))
-    c = candidate(judge, f"sensor-gain:{FORCE}")
-    fitted = judge.fit((c,), (coordinate(1.05, c.search["gain"]),))
+    problem = judge_of(recorded(GAIN, seed, speeds=SPEEDS, noise=0.02, rate=1500.0))
+    c = candidate(problem, f"sensor-gain:{FORCE}")
+    fitted = problem.fit((c,), (coordinate(1.05, c.search["gain"]),))
     assert fitted is not None
-    assert max(bow(judge, fitted, FORCE, term) for term in (square, drift)) < 11.0
+    assert max(bow(problem, fitted, FORCE, term) for term in (square, drift)) < 11.0
 
 
 def test_a_curve_is_seen_beside_the_gain_that_meets_it_best() -> None:
     """z^2 of a least-squares fit of one column more is what the sum of squares falls by."""
-    judge = judge_of(curved(-0.08, 5, 0.02, 1500.0))
-    c = candidate(judge, f"sensor-gain:{FORCE}")
-    fitted = judge.fit((c,), (coordinate(0.93, c.search["gain"]),))
+    problem = judge_of(curved(-0.08, 5, 0.02, 1500.0))
+    c = candidate(problem, f"sensor-gain:{FORCE}")
+    fitted = problem.fit((c,), (coordinate(0.93, c.search["gain"]),))
     assert fitted is not None
-    assert bow(judge, fitted, FORCE) > 3.0 * BENT
+    assert bow(problem, fitted, FORCE) > 3.0 * BENT
 
 
-@pytest.mark.parametrize("thrifty", [False, True])
-def test_a_gain_that_changes_as_it_warms_is_none(thrifty: bool) -> None:
+@pytest.mark.parametrize("is_ensemble", [False, True])
+def test_a_gain_that_changes_as_it_warms_is_none(is_ensemble: bool) -> None:
     """By 10 % of itself in the middle of each drop; where runs are dear and scatter too."""
     made = []
     for name, r in recorded(GAIN, 5, speeds=SPEEDS, channels=CHANNELS, noise=0.02, rate=1500.0):
         warm = 1.0 + 0.1 * (r.time > 0.1)
         made.append((name, replace(r, channels={**r.channels, FORCE: warm * r.channels[FORCE]})))
-    judge = judge_of(made)
-    judge.effort = replace(judge.effort, thrifty=thrifty)
-    c = candidate(judge, f"sensor-gain:{FORCE}")
-    fitted = judge.fit((c,), (coordinate(1.1, c.search["gain"]),))
+    problem = judge_of(made)
+    problem.effort = replace(problem.effort, is_ensemble=is_ensemble)
+    c = candidate(problem, f"sensor-gain:{FORCE}")
+    fitted = problem.fit((c,), (coordinate(1.1, c.search["gain"]),))
     assert fitted is not None
-    assert bow(judge, fitted, FORCE, drift) > 3.0 * BENT
-    assert is_a_curve(judge, fitted)
+    assert bow(problem, fitted, FORCE, drift) > 3.0 * BENT
+    assert is_a_curve(problem, fitted)
 
 
 def test_gain_and_offset_that_meet_a_curved_sensor_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    judge = judge_of(curved(-0.12, 6, 0.02, 1500.0))
-    both = [candidate(judge, f"{id}:{FORCE}") for id in ("sensor-gain", "sensor-bias")]
-    fitted = judge.fit(both, [coordinate(1.0, both[0].search["gain"]), coordinate(1.0, both[1].search["bias"])])
+    problem = judge_of(curved(-0.12, 6, 0.02, 1500.0))
+    both = [candidate(problem, f"{id}:{FORCE}") for id in ("sensor-gain", "sensor-bias")]
+    fitted = problem.fit(both, [coordinate(1.0, both[0].search["gain"]), coordinate(1.0, both[1].search["bias"])])
     assert fitted is not None
-    assert is_a_curve(judge, fitted)
+    assert is_a_curve(problem, fitted)
     assert is_one_line(both)
-    mass = candidate(judge, "mass")
-    beside = judge.fit((both[0], mass), (fitted.x[0], 0.6))
+    mass = candidate(problem, "mass")
+    beside = problem.fit((both[0], mass), (fitted.x[0], 0.6))
     assert beside is not None
-    assert is_a_curve(judge, beside), "whatever stands beside its gain"
+    assert is_a_curve(problem, beside), "whatever stands beside its gain"
     assert not is_one_line(beside.candidates)
-    assert not is_one_line([both[0], candidate(judge, f"sensor-bias:{DEPTH}")])
-    assert not is_a_curve(judge, replace(beside, candidates=(mass, mass))), "of no line"
+    assert not is_one_line([both[0], candidate(problem, f"sensor-bias:{DEPTH}")])
+    assert not is_a_curve(problem, replace(beside, candidates=(mass, mass))), "of no line"
     monkeypatch.setattr(decision, "is_a_curve", lambda *_: True)
     found = diagnose(scenario(), recorded(GAIN, speeds=(1.2, 2.2, 3.2)))
     assert (found.verdict, found.effects) == ("unexplained", ())

@@ -9,8 +9,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rollover.diagnosis.fit.jobs import Crew, Job
-from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.fit.jobs import Executor, Task
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import BESIDE, Candidate
 from rollover.diagnosis.forward.budget import RUNS
@@ -37,76 +37,78 @@ class Tipping(Wave):
 MASS = replace(SLOPE, id="mass", search={"factor": Search(-2.0, 2.0)})
 
 
-def tipped(size: float) -> tuple[Judge, Fitted]:
+def tipped(size: float) -> tuple[Problem, Fitted]:
     """Four recordings of a vehicle that tipped, which moves them by so many times their noise, and the base."""
-    judge, base = judge_of((0.0,) * 4, (size,) * 4)
-    for e in judge.evidence:
+    problem, base = judge_of((0.0,) * 4, (size,) * 4)
+    for e in problem.dataset:
         object.__setattr__(e, "simulator", Tipping(size))
-    judge.measured = [size * np.sin(30.0 * TIME) + w for w in np.random.default_rng(1).standard_normal((4, N))]
-    judge.straying = False
-    blocks = [replace(b, residual=w) for b, w in zip(base.blocks, judge.measured, strict=True)]
-    return judge, replace(base, blocks=tuple(blocks))
+    problem.measured = [size * np.sin(30.0 * TIME) + w for w in np.random.default_rng(1).standard_normal((4, N))]
+    problem.heavy_tailed = False
+    blocks = [replace(b, residual=w) for b, w in zip(base.blocks, problem.measured, strict=True)]
+    return problem, replace(base, blocks=tuple(blocks))
 
 
 def test_what_only_a_strong_effect_does_is_found_though_a_little_of_it_tells_nothing() -> None:
-    judge, base = tipped(20.0)
+    problem, base = tipped(20.0)
     mass, groups = MASS, [[r] for r in range(4)]
-    found = scan.look(judge, base, [mass, SLOPE], groups)
+    found = scan.look(problem, base, [mass, SLOPE], groups)
     assert found.scores["mass"] > 100.0 * found.scores["slope"]
     assert found.far == {"slope": ((0.95,),)}  # a mass leaves 0.91^2 of it, more than is followed
     assert found.leading[0] == "slope"
     assert [c.key for c in found.ranked([mass, SLOPE])] == ["slope", "mass"]
-    inquiry = Inquiry(judge=judge, candidates=(SLOPE,), groups=[], phases=[], say=lambda _: None, crew=Crew())
+    inquiry = Inquiry(
+        problem=problem, candidates=(SLOPE,), groups=[], phases=[], say=lambda _: None, executor=Executor()
+    )
     begun = screen(inquiry, base, [SLOPE], [0, 1], [0.0] * 4, found)[0]
     assert (0.95,) in begun.starts
     assert screen(inquiry, base, [SLOPE], [0, 1], [0.0] * 4, replace(found, far={}))[0].starts != begun.starts
-    judge.straying = True
-    assert scan.look(judge, base, [mass, SLOPE], groups).far == {}  # of what strays so far, chance may be all
+    problem.heavy_tailed = True
+    assert scan.look(problem, base, [mass, SLOPE], groups).far == {}  # of what perturbed runs so far, chance may be all
 
 
 def test_where_known_runs_must_do_no_strong_effect_is_tried() -> None:
-    judge, base = tipped(20.0)
+    problem, base = tipped(20.0)
     groups = [[r] for r in range(4)]
-    scan.look(judge, base, [MASS, SLOPE], groups, base, [0, 1])
-    known = judge.simulations
-    assert scan.look(judge, base, [MASS, SLOPE], groups, base, [0, 1]).far == {}
-    assert judge.simulations == known
-    assert list(scan.look(judge, base, [MASS, SLOPE], groups).far) == ["slope"]
-    assert judge.simulations > known
+    scan.look(problem, base, [MASS, SLOPE], groups, base, [0, 1])
+    known = problem.simulations
+    assert scan.look(problem, base, [MASS, SLOPE], groups, base, [0, 1]).far == {}
+    assert problem.simulations == known
+    assert list(scan.look(problem, base, [MASS, SLOPE], groups).far) == ["slope"]
+    assert problem.simulations > known
 
 
 def test_what_leaves_more_of_the_worst_recording_is_tried_in_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
     """x beyond 60 tips as was recorded, any other place moves what no recording did."""
-    judge, base = tipped(20.0)
-    judge.measured[2] = 1.5 * judge.measured[2]
+    problem, base = tipped(20.0)
+    problem.measured[2] = 1.5 * problem.measured[2]
     asked: dict[int, set[float]] = {1: set(), 2: set()}
     left_at = scan.left_at
 
-    def counted(judge: Judge, candidates: Any, x: Any, shifts: Any, use: Any) -> float | None:
+    def counted(problem: Problem, candidates: Any, x: Any, shifts: Any, use: Any) -> float | None:
         for r in use:
             asked[r] |= {round(float(v), 9) for v in x}
-        return left_at(judge, candidates, x, shifts, use)
+        return left_at(problem, candidates, x, shifts, use)
 
     monkeypatch.setattr(scan, "left_at", counted)
-    assert scan.strongly(judge, base, [SLOPE], [1, 2]) == {"slope": ((0.95,),)}
+    assert scan.strongly(problem, base, [SLOPE], [1, 2]) == {"slope": ((0.95,),)}
     assert asked[2] == {round(x, 9) for (x,) in SLOPE.strong()}
     assert asked[1] == {0.95}
 
 
-@pytest.mark.parametrize(("full", "forgiven"), [(5.0, 20.0), (20.0, 5.0), (20.0, 20.0)])
+@pytest.mark.parametrize(("full", "masked"), [(5.0, 20.0), (20.0, 5.0), (20.0, 20.0)])
 def test_what_leaves_less_of_it_in_full_or_forgiven_is_tried_in_all(
-    full: float, forgiven: float, monkeypatch: pytest.MonkeyPatch
+    full: float, masked: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def left_at(judge: Judge, candidates: Any, x: Any, *_: Any) -> float:
-        return 10.0 if not x else 30.0 if x != (0.95,) else forgiven if judge.straying else full
+    def left_at(problem: Problem, candidates: Any, x: Any, *_: Any) -> float:
+        return 10.0 if not x else 30.0 if x != (0.95,) else masked if problem.heavy_tailed else full
 
     monkeypatch.setattr(scan, "left_at", left_at)
-    judge, base = tipped(20.0)
-    assert scan.strongly(judge, base, [SLOPE], [1, 2]) == ({} if full == forgiven else {"slope": ((0.95,),)})
+    problem, base = tipped(20.0)
+    assert scan.strongly(problem, base, [SLOPE], [1, 2]) == ({} if full == masked else {"slope": ((0.95,),)})
 
 
 def test_a_strong_effect_is_fitted_with_other_courses_forgiven_and_compared_in_full() -> None:
-    """Before the blow x sets a wave, after it which of many courses is taken: in full the nearest dip ends a fit."""
+    """Before the impact x sets a wave, after it which of many courses is taken: in full the nearest dip ends a fit."""
 
     class Parting:
         effort = RUNS
@@ -115,13 +117,13 @@ def test_a_strong_effect_is_fitted_with_other_courses_forgiven_and_compared_in_f
             x, time = changes.get("effects.slope.angle", 0.0), STEP * np.arange(test_chaos.N) - shift
             early = x * np.sin(9.0 * time)
             return {
-                c: np.where(time < test_chaos.BLOW, early, 4.0 * np.sin(150.0 * x + k) * np.cos(20.0 * time))
+                c: np.where(time < test_chaos.IMPACT, early, 4.0 * np.sin(150.0 * x + k) * np.cos(20.0 * time))
                 for k, c in enumerate(test_chaos.CHANNELS)
             }
 
     truth, rng, simulator = 0.7, np.random.default_rng(2), Parting()
     quiet = replace(test_chaos.blown(), simulator=cast(Any, simulator))
-    evidence = []
+    dataset = []
     for _ in range(2):
         signals = []
         for s, values in zip(
@@ -130,20 +132,22 @@ def test_a_strong_effect_is_fitted_with_other_courses_forgiven_and_compared_in_f
             there = values + 0.2 * rng.standard_normal(values.size)
             there[quiet.early[: values.size] == 0.0] *= -1.0  # it went another way, whatever x is
             signals.append(replace(s, values=there))
-        evidence.append(replace(quiet, signals=tuple(signals)))
-    judge = Judge(evidence)
-    judge.straying = False
+        dataset.append(replace(quiet, signals=tuple(signals)))
+    problem = Problem(dataset)
+    problem.heavy_tailed = False
     strength = replace(SLOPE, search={"angle": Search(0.0, 1.0)}, neutral=(0.0,))
-    job = Job(candidates=(strength,), start=(0.3,), shifts=(0.0, 0.0), only=(0, 1), pinned=True)
-    with Crew() as crew:
-        inquiry = Inquiry(judge=judge, candidates=(strength,), groups=[], phases=[], say=lambda _: None, crew=crew)
-        plain, smooth = inquiry.fits([job])[0], _smoothly(inquiry, [job], (0, 1))[0]
+    task = Task(candidates=(strength,), start=(0.3,), shifts=(0.0, 0.0), only=(0, 1), fixed_shifts=True)
+    with Executor() as executor:
+        inquiry = Inquiry(
+            problem=problem, candidates=(strength,), groups=[], phases=[], say=lambda _: None, executor=executor
+        )
+        plain, smooth = inquiry.fits([task])[0], _smoothly(inquiry, [task], (0, 1))[0]
     assert plain is not None
     assert abs(plain.x[0] - truth) > 0.1
     assert smooth.x[0] == pytest.approx(truth, abs=0.02)
-    assert all(b.course is None for b in smooth.blocks)  # it stands in full
+    assert all(b.heavy_tail is None for b in smooth.blocks)  # it stands in full
     assert not any(b.slope.any() for b in smooth.blocks)  # with clocks where they say, as other first fits
-    assert not judge.straying
+    assert not problem.heavy_tailed
 
 
 def test_an_effect_is_strong_at_both_ends_or_at_the_one_that_it_has() -> None:
@@ -171,16 +175,18 @@ def test_a_limit_begins_where_something_gives_way_though_less_is_left_where_noth
     limit = Candidate(
         id="rops-plasticity", kind="physics", family="x", search={"yield_force": Search(0.0, 33.0)}, neutral=(neutral,)
     )  # fmt: skip
-    judge, base = judge_of((0.0,) * 4, (0.0,) * 4)
+    problem, base = judge_of((0.0,) * 4, (0.0,) * 4)
     simulator: Any = Yielding(0.0)
-    for e in judge.evidence:
+    for e in problem.dataset:
         object.__setattr__(e, "simulator", simulator)
     known, true = (simulator.predict(c, 0.0)[CHANNEL] for c in ({}, {"effects.rops-plasticity.yield_force": 17.0}))
-    judge.measured = [true + w for w in np.random.default_rng(1).standard_normal((4, N))]
-    blocks = [replace(b, residual=w - known) for b, w in zip(base.blocks, judge.measured, strict=True)]
+    problem.measured = [true + w for w in np.random.default_rng(1).standard_normal((4, N))]
+    blocks = [replace(b, residual=w - known) for b, w in zip(base.blocks, problem.measured, strict=True)]
     base = replace(base, blocks=tuple(blocks))
-    inquiry = Inquiry(judge=judge, candidates=(limit,), groups=[], phases=[], say=lambda _: None, crew=Crew())
-    looked = replace(scan.look(judge, base, [limit], [[r] for r in range(4)]), far={})
+    inquiry = Inquiry(
+        problem=problem, candidates=(limit,), groups=[], phases=[], say=lambda _: None, executor=Executor()
+    )
+    looked = replace(scan.look(problem, base, [limit], [[r] for r in range(4)]), far={})
     found = screen(inquiry, base, [limit], [0, 1], [0.0] * 4, looked)[0]
     nothing_yields = [x for x in limit.probes() if abs(x[0] - neutral) < 0.1]
     assert nothing_yields

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis.data.phases import drop_phases
-from rollover.diagnosis.fit.jobs import Crew
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.jobs import Executor
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.forward.budget import DROPS
 from rollover.diagnosis.inference.lack_of_fit import Mismatch
-from rollover.diagnosis.pipeline import _evidence, diagnose
+from rollover.diagnosis.pipeline import _dataset, diagnose
 from rollover.diagnosis.selection import truncated_start
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.stepwise import Taken
@@ -86,31 +86,31 @@ def test_what_explains_the_way_down_is_a_beginning_if_it_leads_to_far_less(
     base, asked = fit((), 40_000.0), []
     before, there = taken(base, fit((MASS,), 10_000.0)), taken(base, fit((LAYER, REBOUND), over_all))
 
-    def one_by_one(asking: Inquiry, bare: Fitted, begun: Any = (), *, pairs: bool = True) -> Taken:
+    def one_by_one(asking: Inquiry, no_jacobian: Fitted, begun: Any = (), *, pairs: bool = True) -> Taken:
         asked.append([s.fitted.candidates[-1].id for s in begun])
-        whole = asking.judge.evidence == ["whole"]
+        whole = asking.problem.dataset == ["whole"]
         assert pairs == whole, "all pairs over all that was recorded alone"
-        return there if whole else taken(bare, fit((LAYER, REBOUND) if begun else (LAYER,), above))
+        return there if whole else taken(no_jacobian, fit((LAYER, REBOUND) if begun else (LAYER,), above))
 
-    weighed: list[Any] = []
-    judge = SimpleNamespace(evidence=["whole"], effort=DROPS, simulations=3, weigh=weighed.append)
-    early = SimpleNamespace(evidence=["cut"], fit=lambda *_: fit((), 900.0), simulations=4)
+    reweighted: list[Any] = []
+    problem = SimpleNamespace(dataset=["whole"], effort=DROPS, simulations=3, with_noise_model=reweighted.append)
+    early = SimpleNamespace(dataset=["cut"], fit=lambda *_: fit((), 900.0), simulations=4)
     monkeypatch.setattr(truncated_start, "_cut", lambda *_: "cut")
-    monkeypatch.setattr(truncated_start, "Judge", lambda _: early)
+    monkeypatch.setattr(truncated_start, "Problem", lambda _: early)
     monkeypatch.setattr(truncated_start, "align", lambda _: None)
     monkeypatch.setattr(truncated_start, "one_by_one", one_by_one)
     back = {"moves": np.inf}
     monkeypatch.setattr(truncated_start, "moving_back", lambda *_: back["moves"])
     whole = Inquiry(
-        judge=cast(Any, judge), candidates=(), groups=[], phases=[()], say=lambda _: None,
-        crew=cast(Any, SimpleNamespace(fits=lambda _judge, jobs, _say: [fit(j.candidates, 5_000.0) for j in jobs])),
+        problem=cast(Any, problem), candidates=(), groups=[], phases=[()], say=lambda _: None,
+        executor=cast(Any, SimpleNamespace(fits=lambda _, tasks, __: [fit(j.candidates, 5_000.0) for j in tasks])),
     )  # fmt: skip
     found = truncated_start.down_first(whole, before)
     assert found is (there if better else before)
     ways = [[], ["soil-layer"], ["soil-elastic-rebound"], ["soil-elastic-rebound"]]
     assert asked == ways[: 4 if above < 60.0 else 1], "the way down, as it springs back, the first rise, the whole"
-    assert judge.simulations == (15 if above < 60.0 else 7)
-    assert weighed == ([["whole"]] if over_all > 900.0 else []), "as it was before a way that led nowhere"
+    assert problem.simulations == (15 if above < 60.0 else 7)
+    assert reweighted == ([["whole"]] if over_all > 900.0 else []), "as it was before a way that led nowhere"
     little = taken(base, fit((MASS,), 60.0))
     assert truncated_start.down_first(whole, little) is little
     back["moves"] = 50.0
@@ -118,17 +118,17 @@ def test_what_explains_the_way_down_is_a_beginning_if_it_leads_to_far_less(
 
 
 def test_the_way_down_ends_before_the_deepest_point() -> None:
-    evidence, _ = _evidence(load("drop_test"), recordings({}), Crew())
-    phases = drop_phases(evidence[0])
-    cut = truncated_start._cut(evidence[0], phases, 0.9)
+    dataset, _ = _dataset(load("drop_test"), recordings({}), Executor())
+    phases = drop_phases(dataset[0])
+    cut = truncated_start._cut(dataset[0], phases, 0.9)
     assert cut is not None
     deepest = descend(Rig(speed=SPEEDS[0]), -0.1, 0.8).deepest()[0]
-    for before, after in zip(evidence[0].signals, cut.signals, strict=True):
-        last = evidence[0].recording.time[after.rows[-1]]
+    for before, after in zip(dataset[0].signals, cut.signals, strict=True):
+        last = dataset[0].recording.time[after.rows[-1]]
         assert 0.8 * deepest < last < deepest
         np.testing.assert_array_equal(before.values[: after.rows.size], after.values)
-    assert truncated_start._cut(evidence[0], ((-0.05, "approach"),), 0.9) is None
-    assert truncated_start._cut(evidence[0], ((-0.05, "free-fall"), (-0.045, "peak")), 0.9) is None, "five samples"
+    assert truncated_start._cut(dataset[0], ((-0.05, "approach"),), 0.9) is None
+    assert truncated_start._cut(dataset[0], ((-0.05, "free-fall"), (-0.045, "peak")), 0.9) is None, "five samples"
 
 
 @pytest.mark.parametrize(
@@ -140,17 +140,17 @@ def test_the_way_down_ends_before_the_deepest_point() -> None:
     ],
 )
 def test_what_holds_what_fell_into_it_moves_nothing_on_the_way_back(rig: dict[str, float], is_back: bool) -> None:
-    evidence, _ = _evidence(load("drop_test"), recordings(rig), Crew())
-    judge = Judge(evidence)
-    base = judge.fit((), ())
+    dataset, _ = _dataset(load("drop_test"), recordings(rig), Executor())
+    problem = Problem(dataset)
+    base = problem.fit((), ())
     assert base is not None
-    phases = [drop_phases(e) for e in evidence]
-    asking = Inquiry(judge=judge, candidates=(), groups=[], phases=phases, say=lambda _: None, crew=Crew())
+    phases = [drop_phases(e) for e in dataset]
+    asking = Inquiry(problem=problem, candidates=(), groups=[], phases=phases, say=lambda _: None, executor=Executor())
     beyond = base.left - sum(b.residual.size for b in base.blocks)
     moved = truncated_start.moving_back(asking, base)
     assert moved > 0.1 * beyond if is_back else abs(moved) < 0.1 * truncated_start.BACK * beyond
-    early = [truncated_start._cut(e, p, truncated_start.ENDS[0]) for e, p in zip(evidence, phases, strict=True)]
-    cut = Judge([e for e in early if e is not None])
+    early = [truncated_start._cut(e, p, truncated_start.ENDS[0]) for e, p in zip(dataset, phases, strict=True)]
+    cut = Problem([e for e in early if e is not None])
     above = cut.fit((), ())
     assert above is not None
-    assert truncated_start.moving_back(replace(asking, judge=cut), above) == np.inf, "nothing tells of it"
+    assert truncated_start.moving_back(replace(asking, problem=cut), above) == np.inf, "nothing tells of it"

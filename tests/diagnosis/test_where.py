@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rollover.diagnosis.data.dataset import evidence_of
+from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.data.phases import drop_phases
 from rollover.diagnosis.fit.parameterisation import coordinate, physical
 from rollover.diagnosis.forward.forward_model import simulator_of
@@ -25,7 +25,7 @@ def test_coordinates_go_from_low_to_high_and_back(search: Search) -> None:
 def test_sensor_effects_compete_for_each_channel_and_only_where_they_can_be() -> None:
     own = scenario()
     name, recording = recorded({}, speeds=(2.0,))[0]
-    e = evidence_of(name, recording, simulator_of(own, recording))
+    e = dataset_of(name, recording, simulator_of(own, recording))
     assert e is not None
     keys = {c.key for c in candidates_of([e], ("soil-crust",), "drop")}
     assert {"sensor-scale:ground/sinkage", "sensor-gain:ground/force_normal", "soil-layer"} <= keys
@@ -40,7 +40,7 @@ def test_sensor_effects_compete_for_each_channel_and_only_where_they_can_be() ->
 def test_every_start_of_every_candidate_is_inside_its_range() -> None:
     own = scenario()
     name, recording = recorded({}, speeds=(2.0,))[0]
-    e = evidence_of(name, recording, simulator_of(own, recording))
+    e = dataset_of(name, recording, simulator_of(own, recording))
     assert e is not None
     for c in candidates_of([e], (), "drop"):
         assert len(c.starts()) >= 4, c.key
@@ -52,7 +52,7 @@ def test_every_start_of_every_candidate_is_inside_its_range() -> None:
 def test_phases_are_in_order_and_the_peak_is_the_deepest_point() -> None:
     own = scenario()
     name, recording = recorded({}, speeds=(2.0,), noise=1e-4, rate=2000.0)[0]
-    e = evidence_of(name, recording, simulator_of(own, recording))
+    e = dataset_of(name, recording, simulator_of(own, recording))
     assert e is not None
     phases = drop_phases(e)
     assert [n for _, n in phases] == ["free-fall", "first-contact", "loading", "peak", "unloading", "rest"]

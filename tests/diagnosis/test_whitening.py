@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.whitening import Noise, Whitening
 from rollover.recording import Recording
 from rollover.recording.noise_floor import grown
@@ -62,7 +62,7 @@ def test_samples_whose_past_was_forgiven_are_as_wide_as_the_noise_within_their_o
     wide = 1.0 / grown(ar)
     signals = (signal(np.arange(6.0), 1.0, ar), signal(np.arange(6.0), 1.0))
     recording = Recording(title="r", time=np.arange(6.0), channels={FORCE: np.arange(6.0)})
-    e = Evidence(
+    e = Dataset(
         name="r", recording=recording, simulator=cast(Any, None), signals=signals, shift_prior=1e-3, condition=""
     )
     assert np.array_equal(e.worth(np.zeros(0, dtype=np.int64)), np.ones(12))

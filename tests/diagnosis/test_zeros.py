@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from rollover.diagnosis import diagnose
-from rollover.diagnosis.data.dataset import Evidence
-from rollover.diagnosis.fit.jobs import Crew
+from rollover.diagnosis.data.dataset import Dataset
+from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.noise.offsets import WAVES, Zero, _differ, _own, _stand
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
@@ -39,16 +39,16 @@ def moved(made: Drops, sizes: dict[str, float], share: float, seed: int = 5) -> 
     ], off
 
 
-def weighed(made: Drops) -> list[Evidence]:
-    every, _ = diagnosing._evidence(scenario(), made, Crew())
-    found: list[Evidence] = diagnosing._weighed(scenario(), every)
+def reweighted(made: Drops) -> list[Dataset]:
+    every, _ = diagnosing._dataset(scenario(), made, Executor())
+    found: list[Dataset] = diagnosing._reweighted(scenario(), every)
     return found
 
 
 @pytest.mark.parametrize("hidden", [{}, LAYER])
 def test_zeros_are_told_to_their_standard_error_whatever_is_missing(hidden: dict[str, float]) -> None:
     made, off = moved(drops(hidden), dict.fromkeys(CHANNELS, 3.0), 0.0)
-    z = [(s.zero - o[s.channel]) / s.zero_error for e, o in zip(weighed(made), off, strict=True) for s in e.signals]
+    z = [(s.zero - o[s.channel]) / s.zero_error for e, o in zip(reweighted(made), off, strict=True) for s in e.signals]
     assert len(z) == 3 * len(SPEEDS)
     assert 0.4 < np.std(z) < 1.5  # 18 numbers: 0.17 is one standard error; quiet is louder where something is missing
     assert abs(np.mean(z)) < 0.7
@@ -56,14 +56,14 @@ def test_zeros_are_told_to_their_standard_error_whatever_is_missing(hidden: dict
 
 def test_where_zeros_are_one_none_is_touched() -> None:
     made, _ = moved(drops({}), dict.fromkeys(CHANNELS, 0.0), 2.0)
-    assert all(s.zero == s.zero_error == 0.0 for e in weighed(made) for s in e.signals)
+    assert all(s.zero == s.zero_error == 0.0 for e in reweighted(made) for s in e.signals)
 
 
 @pytest.mark.filterwarnings("error")
 def test_digits_that_show_no_noise_before_anything_is_hit_tell_no_zero() -> None:
     """Sinkage in steps of 30 mm reads 0 there, in which noise of 3 mm never shows: no error to tell a zero to."""
     made = [(n, replace(r, channels={**r.channels, DEPTH: 0.03 * np.round(r[DEPTH] / 0.03)})) for n, r in drops({})]
-    coarse = [s for e in weighed(made) for s in e.signals if s.channel == DEPTH]
+    coarse = [s for e in reweighted(made) for s in e.signals if s.channel == DEPTH]
     assert min(s.quiet[0] for s in coarse) == 0.0
     assert all(s.zero == s.zero_error == 0.0 for s in coarse)
 

@@ -30,8 +30,8 @@ def test_a_misfit_is_held_against_noise_and_scatter() -> None:
 
 def test_scatter_is_what_neighbours_differ_by() -> None:
     time = np.linspace(0.0, 1.0, 400)
-    strays = [np.full(400, 0.3), np.full(400, -0.5), np.full(400, np.nan)]
-    found = _scatter(strays, time)
+    perturbed = [np.full(400, 0.3), np.full(400, -0.5), np.full(400, np.nan)]
+    found = _scatter(perturbed, time)
     assert found is not None
     np.testing.assert_allclose(found, np.sqrt((0.09 + 0.25) / 2.0))
     assert _scatter([], time) is None

@@ -69,14 +69,16 @@ def diagnose(
 
     workers = cores() if workers is None else workers
     if workers > 1:
-        begin_server("rollover.diagnosis.fit.warmup")  # as `Crew` does, but beside all that is imported and read here
+        begin_server(
+            "rollover.diagnosis.fit.warmup"
+        )  # as `Executor` does, but beside all that is imported and read here
 
     from rollover import scenario as scenarios
     from rollover.assessment import results
     from rollover.cli import console
     from rollover.diagnosis import account, diagnosed_text
     from rollover.diagnosis import diagnose as diagnosed
-    from rollover.diagnosis.fit.jobs import Crew
+    from rollover.diagnosis.fit.jobs import Executor
     from rollover.diagnosis.io import FILES, FORMAT, JSON, PAGE, PICTURE, SCENARIO
     from rollover.diagnosis.overlay import series
     from rollover.spec import document
@@ -104,12 +106,12 @@ def diagnose(
     notebook = notes(folder)
     about_fits = json.dumps([about, results.versions()], sort_keys=True)
     words = ["rollover", "diagnose", scenario, *recordings, *_options(hold_out, set_, tolerance, profile)]
-    with Crew(workers, notebook, about_fits) as crew:
+    with Executor(workers, notebook, about_fits) as executor:
         found = diagnosed(
-            chosen, list(measured.items()), hold_out=held, tolerance=tolerance, say=console.say, crew=crew
+            chosen, list(measured.items()), hold_out=held, tolerance=tolerance, say=console.say, executor=executor
         )
         found = replace(found, notes=(*in_words(findings), *found.notes))
-        told = series(chosen, list(measured.items()), found, crew.children)
+        told = series(chosen, list(measured.items()), found, executor.children)
         answer = account(found, about, [{"recording": name, **_plain(f)} for name, f in findings])
         with results.whole(folder) as part, ThreadPoolExecutor(1) as beside:
             results.write_json(part / JSON, answer)
@@ -126,11 +128,11 @@ def diagnose(
                 command=" ".join(map(shlex.quote, words)),
                 scenario_hash=about["scenario_hash"],
                 versions=results.versions(),
-                each=crew.each,
+                each=executor.each,
             )
             (part / PAGE).write_text(text, encoding="utf-8")
             drawn.result()
-    crew.close()
+    executor.close()
     if as_json:
         print(json.dumps(answer, indent=2))
     else:

@@ -27,7 +27,7 @@ LEAST = 1e-9  # of the largest: directions below are rounding
 
 
 @dataclass(frozen=True, kw_only=True)
-class Eased:
+class Marginalised:
     """(D5): directions U (n, q) of unit length, and the share of each that is taken out (q,)."""
 
     directions: Array
@@ -41,13 +41,13 @@ class Eased:
         return np.asarray(values - (self.directions @ inside).reshape(values.shape))
 
 
-def eased(columns: Array) -> Eased:
+def marginalised(columns: Array) -> Marginalised:
     """From N (n, q), columns of what 1 sigma of each condition does."""
     if columns.shape[1] == 0:
-        return Eased(directions=columns, shares=np.zeros(0))
+        return Marginalised(directions=columns, shares=np.zeros(0))
     U, S, _ = np.linalg.svd(columns, full_matrices=False)
     kept = LEAST * max(float(S.max(initial=0.0)), 1e-300) < S
-    return Eased(directions=U[:, kept], shares=1.0 - 1.0 / np.sqrt(1.0 + S[kept] ** 2))
+    return Marginalised(directions=U[:, kept], shares=1.0 - 1.0 / np.sqrt(1.0 + S[kept] ** 2))
 
 
 def doubts(scenario: Scenario, uncertainty: Mapping[str, Doubt], origin: str = "") -> list[dict[str, Any]]:

@@ -11,9 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.condition_uncertainty import Eased, doubts, eased
+from rollover.diagnosis.data.condition_uncertainty import Marginalised, doubts, marginalised
 from rollover.diagnosis.data.whitening import Noise, Whitening
-from rollover.diagnosis.forward.discontinuities import JUMPS, LEAP_IN, SHOWS, about_leaps, beside_leaps, forgiven
+from rollover.diagnosis.forward.discontinuities import (
+    DISCONTINUITY_IN,
+    JUMPS,
+    SHOWS,
+    about_discontinuities,
+    beside_discontinuities,
+    masked,
+)
 from rollover.diagnosis.forward.forward_model import Simulator
 from rollover.recording import Recording
 from rollover.recording.noise_floor import LENGTH, USUAL, NoiseFloor, grown, noise_floor
@@ -63,7 +70,7 @@ class Signal:
         return self.at_rest or (self.noise, self.ar)
 
     @property
-    def loudness(self) -> Array | float:
+    def heteroscedasticity(self) -> Array | float:
         """Noise over `noise`, (n,); 1 where it is the same throughout."""
         return 1.0 if self.level is None else self.level
 
@@ -85,7 +92,7 @@ class _Inside:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Evidence:
+class Dataset:
     """One recording made ready: signals, their simulator, and the prior of its time shift (s)."""
 
     name: str
@@ -94,25 +101,25 @@ class Evidence:
     signals: tuple[Signal, ...]
     shift_prior: float
     condition: str
-    strays: tuple[Array, ...] = ()  # stacked, SI: what runs that nobody could tell apart differ by
+    perturbed: tuple[Array, ...] = ()  # stacked, SI: what runs that nobody could tell apart differ by
     model_error: float = MODEL_ERROR  # of a channel's range
     averaged: int = 1  # samples in one
-    blow: float = np.inf  # s, after which a run may take another course
+    first_impact: float = np.inf  # s, after which a run may take another course
     doubtful: tuple[Mapping[str, Any], ...] = ()  # values exchanged for 1 sigma of each uncertain condition
     doubts: Array | None = None  # what that does to the stack, SI, (n, q)
 
-    def cut(self, inside: Sequence[NDArray[np.bool_]]) -> Evidence:
+    def cut(self, inside: Sequence[NDArray[np.bool_]]) -> Dataset:
         """The samples of each signal that are `inside` (n,) of it."""
         rows = np.concatenate(list(inside))
         return replace(
             self,
             signals=tuple(s.cut(those) for s, those in zip(self.signals, inside, strict=True)),
-            strays=tuple(d[rows] for d in self.strays),
+            perturbed=tuple(d[rows] for d in self.perturbed),
             doubts=None if self.doubts is None else self.doubts[rows],
         )
 
     @cached_property
-    def eased(self) -> Eased:
+    def marginalised(self) -> Marginalised:
         """What takes the uncertain conditions, and zeros, out of a whitened misfit."""
         columns = [] if self.doubts is None else list(self.doubts.T)
         for s, part in self.spans():
@@ -120,8 +127,8 @@ class Evidence:
                 columns.append(np.zeros(self.count))
                 columns[-1][part] = s.zero_error
         if not columns:
-            return eased(np.zeros((self.count, 0)))
-        return eased(np.stack([self.whitened(column) for column in columns], axis=1))
+            return marginalised(np.zeros((self.count, 0)))
+        return marginalised(np.stack([self.whitened(column) for column in columns], axis=1))
 
     @cached_property
     def expected(self) -> float | None:
@@ -130,7 +137,7 @@ class Evidence:
 
     def by_chance(self, rows: slice | NDArray[np.bool_]) -> float:
         """Sum of squares that noise and scatter alone leave of some samples."""
-        scatter = [float(np.sum(self.whitened(stray)[rows] ** 2)) for stray in self.strays]
+        scatter = [float(np.sum(self.whitened(perturbed_run)[rows] ** 2)) for perturbed_run in self.perturbed]
         return float(np.sum(self.due[rows])) + (float(np.mean(scatter)) if scatter else 0.0)
 
     @cached_property
@@ -140,10 +147,10 @@ class Evidence:
 
     @cached_property
     def early(self) -> NDArray[np.bool_]:
-        """Samples (n,) before the blow: what is left there is no matter of the course that a run took."""
-        return np.concatenate([self.recording.time[s.rows] < self.blow for s in self.signals])
+        """Samples (n,) before the impact: what is left there is no matter of the course that a run took."""
+        return np.concatenate([self.recording.time[s.rows] < self.first_impact for s in self.signals])
 
-    def is_rough(self, s: Signal) -> bool:
+    def model_error_dominates(self, s: Signal) -> bool:
         """Whether a scatter between runs, or a tolerance that was asked for, has a large part in the error.
 
         Such an error is one for the whole signal, not one for each sample: within its size it is nothing.
@@ -176,12 +183,12 @@ class Evidence:
         """The same of the measurement."""
         return self.whitened(self.values)
 
-    def leaps(self, raw: Array, predicted: Mapping[str, Array] = NOTHING) -> NDArray[np.int64]:
+    def discontinuities(self, raw: Array, predicted: Mapping[str, Array] = NOTHING) -> NDArray[np.int64]:
         """Samples (stacked) about which a prediction leaps, and means within which it is `predicted` to."""
         own = self._inside
-        found: NDArray[np.bool_] = about_leaps(raw, own.least, own.first, own.last)
+        found: NDArray[np.bool_] = about_discontinuities(raw, own.least, own.first, own.last)
         for s, part in self.spans():
-            size = predicted.get(LEAP_IN + s.channel)
+            size = predicted.get(DISCONTINUITY_IN + s.channel)
             if size is not None:
                 found[part] |= size[s.rows] > (SHOWS if self.averaged > 1 else JUMPS) * s.sigma
         return np.flatnonzero(found)
@@ -196,19 +203,21 @@ class Evidence:
         least = np.where(np.arange(first.size) + 2 <= last, SHOWS * sigma, np.inf)
         return _Inside(first=first, last=last, least=least)
 
-    def forgiven(self, raw: Array, leaps: NDArray[np.int64]) -> Array:
+    def masked(self, raw: Array, discontinuities: NDArray[np.int64]) -> Array:
         """Predicted samples (stacked, SI) about a leap, moved towards the measured ones within their neighbours.
 
         On which side of a leap a sample lies is decided by clocks, not by physics.
         """
-        if not leaps.size:
+        if not discontinuities.size:
             return raw
-        moved: Array = forgiven(raw, leaps, self.values, self._inside.first, self._inside.last)
+        moved: Array = masked(raw, discontinuities, self.values, self._inside.first, self._inside.last)
         return moved
 
-    def worth(self, leaps: NDArray[np.int64]) -> Array:
+    def worth(self, discontinuities: NDArray[np.int64]) -> Array:
         """Weights (n,) of whitened samples: those whose past was forgiven are as wide as the noise itself."""
-        found: Array = beside_leaps(leaps, *self._memories) if leaps.size else np.ones(self.count)
+        found: Array = (
+            beside_discontinuities(discontinuities, *self._memories) if discontinuities.size else np.ones(self.count)
+        )
         return found
 
     @cached_property
@@ -236,12 +245,12 @@ class Evidence:
         return np.concatenate([s.values for s in self.signals])
 
 
-def doubted(e: Evidence, scenario: Scenario) -> Evidence:
+def doubted(e: Dataset, scenario: Scenario) -> Dataset:
     """The evidence with what its conditions leave uncertain; `scenario` is under them. Raises `InputError`."""
     return doubted_beside(replace(e, doubtful=tuple(doubts(scenario, e.recording.uncertainty, e.name))), {})
 
 
-def doubted_beside(e: Evidence, beside: Mapping[str, Any], shift: float = 0.0) -> Evidence:
+def doubted_beside(e: Dataset, beside: Mapping[str, Any], shift: float = 0.0) -> Dataset:
     """The same with that as it is beside values that are exchanged: there an error of a condition does something else.
 
     `shift` is the recording's time shift there, s.
@@ -252,7 +261,7 @@ def doubted_beside(e: Evidence, beside: Mapping[str, Any], shift: float = 0.0) -
     return replace(e, doubts=np.stack(columns, axis=1)) if columns else e
 
 
-def evidence_of(name: str, recording: Recording, simulator: Simulator, averaged: int = 1) -> Evidence | None:
+def dataset_of(name: str, recording: Recording, simulator: Simulator, averaged: int = 1) -> Dataset | None:
     """Make a recording ready; None if it shares no channel with the simulation. Channels that never move are left out.
 
     Noise is estimated from each channel itself; where it is too short for that, the noise that the recording states.
@@ -280,7 +289,7 @@ def evidence_of(name: str, recording: Recording, simulator: Simulator, averaged:
         return None
     loose = recording.clock.zero == "unknown"
     step = float(np.median(np.diff(recording.time))) if recording.time.size > 1 else 0.0
-    return Evidence(
+    return Dataset(
         name=name,
         recording=recording,
         simulator=simulator,
@@ -340,15 +349,15 @@ def condition_of(conditions: Mapping[str, Any]) -> str:
     )
 
 
-def left_out(evidence: Sequence[Evidence]) -> list[list[int]]:
+def left_out(dataset: Sequence[Dataset]) -> list[list[int]]:
     """What is left out in turn: one condition after another, or one recording after another if all share one."""
-    groups = groups_of(evidence)
-    return groups if len(groups) > 1 else [[k] for k in range(len(evidence))]
+    groups = groups_of(dataset)
+    return groups if len(groups) > 1 else [[k] for k in range(len(dataset))]
 
 
-def groups_of(evidence: Sequence[Evidence]) -> list[list[int]]:
+def groups_of(dataset: Sequence[Dataset]) -> list[list[int]]:
     """Places of the recordings that share a condition, one list for each condition."""
     found: dict[str, list[int]] = {}
-    for k, e in enumerate(evidence):
+    for k, e in enumerate(dataset):
         found.setdefault(e.condition or e.name, []).append(k)
     return list(found.values())

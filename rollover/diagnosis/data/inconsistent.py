@@ -23,7 +23,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from rollover.diagnosis.data.dataset import Evidence, Signal
+from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.effects import spoken
 from rollover.effects.sensor import is_length
 from rollover.spec.channels import UNITS, describe
@@ -39,7 +39,7 @@ UNIT = 5.0  # times, or one part of, that a unit must make to be told from what 
 class Aside(ABC):
     """What is left aside as no recording of what it states: a channel, or all of a recording as a channel shows."""
 
-    evidence: Evidence
+    dataset: Dataset
     signal: Signal
 
     summary: ClassVar[str]
@@ -50,7 +50,7 @@ class Aside(ABC):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Slip(Aside):
+class Inconsistency(Aside):
     """A channel of a recording that reads `factor` times what is simulated, as `cause` would have it."""
 
     factor: float
@@ -61,14 +61,14 @@ class Slip(Aside):
     def says(self) -> str:
         """The sentence on it."""
         return (
-            f"{self.evidence.name}: {self.signal.channel} reads {spoken(self.factor)} times what is simulated, as if "
+            f"{self.dataset.name}: {self.signal.channel} reads {spoken(self.factor)} times what is simulated, as if "
             f"{self.cause}; it was left aside."
         )
 
 
-def slips_of(every: Sequence[Evidence]) -> tuple[list[Slip], list[Slip]]:
+def inconsistencies_of(every: Sequence[Dataset]) -> tuple[list[Inconsistency], list[Inconsistency]]:
     """Slips that only some recordings of a channel have, and those that all of them share."""
-    met: dict[str, list[tuple[Evidence, Signal, float]]] = {}
+    met: dict[str, list[tuple[Dataset, Signal, float]]] = {}
     for e in every:
         made = e.simulator.predict({}, 0.0) or {}
         for s in e.signals:
@@ -78,38 +78,42 @@ def slips_of(every: Sequence[Evidence]) -> tuple[list[Slip], list[Slip]]:
     found = []
     for each in met.values():
         beside = _beside(each[0][1].channel, float(np.median([abs(factor) for *_, factor in each])))
-        found += [slip for one in each if (slip := _slip(*one, beside)) is not None and not _is_chance(slip)]
-    shared = [slip for slip in found if _is_shared(slip, found, every)]
-    return [slip for slip in found if slip not in shared], shared
+        found += [
+            inconsistency
+            for one in each
+            if (inconsistency := _inconsistency(*one, beside)) is not None and not _is_chance(inconsistency)
+        ]
+    shared = [inconsistency for inconsistency in found if _is_shared(inconsistency, found, every)]
+    return [inconsistency for inconsistency in found if inconsistency not in shared], shared
 
 
-def _is_chance(slip: Slip) -> bool:
+def _is_chance(inconsistency: Inconsistency) -> bool:
     """Whether runs that nobody could tell apart are less alike in its channel than a slip would have to be.
 
     Of an overturn straight backward, which way the vehicle falls at its end.
     """
-    simulator, channel, rows = slip.evidence.simulator, slip.signal.channel, slip.signal.rows
-    strays = simulator.strays()
+    simulator, channel, rows = inconsistency.dataset.simulator, inconsistency.signal.channel, inconsistency.signal.rows
+    perturbed = simulator.perturbed()
     made = simulator.predict({}, 0.0)
-    if made is None or not strays:
+    if made is None or not perturbed:
         return False
-    apart = float(np.median([np.sum(d[channel][rows] ** 2) for d in strays]))
+    apart = float(np.median([np.sum(d[channel][rows] ** 2) for d in perturbed]))
     return apart > (1.0 - ALIKE**2) * float(np.sum(made[channel][rows] ** 2))
 
 
-def without(every: Sequence[Evidence], slips: Sequence[Slip]) -> list[Evidence]:
+def without(every: Sequence[Dataset], inconsistencies: Sequence[Inconsistency]) -> list[Dataset]:
     """The evidence without channels that are misread by a slip, nor recordings of nothing else."""
-    aside = {(slip.evidence.name, slip.signal.channel) for slip in slips}
+    aside = {(inconsistency.dataset.name, inconsistency.signal.channel) for inconsistency in inconsistencies}
     left = [replace(e, signals=tuple(s for s in e.signals if (e.name, s.channel) not in aside)) for e in every]
     return [e for e in left if e.signals] if aside else list(every)
 
 
-def by_slips(found: Sequence[Aside]) -> str:
+def by_inconsistencies(found: Sequence[Aside]) -> str:
     """What stands behind a verdict where channels were left aside; nothing where none was."""
-    return "".join(f" {slip.says()}" for slip in found)
+    return "".join(f" {inconsistency.says()}" for inconsistency in found)
 
 
-def factor_of(e: Evidence, s: Signal, made: np.ndarray) -> float | None:
+def factor_of(e: Dataset, s: Signal, made: np.ndarray) -> float | None:
     """How many times what is simulated a signal reads, where the two are alike; None if nowhere."""
     time, m, best = e.recording.time[s.rows], s.values, (0.0, 0.0)
     size = float(np.linalg.norm(m))
@@ -131,19 +135,19 @@ def _beside(channel: str, usual: float) -> float:
     return usual / near if _off(usual, near) < USUALLY else usual
 
 
-def _slip(e: Evidence, s: Signal, factor: float, beside: float) -> Slip | None:
+def _inconsistency(e: Dataset, s: Signal, factor: float, beside: float) -> Inconsistency | None:
     near = min(_causes(describe(s.channel).unit), key=lambda cause: _off(factor / beside, cause[0]))
     if _off(factor / beside, near[0]) > NEAR:
         return None
-    return Slip(evidence=e, signal=s, factor=factor, cause=near[1])
+    return Inconsistency(dataset=e, signal=s, factor=factor, cause=near[1])
 
 
-def _is_shared(slip: Slip, found: Sequence[Slip], every: Sequence[Evidence]) -> bool:
+def _is_shared(inconsistency: Inconsistency, found: Sequence[Inconsistency], every: Sequence[Dataset]) -> bool:
     """Whether all recordings of its channel are off by one factor, and that may be a gain: no scale is negative."""
-    channel = slip.signal.channel
+    channel = inconsistency.signal.channel
     heard = sum(s.channel == channel for e in every for s in e.signals)
-    alike = sum((f.signal.channel, f.cause) == (channel, slip.cause) for f in found)
-    return alike == heard and (slip.factor > 0.0 or not is_length(channel))
+    alike = sum((f.signal.channel, f.cause) == (channel, inconsistency.cause) for f in found)
+    return alike == heard and (inconsistency.factor > 0.0 or not is_length(channel))
 
 
 def _off(factor: float, other: float) -> float:

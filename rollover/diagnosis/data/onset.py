@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from rollover.comparison.onset import CLEAR, IN_A_ROW, QUIET, UntoldError, is_apart, is_quiet, timed
-from rollover.diagnosis.data.dataset import ALONE, Evidence
+from rollover.diagnosis.data.dataset import ALONE, Dataset
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.dynamics.drop_test import unfit
 from rollover.recording import Clock, Recording
@@ -100,7 +100,7 @@ def _moved(scenario: Scenario, name: str, recording: Recording) -> tuple[Recordi
     return replace(at.recording, clock=loose), at.zero
 
 
-def first_shown(e: Evidence) -> Iterator[float]:
+def first_shown(e: Dataset) -> Iterator[float]:
     """How late (s) the first contact would be if it were what a channel shows first, of each that is quiet before."""
     for s in e.signals:
         off = np.abs(s.values - np.median(s.values[:QUIET])) > CLEAR * s.sigma

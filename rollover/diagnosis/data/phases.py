@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import Evidence, Signal
+from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.result import Place
 
 Array = NDArray[np.float64]
@@ -18,25 +18,25 @@ PEAK = "peak"  # the phase about the deepest point
 SETTLING = 0.06  # s after the deepest point until what is left is rest
 
 
-def phases_of(evidence: Evidence) -> tuple[tuple[float, str], ...]:
+def phases_of(dataset: Dataset) -> tuple[tuple[float, str], ...]:
     """(start s, name) of each phase that a recording went through."""
-    run = evidence.simulator.marks()
+    run = dataset.simulator.marks()
     if not run:
-        return drop_phases(evidence)
-    first, last = float(evidence.recording.time[0]), float(evidence.recording.time[-1])
+        return drop_phases(dataset)
+    first, last = float(dataset.recording.time[0]), float(dataset.recording.time[-1])
     marks = [m for m in run if m[0] < last]
     marks = [m for k, m in enumerate(marks) if k + 1 == len(marks) or marks[k + 1][0] > first]
     return tuple((max(at, first) if k else first, name) for k, (at, name) in enumerate(marks)) or ((first, "approach"),)
 
 
-def drop_phases(evidence: Evidence) -> tuple[tuple[float, str], ...]:
+def drop_phases(dataset: Dataset) -> tuple[tuple[float, str], ...]:
     """(start s, name) of each phase of a drop: by the measured sinkage where there is any, else by the simulated."""
-    recording = evidence.recording
+    recording = dataset.recording
     depth = recording.channels.get("ground/sinkage")
     if depth is None and "striker/position_z" in recording.channels:
         depth = -recording.channels["striker/position_z"]
     if depth is None:
-        depth = evidence.simulator.state(0.0).get("ground/sinkage", np.full(recording.time.size, np.nan))
+        depth = dataset.simulator.state(0.0).get("ground/sinkage", np.full(recording.time.size, np.nan))
     known = np.isfinite(depth)
     time, z = recording.time[known], depth[known]
     start = float(recording.time[0])
@@ -82,7 +82,7 @@ def placed(
     )
 
 
-def whole(e: Evidence, s: Signal, phases: Sequence[tuple[float, str]], share: float) -> Place:
+def whole(e: Dataset, s: Signal, phases: Sequence[tuple[float, str]], share: float) -> Place:
     """The whole of a signal as a place, with the phase in which it reaches furthest."""
     times = e.recording.time[s.rows]
     peak = float(times[int(np.abs(s.values - s.values[0]).argmax())])

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.data.dataset import Dataset
 from rollover.recording import Recording
 from rollover.recording.checks.finding import trace
 from rollover.recording.checks.samples import spikes
@@ -40,7 +40,7 @@ def pile(values: Array) -> float:
     return most if most > 0.0 and np.count_nonzero(sizes >= most * (1.0 - ALIKE)) >= PILE else 0.0
 
 
-def digitised(evidence: Sequence[Evidence], recordings: Sequence[Recording]) -> list[Evidence]:
+def digitised(dataset: Sequence[Dataset], recordings: Sequence[Recording]) -> list[Dataset]:
     """The evidence with what rounding to the steps of its channels, as recorded, makes neighbouring samples share.
 
     Noise makes the error of each sample its own, and part of the noise: with s of it before a step d, Widrow's theorem
@@ -50,16 +50,16 @@ def digitised(evidence: Sequence[Evidence], recordings: Sequence[Recording]) -> 
     """
     steps = [
         {s.channel: resolution(r.channels[s.channel]) for s in e.signals}
-        for e, r in zip(evidence, recordings, strict=True)
+        for e, r in zip(dataset, recordings, strict=True)
     ]
     least: dict[str, float] = {}
-    for e, step in zip(evidence, steps, strict=True):
+    for e, step in zip(dataset, steps, strict=True):
         for s in e.signals:
             if step[s.channel] > 0.0:
                 own = max(s.noise**2 * e.averaged - step[s.channel] ** 2 / 12.0, 0.0)
                 least[s.channel] = min(own, least.get(s.channel, np.inf))
     found = []
-    for e, r, step in zip(evidence, recordings, steps, strict=True):
+    for e, r, step in zip(dataset, recordings, steps, strict=True):
         signals = []
         for s in e.signals:
             d = step[s.channel]
@@ -73,7 +73,7 @@ def digitised(evidence: Sequence[Evidence], recordings: Sequence[Recording]) -> 
 def without_spikes(recording: Recording, before: float = np.inf) -> tuple[Recording, list[str]]:
     """The recording without single samples that its neighbours contradict, and a line for each channel that had any.
 
-    Only those `before` a time (s): after a blow one contact follows another, and some last no longer than a sample.
+    Only those `before` a time (s): after an impact one contact follows another, and some last no longer than a sample.
     """
     channels, lines = dict(recording.channels), []
     for name in recording.channels:

@@ -1,8 +1,8 @@
 """Scatter from one run to the next: what recordings of one condition differ by, no model can predict.
 
 Where a condition was recorded more than once, half the variance of the difference of two recordings is what one of
-them strays from their mean; what the noise of each does not explain of it is scatter. A condition recorded once is
-given the median scatter of the others, as a share of the range.
+them perturbed runs from their mean; what the noise of each does not explain of it is scatter. A condition recorded once
+is given the median scatter of the others, as a share of the range.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import Evidence, groups_of
+from rollover.diagnosis.data.dataset import Dataset, groups_of
 
 Array = NDArray[np.float64]
 TICK, FINER, PLACES = 1e-3, (1e-4, 1e-5), 21  # s, by which time shifts are tried; then, so many, beside the best
 LATE = 0.1  # s that a clock may be late which says that it is right: then it is the clock that is to be named
 WIDTH = 3.0  # times its prior that a time shift may be
-LEAPS = 3  # samples beside a leap
+DISCONTINUITIES = 3  # samples beside a leap
 SHOWS = 1.2  # times the noise, from which on there is scatter
 WORTH_SAYING, CONTRADICTING = 0.02, 0.1  # of the range
 LEAST = 16  # samples in common, below which nothing is said
 
 
-def with_scatter(found: Sequence[Evidence]) -> list[Evidence]:
+def with_scatter(found: Sequence[Dataset]) -> list[Dataset]:
     """The evidence with the scatter of each channel, where any condition was recorded more than once."""
     apart: dict[tuple[int, str], list[float]] = {}
     for group in groups_of(found):
@@ -64,7 +64,7 @@ def with_scatter(found: Sequence[Evidence]) -> list[Evidence]:
     ]
 
 
-def differing(found: Sequence[Evidence], share: float = WORTH_SAYING) -> list[str]:
+def differing(found: Sequence[Dataset], share: float = WORTH_SAYING) -> list[str]:
     """Repeats that differ by more than noise and more than a share of the range, a line for each condition, channel."""
     lines = []
     for group in groups_of(found):
@@ -85,7 +85,7 @@ def against_itself(verdict: str, contrary: Sequence[str]) -> str:
     return f" They contradict each other: {contrary[0]}."
 
 
-def _difference(a: Evidence, b: Evidence, channel: str) -> float | None:
+def _difference(a: Dataset, b: Dataset, channel: str) -> float | None:
     """Half the mean square of what two recordings of a channel differ by, at their best time shift."""
     x, y = (next((s for s in e.signals if s.channel == channel), None) for e in (a, b))
     if x is None or y is None:
@@ -98,7 +98,7 @@ def _difference(a: Evidence, b: Evidence, channel: str) -> float | None:
             return np.inf
         apart = (x.values[inside] - np.interp(t[inside] - shift, u, y.values)) ** 2
         # a leap lies between two samples of each, and not at the same place
-        return float(np.mean(np.sort(apart)[: apart.size - LEAPS]))
+        return float(np.mean(np.sort(apart)[: apart.size - DISCONTINUITIES]))
 
     wide = max(WIDTH * float(np.hypot(a.shift_prior, b.shift_prior)), LATE)
     shifts = np.arange(-wide, wide + TICK, TICK)

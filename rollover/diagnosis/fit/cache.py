@@ -7,12 +7,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.finite_differences import Point, beside, in_step, in_time, looked_at, wider
 from rollover.diagnosis.fit.notebook import Memory
 from rollover.diagnosis.fit.parameterisation import Candidate, each_with_own, key_at
 from rollover.diagnosis.forward.budget import DROPS
-from rollover.diagnosis.forward.full_run import full_runs, made_ahead, neighbours_of
+from rollover.diagnosis.forward.full_run import full_runs, made_ahead, perturbations_of
 from rollover.system.processes import Children
 
 Array = NDArray[np.float64]
@@ -22,17 +22,17 @@ NONE = np.zeros(0, dtype=np.int64)
 class Simulations:
     """Evidence with a memory of what was simulated: the same values are never simulated twice."""
 
-    def __init__(self, evidence: Sequence[Evidence]) -> None:
-        self.evidence = tuple(evidence)
-        self.effort = max((e.simulator.effort for e in self.evidence), key=lambda e: e.thrifty, default=DROPS)
+    def __init__(self, dataset: Sequence[Dataset]) -> None:
+        self.dataset = tuple(dataset)
+        self.effort = max((e.simulator.effort for e in self.dataset), key=lambda e: e.is_ensemble, default=DROPS)
         self.simulations = 0
-        self._pinned = False
+        self._fixed_shifts = False
         self._raw, self._known = Memory(), Memory()
-        self._leaps: dict[tuple[object, ...], NDArray[np.int64]] = {}
+        self._discontinuities: dict[tuple[object, ...], NDArray[np.int64]] = {}
 
-    def weigh(self, evidence: Sequence[Evidence]) -> None:
+    def with_noise_model(self, dataset: Sequence[Dataset]) -> None:
         """Take the same recordings with another noise: nothing is simulated again."""
-        self.evidence = tuple(evidence)
+        self.dataset = tuple(dataset)
         self._known = Memory()
 
     @property
@@ -42,16 +42,16 @@ class Simulations:
 
     @property
     def _children(self) -> Children | None:
-        runs = full_runs(self.evidence[0].simulator) if self.evidence else None
+        runs = full_runs(self.dataset[0].simulator) if self.dataset else None
         return None if runs is None else runs.children
 
     def made_ahead(self, wanted: Iterable[tuple[int, Sequence[Candidate], Sequence[float]]]) -> None:
         """Make full runs of (recording, candidates, x) side by side where there are children to do it."""
-        made_ahead(self._children, ((self.evidence[r].simulator, self.changes(c, x)) for r, c, x in wanted))
+        made_ahead(self._children, ((self.dataset[r].simulator, self.changes(c, x)) for r, c, x in wanted))
 
     def made_scattered(self, changes: Mapping[str, object], parts: int = 1) -> None:
-        """Make what all recordings' runs with `changes` and their neighbours' are, as `strays` asks for them."""
-        made_ahead(self._children, neighbours_of([e.simulator for e in self.evidence], changes, parts))
+        """Make what all recordings' runs with `changes` and their neighbours' are, as `perturbed` asks for them."""
+        made_ahead(self._children, perturbations_of([e.simulator for e in self.dataset], changes, parts))
 
     def made_beside(
         self,
@@ -59,22 +59,22 @@ class Simulations:
         candidates: Sequence[Candidate],
         x: Sequence[float],
         shifts: Sequence[float],
-        nudge: float,
+        fd_step: float,
         first: int = 0,
     ) -> None:
-        """Make those of a place and of all that slopes ask for, from a `nudge` beside it and coordinate `first` on.
+        """Make those of a place and of all that slopes ask for, from a `fd_step` beside it and coordinate `first` on.
 
         Where runs scatter one step after another is too narrow to tell: all of one width are made before the next.
         """
-        self.made_ahead(beside(use, candidates, x, nudge, first))
-        if self._pinned or not self.is_helped:
+        self.made_ahead(beside(use, candidates, x, fd_step, first))
+        if self._fixed_shifts or not self.is_helped:
             return
-        at, width, todo = (candidates, x), nudge, []
+        at, width, todo = (candidates, x), fd_step, []
         for r, shift in zip(use, shifts, strict=True):
             off = self._off(r, at, shift)
             todo += [(r, k, off) for k in range(first, len(x)) if off is not None]
         while todo:
-            todo = [(r, k, o) for r, k, o in todo if wider(self.evidence[r], o, at, k, width, self.effort.wide)]
+            todo = [(r, k, o) for r, k, o in todo if wider(self.dataset[r], o, at, k, width, self.effort.wide)]
             width *= 2.0
             self.made_ahead((r, candidates, there) for r, k, _ in todo for there in looked_at(at, k, width))
 
@@ -91,7 +91,7 @@ class Simulations:
         key = key_at(r, candidates, x, shift)
         if key not in self._known:
             raw = self.raw(r, candidates, x, shift)
-            self._known[key] = None if raw is None else self.evidence[r].whitened(raw)
+            self._known[key] = None if raw is None else self.dataset[r].whitened(raw)
         return self._known[key]
 
     def raw(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
@@ -106,10 +106,10 @@ class Simulations:
         if found is None:
             return None
         y, predicted = found
-        leaps = self.evidence[r].leaps(y, predicted)
-        if leaps.size:
-            self._leaps[key_at(r, candidates, x, shift)] = leaps
-        return self.evidence[r].forgiven(y, leaps)
+        discontinuities = self.dataset[r].discontinuities(y, predicted)
+        if discontinuities.size:
+            self._discontinuities[key_at(r, candidates, x, shift)] = discontinuities
+        return self.dataset[r].masked(y, discontinuities)
 
     def edged(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Array | None:
         """Stacked prediction of recording r, SI, with its leaps as they are; not remembered. None if it fails."""
@@ -121,12 +121,12 @@ class Simulations:
     ) -> tuple[Array, dict[str, Array]] | None:
         """What recording r is predicted to be, stacked (SI) and by channel; None if that fails."""
         try:
-            found = self.evidence[r].simulator.predict(self.changes(candidates, x), shift)
+            found = self.dataset[r].simulator.predict(self.changes(candidates, x), shift)
         except ValueError:
             return None
         if found is None:
             return None
-        y = self.evidence[r].raw(found)
+        y = self.dataset[r].raw(found)
         return (y, found) if np.all(np.isfinite(y)) else None
 
     @staticmethod
@@ -141,7 +141,7 @@ class Simulations:
     def _in_time(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float, raw: Array) -> Array:
         """dy/dtau (n,) of recording r, SI, `raw` y there."""
         changes, later = self.changes(candidates, x), self.effort.later
-        return in_time(self.evidence[r], changes, shift, raw, later, both=self.effort.thrifty)
+        return in_time(self.dataset[r], changes, shift, raw, later, both=self.effort.is_ensemble)
 
     def moved(self, r: int, before: Point, after: Point, shift: float, slope: Array | None = None) -> Array | None:
         """How the prediction of recording r differs between two points, whitened; nothing where either leaps.
@@ -153,9 +153,9 @@ class Simulations:
         if first is None or last is None:
             return None
         if slope is not None:
-            last = in_step(self.evidence[r], first, last, slope, lambda d: self.edged(r, *after, shift + d))
+            last = in_step(self.dataset[r], first, last, slope, lambda d: self.edged(r, *after, shift + d))
         d = last - first
         for point in (before, after):
-            d[self._leaps.get(key_at(r, *point, shift), NONE)] = 0.0
-        e = self.evidence[r]
-        return e.eased(e.worth(self._leaps.get(key_at(r, *before, shift), NONE)) * e.whitened(d))
+            d[self._discontinuities.get(key_at(r, *point, shift), NONE)] = 0.0
+        e = self.dataset[r]
+        return e.marginalised(e.worth(self._discontinuities.get(key_at(r, *before, shift), NONE)) * e.whitened(d))

@@ -2,7 +2,7 @@
 
 With sum_s A_s dx = sum_s b_s over the training recordings s, recording r is left with c_r - 2 b_r'dx + dx'A_r dx: only
 its own time shift is fitted to it. Where what hits what, and when, hangs on a parameter, slopes hold only near the fit,
-and far from it they foretell a misfit that no run has: full runs are made there instead (`foretold`).
+and far from it they foretell a misfit that no run has: full runs are made there instead (`cross_validated`).
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.fit.finite_differences import Point
-from rollover.diagnosis.fit.levenberg_marquardt import GENTLE, Fitted, Judge, shift_of
-from rollover.diagnosis.fit.scan_jobs import Looks, at_each
+from rollover.diagnosis.fit.levenberg_marquardt import GENTLE, Fitted, Problem, shift_of
+from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
 
 Array = NDArray[np.float64]
 CROOKED = 1.2  # times what a fit leaves, from which on what slopes foretell of held-out recordings is doubted
@@ -45,8 +45,8 @@ class Held:
 def held_out(fitted: Fitted, groups: Sequence[Sequence[int]]) -> Held:
     """Predict each group of recordings by a fit to all the others; one group alone, or what is in none, by its own."""
     count = np.array([b.size for b in fitted.blocks], dtype=float)
-    if fitted.foretold is not None:
-        return Held(left=np.array(fitted.foretold), count=count)
+    if fitted.cross_validated is not None:
+        return Held(left=np.array(fitted.cross_validated), count=count)
     normals = [b.normal() for b in fitted.blocks]
     left = np.array([max(c, 0.0) for _, _, c in normals])
     for group in groups:
@@ -58,29 +58,29 @@ def held_out(fitted: Fitted, groups: Sequence[Sequence[int]]) -> Held:
     return Held(left=left, count=count)
 
 
-def foretold(judge: Judge, fitted: Fitted, groups: Sequence[Sequence[int]]) -> Fitted:
+def cross_validated(problem: Problem, fitted: Fitted, groups: Sequence[Sequence[int]]) -> Fitted:
     """A fit with the runs made that tell what it foretells of each group; as it was where one fails."""
     if not fitted.x:
         return fitted
     left: list[float] = [b.normal()[2] for b in fitted.blocks]
     places = {r: np.clip(np.array(fitted.x) + _without(fitted, group), 0.0, 1.0) for group in groups for r in group}
-    judge.made_ahead((r, fitted.candidates, [float(v) for v in x]) for r, x in places.items())
+    problem.made_ahead((r, fitted.candidates, [float(v) for v in x]) for r, x in places.items())
     for r, x in places.items():
         old = fitted.blocks[r]
         shift = old.shift + shift_of(old, x - np.array(fitted.x))
-        there = judge.clocked(r, fitted.candidates, [float(v) for v in x], shift, judge.effort.clocked)
+        there = problem.clocked(r, fitted.candidates, [float(v) for v in x], shift, problem.effort.clocked)
         if there is None:
             return fitted
         left[r] = there.normal()[2]
-    return replace(fitted, foretold=tuple(left))
+    return replace(fitted, cross_validated=tuple(left))
 
 
 def refitted(
-    judge: Judge,
+    problem: Problem,
     fitted: Fitted,
     groups: Sequence[Sequence[int]],
     without: float = np.inf,
-    looks: Looks = at_each,
+    parallel_map: ParallelMap = serial_map,
 ) -> Fitted:
     """A fit with what it foretells by fits to the other groups, where slopes foretell far worse than it meets them.
 
@@ -94,21 +94,21 @@ def refitted(
     shifts = [b.shift for b in fitted.blocks]
     left = [b.normal()[2] for b in fitted.blocks]
     look = partial(_by_the_rest, at=(fitted.candidates, fitted.x), shifts=shifts)
-    for group, found in zip(groups, looks(judge, look, groups), strict=True):
+    for group, found in zip(groups, parallel_map(problem, look, groups), strict=True):
         if found is None:
             return fitted
         for r, there in zip(group, found, strict=True):
             left[r] = there
-    return replace(fitted, foretold=tuple(left))
+    return replace(fitted, cross_validated=tuple(left))
 
 
-def _by_the_rest(judge: Judge, group: Sequence[int], *, at: Point, shifts: Sequence[float]) -> list[float] | None:
+def _by_the_rest(problem: Problem, group: Sequence[int], *, at: Point, shifts: Sequence[float]) -> list[float] | None:
     """What a fit to all other recordings, begun at a point, leaves of each of a group; None where one fails."""
     (candidates, x), rest = at, [r for r in range(len(shifts)) if r not in group]
-    other = judge.fit(candidates, x, only=rest, shifts=[shifts[r] for r in rest], width=1)
+    other = problem.fit(candidates, x, only=rest, shifts=[shifts[r] for r in rest], width=1)
     if other is None:
         return None
-    found = [judge.clocked(r, other.candidates, other.x, shifts[r], ROUNDS) for r in group]
+    found = [problem.clocked(r, other.candidates, other.x, shifts[r], ROUNDS) for r in group]
     left = [there.normal()[2] for there in found if there is not None]
     return left if len(left) == len(found) else None
 
@@ -129,7 +129,7 @@ def worse(rival: Fitted, best: Fitted, groups: Sequence[Sequence[int]], shared: 
     mean over conditions of ln(E_rival/E_best) in its paired standard errors. `shared` samples have one error in common.
     """
     a, b = held_out(rival, groups), held_out(best, groups)
-    phi = max(1.0, float(np.sqrt(b.left.sum() / b.count.sum())))
+    dispersion = max(1.0, float(np.sqrt(b.left.sum() / b.count.sum())))
     apart = np.zeros(len(best.blocks))
     for r, (x, y) in enumerate(zip(rival.blocks, best.blocks, strict=True)):
         d = y.counted(x.plain_residual - y.plain_residual)
@@ -138,11 +138,11 @@ def worse(rival: Fitted, best: Fitted, groups: Sequence[Sequence[int]], shared: 
     excess = float(a.left.sum() - b.left.sum())
     if excess <= 0.0:
         return 0.0, 0.0
-    first = excess / (2.0 * np.sqrt(max(distance, 1e-12) * shared) * phi)
+    first = excess / (2.0 * np.sqrt(max(distance, 1e-12) * shared) * dispersion)
     # conditions under which the two say the same decide nothing
-    telling = [list(g) for g in groups if apart[list(g)].sum() > 9.0 * phi**2]
+    telling = [list(g) for g in groups if apart[list(g)].sum() > 9.0 * dispersion**2]
     logs = np.array([0.5 * np.log(a.left[g].sum() / b.left[g].sum()) for g in telling])
-    if phi < NOISE_ALONE or logs.size < 2:
+    if dispersion < NOISE_ALONE or logs.size < 2:
         return float(first), float(first)
     error = float(np.std(logs, ddof=1) / np.sqrt(logs.size))
     return float(first), float(np.mean(logs) / max(error, 1e-12))

@@ -1,7 +1,8 @@
 """What runs with the explanation itself scatter by, and the parameters that all of these neighbours ask for together.
 
 Scatter is looked at first where the scenario is; where an effect changes what hits the ground it is another. With
-neighbours y_k = y + d_k of the run at the fitted point, each recording's mean of them strays less than any one, and
+neighbours y_k = y + d_k of the run at the fitted point, each recording's mean of them perturbed runs less than any one,
+and
 
     dx = A^-1 sum_r J_r'(w_r - mean_k d_rk)                                                                    (D8)
 
@@ -19,13 +20,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.jobs import linearised
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
-from rollover.diagnosis.fit.linearisation import GENTLE, Block, shift_of
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.linearisation import GENTLE, ResidualBlock, shift_of
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
-from rollover.diagnosis.noise.ensemble import alike, course, weighted
+from rollover.diagnosis.noise.ensemble import alike, heavy_tail, weighted
 
 Array = NDArray[np.float64]
 WHOLE, OTHERS = 1.0, (0.5, 1.5)  # shares of the way: where a run leaps from one course to another beside it
@@ -37,7 +38,7 @@ PARTS = 4  # of the scenario's step
 SHORTER = 2  # steps by runs in shorter ones, each of which costs as many runs as `PARTS` of others
 
 
-def settled(judge: Judge, part: Step) -> Step:
+def settled(problem: Problem, part: Step) -> Step:
     """A step under the scatter of runs with its explanation, moved to where the mean of them is met best (D8).
 
     Slopes beside a leap lead astray, and so may clocks that a wrong place has bent: it is moved again until a step
@@ -45,64 +46,64 @@ def settled(judge: Judge, part: Step) -> Step:
     is met best. As it was if nothing can be simulated there; where runs do not scatter too. Its rivals are not put
     under that scatter: that costs runs, see `Step.again`.
     """
-    rescattered(judge, part.fitted)
-    slopes = judge.again(part.fitted)
+    rescattered(problem, part.fitted)
+    slopes = problem.again(part.fitted)
     places = [slopes]
     for _ in range(STEPS):
         here = places[-1]
-        if not any(e.strays for e in judge.evidence):
+        if not any(e.perturbed for e in problem.dataset):
             break
-        dx = step_of_means(judge.evidence, here.blocks)
+        dx = step_of_means(problem.dataset, here.blocks)
         if promised(here.blocks, dx) < max(WORTH, PART * (here.left - sum(b.size for b in here.blocks))):
             break
-        there = _onward(judge, here, np.clip(dx, -FARTHEST, FARTHEST))
+        there = _onward(problem, here, np.clip(dx, -FARTHEST, FARTHEST))
         if there is None:
             break
-        found = _scattered_at(judge, slopes, *there)
+        found = _scattered_at(problem, slopes, *there)
         if found is None:
             break
         place, slopes = found
         places.append(place)
     best = places[0]
     if len(places) > 1:
-        best = min(places, key=lambda f: left_of_means(judge, _weighed_anew(judge, f))[0])
+        best = min(places, key=lambda f: left_of_means(problem, _reweighted_anew(problem, f))[0])
     if best.x != places[-1].x:
-        rescattered(judge, best)
-    return replace(part.moved_to(judge.again(best)), base=judge.again(part.base))
+        rescattered(problem, best)
+    return replace(part.moved_to(problem.again(best)), base=problem.again(part.base))
 
 
-def _weighed_anew(judge: Judge, fitted: Fitted) -> Fitted:
+def _reweighted_anew(problem: Problem, fitted: Fitted) -> Fitted:
     """A fit where it stands under the noise as it is held now, without slopes: they cost runs."""
-    new = [judge.block(r, fitted.candidates, fitted.x, b.shift, 0.0) for r, b in enumerate(fitted.blocks)]
+    new = [problem.block(r, fitted.candidates, fitted.x, b.shift, 0.0) for r, b in enumerate(fitted.blocks)]
     return replace(fitted, blocks=tuple(b or old for b, old in zip(new, fitted.blocks, strict=True)))
 
 
-def in_shorter_steps(judge: Judge, fitted: Fitted) -> Fitted:
+def in_shorter_steps(problem: Problem, fitted: Fitted) -> Fitted:
     """A fit moved to where the mean of its neighbours in shorter steps is met best, under their scatter.
 
     As it was where runs do not scatter, and as far as it came where nothing can be simulated further on.
     """
-    if not any(e.strays for e in judge.evidence):
+    if not any(e.perturbed for e in problem.dataset):
         return fitted
-    rescattered(judge, fitted, PARTS)
-    here = slopes = judge.again(fitted)
+    rescattered(problem, fitted, PARTS)
+    here = slopes = problem.again(fitted)
     for _ in range(SHORTER):
-        dx = np.clip(step_of_means(judge.evidence, here.blocks), -FARTHEST, FARTHEST)
+        dx = np.clip(step_of_means(problem.dataset, here.blocks), -FARTHEST, FARTHEST)
         if promised(here.blocks, dx) < WORTH:
             break
-        there = _scattered_at(judge, slopes, *_moved(here, dx), PARTS)
+        there = _scattered_at(problem, slopes, *_moved(here, dx), PARTS)
         if there is None:
             break
         here, slopes = there
     return here
 
 
-def promised(blocks: Sequence[Block], dx: Array) -> float:
+def promised(blocks: Sequence[ResidualBlock], dx: Array) -> float:
     """Gain dx'A dx of a step to a minimum, noise units."""
     return float(sum(dx @ b.normal()[0] @ dx for b in blocks))
 
 
-def _onward(judge: Judge, old: Fitted, dx: Array) -> tuple[Sequence[float], Sequence[float]] | None:
+def _onward(problem: Problem, old: Fitted, dx: Array) -> tuple[Sequence[float], Sequence[float]] | None:
     """Coordinates and time shifts (s) of a fit moved by dx, or a share of that which leaves less; None if none does.
 
     The whole way unless that leaves clearly more: the mean of runs is worth more than the one that happens to be there.
@@ -110,9 +111,9 @@ def _onward(judge: Judge, old: Fitted, dx: Array) -> tuple[Sequence[float], Sequ
     met: list[tuple[float, tuple[Sequence[float], Sequence[float]]]] = []
     for shares in ((WHOLE,), OTHERS):
         begun = [_moved(old, share * dx) for share in shares]
-        judge.made_ahead((r, old.candidates, x) for x, _ in begun for r in range(len(old.blocks)))
+        problem.made_ahead((r, old.candidates, x) for x, _ in begun for r in range(len(old.blocks)))
         for x, shifts in begun:
-            left, clocks = _met(judge, old.candidates, x, shifts)
+            left, clocks = _met(problem, old.candidates, x, shifts)
             met.append((left, (x, clocks)))
         if met[0][0] < old.left:
             return met[0][1]
@@ -123,26 +124,28 @@ def _onward(judge: Judge, old: Fitted, dx: Array) -> tuple[Sequence[float], Sequ
 
 
 def _scattered_at(
-    judge: Judge, slopes: Fitted, x: Sequence[float], shifts: Sequence[float], parts: int = 1
+    problem: Problem, slopes: Fitted, x: Sequence[float], shifts: Sequence[float], parts: int = 1
 ) -> tuple[Fitted, Fitted] | None:
     """A fit as it stands at x and these time shifts (s) under the scatter of runs there, and where its slopes are told.
 
     Between the ends of the step over which those were told they are as good as its own. None if nothing can be
     simulated there.
     """
-    is_beside = judge.is_beside(x, slopes.x)
-    there = _by_slopes_of(judge, slopes, x, shifts) if is_beside else linearised(judge, slopes.candidates, x, shifts)
+    is_beside = problem.is_beside(x, slopes.x)
+    there = (
+        _by_slopes_of(problem, slopes, x, shifts) if is_beside else linearised(problem, slopes.candidates, x, shifts)
+    )
     if there is None:
         return None
-    rescattered(judge, there, parts)
-    slopes = judge.again(slopes if is_beside else there)
-    return _by_slopes_of(judge, slopes, x, shifts) or there, slopes
+    rescattered(problem, there, parts)
+    slopes = problem.again(slopes if is_beside else there)
+    return _by_slopes_of(problem, slopes, x, shifts) or there, slopes
 
 
-def _by_slopes_of(judge: Judge, near: Fitted, x: Sequence[float], shifts: Sequence[float]) -> Fitted | None:
+def _by_slopes_of(problem: Problem, near: Fitted, x: Sequence[float], shifts: Sequence[float]) -> Fitted | None:
     """A fit as it stands at x and these time shifts (s), by the slopes of another place; None if a run fails."""
     each = enumerate(zip(near.blocks, shifts, strict=True))
-    found = [judge.block(r, near.candidates, x, s, judge.effort.fine, b.plain_J) for r, (b, s) in each]
+    found = [problem.block(r, near.candidates, x, s, problem.effort.fine, b.plain_J) for r, (b, s) in each]
     blocks = tuple(b for b in found if b is not None)
     return Fitted(candidates=near.candidates, x=tuple(x), blocks=blocks) if len(blocks) == len(found) else None
 
@@ -154,64 +157,68 @@ def _moved(old: Fitted, dx: Array) -> tuple[list[float], list[float]]:
 
 
 def _met(
-    judge: Judge, candidates: Sequence[Candidate], x: Sequence[float], shifts: Sequence[float]
+    problem: Problem, candidates: Sequence[Candidate], x: Sequence[float], shifts: Sequence[float]
 ) -> tuple[float, Sequence[float]]:
     """What is left at a place, slopes aside, and its time shifts (s) moved to where they fit; infinite if it fails."""
-    found = [judge.clocked(r, candidates, x, shift, judge.effort.clocked) for r, shift in enumerate(shifts)]
+    found = [problem.clocked(r, candidates, x, shift, problem.effort.clocked) for r, shift in enumerate(shifts)]
     blocks = [b for b in found if b is not None]
     if len(blocks) < len(found):
         return np.inf, shifts
     return sum(b.normal()[2] for b in blocks), [b.shift for b in blocks]
 
 
-def rescattered(judge: Judge, fitted: Fitted, parts: int = 1) -> None:
+def rescattered(problem: Problem, fitted: Fitted, parts: int = 1) -> None:
     """Weigh the recordings by what runs at a fitted point scatter by, in `parts` of a step."""
-    changes = judge.changes(fitted.candidates, fitted.x)
-    judge.made_scattered(changes, parts)
-    evidence = []
-    for e, block in zip(judge.evidence, fitted.blocks, strict=True):
-        plain = replace(e, signals=tuple(replace(s, weight=None) for s in e.signals), strays=())
-        evidence.append(weighted(plain, e.simulator.strays(changes, block.shift, parts)))
-    judge.weigh(evidence)
+    changes = problem.changes(fitted.candidates, fitted.x)
+    problem.made_scattered(changes, parts)
+    dataset = []
+    for e, block in zip(problem.dataset, fitted.blocks, strict=True):
+        plain = replace(e, signals=tuple(replace(s, weight=None) for s in e.signals), perturbed=())
+        dataset.append(weighted(plain, e.simulator.perturbed(changes, block.shift, parts)))
+    problem.with_noise_model(dataset)
 
 
-def left_of_means(judge: Judge, fitted: Fitted) -> tuple[float, float]:
-    """Sum of squares that the mean of a fit's neighbours leaves, in all and before the blow alone.
+def left_of_means(problem: Problem, fitted: Fitted) -> tuple[float, float]:
+    """Sum of squares that the mean of a fit's neighbours leaves, in all and before the impact alone.
 
     Under the noise and weights as they are held now. One run meets a recording well or badly by chance; the mean of
     seven much less so.
     """
-    changes = judge.changes(fitted.candidates, fitted.x)
-    judge.made_scattered(changes)
+    changes = problem.changes(fitted.candidates, fitted.x)
+    problem.made_scattered(changes)
     total = before = 0.0
-    for e, block in zip(judge.evidence, fitted.blocks, strict=True):
-        strays = alike(e, e.simulator.strays(changes, block.shift), e.blow)
-        raw = [d for d in (e.raw(stray) for stray in strays) if np.all(np.isfinite(d))]
+    for e, block in zip(problem.dataset, fitted.blocks, strict=True):
+        perturbed = alike(e, e.simulator.perturbed(changes, block.shift), e.first_impact)
+        raw = [d for d in (e.raw(perturbed_run) for perturbed_run in perturbed) if np.all(np.isfinite(d))]
         w = block.plain_residual
         if raw:
-            w = w - e.eased(e.whitened(np.sum(raw, axis=0) / (1.0 + len(raw))))
-        counts = course(e, w) if judge.straying else None
+            w = w - e.marginalised(e.whitened(np.sum(raw, axis=0) / (1.0 + len(raw))))
+        counts = heavy_tail(e, w) if problem.heavy_tailed else None
         more, w = (0.0, w) if counts is None else (counts.more, counts.samples * w)
         total += float(w @ w) + more + (block.shift / block.prior) ** 2
         before += float(w[e.early] @ w[e.early]) + (block.shift / block.prior) ** 2
     return total, before
 
 
-def along(block: Block, e: Evidence, stray: Array) -> Array:
+def along(block: ResidualBlock, e: Dataset, perturbed_run: Array) -> Array:
     """J'd of a deviation (n,), SI, with the recording's time shift taken out, (p,)."""
-    d = block.counted(e.eased(e.whitened(stray)))
+    d = block.counted(e.marginalised(e.whitened(perturbed_run)))
     return np.asarray(block.J.T @ d - (block.J.T @ block.slope) * float(block.slope @ d) / block.weight)
 
 
-def step_of_means(evidence: Sequence[Evidence], blocks: Sequence[Block]) -> Array:
+def step_of_means(dataset: Sequence[Dataset], blocks: Sequence[ResidualBlock]) -> Array:
     """(D8), (p,)."""
     p = blocks[0].J.shape[1]
     A = sum((block.normal()[0] for block in blocks), GENTLE * np.eye(p))
-    b = sum((pull_of_means(e, block) for e, block in zip(evidence, blocks, strict=True)), np.zeros(p))
+    b = sum((pull_of_means(e, block) for e, block in zip(dataset, blocks, strict=True)), np.zeros(p))
     return np.asarray(np.linalg.solve(A, b))
 
 
-def pull_of_means(e: Evidence, block: Block) -> Array:
+def pull_of_means(e: Dataset, block: ResidualBlock) -> Array:
     """One recording's part of A dx of (D8), (p,)."""
     pull = block.normal()[1]
-    return pull - np.mean([along(block, e, stray) for stray in e.strays], axis=0) if e.strays else pull
+    return (
+        pull - np.mean([along(block, e, perturbed_run) for perturbed_run in e.perturbed], axis=0)
+        if e.perturbed
+        else pull
+    )

@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.fit.finite_differences import beside
-from rollover.diagnosis.fit.levenberg_marquardt import Block, Fitted, Judge
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
 from rollover.diagnosis.fit.local_search import polish, timed
 from rollover.diagnosis.fit.model_variants import in_form, shaped
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.scan_jobs import at_each
+from rollover.diagnosis.fit.scan_jobs import serial_map
 from rollover.diagnosis.fit.threshold_scan import Stretch, traced
 from rollover.system.processes import Children, begin_server, map_cases
 from rollover.system.writing import scratch
@@ -37,13 +37,14 @@ How = Literal["fit", "polish", "shape", "time", "trace"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Job:
-    """A fit to be made: `only` some recordings, from time `shifts` (s) of these; see `Judge.fit`.
+class Task:
+    """A fit to be made: `only` some recordings, from time `shifts` (s) of these; see `Problem.fit`.
 
     One of few `rounds` is a first look: it ends without slopes.
     "polish" follows a crooked valley from a start, "shape" fits the shape of the last effect too or takes it in another
     `form`, "time" tries out the time shifts, "trace" begins anew where it sets in, over a `stretch`. A shape or form
-    that comes nowhere near what the best fit `leaves` of each recording is not gone on with. `lent` as in `Judge.fit`.
+    that comes nowhere near what the best fit `leaves` of each recording is not gone on with. `reused` as in
+    `Problem.fit`.
     """
 
     how: How = "fit"
@@ -53,19 +54,19 @@ class Job:
     only: tuple[int, ...] | None = None
     rounds: int | None = None  # as many as a whole fit may take
     width: int = 0
-    pinned: bool = False
+    fixed_shifts: bool = False
     form: Candidate | None = None
     stretch: Stretch | None = None
     leaves: tuple[float, ...] | None = None
-    lent: tuple[NDArray[np.float64], ...] | None = None
+    reused: tuple[NDArray[np.float64], ...] | None = None
 
     def key(self, about: str) -> str:
         """Hash of what is fitted and from where, with `about` for all else that it depends on."""
         every = (*self.candidates, *(() if self.form is None else (self.form,)))
         names = [(c.key, sorted(c.search.items()), sorted(c.form.items())) for c in every]
-        ways = self.how, self.only, self.rounds, self.width, self.pinned, self.stretch, self.leaves
+        ways = self.how, self.only, self.rounds, self.width, self.fixed_shifts, self.stretch, self.leaves
         told = hashlib.sha256(repr((about, names, self.start, self.shifts, ways)).encode())
-        for J in self.lent or ():
+        for J in self.reused or ():
             told.update(J.tobytes())
         return told.hexdigest()
 
@@ -74,13 +75,13 @@ class Job:
         """Places of the recordings."""
         return tuple(range(len(self.shifts))) if self.only is None else self.only
 
-    def beginning(self, nudges: Sequence[float]) -> Iterator[tuple[int, Sequence[Candidate], Sequence[float]]]:
+    def beginning(self, fd_steps: Sequence[float]) -> Iterator[tuple[int, Sequence[Candidate], Sequence[float]]]:
         """(recording, candidates, x) of the runs that a fit begins with."""
-        first = self.lent[0].shape[1] if self.lent else 0
-        return beside(self.recordings, self.candidates, self.start, nudges[min(self.width, len(nudges) - 1)], first)
+        first = self.reused[0].shape[1] if self.reused else 0
+        return beside(self.recordings, self.candidates, self.start, fd_steps[min(self.width, len(fd_steps) - 1)], first)
 
 
-class Crew:
+class Executor:
     """Works off jobs: in this process, or in `workers` children where more than one is asked for.
 
     `notebook` is a file that holds what is done, by key; `close` removes it.
@@ -103,17 +104,17 @@ class Crew:
                 except (ValueError, KeyError, TypeError):
                     continue  # the line at which it was interrupted
 
-    def __enter__(self) -> Crew:
+    def __enter__(self) -> Executor:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.children.stop()
         self._scratch.close()
 
-    def begin(self, judge: Judge) -> None:
+    def begin(self, problem: Problem) -> None:
         """Begin the children, if any, while this process goes on: each makes a run, so that it has all it needs."""
-        if self.workers > 1 and not judge.effort.thrifty:
-            told = self._told(judge, self._about(judge))
+        if self.workers > 1 and not problem.effort.is_ensemble:
+            told = self._told(problem, self._about(problem))
             self._beginning = [self.children.pool.schedule(_begun, args=(told,)) for _ in range(self.workers)]
 
     def is_there(self) -> bool:
@@ -125,55 +126,55 @@ class Crew:
         if self.notebook is not None:
             self.notebook.unlink(missing_ok=True)
 
-    def fits(self, judge: Judge, jobs: Sequence[Job], say: Progress = lambda _: None) -> list[Fitted | None]:
+    def fits(self, problem: Problem, tasks: Sequence[Task], say: Progress = lambda _: None) -> list[Fitted | None]:
         """Fits in the order of the jobs; None where nothing could be simulated."""
-        about = self._about(judge)
-        found: list[Fitted | None] = [None] * len(jobs)
-        keys = [job.key(about) for job in jobs]
+        about = self._about(problem)
+        found: list[Fitted | None] = [None] * len(tasks)
+        keys = [task.key(about) for task in tasks]
         todo = [k for k, key in enumerate(keys) if key not in self._done]
         for k, key in enumerate(keys):
             if key in self._done:
-                found[k] = _rebuilt(judge, jobs[k], self._done[key])
+                found[k] = _rebuilt(problem, tasks[k], self._done[key])
         done = 0
 
         def ended(k: int, fitted: Fitted | None) -> None:
             nonlocal done
             found[k], done = fitted, done + 1
             self._note(keys[k], fitted)
-            say(f"fitted {jobs[k].candidates[-1].key}, {done} of {len(todo)}")
+            say(f"fitted {tasks[k].candidates[-1].key}, {done} of {len(todo)}")
 
         # full runs are made side by side for each fit in turn, and kept here
-        if judge.effort.thrifty:
-            begun = [job for k, job in enumerate(jobs) if k in todo and job.how == "fit"]
-            judge.made_ahead(point for job in begun for point in job.beginning(judge.effort.nudges))
+        if problem.effort.is_ensemble:
+            begun = [task for k, task in enumerate(tasks) if k in todo and task.how == "fit"]
+            problem.made_ahead(point for task in begun for point in task.beginning(problem.effort.fd_steps))
         while done < len(todo) and not (len(todo) - done > 1 and self.is_there()):
             k = todo[done]
-            ended(k, work(judge, jobs[k]))
+            ended(k, work(problem, tasks[k]))
         if done == len(todo):
             return found
-        told, rest = self._told(judge, about), todo[done:]
-        outcomes = map_cases(_worked, [(told, jobs[k]) for k in rest], children=self.children)
+        told, rest = self._told(problem, about), todo[done:]
+        outcomes = map_cases(_worked, [(told, tasks[k]) for k in rest], children=self.children)
         for outcome in outcomes:
             k = rest[outcome.index]
             if outcome.failure is not None:
-                raise RuntimeError(f"a fit of {jobs[k].candidates[-1].key}: {outcome.failure.sentence}")
+                raise RuntimeError(f"a fit of {tasks[k].candidates[-1].key}: {outcome.failure.sentence}")
             fitted, made = outcome.value if outcome.value is not None else (None, 0)
-            judge.simulations += made
+            problem.simulations += made
             ended(k, fitted)
         return found
 
-    def looks(self, judge: Judge, look: Callable[[Judge, T], R], things: Sequence[T]) -> list[R]:
+    def parallel_map(self, problem: Problem, look: Callable[[Problem, T], R], things: Sequence[T]) -> list[R]:
         """What a `look` at each thing tells, in their order: here, or spread over the children once they are there.
 
         `look` and what it returns are sent to them: a function of a module, or a partial of one.
         """
-        if judge.effort.thrifty or len(things) < 2 or not self.is_there():
-            return at_each(judge, look, things)
-        told = self._told(judge, self._about(judge))
+        if problem.effort.is_ensemble or len(things) < 2 or not self.is_there():
+            return serial_map(problem, look, things)
+        told = self._told(problem, self._about(problem))
         shares = [list(things)[k :: 2 * self.workers] for k in range(2 * self.workers)]
         found: dict[int, R] = {}
         for start, (seen, made) in enumerate(self.each(_looked, [(told, look, share) for share in shares if share])):
-            judge.simulations += made
+            problem.simulations += made
             found |= {start + 2 * self.workers * k: one for k, one in enumerate(seen)}
         return [found[k] for k in range(len(things))]
 
@@ -189,17 +190,17 @@ class Crew:
             found[outcome.index] = cast(R, outcome.value)
         return [found[k] for k in range(len(things))]
 
-    def _about(self, judge: Judge) -> str:
+    def _about(self, problem: Problem) -> str:
         """What all fits depend on beside their jobs."""
-        return f"{self.about} {_fingerprint(judge)}"
+        return f"{self.about} {_fingerprint(problem)}"
 
-    def _told(self, judge: Judge, about: str) -> Path:
+    def _told(self, problem: Problem, about: str) -> Path:
         """A file with the judge for children to read, once each: megabytes for each of a thousand jobs take long."""
         if self._folder is None:
             self._folder = self._scratch.enter_context(scratch())
-        path = Path(self._folder, hashlib.sha256(f"{about} {judge.shifts}".encode()).hexdigest())
+        path = Path(self._folder, hashlib.sha256(f"{about} {problem.shifts}".encode()).hexdigest())
         if not path.exists():
-            path.write_bytes(pickle.dumps(judge.bare()))
+            path.write_bytes(pickle.dumps(problem.no_jacobian()))
         return path
 
     def _note(self, key: str, fitted: Fitted | None) -> None:
@@ -218,36 +219,36 @@ def _no_link(path: str, flags: int) -> int:
     return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0), 0o644)
 
 
-def work(judge: Judge, job: Job) -> Fitted | None:
+def work(problem: Problem, task: Task) -> Fitted | None:
     """Work off one job."""
-    if job.how == "fit":
-        return judge.fit(
-            job.candidates,
-            job.start,
-            rounds=job.rounds,
-            only=job.only,
-            shifts=job.shifts,
-            width=job.width,
-            pinned=job.pinned,
-            bare=job.rounds is not None,
-            lent=job.lent,
+    if task.how == "fit":
+        return problem.fit(
+            task.candidates,
+            task.start,
+            rounds=task.rounds,
+            only=task.only,
+            shifts=task.shifts,
+            width=task.width,
+            fixed_shifts=task.fixed_shifts,
+            no_jacobian=task.rounds is not None,
+            reused=task.reused,
         )
-    begun = linearised(judge, job.candidates, job.start, job.shifts, job.recordings)
+    begun = linearised(problem, task.candidates, task.start, task.shifts, task.recordings)
     if begun is None:
         return None
-    leaves = [b.total for b in begun.blocks] if job.leaves is None else job.leaves
-    if job.how == "shape":
-        return shaped(judge, begun, leaves) if job.form is None else in_form(judge, begun, job.form, leaves)
-    if job.stretch is not None:
-        return traced(judge, begun, job.stretch)
-    ways: dict[str, Callable[[Judge, Fitted], Fitted | None]] = {"polish": polish, "time": timed}
-    return ways[job.how](judge, begun)
+    leaves = [b.total for b in begun.blocks] if task.leaves is None else task.leaves
+    if task.how == "shape":
+        return shaped(problem, begun, leaves) if task.form is None else in_form(problem, begun, task.form, leaves)
+    if task.stretch is not None:
+        return traced(problem, begun, task.stretch)
+    ways: dict[str, Callable[[Problem, Fitted], Fitted | None]] = {"polish": polish, "time": timed}
+    return ways[task.how](problem, begun)
 
 
-def _fingerprint(judge: Judge) -> str:
+def _fingerprint(problem: Problem) -> str:
     """Hash of the recordings as they are held: their samples, their noise, and whether they may have strayed."""
-    total = hashlib.sha256(repr(judge.straying).encode())
-    for e in judge.evidence:
+    total = hashlib.sha256(repr(problem.heavy_tailed).encode())
+    for e in problem.dataset:
         total.update(repr((e.name, e.shift_prior)).encode())
         total.update(b"" if e.doubts is None else e.doubts.tobytes())
         for s in e.signals:
@@ -259,28 +260,28 @@ def _fingerprint(judge: Judge) -> str:
     return total.hexdigest()
 
 
-_held: dict[Path, Judge] = {}  # in a child: what it simulated for the job before
+_held: dict[Path, Problem] = {}  # in a child: what it simulated for the job before
 
 
 def _begun(told: Path) -> None:
     _kept(told).fit((), (), rounds=1)
 
 
-def _worked(case: tuple[Path, Job]) -> tuple[Fitted | None, int]:
-    told, job = case
-    judge = _kept(told)
-    before = judge.simulations
-    return work(judge, job), judge.simulations - before
+def _worked(case: tuple[Path, Task]) -> tuple[Fitted | None, int]:
+    told, task = case
+    problem = _kept(told)
+    before = problem.simulations
+    return work(problem, task), problem.simulations - before
 
 
-def _looked(case: tuple[Path, Callable[[Judge, Any], Any], list[Any]]) -> tuple[list[Any], int]:
+def _looked(case: tuple[Path, Callable[[Problem, Any], Any], list[Any]]) -> tuple[list[Any], int]:
     told, look, things = case
-    judge = _kept(told)
-    before = judge.simulations
-    return at_each(judge, look, things), judge.simulations - before
+    problem = _kept(told)
+    before = problem.simulations
+    return serial_map(problem, look, things), problem.simulations - before
 
 
-def _kept(told: Path) -> Judge:
+def _kept(told: Path) -> Problem:
     """The judge of a file, with what it simulated before."""
     if told not in _held:
         _held.clear()
@@ -288,38 +289,38 @@ def _kept(told: Path) -> Judge:
     return _held[told]
 
 
-def _rebuilt(judge: Judge, job: Job, row: dict[str, Any] | None) -> Fitted | None:
+def _rebuilt(problem: Problem, task: Task, row: dict[str, Any] | None) -> Fitted | None:
     if row is None:
         return None
-    candidates = list(job.candidates)
+    candidates = list(task.candidates)
     if candidates and row["form"] != candidates[-1].form:
         candidates[-1] = next(c for c in candidates[-1].forms() if c.form == row["form"])
-    elif len(row["x"]) > len(job.start):
+    elif len(row["x"]) > len(task.start):
         candidates[-1] = candidates[-1].whole()
-    is_bare = job.how == "fit" and job.rounds is not None  # it ended without slopes
-    return linearised(judge, candidates, row["x"], row["shifts"], job.recordings, bare=is_bare)
+    has_no_jacobian = task.how == "fit" and task.rounds is not None  # it ended without slopes
+    return linearised(problem, candidates, row["x"], row["shifts"], task.recordings, no_jacobian=has_no_jacobian)
 
 
 def linearised(
-    judge: Judge,
+    problem: Problem,
     candidates: Sequence[Candidate],
     x: Sequence[float],
     shifts: Sequence[float],
     recordings: Sequence[int] | None = None,
     *,
-    bare: bool = False,
+    no_jacobian: bool = False,
 ) -> Fitted | None:
     """A fit to all recordings or some as it stands at x and these time shifts (s); None if nothing can be simulated.
 
-    A `bare` one has no slopes.
+    A `no_jacobian` one has no slopes.
     """
-    blocks: list[Block] = []
+    blocks: list[ResidualBlock] = []
     use = range(len(shifts)) if recordings is None else recordings
-    nudge = 0.0 if bare else judge.effort.fine
-    if not bare:
-        judge.made_beside(use, candidates, x, shifts, nudge)
+    fd_step = 0.0 if no_jacobian else problem.effort.fine
+    if not no_jacobian:
+        problem.made_beside(use, candidates, x, shifts, fd_step)
     for r, shift in zip(use, shifts, strict=True):
-        block = judge.block(r, candidates, x, shift, nudge)
+        block = problem.block(r, candidates, x, shift, fd_step)
         if block is None:
             return None
         blocks.append(block)

@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cache import NONE, Simulations
-from rollover.diagnosis.fit.finite_differences import Point, moved_to, narrowed, secant, valley_at
-from rollover.diagnosis.fit.linearisation import GENTLE, Block, Fitted, bounded, shift_of, total_of
+from rollover.diagnosis.fit.finite_differences import Point, adaptive_difference, moved_to, ridge_at, step_reduced
+from rollover.diagnosis.fit.linearisation import GENTLE, Fitted, ResidualBlock, bounded, shift_of, total_of
 from rollover.diagnosis.fit.parameterisation import Candidate, key_at
-from rollover.diagnosis.noise.ensemble import course
+from rollover.diagnosis.noise.ensemble import heavy_tail
 from rollover.diagnosis.noise.truncation import soon
 
 Array = NDArray[np.float64]
@@ -31,48 +31,52 @@ PROMISING, HARDLY = 0.3, 0.1  # of such a gain, and of what is enough where more
 NOISE_LEFT = 1.04  # misfit over the noise that needs no further search
 
 
-class Judge(Simulations):
+class Problem(Simulations):
     """Recordings held against what is simulated of them."""
 
-    def __init__(self, evidence: Sequence[Evidence]) -> None:
-        super().__init__(evidence)
-        self.measured = [e.measured() for e in self.evidence]
-        self.shifts = [0.0] * len(self.evidence)
-        self.straying = True  # whether a recording may have taken another course than its run
-        self._near: Judge | None = None
+    def __init__(self, dataset: Sequence[Dataset]) -> None:
+        super().__init__(dataset)
+        self.measured = [e.measured() for e in self.dataset]
+        self.shifts = [0.0] * len(self.dataset)
+        self.heavy_tailed = True  # whether a recording may have taken another course than its run
+        self._near: Problem | None = None
 
-    def bare(self) -> Judge:
+    def no_jacobian(self) -> Problem:
         """The same without what was simulated, to be sent to another process."""
-        other = Judge(self.evidence)
+        other = Problem(self.dataset)
         other.shifts = list(self.shifts)
         return other
 
-    def weigh(self, evidence: Sequence[Evidence]) -> None:
+    def with_noise_model(self, dataset: Sequence[Dataset]) -> None:
         """Take the same recordings with another noise: nothing is simulated again, fits must be made anew."""
-        super().weigh(evidence)
-        self.measured = [e.measured() for e in self.evidence]
+        super().with_noise_model(dataset)
+        self.measured = [e.measured() for e in self.dataset]
 
-    def near(self) -> Judge:
-        """One that sees of the same recordings what comes `soon`; itself where none goes on for long after its blow."""
-        if not self.effort.thrifty:
+    def near(self) -> Problem:
+        """One that sees of the same recordings what comes `soon`; itself where none goes on long after its impact."""
+        if not self.effort.is_ensemble:
             return self
-        evidence = [soon(e) for e in self.evidence]
-        if all(a is b for a, b in zip(evidence, self.evidence, strict=True)):
+        dataset = [soon(e) for e in self.dataset]
+        if all(a is b for a, b in zip(dataset, self.dataset, strict=True)):
             return self
-        if self._near is None or [e.count for e in self._near.evidence] != [e.count for e in evidence]:
-            self._near = Judge(evidence)
+        if self._near is None or [e.count for e in self._near.dataset] != [e.count for e in dataset]:
+            self._near = Problem(dataset)
         else:
-            self._near.weigh(evidence)
-        self._near.shifts, self._near.straying, self._near._pinned = list(self.shifts), self.straying, self._pinned
+            self._near.with_noise_model(dataset)
+        self._near.shifts, self._near.heavy_tailed, self._near._fixed_shifts = (
+            list(self.shifts),
+            self.heavy_tailed,
+            self._fixed_shifts,
+        )
         return self._near
 
-    def beginning(self, base: Fitted) -> tuple[Judge, Fitted]:
+    def beginning(self, base: Fitted) -> tuple[Problem, Fitted]:
         """Who is `near`, and a base as that one sees it, by the slopes that it has."""
         near = self.near()
         if near is self:
             return self, base
         blocks = []
-        for r, (b, e, cut) in enumerate(zip(base.blocks, self.evidence, near.evidence, strict=True)):
+        for r, (b, e, cut) in enumerate(zip(base.blocks, self.dataset, near.dataset, strict=True)):
             both = zip(e.signals, cut.signals, strict=True)
             seen = np.concatenate([np.arange(s.rows.size) < short.rows.size for s, short in both])
             blocks.append(near.block(r, base.candidates, base.x, b.shift, self.effort.fine, b.plain_J[seen]))
@@ -80,17 +84,19 @@ class Judge(Simulations):
         return near, replace(base, blocks=known) if len(known) == len(blocks) else near.again(base)
 
     @contextmanager
-    def held(self, *, straying: bool | None = None, pinned: bool | None = None) -> Iterator[None]:
+    def held(self, *, heavy_tailed: bool | None = None, fixed_shifts: bool | None = None) -> Iterator[None]:
         """Within it recordings may or may not have taken another course, clocks whose zero is known stay or do not.
 
         Far from an explanation a shift eats what is missing.
         """
-        before = self.straying, self._pinned
-        self.straying, self._pinned = (b if v is None else v for v, b in zip((straying, pinned), before, strict=True))
+        before = self.heavy_tailed, self._fixed_shifts
+        self.heavy_tailed, self._fixed_shifts = (
+            b if v is None else v for v, b in zip((heavy_tailed, fixed_shifts), before, strict=True)
+        )
         try:
             yield
         finally:
-            self.straying, self._pinned = before
+            self.heavy_tailed, self._fixed_shifts = before
 
     def again(self, fitted: Fitted) -> Fitted:
         """A fit where it stands, linearised anew under the noise as it is held now."""
@@ -111,17 +117,17 @@ class Judge(Simulations):
         return max((abs(a - b) for a, b in zip(x, there, strict=True)), default=0.0) < self.effort.fine
 
     @property
-    def per_error(self) -> float:
+    def samples_per_error(self) -> float:
         """Samples that share one error: those of a signal where a scatter or a tolerance prevails, else 1."""
-        signals = [s for e in self.evidence for s in e.signals]
-        if not all(e.is_rough(s) for e in self.evidence for s in e.signals):
+        signals = [s for e in self.dataset for s in e.signals]
+        if not all(e.model_error_dominates(s) for e in self.dataset for s in e.signals):
             return 1.0
         return sum(s.rows.size for s in signals) / len(signals)
 
     def residuals(self, fitted: Fitted) -> list[Array]:
         """Measured less predicted, stacked, SI, of each recording."""
         raws = [self.raw(r, fitted.candidates, fitted.x, b.shift) for r, b in enumerate(fitted.blocks)]
-        return [np.zeros(e.count) if y is None else e.values - y for e, y in zip(self.evidence, raws, strict=True)]
+        return [np.zeros(e.count) if y is None else e.values - y for e, y in zip(self.dataset, raws, strict=True)]
 
     def block(
         self,
@@ -129,71 +135,72 @@ class Judge(Simulations):
         candidates: Sequence[Candidate],
         x: Sequence[float],
         shift: float,
-        nudge: float,
+        fd_step: float,
         known: Array | None = None,
         *,
         clock: bool = True,
-    ) -> Block | None:
-        """Recording r linearised at x by differences over `nudge`: no Jacobian for 0, no slope in time without `clock`.
+    ) -> ResidualBlock | None:
+        """Recording r linearised at x by differences over `fd_step`: no Jacobian for 0, no time slope without `clock`.
 
         `known` (n, k) are the first k columns of the Jacobian where those of an earlier place will do.
         """
         y = self.predicted(r, candidates, x, shift)
         if y is None:
             return None
-        e, raw = self.evidence[r], self.raw(r, candidates, x, shift)
+        e, raw = self.dataset[r], self.raw(r, candidates, x, shift)
         assert raw is not None
-        leaps = self._leaps.get(key_at(r, candidates, x, shift), NONE)
+        discontinuities = self._discontinuities.get(key_at(r, candidates, x, shift), NONE)
         J = np.zeros((y.size, len(x)))
         if known is not None:
             J[:, : known.shape[1]] = known
-        clock = clock and not (self._pinned and e.recording.clock.zero != "unknown")
+        clock = clock and not (self._fixed_shifts and e.recording.clock.zero != "unknown")
         slope = np.zeros_like(raw)
         if clock:
             slope = self._in_time(r, candidates, x, shift, raw)
 
-        worth = e.worth(leaps)
-        residual = e.eased(worth * (self.measured[r] - y))
-        far = max(1.0, float(np.sqrt(np.mean(residual * residual)))) if 0.0 < nudge <= self.effort.fine else np.inf
+        worth = e.worth(discontinuities)
+        residual = e.marginalised(worth * (self.measured[r] - y))
+        far = max(1.0, float(np.sqrt(np.mean(residual * residual)))) if 0.0 < fd_step <= self.effort.fine else np.inf
         far = far if far < NEAR else np.inf  # from afar a wide step leads over ripples
 
         def off(end: Point) -> Array | None:
-            return self.moved(r, (candidates, x), end, shift, None if self._pinned else slope)
+            return self.moved(r, (candidates, x), end, shift, None if self._fixed_shifts else slope)
 
         def off_by(k: int) -> Callable[[float], Array | None]:
             at = (candidates, x)
             return lambda step: self.moved(r, at, (candidates, moved_to(at, k, x[k] + step)), shift)
 
-        for k in range(0 if known is None else known.shape[1], len(x) if nudge else 0):
+        for k in range(0 if known is None else known.shape[1], len(x) if fd_step else 0):
             if self.effort.wide:
-                widest = 0.0 if self._pinned else self.effort.wide  # a first fit is short
-                column = secant(e, off, (candidates, x), k, nudge, widest)
+                widest = 0.0 if self._fixed_shifts else self.effort.wide  # a first fit is short
+                column = adaptive_difference(e, off, (candidates, x), k, fd_step, widest)
                 if column is None:
                     return None
-                valley = valley_at((candidates, x), k)
-                J[:, k] = column if valley is None else column - valley[1] * J[:, valley[0]]
+                ridge = ridge_at((candidates, x), k)
+                J[:, k] = column if ridge is None else column - ridge[1] * J[:, ridge[0]]
                 continue
-            column = narrowed(off_by(k), nudge if x[k] < 0.5 else -nudge, far)
+            column = step_reduced(off_by(k), fd_step if x[k] < 0.5 else -fd_step, far)
             if column is None:
                 return None
             J[:, k] = column
-        slope[leaps] = 0.0
-        slope = e.eased(worth * e.whitened(slope)) if clock else slope
-        counts = course(e, residual) if self.straying else None
+        slope[discontinuities] = 0.0
+        slope = e.marginalised(worth * e.whitened(slope)) if clock else slope
+        counts = heavy_tail(e, residual) if self.heavy_tailed else None
         if counts is not None:
             residual, J, slope = counts.samples * residual, counts.samples[:, None] * J, counts.samples * slope
-        return Block(
-            residual=residual, J=J, slope=slope, shift=shift, prior=e.shift_prior, course=counts, expected=e.expected,
-            forgiven=self.straying,
+        return ResidualBlock(
+            residual=residual, J=J, slope=slope, shift=shift, prior=e.shift_prior, heavy_tail=counts,
+            expected=e.expected,
+            masked=self.heavy_tailed,
         )  # fmt: skip
 
     def clocked(
         self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float, rounds: int
-    ) -> Block | None:
+    ) -> ResidualBlock | None:
         """Recording r at x without slopes, its time shift moved to where it is met best: no run more, of full runs."""
         found = self.block(r, candidates, x, shift, 0.0)
         for _ in range(rounds):
-            if self._pinned or found is None:
+            if self._fixed_shifts or found is None:
                 break
             new = self.block(r, candidates, x, found.shift + shift_of(found, np.zeros(len(x))), 0.0)
             if new is None or new.total >= found.total:
@@ -201,15 +208,22 @@ class Judge(Simulations):
             found = new
         return found
 
-    def _on_trial(self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float) -> Block | None:
+    def _on_trial(
+        self, r: int, candidates: Sequence[Candidate], x: Sequence[float], shift: float
+    ) -> ResidualBlock | None:
         """Recording r where a step leads: what is left there is all that is asked for, unless its clock moves on."""
         if self.effort.clocked:
             return self.clocked(r, candidates, x, shift, self.effort.clocked)
         return self.block(r, candidates, x, shift, 0.0, clock=False)
 
     def _less_far(
-        self, r: int, candidates: Sequence[Candidate], x: Sequence[float], before: Block, after: Block | None
-    ) -> Block | None:
+        self,
+        r: int,
+        candidates: Sequence[Candidate],
+        x: Sequence[float],
+        before: ResidualBlock,
+        after: ResidualBlock | None,
+    ) -> ResidualBlock | None:
         """The same with its time shift gone less far, or not at all, where edges left more after it than before."""
         if after is None or after.total <= before.total:
             return after
@@ -226,20 +240,22 @@ class Judge(Simulations):
         only: Sequence[int] | None = None,
         shifts: Sequence[float] | None = None,
         width: int = 0,
-        pinned: bool = False,
-        bare: bool = False,
+        fixed_shifts: bool = False,
+        no_jacobian: bool = False,
         finely: bool = False,
-        lent: Sequence[Array] | None = None,
+        reused: Sequence[Array] | None = None,
     ) -> Fitted | None:
         """Levenberg-Marquardt on (D1) from a start within the unit box; None if nothing can be simulated there.
 
-        `pinned` as in `held`. A `bare` one ends without slopes, where only what it leaves is asked for; one that is
-        made `finely` where a round gains next to nothing, others where it gains less than tells two apart. `lent` are
-        the first slopes (n, k) of each recording to begin with, as a fit of fewer effects has them; it ends with its
-        own.
+        `fixed_shifts` as in `held`. A `no_jacobian` one ends without slopes, where only what it leaves is asked for;
+        one that is made `finely` where a round gains next to nothing, others where it gains less than tells two apart.
+        `reused` are the first slopes (n, k) of each recording to begin with, as a fit of fewer effects has them; it
+        ends with its own.
         """
-        with self.held(pinned=pinned):
-            return self._fit(candidates, start, rounds, only, shifts, width, bare, FINELY if finely else ENOUGH, lent)
+        with self.held(fixed_shifts=fixed_shifts):
+            return self._fit(
+                candidates, start, rounds, only, shifts, width, no_jacobian, FINELY if finely else ENOUGH, reused
+            )
 
     def _fit(
         self,
@@ -249,24 +265,26 @@ class Judge(Simulations):
         only: Sequence[int] | None,
         shifts: Sequence[float] | None,
         width: int,
-        bare: bool,
+        no_jacobian: bool,
         least: float,
-        lent: Sequence[Array] | None,
+        reused: Sequence[Array] | None,
     ) -> Fitted | None:
-        use = list(range(len(self.evidence))) if only is None else list(only)
-        nudges = self.effort.nudges
-        rounds, width = self.effort.rounds if rounds is None else rounds, min(width, len(nudges) - 1)
+        use = list(range(len(self.dataset))) if only is None else list(only)
+        fd_steps = self.effort.fd_steps
+        rounds, width = self.effort.rounds if rounds is None else rounds, min(width, len(fd_steps) - 1)
         x = [float(v) for v in start]
         shifts = [self.shifts[r] for r in use] if shifts is None else list(shifts)
         fixed = len(x) - len(candidates[-1].search) if candidates else 0
-        known: Sequence[Array | None] = [None] * len(use) if lent is None else lent
-        self.made_beside(use, candidates, x, shifts, nudges[width], 0 if lent is None else lent[0].shape[1])
-        found = [self.block(r, candidates, x, s, nudges[width], J) for r, s, J in zip(use, shifts, known, strict=True)]
+        known: Sequence[Array | None] = [None] * len(use) if reused is None else reused
+        self.made_beside(use, candidates, x, shifts, fd_steps[width], 0 if reused is None else reused[0].shape[1])
+        found = [
+            self.block(r, candidates, x, s, fd_steps[width], J) for r, s, J in zip(use, shifts, known, strict=True)
+        ]
         if any(b is None for b in found):
             return None
-        blocks: list[Block] = [b for b in found if b is not None]
+        blocks: list[ResidualBlock] = [b for b in found if b is not None]
         best, damping = total_of(blocks), 1e-3
-        borrowed = lent is not None  # whether slopes are those of another place
+        borrowed = reused is not None  # whether slopes are those of another place
         told = x  # where all were last worked out
         for turn in range(rounds):
             A, b = np.zeros((len(x), len(x))), np.zeros(len(x))
@@ -274,7 +292,7 @@ class Judge(Simulations):
                 Ar, br, _ = block.normal()
                 A, b = A + Ar, b + br
             improved, enough, total = False, max(least, FINELY * 1e-2 * best, self.effort.least), best
-            if least > FINELY and not self.effort.thrifty:
+            if least > FINELY and not self.effort.is_ensemble:
                 enough = max(enough, TRIFLING * (best - sum(k.residual.size for k in blocks)))
             due = 0.0  # gain of a step by these slopes
             for _ in range(TRIES):
@@ -310,36 +328,38 @@ class Judge(Simulations):
             if fresh:
                 # what slopes of another place promise no more those of this one may
                 width, damping = width if borrowed else width + 1, 1e-3
-            last = width >= len(nudges)
-            if last and not improved and len(nudges) == 1:
+            last = width >= len(fd_steps)
+            if last and not improved and len(fd_steps) == 1:
                 break
-            is_bare = bare and (last or turn + 1 == rounds)
-            nudge = 0.0 if is_bare else self.effort.fine if last else nudges[width]
+            has_no_jacobian = no_jacobian and (last or turn + 1 == rounds)
+            fd_step = 0.0 if has_no_jacobian else self.effort.fine if last else fd_steps[width]
             # what is held already moves little: its slopes are worked out anew only where the search narrows, or where
             # they lead astray or not far, as those of another place along a valley do; where a run is dear a short fit
             # keeps all that foretold well, and another ends with those of a place beside it
             slow = gain < KEPT * due or gain < SLOW * best
-            anew = fresh or (slow and not self.effort.thrifty)
-            kept = 0 if anew else len(x) if bare and self.effort.thrifty and not slow else fixed
-            if last and self.effort.thrifty and told is not None and self.is_beside(x, told):
+            anew = fresh or (slow and not self.effort.is_ensemble)
+            kept = 0 if anew else len(x) if no_jacobian and self.effort.is_ensemble and not slow else fixed
+            if last and self.effort.is_ensemble and told is not None and self.is_beside(x, told):
                 kept = len(x)
-            elif anew and not is_bare:
+            elif anew and not has_no_jacobian:
                 told = x
-            borrowed = self.effort.thrifty and ((borrowed and not anew) or 0 < kept == len(x))
-            if not is_bare:
-                self.made_beside(use, candidates, x, shifts, nudge, kept)
+            borrowed = self.effort.is_ensemble and ((borrowed and not anew) or 0 < kept == len(x))
+            if not has_no_jacobian:
+                self.made_beside(use, candidates, x, shifts, fd_step, kept)
             again = [
-                self.block(r, candidates, x, s, nudge, None if not kept or is_bare else block.plain_J[:, :kept])
+                self.block(
+                    r, candidates, x, s, fd_step, None if not kept or has_no_jacobian else block.plain_J[:, :kept]
+                )
                 for r, s, block in zip(use, shifts, blocks, strict=True)
             ]
             if any(b is None for b in again):
                 return None
             blocks = [b for b in again if b is not None]
-            if is_bare:
+            if has_no_jacobian:
                 return Fitted(candidates=tuple(candidates), x=tuple(x), blocks=tuple(blocks))
             if last:
                 break
-        if width < len(nudges) and (borrowed or nudges[width] != self.effort.fine):
+        if width < len(fd_steps) and (borrowed or fd_steps[width] != self.effort.fine):
             self.made_beside(use, candidates, x, shifts, self.effort.fine)
             ended = [self.block(r, candidates, x, s, self.effort.fine) for r, s in zip(use, shifts, strict=True)]
             if all(b is not None for b in ended):
@@ -352,9 +372,9 @@ class Judge(Simulations):
         candidates: Sequence[Candidate],
         x: Sequence[float],
         trial: list[float],
-        after: list[Block | None],
+        after: list[ResidualBlock | None],
         total: float,
-    ) -> tuple[list[float], list[Block | None], float]:
+    ) -> tuple[list[float], list[ResidualBlock | None], float]:
         """Go on the way of a step as long as that helps: events that come too late count for more than their slope."""
         dx = np.array(trial) - np.array(x)
         for _ in range(STRIDES):
@@ -373,4 +393,4 @@ class Judge(Simulations):
         return trial, after, total
 
 
-__all__ = ["GENTLE", "Block", "Fitted", "Judge", "shift_of"]
+__all__ = ["GENTLE", "Fitted", "Problem", "ResidualBlock", "shift_of"]

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.noise.ensemble import Course
+from rollover.diagnosis.noise.ensemble import HeavyTail
 
 Array = NDArray[np.float64]
 WIDEST = 4.0  # times its prior that a time shift may be
@@ -25,12 +25,12 @@ GENTLE = 1e-4  # prior of a coordinate (1/variance): keeps what nothing determin
 
 
 @dataclass(frozen=True, kw_only=True)
-class Block:
+class ResidualBlock:
     """One recording at the fitted point: residual (n,), Jacobian (n, p), slope of the shift (n,), shift, its prior.
 
-    `course` is what samples count where the run went another course than the recording; None where it did not.
+    `heavy_tail` is what samples count where the run went another course than the recording; None where it did not.
     Residual, Jacobian and slope have it in them already. `expected` is the sum of squares that noise and scatter alone
-    leave, where that is not one for each sample; `forgiven` says that another course would have counted for less.
+    leave, where that is not one for each sample; `masked` says that another course would have counted for less.
     """
 
     residual: Array
@@ -38,9 +38,9 @@ class Block:
     slope: Array
     shift: float
     prior: float
-    course: Course | None = None
+    heavy_tail: HeavyTail | None = None
     expected: float | None = None
-    forgiven: bool = False
+    masked: bool = False
 
     @property
     def size(self) -> float:
@@ -49,34 +49,34 @@ class Block:
 
     def counted(self, values: Array) -> Array:
         """Other whitened samples (n,), or columns of them, for what they count here."""
-        return values if self.course is None else np.asarray((values.T * self.course.samples).T)
+        return values if self.heavy_tail is None else np.asarray((values.T * self.heavy_tail.samples).T)
 
     @property
     def plain_residual(self) -> Array:
         """Residual of samples that count in full."""
-        return self.residual if self.course is None else self.residual / self.course.samples
+        return self.residual if self.heavy_tail is None else self.residual / self.heavy_tail.samples
 
     @property
     def valued(self) -> Array:
         """Residual whose squares add up to what is left."""
-        if self.course is None:
+        if self.heavy_tail is None:
             return self.residual
-        return np.where(self.course.late, np.sqrt(self.course.share) * self.plain_residual, self.residual)
+        return np.where(self.heavy_tail.late, np.sqrt(self.heavy_tail.share) * self.plain_residual, self.residual)
 
     @property
     def plain_J(self) -> Array:
         """J of samples that count in full."""
-        return self.J if self.course is None else self.J / self.course.samples[:, None]
+        return self.J if self.heavy_tail is None else self.J / self.heavy_tail.samples[:, None]
 
     @property
     def plain_slope(self) -> Array:
         """Slope of the shift of samples that count in full."""
-        return self.slope if self.course is None else self.slope / self.course.samples
+        return self.slope if self.heavy_tail is None else self.slope / self.heavy_tail.samples
 
     @property
     def squares(self) -> float:
         """Sum of squares of what is left, another course for what it counts (D9)."""
-        return float(self.residual @ self.residual) + (0.0 if self.course is None else self.course.more)
+        return float(self.residual @ self.residual) + (0.0 if self.heavy_tail is None else self.heavy_tail.more)
 
     @property
     def weight(self) -> float:
@@ -102,13 +102,14 @@ class Block:
 class Fitted:
     """Effects fitted to recordings: coordinates, blocks there, and what is left, sum of squares over the noise.
 
-    `foretold` is what runs leave of each recording where the fit to all other conditions would be, if they were made.
+    `cross_validated` is what runs leave of each recording where the fit to all other conditions would be, if they were
+    made.
     """
 
     candidates: tuple[Candidate, ...]
     x: tuple[float, ...]
-    blocks: tuple[Block, ...]
-    foretold: tuple[float, ...] | None = None
+    blocks: tuple[ResidualBlock, ...]
+    cross_validated: tuple[float, ...] | None = None
 
     @property
     def own(self) -> tuple[float, ...]:
@@ -131,7 +132,7 @@ class Fitted:
         return " + ".join(c.key for c in self.candidates) or "as it is"
 
 
-def total_of(blocks: Sequence[Block]) -> float:
+def total_of(blocks: Sequence[ResidualBlock]) -> float:
     """Sum of (D1) over recordings where they stand."""
     return sum(b.total for b in blocks)
 
@@ -147,7 +148,7 @@ def turned(fitted: Fitted) -> Fitted:
     )
 
 
-def shift_of(block: Block, dx: Array) -> float:
+def shift_of(block: ResidualBlock, dx: Array) -> float:
     """Change of the time shift that goes with dx; it stays within `WIDEST` of its prior."""
     g = float(block.slope @ (block.residual - block.J @ dx)) - block.shift * block.prior**-2
     most = WIDEST * block.prior
@@ -180,7 +181,7 @@ def bounded(A: Array, b: Array, x: Array, damping: float) -> Array:
     return dx
 
 
-def freed(vectors: Array, block: Block) -> Array:
+def without_shift(vectors: Array, block: ResidualBlock) -> Array:
     """Vectors (n, m) without what the recording's time shift explains, given its prior."""
     s = block.slope
     shrink = (1.0 - np.sqrt(block.prior**-2 / block.weight)) / max(float(s @ s), 1e-300)

@@ -10,12 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import doubted_beside
-from rollover.diagnosis.fit.levenberg_marquardt import Judge
-from rollover.diagnosis.fit.linearisation import WIDEST, Block, Fitted
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import WIDEST, Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate, each_with_own, physical
 
 Array = NDArray[np.float64]
-TEETH, COMBED, BESIDE = 11, 0.05, 20  # places on a first coordinate, within so much of its fit; on the other, over all
+GRID_SCAN, COMBED, BESIDE = (
+    11,
+    0.05,
+    20,
+)  # places on a first coordinate, within so much of its fit; on the other, over all
 WAVES, OCTAVES = 57, 0.225  # frequencies, within so much of a coordinate of its fit: three octaves
 QUIETLY = (0.3, 0.5)  # coordinates of a damping that lets it ring
 SPREAD = (np.arange(6) + 0.5) / 6  # places of a shape that goes along with them
@@ -29,46 +33,46 @@ TWICE, LITTLE = 2, 1.0  # how often; a gain that is not worth another time
 
 
 def left_at(
-    judge: Judge,
+    problem: Problem,
     candidates: Sequence[Candidate],
     x: Sequence[float],
     shifts: Sequence[float],
     only: Sequence[int] | None = None,
 ) -> float | None:
     """What is left of all recordings or `only` some at x, with time shifts (s) of all; None if a run fails."""
-    blocks = blocks_at(judge, candidates, x, shifts, only)
+    blocks = blocks_at(problem, candidates, x, shifts, only)
     return None if blocks is None else sum(b.normal()[2] for b in blocks)
 
 
 def blocks_at(
-    judge: Judge,
+    problem: Problem,
     candidates: Sequence[Candidate],
     x: Sequence[float],
     shifts: Sequence[float],
     only: Sequence[int] | None = None,
     *,
     clock: bool = True,
-) -> list[Block] | None:
+) -> list[ResidualBlock] | None:
     """Recordings at x and these time shifts (s), without slopes but a clock's; None where one cannot be simulated."""
     use = range(len(shifts)) if only is None else only
-    found = [judge.block(r, candidates, x, shifts[r], 0.0, clock=clock) for r in use]
+    found = [problem.block(r, candidates, x, shifts[r], 0.0, clock=clock) for r in use]
     blocks = [b for b in found if b is not None]
     return blocks if len(blocks) == len(found) else None
 
 
 def by_what_is_left(
-    judge: Judge,
+    problem: Problem,
     candidates: Sequence[Candidate],
     places: Sequence[tuple[float, ...]],
     shifts: Sequence[float],
     only: Sequence[int] | None = None,
 ) -> list[tuple[float, ...]]:
     """Those places that can be simulated, the one that leaves least of all recordings or `only` some first."""
-    met = [(there, x) for x in places if (there := left_at(judge, candidates, x, shifts, only)) is not None]
+    met = [(there, x) for x in places if (there := left_at(problem, candidates, x, shifts, only)) is not None]
     return [x for _, x in sorted(met)]
 
 
-def polish(judge: Judge, fitted: Fitted, size: float = 0.02, most: int = 45) -> Fitted:
+def polish(problem: Problem, fitted: Fitted, size: float = 0.02, most: int = 45) -> Fitted:
     """Follow a crooked valley by a simplex: where a threshold is crossed, differences mislead; never worse."""
     from scipy.optimize import minimize
 
@@ -77,7 +81,7 @@ def polish(judge: Judge, fitted: Fitted, size: float = 0.02, most: int = 45) -> 
     def left(x: Array) -> float:
         inside = [float(v) for v in np.clip(x, 0.0, 1.0)]
         out = float(np.sum(np.abs(x - np.array(inside))))
-        there = left_at(judge, fitted.candidates, inside, shifts)
+        there = left_at(problem, fitted.candidates, inside, shifts)
         return 1e300 if there is None else there * (1.0 + out)
 
     start = np.array(fitted.x)
@@ -87,21 +91,21 @@ def polish(judge: Judge, fitted: Fitted, size: float = 0.02, most: int = 45) -> 
     found = minimize(
         left, start, method="Nelder-Mead", options={"initial_simplex": simplex, "maxfev": most, "xatol": 1e-4}
     )
-    again = judge.fit(fitted.candidates, np.clip(found.x, 0.0, 1.0), rounds=3, shifts=shifts, width=2)
+    again = problem.fit(fitted.candidates, np.clip(found.x, 0.0, 1.0), rounds=3, shifts=shifts, width=2)
     return again if again is not None and again.left < fitted.left else fitted
 
 
-def teeth(fitted: Fitted) -> list[tuple[float, ...]]:
+def grid_scan(fitted: Fitted) -> list[tuple[float, ...]]:
     """Places all along the second parameter of the last effect of a fit, beside where its first one stands.
 
     What hops leaves a misfit full of cliffs: a frequency is found soon, what damps it may lie far off behind one.
     """
     at = len(fitted.x) - 2
-    firsts = np.clip(fitted.x[at] + COMBED * np.linspace(-1.0, 1.0, TEETH), 0.0, 1.0)
+    firsts = np.clip(fitted.x[at] + COMBED * np.linspace(-1.0, 1.0, GRID_SCAN), 0.0, 1.0)
     return [(*fitted.x[:at], float(a), float(b)) for a in firsts for b in (np.arange(BESIDE) + 0.5) / BESIDE]
 
 
-def chords(last: Candidate, own: Sequence[float]) -> tuple[Candidate, list[tuple[float, ...]]]:
+def frequency_scan(last: Candidate, own: Sequence[float]) -> tuple[Candidate, list[tuple[float, ...]]]:
     """The last effect of a fit along its shape, and places all along its frequency and its shape, little damped.
 
     One that was fitted beside a wrong frequency hardly rings any more: what it rings by is not to be seen from there.
@@ -121,18 +125,18 @@ def apart(met: Sequence[tuple[float, tuple[float, ...]]]) -> list[tuple[float, .
     return chosen
 
 
-def along_shapes(last: Candidate, x: Sequence[float]) -> list[tuple[float, ...]]:
+def along_secondary(last: Candidate, x: Sequence[float]) -> list[tuple[float, ...]]:
     """Places beside x all along each parameter of the shape of its last effect, the others as they usually are.
 
     A recording in which a face lets go, or does not, is met within a narrow stretch alone.
     """
     at = len(x)
-    begun = (*x[: at - len(last.search)], *last.with_shapes(x[-len(last.search) :])[0])
+    begun = (*x[: at - len(last.search)], *last.with_secondary(x[-len(last.search) :])[0])
     return [(*begun[:k], float(v), *begun[k + 1 :]) for k in range(at, len(begun)) for v in SCANNED]
 
 
 def least_of(
-    judge: Judge, thing: tuple[Sequence[Candidate], Sequence[tuple[float, ...]]], *, shifts: Sequence[float]
+    problem: Problem, thing: tuple[Sequence[Candidate], Sequence[tuple[float, ...]]], *, shifts: Sequence[float]
 ) -> tuple[float, tuple[float, ...]] | None:
     """What is left of all recordings at that of some places where it is least, and this; None if all runs fail."""
     candidates, places = thing
@@ -140,7 +144,7 @@ def least_of(
     for x in places:
         left = 0.0
         for r, shift in enumerate(shifts):
-            block = judge.block(r, candidates, x, shift, 0.0)
+            block = problem.block(r, candidates, x, shift, 0.0)
             left += np.inf if block is None else block.normal()[2]
             if left >= least:
                 break
@@ -149,29 +153,29 @@ def least_of(
     return None if best is None else (least, best)
 
 
-def timed(judge: Judge, fitted: Fitted) -> Fitted:
+def timed(problem: Problem, fitted: Fitted) -> Fitted:
     """The fit with each time shift tried out to either side: edges make its slope crooked; never worse.
 
     Where one channel has a clock of its own all shifts are tried against that first: the edges of the channel stay.
     """
     best = fitted
     for _ in range(TWICE):
-        x, shifts = _against(judge, best)
-        moved = [judge.block(r, best.candidates, x, s, 0.0, clock=False) for r, s in enumerate(shifts)]
-        blocks = [b if b is None else _tried(judge, r, best.candidates, x, b) for r, b in enumerate(moved)]
+        x, shifts = _against(problem, best)
+        moved = [problem.block(r, best.candidates, x, s, 0.0, clock=False) for r, s in enumerate(shifts)]
+        blocks = [b if b is None else _tried(problem, r, best.candidates, x, b) for r, b in enumerate(moved)]
         shifts = [s if b is None else b.shift for s, b in zip(shifts, blocks, strict=True)]
-        again = judge.fit(best.candidates, x, rounds=3, shifts=shifts, width=2)
+        again = problem.fit(best.candidates, x, rounds=3, shifts=shifts, width=2)
         if again is None or again.left > best.left - LITTLE:
             break
         best = again
     return best
 
 
-def ended(judge: Judge, fitted: Fitted) -> Fitted:
+def ended(problem: Problem, fitted: Fitted) -> Fitted:
     """The fit gone on with over narrow steps as long as that gains: its rounds may have been too few; never worse."""
     best = fitted
     for _ in range(TWICE):
-        again = judge.fit(best.candidates, best.x, shifts=[b.shift for b in best.blocks], width=2, finely=True)
+        again = problem.fit(best.candidates, best.x, shifts=[b.shift for b in best.blocks], width=2, finely=True)
         if again is None or again.left > best.left:
             break
         is_there = again.left > best.left - LITTLE
@@ -181,7 +185,7 @@ def ended(judge: Judge, fitted: Fitted) -> Fitted:
     return best
 
 
-def _against(judge: Judge, fitted: Fitted) -> tuple[tuple[float, ...], list[float]]:
+def _against(problem: Problem, fitted: Fitted) -> tuple[tuple[float, ...], list[float]]:
     """Coordinates, and time shifts (s) of all, moved against the clock of each channel that has one of its own."""
     best, left = (fitted.x, [b.shift for b in fitted.blocks]), fitted.total
     for c, own in each_with_own(fitted.candidates):
@@ -192,7 +196,7 @@ def _against(judge: Judge, fitted: Fitted) -> tuple[tuple[float, ...], list[floa
             for d in (step, -step):
                 moved = coordinate(physical(best[0][k], search) - d, search)
                 x, shifts = (*best[0][:k], moved, *best[0][k + 1 :]), [s + d for s in best[1]]
-                blocks = blocks_at(judge, fitted.candidates, x, shifts, clock=False) if 0.0 < moved < 1.0 else None
+                blocks = blocks_at(problem, fitted.candidates, x, shifts, clock=False) if 0.0 < moved < 1.0 else None
                 there = np.inf if blocks is None else sum(b.total for b in blocks)
                 if there < left:
                     best, left = (x, shifts), there
@@ -202,19 +206,21 @@ def _against(judge: Judge, fitted: Fitted) -> tuple[tuple[float, ...], list[floa
     return best
 
 
-def _tried(judge: Judge, r: int, candidates: Sequence[Candidate], x: Sequence[float], block: Block) -> Block:
+def _tried(
+    problem: Problem, r: int, candidates: Sequence[Candidate], x: Sequence[float], block: ResidualBlock
+) -> ResidualBlock:
     """Recording r at a time shift beside which none is better, nor its clock's as stated, nor the one it began with.
 
     Edges leave one of many recordings in a dip that is a millisecond off.
     """
-    for there in (0.0, judge.shifts[r]):
-        other = judge.block(r, candidates, x, there, 0.0, clock=False)
+    for there in (0.0, problem.shifts[r]):
+        other = problem.block(r, candidates, x, there, 0.0, clock=False)
         block = other if other is not None and other.total < block.total else block
     step, tried = TICK, 0
     while step > SHORTEST and tried < TRIED:
         for there in (block.shift + step, block.shift - step):
             tried += 1
-            other = judge.block(r, candidates, x, there, 0.0, clock=False)
+            other = problem.block(r, candidates, x, there, 0.0, clock=False)
             if other is not None and other.total < block.total and abs(there) < WIDEST * other.prior:
                 block = other
                 break
@@ -223,23 +229,23 @@ def _tried(judge: Judge, r: int, candidates: Sequence[Candidate], x: Sequence[fl
     return block
 
 
-def is_doubtful(judge: Judge) -> bool:
+def is_doubtful(problem: Problem) -> bool:
     """Whether conditions leave something uncertain whose work beside an effect is worth its runs."""
-    return not judge.effort.thrifty and any(e.doubts is not None for e in judge.evidence)
+    return not problem.effort.is_ensemble and any(e.doubts is not None for e in problem.dataset)
 
 
-def conditioned(judge: Judge, fitted: Fitted) -> Fitted:
+def conditioned(problem: Problem, fitted: Fitted) -> Fitted:
     """The fit again with what the conditions leave uncertain as it acts beside it, recordings weighed by that.
 
     What an error of a condition does was seen on the scenario as it is: a mass in doubt moves a spike there, and
     beside a spring that was found its frequency.
     """
     for _ in range(ROUNDS):
-        beside = judge.changes(fitted.candidates, fitted.x)
+        beside = problem.changes(fitted.candidates, fitted.x)
         shifts = [b.shift for b in fitted.blocks]
-        judge.weigh([doubted_beside(e, beside, s) for e, s in zip(judge.evidence, shifts, strict=True)])
-        again = judge.fit(fitted.candidates, fitted.x, shifts=shifts, width=1)
-        fitted = again or judge.again(fitted)
+        problem.with_noise_model([doubted_beside(e, beside, s) for e, s in zip(problem.dataset, shifts, strict=True)])
+        again = problem.fit(fitted.candidates, fitted.x, shifts=shifts, width=1)
+        fitted = again or problem.again(fitted)
     return fitted
 
 
@@ -261,9 +267,9 @@ def but_one(fitted: Fitted, k: int) -> tuple[list[Candidate], list[int]]:
     return [c for c, _ in others], [at for _, own in others for at in range(own.start, own.stop)]
 
 
-def without(judge: Judge, fitted: Fitted, k: int, rounds: int = 8, *, bare: bool = False) -> Fitted | None:
-    """The explanation fitted again without its k-th effect; `bare` as in `Judge.fit`."""
+def without(problem: Problem, fitted: Fitted, k: int, rounds: int = 8, *, no_jacobian: bool = False) -> Fitted | None:
+    """The explanation fitted again without its k-th effect; `no_jacobian` as in `Problem.fit`."""
     rest, columns = but_one(fitted, k)
     x, shifts = [fitted.x[at] for at in columns], [b.shift for b in fitted.blocks]
-    lent = [b.plain_J[:, columns] for b in fitted.blocks] if judge.effort.thrifty else None
-    return judge.fit(rest, x, rounds=rounds, shifts=shifts, bare=bare, lent=lent)
+    reused = [b.plain_J[:, columns] for b in fitted.blocks] if problem.effort.is_ensemble else None
+    return problem.fit(rest, x, rounds=rounds, shifts=shifts, no_jacobian=no_jacobian, reused=reused)

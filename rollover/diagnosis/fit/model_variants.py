@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rollover.diagnosis.fit.levenberg_marquardt import NOISE_LEFT, Judge
+from rollover.diagnosis.fit.levenberg_marquardt import NOISE_LEFT, Problem
 from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.local_search import BEHIND, STARTS, by_what_is_left, few_of, polish, shifts_told
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
@@ -28,7 +28,7 @@ BESIDE_FORM = np.linspace(-0.1, 0.05, 13)  # of a coordinate: where a threshold 
 ELSEWHERE = (0.2, 0.35, 0.5, 0.65, 0.8)  # coordinates of a number that only this form has
 
 
-def shaped(judge: Judge, f: Fitted, leaves: Sequence[float]) -> Fitted | None:
+def shaped(problem: Problem, f: Fitted, leaves: Sequence[float]) -> Fitted | None:
     """The fit with the shape of its last effect, begun where short fits from some places leave least; None if none.
 
     None too where these come nowhere near what another explanation `leaves` of each recording; so in another form. On
@@ -39,26 +39,26 @@ def shaped(judge: Judge, f: Fitted, leaves: Sequence[float]) -> Fitted | None:
         return None
     last, at = f.candidates[-1], len(f.x) - len(f.candidates[-1].search)
     along = replace(last.whole(), along=tuple(last.shapes))
-    places = [(*f.x[:at], *start) for start in last.with_shapes(f.x[at:])]
-    found = _best_of(judge, f, along, places, leaves)
+    places = [(*f.x[:at], *start) for start in last.with_secondary(f.x[at:])]
+    found = _best_of(problem, f, along, places, leaves)
     if found is None:
         return None
     if found.left > f.left:  # the few led to where the others are not met: all of them, from where the fit stands
-        onward = judge.fit((*f.candidates[:-1], along), places[0], shifts=[b.shift for b in f.blocks])
+        onward = problem.fit((*f.candidates[:-1], along), places[0], shifts=[b.shift for b in f.blocks])
         found = min((one for one in (found, onward) if one is not None), key=lambda one: one.left)
     if found.left > _reach_of_all(f, leaves):
         return None
-    found = found if is_noise(found) or found.left > ASTRAY * sum(leaves) else polish(judge, found)
+    found = found if is_noise(found) or found.left > ASTRAY * sum(leaves) else polish(problem, found)
     (whole, x), shifts = found.candidates[-1].plain(found.own), [b.shift for b in found.blocks]
-    bent = judge.fit((*f.candidates[:-1], whole), (*found.x[:at], *x), shifts=shifts, width=2)
+    bent = problem.fit((*f.candidates[:-1], whole), (*found.x[:at], *x), shifts=shifts, width=2)
     own = dict(zip(found.candidates[-1].search, found.own, strict=True))
-    usual = judge.fit(f.candidates, (*found.x[:at], *(own[name] for name in last.search)), shifts=shifts, width=2)
+    usual = problem.fit(f.candidates, (*found.x[:at], *(own[name] for name in last.search)), shifts=shifts, width=2)
     if bent is None or usual is None:
         return bent or usual
     return usual if usual.left < bent.left + enough(bent.left, sum(b.residual.size for b in bent.blocks)) else bent
 
 
-def in_form(judge: Judge, f: Fitted, last: Candidate, leaves: Sequence[float]) -> Fitted | None:
+def in_form(problem: Problem, f: Fitted, last: Candidate, leaves: Sequence[float]) -> Fitted | None:
     """The fit with its last effect in another form, begun where it leaves least.
 
     A threshold lies elsewhere in another form; what is fitted instead of another number is looked for over its range.
@@ -70,8 +70,8 @@ def in_form(judge: Judge, f: Fitted, last: Candidate, leaves: Sequence[float]) -
         several = [there + float(d) for d in BESIDE_FORM] if there is not None and not axes else [there]
         axes.append(list(ELSEWHERE) if there is None else [v for v in several if v is not None and 0.0 < v < 1.0])
     places = [(*f.x[:at], *own) for own in itertools.product(*axes)]
-    met = by_what_is_left(judge, (*f.candidates[:-1], last), places, shifts, few_of(f))
-    found = _best_of(judge, f, last, met[: 2 * STARTS], leaves)
+    met = by_what_is_left(problem, (*f.candidates[:-1], last), places, shifts, few_of(f))
+    found = _best_of(problem, f, last, met[: 2 * STARTS], leaves)
     return found if found is not None and found.left < _reach_of_all(f, leaves) else None
 
 
@@ -86,7 +86,7 @@ def is_noise(fitted: Fitted) -> bool:
 
 
 def _best_of(
-    judge: Judge, f: Fitted, last: Candidate, places: Sequence[tuple[float, ...]], leaves: Sequence[float]
+    problem: Problem, f: Fitted, last: Candidate, places: Sequence[tuple[float, ...]], leaves: Sequence[float]
 ) -> Fitted | None:
     """The best fit with another last effect from some places.
 
@@ -97,7 +97,7 @@ def _best_of(
     """
     candidates, few = (*f.candidates[:-1], last), few_of(f)
     at = [f.blocks[r].shift for r in few]
-    short = [judge.fit(candidates, x, rounds=SHORT, shifts=at, only=few, bare=True) for x in places]
+    short = [problem.fit(candidates, x, rounds=SHORT, shifts=at, only=few, no_jacobian=True) for x in places]
     # fitted alone these soon leave less than beside all others
     own = sum(f.blocks[r].total for r in few)
     most = min(ABREAST * own, reach([leaves[r] for r in few], sum(f.blocks[r].residual.size for r in few), NEARBY))
@@ -109,10 +109,11 @@ def _best_of(
             break
         if len(begun) < STARTS and not any(_is_there(one, other) for other in begun):
             begun.append(one)
-    begun = [one for k, one in enumerate(begun) if not any(_is_one_valley(one, other) for other in begun[:k])]
+    begun = [one for k, one in enumerate(begun) if not any(_is_one_ridge(one, other) for other in begun[:k])]
     held = [b.shift for b in f.blocks]
     again = [
-        judge.fit(candidates, one.x, shifts=shifts_told(held, one, few), rounds=FURTHER, bare=True) for one in begun
+        problem.fit(candidates, one.x, shifts=shifts_told(held, one, few), rounds=FURTHER, no_jacobian=True)
+        for one in begun
     ]
     best: Fitted | None = None
     done: list[Fitted] = []
@@ -123,7 +124,7 @@ def _best_of(
         if any(_is_there(one, other, ALIKE) for other in done) or (best and one.total > ABREAST * best.left):
             continue
         done.append(one)
-        ended = judge.fit(candidates, one.x, shifts=[b.shift for b in one.blocks])
+        ended = problem.fit(candidates, one.x, shifts=[b.shift for b in one.blocks])
         best = min((f for f in (best, ended) if f is not None), key=lambda f: f.left, default=None)
         if best is not None and is_noise(best):
             break
@@ -144,7 +145,7 @@ def _reach_of_all(f: Fitted, leaves: Sequence[float]) -> float:
     return reach(leaves, sum(b.residual.size for b in f.blocks), NEARER)
 
 
-def _is_one_valley(one: Fitted, other: Fitted) -> bool:
+def _is_one_ridge(one: Fitted, other: Fitted) -> bool:
     """Whether two short fits are on their way to one place, and as far."""
     return _is_there(one, other, ALIKE) and abs(one.total - other.total) < AS_MUCH * other.total
 

@@ -89,7 +89,7 @@ class Candidate:
         """Whether the k-th parameter is that place: looked at in many, and over less about each."""
         return self.is_narrow and list(self.search)[k] == "travel"
 
-    def valley(self, x: Sequence[float], k: int) -> tuple[int, float] | None:
+    def ridge(self, x: Sequence[float], k: int) -> tuple[int, float] | None:
         """Which coordinate follows the k-th one along the valley of a narrow effect at x, and how fast; else None.
 
         At a tilt theta a load slides by s, proportional to tan theta - mu, until a given moment:
@@ -214,7 +214,7 @@ class Candidate:
             found.append(replace(self, form=form.fixed, search={**search, **form.search}, shapes={}))
         return found
 
-    def with_shapes(self, x: Sequence[float]) -> list[tuple[float, ...]]:
+    def with_secondary(self, x: Sequence[float]) -> list[tuple[float, ...]]:
         """Coordinates of `whole` at which its fit may begin: the shape's default, and others."""
         kind: Any = EFFECTS[self.id]()
         default = [_begun(getattr(kind, n), s) for n, s in self.shapes.items()]
@@ -263,7 +263,7 @@ def each_with_own(candidates: Sequence[Candidate]) -> Iterator[tuple[Candidate, 
         at += len(c.search)
 
 
-def akin(candidates: Iterable[Candidate], to: Iterable[Candidate]) -> list[Candidate]:
+def same_family(candidates: Iterable[Candidate], to: Iterable[Candidate]) -> list[Candidate]:
     """Candidates that act somewhere, of the family of one that does.
 
     A depth, a length: one is taken for the other where a look shows little of its place.
@@ -308,7 +308,7 @@ def coordinate(value: float, search: Search) -> float:
     return (value - search.low) / (search.high - search.low)
 
 
-def yardstick(id: str, names: Collection[str]) -> tuple[str, float]:
+def strength_parameter(id: str, names: Collection[str]) -> tuple[str, float]:
     """The parameter that says how strong an effect is, of those fitted, and its value at no effect.
 
     The first that has a number for its null; otherwise the first of all, and 0.
@@ -320,8 +320,8 @@ def yardstick(id: str, names: Collection[str]) -> tuple[str, float]:
 
 
 def zero_of(c: Candidate) -> tuple[str, float | None]:
-    """The parameter of `yardstick` and its value at no effect, which the scenario may say; None where none is known."""
-    name, null = yardstick(c.id, c.search)
+    """The parameter of `strength_parameter` and its value at no effect, which the scenario may say; None if unknown."""
+    name, null = strength_parameter(c.id, c.search)
     return name, c.own.get(name) if EFFECTS[c.id].null.get(name) is None else null
 
 
@@ -333,7 +333,7 @@ def is_limit(c: Candidate) -> bool:
 
 def followed(c: Candidate, x: Sequence[float], factor: float) -> tuple[float, ...] | None:
     """Coordinates at which an effect is `factor` times as strong as at x; None for one without a zero to go from."""
-    name, null = yardstick(c.id, c.search)
+    name, null = strength_parameter(c.id, c.search)
     if EFFECTS[c.id].null.get(name) is None:
         return None
     search, at = c.search[name], list(c.search).index(name)

@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Protocol, TypeVar
 
-from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 
-class Looks(Protocol):
+class ParallelMap(Protocol):
     """What looks at each of several things."""
 
-    def __call__(self, judge: Judge, look: Callable[[Judge, T], R], things: Sequence[T], /) -> list[R]:
+    def __call__(self, problem: Problem, look: Callable[[Problem, T], R], things: Sequence[T], /) -> list[R]:
         """What a look at each tells, in their order."""
 
 
-def at_each(judge: Judge, look: Callable[[Judge, T], R], things: Sequence[T]) -> list[R]:
+def serial_map(problem: Problem, look: Callable[[Problem, T], R], things: Sequence[T]) -> list[R]:
     """What a look at each thing tells, one after another."""
-    return [look(judge, thing) for thing in things]
+    return [look(problem, thing) for thing in things]

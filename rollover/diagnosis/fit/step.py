@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from rollover.diagnosis.fit.cross_validation import foretold, held_out, refitted
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.cross_validation import cross_validated, held_out, refitted
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.scan_jobs import Looks, at_each
+from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
 
 Groups = Sequence[Sequence[int]]  # recordings that are held out together
 Phases = Sequence[Sequence[tuple[float, str]]]  # of each recording: when each phase begins, and its name
@@ -38,15 +38,15 @@ class Step:
     rivals: tuple[Fitted, ...] = ()
     screened: tuple[Screened, ...] = ()
 
-    def again(self, judge: Judge) -> Step:
+    def again(self, problem: Problem) -> Step:
         """The same under the noise as it is held now."""
-        return self._each(judge.again)
+        return self._each(problem.again)
 
-    def foretold(self, judge: Judge, groups: Groups, looks: Looks = at_each) -> Step:
+    def cross_validated(self, problem: Problem, groups: Groups, parallel_map: ParallelMap = serial_map) -> Step:
         """The same with what its fits foretell by runs, where slopes do not hold for long; of drops its best alone."""
-        if judge.effort.thrifty:
-            return self._each(lambda f: foretold(judge, f, groups))
-        return self.moved_to(refitted(judge, self.fitted, groups, held_out(self.base, groups).total, looks))
+        if problem.effort.is_ensemble:
+            return self._each(lambda f: cross_validated(problem, f, groups))
+        return self.moved_to(refitted(problem, self.fitted, groups, held_out(self.base, groups).total, parallel_map))
 
     def _each(self, made: Callable[[Fitted], Fitted]) -> Step:
         """The same with something made of each fit; its best stays one of its rivals."""

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rollover.diagnosis.fit.levenberg_marquardt import Judge
-from rollover.diagnosis.fit.linearisation import Fitted, freed
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, without_shift
 from rollover.diagnosis.fit.local_search import blocks_at, few_of, left_at
-from rollover.diagnosis.fit.parameterisation import Candidate, followed, yardstick
+from rollover.diagnosis.fit.parameterisation import Candidate, followed, strength_parameter
 from rollover.effects import EFFECTS
 
 AFAR, NEAR = (np.arange(80) + 0.5) / 80, 0.002 * np.arange(-20, 21)  # places of a threshold, all along and about a fit
@@ -23,11 +23,11 @@ Stretch = tuple[int, float, float]  # a coordinate of a fit, and from where to w
 def stretches(fitted: Fitted) -> list[Stretch]:
     """Where each threshold of the last effect may be tried: below where it was fitted, and above.
 
-    That is each other parameter than the one that says how strong the effect is (`yardstick`); of a clock, which moves
-    edges past samples, that one; of what rings its shape alone.
+    That is each other parameter than the one that says how strong the effect is (`strength_parameter`); of a clock,
+    which moves edges past samples, that one; of what rings its shape alone.
     """
     last, at = fitted.candidates[-1], len(fitted.x) - len(fitted.own)
-    strength = yardstick(last.id, last.search)[0]
+    strength = strength_parameter(last.id, last.search)[0]
     if last.rings:
         names = [name for name in last.search if name in EFFECTS[last.id].shapes]
     else:
@@ -47,43 +47,47 @@ def has_threshold(c: Candidate) -> bool:
     Neither of what rings has a null.
     """
     null = EFFECTS[c.id].null
-    is_strength_known = null.get(yardstick(c.id, c.search)[0]) is not None
+    is_strength_known = null.get(strength_parameter(c.id, c.search)[0]) is not None
     return is_strength_known and any(null.get(name) is None for name in c.search)
 
 
 def placed_beside(
-    judge: Judge, pair: tuple[Candidate, tuple[float, ...], Candidate], *, few: Sequence[int], shifts: Sequence[float]
+    problem: Problem,
+    pair: tuple[Candidate, tuple[float, ...], Candidate],
+    *,
+    few: Sequence[int],
+    shifts: Sequence[float],
 ) -> tuple[float, ...] | None:
     """Where a fit of two effects may begin: the first as it is, the second where least of few recordings is left.
 
     The second has a threshold, and is as strong at each place as these ask for there. None where it helps nowhere.
     """
     first, x, second = pair
-    blocks = blocks_at(judge, (first,), x, shifts, few)
+    blocks = blocks_at(problem, (first,), x, shifts, few)
     if blocks is None:
         return None
     alone = Fitted(candidates=(first,), x=x, blocks=tuple(blocks))
     best, least = None, alone.total
     for place in second.probes():
-        there = _as_strong(judge, alone, second, (*x, *place), few)
-        left = None if there is None else left_at(judge, (first, second), there, shifts, few)
+        there = _as_strong(problem, alone, second, (*x, *place), few)
+        left = None if there is None else left_at(problem, (first, second), there, shifts, few)
         if left is not None and left < least:
             best, least = there, left
     return best
 
 
-def traced(judge: Judge, fitted: Fitted, stretch: Stretch) -> Fitted:
+def traced(problem: Problem, fitted: Fitted, stretch: Stretch) -> Fitted:
     """The fit begun anew where its last effect acts elsewhere, as strongly as recordings ask for there; never worse.
 
     A threshold that moves past a sample leaves a misfit of many small valleys: it is tried all along its stretch, and
     finely beside the fit, on few recordings. What rings keeps its frequency meanwhile.
     """
     if fitted.candidates[-1].rings:
-        return _in_tune(judge, fitted, stretch)
+        return _in_tune(problem, fitted, stretch)
     last, shifts = fitted.candidates[-1], [b.shift for b in fitted.blocks]
     k, at = stretch[0], len(fitted.x) - len(fitted.own)
     few = range(len(shifts)) if is_clock(fitted) else few_of(fitted)  # each has its own edges
-    blocks = blocks_at(judge, fitted.candidates[:-1], fitted.x[:at], shifts, few)
+    blocks = blocks_at(problem, fitted.candidates[:-1], fitted.x[:at], shifts, few)
     best = fitted
     if blocks is None:
         return best
@@ -91,43 +95,43 @@ def traced(judge: Judge, fitted: Fitted, stretch: Stretch) -> Fitted:
     met = []
     for v in _places(fitted, stretch):
         there = (*fitted.x[:k], float(v), *fitted.x[k + 1 :])
-        x = there if is_clock(fitted) else _as_strong(judge, alone, last, there, few)
-        left = None if x is None else left_at(judge, fitted.candidates, x, shifts, few)
+        x = there if is_clock(fitted) else _as_strong(problem, alone, last, there, few)
+        left = None if x is None else left_at(problem, fitted.candidates, x, shifts, few)
         if x is not None and left is not None:
             met.append((left, x))
-    for x in _soonest(judge, fitted, _valleys(met)[:VALLEYS], few):
-        again = judge.fit(fitted.candidates, x, shifts=shifts, width=1)
+    for x in _soonest(problem, fitted, _valleys(met)[:VALLEYS], few):
+        again = problem.fit(fitted.candidates, x, shifts=shifts, width=1)
         best = again if again is not None and again.left < best.left else best
     return best
 
 
 def _soonest(
-    judge: Judge, fitted: Fitted, places: Sequence[tuple[float, ...]], few: Sequence[int]
+    problem: Problem, fitted: Fitted, places: Sequence[tuple[float, ...]], few: Sequence[int]
 ) -> list[tuple[float, ...]]:
     """Of several places those from which a short fit to `few` recordings comes to less than one from where a fit is."""
     at = [fitted.blocks[r].shift for r in few]
     short = [
-        judge.fit(fitted.candidates, x, rounds=SHORT, only=few, shifts=at, width=1, bare=True)
+        problem.fit(fitted.candidates, x, rounds=SHORT, only=few, shifts=at, width=1, no_jacobian=True)
         for x in (fitted.x, *places)
     ]
     own = np.inf if short[0] is None else short[0].total
     return [one.x for one in short[1:] if one is not None and one.total < own]
 
 
-def _in_tune(judge: Judge, fitted: Fitted, stretch: Stretch) -> Fitted:
+def _in_tune(problem: Problem, fitted: Fitted, stretch: Stretch) -> Fitted:
     """The fit of what rings begun anew with another shape, along the valley of its frequency; never worse."""
     shifts, at = [b.shift for b in fitted.blocks], len(fitted.x) - len(fitted.own)
     bent, own = fitted.candidates[-1].bent(fitted.own)
     candidates, x = (*fitted.candidates[:-1], bent), (*fitted.x[:at], *own)
     there = [(*x[: stretch[0]], v, *x[stretch[0] + 1 :]) for v in _places(fitted, stretch)]
     few = few_of(fitted)
-    met = [(left, y) for y in there if (left := left_at(judge, candidates, y, shifts, few)) is not None]
+    met = [(left, y) for y in there if (left := left_at(problem, candidates, y, shifts, few)) is not None]
     best = fitted
     for y in _valleys(met)[:VALLEYS]:
-        new = judge.fit(candidates, y, shifts=shifts, width=1)
+        new = problem.fit(candidates, y, shifts=shifts, width=1)
         if new is not None:
             plain = (*new.x[:at], *bent.plain(new.own)[1])
-            again = judge.fit(fitted.candidates, plain, shifts=[b.shift for b in new.blocks], width=2)
+            again = problem.fit(fitted.candidates, plain, shifts=[b.shift for b in new.blocks], width=2)
             best = again if again is not None and again.left < best.left else best
     return best
 
@@ -139,7 +143,7 @@ def _places(fitted: Fitted, stretch: Stretch) -> list[float]:
 
 
 def _as_strong(
-    judge: Judge, alone: Fitted, last: Candidate, x: tuple[float, ...], few: Sequence[int]
+    problem: Problem, alone: Fitted, last: Candidate, x: tuple[float, ...], few: Sequence[int]
 ) -> tuple[float, ...] | None:
     """Coordinates x with the last effect as strong as recordings ask for beside the fit without it; None if none.
 
@@ -147,9 +151,9 @@ def _as_strong(
     """
     along, size = 0.0, 0.0
     for r, b in zip(few, alone.blocks, strict=True):
-        way = judge.moved(r, (alone.candidates, alone.x), ((*alone.candidates, last), x), b.shift)
+        way = problem.moved(r, (alone.candidates, alone.x), ((*alone.candidates, last), x), b.shift)
         if way is not None:
-            d = freed(way[:, None], b)[:, 0]
+            d = without_shift(way[:, None], b)[:, 0]
             along, size = along + float(d @ b.residual), size + float(d @ d)
     start = followed(last, x[len(alone.x) :], along / size) if size > 0.0 else None
     return None if start is None else (*alone.x, *start)

@@ -19,13 +19,13 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import Evidence, Signal
+from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.data.onset import first_shown
 from rollover.diagnosis.fit.finite_differences import Point
-from rollover.diagnosis.fit.levenberg_marquardt import Judge
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.scan_jobs import Looks, at_each
+from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
 from rollover.effects import spoken
 
 Array = NDArray[np.float64]
@@ -48,52 +48,52 @@ Made = Callable[[float], Array | None]
 Cost = Callable[[Array, float], float]
 
 
-def align(judge: Judge) -> None:
+def align(problem: Problem) -> None:
     """Begin with the time shift at which each recording meets the scenario best."""
-    for r, e in enumerate(judge.evidence):
-        found = _best(judge, r, partial(judge.raw, r, (), ()), partial(_whole, judge, r), _places(e))
-        judge.shifts[r] = judge.shifts[r] if found is None else found
+    for r, e in enumerate(problem.dataset):
+        found = _best(problem, r, partial(problem.raw, r, (), ()), partial(_whole, problem, r), _places(e))
+        problem.shifts[r] = problem.shifts[r] if found is None else found
 
 
 def by_first_contact(
-    judge: Judge, candidates: Sequence[Candidate], x: Sequence[float], looks: Looks = at_each
+    problem: Problem, candidates: Sequence[Candidate], x: Sequence[float], parallel_map: ParallelMap = serial_map
 ) -> list[float | None]:
     """Time shift (s) of each recording by its first contact; None where nothing comes of it."""
-    return looks(judge, partial(_by_contact, beside=(candidates, x)), range(len(judge.evidence)))
+    return parallel_map(problem, partial(_by_contact, beside=(candidates, x)), range(len(problem.dataset)))
 
 
-def _by_contact(judge: Judge, r: int, *, beside: Point) -> float | None:
+def _by_contact(problem: Problem, r: int, *, beside: Point) -> float | None:
     # leaps as they are: these are what tells the time
-    e = judge.evidence[r]
-    at = _first_contact(judge, r, partial(judge.edged, r, *beside))
+    e = problem.dataset[r]
+    at = _first_contact(problem, r, partial(problem.edged, r, *beside))
     known = e.recording.clock.zero != "unknown"
     return None if at is None or (known and abs(at) > BELIEVED * e.shift_prior) else at
 
 
-def _first_contact(judge: Judge, r: int, made: Made) -> float | None:
+def _first_contact(problem: Problem, r: int, made: Made) -> float | None:
     """Time shift (s) of recording r by its first contact: found without a model, then beside there by the model."""
-    e = judge.evidence[r]
+    e = problem.dataset[r]
     places = _places(e)
     places = places[places + e.simulator.contact > e.recording.time[LEAST]]  # what never fell tells of no contact
     if not (np.isfinite(e.simulator.contact) and places.size):
         return None
-    about = _best(judge, r, made, partial(onset, judge, r), places)
-    if about is None or not _falls(judge, r, made(about), about):
+    about = _best(problem, r, made, partial(onset, problem, r), places)
+    if about is None or not _falls(problem, r, made(about), about):
         return None
-    at = _best(judge, r, made, partial(_early, judge, r), about + NEAR * np.linspace(-1.0, 1.0, PLACES))
+    at = _best(problem, r, made, partial(_early, problem, r), about + NEAR * np.linspace(-1.0, 1.0, PLACES))
     return about if at is None or abs(at - about) > AT_THE_END * NEAR else at  # the model leads away from it
 
 
-def mistimed(judge: Judge, fitted: Fitted, looks: Looks = at_each) -> list[tuple[str, float]]:
+def mistimed(problem: Problem, fitted: Fitted, parallel_map: ParallelMap = serial_map) -> list[tuple[str, float]]:
     """Recordings that would meet a fit if they came later by a shift (s) far beyond what their clocks may be off by."""
-    found = looks(judge, partial(_elsewhere, fitted=fitted), range(len(judge.evidence)))
-    return [(e.name, at) for e, at in zip(judge.evidence, found, strict=True) if at is not None]
+    found = parallel_map(problem, partial(_elsewhere, fitted=fitted), range(len(problem.dataset)))
+    return [(e.name, at) for e, at in zip(problem.dataset, found, strict=True) if at is not None]
 
 
-def is_all_by_clocks(judge: Judge, fitted: Fitted, looks: Looks = at_each) -> bool:
+def is_all_by_clocks(problem: Problem, fitted: Fitted, parallel_map: ParallelMap = serial_map) -> bool:
     """Whether such shifts are all that separates the recordings from a fit: each else is met as it stands."""
-    late = {name for name, _ in mistimed(judge, fitted, looks)}
-    others = [b for e, b in zip(judge.evidence, fitted.blocks, strict=True) if e.name not in late]
+    late = {name for name, _ in mistimed(problem, fitted, parallel_map)}
+    others = [b for e, b in zip(problem.dataset, fitted.blocks, strict=True) if e.name not in late]
     return bool(late) and all(b.normal()[2] < MEETS * b.residual.size for b in others)
 
 
@@ -109,19 +109,19 @@ def by_clock(found: Sequence[tuple[str, float]]) -> str:
     )
 
 
-def _elsewhere(judge: Judge, r: int, *, fitted: Fitted) -> float | None:
+def _elsewhere(problem: Problem, r: int, *, fitted: Fitted) -> float | None:
     """Time shift (s), however large, at which recording r meets a fit far better than where it stands; None if none.
 
     Beside that it is met far worse: what rests long before and after is met by any clock in most of its samples.
     """
-    e, made = judge.evidence[r], partial(judge.raw, r, fitted.candidates, fitted.x)
-    falls = not judge.effort.thrifty  # a drop is known at any time
+    e, made = problem.dataset[r], partial(problem.raw, r, fitted.candidates, fitted.x)
+    falls = not problem.effort.is_ensemble  # a drop is known at any time
 
     def left(shift: float) -> float:
         raw = made(float(shift))
         return UNKNOWN if raw is None else _left(e, raw, float(shift), whole=falls)
 
-    about = _best(judge, r, made, partial(_left, e), np.arange(-FURTHEST, FURTHEST, min(e.shift_prior, ASIDE)))
+    about = _best(problem, r, made, partial(_left, e), np.arange(-FURTHEST, FURTHEST, min(e.shift_prior, ASIDE)))
     shown = [at for at in first_shown(e) if abs(at) > ASIDE] if falls else []
     starts = [*([] if about is None else [about]), *shown]
     if not starts:
@@ -144,7 +144,7 @@ def _lowest(left: Callable[[float], float], start: float, width: float) -> tuple
     return float(there.x), float(there.fun)
 
 
-def _left(e: Evidence, raw: Array, shift: float, *, whole: bool = False) -> float:
+def _left(e: Dataset, raw: Array, shift: float, *, whole: bool = False) -> float:
     """Power over the noise of what a run leaves that comes `shift` (s) late; `UNKNOWN` where most of it is.
 
     `whole` says that a run is known at all stamps, however late.
@@ -157,19 +157,19 @@ def _left(e: Evidence, raw: Array, shift: float, *, whole: bool = False) -> floa
     if known.mean() < MOST or not np.all(np.isfinite(raw[known])):
         return UNKNOWN
     moved = replace(e, signals=tuple(signals))
-    misfit = np.where(known, np.concatenate([s.values for s in signals]) - e.forgiven(raw, e.leaps(raw)), 0.0)
+    misfit = np.where(known, np.concatenate([s.values for s in signals]) - e.masked(raw, e.discontinuities(raw)), 0.0)
     left = moved.whitened(misfit)[known]
     return float(left @ left / np.sum(moved.due[known]))
 
 
-def _places(e: Evidence) -> Array:
+def _places(e: Dataset) -> Array:
     """Time shifts (s) that a recording's may be."""
     return np.asarray(WIDTH * e.shift_prior * np.linspace(-1.0, 1.0, PLACES))
 
 
-def _best(judge: Judge, r: int, made: Made, cost: Cost, shifts: Array) -> float | None:
+def _best(problem: Problem, r: int, made: Made, cost: Cost, shifts: Array) -> float | None:
     """One run moved along the stamps tells where to look among `shifts` (s); the best places are then simulated."""
-    e = judge.evidence[r]
+    e = problem.dataset[r]
     raw = made(0.0)
     if raw is None:
         return None
@@ -186,19 +186,19 @@ def _best(judge: Judge, r: int, made: Made, cost: Cost, shifts: Array) -> float 
     return float(near[int(np.argmin(left))])
 
 
-def _whole(judge: Judge, r: int, raw: Array, shift: float) -> float:
+def _whole(problem: Problem, r: int, raw: Array, shift: float) -> float:
     """What is left of recording r by all its samples."""
-    e = judge.evidence[r]
-    return float(np.sum(e.eased(judge.measured[r] - e.whitened(raw)) ** 2)) + (shift / e.shift_prior) ** 2
+    e = problem.dataset[r]
+    return float(np.sum(e.marginalised(problem.measured[r] - e.whitened(raw)) ** 2)) + (shift / e.shift_prior) ** 2
 
 
-def onset(judge: Judge, r: int, raw: Array, shift: float) -> float:
+def onset(problem: Problem, r: int, raw: Array, shift: float) -> float:
     """-2 ln of the likelihood that recording r falls until its contact, `shift` (s) late, and is something else then.
 
     Before, what it misses is noise; thereafter it may be as large as what is predicted, and larger at times: a Cauchy
     distribution of that width.
     """
-    e = judge.evidence[r]
+    e = problem.dataset[r]
     total = (shift / e.shift_prior) ** 2
     for s, part in e.spans():
         late = e.recording.time[s.rows] > e.simulator.contact + shift
@@ -209,9 +209,9 @@ def onset(judge: Judge, r: int, raw: Array, shift: float) -> float:
     return total
 
 
-def _falls(judge: Judge, r: int, raw: Array | None, shift: float) -> bool:
+def _falls(problem: Problem, r: int, raw: Array | None, shift: float) -> bool:
     """Whether what recording r shows before its contact, `shift` (s) late, is a fall: it may have begun too late."""
-    e = judge.evidence[r]
+    e = problem.dataset[r]
     if raw is None:
         return False
     z = [
@@ -226,9 +226,9 @@ def _worth(s: Signal) -> float:
     return max(1.0 - sum(s.ar), 0.05) / (1.0 + max(sum(s.ar), 0.0))
 
 
-def _early(judge: Judge, r: int, raw: Array, shift: float) -> float:
+def _early(problem: Problem, r: int, raw: Array, shift: float) -> float:
     """What is left of it by those up to shortly after the first contact, coloured ones for what they are worth."""
-    e = judge.evidence[r]
+    e = problem.dataset[r]
     total = (shift / e.shift_prior) ** 2
     for s, part in e.spans():
         time = e.recording.time[s.rows] - shift - e.simulator.contact

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.forward.budget import Effort
-from rollover.diagnosis.forward.discontinuities import LEAP_IN, within_means
+from rollover.diagnosis.forward.discontinuities import DISCONTINUITY_IN, within_means
 from rollover.diagnosis.forward.forward_model import Simulator, simulator_of
 from rollover.diagnosis.forward.full_run import full_runs
 from rollover.recording import Recording
@@ -33,8 +33,8 @@ class Averaged:
     """A simulator at several stamps for each mean, `starts` (bins,) where those of each begin; predicts the means.
 
     `inner` tells of no leaps from stamp to stamp, see `DropSimulator`: their means would say nothing.
-    Where fewer than all that are in a mean are simulated, it also says under `LEAP_IN` and the channel's name how far
-    that leaps within or beside each mean: of how many of its samples it has leapt already is not known then.
+    Where fewer than all that are in a mean are simulated, it also says under `DISCONTINUITY_IN` and the channel's name
+    how far that leaps within or beside each mean: of how many of its samples it has leapt already is not known then.
     """
 
     inner: Simulator
@@ -47,9 +47,9 @@ class Averaged:
         every = self.inner.predict(changes, shift)
         if every is None:
             return None
-        return {**self._means(every), **self._leaps(every)}
+        return {**self._means(every), **self._discontinuities(every)}
 
-    def _leaps(self, found: Mapping[str, Array]) -> dict[str, Array]:
+    def _discontinuities(self, found: Mapping[str, Array]) -> dict[str, Array]:
         if np.all(self.counts == self.many):
             return {}
         sizes = {}
@@ -57,7 +57,7 @@ class Averaged:
             sizes[channel] = np.empty(self.starts.size)
             within_means(values, self._of, sizes[channel])
             sizes[channel][self.counts == self.many] = 0.0
-        return {LEAP_IN + channel: size for channel, size in sizes.items()}
+        return {DISCONTINUITY_IN + channel: size for channel, size in sizes.items()}
 
     @cached_property
     def _of(self) -> NDArray[np.int64]:
@@ -67,11 +67,11 @@ class Averaged:
     def _means(self, found: Mapping[str, Array]) -> dict[str, Array]:
         return {c: np.add.reduceat(v, self.starts) / self.counts for c, v in found.items()}
 
-    def strays(
+    def perturbed(
         self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1
     ) -> list[dict[str, Array]]:
         """See `Simulator`."""
-        return [self._means(d) for d in self.inner.strays(changes, shift, parts)]
+        return [self._means(d) for d in self.inner.perturbed(changes, shift, parts)]
 
     def settle(self) -> None:
         """See `Simulator`."""
@@ -147,7 +147,7 @@ def simulated(
     channels = {c: v[at] for c, v in recording.channels.items()}  # which there are is all that is asked of them
     part = replace(recording, time=np.concatenate(stamps), channels=channels)
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    inner = referred(simulator_of(scenario, part, leaps=False), reference)
+    inner = referred(simulator_of(scenario, part, discontinuities=False), reference)
     return thin, Averaged(inner=inner, starts=starts, counts=counts, many=many), many
 
 

@@ -18,18 +18,18 @@ class Effort:
     leaders: int = 4  # first fits that are followed up, at least
     most_leaders: int = 9  # and at most
     rounds: int = 14  # of a whole fit
-    nudges: tuple[float, ...] = (2e-2, 5e-3, 1e-3)  # of a coordinate, for differences: wide first
+    fd_steps: tuple[float, ...] = (2e-2, 5e-3, 1e-3)  # of a coordinate, for differences: wide first
     polishes: int = 2  # fits that are followed along a crooked valley
     wide: float = 0.0  # of a coordinate, to which a central difference may widen; 0: one-sided, as it is
     least: float = 0.0  # gain of a round below which a search narrows
     later: float = 5e-5  # s, by which a clock is moved to see what that does
     clocked: int = 0  # times that a trial's time shifts are moved to where they fit: reading a run again costs little
-    thrifty: bool = False  # looks at few recordings, fits no shapes, and stops where nothing but noise is left
+    is_ensemble: bool = False  # looks at few recordings, fits no shapes, and stops where nothing but noise is left
 
     @property
     def fine(self) -> float:
         """Of a coordinate, for differences where a fit has ended."""
-        return self.nudges[:2][-1]
+        return self.fd_steps[:2][-1]
 
 
 DROPS = Effort()
@@ -42,11 +42,11 @@ RUNS = Effort(
     leaders=2,
     most_leaders=3,
     rounds=6,
-    nudges=(6e-2, 3e-2),
+    fd_steps=(6e-2, 3e-2),
     wide=0.13,
     least=4.0,
     polishes=0,
     later=1e-3,  # from one row of a run to the next
     clocked=3,
-    thrifty=True,
+    is_ensemble=True,
 )

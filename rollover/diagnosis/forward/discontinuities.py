@@ -11,8 +11,10 @@ import numpy as np
 
 from ground.compiled import compiled, leaf
 
-LEAP_IN = "leap in "  # before the name of a channel: how far it leaps about each sample, or within each mean, SI
-LEAP, WITHIN = 4.0, 2.5  # times the steps beside it: of samples, and within a mean of some
+DISCONTINUITY_IN = (
+    "leap in "  # before the name of a channel: how far it leaps about each sample, or within each mean, SI
+)
+DISCONTINUITY, WITHIN = 4.0, 2.5  # times the steps beside it: of samples, and within a mean of some
 SHOWS = 3.0  # times the noise, from which on a step may be a leap
 JUMPS = 5.0  # times the noise, from which on a known jump between two samples decides a fit
 LARGE = 50.0  # times the noise: a leap whose instant is not believed to the sample
@@ -20,20 +22,20 @@ BESIDE = 3  # samples to either side, between whose values one about a leap may 
 
 
 @compiled
-def about_leaps(y: Any, least: Any, first: Any, last: Any) -> Any:
+def about_discontinuities(y: Any, least: Any, first: Any, last: Any) -> Any:
     """Whether a stack y (n,) leaps about each sample, over two samples by more than `least` (n,) from the first.
 
     `first` and `last` (n,) are the ends of the signal of each sample.
     """
     found = np.zeros(y.size, dtype=np.bool_)
     for i in range(y.size - 2):
-        leap = abs(y[i + 2] - y[i])
-        if leap > least[i]:
+        discontinuity = abs(y[i + 2] - y[i])
+        if discontinuity > least[i]:
             before = abs(y[i] - y[i - 1]) if i > first[i] else 0.0
             after = abs(y[i + 3] - y[i + 2]) if i + 2 < last[i] else 0.0
-            if leap > LEAP * max(before, after):
+            if discontinuity > DISCONTINUITY * max(before, after):
                 # when a body lifts off again hangs on little
-                more = 2 if leap > LARGE / SHOWS * least[i] else 0
+                more = 2 if discontinuity > LARGE / SHOWS * least[i] else 0
                 found[max(i - more, first[i]) : min(i + 2 + more, last[i]) + 1] = True
     return found
 
@@ -64,24 +66,24 @@ def within_means(values: Any, mean: Any, sizes: Any) -> None:
 
 
 @compiled
-def beside_leaps(leaps: Any, last: Any, orders: Any, gains: Any) -> Any:
+def beside_discontinuities(discontinuities: Any, last: Any, orders: Any, gains: Any) -> Any:
     """Weights (n,) of whitened samples: those after leaps, as many as the noise remembers, have `gains`, all others 1.
 
     A leap itself counts in full. `last`, `orders` (how many) and `gains` (n,) are those of the signal of each sample.
     """
     found = np.ones(last.size)
-    for i in leaps:
+    for i in discontinuities:
         found[i + 1 : min(i + orders[i], last[i]) + 1] = gains[i]
-    for i in leaps:
+    for i in discontinuities:
         found[i] = 1.0
     return found
 
 
 @compiled
-def forgiven(y: Any, leaps: Any, measured: Any, first: Any, last: Any) -> Any:
-    """A stack y (n,) whose samples about `leaps` are moved towards the measured ones within their neighbours."""
+def masked(y: Any, discontinuities: Any, measured: Any, first: Any, last: Any) -> Any:
+    """A stack y (n,) whose samples about `discontinuities` are moved towards the measured within their neighbours."""
     found = y.copy()
-    for i in leaps:
+    for i in discontinuities:
         near = y[max(i - BESIDE, first[i]) : min(i + BESIDE, last[i]) + 1]
         found[i] = min(max(measured[i], near.min()), near.max())
     return found

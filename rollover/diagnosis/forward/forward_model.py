@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.forward.budget import DROPS, Effort
-from rollover.diagnosis.forward.discontinuities import LEAP_IN, about_jumps
+from rollover.diagnosis.forward.discontinuities import DISCONTINUITY_IN, about_jumps
 from rollover.diagnosis.forward.filtering import Rows, behind_filters, rows_of
 from rollover.diagnosis.forward.full_run import SENSORS, RunSimulator
 from rollover.dynamics.drop_test import BESIDE, DropFailedError, DropModel, Track, channels_of, unfit
@@ -37,7 +37,7 @@ class Simulator(Protocol):
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """Channels (n,) at the recording's stamps less `shift` (s); None if the simulation fails."""
 
-    def strays(
+    def perturbed(
         self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1
     ) -> list[dict[str, Array]]:
         """What runs with `changes` that nobody could tell apart differ by, (n,) at the stamps less `shift`, s.
@@ -66,7 +66,7 @@ class Simulator(Protocol):
         """How much may be simulated."""
 
 
-def blow_of(simulator: Simulator) -> float:
+def first_impact_of(simulator: Simulator) -> float:
     """When the scenario as it is first hits the ground with more than its wheels, s; infinite if it never does."""
     return next((at for at, name in simulator.marks() if name == "impact"), np.inf)
 
@@ -76,19 +76,19 @@ class DropSimulator:
 
     effort = DROPS
 
-    def __init__(self, scenario: Scenario, recording: Recording, *, leaps: bool = True) -> None:
+    def __init__(self, scenario: Scenario, recording: Recording, *, discontinuities: bool = True) -> None:
         self.model = DropModel(scenario=scenario)
         self.recording = recording
-        self.leaps = leaps  # whether it says how far channels leap
+        self.discontinuities = discontinuities  # whether it says how far channels leap
         self._raw: dict[tuple[Any, ...], dict[str, Array]] = {}
         self._models: dict[tuple[Any, ...], DropModel] = {}
         self._tracks: dict[tuple[Any, ...], Track] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         """What is sent to another process: not the runs."""
-        bare = DropModel(scenario=self.model.scenario)
+        no_jacobian = DropModel(scenario=self.model.scenario)
         stores: dict[str, Any] = {"_raw": {}, "_models": {}, "_tracks": {}}
-        return {"model": bare, "recording": self.recording, "leaps": self.leaps, **stores}
+        return {"model": no_jacobian, "recording": self.recording, "leaps": self.discontinuities, **stores}
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """See `Simulator`; ``ValueError`` for a value out of bounds passes."""
@@ -104,9 +104,9 @@ class DropSimulator:
         except DropFailedError:
             return None
         found = behind_filters(channels, self.recording, self.rows)
-        return found | self._leaps(physical, shift, sensors) if self.leaps else found
+        return found | self._discontinuities(physical, shift, sensors) if self.discontinuities else found
 
-    def strays(
+    def perturbed(
         self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1
     ) -> list[dict[str, Array]]:
         """See `Simulator`: one striker on its guide has no neighbours."""
@@ -118,7 +118,7 @@ class DropSimulator:
 
     def until(self, n: int) -> DropSimulator:
         """See `Simulator`."""
-        return DropSimulator(self.model.scenario, self.recording.until(n), leaps=self.leaps)
+        return DropSimulator(self.model.scenario, self.recording.until(n), discontinuities=self.discontinuities)
 
     def marks(self) -> tuple[tuple[float, str], ...]:
         """See `Simulator`."""
@@ -131,8 +131,10 @@ class DropSimulator:
         except DropFailedError:
             return {}
 
-    def _leaps(self, physical: Mapping[str, Any], shift: float, sensors: Mapping[str, Any]) -> dict[str, Array]:
-        """How far channels that nothing smooths leap about each stamp, under `LEAP_IN` and their names."""
+    def _discontinuities(
+        self, physical: Mapping[str, Any], shift: float, sensors: Mapping[str, Any]
+    ) -> dict[str, Array]:
+        """How far channels that nothing smooths leap about each stamp, under `DISCONTINUITY_IN` and their names."""
         time = self.recording.time
         instants, rows = self._track(physical, float(time[-1] - shift) if time.size else 0.0).jumps
         if not instants.size:
@@ -140,7 +142,7 @@ class DropSimulator:
         lags, *clocks = ({e.channel: e for e in every(sensors, name)} for name in EDGES)
         made = channels_of(rows, self._sharp.difference(lags))
         return {
-            LEAP_IN + name: about_jumps(_own(time, name, *clocks) - shift, instants, sizes)
+            DISCONTINUITY_IN + name: about_jumps(_own(time, name, *clocks) - shift, instants, sizes)
             for name, sizes in made.items()
             if sizes.any()
         }
@@ -229,13 +231,15 @@ def _own(time: Array, channel: str, offsets: Mapping[str, Any], drifts: Mapping[
     return (1.0 - drifts[channel].drift) * own if channel in drifts else own
 
 
-def simulator_of(scenario: Scenario, recording: Recording, *, leaps: bool = True) -> Simulator:
+def simulator_of(scenario: Scenario, recording: Recording, *, discontinuities: bool = True) -> Simulator:
     """The quickest simulator that a scenario admits; the recording's conditions are put in by path.
 
-    `leaps` as in `DropSimulator`. Raises `InputError` for a condition that the scenario does not know.
+    `discontinuities` as in `DropSimulator`. Raises `InputError` for a condition that the scenario does not know.
     """
     own = set_up(scenario, recording)
-    return RunSimulator(own, recording) if unfit(own) else DropSimulator(own, recording, leaps=leaps)
+    return (
+        RunSimulator(own, recording) if unfit(own) else DropSimulator(own, recording, discontinuities=discontinuities)
+    )
 
 
 def set_up(scenario: Scenario, recording: Recording) -> Scenario:
@@ -247,4 +251,4 @@ def set_up(scenario: Scenario, recording: Recording) -> Scenario:
     return replace(found, **{name: old for name, (old, new) in own.items() if new == old})
 
 
-__all__ = ["DropSimulator", "RunSimulator", "Simulator", "blow_of", "set_up", "simulator_of"]
+__all__ = ["DropSimulator", "RunSimulator", "Simulator", "first_impact_of", "set_up", "simulator_of"]

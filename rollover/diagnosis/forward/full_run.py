@@ -41,7 +41,7 @@ class _TooSlowError(Exception):
     """A run takes far longer than the first."""
 
 
-class Neighbour(NamedTuple):
+class Perturbation(NamedTuple):
     """Where the grid lies, of an element; its spacing and that of contact points over their own; parts of a step."""
 
     place: tuple[float, float]
@@ -50,13 +50,13 @@ class Neighbour(NamedTuple):
     parts: int = 1
 
 
-NEIGHBOURS = (
-    Neighbour((0.34, 0.28)),
-    Neighbour((-0.41, 0.17), spacing=0.9),
-    Neighbour((0.12, -0.37), points=0.8),
-    Neighbour((-0.22, -0.15), spacing=0.93, points=0.87),
-    Neighbour((0.45, -0.08), parts=2),
-    Neighbour((-0.07, 0.43), spacing=0.9, points=0.8, parts=3),
+PERTURBATIONS = (
+    Perturbation((0.34, 0.28)),
+    Perturbation((-0.41, 0.17), spacing=0.9),
+    Perturbation((0.12, -0.37), points=0.8),
+    Perturbation((-0.22, -0.15), spacing=0.93, points=0.87),
+    Perturbation((0.45, -0.08), parts=2),
+    Perturbation((-0.07, 0.43), spacing=0.9, points=0.8, parts=3),
 )
 
 
@@ -193,7 +193,7 @@ class RunSimulator:
         run, at = known[1], self.recording.time - shift
         return {name: np.interp(at, run.time, values) for name, values in run.channels.items()}
 
-    def strays(
+    def perturbed(
         self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1
     ) -> list[dict[str, Array]]:
         """What neighbours differ by from the run with `changes`, channels (n,) at the stamps less `shift` (s).
@@ -207,7 +207,7 @@ class RunSimulator:
         if base is None:
             return []
         found = []
-        several = self.neighbours(values, parts)
+        several = self.perturbations(values, parts)
         made_ahead(self.children, [(self, beside) for beside in several])
         for beside in several:
             there = self.predict(beside, shift)
@@ -215,9 +215,9 @@ class RunSimulator:
                 found.append({name: there[name] - base[name] for name in base})
         return found
 
-    def neighbours(self, changes: Mapping[str, Any], parts: int = 1) -> list[dict[str, Any]]:
-        """Changes of all neighbours of a run with `changes`, see `strays`."""
-        return [{**changes, **self._beside(one, parts)} for one in NEIGHBOURS]
+    def perturbations(self, changes: Mapping[str, Any], parts: int = 1) -> list[dict[str, Any]]:
+        """Changes of all neighbours of a run with `changes`, see `perturbed`."""
+        return [{**changes, **self._beside(one, parts)} for one in PERTURBATIONS]
 
     def settle(self) -> None:
         """Lay the grid where the run is the most like all others: of two ways that runs go, it takes the common one.
@@ -227,7 +227,7 @@ class RunSimulator:
         """
         places = self._places()
         own = [{CENTRE: place} for place in places]
-        others = [values for values in map(self._beside, NEIGHBOURS) if values not in own]
+        others = [values for values in map(self._beside, PERTURBATIONS) if values not in own]
         self.predict(own[0], 0.0)  # how long one takes
         made_ahead(self.children, [(self, values) for values in (*own, *others)])
         runs = {place: self.predict({CENTRE: place}, 0.0) for place in places}
@@ -273,7 +273,7 @@ class RunSimulator:
         """Where the grid may lie as well, where the scenario has it first."""
         return [self._place(fraction) for fraction in ((0.0, 0.0), *ELSEWHERE)]
 
-    def _beside(self, one: Neighbour, parts: int = 1) -> dict[str, Any]:
+    def _beside(self, one: Perturbation, parts: int = 1) -> dict[str, Any]:
         """Values of a neighbour, its step parted in at least so many `parts`."""
         own, ground = self.scenario, self.scenario.ground.elements
         place = self._place(one.place)
@@ -330,12 +330,12 @@ def full_runs(simulator: Any) -> RunSimulator | None:
     return own if isinstance(own, RunSimulator) else None
 
 
-def neighbours_of(
+def perturbations_of(
     simulators: Iterable[Any], changes: Mapping[str, Any], parts: int
 ) -> list[tuple[Any, Mapping[str, Any]]]:
     """(simulator, changes) of a run and its neighbours by each simulator of full runs, the longest ones first."""
     full = [own for own in map(full_runs, simulators) if own is not None]
-    each = [(own, one) for own in full for one in (changes, *own.neighbours(changes, parts))]
+    each = [(own, one) for own in full for one in (changes, *own.perturbations(changes, parts))]
     return sorted(each, key=lambda pair: float(pair[1].get("simulation.step", np.inf)))
 
 

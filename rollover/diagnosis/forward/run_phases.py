@@ -5,15 +5,15 @@ from __future__ import annotations
 from rollover.dynamics.result import Run
 from rollover.spec.vehicle import Striker
 
-BLOW = 2.0  # weights
+IMPACT = 2.0  # weights
 AFTER = 0.03  # s, shortest sliding that is a phase
 
 
 def phases_of(run: Run) -> tuple[tuple[float, str], ...]:
-    """(start s, name) of support, tipping, impact, sliding, rest: sliding is what comes after the last blow.
+    """(start s, name) of support, tipping, impact, sliding, rest: sliding is what comes after the last impact.
 
-    A blow is a force of the ground beyond `BLOW` times the weight; support ends with the first wheel that lifts off,
-    tipping with the first part that hits the ground and is no wheel.
+    An impact is a force of the ground beyond `IMPACT` times the weight; support ends with the first wheel that lifts
+    off, tipping with the first part that hits the ground and is no wheel.
     """
     marks = list(run.phases)
     start = next((at for at, name in marks if name == "impact"), None)
@@ -22,7 +22,7 @@ def phases_of(run: Run) -> tuple[tuple[float, str], ...]:
     vehicle = run.scenario.vehicle
     mass = vehicle.mass if isinstance(vehicle, Striker) else vehicle.whole.mass
     time, force = run.recording.time, run.recording["ground/force_normal"]
-    blows = time[(force > BLOW * mass * run.scenario.gravity) & (time >= start)]
+    blows = time[(force > IMPACT * mass * run.scenario.gravity) & (time >= start)]
     end = next((at for at, name in marks if name == "rest"), float(time[-1]))
     sliding = float(blows[-1]) if blows.size else start
     if start < sliding < end - AFTER:

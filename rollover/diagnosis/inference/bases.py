@@ -58,6 +58,6 @@ def _from_contact(time: Array, a: Array, speed: float) -> Array:
     return np.asarray(v - np.interp(0.0, time, v) + speed)
 
 
-def hats(x: Array, knots: Array) -> Array:
+def linear_b_splines(x: Array, knots: Array) -> Array:
     """Piecewise linear basis (n, k), constant beyond the ends."""
     return np.stack([np.interp(x, knots, row) for row in np.eye(knots.size)], axis=1)

@@ -6,7 +6,7 @@ to the first order in that difference:
     dF = m (a - a_s),    dM = J d(omega - omega_s)/dt                                                          (D4)
 
 m, J those of the chassis about its centre of mass. Each degree of freedom is weighed by its own noise and by what runs
-that nobody could tell apart differ by, so that a blow that falls elsewhere is no force.
+that nobody could tell apart differ by, so that an impact that falls elsewhere is no force.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import Evidence, Signal
+from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.result import Degree
 from rollover.scenario import Scenario
 from rollover.spec.vehicle import Striker, chassis_of
@@ -28,7 +28,7 @@ SMOOTHED = 0.012  # s, over which a gyroscope is differentiated
 
 
 def degrees_of(
-    scenarios: Sequence[Scenario], evidence: Sequence[Evidence], shifts: Sequence[float]
+    scenarios: Sequence[Scenario], dataset: Sequence[Dataset], shifts: Sequence[float]
 ) -> tuple[Degree, ...]:
     """Degrees of freedom of the chassis by their share of the misfit, largest first.
 
@@ -36,7 +36,7 @@ def degrees_of(
     """
     forces: dict[str, list[Array]] = {}
     worth: dict[str, float] = {}
-    for scenario, e, shift in zip(scenarios, evidence, shifts, strict=True):
+    for scenario, e, shift in zip(scenarios, dataset, shifts, strict=True):
         predicted = e.simulator.predict({}, shift)
         if predicted is None or isinstance(scenario.vehicle, Striker):
             continue

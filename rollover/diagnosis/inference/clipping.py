@@ -1,8 +1,8 @@
 """Flat tops: a channel that ends at one value in several recordings is cut off there.
 
-Where runs scatter after a blow the samples beyond it count for little, and it is the blow that exceeds a range. What
-recordings show by themselves is named for that where nothing else is: `rollover.recording.checks` finds a top that is
-flat to the last digit, and recordings of different tests do not end at the same digit unless something ends there.
+Where runs scatter after an impact the samples beyond it count for little, and it is the impact that exceeds a range.
+What recordings show by themselves is named for that where nothing else is: `rollover.recording.checks` finds a top that
+is flat to the last digit, and recordings of different tests do not end at the same digit unless something ends there.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.phases import whole
 from rollover.diagnosis.result import Place
 from rollover.effects import spoken
@@ -17,19 +17,19 @@ Array = NDArray[np.float64]
 FINEST = 0.05  # of a channel's range in all recordings: steps of its digits that are worth a verdict
 
 
-def coarse(evidence: Sequence[Evidence], phases: Sequence[Sequence[tuple[float, str]]]) -> tuple[Place, ...]:
+def coarse(dataset: Sequence[Dataset], phases: Sequence[Sequence[tuple[float, str]]]) -> tuple[Place, ...]:
     """Where channels are recorded in steps of more than `FINEST` of their range and more than their noise."""
     values: dict[str, list[Array]] = {}
-    for s in (s for e in evidence for s in e.signals):
+    for s in (s for e in dataset for s in e.signals):
         values.setdefault(s.channel, []).append(s.values)
     least = {channel: FINEST * float(np.ptp(np.concatenate(v))) for channel, v in values.items()}
-    rough = [(r, e, s) for r, e in enumerate(evidence) for s in e.signals if s.step > least[s.channel]]
+    rough = [(r, e, s) for r, e in enumerate(dataset) for s in e.signals if s.step > least[s.channel]]
     return tuple(whole(e, s, phases[r], 1.0 / len(rough)) for r, e, s in rough)
 
 
-def by_digits(places: Sequence[Place], evidence: Sequence[Evidence]) -> str:
+def by_digits(places: Sequence[Place], dataset: Sequence[Dataset]) -> str:
     """The sentence on what digits make of recordings."""
-    steps = {s.channel: s.step for e in evidence for s in e.signals if s.channel in {p.channel for p in places}}
+    steps = {s.channel: s.step for e in dataset for s in e.signals if s.channel in {p.channel for p in places}}
     said = " and ".join(f"{c} in steps of {spoken(step)} {describe(c).unit}" for c, step in steps.items())
     return (
         f"Recorded is {said}, far more than the noise: what was measured and what was recorded differ by half of that, "

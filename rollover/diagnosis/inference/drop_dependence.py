@@ -17,11 +17,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import Evidence
-from rollover.diagnosis.fit.levenberg_marquardt import Block, Fitted, Judge
-from rollover.diagnosis.fit.scan_jobs import Looks, at_each
+from rollover.diagnosis.data.dataset import Dataset
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
+from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
 from rollover.diagnosis.fit.time_shift import by_first_contact
-from rollover.diagnosis.inference.bases import ACCELERATION, DEPTH, SPEED, TIME, hats
+from rollover.diagnosis.inference.bases import ACCELERATION, DEPTH, SPEED, TIME, linear_b_splines
 from rollover.diagnosis.inference.lack_of_fit import Mismatch
 from rollover.diagnosis.inference.residual_force import WHERES, Descent, Where, channels_of, descent
 from rollover.scenario import Scenario
@@ -96,17 +96,19 @@ def _steady(N: Array) -> Array:
     return np.asarray(STEADY * size * (D.T @ D) + 1e-10 * max(size, 1e-300) * np.eye(k))
 
 
-def dependence(judge: Judge, scenarios: Sequence[Scenario], base: Fitted, looks: Looks = at_each) -> Dependence:
+def dependence(
+    problem: Problem, scenarios: Sequence[Scenario], base: Fitted, parallel_map: ParallelMap = serial_map
+) -> Dependence:
     """What is left beside a fit depends on what; `scenarios` under the conditions of the recordings."""
-    evidence = judge.evidence
-    blocks, found = ways(judge, scenarios, base, looks)
-    channel = alone(evidence, blocks, found)
+    dataset = problem.dataset
+    blocks, found = ways(problem, scenarios, base, parallel_map)
+    channel = alone(dataset, blocks, found)
     if channel is not None:
-        return Dependence(shares=_added(*_of_channel(channel, judge, base)), channel=channel)
-    return Dependence(shares=_added(*_of_forces(judge, found, looks))) if found else Dependence()
+        return Dependence(shares=_added(*_of_channel(channel, problem, base)), channel=channel)
+    return Dependence(shares=_added(*_of_forces(problem, found, parallel_map))) if found else Dependence()
 
 
-def dependence_of_one(judge: Judge, base: Fitted, before: Mismatch) -> Dependence | None:
+def dependence_of_one(problem: Problem, base: Fitted, before: Mismatch) -> Dependence | None:
     """What the misfit of the one channel that goes its own way depends on; None where others miss as well."""
     by: dict[str, float] = {}
     for c in before.telling:
@@ -116,33 +118,37 @@ def dependence_of_one(judge: Judge, base: Fitted, before: Mismatch) -> Dependenc
     chance = BY_CHANCE * float(np.sqrt(2.0 * sum(c.rows.size for c in others)))
     if not others or sum(c.excess for c in others) > min(ALONE * by[most] + chance, RATHER * by[most]):
         return None
-    return Dependence(shares=_added(*_of_channel(most, judge, base)), channel=most)
+    return Dependence(shares=_added(*_of_channel(most, problem, base)), channel=most)
 
 
 def ways(
-    judge: Judge, scenarios: Sequence[Scenario], base: Fitted, looks: Looks = at_each
-) -> tuple[list[list[Block]], list[Descent]]:
+    problem: Problem, scenarios: Sequence[Scenario], base: Fitted, parallel_map: ParallelMap = serial_map
+) -> tuple[list[list[ResidualBlock]], list[Descent]]:
     """Each recording at some time shifts, and its way down at the best of them."""
-    told = by_first_contact(judge, base.candidates, base.x, looks)
-    found = looks(judge, partial(_way, base=base), list(zip(range(len(scenarios)), scenarios, told, strict=True)))
+    told = by_first_contact(problem, base.candidates, base.x, parallel_map)
+    found = parallel_map(
+        problem, partial(_way, base=base), list(zip(range(len(scenarios)), scenarios, told, strict=True))
+    )
     return [blocks for blocks, _ in found], [best for _, best in found if best is not None]
 
 
-def _way(judge: Judge, one: tuple[int, Scenario, float | None], *, base: Fitted) -> tuple[list[Block], Descent | None]:
+def _way(
+    problem: Problem, one: tuple[int, Scenario, float | None], *, base: Fitted
+) -> tuple[list[ResidualBlock], Descent | None]:
     """A recording's blocks at some time shifts, and its way down at the best of them.
 
     Far from an explanation a shift eats what is missing: tried are the base's, what a clock says, the one that the
     first contact tells, and the one that goes with a force that may be anything.
     """
     r, scenario, told = one
-    e, b = judge.evidence[r], base.blocks[r]
+    e, b = problem.dataset[r], base.blocks[r]
     blocks, best = [b], descent(scenario, e, b)
     tried = [b.shift]
     shift = 0.0 if e.recording.clock.zero != "unknown" else b.shift
     for turn in range(SHIFTS):
         shift = told if turn == 1 and told is not None else shift
         if min(abs(shift - other) for other in tried) > NEAR * b.prior:
-            there = judge.block(r, base.candidates, base.x, shift, 0.0)
+            there = problem.block(r, base.candidates, base.x, shift, 0.0)
             other = None if there is None else descent(scenario, e, there)
             tried.append(shift)
             blocks += [] if there is None else [there]
@@ -151,14 +157,16 @@ def _way(judge: Judge, one: tuple[int, Scenario, float | None], *, base: Fitted)
     return blocks, best
 
 
-def alone(evidence: Sequence[Evidence], blocks: Sequence[Sequence[Block]], found: Sequence[Descent]) -> str | None:
+def alone(
+    dataset: Sequence[Dataset], blocks: Sequence[Sequence[ResidualBlock]], found: Sequence[Descent]
+) -> str | None:
     """The channel without which nothing is left to explain, if there is one and no force does as well."""
     total = sum(min(float(b.residual @ b.residual) - b.residual.size for b in several) for several in blocks)
     free = min((sum(d.excess(where) for d in found) for where in WHERES), default=total)
     best, alone_on = np.inf, ""
-    for channel in sorted({s.channel for e in evidence for s in e.signals}):
+    for channel in sorted({s.channel for e in dataset for s in e.signals}):
         beside, many = 0.0, 0
-        for e, several in zip(evidence, blocks, strict=True):
+        for e, several in zip(dataset, blocks, strict=True):
             rows = np.concatenate([np.full(s.rows.size, s.channel != channel) for s in e.signals])
             beside += min(_left(b, rows) for b in several) - float(rows.sum())
             many += int(rows.sum())
@@ -167,22 +175,24 @@ def alone(evidence: Sequence[Evidence], blocks: Sequence[Sequence[Block]], found
     return alone_on if best < min(ALONE * total, RATHER * free) else None
 
 
-def _left(b: Block, rows: NDArray[np.bool_]) -> float:
+def _left(b: ResidualBlock, rows: NDArray[np.bool_]) -> float:
     """Sum of squares of some rows, their own time shift fitted to them."""
     w, s = b.residual[rows], b.slope[rows]
     g = float(s @ w) - b.shift * b.prior**-2
     return float(w @ w) + (b.shift / b.prior) ** 2 - g * g / (float(s @ s) + b.prior**-2)
 
 
-def shiftless(w: Array, slope: Array, prior: float) -> Array:
+def without_shifts(w: Array, slope: Array, prior: float) -> Array:
     """A misfit (n,) or columns (n, k) without what the recording's time shift explains."""
     s = slope / np.sqrt(float(slope @ slope) + prior**-2)
     return np.asarray(w - np.outer(s, s @ w) if w.ndim > 1 else w - s * float(s @ w))
 
 
-def _of_forces(judge: Judge, found: Sequence[Descent], looks: Looks) -> tuple[list[Model], list[Array], float, float]:
+def _of_forces(
+    problem: Problem, found: Sequence[Descent], parallel_map: ParallelMap
+) -> tuple[list[Model], list[Array], float, float]:
     """Every model of a force, the misfits, the noise's part of them, and phi."""
-    misfits = [shiftless(d.residual[d.rows], d.slope[d.rows], d.prior) for d in found]
+    misfits = [without_shifts(d.residual[d.rows], d.slope[d.rows], d.prior) for d in found]
     strength = [(d.way.force / float(d.way.force.max()))[:, None] for d in found]
     models: list[Model] = []
     for where in WHERES:
@@ -191,7 +201,7 @@ def _of_forces(judge: Judge, found: Sequence[Descent], looks: Looks) -> tuple[li
             x = [_quantity(d, on) for d in found]
             for many in KNOTS:
                 knots = _knots(np.concatenate(x), many)
-                basis = [hats(one, knots) for one in x]
+                basis = [linear_b_splines(one, knots) for one in x]
                 functions.append((on, basis))
                 if where == "ground" and on != ACCELERATION:
                     functions.append((on, [b * s for b, s in zip(basis, strength, strict=True)]))
@@ -205,27 +215,27 @@ def _of_forces(judge: Judge, found: Sequence[Descent], looks: Looks) -> tuple[li
             functions.append((IMPACT, [s * row for s, row in zip(strength, by_touch, strict=True)]))
         ends = np.cumsum([basis[0].shape[1] for _, basis in functions])[:-1]
         forces = [np.hstack([basis[k] for _, basis in functions]) for k in range(len(found))]
-        felt = looks(judge, partial(_felt, where=where), list(zip(found, forces, strict=True)))
+        felt = parallel_map(problem, partial(_felt, where=where), list(zip(found, forces, strict=True)))
         each = zip(*(np.split(J, ends, axis=1) for J in felt), strict=True)
         models += [Model(on=on, columns=columns) for (on, _), columns in zip(functions, each, strict=True)]
     n = float(sum(w.size for w in misfits))
     free = sum(d.free for d in found)
-    phi = min(sum(d.left[where] for d in found) for where in WHERES) / max(n - free, 1.0)
-    return models, misfits, n, max(phi, 1.0)
+    dispersion = min(sum(d.left[where] for d in found) for where in WHERES) / max(n - free, 1.0)
+    return models, misfits, n, max(dispersion, 1.0)
 
 
-def _felt(judge: Judge, forced: tuple[Descent, Array], *, where: Where) -> Array:
+def _felt(problem: Problem, forced: tuple[Descent, Array], *, where: Where) -> Array:
     """What forces (n, k), over the largest on the way, do to a recording, its time shift left out: all in one go."""
-    del judge
+    del problem
     d, forces = forced
-    J = channels_of(d.way, d.way.moved(forces * float(d.way.force.max()), where), d.evidence, d.shift)[d.rows]
-    return shiftless(J, d.slope[d.rows], d.prior)
+    J = channels_of(d.way, d.way.moved(forces * float(d.way.force.max()), where), d.dataset, d.shift)[d.rows]
+    return without_shifts(J, d.slope[d.rows], d.prior)
 
 
-def _of_channel(channel: str, judge: Judge, base: Fitted) -> tuple[list[Model], list[Array], float, float]:
+def _of_channel(channel: str, problem: Problem, base: Fitted) -> tuple[list[Model], list[Array], float, float]:
     """Every model of a sensor that goes its own way by itself."""
     misfits, values, times, slots = [], [], [], []
-    for e, b, off in zip(judge.evidence, base.blocks, judge.residuals(base), strict=True):
+    for e, b, off in zip(problem.dataset, base.blocks, problem.residuals(base), strict=True):
         for s, part in e.spans():
             if s.channel == channel:
                 misfits.append(b.residual[part])
@@ -246,21 +256,21 @@ def _of_channel(channel: str, judge: Judge, base: Fitted) -> tuple[list[Model], 
     for many in FINE:
         edges = np.linspace(0.0, 1.0, many)
         both = np.concatenate(values)
-        add(VALUE, [hats(v, both.min() + np.ptp(both) * edges) * size for v in values])
+        add(VALUE, [linear_b_splines(v, both.min() + np.ptp(both) * edges) * size for v in values])
         every = np.concatenate(times)
-        basis = [hats(t, every.min() + np.ptp(every) * edges) for t in times]
+        basis = [linear_b_splines(t, every.min() + np.ptp(every) * edges) for t in times]
         add(TIME, [f * size for f in basis])
         add(TIME, [f * v[:, None] for f, v in zip(basis, values, strict=True)])
     n = float(sum(w.size for w in misfits))
     return models, misfits, n, 1.0
 
 
-def _added(models: list[Model], misfits: list[Array], n: float, phi: float) -> tuple[tuple[str, float], ...]:
+def _added(models: list[Model], misfits: list[Array], n: float, dispersion: float) -> tuple[tuple[str, float], ...]:
     """Quantities one after another, each the best by (D7) beside those before it, with the share that it adds."""
     total = sum(float(w @ w) for w in misfits)
-    excess = max(total - n * phi, 1e-300)
+    excess = max(total - n * dispersion, 1e-300)
     held: Model | None = None
-    at, score = total, total / phi
+    at, score = total, total / dispersion
     shares: list[tuple[str, float]] = []
     rest = list(models)
     while rest:
@@ -268,7 +278,7 @@ def _added(models: list[Model], misfits: list[Array], n: float, phi: float) -> t
         for m in rest:
             whole = m if held is None else m.beside(held)
             left = whole.left(misfits)
-            tried.append((left / phi + whole.columns[0].shape[1] * np.log(n), left, m.on, whole))
+            tried.append((left / dispersion + whole.columns[0].shape[1] * np.log(n), left, m.on, whole))
         best = min(tried, key=lambda one: one[0])
         if best[0] >= score:
             break

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import MODEL_ERROR, Evidence
+from rollover.diagnosis.data.dataset import MODEL_ERROR, Dataset
 from rollover.diagnosis.fit.ensemble_mean import PARTS, along, left_of_means, pull_of_means, step_of_means
 from rollover.diagnosis.fit.finite_differences import CLOCKED
 from rollover.diagnosis.fit.jobs import linearised
-from rollover.diagnosis.fit.levenberg_marquardt import GENTLE, Fitted, Judge
-from rollover.diagnosis.fit.linearisation import Block, at_an_end, shift_of
+from rollover.diagnosis.fit.levenberg_marquardt import GENTLE, Fitted, Problem
+from rollover.diagnosis.fit.linearisation import ResidualBlock, at_an_end, shift_of
 from rollover.diagnosis.fit.parameterisation import Candidate, each_with_own, physical
 from rollover.diagnosis.inference.local_quadratic import TWO_SIDED, by_student, over_roughness
 from rollover.diagnosis.result import Interval
@@ -27,34 +27,34 @@ KNOWN = 1e-3  # of such an end, by which it is known
 CLEARLY = 0.4  # of the rise that is due, and
 ROUGH = 8.0  # rise that is no chance: from place to place the misfit of a mean of runs differs by 3 (1 sd)
 FURTHER, FARTHEST = 2.0, 30.0  # factors by which one goes on at a time, and at most
-RIPPLES = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)  # factors at which one looks behind a rise
+LOCAL_MINIMA = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)  # factors at which one looks behind a rise
 BEYOND = 1.2  # factor below which an interval that is too narrow is chance
 FEWEST = 3  # recordings that can disagree
 HALVINGS = 7  # of the way to the end of a range
-ALONG, VALLEY, FEW_ROUNDS = 1.3, 9, 8  # a factor, how often, and rounds of a fit with one coordinate held
+ALONG, RIDGE, FEW_ROUNDS = 1.3, 9, 8  # a factor, how often, and rounds of a fit with one coordinate held
 EVENLY = 12.0**-0.5  # standard deviation of what is spread evenly from 0 to 1
 BOTH = (-1.0, 1.0)
 
 Sides = Mapping[int, Sequence[float]]  # coordinates, and of each -1.0 for down, 1.0 for up
 
 
-def scattered(evidence: Sequence[Evidence], blocks: Sequence[Block], inverse: Array) -> Array:
+def scattered(dataset: Sequence[Dataset], blocks: Sequence[ResidualBlock], inverse: Array) -> Array:
     """Variances (p,) of parameters fitted to one run each, by what neighbours of the run scatter by.
 
     sum_r var_k(A^-1 J_r'd_rk) (1 + 1/k) (t/1.96)^2: what was measured is one run more, the model the mean of k.
     """
     found, free = np.zeros(inverse.shape[0]), 0
-    for e, block in zip(evidence, blocks, strict=True):
-        k = len(e.strays)
+    for e, block in zip(dataset, blocks, strict=True):
+        k = len(e.perturbed)
         if k < 2:
             continue
         free += k - 1
-        each = np.array([inverse @ along(block, e, stray) for stray in e.strays])
+        each = np.array([inverse @ along(block, e, perturbed_run) for perturbed_run in e.perturbed])
         found += (1.0 + 1.0 / k) * np.var(each, axis=0, ddof=1)
     return np.asarray(found * by_student(free)) if free else found
 
 
-def disagreeing(evidence: Sequence[Evidence], blocks: Sequence[Block], inverse: Array) -> Array:
+def disagreeing(dataset: Sequence[Dataset], blocks: Sequence[ResidualBlock], inverse: Array) -> Array:
     """Variances (p,) by how far apart recordings pull parameters: what all models of the noise leave out shows there.
 
     (t/1.96)^2 R/(R - 1) A^-1 [sum_r (g_r - g)(g_r - g)'] A^-1, g_r recording r's part of A dx of (D8), g their mean.
@@ -62,26 +62,26 @@ def disagreeing(evidence: Sequence[Evidence], blocks: Sequence[Block], inverse: 
     number = len(blocks)
     if number < FEWEST:
         return np.zeros(inverse.shape[0])
-    pulls = np.array([pull_of_means(e, block) for e, block in zip(evidence, blocks, strict=True)])
+    pulls = np.array([pull_of_means(e, block) for e, block in zip(dataset, blocks, strict=True)])
     moved = (pulls - pulls.mean(axis=0)) @ inverse
     return np.asarray(by_student(number - 1) * number / (number - 1) * np.sum(moved**2, axis=0))
 
 
-def unshaped(judge: Judge, fitted: Fitted, inverse: Array) -> Array:
+def unshaped(problem: Problem, fitted: Fitted, inverse: Array) -> Array:
     """Variances (p,) of what shapes of the last effect that are not fitted would move: each evenly over its range."""
     found = np.zeros(len(fitted.x))
     last, at = fitted.candidates[-1], list(fitted.x)
     shapes = list(last.shapes)
     if any(getattr(EFFECTS[last.id](), name, 0.0) is None for name in shapes):
         return found  # as the scenario has it
-    begun = last.with_shapes(())[0] if shapes else ()
+    begun = last.with_secondary(())[0] if shapes else ()
     whole = (*fitted.candidates[:-1], last.whole())
     for k in range(len(shapes)):
         pull = np.zeros(len(fitted.x))
         low, high = (min(max(begun[k] + s * EVENLY, 0.0), 1.0) for s in (-1.0, 1.0))
         ends = [(whole, [*at, *begun[:k], v, *begun[k + 1 :]]) for v in (low, high)]
         for r, block in enumerate(fitted.blocks):
-            d = judge.moved(r, ends[0], ends[1], block.shift)
+            d = problem.moved(r, ends[0], ends[1], block.shift)
             if d is not None:
                 d = block.counted(d)
                 pull += block.J.T @ d - (block.J.T @ block.slope) * float(block.slope @ d) / block.weight
@@ -89,7 +89,7 @@ def unshaped(judge: Judge, fitted: Fitted, inverse: Array) -> Array:
     return found
 
 
-def with_shapes(judge: Judge, fitted: Fitted) -> tuple[Fitted, Array, list[int]]:
+def with_secondary(problem: Problem, fitted: Fitted) -> tuple[Fitted, Array, list[int]]:
     """The fit with the shapes of its effects that were not fitted, the prior of each coordinate, where the fitted are.
 
     Such a shape is where it is usual, spread evenly over its range as far as the recordings do not tell; one that is
@@ -101,12 +101,12 @@ def with_shapes(judge: Judge, fitted: Fitted) -> tuple[Fitted, Array, list[int]]
         kept += range(len(x), len(x) + len(own))
         usual = {name: getattr(EFFECTS[c.id](), name) for name in c.shapes}
         told = all(v is not None and c.shapes[name].low <= v <= c.shapes[name].high for name, v in usual.items())
-        whole = c.with_shapes(own)[0] if told and usual else own
+        whole = c.with_secondary(own)[0] if told and usual else own
         prior += [GENTLE] * len(own) + [EVENLY**-2] * (len(whole) - len(own))
         x += whole
         candidates.append(c.whole() if told else c)
-    if len(x) > len(kept) and not judge.effort.thrifty:
-        found = linearised(judge, candidates, x, [b.shift for b in fitted.blocks])
+    if len(x) > len(kept) and not problem.effort.is_ensemble:
+        found = linearised(problem, candidates, x, [b.shift for b in fitted.blocks])
         if found is not None:
             return found, np.array(prior), kept
     # of a parameter of a narrow effect recordings may tell nothing at all: it lies evenly in its range
@@ -114,21 +114,23 @@ def with_shapes(judge: Judge, fitted: Fitted) -> tuple[Fitted, Array, list[int]]
     return fitted, np.array(own_prior), list(range(len(fitted.x)))
 
 
-def reaches(judge: Judge, fitted: Fitted, own: Array, phi: float, sides: Sides | None = None) -> Array:
+def profile_extents(
+    problem: Problem, fitted: Fitted, own: Array, dispersion: float, sides: Sides | None = None
+) -> Array:
     """How much further than by its slopes a misfit stays low, factors (p, 2) of `own` deviations down and up, >= 1.
 
     `TWO_SIDED` deviations off, the other parameters going along, it should have risen by `TWO_SIDED`^2 phi. Leaps and
     chance make slopes too steep: where it has clearly not, one goes on until it has, and back on a parabola. Of runs
     that scatter it is the misfit of their mean, which is rough by itself. With `sides` these alone are looked at.
     """
-    found, due = np.ones((own.size, 2)), TWO_SIDED**2 * phi
-    enough = max(CLEARLY * due, ROUGH if any(e.strays for e in judge.evidence) else 0.0)
+    found, due = np.ones((own.size, 2)), TWO_SIDED**2 * dispersion
+    enough = max(CLEARLY * due, ROUGH if any(e.perturbed for e in problem.dataset) else 0.0)
     if sides is not None and not any(sides.values()):
         return found
-    start = _misfit(judge, fitted, np.zeros(len(fitted.x)))
+    start = _misfit(problem, fitted, np.zeros(len(fitted.x)))
     if start is None:
         return found
-    rippled = _rippled(fitted) if not judge.effort.thrifty else set()
+    rippled = _rippled(fitted) if not problem.effort.is_ensemble else set()
     for k, way in enumerate(_ways(fitted, own)):
         for side, sign in enumerate(BOTH):
             if sides is not None and sign not in sides.get(k, ()):
@@ -136,7 +138,7 @@ def reaches(judge: Judge, fitted: Fitted, own: Array, phi: float, sides: Sides |
             far = 1.0
             while far < FARTHEST:
                 x = np.array(fitted.x) + sign * far * way
-                there = _misfit(judge, fitted, sign * far * way) if np.all((x >= 0.0) & (x <= 1.0)) else None
+                there = _misfit(problem, fitted, sign * far * way) if np.all((x >= 0.0) & (x <= 1.0)) else None
                 if there is None:
                     break
                 if there - start > enough:
@@ -144,8 +146,8 @@ def reaches(judge: Judge, fitted: Fitted, own: Array, phi: float, sides: Sides |
                     break
                 far *= FURTHER
             if k in rippled:
-                far = max(far, _over_ripples(judge, fitted, sign * way, k, start + due))
-                far = _along_valley(judge, fitted, k, sign * TWO_SIDED * own[k], (start, due), far)
+                far = max(far, _over_local_minima(problem, fitted, sign * way, k, start + due))
+                far = _along_ridge(problem, fitted, k, sign * TWO_SIDED * own[k], (start, due), far)
             found[k, side] = far if far > BEYOND else 1.0
     return found
 
@@ -165,21 +167,23 @@ def _rippled(fitted: Fitted) -> set[int]:
     return {k for own in bent for k in range(own.start, own.stop)}
 
 
-def _over_ripples(judge: Judge, fitted: Fitted, way: Array, k: int, most: float) -> float:
+def _over_local_minima(problem: Problem, fitted: Fitted, way: Array, k: int, most: float) -> float:
     """The furthest factor on the k-th coordinate's `way` (p,) with no more than `most` left, at least 1.
 
     It ends at the end of its range, and what goes along at the ends of theirs.
     """
     reached, begun = 1.0, np.array(fitted.x)
     end = ((1.0 if way[k] > 0.0 else 0.0) - begun[k]) / way[k]
-    for far in sorted({*(f for f in RIPPLES if f < end), min(max(end, RIPPLES[0]), RIPPLES[-1])}):
-        there = _misfit(judge, fitted, np.clip(begun + far * way, 0.0, 1.0) - begun)
+    for far in sorted({*(f for f in LOCAL_MINIMA if f < end), min(max(end, LOCAL_MINIMA[0]), LOCAL_MINIMA[-1])}):
+        there = _misfit(problem, fitted, np.clip(begun + far * way, 0.0, 1.0) - begun)
         if there is not None and there <= most:
             reached = far
     return reached
 
 
-def _along_valley(judge: Judge, fitted: Fitted, k: int, way: float, rise: tuple[float, float], begun: float) -> float:
+def _along_ridge(
+    problem: Problem, fitted: Fitted, k: int, way: float, rise: tuple[float, float], begun: float
+) -> float:
     """The factor on the `way` of coordinate k at which the misfit has risen by what is due, all others fitted anew.
 
     `rise` is what is left at the fit and what is due. A straight way leaves a crooked valley early: from `begun` on it
@@ -190,12 +194,12 @@ def _along_valley(judge: Judge, fitted: Fitted, k: int, way: float, rise: tuple[
     if any(len(c.search) == 1 for c, place in each_with_own(fitted.candidates) if place.start <= k < place.stop):
         return far
     inside, beyond = (far, due), far
-    for _ in range(VALLEY):
+    for _ in range(RIDGE):
         beyond = beyond * ALONG
         at = fitted.x[k] + beyond * way
         if not 0.0 < at < 1.0:
             break
-        found = judge.fit(_held(fitted, k, at), x, rounds=FEW_ROUNDS, shifts=shifts, width=1)
+        found = problem.fit(_held(fitted, k, at), x, rounds=FEW_ROUNDS, shifts=shifts, width=1)
         if found is None:
             break
         if found.left - start > due:
@@ -215,18 +219,18 @@ def _held(fitted: Fitted, k: int, at: float) -> list[Candidate]:
     return [held if one is c else one for one in fitted.candidates]
 
 
-def _within_range(judge: Judge, fitted: Fitted, wide: Array, phi: float) -> Array:
+def _within_range(problem: Problem, fitted: Fitted, wide: Array, dispersion: float) -> Array:
     """Deviations (p, 2) down and up, with those that lead out of the range ended where too much is left before that.
 
     What pulls no further once it holds has no slope there, and is something all the same: with next to none of it much
     more is left. The way to the end of the range is halved again and again, all others fitted anew.
     """
-    found, due = wide.copy(), TWO_SIDED**2 * phi
+    found, due = wide.copy(), TWO_SIDED**2 * dispersion
     shifts = [b.shift for b in fitted.blocks]
 
     def is_met(k: int, at: float) -> bool:
         others = [v for j, v in enumerate(fitted.x) if j != k]
-        there = judge.fit(_held(fitted, k, at), others, rounds=FEW_ROUNDS, shifts=shifts, width=1)
+        there = problem.fit(_held(fitted, k, at), others, rounds=FEW_ROUNDS, shifts=shifts, width=1)
         return there is None or there.left - fitted.left < due
 
     for k, x in enumerate(fitted.x):
@@ -241,7 +245,7 @@ def _within_range(judge: Judge, fitted: Fitted, wide: Array, phi: float) -> Arra
     return found
 
 
-def rough_reaches(judge: Judge, fitted: Fitted, own: Array, phi: float) -> Array:
+def quadratic_extents(problem: Problem, fitted: Fitted, own: Array, dispersion: float) -> Array:
     """How far (p, 2) the mean course of runs beside the fit may be what was measured, see `over_roughness`.
 
     In units of `own` deviations down and up, NaN where runs do not tell. It has in it what scatter and disagreement do.
@@ -249,37 +253,39 @@ def rough_reaches(judge: Judge, fitted: Fitted, own: Array, phi: float) -> Array
     found = np.full((own.size, 2), np.nan)
     for k, way in enumerate(_ways(fitted, own)):
 
-        def runs(places: Sequence[float], way: Array = way) -> list[Sequence[Block] | None]:
+        def runs(places: Sequence[float], way: Array = way) -> list[Sequence[ResidualBlock] | None]:
             points = [np.array(fitted.x) + t * way for t in places]
             inside = [bool(np.all((x >= 0.0) & (x <= 1.0))) for x in points]
-            judge.made_ahead(
+            problem.made_ahead(
                 (r, fitted.candidates, [float(v) for v in x])
                 for x, there in zip(points, inside, strict=True)
                 for r in range(len(fitted.blocks) if there else 0)
             )
-            met = [_clocked(judge, fitted, t * way) if there else None for t, there in zip(places, inside, strict=True)]
+            met = [
+                _clocked(problem, fitted, t * way) if there else None for t, there in zip(places, inside, strict=True)
+            ]
             return [None if f is None else f.blocks for f in met]
 
-        told = over_roughness(runs, [b.plain_J @ way for b in fitted.blocks], TWO_SIDED**2 * phi)
+        told = over_roughness(runs, [b.plain_J @ way for b in fitted.blocks], TWO_SIDED**2 * dispersion)
         if told is not None:
             found[k] = told
     return found
 
 
-def _misfit(judge: Judge, fitted: Fitted, way: Array) -> float | None:
+def _misfit(problem: Problem, fitted: Fitted, way: Array) -> float | None:
     """What is left some way (p,) from a fit, of runs that scatter by their mean; None where it cannot be simulated."""
-    moved = _clocked(judge, fitted, way)
+    moved = _clocked(problem, fitted, way)
     if moved is None:
         return None
-    return left_of_means(judge, moved)[0] if any(e.strays for e in judge.evidence) else moved.left
+    return left_of_means(problem, moved)[0] if any(e.perturbed for e in problem.dataset) else moved.left
 
 
-def _clocked(judge: Judge, fitted: Fitted, way: Array) -> Fitted | None:
+def _clocked(problem: Problem, fitted: Fitted, way: Array) -> Fitted | None:
     """A fit moved some way (p,), clocks gone along, without slopes; None where it cannot be simulated."""
     x = [float(v) for v in np.array(fitted.x) + way]
-    judge.made_ahead((r, fitted.candidates, x) for r in range(len(fitted.blocks)))
+    problem.made_ahead((r, fitted.candidates, x) for r in range(len(fitted.blocks)))
     found = [
-        judge.clocked(r, fitted.candidates, x, there.shift + shift_of(there, way), CLOCKED)
+        problem.clocked(r, fitted.candidates, x, there.shift + shift_of(there, way), CLOCKED)
         for r, there in enumerate(fitted.blocks)
     ]
     blocks = [b for b in found if b is not None]
@@ -288,10 +294,10 @@ def _clocked(judge: Judge, fitted: Fitted, way: Array) -> Fitted | None:
     return replace(fitted, x=tuple(x), blocks=tuple(blocks))
 
 
-def _noise(judge: Judge, fitted: Fitted, prior: Array) -> Array:
+def _noise(problem: Problem, fitted: Fitted, prior: Array) -> Array:
     """Covariance (p, p) of J'w that comes of the noise alone, and `prior`: a weighed sample's noise is below 1."""
     found = np.diag(prior)
-    for e, block in zip(judge.evidence, fitted.blocks, strict=True):
+    for e, block in zip(problem.dataset, fitted.blocks, strict=True):
         J = block.J - np.outer(block.slope, block.slope @ block.J) / block.weight
         J = J * block.counted(np.sqrt(e.due))[:, None]
         found = found + J.T @ J
@@ -299,7 +305,7 @@ def _noise(judge: Judge, fitted: Fitted, prior: Array) -> Array:
 
 
 def intervals(
-    judge: Judge, fitted: Fitted, sides: Sides | None = None, coarse: Fitted | None = None
+    problem: Problem, fitted: Fitted, sides: Sides | None = None, coarse: Fitted | None = None
 ) -> list[dict[str, Interval]]:
     """For each effect, its parameters with 95 % intervals.
 
@@ -307,51 +313,51 @@ def intervals(
     model of `MODEL_ERROR` in any one channel would do, A^-1 J'(error): integrators differ, noise or not. Where runs
     that nobody could tell apart scatter and samples are weighed by that, cov = phi A^-1 N A^-1 with N the covariance
     that the noise alone gives J'w; beside it stand `scattered` and `unshaped`. Elsewhere shapes that were not fitted
-    are in A, see `with_shapes`; an end of a range is read off where samples pile up there. How far the misfit stays low
-    is told by `rough_reaches` where runs scatter, and by `reaches` elsewhere and where that does not tell; with `sides`
-    by `reaches` alone, and all others are as wide as slopes say. `coarse` is the fit that was moved to this one
-    `in_shorter_steps`: steps of no length would move it by another 1/(PARTS - 1) of that.
+    are in A, see `with_secondary`; an end of a range is read off where samples pile up there. How far the misfit stays
+    low is told by `quadratic_extents` where runs scatter, and by `profile_extents` elsewhere and where that does not
+    tell; with `sides` by `profile_extents` alone, and all others are as wide as slopes say. `coarse` is the fit that
+    was moved to this one `in_shorter_steps`: steps of no length would move it by another 1/(PARTS - 1) of that.
     """
     told, coarse = fitted, coarse or fitted
-    fitted, prior, kept = with_shapes(judge, fitted)
+    fitted, prior, kept = with_secondary(problem, fitted)
     p = len(fitted.x)
     A = sum((b.normal()[0] for b in fitted.blocks), np.zeros((p, p))) + np.diag(prior)
     inverse: Array = np.asarray(np.linalg.inv(A), dtype=np.float64)
     count = sum(b.residual.size for b in fitted.blocks)
-    phi = max(1.0, fitted.left / count) * judge.per_error
-    strayed = any(e.strays for e in judge.evidence)
-    noise = inverse @ _noise(judge, fitted, prior) @ inverse if strayed else inverse
-    sd = np.sqrt(np.maximum(phi * np.diag(noise), 0.0))
+    dispersion = max(1.0, fitted.left / count) * problem.samples_per_error
+    strayed = any(e.perturbed for e in problem.dataset)
+    noise = inverse @ _noise(problem, fitted, prior) @ inverse if strayed else inverse
+    sd = np.sqrt(np.maximum(dispersion * np.diag(noise), 0.0))
     moved = np.zeros(p)
-    channels = {s.channel for e in judge.evidence for s in e.signals}
+    channels = {s.channel for e in problem.dataset for s in e.signals}
     for channel in channels:
         pull = np.zeros(p)
         for r, block in enumerate(fitted.blocks):
-            for signal, part in judge.evidence[r].spans():
+            for signal, part in problem.dataset[r].spans():
                 if signal.channel == channel:
-                    y = block.counted(judge.measured[r] - block.plain_residual)[part]
+                    y = block.counted(problem.measured[r] - block.plain_residual)[part]
                     pull += block.J[part].T @ (MODEL_ERROR * y)
         moved += (inverse @ pull) ** 2
     # a fit that ended before it was at rest is off by what the next step would have been
     rest = inverse @ sum((b.normal()[1] for b in fitted.blocks), np.zeros(p))
     if strayed:
-        moved += scattered(judge.evidence, fitted.blocks, inverse) + unshaped(judge, fitted, inverse)
-        rest = step_of_means(judge.evidence, fitted.blocks)
+        moved += scattered(problem.dataset, fitted.blocks, inverse) + unshaped(problem, fitted, inverse)
+        rest = step_of_means(problem.dataset, fitted.blocks)
     moved += rest**2
     moved[kept] += ((np.array(told.x) - np.array(coarse.x)) / (PARTS - 1)) ** 2
     variance = sd**2 + moved
     if strayed:
-        variance = np.maximum(variance, disagreeing(judge.evidence, fitted.blocks, inverse))
+        variance = np.maximum(variance, disagreeing(problem.dataset, fitted.blocks, inverse))
     sd = np.sqrt(variance)[kept]
-    own = np.sqrt(phi * np.diag(inverse))[kept]
+    own = np.sqrt(dispersion * np.diag(inverse))[kept]
     rough = np.full((own.size, 2), np.nan)
     if strayed and sides is None:
-        rough = rough_reaches(judge, judge.again(coarse), own, phi)
+        rough = quadratic_extents(problem, problem.again(coarse), own, dispersion)
         sides = {k: BOTH for k in range(own.size) if np.isnan(rough[k, 0])}  # for means of seven runs
-    far = reaches(judge, coarse, own, phi, sides)
+    far = profile_extents(problem, coarse, own, dispersion, sides)
     wide = np.fmax(np.sqrt(sd[:, None] ** 2 + own[:, None] ** 2 * (far**2 - 1.0)), own[:, None] * rough)
-    if not judge.effort.thrifty:
-        wide = _within_range(judge, told, wide, phi)
+    if not problem.effort.is_ensemble:
+        wide = _within_range(problem, told, wide, dispersion)
     found, at = [], 0
     for c in told.candidates:
         kind: Any = EFFECTS[c.id]
@@ -369,15 +375,15 @@ def intervals(
             )
             at += 1
         if c.id == "sensor-clipping":
-            values = {name: read_off(one, end_of(judge.evidence, c.channel)) for name, one in values.items()}
+            values = {name: read_off(one, end_of(problem.dataset, c.channel)) for name, one in values.items()}
         values |= {n: Interval(value=v, low=v, high=v, unit=units.get(n, "")) for n, v in c.form.items()}
         found.append(values)
     return found
 
 
-def end_of(evidence: Sequence[Evidence], channel: str | None) -> float | None:
+def end_of(dataset: Sequence[Dataset], channel: str | None) -> float | None:
     """Size of the largest value of a channel if it is met again and again, to the last digit: the end of a range."""
-    ends = [s.end for e in evidence for s in e.signals if s.channel == channel]
+    ends = [s.end for e in dataset for s in e.signals if s.channel == channel]
     return max(ends, default=0.0) or None
 
 

@@ -9,7 +9,7 @@ Where runs scatter, samples are weighed (D3), and of S = |Q'w|^2 noise and scatt
     M = tr(Q'W^2 Q) + mean_k |Q'd_k|^2                                                                          (D14)
 
 d_k what neighbours differ by, each weighed by what the others scatter, as the recording is; the first term times what
-whitening leaves of slow noise (`colour.Rest`). Where another course is forgiven, both count after the blow for what
+whitening leaves of slow noise (`colour.Rest`). Where another course is forgiven, both count after the impact for what
 they would in a recording that differs by d_k (D9). S/M then has nu = 2 M^2/var S degrees of freedom, var S from the
 noise, from noise and scatter together, and from how far the neighbours of a recording differ in all its cells at once;
 M is known as well as so few neighbours tell.
@@ -24,9 +24,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import Evidence
-from rollover.diagnosis.fit.linearisation import Block
-from rollover.diagnosis.noise.autoregression import Rest, hums, rests
+from rollover.diagnosis.data.dataset import Dataset
+from rollover.diagnosis.fit.linearisation import ResidualBlock
+from rollover.diagnosis.noise.autoregression import Rest, line_spectra, rests
 from rollover.diagnosis.noise.ensemble import FEW, SENT, is_other, shares, too_many, unseen
 from rollover.diagnosis.noise.outliers import too_often
 from rollover.diagnosis.noise.spectral_lines import basis as line
@@ -70,7 +70,7 @@ class Cell:
 class Mismatch:
     """All cells, the p-value of "nothing but noise", and the familywise p-values of the cells.
 
-    `telling` are the cells that it is judged by: not those after a blow of a recording that took another course.
+    `telling` are the cells that it is judged by: not those after an impact of a recording that took another course.
     """
 
     cells: tuple[Cell, ...]
@@ -93,14 +93,14 @@ class Mismatch:
 
 
 def mismatch_of(
-    evidence: Sequence[Evidence], blocks: Sequence[Block], phases: Sequence[Sequence[tuple[float, str]]]
+    dataset: Sequence[Dataset], blocks: Sequence[ResidualBlock], phases: Sequence[Sequence[tuple[float, str]]]
 ) -> Mismatch:
     """Judge the residuals at a fitted point; `phases` are (start, name) for each recording."""
     cells: list[Cell] = []
-    strays = [unseen(e) for e in evidence]
-    worth = [_worth(e, block, apart) for e, block, apart in zip(evidence, blocks, strays, strict=True)]
-    humming, colours = hums(evidence, [b.valued for b in blocks]), rests(evidence)
-    for r, (e, block) in enumerate(zip(evidence, blocks, strict=True)):
+    perturbed = [unseen(e) for e in dataset]
+    worth = [_worth(e, block, apart) for e, block, apart in zip(dataset, blocks, perturbed, strict=True)]
+    humming, colours = line_spectra(dataset, [b.valued for b in blocks]), rests(dataset)
+    for r, (e, block) in enumerate(zip(dataset, blocks, strict=True)):
         for signal, part in e.spans():
             time = e.recording.time[signal.rows]
             for k, (start, name) in enumerate(phases[r]):
@@ -108,15 +108,15 @@ def mismatch_of(
                 inside = np.flatnonzero((time >= start) & (time < end))
                 if inside.size >= 4:
                     rows = inside + part.start
-                    hum, rest, due = humming[signal.channel], colours[r][signal.channel], None
+                    line_spectrum, rest, due = humming[signal.channel], colours[r][signal.channel], None
                     if signal.weight is not None:
-                        due = Expected(signal.weight[inside], rest, strays[r][:, rows], worth[r][:, rows])
-                    cells.append(_cell(r, signal.channel, name, time[inside], rows, block, hum, due))
-    # after a blow a recording that took another course tells nothing by itself
-    other = [is_other(b.course) for b in blocks]
-    telling = [c for c in cells if not (other[c.recording] and c.start >= evidence[c.recording].blow)]
+                        due = Expected(signal.weight[inside], rest, perturbed[r][:, rows], worth[r][:, rows])
+                    cells.append(_cell(r, signal.channel, name, time[inside], rows, block, line_spectrum, due))
+    # after an impact a recording that took another course tells nothing by itself
+    other = [is_other(b.heavy_tail) for b in blocks]
+    telling = [c for c in cells if not (other[c.recording] and c.start >= dataset[c.recording].first_impact)]
     # within half a step of its digits a channel tells nothing, however alike neighbouring samples err
-    stepped = {(r, s.channel) for r, e in enumerate(evidence) for s in e.signals if s.step > 0.0}
+    stepped = {(r, s.channel) for r, e in enumerate(dataset) for s in e.signals if s.step > 0.0}
     telling = [c for c in telling if c.excess > 0.0 or (c.recording, c.channel) not in stepped]
     by_channel: dict[str, list[Array]] = {}
     for c in telling:
@@ -135,24 +135,24 @@ class Expected(NamedTuple):
 
     weight: Array
     rest: Rest
-    strays: Array
+    perturbed: Array
     worth: Array
 
     def left(self, Q: Array, waves: int) -> tuple[tuple[float, float], Array]:
         """What noise leaves in the columns of `Q` (n, m) and beside them, and what each neighbour adds, (k, 2)."""
         slow, noise = float(np.sum((Q * self.weight[:, None]) ** 2)), float(self.weight @ self.weight)
         shape = float(np.mean(self.rest.at(np.arange(waves) / (2.0 * self.weight.size))))
-        apart, fewer = self.worth * self.strays, (self.worth**2 - 1.0) * self.weight**2
+        apart, fewer = self.worth * self.perturbed, (self.worth**2 - 1.0) * self.weight**2
         along = np.sum((apart @ Q) ** 2, axis=1) + shape * fewer @ np.sum(Q**2, axis=1)
         beside = np.sum(apart**2, axis=1) + np.sum(fewer, axis=1) - along
         return (shape * slow, noise - shape * slow), np.stack([along, beside], axis=1)
 
 
-def _worth(e: Evidence, block: Block, strays: Array) -> Array:
-    """(k, n): roots of what samples count where a recording goes as one of the `strays` does."""
-    if not block.forgiven:
-        return np.ones(strays.shape)
-    return np.where(e.early, 1.0, np.sqrt(shares(e, strays))[:, None])
+def _worth(e: Dataset, block: ResidualBlock, perturbed: Array) -> Array:
+    """(k, n): roots of what samples count where a recording goes as one of the `perturbed` does."""
+    if not block.masked:
+        return np.ones(perturbed.shape)
+    return np.where(e.early, 1.0, np.sqrt(shares(e, perturbed))[:, None])
 
 
 def _p_value(cells: Sequence[Cell], clocks: int) -> float:
@@ -189,7 +189,7 @@ def _cell(
     phase: str,
     time: Array,
     rows: NDArray[np.int64],
-    block: Block,
+    block: ResidualBlock,
     humming: tuple[float, ...],
     due: Expected | None,
 ) -> Cell:

@@ -29,7 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.fit.linearisation import Block, total_of
+from rollover.diagnosis.fit.linearisation import ResidualBlock, total_of
 
 Array = NDArray[np.float64]
 STAGES = ((1.0, 2.0, 3.0, 4.0), (6.0, 8.0), (12.0, 16.0), (24.0, 32.0))  # places on either side, the nearest first
@@ -37,10 +37,12 @@ CLEAR = 10.0  # times what scatter alone makes of it, by which a slope is told w
 TOLD = 1.0  # the same, by which it is told at all
 FEWEST = 6  # places that tell one
 KEPT = 0.8  # of slopes at the fit, from which on they are those of the mean too
-STEEPER, LEAP = 4.0, 10.0  # times what slopes foretell, and what is due: beyond both a run took another course
+STEEPER, DISCONTINUITY = 4.0, 10.0  # times what slopes foretell, and what is due: beyond both a run took another course
 TWO_SIDED = 1.96
 
-Runs = Callable[[Sequence[float]], Sequence[Sequence[Block] | None]]  # at places t; None where nothing can be simulated
+Runs = Callable[
+    [Sequence[float]], Sequence[Sequence[ResidualBlock] | None]
+]  # at places t; None where nothing can be simulated
 
 
 def by_student(free: float) -> float:
@@ -57,7 +59,7 @@ def over_roughness(runs: Runs, slopes: Sequence[Array], due: float) -> tuple[flo
     are surely right, for then they tell more. None where that is not told: no slope stands out within the places that
     are looked at, more and more until one is told well.
     """
-    met: list[tuple[float, Sequence[Block]]] = []
+    met: list[tuple[float, Sequence[ResidualBlock]]] = []
     best = Slope(clear=0.0)
     for stage in STAGES:
         places = [side * at for at in stage for side in (-1.0, 1.0)]
@@ -70,7 +72,7 @@ def over_roughness(runs: Runs, slopes: Sequence[Array], due: float) -> tuple[flo
         recordings = [_alike(blocks, nearest, J) for blocks, J in zip(each, slopes, strict=True)]
         squares = sum(np.sum(left**2, axis=1) for left, _ in recordings)
         low = np.sort(squares)[FEWEST // 2 - 1]  # not the least: one run may take the recording's own course
-        kept = np.abs(squares - low) < STEEPER * due * t**2 + LEAP * due
+        kept = np.abs(squares - low) < STEEPER * due * t**2 + DISCONTINUITY * due
         if np.sum(kept) < FEWEST:
             continue
         found = _slope(t[kept], [(left[kept], J) for left, J in recordings], due)
@@ -94,7 +96,7 @@ class Slope:
     up: float = 0.0
 
 
-def _alike(blocks: Sequence[Block], nearest: Sequence[int], slope: Array) -> tuple[Array, Array]:
+def _alike(blocks: Sequence[ResidualBlock], nearest: Sequence[int], slope: Array) -> tuple[Array, Array]:
     """What runs (k) leave of one recording (k, n + 1), and a slope (n + 1,), the time shift eliminated from both.
 
     Samples count at all places what they do in the middle of the nearest runs; the shift's part of (D1) is the last.

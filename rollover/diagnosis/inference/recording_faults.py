@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.inconsistent import Aside
 from rollover.diagnosis.data.phases import phases_of, whole
 from rollover.diagnosis.fit.step import Phases
@@ -18,7 +18,7 @@ from rollover.recording import Recording
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shown:
+class RecordingFault:
     """A verdict on what recordings show by themselves: where, by which effects if any, in one sentence."""
 
     verdict: Verdict
@@ -33,36 +33,39 @@ class Shown:
 
 
 def by_themselves(
-    evidence: Sequence[Evidence], recordings: Mapping[str, Recording], phases: Phases, p_value: float
-) -> Shown | None:
+    dataset: Sequence[Dataset], recordings: Mapping[str, Recording], phases: Phases, p_value: float
+) -> RecordingFault | None:
     """What recordings show by themselves, that differ from their simulation with `p_value`; None if they are sound."""
-    names = [e.name for e in evidence]
-    if places := coarse(evidence, phases):  # in coarse steps any top is flat
-        return _unexplained(places, by_digits(places, evidence), len(evidence), p_value)
+    names = [e.name for e in dataset]
+    if places := coarse(dataset, phases):  # in coarse steps any top is flat
+        return _unexplained(places, by_digits(places, dataset), len(dataset), p_value)
     whole = [recordings[name] for name in names]
     effects, places = cut_off(names, whole, phases)
     if effects:
-        said = agreeing_but(effects, len(evidence), p_value)
+        said = agreeing_but(effects, len(dataset), p_value)
         least = min(p_value, *(e.p_value for e in effects))
-        return Shown(verdict="sensor", effects=effects, places=places, sentence=said, p_value=least)
-    return broken_off(evidence, recordings, phases, p_value)
+        return RecordingFault(verdict="sensor", effects=effects, places=places, sentence=said, p_value=least)
+    return broken_off(dataset, recordings, phases, p_value)
 
 
 def broken_off(
-    evidence: Sequence[Evidence], recordings: Mapping[str, Recording], phases: Phases, p_value: float
-) -> Shown | None:
+    dataset: Sequence[Dataset], recordings: Mapping[str, Recording], phases: Phases, p_value: float
+) -> RecordingFault | None:
     """Where recordings break off again and again; None if they do not."""
-    names = [e.name for e in evidence]
+    names = [e.name for e in dataset]
     places = lost(names, [recordings[name] for name in names], phases)
-    return _unexplained(places, by_loss(places), len(evidence), p_value) if places else None
+    return _unexplained(places, by_loss(places), len(dataset), p_value) if places else None
 
 
-def misread(slips: Sequence[Aside], recordings: int, p_value: float) -> Shown | None:
+def misread(inconsistencies: Sequence[Aside], recordings: int, p_value: float) -> RecordingFault | None:
     """What was left aside as no recording of what it states, where all else agrees; None if nothing was."""
-    share = 1.0 / max(len(slips), 1)
-    places = tuple(whole(slip.evidence, slip.signal, phases_of(slip.evidence), share) for slip in slips)
-    said = " ".join(dict.fromkeys(slip.summary for slip in slips))
-    return _unexplained(places, said, recordings, p_value) if slips else None
+    share = 1.0 / max(len(inconsistencies), 1)
+    places = tuple(
+        whole(inconsistency.dataset, inconsistency.signal, phases_of(inconsistency.dataset), share)
+        for inconsistency in inconsistencies
+    )
+    said = " ".join(dict.fromkeys(inconsistency.summary for inconsistency in inconsistencies))
+    return _unexplained(places, said, recordings, p_value) if inconsistencies else None
 
 
 def agreeing_but(effects: Sequence[Named], recordings: int, p_value: float) -> str:
@@ -70,10 +73,10 @@ def agreeing_but(effects: Sequence[Named], recordings: int, p_value: float) -> s
     return _otherwise(" ".join(e.statement for e in effects), recordings, _within(p_value))
 
 
-def _unexplained(places: tuple[Place, ...], said: str, recordings: int, p_value: float) -> Shown:
+def _unexplained(places: tuple[Place, ...], said: str, recordings: int, p_value: float) -> RecordingFault:
     agree = _within(p_value) if p_value > SURE else "hardly differ"
     said = _otherwise(said, recordings, agree)
-    return Shown(verdict="unexplained", effects=(), places=places, sentence=said, p_value=0.0)
+    return RecordingFault(verdict="unexplained", effects=(), places=places, sentence=said, p_value=0.0)
 
 
 def _otherwise(said: str, recordings: int, agree: str) -> str:

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from ground.compiled import leaf
 from ground.law import REFERENCE_AREA, along
-from rollover.diagnosis.data.dataset import Evidence
-from rollover.diagnosis.fit.levenberg_marquardt import Block
+from rollover.diagnosis.data.dataset import Dataset
+from rollover.diagnosis.fit.levenberg_marquardt import ResidualBlock
 from rollover.diagnosis.forward.filtering import behind_filters, rows_of
-from rollover.diagnosis.inference.bases import hats
+from rollover.diagnosis.inference.bases import linear_b_splines
 from rollover.dynamics.drop_test import DropModel
 from rollover.scenario import Scenario
 from rollover.spec.initiation import Drop
@@ -36,7 +36,7 @@ STEP = 5e-4  # s
 LATEST = 0.4  # s
 STOPPED = 0.03  # of the speed just after the impact
 FREE = 56  # knots of a force that may be anything
-NUDGE = 1e-4  # m, of a tangent
+FD_STEP = 1e-4  # m, of a tangent
 EARLY = 1.6  # power of the spacing of these knots: what the impact does is over soon
 GIVES = 1.0  # prior of a free force, of the largest on the way
 FASTER = 0.1  # prior of the speed just after the impact, of itself
@@ -92,7 +92,7 @@ def pushed(push: Any, k: Any, h: float, z: Any, v: Any, a: Any) -> None:
             v[i, j] = v[i - 1, j] + 0.5 * h * (a[i - 1, j] + a[i, j])
 
 
-def channels_of(way: Way, moves: Moves, e: Evidence, shift: float) -> Array:
+def channels_of(way: Way, moves: Moves, e: Dataset, shift: float) -> Array:
     """Those changes as the recording would show them: stacked, whitened, (n, k); what is later stays as it ends."""
     z, v, a, felt = moves
     shown = {
@@ -112,7 +112,7 @@ def channels_of(way: Way, moves: Moves, e: Evidence, shift: float) -> Array:
     for channel in e.recording.channels:
         y = shown.get(channel)
         found[channel] = nothing if y is None else begun * ((1.0 - ahead) * y[at] + ahead * y[at + 1])
-    return np.asarray(e.eased(e.whitened(e.raw(behind_filters(found, e.recording, rows)))))
+    return np.asarray(e.marginalised(e.whitened(e.raw(behind_filters(found, e.recording, rows)))))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,7 +123,7 @@ class Descent:
     force and by a push, each free in time, and `free` how many numbers that took.
     """
 
-    evidence: Evidence
+    dataset: Dataset
     way: Way
     shift: float
     rows: NDArray[np.bool_]
@@ -144,7 +144,7 @@ class Descent:
         return self.left[where] - (float(self.rows.sum()) - self.free)
 
 
-def descent(scenario: Scenario, e: Evidence, block: Block) -> Descent | None:
+def descent(scenario: Scenario, e: Dataset, block: ResidualBlock) -> Descent | None:
     """The way down of a recording under its `scenario`, beside the base's `block`; None if it has none."""
     striker, start = scenario.vehicle, scenario.initiation
     if not isinstance(striker, Striker) or not isinstance(start, Drop) or striker.nose == "cone":
@@ -166,7 +166,7 @@ def descent(scenario: Scenario, e: Evidence, block: Block) -> Descent | None:
         return area * along(scenario.ground.law, np.maximum(depth, 0.0), speed, speed=touch)
 
     force = spring(z, v)
-    tangent = (spring(z + NUDGE, v) - force) / NUDGE
+    tangent = (spring(z + FD_STEP, v) - force) / FD_STEP
     way = Way(
         time=time, depth=z, speed=v, acceleration=np.gradient(v, time), force=force, stiffness=tangent, mass=mass,
         whole=(1.0 + share) * mass, touch=touch, gravity=scenario.gravity,
@@ -174,17 +174,19 @@ def descent(scenario: Scenario, e: Evidence, block: Block) -> Descent | None:
     stamps = np.concatenate([e.recording.time[s.rows] for s in e.signals]) - block.shift
     rows = stamps <= time[-1]
     knots = time[-1] * np.linspace(0.0, 1.0, FREE) ** EARLY
-    f = hats(time, knots) * GIVES * float(force.max())
+    f = linear_b_splines(time, knots) * GIVES * float(force.max())
     measured = way
     for _ in range(TURNS):
         x, _, _ = _free(measured, f, "ground", e, block, rows)
         dz, dv, da = (m @ x[:-1] for m in _all_moves(measured, f, "ground")[:3])
         depth = np.maximum(z + dz, 0.0)
         there = spring(depth, v)
-        secant = np.where(np.abs(dz) > NUDGE, (there - force) / np.where(np.abs(dz) > NUDGE, dz, 1.0), tangent)
+        adaptive_difference = np.where(
+            np.abs(dz) > FD_STEP, (there - force) / np.where(np.abs(dz) > FD_STEP, dz, 1.0), tangent
+        )
         measured = replace(
             way, depth=depth, speed=v + dv, acceleration=way.acceleration + da, force=there,
-            stiffness=np.clip(secant, 0.0, None),
+            stiffness=np.clip(adaptive_difference, 0.0, None),
         )  # fmt: skip
     on = measured.speed > STOPPED * v[1]
     n = int(np.argmin(on)) if not on.all() else n
@@ -198,7 +200,7 @@ def descent(scenario: Scenario, e: Evidence, block: Block) -> Descent | None:
         x, left[where], free = _free(measured, f, where, e, block, rows)
         later[where] = float(x[-1]) * block.prior
     return Descent(
-        evidence=e, way=measured, shift=block.shift, rows=rows, residual=block.residual, slope=block.slope,
+        dataset=e, way=measured, shift=block.shift, rows=rows, residual=block.residual, slope=block.slope,
         prior=block.prior, left=left, free=free,
         better=block.shift + later[min(WHERES, key=lambda where: left[where])],
     )  # fmt: skip
@@ -213,7 +215,7 @@ def _all_moves(way: Way, f: Array, where: Where) -> Moves:
 
 
 def _free(
-    way: Way, f: Array, where: Where, e: Evidence, block: Block, rows: NDArray[np.bool_]
+    way: Way, f: Array, where: Where, e: Dataset, block: ResidualBlock, rows: NDArray[np.bool_]
 ) -> tuple[Array, float, float]:
     """Strengths of forces and of the speed that leave least of a recording, what that is, and how many count."""
     J = channels_of(way, _all_moves(way, f, where), e, block.shift)[rows]

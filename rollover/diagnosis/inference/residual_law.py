@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ground.empirical import MOST, TERMS
-from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cross_validation import held_out
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.inference.weak_form import Balance, balances
@@ -51,21 +51,23 @@ class Subset:
 
 
 def proposed(
-    judge: Judge,
+    problem: Problem,
     base: Fitted,
     scenarios: Sequence[Scenario],
-    evidence: Sequence[Evidence],
+    dataset: Sequence[Dataset],
     groups: Sequence[Sequence[int]],
 ) -> Law | None:
-    """The law that predicts held-out conditions best, if any does; `scenarios` under the conditions of `evidence`."""
-    found = balances(scenarios, evidence)
+    """The law that predicts held-out conditions best, if any does; `scenarios` under the conditions of `dataset`."""
+    found = balances(scenarios, dataset)
     if len({b.condition for b in found}) < 3 or len(groups) < 3:
         return None
     depth, speed = (float(f"{max(float(getattr(b, name).max()) for b in found):.2g}") for name in ("depth", "speed"))
     fits = []
     for subset in best_subsets(found, depth, speed):
         candidate, x = _candidate(subset, depth, speed)
-        fitted = judge.fit((*base.candidates, candidate), (*base.x, *x), shifts=[b.shift for b in base.blocks], width=1)
+        fitted = problem.fit(
+            (*base.candidates, candidate), (*base.x, *x), shifts=[b.shift for b in base.blocks], width=1
+        )
         if fitted is not None:
             fits.append(fitted)
     if not fits:
@@ -76,7 +78,7 @@ def proposed(
     gain, error = float(gains.mean()), float(gains.std(ddof=1) / np.sqrt(gains.size))
     if gain < max(LEAST_GAIN, ERRORS * error):
         return None
-    return _law(judge, best, gain, error, before.total, after.total)
+    return _law(problem, best, gain, error, before.total, after.total)
 
 
 def offered(law: Law | None) -> str:
@@ -146,9 +148,9 @@ def _candidate(subset: Subset, depth: float, speed: float) -> tuple[Candidate, l
     return Candidate(id=Empirical.id, kind="physics", family=family, search=search, fixed=fixed), x
 
 
-def _law(judge: Judge, fitted: Fitted, gain: float, error: float, before: float, after: float) -> Law:
+def _law(problem: Problem, fitted: Fitted, gain: float, error: float, before: float, after: float) -> Law:
     candidate = fitted.candidates[-1]
-    parameters = intervals(judge, fitted)[-1]
+    parameters = intervals(problem, fitted)[-1]
     settings: dict[str, Any] = dict(candidate.fixed) | {name: i.value for name, i in parameters.items()}
     effect = Empirical(**settings)
     terms = tuple(

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rollover.comparison.rating import Iso18571, iso18571
-from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cross_validation import Held, held_out
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge, shift_of
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, shift_of
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.result import Score
 
 SAMPLES = 1500  # that a rating is worked out on
-FEWEST = 24  # samples before a blow, of fewer nothing is said
+FEWEST = 24  # samples before an impact, of fewer nothing is said
 FORCES = ("ground/force_normal", "rops/force", "striker/acceleration_z", "chassis/acceleration_z")
 
 
@@ -28,17 +28,19 @@ class Judged:
     by_recording: tuple[tuple[str, float], ...]
 
 
-def judged(judge: Judge, fitted: Fitted, kept: Sequence[Evidence], groups: Sequence[Sequence[int]]) -> Judged:
+def judged(problem: Problem, fitted: Fitted, kept: Sequence[Dataset], groups: Sequence[Sequence[int]]) -> Judged:
     """Judge an explanation by recordings that were kept from it, or without such by leaving conditions out in turn."""
-    every = range(len(judge.evidence))
+    every = range(len(problem.dataset))
     left = sum(b.normal()[2] for b in fitted.blocks)
-    train = _score([_rated(judge, fitted, r) for r in every], float(np.sqrt(left / sum(b.size for b in fitted.blocks))))
+    train = _score(
+        [_rated(problem, fitted, r) for r in every], float(np.sqrt(left / sum(b.size for b in fitted.blocks)))
+    )
     held = held_out(fitted, groups)
-    rows = [(e.name, float(v)) for e, v in zip(judge.evidence, held.nrmse, strict=True)]
+    rows = [(e.name, float(v)) for e, v in zip(problem.dataset, held.nrmse, strict=True)]
     if not kept:
         scores = {"training": train, "held_out": replace(train, nrmse=held.total)}
         return Judged(scores=scores, held=held, by_recording=tuple(rows))
-    other = Judge(kept)
+    other = Problem(kept)
     align(other)
     apart = predicted(other, fitted)
     if apart is None:
@@ -49,26 +51,26 @@ def judged(judge: Judge, fitted: Fitted, kept: Sequence[Evidence], groups: Seque
     return Judged(scores={"training": train, "held_out": score}, held=held, by_recording=tuple(rows))
 
 
-def before_a_blow(evidence: Sequence[Evidence], fitted: Fitted) -> float | None:
-    """Misfit over the noise of all samples before the first blow, where no run scatters; None where none does after.
+def before_an_impact(dataset: Sequence[Dataset], fitted: Fitted) -> float | None:
+    """Misfit over the noise of all samples before the first impact, where no run scatters; None where none does after.
 
-    None of few too; those at a start, which have no past to be whitened with, are none. Samples beyond a blow count for
-    less the more runs scatter there, and less is left of what they miss, too.
+    None of few too; those at a start, which have no past to be whitened with, are none. Samples beyond an impact count
+    for less the more runs scatter there, and less is left of what they miss, too.
     """
-    if all(e.expected is None for e in evidence):
+    if all(e.expected is None for e in dataset):
         return None
-    early = np.concatenate([b.plain_residual[e.early] for e, b in zip(evidence, fitted.blocks, strict=True)])
+    early = np.concatenate([b.plain_residual[e.early] for e, b in zip(dataset, fitted.blocks, strict=True)])
     telling = early[early != 0.0]
     return float(np.sqrt(np.mean(telling**2))) if telling.size >= FEWEST else None
 
 
-def predicted(judge: Judge, fitted: Fitted, rounds: int = 5) -> Fitted | None:
+def predicted(problem: Problem, fitted: Fitted, rounds: int = 5) -> Fitted | None:
     """An explanation carried over to other recordings: only their own time shifts are fitted."""
     blocks = []
-    for r in range(len(judge.evidence)):
-        at, best = judge.shifts[r], None
+    for r in range(len(problem.dataset)):
+        at, best = problem.shifts[r], None
         for _ in range(rounds):
-            block = judge.block(r, fitted.candidates, fitted.x, at, 0.0)
+            block = problem.block(r, fitted.candidates, fitted.x, at, 0.0)
             if block is None:
                 return None
             if best is None or block.total < best.total:
@@ -79,10 +81,10 @@ def predicted(judge: Judge, fitted: Fitted, rounds: int = 5) -> Fitted | None:
     return Fitted(candidates=fitted.candidates, x=fitted.x, blocks=tuple(blocks))
 
 
-def _rated(judge: Judge, fitted: Fitted, r: int) -> tuple[list[float], list[float]]:
+def _rated(problem: Problem, fitted: Fitted, r: int) -> tuple[list[float], list[float]]:
     """ISO ratings of one recording's channels, and the error of its peak force, where they can be had."""
-    e, block = judge.evidence[r], fitted.blocks[r]
-    predicted = e.simulator.predict(judge.changes(fitted.candidates, fitted.x), block.shift)
+    e, block = problem.dataset[r], fitted.blocks[r]
+    predicted = e.simulator.predict(problem.changes(fitted.candidates, fitted.x), block.shift)
     if predicted is None:
         return [], []
     ratings, peaks = [], []

@@ -1,6 +1,6 @@
 """What the misfit of a vehicle's motion depends on: one channel, regressed on one quantity of the motion after another.
 
-What is missing moves all that comes after it, and after a blow chance does: so it is the whitened misfit w of the
+What is missing moves all that comes after it, and after an impact chance does: so it is the whitened misfit w of the
 chassis' channel that misses most that is explained, samples for what they count in the fit, by a function of a quantity
 q common to all recordings, piecewise linear. Of a rate of turn also what has grown with it, integral f(q) dt: a moment
 that acts. A quantity's share is what its function, fitted to all other conditions, takes from the excess of w'w over
@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
-from rollover.diagnosis.inference.bases import TIME, hats
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.inference.bases import TIME, linear_b_splines
 from rollover.diagnosis.inference.chassis import ABOUT, ALONG
 
 Array = NDArray[np.float64]
@@ -39,19 +39,19 @@ class Seen:
     noise: float
 
 
-def dependency(judge: Judge, base: Fitted) -> tuple[tuple[str, float], ...]:
+def dependency(problem: Problem, base: Fitted) -> tuple[tuple[str, float], ...]:
     """Quantities with their shares, which add up to at most 1, the first the one that predicts most; () if none does.
 
     Empty where no instrument sits at the chassis' centre of mass, or where it misses by no more than noise does.
     """
     channels = [f"{stem}{axis}" for stem in (ALONG, ABOUT) for axis in "xyz"]
-    every = {channel: _seen(judge, base, channel) for channel in channels}
+    every = {channel: _seen(problem, base, channel) for channel in channels}
     excess = {c: sum(float(s.misfit @ s.misfit) - s.noise for s in seen) for c, seen in every.items() if seen}
     most = max(excess, key=lambda c: excess[c], default=None)
     if most is None or excess[most] <= 0.0:
         return ()
     seen = every[most]
-    models = [(name, _columns(judge, base, seen, name, grown)) for name, grown in _ways(seen, most.startswith(ABOUT))]
+    models = [(name, _columns(problem, base, seen, name, grown)) for name, grown in _ways(seen, most.startswith(ABOUT))]
     held: list[Array] | None = None
     shares: list[tuple[str, float]] = []
     for _ in range(MOST):
@@ -70,16 +70,16 @@ def dependency(judge: Judge, base: Fitted) -> tuple[tuple[str, float], ...]:
     return tuple(shares)
 
 
-def _seen(judge: Judge, base: Fitted, channel: str) -> list[Seen]:
+def _seen(problem: Problem, base: Fitted, channel: str) -> list[Seen]:
     """A channel in the recordings that have it at the chassis' centre of mass."""
     found = []
-    for r, (e, block) in enumerate(zip(judge.evidence, base.blocks, strict=True)):
+    for r, (e, block) in enumerate(zip(problem.dataset, base.blocks, strict=True)):
         if channel in e.recording.sensors:
             continue
         for s, part in e.spans():
             if s.channel == channel and (state := e.simulator.state(block.shift)):
                 counts = np.ones(s.rows.size) if s.weight is None else s.weight
-                counts = counts if block.course is None else counts * block.course.samples[part]
+                counts = counts if block.heavy_tail is None else counts * block.heavy_tail.samples[part]
                 of = {TIME: e.recording.time[s.rows]}
                 of |= {c: state[c][s.rows] for c in (*STATE, *FURTHER) if c in state}
                 found.append(
@@ -97,12 +97,12 @@ def _ways(seen: Sequence[Seen], turns: bool) -> list[tuple[str, bool]]:
     return [(name, grown) for name in shared for grown in ((False, True) if turns else (False,))]
 
 
-def _columns(judge: Judge, base: Fitted, seen: Sequence[Seen], name: str, grown: bool) -> list[Array]:
+def _columns(problem: Problem, base: Fitted, seen: Sequence[Seen], name: str, grown: bool) -> list[Array]:
     """What functions of a quantity do to the whitened channel, (n, k) each."""
     knots = np.unique(np.quantile(np.concatenate([s.of[name] for s in seen]), np.linspace(0.0, 1.0, KNOTS)))
     found = []
     for s in seen:
-        basis, e = hats(s.of[name], knots), judge.evidence[s.recording]
+        basis, e = linear_b_splines(s.of[name], knots), problem.dataset[s.recording]
         if grown:
             basis = np.cumsum(basis, axis=0) * float(np.median(np.diff(s.of[TIME])))
         raw = np.zeros((e.count, basis.shape[1]))

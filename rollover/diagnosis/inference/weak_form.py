@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ground.empirical import TERMS, shape
 from ground.law import REFERENCE_AREA, along
-from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.inference.bases import motion
 from rollover.scenario import Scenario
 from rollover.spec.initiation import Drop
@@ -50,13 +50,13 @@ class Balance:
         return self.weights @ np.stack([shape(name, x, u, w) for name in TERMS], axis=1)
 
 
-def balances(scenarios: Sequence[Scenario], evidence: Sequence[Evidence]) -> list[Balance]:
+def balances(scenarios: Sequence[Scenario], dataset: Sequence[Dataset]) -> list[Balance]:
     """(D4) of each recording that has what it takes, force on the reference face; scenarios under their conditions."""
-    found = [_balance(s, e) for s, e in zip(scenarios, evidence, strict=True)]
+    found = [_balance(s, e) for s, e in zip(scenarios, dataset, strict=True)]
     return [one for one in found if one is not None]
 
 
-def _balance(scenario: Scenario, e: Evidence) -> Balance | None:
+def _balance(scenario: Scenario, e: Dataset) -> Balance | None:
     striker, start, r = scenario.vehicle, scenario.initiation, e.recording
     if not isinstance(striker, Striker) or not isinstance(start, Drop) or striker.nose == "cone":
         return None
@@ -73,8 +73,8 @@ def _balance(scenario: Scenario, e: Evidence) -> Balance | None:
         return None
     rows = rows[:: max(1, rows.size // MOST_ROWS)]
     t, dt = time[rows], np.gradient(time[rows])
-    phi, curved = _tests(t)
-    weights = phi * dt
+    dispersion, curved = _tests(t)
+    weights = dispersion * dt
     area = striker.face_length * striker.face_width / REFERENCE_AREA
     spring = area * along(scenario.ground.law, z[rows], v[rows], speed=touch)
     seen = "striker/acceleration_z" in r.channels
@@ -104,6 +104,6 @@ def _tests(t: Array) -> tuple[Array, Array]:
     c = np.cos(0.5 * np.pi * np.clip((t[None] - centres) / half, -1.0, 1.0))
     rate = 0.5 * np.pi / half
     scale = 4.0 / (3.0 * half)  # integral of cos^4 over the window: 3/4 half
-    phi = scale * c**4
+    dispersion = scale * c**4
     curved = scale * rate**2 * (12.0 * c**2 * (1.0 - c**2) - 4.0 * c**4)
-    return phi, curved
+    return dispersion, curved

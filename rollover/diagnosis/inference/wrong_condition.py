@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rollover.diagnosis.data.dataset import Evidence, Signal
+from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.data.inconsistent import Aside, factor_of
 from rollover.diagnosis.fit.time_shift import WIDTH
 from rollover.effects import spoken
@@ -33,7 +33,7 @@ ALIKE, FALLS = 4.0, 4.0  # times the power that the others miss, at most, and le
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Misstated(Aside):
+class WrongCondition(Aside):
     """A recording that was made at another `speed` (m/s) than it states, as its sinkage, `signal`, shows first."""
 
     speed: float
@@ -42,14 +42,14 @@ class Misstated(Aside):
 
     def says(self) -> str:
         """The sentence on it."""
-        stated = spoken(_speed(self.evidence))
+        stated = spoken(_speed(self.dataset))
         return (
-            f"{self.evidence.name}: beside the others it is a drop at about {self.speed:.2g} m/s, not at the stated "
+            f"{self.dataset.name}: beside the others it is a drop at about {self.speed:.2g} m/s, not at the stated "
             f"{stated} m/s; it was left aside."
         )
 
 
-def misstated(every: Sequence[Evidence]) -> list[Misstated]:
+def wrong_conditions(every: Sequence[Dataset]) -> list[WrongCondition]:
     """The one recording, if any, that contradicts the speed that it states and all others."""
     known = [e for e in every if _speed(e) > 0.0 and np.isfinite(e.simulator.contact)]
     if not FEWEST <= len(known) == len(every):
@@ -71,10 +71,10 @@ def misstated(every: Sequence[Evidence]) -> list[Misstated]:
     alike = left < ALIKE * max(power for k, (_, power) in enumerate(best) if k != r)
     if more * d < 0.0 or abs(more) < OTHER or not alike or left > stated / FALLS:
         return []
-    return [Misstated(evidence=e, signal=signal, speed=_speed(e) * math.exp(more))]
+    return [WrongCondition(dataset=e, signal=signal, speed=_speed(e) * math.exp(more))]
 
 
-def _dropped(e: Evidence) -> tuple[float, float]:
+def _dropped(e: Dataset) -> tuple[float, float]:
     """Logarithm of the speed, over the stated one, at which a recording is met best, and what is left there."""
     from scipy.optimize import minimize_scalar
 
@@ -87,7 +87,7 @@ def _dropped(e: Evidence) -> tuple[float, float]:
     return float(found.x), float(found.fun)
 
 
-def _missed(e: Evidence, speed: float) -> float:
+def _missed(e: Dataset, speed: float) -> float:
     """Power over the noise that a recording misses the simulation at a speed (m/s) by, at its best time shift."""
     from scipy.optimize import minimize_scalar
 
@@ -115,12 +115,12 @@ def _off(r: int, x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
     return float(y[r] - A[r] @ line), scatter * math.sqrt(1.0 + wide)
 
 
-def _factor(e: Evidence, s: Signal) -> float:
+def _factor(e: Dataset, s: Signal) -> float:
     """How many times what is simulated a signal reads; 0 where the two are not alike."""
     made = (e.simulator.predict({}, 0.0) or {}).get(s.channel)
     return 0.0 if made is None else factor_of(e, s, made) or 0.0
 
 
-def _speed(e: Evidence) -> float:
+def _speed(e: Dataset) -> float:
     stated = e.recording.conditions.get(SPEED)
     return float(stated) if isinstance(stated, (int, float)) else 0.0

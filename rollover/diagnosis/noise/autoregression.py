@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import Evidence, Signal, by_differences
-from rollover.diagnosis.forward.forward_model import blow_of
+from rollover.diagnosis.data.dataset import Dataset, Signal, by_differences
+from rollover.diagnosis.forward.forward_model import first_impact_of
 from rollover.diagnosis.noise.drift import is_recorders
-from rollover.diagnosis.noise.outliers import LOUDER, without_bursts
+from rollover.diagnosis.noise.outliers import LOUDER, without_outliers
 from rollover.diagnosis.noise.spectral_lines import lines, without
 from rollover.recording.filters import attenuation, least_rate
 from rollover.recording.noise_floor import LENGTH, NoiseFloor, grown, noise_floor
@@ -47,17 +47,17 @@ AGREES = 2.0  # standard errors within which a memory is that of a filter
 BANDS = 2048  # frequencies that the noise behind a filter is summed over
 
 
-def quiet(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evidence]:
+def quiet(dataset: Sequence[Dataset], residuals: Sequence[Array]) -> list[Dataset]:
     """The evidence with its noise from the quiet stretches of the misfits (SI, stacked), recordings alike together."""
-    found = [list(e.signals) for e in evidence]
-    humming = hums(evidence, residuals)
-    for members in alike(evidence):
+    found = [list(e.signals) for e in dataset]
+    humming = line_spectra(dataset, residuals)
+    for members in alike(dataset):
         misfits, values = [], []
         for r, _, s, part in members:
-            told = _before_the_blow(evidence[r], s)
-            without_hum = _cleaned(evidence[r], s, residuals[r][part], humming)
-            misfits.append((without_hum / s.loudness)[told])
-            values.append(((s.values - residuals[r][part] + without_hum) / s.loudness)[told])
+            told = _before_the_impact(dataset[r], s)
+            without_lines = _cleaned(dataset[r], s, residuals[r][part], humming)
+            misfits.append((without_lines / s.heteroscedasticity)[told])
+            values.append(((s.values - residuals[r][part] + without_lines) / s.heteroscedasticity)[told])
         sizes = unlike(misfits, values)
         misfits, values = ([v / size for v, size in zip(each, sizes, strict=True)] for each in (misfits, values))
         common = _quieter(misfits, values)
@@ -70,9 +70,9 @@ def quiet(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evid
             found[r][k] = replace(s, noise=best.sigma * size, ar=best.ar)
     found = [
         [replace(with_noise(s, s.noise, s.ar, e.model_error), at_rest=(s.noise, s.ar)) for s in f]
-        for e, f in zip(evidence, found, strict=True)
+        for e, f in zip(dataset, found, strict=True)
     ]
-    return [replace(e, signals=tuple(s)) for e, s in zip(evidence, found, strict=True)]
+    return [replace(e, signals=tuple(s)) for e, s in zip(dataset, found, strict=True)]
 
 
 def unlike(misfits: Sequence[Array], values: Sequence[Array]) -> Array:
@@ -94,28 +94,30 @@ def unlike(misfits: Sequence[Array], values: Sequence[Array]) -> Array:
     return np.exp(apart) if chdtrc(len(misfits) - 1, float(worth @ apart**2)) < BY_CHANCE else even
 
 
-def _before_the_blow(e: Evidence, s: Signal) -> slice:
-    """Samples that tell a noise: after a blow what chance makes of a run is quiet nowhere; all if these are too few."""
-    n = int(np.searchsorted(e.recording.time[s.rows], blow_of(e.simulator)))
+def _before_the_impact(e: Dataset, s: Signal) -> slice:
+    """Samples that tell a noise: after an impact what chance makes of a run is quiet nowhere; all if too few."""
+    n = int(np.searchsorted(e.recording.time[s.rows], first_impact_of(e.simulator)))
     return slice(n if n >= LENGTH else None)
 
 
-def whole(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evidence]:
+def whole(dataset: Sequence[Dataset], residuals: Sequence[Array]) -> list[Dataset]:
     """The evidence with its noise from all of the misfits: an autoregression by least squares, recordings together."""
-    found = [list(e.signals) for e in evidence]
-    humming = hums(evidence, residuals)
+    found = [list(e.signals) for e in dataset]
+    humming = line_spectra(dataset, residuals)
     shared: list[tuple[list[Member], list[Array]]] = []
-    for members in alike(evidence):
-        members = [m for m in members if not evidence[m[0]].is_rough(m[2])]
-        parts = [_cleaned(evidence[r], s, residuals[r][part], humming) / s.loudness for r, _, s, part in members]
+    for members in alike(dataset):
+        members = [m for m in members if not dataset[m[0]].model_error_dominates(m[2])]
+        parts = [
+            _cleaned(dataset[r], s, residuals[r][part], humming) / s.heteroscedasticity for r, _, s, part in members
+        ]
         # what comes now and then is no noise
         if members and not any(is_bursting(m[2], part, _level(part)) for m, part in zip(members, parts, strict=True)):
             shared.append((members, parts))
     told = [one for both in shared for one in _told(*both, autoregression)]
     slow = slower(told)
-    misfits: dict[str, list[tuple[Evidence, Signal, Array]]] = {}
+    misfits: dict[str, list[tuple[Dataset, Signal, Array]]] = {}
     for members, parts in shared:
-        each = ((evidence[r], s, p) for (r, _, s, _), p in zip(members, parts, strict=True))
+        each = ((dataset[r], s, p) for (r, _, s, _), p in zip(members, parts, strict=True))
         misfits.setdefault(members[0][2].channel, []).extend(each)
     far = {channel for channel, every in misfits.items() if is_recorders(every)}
     if slow <= far:
@@ -124,8 +126,8 @@ def whole(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> list[Evid
         slow = set()
     for r, k, s, sigma, ar in told:
         if s.channel not in slow:
-            found[r][k] = with_noise(s, sigma, ar, evidence[r].model_error)
-    return [replace(e, signals=tuple(s)) for e, s in zip(evidence, found, strict=True)]
+            found[r][k] = with_noise(s, sigma, ar, dataset[r].model_error)
+    return [replace(e, signals=tuple(s)) for e, s in zip(dataset, found, strict=True)]
 
 
 def _told(members: Sequence[Member], parts: Sequence[Array], memory: Memory) -> list[Told]:
@@ -147,10 +149,10 @@ def _level(misfit: Array) -> float:
     return max(float(np.sqrt(np.mean(misfit**2))), 1e-300)
 
 
-def hums(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> dict[str, tuple[float, ...]]:
+def line_spectra(dataset: Sequence[Dataset], residuals: Sequence[Array]) -> dict[str, tuple[float, ...]]:
     """Lines (Hz) in the misfits of each channel."""
     found: dict[str, tuple[list[Array], list[Array]]] = {}
-    for e, residual in zip(evidence, residuals, strict=True):
+    for e, residual in zip(dataset, residuals, strict=True):
         for s, part in e.spans():
             times, misfits = found.setdefault(s.channel, ([], []))
             times.append(e.recording.time[s.rows])
@@ -158,7 +160,7 @@ def hums(evidence: Sequence[Evidence], residuals: Sequence[Array]) -> dict[str, 
     return {channel: lines(*both) for channel, both in found.items()}
 
 
-def _cleaned(e: Evidence, s: Signal, misfit: Array, humming: Mapping[str, tuple[float, ...]]) -> Array:
+def _cleaned(e: Dataset, s: Signal, misfit: Array, humming: Mapping[str, tuple[float, ...]]) -> Array:
     """A misfit without the lines of its channel."""
     return without(e.recording.time[s.rows], misfit, humming[s.channel])
 
@@ -194,7 +196,7 @@ def tolerated(memory: float, count: float) -> float:
 
 def is_bursting(s: Signal, misfit: Array, level: float) -> bool:
     """Whether a misfit (n,) is much less beside its bursts; digits that leap are none."""
-    return s.step == 0.0 and level > LOUDER * float(np.sqrt(np.mean(without_bursts(misfit) ** 2)))
+    return s.step == 0.0 and level > LOUDER * float(np.sqrt(np.mean(without_outliers(misfit) ** 2)))
 
 
 def level_of(sigma: float, ar: tuple[float, ...]) -> float:
@@ -202,13 +204,13 @@ def level_of(sigma: float, ar: tuple[float, ...]) -> float:
     return sigma / grown(ar) / max(1.0 - sum(ar), 1.0 - STEADY)
 
 
-def alike(evidence: Sequence[Evidence]) -> list[list[Member]]:
+def alike(dataset: Sequence[Dataset]) -> list[list[Member]]:
     """Signals (recording, place, signal, its part of the stack) of one channel that share a recorder.
 
     The same rate, as many samples averaged, the same filter class.
     """
     groups: list[tuple[tuple[str, int | None, int], float, list[Member]]] = []
-    for r, e in enumerate(evidence):
+    for r, e in enumerate(dataset):
         for k, (s, part) in enumerate(e.spans()):
             what = (s.channel, e.recording.cfc.get(s.channel), e.averaged)
             rate = -float(np.log(np.median(np.diff(e.recording.time[s.rows]))))
@@ -244,16 +246,16 @@ class Rest:
         )
 
 
-def rests(evidence: Sequence[Evidence]) -> list[dict[str, Rest]]:
+def rests(dataset: Sequence[Dataset]) -> list[dict[str, Rest]]:
     """What is left of each recording's noises by channel: of white noise behind the filter class that is declared.
 
     Only where samples are weighed: elsewhere noise is held against its own roughness, not against what is expected.
     """
-    found: list[dict[str, Rest]] = [{s.channel: Rest() for s in e.signals} for e in evidence]
-    for members in alike(evidence):
-        told = sum(int(evidence[r].early[part].sum()) for r, _, _, part in members)
+    found: list[dict[str, Rest]] = [{s.channel: Rest() for s in e.signals} for e in dataset]
+    for members in alike(dataset):
+        told = sum(int(dataset[r].early[part].sum()) for r, _, _, part in members)
         for r, _, s, _ in members:
-            e = evidence[r]
+            e = dataset[r]
             cfc = e.recording.cfc.get(s.channel)
             if s.weight is None or cfc is None or e.averaged > 1 or len(s.ar) != 1:
                 continue
@@ -337,7 +339,7 @@ def _quieter(misfits: Sequence[Array], own: Sequence[Array]) -> NoiseFloor | Non
         return None
     best, other = _floor(misfits), _floor(own)
     best = other if other.sigma < CLEARLY * best.sigma else best
-    beside = _floor([without_bursts(v) for v in misfits])
+    beside = _floor([without_outliers(v) for v in misfits])
     return beside if 0.0 < LOUDER * beside.sigma < best.sigma else best
 
 

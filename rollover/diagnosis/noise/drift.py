@@ -21,7 +21,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import Evidence, Signal
+from rollover.diagnosis.data.dataset import Dataset, Signal
 
 Array = NDArray[np.float64]
 TERMS = 5  # cosines of a stretch, the first of them its mean
@@ -33,7 +33,7 @@ SLOW, LOUDER, ALIKE = 0.01, 0.01, 0.02  # p-values of (A1), below, of (A2) and (
 STEADY = 0.99  # memory of a quiet noise, at most
 
 
-def is_recorders(told: Sequence[tuple[Evidence, Signal, Array]]) -> bool:
+def is_recorders(told: Sequence[tuple[Dataset, Signal, Array]]) -> bool:
     """Whether slow misfits (n,) of a channel, one of each recording, are its recorder's noise; not if none can tell."""
     ends = [int(np.searchsorted(e.recording.time[s.rows], e.simulator.contact)) for e, s, _ in told]
     if len(told) < FEWEST or any(n < LEAST or w.size < 2 * n for n, (_, _, w) in zip(ends, told, strict=True)):

@@ -8,8 +8,8 @@ differ by there is no mismatch. With scatter s(t) beside the noise sigma, each s
 of what it would: L samples of the scatter go together, so that each of them is worth 1/L of one that stands alone;
 c makes up for the few neighbours.
 
-Few neighbours do not show every course that a run may take. One that takes another after a blow begins it anew from a
-state of d = 14 numbers, place and speed of the chassis in six degrees of freedom and of the front axle in one, which
+Few neighbours do not show every course that a run may take. One that takes another after an impact begins it anew from
+a state of d = 14 numbers, place and speed of the chassis in six degrees of freedom and of the front axle in one, which
 nobody knows the size of. What such a state leaves beyond the E that is expected, x, has the likelihood of d normal
 numbers of unknown variance,
 
@@ -36,8 +36,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import Evidence, Signal
-from rollover.diagnosis.forward.forward_model import blow_of
+from rollover.diagnosis.data.dataset import Dataset, Signal
+from rollover.diagnosis.forward.forward_model import first_impact_of
 
 Array = NDArray[np.float64]
 WINDOW = 0.02  # s, over which the neighbours' squares are averaged: what is off by a little in time is off in size
@@ -53,33 +53,35 @@ OTHERS = 2  # neighbours at least that tell how far one more may go
 FAR = 9.0  # times the middle power of neighbours, beyond which one took another course
 
 
-def weighted(e: Evidence, strays: Sequence[Mapping[str, Array]]) -> Evidence:
-    """The evidence with each sample's weight (D3); `strays` are the neighbours' deviations at its stamps."""
-    blow = blow_of(e.simulator)
-    strays = alike(e, strays, blow)
-    if not strays:
+def weighted(e: Dataset, perturbed: Sequence[Mapping[str, Array]]) -> Dataset:
+    """The evidence with each sample's weight (D3); `perturbed` are the neighbours' deviations at its stamps."""
+    first_impact = first_impact_of(e.simulator)
+    perturbed = alike(e, perturbed, first_impact)
+    if not perturbed:
         return e
-    signals = tuple(_weighted(e, s, np.stack([d[s.channel][s.rows] for d in strays])) for s in e.signals)
-    stacked = [e.raw(d) for d in strays]
-    return replace(e, signals=signals, strays=tuple(d for d in stacked if np.all(np.isfinite(d))), blow=blow)
+    signals = tuple(_weighted(e, s, np.stack([d[s.channel][s.rows] for d in perturbed])) for s in e.signals)
+    stacked = [e.raw(d) for d in perturbed]
+    return replace(
+        e, signals=signals, perturbed=tuple(d for d in stacked if np.all(np.isfinite(d))), first_impact=first_impact
+    )
 
 
-def alike(e: Evidence, strays: Sequence[Mapping[str, Array]], blow: float) -> list[Mapping[str, Array]]:
-    """Neighbours without those that took a clearly other course after the `blow` (s): (D9) is for these."""
-    late = [(s, s.rows[e.recording.time[s.rows] >= blow]) for s in e.signals]
-    power = [sum(float(np.nansum((d[s.channel][rows] / s.sigma) ** 2)) for s, rows in late) for d in strays]
+def alike(e: Dataset, perturbed: Sequence[Mapping[str, Array]], first_impact: float) -> list[Mapping[str, Array]]:
+    """Neighbours without those that took a clearly other course after the `first_impact` (s): (D9) is for these."""
+    late = [(s, s.rows[e.recording.time[s.rows] >= first_impact]) for s in e.signals]
+    power = [sum(float(np.nansum((d[s.channel][rows] / s.sigma) ** 2)) for s, rows in late) for d in perturbed]
     most = FAR * float(np.median(power)) if power else 0.0
-    return [d for d, p in zip(strays, power, strict=True) if p <= most]
+    return [d for d, p in zip(perturbed, power, strict=True) if p <= most]
 
 
-def _weighted(e: Evidence, s: Signal, strays: Array) -> Signal:
-    """A signal with its weights; `strays` (k, n), SI."""
-    strays = strays[np.all(np.isfinite(strays), axis=1)]
-    if not len(strays):
+def _weighted(e: Dataset, s: Signal, perturbed: Array) -> Signal:
+    """A signal with its weights; `perturbed` (k, n), SI."""
+    perturbed = perturbed[np.all(np.isfinite(perturbed), axis=1)]
+    if not len(perturbed):
         return s
     time = e.recording.time[s.rows]
-    scatter = averaged(np.mean(strays**2, axis=0), time)
-    together = min(memory(strays), max(1.0, LONGEST / float(np.median(np.diff(time)))))
+    scatter = averaged(np.mean(perturbed**2, axis=0), time)
+    together = min(memory(perturbed), max(1.0, LONGEST / float(np.median(np.diff(time)))))
     weight = s.sigma / np.sqrt(s.sigma**2 + FEW * together * scatter)
     return s if weight.min() > UNTOUCHED else replace(s, weight=weight)
 
@@ -93,20 +95,20 @@ def averaged(squares: Array, time: Array) -> Array:
     return np.asarray((sums[high] - sums[low]) / (high - low))
 
 
-def memory(strays: Array) -> float:
+def memory(perturbed: Array) -> float:
     """How many samples of deviations (k, n) go together: (1 + rho)/(1 - rho), rho from one sample to the next."""
-    power = float(np.sum(strays**2))
+    power = float(np.sum(perturbed**2))
     if power <= 0.0:
         return 1.0
-    rho = float(np.sum(strays[:, 1:] * strays[:, :-1])) / power
+    rho = float(np.sum(perturbed[:, 1:] * perturbed[:, :-1])) / power
     return max(1.0, (1.0 + rho) / max(1.0 - rho, 1e-3))
 
 
 @dataclass(frozen=True, kw_only=True)
-class Course:
+class HeavyTail:
     """What samples count in sums of squares where a run took another course, and what is added to such a sum.
 
-    `samples` (n,) are the roots of (D11), 1 before the blow; `share` is (D9) over the plain sum of what comes after.
+    `samples` (n,) are the roots of (D11), 1 before the impact; `share` is (D9) over the plain sum of what comes after.
     """
 
     samples: Array
@@ -115,7 +117,7 @@ class Course:
 
     @property
     def late(self) -> NDArray[np.bool_]:
-        """Samples (n,) after the blow."""
+        """Samples (n,) after the impact."""
         return self.samples < 1.0
 
     @property
@@ -124,7 +126,7 @@ class Course:
         return float(self.samples.min()) ** 2
 
 
-def course(e: Evidence, residual: Array) -> Course | None:
+def heavy_tail(e: Dataset, residual: Array) -> HeavyTail | None:
     """How a whitened misfit (n,) counts by (D9); None where all samples count in full."""
     found = _beyond(e, residual**2)
     if found is None:
@@ -133,25 +135,25 @@ def course(e: Evidence, residual: Array) -> Course | None:
     share = _share(expected, beyond)
     slope = STATE / (STATE + beyond)
     left = float(np.sum(residual[inside] ** 2))
-    return Course(samples=np.where(inside, np.sqrt(slope), 1.0), share=share, more=(share - slope) * left)
+    return HeavyTail(samples=np.where(inside, np.sqrt(slope), 1.0), share=share, more=(share - slope) * left)
 
 
-def unseen(e: Evidence) -> Array:
+def unseen(e: Dataset) -> Array:
     """Neighbours (k, n), whitened, each weighed by what the others scatter: the recording is none of them either."""
     found = []
-    for k, stray in enumerate(e.strays):
-        others = [d for j, d in enumerate(e.strays) if j != k]
+    for k, perturbed_run in enumerate(e.perturbed):
+        others = [d for j, d in enumerate(e.perturbed) if j != k]
         alone = tuple(
             _weighted(e, replace(s, weight=None), np.stack([d[part] for d in others])) if len(others) >= OTHERS else s
             for s, part in e.spans()
         )
-        found.append(e.eased(replace(e, signals=alone).whitened(stray)))
+        found.append(e.marginalised(replace(e, signals=alone).whitened(perturbed_run)))
     return np.array(found).reshape(-1, e.count)
 
 
-def shares(e: Evidence, strays: Array) -> Array:
-    """(k,): what a recording that differs as neighbours (k, n) do would count after the blow, of its sum of squares."""
-    found = [_beyond(e, e.due + stray**2) for stray in strays]
+def shares(e: Dataset, perturbed: Array) -> Array:
+    """(k,): what a recording that differs as neighbours (k, n) do counts after the impact, of its sum of squares."""
+    found = [_beyond(e, e.due + perturbed_run**2) for perturbed_run in perturbed]
     return np.array([1.0 if f is None else _share(f[0], f[1]) for f in found])
 
 
@@ -160,16 +162,16 @@ def _share(expected: float, beyond: float) -> float:
     return float((expected + STATE * np.log1p(beyond / STATE)) / (expected + beyond))
 
 
-def _beyond(e: Evidence, squares: Array) -> tuple[float, float, NDArray[np.bool_]] | None:
-    """E and x of (D9), and the samples after the blow, of squares (n,) of a misfit; None where x is not above 0.
+def _beyond(e: Dataset, squares: Array) -> tuple[float, float, NDArray[np.bool_]] | None:
+    """E and x of (D9), and the samples after the impact, of squares (n,) of a misfit; None where x is not above 0.
 
-    None too of a recording that begins after it: nothing shows that it came to the blow as its run did.
+    None too of a recording that begins after it: nothing shows that it came to the impact as its run did.
     """
     if len(e.signals) < ALONE or not any(s.weight is not None for s in e.signals) or not e.early.any():
         return None
     over, expected, inside = [], 0.0, np.zeros(squares.size, dtype=bool)
     for s, part in e.spans():
-        later = e.recording.time[s.rows] >= e.blow
+        later = e.recording.time[s.rows] >= e.first_impact
         if not later.any():
             continue
         inside[part] = later
@@ -192,7 +194,7 @@ def gained(less: Array, slope: float) -> Array:
     return np.asarray(-STATE * np.log1p(-within / STATE) + (less - within) / slope)
 
 
-def is_other(found: Course | None) -> bool:
+def is_other(found: HeavyTail | None) -> bool:
     """Whether a recording took a clearly other course than its run."""
     return found is not None and found.share < OTHER
 

@@ -6,7 +6,7 @@ period keeps a thousandth of its size). Sorted by the value their median size s 
     s^2 = a + b y + c y^2,   level(y) = sqrt(s^2(y)/min s^2)                                                    (D10)
 
 in units of the smallest. Only what is clear in all recordings of a channel counts: a kink or a filter does a little of
-the same. What comes after a blow in an overturn is left out: there one contact follows another.
+the same. What comes after an impact in an overturn is left out: there one contact follows another.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import Evidence, Signal
-from rollover.diagnosis.forward.forward_model import blow_of
+from rollover.diagnosis.data.dataset import Dataset, Signal
+from rollover.diagnosis.forward.forward_model import first_impact_of
 from rollover.diagnosis.noise.autoregression import alike
 from rollover.recording.noise_floor import LENGTH, USUAL
 
@@ -33,23 +33,23 @@ SPREAD = 1.17 * 3.0**0.5  # standard error of ln s times sqrt(samples): of a med
 SMOOTHED = 9  # samples, over which the value is averaged
 
 
-def with_loudness(evidence: Sequence[Evidence]) -> list[Evidence]:
+def with_variance_model(dataset: Sequence[Dataset]) -> list[Dataset]:
     """The evidence with each sample's noise where that clearly grows with the value, (D10)."""
-    found = [list(e.signals) for e in evidence]
-    for members in alike(evidence):
-        told = [t for r, _, s, _ in members if (t := _told(evidence[r], s)) is not None and _varies(*t)]
+    found = [list(e.signals) for e in dataset]
+    for members in alike(dataset):
+        told = [t for r, _, s, _ in members if (t := _told(dataset[r], s)) is not None and _varies(*t)]
         if not told or not _grows(told):
             continue
         law, least = _law(told)
         for r, k, s, _ in members:
             level = np.sqrt(np.maximum(np.polyval(law, _smoothed(s.values)), least) / least)
             found[r][k] = replace(s, level=level)
-    return [replace(e, signals=tuple(s)) for e, s in zip(evidence, found, strict=True)]
+    return [replace(e, signals=tuple(s)) for e, s in zip(dataset, found, strict=True)]
 
 
-def _told(e: Evidence, s: Signal) -> tuple[Array, Array] | None:
+def _told(e: Dataset, s: Signal) -> tuple[Array, Array] | None:
     """Values (n,) of a signal and the size of its noise there; None of too few or unevenly spaced samples."""
-    s = s.cut(e.recording.time[s.rows] < blow_of(e.simulator))
+    s = s.cut(e.recording.time[s.rows] < first_impact_of(e.simulator))
     stamps = np.diff(e.recording.time[s.rows])
     if s.values.size < max(BINS * FEWEST, LENGTH) or s.scatter > 0.0:
         return None  # the steps of digits are no noise

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import Evidence, Signal
+from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.noise.autoregression import level_of
 from rollover.diagnosis.noise.drift import along
 from rollover.effects import spoken
@@ -43,10 +43,10 @@ class Zero:
     slow: float = 0.0  # sum of squares of its first cosines beyond the mean, over what noise lets expect of each
 
 
-def with_zeros(evidence: Sequence[Evidence], residuals: Sequence[Array], shifts: Sequence[float]) -> list[Evidence]:
+def with_zeros(dataset: Sequence[Dataset], residuals: Sequence[Array], shifts: Sequence[float]) -> list[Dataset]:
     """The evidence with its zeros set where they differ; `residuals` (stacked, SI) at time `shifts` (s)."""
     by: dict[str, list[Zero]] = {}
-    for r, (e, residual, shift) in enumerate(zip(evidence, residuals, shifts, strict=True)):
+    for r, (e, residual, shift) in enumerate(zip(dataset, residuals, shifts, strict=True)):
         for k, (s, part) in enumerate(e.spans()):
             before = _before(e, s, shift)
             if before is not None and float(np.ptp((s.values - residual[part])[before])) < FLAT * s.sigma:
@@ -56,18 +56,18 @@ def with_zeros(evidence: Sequence[Evidence], residuals: Sequence[Array], shifts:
                 zero = Zero(r=r, k=k, off=float(early.mean()), error=float(error), slow=slow)
                 by.setdefault(s.channel, []).append(zero)
     able = [zeros for zeros in by.values() if len(zeros) >= FEWEST and all(z.error > 0.0 for z in zeros)]
-    found = [list(e.signals) for e in evidence]
+    found = [list(e.signals) for e in dataset]
     if _differ(able) and _stand(able):
         for z, off in ((z, off) for zeros in able for z, off in zip(zeros, _own(zeros), strict=True)):
             s = found[z.r][z.k]
             found[z.r][z.k] = replace(s, values=s.values - off, zero=off, zero_error=z.error)
-    return [replace(e, signals=tuple(s)) for e, s in zip(evidence, found, strict=True)]
+    return [replace(e, signals=tuple(s)) for e, s in zip(dataset, found, strict=True)]
 
 
-def by_zeros(evidence: Sequence[Evidence]) -> list[str]:
+def by_zeros(dataset: Sequence[Dataset]) -> list[str]:
     """A line for each channel whose zeros were set and do differ."""
     by: dict[str, list[Signal]] = {}
-    for s in (s for e in evidence for s in e.signals if s.zero_error > 0.0):
+    for s in (s for e in dataset for s in e.signals if s.zero_error > 0.0):
         by.setdefault(s.channel, []).append(s)
     spread = {channel: float(np.std([s.zero for s in each])) for channel, each in by.items()}
     return [
@@ -109,10 +109,10 @@ def _off(zeros: Sequence[Zero]) -> tuple[Array, Array]:
     return off - np.average(off, weights=error**-2.0), error
 
 
-def _before(e: Evidence, s: Signal, shift: float) -> slice | None:
+def _before(e: Dataset, s: Signal, shift: float) -> slice | None:
     """Samples of a signal that lie well before the first contact; None of too few."""
     time, contact = e.recording.time[s.rows], e.simulator.contact + shift
-    if not np.isfinite(contact) or e.simulator.effort.thrifty:
+    if not np.isfinite(contact) or e.simulator.effort.is_ensemble:
         return None
     n = int(np.searchsorted(time, time[0] + EARLY * (contact - time[0])))
     return slice(n) if n >= LEAST else None

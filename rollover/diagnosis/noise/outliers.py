@@ -17,7 +17,7 @@ FEWEST = 0.7  # of the samples, that lie beside the bursts
 RARE = 0.01  # of a channel's samples, that may lie far off by any noise
 
 
-def without_bursts(values: Array) -> Array:
+def without_outliers(values: Array) -> Array:
     """Evenly spaced values (n,), those far from their neighbours replaced by the middle one of these.
 
     As they are where so many lie far off that these are the rule.

@@ -1,4 +1,4 @@
-"""What comes long after a blow: the end of a long recording costs most of a run.
+"""What comes long after an impact: the end of a long recording costs most of a run.
 
 Where it hardly counts it is left aside, and looks at many candidates do without it.
 """
@@ -11,23 +11,23 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.data.dataset import Dataset
 
-LASTING = 0.6  # s after the blow that are always kept
+VALIDATED = 0.6  # s after the impact that are always kept
 SHORT = 0.1  # s that are not worth cutting off
 COUNTS = 0.3  # of what it would, on the average, from which on the end is kept
 BEYOND = 3.0  # times what noise and scatter leave, that the end is missed by and kept
 FEWEST = 8  # samples of a signal
 
 
-def shortened(e: Evidence, *, alone: bool = False) -> Evidence:
-    """The evidence without its end, where that counts little: long after a blow neighbours differ as effects do.
+def shortened(e: Dataset, *, alone: bool = False) -> Dataset:
+    """The evidence without its end, where that counts little: long after an impact neighbours differ as effects do.
 
     As it is where samples are not weighed, and where the end counts or differs by more than chance does. Of a recording
-    that is `alone` nothing after the blow is kept: whether an effect or another course of the run did it, only a second
-    one could tell.
+    that is `alone` nothing after the impact is kept: whether an effect or another course of the run did it, only a
+    second one could tell.
     """
-    time, end = e.recording.time, e.blow + (0.0 if alone else LASTING)
+    time, end = e.recording.time, e.first_impact + (0.0 if alone else VALIDATED)
     if not time[-1] > end + SHORT:
         return e
     late = np.concatenate([time[s.rows] > end for s in e.signals])
@@ -36,19 +36,19 @@ def shortened(e: Evidence, *, alone: bool = False) -> Evidence:
     return up_to(e, end) or e
 
 
-def soon(e: Evidence) -> Evidence:
-    """The evidence up to `LASTING` after the blow, the simulation's and the recording's; itself if it is no longer.
+def soon(e: Dataset) -> Dataset:
+    """The evidence up to `VALIDATED` after the impact, the simulation's and the recording's; itself if it is no longer.
 
     What happens later hangs on what happened until then. The recording's is when half of its channels have gone half of
     their range.
     """
     time = e.recording.time
     gone = [time[s.rows[np.argmax(2.0 * np.abs(s.values - s.values[0]) >= np.ptp(s.values))]] for s in e.signals]
-    end = max(e.blow, float(np.median(gone))) + LASTING
+    end = max(e.first_impact, float(np.median(gone))) + VALIDATED
     return (up_to(e, end) or e) if time[-1] > end + SHORT else e
 
 
-def up_to(e: Evidence, end: float, beyond: float = 0.0) -> Evidence | None:
+def up_to(e: Dataset, end: float, beyond: float = 0.0) -> Dataset | None:
     """What was recorded up to an end (s); None where a signal has too little of it.
 
     Its runs go on for `beyond` (s): a filter looks ahead.
@@ -61,7 +61,7 @@ def up_to(e: Evidence, end: float, beyond: float = 0.0) -> Evidence | None:
     return replace(e.cut(kept), recording=e.recording.until(n), simulator=e.simulator.until(n))
 
 
-def _differs(e: Evidence, late: NDArray[np.bool_]) -> bool:
+def _differs(e: Dataset, late: NDArray[np.bool_]) -> bool:
     """Whether the scenario as it is misses an end by more than noise and scatter do."""
     predicted = e.simulator.predict({}, 0.0)
     if predicted is None:
@@ -70,7 +70,7 @@ def _differs(e: Evidence, late: NDArray[np.bool_]) -> bool:
     return float(missed @ missed) > BEYOND * e.by_chance(late)
 
 
-def left_aside(every: Sequence[Evidence], found: Sequence[Evidence]) -> list[str]:
+def left_aside(every: Sequence[Dataset], found: Sequence[Dataset]) -> list[str]:
     """The ends of recordings that do not count, in sentences."""
     ends = {e.name: float(e.recording.time[-1]) for e in every}
     cut = [(e.name, float(e.recording.time[-1])) for e in found if float(e.recording.time[-1]) < ends[e.name]]

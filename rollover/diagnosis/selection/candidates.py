@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ground.law import REFERENCE_AREA, REFERENCE_MASS
-from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate, physical
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.effects import EFFECTS, Heard, Search, effects
@@ -33,7 +33,7 @@ def size_of(scenario: Scenario) -> tuple[float, float]:
 
 
 def candidates_of(
-    evidence: Sequence[Evidence],
+    dataset: Sequence[Dataset],
     switched_on: Iterable[str],
     acts: str,
     scenario: Any = None,
@@ -46,12 +46,12 @@ def candidates_of(
     effects()
     spans: dict[str, float] = {}
     ends: dict[str, float] = {}
-    for e in evidence:
+    for e in dataset:
         for s in e.signals:
             spans[s.channel] = max(spans.get(s.channel, 0.0), s.span)
             ends[s.channel] = max(ends.get(s.channel, 0.0), s.end)
-    found, times = [], _times(evidence)
-    tried = set_up(scenario, evidence[0].recording) if scenario is not None and evidence else scenario
+    found, times = [], _times(dataset)
+    tried = set_up(scenario, dataset[0].recording) if scenario is not None and dataset else scenario
     for name, kind in EFFECTS.items():
         if name in switched_on or acts not in kind.acts or not kind.competes:
             continue
@@ -137,13 +137,13 @@ def _widened(search: Search, null: float | None) -> Search:
     return search._replace(low=search.low / FAINT) if search.scale == "log" and null == 0.0 else search
 
 
-def _times(evidence: Sequence[Evidence]) -> dict[str, float]:
+def _times(dataset: Sequence[Dataset]) -> dict[str, float]:
     """How many times as far as the scenario has it each channel moves, the middle recording's.
 
     Below 0 where it is turned round.
     """
     found: dict[str, list[float]] = {}
-    for e in evidence:
+    for e in dataset:
         predicted = e.simulator.predict({}, 0.0) or {}
         for s in e.signals:
             made = predicted[s.channel][s.rows] if s.channel in predicted else np.zeros(1)

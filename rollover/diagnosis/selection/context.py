@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from rollover.diagnosis.fit.jobs import Crew, Job, R, T
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.jobs import Executor, R, T, Task
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Groups, Phases
 
@@ -17,22 +17,22 @@ Progress = Callable[[str], None]
 class Inquiry:
     """What every step of a selection is made with: recordings, effects, what is held out in turn, and who works."""
 
-    judge: Judge
+    problem: Problem
     candidates: Sequence[Candidate]
     groups: Groups
     phases: Phases
     say: Progress
-    crew: Crew
+    executor: Executor
 
     def free(self, current: Fitted) -> list[Candidate]:
         """Candidates that an explanation does not hold yet."""
         used = {c.key for c in current.candidates}
         return [c for c in self.candidates if c.key not in used]
 
-    def fits(self, jobs: Sequence[Job]) -> list[Fitted | None]:
+    def fits(self, tasks: Sequence[Task]) -> list[Fitted | None]:
         """What comes of jobs, in their order."""
-        return self.crew.fits(self.judge, jobs, self.say)
+        return self.executor.fits(self.problem, tasks, self.say)
 
-    def looks(self, look: Callable[[Judge, T], R], things: Sequence[T]) -> list[R]:
-        """What a look at each thing tells, in their order; see `Crew.looks`."""
-        return self.crew.looks(self.judge, look, things)
+    def parallel_map(self, look: Callable[[Problem, T], R], things: Sequence[T]) -> list[R]:
+        """What a look at each thing tells, in their order; see `Executor.parallel_map`."""
+        return self.executor.parallel_map(self.problem, look, things)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rollover.diagnosis.fit.cross_validation import held_out
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.linearisation import at_an_end, turned
 from rollover.diagnosis.fit.local_search import but_one, left_at, without
 from rollover.diagnosis.fit.parameterisation import Candidate, each_with_own, is_one_sensor
@@ -17,11 +17,11 @@ from rollover.diagnosis.inference.adequacy import NEGLIGIBLE, is_enough, is_tole
 from rollover.diagnosis.inference.lack_of_fit import SURE, Mismatch, mismatch_of
 from rollover.diagnosis.result import Verdict
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.ensemble_validation import NEEDED, surely_there, unforgiven
-from rollover.diagnosis.selection.flexibility import MOST, is_a_curve, is_any_curve, is_one_line, is_pliant
+from rollover.diagnosis.selection.ensemble_validation import F_THRESHOLD, significant_by_wald, unforgiven
+from rollover.diagnosis.selection.flexibility import MOST, is_a_curve, is_one_line, is_over_flexible, is_pliant
 from rollover.diagnosis.selection.forward_step import NEARLY_NOISE, moves
-from rollover.diagnosis.selection.pairs import instead, two_by_two
-from rollover.diagnosis.selection.score_test import Gate
+from rollover.diagnosis.selection.pairs import best_subsets, swapped
+from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.simplification import MANY, followed, mirrored
 from rollover.diagnosis.selection.stepwise import as_conditioned, one_by_one
 from rollover.diagnosis.selection.truncated_start import down_first
@@ -46,7 +46,7 @@ class Explanation:
     base: Fitted
     fitted: Fitted
     parts: tuple[Step, ...]
-    looked: Gate
+    looked: ScoreTest
     detectable: Mapping[str, float]
     before: Mismatch
     after: Mismatch
@@ -78,24 +78,24 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
 
     Where that ends with less than all, the way down is explained first, and effects are tried two by two.
     """
-    judge, groups, phases = inquiry.judge, inquiry.groups, inquiry.phases
+    problem, groups, phases = inquiry.problem, inquiry.groups, inquiry.phases
     found = down_first(inquiry, one_by_one(inquiry, base))
     base, taken, left, current = found.base, list(found.steps), found.left, found.fitted
-    is_whole = is_enough(judge, current, left)
-    is_open = not (judge.effort.thrifty or found.paired) and (not is_whole or len(taken) == MOST)
+    is_whole = is_enough(problem, current, left)
+    is_open = not (problem.effort.is_ensemble or found.paired) and (not is_whole or len(taken) == MOST)
     if found.first is not None and is_open:
         # two that leave what chance leaves are preferred to three that do
-        both = two_by_two(inquiry, taken or [found.first], found.at_first, current, is_whole=is_whole)
+        both = best_subsets(inquiry, taken or [found.first], found.at_first, current, is_whole=is_whole)
         if both is not None:
             (taken, left), current = both, both[0][-1].fitted
-            is_whole = is_enough(judge, current, left)
-    is_open = is_whole and len(taken) > 1 and is_open_to_be_named(judge, current, left)
-    needed = _ended(inquiry, taken) if is_open else _one_each(inquiry, taken)
-    parts = [s.again(judge) for s in taken] if needed is None else needed
-    if is_open and needed is not None and not judge.effort.thrifty:
-        parts = [mirrored(inquiry, s) for s in needed]
-    base = unforgiven(judge, base) if taken and judge.effort.thrifty else judge.again(base)
-    parts = [s.foretold(judge, groups, inquiry.crew.looks) for s in parts]
+            is_whole = is_enough(problem, current, left)
+    is_open = is_whole and len(taken) > 1 and is_open_to_be_named(problem, current, left)
+    retained = _ended(inquiry, taken) if is_open else _one_each(inquiry, taken)
+    parts = [s.again(problem) for s in taken] if retained is None else retained
+    if is_open and retained is not None and not problem.effort.is_ensemble:
+        parts = [mirrored(inquiry, s) for s in retained]
+    base = unforgiven(problem, base) if taken and problem.effort.is_ensemble else problem.again(base)
+    parts = [s.cross_validated(problem, groups, inquiry.executor.parallel_map) for s in parts]
     current = parts[-1].fitted if parts else base
     return Explanation(
         base=base,
@@ -104,26 +104,28 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
         looked=found.at_first,
         detectable={**found.at_first.detectable, **found.looked.detectable},
         before=found.before,
-        after=mismatch_of(judge.evidence, current.blocks, phases),
-        first=None if found.first is None else found.first.again(judge).foretold(judge, groups, inquiry.crew.looks),
+        after=mismatch_of(problem.dataset, current.blocks, phases),
+        first=None
+        if found.first is None
+        else found.first.again(problem).cross_validated(problem, groups, inquiry.executor.parallel_map),
         refuted=found.refuted,
-        settled=needed is not None,
+        settled=retained is not None,
     )
 
 
-def is_open_to_be_named(judge: Judge, fitted: Fitted, left: Mismatch) -> bool:
+def is_open_to_be_named(problem: Problem, fitted: Fitted, left: Mismatch) -> bool:
     """Whether several effects may be named: as many as may be leave no more than `decided` asks, or one is needless."""
-    if judge.effort.thrifty or len(fitted.candidates) < MOST or left.p_value > MANY:
+    if problem.effort.is_ensemble or len(fitted.candidates) < MOST or left.p_value > MANY:
         return True
-    if not matters(judge, fitted, left) or is_tolerated(judge, fitted):
+    if not matters(problem, fitted, left) or is_tolerated(problem, fitted):
         return True
-    return len(without_needless(judge, judge.again(fitted)).candidates) < MOST
+    return len(backward_elimination(problem, problem.again(fitted)).candidates) < MOST
 
 
 def _ended(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
-    """Steps of the effects that are needed, as `_needed`, the last one's fit followed to its end."""
-    needed = _needed(inquiry, taken)
-    return None if needed is None else _one_each(inquiry, [*needed[:-1], followed(inquiry, needed[-1])[0]])
+    """Steps of the effects that are needed, as `_retained`, the last one's fit followed to its end."""
+    retained = _retained(inquiry, taken)
+    return None if retained is None else _one_each(inquiry, [*retained[:-1], followed(inquiry, retained[-1])[0]])
 
 
 def _one_each(inquiry: Inquiry, steps: Sequence[Step]) -> list[Step]:
@@ -131,14 +133,14 @@ def _one_each(inquiry: Inquiry, steps: Sequence[Step]) -> list[Step]:
 
     What came there in the place of another is looked for once more, so that it has rivals too.
     """
-    known = {s.fitted.candidates[-1].key: s.again(inquiry.judge) for s in steps}
+    known = {s.fitted.candidates[-1].key: s.again(inquiry.problem) for s in steps}
     if not steps:
         return []
     *others, last = known[steps[-1].fitted.candidates[-1].key].fitted.candidates
     found: list[Step] = []
     current = known[last.key].fitted
     for c in others:
-        back = None if c.key in known else instead(inquiry, current)
+        back = None if c.key in known else swapped(inquiry, current)
         current = turned(current)
         if back is not None and back.fitted.candidates[-1].key == c.key:
             known[c.key] = back
@@ -149,17 +151,17 @@ def _one_each(inquiry: Inquiry, steps: Sequence[Step]) -> list[Step]:
     return [*found, known[last.key]]
 
 
-def _needed(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
+def _retained(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
     """Steps of the effects that are needed: each dropped if that costs no more than chance, or given to a better one.
 
     Beside a better one others may not be needed any more. Returned in such an order that the last one's fit is the
     whole explanation; every step's fit is. None where as many as may be are given for others again and again: that any
     which can be bent to it will do explains nothing.
     """
-    judge = inquiry.judge
+    problem = inquiry.problem
     last = taken[-1]
-    current = without_needless(judge, judge.again(last.fitted), last.base)
-    if (judge.effort.thrifty or is_any_curve(current.candidates)) and len(current.candidates) == len(taken):
+    current = backward_elimination(problem, problem.again(last.fitted), last.base)
+    if (problem.effort.is_ensemble or is_over_flexible(current.candidates)) and len(current.candidates) == len(taken):
         return _one_each(inquiry, taken)  # the second will be refused, whichever came first
     parts: list[Step] = []
     exchanged = 0
@@ -169,16 +171,16 @@ def _needed(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
         if whole and {c.token for c in current.candidates} == {c.token for c in last.fitted.candidates}:
             parts.append(last)  # found beside just these others
             break
-        found, taken_out = instead(inquiry, current), current.candidates[0].key
+        found, taken_out = swapped(inquiry, current), current.candidates[0].key
         if found is None:
             return _one_each(inquiry, taken)
-        current = without_needless(judge, found.fitted)
+        current = backward_elimination(problem, found.fitted)
         if found.fitted.candidates[-1].key != taken_out and exchanged < MOST:
             parts, exchanged = [], exchanged + 1  # those before were looked for beside what is no more
             if exchanged > AGAIN and len(current.candidates) == MOST:
                 return None
         parts = [*parts, found] if len(current.candidates) == len(found.fitted.candidates) else []
-    return [s.again(judge) for s in parts]
+    return [s.again(problem) for s in parts]
 
 
 def is_elsewhere(last: Step) -> bool:
@@ -189,68 +191,68 @@ def is_elsewhere(last: Step) -> bool:
     return [c.token for c in last.base.candidates] != [c.token for c in last.fitted.candidates[:-1]]
 
 
-def without_needless(judge: Judge, fitted: Fitted, base: Fitted | None = None) -> Fitted:
+def backward_elimination(problem: Problem, fitted: Fitted, base: Fitted | None = None) -> Fitted:
     """The explanation without those of its effects that may be dropped for no more than chance.
 
     `base` is the fit beside which the last one was found. Of full runs, those that are surely there are not tried.
     """
     while len(fitted.candidates) > 1:
         losses: list[tuple[float, int, Fitted | None]] = [(np.inf, -1, None)]
-        surely = surely_there(judge, fitted) if judge.effort.thrifty else set()
+        surely = significant_by_wald(problem, fitted) if problem.effort.is_ensemble else set()
         for k in {*range(len(fitted.candidates))} - surely:
-            rest = _rest(judge, fitted, k, base)
+            rest = _rest(problem, fitted, k, base)
             losses.append((rest.left - fitted.left if rest is not None else np.inf, k, rest))
         loss, _, rest = min(losses, key=lambda one: one[0])
-        phi = max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks))
-        if rest is None or loss / phi > NEEDED:
+        dispersion = max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks))
+        if rest is None or loss / dispersion > F_THRESHOLD:
             break
-        fitted = judge.again(rest) if judge.effort.thrifty else rest
+        fitted = problem.again(rest) if problem.effort.is_ensemble else rest
     return fitted
 
 
-def _rest(judge: Judge, fitted: Fitted, k: int, base: Fitted | None) -> Fitted | None:
+def _rest(problem: Problem, fitted: Fitted, k: int, base: Fitted | None) -> Fitted | None:
     """The explanation without its k-th effect, fitted again unless that is the `base` of full runs: these cost much.
 
     Of these it ends without slopes.
     """
     others = [c.token for j, c in enumerate(fitted.candidates) if j != k]
-    if judge.effort.thrifty and base is not None and [c.token for c in base.candidates] == others:
-        return judge.again(base)
-    return without(judge, fitted, k, bare=judge.effort.thrifty)
+    if problem.effort.is_ensemble and base is not None and [c.token for c in base.candidates] == others:
+        return problem.again(base)
+    return without(problem, fitted, k, no_jacobian=problem.effort.is_ensemble)
 
 
-def decided(judge: Judge, found: Explanation, groups: Groups, phases: Phases) -> tuple[Explanation, Verdict]:
+def decided(problem: Problem, found: Explanation, groups: Groups, phases: Phases) -> tuple[Explanation, Verdict]:
     """The verdict; what does not explain is not named.
 
     Several effects are named only if together they leave nothing but noise, or what was said to be tolerated; as many
     as may be, or two of one sensor, or of a soil that is bent, more surely so: they can be bent to more. One alone also
     where it takes nearly all.
     """
-    held, is_curved = found.fitted.candidates, is_a_curve(judge, found.fitted)
-    if not found.settled or is_any_curve(held) or (is_curved and is_one_line(held)):
+    held, is_curved = found.fitted.candidates, is_a_curve(problem, found.fitted)
+    if not found.settled or is_over_flexible(held) or (is_curved and is_one_line(held)):
         return found.refused(), "unexplained"
     is_bending = len(found.parts) == MOST or is_one_sensor(held) or is_pliant(held)
     is_whole = found.after.p_value > (MANY if is_bending else SURE)
-    if is_bending and not judge.effort.thrifty:
+    if is_bending and not problem.effort.is_ensemble:
         # what is bent to a curve nearly everywhere leaves what it cannot be bent to in one place
         is_whole = is_whole and min(found.after.adjusted, default=1.0) > SURE
-    is_whole = is_whole or not matters(judge, found.fitted, found.after)
+    is_whole = is_whole or not matters(problem, found.fitted, found.after)
     start, ahead = held_out(found.base, groups).total, held_out(found.fitted, groups).total
     is_whole = is_whole and not (ahead > NEARLY_NOISE and takes_little(found, groups)) and not is_curved
     # what a tolerance allows has structure too
-    is_whole = is_whole or (is_tolerated(judge, found.fitted) and ahead < HARDLY_MORE)
+    is_whole = is_whole or (is_tolerated(problem, found.fitted) and ahead < HARDLY_MORE)
     if found.parts and is_whole and ahead < start:
-        return found, _kind(strongest(judge, found.base, found.fitted))
+        return found, _kind(strongest(problem, found.base, found.fitted))
     if found.first is not None and found.parts:
         one = found.first
         end = held_out(one.fitted, groups).total
         inside = not any(at_an_end(v) for v in one.fitted.x)
-        after = mismatch_of(judge.evidence, one.fitted.blocks, phases)
+        after = mismatch_of(problem.dataset, one.fitted.blocks, phases)
         is_nearly_all = end**2 - 1.0 < PARTLY * (start**2 - 1.0) and after.structure <= PARTLY * found.before.structure
         if is_nearly_all and inside:
             return replace(found, parts=(one,), fitted=one.fitted, after=after), _kind(one.fitted.candidates[-1])
-    significant = found.before.p_value < SURE and matters(judge, found.base, found.before)
-    significant = significant and not is_tolerated(judge, found.base) and not is_slight(judge, found.first, phases)
+    significant = found.before.p_value < SURE and matters(problem, found.base, found.before)
+    significant = significant and not is_tolerated(problem, found.base) and not is_slight(problem, found.first, phases)
     verdict: Verdict = "unexplained" if significant or found.parts else "no-mismatch"
     return found.refused(), verdict
 
@@ -261,31 +263,31 @@ def takes_little(found: Explanation, groups: Groups, share: float = LITTLE) -> b
     return start**2 - ahead**2 < share * (start**2 - 1.0)
 
 
-def done_by_others(judge: Judge, found: Explanation, ids: Collection[str]) -> set[str]:
+def done_by_others(problem: Problem, found: Explanation, ids: Collection[str]) -> set[str]:
     """Of effects that may be nothing by their intervals, those whose work the others do, in any shape of theirs.
 
     A shape that was not fitted widens an interval as far as slopes say. Of full runs, where a fit costs much, all are.
     """
-    if judge.effort.thrifty:
+    if problem.effort.is_ensemble:
         return set(ids)
     fitted, done = found.fitted, set()
-    phi = judge.per_error * max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks))
+    dispersion = problem.samples_per_error * max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks))
     shifts = [b.shift for b in fitted.blocks]
     for k, c in enumerate(fitted.candidates):
         if c.id not in ids:
             continue
         others = [(o, fitted.x[own]) for j, (o, own) in enumerate(each_with_own(fitted.candidates)) if j != k]
-        fits = [without(judge, fitted, k)]
+        fits = [without(problem, fitted, k)]
         for j, (other, x) in enumerate(others):
-            for place in other.with_shapes(x) if other.shapes else ():
+            for place in other.with_secondary(x) if other.shapes else ():
                 way = [*others[:j], (other.whole(), place), *others[j + 1 :]]
-                fits.append(judge.fit([o for o, _ in way], [v for _, at in way for v in at], shifts=shifts))
-        if min((f.left for f in fits if f is not None), default=np.inf) - fitted.left < NEEDED * phi:
+                fits.append(problem.fit([o for o, _ in way], [v for _, at in way for v in at], shifts=shifts))
+        if min((f.left for f in fits if f is not None), default=np.inf) - fitted.left < F_THRESHOLD * dispersion:
             done.add(c.id)
     return done
 
 
-def by_the_first(judge: Judge, found: Explanation, nothing: Collection[str], phases: Phases) -> Explanation:
+def by_the_first(problem: Problem, found: Explanation, nothing: Collection[str], phases: Phases) -> Explanation:
     """The explanation by its first effect alone, where that is none of those that may be `nothing`; else refused.
 
     Of one that was all there is, its gain is refuted with it.
@@ -293,8 +295,8 @@ def by_the_first(judge: Judge, found: Explanation, nothing: Collection[str], pha
     one = found.first
     if one is None or one.fitted.candidates[-1].id in nothing:
         return replace(found.refused(), refuted=found.refuted or len(found.parts) == 1)
-    one = one.again(judge)
-    one, after = as_conditioned(judge, one, mismatch_of(judge.evidence, one.fitted.blocks, phases), phases)
+    one = one.again(problem)
+    one, after = as_conditioned(problem, one, mismatch_of(problem.dataset, one.fitted.blocks, phases), phases)
     return replace(found, parts=(one,), fitted=one.fitted, after=after)
 
 
@@ -302,17 +304,17 @@ def _kind(c: Candidate) -> Verdict:
     return "missing-physics" if c.kind == "physics" else "parameter" if c.kind == "parameter" else "sensor"
 
 
-def strongest(judge: Judge, base: Fitted, fitted: Fitted) -> Candidate:
+def strongest(problem: Problem, base: Fitted, fitted: Fitted) -> Candidate:
     """The effect without which most would be left; of full runs, where fits are dear, with the others as they stand."""
     best, loss = fitted.candidates[0], -np.inf
     for k, c in enumerate(fitted.candidates):
         if len(fitted.candidates) == 1:
             return c
-        if judge.effort.thrifty:
+        if problem.effort.is_ensemble:
             others, columns = but_one(fitted, k)
-            left = left_at(judge, others, [fitted.x[at] for at in columns], [b.shift for b in fitted.blocks])
+            left = left_at(problem, others, [fitted.x[at] for at in columns], [b.shift for b in fitted.blocks])
         else:
-            rest = without(judge, fitted, k, rounds=4)
+            rest = without(problem, fitted, k, rounds=4)
             left = rest.left if rest is not None else None
         left = base.left if left is None else left
         if left > loss:
@@ -320,8 +322,8 @@ def strongest(judge: Judge, base: Fitted, fitted: Fitted) -> Candidate:
     return best
 
 
-def is_slight(judge: Judge, first: Step | None, phases: Phases) -> bool:
+def is_slight(problem: Problem, first: Step | None, phases: Phases) -> bool:
     """Whether all that separates simulation and recordings is the work of an effect that moves nothing worth a name."""
-    if first is None or moves(judge, first.base, first.fitted) >= NEGLIGIBLE:
+    if first is None or moves(problem, first.base, first.fitted) >= NEGLIGIBLE:
         return False
-    return mismatch_of(judge.evidence, first.fitted.blocks, phases).p_value > SURE
+    return mismatch_of(problem.dataset, first.fitted.blocks, phases).p_value > SURE

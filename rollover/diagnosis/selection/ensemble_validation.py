@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.fit.cross_validation import held_out
 from rollover.diagnosis.fit.ensemble_mean import left_of_means, settled
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
-from rollover.diagnosis.fit.parameterisation import Candidate, akin, physical
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.parameterisation import Candidate, physical, same_family
 from rollover.diagnosis.fit.step import Groups, Step
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.noise.ensemble import SENT, is_other, too_many
 from rollover.diagnosis.result import Interval
-from rollover.diagnosis.selection.score_test import Gate, p_value
+from rollover.diagnosis.selection.score_test import ScoreTest, p_value
 from rollover.diagnosis.selection.screening import begun
 from rollover.effects import EFFECTS
 
@@ -26,131 +26,131 @@ SPOKEN = 0.05  # p-value of a candidate's own score, beyond which its fit to run
 RIVAL = 0.5  # of the best's gain, by the mean of its runs, that a rival must have
 # times an interval by slopes, beyond which no run is needed to tell a strength from none, and the effect is needed
 SURELY, INDEED = 4.0, 10.0
-NEEDED = 25.0  # gain, over what is left per sample, that an effect must bring beside all the others
+F_THRESHOLD = 25.0  # gain, over what is left per sample, that an effect must bring beside all the others
 SHARED = 9.0  # of that, what all recordings but one must bring together
 
 
-def begun_anew(judge: Judge, base: Fitted) -> Fitted:
+def begun_anew(problem: Problem, base: Fitted) -> Fitted:
     """A base from the time shifts that its rivals begin with, if that leaves less: where runs scatter it hangs on them.
 
     Else what a better clock gains would be every rival's.
     """
-    again = judge.fit(base.candidates, base.x, shifts=begun(judge, base))
+    again = problem.fit(base.candidates, base.x, shifts=begun(problem, base))
     return min((f for f in (base, again) if f is not None), key=lambda f: sum(b.total for b in f.blocks))
 
 
-def unbent(judge: Judge, base: Fitted) -> Fitted:
+def unbent(problem: Problem, base: Fitted) -> Fitted:
     """A base with its time shifts no further from where known clocks say than their error."""
     blocks = []
     for r, b in enumerate(base.blocks):
-        known = judge.evidence[r].recording.clock.zero != "unknown"
+        known = problem.dataset[r].recording.clock.zero != "unknown"
         there = min(max(b.shift, -b.prior), b.prior) if known else b.shift
-        new = judge.block(r, base.candidates, base.x, there, judge.effort.fine) if there != b.shift else b
+        new = problem.block(r, base.candidates, base.x, there, problem.effort.fine) if there != b.shift else b
         blocks.append(new or b)
     return replace(base, blocks=tuple(blocks))
 
 
-def astray(judge: Judge, fitted: Fitted) -> Fitted:
+def astray(problem: Problem, fitted: Fitted) -> Fitted:
     """A fit with all samples counted in full if more recordings took another course than chance sends there.
 
     What so many do together is missing from the simulation, and where they went tells what.
     """
-    judge.straying = True
-    found = judge.again(fitted)
-    if too_many(sum(is_other(b.course) for b in found.blocks), len(found.blocks)) > SENT:
+    problem.heavy_tailed = True
+    found = problem.again(fitted)
+    if too_many(sum(is_other(b.heavy_tail) for b in found.blocks), len(found.blocks)) > SENT:
         return found
-    judge.straying = False
-    return judge.again(fitted)
+    problem.heavy_tailed = False
+    return problem.again(fitted)
 
 
-def unforgiven(judge: Judge, base: Fitted) -> Fitted:
+def unforgiven(problem: Problem, base: Fitted) -> Fitted:
     """A base as an explanation is held against it: in full where its recordings took other courses by more than chance.
 
     Those were forgiven for want of an explanation alone; forgiven they leave no more than the best there is.
     """
-    found = astray(judge, base)
-    judge.straying = True
+    found = astray(problem, base)
+    problem.heavy_tailed = True
     return found
 
 
-def backed(found: Step, looked: Gate, spoken: float = SPOKEN) -> Step:
+def backed(found: Step, looked: ScoreTest, spoken: float = SPOKEN) -> Step:
     """A step without rivals that nothing spoke for when looked at, by a p-value: their runs met them by chance.
 
     What speaks for one that acts somewhere speaks for its kin; for a strong one its runs did.
     """
     last = [f.candidates[-1] for f in found.rivals]
     told = [c for c in last if c.key in looked.far or p_value(looked.scores.get(c.key, 0.0), looked.null) < spoken]
-    kept = [*told, *akin(last, told)]
+    kept = [*told, *same_family(last, told)]
     return replace(found, rivals=tuple(f for f in found.rivals if f.candidates[-1] in kept))
 
 
-def lasting(judge: Judge, found: Step, groups: Groups) -> Step | None:
+def ensemble_validated(problem: Problem, found: Step, groups: Groups) -> Step | None:
     """The best of a step's rivals by the mean of its runs, if that gains and has a strength; None if none does.
 
     Rivals whose mean gains much less are none.
     """
-    held = judge.evidence
-    start = left_of_means(judge, found.base)
+    held = problem.dataset
+    start = left_of_means(problem, found.base)
     gains = {
-        id(f): max(a - b for a, b in zip(start, left_of_means(judge, f), strict=True)) for f in found.rivals
-    }  # what shows before the blow need not outweigh what chance does after it
+        id(f): max(a - b for a, b in zip(start, left_of_means(problem, f), strict=True)) for f in found.rivals
+    }  # what shows before the impact need not outweigh what chance does after it
     best = max(gains.values(), default=0.0)
     near = [f for f in found.rivals if gains[id(f)] > RIVAL * best]
     for rival in sorted(near, key=lambda f: -gains[id(f)]):
-        if gains[id(rival)] < NEEDED:
+        if gains[id(rival)] < F_THRESHOLD:
             return None
-        one = settled(judge, replace(found, fitted=rival, rivals=tuple(near)))
-        ahead = replace(one, rivals=()).foretold(judge, groups)
-        gains_on = (outlasts(ahead, groups) and is_shared(ahead, groups)) or outlasts(
-            before_the_blow(judge, one), groups
+        one = settled(problem, replace(found, fitted=rival, rivals=tuple(near)))
+        ahead = replace(one, rivals=()).cross_validated(problem, groups)
+        gains_on = (is_validated(ahead, groups) and is_shared(ahead, groups)) or is_validated(
+            before_the_impact(problem, one), groups
         )
-        if gains_on and is_there_as_held(judge, one.fitted):
+        if gains_on and is_there_as_held(problem, one.fitted):
             return one
-        judge.weigh(held)
+        problem.with_noise_model(held)
     return None
 
 
-def before_the_blow(judge: Judge, found: Step) -> Step:
+def before_the_impact(problem: Problem, found: Step) -> Step:
     """A step judged by samples alone that no course a run may take has touched."""
 
     def cut(f: Fitted) -> Fitted:
         blocks = [
-            replace(b, residual=b.residual[k], J=b.J[k], slope=b.slope[k], course=None, expected=None)
-            for b, k in zip(f.blocks, (e.early for e in judge.evidence), strict=True)
+            replace(b, residual=b.residual[k], J=b.J[k], slope=b.slope[k], heavy_tail=None, expected=None)
+            for b, k in zip(f.blocks, (e.early for e in problem.dataset), strict=True)
         ]
-        return replace(f, blocks=tuple(blocks), foretold=None)
+        return replace(f, blocks=tuple(blocks), cross_validated=None)
 
     return replace(found, base=cut(found.base), fitted=cut(found.fitted), rivals=())
 
 
-def is_there_as_held(judge: Judge, fitted: Fitted) -> bool:
+def is_there_as_held(problem: Problem, fitted: Fitted) -> bool:
     """`is_there` with other courses forgiven if that is how the effect will be held, though it was found in full.
 
     What one recording on another course asks for is not what the others do.
     """
-    if judge.straying:
-        return is_there(judge, fitted)
-    with judge.held(straying=True):
-        return is_there(judge, astray(judge, fitted))
+    if problem.heavy_tailed:
+        return is_there(problem, fitted)
+    with problem.held(heavy_tailed=True):
+        return is_there(problem, astray(problem, fitted))
 
 
-def is_there(judge: Judge, fitted: Fitted) -> bool:
+def is_there(problem: Problem, fitted: Fitted) -> bool:
     """Whether the strength of the last effect is told from none: its interval keeps away from what changes nothing."""
     last = fitted.candidates[-1]
     nulls = _nulls(last)
     if not nulls:
         return True
-    by_slopes = intervals(judge, fitted, {})[-1]
+    by_slopes = intervals(problem, fitted, {})[-1]
     if not _is_apart(by_slopes, nulls, 1.0):
         return False  # runs only widen it
     first, values = len(fitted.x) - len(last.search), last.values(fitted.x[-len(last.search) :])
     sides = {first + k: (-1.0 if values[n] > nulls[n] else 1.0,) for k, n in enumerate(last.search) if n in nulls}
-    return _is_apart(by_slopes, nulls, SURELY) or _is_apart(intervals(judge, fitted, sides)[-1], nulls, 1.0)
+    return _is_apart(by_slopes, nulls, SURELY) or _is_apart(intervals(problem, fitted, sides)[-1], nulls, 1.0)
 
 
-def surely_there(judge: Judge, fitted: Fitted) -> set[int]:
+def significant_by_wald(problem: Problem, fitted: Fitted) -> set[int]:
     """Places of the effects that no run is needed to tell that something would be missing without: by slopes alone."""
-    each = zip(map(_nulls, fitted.candidates), intervals(judge, fitted, {}), strict=True)
+    each = zip(map(_nulls, fitted.candidates), intervals(problem, fitted, {}), strict=True)
     return {k for k, (nulls, by_slopes) in enumerate(each) if _is_apart(by_slopes, nulls, INDEED)}
 
 
@@ -168,9 +168,9 @@ def _is_apart(found: Mapping[str, Interval], nulls: Mapping[str, float], times: 
     return any(null < v - times * (v - low) or null > v + times * (high - v) for v, low, high, null in known)
 
 
-def outlasts(found: Step, groups: Groups) -> bool:
+def is_validated(found: Step, groups: Groups) -> bool:
     """Whether an effect predicts what was held out better by more than chance, under the scatter of its own runs."""
-    return bool(_gains(found, groups).sum() > NEEDED)
+    return bool(_gains(found, groups).sum() > F_THRESHOLD)
 
 
 def is_shared(found: Step, groups: Groups) -> bool:

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
-from rollover.diagnosis.fit.linearisation import freed
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.linearisation import without_shift
 from rollover.diagnosis.fit.parameterisation import Candidate
 
 Array = NDArray[np.float64]
@@ -18,10 +18,10 @@ MOST = 3  # effects in one explanation
 BENT = 16.0  # gain of a curve or a drift beside a line, of four standard errors
 
 
-def is_a_curve(judge: Judge, fitted: Fitted) -> bool:
+def is_a_curve(problem: Problem, fitted: Fitted) -> bool:
     """Whether effects that make a straight line of a channel leave a curve of it, or one that drifts."""
     channels = {str(c.channel) for c in fitted.candidates if c.id in LINES}
-    return any(bow(judge, fitted, channel, term) > BENT for channel in sorted(channels) for term in (square, drift))
+    return any(bow(problem, fitted, channel, term) > BENT for channel in sorted(channels) for term in (square, drift))
 
 
 def is_one_line(candidates: Sequence[Candidate]) -> bool:
@@ -40,7 +40,7 @@ def drift(read: Array, time: Array) -> Array:
     return np.asarray(read * (time - time.mean()))
 
 
-def bow(judge: Judge, fitted: Fitted, channel: str, term: Callable[[Array, Array], Array] = square) -> float:
+def bow(problem: Problem, fitted: Fitted, channel: str, term: Callable[[Array, Array], Array] = square) -> float:
     """Gain of a term in what a channel reads, over its range, beside all effects of a fit and the time shifts.
 
     Of noise alone it is chi-square of one degree of freedom: z = q'e/|q|, q the term, whitened, freed of the fit's
@@ -48,15 +48,15 @@ def bow(judge: Judge, fitted: Fitted, channel: str, term: Callable[[Array, Array
     """
     terms, misfits, held = [], [], []
     for r, block in enumerate(fitted.blocks):
-        raw = judge.raw(r, fitted.candidates, fitted.x, block.shift)
+        raw = problem.raw(r, fitted.candidates, fitted.x, block.shift)
         if raw is None:
             return 0.0
-        e, added = judge.evidence[r], np.zeros_like(raw)
+        e, added = problem.dataset[r], np.zeros_like(raw)
         for signal, part in e.spans():
             if signal.channel == channel:
                 added[part] = term(raw[part] / signal.span, e.recording.time[signal.rows])
         own = np.column_stack([block.counted(e.whitened(added)), block.residual, block.J])
-        own = freed(own, block)
+        own = without_shift(own, block)
         terms.append(own[:, 0])
         misfits.append(own[:, 1])
         held.append(own[:, 2:])
@@ -66,7 +66,7 @@ def bow(judge: Judge, fitted: Fitted, channel: str, term: Callable[[Array, Array
     return float((q @ misfit) ** 2 / max(float(q @ q), 1e-300))
 
 
-def is_any_curve(candidates: Sequence[Candidate]) -> bool:
+def is_over_flexible(candidates: Sequence[Candidate]) -> bool:
     """Whether they draw any curve: as many effects as may be, all of one sensor or of the soil, or two bent ones.
 
     Two effects of the soil that both take another form than their usual one are curves enough, whatever joins them. The

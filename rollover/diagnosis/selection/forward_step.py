@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.fit.cross_validation import held_out, refitted, worse
-from rollover.diagnosis.fit.jobs import Job
-from rollover.diagnosis.fit.levenberg_marquardt import NOISE_LEFT, Block, Fitted, Judge
+from rollover.diagnosis.fit.jobs import Task
+from rollover.diagnosis.fit.levenberg_marquardt import NOISE_LEFT, Fitted, Problem, ResidualBlock
 from rollover.diagnosis.fit.linearisation import at_an_end
 from rollover.diagnosis.fit.local_search import shifts_told
 from rollover.diagnosis.fit.step import Groups, Phases, Screened, Step
@@ -19,8 +19,8 @@ from rollover.diagnosis.inference.lack_of_fit import SURE, mismatch_of
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.restarts import begun_otherwise, from_there, one_each, shaped_too, timed_too
-from rollover.diagnosis.selection.score_test import Gate, p_value
-from rollover.diagnosis.selection.screening import ELSEWHERE, begun, is_far, kin, promising, screen, spread
+from rollover.diagnosis.selection.score_test import ScoreTest, p_value
+from rollover.diagnosis.selection.screening import ELSEWHERE, begun, is_far, of_same_family, promising, screen, spread
 
 Array = NDArray[np.float64]
 WITHIN = 6.0  # times what the best leaves, up to which a first fit is followed up
@@ -37,65 +37,65 @@ NEARLY_NOISE = 1.3  # misfit over the noise up to which its own colour is believ
 LIKE_NOISE = 2.2  # misfit over the noise up to which it may be noise that was underrated
 
 
-def step(inquiry: Inquiry, base: Fitted, looked: Gate) -> Step | None:
+def step(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> Step | None:
     """Fit the promising candidates beside the base and rank them by what they predict of held-out conditions.
 
     `looked` is what all of them scored beside the base. Where the best leaves nearly noise, that noise is weighed by
     what it leaves; the step is then under that noise. None if nothing could be fitted.
     """
-    judge, groups, candidates = inquiry.judge, inquiry.groups, inquiry.free(base)
+    problem, groups, candidates = inquiry.problem, inquiry.groups, inquiry.free(base)
     inquiry.say(f"looking at {len(candidates)} candidates beside {base.label}")
     # of recordings that went another way together, two may be those that no explanation brings back
-    several = judge.effort.few if judge.straying else judge.effort.looked_at
-    few, shifts = spread(base, groups, several), begun(judge, base, inquiry.crew.looks)
-    who, start = judge.beginning(base)
-    early = replace(inquiry, judge=who)
-    screened = screen(early, start, promising(candidates, looked, judge.effort), few, shifts, looked)
+    several = problem.effort.few if problem.heavy_tailed else problem.effort.looked_at
+    few, shifts = spread(base, groups, several), begun(problem, base, inquiry.executor.parallel_map)
+    who, start = problem.beginning(base)
+    early = replace(inquiry, problem=who)
+    screened = screen(early, start, promising(candidates, looked, problem.effort), few, shifts, looked)
     count = sum(b.residual.size for b in base.blocks)
     screened, begun_with = _first_fits(early, start, screened, few, shifts, looked)
-    lent = lent_by(judge, base)
-    jobs = [
-        Job(candidates=f.candidates, start=f.x, shifts=shifts_told(shifts, f, few), width=1, lent=lent)
+    reused = reused_of(problem, base)
+    tasks = [
+        Task(candidates=f.candidates, start=f.x, shifts=shifts_told(shifts, f, few), width=1, reused=reused)
         for f in begun_with
     ]
-    fits = [f for f in inquiry.fits(jobs) if f is not None]
+    fits = [f for f in inquiry.fits(tasks) if f is not None]
     if not fits:
         return None
-    if base.candidates and not judge.effort.thrifty:
+    if base.candidates and not problem.effort.is_ensemble:
         fits += _from_base(inquiry, base, fits, looked)
     fits.sort(key=lambda f: f.left)
-    if not judge.effort.thrifty:
+    if not problem.effort.is_ensemble:
         fits = begun_otherwise(inquiry, base, fits, looked, shifts)
     # where a threshold makes the way crooked, the nearer ones are followed to the end; of what explains the best alone
     able = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < CROOKED * fits[0].left]
     alone = [f for f in able[:1] if f is fits[0] and not base.candidates]
-    near = able[: judge.effort.polishes] if fits[0].left > NOISE_LEFT**2 * count else alone
-    if near and judge.effort.polishes:
+    near = able[: problem.effort.polishes] if fits[0].left > NOISE_LEFT**2 * count else alone
+    if near and problem.effort.polishes:
         polished = inquiry.fits([from_there(f, "polish") for f in near])
         others = [f for f in fits if not any(f is one for one in near)]
         fits = others + [new or old for new, old in zip(polished, near, strict=True)]
-    fits = one_each(fits) if judge.effort.thrifty else shaped_too(inquiry, base, one_each(fits))
-    if not judge.effort.thrifty:
+    fits = one_each(fits) if problem.effort.is_ensemble else shaped_too(inquiry, base, one_each(fits))
+    if not problem.effort.is_ensemble:
         fits = timed_too(inquiry, base, fits)
-    if weighed(judge, fits[0], inquiry.phases):
-        base, fits = judge.again(base), [judge.again(f) for f in fits]
-    if not judge.effort.thrifty:
+    if reweighted(problem, fits[0], inquiry.phases):
+        base, fits = problem.again(base), [problem.again(f) for f in fits]
+    if not problem.effort.is_ensemble:
         fits = _by_fits(inquiry, fits)
     fits.sort(key=lambda f: held_out(f, groups).left.sum())
-    fits = simplest(fits, groups, judge.per_error)
+    fits = simplest(fits, groups, problem.samples_per_error)
     least = min(f.left for f in fits)
-    phi = max(1.0, least / count)  # what even the best leaves is no chance of the noise's size
+    dispersion = max(1.0, least / count)  # what even the best leaves is no chance of the noise's size
     score = looked.score
-    if judge.per_error > 1.0:
+    if problem.samples_per_error > 1.0:
         # beside a tolerance what is missing is large, and a fit finds more of it than its slope where it is not
-        phi, score = phi * judge.per_error, max(score, base.left - least)
-    p = p_value(score / phi, looked.null)
+        dispersion, score = dispersion * problem.samples_per_error, max(score, base.left - least)
+    p = p_value(score / dispersion, looked.null)
     return Step(base=base, fitted=fits[0], p_value=p, rivals=tuple(fits), screened=tuple(screened))
 
 
-def lent_by(judge: Judge, base: Fitted, few: Sequence[int] | None = None) -> tuple[Array, ...] | None:
+def reused_of(problem: Problem, base: Fitted, few: Sequence[int] | None = None) -> tuple[Array, ...] | None:
     """Slopes (n, k) that a base has of each recording, or of `few`, for fits beside it; None where they cost no run."""
-    if not judge.effort.thrifty or not base.candidates:
+    if not problem.effort.is_ensemble or not base.candidates:
         return None
     return tuple(base.blocks[r].plain_J for r in (range(len(base.blocks)) if few is None else few))
 
@@ -106,38 +106,38 @@ def _by_fits(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
     lead, ahead = min(fits, key=lambda f: f.left), min(fits, key=lambda f: held_out(f, groups).left.sum())
     if lead is ahead:
         return list(fits)
-    new = refitted(inquiry.judge, lead, groups, held_out(ahead, groups).total, inquiry.crew.looks)
+    new = refitted(inquiry.problem, lead, groups, held_out(ahead, groups).total, inquiry.executor.parallel_map)
     return [new if f is lead else f for f in fits]
 
 
-def _from_base(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: Gate) -> list[Fitted]:
+def _from_base(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: ScoreTest) -> list[Fitted]:
     """Fits anew, from the base itself, of candidates that were led astray: beside them more is left than without.
 
     Those that soon gain a part of what the best does are gone on with.
     """
-    jobs, least, shifts = [], min(f.left for f in fits), tuple(b.shift for b in base.blocks)
+    tasks, least, shifts = [], min(f.left for f in fits), tuple(b.shift for b in base.blocks)
     for f in fits:
         if f.left > base.left:
             begin = looked.starts.get(f.candidates[-1].key, (f.own,))[0]
-            jobs.append(Job(candidates=f.candidates, start=(*base.x, *begin), shifts=shifts, rounds=SOON))
-    short = [f for f in inquiry.fits(jobs) if f is not None]
+            tasks.append(Task(candidates=f.candidates, start=(*base.x, *begin), shifts=shifts, rounds=SOON))
+    short = [f for f in inquiry.fits(tasks) if f is not None]
     able = [f for f in short if base.left - f.total > PART * (base.left - least)]
     ended = [f for f in inquiry.fits([from_there(f, "fit") for f in able]) if f is not None]
-    return ended + [inquiry.judge.again(f) for f in short if not any(f is one for one in able)]
+    return ended + [inquiry.problem.again(f) for f in short if not any(f is one for one in able)]
 
 
-def weighed(judge: Judge, fitted: Fitted, phases: Phases) -> bool:
+def reweighted(problem: Problem, fitted: Fitted, phases: Phases) -> bool:
     """Weigh the recordings by all that a fit leaves, if that is noise: as little as seen, or more without structure."""
     left, count = fitted.left, sum(b.residual.size for b in fitted.blocks)
     if left > LIKE_NOISE**2 * count:
         return False
-    before = judge.evidence
-    judge.weigh(autoregression.whole(before, judge.residuals(fitted)))
+    before = problem.dataset
+    problem.with_noise_model(autoregression.whole(before, problem.residuals(fitted)))
     if left < NEARLY_NOISE**2 * count:
         return True
-    if mismatch_of(judge.evidence, judge.again(fitted).blocks, phases).p_value > SURE:
+    if mismatch_of(problem.dataset, problem.again(fitted).blocks, phases).p_value > SURE:
         return True
-    judge.weigh(before)
+    problem.with_noise_model(before)
     return False
 
 
@@ -147,34 +147,34 @@ def _first_fits(
     screened: Sequence[Screened],
     few: Sequence[int],
     shifts: Sequence[float],
-    looked: Gate,
+    looked: ScoreTest,
 ) -> tuple[list[Screened], list[Fitted]]:
     """Short fits to few recordings: the ones worth a full fit, best first, and what each leaves."""
-    judge = inquiry.judge
-    chosen = {s.candidate.key: s for s in _chosen(screened, judge.effort, looked)}
+    problem = inquiry.problem
+    chosen = {s.candidate.key: s for s in _chosen(screened, problem.effort, looked)}
     told: dict[str, float] = {}
     inquiry.say(f"first fits of {len(chosen)} candidates to {len(few)} recordings")
     at = tuple(shifts[r] for r in few)
-    pinned = judge.effort.thrifty or is_far(judge, base)
-    jobs = [
-        Job(
+    fixed_shifts = problem.effort.is_ensemble or is_far(problem, base)
+    tasks = [
+        Task(
             candidates=(*base.candidates, s.candidate), start=(*base.x, *start), shifts=at, only=tuple(few),
-            rounds=judge.effort.short, pinned=pinned, lent=lent_by(judge, base, few),
+            rounds=problem.effort.short, fixed_shifts=fixed_shifts, reused=reused_of(problem, base, few),
         )
         for s in chosen.values()
         for start in s.starts
     ]  # fmt: skip
-    far = [] if judge.straying else [job for job in jobs if job.candidates[-1].key in looked.far]
-    fits = [f for f in inquiry.fits([job for job in jobs if job not in far]) if f is not None]
+    far = [] if problem.heavy_tailed else [task for task in tasks if task.candidates[-1].key in looked.far]
+    fits = [f for f in inquiry.fits([task for task in tasks if task not in far]) if f is not None]
     fits += _smoothly(inquiry, far, few)
     for one in fits:
         key, size = one.candidates[-1].key, sum(b.residual.size for b in one.blocks)
         told[key] = min(told.get(key, np.inf), float(np.sqrt(one.left / size)))
     fits.sort(key=lambda f: f.left)
-    worth = [f for k, f in enumerate(fits) if k < judge.effort.leaders or f.left < WITHIN * fits[0].left]
-    if judge.effort.thrifty and fits:
+    worth = [f for k, f in enumerate(fits) if k < problem.effort.leaders or f.left < WITHIN * fits[0].left]
+    if problem.effort.is_ensemble and fits:
         worth = one_each(worth) + _elsewhere(worth)
-        before = [judge.block(r, base.candidates, base.x, shifts[r], 0.0) for r in few]  # clocks where they are held
+        before = [problem.block(r, base.candidates, base.x, shifts[r], 0.0) for r in few]  # clocks where they are held
         as_it_is = sum(b.total for b in before if b is not None)
         # and what leads by its score: the gain of one that others are measured by may be chance of its runs
         worth = [
@@ -182,29 +182,29 @@ def _first_fits(
             for f in worth
             if as_it_is - f.left >= RIVALS * (as_it_is - fits[0].left) or f.candidates[-1].key == looked.best
         ]
-    worth = worth[: judge.effort.most_leaders]
+    worth = worth[: problem.effort.most_leaders]
     # a first fit may lead astray what scored most
     if all(f.candidates[-1].key != looked.best for f in worth):
         worth += [f for f in fits if f.candidates[-1].key == looked.best][:1]
     return [replace(s, nrmse=told.get(s.candidate.key, 0.0)) for s in screened], worth
 
 
-def _smoothly(inquiry: Inquiry, jobs: Sequence[Job], few: Sequence[int]) -> list[Fitted]:
+def _smoothly(inquiry: Inquiry, tasks: Sequence[Task], few: Sequence[int]) -> list[Fitted]:
     """Fits to few recordings with other courses forgiven, as they stand in full.
 
     Where runs part ways what is left in full leaps from place to place, and a fit ends at the first dip.
     """
-    judge, found = inquiry.judge, []
-    with judge.held(straying=True):
-        fits = [f for f in inquiry.fits(jobs) if f is not None]
-    with judge.held(pinned=True):  # as other first fits are
+    problem, found = inquiry.problem, []
+    with problem.held(heavy_tailed=True):
+        fits = [f for f in inquiry.fits(tasks) if f is not None]
+    with problem.held(fixed_shifts=True):  # as other first fits are
         for f in fits:
-            blocks = [judge.block(r, f.candidates, f.x, b.shift, 0.0) for r, b in zip(few, f.blocks, strict=True)]
+            blocks = [problem.block(r, f.candidates, f.x, b.shift, 0.0) for r, b in zip(few, f.blocks, strict=True)]
             found.append(replace(f, blocks=tuple(b for b in blocks if b is not None)))
     return [f for f in found if len(f.blocks) == len(few)]
 
 
-def _chosen(screened: Sequence[Screened], effort: Effort, looked: Gate) -> list[Screened]:
+def _chosen(screened: Sequence[Screened], effort: Effort, looked: ScoreTest) -> list[Screened]:
     """Those worth a first fit: that start well, and that have most to gain.
 
     Of runs that scatter those whose score is a small part of the best one's are not; what a sensor makes of them costs
@@ -212,13 +212,13 @@ def _chosen(screened: Sequence[Screened], effort: Effort, looked: Gate) -> list[
     than each: the two are compared with their own kind. With a leader come its kin.
     """
     by_start = sorted(screened, key=lambda s: s.left)[: effort.promising // 2]
-    if not effort.thrifty:
+    if not effort.is_ensemble:
         return [*by_start, *sorted(screened, key=lambda s: -s.potential)[: effort.promising]]
     by_key = {s.candidate.key: s for s in screened}
     ranked = [by_key[c.key] for c in looked.ranked([s.candidate for s in screened])]
     moving = [s for s in ranked if s.candidate.kind != "sensor"]
     reading = [s for s in ranked if s.candidate.kind == "sensor"]
-    related = kin([s.candidate for s in moving], effort.promising, effort.leaders)
+    related = of_same_family([s.candidate for s in moving], effort.promising, effort.leaders)
 
     def score(s: Screened) -> float:
         return looked.scores.get(s.candidate.key, 0.0)
@@ -240,30 +240,30 @@ def _elsewhere(fits: Sequence[Fitted]) -> list[Fitted]:
     return [f for f in same if max(abs(a - b) for a, b in zip(f.x, lead.x, strict=True)) > 0.5 * ELSEWHERE][:1]
 
 
-def moves(judge: Judge, base: Fitted, fitted: Fitted) -> float:
+def moves(problem: Problem, base: Fitted, fitted: Fitted) -> float:
     """How far the added effect moves any channel of any recording, largest root mean square over the range.
 
     Within half a step of a channel's digits nothing is told to have moved.
     """
-    return _apart(judge, base.blocks, fitted.blocks)
+    return _apart(problem, base.blocks, fitted.blocks)
 
 
-def does(judge: Judge, fitted: Fitted) -> float:
+def does(problem: Problem, fitted: Fitted) -> float:
     """How far the last effect moves any channel beside the others as they stand; 0 where these cannot be simulated.
 
     What the others cannot be bent to of it is less: all that ground of another stiffness leaves of a rate, a tenth.
     """
     last = fitted.candidates[-1]
     rest, x = fitted.candidates[:-1], fitted.x[: len(fitted.x) - len(last.search)]
-    alone = [judge.block(r, rest, x, b.shift, 0.0) for r, b in enumerate(fitted.blocks)]
-    return 0.0 if None in alone else _apart(judge, [b for b in alone if b is not None], fitted.blocks)
+    alone = [problem.block(r, rest, x, b.shift, 0.0) for r, b in enumerate(fitted.blocks)]
+    return 0.0 if None in alone else _apart(problem, [b for b in alone if b is not None], fitted.blocks)
 
 
-def _apart(judge: Judge, some: Sequence[Block], others: Sequence[Block]) -> float:
+def _apart(problem: Problem, some: Sequence[ResidualBlock], others: Sequence[ResidualBlock]) -> float:
     """How far two lots of runs are apart in any channel of any recording, see `moves`."""
     most = 0.0
     for r, (a, b) in enumerate(zip(some, others, strict=True)):
-        for signal, part in judge.evidence[r].spans():
+        for signal, part in problem.dataset[r].spans():
             d = (a.plain_residual - b.plain_residual)[part]
             size = float(np.sqrt(np.mean(d * d))) * signal.sigma
             if size > 0.5 * signal.step:

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
-from rollover.diagnosis.fit.jobs import Job
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.jobs import Task
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.linearisation import turned
 from rollover.diagnosis.fit.local_search import BEHIND, few_of, shifts_told, without
 from rollover.diagnosis.fit.parameterisation import Candidate
@@ -17,12 +17,12 @@ from rollover.diagnosis.fit.threshold_scan import has_threshold, placed_beside, 
 from rollover.diagnosis.inference.adequacy import is_enough
 from rollover.diagnosis.inference.lack_of_fit import SURE, Mismatch, mismatch_of
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.ensemble_validation import NEEDED
-from rollover.diagnosis.selection.flexibility import is_any_curve
-from rollover.diagnosis.selection.forward_step import NEARLY_NOISE, step, weighed
+from rollover.diagnosis.selection.ensemble_validation import F_THRESHOLD
+from rollover.diagnosis.selection.flexibility import is_over_flexible
+from rollover.diagnosis.selection.forward_step import NEARLY_NOISE, reweighted, step
 from rollover.diagnosis.selection.restarts import from_there, shaped_too
 from rollover.diagnosis.selection.scan import look
-from rollover.diagnosis.selection.score_test import Gate
+from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.screening import is_far
 from rollover.diagnosis.selection.simplification import followed, mirror_images, simpler, unbent
 
@@ -37,8 +37,8 @@ ALIKE = 2.0  # times what the best of them leaves, up to which the shape of what
 Start = tuple[tuple[Candidate, ...], tuple[float, ...]]  # two effects, and where a fit of them begins
 
 
-def two_by_two(
-    inquiry: Inquiry, taken: Sequence[Step], looked: Gate, current: Fitted, *, is_whole: bool = False
+def best_subsets(
+    inquiry: Inquiry, taken: Sequence[Step], looked: ScoreTest, current: Fitted, *, is_whole: bool = False
 ) -> tuple[list[Step], Mismatch] | None:
     """The best pair of effects, as steps, and what it leaves, see `best_pair`; None if `current` stays.
 
@@ -46,31 +46,31 @@ def two_by_two(
     an effect that is not needed takes. Where a pair leaves nearly noise, and more than quiet stretches tell of, it is
     under the noise that all of it tells of.
     """
-    judge, held = inquiry.judge, inquiry.judge.evidence
+    problem, held = inquiry.problem, inquiry.problem.dataset
     pair = best_pair(inquiry, taken, looked)
     if pair is None:
         return None
     found, left = followed(inquiry, pair)
-    if not is_enough(judge, found.fitted, left) and any(c.rings for c in found.fitted.candidates):
+    if not is_enough(problem, found.fitted, left) and any(c.rings for c in found.fitted.candidates):
         # what its shape shows now did not show beside another one
-        ringing = found.fitted if found.fitted.candidates[-1].rings else judge.again(turned(found.fitted))
-        other = instead(inquiry, ringing)
+        ringing = found.fitted if found.fitted.candidates[-1].rings else problem.again(turned(found.fitted))
+        other = swapped(inquiry, ringing)
         if other is not None and other.fitted.left < found.fitted.left:
             found, left = followed(inquiry, other)
-    if is_whole and costs(judge, found.fitted, current) > NEEDED:
+    if is_whole and costs(problem, found.fitted, current) > F_THRESHOLD:
         return None  # noise that such a pair tells of would hold the third effect
-    if not is_enough(judge, found.fitted, left) and weighed(judge, found.fitted, inquiry.phases):
-        found = found.again(judge)
-        left = mismatch_of(judge.evidence, found.fitted.blocks, inquiry.phases)
+    if not is_enough(problem, found.fitted, left) and reweighted(problem, found.fitted, inquiry.phases):
+        found = found.again(problem)
+        left = mismatch_of(problem.dataset, found.fitted.blocks, inquiry.phases)
     if not (left.p_value > SURE if is_whole else is_better(found.fitted, left, current)):
-        judge.weigh(held)
+        problem.with_noise_model(held)
         return None
     return [replace(taken[0], fitted=found.base), found], left
 
 
-def costs(judge: Judge, fewer: Fitted, more: Fitted) -> float:
+def costs(problem: Problem, fewer: Fitted, more: Fitted) -> float:
     """What a fit of fewer effects leaves more than one of more, over what that leaves per sample."""
-    left = judge.again(more).left
+    left = problem.again(more).left
     return (fewer.left - left) / max(1.0, left / sum(b.residual.size for b in more.blocks))
 
 
@@ -85,82 +85,83 @@ def is_better(other: Fitted, left: Mismatch, current: Fitted, *, scattered: bool
     if scattered:
         return other.left < BETTER * current.left
     chance = sum(b.residual.size for b in other.blocks)
-    part = 1.0 / BETTER if is_any_curve(current.candidates) else BETTER
+    part = 1.0 / BETTER if is_over_flexible(current.candidates) else BETTER
     return other.left - chance < part * (current.left - chance)
 
 
 def with_another_first(inquiry: Inquiry, taken: Sequence[Step], current: Fitted) -> tuple[list[Step], Mismatch] | None:
     """Two steps with the first effect given for another beside the second, and what they leave; None if not better."""
-    other = instead(inquiry, taken[-1].fitted)
+    other = swapped(inquiry, taken[-1].fitted)
     if other is None or other.fitted.left >= taken[-1].fitted.left:
         return None
     found, left = followed(inquiry, other)
     return ([taken[-1], found], left) if is_better(found.fitted, left, current, scattered=True) else None
 
 
-def instead(inquiry: Inquiry, current: Fitted) -> Step | None:
+def swapped(inquiry: Inquiry, current: Fitted) -> Step | None:
     """The first effect of an explanation taken out and looked for anew beside the rest: it comes back, or a better."""
-    judge = inquiry.judge
-    rest = without(judge, current, 0)
+    problem = inquiry.problem
+    rest = without(problem, current, 0)
     if rest is None:
         return None
-    looked = look(judge, rest, inquiry.free(rest), inquiry.groups, looks=inquiry.crew.looks)
+    looked = look(problem, rest, inquiry.free(rest), inquiry.groups, parallel_map=inquiry.executor.parallel_map)
     found = step(inquiry, rest, looked)
-    held = judge.again(turned(current))
-    if found is None or found.fitted.left > held.left + NEEDED:  # on the way back nothing came as far
+    held = problem.again(turned(current))
+    if found is None or found.fitted.left > held.left + F_THRESHOLD:  # on the way back nothing came as far
         rivals = () if found is None else found.rivals
         beside = tuple(f for f in rivals if f.candidates[-1].key != held.candidates[-1].key)
-        back = Step(base=judge.again(rest), fitted=held, p_value=looked.p_value(), rivals=(held, *beside))
+        back = Step(base=problem.again(rest), fitted=held, p_value=looked.p_value(), rivals=(held, *beside))
         return simpler(inquiry, back) or back
     return found
 
 
-def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: Gate) -> Step | None:
+def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: ScoreTest) -> Step | None:
     """The best pair of the first step's rivals, of what led later, and of what gains most, as a step of its second.
 
     Of two effects neither need come first alone: a third may be like both, and the second may leave much alone. Short
     fits tell which pairs are worth whole ones; the best takes the shapes that pay if it comes near what others leave.
     """
-    judge, first = inquiry.judge, taken[0]
+    problem, first = inquiry.problem, taken[0]
     lead = min(first.rivals, key=lambda f: f.left)
     few, shifts = few_of(lead), tuple(b.shift for b in lead.blocks)
-    at, pinned = tuple(shifts[r] for r in few), is_far(judge, first.base)
+    at, fixed_shifts = tuple(shifts[r] for r in few), is_far(problem, first.base)
     # slopes tell what two do together where these are not far off
-    partners = _partners(inquiry, first, taken, looked, SCORED if pinned else 0)
+    partners = _partners(inquiry, first, taken, looked, SCORED if fixed_shifts else 0)
     two = itertools.combinations(partners, 2)
     short: list[Start] = [((a, b), (*x, *y)) for (a, x), (b, y) in two if _may_explain(a, b)]
-    short += _placed_anew(inquiry, partners, few, shifts) if pinned else _together(inquiry, looked)
+    short += _placed_anew(inquiry, partners, few, shifts) if fixed_shifts else _together(inquiry, looked)
     inquiry.say(f"{len(short)} pairs of effects")
     for rounds, most in ROUNDS:
-        jobs = [
-            Job(candidates=both, start=x, shifts=at, only=tuple(few), rounds=rounds, pinned=pinned) for both, x in short
+        tasks = [
+            Task(candidates=both, start=x, shifts=at, only=tuple(few), rounds=rounds, fixed_shifts=fixed_shifts)
+            for both, x in short
         ]
-        met = sorted((f for f in inquiry.fits(jobs) if f is not None), key=lambda f: f.left)[:most]
+        met = sorted((f for f in inquiry.fits(tasks) if f is not None), key=lambda f: f.left)[:most]
         short = [(f.candidates, f.x) for f in met]
-    if not met or _takes_little(judge.again(lead), met[0], few):
+    if not met or _takes_little(problem.again(lead), met[0], few):
         return None
-    jobs = [Job(candidates=f.candidates, start=f.x, shifts=shifts_told(shifts, f, few)) for f in met]
-    fits = [f for f in inquiry.fits(jobs) if f is not None]
+    tasks = [Task(candidates=f.candidates, start=f.x, shifts=shifts_told(shifts, f, few)) for f in met]
+    fits = [f for f in inquiry.fits(tasks) if f is not None]
     if not fits:
         return None
     best = min([*fits, *_in_tune(inquiry, fits), *_traced(inquiry, fits)], key=lambda f: f.left)
     best = min([best, *_mirrored(inquiry, best)], key=lambda f: f.left)
     if best.left < BEHIND * taken[-1].fitted.left:
-        ways = (best, judge.again(turned(best)))
-        jobs = [Job(candidates=p.candidates[:-1], start=p.x[: -len(p.own)], shifts=shifts) for p in ways]
-        for pair, alone in zip(ways, inquiry.fits(jobs), strict=True):
+        ways = (best, problem.again(turned(best)))
+        tasks = [Task(candidates=p.candidates[:-1], start=p.x[: -len(p.own)], shifts=shifts) for p in ways]
+        for pair, alone in zip(ways, inquiry.fits(tasks), strict=True):
             if alone is not None:
                 best = min(best, *shaped_too(inquiry, alone, [pair]), key=lambda f: f.left)
-    alone = judge.fit(best.candidates[:-1], best.x[: -len(best.own)], shifts=[b.shift for b in best.blocks])
+    alone = problem.fit(best.candidates[:-1], best.x[: -len(best.own)], shifts=[b.shift for b in best.blocks])
     return None if alone is None else Step(base=alone, fitted=best, p_value=first.p_value, rivals=(best,))
 
 
 def _may_explain(one: Candidate, other: Candidate) -> bool:
     """Whether two may be named together: they are not one effect twice, nor any curve."""
-    return one.key != other.key and not is_any_curve((one, other))
+    return one.key != other.key and not is_over_flexible((one, other))
 
 
-def _together(inquiry: Inquiry, looked: Gate) -> list[Start]:
+def _together(inquiry: Inquiry, looked: ScoreTest) -> list[Start]:
     """Pairs of candidates that gain most together by their slopes, in their usual shapes, from where these lead."""
     usual = {c.key: c for c in inquiry.candidates}
     begun = [(usual[key], x, usual[other], y) for (key, x), (other, y) in looked.both]
@@ -179,7 +180,7 @@ def _placed_anew(
     """
     able = [c for c, _ in partners if has_threshold(c) and not c.is_bent]
     ways = [(a, x, c) for a, x in partners[:LEADING] for c in able if c.key != a.key]
-    found = inquiry.looks(partial(placed_beside, few=tuple(few), shifts=tuple(shifts)), ways)
+    found = inquiry.parallel_map(partial(placed_beside, few=tuple(few), shifts=tuple(shifts)), ways)
     return [((a, c), x) for (a, _, c), x in zip(ways, found, strict=True) if x is not None]
 
 
@@ -197,7 +198,7 @@ def _in_tune(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fitted]:
 
     With a wrong share of the nose all that stands beside it is met as badly, and the wrong one may lead.
     """
-    able = [f if f.candidates[-1].rings else inquiry.judge.again(turned(f)) for f in pairs if _rings(f)]
+    able = [f if f.candidates[-1].rings else inquiry.problem.again(turned(f)) for f in pairs if _rings(f)]
     lead = min(pairs, key=lambda f: f.left)
     near = [f for f in able if f.left < ALIKE * lead.left and f.candidates[-1].shapes]
     leaves = tuple(b.total for b in lead.blocks)
@@ -211,13 +212,13 @@ def _traced(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fitted]:
     None where the best leaves no more than noise.
     """
     ranked = sorted(pairs, key=lambda f: f.left)
-    if mismatch_of(inquiry.judge.evidence, ranked[0].blocks, inquiry.phases).p_value > SURE:
+    if mismatch_of(inquiry.problem.dataset, ranked[0].blocks, inquiry.phases).p_value > SURE:
         return []
     near = (f for f in ranked if f.left < PLACED * ranked[0].left)
-    ways = (way for f in near for way in (f, inquiry.judge.again(turned(f))))
+    ways = (way for f in near for way in (f, inquiry.problem.again(turned(f))))
     able = itertools.islice((way for way in ways if stretches(way) and not way.candidates[-1].rings), PLACES)
-    jobs = [replace(from_there(f, "trace"), stretch=s) for f in able for s in stretches(f)]
-    return [f for f in inquiry.fits(jobs) if f is not None]
+    tasks = [replace(from_there(f, "trace"), stretch=s) for f in able for s in stretches(f)]
+    return [f for f in inquiry.fits(tasks) if f is not None]
 
 
 def _mirrored(inquiry: Inquiry, pair: Fitted) -> list[Fitted]:
@@ -238,13 +239,13 @@ def _rings(pair: Fitted) -> bool:
 
 
 def _partners(
-    inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: Gate, scored: int
+    inquiry: Inquiry, first: Step, taken: Sequence[Step], looked: ScoreTest, scored: int
 ) -> list[tuple[Candidate, tuple[float, ...]]]:
     """Who may be one of two, and where its fit begins; what was bent to lead alone also in its usual shape.
 
     Those that led, and of the others so many that `scored` most at first.
     """
-    leading = sorted((inquiry.judge.again(f) for f in first.rivals), key=lambda f: f.left)[:LEADING]
+    leading = sorted((inquiry.problem.again(f) for f in first.rivals), key=lambda f: f.left)[:LEADING]
     later = [f for s in taken[1:] for f in sorted(s.rivals, key=lambda f: f.left)[:FOLLOWING]]
     found: dict[tuple[str, bool], tuple[Candidate, tuple[float, ...]]] = {}
     for f in (*leading, *later):

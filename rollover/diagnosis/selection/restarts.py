@@ -9,26 +9,26 @@ from functools import partial
 import numpy as np
 
 from rollover.diagnosis.fit.cross_validation import held_out
-from rollover.diagnosis.fit.jobs import How, Job
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
-from rollover.diagnosis.fit.linearisation import Block
+from rollover.diagnosis.fit.jobs import How, Task
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.fit.local_search import (
     BEHIND,
     LITTLE,
-    along_shapes,
+    along_secondary,
     apart,
-    chords,
     few_of,
+    frequency_scan,
+    grid_scan,
     least_of,
     left_at,
-    teeth,
 )
 from rollover.diagnosis.fit.model_variants import WORTH, enough, is_noise
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.threshold_scan import is_clock, stretches
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.score_test import Gate
+from rollover.diagnosis.selection.score_test import ScoreTest
 
 RUGGED = 2.0  # misfit over the noise that the best leaves, from which on there may be something behind a cliff
 LEADS = 1.5  # times what the best leaves, up to which it is looked for
@@ -47,7 +47,7 @@ SHAPED = 4.0  # times what the best leaves, up to which an effect's shape is fit
 
 
 def begun_otherwise(
-    inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: Gate, shifts: Sequence[float]
+    inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: ScoreTest, shifts: Sequence[float]
 ) -> list[Fitted]:
     """The fits, best first, with those that another beginning or another shape makes of what did not come far."""
     count = sum(b.residual.size for b in base.blocks)
@@ -57,7 +57,7 @@ def begun_otherwise(
 
 
 def _as_promised(
-    inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: Gate, shifts: Sequence[float]
+    inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: ScoreTest, shifts: Sequence[float]
 ) -> list[Fitted]:
     """The fits, best first, with those whose slopes lead and whose usual shape does not bear them out."""
     gains = {f.candidates[-1].key: base.left - f.left for f in one_each(fits)}
@@ -66,10 +66,10 @@ def _as_promised(
         score = looked.scores.get(c.key, 0.0)
         if score > max(PROMISED * looked.score, WORTH) and gains.get(c.key, 0.0) < PROMISED * score:
             places.append((c, (*base.x, *looked.starts.get(c.key, c.starts())[0])))
-    return _with_shapes(inquiry, base, fits, places, shifts)
+    return _with_secondary(inquiry, base, fits, places, shifts)
 
 
-def _combed(inquiry: Inquiry, fits: Sequence[Fitted], looked: Gate, shifts: Sequence[float]) -> list[Fitted]:
+def _combed(inquiry: Inquiry, fits: Sequence[Fitted], looked: ScoreTest, shifts: Sequence[float]) -> list[Fitted]:
     """The fits, best first, the best that rings begun anew along its damping and its frequency.
 
     It leads by what it leaves, or by its score: its frequency may have been found beside a wrong damping.
@@ -79,9 +79,9 @@ def _combed(inquiry: Inquiry, fits: Sequence[Fitted], looked: Gate, shifts: Sequ
     if old is None:
         return list(fits)
     few = few_of(old)
-    begun = [(old.candidates, x) for x in apart(_met(inquiry, old.candidates, teeth(old), shifts, few))]
-    begun += _in_chords(inquiry, old, shifts, few)
-    made = inquiry.fits([Job(candidates=c, start=x, shifts=tuple(shifts), width=1) for c, x in begun])
+    begun = [(old.candidates, x) for x in apart(_met(inquiry, old.candidates, grid_scan(old), shifts, few))]
+    begun += _by_frequency(inquiry, old, shifts, few)
+    made = inquiry.fits([Task(candidates=c, start=x, shifts=tuple(shifts), width=1) for c, x in begun])
     new = _plainest([f for f in made if f is not None] or [old], sum(b.residual.size for b in old.blocks))
     for how in FOLLOWED:
         new = inquiry.fits([from_there(new, how)])[0] or new
@@ -89,13 +89,13 @@ def _combed(inquiry: Inquiry, fits: Sequence[Fitted], looked: Gate, shifts: Sequ
     return sorted([better, *(f for f in fits if f is not old)], key=lambda f: f.left)
 
 
-def _in_chords(
+def _by_frequency(
     inquiry: Inquiry, old: Fitted, shifts: Sequence[float], few: Sequence[int]
 ) -> list[tuple[tuple[Candidate, ...], tuple[float, ...]]]:
     """Where what rings last in a fit leaves least at all frequencies and shapes: first of the recording met worst."""
     *beside, last = old.candidates
     at = old.x[: len(old.x) - len(old.own)]
-    whole, places = chords(last, old.own)
+    whole, places = frequency_scan(last, old.own)
     candidates, worst = (*beside, whole), max(few, key=lambda r: old.blocks[r].total)
     heard = _met(inquiry, candidates, [(*at, *own) for own in places], shifts, (worst,))[:HEARD]
     plain = [whole.plain(x[len(at) :]) for x in apart(_met(inquiry, candidates, [x for _, x in heard], shifts, few))]
@@ -111,12 +111,12 @@ def _met(
 ) -> list[tuple[float, tuple[float, ...]]]:
     """What is left of `few` recordings at those of some places that can be simulated, with these, the least first."""
     look = partial(_left_of, candidates=tuple(candidates), shifts=tuple(shifts), few=tuple(few))
-    met = zip(inquiry.looks(look, places), places, strict=True)
+    met = zip(inquiry.parallel_map(look, places), places, strict=True)
     return sorted((there, x) for there, x in met if there is not None)
 
 
 def _left_of(
-    judge: Judge,
+    problem: Problem,
     x: tuple[float, ...],
     *,
     candidates: Sequence[Candidate],
@@ -124,11 +124,11 @@ def _left_of(
     few: Sequence[int],
 ) -> float | None:
     """What is left of `few` recordings at x; None if a run fails."""
-    return left_at(judge, candidates, x, shifts, few)
+    return left_at(problem, candidates, x, shifts, few)
 
 
 def _but_for_some(
-    inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: Gate, shifts: Sequence[float]
+    inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: ScoreTest, shifts: Sequence[float]
 ) -> list[Fitted]:
     """The fits, best first, with those whose shape may be wrong for a few recordings alone, fitted together with it.
 
@@ -139,12 +139,12 @@ def _but_for_some(
     begun = [tuple((*base.x, *start) for start in (*looked.starts.get(c.key, ()), *c.starts())) for c in able]
     most = MOSTLY * _middle(fits[0].blocks)
     look = partial(_best_middle, beside=base.candidates, shifts=tuple(shifts), most=most)
-    met = zip(able, inquiry.looks(look, list(zip(able, begun, strict=True))), strict=True)
+    met = zip(able, inquiry.parallel_map(look, list(zip(able, begun, strict=True))), strict=True)
     places = [(c, x) for c, x in met if x is not None]
-    return _with_shapes(inquiry, base, fits, places, shifts)
+    return _with_secondary(inquiry, base, fits, places, shifts)
 
 
-def _with_shapes(
+def _with_secondary(
     inquiry: Inquiry,
     base: Fitted,
     fits: Sequence[Fitted],
@@ -156,15 +156,15 @@ def _with_shapes(
     They are begun where least is left all along each parameter of the shape. One that comes nowhere near what the best
     fit leaves is not gone on with.
     """
-    sets = [((*base.candidates, c.whole()), along_shapes(c, x)) for c, x in places]
+    sets = [((*base.candidates, c.whole()), along_secondary(c, x)) for c, x in places]
     parts = [(candidates, tuple(every[k::PARTS])) for candidates, every in sets for k in range(PARTS)]
-    met = inquiry.looks(partial(least_of, shifts=tuple(shifts)), parts)
-    jobs = []
+    met = inquiry.parallel_map(partial(least_of, shifts=tuple(shifts)), parts)
+    tasks = []
     for k, (candidates, _) in enumerate(sets):
         least = min((one for one in met[k * PARTS : (k + 1) * PARTS] if one is not None), default=None)
         if least is not None:
-            jobs.append(Job(candidates=candidates, start=least[1], shifts=tuple(shifts), width=1))
-    begun = [f for f in inquiry.fits(jobs) if f is not None]
+            tasks.append(Task(candidates=candidates, start=least[1], shifts=tuple(shifts), width=1))
+    begun = [f for f in inquiry.fits(tasks) if f is not None]
     near = [f for f in begun if f.left <= BEHIND * fits[0].left]
     followed = zip(inquiry.fits([from_there(f, "polish") for f in near]), near, strict=True)
     others = [f for f in begun if not any(f is one for one in near)]
@@ -172,7 +172,7 @@ def _with_shapes(
 
 
 def _best_middle(
-    judge: Judge,
+    problem: Problem,
     begun: tuple[Candidate, tuple[tuple[float, ...], ...]],
     *,
     beside: tuple[Candidate, ...],
@@ -181,17 +181,17 @@ def _best_middle(
 ) -> tuple[float, ...] | None:
     """Where a candidate leaves least of the middle recording of those places; None if nowhere less than `most`."""
     c, places = begun
-    met = [(left, x) for x in places if (left := _middle_at(judge, (*beside, c), x, shifts, most)) is not None]
+    met = [(left, x) for x in places if (left := _middle_at(problem, (*beside, c), x, shifts, most)) is not None]
     return min(met)[1] if met else None
 
 
 def _middle_at(
-    judge: Judge, candidates: Sequence[Candidate], x: tuple[float, ...], shifts: Sequence[float], most: float
+    problem: Problem, candidates: Sequence[Candidate], x: tuple[float, ...], shifts: Sequence[float], most: float
 ) -> float | None:
     """What the middle recording leaves per sample at x; None from `most` on, or where one cannot be simulated."""
     left: list[float] = []
     for r, shift in enumerate(shifts):
-        block = judge.block(r, candidates, x, shift, 0.0)
+        block = problem.block(r, candidates, x, shift, 0.0)
         if block is None:
             return None
         left.append(_per_sample(block))
@@ -202,12 +202,12 @@ def _middle_at(
     return middle if middle < most else None
 
 
-def _middle(blocks: Sequence[Block]) -> float:
+def _middle(blocks: Sequence[ResidualBlock]) -> float:
     """What the middle one of several recordings leaves per sample."""
     return float(np.median([_per_sample(b) for b in blocks]))
 
 
-def _per_sample(block: Block) -> float:
+def _per_sample(block: ResidualBlock) -> float:
     """What is left of a recording per sample."""
     return block.normal()[2] / block.residual.size
 
@@ -220,17 +220,17 @@ def shaped_too(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[F
     lead = min(fits, key=lambda f: f.left)
     best, size = lead.left, sum(b.residual.size for b in fits[0].blocks)
     held = [held_out(f, inquiry.groups).total ** 2 for f in fits]
-    is_whole = mismatch_of(inquiry.judge.evidence, lead.blocks, inquiry.phases).p_value > BY_CHANCE
-    ways: list[tuple[int, Job]] = []
+    is_whole = mismatch_of(inquiry.problem.dataset, lead.blocks, inquiry.phases).p_value > BY_CHANCE
+    ways: list[tuple[int, Task]] = []
     for k, (f, ahead) in enumerate(zip(fits, held, strict=True)):
         is_near = f.left < SHAPED * best or ahead < SHAPED * min(held)
         if not is_near or base.left - f.left < LEAST * (base.left - size):
             continue
-        jobs = [from_there(f, "shape")] if f.candidates[-1].shapes else []
-        jobs += [] if is_whole else [replace(from_there(f, "shape"), form=c) for c in f.candidates[-1].forms()]
-        ways += [(k, replace(job, leaves=tuple(b.total for b in lead.blocks))) for job in jobs]
+        tasks = [from_there(f, "shape")] if f.candidates[-1].shapes else []
+        tasks += [] if is_whole else [replace(from_there(f, "shape"), form=c) for c in f.candidates[-1].forms()]
+        ways += [(k, replace(task, leaves=tuple(b.total for b in lead.blocks))) for task in tasks]
     made: dict[int, list[Fitted]] = {}
-    for (k, _), new in zip(ways, _polished(inquiry, inquiry.fits([job for _, job in ways]), best), strict=True):
+    for (k, _), new in zip(ways, _polished(inquiry, inquiry.fits([task for _, task in ways]), best), strict=True):
         if new is not None:
             made.setdefault(k, []).append(new)
     found = list(fits)
@@ -278,18 +278,18 @@ def clocked_alike(inquiry: Inquiry, fits: Sequence[Fitted]) -> list[Fitted]:
     if len(fits) < 2:
         return list(fits)
     lead = min(fits, key=lambda f: f.left)
-    shifts = [_shifts_beside(inquiry.judge, f, lead) for f in fits]
-    jobs = {k: replace(from_there(fits[k], "time"), shifts=s) for k, s in enumerate(shifts) if s is not None}
-    found = dict(zip(jobs, inquiry.fits(list(jobs.values())), strict=True))
+    shifts = [_shifts_beside(inquiry.problem, f, lead) for f in fits]
+    tasks = {k: replace(from_there(fits[k], "time"), shifts=s) for k, s in enumerate(shifts) if s is not None}
+    found = dict(zip(tasks, inquiry.fits(list(tasks.values())), strict=True))
     return [min((f, found.get(k) or f), key=lambda one: one.left) for k, f in enumerate(fits)]
 
 
-def _shifts_beside(judge: Judge, fitted: Fitted, lead: Fitted) -> tuple[float, ...] | None:
+def _shifts_beside(problem: Problem, fitted: Fitted, lead: Fitted) -> tuple[float, ...] | None:
     """Time shifts (s) of all recordings, those of `lead` where they leave less; None if they do nowhere."""
     shifts = [b.shift for b in fitted.blocks]
     for r, (own, other) in enumerate(zip(fitted.blocks, lead.blocks, strict=True)):
         if abs(other.shift - own.shift) > TOLD:
-            there = judge.block(r, fitted.candidates, fitted.x, other.shift, 0.0, clock=False)
+            there = problem.block(r, fitted.candidates, fitted.x, other.shift, 0.0, clock=False)
             if there is not None and there.total < own.total - LITTLE:
                 shifts[r] = other.shift
     return tuple(shifts) if any(s != b.shift for s, b in zip(shifts, fitted.blocks, strict=True)) else None
@@ -301,9 +301,9 @@ def traced_too(inquiry: Inquiry, fitted: Fitted) -> Fitted:
     return min([fitted, *(f for f in begun if f is not None)], key=lambda f: f.left)
 
 
-def from_there(f: Fitted, how: How) -> Job:
+def from_there(f: Fitted, how: How) -> Task:
     """What is made of a fit where it stands."""
-    return Job(how=how, candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks))
+    return Task(how=how, candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks))
 
 
 def one_each(fits: Sequence[Fitted]) -> list[Fitted]:

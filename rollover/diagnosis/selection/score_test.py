@@ -1,8 +1,8 @@
 """When a gain is more than chance: the score of the best of all candidates against its null distribution.
 
 Each candidate looked at in a few places beside what is held already gives directions d in the space of the whitened
-samples, freed of what the time shifts and the effects already held explain. Where runs depend on chance after a blow,
-what it does before is a direction of its own. On noise alone the gain of a direction is
+samples, freed of what the time shifts and the effects already held explain. Where runs depend on chance after an
+impact, what it does before is a direction of its own. On noise alone the gain of a direction is
 z^2, z = d'n/|d|, and the best of all is max z^2: drawn from N(0, G), G the matrix of the directions' cosines, without a
 single simulation. What is compared with it is the same maximum for the misfit.
 """
@@ -17,15 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.fit.finite_differences import Point
-from rollover.diagnosis.fit.levenberg_marquardt import Block, Fitted, Judge
-from rollover.diagnosis.fit.linearisation import freed
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
+from rollover.diagnosis.fit.linearisation import without_shift
 from rollover.diagnosis.fit.parameterisation import (
     Candidate,
     followed,
     is_limit,
     zero_of,
 )
-from rollover.diagnosis.fit.scan_jobs import Looks, at_each
+from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
 from rollover.diagnosis.noise.ensemble import FEW, gained
 from rollover.diagnosis.selection.pair_score import jointly
 
@@ -40,7 +40,7 @@ CLOSER = 8  # places of one effect that are looked at closer
 
 
 @dataclass(frozen=True, kw_only=True)
-class Gate:
+class ScoreTest:
     """The best score of all candidates, each one's own by key, the null (draws,), and the strength that would show.
 
     `starts` are the places where a fit may begin, by key, the best first: the directions that score most, followed as
@@ -73,34 +73,34 @@ class Gate:
         joined = [c for both in zip(leading, by_score, strict=False) for c in both]
         return list({c.key: c for c in (*joined, *by_score)}.values())
 
-    def p_value(self, phi: float = 1.0) -> float:
-        """p-value of the best score; `phi` is what is left per sample where not even an explanation leaves noise."""
-        return p_value(self.score / max(phi, 1.0), self.null)
+    def p_value(self, dispersion: float = 1.0) -> float:
+        """p-value of the best score; `dispersion` is what is left per sample where no explanation leaves noise."""
+        return p_value(self.score / max(dispersion, 1.0), self.null)
 
 
-def gate(
-    judge: Judge,
+def score_test(
+    problem: Problem,
     base: Fitted,
     candidates: Sequence[Candidate],
     only: Sequence[int] | None = None,
     beside: Fitted | None = None,
-    looks: Looks = at_each,
-) -> Gate:
+    parallel_map: ParallelMap = serial_map,
+) -> ScoreTest:
     """Look at every candidate beside the base, in all recordings or `only` some, from the base's own time shifts.
 
     Directions are what candidates move `beside` another fit, where that is given: the null holds for any directions.
-    `looks` works them off.
+    `parallel_map` works them off.
     """
     at, use = beside or base, list(range(len(base.blocks))) if only is None else list(only)
     blocks = [base.blocks[r] for r in use]
-    misfit = np.concatenate([freed((b.residual + b.shift * b.slope)[:, None], b)[:, 0] for b in blocks])
-    held = np.concatenate([freed(b.J, b) for b in blocks]) if base.x else np.zeros((misfit.size, 0))
+    misfit = np.concatenate([without_shift((b.residual + b.shift * b.slope)[:, None], b)[:, 0] for b in blocks])
+    held = np.concatenate([without_shift(b.J, b) for b in blocks]) if base.x else np.zeros((misfit.size, 0))
     own, _ = np.linalg.qr(held)
     columns, seen_at, sizes = [], [], []
-    quiet = _before_the_blow(judge, use)
-    judge.made_ahead((r, (*at.candidates, c), (*at.x, *x)) for c in candidates for x in c.probes() for r in use)
+    quiet = _before_the_impact(problem, use)
+    problem.made_ahead((r, (*at.candidates, c), (*at.x, *x)) for c in candidates for x in c.probes() for r in use)
     look = partial(_directions, at=(at.candidates, at.x), blocks=base.blocks, use=tuple(use))
-    for c, found in zip(candidates, looks(judge, look, candidates), strict=True):
+    for c, found in zip(candidates, parallel_map(problem, look, candidates), strict=True):
         for x, d in found:
             parts = [(d, SHOWS)]
             if c.kind != "sensor" and quiet is not None:
@@ -113,12 +113,12 @@ def gate(
                     seen_at.append((c, x))
                     sizes.append(size)
     if not columns:
-        return Gate(score=0.0, scores={}, null=np.zeros(DRAWS), detectable={})
+        return ScoreTest(score=0.0, scores={}, null=np.zeros(DRAWS), detectable={})
     D = np.stack(columns, axis=1)
     misfit = misfit - own @ (own.T @ misfit)
     along, scores = _best_along(misfit, D, blocks)
-    scores = scores / (1.0 + _trust(judge, blocks, use, D))
-    if any(judge.evidence[r].strays for r in use):
+    scores = scores / (1.0 + _trust(problem, blocks, use, D))
+    if any(problem.dataset[r].perturbed for r in use):
         scores = scores / _at_odds(misfit, D, [b.residual.size for b in blocks])
     detectable: dict[str, float] = {}
     own_best: dict[str, float] = {}
@@ -137,10 +137,10 @@ def gate(
             ways[c.key].append(start)
     cosines = D.T @ D
     both = []
-    for pair in [] if judge.effort.thrifty else jointly(along, cosines, [c.key for c, _ in seen_at]):
+    for pair in [] if problem.effort.is_ensemble else jointly(along, cosines, [c.key for c, _ in seen_at]):
         one, other = (_led(*seen_at[k], far / sizes[k]) for k, far in zip(pair.places, pair.along, strict=True))
         both.append((one, other))
-    return Gate(
+    return ScoreTest(
         score=float(scores.max()),
         scores=own_best,
         null=null_by(cosines),
@@ -152,12 +152,12 @@ def gate(
     )
 
 
-def _before_the_blow(judge: Judge, use: Sequence[int]) -> Array | None:
+def _before_the_impact(problem: Problem, use: Sequence[int]) -> Array | None:
     """1 for the stacked samples before runs depend on chance, 0 after; None where they never do.
 
     What an effect does there is the effect's alone; beyond, one run's difference is chance to a large part.
     """
-    stacked = np.concatenate([judge.evidence[r].early for r in use]).astype(float)
+    stacked = np.concatenate([problem.dataset[r].early for r in use]).astype(float)
     return None if stacked.all() or not stacked.any() else stacked
 
 
@@ -166,19 +166,23 @@ def _led(c: Candidate, x: tuple[float, ...], factor: float) -> Place:
     return c.key, followed(c, x, factor) or x
 
 
-def _best_along(misfit: Array, D: Array, blocks: Sequence[Block]) -> tuple[Array, Array]:
+def _best_along(misfit: Array, D: Array, blocks: Sequence[ResidualBlock]) -> tuple[Array, Array]:
     """How far along each unit direction (n, m) is best, (m,), and what that gains, (m,), noise units.
 
     z and z^2, z = d'n, where all samples count in full. Where recordings took another course more may be gained further
     on (D12): as far as each of them asks for is tried.
     """
     along = D.T @ misfit
-    if all(b.course is None for b in blocks):
+    if all(b.heavy_tail is None for b in blocks):
         return along, along**2
     tried, parts = [along], []
     for b, whole in zip(blocks, _stacked([b.residual.size for b in blocks]), strict=True):
         every = slice(None)
-        cells = [(1.0, every)] if b.course is None else [(1.0, ~b.course.late), (b.course.slope, b.course.late)]
+        cells = (
+            [(1.0, every)]
+            if b.heavy_tail is None
+            else [(1.0, ~b.heavy_tail.late), (b.heavy_tail.slope, b.heavy_tail.late)]
+        )
         for slope, rows in cells:
             d, w = D[whole][rows], misfit[whole][rows]
             pull, size = d.T @ w, np.sum(d**2, axis=0)
@@ -207,39 +211,41 @@ def _at_odds(misfit: Array, D: Array, sizes: Sequence[int]) -> Array:
     return np.asarray(np.maximum(1.0, apart / max(len(parts) - 1, 1)))
 
 
-def _trust(judge: Judge, blocks: Sequence[Block], use: Sequence[int], D: Array) -> Array:
+def _trust(problem: Problem, blocks: Sequence[ResidualBlock], use: Sequence[int], D: Array) -> Array:
     """Variance along each direction (n, m) of what runs that nobody could tell apart differ by, (m,), noise units."""
-    many = min((len(judge.evidence[r].strays) for r in use), default=0)
+    many = min((len(problem.dataset[r].perturbed) for r in use), default=0)
     found = np.zeros(D.shape[1])
     for k in range(many):
-        strays = [
-            freed(block.counted(judge.evidence[r].whitened(judge.evidence[r].strays[k]))[:, None], block)[:, 0]
+        perturbed = [
+            without_shift(block.counted(problem.dataset[r].whitened(problem.dataset[r].perturbed[k]))[:, None], block)[
+                :, 0
+            ]
             for r, block in zip(use, blocks, strict=True)
         ]
-        found += (D.T @ np.concatenate(strays)) ** 2
+        found += (D.T @ np.concatenate(perturbed)) ** 2
     return np.asarray(FEW * found / max(many, 1))
 
 
 def _directions(
-    judge: Judge, c: Candidate, *, at: Point, blocks: Sequence[Block], use: Sequence[int]
+    problem: Problem, c: Candidate, *, at: Point, blocks: Sequence[ResidualBlock], use: Sequence[int]
 ) -> list[tuple[tuple[float, ...], Array]]:
     """Where a candidate is looked at beside a point, and what it moves there in the recordings `use`."""
-    places = (*c.probes(), *(c.further() if judge.effort.thrifty else ()))
-    found = [(x, _direction(judge, at, blocks, c, x, use)) for x in places]
+    places = (*c.probes(), *(c.further() if problem.effort.is_ensemble else ()))
+    found = [(x, _direction(problem, at, blocks, c, x, use)) for x in places]
     return [(x, d) for x, d in found if d is not None]
 
 
 def _direction(
-    judge: Judge, at: Point, blocks: Sequence[Block], c: Candidate, x: Sequence[float], use: Sequence[int]
+    problem: Problem, at: Point, blocks: Sequence[ResidualBlock], c: Candidate, x: Sequence[float], use: Sequence[int]
 ) -> Array | None:
     """What the candidate at x moves beside a point in the recordings `use`, without time shifts; None if it fails."""
     found = []
     for r in use:
         block = blocks[r]
-        d = judge.moved(r, at, ((*at[0], c), (*at[1], *x)), block.shift)
+        d = problem.moved(r, at, ((*at[0], c), (*at[1], *x)), block.shift)
         if d is None:
             return None
-        found.append(freed(block.counted(d)[:, None], block)[:, 0])
+        found.append(without_shift(block.counted(d)[:, None], block)[:, 0])
     return np.concatenate(found)
 
 

@@ -9,15 +9,15 @@ from functools import partial
 import numpy as np
 
 from rollover.diagnosis.fit.finite_differences import Point
-from rollover.diagnosis.fit.levenberg_marquardt import Block, Fitted, Judge
-from rollover.diagnosis.fit.linearisation import freed
-from rollover.diagnosis.fit.parameterisation import BESIDE, Candidate, akin
-from rollover.diagnosis.fit.scan_jobs import Looks, at_each
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
+from rollover.diagnosis.fit.linearisation import without_shift
+from rollover.diagnosis.fit.parameterisation import BESIDE, Candidate, same_family
+from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
 from rollover.diagnosis.fit.step import Screened
 from rollover.diagnosis.fit.time_shift import by_first_contact
 from rollover.diagnosis.forward.budget import DROPS, Effort
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.score_test import WAYS, Gate
+from rollover.diagnosis.selection.score_test import WAYS, ScoreTest
 
 SCORED = 18  # candidates looked at closer, by their score
 BENT = 1.2  # misfit over the noise from which on time shifts fitted to it are bent by what is missing
@@ -36,29 +36,29 @@ def spread(base: Fitted, groups: Sequence[Sequence[int]], few: int = DROPS.few) 
     return sorted({members[round(k * (len(members) - 1) / (few - 1))] for k in range(few)})
 
 
-def is_far(judge: Judge, base: Fitted) -> bool:
+def is_far(problem: Problem, base: Fitted) -> bool:
     """Whether a base is so far off that its time shifts tell of what is missing; beside a tolerance that is soon."""
-    far = FAR if judge.per_error == 1.0 else 1.0
+    far = FAR if problem.samples_per_error == 1.0 else 1.0
     return base.left > far**2 * sum(b.residual.size for b in base.blocks)
 
 
-def begun(judge: Judge, base: Fitted, looks: Looks = at_each) -> list[float]:
+def begun(problem: Problem, base: Fitted, parallel_map: ParallelMap = serial_map) -> list[float]:
     """Time shifts (s) to begin with: where the base is off its own are bent by what is missing, the contact's hardly.
 
     Where samples are weighed by what neighbours scatter by, how far off it is cannot be told from what is left.
     """
     count = sum(b.residual.size for b in base.blocks)
-    if judge.effort.thrifty or judge.per_error > 1.0:
+    if problem.effort.is_ensemble or problem.samples_per_error > 1.0:
         told: list[float | None] = [None] * len(base.blocks)
-        if not judge.effort.thrifty and not is_far(judge, base):
+        if not problem.effort.is_ensemble and not is_far(problem, base):
             return [b.shift for b in base.blocks]
     elif base.left < BENT**2 * count:
         return [b.shift for b in base.blocks]
     else:
-        told = by_first_contact(judge, base.candidates, base.x, looks)
+        told = by_first_contact(problem, base.candidates, base.x, parallel_map)
     return [
         at if at is not None else b.shift if e.recording.clock.zero == "unknown" else 0.0
-        for at, b, e in zip(told, base.blocks, judge.evidence, strict=True)
+        for at, b, e in zip(told, base.blocks, problem.dataset, strict=True)
     ]
 
 
@@ -68,30 +68,30 @@ def screen(
     candidates: Sequence[Candidate],
     few: Sequence[int],
     shifts: Sequence[float],
-    looked: Gate,
+    looked: ScoreTest,
 ) -> list[Screened]:
     """Look at each candidate in some places beside the base, on a few recordings, from time `shifts` (s) of all.
 
     Not far from an explanation the places to which `looked` leads are enough.
     """
-    judge = inquiry.judge
-    beside = [judge.block(r, base.candidates, base.x, shifts[r], 0.0) for r in few]
+    problem = inquiry.problem
+    beside = [problem.block(r, base.candidates, base.x, shifts[r], 0.0) for r in few]
     blocks = tuple(b for b in beside if b is not None)
     if len(blocks) < len(few):
         return []
-    near = not is_far(judge, base) and not judge.effort.thrifty
+    near = not is_far(problem, base) and not problem.effort.is_ensemble
 
     def places(c: Candidate) -> tuple[tuple[float, ...], ...]:
-        ways = () if judge.effort.thrifty and not c.is_placed else looked.starts.get(c.key, ())
+        ways = () if problem.effort.is_ensemble and not c.is_placed else looked.starts.get(c.key, ())
         is_led = (near or c.is_placed) and ways and not c.is_sudden
         return tuple(ways if is_led else (*ways, *c.starts()))
 
-    judge.made_ahead((r, (*base.candidates, c), (*base.x, *x)) for c in candidates for x in places(c) for r in few)
+    problem.made_ahead((r, (*base.candidates, c), (*base.x, *x)) for c in candidates for x in places(c) for r in few)
     things = [_Look(candidate=c, places=places(c), far=looked.far.get(c.key, ())) for c in candidates]
     look = partial(
         _screened, base=(base.candidates, base.x), few=tuple(few), shifts=tuple(shifts[r] for r in few), blocks=blocks
     )
-    return [s for s in inquiry.looks(look, things) if s is not None]
+    return [s for s in inquiry.parallel_map(look, things) if s is not None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,13 +104,13 @@ class _Look:
 
 
 def _screened(
-    judge: Judge,
+    problem: Problem,
     thing: _Look,
     *,
     base: Point,
     few: tuple[int, ...],
     shifts: tuple[float, ...],
-    blocks: tuple[Block, ...],
+    blocks: tuple[ResidualBlock, ...],
 ) -> Screened | None:
     """One candidate looked at beside a base, which few recordings meet by these blocks; None if nothing can be made."""
     c, potential = thing.candidate, 0.0
@@ -118,13 +118,13 @@ def _screened(
     for start in thing.places:
         left, along, size, count = 0.0, 0.0, 0.0, 0
         for r, shift, block in zip(few, shifts, blocks, strict=True):
-            there = judge.block(r, (*base[0], c), (*base[1], *start), shift, 0.0)
+            there = problem.block(r, (*base[0], c), (*base[1], *start), shift, 0.0)
             if there is None:
                 break
             count += 1
             left += there.normal()[2]
             way = block.counted(block.plain_residual - there.plain_residual)
-            free = freed(np.column_stack([way, block.residual]), block)
+            free = without_shift(np.column_stack([way, block.residual]), block)
             along += float(free[:, 0] @ free[:, 1])
             size += float(free[:, 0] @ free[:, 0])
         if count < len(blocks):
@@ -141,9 +141,9 @@ def _screened(
     return Screened(candidate=c, starts=starts, left=met[0][0], potential=potential)
 
 
-def kin(ranked: Sequence[Candidate], taken: int, leaders: int) -> list[Candidate]:
+def of_same_family(ranked: Sequence[Candidate], taken: int, leaders: int) -> list[Candidate]:
     """Beyond the first that are `taken`, those akin to one of the `leaders` that move the vehicle."""
-    return akin(ranked[taken:], [c for c in ranked if c.kind != "sensor"][:leaders])
+    return same_family(ranked[taken:], [c for c in ranked if c.kind != "sensor"][:leaders])
 
 
 def _begun_at(c: Candidate, met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float, ...], ...]:
@@ -165,7 +165,7 @@ def _apart(met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float,
     return (best, *other[:1])
 
 
-def promising(candidates: Sequence[Candidate], looked: Gate, effort: Effort = DROPS) -> list[Candidate]:
+def promising(candidates: Sequence[Candidate], looked: ScoreTest, effort: Effort = DROPS) -> list[Candidate]:
     """Those that scored best, and of two parameters all: beside their thresholds a score tells little.
 
     Where each costs runs, of these only the kin of what leads, and a few that move the vehicle in any case.
@@ -173,6 +173,6 @@ def promising(candidates: Sequence[Candidate], looked: Gate, effort: Effort = DR
     ranked = looked.ranked(candidates)
     if effort.scored is not None:
         moving = [c for c in ranked if c.kind != "sensor"][: effort.promising]
-        related = kin(ranked, effort.scored, effort.leaders)
+        related = of_same_family(ranked, effort.scored, effort.leaders)
         return list({c.key: c for c in (*ranked[: effort.scored], *moving, *related)}.values())
     return [c for k, c in enumerate(ranked) if k < SCORED or len(c.search) > 1]

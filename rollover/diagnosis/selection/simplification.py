@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from rollover.diagnosis.fit.jobs import Job
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.jobs import Task
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.linearisation import turned
 from rollover.diagnosis.fit.local_search import ended, polish, timed, without
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinates, each_with_own
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.flexibility import is_any_curve
+from rollover.diagnosis.selection.flexibility import is_over_flexible
 from rollover.diagnosis.selection.forward_step import NEARLY_NOISE, SOON, is_at_an_end
 from rollover.diagnosis.selection.restarts import LEADS, from_there, traced_too
 from rollover.effects import EFFECTS
@@ -32,23 +32,23 @@ def followed(inquiry: Inquiry, found: Step) -> tuple[Step, Mismatch]:
     too early. One effect's is followed only if what it leaves is in doubt, or if it is met better with its threshold
     elsewhere.
     """
-    judge, phases, old = inquiry.judge, inquiry.phases, found.fitted
-    left = mismatch_of(judge.evidence, old.blocks, phases)
+    problem, phases, old = inquiry.problem, inquiry.phases, found.fitted
+    left = mismatch_of(problem.dataset, old.blocks, phases)
     is_near = old.left < NEARLY_NOISE**2 * sum(b.residual.size for b in old.blocks)
-    if judge.effort.thrifty or not is_near:
+    if problem.effort.is_ensemble or not is_near:
         return found, left
-    if not is_any_curve(old.candidates):  # as they stand these will be refused, however well they fit
+    if not is_over_flexible(old.candidates):  # as they stand these will be refused, however well they fit
         new = traced_too(inquiry, old)
         if new.left < old.left or len(old.candidates) > 1 or left.p_value < MANY:
-            new = timed(judge, polish(judge, new))
-        new = ended(judge, new)
+            new = timed(problem, polish(problem, new))
+        new = ended(problem, new)
         if new.left < old.left:
             found = _with_rivals(inquiry, found.moved_to(new))
-            left = mismatch_of(judge.evidence, new.blocks, phases)
+            left = mismatch_of(problem.dataset, new.blocks, phases)
     for simple in (simpler, _straightened, plainer):
         other = simple(inquiry, found)
         if other is not None:
-            found, left = other, mismatch_of(judge.evidence, other.fitted.blocks, phases)
+            found, left = other, mismatch_of(problem.dataset, other.fitted.blocks, phases)
     return found, left
 
 
@@ -65,8 +65,8 @@ def simpler(inquiry: Inquiry, found: Step) -> Step | None:
         able = [f for f in able if len(f.own) < len(best.own) and f.left < found.base.left][:SIMPLER]
         begun += [((*beside, f.candidates[-1]), f.own) for f in able]
     shifts = tuple(b.shift for b in best.blocks)
-    jobs = [Job(candidates=candidates, start=(*shared, *own), shifts=shifts, width=1) for candidates, own in begun]
-    one = min((f for f in inquiry.fits(jobs) if f is not None), key=lambda f: f.left, default=None)
+    tasks = [Task(candidates=candidates, start=(*shared, *own), shifts=shifts, width=1) for candidates, own in begun]
+    one = min((f for f in inquiry.fits(tasks) if f is not None), key=lambda f: f.left, default=None)
     if one is None or not _is_as_good(one, best):
         return None
     return _led_by(one, found)
@@ -94,8 +94,10 @@ def _with_rivals(inquiry: Inquiry, found: Step) -> Step:
         return found
     shifts, near = tuple(b.shift for b in best.blocks), sorted(found.rivals, key=lambda f: f.left)[:BESIDE]
     begun = [f for f in near if f is not best]
-    jobs = [Job(candidates=(*beside, f.candidates[-1]), start=(*shared, *f.own), shifts=shifts, width=1) for f in begun]
-    better = {id(f): again for f, again in zip(begun, inquiry.fits(jobs), strict=True) if again is not None}
+    tasks = [
+        Task(candidates=(*beside, f.candidates[-1]), start=(*shared, *f.own), shifts=shifts, width=1) for f in begun
+    ]
+    better = {id(f): again for f, again in zip(begun, inquiry.fits(tasks), strict=True) if again is not None}
     rivals = (min(f, better.get(id(f), f), key=lambda one: one.left) for f in found.rivals)
     return replace(found, rivals=tuple(rivals))
 
@@ -110,8 +112,8 @@ def _straightened(inquiry: Inquiry, found: Step) -> Step | None:
     if len(best.candidates) < 2 or not bent:
         return None
     shifts, ways = tuple(b.shift for b in best.blocks), [bent, *([k] for k in bent if len(bent) > 1)]
-    jobs = [Job(candidates=c, start=x, shifts=shifts, width=1) for c, x in (unbent(best, usual, w) for w in ways)]
-    fits = [f for f in inquiry.fits(jobs) if f is not None and _is_as_good(f, best)]
+    tasks = [Task(candidates=c, start=x, shifts=shifts, width=1) for c, x in (unbent(best, usual, w) for w in ways)]
+    fits = [f for f in inquiry.fits(tasks) if f is not None and _is_as_good(f, best)]
     if not fits:
         return None
     return _led_by(min(fits, key=lambda f: (len(f.x), f.left)), found)
@@ -123,17 +125,17 @@ def plainer(inquiry: Inquiry, found: Step) -> Step | None:
     Two thresholds in one place do the work of one and a stiffness: of either. The way there is crooked: all others move
     with it, beside that which does most of the work less far.
     """
-    made = (_plainer_last(inquiry, way) for way in _ways(inquiry.judge, found))
+    made = (_plainer_last(inquiry, way) for way in _ways(inquiry.problem, found))
     return next((new for new in made if new is not None), None)
 
 
-def _ways(judge: Judge, found: Step) -> Iterator[Step]:
+def _ways(problem: Problem, found: Step) -> Iterator[Step]:
     """A step, and of two effects of one family, of several numbers each, the same with the first for its last."""
     yield found
     each = found.fitted.candidates
     if len(each) == 2 and len({c.family for c in each}) == 1 and all(len(c.search) > 1 for c in each):
         around = turned(found.fitted)
-        base = without(judge, around, 1)
+        base = without(problem, around, 1)
         if base is not None:
             yield Step(base=base, fitted=around, p_value=found.p_value, rivals=(around,))
 
@@ -145,8 +147,8 @@ def _plainer_last(inquiry: Inquiry, found: Step) -> Step | None:
     if not beside or not able:
         return None
     shifts = tuple(b.shift for b in best.blocks)
-    jobs = [Job(candidates=(*beside, c), start=(*shared, *c.probes()[0]), shifts=shifts, rounds=SOON) for c in able]
-    short = sorted((f for f in inquiry.fits(jobs) if f is not None), key=lambda f: f.total)[:PLAINER]
+    tasks = [Task(candidates=(*beside, c), start=(*shared, *c.probes()[0]), shifts=shifts, rounds=SOON) for c in able]
+    short = sorted((f for f in inquiry.fits(tasks) if f is not None), key=lambda f: f.total)[:PLAINER]
     whole = inquiry.fits([from_there(f, "fit") for f in short])
     one = min((f for f in whole if f is not None), key=lambda f: f.left, default=None)
     if one is None or one.left > LEADS * best.left:
@@ -175,12 +177,12 @@ def mirror_images(
     last, shifts = fitted.candidates[-1], tuple(b.shift for b in fitted.blocks)
     begun = list(_mirrors(last, fitted.own, inquiry.free(fitted))) if beside else []
     held = [replace(c, search={}, fixed={**c.fixed, **c.values(own)}) for c, own in begun]
-    jobs = [Job(candidates=(c, *beside), start=tuple(shared), shifts=shifts) for c in held]
-    led = [(c, own, f) for (c, own), f in zip(begun, inquiry.fits(jobs), strict=True) if f is not None]
-    jobs = [
-        Job(candidates=(*beside, c), start=(*f.x, *own), shifts=tuple(b.shift for b in f.blocks)) for c, own, f in led
+    tasks = [Task(candidates=(c, *beside), start=tuple(shared), shifts=shifts) for c in held]
+    led = [(c, own, f) for (c, own), f in zip(begun, inquiry.fits(tasks), strict=True) if f is not None]
+    tasks = [
+        Task(candidates=(*beside, c), start=(*f.x, *own), shifts=tuple(b.shift for b in f.blocks)) for c, own, f in led
     ]
-    return [f for f in inquiry.fits(jobs) if f is not None]
+    return [f for f in inquiry.fits(tasks) if f is not None]
 
 
 def _mirrors(
@@ -219,5 +221,5 @@ def _led_by(new: Fitted, found: Step) -> Step:
 
 def _is_as_good(simple: Fitted, best: Fitted) -> bool:
     """Whether a fit of fewer numbers leaves hardly more than the best."""
-    phi = max(1.0, best.left / sum(b.residual.size for b in best.blocks))
-    return simple.left < best.left + phi * TELLS * (len(best.x) - len(simple.x))
+    dispersion = max(1.0, best.left / sum(b.residual.size for b in best.blocks))
+    return simple.left < best.left + dispersion * TELLS * (len(best.x) - len(simple.x))

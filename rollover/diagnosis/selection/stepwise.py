@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeGuard
 
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.local_search import conditioned, is_doubtful, timed
 from rollover.diagnosis.fit.step import Phases, Step
 from rollover.diagnosis.fit.time_shift import is_all_by_clocks
@@ -14,12 +14,12 @@ from rollover.diagnosis.inference.adequacy import NEGLIGIBLE, is_enough, is_tole
 from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
 from rollover.diagnosis.noise.ensemble import is_other
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.ensemble_validation import SPOKEN, astray, backed, begun_anew, lasting
-from rollover.diagnosis.selection.flexibility import MOST, is_any_curve
-from rollover.diagnosis.selection.forward_step import does, moves, step, weighed
-from rollover.diagnosis.selection.pairs import two_by_two, with_another_first
+from rollover.diagnosis.selection.ensemble_validation import SPOKEN, astray, backed, begun_anew, ensemble_validated
+from rollover.diagnosis.selection.flexibility import MOST, is_over_flexible
+from rollover.diagnosis.selection.forward_step import does, moves, reweighted, step
+from rollover.diagnosis.selection.pairs import best_subsets, with_another_first
 from rollover.diagnosis.selection.scan import look, look_again
-from rollover.diagnosis.selection.score_test import Gate
+from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.simplification import followed
 
 CHANCE = 0.005  # p-value of the best of all candidates that admits one
@@ -50,8 +50,8 @@ class Taken:
     before: Mismatch
     left: Mismatch
     first: Step | None
-    at_first: Gate
-    looked: Gate
+    at_first: ScoreTest
+    looked: ScoreTest
     refuted: bool = False
     paired: bool = False
 
@@ -66,40 +66,46 @@ def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = (), *, pa
 
     Two that leave more than noise are given for the best of all `pairs`, if these are to be tried.
     """
-    judge, candidates, groups, phases = inquiry.judge, inquiry.candidates, inquiry.groups, inquiry.phases
+    problem, candidates, groups, phases = inquiry.problem, inquiry.candidates, inquiry.groups, inquiry.phases
     count = sum(b.residual.size for b in base.blocks)
-    clocked = begun_anew if judge.effort.thrifty else timed
-    base = clocked(judge, base)  # what a clock leaves is no noise,
-    if weighed(judge, base, phases):
-        base = judge.again(base)
-    base = clocked(judge, base)  # and no effect's gain
-    before = mismatch_of(judge.evidence, base.blocks, phases)
-    base = astray(judge, base)
+    clocked = begun_anew if problem.effort.is_ensemble else timed
+    base = clocked(problem, base)  # what a clock leaves is no noise,
+    if reweighted(problem, base, phases):
+        base = problem.again(base)
+    base = clocked(problem, base)  # and no effect's gain
+    before = mismatch_of(problem.dataset, base.blocks, phases)
+    base = astray(problem, base)
     inquiry.say(f"looking at {len(candidates)} candidates, which of them could matter")
-    looked = first_look = look(judge, base, candidates, groups, looks=inquiry.crew.looks)
+    looked = first_look = look(problem, base, candidates, groups, parallel_map=inquiry.executor.parallel_map)
 
-    def beside(fitted: Fitted, left: Mismatch) -> Gate:
-        known = base if is_enough(judge, fitted, left) else None
-        return look_again(judge, fitted, known, inquiry.free(fitted), groups, first_look, inquiry.crew.looks)
+    def beside(fitted: Fitted, left: Mismatch) -> ScoreTest:
+        known = base if is_enough(problem, fitted, left) else None
+        return look_again(
+            problem, fitted, known, inquiry.free(fitted), groups, first_look, inquiry.executor.parallel_map
+        )
 
     current, left = base, before
     taken = list(begun)
     first = taken[0] if taken else None
     if taken:
         current = taken[-1].fitted
-        left = mismatch_of(judge.evidence, current.blocks, phases)
+        left = mismatch_of(problem.dataset, current.blocks, phases)
         looked = beside(current, left)
     refuted = paired = False
     for _ in range(MOST - len(begun)):
-        if is_tolerated(judge, current):
+        if is_tolerated(problem, current):
             break
-        if looked.p_value() > CHANCE and is_enough(judge, current, left):
+        if looked.p_value() > CHANCE and is_enough(problem, current, left):
             break
-        if not taken and not judge.effort.thrifty and is_all_by_clocks(judge, base, inquiry.crew.looks):
+        if (
+            not taken
+            and not problem.effort.is_ensemble
+            and is_all_by_clocks(problem, base, inquiry.executor.parallel_map)
+        ):
             break
         tried = step(inquiry, current, looked)
         first = first or tried
-        if not is_beyond_chance(tried, judge, phases):
+        if not is_beyond_chance(tried, problem, phases):
             break
         found = upheld(inquiry, tried, looked)
         if found is None and not taken:
@@ -108,28 +114,28 @@ def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = (), *, pa
         if found is None:
             refuted = not taken
             break
-        found, left = as_conditioned(judge, *followed(inquiry, found), phases)
+        found, left = as_conditioned(problem, *followed(inquiry, found), phases)
         taken.append(found)
         current = found.fitted
-        if not judge.straying:
-            current = astray(judge, current)
-            left = mismatch_of(judge.evidence, current.blocks, phases)
-        if len(taken) == 2 and not is_enough(judge, current, left):
+        if not problem.heavy_tailed:
+            current = astray(problem, current)
+            left = mismatch_of(problem.dataset, current.blocks, phases)
+        if len(taken) == 2 and not is_enough(problem, current, left):
             # of two that are strong the first may have been taken for something else
             other = None
-            if pairs and not judge.effort.thrifty:
-                other, paired = two_by_two(inquiry, taken, first_look, current), True
-            elif judge.effort.thrifty and current.left - count < ABLE * (base.left - count):
+            if pairs and not problem.effort.is_ensemble:
+                other, paired = best_subsets(inquiry, taken, first_look, current), True
+            elif problem.effort.is_ensemble and current.left - count < ABLE * (base.left - count):
                 other = with_another_first(inquiry, taken, current)
             if other is not None:
                 (taken, left), current = other, other[0][-1].fitted
-        is_lost = len(taken) > 1 and (is_hopeless(judge, base, current) or is_unlikely(judge, taken[-1], current))
-        if is_lost or is_any_curve(current.candidates):
+        is_lost = len(taken) > 1 and (is_hopeless(problem, base, current) or is_unlikely(problem, taken[-1], current))
+        if is_lost or is_over_flexible(current.candidates):
             break
         looked = beside(current, left)
-    if not judge.straying:
-        judge.straying, current = True, judge.again(current)
-        left = mismatch_of(judge.evidence, current.blocks, phases)
+    if not problem.heavy_tailed:
+        problem.heavy_tailed, current = True, problem.again(current)
+        left = mismatch_of(problem.dataset, current.blocks, phases)
     return Taken(
         base=base,
         steps=tuple(taken),
@@ -144,47 +150,51 @@ def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = (), *, pa
     )
 
 
-def is_hopeless(judge: Judge, base: Fitted, current: Fitted) -> bool:
+def is_hopeless(problem: Problem, base: Fitted, current: Fitted) -> bool:
     """Whether two effects leave far more than noise, and no small part of what there was beyond it."""
-    count, hardly_any = sum(b.residual.size for b in current.blocks), HARDLY_ANY[judge.effort.thrifty]
+    count, hardly_any = sum(b.residual.size for b in current.blocks), HARDLY_ANY[problem.effort.is_ensemble]
     return current.left > HOPELESS**2 * count and current.left - count > hardly_any * (base.left - count)
 
 
-def is_unlikely(judge: Judge, last: Step, current: Fitted) -> bool:
+def is_unlikely(problem: Problem, last: Step, current: Fitted) -> bool:
     """Whether a third effect, of drops, would have to take far more than the second did for nothing to be left."""
     beyond = current.left - sum(b.residual.size for b in current.blocks)
-    return not judge.effort.thrifty and beyond > UNLIKELY * max(last.base.left - current.left, 0.0)
+    return not problem.effort.is_ensemble and beyond > UNLIKELY * max(last.base.left - current.left, 0.0)
 
 
-def is_beyond_chance(found: Step | None, judge: Judge, phases: Phases) -> TypeGuard[Step]:
+def is_beyond_chance(found: Step | None, problem: Problem, phases: Phases) -> TypeGuard[Step]:
     """Whether a step gains more than the best of all candidates does by chance, and moves something by it.
 
     An effect that moves things itself is none to be left out because others can be bent to nearly all of it, nor is a
     part of what is not negligible as a whole. Where runs scatter, slopes say less than the fits do: what is missing for
     sure is looked for though the best slopes could be chance.
     """
-    if found is None or found.p_value > (BY_SCATTER if judge.effort.thrifty else CHANCE):
+    if found is None or found.p_value > (BY_SCATTER if problem.effort.is_ensemble else CHANCE):
         return False
-    if found.p_value > CHANCE and not is_missed(found.base, judge, phases):
+    if found.p_value > CHANCE and not is_missed(found.base, problem, phases):
         return False
-    moved = moves(judge, found.base, found.fitted)
-    if moved >= NEGLIGIBLE or moved < PART * NEGLIGIBLE or judge.effort.thrifty:
+    moved = moves(problem, found.base, found.fitted)
+    if moved >= NEGLIGIBLE or moved < PART * NEGLIGIBLE or problem.effort.is_ensemble:
         return moved >= NEGLIGIBLE
-    if found.base.candidates and does(judge, found.fitted) >= NEGLIGIBLE:
+    if found.base.candidates and does(problem, found.fitted) >= NEGLIGIBLE:
         return True
-    return is_missed(found.base, judge, phases)
+    return is_missed(found.base, problem, phases)
 
 
-def is_missed(fitted: Fitted, judge: Judge, phases: Phases) -> bool:
+def is_missed(fitted: Fitted, problem: Problem, phases: Phases) -> bool:
     """Whether a fit surely leaves something that matters."""
-    return not is_enough(judge, fitted, mismatch_of(judge.evidence, fitted.blocks, phases))
+    return not is_enough(problem, fitted, mismatch_of(problem.dataset, fitted.blocks, phases))
 
 
-def upheld(inquiry: Inquiry, found: Step, looked: Gate) -> Step | None:
+def upheld(inquiry: Inquiry, found: Step, looked: ScoreTest) -> Step | None:
     """A step as it is to be taken; None where runs scatter and its gain does not outlast that."""
-    judge = inquiry.judge
+    problem = inquiry.problem
     spoken = SPOKEN if found.p_value <= CHANCE else BY_SCATTER  # what admitted the step speaks for its best
-    return lasting(judge, backed(found, looked, spoken), inquiry.groups) if judge.effort.thrifty else found
+    return (
+        ensemble_validated(problem, backed(found, looked, spoken), inquiry.groups)
+        if problem.effort.is_ensemble
+        else found
+    )
 
 
 def counted_otherwise(inquiry: Inquiry, current: Fitted) -> Step | None:
@@ -193,31 +203,31 @@ def counted_otherwise(inquiry: Inquiry, current: Fitted) -> Step | None:
     Chance could have sent several there, but so could what is missing; and where they went there may hide what shows
     before. If nothing lasts they are counted as they were.
     """
-    judge = inquiry.judge
-    before = judge.straying
-    if before and sum(is_other(b.course) for b in current.blocks) < SEVERAL:
+    problem = inquiry.problem
+    before = problem.heavy_tailed
+    if before and sum(is_other(b.heavy_tail) for b in current.blocks) < SEVERAL:
         return None
-    judge.straying = not before
-    base = judge.again(current)
-    looked = look(judge, base, inquiry.candidates, inquiry.groups)
+    problem.heavy_tailed = not before
+    base = problem.again(current)
+    looked = look(problem, base, inquiry.candidates, inquiry.groups)
     tried = step(inquiry, base, looked)
-    found = upheld(inquiry, tried, looked) if is_beyond_chance(tried, judge, inquiry.phases) else None
+    found = upheld(inquiry, tried, looked) if is_beyond_chance(tried, problem, inquiry.phases) else None
     if found is None:
-        judge.straying = before
+        problem.heavy_tailed = before
     return found
 
 
-def as_conditioned(judge: Judge, found: Step, left: Mismatch, phases: Phases) -> tuple[Step, Mismatch]:
+def as_conditioned(problem: Problem, found: Step, left: Mismatch, phases: Phases) -> tuple[Step, Mismatch]:
     """A step and what it leaves; with the errors of the conditions as they act beside it if that leaves chance alone.
 
     Else these stay as they act on the scenario as it is: a wrong effect would bend them too.
     """
-    if is_enough(judge, found.fitted, left) or not is_doubtful(judge):
+    if is_enough(problem, found.fitted, left) or not is_doubtful(problem):
         return found, left
-    before = judge.evidence
-    new = conditioned(judge, found.fitted)
-    there = mismatch_of(judge.evidence, new.blocks, phases)
-    if is_enough(judge, new, there):
+    before = problem.dataset
+    new = conditioned(problem, found.fitted)
+    there = mismatch_of(problem.dataset, new.blocks, phases)
+    if is_enough(problem, new, there):
         return found.moved_to(new), there
-    judge.weigh(before)
+    problem.with_noise_model(before)
     return found, left

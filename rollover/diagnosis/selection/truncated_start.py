@@ -2,7 +2,7 @@
 
 Where much is missing on the way back, as of ground that springs, no effect of the way down meets a recording well, and
 one that meets neither may lead. Up to the deepest point it is out of sight. What bounces comes down again at other
-times with another spring, and fits to several such blows end at the wrong ones: the first rise comes before them, and
+times with another spring, and fits to several such impacts end at the wrong ones: the first rise comes before them, and
 before what holds the face as it lifts off comes what it springs back by.
 """
 
@@ -13,10 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from rollover.diagnosis.data.dataset import Evidence
+from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.phases import AROUND_PEAK, PEAK
-from rollover.diagnosis.fit.jobs import Job
-from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Judge
+from rollover.diagnosis.fit.jobs import Task
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.noise.truncation import up_to
@@ -36,8 +36,8 @@ AT_REST, DEEPEST, BACK = 1.2, 0.999, 0.02
 
 def down_first(inquiry: Inquiry, found: Taken) -> Taken:
     """What was found, or a better one begun with what explains the way down alone; only where much is left."""
-    judge, base = inquiry.judge, found.base
-    if judge.effort.thrifty or found.fitted.left < HOPELESS**2 * found.count:
+    problem, base = inquiry.problem, found.base
+    if problem.effort.is_ensemble or found.fitted.left < HOPELESS**2 * found.count:
         return found
     if moving_back(inquiry, base) < BACK * (found.fitted.left - found.count):
         return found  # it came to rest as the simulation does, wherever that was
@@ -47,13 +47,13 @@ def down_first(inquiry: Inquiry, found: Taken) -> Taken:
         if above is None or not above.steps or above.fitted.left > NEARLY_NOISE**2 * above.count:
             break
         steps = above.steps
-    begun, held = _over_all(inquiry, base, steps), judge.evidence
+    begun, held = _over_all(inquiry, base, steps), problem.dataset
     if not begun:
         return found
     other = one_by_one(inquiry, base, begun)
     if is_better(other.fitted, other.left, found.fitted):
         return other
-    judge.weigh(held)
+    problem.with_noise_model(held)
     return found
 
 
@@ -64,7 +64,7 @@ def moving_back(inquiry: Inquiry, base: Fitted) -> float:
     nothing was recorded there.
     """
     found, count = 0.0, 0
-    for e, block, phases in zip(inquiry.judge.evidence, base.blocks, inquiry.phases, strict=True):
+    for e, block, phases in zip(inquiry.problem.dataset, base.blocks, inquiry.phases, strict=True):
         depth = e.simulator.state(block.shift).get("ground/sinkage")
         peaks = [start for start, name in phases if name == PEAK]
         if depth is None or not peaks:
@@ -80,19 +80,23 @@ def moving_back(inquiry: Inquiry, base: Fitted) -> float:
 
 def _until(inquiry: Inquiry, end: float, steps: Sequence[Step]) -> Taken | None:
     """What explains recordings up to an end, of the time to the deepest point, going on from steps; None if nothing."""
-    some = [_cut(e, phases, end) for e, phases in zip(inquiry.judge.evidence, inquiry.phases, strict=True)]
-    early = Judge([e for e in some if e is not None])
-    if len(early.evidence) < len(some):
+    some = [_cut(e, phases, end) for e, phases in zip(inquiry.problem.dataset, inquiry.phases, strict=True)]
+    early = Problem([e for e in some if e is not None])
+    if len(early.dataset) < len(some):
         return None
     inquiry.say(f"up to {end:g} of the way down first")
     align(early)
-    bare, above = early.fit((), ()), replace(inquiry, judge=early)
-    found = one_by_one(above, bare, _over_all(above, bare, steps), pairs=False) if bare is not None else None
-    inquiry.judge.simulations += early.simulations
+    no_jacobian, above = early.fit((), ()), replace(inquiry, problem=early)
+    found = (
+        one_by_one(above, no_jacobian, _over_all(above, no_jacobian, steps), pairs=False)
+        if no_jacobian is not None
+        else None
+    )
+    inquiry.problem.simulations += early.simulations
     return found
 
 
-def _cut(e: Evidence, phases: Sequence[tuple[float, str]], end: float) -> Evidence | None:
+def _cut(e: Dataset, phases: Sequence[tuple[float, str]], end: float) -> Dataset | None:
     """What was recorded before an end; None where a signal has too little of it."""
     peaks = [start for start, name in phases if name == PEAK]
     if not peaks:
@@ -106,8 +110,8 @@ def _over_all(inquiry: Inquiry, base: Fitted, steps: Sequence[Step]) -> list[Ste
     beside = base
     for s in steps:
         near = [s.fitted, *sorted((f for f in s.rivals if f is not s.fitted), key=lambda f: f.left)[:RIVALS]]
-        jobs = [Job(candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks)) for f in near]
-        best, *rivals = inquiry.fits(jobs)
+        tasks = [Task(candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks)) for f in near]
+        best, *rivals = inquiry.fits(tasks)
         if best is None:
             return []
         others = tuple(f for f in rivals if f is not None)
