@@ -74,9 +74,9 @@ def test_a_diagnosis_tells_a_stated_clock_that_is_off_and_is_right_once_it_is_fr
     kept = diagnose(scenario(), given)
     assert kept.verdict == "unexplained"
     assert sum("left as it is stated to be" in note for note in kept.notes) == 3
-    without_shift = diagnose(scenario(), [(name, replace(r, clock=Clock(zero="unknown"))) for name, r in given])
-    assert without_shift.verdict == "no-mismatch"
-    assert not any("left as it is" in note for note in without_shift.notes)
+    unknown = diagnose(scenario(), [(name, replace(r, clock=Clock(zero="unknown"))) for name, r in given])
+    assert unknown.verdict == "no-mismatch"
+    assert not any("left as it is" in note for note in unknown.notes)
 
 
 def test_what_begins_within_its_blow_is_laid_over_the_simulation() -> None:
@@ -106,3 +106,15 @@ def test_what_is_missing_is_named_from_drops_that_nobody_timed() -> None:
     assert found.effects[0].parameters["damping"].value == pytest.approx(180.0, rel=0.02)
     assert sum("its clock has no zero" in line for line in found.notes) == 3
     assert all(max(t.rms_after for t in one.tracks) < 1.2 for one in series(scenario(), given, found))
+
+
+def test_a_diagnosis_says_the_same_on_any_clock() -> None:
+    """From one second early to an epoch: values, ends of intervals and misfits to 1e-6 of each number."""
+    damping = {"effects.soil-viscous-damping.damping": 180.0}
+    first, other = [diagnose(scenario(), drops(Clock(zero="unknown"), (late,) * 3, damping)) for late in (-1.0, 1e9)]
+    assert [e.id for e in first.effects] == ["soil-viscous-damping"]
+    assert (other.verdict, [e.id for e in other.effects]) == (first.verdict, [e.id for e in first.effects])
+    value, same = (found.effects[0].parameters["damping"] for found in (first, other))
+    assert (same.value, same.low, same.high) == pytest.approx((value.value, value.low, value.high), rel=1e-6)
+    assert value.low <= 180.0 <= value.high
+    assert other.after["held_out"].nrmse == pytest.approx(first.after["held_out"].nrmse, rel=1e-6)
