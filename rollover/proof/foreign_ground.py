@@ -16,7 +16,7 @@ WIDTH = 0.045  # m, the lesser side of the face
 
 def _hunt_crossley(random: Random, s: Setting, id: str) -> Change:
     """F + chi z^1.5 v, down and up; a surface does not pull."""
-    chi = strength(random) / (0.1**1.5 * USUAL)
+    chi = strength(random) / (math.pow(0.1, 1.5) * USUAL)
 
     def law(t: float, z: float, v: float, force: float) -> float:
         return max(force + chi * math.pow(max(z, 0.0), 1.5) * v, min(force, 0.0))

@@ -123,7 +123,7 @@ def _drag(power: float) -> Form:
     """-F v^power of the air, 3 to 80 N at 3 m/s: a plate or a sail on the striker."""
 
     def draw(random: Random, s: Setting, id: str) -> Change:
-        factor = log_uniform(random, 3.0, 80.0) / 3.0**power
+        factor = log_uniform(random, 3.0, 80.0) / math.pow(3.0, power)
 
         def push(t: float, x: float, v: float) -> float:
             return -factor * math.copysign(math.pow(abs(v), power), v)
