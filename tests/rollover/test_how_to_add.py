@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "how_to_add.md"
 MOST = 40  # lines of a diff
-MAIN = "from rollover.cli import main; main()"
+MAIN = "from rollover.cli.main import main; main()"
 NAMES = ("a ground law", "an effect", "a vehicle", "a scenario", "an importer")
 
 
@@ -75,7 +75,8 @@ def test_an_effect_of_ones_own_acts(tmp_path: Path) -> None:
     applied(tmp_path, "an effect")
     assert "soil-roots" in python(tmp_path, "-c", MAIN, "--effects", "roots.py", "list", "effects")
     acting = (
-        "import sys; from rollover import scenario, simulate; from rollover.effects import effects; effects()\n"
+        "import sys; from rollover import scenario; from rollover.dynamics import simulate\n"
+        "from rollover.effects import effects; effects()\n"
         "drop = scenario.load('drop_test').replaced({'simulation.duration': 0.02})\n"
         "rooted = drop.replaced({'effects.soil-roots.stiffness': 3e4})\n"
         "print(*(simulate.run(s).recording['ground/force_normal'].max() for s in (drop, rooted)))"

@@ -54,7 +54,7 @@ def test_the_lock_dies_with_its_process_and_what_it_left_is_swept(tmp_path: Path
     script = f"""
 import os, signal, sys
 from pathlib import Path
-from rollover import writing
+from rollover.system import writing
 with writing.working():
     writing.hold(Path({str(target)!r}))
     with writing.whole(Path({str(target)!r})) as part:
