@@ -236,6 +236,14 @@ def load(path: str | Path) -> Scenario:
     return scenario
 
 
+def given(scenario: str | Path | Scenario) -> tuple[Scenario, Path | None]:
+    """A scenario with its file, None where it is one already. Raises `InputError`."""
+    if isinstance(scenario, Scenario):
+        return scenario, None
+    path = document.find(scenario)
+    return load(path), path
+
+
 def schema(part: Literal["scenario", "vehicle", "soil"] = "scenario") -> dict[str, Any]:
     """JSON Schema of a scenario file, or of a vehicle or soil file on its own."""
     kind: Any = {"scenario": Scenario, "vehicle": AnyVehicle, "soil": AnyLaw}[part]

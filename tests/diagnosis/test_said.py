@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.cli.commands.diagnose import in_words
+from rollover.diagnosis.sensors_first import in_words
 from rollover.diagnosis import statements
 from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.data.phases import drop_phases
