@@ -284,7 +284,7 @@ class Text(HTMLParser):
         self.text += data
 
 
-def test_a_notebook_shows_a_failed_run_and_escapes_names() -> None:
+def test_a_notebook_escapes_what_files_say() -> None:
     wild = ro.load("drop_test").replaced({"title": "<script>alert(1)</script>", "simulation.duration": 0.02})
     shown = Text(ro.run(wild, half_step=False)._repr_html_())
     assert "script" not in shown.tags

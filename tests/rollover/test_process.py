@@ -23,7 +23,7 @@ def python(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=env, check=False)
 
 
-MAIN = "import sys; sys.argv = ['rollover', {arguments}]; from rollover.cli import main; main()"
+MAIN = "import sys; sys.argv = ['rollover', {arguments}]; from rollover.cli.main import main; main()"
 
 
 def test_help_imports_nothing_heavy() -> None:
@@ -66,7 +66,7 @@ def test_wrong_usage_is_2() -> None:
 SLOW = """
 import signal, sys, time
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that runs tests in the background ignores it
-from rollover.assessment import results as store
+from rollover.assessment import results
 from rollover.scenario import load
 from tests.rollover.example import run_of
 
@@ -77,7 +77,7 @@ def picture(path):
 
 from pathlib import Path
 import rollover.cli.catalogue as c
-c.TABLES["laws"] = lambda: store.write(Path("out/slow"), run_of(load("drop_test")), (), picture=picture)
+c.TABLES["laws"] = lambda: results.write(Path("out/slow"), run_of(load("drop_test")), (), picture=picture)
 """
 
 
