@@ -147,11 +147,25 @@ class Scenario:
             )
         _check_start(self.vehicle, self.initiation)
 
-    def replaced(self, changes: Mapping[str, Any], *, origin: str = "replaced") -> Scenario:
+    def replaced(self, changes: Mapping[str, object], *, origin: str = "replaced") -> Scenario:
         """Return this scenario with values replaced by path, checked exactly like a file.
 
-        ``{"ground.law.stiffness_scale": 1.2, "vehicle.wheels.rear_left.tyre.friction": 0.6}``; elements of a
-        list by name or place, a new `kind` starts its part afresh. Raises `InputError`.
+        Parameters
+        ----------
+        changes
+            ``{"ground.law.stiffness_scale": 1.2, "vehicle.wheels.rear_left.tyre.friction": 0.6}``, SI; elements of a
+            list by name or place, a new `kind` starts its part afresh.
+        origin
+            Where they come from, for messages.
+
+        Returns
+        -------
+        Scenario
+
+        Raises
+        ------
+        InputError
+            For a path that is none, and a value out of bounds.
         """
         return document.replaced(self, changes, origin)
 
@@ -234,6 +248,14 @@ def load(path: str | Path) -> Scenario:
     """Scenario from a file or, by its name, one of the shipped ones. Raises `InputError`."""
     scenario: Scenario = document.load(document.find(path), Scenario)
     return scenario
+
+
+def given(scenario: str | Path | Scenario) -> tuple[Scenario, Path | None]:
+    """A scenario with its file, None where it is one already. Raises `InputError`."""
+    if isinstance(scenario, Scenario):
+        return scenario, None
+    path = document.find(scenario)
+    return load(path), path
 
 
 def schema(part: Literal["scenario", "vehicle", "soil"] = "scenario") -> dict[str, Any]:

@@ -187,7 +187,7 @@ def write(
         if picture is not None:
             picture(part / PICTURE)
         names = sorted([*(p.name for p in part.iterdir()), RUN, *([PAGE] if page is not None else [])])
-        answer = _answer(run, scenario_hash, peaks, criteria, half_step, names)
+        answer = account(run, peaks, criteria, half_step, names)
         if made_from is not None:
             answer["origin"] = plain(made_from)
         write_json(part / RUN, answer)
@@ -210,14 +210,14 @@ def read_run_json(folder: Path) -> dict[str, Any]:
     return found
 
 
-def _answer(
+def account(
     run: Run,
-    scenario_hash: str,
     peaks: Sequence[PeakLoad],
-    criteria: Sequence[Mapping[str, Any]],
-    half_step: Run | None,
-    files: list[str],
+    criteria: Sequence[Mapping[str, Any]] = (),
+    half_step: Run | None = None,
+    files: Sequence[str] = (),
 ) -> dict[str, Any]:
+    """What run.json says, bare JSON values; `files` are those of the results folder."""
     closed = closure(run)
     answer: dict[str, Any] = plain(
         {
@@ -227,7 +227,7 @@ def _answer(
             "status": run.status,
             "sentence": run.sentence,
             "versions": versions(),
-            "scenario_hash": scenario_hash,
+            "scenario_hash": content_hash(run.scenario),
             "wall_time": run.wall_time,
             "stop_time": run.stop_time,
             "domain_flags": run.domain_flags,
@@ -247,7 +247,7 @@ def _answer(
                 "sentence": half_step.sentence,
                 "wall_time": half_step.wall_time,
             },
-            "files": files,
+            "files": list(files),
         }
     )
     return answer

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rollover.dynamics import simulate
+from rollover.dynamics.result import Run
 from rollover.recording import Recording
 from rollover.recording.filters import filtered
-from rollover.system.errors import hint
+from rollover.scenario import Scenario, given
+from rollover.spec import document
+from rollover.system.arguments import within
+from rollover.system.errors import Fault, InputError, hint
 
 DROP = ("ground/force_normal", "ground/sinkage", "striker/acceleration_z")
 SIDEWAYS = (
@@ -75,4 +81,102 @@ def synthetic(
         conditions=dict(conditions or {}),
         noise={name: sigma for name, sigma in noise.items() if sigma > 0.0},
         cfc=dict.fromkeys(channels, cfc) if cfc is not None else {},
+    )
+
+
+def instrumented(
+    run: Run,
+    stated: Collection[str],
+    *,
+    channels: Sequence[str] | None = None,
+    rate: float = 1000.0,
+    share: float = 0.005,
+    sigmas: Mapping[str, float] | None = None,
+    cfc: int | None = None,
+    late: float = 0.0,
+    seed: int = 0,
+    by: str = "synthesize",
+) -> Recording:
+    """A run as instruments would have recorded it, see `synthetic`; `stated` paths are its conditions.
+
+    `channels` None: the usual ones. Raises `InputError`, of which `by` is the origin.
+    """
+    try:
+        return synthetic(
+            run.recording,
+            channels=tuple(channels) if channels else usual(run.recording),
+            rate=rate,
+            share=share,
+            sigmas=sigmas,
+            cfc=cfc,
+            late=late,
+            seed=seed,
+            conditions={leaf.path: leaf.value for leaf in document.paths(run.scenario) if leaf.path in stated},
+        )
+    except ValueError as e:
+        raise InputError(Fault(file=by, message=str(e))) from None
+
+
+def synthesize(
+    scenario: str | Path | Scenario,
+    stated: Mapping[str, object] | None = None,
+    *,
+    hidden: Mapping[str, object] | None = None,
+    channels: Sequence[str] = (),
+    rate: float = 1000.0,
+    noise: float = 0.005,
+    sigmas: Mapping[str, float] | None = None,
+    cfc: int | None = None,
+    late: float = 0.0,
+    seed: int = 0,
+) -> Recording:
+    """Simulate a scenario, and record what instruments with noise would have recorded of it.
+
+    Parameters
+    ----------
+    scenario
+        Scenario, or the path or name of one.
+    stated
+        Values by path that are replaced, and stand among the recording's conditions.
+    hidden
+        Values by path that are replaced, and do not.
+    channels
+        What is recorded; none: the usual ones.
+    rate
+        Sampling rate, 1 to 1e6 Hz.
+    noise
+        White noise, 1 sigma as a share of each channel's range.
+    sigmas
+        1 sigma (SI) for some channels instead.
+    cfc
+        Filter class (SAE J211) that the instruments apply.
+    late
+        How late their clock is, s.
+    seed
+        Of the noise.
+
+    Returns
+    -------
+    Recording
+        Channels over time (SI).
+
+    Raises
+    ------
+    InputError
+        For wrong input, an unknown channel, a rate too low for the filter class.
+    RuntimeError
+        Where the simulation failed.
+    """
+    within("rate", rate, 1.0, 1e6)
+    within("seed", seed, 0)
+    for name, sigma in {"noise": noise, **(sigmas or {})}.items():
+        within(name, sigma, 0.0)
+    base, file = given(scenario)
+    chosen = base.replaced(stated or {}, origin="stated").replaced(hidden or {}, origin="hidden")
+    with document.named(file):
+        done = simulate.run(chosen)
+    if done.status == "failed":
+        raise RuntimeError(f"the simulation failed: {done.sentence}")
+    return instrumented(
+        done, stated or {}, channels=channels, rate=rate, share=noise, sigmas=sigmas, cfc=cfc, late=late, seed=seed
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from rollover.recording.time_stamps import Zero
+from rollover.system.notebook import card
 
 Verdict = Literal["no-mismatch", "parameter", "sensor", "missing-physics", "unexplained", "cannot-tell"]
 
@@ -138,3 +139,22 @@ class Diagnosis:
     clocks: Mapping[str, Zero] = field(default_factory=dict)  # zeros that were found, of clocks in doubt
     grids: Mapping[str, tuple[float, ...]] = field(default_factory=dict)  # of full runs: centre of the elements, m
     empirical: Law | None = None  # where no effect explains the mismatch
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the sentence, the effects that are named with their intervals, what the fit gains."""
+        rows = [
+            (e.id, e.channel or "", name, f"{i.value:.5g}", f"{i.low:.5g}", f"{i.high:.5g}", i.unit)
+            for e in self.effects
+            for name, i in e.parameters.items()
+        ]
+        said = [self.sentence]
+        for which in ("training", "held_out"):
+            if which in self.before and which in self.after:
+                was, now = self.before[which].nrmse, self.after[which].nrmse
+                said.append(f"{which.replace('_', ' ')}: misfit over noise {was:.3g} -> {now:.3g}")
+        for e in self.effects:
+            if e.indistinguishable_from:
+                others = ", ".join(e.indistinguishable_from)
+                said.append(f"{e.id} or {others}: measure next: {e.discriminating_test}")
+        headings = ("effect", "channel", "parameter", "value", "95 % from", "to", "unit")
+        return card(self.verdict, [*said, *self.notes], headings, rows, words=(0, 1, 2, 6))

@@ -12,7 +12,8 @@ from rollover.recording.pairs import (
     write_table,
 )
 from rollover.recording.record import Clock, Doubt, Recording, Sensor
-from rollover.recording.runs import FORMAT, is_run, read_parquet, write_parquet
+from rollover.recording.runs import FORMAT, arrow_table, data_frame, is_run, read_parquet, write_parquet
 
 __all__ = ["FORMAT", "Clock", "Doubt", "Recording", "Sensor", "UnreadableError", "as_numbers", "is_run"]
-__all__ += ["put_text", "read_pairs", "read_parquet", "read_table", "write_pairs", "write_parquet", "write_table"]
+__all__ += ["arrow_table", "data_frame", "put_text", "read_pairs", "read_parquet", "read_table"]
+__all__ += ["write_pairs", "write_parquet", "write_table"]

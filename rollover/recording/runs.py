@@ -6,7 +6,7 @@ import json
 import math
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rollover.recording.record import Clock, Recording, Sensor
 from rollover.recording.tables import numbers, open_parquet
@@ -14,13 +14,23 @@ from rollover.spec.channels import describe
 from rollover.system.boundary import CURE, worded
 from rollover.system.errors import Fault, InputError
 
+if TYPE_CHECKING:
+    from pandas import DataFrame as DataFrame
+    from pyarrow import Table as Table
+
 FORMAT = "rollover-channels/1"
 
 
 def write_parquet(recording: Recording, path: Path) -> None:
     """Write one row per time stamp and one column per channel, each with its unit and meaning."""
-    import pyarrow as pa
     import pyarrow.parquet as pq
+
+    pq.write_table(arrow_table(recording), path)
+
+
+def arrow_table(recording: Recording) -> Table:
+    """One row per time stamp, one column per channel (SI), each with its unit and meaning as metadata."""
+    import pyarrow as pa
 
     table = {"time": recording.time, **recording.channels}
     known = {name: describe(name) for name in table}
@@ -41,7 +51,17 @@ def write_parquet(recording: Recording, path: Path) -> None:
         "notes": list(recording.notes),
     }
     schema = pa.schema(fields, metadata={"rollover": json.dumps(about)})
-    pq.write_table(pa.table([pa.array(values) for values in table.values()], schema=schema), path)
+    return pa.table([pa.array(values) for values in table.values()], schema=schema)
+
+
+def data_frame(recording: Recording) -> DataFrame:
+    """One column per channel (SI), the index is the time, s. Raises ``ImportError`` without pandas."""
+    try:
+        return arrow_table(recording).to_pandas().set_index("time")
+    except ImportError as e:
+        if (e.name or "pandas").partition(".")[0] != "pandas":
+            raise
+        raise ImportError("pandas is not installed; `pip install pandas`, or `to_arrow()`", name="pandas") from None
 
 
 def is_run(path: Path) -> bool:

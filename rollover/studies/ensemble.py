@@ -26,7 +26,7 @@ IMPULSE, RAW = "impulse", "raw"
 ALSO = (("rops/deflection", "m"), ("rops/energy", "J"), ("ground/sinkage", "m"))
 
 
-class FailedRunError(Exception):
+class FailedRunError(RuntimeError):
     """A run that a peak was wanted of failed; its sentence says why."""
 
 

@@ -12,6 +12,7 @@ from rollover.spec import document
 from rollover.studies import baseline as baselines
 from rollover.studies.baseline import Answer, Baseline
 from rollover.studies.ensemble import Extreme, Observed, neighbours, observed
+from rollover.system.arguments import within
 from rollover.system.errors import Fault, InputError
 from rollover.system.processes import Outcome, map_cases
 
@@ -37,6 +38,35 @@ class Chosen:
 
 
 Show = Callable[[int, int], None]  # runs done, of all
+
+
+def regress(
+    scenarios: str | Path | Sequence[str | Path] = (), *, workers: int = 0, time_limit: float = TIME_LIMIT
+) -> tuple[Answer, ...]:
+    """Compare peak loads with their baselines, which stay as they are.
+
+    Parameters
+    ----------
+    scenarios
+        Names or paths of scenarios, or folders of them; none: all that are shipped.
+    workers
+        Child processes that run them; 0 works in this one, where no limit holds.
+    time_limit
+        Wall time for each run in a child process, s.
+
+    Returns
+    -------
+    tuple of Regression
+        One for each scenario; `ok` where nothing has changed.
+
+    Raises
+    ------
+    InputError
+        For scenarios and baselines that cannot be read.
+    """
+    within("time_limit", time_limit, 1.0)
+    names = [scenarios] if isinstance(scenarios, (str, Path)) else scenarios
+    return tuple(compared(chosen([str(name) for name in names]), workers=workers, time_limit=time_limit))
 
 
 def chosen(names: Sequence[str]) -> Chosen:

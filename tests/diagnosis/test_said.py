@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rollover.cli.commands.diagnose import in_words
 from rollover.diagnosis import statements
 from rollover.diagnosis.data.dataset import dataset_of
 from rollover.diagnosis.data.phases import drop_phases
@@ -19,6 +18,7 @@ from rollover.diagnosis.forward.forward_model import simulator_of
 from rollover.diagnosis.inference.scores import before_an_impact
 from rollover.diagnosis.noise.ensemble import HeavyTail
 from rollover.diagnosis.result import Interval, Named
+from rollover.diagnosis.sensors_first import in_words
 from rollover.diagnosis.statements import sentence
 from rollover.effects import EFFECTS, units_of
 from rollover.effects.sensor import SensorBias, SensorClipping

@@ -99,19 +99,59 @@ def test_a_signal_while_writing_leaves_nothing(tmp_path: Path, number: signal.Si
 # ---------------------------------------------------------------- import names that others own
 
 
+def last_line(done: subprocess.CompletedProcess[str]) -> str:
+    assert done.returncode == 1, done.stderr
+    return done.stderr.strip().splitlines()[-1]
+
+
 @pytest.mark.parametrize("name", ["ground", "viz"])
 def test_a_foreign_package_of_our_name_is_named(tmp_path: Path, name: str) -> None:
     (tmp_path / name).mkdir()
     (tmp_path / name / "__init__.py").write_text("raise SystemExit('foreign code ran')\n")
-    done = python(f"import sys; sys.path[:0] = [{str(tmp_path)!r}]; import rollover")
-    assert done.returncode == 1
-    line = done.stderr.strip().splitlines()[-1]
+    line = last_line(python(f"import sys; sys.path[:0] = [{str(tmp_path)!r}]; import rollover"))
     assert line.startswith(
         f"ImportError: import {name}: taken by another package, got {tmp_path / name / '__init__.py'}; "
     )
     (tmp_path / name / "__init__.py").unlink()
     done = python(f"import sys; sys.path[:0] = [{str(tmp_path)!r}]; import rollover")
     assert done.returncode == 0, "a folder without __init__ does not stand before a package"
+
+
+@pytest.mark.parametrize("name", ["ground", "viz"])
+def test_a_file_of_our_name_in_the_users_folder_is_named(tmp_path: Path, name: str) -> None:
+    (tmp_path / f"{name}.py").write_text("raise SystemExit('foreign code ran')\n")
+    (tmp_path / "study.py").write_text("import rollover\n")
+    done = subprocess.run(
+        [sys.executable, str(tmp_path / "study.py")], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    line = last_line(done)
+    assert line.startswith(f"ImportError: import {name}: taken by another package, got {tmp_path / name}.py; ")
+    assert line.endswith("or rename that file or take it off the import path")
+
+
+@pytest.mark.parametrize("name", ["ground", "viz"])
+@pytest.mark.parametrize("text", ["__version__ = '3'\n", '# not DISTRIBUTION = "rollover"\n', "", "\xff"])
+def test_a_foreign_package_installed_over_ours_is_named(tmp_path: Path, name: str, text: str) -> None:
+    site = tmp_path / "site"
+    for file in ("rollover/__init__.py", "rollover/system/__init__.py", "rollover/system/import_names.py"):
+        (site / file).parent.mkdir(parents=True, exist_ok=True)
+        (site / file).write_text((ROOT / file).read_text())
+    for package in ("ground", "viz"):
+        (site / package).mkdir()
+        (site / package / "__init__.py").write_text((ROOT / package / "__init__.py").read_text())
+    code = f"import sys; sys.path[:0] = [{str(site)!r}]; import rollover; print(rollover.__file__)"
+    done = python(code)
+    assert done.stdout.strip() == str(site / "rollover" / "__init__.py"), done.stderr
+    (site / name / "__init__.py").write_bytes(text.encode("latin-1"))
+    about = site / "other_tool-3.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: other-tool\nVersion: 3.0\n")
+    (about / "RECORD").write_text(f"{name}/__init__.py,,\n")
+    line = last_line(python(code))
+    place = site / name / "__init__.py"
+    assert line.startswith(f"ImportError: import {name}: taken by another package, got {place} of the distribution")
+    assert "other-tool in the place of rollover's own; " in line
+    assert line.endswith("install rollover anew")
 
 
 def test_the_version_is_that_of_the_distribution() -> None:

@@ -128,6 +128,19 @@ def test_the_python_of_the_pages_runs() -> None:
     exec(compile(code, "rollover/README.md", "exec"), {})
 
 
+def test_the_python_page_runs_from_top_to_bottom(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "python.md").read_text(), flags=re.DOTALL)
+    assert len(blocks) == 5
+    shared: dict[str, Any] = {}
+    for block in blocks:
+        exec(compile(block, "docs/python.md", "exec"), shared)
+    assert shared["run"].status == "done"
+    assert "<svg" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    named = set(re.findall(r"\bro\.(\w+)", (ROOT / "docs" / "python.md").read_text()))
+    assert named <= set(dir(shared["ro"]))
+
+
 def test_the_picture_is_small() -> None:
     (picture,) = re.findall(r"!\[[^\]]*\]\(([^)]*)\)", TEXT)
     assert 20_000 < (ROOT / picture).stat().st_size < 200_000

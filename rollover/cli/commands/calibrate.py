@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rollover.cli.commands.common import BROKE, AsJson, Force, Setting, answering, app, manual, settings
-from rollover.system.errors import Fault, InputError
+from rollover.system.errors import InputError
 
 if TYPE_CHECKING:
     from rollover.calibration.calibrate import Calibration
 
-FORMAT = "rollover-calibrate/1"
 JSON, OVERRIDE, SCENARIO, PAGE = "calibrate.json", "override.yaml", "scenario-calibrated.yaml", "report.html"
 
 
@@ -53,49 +52,30 @@ def calibrate(
     """Fit values of a scenario to recordings, with intervals, and say what the recordings cannot determine."""
     from rollover import scenario as scenarios
     from rollover.assessment import results
-    from rollover.calibration.calibrate import calibrate as fitted
-    from rollover.calibration.objective import parameter
+    from rollover.calibration.account import FORMAT, account
+    from rollover.calibration.request import Request
     from rollover.cli import console
-    from rollover.cli.commands.compare import read
-    from rollover.comparison.misfit import estimated_noise
+    from rollover.comparison.recordings import read
     from rollover.spec import document
 
     path = document.find(scenario)
     chosen = scenarios.load(path)
     if set_:
         chosen = chosen.replaced(settings(set_), origin="--set")
-    parameters = [parameter(chosen, text) for text in fit]
-    if len({p.path for p in parameters}) < len(parameters):
-        raise InputError(Fault(file="--fit", message="a path given twice; once is allowed"))
-    measured = read(recordings, profile)
-    held = _held_out(list(measured), hold_out or [])
+    request = Request.of(chosen, read(recordings, profile), fit, hold_out or [], by=("--fit", "--hold-out"))
     folder = out or Path("out", "calibrate", path.stem)
     about: dict[str, Any] = {
         "scenario_hash": document.content_hash(chosen),
-        "recordings": list(measured),
+        "recordings": list(request.recordings),
         "fitted": fit,
-        "held_out": sorted(held),
+        "held_out": request.held_out,
     }
     about["origin"] = results.origin(path, folder, set_ or [])
     results.claim_account(folder, FORMAT, about, [JSON, OVERRIDE, SCENARIO, PAGE], force=force, say=console.say)
-    try:
-        found = fitted(
-            chosen,
-            {name: r for name, r in measured.items() if name not in held},
-            parameters,
-            held_out={name: r for name, r in measured.items() if name in held},
-            noise=estimated_noise,
-            clock_sigma=clock_sigma,
-            channels=channel,
-            starts=starts,
-            seed=seed,
-            workers=workers,
-        )
-    except InputError:
-        raise
-    except ValueError as e:
-        raise InputError(Fault(file=str(path), message=str(e))) from None
-    answer = _answer(about, found)
+    found = request.calibrated(
+        file=path, clock_sigma=clock_sigma, channels=channel, starts=starts, seed=seed, workers=workers
+    )
+    answer = account(found, about)
     with results.whole(folder) as part:
         results.write_json(part / JSON, answer)
         _write_scenario(part, folder, path, settings(set_ or []), found)
@@ -109,17 +89,6 @@ def calibrate(
         print(json.dumps(results.plain(answer), indent=2))
     else:
         console.calibration(found, str(folder))
-
-
-def _held_out(names: list[str], given: list[str]) -> set[str]:
-    from rollover.system.errors import hint
-
-    for name in given:
-        if name not in names:
-            raise InputError(Fault(file="--hold-out", message=f"no such recording, got {name!r}; {hint(name, names)}"))
-    if set(names) <= set(given):
-        raise InputError(Fault(file="--hold-out", message=f"nothing left to fit, got all of {', '.join(names)}"))
-    return set(given)
 
 
 def _options(fit: list[str], hold_out: list[str] | None) -> list[str]:
@@ -159,31 +128,3 @@ def _nested(values: dict[str, float]) -> dict[str, Any]:
             at = at.setdefault(step, {})
         at[last] = value
     return tree
-
-
-def _answer(about: dict[str, Any], c: Calibration) -> dict[str, Any]:
-    from rollover.assessment import results
-    from rollover.comparison.misfit import summary
-
-    return {
-        "format": FORMAT,
-        **about,
-        "versions": results.versions(),
-        "parameters": {e.path: summary(e) for e in c.estimates},
-        "correlation": c.correlation,
-        "condition": c.condition,
-        "combinations": list(c.combinations),
-        "clock_offsets": dict(c.clocks),
-        "clock_errors": dict(c.clock_errors),
-        "clocks": {name: zero.answer for name, zero in c.zeros.items()},
-        "clock_sigma": c.clock_sigma,
-        "noise": {name: dict(of) for name, of in c.noise.items()},
-        "fit": {"training": summary(c.training), "held_out": None if c.held_out is None else summary(c.held_out)},
-        "samples": c.samples,
-        "independent_samples": c.independent,
-        "outliers": c.outliers,
-        "widening": c.widening,
-        "starts_agreeing": list(c.starts_agreeing),
-        "warnings": list(c.warnings),
-        "override": c.override,
-    }

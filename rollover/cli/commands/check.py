@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rollover.cli.commands.common import AsJson, answering, app, manual
-from rollover.cli.commands.profiles import profile_of
+from rollover.comparison.profiles import profile_of
 from rollover.system.errors import Fault, InputError, excerpt
 
 if TYPE_CHECKING:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -22,17 +23,16 @@ from rollover.cli.commands.common import (
     manual,
     settings,
 )
-from rollover.cli.commands.profiles import profile_of
 from rollover.system.errors import THERE, Fault, InputError, absent, cured
 
 if TYPE_CHECKING:
+    from rollover.comparison.compared import Progress
     from rollover.comparison.misfit import Misfit
     from rollover.comparison.run_pair import Pair
     from rollover.dynamics.result import Run
-    from rollover.recording import Recording
     from rollover.scenario import Scenario
 
-FORMAT, PAIR = "rollover-compare/1", "rollover-compare-runs/1"
+PAIR = "rollover-compare-runs/1"
 JSON, PAGE, PICTURE = "compare.json", "report.html", "compare.rrd"
 
 
@@ -78,6 +78,8 @@ def compare(
     from rollover import scenario as scenarios
     from rollover.assessment import results
     from rollover.cli import console
+    from rollover.comparison.compared import FORMAT, account, compared
+    from rollover.comparison.recordings import read
     from rollover.comparison.run_pair import is_result
     from rollover.spec import document
 
@@ -96,10 +98,9 @@ def compare(
     about["origin"] = results.origin(path, folder, set_ or [])
     results.claim_account(folder, FORMAT, about, [JSON, PAGE, *pictures.values()], force=force, say=console.say)
     _say_compiling()
-    with document.named(path):
-        runs = {name: _run(chosen, name, recording) for name, recording in measured.items()}
-    found = _misfits(runs, measured, cfc)
-    answer = _answer(about, runs, found)
+    done = compared(chosen, measured, file=path, cfc=cfc, watch=_watched)
+    found, runs = done.misfits, done.runs
+    answer = account(done, about)
     by = ["--profile", str(profile)] if profile else []
     command = " ".join(map(shlex.quote, ["rollover", "compare", scenario, *recordings, *by]))
     with results.whole(folder) as part:
@@ -182,13 +183,6 @@ def _draw_pair(found: Pair, path: Path) -> None:
         console.say(f"No rerun wheel for this platform: {path.name} was not written.")
 
 
-def read(paths: list[str], profile: Path | None) -> dict[str, Recording]:
-    """Recordings by name, those in folders too. Raises `InputError` for all faults at once, and for one name twice."""
-    from rollover.recording.importers import read_named
-
-    return {name: recording for name, (_, recording) in read_named(paths, profile_of(profile)).items()}
-
-
 def _say_compiling() -> None:
     from ground.compiled import is_warm
     from rollover.cli import console
@@ -197,61 +191,14 @@ def _say_compiling() -> None:
         console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
 
 
-def _run(scenario: Scenario, name: str, recording: Recording) -> Run:
+@contextmanager
+def _watched(name: str, under: Scenario) -> Iterator[Progress]:
+    """Progress of one recording's run, shown."""
     from rollover.cli import console
-    from rollover.dynamics import simulate
 
-    under = scenario.replaced(recording.conditions, origin=f"{name}: conditions")
     lead = getattr(under.initiation, "lead_time", 0.0)
     with console.progress(f"simulating {name}", -lead, under.simulation.duration) as show:
-        return simulate.run(under, progress=show)
-
-
-def _misfits(runs: Mapping[str, Run], measured: Mapping[str, Recording], cfc: int | None) -> list[Misfit]:
-    """Each recording against its run. Raises `InputError` for all at once of which nothing can be compared."""
-    found, faults = [], []
-    for name, recording in measured.items():
-        try:
-            found.append(_misfit(runs[name], recording, name, cfc))
-        except InputError as e:
-            faults += e.faults
-    if faults:
-        raise InputError(*faults)
-    return found
-
-
-def _misfit(run: Run, recording: Recording, name: str, cfc: int | None) -> Misfit:
-    from dataclasses import replace
-
-    from rollover.comparison.misfit import estimated_noise, misfit
-    from rollover.comparison.onset import timed
-
-    wanted = run.scenario.loads.cfc if cfc is None else cfc
-    at = timed(name, recording, run.scenario, lambda _: run.recording)
-    try:
-        found = misfit(run, at.recording, name=name, cfc=wanted, at_least=cfc is not None, noise=estimated_noise)
-    except ValueError as e:
-        raise InputError(Fault(file=name, message=str(e))) from None
-    if not found.channels:
-        why = "; ".join(f"{channel}: {reason}" for channel, reason in found.skipped.items())
-        message = f"nothing to compare, got {why}; one channel that both have at one time is needed"
-        raise InputError(Fault(file=name, message=message))
-    return replace(found, zero=at.zero)
-
-
-def _answer(about: Mapping[str, Any], runs: Mapping[str, Run], found: list[Misfit]) -> dict[str, Any]:
-    from rollover.assessment import results
-    from rollover.comparison.misfit import summary
-
-    return {
-        "format": FORMAT,
-        **about,
-        "versions": results.versions(),
-        "comparisons": [
-            {**summary(each), "status": runs[each.recording].status, "sentence": runs[each.recording].sentence}
-            for each in found
-        ],
-    }
+        yield show
 
 
 def _pictures(names: list[str]) -> dict[str, str]:

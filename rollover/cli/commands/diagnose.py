@@ -4,24 +4,17 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rollover.cli.commands.common import AsJson, Force, Setting, answering, app, manual, settings
-from rollover.cli.commands.profiles import profile_of
-from rollover.system.errors import Fault, InputError
 
 if TYPE_CHECKING:
     from rollover.diagnosis import Diagnosis
     from rollover.diagnosis.overlay import Told
-    from rollover.recording import Recording
-    from rollover.recording.checks import Finding
-    from rollover.scenario import Scenario
-
-SPELT_OUT = 3  # findings alike of one channel
 
 
 @app.command(
@@ -63,7 +56,6 @@ def diagnose(
 ) -> None:
     """Say what separates a scenario from recordings: which physics, value or sensor, where, and how sure that is."""
     from concurrent.futures import ThreadPoolExecutor
-    from dataclasses import replace
 
     from rollover.system.processes import begin_server, cores
 
@@ -76,11 +68,12 @@ def diagnose(
     from rollover import scenario as scenarios
     from rollover.assessment import results
     from rollover.cli import console
+    from rollover.comparison.recordings import held_out, read
     from rollover.diagnosis import account, diagnosed_text
-    from rollover.diagnosis import diagnose as diagnosed
     from rollover.diagnosis.fit.jobs import Executor
     from rollover.diagnosis.io import FILES, FORMAT, JSON, PAGE, PICTURE, SCENARIO
     from rollover.diagnosis.overlay import series
+    from rollover.diagnosis.sensors_first import check, diagnosed, plain, prechecked
     from rollover.spec import document
     from rollover.system.writing import notes
 
@@ -89,8 +82,8 @@ def diagnose(
     if set_:
         chosen = chosen.replaced(settings(set_), origin="--set")
     measured = read(recordings, profile)
-    _check(chosen, measured)
-    held = _held_out(list(measured), hold_out or [])
+    check(chosen, measured)
+    held = held_out(list(measured), hold_out or [], "--hold-out")
     folder = out or Path("out", "diagnose", path.stem)
     about: dict[str, Any] = {
         "scenario_hash": document.content_hash(chosen),
@@ -101,18 +94,17 @@ def diagnose(
     about["origin"] = results.origin(path, folder, set_ or [])
     results.claim_account(folder, FORMAT, about, FILES, force=force, say=console.say)
     console.say("asking the sensors first")
-    findings = _prechecks(chosen, measured)
+    findings = prechecked(chosen, measured)
     # beside the results folder, which is written whole or not at all: what an interrupted diagnosis had fitted
     notebook = notes(folder)
     about_fits = json.dumps([about, results.versions()], sort_keys=True)
     words = ["rollover", "diagnose", scenario, *recordings, *_options(hold_out, set_, tolerance, profile)]
     with Executor(workers, notebook, about_fits) as executor:
         found = diagnosed(
-            chosen, list(measured.items()), hold_out=held, tolerance=tolerance, say=console.say, executor=executor
+            chosen, measured, findings, hold_out=held, tolerance=tolerance, say=console.say, executor=executor
         )
-        found = replace(found, notes=(*in_words(findings), *found.notes))
         told = series(chosen, list(measured.items()), found, executor.children)
-        answer = account(found, about, [{"recording": name, **_plain(f)} for name, f in findings])
+        answer = account(found, about, plain(findings))
         with results.whole(folder) as part, ThreadPoolExecutor(1) as beside:
             results.write_json(part / JSON, answer)
             (part / SCENARIO).write_text(diagnosed_text(chosen, found), encoding="utf-8")
@@ -137,72 +129,6 @@ def diagnose(
         print(json.dumps(answer, indent=2))
     else:
         console.diagnosis(found, str(folder))
-
-
-def read(paths: Sequence[str], profile: Path | None = None) -> dict[str, Recording]:
-    """Recordings by name, those in folders too. Raises `InputError` for all faults at once."""
-    from rollover.recording.importers import read_named
-
-    return {name: recording for name, (_, recording) in read_named(paths, profile_of(profile)).items()}
-
-
-def _check(scenario: Scenario, measured: Mapping[str, Recording]) -> None:
-    """Refuse conditions that the scenario does not know, all at once. Raises `InputError`."""
-    from rollover.diagnosis.forward.forward_model import set_up
-
-    faults: list[Fault] = []
-    for recording in measured.values():
-        try:
-            set_up(scenario, recording)
-        except InputError as e:
-            faults += e.faults
-    if faults:
-        raise InputError(*faults)
-
-
-def _held_out(names: list[str], given: list[str]) -> list[str]:
-    from rollover.system.errors import hint
-
-    for name in given:
-        if name not in names:
-            raise InputError(Fault(file="--hold-out", message=f"no such recording, got {name!r}; {hint(name, names)}"))
-    if set(names) <= set(given):
-        raise InputError(Fault(file="--hold-out", message=f"nothing left to fit, got all of {', '.join(names)}"))
-    return sorted(set(given))
-
-
-def in_words(findings: Sequence[tuple[str, Finding]]) -> Iterator[str]:
-    """A line for each finding; of many alike in one channel of one recording the first ones, and how many more."""
-    alike: dict[tuple[str, str, str], list[str]] = {}
-    for name, f in findings:
-        alike.setdefault((name, f.channel, f.check), []).append(f.sentence)
-    for (name, channel, check), sentences in alike.items():
-        yield from (f"{name}: {channel}: {s}" for s in sentences[:SPELT_OUT])
-        if len(sentences) > SPELT_OUT:
-            yield f"{name}: {channel}: {len(sentences) - SPELT_OUT} more such findings ({check})"
-
-
-def _prechecks(scenario: Scenario, measured: Mapping[str, Recording]) -> list[tuple[str, Finding]]:
-    """What the recordings alone give away about their sensors, before any model is asked."""
-    from rollover.diagnosis.forward.forward_model import set_up
-    from rollover.recording.checks import prechecks, shared_rails
-
-    found = []
-    for name, recording in measured.items():
-        own = set_up(scenario, recording)
-        mass = getattr(own.vehicle, "mass", None)
-        found += [(name, f) for f in prechecks(recording, mass=mass, gravity=own.gravity)]
-    told = {(name, f.check, f.channel) for name, f in found}
-    return found + [(name, f) for name, f in shared_rails(measured) if (name, f.check, f.channel) not in told]
-
-
-def _plain(finding: Finding) -> dict[str, Any]:
-    from dataclasses import asdict
-
-    from rollover.assessment import results
-
-    bare: dict[str, Any] = results.plain(asdict(finding))
-    return bare
 
 
 def _options(hold_out: list[str] | None, set_: list[str] | None, tolerance: float, profile: Path | None) -> list[str]:

@@ -10,7 +10,6 @@ from typing import Annotated
 import typer
 
 from rollover.cli.commands.common import AsJson, Force, Setting, answering, app, manual, settings
-from rollover.cli.commands.profiles import profile_of
 from rollover.system.errors import Fault, InputError
 
 SOIL, ANSWER = "soil.yaml", "identify.json"
@@ -61,50 +60,34 @@ def identify_(
 ) -> None:
     """Identify a ground law from drops: stiffness over depth, coefficients with intervals, a soil file."""
     from rollover import scenario as scenarios
-    from rollover.calibration import ground_law
+    from rollover.calibration import identification
     from rollover.cli import console
-    from rollover.recording.importers import name_of, read_named
+    from rollover.comparison.recordings import gathered
+    from rollover.recording.importers import name_of
     from rollover.spec import document
-    from rollover.spec.vehicle import Striker
     from rollover.system.writing import hold
 
     chosen = scenarios.load(document.find(scenario))
     if set_:
         chosen = chosen.replaced(settings(set_), origin="--set")
-    found = {
-        name: (recording, _digest(at)) for name, (at, recording) in read_named(recordings, profile_of(profile)).items()
-    }
+    found = gathered(recordings, profile)
     folder = out or Path("out", "identify", name_of(Path(recordings[0])))
     if not folder.exists() or folder.is_dir():
         hold(folder)
     _claim(folder, force)
-    is_cone = isinstance(chosen.vehicle, Striker) and chosen.vehicle.nose == "cone"
-    wanted = form or (Form.bearing if is_cone else Form.ye)
-    given = {name: recording for name, (recording, _) in found.items()}
-    settled = ground_law.settled(given, chosen)
-    drops, unusable = ground_law.drops_of(settled.recordings, chosen, buoyancy=buoyancy, terminal=terminal_speed)
-    refused = [*settled.refused, *unusable]
-    zeros = {**settled.zeros, **ground_law.zeros_of(drops, given)}
-    sources = sorted({recording.source for recording, _ in found.values() if recording.source})
-    answer = ground_law.identified(
-        drops,
-        {name: digest for name, (_, digest) in found.items()},
-        form=wanted.value,
-        fraction=chosen.ground.co_moving_mass.share if fraction is None else fraction,
+    answer = identification.identified(
+        found,
+        chosen,
+        form=None if form is None else form.value,
+        fraction=fraction,
         law_mass=striker_mass.value,
+        buoyancy=buoyancy,
+        terminal=terminal_speed,
         keep=keep,
-        source="; ".join(sources) or "recorded drops",
     )
-    clocks = {name: zero.answer for name, zero in zeros.items()}
-    timed = [f"{name}: {zero.sentence}" for name, zero in zeros.items()]
-    report = {
-        **answer.answer,
-        "clocks": clocks,
-        "refused": refused,
-        "remarks": [*timed, *answer.remarks],
-    }
-    _write(folder, document.dump(answer.law, ground_law.head(answer)), report)
-    for reason in refused:
+    report = identification.account(answer)
+    _write(folder, answer.soil, report)
+    for reason in answer.refused:
         console.say(f"left out: {reason}")
     if as_json:
         print(json.dumps(report, indent=2))
@@ -112,22 +95,9 @@ def identify_(
     widths = [max(map(len, column)) for column in zip(*answer.table, strict=True)]
     for row in answer.table:
         console.tell("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
-    for remark in (*timed, *answer.remarks):
+    for remark in answer.remarks:
         console.tell(remark)
     console.tell(f"Soil: {folder / SOIL}")
-
-
-def _digest(path: Path) -> str:
-    """SHA-256 of a recording's file: of a run's folder its channels, of another one all files with their names."""
-    import hashlib
-
-    path = path / "channels.parquet" if (path / "channels.parquet").is_file() else path
-    if path.is_file():
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    every = hashlib.sha256()
-    for file in sorted(p for p in path.rglob("*") if p.is_file()):
-        every.update(f"{file.relative_to(path).as_posix()}\0".encode() + hashlib.sha256(file.read_bytes()).digest())
-    return every.hexdigest()
 
 
 def _claim(folder: Path, force: bool) -> None:

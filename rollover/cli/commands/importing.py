@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rollover.cli.commands.common import AsJson, Force, answering, app, manual
-from rollover.cli.commands.profiles import profile_of
+from rollover.comparison.profiles import profile_of
 from rollover.system.errors import Fault, InputError, hint
 
 if TYPE_CHECKING:

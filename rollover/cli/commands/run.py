@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -27,6 +28,7 @@ from rollover.cli.commands.common import (
 )
 
 if TYPE_CHECKING:
+    from rollover.assessment.assessed import Progress
     from rollover.assessment.criteria import Criterion
     from rollover.assessment.loads import PeakLoad
     from rollover.dynamics.result import Run
@@ -76,19 +78,18 @@ def run(
     compiles = not is_warm()
     if compiles:
         console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
-    from rollover.assessment import loads, results
+    from rollover.assessment import results
+    from rollover.assessment.assessed import assessed
 
     folder = out or Path("out", "run", path.stem)
     made_from = results.origin(path, folder, set_ or [])
     # before a run that may take minutes
     results.claim(folder, document.content_hash(chosen), force=force, made_from=made_from, say=console.say)
     with document.named(path):
-        done, again = _simulated(chosen, half_step)
-    # what a run that broke off reached is in its channels; a peak of it would pass for the peak
-    peaks = loads.peak_loads(done, again if again and again.status == "done" else None) if done.status == "done" else ()
+        found = assessed(chosen, half_step=half_step, watch=_watched)
+    done, again, peaks, rows = found.result, found.half_step, found.peaks, found.criteria
     if peaks and ensemble > 1:
         peaks = _with_scatter(peaks, chosen, ensemble)
-    rows = _criteria(done, again)
     command = " ".join(["rollover", "run", scenario, *(f"--set {shlex.quote(s)}" for s in set_ or [])])
     answer = results.write(
         folder,
@@ -112,13 +113,6 @@ def run(
         _require(rows, str(path))
 
 
-def _criteria(done: Run, again: Run | None) -> tuple[Criterion, ...]:
-    from rollover.assessment.criteria import criteria, with_half_step
-
-    rows = criteria(done)
-    return with_half_step(rows, criteria(again)) if rows and again and again.status == "done" else rows
-
-
 def _require(rows: Sequence[Criterion], path: str) -> None:
     """Say which verdicts are not met, or not given because the test did not go far enough. Raises `typer.Exit`."""
     from rollover.cli import console
@@ -135,19 +129,14 @@ def _require(rows: Sequence[Criterion], path: str) -> None:
     console.say(f"{path}: {answer}.")
 
 
-def _simulated(scenario: Scenario, half_step: bool) -> tuple[Run, Run | None]:
+@contextmanager
+def _watched(what: str, scenario: Scenario) -> Iterator[Progress]:
+    """Progress of a run, shown."""
     from rollover.cli import console
-    from rollover.dynamics import simulate
 
     lead = getattr(scenario.initiation, "lead_time", 0.0)
-    times = scenario.simulation
-    with console.progress("simulating", -lead, times.duration) as show:
-        done = simulate.run(scenario, progress=show)
-    if not half_step or done.status == "failed":
-        return done, None
-    finer = scenario.replaced({"simulation.step": 0.5 * times.step})
-    with console.progress("again at half the step", -lead, times.duration) as show:
-        return done, simulate.run(finer, progress=show)
+    with console.progress(what, -lead, scenario.simulation.duration) as show:
+        yield show
 
 
 def _with_scatter(peaks: Sequence[PeakLoad], scenario: Scenario, starts: int) -> tuple[PeakLoad, ...]:

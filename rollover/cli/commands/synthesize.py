@@ -53,7 +53,7 @@ def synthesize(
     """Simulate a scenario and write what instruments with noise would have recorded of it."""
     from rollover import scenario as scenarios
     from rollover.cli import console
-    from rollover.comparison.synthesis import synthetic, usual
+    from rollover.comparison.synthesis import instrumented
     from rollover.dynamics import simulate
     from rollover.recording.importers import write_recording
     from rollover.spec import document
@@ -73,20 +73,18 @@ def synthesize(
     if done.status == "failed":
         console.say(f"{path}: the simulation failed: {done.sentence}")
         raise typer.Exit(FAILED)
-    try:
-        made = synthetic(
-            done.recording,
-            channels=tuple(channel) if channel else usual(done.recording),
-            rate=rate,
-            share=share,
-            sigmas=sigmas,
-            cfc=cfc,
-            late=late,
-            seed=zlib.crc32(target.stem.encode()) if seed is None else seed,  # two recordings never share their noise
-            conditions={leaf.path: leaf.value for leaf in document.paths(chosen) if leaf.path in stated},
-        )
-    except ValueError as e:
-        raise InputError(Fault(file="rollover synthesize", message=str(e))) from None
+    made = instrumented(
+        done,
+        stated,
+        channels=channel,
+        rate=rate,
+        share=share,
+        sigmas=sigmas,
+        cfc=cfc,
+        late=late,
+        seed=zlib.crc32(target.stem.encode()) if seed is None else seed,  # two recordings never share their noise
+        by="rollover synthesize",
+    )
     write_recording(made, target, force=force)
     if as_json:
         print(json.dumps({"recording": str(target), "samples": made.time.size, "noise": dict(made.noise)}, indent=2))

@@ -60,11 +60,13 @@ def headings(path: Path) -> dict[str, Node]:
 
 
 @contextmanager
-def named(path: Path) -> Iterator[None]:
-    """Within it, a fault that knows no file is one of the file `path`, at the line of its value or its base."""
+def named(path: Path | None) -> Iterator[None]:
+    """Within it, a fault that knows no file is one of the file `path`, if any, at the line of its value or its base."""
     try:
         yield
     except InputError as e:
+        if path is None:
+            raise
         raise InputError(*(f if f.file else _placed(f, path) for f in e.faults)) from None
 
 

@@ -1,4 +1,4 @@
-"""The profile that `--profile` names, its conditions held against what a scenario has."""
+"""A profile of foreign files, its conditions held against what a scenario has."""
 
 from __future__ import annotations
 

@@ -1,0 +1,147 @@
+"""A ground law from recorded drops: what `rollover identify` does between reading and writing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from ground.identify import LawMass
+from ground.law import GroundLaw
+from rollover.calibration import ground_law
+from rollover.comparison.recordings import Recordings, digest, gathered
+from rollover.recording import Recording
+from rollover.recording.time_stamps import Zero
+from rollover.scenario import Scenario, given
+from rollover.spec.document import dump
+from rollover.spec.vehicle import Striker
+from rollover.system.arguments import one_of, within
+
+
+@dataclass(frozen=True, kw_only=True)
+class Identification:
+    """A ground law with what stands behind it.
+
+    `soil` is the text of a soil file, `numbers` what was found (SI) with intervals, `table` its rows as text, `refused`
+    a sentence for each drop that was left out, `zeros` where clocks in doubt were set to.
+    """
+
+    law: GroundLaw
+    soil: str
+    numbers: Mapping[str, Any]
+    table: tuple[tuple[str, ...], ...]
+    remarks: tuple[str, ...]
+    refused: tuple[str, ...]
+    zeros: Mapping[str, Zero]
+
+
+def identify(
+    recordings: Recordings,
+    scenario: str | Path | Scenario = "drop_test",
+    *,
+    law: Literal["ye-2006", "bearing"] | None = None,
+    fraction: float | None = None,
+    striker_mass: LawMass = "reference",
+    buoyancy: float = 0.0,
+    terminal_speed: bool = False,
+    keep: bool = False,
+    profile: str | Path | None = None,
+) -> Identification:
+    """Identify a ground law from recorded drops: stiffness over depth, coefficients with intervals, a soil file.
+
+    Parameters
+    ----------
+    recordings, profile
+        As in `rollover.compare`.
+    scenario
+        Whose striker fell, unless a recording says otherwise.
+    law
+        Which law; None: "bearing" for a cone, else "ye-2006".
+    fraction
+        Share m_b1/m_s of the co-moving mass, 0 to 10; None: the scenario's.
+    striker_mass
+        Which mass stands in eq (5) of the law, as `ground.striker_mass` of a scenario.
+    buoyancy
+        Of the striker in what it falls through, N.
+    terminal_speed
+        Whether it fell at terminal speed, which tells its drag.
+    keep
+        Whether published values stand for what the drops cannot determine.
+
+    Returns
+    -------
+    Identification
+        The law, the text of its soil file, numbers with intervals, and which drops were left out.
+
+    Raises
+    ------
+    InputError
+        For wrong input, and where no drop is usable.
+    """
+    within("fraction", 0.0 if fraction is None else fraction, 0.0, 10.0)
+    within("buoyancy", buoyancy, 0.0)
+    one_of("law", law, ("ye-2006", "bearing"))
+    one_of("striker_mass", striker_mass, ("reference", "effective"))
+    return identified(
+        gathered(recordings, profile),
+        given(scenario)[0],
+        form=law,
+        fraction=fraction,
+        law_mass=striker_mass,
+        buoyancy=buoyancy,
+        terminal=terminal_speed,
+        keep=keep,
+    )
+
+
+def identified(
+    recordings: Mapping[str, tuple[Path | None, Recording]],
+    scenario: Scenario,
+    *,
+    form: Literal["ye-2006", "bearing"] | None = None,
+    fraction: float | None = None,
+    law_mass: LawMass = "reference",
+    buoyancy: float = 0.0,
+    terminal: bool = False,
+    keep: bool = False,
+) -> Identification:
+    """Identify a law from drops of a scenario's striker, given as (path, recording) by name.
+
+    `form` None: what fits the striker's nose. `fraction` m_b1/m_s, None: the scenario's co-moving mass. `buoyancy` N.
+    Raises `InputError`.
+    """
+    is_cone = isinstance(scenario.vehicle, Striker) and scenario.vehicle.nose == "cone"
+    known = {name: recording for name, (_, recording) in recordings.items()}
+    settled = ground_law.settled(known, scenario)
+    drops, unusable = ground_law.drops_of(settled.recordings, scenario, buoyancy=buoyancy, terminal=terminal)
+    zeros = {**settled.zeros, **ground_law.zeros_of(drops, known)}
+    sources = sorted({recording.source for recording in known.values() if recording.source})
+    found = ground_law.identified(
+        drops,
+        {name: digest(path, recording) for name, (path, recording) in recordings.items()},
+        form=form or ("bearing" if is_cone else "ye-2006"),
+        fraction=scenario.ground.co_moving_mass.share if fraction is None else fraction,
+        law_mass=law_mass,
+        keep=keep,
+        source="; ".join(sources) or "recorded drops",
+    )
+    return Identification(
+        law=found.law,
+        soil=dump(found.law, ground_law.head(found)),
+        numbers=found.answer,
+        table=found.table,
+        remarks=(*(f"{name}: {zero.sentence}" for name, zero in zeros.items()), *found.remarks),
+        refused=(*settled.refused, *unusable),
+        zeros=zeros,
+    )
+
+
+def account(found: Identification) -> dict[str, Any]:
+    """What identify.json says."""
+    return {
+        **found.numbers,
+        "clocks": {name: zero.answer for name, zero in found.zeros.items()},
+        "refused": list(found.refused),
+        "remarks": list(found.remarks),
+    }

@@ -1,0 +1,176 @@
+"""A study from its file to its answer: what `rollover study` does between reading and what it says."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.special import ndtr
+
+from rollover.assessment.results import plain, versions
+from rollover.assessment.shipped import origin
+from rollover.spec.document import content_hash, dump
+from rollover.studies import case_store, cluster, reliability
+from rollover.studies.design import from_unit, points
+from rollover.studies.runner import Builder, Conducted, Progress, Way, conduct, evaluate
+from rollover.studies.study import Study, load
+from rollover.studies.summary import answers, values_of
+from rollover.system.writing import sweep
+
+Page = Callable[[Conducted, Mapping[str, Any]], str]
+Watch = Callable[[str], AbstractContextManager[Callable[..., None]]]
+
+
+@contextmanager
+def unwatched(what: str) -> Iterator[Callable[..., None]]:
+    """Nobody is told how many are done."""
+    del what
+    yield lambda *_: None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prepared:
+    """A study that was read, and its folder, `target` resolved, that may be written."""
+
+    name: str
+    study: Study
+    folder: Path
+    target: Path
+
+    def carried_out(
+        self,
+        way: Way,
+        *,
+        page: Page,
+        watch: Watch = unwatched,
+        say: Callable[[str], None] = lambda _: None,
+    ) -> dict[str, Any]:
+        """Run what is missing and write the answer to the folder.
+
+        Returns what study.json says, before `plain`. `page` gives the report, `watch(what)` what is told how many cases
+        are done. Raises `InputError`.
+        """
+        chosen, target = self.study, self.target
+        with case_store.locked(target):
+            _begin(target, self.name, chosen)
+            began = time.perf_counter()
+            with watch("cases") as show:
+                done = conduct(chosen, target, way, lambda p: show(p.done, p.of, _note(p)))
+            ran = time.perf_counter() - began
+            builder = Builder(chosen)
+            account = {**_head(self.name, chosen, "done"), **answers(chosen, done), "ran": done.ran}
+            account["kept"] = len(set(done.keys)) - done.ran
+            account["reliability"] = _reliability(chosen, builder, target, way, watch, say)
+            account["worst"] = _write_worst(target, chosen, builder, account)
+            account["run_time"] = ran
+            bare: dict[str, Any] = plain(account)
+            case_store.put_text(target / case_store.PAGE, page(done, bare))
+            case_store.put_text(target / case_store.ACCOUNT, json.dumps(bare, indent=2, allow_nan=False) + "\n")
+        return account
+
+
+def prepared(path: Path, out: Path | None = None, *, scheduler: str = "", force: bool = False) -> Prepared:
+    """Read a study and what it needs, and claim its folder (None: out/study/NAME). Raises `InputError`."""
+    chosen = load(path)
+    points(chosen)  # reads the plan's table as well, before anything is written
+    if chosen.reliability is not None:
+        reliability.installed()
+    if scheduler:
+        cluster.installed(scheduler)
+    folder = out or Path("out", "study", path.stem)
+    target = case_store.claim(folder, path.stem, force=force)
+    return Prepared(name=path.stem, study=chosen, folder=folder, target=target)
+
+
+def _begin(target: Path, name: str, chosen: Study) -> None:
+    """Mark the folder as this study's, so that it can be gone on with after whatever happens."""
+    target.mkdir(parents=True, exist_ok=True)
+    sweep(target)  # what a process left that was killed
+    head = f"{chosen.title}\nEvery value of the study beside this file."
+    case_store.put_text(target / case_store.STUDY, dump(chosen, head))
+    if not (target / case_store.ACCOUNT).exists() or _name_of(target / case_store.ACCOUNT) != name:
+        case_store.put_text(target / case_store.ACCOUNT, json.dumps(_head(name, chosen, "running"), indent=2) + "\n")
+
+
+def _name_of(account: Path) -> str:
+    try:
+        return str(json.loads(account.read_text(encoding="utf-8")).get("name", ""))
+    except (OSError, ValueError):
+        return ""
+
+
+def _head(name: str, chosen: Study, status: str) -> dict[str, Any]:
+    made_from = origin(chosen.scenario)
+    return {
+        "format": case_store.FORMAT,
+        "name": name,
+        "title": chosen.title,
+        "differs": made_from.in_words if made_from else "",
+        "status": status,
+        "scenario_hash": content_hash(chosen.scenario),
+        "plan": chosen.plan.kind,
+        "versions": versions(),
+    }
+
+
+def _note(p: Progress) -> str:
+    failed = f"{p.failed} failed, " if p.failed else ""
+    return f"{failed}{60.0 * p.rate:.3g} a minute, {_span(p.left)} left" if p.rate > 0.0 else failed.rstrip(", ")
+
+
+def _span(seconds: float) -> str:
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
+
+
+def _reliability(
+    chosen: Study, builder: Builder, target: Path, way: Way, watch: Watch, say: Callable[[str], None]
+) -> dict[str, Any] | None:
+    """FORM and importance sampling through the same store: what was run once is not run again."""
+    if chosen.reliability is None:
+        return None
+
+    output = chosen.outputs[0]
+    limit = output.limit
+    assert limit is not None
+
+    def limit_state(u: Any) -> Any:
+        with watch("cases about the design point") as show:
+            found = from_unit(chosen, ndtr(u))
+            rows = evaluate(builder, target, way, found, lambda p: show(p.done, p.of, _note(p)))
+        return output.worst_sign * (values_of(output, rows) - limit) / max(abs(limit), 1e-12)
+
+    names = [axis.name for axis in chosen.axes]
+    try:
+        found = reliability.form_and_importance_sampling(limit_state, names, chosen.reliability, chosen.confidence)
+    except reliability.NoDesignPointError as e:
+        say(f"No reliability: {e}")
+        return {"reason": str(e)}
+    point = from_unit(chosen, ndtr(np.array([[found["design_point"][n] for n in names]]))).row(0)
+    return {**found, "output": output.name, "limit": limit, "design_values": point}
+
+
+def _write_worst(target: Path, chosen: Study, builder: Builder, account: dict[str, Any]) -> dict[str, Any] | None:
+    """Write the worst case of the first output as a scenario, and say what it is."""
+    worst = account["outputs"][0]["worst"]
+    if worst is None:
+        (target / case_store.WORST).unlink(missing_ok=True)
+        return None
+    output = chosen.outputs[0]
+    said = ", ".join(f"{name} = {value}" for name, value in worst["axes"].items())
+    scenario = builder.scenario(worst["axes"])
+    head = (
+        f"Worst case of the study {account['name']}: point {worst['point']}, {said}.\n"
+        f"There {output.name} is {worst['value']!r} {output.unit}; run it again: rollover run {case_store.WORST}"
+    )
+    if chosen.simulator == "drop":
+        head += "\nThe study dropped it by itself; the full run differs by the integration error."
+    case_store.put_text(target / case_store.WORST, dump(scenario, head))
+    return {"output": output.name, "file": case_store.WORST, "scenario_hash": content_hash(scenario), **worst}
