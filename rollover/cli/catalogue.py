@@ -1,4 +1,4 @@
-"""What exists: shipped files, laws, effects, channels, paths; and whether a file is in order."""
+"""What exists: shipped files, laws, effects, channels, paths; and whether a file is valid."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from ground.law import laws as known_laws
 from ground.quantity import quantities
 from rollover import scenario as scenarios
 from rollover.effects import effects as known_effects
 from rollover.spec import channels as table
 from rollover.spec import document
+from rollover.spec.laws import laws as known_laws
 from rollover.spec.rops import Rops
 from rollover.spec.vehicle import Vehicle, pitch_inertia
 from rollover.system.errors import Fault, InputError, excerpt

@@ -152,14 +152,14 @@ def _print(name: str, row: dict[str, Any]) -> None:
     from rollover.cli.console import tell
 
     if row["is"] != "recording":
-        tell(f"{name}: {row['is']}, in order")
+        tell(f"{name}: {row['is']}, valid")
         return
     from rollover.recording.checks import when
 
     first, step = row["first"], row["step"]
     span = f"{row['samples']} samples, {when(row['start'] - first, row['end'] - first, step)}"
     span += f" from its first stamp at {first:.10g} s" if first else ""
-    tell(f"{name}: recording, in order: {excerpt(row['title'])}, {span}")
+    tell(f"{name}: recording, valid: {excerpt(row['title'])}, {span}")
     for channel in row["channels"]:
         noise = "noise not known" if channel["noise"] is None else f"noise {channel['noise']:.3g} {channel['unit']}"
         tell(f"  {channel['channel']}: {noise}")

@@ -33,7 +33,7 @@ JSON, PAGE = "stability.json", "report.html"
 CODE_6 = {
     "limit_deg": 38.0,
     "what": "OECD Codes 6 and 7, narrow tractors: least angle of unstable equilibrium on a tilting plane, pivot free",
-    "confidence": "recalled, not seen",
+    "confidence": "recalled, source not checked",
 }
 
 
@@ -66,7 +66,7 @@ def stability_(
     if set_:
         chosen = chosen.replaced(settings(set_), origin="--set")
     folder = out or Path("out", "stability", Path(name).stem)
-    about: dict[str, Any] = {"scenario_hash": document.content_hash(chosen)}
+    about: dict[str, Any] = {"scenario_hash": document.content_hash(chosen), **chosen.own_code}
     about["origin"] = results.origin(_file(name), folder, set_ or [])
     results.claim_account(folder, FORMAT, about, (JSON, PAGE), force=force, say=console.say)
     if not is_warm():

@@ -47,7 +47,7 @@ def study(
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
-    """Run what is missing of a study, then answer: ranges, quantiles, odds beyond a limit, sensitivities, the worst."""
+    """Run what a study lacks, then give ranges, quantiles, exceedance probability, sensitivities, worst case."""
     from ground.compiled import is_warm
     from rollover import studies
     from rollover.cli import console
@@ -132,6 +132,7 @@ def _head(name: str, chosen: Study, status: str) -> dict[str, Any]:
         "differs": made_from.in_words if made_from else "",
         "status": status,
         "scenario_hash": document.content_hash(chosen.scenario),
+        **chosen.scenario.own_code,
         "plan": chosen.plan.kind,
         "versions": results.versions(),
     }
