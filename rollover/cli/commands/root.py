@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from rollover.cli.commands.common import app
+from rollover.system import own_code
 
 
 @app.callback()
@@ -17,10 +17,11 @@ def root(
         list[Path] | None,
         typer.Option("--effects", metavar="FILE", help="A Python file with effects of your own; may be repeated."),
     ] = None,
+    laws: Annotated[
+        list[Path] | None,
+        typer.Option("--laws", metavar="FILE", help="A Python file with ground laws of your own; may be repeated."),
+    ] = None,
 ) -> None:
     """Vehicle rollover load studies: what the ground does to a ROPS."""
-    if effects:
-        # the variable reaches the processes that a study or a diagnosis starts
-        known = os.environ.get("ROLLOVER_EFFECTS", "")
-        files = [str(path.resolve()) for path in effects]
-        os.environ["ROLLOVER_EFFECTS"] = os.pathsep.join([*filter(None, [known]), *files])
+    own_code.add("effects", effects or [])
+    own_code.add("laws", laws or [])
