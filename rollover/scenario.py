@@ -21,6 +21,7 @@ from rollover.spec.excitation import Excitation
 from rollover.spec.footing import check_standing, check_turning
 from rollover.spec.initiation import Driving, Drop, Initiation, Release, Standing, Throw, TipOver
 from rollover.spec.laws import laws
+from rollover.spec.rops import Rops
 from rollover.spec.stand import PendulumBlow, StaticTest, TiltTable
 from rollover.spec.standards.static_sequence import sequence
 from rollover.spec.vehicle import RigidBody, Striker, Vehicle
@@ -253,7 +254,7 @@ def load(path: str | Path) -> Scenario:
     return scenario
 
 
-def schema(part: Literal["scenario", "vehicle", "soil"] = "scenario") -> dict[str, Any]:
-    """JSON Schema of a scenario file, or of a vehicle or soil file on its own."""
-    kind: Any = {"scenario": Scenario, "vehicle": AnyVehicle, "soil": AnyLaw}[part]
+def schema(part: Literal["scenario", "vehicle", "rops", "soil"] = "scenario") -> dict[str, Any]:
+    """JSON Schema of a scenario file, or of a vehicle, ROPS or soil file on its own."""
+    kind: Any = {"scenario": Scenario, "vehicle": AnyVehicle, "rops": Rops, "soil": AnyLaw}[part]
     return document.schema(kind, f"rollover {part}")

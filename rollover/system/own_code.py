@@ -67,6 +67,11 @@ def is_own(kind: str, thing: object) -> bool:
     return type(thing).__module__.startswith(_prefix(kind))
 
 
+def file_of(kind: str, own_class: type) -> Path | None:
+    """The file of one's own that a class stands in; None for a class of the package."""
+    return next((path for path in named(kind) if _module(kind, path) == own_class.__module__), None)
+
+
 @functools.cache  # a study asks for it with each of its cases
 def _hashes(paths: tuple[str, ...]) -> dict[str, str]:
     found: dict[str, str] = {}

@@ -24,7 +24,10 @@ if TYPE_CHECKING:
 def check(
     files: Annotated[
         list[str],
-        typer.Argument(help="Scenarios, vehicles, soils, recordings or folders of recordings.", metavar="FILE..."),
+        typer.Argument(
+            help="Files of any kind, folders of recordings, Python files with laws or effects.",
+            metavar="FILE...",
+        ),
     ],
     profile: Annotated[Path | None, typer.Option(help="What the columns of foreign recordings are.")] = None,
     scenario: Annotated[str | None, typer.Option(help="Whose values the recordings' conditions must be.")] = None,
@@ -73,6 +76,8 @@ def _document(name: str) -> dict[str, Any]:
 def _is_recording(name: str, profile: Described | None) -> bool:
     """Whatever is there and no YAML of ours; a sidecar by its format. Without an ending it is one by its profile."""
     path = Path(name)
+    if path.suffix.lower() == ".py":
+        return False
     if path.suffix.lower() not in (".yaml", ".yml"):
         return bool(path.suffix) or path.is_dir() or (profile is not None and path.is_file())
     try:
