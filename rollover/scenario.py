@@ -198,19 +198,23 @@ class Scenario:
         return changed
 
 
+def _check_start_of_striker(start: Initiation) -> None:
+    if isinstance(start, Release):
+        return
+    if not isinstance(start, Drop):
+        raise ValueError(
+            f"initiation.kind: a striker cannot begin so, got {start.kind!r}; 'drop' or 'release' is allowed"
+        )
+    for name in ("roll_deg", "pitch_deg", "yaw_deg"):
+        if getattr(start, name) != 0.0:
+            raise ValueError(
+                f"initiation.{name}: a striker keeps level on its guide, got {getattr(start, name)!r}; 0 is allowed"
+            )
+
+
 def _check_start(vehicle: Vehicle | Striker | RigidBody, start: Initiation) -> None:
     if isinstance(vehicle, Striker):
-        if isinstance(start, Release):
-            return
-        if not isinstance(start, Drop):
-            raise ValueError(
-                f"initiation.kind: a striker cannot begin so, got {start.kind!r}; 'drop' or 'release' is allowed"
-            )
-        for name in ("roll_deg", "pitch_deg", "yaw_deg"):
-            if getattr(start, name) != 0.0:
-                raise ValueError(
-                    f"initiation.{name}: a striker keeps level on its guide, got {getattr(start, name)!r}; 0 is allowed"
-                )
+        _check_start_of_striker(start)
         return
     if isinstance(start, (StaticTest, PendulumBlow)) and (vehicle.rops is None or not vehicle.rops.members):
         raise ValueError(f"initiation.kind: {start.kind!r} loads a ROPS, got a vehicle without; one with members")

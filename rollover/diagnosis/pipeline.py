@@ -202,7 +202,7 @@ def _diagnosed(
         depends_on = of_motion if of_one is None or of_one.yields_to(of_motion) else of_one
     law = None
     if verdict == "unexplained" and acts == "drop" and shown is None:
-        say("a law for the unexplained residual")
+        say("a law for what no candidate explains")
         law = proposed(problem, explanation.base, set_ups, found, groups)
     detectable = dict(explanation.detectable)
     contrary = differing(found, CONTRADICTING)
@@ -326,9 +326,9 @@ def _dataset(
         notes += [f"{name}: {line}" for line in spiked]
         one = dataset_of(name, thin, simulator, averaged)
         still = [c for c, v in recording.channels.items() if np.isfinite(v).any() and np.nanmin(v) == np.nanmax(v)]
-        notes += [f"{name}: {channel} is constant and was excluded" for channel in still]
+        notes += [f"{name}: {channel} never moves and was left aside" for channel in still]
         if one is None:
-            notes.append(f"{name}: shares no usable channel with the simulation and was excluded")
+            notes.append(f"{name}: shares no usable channel with the simulation and was left aside")
             foreign += foreign_to(simulator, name, recording)
         else:
             found.append(one)

@@ -26,7 +26,7 @@ def _scenario(name: str) -> Mapping[str, str]:
     head = (
         f"{name}: a tractor tips over sideways onto flat clay.\n"
         f"Check: rollover check {name}.yaml   Run: rollover run {name}.yaml   Values: rollover list paths {name}.yaml\n"
-        "A key with a default may be left out. `vehicle`, `law`: files, see `rollover list vehicles`, `list soils`, or\n"
+        "A key with a default may be left out. `vehicle`, `law`: see `rollover list vehicles`, `list soils`, or\n"
         "your own (`rollover new vehicle`). `effects`: `rollover list effects`. Other kinds: `rollover schema`."
     )
     files = {"vehicle": f"vehicles/{VEHICLE}.yaml", "ground.law": "soils/natural_clay.yaml"}
