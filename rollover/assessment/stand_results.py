@@ -93,7 +93,7 @@ def _shaker(tests: Sequence[Entry]) -> Findings:
     e = tests[0]
     sentence = (
         f"{e['turns']:.0f} turns at {e['frequency']:g} Hz with {1e-3 * e['force_amplitude']:.2f} kN: swings by "
-        f"+-{1e3 * e['way_amplitude']:.2f} mm in the end, work of the exciter {1e-3 * e['work']:.3f} kJ"
+        f"+-{1e3 * e['deflection_amplitude']:.2f} mm in the end, work of the exciter {1e-3 * e['work']:.3f} kJ"
     )
     rows = tuple((str(s["turns"]), _number(s["settlement"], 1e3)) for s in e["settlement"])
     return Findings(headings=("turns", "settlement mm"), rows=rows, sentence=sentence)

@@ -141,7 +141,7 @@ def _recording(
 
 
 def _shared(rows: list[dict[str, Any]], read: dict[str, Recording]) -> None:
-    """Add to each recording what only several of them tell together, where it is not told already."""
+    """Add to each recording what only several of them show together, where it is not there already."""
     if len(read) < 2:
         return
     from rollover.recording.checks import shared_rails

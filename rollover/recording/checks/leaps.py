@@ -65,7 +65,7 @@ def leaps(t: Trace, unit: str, cfc: int | None) -> Iterator[Finding]:
         return
     off = across(t.values)[found]
     yield Finding(
-        check="leap",
+        check="jump",
         channel=t.channel,
         start=float(t.time[found[0]]),
         end=float(t.time[found[-1]]),
