@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from ground.array import CoMovingMass, Elements
 from ground.friction import Coulomb
 from ground.kinds import ByKey, ByKind
-from ground.law import GroundLaw, laws
+from ground.law import GroundLaw
 from ground.quantity import Quantity, parameters
 from ground.surface import Plane, Surface
 from rollover.effects import EFFECTS, entries, nothing
@@ -20,12 +20,15 @@ from rollover.spec.estimates import Estimate, wheel_estimates
 from rollover.spec.excitation import Excitation
 from rollover.spec.footing import check_standing, check_turning
 from rollover.spec.initiation import Driving, Drop, Initiation, Release, Standing, Throw, TipOver
+from rollover.spec.laws import laws
+from rollover.spec.rops import Rops
 from rollover.spec.stand import PendulumBlow, StaticTest, TiltTable
 from rollover.spec.standards.static_sequence import sequence
 from rollover.spec.vehicle import RigidBody, Striker, Vehicle
+from rollover.system import own_code
 
 AnyVehicle = Annotated[Vehicle | Striker | RigidBody, ByKind()]
-AnyLaw = Annotated[GroundLaw, ByKind(laws)]  # whatever law stands in the folder `ground`
+AnyLaw = Annotated[GroundLaw, ByKind(laws)]  # whatever law stands in the folder `ground` or in a file of one's own
 
 MOST_STEPS = 100_000_000  # of a run: at 10 us, the least that a step costs, a quarter of an hour
 MOST_ROWS = 5_000_000  # of the channels, of which a tractor has a hundred: 4 GB
@@ -61,6 +64,11 @@ class Ground:
         "or the latter with m v clamped to the calibrated momentum",
     ] = "reference"
     patches: Annotated[tuple[Patch, ...], "parts with another soil; the last one counts where they overlap"] = ()
+
+    @property
+    def every_law(self) -> list[GroundLaw]:
+        """The law of the array, and those of its patches."""
+        return [self.law, *(patch.law for patch in self.patches)]
 
 
 @parameters
@@ -147,6 +155,16 @@ class Scenario:
             )
         _check_start(self.vehicle, self.initiation)
 
+    @property
+    def own_code(self) -> dict[str, dict[str, dict[str, str]]]:
+        """What a result states of files of one's own under `own_code`: SHA-256 by name, of each kind made use of.
+
+        Empty where no effect or law of this scenario is one's own.
+        """
+        used = {"effects": list(self.effects.values()), "laws": self.ground.every_law}
+        found = {k: own_code.hashes(k) for k, things in used.items() if any(own_code.is_own(k, t) for t in things)}
+        return {"own_code": found} if found else {}
+
     def replaced(self, changes: Mapping[str, object], *, origin: str = "replaced") -> Scenario:
         """Return this scenario with values replaced by path, checked exactly like a file.
 
@@ -194,19 +212,23 @@ class Scenario:
         return changed
 
 
+def _check_start_of_striker(start: Initiation) -> None:
+    if isinstance(start, Release):
+        return
+    if not isinstance(start, Drop):
+        raise ValueError(
+            f"initiation.kind: a striker cannot begin so, got {start.kind!r}; 'drop' or 'release' is allowed"
+        )
+    for name in ("roll_deg", "pitch_deg", "yaw_deg"):
+        if getattr(start, name) != 0.0:
+            raise ValueError(
+                f"initiation.{name}: a striker keeps level on its guide, got {getattr(start, name)!r}; 0 is allowed"
+            )
+
+
 def _check_start(vehicle: Vehicle | Striker | RigidBody, start: Initiation) -> None:
     if isinstance(vehicle, Striker):
-        if isinstance(start, Release):
-            return
-        if not isinstance(start, Drop):
-            raise ValueError(
-                f"initiation.kind: a striker cannot begin so, got {start.kind!r}; 'drop' or 'release' is allowed"
-            )
-        for name in ("roll_deg", "pitch_deg", "yaw_deg"):
-            if getattr(start, name) != 0.0:
-                raise ValueError(
-                    f"initiation.{name}: a striker keeps level on its guide, got {getattr(start, name)!r}; 0 is allowed"
-                )
+        _check_start_of_striker(start)
         return
     if isinstance(start, (StaticTest, PendulumBlow)) and (vehicle.rops is None or not vehicle.rops.members):
         raise ValueError(f"initiation.kind: {start.kind!r} loads a ROPS, got a vehicle without; one with members")
@@ -258,7 +280,7 @@ def given(scenario: str | Path | Scenario) -> tuple[Scenario, Path | None]:
     return load(path), path
 
 
-def schema(part: Literal["scenario", "vehicle", "soil"] = "scenario") -> dict[str, Any]:
-    """JSON Schema of a scenario file, or of a vehicle or soil file on its own."""
-    kind: Any = {"scenario": Scenario, "vehicle": AnyVehicle, "soil": AnyLaw}[part]
+def schema(part: Literal["scenario", "vehicle", "rops", "soil"] = "scenario") -> dict[str, Any]:
+    """JSON Schema of a scenario file, or of a vehicle, ROPS or soil file on its own."""
+    kind: Any = {"scenario": Scenario, "vehicle": AnyVehicle, "rops": Rops, "soil": AnyLaw}[part]
     return document.schema(kind, f"rollover {part}")

@@ -66,7 +66,7 @@ def in_words(rows: Sequence[Criterion]) -> list[str]:
         found.append(f"Not loaded far enough, so no verdict: {', '.join(short)}.")
     if any(row.margin is None for row in rows):
         found.append(
-            "A margin is not stated where a test went only as far as it was told: what more a frame can take shows "
+            "A margin is not stated where a test went only to its prescribed load: what more a frame can take shows "
             "when it is pushed until it fails (initiation.push_on: the name of a load)."
         )
     return found
@@ -135,11 +135,11 @@ def _share(share: float) -> Criterion:
         upper=0.61,
         bound="range",
         source="HSE research report 432",
-        confidence="seen",
+        confidence="source checked",
     )
     clay, firm, soft = (f"{100.0 * value:.0f} %" for value in LIGHT_SHARES)
     note = (
-        "of the kinetic energy when the ROPS lands. Published shares come from ground and frames that are not told; "
+        "of the kinetic energy when the ROPS lands. Published shares come from ground and frames that are not stated; "
         f"soil that yields takes its part first: here a vehicle of 450 kg has {clay} on natural clay, {firm} on ground "
         f"a hundred times as stiff and {soft} there with mounts that yield at a third"
     )
@@ -158,7 +158,7 @@ def _zone(approach: Approach) -> Criterion:
         value=0.0,
         bound="least",
         source=STATIC,
-        confidence="seen",
+        confidence="source checked",
     )
     where = f"nearest: {approach.nearest}" if approach.what == "structure" else "height above the undisturbed surface"
     note = f"{where}, at {approach.time:.3f} s"
@@ -181,5 +181,5 @@ def _compared(run: Run, requirement: Requirement) -> Criterion | None:
         return compared(requirement, float(force[k]), note)
     if requirement.quantity == "deflection":
         most, left, _ = virtual_tests.elastic_deflection(run)
-        return compared(requirement, most - left, "upper corner, less what was left at the end of the run")
+        return compared(requirement, most - left, "upper corner, less the permanent set at the end of the run")
     return None  # heights and angles are settings of a test, not results of a rollover

@@ -19,6 +19,7 @@ from rollover.assessment.ledger import closure
 from rollover.assessment.shipped import origin as shipped_origin
 from rollover.recording import write_parquet
 from rollover.spec.document import content_hash, dump, shipped_folder
+from rollover.system import own_code
 from rollover.system.boundary import worded
 from rollover.system.errors import Fault, InputError
 from rollover.system.writing import hold, own
@@ -88,12 +89,18 @@ def claim(
             title = found.get("title", "")
             raise _refused(folder, f"holds another run, got {title!r}; --force replaces it, --out leaves it")
         _say_replaced(say, folder, "run", found)
-    elif found.get("versions") != versions():
+    elif found.get("versions") != versions() or _is_by_other_code(found):
         if not is_own:
             raise _refused(folder, "holds this run by other versions; --force replaces it, --out leaves it")
         if say is not None:
             say(f"{folder}: replaces the run of this scenario by other versions")
     return target
+
+
+def _is_by_other_code(found: Mapping[str, Any]) -> bool:
+    """Whether files of one's own effects or laws that a result was made with say something else now."""
+    stated = found.get("own_code", {})
+    return isinstance(stated, Mapping) and any(own_code.hashes(k) != stated[k] for k in own_code.KINDS if k in stated)
 
 
 def _say_replaced(say: Callable[[str], None] | None, folder: Path, what: str, found: Mapping[str, Any]) -> None:
@@ -227,6 +234,7 @@ def account(
             "status": run.status,
             "sentence": run.sentence,
             "versions": versions(),
+            **run.scenario.own_code,
             "scenario_hash": content_hash(run.scenario),
             "wall_time": run.wall_time,
             "stop_time": run.stop_time,

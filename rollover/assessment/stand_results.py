@@ -25,7 +25,17 @@ def findings(tests: Sequence[Entry]) -> Findings | None:
 
 
 def _loads(tests: Sequence[Entry]) -> Findings:
-    headings = ("load", "from", "status", "energy kJ", "force kN", "peak kN", "way mm", "left mm", "overload test")
+    headings = (
+        "load",
+        "from",
+        "status",
+        "energy kJ",
+        "force kN",
+        "peak kN",
+        "deflection mm",
+        "permanent set mm",
+        "overload test",
+    )
     rows = []
     for e in tests:
         over = e["overload"]
@@ -55,7 +65,7 @@ def _pendulum(tests: Sequence[Entry]) -> Findings:
     names = [name for name in e[given[0][0]] if any(e[key][name] for key, _ in given)] if given else []
     sentence = (
         f"The block struck at {e['block_speed']:.2f} m/s with {1e-3 * e['block_energy']:.2f} kJ and gave away at most "
-        f"{1e-3 * e['given_most']:.2f} kJ; the struck point went {1e3 * e['deflection']:.0f} mm, tractor and all"
+        f"{1e-3 * e['given_most']:.2f} kJ; the struck point deflected {1e3 * e['deflection']:.0f} mm, tractor and all"
     )
     return Findings(
         headings=("taken by", *(heading for _, heading in given)),
@@ -83,7 +93,7 @@ def _shaker(tests: Sequence[Entry]) -> Findings:
     e = tests[0]
     sentence = (
         f"{e['turns']:.0f} turns at {e['frequency']:g} Hz with {1e-3 * e['force_amplitude']:.2f} kN: swings by "
-        f"+-{1e3 * e['way_amplitude']:.2f} mm in the end, work of the exciter {1e-3 * e['work']:.3f} kJ"
+        f"+-{1e3 * e['deflection_amplitude']:.2f} mm in the end, work of the exciter {1e-3 * e['work']:.3f} kJ"
     )
     rows = tuple((str(s["turns"]), _number(s["settlement"], 1e3)) for s in e["settlement"])
     return Findings(headings=("turns", "settlement mm"), rows=rows, sentence=sentence)

@@ -28,7 +28,7 @@ FORMAT = "rollover-stability/1"
 CODE_6 = {
     "limit_deg": 38.0,
     "what": "OECD Codes 6 and 7, narrow tractors: least angle of unstable equilibrium on a tilting plane, pivot free",
-    "confidence": "recalled, not seen",
+    "confidence": "recalled, source not checked",
 }
 
 

@@ -134,7 +134,9 @@ def blow(run: Run, blow_: PendulumBlow, asked: Sequence[Requirement]) -> list[Cr
             found.append(judged(requirement, blow_.height, note, otherwise=struck))
         elif requirement.quantity == "deflection":
             most, left, swing = elastic_deflection(run)
-            note = f"upper corner: at most {1e3 * most:.0f} mm, {1e3 * left:.0f} mm left (+-{1e3 * swing:.0f} mm)"
+            note = (
+                f"upper corner: at most {1e3 * most:.0f} mm, {1e3 * left:.0f} mm permanent set (+-{1e3 * swing:.0f} mm)"
+            )
             found.append(judged(requirement, most - left, note, otherwise=struck))
     return found
 

@@ -218,7 +218,7 @@ def _from_starts(
     ends = [o.value for o in outcomes if o.value is not None]
     if not ends:
         failure = outcomes[0].failure
-        raise ValueError(f"no start led anywhere, got {failure.sentence if failure else 'nothing'}; other bounds")
+        raise ValueError(f"no start converged, got {failure.sentence if failure else 'nothing'}; other bounds")
     best = min(ends, key=lambda end: end[1])
     same = sum(bool(np.max(np.abs(end[0] - best[0])) < SAME) for end in ends)
     return best[0], (same, len(ends))
@@ -353,11 +353,11 @@ def _combination(objective: Objective, direction: Array, spread: float) -> str:
     parts = [(p, float(d)) for p, d in zip(objective.parameters, direction, strict=True) if d**2 > 0.01]
     parts.sort(key=lambda part: -abs(part[1]))
     if len(parts) == 1:
-        return f"{parts[0][0].path} alone is not seen by these recordings"
+        return f"{parts[0][0].path} alone is not observable in these recordings"
     lead, size = parts[0][0], _shown(*parts[0])
     words = [f"{lead.path} by +1 {_step_unit(lead)}"]
     words += [f"{p.path} by {_shown(p, d) / size:+.3g} {_step_unit(p)}" for p, d in parts[1:]]
-    return "changed together these are not seen: " + ", ".join(words)
+    return "changed together these are not observable: " + ", ".join(words)
 
 
 def _shown(p: Parameter, d: float) -> float:

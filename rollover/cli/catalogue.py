@@ -1,4 +1,4 @@
-"""What exists: shipped files, laws, effects, channels, paths; and whether a file is in order."""
+"""What exists: shipped files, laws, effects, channels, paths; and whether a file is valid."""
 
 from __future__ import annotations
 
@@ -6,16 +6,17 @@ import inspect
 from collections.abc import Callable, Iterable
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from ground.law import laws as known_laws
 from ground.quantity import quantities
 from rollover import scenario as scenarios
 from rollover.effects import effects as known_effects
 from rollover.spec import channels as table
 from rollover.spec import document
+from rollover.spec.laws import laws as known_laws
 from rollover.spec.rops import Rops
 from rollover.spec.vehicle import Vehicle, pitch_inertia
+from rollover.system import own_code
 from rollover.system.errors import Fault, InputError, excerpt
 
 Row = dict[str, Any]
@@ -117,19 +118,30 @@ TABLES: dict[str, Callable[[], list[Row]]] = {
 
 
 def check(name: str) -> str:
-    """Validate a scenario, study, vehicle, ROPS, soil or baseline file and say which it is. Raises `InputError`."""
+    """Validate a file and say what it is: scenario, study, vehicle, ROPS, soil, baseline, profile, law or effect.
+
+    Raises `InputError`.
+    """
     path = _found(name)
+    if path.suffix.lower() == ".py":
+        return _check_code(path)
     keys = document.headings(path)
     kind = keys["kind"].plain if "kind" in keys else None
     if kind is not None and not isinstance(kind, str):
         known = (*known_laws(), *document.slot_of(scenarios.AnyVehicle).kinds)
         raise keys["kind"].place.fault("kind", f"not a word, got {excerpt(repr(kind))}; {', '.join(known)} are allowed")
-    if str(keys["format"].plain if "format" in keys else "").startswith("rollover-baseline/"):
+    form = str(keys["format"].plain if "format" in keys else "")
+    if form.startswith("rollover-profile/"):
+        from rollover.recording.importers.sidecar import Profile, read_described
+
+        read_described(path, Profile)
+        return "profile"
+    if form.startswith("rollover-baseline/"):
         from rollover.studies import baseline  # brings the simulator along, which the other files need not
 
         baseline.read(path)
         return "baseline"
-    if str(keys["format"].plain if "format" in keys else "").startswith("rollover-study/") or "axes" in keys:
+    if form.startswith("rollover-study/") or "axes" in keys:
         from rollover import studies as study
         from rollover.studies.design import points
 
@@ -147,6 +159,18 @@ def check(name: str) -> str:
         raise InputError(Fault(file=str(path), line=1, path="kind", message=_which_kind(keys)))
     scenarios.load(path)
     return "scenario"
+
+
+def _check_code(path: Path) -> str:
+    """Load a Python file of one's own and say what it adds. Raises `InputError`."""
+    kind: Literal["effects", "laws"] = "laws" if "GroundLaw" in path.read_text("utf-8", "replace") else "effects"
+    own_code.add(kind, [path])
+    table: dict[str, Any] = dict(known_laws() if kind == "laws" else known_effects())
+    found = [name for name, thing in table.items() if own_code.file_of(kind, thing) == path.resolve()]
+    if not found:
+        message = "neither a ground law nor an effect, got no class derived from GroundLaw or Effect; one is needed"
+        raise InputError(Fault(file=str(path), message=message))
+    return f"{kind.removesuffix('s')} {', '.join(found)}"
 
 
 def _which_kind(keys: Iterable[str]) -> str:

@@ -138,7 +138,7 @@ def _span(scenario: Scenario) -> tuple[float, float]:
 def _nothing_tells(recording: Recording, start: float, end: float) -> str:
     stamps = f"{recording.time[0]:.10g} to {recording.time[-1]:.10g} s"
     return (
-        f"nothing tells where its zero is, got stamps from {stamps} for a scenario from {start:g} to {end:g} s, no "
+        f"its time zero cannot be determined, got stamps from {stamps} for a scenario from {start:g} to {end:g} s, no "
         "onset of contact, and no place where it is like the simulation; stamps that begin with the scenario are needed"
     )
 

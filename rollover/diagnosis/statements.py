@@ -75,7 +75,7 @@ def _or_the_other(problem: Problem, c: Candidate, values: Mapping[str, Any]) -> 
     if abs(values["offset"]) > UNSURE * min(e.shift_prior for e in problem.dataset):
         return []
     way = "early" if values["offset"] > 0.0 else "late"
-    return [f"Of two channels nobody can tell which: {others.pop()} may come as much too {way}."]
+    return [f"With two channels the late one cannot be identified: {others.pop()} may be {way} by as much."]
 
 
 def is_none(effect: Named) -> bool:
@@ -113,7 +113,7 @@ def of_no_ground(found: Sequence[Dataset]) -> str:
     ends = [max(float(e.recording.time[s.rows[-1]]) for s in e.signals) for e in found]
     if any(end >= at or not np.isfinite(at) for end, at in zip(ends, contacts, strict=True)):
         return ""
-    return " None of them reaches the first contact: of the ground nothing can be told."
+    return " None of them reaches the first contact: nothing can be said of the ground."
 
 
 def by_steps(effects: Sequence[Named]) -> list[str]:
@@ -156,9 +156,7 @@ def considered(
     for c in candidates:
         if c.key not in lines:
             reason = (
-                "chosen beside another one"
-                if c.key in chosen
-                else "moves the simulation in directions in which the misfit has little"
+                "chosen beside another one" if c.key in chosen else "its sensitivity is nearly orthogonal to the misfit"
             )
             lines[c.key] = Considered(id=c.id, channel=c.channel, held_out_gain=0.0, reason=reason)
     return tuple(sorted(lines.values(), key=lambda c: -c.held_out_gain))
@@ -174,7 +172,7 @@ def closest(found: Explanation, groups: Sequence[Sequence[int]]) -> str:
         return ""
     last = one.fitted.candidates[-1]
     of = f" of {last.channel}" if last.channel else ""
-    return f" The closest, {last.id}{of}, leaves {end:.2f} times the noise, and in that there is structure."
+    return f" The closest, {last.id}{of}, leaves {end:.2f} times the noise, with structure in it."
 
 
 def places(mismatch: Mismatch, dataset: Sequence[Dataset], depends: str | None) -> tuple[Place, ...]:
@@ -230,7 +228,7 @@ def sentence(
     if verdict == "no-mismatch":
         return f"Simulation and {len(dataset)} recordings agree within the noise (p = {p_value:.2g})."
     if verdict == "cannot-tell":
-        return "These recordings are too weak to show even typical effects: nothing can be said."
+        return "These recordings are too weak to show even effects of typical strength: no statement is possible."
     if verdict == "unexplained":
         return (
             f"Simulation and recordings differ ({first.total:.1f} times the noise), and no candidate explains it"
@@ -239,16 +237,19 @@ def sentence(
     said = " ".join(e.statement for e in effects)
     rivals = sorted({r for e in effects for r in e.indistinguishable_from})
     also = (
-        "" if cross_validated else " Of one condition nothing can be held out: that is the misfit of what was fitted."
+        ""
+        if cross_validated
+        else " With one condition nothing can be held out: this is the misfit of the fitted recordings."
     )
-    also += " What is left of it has structure: this is not the whole." if remains else ""
-    also += f" Not told apart by these recordings: {', '.join(rivals)}." if rivals else ""
+    also += " The unexplained residual has structure: these effects are not the whole difference." if remains else ""
+    also += f" Not distinguishable by these recordings: {', '.join(rivals)}." if rivals else ""
     misfit = "held-out misfit" if cross_validated else "misfit"
     falls = f"{said} With it the {misfit} falls from {first.total:.1f} to {last.total:.2f} times the noise"
     without, with_ = early
     if without is None or with_ is None:
         return f"{falls}.{also}"
     first_impact = (
-        f"before the first blow, where none scatters, the misfit is {with_:.2f} times the noise for {without:.1f}"
+        f"before the first impact, where runs do not scatter, the misfit is {with_:.2f} times the noise "
+        f"for {without:.1f}"
     )
     return f"{falls} and the scatter of runs; {first_impact}.{also}"

@@ -34,7 +34,7 @@ ENTRY = 0.02  # longest step over the time in which a cone goes in
 ROUNDING = 1e-6  # of the largest force: what changes by less has not jumped
 BESIDE = 1e-9  # s: on either side of a jump
 TOLD = 64  # grounds with their effects, of which the kernel's numbers are kept: drops share them
-RESOLVED = 0.15  # longest step times the frequency of a striker that gives way
+RESOLVED = 0.15  # longest step times the frequency of a compliant striker
 
 COLUMNS = {
     "ground/force_normal": (track.OUT_FORCE, 1.0),

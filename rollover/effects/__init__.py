@@ -7,19 +7,14 @@ environment variable ROLLOVER_EFFECTS (several files as in PATH); it then stands
 from __future__ import annotations
 
 import functools
-import hashlib
-import importlib.util
-import os
-import sys
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from ground.settings import ForceTerm
 from rollover.effects import empirical, ground, parameter, sensor, striker, vehicle
 from rollover.effects.effect import EFFECTS, Effect, Form, Heard, Search, nothing, possible, spoken, units_of
 from rollover.recording import Recording
-from rollover.system.errors import Fault, InputError
+from rollover.system import own_code
 
 __all__ = [
     "EFFECTS",
@@ -36,31 +31,13 @@ __all__ = [
 ]
 __all__ += ["empirical", "entries", "every", "nth", "possible", "sensor", "spoken", "striker", "units_of", "vehicle"]
 
-VARIABLE = "ROLLOVER_EFFECTS"
 MOST = 3  # sensor effects of one id in a scenario, each on its own channel
 
 
 def effects() -> dict[str, type[Effect]]:
     """Every effect that exists, by its id; those of one's own files last. Raises `InputError`."""
-    for name in filter(None, os.environ.get(VARIABLE, "").split(os.pathsep)):
-        _load(Path(name).resolve())
+    own_code.load("effects")
     return dict(EFFECTS)
-
-
-def _load(path: Path) -> None:
-    module = f"rollover_effects_{hashlib.sha256(str(path).encode()).hexdigest()[:12]}"
-    if module in sys.modules:
-        return
-    spec = importlib.util.spec_from_file_location(module, path)
-    if spec is None or spec.loader is None or not path.is_file():
-        raise InputError(Fault(file=str(path), message="no such file of effects; a Python file is needed"))
-    loaded = importlib.util.module_from_spec(spec)
-    sys.modules[module] = loaded
-    try:
-        spec.loader.exec_module(loaded)
-    except Exception as e:
-        del sys.modules[module]
-        raise InputError(Fault(file=str(path), message=f"cannot be used: {type(e).__name__}: {e}")) from e
 
 
 def acting(chosen: Mapping[str, Any]) -> tuple[dict[int, float], tuple[ForceTerm, ...]]:

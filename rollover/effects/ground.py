@@ -1,7 +1,7 @@
 """Effects of the ground: terms of an element's loading curve, of its way back, of the mass that moves along.
 
 Forces are those of the reference face (140 mm x 45 mm) and grow with the area of contact. `M` in a source: recalled,
-not seen, with high (+), medium or low (-) confidence; a number of that kind is where a search starts, not a truth.
+source not checked, with high (+), medium or low (-) confidence: where a search starts, not a truth.
 """
 
 from __future__ import annotations
@@ -220,13 +220,11 @@ class SoilElasticRebound(Effect):
     recovery: Annotated[
         float, Quantity("1", "share of z_max that springs back; none below the law's own", least=0, below=1)
     ] = 0.1
-    damping_ratio: Annotated[float, Quantity("1", "dashpot of the way back over the critical one", least=0, most=2)] = (
-        0.1
-    )
+    damping_ratio: Annotated[float, Quantity("1", "damping ratio of the unloading path", least=0, most=2)] = 0.1
     clings: Annotated[float, Quantity("1", CLINGS, least=0, most=1)] = 0.0
 
     id = "soil-elastic-rebound"
-    family = "a way back that is not the plastic one"
+    family = "an unloading path that is not the plastic one"
     equation = "K_u = K'(z_max)/max(recovery, that of the law); c_u = 2 damping_ratio sqrt(K_u (m_s + m_b1))"
     source = "rebound of 2-10 % of z_max in clay (M); the damping ratio is a guess (M-)"
     sentence = "The ground springs back by {recovery} of the deepest sinkage."
@@ -283,7 +281,7 @@ class SoilLayer(Effect):
 
     depth: Annotated[float, Quantity("m", "of the layer's top; sinkage", above=0)] = 0.25
     stiffness_ratio: Annotated[float, Quantity("1", "of K' below to K' above", above=0)] = 3.0
-    onset: Annotated[float, Quantity("1", "0: the force leaps at the top; 1: it sets in there", least=0, most=1)] = 0.0
+    onset: Annotated[float, Quantity("1", "0: the force jumps at the top; 1: it sets in there", least=0, most=1)] = 0.0
     width: Annotated[float, Quantity("m", "over which K' changes, about the top; 0: at once", least=0)] = 0.0
     stiffness: Annotated[float, Quantity("N/m", "k_h that the layer adds of its own; reference face", least=0)] = 0.0
 
@@ -377,7 +375,7 @@ class GroundFriction(Effect):
     family = "a force along the surface"
     equation = "|F_t| <= mu F_n"
     source = "mu 0.13-0.85 in the literature on rollover and skid tests (M)"
-    sentence = "Structure and ground rub on each other with mu = {coefficient}."
+    sentence = "Friction between structure and ground with mu = {coefficient}."
     rivals: ClassVar[Mapping[str, str]] = {"slope": "the lateral acceleration before contact: friction has none there"}
     acts = ("rollover",)
     channels = ("ground/force_tangential", "chassis/yaw", "chassis/angular_velocity_x")

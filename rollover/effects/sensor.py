@@ -126,7 +126,7 @@ class SensorMisalignment(Effect):
 
 @parameters
 class SensorLag(Effect):
-    """y + tau y' + beta tau^2 y'' = x: a slow sensor or a filter of first or second order that nobody wrote down."""
+    """y + tau y' + beta tau^2 y'' = x: a slow sensor or a filter of first or second order that is not documented."""
 
     channel: Annotated[str, "that is misread"] = "ground/force_normal"
     time: Annotated[float, Quantity("s", "tau, by which a steady rise is read late", least=0)] = 0.002

@@ -67,7 +67,7 @@ class AirDrag(Effect):
     family = "a drag on the falling body"
     equation = "F = -1/2 rho C_d A v |v|"
     source = (
-        "C_d of blunt bodies about 1 (M+); 60 N at 5 m/s on a tractor: as a rule nothing to be seen; C_d of a smooth "
+        "C_d of blunt bodies about 1 (M+); 60 N at 5 m/s on a tractor: as a rule not observable; C_d of a smooth "
         "sphere 0.5, beyond Re 2e5 to 4e5 0.1 to 0.2 (Achenbach, J. Fluid Mech. 54, 1972; M+)"
     )
     sentence = "The air brakes the fall like a blunt body of {area}."
@@ -120,7 +120,7 @@ class StructuralCompliance(Effect):
     family = "a body that is not rigid"
     equation = "S = k (x_body - x_nose) + c (v_body - v_nose)"
     source = "load cells and bolted strikers, 1e6-1e8 N/m (M-)"
-    sentence = "The striker gives way by {stiffness} between its nose and its body."
+    sentence = "The striker is compliant by {stiffness} between its nose and its body."
     rivals: ClassVar[Mapping[str, str]] = {
         "sensor-lag": "a ringing after the first contact: a lag does not ring",
         "co-moving-mass": "a ringing after the first contact",

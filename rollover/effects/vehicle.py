@@ -19,10 +19,10 @@ class RopsElasticity(Effect):
     stiffness: Annotated[float | None, Quantity("N/m", "of all mounts together along y", above=0)] = 3e5
 
     id = "rops-elasticity"
-    family = "a structure that gives way"
+    family = "a compliant structure"
     equation = "k_i -> k_i stiffness / sum k_y; dashpots by its root"
     source = "two-post frames about 0.3 MN/m at the top (M)"
-    sentence = "The ROPS gives way by {stiffness} to the side."
+    sentence = "The ROPS deflects by {stiffness} to the side."
     rivals: ClassVar[Mapping[str, str]] = {
         "soil-stiffness": "the deflection of the ROPS, which soft ground leaves alone",
         "mount-play": "the force as the deflection goes to zero: play has a dead zone there",
@@ -53,7 +53,7 @@ class RopsPlasticity(Effect):
     yield_force: Annotated[float | None, Quantity("N", "F_y of all mounts together along y", above=0)] = 34_000.0
 
     id = "rops-plasticity"
-    family = "a structure that gives way"
+    family = "a compliant structure"
     equation = "|F_i| <= F_y k_i / sum k"
     source = "F_y 34 kN for a two-post frame of some 3 t (M); faster loading raises it (Cowper and Symonds, M+)"
     sentence = "The ROPS yields at {yield_force} to the side."
@@ -115,7 +115,7 @@ class TyreLateralStiffness(Effect):
     family = "a tyre that is not the one written down"
     equation = "k_y = stiffness"
     source = "0.3-0.7 of the vertical stiffness (M)"
-    sentence = "Each tyre gives way to the side by {stiffness}."
+    sentence = "Each tyre deflects laterally by {stiffness}."
     rivals: ClassVar[Mapping[str, str]] = {"centre-of-mass": "a static tilt test with the tyres blocked"}
     acts = ("rollover",)
     channels = ("chassis/position_y", "chassis/roll")
@@ -134,7 +134,7 @@ class TyreLateralStiffness(Effect):
 class AxleStop(Effect):
     """Stops of the front axle at another angle or with another stiffness."""
 
-    angle: Annotated[float | None, Quantity("rad", "free swing to either side", above=0, most=0.78)] = 0.2
+    angle: Annotated[float | None, Quantity("rad", "free pivot angle to either side", above=0, most=0.78)] = 0.2
     stiffness: Annotated[float | None, Quantity("N m/rad", "of a stop", above=0)] = None
 
     id = "axle-stop"
@@ -200,10 +200,10 @@ class MountPlay(Effect):
     gap: Annotated[float, Quantity("m", "to either side along x, y, z", least=0)] = 0.008
 
     id = "mount-play"
-    family = "a structure that gives way"
+    family = "a compliant structure"
     equation = "F = k (delta - clip(delta, +-gap))"
     source = "5-15 mm in worn or silent-block mounts (M-)"
-    sentence = "The mounts of the ROPS move by {gap} before they bear."
+    sentence = "The mounts of the ROPS have a play of {gap} before they bear."
     rivals: ClassVar[Mapping[str, str]] = {
         "sensor-clock-offset": "the force against the deflection: play has a dead zone",
         "rops-elasticity": "the force as the deflection goes to zero",

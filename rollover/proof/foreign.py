@@ -1,7 +1,7 @@
 """Effects by laws of the literature that are not those of the product: which there are, and a draw among them.
 
 Every effect that acts by a law has at least three. A mass, a speed and a clock have no law to differ in. The law in
-the docstring of a draw is what counts; sources are recalled, not seen.
+the docstring of a draw is what counts; sources are recalled, source not checked.
 """
 
 from __future__ import annotations

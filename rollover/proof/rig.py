@@ -58,7 +58,7 @@ class Rig:
     drag_exponent: float = 2.0
     growth: float = 0.0  # kg/m
     recovery: float = 0.02  # K_u = K'(z_max)/recovery
-    unloading_ratio: float = 1.0  # dashpot of the way back over the critical one
+    unloading_ratio: float = 1.0  # damping ratio of the unloading path
     pull: float = 0.0  # N on the face
     reach: float = 0.005  # m
     layer_depth: float = math.inf

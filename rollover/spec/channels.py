@@ -45,7 +45,7 @@ _ENERGY = {
     "axle": "stored and lost in the front axle's stops",
     "device": "taken by the devices of a test stand, less what they put in",
     "lashing": "stored and lost in the lashings of a test stand",
-    "effects": "taken by effects on the bodies: guide, air, a striker that gives way",
+    "effects": "taken by effects on the bodies: guide, air, a compliant striker",
     "drive": "taken by the brakes, less what the engine gave",
     "residual": "what the ledger does not explain",
 }
@@ -64,7 +64,7 @@ CHANNELS: dict[str, Channel] = {
         Channel(
             name="striker/position_z",
             unit="m",
-            meaning="of the striker's face, world, 0 on the ground; travel of its body, if its nose gives way",
+            meaning="of the striker's face, world, 0 on the ground; travel of its body, if its nose is compliant",
         ),
         Channel(name="striker/velocity_z", unit="m/s", meaning="world"),
         Channel(name="striker/acceleration_z", unit="m/s2", meaning="world, coordinate acceleration"),

@@ -48,7 +48,7 @@ class Connector:
     yield_moment: Annotated[Limits, Quantity("N m", "M_y", above=0)] = NONE
     hardening: Annotated[Point, Quantity("1", "tangent over elastic stiffness", least=0, below=1)] = (0.0, 0.0, 0.0)
     rotational_hardening: Annotated[Point, Quantity("1", "the same about x, y, z", least=0, below=1)] = (0.0, 0.0, 0.0)
-    play: Annotated[Point, Quantity("m", "free way to either side along x, y, z", least=0)] = (0.0, 0.0, 0.0)
+    play: Annotated[Point, Quantity("m", "free play to either side along x, y, z", least=0)] = (0.0, 0.0, 0.0)
     rotational_play_deg: Annotated[Point, Quantity("deg", "free turn to either side", least=0, most=45)] = (
         0.0,
         0.0,

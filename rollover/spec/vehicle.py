@@ -68,7 +68,7 @@ class FrontAxle:
 
     pivot: Annotated[Point, Quantity("m", "a point of the pivot axis, vehicle axes")]
     body: MassProperties
-    swing_deg: Annotated[float, Quantity("deg", "free swing to either side", above=0, most=45)]
+    swing_deg: Annotated[float, Quantity("deg", "free pivot angle to either side", above=0, most=45)]
     stop_stiffness: Annotated[float, Quantity("N m/rad", above=0)]
     stop_damping: Annotated[float, Quantity("N m s/rad", least=0)] = 0.0
     stop: Annotated[

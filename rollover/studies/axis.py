@@ -148,7 +148,7 @@ class Range(Axis):
 
 @parameters
 class Uniform(Axis):
-    """Any value between `low` and `high` with equal odds."""
+    """Any value between `low` and `high` with equal probability."""
 
     kind: Literal["uniform"] = "uniform"
     low: float
@@ -166,7 +166,7 @@ class Uniform(Axis):
 
 @parameters
 class LogUniform(Axis):
-    """Any order of magnitude between `low` and `high` with equal odds."""
+    """Any order of magnitude between `low` and `high` with equal probability."""
 
     kind: Literal["log-uniform"] = "log-uniform"
     low: Annotated[float, Quantity("", above=0)]
@@ -207,7 +207,7 @@ class Triangular(Axis):
 
 @parameters
 class Normal(Axis):
-    """Gaussian; what lies below `low` or above `high` is cut off and its odds shared out."""
+    """Gaussian; what lies below `low` or above `high` is cut off and its probability shared out."""
 
     kind: Literal["normal"] = "normal"
     mean: float

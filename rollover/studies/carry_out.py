@@ -114,6 +114,7 @@ def _head(name: str, chosen: Study, status: str) -> dict[str, Any]:
         "differs": made_from.in_words if made_from else "",
         "status": status,
         "scenario_hash": content_hash(chosen.scenario),
+        **chosen.scenario.own_code,
         "plan": chosen.plan.kind,
         "versions": versions(),
     }

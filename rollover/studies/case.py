@@ -12,7 +12,6 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -23,11 +22,13 @@ from rollover.assessment.loads import load_channels, magnitude, peak_loads
 from rollover.assessment.results import versions
 from rollover.dynamics.drop_test import DropFailedError, DropModel
 from rollover.dynamics.result import Run
-from rollover.effects import VARIABLE, effects
+from rollover.effects import effects
 from rollover.recording import Recording
 from rollover.scenario import Scenario, load
 from rollover.spec import document
 from rollover.spec.initiation import TipOver
+from rollover.spec.laws import laws
+from rollover.system import own_code
 
 ALSO = ("rops/deflection", "rops/energy", "ground/sinkage", "chassis/roll")
 CLEARANCE = ("clearance/structure", "clearance/ground")
@@ -46,7 +47,7 @@ class Case:
     simulator: Simulator
     clearance: bool
     versions: str
-    effects: str  # files of one's own effects, which a worker elsewhere has to read first
+    own_code: Mapping[str, str]  # files of one's own effects and laws, which a worker elsewhere has to read first
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,13 +72,15 @@ def case_of(key: str, scenario: Scenario, *, simulator: Simulator, clearance: bo
         simulator=simulator,
         clearance=clearance,
         versions=stated_versions(),
-        effects=os.environ.get(VARIABLE, ""),
+        own_code={name: os.environ.get(name, "") for name in own_code.KINDS.values()},
     )
 
 
 def key_of(scenario: Scenario, *, simulator: Simulator, clearance: bool) -> str:
     """SHA-256 over the resolved scenario, the versions, and how it is simulated: 40 hexadecimal digits of it."""
-    own = own_effects(os.environ.get(VARIABLE, "")) if scenario.effects else ""
+    own = own_files("effects") if scenario.effects else ""
+    if any(own_code.is_own("laws", law) for law in scenario.ground.every_law):
+        own += own_files("laws")
     text = f"{document.content_hash(scenario)} {stated_versions()} {simulator} {clearance} {own}"
     return hashlib.sha256(text.encode()).hexdigest()[:40]
 
@@ -88,13 +91,9 @@ def stated_versions() -> str:
     return ", ".join(f"{name} {version}" for name, version in versions().items())
 
 
-@functools.cache
-def own_effects(files: str) -> str:
-    """Hash of the files of one's own effects: what they say decides a result as a version does."""
-    digest = hashlib.sha256()
-    for name in dict.fromkeys(filter(None, files.split(os.pathsep))):  # one that is given twice is one
-        digest.update(Path(name).read_bytes() if Path(name).is_file() else b"")
-    return digest.hexdigest() if files else ""
+def own_files(kind: Literal["effects", "laws"]) -> str:
+    """Hash of the files of one's own effects or laws: what they say decides a result as a version does."""
+    return " ".join(own_code.hashes(kind).values())
 
 
 def warm_up(simulator: Simulator = "full") -> None:
@@ -115,10 +114,12 @@ def work(case: Case) -> Result:
     """Simulate a case. Raises what the simulation raises; one that fails is a result with a sentence."""
     if case.versions != stated_versions():
         raise WrongVersionsError(f"this worker has {stated_versions()}; the study was begun with {case.versions}")
-    if case.effects and os.environ.get(VARIABLE, "") != case.effects:
-        os.environ[VARIABLE] = case.effects
+    for name, files in case.own_code.items():
+        if files:
+            os.environ[name] = files
     effects()  # before the scenario, which may hold some of one's own
     began, cpu = time.time(), time.process_time()
+    laws()
     scenario: Scenario = pickle.loads(case.scenario)
     found = _dropped(scenario) if case.simulator == "drop" else _simulated(scenario, case.clearance)
     measures, run_flags, peak_flags, sentence = found

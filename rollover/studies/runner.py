@@ -22,7 +22,7 @@ from rollover.studies.case import (
     Simulator,
     case_of,
     key_of,
-    own_effects,
+    own_files,
     stated_versions,
     warm_up,
     work,
@@ -218,10 +218,6 @@ class _Tally:
 
 def _plan_hash(study: Study, found: Points) -> str:
     """What the keys of a plan depend on: base, axes, values, versions, own effects."""
-    import os
-
-    from rollover.effects import VARIABLE
-
     digest = hashlib.sha256(document.content_hash(study.scenario).encode())
     axes = [document.to_mapping(axis) for axis in study.axes]
     told = [
@@ -229,7 +225,8 @@ def _plan_hash(study: Study, found: Points) -> str:
         study.simulator,
         Builder(study).clearance,
         stated_versions(),
-        own_effects(os.environ.get(VARIABLE, "")),
+        own_files("effects"),
+        *filter(None, [own_files("laws")]),
     ]
     digest.update(json.dumps(told, sort_keys=True).encode())
     for name, column in found.columns.items():

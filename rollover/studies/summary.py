@@ -126,7 +126,7 @@ def quantile(values: Array, q: float, confidence: float) -> dict[str, Any]:
 
 
 def clopper_pearson(hits: int, n: int, confidence: float) -> tuple[float, float]:
-    """Exact interval of a probability: the p at which so many hits or more, or so few, have odds of half the rest."""
+    """Exact interval of a probability: so many hits or more, or so few, have half the rest at its ends."""
     from scipy.special import betaincinv
 
     tail = 0.5 * (1.0 - confidence)

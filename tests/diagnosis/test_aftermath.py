@@ -1,4 +1,4 @@
-"""The end of a recording that hardly counts is left aside: when, what of it, and what the shorter runs still see."""
+"""The end of a recording that hardly counts is excluded: when, what of it, and what the shorter runs still see."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_an_end_that_hardly_counts_isleft_aside() -> None:
     np.testing.assert_array_equal(found.perturbed[0], np.arange(n))
     assert isinstance(found.simulator, RunSimulator)
     assert found.simulator.scenario.simulation.duration < IMPACT + VALIDATED + 0.05
-    assert left_aside([whole], [found]) == ["toss: what comes after 1.10 s depends on chance and was left aside"]
+    assert left_aside([whole], [found]) == ["toss: what comes after 1.10 s is chaotic and was excluded"]
 
 
 def test_an_end_that_counts_is_kept() -> None:

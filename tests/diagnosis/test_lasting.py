@@ -384,9 +384,7 @@ def test_other_courses_are_counted_otherwise_where_nothing_lasts(
 
 
 @pytest.mark.parametrize(("heavy_tailed", "masked"), [(True, True), (False, True), (False, False)])
-def test_a_strength_is_told_under_the_courses_that_will_be_forgiven(
-    heavy_tailed: bool, masked: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_strength_is_judged_as_it_is_held(heavy_tailed: bool, masked: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Found in full, one recording on another course asks for another strength; all samples count again afterwards."""
     problem = Problem([])
     problem.heavy_tailed = heavy_tailed

@@ -84,7 +84,7 @@ def test_a_contact_that_opens_makes_leaps_to_and_fro() -> None:
         assert leaping(told, 60).tolist() == [190, 202, 440, 452], seed
         assert leaping(told, None).size == 0
         assert leaping(told, 180).size == 0  # too slow for that class
-        (found,) = (f for f in prechecks(made(values)) if f.check == "leap")
+        (found,) = (f for f in prechecks(made(values)) if f.check == "jump")
         assert (found.value, found.channel) == (4.0, ACCELERATION)
 
 

@@ -1,4 +1,4 @@
-"""A drop that contradicts the speed that it states is left aside; one that met what others did not is kept."""
+"""A drop that contradicts the speed that it states is excluded; one that met what others did not is kept."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_the_speed_that_was_dropped_at_is_told(missing: dict[str, Any], which: i
     [found] = wrong_conditions(every)
     assert found.dataset is every[which]
     assert found.speed == pytest.approx(SPEEDS[which], rel=0.1)
-    assert f"not at the stated {SPEEDS[which] / times:.3g} m/s; it was left aside" in found.says()
+    assert f"not at the stated {SPEEDS[which] / times:.3g} m/s; it was excluded" in found.says()
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_such_a_drop_is_left_aside_and_the_others_are_diagnosed(missing: dict[st
     found = diagnose(scenario(), stating(drops(missing), 1, 1.5))
     assert [e.id for e in found.effects] == named
     assert found.verdict == ("missing-physics" if named else "unexplained")
-    assert "not at the stated 1.07 m/s; it was left aside" in found.sentence
+    assert "not at the stated 1.07 m/s; it was excluded" in found.sentence
     assert ("What is stated of a recording is not what was tested. Otherwise" in found.sentence) == (not named)
     assert "v1.6" not in found.training
-    assert any("it was left aside" in note for note in found.notes)
+    assert any("it was excluded" in note for note in found.notes)

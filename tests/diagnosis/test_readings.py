@@ -107,18 +107,18 @@ def test_spikes_are_left_aside_and_said_so() -> None:
         values[[500, 840, 1200]] += 0.6 * np.ptp(values)
         made.append((name, replace(r, channels={**r.channels, FORCE: values})))
     kept, lines = without_spikes(made[0][1])
-    assert lines == [f"{FORCE}: 3 spikes were left aside"]
+    assert lines == [f"{FORCE}: 3 spikes were excluded"]
     assert (
         np.flatnonzero(np.isnan(kept[FORCE])).tolist()
         == np.flatnonzero(made[0][1][FORCE] != clean[0][1][FORCE]).tolist()
     )
     assert without_spikes(clean[0][1]) == (clean[0][1], [])
     early, lines = without_spikes(made[0][1], before=float(made[0][1].time[700]))
-    assert lines == [f"{FORCE}: one spike was left aside"]
+    assert lines == [f"{FORCE}: one spike was excluded"]
     assert np.flatnonzero(np.isnan(early[FORCE])).tolist() == [500]
     found = diagnose(scenario(), made)
     assert found.verdict == "no-mismatch"
-    assert sum("spikes were left aside" in note for note in found.notes) == 2
+    assert sum("spikes were excluded" in note for note in found.notes) == 2
 
 
 def test_a_fit_with_its_first_effect_last_is_the_same_fit() -> None:

@@ -99,7 +99,7 @@ def test_a_misfit_that_scatter_takes_part_in_or_that_is_not_all_met_is_said_to_b
     plain = sentence("parameter", [tilted], 0.0, first, last, [])
     assert plain == "The ground is inclined. With it the held-out misfit falls from 1.2 to 0.80 times the noise."
     more = sentence("parameter", [tilted], 0.0, first, last, [], remains=True)
-    assert more == plain + " What is left of it has structure: this is not the whole."
+    assert more == plain + " The unexplained residual has structure: these effects are not the whole difference."
     one = sentence("parameter", [tilted], 0.0, first, last, [], cross_validated=False)
     assert one.startswith(plain.replace("held-out ", "") + " Of one condition nothing can be held out")
     unexplained = sentence("unexplained", (), 0.0, first, last, [], cross_validated=False)

@@ -59,7 +59,7 @@ def test_what_else_is_missing_is_found_beside_it(channel: str, factor: float, wh
     assert [e.id for e in found.effects] == ["soil-layer"]
     depth = found.effects[0].parameters["depth"]
     assert depth.low <= LAYER["effects.soil-layer.depth"] <= depth.high
-    assert found.sentence.count("it was left aside") == (1 if which else len(whole))
+    assert found.sentence.count("it was excluded") == (1 if which else len(whole))
 
 
 @pytest.mark.parametrize("factor", [1e-3, -1.0, 9.80665])
@@ -68,7 +68,7 @@ def test_what_all_are_too_large_by_is_a_gain(factor: float) -> None:
     found = diagnose(scenario(), mistaken(whole, FORCE, factor, None))
     assert [(e.id, e.channel) for e in found.effects] == [("sensor-gain", FORCE)]
     assert found.effects[0].parameters["gain"].value == pytest.approx(factor, rel=5e-3)
-    assert "it was left aside" not in found.sentence
+    assert "it was excluded" not in found.sentence
 
 
 def test_where_nothing_else_was_recorded_it_is_what_cannot_be_told() -> None:
@@ -118,7 +118,7 @@ def test_ground_that_is_three_times_as_stiff_makes_no_feet_of_metres() -> None:
     speeds = (1.1, 1.6, 2.1, 2.6, 3.1)
     found = diagnose(scenario(), recorded(hard, 4, speeds=speeds, channels=CHANNELS, rate=1000.0))
     assert [e.id for e in found.effects] == ["soil-layer"]
-    assert "it was left aside" not in found.sentence
+    assert "it was excluded" not in found.sentence
 
 
 @pytest.mark.parametrize(
@@ -131,7 +131,7 @@ def test_ground_that_is_three_times_as_stiff_makes_no_feet_of_metres() -> None:
     ],
 )
 def test_a_scale_is_never_negative(channel: str, factor: float, shared: bool) -> None:
-    """A channel turned round in all recordings has a negative gain; a length or an angle has none: it is left aside."""
+    """A channel turned round in all recordings has a negative gain; a length or an angle has none: it is excluded."""
     every: list[Any] = [SimpleNamespace(name=name, signals=(SimpleNamespace(channel=channel),)) for name in "ab"]
     found = [Inconsistency(dataset=e, signal=e.signals[0], factor=factor, cause="such") for e in every]
     assert slipping._is_shared(found[0], found, every) is shared

@@ -95,7 +95,7 @@ def test_a_clock_beyond_the_scenario_that_nothing_tells_is_refused_by_name() -> 
     (name, one), *_ = drops(Clock(), (3600.0, 0.0, 0.0))
     rows = one.time < 3600.0 - 2e-3
     fall = replace(one, time=one.time[rows], channels={c: v[rows] for c, v in one.channels.items()})
-    with pytest.raises(InputError, match=f"^{name}: clock: nothing tells where its zero is, got stamps from 3599.9"):
+    with pytest.raises(InputError, match=f"^{name}: clock: its time zero cannot be determined, got stamps from 3599.9"):
         from_first_contact(scenario(), [(name, fall)])
 
 

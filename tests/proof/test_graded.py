@@ -72,7 +72,7 @@ def test_what_is_counted_of_foreign_forms_and_backgrounds() -> None:
     assert real["by_over_background"]["0 to 0.5"]["detected"]["hits"] == 0
     lines = " ".join(" ".join(sentences(found)).split())
     assert "in the set, of all 2 of 7 (" in lines
-    assert "a background alone called by a name 1 of 3 (" in lines
+    assert "a background alone named as an effect 1 of 3 (" in lines
     assert "Probabilities" not in lines
 
 

@@ -90,7 +90,7 @@ def test_a_background_is_asked_for_told_and_part_of_what_the_folder_is_about(
     asked = ["prove", "--cases", "1", "--kinds", "background", "--workers", "0", "--out", str(out)]
     answer = CliRunner().invoke(app, [*asked, "--background", "0.03"])
     assert answer.exit_code == 0, answer.output
-    assert "a background alone called by a name" in answer.output
+    assert "a background alone named as an effect" in answer.output
     account = json.loads((out / "prove.json").read_text())
     assert account["background"] == 0.03
     assert account["summary"]["real"]["background_alone"]["false_name"]["of"] == 1

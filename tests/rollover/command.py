@@ -1,6 +1,6 @@
 """The command `rollover` as a module, for tests that need a process of its own."""
 
-from rollover.cli import main
+from rollover.cli.main import main
 
 if __name__ == "__main__":
     main()

@@ -73,7 +73,7 @@ def test_recovery_is_not_determined_if_the_recording_ends_before_unloading() -> 
     assert recovery.open_low
     assert recovery.open_high
     assert "not depend on it" in recovery.why
-    assert any("ground.law.recovery alone is not seen" in w for w in found.warnings)
+    assert any("ground.law.recovery alone is not observable" in w for w in found.warnings)
 
 
 def test_recovery_is_determined_if_the_recording_goes_on() -> None:

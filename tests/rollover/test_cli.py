@@ -90,7 +90,7 @@ ASKED = Requirement(
     value=5250.0,
     bound="least",
     source="the code",
-    confidence="seen",
+    confidence="source checked",
 )
 
 
@@ -119,7 +119,12 @@ def test_run_prints_and_keeps_what_it_is_held_against(bench: Bench) -> None:
         assert word in line
     assert "all 1 verdicts are met" in done.stderr
     [row] = results.read_run_json(Path("out/run/drop_test"))["criteria"]
-    wanted = {"clause": "energy, load from the side", "source": "the code", "confidence": "seen", "value": 5250.0}
+    wanted = {
+        "clause": "energy, load from the side",
+        "source": "the code",
+        "confidence": "source checked",
+        "value": 5250.0,
+    }
     assert {key: row["requirement"][key] for key in wanted} == wanted
     assert (row["simulated"], row["verdict"], row["note"]) == (5512.5, "met", "load 'side' reached")
     assert row["margin"] == pytest.approx(0.05)

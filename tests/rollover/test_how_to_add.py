@@ -94,7 +94,7 @@ def test_a_vehicle_and_a_scenario_are_in_order_and_run(tmp_path: Path) -> None:
     applied(copy, "a vehicle", "a scenario")
     files = ["scenarios/vehicles/orchard_tractor.yaml", "scenarios/orchard_overturn.yaml"]
     said = python(copy, "-c", MAIN, "check", *files)
-    assert [line.split(": ")[1] for line in said.splitlines()] == ["vehicle, in order", "scenario, in order"]
+    assert [line.split(": ")[1] for line in said.splitlines()] == ["vehicle, valid", "scenario, valid"]
     short = ["--no-half-step", "--set", "simulation.duration=0.02", "--out", "out"]
     assert "orchard tractor" in python(copy, "-c", MAIN, "run", files[1], *short)
     assert (copy / "out" / "recording.rrd").is_file()

@@ -156,7 +156,7 @@ def test_a_clock_that_nothing_tells_is_refused_by_name() -> None:
     made = drop()
     rows = made.time < -0.002
     fall = replace(made, time=made.time[rows], channels={c: v[rows] for c, v in made.channels.items()})
-    with pytest.raises(InputError, match=r"^d3: clock: nothing tells where its zero is, got stamps from 99.97"):
+    with pytest.raises(InputError, match=r"^d3: clock: its time zero cannot be determined, got stamps from 99.97"):
         timed("d3", on(fall, 100.0, Clock()), under(made))
 
 
@@ -301,7 +301,7 @@ def test_a_comparison_of_nothing_is_refused_with_its_cause(command: tuple[str, .
     write(fall, tmp_path / "fall.csv")
     said = {
         "foreign": ("chassis/roll",),
-        "fall": ("fall: clock: nothing tells where its zero is, got stamps from 99.97",),
+        "fall": ("fall: clock: its time zero cannot be determined, got stamps from 99.97",),
     }
     for name, words in said.items():
         out = tmp_path / "out"

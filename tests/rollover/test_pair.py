@@ -31,7 +31,7 @@ ZONE = Requirement(
     value=0.0,
     bound="least",
     source="the code",
-    confidence="seen",
+    confidence="source checked",
 )
 
 

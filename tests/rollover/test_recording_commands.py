@@ -41,7 +41,7 @@ def test_import_by_profile_and_check(tmp_path: Path) -> None:
     assert "exists; --force replaces it" in faults
     code, said, _ = ask("check", out / "raw.csv")
     assert code == 0
-    assert said.startswith(f"{out / 'raw.csv'}: recording, in order: Bench, 2 samples, 0 to 0.1 s\n")
+    assert said.startswith(f"{out / 'raw.csv'}: recording, valid: Bench, 2 samples, 0 to 0.1 s\n")
 
 
 def test_import_says_what_it_left_out(tmp_path: Path) -> None:
@@ -63,7 +63,7 @@ def test_check_takes_a_folder_of_recordings_one_by_one(tmp_path: Path) -> None:
     (tmp_path / "b.csv").write_text("nothing\n")
     code, said, faults = ask("check", tmp_path)
     assert code == 2
-    assert said.startswith(f"{tmp_path / 'a.csv'}: recording, in order")
+    assert said.startswith(f"{tmp_path / 'a.csv'}: recording, valid")
     assert faults.startswith(f"{tmp_path / 'b.csv'}")
     empty = tmp_path / "empty"
     empty.mkdir()

@@ -40,7 +40,7 @@ def test_account_of_a_vehicle(folder: Path) -> None:
     for each in answer["losses"]:
         assert each["share"] == pytest.approx(1.0 - each["with_deg"] / each["without_deg"])
         assert 0.01 < each["share"] < 0.20
-    assert answer["code_6"]["confidence"] == "recalled, not seen"
+    assert answer["code_6"]["confidence"] == "recalled, source not checked"
 
 
 def test_page(folder: Path) -> None:

@@ -140,7 +140,7 @@ def test_every_requirement_says_where_it_stands_and_how_sure_it_is() -> None:
     assert len(rows) > 50
     for r in rows:
         assert all((r.standard, r.name, r.formula, r.clause, r.source)), r
-        assert r.confidence in ("seen", "recalled-high", "recalled", "recalled-low")
+        assert r.confidence in ("source checked", "recalled, high confidence", "recalled", "recalled, low confidence")
         assert r.value > 0.0
         assert r.unit == {"energy": "J", "force": "N", "height": "m", "angle": "rad", "deflection": "m"}[r.quantity]
 

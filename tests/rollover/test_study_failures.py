@@ -1,4 +1,4 @@
-"""Failed cases of a study that do not lie at random are said, and bound what is answered; grids tell no odds."""
+"""Failed cases of a study not at random are said, and bound what is answered; grids give no probabilities."""
 
 from __future__ import annotations
 

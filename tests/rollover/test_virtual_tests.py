@@ -277,7 +277,7 @@ def test_in_words(
 
     requirement = Requirement(
         standard="s", name="n", formula="f", clause="c", quantity=quantity, unit=unit, value=value, upper=upper,
-        bound="least" if upper is None else "range", source="", confidence="seen",
+        bound="least" if upper is None else "range", source="", confidence="source checked",
     )  # fmt: skip
     assert compared(requirement, simulated, "").in_words == words
 

@@ -44,7 +44,7 @@ def test_the_page_of_a_finding() -> None:
     assert "Without a gain: 1 more" in said
     assert "a flat top" in said
     assert "<one>: a note." in said
-    assert "What these recordings would have shown" not in said
+    assert "What these recordings would have detected" not in said
     assert text.count("<svg") == 2
 
 
@@ -156,5 +156,5 @@ def test_the_words_say_which_recordings_were_left_out(kept: tuple[str, ...], one
 def test_the_words_name_the_rival_and_the_next_test() -> None:
     words = markdown(sensor_at_fault())
     assert words.startswith("# A sensor is at fault: sensor-gain of ground/force_normal.")
-    assert "Not told apart from soil-stiffness." in words
+    assert "Not distinguishable from soil-stiffness." in words
     assert "Measure next: weigh the striker at rest." in words

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from viz.figures import plots
 from viz.figures.plots import COLOURS, Curve, Level, Outline, View, thinned
+from viz.figures.svg import number_label
 
 Array = NDArray[np.float64]
 T = np.linspace(0.0, 4.0, 401)
@@ -137,3 +139,13 @@ def test_names_of_short_phases_do_not_run_into_each_other() -> None:
     line = {name: float(y) for y, name in re.findall(r'<text [^>]* y="([\d.]+)"[^>]*>(\w+)</text>', svg)}
     assert line["loading"] == line["peak"] == line["rest"]
     assert line["unloading"] > line["peak"] + 8.0
+
+
+def test_rounding_error_is_labelled_zero_beside_what_it_is_the_error_of() -> None:
+    words = re.findall(r"<text[^>]*>([^<]*)</text>", plots.bars({"a": 12.5, "b": 1.69e-17, "c": -0.0}, label="kJ"))
+    assert words.count("0") >= 2
+    assert not [w for w in words if "e-1" in w or w == "-0"]
+    assert number_label(1.69e-17, [12.5, 1.69e-17]) == "0"
+    assert number_label(-3e-12, [math.nan, -20.0], 3) == "0"
+    assert number_label(1.69e-17, [1.69e-17, 3e-17]) == "1.69e-17"  # of quantities that are all that small
+    assert number_label(2e-6, [12.5]) == "2e-06"  # small, but no rounding error

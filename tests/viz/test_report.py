@@ -42,7 +42,7 @@ ASKED = Requirement(
     value=5250.0,
     bound="least",
     source="the code",
-    confidence="recalled-high",
+    confidence="recalled, high confidence",
 )
 SIDE = Criterion(requirement=ASKED, simulated=4200.0, margin=-0.2, verdict="compared", note="a measure")
 ZONE = replace(
@@ -98,7 +98,7 @@ def test_the_pages_numbers_are_those_of_run_json(folder: Path) -> None:
     assert shown["CFC 60"] == f"{peak['filtered'] / 1e3:.4g}"
     assert row[3] == f"{peak['raw_time']:.3f}"
     assert shown["impulse, N s"] == f"{peak['impulse']:.4g}"
-    assert shown["half step"] == f"{100 * peak['half_step_change']:.2g} %"
+    assert shown["change at half step"] == f"{100 * peak['half_step_change']:.2g} %"
     assert (peak["starts"], shown["mean of 2"]) == (2, f"{peak['mean'] / 1e3:.4g}")
     assert shown["scatter"] == f"{100 * peak['scatter']:.2g} %"
     assert 0.0 < peak["scatter"] < 1e-6
@@ -115,7 +115,7 @@ def test_the_page_of_an_overturn(overturn: Run, peaks: tuple[PeakLoad, ...]) -> 
             assert any(f"{peak.raw / 1e3:.4g}" in row for row in parts.rows), peak.channel
     side = next(row for row in parts.rows if row[0] == "OECD Code 4 / ISO 5700: side load")
     assert side[1:6] == ["at least 5.25 kJ", "4.2 kJ", "0.80 x", "compared", "3.2"]
-    assert side[6] == "1.75 M; the code; recalled, high"
+    assert side[6] == "1.75 M; the code; recalled, high confidence"
     zone = next(row for row in parts.rows if row[0].endswith("distance of the structure"))
     assert zone[2:5] == ["-12 mm", "-12 mm", "not met"]
     for flag in overturn.domain_flags:

@@ -21,10 +21,10 @@ STATES: Mapping[str, State] = {
 ANSWERS: Mapping[str, str] = {
     "no-mismatch": "Simulation and recordings agree within the noise.",
     "parameter": "A value of the scenario is wrong.",
-    "sensor": "A sensor is at fault.",
+    "sensor": "A sensor is faulty.",
     "missing-physics": "Physics is missing from the scenario.",
-    "unexplained": "There is a mismatch that no candidate explains.",
-    "cannot-tell": "These recordings cannot tell.",
+    "unexplained": "There is an unexplained residual: no candidate explains the mismatch.",
+    "cannot-tell": "These recordings are too weak for a statement.",
 }
 
 
@@ -66,7 +66,7 @@ def markdown(found: Diagnosis) -> str:
             lines.append(f"| {name} | {i.value:.4g} | {i.low:.4g} | {i.high:.4g} | {i.unit} |")
         lines.append("")
         if e.indistinguishable_from:
-            lines += [f"Not told apart from {', '.join(e.indistinguishable_from)}.", ""]
+            lines += [f"Not distinguishable from {', '.join(e.indistinguishable_from)}.", ""]
             lines += [f"Measure next: {e.discriminating_test}.", ""] if e.discriminating_test else []
     if found.where:
         lines += ["## Where", "", "| recording | channel | phase | share |", "|-|-|-|-|"]

@@ -159,21 +159,8 @@ def _describe(channel: str) -> tuple[str, str, int]:
             group = {"force": "loads", "deflection": "sinkage", "energy": "energy"}[what]
             name = "energy put in" if what == "energy" else what
             return group, f"test stand, {name}", MEASURED
-        case ["rops", "force"]:
-            return "loads", "ROPS force", BODY["rops"]
-        case ["rops", "force_x" | "force_y" | "force_z" as what]:
-            return "loads", f"ROPS force, {what[-1]}", AXIS[what[-1]]
-        case ["rops", "mount" | "hinge" as what, name, "force" | "moment" as load]:
-            return "mounts", f"{what} {name}" + (", moment" if load == "moment" else ""), SIMULATED
-        case ["rops", "mount" | "hinge" as what, name, part]:
-            quantity = "" if part.startswith("force") else f"{part[:-2]} "
-            return "mounts", f"{what} {name}, {quantity}{part[-1]}", AXIS[part[-1]]
-        case ["rops", "impulse"]:
-            return "loads", "collision impulse on the ROPS", BODY["rops"]
-        case ["rops", "deflection"]:
-            return "sinkage", "ROPS deflection", LEDGER["rops"]
-        case ["rops", "energy"]:
-            return "energy", "absorbed by the ROPS", CYCLE[0]
+        case ["rops", *rest]:
+            return _describe_rops(channel, rest)
         case ["ground", "force_normal"]:
             return "loads", "ground force", BODY["ground"]
         case ["ground", "force_tangential"]:
@@ -196,6 +183,26 @@ def _describe(channel: str) -> tuple[str, str, int]:
             return "motion", f"{name} axle {what}", CYCLE[1 if what == "angle" else 2]
         case ["chassis" | "striker" as body, what]:
             return "motion", *_motion(body, what)
+    return "other", channel, _any(channel)
+
+
+def _describe_rops(channel: str, rest: list[str]) -> tuple[str, str, int]:
+    match rest:
+        case ["force"]:
+            return "loads", "ROPS force", BODY["rops"]
+        case ["force_x" | "force_y" | "force_z" as what]:
+            return "loads", f"ROPS force, {what[-1]}", AXIS[what[-1]]
+        case ["mount" | "hinge" as what, name, "force" | "moment" as load]:
+            return "mounts", f"{what} {name}" + (", moment" if load == "moment" else ""), SIMULATED
+        case ["mount" | "hinge" as what, name, part]:
+            quantity = "" if part.startswith("force") else f"{part[:-2]} "
+            return "mounts", f"{what} {name}, {quantity}{part[-1]}", AXIS[part[-1]]
+        case ["impulse"]:
+            return "loads", "collision impulse on the ROPS", BODY["rops"]
+        case ["deflection"]:
+            return "sinkage", "ROPS deflection", LEDGER["rops"]
+        case ["energy"]:
+            return "energy", "absorbed by the ROPS", CYCLE[0]
     return "other", channel, _any(channel)
 
 

@@ -228,7 +228,7 @@ def _table(found: Sequence[Peak]) -> list[str]:
     shows_change = any(known(p.half_step_change) for p in found)
     columns += [heading] if shows_filtered else []
     columns += ["collision impulse"] if shows_impulse else []
-    columns += ["half step"] if shows_change else []
+    columns += ["change at half step"] if shows_change else []
     lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
     for p in found:
         row = [title_of(p), raw(p)]
@@ -246,7 +246,7 @@ def _table(found: Sequence[Peak]) -> list[str]:
 def standing(flags: Collection[str]) -> str:
     """How a load stands to what the ground law was measured for, from its domain flags."""
     if "uncalibrated" in flags:
-        deep = ", and it gave way further than it may" if "deep-sinkage" in flags else ""
+        deep = ", and its sinkage is beyond the law's range" if "deep-sinkage" in flags else ""
         return f"the ground law is not calibrated{deep}"
     return "outside the ground law's calibrated domain" if flags else "inside the calibrated domain"
 
@@ -288,7 +288,7 @@ def in_words(flag: str, domain: Domain) -> str:
         "second-hit": "a second hit on the same rut; virgin soil was tested",
         "oblique-impact": f"impact more than {math.degrees(domain.obliquity_most):.3g} deg off the ground's normal",
         "uncalibrated": "no measurement stands behind the ground law's numbers (calibration: null, no own domain)",
-        "deep-sinkage": "the ground gave way further than its law covers"
+        "deep-sinkage": "sinkage beyond the range of the ground law"
         + (f", {1e3 * domain.sinkage_most:.3g} mm" if math.isfinite(domain.sinkage_most) else " in a patch"),
     }
     return words.get(flag, flag.replace("-", " "))

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viz.figures.plots import COLOURS, canvas, finish, shades
+from viz.figures.svg import number_label
 
 PAPER, WHITE = "#dfeaf6", "#ffffff"  # of the least value and of numbers on dark cells
 MOST_NUMBERS = 120  # cells up to which each carries its number
@@ -30,7 +31,7 @@ def heat_map(x: NDArray[Any], y: NDArray[Any], values: NDArray[np.float64], *, a
             elif cells.size <= MOST_NUMBERS:
                 dark = high > low and value > 0.5 * (low + high)
                 axes.text(
-                    j + 0.5, i + 0.5, f"{value:.3g}", ha="center", va="center", fontsize=7,
+                    j + 0.5, i + 0.5, number_label(value, values, 3), ha="center", va="center", fontsize=7,
                     color=WHITE if dark else COLOURS["ink"],
                 )  # fmt: skip
         for axis, levels in ((axes.xaxis, columns), (axes.yaxis, rows)):

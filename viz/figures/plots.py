@@ -16,7 +16,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from viz.figures.svg import cleaned
+from viz.figures.svg import cleaned, number_label
 
 Array = NDArray[np.float64]
 Role = Literal["first", "second", "third", "fourth", "limit", "muted", "ink"]
@@ -213,7 +213,7 @@ def bars(values: Mapping[str, float], *, label: str, roles: Mapping[str, Role] |
         for k, v in enumerate(numbers):
             left = v < 0.0
             axes.annotate(
-                f"{v:.4g}", (v, k), xytext=(-4 if left else 4, 0), textcoords="offset points",
+                number_label(v, numbers), (v, k), xytext=(-4 if left else 4, 0), textcoords="offset points",
                 ha="right" if left else "left", va="center", color=COLOURS["ink"],
             )  # fmt: skip
         finish(axes, label, "", margins=(0.14, 0.02))

@@ -71,9 +71,9 @@ def _blow(run: Run, rows: Sequence[Criterion]) -> list[Block]:
     x = 1e3 * run.recording["device/deflection"][from_then]
     force = Curve(name="raw", x=x, y=1e-3 * run.recording["device/force"][from_then])
     way = Curve(name="ROPS against the chassis", x=time, y=1e3 * run.recording["rops/deflection"])
-    text = "Force of the block over the way of the struck point, which the tractor's own motion is part of."
+    text = "Force of the block over the displacement of the struck point, the tractor's own motion included."
     return [
-        Figure(svg=plots.xy([force], across="way of the struck point, mm", label="force, kN"), caption=text),
+        Figure(svg=plots.xy([force], across="displacement of the struck point, mm", label="force, kN"), caption=text),
         Figure(
             svg=plots.history([way], label="deflection, mm", phases=run.phases),
             caption="Deflection of the ROPS's upper corner against the chassis: at most, and what is left.",
@@ -99,11 +99,14 @@ def _driving(run: Run, rows: Sequence[Criterion]) -> list[Block]:
     sets = [(k + 1.0, 1e3 * e["set"]) for k, e in enumerate(run.tests) if "set" in e]
     way = Curve(name="pile", x=run.recording.time, y=1e3 * run.recording["device/deflection"])
     blocks: list[Block] = [
-        Figure(svg=plots.history([way], label="way down, mm", phases=run.phases), caption="Way of the pile over time.")
+        Figure(
+            svg=plots.history([way], label="penetration, mm", phases=run.phases),
+            caption="Penetration of the pile over time.",
+        )
     ]
     if len(sets) > 1:
         x, y = np.array(sets).T
         curve = Curve(name="set", x=x, y=y)
-        text = "Set of each blow: how much deeper the pile stands when the next one falls."
+        text = "Set of each blow: the permanent penetration gained until the next blow."
         blocks.append(Figure(svg=plots.xy([curve], across="blow", label="set, mm"), caption=text))
     return blocks

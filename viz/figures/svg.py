@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
+NOUGHT = 1e-9  # of the largest: what is summed over a million steps rounds by up to a million times 1e-16 of it
 _NUMBER = re.compile(r"-?\d+\.\d{3,}")
 
 
@@ -29,3 +31,9 @@ def cleaned(svg: str, colours: Mapping[str, str]) -> str:
     own = hashlib.sha256(svg.encode()).hexdigest()[:8]
     svg = re.sub(r'(\sid="|="#|url\(#)', rf"\g<1>f{own}-", svg)
     return re.sub(r"\n\s*", "\n", svg)
+
+
+def number_label(value: float, beside: Iterable[float], digits: int = 4) -> str:
+    """A value as it stands in a figure: 0 where it is rounding error of the largest finite one `beside` it."""
+    largest = max((abs(v) for v in beside if math.isfinite(v)), default=0.0)
+    return "0" if abs(value) <= NOUGHT * largest else f"{value:.{digits}g}"

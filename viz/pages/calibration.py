@@ -52,7 +52,7 @@ def page(c: Calibration, *, command: str, scenario_hash: str = "", versions: Map
     )
     clock = Table(columns=["recording", "clock late, ms", "1 sigma, ms"], rows=clocks, numeric=(1, 2))
     zeros = [Note(text=f"{name}: {zero.sentence}.") for name, zero in c.zeros.items()]
-    blocks.append(Section(title="What it rests on", blocks=[Note(text=text), *zeros, clock]))
+    blocks.append(Section(title="Basis of the fit", blocks=[Note(text=text), *zeros, clock]))
     return render(
         title=c.scenario.title,
         subtitle="Calibration",

@@ -34,7 +34,7 @@ def page(
         *(differences_section(scenario) if scenario is not None else []),
         Note(
             text="Each recording is compared at its own stamps with a run under its own conditions, both through the "
-            "same filter class. Nothing was shifted in time but a clock in doubt, where that is said. "
+            "same filter class. Nothing was shifted in time but an uncertain clock, where that is stated. "
             "ISO/TS 18571 and peaks are over the event, from first contact to rest."
         ),
     ]
@@ -100,8 +100,8 @@ def _recording(found: Misfit) -> list[Block]:
         [
             c.channel,
             cell.phase,
-            f"{cell.start:.4f}",
-            f"{cell.end:.4f}",
+            f"{cell.start:z.4f}",
+            f"{cell.end:z.4f}",
             str(cell.samples),
             f"{100.0 * cell.share:.1f}",
             _number(cell.rating.over_noise) if isinstance(cell.rating, Rating) else "",

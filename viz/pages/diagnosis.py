@@ -145,7 +145,7 @@ def _figure(drawn: tuple[Told, str]) -> Figure:
     if track.rms_after is not None:
         fall += f" before, {_g(track.rms_after, 3)} after"
     judged = ", held out" if one.held_out else ""
-    over = "over the noise" if track.scatter is None else "over the noise, grey what neighbouring runs differ by"
+    over = "over the noise" if track.scatter is None else "over the noise, grey: ensemble scatter"
     caption = f"{one.recording}{judged}: {track.channel}; below, measured less simulated {over}: {fall} (RMS)."
     return Figure(svg=svg, caption=caption)
 
@@ -156,14 +156,14 @@ def _places(places: Sequence[Place], caption: str) -> Table:
             p.recording,
             p.channel,
             p.phase,
-            f"{p.start:.4f}",
-            f"{p.end:.4f}",
+            f"{p.start:z.4f}",
+            f"{p.end:z.4f}",
             f"{100.0 * p.share:.1f}",
             "" if p.depends_on is None else label_of(p.depends_on),
         ]
         for p in places
     ]
-    columns = ["recording", "channel", "phase", "from, s", "to, s", "share, %", "goes with"]
+    columns = ["recording", "channel", "phase", "from, s", "to, s", "share, %", "depends on"]
     return Table(columns=columns, rows=rows, numeric=(3, 4, 5), caption=caption)
 
 
@@ -218,7 +218,7 @@ def _next(found: Diagnosis) -> list[Block]:
         else:
             confirm = f" To confirm it: {e.discriminating_test}." if e.discriminating_test else ""
             blocks.append(Note(text=f"{own}: no other candidate predicts the held-out recordings as well.{confirm}"))
-    return [Section(title="What cannot be told apart, and what to measure next", blocks=blocks)] if blocks else []
+    return [Section(title="What cannot be distinguished, and what to measure next", blocks=blocks)] if blocks else []
 
 
 def _considered(found: Diagnosis) -> list[Block]:
@@ -234,7 +234,7 @@ def _considered(found: Diagnosis) -> list[Block]:
         return []
     fitted = [r for r, c in zip(rows, found.candidates, strict=True) if c.held_out_gain != 0.0 or c.reason == "chosen"]
     rest = [r for r in rows if r not in fitted]
-    columns = ["candidate", "held-out gain", "why, or why not"]
+    columns = ["candidate", "held-out gain", "reason"]
     caption = "Gain: logarithm of the held-out misfit before over after, this candidate alone; 0.69 halves it."
     blocks: list[Block] = [Table(columns=columns, rows=fitted, numeric=(1,), caption=caption)] if fitted else []
     if rest:
@@ -254,13 +254,13 @@ def _detectable(found: Diagnosis) -> list[Block]:
         first = next(iter(getattr(kinds.get(id), "search", {})), "")
         rows.append([named(id, channel or None), first, _g(value)])
     table = Table(
-        columns=["effect", "parameter", "least that shows"],
+        columns=["effect", "parameter", "smallest detectable"],
         rows=rows,
         numeric=(2,),
-        caption="Strengths whose trace would stand at five standard errors of the noise, SI: how far from none, "
-        "or from what the scenario has; of a limit, the largest that was tried and shows.",
+        caption="Strengths whose effect would be five standard errors of the noise, SI: distance from none, "
+        "or from what the scenario has; of a limit, the largest tried that is detectable.",
     )
-    return [Section(title="What these recordings would have shown", blocks=[table])]
+    return [Section(title="What these recordings would have detected", blocks=[table])]
 
 
 def _sensors(prechecks: Sequence[tuple[str, Finding]], count: int) -> Section:
@@ -273,7 +273,7 @@ def _sensors(prechecks: Sequence[tuple[str, Finding]], count: int) -> Section:
         for name, f in prechecks
     ]
     columns = ["recording", "channel", "check", "from, s", "to, s", "what it means"]
-    note = Note(text="A sensor at fault looks like missing physics: settle these before the ground is blamed.")
+    note = Note(text="A sensor fault looks like missing physics: resolve these before the ground is blamed.")
     return Section(title="Sensors, before any model", blocks=[note, Table(columns=columns, rows=rows, numeric=(3, 4))])
 
 
@@ -285,7 +285,7 @@ def _basis(found: Diagnosis, told: Sequence[Told]) -> Section:
         noise.append([channel, _g(sigma * s.factor, 3), s.unit])
     shifts: list[Row] = [[t.recording, f"{1e3 * t.shift:+.3f}"] for t in told]
     blocks: list[Block] = [
-        Note(text=f"That noise alone leaves such a misfit has {_chance(found.p_value)}."),
+        Note(text=f"Noise alone leaves such a misfit with {_chance(found.p_value)}."),
         Table(columns=["channel", "noise, 1 sigma", "unit"], rows=noise, numeric=(1,)),
         Table(
             columns=["recording", "late, ms"],
@@ -296,7 +296,7 @@ def _basis(found: Diagnosis, told: Sequence[Told]) -> Section:
         Note(text=f"{found.simulations} simulations in {found.seconds:.1f} s."),
     ]
     blocks += [Note(text=_sentence(note), warning=True) for note in found.notes]
-    return Section(title="What it rests on", blocks=blocks)
+    return Section(title="Basis of the diagnosis", blocks=blocks)
 
 
 def _chance(p: float) -> str:

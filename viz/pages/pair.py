@@ -59,8 +59,8 @@ def _loads(found: Pair) -> list[Block]:
     ]
     if not rows:
         return []
-    columns = ["load", "filter", "baseline", "at, s", "candidate", "at, s", "change", "half step", ""]
-    caption = "Half step: what halving the time step changes in the filtered peak, the larger of both runs."
+    columns = ["load", "filter", "baseline", "at, s", "candidate", "at, s", "change", "change at half step", ""]
+    caption = "Change at half step: what halving the time step changes in the filtered peak, the larger of both runs."
     return [Section(title="Loads", blocks=[Table(columns=columns, rows=rows, numeric=range(2, 8), caption=caption)])]
 
 

@@ -79,7 +79,7 @@ def _false_alarms(summary: Mapping[str, Any]) -> list[Block]:
     blocks: list[Block] = [
         Figure(
             svg=shares([s for s in found if s.of]),
-            caption="False alarms: null has nothing hidden, decoy something that no channel shows, negligible an "
+            caption="False alarms: null has nothing hidden, decoy an effect that no channel shows, negligible an "
             "effect far below the noise, background nothing but a background.",
         )
     ]

@@ -106,7 +106,7 @@ def _peaks(run: Run, peaks: Sequence[PeakLoad]) -> list[Block]:
         return []
     within = "inside" if rests_on_ground(run) else "ground not touched"
     ensemble = any(p.scatter is not None for p in shown)
-    columns = ["load", "unit", "raw", "at, s", f"CFC {shown[0].cfc}", "at, s", "impulse, N s", "half step"]
+    columns = ["load", "unit", "raw", "at, s", f"CFC {shown[0].cfc}", "at, s", "impulse, N s", "change at half step"]
     columns += [f"mean of {shown[0].starts}", "scatter"] if ensemble else []
     rows: list[list[str | Cell]] = []
     for p in shown:
@@ -139,12 +139,12 @@ def _standards(run: Run, rows: Sequence[Criterion]) -> list[Block]:
     for row in rows:
         r = row.requirement
         half = [row.half_step_in_words] if halved else []
-        sure = f"{r.formula}; {r.source}; {r.confidence.replace('-', ', ')}"
+        sure = f"{r.formula}; {r.source}; {r.confidence}"
         verdict = Cell(row.verdict, states[row.verdict])
         cells.append([f"{r.standard}: {r.name}", *row.in_words, *half, verdict, r.clause, sure])
-    columns = ["requirement", "asked", "simulated", "margin or ratio", *(["half step"] if halved else [])]
+    columns = ["requirement", "asked", "simulated", "margin or ratio", *(["change at half step"] if halved else [])]
     numeric = range(1, len(columns))
-    columns += ["verdict", "clause", "formula, source, how sure"]
+    columns += ["verdict", "clause", "formula, source, confidence"]
     table = Table(columns=columns, rows=cells, numeric=numeric)
     blocks: list[Block] = [table]
     if any(row.verdict == "compared" for row in rows):

@@ -68,8 +68,8 @@ def _headline(account: Mapping[str, Any]) -> Headline:
         return Headline(sentence="No case has an answer.", detail=failed, state="fail")
     if (e := first["exceedance"]) is not None:
         limit = f"{e['limit'] * factor:.4g} {unit}"
-        odds = f"{_percent(e['low_of_all'])} to {_percent(e['high_of_all'])}"
-        sentence = f"{first['name']} lies {e['beyond']} {limit} in {_percent(e['probability'])} of cases ({odds})."
+        interval = f"{_percent(e['low_of_all'])} to {_percent(e['high_of_all'])}"
+        sentence = f"{first['name']} lies {e['beyond']} {limit} in {_percent(e['probability'])} of cases ({interval})."
         if e["failed"]:
             failed += f"{_percent(e['least'])} to {_percent(e['most'])} of all, as the failed ones lie on either side. "
     else:
@@ -181,7 +181,7 @@ def _reliability(found: Mapping[str, Any]) -> Section:
     if "reason" in found:
         return Section(title="Reliability", blocks=[Note(text=f"No design point: {found['reason']}", warning=True)])
     head = Table(
-        columns=("way", "probability", "from", "to", "cases"),
+        columns=("method", "probability", "from", "to", "cases"),
         rows=[
             ["importance sampling", *(f"{found[k]:.3g}" for k in ("probability", "low", "high")), f"{found['cases']}"],
             ["FORM", f"{found['form_probability']:.3g}", "", "", f"{found['search_cases']}"],

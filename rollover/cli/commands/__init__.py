@@ -9,6 +9,7 @@ from rollover.cli.commands import view
 from rollover.cli.commands import listing
 from rollover.cli.commands import check
 from rollover.cli.commands import importing
+from rollover.cli.commands import new
 from rollover.cli.commands import schema
 from rollover.cli.commands import regress
 from rollover.cli.commands import identify
@@ -28,6 +29,7 @@ __all__ = [
     "identify",
     "importing",
     "listing",
+    "new",
     "prove",
     "regress",
     "root",

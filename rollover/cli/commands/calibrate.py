@@ -41,7 +41,7 @@ def calibrate(
     set_: Setting = None,
     channel: Annotated[list[str] | None, typer.Option("--channel", help="Use these channels only.")] = None,
     clock_sigma: Annotated[float, typer.Option(help="Prior of each recording's clock offset, s.", min=0.0)] = 1e-3,
-    starts: Annotated[int, typer.Option(help="Random starts that are looked at.", min=0)] = 8,
+    starts: Annotated[int, typer.Option(help="Random starts that are screened.", min=0)] = 8,
     seed: Annotated[int, typer.Option(help="Of the random starts.")] = 0,
     profile: Annotated[Path | None, typer.Option(help="What the columns of foreign files are.")] = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/calibrate/NAME")] = None,
@@ -66,6 +66,7 @@ def calibrate(
     folder = out or Path("out", "calibrate", path.stem)
     about: dict[str, Any] = {
         "scenario_hash": document.content_hash(chosen),
+        **chosen.own_code,
         "recordings": list(request.recordings),
         "fitted": fit,
         "held_out": request.held_out,

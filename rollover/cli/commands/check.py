@@ -24,7 +24,10 @@ if TYPE_CHECKING:
 def check(
     files: Annotated[
         list[str],
-        typer.Argument(help="Scenarios, vehicles, soils, recordings or folders of recordings.", metavar="FILE..."),
+        typer.Argument(
+            help="Files of any kind, folders of recordings, Python files with laws or effects.",
+            metavar="FILE...",
+        ),
     ],
     profile: Annotated[Path | None, typer.Option(help="What the columns of foreign recordings are.")] = None,
     scenario: Annotated[str | None, typer.Option(help="Whose values the recordings' conditions must be.")] = None,
@@ -73,6 +76,8 @@ def _document(name: str) -> dict[str, Any]:
 def _is_recording(name: str, profile: Described | None) -> bool:
     """Whatever is there and no YAML of ours; a sidecar by its format. Without an ending it is one by its profile."""
     path = Path(name)
+    if path.suffix.lower() == ".py":
+        return False
     if path.suffix.lower() not in (".yaml", ".yml"):
         return bool(path.suffix) or path.is_dir() or (profile is not None and path.is_file())
     try:
@@ -136,7 +141,7 @@ def _recording(
 
 
 def _shared(rows: list[dict[str, Any]], read: dict[str, Recording]) -> None:
-    """Add to each recording what only several of them tell together, where it is not told already."""
+    """Add to each recording what only several of them show together, where it is not there already."""
     if len(read) < 2:
         return
     from rollover.recording.checks import shared_rails
@@ -152,14 +157,14 @@ def _print(name: str, row: dict[str, Any]) -> None:
     from rollover.cli.console import tell
 
     if row["is"] != "recording":
-        tell(f"{name}: {row['is']}, in order")
+        tell(f"{name}: {row['is']}, valid")
         return
     from rollover.recording.checks import when
 
     first, step = row["first"], row["step"]
     span = f"{row['samples']} samples, {when(row['start'] - first, row['end'] - first, step)}"
     span += f" from its first stamp at {first:.10g} s" if first else ""
-    tell(f"{name}: recording, in order: {excerpt(row['title'])}, {span}")
+    tell(f"{name}: recording, valid: {excerpt(row['title'])}, {span}")
     for channel in row["channels"]:
         noise = "noise not known" if channel["noise"] is None else f"noise {channel['noise']:.3g} {channel['unit']}"
         tell(f"  {channel['channel']}: {noise}")

@@ -94,7 +94,11 @@ def compare(
     measured = read(recordings, profile)
     folder = out or Path("out", "compare", path.stem)
     pictures = _pictures(list(measured))
-    about: dict[str, Any] = {"scenario_hash": document.content_hash(chosen), "recordings": list(measured)}
+    about: dict[str, Any] = {
+        "scenario_hash": document.content_hash(chosen),
+        **chosen.own_code,
+        "recordings": list(measured),
+    }
     about["origin"] = results.origin(path, folder, set_ or [])
     results.claim_account(folder, FORMAT, about, [JSON, PAGE, *pictures.values()], force=force, say=console.say)
     _say_compiling()

@@ -87,6 +87,7 @@ def diagnose(
     folder = out or Path("out", "diagnose", path.stem)
     about: dict[str, Any] = {
         "scenario_hash": document.content_hash(chosen),
+        **chosen.own_code,
         "recordings": list(measured),
         "hold_out": held,
         "tolerance": tolerance,

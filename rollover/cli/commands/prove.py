@@ -132,7 +132,7 @@ def sentences(summary: dict[str, Any]) -> list[str]:
         "  alone and right": summary["alone_and_right"],
         "Two effects: both named": summary["two_effects"]["both"],
         "Unlisted: called unexplained": summary["outside"]["unexplained"],
-        "  called by a listed name that is not even near": summary["outside"]["wrong"],
+        "  named a listed effect that is not even close": summary["outside"]["wrong"],
         "Intervals that hold the true value": summary["coverage"],
     }
     if (real := summary["real"]) is not None:
@@ -141,8 +141,8 @@ def sentences(summary: dict[str, Any]) -> list[str]:
             "  first, of all": real["of_all"]["first"],
             "  in the set, of those larger than the background": real["stronger_than_background"]["in_set"],
             "  called by another name": real["called"]["another_name"],
-            "  a background alone called by a name": real["background_alone"]["false_name"],
-            "  a background alone called unexplained": real["background_alone"]["unexplained"],
+            "  a background alone named as an effect": real["background_alone"]["false_name"],
+            "  a background alone named unexplained": real["background_alone"]["unexplained"],
         }
     lines = [f"{what:<50} {_share(found)}" for what, found in said.items() if found["of"]]
     if (given := summary["probabilities"]) is not None and given["cases"]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from rollover.cli.commands.common import app
+from rollover.system import own_code
 
 
 def _told(wanted: bool) -> None:
@@ -28,10 +28,11 @@ def root(
     version: Annotated[
         bool, typer.Option("--version", help="Say which version this is.", is_eager=True, callback=_told)
     ] = False,
+    laws: Annotated[
+        list[Path] | None,
+        typer.Option("--laws", metavar="FILE", help="A Python file with ground laws of your own; may be repeated."),
+    ] = None,
 ) -> None:
     """Vehicle rollover load studies: what the ground does to a ROPS."""
-    if effects:
-        # the variable reaches the processes that a study or a diagnosis starts
-        known = os.environ.get("ROLLOVER_EFFECTS", "")
-        files = [str(path.resolve()) for path in effects]
-        os.environ["ROLLOVER_EFFECTS"] = os.pathsep.join([*filter(None, [known]), *files])
+    own_code.add("effects", effects or [])
+    own_code.add("laws", laws or [])

@@ -55,7 +55,11 @@ def run(
     ] = True,
     ensemble: Annotated[
         int,
-        typer.Option(help="Starts that nobody could tell apart, for mean and scatter of each load.", min=1, max=100),
+        typer.Option(
+            help="Neighbouring starts, within the uncertainty of the initial state, for mean and scatter of each load.",
+            min=1,
+            max=100,
+        ),
     ] = 1,
     require: Annotated[
         bool, typer.Option("--require", help="Exit with 1 if a criterion of loads.standards is not met.")

@@ -52,7 +52,7 @@ def stability_(
     if set_:
         chosen = chosen.replaced(settings(set_), origin="--set")
     folder = out or Path("out", "stability", Path(name).stem)
-    about: dict[str, Any] = {"scenario_hash": document.content_hash(chosen)}
+    about: dict[str, Any] = {"scenario_hash": document.content_hash(chosen), **chosen.own_code}
     about["origin"] = results.origin(file_of(name), folder, set_ or [])
     results.claim_account(folder, FORMAT, about, (JSON, PAGE), force=force, say=console.say)
     if not is_warm():

@@ -46,7 +46,7 @@ def study(
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
-    """Run what is missing of a study, then answer: ranges, quantiles, odds beyond a limit, sensitivities, the worst."""
+    """Run what a study lacks, then give ranges, quantiles, exceedance probability, sensitivities, worst case."""
     from ground.compiled import is_warm
     from rollover import studies
     from rollover.assessment import results

@@ -95,8 +95,10 @@ def _stand(out: Console, run: Run) -> None:
 def _criteria(rows: Sequence[Criterion]) -> Table:
     table = Table(box=None, pad_edge=False)
     styles = {"met": "green", "not met": "bold red", "no verdict": "yellow", "compared": ""}
-    for heading in ("standard", "requirement", "asked", "simulated", "margin", "half step", "verdict"):
-        table.add_column(heading, justify="right" if heading in ("simulated", "margin", "half step") else "left")
+    for heading in ("standard", "requirement", "asked", "simulated", "margin", "change at half step", "verdict"):
+        table.add_column(
+            heading, justify="right" if heading in ("simulated", "margin", "change at half step") else "left"
+        )
     for row in rows:
         r, (asked, simulated, margin) = row.requirement, row.in_words
         words = (r.standard, r.name, asked, simulated, margin, row.half_step_in_words or "-", row.verdict)
@@ -110,7 +112,7 @@ def _table(peaks: Sequence[PeakLoad]) -> Table:
     table.add_column("unit")
     ensemble = any(peak.scatter is not None for peak in peaks)
     spread = (f"mean of {peaks[0].starts}", "scatter") if ensemble else ()
-    for heading in ("raw", "at s", f"CFC {peaks[0].cfc}", "at s", "impulse N s", "moves at half step", *spread):
+    for heading in ("raw", "at s", f"CFC {peaks[0].cfc}", "at s", "impulse N s", "change at half step", *spread):
         table.add_column(heading, justify="right")
     for peak in peaks:
         if peak.raw == 0.0:

@@ -62,7 +62,7 @@ class Inconsistency(Aside):
         """The sentence on it."""
         return (
             f"{self.dataset.name}: {self.signal.channel} reads {spoken(self.factor)} times what is simulated, as if "
-            f"{self.cause}; it was left aside."
+            f"{self.cause}; it was excluded."
         )
 
 

@@ -83,5 +83,5 @@ def without_spikes(recording: Recording, before: float = np.inf) -> tuple[Record
             gone = np.isin(recording.time, [f.start for f in found])
             channels[name] = np.where(gone, np.nan, recording.channels[name])
             count = int(gone.sum())
-            lines.append(f"{name}: {'one spike was' if count == 1 else f'{count} spikes were'} left aside")
+            lines.append(f"{name}: {'one spike was' if count == 1 else f'{count} spikes were'} excluded")
     return (replace(recording, channels=channels), lines) if lines else (recording, [])

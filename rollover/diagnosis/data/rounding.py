@@ -32,7 +32,7 @@ def to_the_last_digit(recordings: Sequence[tuple[str, Recording]]) -> tuple[list
         for name, r in recordings
     ]
     return told, [
-        f"{path} is taken as rounded, +-{s:.2g}: a sidecar's `uncertainty` says more" for path, s in known.items()
+        f"{path} is taken as rounded, +-{s:.2g}: state it as `uncertainty` in the sidecar" for path, s in known.items()
     ]
 
 

@@ -33,5 +33,5 @@ def by_digits(places: Sequence[Place], dataset: Sequence[Dataset]) -> str:
     said = " and ".join(f"{c} in steps of {spoken(step)} {describe(c).unit}" for c, step in steps.items())
     return (
         f"Recorded is {said}, far more than the noise: what was measured and what was recorded differ by half of that, "
-        "which no candidate explains."
+        "which no candidate can explain."
     )

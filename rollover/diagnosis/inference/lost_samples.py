@@ -44,6 +44,6 @@ def by_loss(places: Sequence[Place]) -> str:
     channels = dict.fromkeys(p.channel for p in places)
     said = " and ".join(f"{c} breaks off in {sum(p.channel == c for p in places)} places" for c in channels)
     return (
-        f"{said}: it reads exactly 0, or leaps as its filter lets no signal. A contact opens, or samples were lost, "
-        "which no candidate explains."
+        f"{said}: it reads exactly 0, or jumps as its filter allows none. A contact opens, or samples were lost, "
+        "which no candidate can explain."
     )

@@ -45,7 +45,7 @@ class WrongCondition(Aside):
         stated = spoken(_speed(self.dataset))
         return (
             f"{self.dataset.name}: beside the others it is a drop at about {self.speed:.2g} m/s, not at the stated "
-            f"{stated} m/s; it was left aside."
+            f"{stated} m/s; it was excluded."
         )
 
 

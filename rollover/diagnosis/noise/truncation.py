@@ -74,4 +74,4 @@ def left_aside(every: Sequence[Dataset], found: Sequence[Dataset]) -> list[str]:
     """The ends of recordings that do not count, in sentences."""
     ends = {e.name: float(e.recording.time[-1]) for e in every}
     cut = [(e.name, float(e.recording.time[-1])) for e in found if float(e.recording.time[-1]) < ends[e.name]]
-    return [f"{name}: what comes after {at:.2f} s depends on chance and was left aside" for name, at in cut]
+    return [f"{name}: what comes after {at:.2f} s is chaotic and was excluded" for name, at in cut]

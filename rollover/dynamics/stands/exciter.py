@@ -59,7 +59,7 @@ class Shaker:
                 "force_amplitude": self.harmonic.amplitude,
                 "frequency": self.harmonic.frequency,
                 "turns": turns,
-                "way_amplitude": 0.5 * float(np.ptp(way[last])),
+                "deflection_amplitude": 0.5 * float(np.ptp(way[last])),
                 "settlement": settled,
                 "work": float(self.t.device_memory[0, d.K_WORK]),
             },

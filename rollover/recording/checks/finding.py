@@ -24,7 +24,7 @@ class Finding:
     """Something wrong with a channel that needs no model to be seen.
 
     `check` free-fall | rest | zero-offset | polarity | gain | double-integral | clipping | stuck | gap | clock-drift |
-    lag | spike | leap | time-base | wrap-around (which is no fault) | stated-noise;
+    lag | spike | jump | time-base | wrap-around (which is no fault) | stated-noise;
     `start`, `end` s; `value` in `unit`, `error` its standard error where it has one; `sentence` says what it means.
     """
 

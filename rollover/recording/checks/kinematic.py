@@ -75,7 +75,7 @@ def _finding(
     name: str, value: float, error: float, as_well: list[str], p: Trace, a: Trace, unit: str, time: Array
 ) -> Finding:
     said = {
-        "gain": f"{p.channel} moves {1.0 + value:.4g} times as far as {a.channel} says: a gain or unit error",
+        "gain": f"{p.channel} moves {1.0 + value:.4g} times as far as {a.channel} implies: a gain or unit error",
         "bias": f"the integral of {a.channel} drifts by {value:.3g} {unit} against {p.channel}: a zero offset",
         "lag": f"{p.channel} comes {1e3 * value:.3g} ms after {a.channel}: a delay, of a filter or a trigger",
         "drift": f"{p.channel} and {a.channel} run apart by {1e3 * value:.3g} ms a second: a time-base error",

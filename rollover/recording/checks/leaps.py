@@ -31,7 +31,7 @@ AGAIN = 2  # leaps, at least: one alone is a disturbance
 
 
 def leaping(t: Trace, cfc: int | None) -> NDArray[np.int64]:
-    """Samples before which a channel leaps as its filter class `cfc` lets none; none where that cannot be told."""
+    """Samples before which a channel jumps as its filter class `cfc` lets none; none where that cannot be told."""
     rate = 1.0 / t.step
     if cfc is None or not t.regular or t.values.size < 8 * REACH or rate < least_rate(cfc):
         return np.zeros(0, dtype=np.int64)
@@ -65,15 +65,15 @@ def leaps(t: Trace, unit: str, cfc: int | None) -> Iterator[Finding]:
         return
     off = across(t.values)[found]
     yield Finding(
-        check="leap",
+        check="jump",
         channel=t.channel,
         start=float(t.time[found[0]]),
         end=float(t.time[found[-1]]),
         value=float(found.size),
         unit="",
         error=None,
-        sentence=f"{found.size} leaps of up to {2.0 * float(off.max()):.4g} {unit} from one sample to the next, which "
-        f"CFC {cfc} lets no signal make: an intermittent contact behind the filter, or lost samples",
+        sentence=f"{found.size} jumps of up to {2.0 * float(off.max()):.4g} {unit} from one sample to the next, which "
+        f"CFC {cfc} lets no signal make: an intermittent contact after the filter, or lost samples",
     )
 
 

@@ -72,7 +72,7 @@ def free_fall(traces: Mapping[str, Trace], gravity: float) -> Iterator[Finding]:
             value=bias,
             unit="N",
             error=error,
-            sentence=f"reads {bias:.4g} N in free fall, where nothing touches: a zero offset of the load cell",
+            sentence=f"reads {bias:.4g} N in free fall, where no force acts on it: a zero offset of the load cell",
         )
 
 

@@ -189,7 +189,7 @@ def spikes(t: Trace, unit: str, *, among_contacts: bool = False) -> Iterator[Fin
             unit=unit,
             error=scale,
             sentence=f"one sample lies {found[i]:.4g} {unit} off its neighbours, {abs(found[i]) / scale:.1f} sigma: "
-            "an electromagnetic spike, or a contact of no more than a sample",
+            "an electromagnetic spike, or a contact no longer than one sample",
         )
 
 

@@ -43,7 +43,7 @@ def stamps(recording: Recording) -> Iterator[Finding]:
     if recording.clock.zero == "known" and (start > LONGEST or end < 0.0):
         what = f"begin at {start:.2e} s" if start > LONGEST else f"end at {instant(end, step)} s, before 0"
         yield found(
-            f"stamps {what}, where no scenario has anything: a clock with a zero of its own (time-base error) unless "
+            f"stamps {what}, outside any scenario: a clock with a zero of its own (time-base error) unless "
             "`clock: {zero: unknown}` says so",
             start if start > LONGEST else end,
         )

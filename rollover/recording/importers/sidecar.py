@@ -151,6 +151,11 @@ class Profile:
         doubts_of(self.uncertainty)
 
 
+def schema(kind: type[Sidecar] | type[Profile], title: str) -> dict[str, Any]:
+    """JSON Schema of a recording's sidecar or of a profile."""
+    return document.schema(kind, title, entries={"channels": Column})
+
+
 def doubts_of(uncertainty: Mapping[str, Any]) -> dict[str, Doubt]:
     """Standard deviation by scenario path. Raises ``ValueError`` for what is none."""
     found: dict[str, Doubt] = {}

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from rollover.spec.document.annotated import annotated
 from rollover.spec.document.check import check
 from rollover.spec.document.exchange import Itself, exchanged, value_at
 from rollover.spec.document.include import expand, find, headings, named, shipped_folder
@@ -23,6 +24,7 @@ __all__ = [
     "Itself",
     "Leaf",
     "Node",
+    "annotated",
     "check",
     "content_hash",
     "dump",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import typing
+from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from typing import Any, Literal
 
@@ -19,10 +20,14 @@ _FILE = {
 _PARTIAL = "-partial"  # what is laid over a base: nothing in it is required
 
 
-def schema(kind: Any, title: str) -> dict[str, Any]:
-    """JSON Schema (2020-12) of the files that describe objects of a class or of an annotation that offers several."""
+def schema(kind: Any, title: str, *, entries: Mapping[str, type] | None = None) -> dict[str, Any]:
+    """JSON Schema (2020-12) of the files that describe objects of a class or of an annotation that offers several.
+
+    `entries`, class by key, is for files that stand by themselves, without `base` and other files in them: what each
+    value of an open mapping under that key has to be.
+    """
     slot = slot_of(kind)
-    writer = _Writer()
+    writer = _Writer(entries)
     root = writer.one_of(slot, "", file=False)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -33,8 +38,9 @@ def schema(kind: Any, title: str) -> dict[str, Any]:
 
 
 class _Writer:
-    def __init__(self) -> None:
+    def __init__(self, entries: Mapping[str, type] | None = None) -> None:
         self.definitions: dict[str, dict[str, Any]] = {}
+        self.entries = entries
 
     def slot(self, slot: Slot, suffix: str) -> dict[str, Any]:
         """Schema of what may stand at a place."""
@@ -50,7 +56,7 @@ class _Writer:
             {"$ref": f"#/$defs/{self._define(member, suffix, by_kind=slot.by_kind is not None)}"}
             for member in slot.kinds.values()
         ]
-        choices += [_FILE] if file else []
+        choices += [_FILE] if file and self.entries is None else []
         return choices[0] if len(choices) == 1 else {"anyOf": choices}
 
     def _bare(self, slot: Slot, suffix: str) -> dict[str, Any]:
@@ -83,6 +89,8 @@ class _Writer:
                 else {}
             )
             return {"type": "number", **{name: bound for name, bound in bounds.items() if bound is not None}}
+        if typing.get_origin(slot.type) is Mapping:
+            return {"type": "object"}
         return {"type": {bool: "boolean", int: "integer"}[slot.type]}
 
     def _list(self, slot: Slot) -> dict[str, Any]:
@@ -107,12 +115,18 @@ class _Writer:
             default = f.default_factory() if f.default_factory is not MISSING else f.default
             if f.init and default is not MISSING:
                 properties[f.name] = {**properties[f.name], "default": plain(default, slots(kind)[f.name])}
+        for key, entry in (self.entries or {}).items():
+            if key in properties and properties[key].get("type") == "object":
+                each = {"$ref": f"#/$defs/{self._define(entry, suffix, by_kind=False)}"}
+                properties[key] = {**properties[key], "minProperties": 1, "additionalProperties": each}
         definition: dict[str, Any] = {"type": "object", "additionalProperties": False, "properties": properties}
         if kind.__doc__:
             definition["description"] = kind.__doc__.strip().splitlines()[0]
         needed = [*(["kind"] if by_kind else []), *required(kind)]
         if suffix:
             definition["properties"] = {BASE: _FILE, **properties}
+        elif self.entries is not None:
+            definition["required"] = needed
         else:
             # with a base, whatever is missing here comes from there
             partial = self._define(kind, _PARTIAL, by_kind)

@@ -103,7 +103,7 @@ class Slot:
         if self.type is float:
             quantity = self.quantity or Quantity("1")
             bounds = quantity.allowed.removeprefix("any finite number").strip()
-            return f"a number {'in ' if bounds == quantity.unit else ''}{bounds}".strip()
+            return f"a number {'in ' if bounds and bounds == quantity.unit else ''}{bounds}".strip()
         return {bool: "true or false", str: "text", int: "a whole number"}.get(self.type, "another value")
 
 

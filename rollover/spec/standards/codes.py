@@ -1,7 +1,7 @@
 """Requirements of the standards for roll-over protective structures, each with formula, clause, source and confidence.
 
-M is the reference mass in kg, energies are in J, forces in N, heights in m. A number is `seen` where its source's text
-was read; everything else was recalled and is only as good as its stated confidence. This is a calculator beside a
+M is the reference mass in kg, energies are in J, forces in N, heights in m. `source checked`: its source's text was
+read; everything else was recalled and is only as good as its stated confidence. This is a calculator beside a
 simulation: a type approval needs the text in force.
 """
 
@@ -33,7 +33,7 @@ __all__ = [
 
 STATIC = "French order of 6 July 1981, annex I (static tests of the EEC and OECD)"
 DYNAMIC = "French order of 6 July 1981, annex II (dynamic tests of the EEC and OECD)"
-NINE, TEN = "EU 1322/2014 annex IX, not seen", "EU 1322/2014 annex X, not seen"
+NINE, TEN = "EU 1322/2014 annex IX, source not checked", "EU 1322/2014 annex X, source not checked"
 NARROW = "excerpts of the EEC directives on narrow-track tractors"
 OSHA_TEXT = "29 CFR 1926.1002 and 1928.52, SAE J1194"
 SIDES: tuple[str, ...] = ("left", "right")
@@ -121,7 +121,7 @@ def code_3(tractor: Tractor) -> tuple[Requirement, ...]:
             value=0.250,
             bound="most",
             source=DYNAMIC,
-            confidence="seen",
+            confidence="source checked",
             come_from=SIDES,
         ),
     ]
@@ -173,7 +173,7 @@ def code_7(tractor: Tractor) -> tuple[Requirement, ...]:
 def osha(tractor: Tractor) -> tuple[Requirement, ...]:
     """SAE J1194, 29 CFR 1926.1002: side 723 + 0.4 W ft lbf, rear 0.47 W ft lbf, crush 2 W; W in lb."""
     standard, W = "SAE J1194 / 29 CFR 1926.1002", tractor.mass / POUND
-    high: Confidence = "recalled-high"
+    high: Confidence = "recalled, high confidence"
     weight, side, rear = 2.0 * tractor.mass * 9.80665, (723.0 + 0.4 * W) * FOOT_POUND, 0.47 * W * FOOT_POUND
     return (
         _energy(standard, "side load", "723 + 0.4 W ft lbf", side, "static, side", high, OSHA_TEXT, SIDES),
@@ -221,7 +221,7 @@ def _energy(
     formula: str,
     value: float,
     clause: str,
-    confidence: Confidence = "seen",
+    confidence: Confidence = "source checked",
     source: str = STATIC,
     come_from: tuple[str, ...] = (),
 ) -> Requirement:
@@ -229,7 +229,7 @@ def _energy(
 
 
 def _force(standard: str, name: str, formula: str, value: float, clause: str, source: str = STATIC) -> Requirement:
-    return _requirement(standard, name, formula, value, clause, "force", "N", "seen", source, ABOVE)
+    return _requirement(standard, name, formula, value, clause, "force", "N", "source checked", source, ABOVE)
 
 
 def _crush(standard: str, name: str, mass: float) -> Requirement:
@@ -240,14 +240,14 @@ def _height(
     standard: str, name: str, formula: str, millimetres: float, clause: str, come_from: tuple[str, ...]
 ) -> Requirement:
     value = 1e-3 * millimetres
-    return _requirement(standard, name, formula, value, clause, "height", "m", "seen", DYNAMIC, come_from)
+    return _requirement(standard, name, formula, value, clause, "height", "m", "source checked", DYNAMIC, come_from)
 
 
 def _narrow_angle(standard: str) -> Requirement:
-    source = "EU 1322/2014 annex IX, preparation seen, angle recalled"
+    source = "EU 1322/2014 annex IX, preparation checked, angle recalled"
     return _requirement(
         standard, "lateral stability", "unstable equilibrium on a tilting plane", math.radians(38.0),
-        "lateral stability, pivot free", "angle", "rad", "recalled-high", source, SIDES,
+        "lateral stability, pivot free", "angle", "rad", "recalled, high confidence", source, SIDES,
     )  # fmt: skip
 
 

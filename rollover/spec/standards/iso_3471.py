@@ -128,7 +128,7 @@ def iso_3471_requirements(machine: str, mass: float) -> tuple[Requirement, ...]:
             value=value,
             bound="least",
             source=SOURCE,
-            confidence="recalled-high",
+            confidence="recalled, high confidence",
         )
         for name, formula, quantity, unit, value in rows
     )

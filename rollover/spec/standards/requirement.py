@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-Confidence = Literal["seen", "recalled-high", "recalled", "recalled-low"]
+Confidence = Literal["source checked", "recalled, high confidence", "recalled", "recalled, low confidence"]
 
 
 @dataclass(frozen=True, kw_only=True)
