@@ -12,7 +12,7 @@ CORE := .venv/core
 .PHONY: demo test test-core view setup lint bench clean
 
 demo: setup
-	.venv/bin/rollover run side_overturn --out out/demo --force
+	.venv/bin/rollover run side_overturn --set simulation.step=0.0005 --out out/demo --force
 	@echo "Look at it with: .venv/bin/rollover view out/demo"
 
 test: $(TESTED) lint test-core
