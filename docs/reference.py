@@ -135,7 +135,11 @@ def commands() -> str:
         text.append(f"## rollover {name}\n\n{plain(inspect.cleandoc(command.help or ''))}\n")
         rows = [
             (
-                code(str(parameter.metavar or parameter.name).strip("[]") if parameter.param_type_name == "argument" else _spelt(parameter)),
+                code(
+                    str(parameter.metavar or parameter.name).strip("[]")
+                    if parameter.param_type_name == "argument"
+                    else _spelt(parameter)
+                ),
                 plain(str(getattr(parameter, "help", "") or "")),
                 code("" if _silent(parameter.default) else str(parameter.default)),
             )
