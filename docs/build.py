@@ -1,4 +1,4 @@
-"""The documentation site: `python docs/build.py [FOLDER]` collects the pages, adds the reference, and builds them strict.
+"""The documentation site: `python docs/build.py [FOLDER]` collects pages, adds the reference, and builds them strict.
 
 Pages stay where they are read in the repository; what is built is a copy in which links to files that are no page are
 plain text. No network is needed: theme and search come with the packages.
@@ -75,7 +75,7 @@ def _linked(page: Path, pages: set[Path], folder: Path) -> str:
 
     def link(found: re.Match[str]) -> str:
         picture, text, target = found.groups()
-        path, _, anchor = target.partition("#")
+        path, _, _ = target.partition("#")
         if "://" in target or not path:
             return found[0]
         aim = (page.parent / path).resolve()

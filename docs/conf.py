@@ -1,4 +1,4 @@
-"""Sphinx: plain Markdown, a theme without fonts or scripts from elsewhere; every warning is an error (see `build.py`)."""
+"""Sphinx: plain Markdown, a theme without fonts or scripts from elsewhere; `build.py` makes every warning an error."""
 
 project = "rollover"
 author = "The rollover authors"

@@ -1,4 +1,4 @@
-"""Reference pages from the tables that `rollover schema`, `rollover list` and `--help` are made of: they cannot differ."""
+"""Reference pages from the tables that `rollover schema`, `rollover list` and `--help` are made of."""
 
 from __future__ import annotations
 
