@@ -41,7 +41,13 @@ RUN = [
     "docs/estimation.md",
     "rollover/README.md",
 ]
-ELSEWHERE = {"docs/how_to_add.md", "docs/engineers_day.md"}  # the first has tests of its own, the other is a table
+ELSEWHERE = {  # page -> its blocks that are not run here, and why
+    "docs/engineers_day.md": 0,  # a table
+    "docs/how_to_add.md": 6,  # diffs, tried by test_how_to_add.py; a profile of a folder that is nobody's
+    "scenarios/studies/README.md": 5,  # studies of 256 overturns, a cluster, readers of their tables
+    "ground/README.md": 1,  # a law, tried by test_laws_contract.py
+    "viz/README.md": 1,  # a fragment of a page
+}
 NOT_RUN = {"docs/proof.md": 4}  # blocks that say why: campaigns of hours
 
 
@@ -163,9 +169,11 @@ CHECKS: dict[str, Callable[[Path, Path, list[Path]], None]] = {
 }
 
 
-def test_no_page_of_the_documentation_is_passed_over() -> None:
-    pages = {str(p.relative_to(ROOT)) for p in (ROOT / "docs").rglob("*.md")}
-    assert pages <= {*RUN, *ELSEWHERE}
+def test_no_block_of_a_page_is_passed_over_in_silence() -> None:
+    pages = {str(p.relative_to(ROOT)) for p in PAGES}
+    rest = {page: len(blocks(page)) for page in pages - set(RUN)}
+    listed = {page: count for page, count in rest.items() if count or page.startswith("docs/")}
+    assert listed == ELSEWHERE
 
 
 def test_the_readme_is_one_screen() -> None:
