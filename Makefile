@@ -16,7 +16,7 @@ demo: setup
 	.venv/bin/rollover run side_overturn --set simulation.step=0.0005 --out out/demo --force
 	@echo "Look at it with: .venv/bin/rollover view out/demo"
 
-test: $(TESTED) lint test-core docs
+test: $(TESTED) lint test-core
 	.venv/bin/pytest -n auto --strict-skips tests
 
 # an environment without any optional package: what needs one says so in one line
