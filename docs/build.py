@@ -38,6 +38,7 @@ SITE = {  # caption -> pages, in the order of the menu
         "docs/validation",
         "docs/proof",
         "rollover/proof/README",
+        "rollover/proof/overturns/README",
         "rollover/diagnosis/README",
         "rollover/effects/README",
     ],
