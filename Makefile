@@ -1,18 +1,19 @@
 # make demo   a tractor tips over onto the ground array: loads in the terminal, recording in out/demo
 # make test   lint, types, import rules, tests; first installs all optional packages that the tests use
-# Both set everything up in .venv first (Python >= 3.11 with pip is all they need).
+# make docs   the documentation site in out/site, every warning an error
+# Each sets everything up in .venv first (Python >= 3.11 with pip is all they need).
 
 PYTHON ?= python3
 UV := $(shell command -v uv 2>/dev/null || echo .tools/bin/uv)
 READY := .venv/.ready
 TESTED := .venv/.tested
-GROUPS := --group formats --group oracle --group studies --group browser
+GROUPS := --group formats --group oracle --group studies --group browser --group docs
 CORE := .venv/core
 
-.PHONY: demo test test-core view setup lint bench clean
+.PHONY: demo test test-core docs view setup lint bench clean
 
 demo: setup
-	.venv/bin/rollover run side_overturn --out out/demo --force
+	.venv/bin/rollover run side_overturn --set simulation.step=0.0005 --out out/demo --force
 	@echo "Look at it with: .venv/bin/rollover view out/demo"
 
 test: $(TESTED) lint test-core
@@ -22,6 +23,10 @@ test: $(TESTED) lint test-core
 test-core: setup
 	UV_PROJECT_ENVIRONMENT=$(CORE) $(UV) sync --locked --quiet --python $(PYTHON)
 	$(CORE)/bin/pytest -q tests/core_only
+
+docs: $(TESTED)
+	.venv/bin/python docs/build.py out/site
+	@echo "Look at it with a browser: out/site/index.html"
 
 lint: setup
 	.venv/bin/ruff check .

@@ -203,7 +203,7 @@ def test_looks_and_first_fits_are_made_soon_after_the_blow_and_fits_of_all(monke
         asked.append(("look", problem, base.blocks[0].residual.size))
         return ScoreTest(score=0.0, scores={}, null=np.zeros(10), detectable={})
 
-    monkeypatch.setattr(scan, "gate", gated)
+    monkeypatch.setattr(scan, "score_test", gated)
     looked = scan.look(problem, base, [], [[0], [1]])
 
     def screened(inquiry: Inquiry, base: Fitted, *_: object) -> list[Any]:

@@ -168,7 +168,7 @@ def test_what_draws_any_curve_is_not_followed_but_straightened(
     best = fitted("soil-layer", 4.0, (0.7, 0.3))
     problem = SimpleNamespace(effort=SimpleNamespace(is_ensemble=False), dataset=[])
     monkeypatch.setattr(simplification, "mismatch_of", lambda *_: SimpleNamespace(p_value=1e-9))
-    monkeypatch.setattr(simplification, "is_any_curve", lambda _: is_a_curve)
+    monkeypatch.setattr(simplification, "is_over_flexible", lambda _: is_a_curve)
     monkeypatch.setattr(simplification, "traced_too", lambda _, f: traced.append(f) or f)
     for name in ("timed", "polish", "ended"):
         monkeypatch.setattr(simplification, name, lambda _, f: f)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -88,3 +89,16 @@ def test_a_full_run_keeps_the_rate_of_its_filters() -> None:
     assert inside.shape[1] == 5
     assert 1.0 / float(np.median(np.diff(thin.time))) > 1800.0
     assert thinned(recording, 6000.0) == (recording, None)
+
+
+def test_a_simulator_in_another_process_is_what_it_was_here() -> None:
+    """Workers get it pickled: every attribute arrives, and it predicts the same."""
+    here = DropSimulator(scenario.load("drop_test"), recorded(np.arange(0.0, 0.3, 1e-3)), discontinuities=True)
+    there = pickle.loads(pickle.dumps(here))
+    assert vars(there).keys() == vars(here).keys()
+    assert there.discontinuities is True
+    mine, theirs = (one.predict({"effects.mass.added": 3.0}, 2e-4) for one in (here, there))
+    assert mine is not None
+    assert theirs is not None
+    assert mine.keys() == theirs.keys()
+    assert all(np.array_equal(mine[c], theirs[c]) for c in mine)

@@ -95,7 +95,7 @@ def test_a_nose_that_was_fitted_beside_a_wrong_frequency_is_found_by_what_it_rin
     (found,) = _combed(inquiry, [astray], looked, [b.shift for b in astray.blocks])
     assert found.left < 1.2 * sum(e.count for e in problem.dataset)
     assert found.candidates[-1].values(found.x) == pytest.approx(true, rel=0.01)
-    monkeypatch.setattr(restarts, "_in_chords", lambda *_: [])
+    monkeypatch.setattr(restarts, "_by_frequency", lambda *_: [])
     (near,) = _combed(inquiry, [astray], looked, [b.shift for b in astray.blocks])
     assert near.left > 10.0 * found.left
 

@@ -149,7 +149,7 @@ def test_what_may_be_nothing_is_another_effects_work_only_if_that_does_it(
     doubtful = {"sensor-clock-offset"}
     assert decision.done_by_others(problem, found, doubtful) == (doubtful if done else set())
     assert decision.done_by_others(problem, found, set()) == set()
-    monkeypatch.setattr(Problem, "per_error", 1e6)
+    monkeypatch.setattr(Problem, "samples_per_error", 1e6)
     assert decision.done_by_others(problem, found, doubtful) == doubtful
 
 

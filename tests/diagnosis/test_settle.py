@@ -85,7 +85,7 @@ def test_a_shape_that_is_not_fitted_widens_an_interval(monkeypatch: pytest.Monke
     """y = 20 (x + f) sin t with f from 0 to 1 unknown: x is known to sqrt(1/12) and no better."""
     problem = Problem([dataset(4, 0.0)])
     alone = replace(SLOPE, shapes={"other": Search(0.0, 1.0)})
-    monkeypatch.setattr(Candidate, "with_shapes", lambda self, x: [(*x, 0.5)])
+    monkeypatch.setattr(Candidate, "with_secondary", lambda self, x: [(*x, 0.5)])
     block = problem.block(0, (SLOPE,), (0.4,), 0.0, problem.effort.fine)
     assert block is not None
     inverse = np.linalg.inv(block.J.T @ block.J)
@@ -284,7 +284,7 @@ def test_a_value_is_that_of_shorter_steps(size: float, monkeypatch: pytest.Monke
     assert whole.low < 0.4 < whole.high
     assert (by_itself.as_simulated, whole.as_simulated) == (None, fitted.x[0])
     # how rough the misfit of runs is counts where an interval is stated, not where a side of it is asked for
-    monkeypatch.setattr(intervals_of, "rough_reaches", lambda *_: np.full((1, 2), 50.0))
+    monkeypatch.setattr(intervals_of, "quadratic_extents", lambda *_: np.full((1, 2), 50.0))
     assert intervals(problem, fine, {}, fitted)[0]["angle"] == whole
     rough = intervals(problem, fine, None, fitted)[0]["angle"]
     assert rough.high - rough.low > 5.0 * (whole.high - whole.low)
@@ -298,7 +298,7 @@ def test_a_value_is_that_of_shorter_steps(size: float, monkeypatch: pytest.Monke
     monkeypatch.setattr(intervals_of, "profile_extents", profile_extents)
     assert intervals(problem, fine, None, fitted)[0]["angle"] == rough
     for far in (0.0, np.nan):
-        monkeypatch.setattr(intervals_of, "rough_reaches", lambda *_, far=far: np.full((1, 2), far))
+        monkeypatch.setattr(intervals_of, "quadratic_extents", lambda *_, far=far: np.full((1, 2), far))
         assert intervals(problem, fine, None, fitted)[0]["angle"] == whole
     assert asked == [{}, {}, {0: (-1.0, 1.0)}]
     told = [cast(Any, SimpleNamespace(id="slope", parameters={"angle": i})) for i in (by_itself, whole)]

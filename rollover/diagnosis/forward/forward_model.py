@@ -88,7 +88,7 @@ class DropSimulator:
         """What is sent to another process: not the runs."""
         no_jacobian = DropModel(scenario=self.model.scenario)
         stores: dict[str, Any] = {"_raw": {}, "_models": {}, "_tracks": {}}
-        return {"model": no_jacobian, "recording": self.recording, "leaps": self.discontinuities, **stores}
+        return {"model": no_jacobian, "recording": self.recording, "discontinuities": self.discontinuities, **stores}
 
     def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, Array] | None:
         """See `Simulator`; ``ValueError`` for a value out of bounds passes."""
