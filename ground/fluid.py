@@ -36,6 +36,7 @@ class FluidEntry(GroundLaw):
     gravity: Annotated[float, Quantity("m/s2", "g of the hydrostatic pressure", least=0, most=30)] = 9.81
 
     plastic = False
+    fluid = True
 
     @staticmethod
     @force_law

@@ -124,6 +124,7 @@ class GroundLaw:
     advance: ClassVar[Any] = None
     hidden: ClassVar[int] = 0
     plastic: ClassVar[bool] = True  # False: the loading curve is followed in both directions
+    fluid: ClassVar[bool] = False  # True: a medium that keeps no shape, without layers, crust or strength
     memoryless: ClassVar[bool] = (
         False  # True: not plastic, and nothing stays at the place: contacts go along with the body
     )

@@ -33,6 +33,7 @@ def account(
             "format": FORMAT,
             **(about or {}),
             "verdict": found.verdict,
+            "answer": found.answer,
             "sentence": found.sentence,
             "remaining": {
                 "significant": found.remaining_significant,
@@ -47,6 +48,8 @@ def account(
             "dependencies": [{"on": name, "share": share} for name, share in found.dependencies],
             "degrees_of_freedom": [asdict(d) for d in found.degrees],
             "effects": [_effect(e) for e in found.effects],
+            "discrepancy": {channel: asdict(scale) for channel, scale in found.discrepancy.items()},
+            "invariants": {"checked": len(found.checked), "broken": list(found.broken)},
             "fit": {
                 "training": _fit(found, "training", found.training),
                 "held_out": _fit(found, "held_out", found.held_out),
@@ -74,12 +77,20 @@ def _effect(effect: Named) -> dict[str, Any]:
         "id": effect.id,
         "kind": effect.kind,
         **({} if effect.channel is None else {"channel": effect.channel}),
+        "answer": effect.answer,
+        "explains": None if effect.explains is None else _finite(asdict(effect.explains)),
+        "moves_leading_load_by": effect.moves,
         "statement": effect.statement,
         "parameters": {name: _interval(i) for name, i in effect.parameters.items()},
         "p_value": effect.p_value,
         "indistinguishable_from": list(effect.indistinguishable_from),
         "discriminating_test": effect.discriminating_test,
     }
+
+
+def _finite(numbers: Mapping[str, float]) -> dict[str, float | None]:
+    """Numbers, none where there is no end of an interval."""
+    return {name: v if isfinite(v) else None for name, v in numbers.items()}
 
 
 def _interval(interval: Interval) -> dict[str, Any]:
@@ -107,7 +118,11 @@ def _fit(found: Diagnosis, which: str, names: tuple[str, ...]) -> dict[str, Any]
 def diagnosed_scenario(scenario: Scenario, found: Diagnosis) -> Scenario:
     """The scenario with the found effects, or the law found by regression, switched on and fitted."""
     ids = [e.id for e in found.effects]
-    changes = {f"effects.{nth(e.id, 1 + ids[:k].count(e.id))}": dict(e.settings) for k, e in enumerate(found.effects)}
+    changes = {
+        f"effects.{nth(e.id, 1 + ids[:k].count(e.id))}": dict(e.settings)
+        for k, e in enumerate(found.effects)
+        if e.settings
+    }
     if found.empirical is not None:
         changes["effects.empirical"] = dict(found.empirical.settings)
     return scenario.replaced(changes, origin="diagnosis") if changes else scenario

@@ -11,6 +11,8 @@ from rollover.system.notebook import card
 
 Verdict = Literal["no-mismatch", "parameter", "sensor", "missing-physics", "unexplained", "cannot-tell"]
 
+Answer = Literal["nothing", "immaterial", "whole", "part", "likeness", "unexplained", "cannot-tell"]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Place:
@@ -55,8 +57,30 @@ class Interval:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Share:
+    """Share of a held-out mismatch with its 95 % interval over recordings; at most 1, below 0 where it adds to it."""
+
+    share: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scale:
+    """What a model misses of a channel beside what it lacks: 1 sigma (SI), and the time over which it is one error."""
+
+    scale: float
+    unit: str
+    correlation_time: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
 class Named:
-    """An effect that was found, with what it cannot be told apart from and how to."""
+    """An effect that was found, with what it cannot be told apart from and how to.
+
+    `explains` is its share of the held-out mismatch, `moves` the most by which it moves a load, of its peak; None where
+    it moves none.
+    """
 
     id: str
     kind: str
@@ -67,6 +91,9 @@ class Named:
     p_value: float
     indistinguishable_from: tuple[str, ...]
     discriminating_test: str
+    answer: Answer = "whole"
+    explains: Share | None = None
+    moves: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,6 +166,10 @@ class Diagnosis:
     clocks: Mapping[str, Zero] = field(default_factory=dict)  # zeros that were found, of clocks in doubt
     grids: Mapping[str, tuple[float, ...]] = field(default_factory=dict)  # of full runs: centre of the elements, m
     empirical: Law | None = None  # where no effect explains the mismatch
+    answer: Answer = "cannot-tell"
+    discrepancy: Mapping[str, Scale] = field(default_factory=dict)  # by channel, where it was estimated or stated
+    checked: tuple[str, ...] = ()  # invariants that were checked
+    broken: tuple[str, ...] = ()  # those of them that do not hold
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the sentence, the effects that are named with their intervals, what the fit gains."""

@@ -49,13 +49,20 @@ def diagnosed(
     findings: Findings,
     *,
     hold_out: Sequence[str] = (),
-    tolerance: float = 0.0,
+    tolerance: float | Mapping[str, float] = 0.0,
+    reference: Sequence[str] = (),
     say: Callable[[str], None] = lambda _: None,
     executor: Executor | None = None,
 ) -> Diagnosis:
     """Diagnose, see `diagnose`; what the sensors gave away stands first among the notes. Raises `InputError`."""
     found = diagnose(
-        scenario, list(measured.items()), hold_out=hold_out, tolerance=tolerance, say=say, executor=executor
+        scenario,
+        list(measured.items()),
+        hold_out=hold_out,
+        tolerance=tolerance,
+        reference=reference,
+        say=say,
+        executor=executor,
     )
     return replace(found, notes=(*in_words(findings), *found.notes))
 

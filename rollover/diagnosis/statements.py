@@ -15,10 +15,10 @@ from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.inference.adequacy import NEGLIGIBLE
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.inference.lack_of_fit import SURE, Mismatch
-from rollover.diagnosis.result import Considered, Named, Place, Verdict
+from rollover.diagnosis.result import Considered, Named, Place, Scale, Verdict
 from rollover.diagnosis.selection.decision import Explanation, strongest
 from rollover.diagnosis.selection.forward_step import confusion
-from rollover.effects import EFFECTS
+from rollover.effects import EFFECTS, spoken
 
 NOTABLE = 0.1  # of an interval
 UNSURE = 3.0  # times the error of a recording's clock, up to which a channel alone may be late or all others early
@@ -114,6 +114,38 @@ def of_no_ground(found: Sequence[Dataset]) -> str:
     if any(end >= at or not np.isfinite(at) for end, at in zip(ends, contacts, strict=True)):
         return ""
     return " None of them reaches the first contact: nothing can be said of the ground."
+
+
+def of_no_consequence(effects: Sequence[Named]) -> str:
+    """The sentence where all that separates simulation and recordings moves no load by more than a share of it."""
+    moves = max(e.moves or 0.0 for e in effects)
+    said = " ".join(e.statement for e in effects)
+    return f"Simulation and recordings differ by nothing of consequence: no load moves by more than {moves:.2%}. {said}"
+
+
+def by_share(effects: Sequence[Named], scales: Mapping[str, Scale]) -> str:
+    """What a sentence goes on with where effects are a part of it, or have not quite its form."""
+    found = [e for e in effects if e.explains is not None and e.answer in ("part", "likeness")]
+    said = ""
+    for e in found:
+        assert e.explains is not None
+        share, low, high = (max(v, 0.0) for v in (e.explains.share, e.explains.low, e.explains.high))
+        form = "; in another form, or beside more" if e.answer == "likeness" and scales else ""
+        said += f" {e.id} explains {share:.0%} ({low:.0%} to {high:.0%}) of the held-out mismatch{form}."
+    if found and scales:
+        each = ", ".join(f"{spoken(s.scale)} {s.unit} of {channel}" for channel, s in scales.items())
+        said += f" What models usually miss beside it is taken to be {each}."
+    return said
+
+
+def as_models_miss(left: Mapping[str, float], p_value: float, recordings: int) -> str:
+    """The sentence where what a scenario leaves, a share of each channel's range, is what models usually miss."""
+    each = ", ".join(f"{share:.1%} of {channel}" for channel, share in left.items())
+    return (
+        f"Simulation and {recordings} recordings differ by more than noise, but by no more than models usually miss "
+        f"(root mean square, of the range: {each}), and nothing explains that better than chance (p = {p_value:.2g} of "
+        "noise alone)."
+    )
 
 
 def by_steps(effects: Sequence[Named]) -> list[str]:
@@ -212,11 +244,13 @@ def sentence(
     *,
     remains: bool = False,
     cross_validated: bool = True,
+    beside: bool = False,
 ) -> str:
     """The verdict in a few sentences; `early` is the misfit before the first impact without and with the effects.
 
     `remains` says that these are not all that separates simulation and recordings, `cross_validated` that some
-    recordings were held out, as none can be of one condition.
+    recordings were held out, as none can be of one condition, `beside` that an estimated discrepancy counts beside the
+    noise.
     """
     if verdict == "no-mismatch" and p_value < SURE:
         model_error_dominates = any(e.model_error_dominates(s) for e in dataset for s in e.signals)
@@ -245,6 +279,7 @@ def sentence(
     also += f" Not distinguishable by these recordings: {', '.join(rivals)}." if rivals else ""
     misfit = "held-out misfit" if cross_validated else "misfit"
     falls = f"{said} With it the {misfit} falls from {first.total:.1f} to {last.total:.2f} times the noise"
+    falls += " and what models usually miss" if beside else ""
     without, with_ = early
     if without is None or with_ is None:
         return f"{falls}.{also}"

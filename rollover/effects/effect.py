@@ -69,6 +69,7 @@ class Effect:
     rivals: ClassVar[Mapping[str, str]] = {}  # look-alike -> the test that tells them apart
     acts: ClassVar[tuple[str, ...]] = ("drop", "rollover")
     channels: ClassVar[tuple[str, ...]] = ()  # that feel it first
+    solid: ClassVar[bool] = False  # it is of ground that keeps its shape: no fluid has it
     competes: ClassVar[bool] = True  # as an explanation of what a scenario misses
     null: ClassVar[Mapping[str, float | None]] = {}
     search: ClassVar[Mapping[str, Search]] = {}

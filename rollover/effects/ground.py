@@ -86,6 +86,7 @@ class SoilRateHardening(Effect):
     )
 
     id = "soil-rate-hardening"
+    solid = True
     family = SPEED
     equation = "F *= 1 + lambda log10(max(v, v_0)/v_0), or (max(v, v_least)/v_0)^beta"
     source = (
@@ -255,6 +256,7 @@ class SoilAdhesion(Effect):
     reach: Annotated[float, Quantity("m", "gap at which nothing is held any more", above=0)] = 0.005
 
     id = "soil-adhesion"
+    solid = True
     family = "a pull at lift-off"
     equation = "F = max(line, -c_a A max(1 - gap/reach, 0)); gap = rut - z"
     source = "c_a 1-10 kPa in the field, suction up to 80-100 kPa (M); the reach is a guess (M-)"
@@ -286,6 +288,7 @@ class SoilLayer(Effect):
     stiffness: Annotated[float, Quantity("N/m", "k_h that the layer adds of its own; reference face", least=0)] = 0.0
 
     id = "soil-layer"
+    solid = True
     family = DEPTH
     equation = (
         "F = K'(z) (z + (ratio - 1) (z - onset depth)) + k_h (z - depth) for z > depth; onset 0: F = ratio K'(z) z"
@@ -335,6 +338,7 @@ class SoilCrust(Effect):
     remains: Annotated[float, Quantity("1", "share of what it adds that stays below it", least=0, most=1)] = 0.0
 
     id = "soil-crust"
+    solid = True
     family = DEPTH
     equation = "F = ratio K'(z) z for z < thickness; K'(z) (z + (ratio - 1) remains thickness) below"
     source = "20-80 mm (M)"

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from rollover.diagnosis import account, diagnose
+from rollover.diagnosis import account, diagnose, power
 from rollover.recording import Recording
 from tests.diagnosis.drops import DEPTH, FORCE, recorded, scenario
 
-diagnosing = importlib.import_module("rollover.diagnosis.pipeline")
 Recordings = list[tuple[str, Recording]]
 SPEEDS = (1.5, 2.5)
 
@@ -127,7 +125,7 @@ def test_recordings_that_contradict_each_other_are_not_explained() -> None:
 def test_recordings_are_too_weak_where_usual_strengths_would_not_show(
     detectable: dict[str, float], is_weak: bool
 ) -> None:
-    assert diagnosing._is_weak(detectable) is is_weak
+    assert power.is_weak(detectable) is is_weak
 
 
 def test_millimetres_that_say_they_are_metres_are_the_scale_of_their_channel() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from dataclasses import replace
 from types import SimpleNamespace
@@ -15,10 +14,10 @@ from rollover.diagnosis import diagnose
 from rollover.diagnosis.data import inconsistent as slipping
 from rollover.diagnosis.data.inconsistent import Inconsistency, inconsistencies_of
 from rollover.diagnosis.fit.jobs import Executor
+from rollover.diagnosis.prepared import prepared
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
-diagnosing = importlib.import_module("rollover.diagnosis.pipeline")
 CHANNELS = (FORCE, DEPTH, ACCELERATION)
 LAYER = {"effects.soil-layer.depth": 0.05, "effects.soil-layer.stiffness_ratio": 2.0}
 Drops = list[tuple[str, Recording]]
@@ -78,7 +77,7 @@ def test_where_nothing_else_was_recorded_it_is_what_cannot_be_told() -> None:
 
 
 def inconsistencies(made: Drops) -> tuple[list[Inconsistency], list[Inconsistency]]:
-    every, _ = diagnosing._dataset(scenario(), made, Executor())
+    every, _ = prepared(scenario(), made, Executor())
     return inconsistencies_of(every)
 
 
@@ -102,7 +101,7 @@ def test_what_goes_its_own_way_is_no_slip() -> None:
 def test_what_neighbouring_runs_do_as_well_is_no_slip(apart: float, is_slip: bool) -> None:
     """Runs that nobody could tell apart, by so much of a channel: 0.71 of it leave |r| = 0.7."""
     made = mistaken(recorded({}, 4, speeds=(1.5, 2.0, 2.5), channels=CHANNELS), FORCE, -1.0)
-    every, _ = diagnosing._dataset(scenario(), made, Executor())
+    every, _ = prepared(scenario(), made, Executor())
     there = every[1].simulator.predict({}, 0.0)
     assert there is not None
     perturbed = [{FORCE: size * apart * there[FORCE]} for size in (-1.0, 1.0, 0.0, 3.0, -1.0)]

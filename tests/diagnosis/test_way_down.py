@@ -16,7 +16,8 @@ from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.forward.budget import DROPS
 from rollover.diagnosis.inference.lack_of_fit import Mismatch
-from rollover.diagnosis.pipeline import _dataset, diagnose
+from rollover.diagnosis.pipeline import diagnose
+from rollover.diagnosis.prepared import prepared
 from rollover.diagnosis.selection import truncated_start
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.stepwise import Taken
@@ -118,7 +119,7 @@ def test_what_explains_the_way_down_is_a_beginning_if_it_leads_to_far_less(
 
 
 def test_the_way_down_ends_before_the_deepest_point() -> None:
-    dataset, _ = _dataset(load("drop_test"), recordings({}), Executor())
+    dataset, _ = prepared(load("drop_test"), recordings({}), Executor())
     phases = drop_phases(dataset[0])
     cut = truncated_start._cut(dataset[0], phases, 0.9)
     assert cut is not None
@@ -140,7 +141,7 @@ def test_the_way_down_ends_before_the_deepest_point() -> None:
     ],
 )
 def test_what_holds_what_fell_into_it_moves_nothing_on_the_way_back(rig: dict[str, float], is_back: bool) -> None:
-    dataset, _ = _dataset(load("drop_test"), recordings(rig), Executor())
+    dataset, _ = prepared(load("drop_test"), recordings(rig), Executor())
     problem = Problem(dataset)
     base = problem.fit((), ())
     assert base is not None

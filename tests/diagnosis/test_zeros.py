@@ -13,6 +13,7 @@ from rollover.diagnosis import diagnose
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.noise.offsets import WAVES, Zero, _differ, _own, _stand
+from rollover.diagnosis.prepared import prepared
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
@@ -40,7 +41,7 @@ def moved(made: Drops, sizes: dict[str, float], share: float, seed: int = 5) -> 
 
 
 def reweighted(made: Drops) -> list[Dataset]:
-    every, _ = diagnosing._dataset(scenario(), made, Executor())
+    every, _ = prepared(scenario(), made, Executor())
     found: list[Dataset] = diagnosing._reweighted(scenario(), every)
     return found
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
+from rollover.cli.commands.diagnose import tolerances
 from rollover.cli.main import app
 from rollover.diagnosis import Diagnosis, account
 from rollover.diagnosis.overlay import series
@@ -232,3 +233,32 @@ def test_wrong_input_is_one_line_and_nothing_is_written(
     assert says in refused.stderr
     assert len(refused.stderr.strip().splitlines()) == 1
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--tolerance", "lots"), "--tolerance: not a share of a range, got 'lots'; a number from 0 to 0.5"),
+        (("--tolerance", "0.7"), "--tolerance: not a share of a range, got '0.7'"),
+        (("--tolerance", "ground/sinkag=0.05"), "no such channel in the recordings, got 'ground/sinkag'"),
+        (("--reference", "v9"), "--reference: no such recording, got 'v9'"),
+        (("--reference", "v1", "--hold-out", "v1"), "--reference: held out too, got 'v1'"),
+        (("--reference", "v1", "--tolerance", "0.05"), "--reference: beside --tolerance, got both"),
+        (("--reference", "v1", "--reference", "v2", "--hold-out", "v3"), "--reference: nothing left to fit"),
+    ],
+)
+def test_what_is_no_share_no_channel_or_no_recording_is_one_line(
+    folder: Path, tmp_path: Path, words: tuple[str, ...], said: str
+) -> None:
+    found = rollover("diagnose", "drop_test", folder, "--out", tmp_path / "out", *words)
+    assert found.exit_code == 2
+    assert said in found.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_shares_by_channel_leave_the_others_to_the_general_one() -> None:
+    made = {"a": Recording(title="a", time=np.arange(3.0), channels={"x": np.ones(3), "y": np.ones(3)})}
+    assert tolerances(["0.02", "y=0.1"], made) == {"x": 0.02, "y": 0.1}
+    assert tolerances(["y=0.1"], made) == {"x": 0.0, "y": 0.1}
+    assert tolerances(["0.02"], made) == 0.02
+    assert tolerances([], made) == 0.0

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rollover.cli.commands.common import AsJson, Force, Setting, answering, app, manual, settings
+from rollover.system.errors import Fault, InputError
 
 if TYPE_CHECKING:
     from rollover.diagnosis import Diagnosis
     from rollover.diagnosis.overlay import Told
+    from rollover.recording import Recording
+
+MOST_TOLERATED = 0.5  # of a range: what may miss half of it is no model of it
 
 
 @app.command(
@@ -39,11 +43,20 @@ def diagnose(
         ),
     ] = None,
     tolerance: Annotated[
-        float,
+        list[str] | None,
         typer.Option(
-            help="Share of a channel's range by which a scenario that lacks nothing may miss it.", min=0, max=0.5
+            metavar="[CHANNEL=]SHARE",
+            help="Share of its range by which a scenario that lacks nothing may miss a channel; may be repeated",
+            show_default="estimated where nothing explains the recordings",
         ),
-    ] = 0.0,
+    ] = None,
+    reference: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="A recording of the same rig in which nothing is suspected: it teaches that share; may be repeated.",
+        ),
+    ] = None,
     set_: Setting = None,
     profile: Annotated[Path | None, typer.Option(help="What the columns of foreign files are.")] = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/diagnose/NAME")] = None,
@@ -84,13 +97,18 @@ def diagnose(
     measured = read(recordings, profile)
     check(chosen, measured)
     held = held_out(list(measured), hold_out or [], "--hold-out")
+    taught = _references(list(measured), reference or [], held)
+    allowed = tolerances(tolerance or [], measured)
+    if taught and allowed:
+        raise InputError(Fault(file="--reference", message="beside --tolerance, got both; one of them says it"))
     folder = out or Path("out", "diagnose", path.stem)
     about: dict[str, Any] = {
         "scenario_hash": document.content_hash(chosen),
         **chosen.own_code,
         "recordings": list(measured),
         "hold_out": held,
-        "tolerance": tolerance,
+        "tolerance": allowed,
+        "reference": taught,
     }
     about["origin"] = results.origin(path, folder, set_ or [])
     results.claim_account(folder, FORMAT, about, FILES, force=force, say=console.say)
@@ -99,10 +117,17 @@ def diagnose(
     # beside the results folder, which is written whole or not at all: what an interrupted diagnosis had fitted
     notebook = notes(folder)
     about_fits = json.dumps([about, results.versions()], sort_keys=True)
-    words = ["rollover", "diagnose", scenario, *recordings, *_options(hold_out, set_, tolerance, profile)]
+    words = ["rollover", "diagnose", scenario, *recordings, *_options(hold_out, tolerance, reference, set_, profile)]
     with Executor(workers, notebook, about_fits) as executor:
         found = diagnosed(
-            chosen, measured, findings, hold_out=held, tolerance=tolerance, say=console.say, executor=executor
+            chosen,
+            measured,
+            findings,
+            hold_out=held,
+            tolerance=allowed,
+            reference=taught,
+            say=console.say,
+            executor=executor,
         )
         told = series(chosen, list(measured.items()), found, executor.children)
         answer = account(found, about, plain(findings))
@@ -132,9 +157,62 @@ def diagnose(
         console.diagnosis(found, str(folder))
 
 
-def _options(hold_out: list[str] | None, set_: list[str] | None, tolerance: float, profile: Path | None) -> list[str]:
-    stated, by = [f"{tolerance:g}"] if tolerance else [], [str(profile)] if profile else []
-    given = (("--hold-out", hold_out or []), ("--set", set_ or []), ("--tolerance", stated), ("--profile", by))
+def _references(names: list[str], given: list[str], held: list[str]) -> list[str]:
+    from rollover.system.errors import hint
+
+    for name in given:
+        if name not in names:
+            raise InputError(Fault(file="--reference", message=f"no such recording, got {name!r}; {hint(name, names)}"))
+        if name in held:
+            raise InputError(Fault(file="--reference", message=f"held out too, got {name!r}; another one of {names}"))
+    if set(names) <= {*given, *held}:
+        raise InputError(Fault(file="--reference", message=f"nothing left to fit, got {', '.join(names)}"))
+    return sorted(set(given))
+
+
+def tolerances(given: Sequence[str], measured: Mapping[str, Recording]) -> float | dict[str, float]:
+    """Shares as they are given: one for all channels, or by channel, those not named by the one for all.
+
+    Raises `InputError`.
+    """
+    from rollover.system.errors import hint
+
+    channels = list(dict.fromkeys(channel for recording in measured.values() for channel in recording.channels))
+    found: dict[str, float] = {}
+    general = 0.0
+    for text in given:
+        channel, is_by_channel, number = text.rpartition("=")
+        try:
+            share = float(number)
+        except ValueError:
+            share = -1.0
+        if not 0.0 <= share <= MOST_TOLERATED:
+            message = f"not a share of a range, got {number!r}; a number from 0 to {MOST_TOLERATED:g}, or CHANNEL=SHARE"
+            raise InputError(Fault(file="--tolerance", message=message))
+        if is_by_channel and channel not in channels:
+            message = f"no such channel in the recordings, got {channel!r}; {hint(channel, channels)}"
+            raise InputError(Fault(file="--tolerance", message=message))
+        if is_by_channel:
+            found[channel] = share
+        else:
+            general = share
+    return {channel: found.get(channel, general) for channel in channels} if found else general
+
+
+def _options(
+    hold_out: list[str] | None,
+    tolerance: list[str] | None,
+    reference: list[str] | None,
+    set_: list[str] | None,
+    profile: Path | None,
+) -> list[str]:
+    given = (
+        ("--hold-out", hold_out or []),
+        ("--set", set_ or []),
+        ("--tolerance", tolerance or []),
+        ("--reference", reference or []),
+        ("--profile", [str(profile)] if profile else []),
+    )
     return [part for name, texts in given for text in texts for part in (name, text)]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -34,6 +34,7 @@ ALONE = 0.02  # s, prior of the time shift of a recording whose clock has no zer
 CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is believed
 MANY = 10  # quiet windows from which on a memory of two samples is told
 ROUGH = 0.5  # times the noise, from which on another error has a large part
+HIDDEN = 1.02 * ROUGH  # of the noise: a discrepancy below is hidden by it, and held to be as large
 CORNER = 2.0775  # corner frequency over the filter class, forward and backward, Hz
 NOTHING: Mapping[str, Array] = MappingProxyType({})
 SHIFT = 1e-3  # s, prior of the time shift of a recording whose zero is known
@@ -103,6 +104,8 @@ class Dataset:
     condition: str
     perturbed: tuple[Array, ...] = ()  # stacked, SI: what runs that nobody could tell apart differ by
     model_error: float = MODEL_ERROR  # of a channel's range
+    discrepancy: Mapping[str, float] = field(default_factory=dict)  # by channel, a share of its range
+    memory: Mapping[str, float] = field(default_factory=dict)  # by channel, correlation time of that where known, s
     averaged: int = 1  # samples in one
     first_impact: float = np.inf  # s, after which a run may take another course
     doubtful: tuple[Mapping[str, Any], ...] = ()  # values exchanged for 1 sigma of each uncertain condition
@@ -155,8 +158,22 @@ class Dataset:
 
         Such an error is one for the whole signal, not one for each sample: within its size it is nothing.
         """
-        known = s.scatter > 0.0 or self.model_error > MODEL_ERROR
-        return known and float(np.hypot(s.scatter, self.model_error * s.span)) > ROUGH * s.noise
+        known = s.scatter > 0.0 or self.error_of(s) > MODEL_ERROR
+        return known and float(np.hypot(s.scatter, self.error_of(s) * s.span)) > ROUGH * s.noise
+
+    def error_of(self, s: Signal) -> float:
+        """What the model may miss a signal by, as a share of its range: integrators' error and the discrepancy."""
+        if not self.discrepancy:
+            return self.model_error
+        beside = max(self.discrepancy.get(s.channel, 0.0), HIDDEN * s.noise / s.span)
+        return float(np.hypot(self.model_error, beside))
+
+    def shared(self, s: Signal) -> float:
+        """Samples that share one error of the model: those of two correlation times, or of the whole signal, (D19)."""
+        time, known = self.recording.time[s.rows], self.memory.get(s.channel)
+        if known is None:
+            return float(time.size)
+        return float(min(max(2.0 * known / float(np.median(np.diff(time))), 1.0), time.size))
 
     @property
     def count(self) -> int:

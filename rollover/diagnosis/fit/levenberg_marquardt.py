@@ -119,10 +119,10 @@ class Problem(Simulations):
     @property
     def samples_per_error(self) -> float:
         """Samples that share one error: those of a signal where a scatter or a tolerance prevails, else 1."""
-        signals = [s for e in self.dataset for s in e.signals]
+        shared = [e.shared(s) for e in self.dataset for s in e.signals]
         if not all(e.model_error_dominates(s) for e in self.dataset for s in e.signals):
             return 1.0
-        return sum(s.rows.size for s in signals) / len(signals)
+        return sum(shared) / len(shared)
 
     def residuals(self, fitted: Fitted) -> list[Array]:
         """Measured less predicted, stacked, SI, of each recording."""

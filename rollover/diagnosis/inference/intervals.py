@@ -199,7 +199,7 @@ def _along_ridge(
         at = fitted.x[k] + beyond * way
         if not 0.0 < at < 1.0:
             break
-        found = problem.fit(_held(fitted, k, at), x, rounds=FEW_ROUNDS, shifts=shifts, width=1)
+        found = problem.fit(held_at(fitted, k, at), x, rounds=FEW_ROUNDS, shifts=shifts, width=1)
         if found is None:
             break
         if found.left - start > due:
@@ -210,7 +210,7 @@ def _along_ridge(
     return inside[0]
 
 
-def _held(fitted: Fitted, k: int, at: float) -> list[Candidate]:
+def held_at(fitted: Fitted, k: int, at: float) -> list[Candidate]:
     """The effects of a fit with its k-th coordinate held at a place."""
     c, place = next((c, place) for c, place in each_with_own(fitted.candidates) if place.start <= k < place.stop)
     name = list(c.search)[k - place.start]
@@ -230,7 +230,7 @@ def _within_range(problem: Problem, fitted: Fitted, wide: Array, dispersion: flo
 
     def is_met(k: int, at: float) -> bool:
         others = [v for j, v in enumerate(fitted.x) if j != k]
-        there = problem.fit(_held(fitted, k, at), others, rounds=FEW_ROUNDS, shifts=shifts, width=1)
+        there = problem.fit(held_at(fitted, k, at), others, rounds=FEW_ROUNDS, shifts=shifts, width=1)
         return there is None or there.left - fitted.left < due
 
     for k, x in enumerate(fitted.x):

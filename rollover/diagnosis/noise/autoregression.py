@@ -69,7 +69,7 @@ def quiet(dataset: Sequence[Dataset], residuals: Sequence[Array]) -> list[Datase
             best = own if own is not None and loud else common
             found[r][k] = replace(s, noise=best.sigma * size, ar=best.ar)
     found = [
-        [replace(with_noise(s, s.noise, s.ar, e.model_error), at_rest=(s.noise, s.ar)) for s in f]
+        [replace(with_noise(s, s.noise, s.ar, e.error_of(s)), at_rest=(s.noise, s.ar)) for s in f]
         for e, f in zip(dataset, found, strict=True)
     ]
     return [replace(e, signals=tuple(s)) for e, s in zip(dataset, found, strict=True)]
@@ -126,7 +126,7 @@ def whole(dataset: Sequence[Dataset], residuals: Sequence[Array]) -> list[Datase
         slow = set()
     for r, k, s, sigma, ar in told:
         if s.channel not in slow:
-            found[r][k] = with_noise(s, sigma, ar, dataset[r].model_error)
+            found[r][k] = with_noise(s, sigma, ar, dataset[r].error_of(s))
     return [replace(e, signals=tuple(s)) for e, s in zip(dataset, found, strict=True)]
 
 

@@ -52,8 +52,9 @@ def candidates_of(
             ends[s.channel] = max(ends.get(s.channel, 0.0), s.end)
     found, times = [], _times(dataset)
     tried = set_up(scenario, dataset[0].recording) if scenario is not None and dataset else scenario
+    in_fluid = scenario is not None and scenario.ground.law.fluid
     for name, kind in EFFECTS.items():
-        if name in switched_on or acts not in kind.acts or not kind.competes:
+        if name in switched_on or acts not in kind.acts or not kind.competes or (kind.solid and in_fluid):
             continue
         if kind.kind == "sensor":
             heard = [Heard(channel, spans, times.get(channel, 1.0), ends[channel]) for channel in spans]

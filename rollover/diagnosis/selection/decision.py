@@ -242,7 +242,7 @@ def decided(problem: Problem, found: Explanation, groups: Groups, phases: Phases
     # what a tolerance allows has structure too
     is_whole = is_whole or (is_tolerated(problem, found.fitted) and ahead < HARDLY_MORE)
     if found.parts and is_whole and ahead < start:
-        return found, _kind(strongest(problem, found.base, found.fitted))
+        return found, kind_of(strongest(problem, found.base, found.fitted))
     if found.first is not None and found.parts:
         one = found.first
         end = held_out(one.fitted, groups).total
@@ -250,7 +250,7 @@ def decided(problem: Problem, found: Explanation, groups: Groups, phases: Phases
         after = mismatch_of(problem.dataset, one.fitted.blocks, phases)
         is_nearly_all = end**2 - 1.0 < PARTLY * (start**2 - 1.0) and after.structure <= PARTLY * found.before.structure
         if is_nearly_all and inside:
-            return replace(found, parts=(one,), fitted=one.fitted, after=after), _kind(one.fitted.candidates[-1])
+            return replace(found, parts=(one,), fitted=one.fitted, after=after), kind_of(one.fitted.candidates[-1])
     significant = found.before.p_value < SURE and matters(problem, found.base, found.before)
     significant = significant and not is_tolerated(problem, found.base) and not is_slight(problem, found.first, phases)
     verdict: Verdict = "unexplained" if significant or found.parts else "no-mismatch"
@@ -300,7 +300,8 @@ def by_the_first(problem: Problem, found: Explanation, nothing: Collection[str],
     return replace(found, parts=(one,), fitted=one.fitted, after=after)
 
 
-def _kind(c: Candidate) -> Verdict:
+def kind_of(c: Candidate) -> Verdict:
+    """The verdict on what an effect explains."""
     return "missing-physics" if c.kind == "physics" else "parameter" if c.kind == "parameter" else "sensor"
 
 

@@ -1,0 +1,228 @@
+"""From recordings made ready to a conclusion: who explains them, what that is worth, and what is no finding."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+from rollover.diagnosis.alone import decided_beside, explained_by_one
+from rollover.diagnosis.data.dataset import Dataset, doubted_beside, left_out
+from rollover.diagnosis.data.inconsistent import Aside, by_inconsistencies
+from rollover.diagnosis.data.phases import phases_of
+from rollover.diagnosis.data.repeatability import differing
+from rollover.diagnosis.fit.jobs import Executor
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.local_search import conditioned, is_doubtful
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.fit.step import Groups
+from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.forward.forward_model import set_up
+from rollover.diagnosis.grades import graded, with_shares
+from rollover.diagnosis.inference.adequacy import is_enough, is_tolerated
+from rollover.diagnosis.inference.discrepancy import Discrepancy
+from rollover.diagnosis.inference.lack_of_fit import mismatch_of
+from rollover.diagnosis.inference.recording_faults import RecordingFault, broken_off, by_themselves, misread
+from rollover.diagnosis.invariants import barred, clear_of_null, is_noise_alone, next_best
+from rollover.diagnosis.noise.offsets import by_zeros
+from rollover.diagnosis.noise.truncation import left_aside
+from rollover.diagnosis.power import nothing_told
+from rollover.diagnosis.prepared import trusted
+from rollover.diagnosis.result import Answer, Diagnosis, Named, Verdict
+from rollover.diagnosis.selection.candidates import candidates_of, size_of
+from rollover.diagnosis.selection.context import Inquiry
+from rollover.diagnosis.selection.decision import (
+    Explanation,
+    by_the_first,
+    decided,
+    done_by_others,
+    explained,
+    takes_little,
+)
+from rollover.diagnosis.statements import (
+    interval_contains_null,
+    named,
+)
+from rollover.dynamics.drop_test import unfit
+from rollover.recording import Recording
+from rollover.scenario import Scenario
+
+NAMING = ("parameter", "sensor", "missing-physics")  # verdicts that name effects
+HALF = 0.5  # of what was beyond the noise: of less a channel that breaks off may be all of it
+AS_NOISE = "what is left is 1.0 times the noise, or hardly more and before the first contact: no more than noise"
+FEWEST = 24  # samples in all, below which nothing is said
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """What a diagnosis was asked for, and when (s of the clock that counts).
+
+    `discrepancy` is what the scenario may miss beside what it lacks, once that is stated, taught or estimated.
+    """
+
+    scenario: Scenario
+    recordings: Mapping[str, Recording]
+    hold_out: Sequence[str]
+    say: Callable[[str], None]
+    executor: Executor
+    began: float
+    discrepancy: Discrepancy | None = None
+    is_timed: bool = False  # whether clocks were set right that are off by far more than they may be
+
+
+@dataclass(frozen=True, kw_only=True)
+class Conclusion:
+    """What recordings say: the explanation, its verdict and grade, and what it was drawn from.
+
+    `tried` is the explanation before what does not explain was refused, `slight` are effects of no consequence, `shown`
+    is what recordings show by themselves, `kept` are those that were held out, `groups` what is left out in turn.
+    """
+
+    asked: Asked
+    problem: Problem
+    tried: Explanation
+    explanation: Explanation
+    verdict: Verdict
+    grade: Answer
+    effects: tuple[Named, ...]
+    slight: tuple[Named, ...]
+    shown: RecordingFault | None
+    kept: tuple[Dataset, ...]
+    groups: Groups
+    candidates: Sequence[Candidate]
+    acts: str
+    is_cross_validated: bool
+    inconsistencies: tuple[Aside, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def is_beside(self) -> bool:
+        """Whether it was drawn beside a discrepancy that was estimated."""
+        return self.asked.discrepancy is not None and self.asked.discrepancy.is_estimated
+
+
+def concluded(
+    asked: Asked, every: Sequence[Dataset], inconsistencies: Sequence[Aside], notes: Sequence[str]
+) -> Conclusion | Diagnosis:
+    """What recordings without what was left aside say; the diagnosis itself where there is too little to judge."""
+    scenario, recordings, hold_out = asked.scenario, asked.recordings, asked.hold_out
+    executor, began, names = asked.executor, asked.began, list(asked.recordings)
+    notes = [*notes, *(inconsistency.says() for inconsistency in inconsistencies)]
+    found = trusted(scenario, [e for e in every if e.name not in hold_out])
+    kept = [e for e in trusted(scenario, every) if e.name in hold_out] if hold_out else []
+    if sum(e.count for e in found) < FEWEST:
+        return nothing_told(every, names, notes, began, by_inconsistencies(inconsistencies))
+    notes += [*left_aside(every, found), *by_zeros(found)]
+    groups = left_out(found)
+    notes += differing(found)
+    is_cross_validated = len(groups) > 1 or bool(kept)
+    if not is_cross_validated:
+        notes.append("one condition only: what stands as held out is predicted by the fit to it")
+    problem = Problem(found)
+    executor.begin(problem)
+    align(problem)
+    base = problem.fit((), ())
+    if base is None:
+        return nothing_told(every, names, [*notes, "the scenario itself could not be simulated"], began)
+    phases = [phases_of(e) for e in found]
+    acts = "rollover" if any(unfit(set_up(scenario, e.recording)) for e in found) else "drop"
+    candidates = candidates_of(found, scenario.effects, acts, scenario, size_of(set_up(scenario, found[0].recording)))
+    inquiry = Inquiry(
+        problem=problem, candidates=candidates, groups=groups, phases=phases, say=asked.say, executor=executor
+    )
+    is_beside = asked.discrepancy is not None and asked.discrepancy.is_estimated
+    if asked.discrepancy is not None and is_beside:
+        explanation = tried = explained_by_one(inquiry, base, usual=asked.discrepancy.is_usual)
+    else:
+        explanation = tried = explained(inquiry, base)
+
+    def decide(found: Explanation) -> tuple[Explanation, Verdict]:
+        return decided_beside(problem, found, groups) if is_beside else decided(problem, found, groups, phases)
+
+    explanation, verdict = decide(explanation)
+    held, named_so = problem.dataset, _named_beside(problem, explanation, verdict, kept, groups, phases)
+    nothing: set[str] = set()
+    while (
+        more := done_by_others(problem, named_so[0], interval_contains_null(named_so[1], problem.effort.is_ensemble))
+        - nothing
+    ):
+        # what may as well be nothing is none of it: what came first explains what there is alone, or nothing does
+        nothing |= more
+        problem.with_noise_model(held)
+        alone = by_the_first(problem, explanation, nothing, phases)
+        explanation, verdict = decide(alone)
+        named_so = _named_beside(problem, explanation, verdict, kept, groups, phases)
+    while more := barred(problem, named_so[0], named_so[1], groups) - nothing:
+        nothing |= more
+        problem.with_noise_model(held)
+        explanation, verdict = decide(next_best(problem, explanation, nothing, groups, phases))
+        named_so = _named_beside(problem, explanation, verdict, kept, groups, phases)
+    explanation, effects, kept = named_so
+    effects = clear_of_null(problem, explanation, effects)
+    found = list(problem.dataset)
+    if verdict == "unexplained" and is_noise_alone(problem, explanation, groups):
+        verdict = "no-mismatch"
+        notes.append(AS_NOISE)
+    scales = asked.discrepancy.scales if asked.discrepancy is not None and is_beside else {}
+    enough = is_tolerated if is_beside else partial(is_enough, left=explanation.after)
+    left = not enough(problem, explanation.fitted)
+    grade, effects = graded(*with_shares(problem, explanation, effects, groups), scales, remains=left)
+    slight = effects if grade == "immaterial" else ()
+    if slight or (effects and grade == "unexplained"):
+        verdict, effects, explanation = "no-mismatch" if slight else "unexplained", (), explanation.refused()
+    shown = None
+    if verdict == "no-mismatch":
+        shown = by_themselves(found, recordings, phases, explanation.p_value) or misread(
+            inconsistencies, len(found), explanation.p_value
+        )
+    elif effects and takes_little(explanation, groups, HALF):
+        # what is lost again and again is met by no effect, and bends those that are fitted to it
+        shown = broken_off(found, recordings, phases, explanation.p_value)
+        if shown is not None and not (takes_little(explanation, groups) or shown.is_of(e.channel for e in effects)):
+            shown = None  # what another channel loses is no reason to doubt them
+    if shown is not None:
+        verdict, effects = shown.verdict, shown.effects
+        explanation = explanation.refused()
+    return Conclusion(
+        asked=asked,
+        problem=problem,
+        tried=tried,
+        explanation=explanation,
+        verdict=verdict,
+        grade=grade,
+        effects=effects,
+        slight=slight,
+        shown=shown,
+        kept=tuple(kept),
+        groups=groups,
+        candidates=candidates,
+        acts=acts,
+        is_cross_validated=is_cross_validated,
+        inconsistencies=tuple(inconsistencies),
+        notes=tuple(notes),
+    )
+
+
+def _named_beside(
+    problem: Problem,
+    explanation: Explanation,
+    verdict: str,
+    kept: Sequence[Dataset],
+    groups: Sequence[Sequence[int]],
+    phases: Sequence[Sequence[tuple[float, str]]],
+) -> tuple[Explanation, tuple[Named, ...], list[Dataset]]:
+    """An explanation eased beside its effects, these with their numbers if the verdict names any, and the kept ones."""
+    whole, kept = marginalised_beside(problem, explanation, kept, phases)
+    return whole, named(problem, whole, groups) if verdict in NAMING else (), kept
+
+
+def marginalised_beside(
+    problem: Problem, explanation: Explanation, kept: Sequence[Dataset], phases: Sequence[Sequence[tuple[float, str]]]
+) -> tuple[Explanation, list[Dataset]]:
+    """The explanation fitted again with what the conditions leave uncertain as it acts beside it; kept ones too."""
+    if not explanation.parts or not is_doubtful(problem):
+        return explanation, list(kept)
+    fitted = conditioned(problem, explanation.fitted)
+    beside = problem.changes(fitted.candidates, fitted.x)
+    after = mismatch_of(problem.dataset, fitted.blocks, phases)
+    return replace(explanation, fitted=fitted, after=after), [doubted_beside(e, beside) for e in kept]

@@ -1,0 +1,142 @@
+"""How much an explanation explains: shares of the held-out mismatch with intervals, and the grade of the answer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.data.dataset import Dataset
+from rollover.diagnosis.fit.cross_validation import held_out
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.parameterisation import Candidate, each_with_own
+from rollover.diagnosis.fit.step import Groups
+from rollover.diagnosis.inference.lack_of_fit import SURE
+from rollover.diagnosis.result import Answer, Named, Share, Verdict
+from rollover.diagnosis.selection.decision import Explanation
+
+Array = NDArray[np.float64]
+IMMATERIAL = 0.01  # of a load's peak: what moves no load by more is of no consequence
+VALIDATED = 0.99  # quantile of a load's change: what is left out are leaps, whose instant a clock decides
+HALF = 0.5  # of the mismatch, that is explained at least by what is called a part of it
+NEARLY_ALL = 0.95  # of the mismatch, that the whole explains surely: what resembles an unlisted effect leaves more
+BODY = 0.03  # of a channel's range: discrepancies of models are about this, see `discrepancy.MEDIAN`
+CONFIDENCE = 0.975  # one side of a 95 % interval
+LOADS = ("force", "moment", "acceleration")  # in the names of channels that are loads, or tell one
+
+
+def shares(problem: Problem, found: Explanation, groups: Groups) -> tuple[Share | None, dict[str, Share]]:
+    """Share of the held-out mismatch that all effects explain together, and each of them beside the others by key.
+
+    1 - (L_after - N)/(L_before - N) with L the held-out sums of squares, N what noise alone leaves of them, (D20).
+    """
+    noise = np.array([_by_noise(e) for e in problem.dataset])
+    before, after = held_out(found.base, groups).left, held_out(found.fitted, groups).left
+    if not found.parts or float(np.sum(before - noise)) <= 0.0:
+        return None, {}
+    whole = jackknifed(before - after, before - noise, groups)
+    if len(found.parts) == 1:
+        return whole, {found.parts[0].fitted.candidates[-1].key: whole}
+    each = {}
+    for step in found.parts:
+        without, with_ = held_out(step.base, groups).left, held_out(step.fitted, groups).left
+        each[step.fitted.candidates[-1].key] = jackknifed(without - with_, before - noise, groups)
+    return whole, each
+
+
+def jackknifed(gained: Array, due: Array, groups: Groups) -> Share:
+    """Ratio sum(gained)/sum(due) of recordings (n,) with an interval by leaving out one group after another."""
+    from scipy.special import stdtrit
+
+    share = float(gained.sum() / due.sum())
+    kept = [[r for r in range(gained.size) if r not in group] for group in groups]
+    each = [float(gained[k].sum() / due[k].sum()) for k in kept if k and float(due[k].sum()) > 0.0]
+    m = len(each)
+    if m < 2:
+        return Share(share=min(share, 1.0), low=-np.inf, high=1.0)
+    error = float(np.sqrt((m - 1) / m * np.sum((np.array(each) - np.mean(each)) ** 2)))
+    wide = float(stdtrit(m - 1, CONFIDENCE)) * error
+    return Share(share=min(share, 1.0), low=share - wide, high=min(share + wide, 1.0))
+
+
+def _by_noise(e: Dataset) -> float:
+    """Sum of squares that the noise alone leaves of a recording beside a discrepancy."""
+    return float(sum(s.rows.size * min(s.noise / s.sigma, 1.0) ** 2 for s in e.signals))
+
+
+def with_shares(
+    problem: Problem, found: Explanation, effects: Sequence[Named], groups: Groups
+) -> tuple[tuple[Named, ...], Share | None]:
+    """Effects with the share of the mismatch that each explains and how far it moves loads, and the share of all."""
+    whole, each = shares(problem, found, groups)
+    # where a run is dear, what was simulated without an effect stands for the others as they are
+    bases = {s.fitted.candidates[-1].key: s.base for s in found.parts} if problem.effort.is_ensemble else {}
+    told = []
+    for k, (c, own) in enumerate(each_with_own(found.fitted.candidates)):
+        others = [o for j, o in enumerate(found.fitted.candidates) if j != k]
+        x = [v for j, v in enumerate(found.fitted.x) if not own.start <= j < own.stop]
+        if c.key in bases:
+            others, x = list(bases[c.key].candidates), list(bases[c.key].x)
+        named = [e for e in effects if (e.id, e.channel) == (c.id, c.channel)]
+        moves = moved(problem, found.fitted, others, x) if c.kind != "sensor" and named else None
+        told += [replace(e, explains=each.get(c.key), moves=moves) for e in named]
+    place = {(e.id, e.channel): n for n, e in enumerate(effects)}
+    return tuple(sorted(told, key=lambda e: place[e.id, e.channel])), whole
+
+
+def moved(problem: Problem, fitted: Fitted, others: Sequence[Candidate], x: Sequence[float]) -> float | None:
+    """The most by which a fit's loads differ from those of the `others` at x, of a load's peak; None of no load."""
+    most: float | None = None
+    for r, (e, block) in enumerate(zip(problem.dataset, fitted.blocks, strict=True)):
+        a = problem.raw(r, fitted.candidates, fitted.x, block.shift)
+        b = problem.raw(r, others, x, block.shift)
+        if a is None or b is None:
+            continue
+        for s, part in e.spans():
+            peak = float(np.max(np.abs(a[part])))
+            if is_load(s.channel) and peak > 0.0:
+                most = max(most or 0.0, float(np.quantile(np.abs(a[part] - b[part]), VALIDATED)) / peak)
+    return most
+
+
+def answer_of(verdict: Verdict, grade: Answer, p_value: float, *, slight: bool, is_beside: bool) -> Answer:
+    """The answer of a diagnosis by its verdict, and by the `grade` of the effects that it names.
+
+    `slight` are effects of no consequence; what is left beside a discrepancy (`is_beside`) is nothing.
+    """
+    if verdict == "no-mismatch":
+        return "immaterial" if slight or (p_value < SURE and not is_beside) else "nothing"
+    if verdict in ("unexplained", "cannot-tell"):
+        return "unexplained" if verdict == "unexplained" else "cannot-tell"
+    return grade
+
+
+def is_load(channel: str) -> bool:
+    """Whether a channel is a load, or tells one."""
+    return any(name in channel.rsplit("/", 1)[-1] for name in LOADS)
+
+
+def is_immaterial(effect: Named) -> bool:
+    """Whether an effect of the body or the ground is there, and of no consequence to any load."""
+    return effect.kind != "sensor" and effect.moves is not None and effect.moves < IMMATERIAL
+
+
+def graded(
+    effects: Sequence[Named], whole: Share | None, scales: Mapping[str, float], *, remains: bool
+) -> tuple[Answer, tuple[Named, ...]]:
+    """The answer, and the effects with theirs; `scales` is a discrepancy that was estimated, `remains` what is left.
+
+    Whole: noise is left, or beside it no more than models usually miss and surely nearly nothing of what there was.
+    Likeness: its family cannot be told from another, or its form is not quite that of the recordings. Part: structure
+    is left that is more.
+    """
+    if effects and all(is_immaterial(e) for e in effects):
+        return "immaterial", tuple(replace(e, answer="immaterial") for e in effects)
+    if remains and whole is not None and whole.share < HALF:
+        return "unexplained", tuple(replace(e, answer="unexplained") for e in effects)
+    alike = any(e.indistinguishable_from for e in effects)
+    bent = bool(scales) and (max(scales.values()) > BODY or whole is None or whole.low < NEARLY_ALL)
+    answer: Answer = "part" if remains else "likeness" if alike or bent else "whole"
+    return answer, tuple(replace(e, answer="immaterial" if is_immaterial(e) else answer) for e in effects)

@@ -1,0 +1,137 @@
+"""What a model misses beside what it lacks: scales of the discrepancy, by what explanations leave (D16) to (D19)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.data.dataset import ROUGH, Dataset
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.result import Scale
+from rollover.spec.channels import describe
+
+Array = NDArray[np.float64]
+RARELY = (0.01, 0.10)  # of a channel's range: models are rarely closer to what they are a model of, and rarely further
+NORMAL_95 = 1.645  # 95 % of a normal distribution lie below so many standard deviations
+MEDIAN = float(np.sqrt(RARELY[0] * RARELY[1]))
+SPREAD = float(np.log(RARELY[1] / RARELY[0]) / (2.0 * NORMAL_95))  # of ln s, by these quantiles of 5 and 95 %
+SCALES = np.geomspace(1e-4, 1.0, 801)  # s that are tried: steps of 1.2 %, the widest that no digit of a report shows
+LESS = 0.7  # times a scale, that another estimate must come to for it to be worth another fit
+USUAL = 0.05  # of a channel's range: three quarters of all models miss less, by `MEDIAN` and `SPREAD`
+DRAWS = 2.0  # of a discrepancy in a channel: what is loaded, and what unloads and rests; each drop repeats them
+
+
+@dataclass(frozen=True, kw_only=True)
+class Discrepancy:
+    """Scale (share of the range) and correlation time (s) of each channel; `by_none` is what the scenario leaves."""
+
+    scales: Mapping[str, float]
+    times: Mapping[str, float] = field(default_factory=dict)
+    by_none: Mapping[str, float] = field(default_factory=dict)
+    is_estimated: bool = False  # by what explanations leave of the recordings themselves: neither stated nor taught
+
+    @property
+    def is_usual(self) -> bool:
+        """Whether it is no larger than what models usually miss."""
+        return max(self.scales.values(), default=0.0) <= USUAL
+
+    def is_clearly_above(self, other: Discrepancy) -> bool:
+        """Whether another estimate is clearly smaller in any channel."""
+        return any(other.scales.get(c, s) < LESS * s for c, s in self.scales.items())
+
+    def told(self, dataset: Sequence[Dataset]) -> dict[str, Scale]:
+        """Scale of each channel in its unit, and its correlation time where it is known."""
+        spans: dict[str, list[float]] = {}
+        for e in dataset:
+            for s in e.signals:
+                spans.setdefault(s.channel, []).append(s.span)
+        return {
+            c: Scale(
+                scale=share * float(np.median(spans[c])), unit=describe(c).unit, correlation_time=self.times.get(c)
+            )
+            for c, share in self.scales.items()
+            if c in spans
+        }
+
+
+def posterior(left: float, draws: float = DRAWS) -> tuple[float, float]:
+    """Most probable s (share of a range) and log probability of a remainder of rms `left` in some draws, (D17)."""
+    log_p = -draws * (np.log(SCALES) + 0.5 * (left / SCALES) ** 2) - 0.5 * (np.log(SCALES / MEDIAN) / SPREAD) ** 2
+    best = int(np.argmax(log_p))
+    return float(SCALES[best]), float(np.log(np.sum(np.exp(log_p - log_p[best]))) + log_p[best])
+
+
+def left_beyond_noise(problem: Problem, fitted: Fitted) -> dict[str, float]:
+    """Root mean square that a fit leaves of each channel after first contact beyond noise, a share of its range."""
+    found: dict[str, list[float]] = {}
+    for e, residual in zip(problem.dataset, problem.residuals(fitted), strict=True):
+        residual = without_doubts(e, residual)
+        for s, part in e.spans():
+            after = e.recording.time[s.rows] >= e.simulator.contact
+            if after.any():
+                power = float(np.mean(residual[part][after] ** 2)) - s.noise**2
+                found.setdefault(s.channel, []).append(max(power, 0.0) / s.span**2)
+    return {channel: float(np.sqrt(np.mean(powers))) for channel, powers in found.items()}
+
+
+def without_doubts(e: Dataset, residual: Array) -> Array:
+    """A misfit (n,), SI, without what uncertain conditions make of it at their most probable values."""
+    if e.doubts is None:
+        return residual
+    N = e.whitened(e.doubts)
+    pulls = np.linalg.solve(np.eye(N.shape[1]) + N.T @ N, N.T @ e.whitened(residual))
+    return np.asarray(residual - e.doubts @ pulls)
+
+
+def estimated(problem: Problem, base: Fitted, tried: Sequence[Fitted]) -> Discrepancy:
+    """The discrepancy by the remains of "nothing" and of all that was tried, each for what it is worth, (D18).
+
+    Which explanation is right every recording tells anew; how far it misses is told by the rig, once for all of them.
+    """
+    models = [base, *tried]
+    left = [left_beyond_noise(problem, m) for m in models]
+    told = [{c: posterior(v) for c, v in one.items()} for one in left]
+    score = len(problem.dataset) * np.array([sum(v for _, v in one.values()) for one in told])
+    weight = np.exp(score - score.max())
+    weight /= weight.sum()
+    scales = {}
+    for channel in left[0]:
+        power = sum(w * one[channel][0] ** 2 for w, one in zip(weight, told, strict=True))
+        scales[channel] = float(np.sqrt(power))
+    times = correlation_times(problem, models[int(np.argmax(weight))])
+    return Discrepancy(scales=scales, times=times, by_none=left[0], is_estimated=True)
+
+
+def taught(problem: Problem, base: Fitted) -> Discrepancy | None:
+    """The discrepancy of recordings in which nothing is missing, a draw each; None if noise hides it everywhere."""
+    left = left_beyond_noise(problem, base)
+    scales = {c: posterior(v, DRAWS * len(problem.dataset))[0] for c, v in left.items()}
+    hidden = {s.channel for e in problem.dataset for s in e.signals if scales[s.channel] * s.span > ROUGH * s.noise}
+    return Discrepancy(scales=scales, times=correlation_times(problem, base), by_none=left) if hidden else None
+
+
+def correlation_times(problem: Problem, fitted: Fitted) -> dict[str, float]:
+    """Time (s) over which what a fit leaves of each channel is one error: by its lag of half the correlation, (D19)."""
+    found: dict[str, list[float]] = {}
+    for e, residual in zip(problem.dataset, problem.residuals(fitted), strict=True):
+        residual = without_doubts(e, residual)
+        for s, part in e.spans():
+            time = e.recording.time[s.rows]
+            v = residual[part][time >= e.simulator.contact]
+            if v.size < 8:
+                continue
+            power = float(np.mean(v**2)) - s.noise**2
+            if power <= 0.0:
+                continue
+            lags = range(1, v.size // 2)
+            below = next((k for k in lags if float(np.mean(v[k:] * v[:-k])) < 0.5 * power), v.size // 2)
+            found.setdefault(s.channel, []).append(below * float(np.median(np.diff(time))) / np.log(2.0))
+    return {channel: float(np.median(times)) for channel, times in found.items()}
+
+
+def beside(every: Sequence[Dataset], found: Discrepancy) -> list[Dataset]:
+    """The evidence with a discrepancy of these scales and correlation times by channel."""
+    return [replace(e, discrepancy=dict(found.scales), memory=dict(found.times)) for e in every]

@@ -1,0 +1,175 @@
+"""What holds of every diagnosis: findings that break it are none, and what breaks it all the same is said by name."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from math import isfinite
+
+import numpy as np
+
+from rollover.diagnosis.fit.cross_validation import held_out
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.parameterisation import coordinate, physical, strength_parameter
+from rollover.diagnosis.fit.step import Groups, Phases
+from rollover.diagnosis.grades import IMMATERIAL
+from rollover.diagnosis.inference.intervals import FEW_ROUNDS, held_at
+from rollover.diagnosis.inference.lack_of_fit import SURE, mismatch_of
+from rollover.diagnosis.inference.local_quadratic import TWO_SIDED
+from rollover.diagnosis.result import Diagnosis, Named
+from rollover.diagnosis.selection.decision import Explanation
+from rollover.diagnosis.selection.forward_step import NEARLY_NOISE, is_at_an_end
+from rollover.diagnosis.selection.stepwise import as_conditioned
+from rollover.diagnosis.statements import is_none
+from rollover.effects import EFFECTS
+
+NAMING = ("parameter", "sensor", "missing-physics")  # verdicts that name effects
+AT_NOISE = 1.05  # times the noise: what a sentence would give as 1.0
+HALVINGS = 6  # of the way to a null: by then it is known to a 64th of that
+PART = 0.5  # of what the best takes beyond noise, that another must take to stand in for it
+
+
+def at_bounds(effects: Sequence[Named]) -> set[str]:
+    """Ids of effects with a number at an end of its range: the search ended there, not the effect.
+
+    A shape that few recordings tell from the strength may lie there.
+    """
+    return {
+        e.id for e in effects if any(i.at_bound for name, i in e.parameters.items() if name not in EFFECTS[e.id].shapes)
+    }
+
+
+def barred(problem: Problem, found: Explanation, effects: Sequence[Named], groups: Groups) -> set[str]:
+    """Ids of effects that are no finding: at a bound, maybe null, or predicting worse than nothing does.
+
+    Of an effect alone the misfit itself is asked whether it may be null, slopes only of one beside others.
+    """
+    if effects and held_out(found.fitted, groups).total >= held_out(found.base, groups).total:
+        return {e.id for e in effects}
+    null = {e.id for e in effects if may_be_null(e)}
+    if len(effects) == 1 and null and is_clear_of_null(problem, found.fitted):
+        null = set()
+    return at_bounds(effects) | null
+
+
+def may_be_null(effect: Named) -> bool:
+    """Whether its interval holds its null; what does something at its least strength already is there all the same."""
+    return is_none(effect) and not EFFECTS[effect.id].is_sudden
+
+
+def holds_null(effect: Named) -> bool:
+    """Whether the interval of each of its numbers that has a null holds that."""
+    nulls = {n: EFFECTS[effect.id].null.get(n) for n in effect.parameters}
+    known = {n: v for n, v in nulls.items() if isinstance(v, (int, float))}
+    return bool(known) and all(effect.parameters[n].low <= v <= effect.parameters[n].high for n, v in known.items())
+
+
+def is_clear_of_null(problem: Problem, fitted: Fitted) -> bool:
+    """Whether the misfit of an effect alone rises by what ends an interval before its null is reached.
+
+    An interval by slopes may hold the null of a number whose misfit is steep on that side. Where a run is dear it is
+    not looked at.
+    """
+    return problem.effort.is_ensemble or null_side(problem, fitted) is not None
+
+
+def null_side(problem: Problem, fitted: Fitted) -> tuple[str, float, bool] | None:
+    """The number that says how strong an effect alone is, where its interval ends towards its null, and if from below.
+
+    By halving the way with all else fitted anew; None where even next to the null too little more is left.
+    """
+    c = fitted.candidates[-1]
+    name, null = strength_parameter(c.id, c.search)
+    search, k = c.search[name], list(c.search).index(name)
+    at = fitted.x[k]
+    end = coordinate(null, search) if search.scale == "linear" or null > 0.0 else 0.0
+    if not np.isfinite(end):
+        return None
+    count = sum(b.residual.size for b in fitted.blocks)
+    due = TWO_SIDED**2 * max(1.0, fitted.left / count) * problem.samples_per_error
+    shifts, others = [b.shift for b in fitted.blocks], [v for j, v in enumerate(fitted.x) if j != k]
+
+    def is_met(place: float) -> bool:
+        there = problem.fit(held_at(fitted, k, place), others, rounds=FEW_ROUNDS, shifts=shifts, width=1)
+        return there is None or there.left - fitted.left < due
+
+    beyond, inside = min(max(end, 0.0), 1.0), at
+    if is_met(beyond):
+        return None
+    for _ in range(HALVINGS):
+        middle = 0.5 * (inside + beyond)
+        inside, beyond = (middle, beyond) if is_met(middle) else (inside, middle)
+    return name, physical(beyond, search), beyond < at
+
+
+def clear_of_null(problem: Problem, found: Explanation, effects: Sequence[Named]) -> tuple[Named, ...]:
+    """Effects, one alone with an interval that ends before its null where it would hold that by slopes."""
+    if len(effects) != 1 or problem.effort.is_ensemble or not may_be_null(effects[0]):
+        return tuple(effects)
+    told = null_side(problem, found.fitted)
+    if told is None:
+        return tuple(effects)
+    name, end, is_low = told
+    own = effects[0].parameters[name]
+    own = replace(own, low=end) if is_low else replace(own, high=end)
+    return (replace(effects[0], parameters={**effects[0].parameters, name: own}),)
+
+
+def next_best(
+    problem: Problem, found: Explanation, out: Collection[str], groups: Groups, phases: Phases
+) -> Explanation:
+    """The explanation by the best single effect that is not `out`, if it takes a good part of what the best does."""
+    first = found.first
+    if first is None:
+        return found.refused()
+    start = float(held_out(first.base, groups).left.sum())
+    left = {f.label: float(held_out(f, groups).left.sum()) for f in first.rivals}
+    most = max((start - v for v in left.values()), default=0.0)
+    able = [
+        f
+        for f in first.rivals
+        if f.candidates[-1].id not in out and not is_at_an_end(f) and start - left[f.label] > PART * most
+    ]
+    if not able:
+        return found.refused()
+    one = replace(first, fitted=min(able, key=lambda f: left[f.label])).again(problem)
+    one, after = as_conditioned(problem, one, mismatch_of(problem.dataset, one.fitted.blocks, phases), phases)
+    return replace(found, parts=(one,), fitted=one.fitted, after=after, first=one)
+
+
+def is_noise_alone(problem: Problem, found: Explanation, groups: Groups) -> bool:
+    """Whether what is significant is 1.0 times the noise, or nearly that and lies before the first contact.
+
+    Neither is a mismatch: a noise with a slow part below a white one looks so. What is more acts in the fall.
+    """
+    total = held_out(found.base, groups).total
+    if total < AT_NOISE:
+        return True
+    pairs = zip(found.before.cells, found.before.adjusted, strict=True)
+    significant = [c for c, p in pairs if p < SURE]
+    early = all(c.end <= problem.dataset[c.recording].simulator.contact for c in significant)
+    return total < NEARLY_NOISE and bool(significant) and early
+
+
+def checked(found: Diagnosis) -> Diagnosis:
+    """The diagnosis with the invariants that were checked, and those of them that it breaks."""
+    detectable = {name: v for name, v in found.smallest_detectable.items() if isfinite(v) and v > 0.0}
+    found = replace(found, smallest_detectable=detectable)
+    before, after = (s["held_out"].nrmse if "held_out" in s else None for s in (found.before, found.after))
+    gains = before is None or after is None or not found.effects or after < before
+    rules = {
+        "no value at a bound is a finding": not at_bounds(found.effects),
+        "no interval of a finding holds its null": not any(
+            holds_null(e) and not EFFECTS[e.id].is_sudden for e in found.effects
+        ),
+        "held-out recordings are predicted no worse than without": gains,
+        "verdict and effects agree": (found.verdict in NAMING) == bool(found.effects),
+        "no effect of consequence to no load leads to a verdict": not found.effects
+        or any(e.moves is None or e.moves >= IMMATERIAL or e.kind == "sensor" for e in found.effects),
+        "smallest_detectable is above 0": all(v > 0.0 for v in found.smallest_detectable.values()),
+        "unexplained is more than 1.0 times the noise": found.verdict != "unexplained"
+        or not found.where
+        or before is None
+        or before >= AT_NOISE,
+    }
+    return replace(found, checked=tuple(rules), broken=tuple(name for name, holds in rules.items() if not holds))

@@ -1,0 +1,82 @@
+"""Recordings made ready for a diagnosis: what is left aside of them, what their digits and their noise are like."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rollover.diagnosis.data.dataset import Dataset, dataset_of, doubted, foreign_to
+from rollover.diagnosis.data.quantisation import digitised, without_spikes
+from rollover.diagnosis.data.repeatability import with_scatter
+from rollover.diagnosis.fit.jobs import Executor
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.time_shift import align
+from rollover.diagnosis.forward.averaging import compared
+from rollover.diagnosis.forward.forward_model import first_impact_of, set_up
+from rollover.diagnosis.forward.full_run import full_runs
+from rollover.diagnosis.noise import autoregression
+from rollover.diagnosis.noise.ensemble import weighted
+from rollover.diagnosis.noise.heteroscedasticity import with_variance_model
+from rollover.diagnosis.noise.offsets import with_zeros
+from rollover.diagnosis.noise.truncation import shortened
+from rollover.recording import Recording
+from rollover.scenario import Scenario
+from rollover.spec.channels import describe
+from rollover.system.errors import InputError
+
+
+def prepared(
+    scenario: Scenario, recordings: Sequence[tuple[str, Recording]], executor: Executor
+) -> tuple[list[Dataset], list[str]]:
+    """Recordings as evidence, and what is to be said of them. Raises `InputError` where none of it is simulated."""
+    found, read, notes, foreign = [], [], [], []
+    for name, whole in recordings:
+        recording, spiked = without_spikes(whole)
+        recording, thin, simulator, averaged = compared(scenario, recording)
+        if spiked and (first_impact := first_impact_of(simulator)) < np.inf:
+            recording, spiked = without_spikes(whole, first_impact)
+            recording, thin, simulator, averaged = compared(scenario, recording)
+        runs = full_runs(simulator)
+        if runs is not None:
+            runs.children = executor.children
+        simulator.settle()
+        notes += [f"{name}: {line}" for line in spiked]
+        one = dataset_of(name, thin, simulator, averaged)
+        still = [c for c, v in recording.channels.items() if np.isfinite(v).any() and np.nanmin(v) == np.nanmax(v)]
+        notes += [f"{name}: {channel} never moves and was left aside" for channel in still]
+        if one is None:
+            notes.append(f"{name}: shares no usable channel with the simulation and was left aside")
+            foreign += foreign_to(simulator, name, recording)
+        else:
+            found.append(one)
+            read.append(recording)
+    if foreign and not found:
+        raise InputError(*foreign)
+    found = with_variance_model(digitised(found, read))
+    louder = {s.channel: float(s.level.max()) for e in found for s in e.signals if s.level is not None}
+    notes += [f"{c}: the noise grows with the value, to {most:.1f} times its least" for c, most in louder.items()]
+    steps = {s.channel: s.step for e in found for s in e.signals if s.step > 0.0}
+    notes += [
+        f"{c}: recorded in steps of {step:.3g} {describe(c).unit}, more than its noise: what is smaller does not show"
+        for c, step in steps.items()
+    ]
+    return found, notes
+
+
+def noise_told(scenario: Scenario, every: Sequence[Dataset]) -> list[Dataset]:
+    """The recordings with the noise of those alike taken together, from their quiet stretches."""
+    every = [doubted(e, set_up(scenario, e.recording)) for e in with_scatter(every)]
+    problem = Problem(every)
+    align(problem)
+    base = problem.fit((), (), rounds=2)
+    if base is None:
+        return list(every)
+    residuals, shifts = problem.residuals(base), [b.shift for b in base.blocks]
+    return with_zeros(autoregression.quiet(every, residuals), residuals, shifts)
+
+
+def trusted(scenario: Scenario, every: Sequence[Dataset]) -> list[Dataset]:
+    """The recordings weighed, what the simulation itself is not sure of less."""
+    reweighted = [weighted(e, e.simulator.perturbed()) for e in noise_told(scenario, every)]
+    return [shortened(e, alone=len(reweighted) == 1) for e in reweighted]

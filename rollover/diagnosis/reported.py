@@ -1,0 +1,160 @@
+"""A conclusion as it is reported: places, dependence, scores, one sentence."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Sequence
+
+from rollover.diagnosis.conclusion import Conclusion
+from rollover.diagnosis.data.dataset import Dataset
+from rollover.diagnosis.data.inconsistent import by_inconsistencies
+from rollover.diagnosis.data.repeatability import CONTRADICTING, against_itself, differing
+from rollover.diagnosis.fit.time_shift import by_clock, mistimed
+from rollover.diagnosis.forward.forward_model import set_up
+from rollover.diagnosis.forward.full_run import full_runs
+from rollover.diagnosis.grades import answer_of
+from rollover.diagnosis.inference.adequacy import is_enough, is_tolerated
+from rollover.diagnosis.inference.chassis import degrees_of
+from rollover.diagnosis.inference.drop_dependence import Dependence, dependence, dependence_of_one
+from rollover.diagnosis.inference.residual_law import offered, proposed
+from rollover.diagnosis.inference.scores import before_an_impact, judged
+from rollover.diagnosis.inference.vehicle_dependence import dependency
+from rollover.diagnosis.power import is_weak
+from rollover.diagnosis.result import Degree, Diagnosis
+from rollover.diagnosis.statements import (
+    as_models_miss,
+    by_share,
+    by_steps,
+    closest,
+    considered,
+    noise,
+    of_no_consequence,
+    of_no_ground,
+    places,
+    sentence,
+)
+from rollover.effects import spoken
+
+
+def reported(c: Conclusion) -> Diagnosis:
+    """A conclusion as it is reported, with what the mismatch depends on."""
+    asked, problem, explanation, shown, verdict, effects = (
+        c.asked,
+        c.problem,
+        c.explanation,
+        c.shown,
+        c.verdict,
+        c.effects,
+    )
+    scenario, executor, groups, found = asked.scenario, asked.executor, c.groups, list(problem.dataset)
+    before, after = explanation.before, explanation.after
+    set_ups = [set_up(scenario, e.recording) for e in found]
+    is_mismatch = verdict not in ("no-mismatch", "cannot-tell") and shown is None
+    asked.say("what the mismatch depends on")
+    depends_on = Dependence()
+    degrees: tuple[Degree, ...] = ()
+    if c.acts == "drop" and is_mismatch:
+        depends_on = dependence(problem, set_ups, explanation.base, executor.parallel_map)
+    elif c.acts != "drop":
+        degrees = degrees_of(set_ups, found, [b.shift for b in explanation.base.blocks])
+        of_one = dependence_of_one(problem, explanation.base, before) if is_mismatch else None
+        of_motion = Dependence(shares=dependency(problem, explanation.base))
+        depends_on = of_motion if of_one is None or of_one.yields_to(of_motion) else of_one
+    law = None
+    if verdict == "unexplained" and c.acts == "drop" and shown is None:
+        asked.say("a law for what no candidate explains")
+        law = proposed(problem, explanation.base, set_ups, found, groups)
+    told_of = {} if asked.discrepancy is None else asked.discrepancy.told(found)
+    detectable = dict(explanation.detectable)
+    contrary = differing(found, CONTRADICTING)
+    if verdict == "no-mismatch" and not c.slight and (contrary or is_weak(detectable)):
+        verdict = "cannot-tell"
+    h_before, h_after = (judged(problem, f, c.kept, groups) for f in (explanation.base, explanation.fitted))
+    early = before_an_impact(problem.dataset, explanation.base), before_an_impact(problem.dataset, explanation.fitted)
+    remains = not (c.is_beside and is_tolerated(problem, explanation.fitted)) and not is_enough(
+        problem, explanation.fitted, after
+    )
+    by_itself = () if shown is None else shown.places
+    lost = by_itself if verdict == "unexplained" else ()
+    is_left = (verdict == "unexplained" and shown is None) or (bool(effects) and remains)
+    training = tuple(e.name for e in found)
+    notes = [*c.notes, *(_felt(degrees[0]) for _ in degrees[:1] if is_mismatch), *by_steps(effects), *_cost(found)]
+    return Diagnosis(
+        verdict=verdict,
+        sentence=(
+            shown.sentence
+            if shown is not None
+            else of_no_consequence(c.slight)
+            if c.slight
+            else as_models_miss(asked.discrepancy.by_none, explanation.p_value, len(found))
+            if verdict == "no-mismatch" and asked.discrepancy is not None and c.is_beside
+            else sentence(
+                verdict,
+                effects,
+                explanation.p_value,
+                h_before.held,
+                h_after.held,
+                found,
+                early,
+                remains=remains,
+                cross_validated=c.is_cross_validated,
+                beside=c.is_beside and bool(told_of),
+            )
+        )
+        + (closest(explanation, groups) if verdict == "unexplained" and shown is None else "")
+        + (by_clock(mistimed(problem, explanation.fitted, executor.parallel_map)) if is_left else "")
+        + (by_share(effects, told_of) if shown is None else "")
+        + offered(law)
+        + by_inconsistencies(c.inconsistencies)
+        + against_itself(verdict, contrary)
+        + of_no_ground(found),
+        p_value=explanation.p_value if shown is None else shown.p_value,
+        noise=noise(found),
+        where=places(before, found, depends_on.on) if is_mismatch else by_itself,
+        effects=effects,
+        remaining_significant=is_left or bool(lost),
+        remaining_p_value=after.p_value,
+        remaining_where=places(after, found, None) if is_left else lost,
+        depends_on=depends_on.on if is_mismatch else next((p.depends_on for p in lost), None),
+        dependencies=depends_on.shares,
+        degrees=degrees if is_mismatch else (),
+        smallest_detectable=detectable,
+        training=training,
+        held_out=tuple(e.name for e in c.kept) or training,
+        before=h_before.scores,
+        after=h_after.scores,
+        per_recording=tuple(
+            (n, a, b) for (n, a), (_, b) in zip(h_before.by_recording, h_after.by_recording, strict=True)
+        ),
+        candidates=considered(explanation, c.candidates, groups),
+        simulations=problem.simulations,
+        seconds=clock.perf_counter() - asked.began,
+        notes=tuple(notes),
+        grids=_grids([*found, *c.kept]),
+        empirical=law,
+        answer=answer_of(
+            verdict, c.grade, explanation.p_value, slight=bool(c.slight), is_beside=asked.discrepancy is not None
+        ),
+        discrepancy=told_of,
+    )
+
+
+def _grids(dataset: Sequence[Dataset]) -> dict[str, tuple[float, ...]]:
+    """Centre of the ground's elements (m) of the run that stands for its neighbours, by recording; drops have none."""
+    made = [(e.name, full_runs(e.simulator)) for e in dataset]
+    return {name: s.scenario.ground.elements.centre for name, s in made if s is not None}
+
+
+def _felt(d: Degree) -> str:
+    """The degree of freedom that misses most, in a sentence."""
+    what = "force" if d.unit == "N" else "moment"
+    return (
+        f"on the {d.body}, {d.share:.0%} of the misfit is a {what} {d.axis}, {spoken(d.rms)} {d.unit} root mean square"
+    )
+
+
+def _cost(found: Sequence[Dataset]) -> list[str]:
+    """What full runs took, where there were any."""
+    made = [s for e in found if (s := full_runs(e.simulator)) is not None]
+    runs, seconds = sum(s.runs for s in made), sum(s.seconds for s in made)
+    return [f"{runs} full runs of {1e3 * seconds / runs:.0f} ms on the average"] if runs else []
