@@ -265,7 +265,8 @@ def diagnose(
     recordings: Recordings,
     *,
     hold_out: str | Sequence[str] = (),
-    tolerance: float = 0.0,
+    tolerance: float | Mapping[str, float] = 0.0,
+    reference: str | Sequence[str] = (),
     profile: str | Path | None = None,
     workers: int = 0,
 ) -> Diagnosis:
@@ -278,7 +279,9 @@ def diagnose(
     hold_out
         Names of recordings to judge by; none: each condition in turn.
     tolerance
-        Share of a channel's range, 0 to 0.5, by which a scenario that lacks nothing may miss it.
+        Share of a channel's range, 0 to 0.5, by which a scenario that lacks nothing may miss it: of all, or by channel.
+    reference
+        Names of recordings of the same rig in which nothing is suspected: they teach that share.
     workers
         Child processes that fit at once; the answer is the same.
 
@@ -298,13 +301,16 @@ def diagnose(
     from rollover.scenario import given
     from rollover.system.arguments import listed, within
 
-    within("tolerance", tolerance, 0.0, 0.5)
+    for share in [tolerance] if isinstance(tolerance, (int, float)) else tolerance.values():
+        within("tolerance", share, 0.0, 0.5)
     chosen, known = given(scenario)[0], measured(recordings, profile)
     check(chosen, known)
     held = held_out(list(known), listed(hold_out)) if hold_out else []
     with Executor(workers) as executor:
         findings = prechecked(chosen, known)
-        return diagnosed(chosen, known, findings, hold_out=held, tolerance=tolerance, executor=executor)
+        return diagnosed(
+            chosen, known, findings, hold_out=held, tolerance=tolerance, reference=listed(reference), executor=executor
+        )
 
 
 def study(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 MOST = 400  # lines: what one reads in a sitting, and a file of one purpose needs
-LONGER = {"rollover/diagnosis/pipeline.py": 415}  # one walk through the stages
+LONGER: dict[str, int] = {}  # files that may be longer, with their length and the reason
 
 
 def test_no_python_file_is_longer_than_one_purpose_needs() -> None:

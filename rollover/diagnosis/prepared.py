@@ -1,4 +1,4 @@
-"""Recordings made ready for a diagnosis: what is left aside of them, what their digits and their noise are like."""
+"""Recordings made ready for a diagnosis: what is excluded, what their digits and their noise are like."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ def prepared(
         notes += [f"{name}: {line}" for line in spiked]
         one = dataset_of(name, thin, simulator, averaged)
         still = [c for c, v in recording.channels.items() if np.isfinite(v).any() and np.nanmin(v) == np.nanmax(v)]
-        notes += [f"{name}: {channel} never moves and was left aside" for channel in still]
+        notes += [f"{name}: {channel} is constant and was excluded" for channel in still]
         if one is None:
-            notes.append(f"{name}: shares no usable channel with the simulation and was left aside")
+            notes.append(f"{name}: shares no usable channel with the simulation and was excluded")
             foreign += foreign_to(simulator, name, recording)
         else:
             found.append(one)

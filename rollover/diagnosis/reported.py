@@ -62,7 +62,7 @@ def reported(c: Conclusion) -> Diagnosis:
         depends_on = of_motion if of_one is None or of_one.yields_to(of_motion) else of_one
     law = None
     if verdict == "unexplained" and c.acts == "drop" and shown is None:
-        asked.say("a law for what no candidate explains")
+        asked.say("a law for the unexplained residual")
         law = proposed(problem, explanation.base, set_ups, found, groups)
     told_of = {} if asked.discrepancy is None else asked.discrepancy.told(found)
     detectable = dict(explanation.detectable)

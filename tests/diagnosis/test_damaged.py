@@ -85,7 +85,7 @@ def test_damaged_recordings_of_what_the_scenario_says_give_no_name(damaged: Call
     if damaged in (before_contact, flat):
         assert found.verdict == "cannot-tell", found.sentence
     assert ("nothing can be said of the ground" in found.sentence) == (damaged is before_contact)
-    assert any("never moves" in note for note in found.notes) == (damaged is flat)
+    assert any("is constant" in note for note in found.notes) == (damaged is flat)
     assert account(found)["verdict"] == found.verdict
     assert found.sentence
 
