@@ -64,7 +64,7 @@ def prepared(
     return found, notes
 
 
-def noise_told(scenario: Scenario, every: Sequence[Dataset]) -> list[Dataset]:
+def with_common_noise(scenario: Scenario, every: Sequence[Dataset]) -> list[Dataset]:
     """The recordings with the noise of those alike taken together, from their quiet stretches."""
     every = [doubted(e, set_up(scenario, e.recording)) for e in with_scatter(every)]
     problem = Problem(every)
@@ -78,5 +78,5 @@ def noise_told(scenario: Scenario, every: Sequence[Dataset]) -> list[Dataset]:
 
 def trusted(scenario: Scenario, every: Sequence[Dataset]) -> list[Dataset]:
     """The recordings weighed, what the simulation itself is not sure of less."""
-    reweighted = [weighted(e, e.simulator.perturbed()) for e in noise_told(scenario, every)]
+    reweighted = [weighted(e, e.simulator.perturbed()) for e in with_common_noise(scenario, every)]
     return [shortened(e, alone=len(reweighted) == 1) for e in reweighted]

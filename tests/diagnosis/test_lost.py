@@ -18,7 +18,7 @@ from rollover.recording.checks.leaps import across, leaping, of_a_blow
 from rollover.recording.filters import filtered
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
-diagnosing = importlib.import_module("rollover.diagnosis.pipeline")
+diagnosing = importlib.import_module("rollover.diagnosis.conclusion")
 RATE, N = 1000.0, 600
 TIME = np.arange(N) / RATE
 PHASES = [((0.0, "approach"), (0.3, "impact"))] * 3

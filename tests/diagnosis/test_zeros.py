@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -13,11 +12,10 @@ from rollover.diagnosis import diagnose
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.noise.offsets import WAVES, Zero, _differ, _own, _stand
-from rollover.diagnosis.prepared import prepared
+from rollover.diagnosis.prepared import prepared, with_common_noise
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
-diagnosing = importlib.import_module("rollover.diagnosis.pipeline")
 CHANNELS = (FORCE, DEPTH, ACCELERATION)
 SPEEDS = (1.1, 1.6, 2.1, 2.6, 3.1, 3.6)
 LAYER = {"effects.soil-layer.depth": 0.05, "effects.soil-layer.stiffness_ratio": 1.3}
@@ -42,8 +40,7 @@ def moved(made: Drops, sizes: dict[str, float], share: float, seed: int = 5) -> 
 
 def reweighted(made: Drops) -> list[Dataset]:
     every, _ = prepared(scenario(), made, Executor())
-    found: list[Dataset] = diagnosing._reweighted(scenario(), every)
-    return found
+    return with_common_noise(scenario(), every)
 
 
 @pytest.mark.parametrize("hidden", [{}, LAYER])
