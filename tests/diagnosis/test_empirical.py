@@ -25,7 +25,7 @@ from rollover.recording import Recording
 from rollover.scenario import load
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
-asked = sys.modules["rollover.diagnosis.pipeline"]
+asked = sys.modules["rollover.diagnosis.conclusion"]
 
 
 @pytest.mark.parametrize(

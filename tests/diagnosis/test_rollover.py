@@ -33,7 +33,7 @@ FEW = ("ground-friction", "soil-stiffness", "slope", "sensor-gain", "sensor-scal
 @pytest.fixture
 def _few_rivals(monkeypatch: pytest.MonkeyPatch) -> None:
     """Five effects compete: all of them would take minutes."""
-    module = sys.modules["rollover.diagnosis.pipeline"]
+    module = sys.modules["rollover.diagnosis.conclusion"]
 
     def few(*given: Any) -> list[Candidate]:
         return [c for c in candidates_of(*given) if c.id in FEW]
