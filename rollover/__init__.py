@@ -267,6 +267,7 @@ def diagnose(
     hold_out: str | Sequence[str] = (),
     tolerance: float | Mapping[str, float] = 0.0,
     reference: str | Sequence[str] = (),
+    estimate: bool = False,
     profile: str | Path | None = None,
     workers: int = 0,
 ) -> Diagnosis:
@@ -282,6 +283,8 @@ def diagnose(
         Share of a channel's range, 0 to 0.5, by which a scenario that lacks nothing may miss it: of all, or by channel.
     reference
         Names of recordings of the same rig in which nothing is suspected: they teach that share.
+    estimate
+        Estimate that share where nothing explains the recordings beside their noise, and diagnose again beside it.
     workers
         Child processes that fit at once; the answer is the same.
 
@@ -309,7 +312,14 @@ def diagnose(
     with Executor(workers) as executor:
         findings = prechecked(chosen, known)
         return diagnosed(
-            chosen, known, findings, hold_out=held, tolerance=tolerance, reference=listed(reference), executor=executor
+            chosen,
+            known,
+            findings,
+            hold_out=held,
+            tolerance=tolerance,
+            reference=listed(reference),
+            estimate=estimate,
+            executor=executor,
         )
 
 

@@ -67,6 +67,7 @@ class Asked:
     executor: Executor
     began: float
     discrepancy: Discrepancy | None = None
+    estimates: bool = False  # whether a model error is estimated, and answers that it makes doubtful are refused
     is_timed: bool = False  # whether clocks were set right that are off by far more than they may be
 
 
@@ -152,23 +153,23 @@ def concluded(
         alone = by_the_first(problem, explanation, nothing, phases)
         explanation, verdict = decide(alone)
         named_so = _named_beside(problem, explanation, verdict, kept, groups, phases)
-    while more := barred(problem, named_so[0], named_so[1], groups) - nothing:
+    while asked.estimates and (more := barred(problem, named_so[0], named_so[1], groups) - nothing):
         nothing |= more
         problem.with_noise_model(held)
         explanation, verdict = decide(next_best(problem, explanation, nothing, groups, phases))
         named_so = _named_beside(problem, explanation, verdict, kept, groups, phases)
     explanation, effects, kept = named_so
-    effects = clear_of_null(problem, explanation, effects)
+    effects = clear_of_null(problem, explanation, effects) if asked.estimates else effects
     found = list(problem.dataset)
-    if verdict == "unexplained" and is_noise_alone(problem, explanation, groups):
+    if asked.estimates and verdict == "unexplained" and is_noise_alone(problem, explanation, groups):
         verdict = "no-mismatch"
         notes.append(AS_NOISE)
     scales = asked.discrepancy.scales if asked.discrepancy is not None and is_beside else {}
     enough = is_tolerated if is_beside else partial(is_enough, left=explanation.after)
     left = not enough(problem, explanation.fitted)
     grade, effects = graded(*with_shares(problem, explanation, effects, groups), scales, remains=left)
-    slight = effects if grade == "immaterial" else ()
-    if slight or (effects and grade == "unexplained"):
+    slight = effects if asked.estimates and grade == "immaterial" else ()
+    if asked.estimates and (slight or (effects and grade == "unexplained")):
         verdict, effects, explanation = "no-mismatch" if slight else "unexplained", (), explanation.refused()
     shown = None
     if verdict == "no-mismatch":

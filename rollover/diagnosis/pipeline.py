@@ -37,19 +37,20 @@ def diagnose(
     hold_out: Sequence[str] = (),
     tolerance: float | Mapping[str, float] = 0.0,
     reference: Sequence[str] = (),
+    estimate: bool = False,
     say: Callable[[str], None] = lambda _: None,
     executor: Executor | None = None,
 ) -> Diagnosis:
     """Compare a scenario with recordings and say what separates them.
 
     `recordings` are (name, recording); `hold_out` names those that are never fitted, otherwise each condition is left
-    out in turn. `tolerance` is the share of a channel's range by which a scenario that lacks nothing may still miss it,
-    of all or by channel: what is smaller counts as noise. `reference` names recordings of the same rig in which nothing
-    is suspected: they teach how far it misses, and are not diagnosed. Where neither is stated that is estimated if
-    nothing explains the recordings otherwise, see `discrepancy`. `executor` works off the fits, in children if it has
-    any; the answer is the same. Raises `InputError` for an unknown condition, a clock that nothing tells the zero of,
-    and recordings without any channel that is simulated; ``ValueError`` for a name in `hold_out` or `reference` that is
-    none, a tolerance outside 0 to 1.
+    out in turn. `tolerance` is the share of a channel's range by which a scenario that lacks nothing may still miss
+    it, of all or by channel: what is smaller counts as noise. `reference` names recordings of the same rig in which
+    nothing is suspected: they teach how far it misses, and are not diagnosed. With `estimate` that is estimated where
+    nothing explains the recordings otherwise (see `inference.discrepancy`), and what it makes doubtful is not named.
+    `executor` works off the fits, in children if it has any; the answer is the same. Raises `InputError` for an
+    unknown condition, a clock that nothing tells the zero of, and recordings without any channel that is simulated;
+    ``ValueError`` for a name in `hold_out` or `reference` that is none, a tolerance outside 0 to 1.
     """
     began = clock.perf_counter()
     names = [name for name, _ in recordings]
@@ -74,7 +75,13 @@ def diagnose(
     notes += [*about_clocks(scenario, recordings, zeros), *rounded]
     every = [replace(e, model_error=float(np.hypot(e.model_error, general))) for e in every]
     asked = Asked(
-        scenario=scenario, recordings=dict(recordings), hold_out=hold_out, say=say, executor=executor, began=began
+        scenario=scenario,
+        recordings=dict(recordings),
+        hold_out=hold_out,
+        say=say,
+        executor=executor,
+        began=began,
+        estimates=estimate,
     )
     if reference:
         every, learned = _by_references(scenario, every, reference)
@@ -104,7 +111,7 @@ def _diagnosed(
     found = concluded(asked, every, inconsistencies, notes)
     if isinstance(found, Diagnosis):
         return found
-    if found.verdict == "unexplained" and found.shown is None:
+    if asked.estimates and found.verdict == "unexplained" and found.shown is None:
         other = _set_right(found, every, notes) or _beside(found, every, notes)
         if other is not None:
             return other

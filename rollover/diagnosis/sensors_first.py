@@ -51,6 +51,7 @@ def diagnosed(
     hold_out: Sequence[str] = (),
     tolerance: float | Mapping[str, float] = 0.0,
     reference: Sequence[str] = (),
+    estimate: bool = False,
     say: Callable[[str], None] = lambda _: None,
     executor: Executor | None = None,
 ) -> Diagnosis:
@@ -61,6 +62,7 @@ def diagnosed(
         hold_out=hold_out,
         tolerance=tolerance,
         reference=reference,
+        estimate=estimate,
         say=say,
         executor=executor,
     )

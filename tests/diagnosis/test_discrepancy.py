@@ -148,7 +148,7 @@ def test_a_discrepancy_is_of_its_channel_and_none_is_smaller_than_noise_hides() 
 
 
 def test_a_slow_wave_alone_is_said_to_be_what_models_miss_and_nothing_is_named() -> None:
-    found = diagnose(scenario(), bent(0.012))
+    found = diagnose(scenario(), bent(0.012), estimate=True)
     assert (found.verdict, found.answer, found.effects, found.broken) == ("no-mismatch", "nothing", (), ())
     assert "models usually miss" in found.sentence
     scale = account(found)["discrepancy"][FORCE]
@@ -159,7 +159,7 @@ def test_a_slow_wave_alone_is_said_to_be_what_models_miss_and_nothing_is_named()
 
 def test_an_effect_is_named_beside_a_slow_wave_that_no_effect_makes() -> None:
     layer = {"effects.soil-layer.depth": 0.1, "effects.soil-layer.stiffness_ratio": 1.8}
-    found = diagnose(scenario(), bent(0.01, changes=layer))
+    found = diagnose(scenario(), bent(0.01, changes=layer), estimate=True)
     assert [e.id for e in found.effects] == ["soil-layer"]
     assert (found.verdict, found.broken) == ("missing-physics", ())
     assert found.answer in ("whole", "likeness")
@@ -174,5 +174,5 @@ def test_an_effect_is_named_beside_a_slow_wave_that_no_effect_makes() -> None:
 
 
 def test_noise_alone_is_held_against_noise_alone() -> None:
-    found = diagnose(scenario(), recorded({}, 3, noise=0.003))
+    found = diagnose(scenario(), recorded({}, 3, noise=0.003), estimate=True)
     assert (found.answer, dict(found.discrepancy)) == ("nothing", {})

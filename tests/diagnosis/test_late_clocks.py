@@ -13,7 +13,7 @@ from tests.diagnosis.drops import recorded, scenario
 
 def test_clocks_that_explain_all_are_a_sensors_fault_and_not_unexplained() -> None:
     late = [(name, replace(r, time=r.time + 0.019)) for name, r in recorded({}, 7, noise=0.004)]
-    found = diagnose(scenario(), late)
+    found = diagnose(scenario(), late, estimate=True)
     assert (found.verdict, found.answer, found.broken) == ("sensor", "whole", ())
     assert {(e.id, e.kind) for e in found.effects} == {("sensor-clock-offset", "sensor")}
     offset = found.effects[0].parameters["offset"]

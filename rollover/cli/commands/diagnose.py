@@ -47,7 +47,7 @@ def diagnose(
         typer.Option(
             metavar="[CHANNEL=]SHARE",
             help="Share of its range by which a scenario that lacks nothing may miss a channel; may be repeated",
-            show_default="estimated where nothing explains the recordings",
+            show_default="none; see --estimate",
         ),
     ] = None,
     reference: Annotated[
@@ -57,6 +57,14 @@ def diagnose(
             help="A recording of the same rig in which nothing is suspected: it teaches that share; may be repeated.",
         ),
     ] = None,
+    estimate: Annotated[
+        bool,
+        typer.Option(
+            "--estimate/--no-estimate",
+            help="Where nothing explains the recordings beside their noise, estimate how far the model misses by "
+            "itself, and diagnose again beside that.",
+        ),
+    ] = False,
     set_: Setting = None,
     profile: Annotated[Path | None, typer.Option(help="What the columns of foreign files are.")] = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/diagnose/NAME")] = None,
@@ -109,6 +117,7 @@ def diagnose(
         "hold_out": held,
         "tolerance": allowed,
         "reference": taught,
+        "estimate": estimate,
     }
     about["origin"] = results.origin(path, folder, set_ or [])
     results.claim_account(folder, FORMAT, about, FILES, force=force, say=console.say)
@@ -126,6 +135,7 @@ def diagnose(
             hold_out=held,
             tolerance=allowed,
             reference=taught,
+            estimate=estimate,
             say=console.say,
             executor=executor,
         )
