@@ -13,8 +13,9 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-import viz
-from rollover.assessment import results
+import viz.pages
+import viz.recordings
+from rollover.assessment import assessed, loads, results
 from rollover.assessment.criterion import Criterion, compared, judged
 from rollover.cli.main import app
 from rollover.dynamics import simulate
@@ -63,20 +64,17 @@ def bench(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Bench:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(simulate, "run", bench.run)
     monkeypatch.setattr("ground.compiled.is_warm", lambda: True)
-    loads, log = types.ModuleType("rollover.assessment.loads"), types.ModuleType("viz.recordings.log")
-    loads.peak_loads = bench.peak_loads  # type: ignore[attr-defined]
-    loads.unconverged = lambda peaks: bench.unconverged  # type: ignore[attr-defined]
+    log, report = types.ModuleType("viz.recordings.log"), types.ModuleType("viz.pages.report")
     log.write_rrd = lambda run, path, peaks: path.write_bytes(b"rrd")  # type: ignore[attr-defined]
-    report = types.ModuleType("viz.pages.report")
     report.page = lambda run, peaks, answer, rows, command: f"<p>{command}</p>"  # type: ignore[attr-defined]
-    for module in (loads, log, report):
+    for module in (log, report):
         monkeypatch.setitem(sys.modules, module.__name__, module)
-    monkeypatch.setattr("rollover.assessment.loads", loads, raising=False)
-    monkeypatch.setattr(
-        "rollover.assessment.criteria.criteria", lambda run: bench.rows.pop(0) if len(bench.rows) > 1 else bench.rows[0]
-    )
-    monkeypatch.setattr(viz, "log", log, raising=False)
-    monkeypatch.setattr(viz, "report", report, raising=False)
+    monkeypatch.setattr(assessed, "peak_loads", bench.peak_loads)
+    for place in (assessed, loads):
+        monkeypatch.setattr(place, "unconverged", lambda peaks: bench.unconverged)
+    monkeypatch.setattr(assessed, "criteria", lambda run: bench.rows.pop(0) if len(bench.rows) > 1 else bench.rows[0])
+    monkeypatch.setattr(viz.recordings, "log", log, raising=False)
+    monkeypatch.setattr(viz.pages, "report", report, raising=False)
     return bench
 
 
@@ -316,7 +314,7 @@ def test_check_tells_all_faults_of_all_files(tmp_path: Path, monkeypatch: pytest
     Path("c.yaml").write_text("kind: ye-2006\nrecovery: 2\n")
     done = rollover("check", "a.yaml", "b.yaml", "c.yaml", "nope")
     assert done.exit_code == 2
-    assert done.stdout == "b.yaml: scenario, in order\n"
+    assert done.stdout == "b.yaml: scenario, valid\n"
     assert [line.split(": ")[0] for line in done.stderr.splitlines()] == ["a.yaml:6", "a.yaml:8", "c.yaml:2", "nope"]
     answer = json.loads(rollover("check", "a.yaml", "b.yaml", "--json").stdout)
     assert answer["ok"] is False
