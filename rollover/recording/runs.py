@@ -80,6 +80,8 @@ def read_parquet(path: Path) -> Recording:
     import pyarrow as pa
 
     try:
+        if path.stat().st_size == 0:
+            raise InputError(Fault(file=str(path), message=f"cannot be read: empty, got 0 bytes; {CURE}"))
         table = open_parquet(path).read()
     except (OSError, pa.ArrowException, ValueError) as e:
         if isinstance(e, InputError):

@@ -229,7 +229,7 @@ def test_a_half_step_that_fails_is_told_and_not_compared(bench: Bench) -> None:
 
 
 def test_without_rerun_everything_but_the_picture_is_written(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr(viz, "log")
+    monkeypatch.delattr(viz.recordings, "log")
     monkeypatch.delitem(sys.modules, "viz.recordings.log")
     monkeypatch.setitem(sys.modules, "rerun", None)  # importing it fails as where it is not installed
     done = rollover("run", "drop_test")

@@ -116,7 +116,8 @@ def _usage(e: Any) -> Fault:
     """What is wrong with a command's words, in one line: the command, what is wrong, where it says what is right."""
     context = getattr(e, "ctx", None)
     path = context.command_path if context is not None else "rollover"
-    message = " ".join(e.format_message().split()).rstrip(".")
+    message = " ".join(e.format_message().split())
+    message = message if message.endswith("...") else message.removesuffix(".")
     return Fault(file=path, message=f"{message[:1].lower()}{message[1:]}; `{path} --help` tells what is allowed")
 
 

@@ -40,7 +40,7 @@ def compose(text: str) -> Any:
         rest = len(text) - sum(row.end() - row.start() for row in _ROW.finditer(text))
         budget.check_count(rest, budget.TEXT, TooMuchError, "characters beside rows of numbers")
     if deep := DEEP.search(text):
-        raise TooMuchError("nested too deeply; lists and mappings inside each other end long before", _line(text, deep))
+        raise TooMuchError("nested too deeply; a few levels are needed", _line(text, deep))
     yaml = YAML(typ="safe", pure=True)
     yaml.Scanner, yaml.Composer = _Scanner, _Composer
     root = yaml.compose(text)
