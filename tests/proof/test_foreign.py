@@ -312,9 +312,7 @@ def test_ways_back_are_bent() -> None:
         assert line.presses(drop.rig, half, 0.0) == pytest.approx(line.force * shape(0.5))
 
 
-@pytest.mark.xfail(
-    strict=True, reason="the load cell of this drop shows no pull, though the line of its way back has one"
-)
+@pytest.mark.xfail(strict=True, reason="the load cell shows no pull, though the way back has one")
 def test_pulls_are_bent() -> None:
     x = np.linspace(0.0, 1.0, 101)
     for form in foreign.FORMS["soil-adhesion"]:
