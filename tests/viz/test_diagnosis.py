@@ -27,7 +27,7 @@ def test_the_page_of_a_finding() -> None:
     parts = Parts(text)
     assert parts.fetched() == []
     said = parts.said
-    assert "A sensor is at fault: sensor-gain of ground/force_normal." in said
+    assert "A sensor is faulty: sensor-gain of ground/force_normal." in said
     row = next(r for r in parts.rows if r[:2] == ["sensor-gain of ground/force_normal", "sensor"])
     assert row[2:7] == ["gain", "1.08", "1.07", "1.09", "-"]
     assert "at the end of its range" in row[7]
@@ -155,6 +155,6 @@ def test_the_words_say_which_recordings_were_left_out(kept: tuple[str, ...], one
 
 def test_the_words_name_the_rival_and_the_next_test() -> None:
     words = markdown(sensor_at_fault())
-    assert words.startswith("# A sensor is at fault: sensor-gain of ground/force_normal.")
+    assert words.startswith("# A sensor is faulty: sensor-gain of ground/force_normal.")
     assert "Not distinguishable from soil-stiffness." in words
     assert "Measure next: weigh the striker at rest." in words
