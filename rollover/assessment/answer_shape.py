@@ -41,9 +41,11 @@ def misfit_of(value: Any, shape: Any = ANSWER, path: str = "") -> tuple[str, str
     if isinstance(shape, Mapping):
         if not isinstance(value, dict):
             return path, f"not a mapping, got {_got(value)}; a mapping is needed"
-        if missing := [key for key in shape if key not in value]:
+        # what may be null was not written by older versions
+        if missing := [key for key, inner in shape.items() if key not in value and not isinstance(inner, tuple)]:
             return path, f"lacks {', '.join(missing)}; each is needed"
-        found = (misfit_of(value[key], inner, f"{path}.{key}" if path else key) for key, inner in shape.items())
+        there = [(key, inner) for key, inner in shape.items() if key in value]
+        found = (misfit_of(value[key], inner, f"{path}.{key}" if path else key) for key, inner in there)
         return next((f for f in found if f), None)
     return None if _is(value, shape) else (path, f"not {shape}, got {_got(value)}; {shape} is needed")
 

@@ -78,7 +78,7 @@ def _checked(told: Any, journal: Path) -> list[tuple[Path, Path]]:
     try:
         moves = [(Path(a), Path(b)) for a, b in told["files"]]
         good = told["format"] == FORMAT and len(told["account"]) == 2 and isinstance(told["journals"], list)
-        good = good and all(a.parent == b.parent and writing.own(b, a.name) for a, b in moves)
+        good = good and all(a.parent.resolve() == b.parent.resolve() and writing.own(b, a.name) for a, b in moves)
         good = good and journal.parent.resolve() in {b.parent.resolve() for _, b in moves}
         part, target = map(Path, told["account"])
         good = good and writing.own(target, part.name)

@@ -45,8 +45,8 @@ def test_the_page_says_that_runs_differ() -> None:
         one = [replace(told()[0], tracks=tuple(tracks))]
         return page(sensor_at_fault(), one, title="Overturn", command="rollover diagnose x")
 
-    assert "what neighbouring runs differ by" in shown(30.0)
-    assert "neighbouring" not in shown(None)
+    assert "ensemble scatter" in shown(30.0)
+    assert "ensemble scatter" not in shown(None)
 
 
 def test_quantities_that_predict_nothing_need_no_table() -> None:

@@ -126,7 +126,7 @@ def test_a_tornado_shows_the_widest_first() -> None:
 
 
 def test_colours_of_figures_and_of_the_page_are_the_same() -> None:
-    css = (Path(plots.__file__).parent / "templates" / "page.css").read_text()
+    css = (Path(plots.__file__).parents[1] / "pages" / "templates" / "page.css").read_text()
     light = css[: css.index("@media")]
     for role, colour in COLOURS.items():
         assert f"--{role}: {colour}" in light
