@@ -198,10 +198,10 @@ def effects_() -> str:
 def standards() -> str:
     """Every requirement with clause, formula and how surely it is known, and its value for one tractor."""
     sure = {
-        "seen": "the text was read",
-        "recalled-high": "recalled, high confidence",
+        "source checked": "the text was read",
+        "recalled, high confidence": "recalled, high confidence",
         "recalled": "recalled",
-        "recalled-low": "recalled, low confidence",
+        "recalled, low confidence": "recalled, low confidence",
     }
     text = ["# Standards\n", "This is a simulation study, not type approval. " + _example() + "\n"]
     machines = {f"ISO 3471, {name}": iso_3471_requirements(name, 10000.0) for name in MACHINES}

@@ -188,7 +188,17 @@ def test_diagnose(drops: Path, tmp_path: Path) -> None:
     found = ro.diagnose("drop_test", drops)
     written = read_json(tmp_path / "found" / "diagnosis.json")
     told = said(diagnosed(found))
-    asked = ("seconds", "prechecks", "scenario_hash", "recordings", "hold_out", "tolerance", "origin")
+    asked = (
+        "seconds",
+        "prechecks",
+        "scenario_hash",
+        "recordings",
+        "hold_out",
+        "tolerance",
+        "reference",
+        "estimate",
+        "origin",
+    )
     assert {k: v for k, v in told.items() if k not in asked} == {k: v for k, v in written.items() if k not in asked}
     shown = found._repr_html_()
     assert found.sentence.split(".")[0] in Text(shown).text

@@ -153,7 +153,7 @@ def after_the_commands(here: Path, shelf: Path, shown: list[Path]) -> None:
 def after_the_logger(here: Path, shelf: Path, shown: list[Path]) -> None:
     """The layer that was concealed in the recordings is what the page says it is."""
     found = json.loads((here / "out/diagnosed/diagnosis.json").read_text())
-    assert "soil-layer" in json.dumps(found["findings"])
+    assert "soil-layer" in json.dumps(found["effects"])
     assert "soil-layer" in (here / "out/diagnosed/scenario-diagnosed.yaml").read_text()
 
 

@@ -20,6 +20,7 @@ from rollover.spec.standards.requirement import Requirement
 from rollover.studies.baseline import Answer, Difference
 from tests.viz import example
 from tests.viz.html import Parts
+from viz.content import blocks
 from viz.content.blocks import Cell, Details, Footer, Headline, Note, Pairs, Table
 from viz.content.entities import series
 from viz.pages import page as pages
@@ -213,8 +214,8 @@ def test_pages_print_and_know_the_dark() -> None:
 def figures(run: Run) -> dict[str, str]:
     """Caption and text of each figure over time."""
     section = report._histories(run, peak_loads(run))[0]
-    assert isinstance(section, pages.Section)
-    return {b.caption: b.svg for b in section.blocks if isinstance(b, pages.Figure)}
+    assert isinstance(section, blocks.Section)
+    return {b.caption: b.svg for b in section.blocks if isinstance(b, blocks.Figure)}
 
 
 def test_one_axis_has_one_quantity(overturn: Run) -> None:
