@@ -96,11 +96,16 @@ def digest(path: Path | None, recording: Recording) -> str:
     return every.hexdigest()
 
 
-def held_out(names: Sequence[str], given: Sequence[str], option: str = "hold_out") -> list[str]:
-    """The names of `given`, sorted, once each; `option` is where they were given. Raises `InputError`."""
+def check_names(names: Sequence[str], given: Sequence[str], option: str) -> None:
+    """Refuse names that no recording has; `option` is where they were given. Raises `InputError`."""
     for name in given:
         if name not in names:
             raise InputError(Fault(file=option, message=f"no such recording, got {name!r}; {hint(name, names)}"))
+
+
+def held_out(names: Sequence[str], given: Sequence[str], option: str = "hold_out") -> list[str]:
+    """The names of `given`, sorted, once each; `option` is where they were given. Raises `InputError`."""
+    check_names(names, given, option)
     if set(names) <= set(given):
         raise InputError(Fault(file=option, message=f"nothing left to fit, got all of {', '.join(names)}"))
     return sorted(set(given))

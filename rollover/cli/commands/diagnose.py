@@ -82,9 +82,8 @@ def diagnose(
 
     workers = cores() if workers is None else workers
     if workers > 1:
-        begin_server(
-            "rollover.diagnosis.fit.warmup"
-        )  # as `Executor` does, but beside all that is imported and read here
+        # as `Executor` does, but beside all that is imported and read here
+        begin_server("rollover.diagnosis.fit.warmup")
 
     from rollover import scenario as scenarios
     from rollover.assessment import results
@@ -127,6 +126,7 @@ def diagnose(
     notebook = notes(folder)
     about_fits = json.dumps([about, results.versions()], sort_keys=True)
     words = ["rollover", "diagnose", scenario, *recordings, *_options(hold_out, tolerance, reference, set_, profile)]
+    words += ["--estimate"] * estimate
     with Executor(workers, notebook, about_fits) as executor:
         found = diagnosed(
             chosen,
@@ -168,11 +168,10 @@ def diagnose(
 
 
 def _references(names: list[str], given: list[str], held: list[str]) -> list[str]:
-    from rollover.system.errors import hint
+    from rollover.comparison.recordings import check_names
 
+    check_names(names, given, "--reference")
     for name in given:
-        if name not in names:
-            raise InputError(Fault(file="--reference", message=f"no such recording, got {name!r}; {hint(name, names)}"))
         if name in held:
             raise InputError(Fault(file="--reference", message=f"held out too, got {name!r}; another one of {names}"))
     if set(names) <= {*given, *held}:
