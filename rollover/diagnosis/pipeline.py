@@ -111,7 +111,8 @@ def _diagnosed(
     found = concluded(asked, every, inconsistencies, notes)
     if isinstance(found, Diagnosis):
         return found
-    if asked.estimates and found.verdict == "unexplained" and found.shown is None:
+    # what is named and leaves structure is held against no more than noise as well
+    if asked.estimates and found.shown is None and (found.verdict == "unexplained" or found.grade == "part"):
         other = _set_right(found, every, notes) or _beside(found, every, notes)
         if other is not None:
             return other
