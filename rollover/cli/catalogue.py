@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import fields
 from pathlib import Path
@@ -29,14 +30,14 @@ def files(folder: str) -> list[Row]:
 
 
 def headline(path: Path) -> str:
-    """First paragraph of the comment that a file opens with, up to its first full stop."""
+    """First sentence of the comment that a file opens with."""
     lines = []
     for line in path.read_text(encoding="utf-8").splitlines():
         if not line.startswith("#") or not line.strip("# "):
             break
         lines.append(line.strip("# "))
-    first, stop, _ = " ".join(lines).partition(". ")
-    return first.rstrip(".") if stop else first
+    first = re.split(r"(?<=[.?!]) ", " ".join(lines), maxsplit=1)[0]
+    return first.rstrip(".")
 
 
 def vehicles() -> list[Row]:

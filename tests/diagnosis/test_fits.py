@@ -355,7 +355,7 @@ def test_one_condition_alone_says_that_nothing_was_held_out() -> None:
     named = diagnose(scenario(), recorded(GAIN, speeds=(2.0,)))
     assert named.effects
     assert "the misfit falls" in named.sentence
-    assert "Of one condition nothing can be held out" in named.sentence
+    assert "With one condition nothing can be held out" in named.sentence
 
 
 def test_a_rebound_is_looked_for_from_what_the_law_springs_back_by_itself() -> None:

@@ -101,11 +101,11 @@ def test_a_misfit_that_scatter_takes_part_in_or_that_is_not_all_met_is_said_to_b
     more = sentence("parameter", [tilted], 0.0, first, last, [], remains=True)
     assert more == plain + " The unexplained residual has structure: these effects are not the whole difference."
     one = sentence("parameter", [tilted], 0.0, first, last, [], cross_validated=False)
-    assert one.startswith(plain.replace("held-out ", "") + " Of one condition nothing can be held out")
+    assert one.startswith(plain.replace("held-out ", "") + " With one condition nothing can be held out")
     unexplained = sentence("unexplained", (), 0.0, first, last, [], cross_validated=False)
     assert unexplained.endswith("no candidate explains it.")
     said = sentence("parameter", [tilted], 0.0, first, last, [], (6.94, 1.02))
-    assert said.startswith(plain[:-1] + " and the scatter of runs; before the first blow")
+    assert said.startswith(plain[:-1] + " and the scatter of runs; before the first impact")
     assert said.endswith("the misfit is 1.02 times the noise for 6.9.")
 
 

@@ -184,7 +184,7 @@ def test_a_vehicle_that_is_like_nothing_simulated_is_refused(overturn: tuple[Sce
     made = synthetic(run, channels=usual(run), rate=500.0, seed=1)
     rng = np.random.default_rng(3)
     other = replace(made, channels={c: rng.normal(0.0, 1.0, made.time.size) for c in made.channels})
-    with pytest.raises(InputError, match=r"^v: clock: nothing tells where its zero is"):
+    with pytest.raises(InputError, match=r"^v: clock: its time zero cannot be determined"):
         timed("v", on(other, 0.0), scenario, lambda _: run)
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from rollover.system import budget
+from rollover.system.boundary import reading
 from rollover.system.errors import Fault, InputError
 from rollover.system.processes import Children, Failure, limited, map_cases
 
@@ -35,6 +36,7 @@ class _Task:
     read: Callable[..., Any]
     path: Path
     more: tuple[Any, ...]
+    what: str
     modules: tuple[str, ...]
     folder: str
     factor: str
@@ -59,6 +61,7 @@ def apart(read: Callable[..., V], path: Path, *more: Any, what: str, modules: Se
         read=read,
         path=path,
         more=more,
+        what=what,
         modules=tuple(modules),
         folder=folder,
         factor=f"{budget.factor()!r}",
@@ -93,7 +96,7 @@ def _work(task: _Task) -> Any:
     if task.folder:
         os.chdir(task.folder)
     try:
-        with limited(task.memory, task.processor):
+        with limited(task.memory, task.processor), reading(task.path, f"{task.what} file"):
             return task.read(task.path, *task.more)
     except InputError as e:
         return e

@@ -35,7 +35,7 @@ def find(name: str | Path, folder: str = "") -> Path:
         if candidate.is_file():
             return candidate
     if path.is_dir():
-        raise InputError(Fault(file=str(name), message="a folder, not a file"))
+        raise InputError(Fault(file=str(name), message="a folder, not a file; name a YAML file in it"))
     known = [p.stem for p in sorted(shelf.glob("*.yaml"))]
     here = [str(p) for p in sorted(path.parent.glob("*.yaml"))] if path.parent.is_dir() else []
     close = nearest(path.stem, known) or nearest(str(path), here)
