@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from rollover.system import budget
-from rollover.system.boundary import reading
+from rollover.system.boundary import worded
 from rollover.system.errors import Fault, InputError
 from rollover.system.processes import Children, Failure, limited, map_cases
 
@@ -96,10 +96,15 @@ def _work(task: _Task) -> Any:
     if task.folder:
         os.chdir(task.folder)
     try:
-        with limited(task.memory, task.processor), reading(task.path, f"{task.what} file"):
+        with limited(task.memory, task.processor):
             return task.read(task.path, *task.more)
     except InputError as e:
         return e
+    except MemoryError:
+        raise
+    except Exception as e:  # every library has its own
+        message = f"not a readable {task.what} file: {worded(e)}; a sound file is needed"
+        return InputError(Fault(file=str(task.path), message=message))
 
 
 def _told(failure: Failure, what: str, task: _Task, wall: float) -> str:
