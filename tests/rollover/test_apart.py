@@ -97,7 +97,9 @@ def test_faults_of_the_file_come_back_as_they_are_and_others_in_one_line(file: P
     with pytest.raises(InputError) as caught:
         apart(reader, file, "refuse", what="TEST")
     assert str(caught.value) == f"{file}: F: no\nb: neither"
-    assert "not a readable TEST file: damaged, or of a kind that is not read; a sound file is needed" in refused(file, "raise")
+    assert "not a readable TEST file: damaged, or of a kind that is not read; a sound file is needed" in refused(
+        file, "raise"
+    )
 
 
 def test_a_relative_path_is_that_of_the_folder_of_now(file: Path, tmp_path: Path, monkeypatch: Any) -> None:
