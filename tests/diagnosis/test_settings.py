@@ -45,8 +45,12 @@ def undocumented(source: str) -> Iterator[str]:
             if isinstance(field, ast.AnnAssign) and isinstance(field.value, ast.expr):
                 is_stage = isinstance(field.value, ast.Call) and not field.value.args and not field.value.keywords
                 beside = lines[(field.end_lineno or 0) - 1].partition("#")[2]
-                above = lines[field.lineno - 2].strip()
-                comment = beside or (above[1:] if above.startswith("#") else "")
+                above = ""
+                for line in map(str.strip, lines[field.lineno - 2 :: -1]):
+                    if not line.startswith("#"):
+                        break
+                    above = line[1:] + above
+                comment = beside or above
                 if not is_stage and len(comment.split()) < 2:
                     yield f"{node.name}.{ast.unparse(field.target)}"
 
