@@ -9,7 +9,7 @@ from dataclasses import dataclass
 class ConditionUncertainty:
     """Errors of the stated conditions."""
 
-    # share of the largest singular value: directions below are rounding; rounding of double precision
+    # share of the largest singular value: directions below are rounding; chosen
     least_singular_value: float = 1e-9
 
 
@@ -17,7 +17,7 @@ class ConditionUncertainty:
 class Dataset:
     """Signals of a recording, their noise and time shift."""
 
-    # share of a channel's range: what integrators differ by is no mismatch; difference of integrators
+    # share of a channel's range: what integrators differ by is no mismatch; chosen
     model_error: float = 2e-4
     # s, standard deviation: prior of the time shift of a recording whose clock has no known zero; chosen
     loose_shift_prior: float = 0.02
@@ -73,7 +73,7 @@ class Quantisation:
     least_levels: int = 3  # levels of a digitised channel, at least; chosen
     least_common_error: float = 0.03  # share of half a step: less in common is no error of quantisation; chosen
     most_levels: float = 0.5  # levels per sample: with so many, or more, steps do not matter; chosen
-    equal_within: float = 1e-9  # relative difference: values within it are equal; rounding of stored values
+    equal_within: float = 1e-9  # relative difference: values within it are equal; chosen
     least_at_end: int = 5  # samples: so many equal extremes are an end of the range; chosen
 
 

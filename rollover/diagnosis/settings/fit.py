@@ -56,9 +56,9 @@ class LevenbergMarquardt:
     most_lengthenings: int = 6  # lengthenings of one step; chosen
     step_retries: int = 4  # trials of a step, each damped more; chosen
     local_slopes_below: float = 2.0  # misfit over the noise: up to it slopes are those of the place itself; chosen
-    # share of the promised gain: a step that makes less has its Jacobian renewed; chosen
+    # share of the promised gain: with less the Jacobian of what is held is renewed; chosen
     reuse_least_share: float = 0.7
-    reuse_least_gain: float = 0.01  # share of the misfit: a step that gains less has its Jacobian renewed; chosen
+    reuse_least_gain: float = 0.01  # share of the misfit: with less the Jacobian of what is held is renewed; chosen
     # shares of a time shift's step that are tried where all of it leads nowhere; chosen
     shorter_shifts: tuple[float, ...] = (0.5, 0.0)
     # share of the misfit beyond the noise: least gain of a round for drops where much is left; chosen

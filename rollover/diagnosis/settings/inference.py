@@ -103,7 +103,7 @@ class LocalQuadratic:
 
     # standard errors: places on either side, stage by stage, the nearest first; chosen
     stages: tuple[tuple[float, ...], ...] = ((1.0, 2.0, 3.0, 4.0), (6.0, 8.0), (12.0, 16.0), (24.0, 32.0))
-    # ratio to what scatter alone makes of it: a slope is well determined; first-stage F of 10 (Staiger and Stock
+    # ratio to what scatter alone makes of it: a slope is well determined; as of weak instruments (Staiger and Stock
     # 1997)
     clear_slope: float = 10.0
     some_slope: float = 1.0  # the same ratio: a slope is determined at all; chosen
@@ -145,7 +145,7 @@ class ResidualLaw:
     least_term_gain: float = 0.15  # ln of the held-out error: least gain of a further term; chosen
     least_errors: float = 2.0  # standard errors that a gain must exceed; chosen
     least_law_gain: float = 0.1  # ln of the held-out errors' ratio: below it a law is not offered; chosen
-    ridge: float = 1e-6  # share of a column's square: ridge of the regression; rounding
+    ridge: float = 1e-6  # share of a column's square: ridge of the regression; chosen
     search_width: float = 1.5  # ratio to the regression's force: half width of the search; chosen
 
 

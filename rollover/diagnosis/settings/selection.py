@@ -19,7 +19,7 @@ class Decision:
     """Decision on an explanation."""
 
     look_share: float = 0.05  # share of all errors for the look at candidates, where runs scatter; chosen
-    largest_p_value: float = 1.0 - 1e-12  # p-value: largest whose logarithm is taken; rounding of double precision
+    largest_p_value: float = 1.0 - 1e-12  # p-value: largest whose logarithm is taken; chosen
     # share of the excess misfit, were it structured, that one named effect may leave; chosen
     left_structure: float = 0.005
     # share of the excess misfit that effects must take where far more than noise is left; chosen
@@ -60,7 +60,7 @@ class ForwardStep:
     least_score: float = 0.05  # share of the best score: below it none is fitted where fits cost much; chosen
     polished_misfit: float = 100.0  # ratio to the best misfit: up to it a fit of two parameters is polished; chosen
     roughness: float = 0.002  # share of the misfit that is arithmetic; chosen
-    simpler_errors: float = 1.0  # standard errors within which the simpler one is preferred; one-standard-error rule
+    simpler_errors: float = 1.0  # standard errors within which the simpler one is preferred; chosen
     excluded_errors: float = 2.0  # standard errors beyond which a rival is excluded; chosen
     same_misfit: float = 0.3  # sum of squares over the noise: fits no further apart are one and the same; chosen
     nearly_noise: float = 1.3  # misfit over the noise: up to it the noise's own memory is believed; chosen
@@ -108,7 +108,7 @@ class Restarts:
     tied_misfit: float = 1.2  # ratio to the best misfit: up to it time shifts are tried; chosen
     chance_p_value: float = 0.01  # p-value of what is left: above it no other form is searched; chosen
     same_shift: float = 2e-5  # s: time shifts within it are one; chosen
-    parts: int = 4  # parts into which places are split for workers; costs no answer
+    parts: int = 4  # parts into which places are split for workers; chosen
     most_oscillations: int = 60  # places of an oscillation, by one recording, that few recordings are asked for; chosen
     # share of the base's excess misfit, and of the best's gain: from it on shape and time shifts are fitted too;
     # chosen
@@ -132,7 +132,7 @@ class ScoreTest:
     draws: int = 4000  # draws of the null distribution; chosen
     least_direction: float = 1e-3  # noise units: a direction that moves the whole by less is arithmetic; chosen
     visible: float = 5.0  # standard errors of the noise at which an effect shows; chosen
-    jitter: float = 1e-9  # added to a correlation matrix's diagonal, per row; rounding of a factorisation
+    jitter: float = 1e-9  # added to a correlation matrix's diagonal, per row; chosen
     ways: int = 2  # places of one effect at which fits begin; chosen
     close_places: int = 8  # places of one effect that are looked at closely; chosen
 
@@ -146,7 +146,7 @@ class Screening:
     biased_shifts: float = 1.2
     fixed_shifts: float = 3.0  # misfit over the noise: from it on time shifts are not fitted in a first look; chosen
     start_distance: float = 0.2  # coordinate (0 to 1): least distance of two starts; chosen
-    no_change: float = 1e-12  # sum of squares over the noise: up to it a start changes nothing; rounding
+    no_change: float = 1e-12  # sum of squares over the noise: up to it a start changes nothing; chosen
 
 
 @dataclass(frozen=True, kw_only=True)
