@@ -5,15 +5,16 @@ from __future__ import annotations
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.local_search import timed
 from rollover.diagnosis.fit.step import Groups
-from rollover.diagnosis.grades import HALF, shares
+from rollover.diagnosis.grades import shares
 from rollover.diagnosis.inference.adequacy import is_tolerated
-from rollover.diagnosis.inference.lack_of_fit import SURE, mismatch_of
+from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.result import Verdict
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.decision import Explanation, kind_of
 from rollover.diagnosis.selection.forward_step import confusion, step
 from rollover.diagnosis.selection.scan import look
 from rollover.diagnosis.selection.stepwise import as_conditioned
+from rollover.diagnosis.settings import SETTINGS
 
 
 def explained_by_one(inquiry: Inquiry, base: Fitted, *, usual: bool = True) -> Explanation:
@@ -52,12 +53,14 @@ def decided_beside(problem: Problem, found: Explanation, groups: Groups) -> tupl
     """
     if is_tolerated(problem, found.base):
         return found.refused(), "no-mismatch"
-    if not found.parts or found.parts[0].p_value > SURE:
+    if not found.parts or found.parts[0].p_value > SETTINGS.inference.lack_of_fit.p_value:
         return found.refused(), "unexplained"
     whole, _ = shares(problem, found, groups)
     families = {f.candidates[-1].family for f in confusion(found.parts[0], groups, problem.samples_per_error)}
-    is_enough = is_tolerated(problem, found.fitted) and whole is not None and whole.share >= HALF
-    is_sure = whole is not None and whole.low >= HALF and len(families) == 1
+    is_enough = (
+        is_tolerated(problem, found.fitted) and whole is not None and whole.share >= SETTINGS.report.grades.half_share
+    )
+    is_sure = whole is not None and whole.low >= SETTINGS.report.grades.half_share and len(families) == 1
     if is_enough or is_sure:
         return found, kind_of(found.fitted.candidates[-1])
     return found.refused(), "unexplained"

@@ -39,6 +39,7 @@ from rollover.diagnosis.selection.decision import (
     explained,
     takes_little,
 )
+from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.statements import (
     interval_contains_null,
     named,
@@ -48,9 +49,8 @@ from rollover.recording import Recording
 from rollover.scenario import Scenario
 
 NAMING = ("parameter", "sensor", "missing-physics")  # verdicts that name effects
-HALF = 0.5  # of what was beyond the noise: of less a channel that breaks off may be all of it
+TUNING = SETTINGS.report.conclusion
 AS_NOISE = "what is left is 1.0 times the noise, or hardly more and before the first contact: no more than noise"
-FEWEST = 24  # samples in all, below which nothing is said
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,7 +111,7 @@ def concluded(
     notes = [*notes, *(inconsistency.says() for inconsistency in inconsistencies)]
     found = trusted(scenario, [e for e in every if e.name not in hold_out])
     kept = [e for e in trusted(scenario, every) if e.name in hold_out] if hold_out else []
-    if sum(e.count for e in found) < FEWEST:
+    if sum(e.count for e in found) < TUNING.least_samples:
         return nothing_told(every, names, notes, began, by_inconsistencies(inconsistencies))
     notes += [*left_aside(every, found), *by_zeros(found)]
     groups = left_out(found)
@@ -176,7 +176,7 @@ def concluded(
         shown = by_themselves(found, recordings, phases, explanation.p_value) or misread(
             inconsistencies, len(found), explanation.p_value
         )
-    elif effects and takes_little(explanation, groups, HALF):
+    elif effects and takes_little(explanation, groups, TUNING.main_share):
         # what is lost again and again is met by no effect, and bends those that are fitted to it
         shown = broken_off(found, recordings, phases, explanation.p_value)
         if shown is not None and not (takes_little(explanation, groups) or shown.is_of(e.channel for e in effects)):

@@ -13,17 +13,12 @@ from rollover.diagnosis.fit.cross_validation import held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate, each_with_own
 from rollover.diagnosis.fit.step import Groups
-from rollover.diagnosis.inference.lack_of_fit import SURE
 from rollover.diagnosis.result import Answer, Named, Share, Verdict
 from rollover.diagnosis.selection.decision import Explanation
+from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
-IMMATERIAL = 0.01  # of a load's peak: what moves no load by more is of no consequence
-VALIDATED = 0.99  # quantile of a load's change: what is left out are leaps, whose instant a clock decides
-HALF = 0.5  # of the mismatch, that is explained at least by what is called a part of it
-NEARLY_ALL = 0.95  # of the mismatch, that the whole explains surely: what resembles an unlisted effect leaves more
-BODY = 0.03  # of a channel's range: discrepancies of models are about this, see `discrepancy.MEDIAN`
-CONFIDENCE = 0.975  # one side of a 95 % interval
+TUNING = SETTINGS.report.grades
 LOADS = ("force", "moment", "acceleration")  # in the names of channels that are loads, or tell one
 
 
@@ -57,7 +52,7 @@ def jackknifed(gained: Array, due: Array, groups: Groups) -> Share:
     if m < 2:
         return Share(share=min(share, 1.0), low=-np.inf, high=1.0)
     error = float(np.sqrt((m - 1) / m * np.sum((np.array(each) - np.mean(each)) ** 2)))
-    wide = float(stdtrit(m - 1, CONFIDENCE)) * error
+    wide = float(stdtrit(m - 1, TUNING.one_sided_confidence)) * error
     return Share(share=min(share, 1.0), low=share - wide, high=min(share + wide, 1.0))
 
 
@@ -97,7 +92,7 @@ def moved(problem: Problem, fitted: Fitted, others: Sequence[Candidate], x: Sequ
         for s, part in e.spans():
             peak = float(np.max(np.abs(a[part])))
             if is_load(s.channel) and peak > 0.0:
-                most = max(most or 0.0, float(np.quantile(np.abs(a[part] - b[part]), VALIDATED)) / peak)
+                most = max(most or 0.0, float(np.quantile(np.abs(a[part] - b[part]), TUNING.load_quantile)) / peak)
     return most
 
 
@@ -107,7 +102,11 @@ def answer_of(verdict: Verdict, grade: Answer, p_value: float, *, slight: bool, 
     `slight` are effects of no consequence; what is left beside a discrepancy (`is_beside`) is nothing.
     """
     if verdict == "no-mismatch":
-        return "immaterial" if slight or (p_value < SURE and not is_beside) else "nothing"
+        return (
+            "immaterial"
+            if slight or (p_value < SETTINGS.inference.lack_of_fit.p_value and not is_beside)
+            else "nothing"
+        )
     if verdict in ("unexplained", "cannot-tell"):
         return "unexplained" if verdict == "unexplained" else "cannot-tell"
     return grade
@@ -120,7 +119,7 @@ def is_load(channel: str) -> bool:
 
 def is_immaterial(effect: Named) -> bool:
     """Whether an effect of the body or the ground is there, and of no consequence to any load."""
-    return effect.kind != "sensor" and effect.moves is not None and effect.moves < IMMATERIAL
+    return effect.kind != "sensor" and effect.moves is not None and effect.moves < TUNING.immaterial
 
 
 def graded(
@@ -134,9 +133,11 @@ def graded(
     """
     if effects and all(is_immaterial(e) for e in effects):
         return "immaterial", tuple(replace(e, answer="immaterial") for e in effects)
-    if remains and whole is not None and whole.share < HALF:
+    if remains and whole is not None and whole.share < TUNING.half_share:
         return "unexplained", tuple(replace(e, answer="unexplained") for e in effects)
     alike = any(e.indistinguishable_from for e in effects)
-    bent = bool(scales) and (max(scales.values()) > BODY or whole is None or whole.low < NEARLY_ALL)
+    bent = bool(scales) and (
+        max(scales.values()) > TUNING.usual_discrepancy or whole is None or whole.low < TUNING.nearly_all
+    )
     answer: Answer = "part" if remains else "likeness" if alike or bent else "whole"
     return answer, tuple(replace(e, answer="immaterial" if is_immaterial(e) else answer) for e in effects)

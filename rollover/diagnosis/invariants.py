@@ -12,21 +12,18 @@ from rollover.diagnosis.fit.cross_validation import held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import coordinate, physical, strength_parameter
 from rollover.diagnosis.fit.step import Groups, Phases
-from rollover.diagnosis.grades import IMMATERIAL
-from rollover.diagnosis.inference.intervals import FEW_ROUNDS, held_at
-from rollover.diagnosis.inference.lack_of_fit import SURE, mismatch_of
-from rollover.diagnosis.inference.local_quadratic import TWO_SIDED
+from rollover.diagnosis.inference.intervals import held_at
+from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.result import Diagnosis, Named
 from rollover.diagnosis.selection.decision import Explanation
-from rollover.diagnosis.selection.forward_step import NEARLY_NOISE, is_at_an_end
+from rollover.diagnosis.selection.forward_step import is_at_an_end
 from rollover.diagnosis.selection.stepwise import as_conditioned
+from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.statements import is_none
 from rollover.effects import EFFECTS
 
 NAMING = ("parameter", "sensor", "missing-physics")  # verdicts that name effects
-AT_NOISE = 1.05  # times the noise: what a sentence would give as 1.0
-HALVINGS = 6  # of the way to a null: by then it is known to a 64th of that
-PART = 0.5  # of what the best takes beyond noise, that another must take to stand in for it
+TUNING = SETTINGS.report.invariants
 
 
 def at_bounds(effects: Sequence[Named]) -> set[str]:
@@ -86,17 +83,23 @@ def null_side(problem: Problem, fitted: Fitted) -> tuple[str, float, bool] | Non
     if not np.isfinite(end):
         return None
     count = sum(b.residual.size for b in fitted.blocks)
-    due = TWO_SIDED**2 * max(1.0, fitted.left / count) * problem.samples_per_error
+    due = (
+        SETTINGS.inference.local_quadratic.normal_quantile**2
+        * max(1.0, fitted.left / count)
+        * problem.samples_per_error
+    )
     shifts, others = [b.shift for b in fitted.blocks], [v for j, v in enumerate(fitted.x) if j != k]
 
     def is_met(place: float) -> bool:
-        there = problem.fit(held_at(fitted, k, place), others, rounds=FEW_ROUNDS, shifts=shifts, width=1)
+        there = problem.fit(
+            held_at(fitted, k, place), others, rounds=SETTINGS.inference.intervals.held_rounds, shifts=shifts, width=1
+        )
         return there is None or there.left - fitted.left < due
 
     beyond, inside = min(max(end, 0.0), 1.0), at
     if is_met(beyond):
         return None
-    for _ in range(HALVINGS):
+    for _ in range(TUNING.halvings):
         middle = 0.5 * (inside + beyond)
         inside, beyond = (middle, beyond) if is_met(middle) else (inside, middle)
     return name, physical(beyond, search), beyond < at
@@ -128,7 +131,7 @@ def next_best(
     able = [
         f
         for f in first.rivals
-        if f.candidates[-1].id not in out and not is_at_an_end(f) and start - left[f.label] > PART * most
+        if f.candidates[-1].id not in out and not is_at_an_end(f) and start - left[f.label] > TUNING.rival_share * most
     ]
     if not able:
         return found.refused()
@@ -143,12 +146,12 @@ def is_noise_alone(problem: Problem, found: Explanation, groups: Groups) -> bool
     Neither is a mismatch: a noise with a slow part below a white one looks so. What is more acts in the fall.
     """
     total = held_out(found.base, groups).total
-    if total < AT_NOISE:
+    if total < TUNING.at_noise:
         return True
     pairs = zip(found.before.cells, found.before.adjusted, strict=True)
-    significant = [c for c, p in pairs if p < SURE]
+    significant = [c for c, p in pairs if p < SETTINGS.inference.lack_of_fit.p_value]
     early = all(c.end <= problem.dataset[c.recording].simulator.contact for c in significant)
-    return total < NEARLY_NOISE and bool(significant) and early
+    return total < SETTINGS.selection.forward_step.nearly_noise and bool(significant) and early
 
 
 def checked(found: Diagnosis) -> Diagnosis:
@@ -165,11 +168,13 @@ def checked(found: Diagnosis) -> Diagnosis:
         "held-out recordings are predicted no worse than without": gains,
         "verdict and effects agree": (found.verdict in NAMING) == bool(found.effects),
         "no effect of consequence to no load leads to a verdict": not found.effects
-        or any(e.moves is None or e.moves >= IMMATERIAL or e.kind == "sensor" for e in found.effects),
+        or any(
+            e.moves is None or e.moves >= SETTINGS.report.grades.immaterial or e.kind == "sensor" for e in found.effects
+        ),
         "smallest_detectable is above 0": all(v > 0.0 for v in found.smallest_detectable.values()),
         "unexplained is more than 1.0 times the noise": found.verdict != "unexplained"
         or not found.where
         or before is None
-        or before >= AT_NOISE,
+        or before >= TUNING.at_noise,
     }
     return replace(found, checked=tuple(rules), broken=tuple(name for name, holds in rules.items() if not holds))

@@ -7,16 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from rollover.diagnosis.data.dataset import SHIFT
 from rollover.diagnosis.fit.cross_validation import held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.inference.scores import judged
 from rollover.diagnosis.result import Diagnosis, Interval, Named
 from rollover.diagnosis.selection.decision import Explanation
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS, spoken
 
-ID, CHANNELS = "sensor-clock-offset", 3  # as many channels as a scenario may have late each by itself
-CONFIDENCE = 0.975  # one side of a 95 % interval
+TUNING = SETTINGS.report.late_clocks
+ID = "sensor-clock-offset"
 
 
 def beside_clocks(found: Diagnosis, late: Mapping[str, float], problem: Problem, tried: Explanation) -> Diagnosis:
@@ -44,10 +44,10 @@ def _named(late: Mapping[str, float], problem: Problem, p_value: float) -> tuple
     from scipy.special import stdtrit
 
     values = np.array(list(late.values()))
-    is_common = len(late) == len(problem.dataset) and float(np.ptp(values)) < 2.0 * SHIFT
+    is_common = len(late) == len(problem.dataset) and float(np.ptp(values)) < 2.0 * SETTINGS.data.dataset.shift_prior
     value, n = float(np.mean(values)), values.size
-    error = max(float(np.std(values, ddof=1)) / np.sqrt(n) if n > 1 else 0.0, 0.1 * SHIFT)
-    wide = float(stdtrit(max(n - 1, 1), CONFIDENCE)) * error
+    error = max(float(np.std(values, ddof=1)) / np.sqrt(n) if n > 1 else 0.0, 0.1 * SETTINGS.data.dataset.shift_prior)
+    wide = float(stdtrit(max(n - 1, 1), SETTINGS.report.grades.one_sided_confidence)) * error
     way = "late" if value > 0.0 else "early"
     each = ", ".join(f"{spoken(abs(s) * 1e3)} ms {'late' if s > 0.0 else 'early'} ({name})" for name, s in late.items())
     statement = (
@@ -56,7 +56,7 @@ def _named(late: Mapping[str, float], problem: Problem, p_value: float) -> tuple
         else f"Clocks of recordings are off: {each}."
     )
     channels = list(dict.fromkeys(s.channel for e in problem.dataset for s in e.signals))
-    own: list[str | None] = [*channels] if is_common and len(channels) <= CHANNELS else [None]
+    own: list[str | None] = [*channels] if is_common and len(channels) <= TUNING.most_channels else [None]
     return tuple(
         Named(
             id=ID,

@@ -26,12 +26,12 @@ from rollover.diagnosis.io import diagnosed_scenario
 from rollover.diagnosis.noise.ensemble import averaged
 from rollover.diagnosis.noise.heteroscedasticity import with_variance_model
 from rollover.diagnosis.result import Diagnosis
+from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
 from rollover.scenario import Scenario
 from rollover.system.processes import Children
 
 Array = NDArray[np.float64]
-WIDEST = 3.0  # times its prior that a time shift may be
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,10 +198,10 @@ def single(residual: Array, sigma: float, many: int) -> float:
 
 
 def _shift(dataset: Dataset) -> float:
-    """Time shift at which a simulation meets its recording best, within `WIDEST` of its prior, s."""
+    """Time shift at which a simulation meets its recording best, within `search_width` of its prior, s."""
     problem = Problem([dataset])
     align(problem)
     fitted = problem.fit((), ())
     best = problem.shifts[0] if fitted is None else fitted.blocks[0].shift
-    most = WIDEST * dataset.shift_prior
+    most = SETTINGS.fit.time_shift.search_width * dataset.shift_prior
     return float(np.clip(best, -most, most))

@@ -8,10 +8,11 @@ from collections.abc import Mapping, Sequence
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.parameterisation import strength_parameter
 from rollover.diagnosis.result import Diagnosis
+from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.statements import noise
 from rollover.effects import EFFECTS
 
-MOSTLY = 0.6  # of the effects that would not have shown: then nothing can be told
+TUNING = SETTINGS.report.power
 
 
 def is_weak(detectable: Mapping[str, float]) -> bool:
@@ -30,7 +31,7 @@ def is_weak(detectable: Mapping[str, float]) -> bool:
         usual = getattr(EFFECTS[name](), parameter, None)
         blind += usual is None or value > abs(usual - null)
     acts = any(channel.startswith("ground/") for name in typical for channel in EFFECTS[name].channels)
-    return blind > MOSTLY * len(typical) if acts else blind == len(typical)
+    return blind > TUNING.blind_share * len(typical) if acts else blind == len(typical)
 
 
 def nothing_told(

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from rollover.diagnosis.conclusion import Conclusion
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.inconsistent import by_inconsistencies
-from rollover.diagnosis.data.repeatability import CONTRADICTING, against_itself, differing
+from rollover.diagnosis.data.repeatability import against_itself, differing
 from rollover.diagnosis.fit.time_shift import by_clock, mistimed
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.forward.full_run import full_runs
@@ -21,6 +21,7 @@ from rollover.diagnosis.inference.scores import before_an_impact, judged
 from rollover.diagnosis.inference.vehicle_dependence import dependency
 from rollover.diagnosis.power import is_weak
 from rollover.diagnosis.result import Degree, Diagnosis
+from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.statements import (
     as_models_miss,
     by_share,
@@ -66,7 +67,7 @@ def reported(c: Conclusion) -> Diagnosis:
         law = proposed(problem, explanation.base, set_ups, found, groups)
     told_of = {} if asked.discrepancy is None else asked.discrepancy.told(found)
     detectable = dict(explanation.detectable)
-    contrary = differing(found, CONTRADICTING)
+    contrary = differing(found, SETTINGS.data.repeatability.contradiction)
     if verdict == "no-mismatch" and not c.slight and (contrary or is_weak(detectable)):
         verdict = "cannot-tell"
     h_before, h_after = (judged(problem, f, c.kept, groups) for f in (explanation.base, explanation.fitted))

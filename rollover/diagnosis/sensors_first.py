@@ -11,12 +11,13 @@ from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.pipeline import diagnose
 from rollover.diagnosis.result import Diagnosis
+from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
 from rollover.recording.checks import Finding, prechecks, shared_rails
 from rollover.scenario import Scenario
 from rollover.system.errors import Fault, InputError
 
-SPELT_OUT = 3  # findings alike of one channel
+TUNING = SETTINGS.report.sensors_first
 Findings = Sequence[tuple[str, Finding]]
 
 
@@ -75,9 +76,9 @@ def in_words(findings: Findings) -> Iterator[str]:
     for name, f in findings:
         alike.setdefault((name, f.channel, f.check), []).append(f.sentence)
     for (name, channel, check_), sentences in alike.items():
-        yield from (f"{name}: {channel}: {s}" for s in sentences[:SPELT_OUT])
-        if len(sentences) > SPELT_OUT:
-            yield f"{name}: {channel}: {len(sentences) - SPELT_OUT} more such findings ({check_})"
+        yield from (f"{name}: {channel}: {s}" for s in sentences[: TUNING.spelt_out])
+        if len(sentences) > TUNING.spelt_out:
+            yield f"{name}: {channel}: {len(sentences) - TUNING.spelt_out} more such findings ({check_})"
 
 
 def plain(findings: Findings) -> list[dict[str, Any]]:

@@ -9,20 +9,18 @@ import numpy as np
 
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cross_validation import Held, held_out
-from rollover.diagnosis.fit.ensemble_mean import PARTS, in_shorter_steps
+from rollover.diagnosis.fit.ensemble_mean import in_shorter_steps
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.inference.adequacy import NEGLIGIBLE
 from rollover.diagnosis.inference.intervals import intervals
-from rollover.diagnosis.inference.lack_of_fit import SURE, Mismatch
+from rollover.diagnosis.inference.lack_of_fit import Mismatch
 from rollover.diagnosis.result import Considered, Named, Place, Scale, Verdict
 from rollover.diagnosis.selection.decision import Explanation, strongest
 from rollover.diagnosis.selection.forward_step import confusion
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS, spoken
 
-NOTABLE = 0.1  # of an interval
-UNSURE = 3.0  # times the error of a recording's clock, up to which a channel alone may be late or all others early
-SMALL = 0.2  # of a strength: an interval of its logarithm that goes down so far is one of a few times chance
+TUNING = SETTINGS.report.statements
 
 
 def named(problem: Problem, found: Explanation, groups: Sequence[Sequence[int]]) -> tuple[Named, ...]:
@@ -72,7 +70,7 @@ def _or_the_other(problem: Problem, c: Candidate, values: Mapping[str, Any]) -> 
     others = {s.channel for e in problem.dataset for s in e.signals} - {c.channel}
     if c.id != "sensor-clock-offset" or len(others) != 1:
         return []
-    if abs(values["offset"]) > UNSURE * min(e.shift_prior for e in problem.dataset):
+    if abs(values["offset"]) > TUNING.clock_errors * min(e.shift_prior for e in problem.dataset):
         return []
     way = "early" if values["offset"] > 0.0 else "late"
     return [f"With two channels the late one cannot be identified: {others.pop()} may be {way} by as much."]
@@ -89,7 +87,7 @@ def is_none(effect: Named) -> bool:
 
     def may_be(name: str, null: float) -> bool:
         i = effect.parameters[name]
-        least = i.low - (SMALL * i.value if null == 0.0 and name in logarithmic else 0.0)
+        least = i.low - (TUNING.near_zero * i.value if null == 0.0 and name in logarithmic else 0.0)
         return least <= null <= i.high
 
     known = {p: null for p, null in nulls.items() if isinstance(null, (int, float))}
@@ -152,10 +150,10 @@ def by_steps(effects: Sequence[Named]) -> list[str]:
     """What the scenario's own steps would have said of values, where that is far off beside their intervals."""
     return [
         f"{effect.id} {name}: {i.value:.4g} {i.unit}".rstrip()
-        + f" by steps of 1/{PARTS} of the scenario's, in its own {i.as_simulated:.4g}"
+        + f" by steps of 1/{SETTINGS.fit.ensemble_mean.finer_parts} of the scenario's, in its own {i.as_simulated:.4g}"
         for effect in effects
         for name, i in effect.parameters.items()
-        if i.as_simulated is not None and abs(i.as_simulated - i.value) > NOTABLE * (i.high - i.low)
+        if i.as_simulated is not None and abs(i.as_simulated - i.value) > TUNING.notable_change * (i.high - i.low)
     ]
 
 
@@ -252,12 +250,12 @@ def sentence(
     recordings were held out, as none can be of one condition, `beside` that an estimated discrepancy counts beside the
     noise.
     """
-    if verdict == "no-mismatch" and p_value < SURE:
+    if verdict == "no-mismatch" and p_value < SETTINGS.inference.lack_of_fit.p_value:
         model_error_dominates = any(e.model_error_dominates(s) for e in dataset for s in e.signals)
         beyond = " beyond what is tolerated or repeats differ by" if model_error_dominates else ""
         return (
             f"Simulation and {len(dataset)} recordings differ by more than noise (p = {p_value:.2g}), but by less "
-            f"than {NEGLIGIBLE:.1%} of any channel's range{beyond}."
+            f"than {SETTINGS.inference.adequacy.negligible:.1%} of any channel's range{beyond}."
         )
     if verdict == "no-mismatch":
         return f"Simulation and {len(dataset)} recordings agree within the noise (p = {p_value:.2g})."

@@ -14,11 +14,12 @@ from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.forward.averaging import Averaged
-from rollover.diagnosis.forward.full_run import AHEAD, RunSimulator
-from rollover.diagnosis.noise.truncation import VALIDATED, left_aside, shortened, soon, up_to
+from rollover.diagnosis.forward.full_run import RunSimulator
+from rollover.diagnosis.noise.truncation import left_aside, shortened, soon, up_to
 from rollover.diagnosis.selection import forward_step, scan
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.score_test import ScoreTest
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
 from rollover.recording import Recording
 from tests.physics.scenes import shipped
@@ -35,7 +36,9 @@ def dataset(counts: float, *, cfc: int | None = None, off: float = 0.0) -> Datas
     empty = Recording(title="toss", time=time, channels={CHANNEL: np.zeros(time.size)}, cfc=cfcs)
     there = RunSimulator(scenario, empty).predict({}, 0.0)
     assert there is not None
-    made = replace(empty, channels={CHANNEL: there[CHANNEL] + off * (time > IMPACT + VALIDATED)})
+    made = replace(
+        empty, channels={CHANNEL: there[CHANNEL] + off * (time > IMPACT + SETTINGS.noise.truncation.kept_after_impact)}
+    )
     rows = np.arange(0, time.size, 2)
     weight = np.where(time[rows] < IMPACT, 1.0, counts)
     signal = Signal(
@@ -58,18 +61,20 @@ def dataset(counts: float, *, cfc: int | None = None, off: float = 0.0) -> Datas
 def test_an_end_that_hardly_counts_isleft_aside() -> None:
     whole = dataset(0.3)
     found = shortened(whole)
-    assert found.recording.time[-1] == pytest.approx(IMPACT + VALIDATED, abs=STEP)
+    assert found.recording.time[-1] == pytest.approx(IMPACT + SETTINGS.noise.truncation.kept_after_impact, abs=STEP)
     (signal,) = found.signals
     assert signal.weight is not None
     n = signal.rows.size
-    assert n == np.count_nonzero(whole.recording.time[whole.signals[0].rows] <= IMPACT + VALIDATED)
+    assert n == np.count_nonzero(
+        whole.recording.time[whole.signals[0].rows] <= IMPACT + SETTINGS.noise.truncation.kept_after_impact
+    )
     np.testing.assert_array_equal(signal.values, whole.signals[0].values[:n])
     assert signal.weight.size == n
     np.testing.assert_array_equal(signal.level, 1.0 + found.recording.time[signal.rows])
     assert found.measured().size == n
     np.testing.assert_array_equal(found.perturbed[0], np.arange(n))
     assert isinstance(found.simulator, RunSimulator)
-    assert found.simulator.scenario.simulation.duration < IMPACT + VALIDATED + 0.05
+    assert found.simulator.scenario.simulation.duration < IMPACT + SETTINGS.noise.truncation.kept_after_impact + 0.05
     assert left_aside([whole], [found]) == ["toss: what comes after 1.10 s is chaotic and was excluded"]
 
 
@@ -77,7 +82,7 @@ def test_an_end_that_counts_is_kept() -> None:
     for e in (
         dataset(0.9),
         replace(dataset(0.3), first_impact=np.inf),
-        replace(dataset(0.3), first_impact=END - VALIDATED),
+        replace(dataset(0.3), first_impact=END - SETTINGS.noise.truncation.kept_after_impact),
     ):
         assert shortened(e) is e
     plain = dataset(0.3)
@@ -106,7 +111,10 @@ def test_a_shorter_run_is_the_same_run_and_its_filter_looks_ahead() -> None:
     whole = dataset(0.3, cfc=60)
     found = shortened(whole)
     assert isinstance(found.simulator, RunSimulator)
-    assert found.simulator.scenario.simulation.duration >= IMPACT + VALIDATED + AHEAD
+    assert (
+        found.simulator.scenario.simulation.duration
+        >= IMPACT + SETTINGS.noise.truncation.kept_after_impact + SETTINGS.forward.run.filter_ahead
+    )
     long, short = whole.simulator.predict({}, 0.0), found.simulator.predict({}, 0.0)
     assert long is not None
     assert short is not None

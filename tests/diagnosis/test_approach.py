@@ -15,6 +15,7 @@ from rollover.diagnosis import diagnose
 from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.noise.drift import along, cosines, is_louder, is_recorders, is_shared, is_slow
+from rollover.diagnosis.settings import SETTINGS
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario, signal
 
 N, BEFORE = 400, 60
@@ -129,7 +130,7 @@ def test_a_long_memory_reaches_where_a_short_one_does_not() -> None:
         short, long = autoregression.autoregression(series), autoregression.long_memory(series)
         levels.append((autoregression.level_of(*short), autoregression.level_of(*long), len(long[1])))
     low, high, reach = np.mean(levels, axis=0)
-    assert reach > 1.5 * autoregression.LONGEST
+    assert reach > 1.5 * SETTINGS.noise.autoregression.longest_memory
     assert high > 1.3 * low
     for a in (0.0, 0.5, 0.9):
         series = [lfilter([1.0], [1.0, -a], rng.standard_normal(N)) for _ in range(6)]

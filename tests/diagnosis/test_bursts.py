@@ -7,8 +7,9 @@ import pytest
 
 from rollover.diagnosis.fit.levenberg_marquardt import ResidualBlock
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
-from rollover.diagnosis.noise import autoregression, outliers
+from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.noise.outliers import too_often, without_outliers
+from rollover.diagnosis.settings import SETTINGS
 from tests.diagnosis.test_chaos import SIGMA, STEP, N, dataset
 
 
@@ -56,12 +57,14 @@ def test_rare_bursts_are_a_mismatch_though_they_are_rough() -> None:
     found = []
     for many in (0, 6):
         off = SIGMA * rng.standard_normal(N)
-        off[rng.permutation(N)[:many]] += 1.5 * outliers.FAR * SIGMA * rng.choice([-1.0, 1.0], many)
+        off[rng.permutation(N)[:many]] += (
+            1.5 * SETTINGS.noise.outliers.outlier_distance * SIGMA * rng.choice([-1.0, 1.0], many)
+        )
         e = dataset(off)
         block = ResidualBlock(residual=e.whitened(off), J=np.zeros((N, 0)), slope=np.zeros(N), shift=0.0, prior=1e-3)
         found.append(mismatch_of([e], [block], [((times[0], "rest"),)]).p_value)
     assert found[0] > 0.05
     assert found[1] > 0.01  # as few as any recorder may have
-    off[rng.permutation(N)[:24]] += 1.5 * outliers.FAR * SIGMA * rng.choice([-1.0, 1.0], 24)
+    off[rng.permutation(N)[:24]] += 1.5 * SETTINGS.noise.outliers.outlier_distance * SIGMA * rng.choice([-1.0, 1.0], 24)
     block = ResidualBlock(residual=e.whitened(off), J=np.zeros((N, 0)), slope=np.zeros(N), shift=0.0, prior=1e-3)
     assert mismatch_of([e], [block], [((times[0], "rest"),)]).p_value < 1e-9

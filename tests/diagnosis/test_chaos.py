@@ -13,9 +13,7 @@ from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.fit.levenberg_marquardt import ResidualBlock
 from rollover.diagnosis.forward.forward_model import simulator_of
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
-from rollover.diagnosis.noise import ensemble
 from rollover.diagnosis.noise.ensemble import (
-    STATE,
     HeavyTail,
     alike,
     gained,
@@ -27,6 +25,7 @@ from rollover.diagnosis.noise.ensemble import (
     unseen,
     weighted,
 )
+from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
 from tests.physics.scenes import shipped
 
@@ -71,7 +70,9 @@ def test_a_sample_counts_by_its_noise_and_its_scatter() -> None:
     found = weighted(e, [alternating, {CHANNEL: -alternating[CHANNEL]}]).signals[0].weight
     assert found is not None
     inside = slice(110, N)
-    np.testing.assert_allclose(found[inside], SIGMA / np.sqrt(SIGMA**2 + ensemble.FEW * 0.5**2), rtol=1e-12)
+    np.testing.assert_allclose(
+        found[inside], SIGMA / np.sqrt(SIGMA**2 + SETTINGS.noise.ensemble.few_factor * 0.5**2), rtol=1e-12
+    )
     np.testing.assert_array_equal(found[:95], 1.0)
 
 
@@ -194,7 +195,9 @@ def test_another_course_counts_as_one_state_of_unknown_size() -> None:
     q = np.sum(w[late].reshape(4, -1) ** 2, axis=1)
     expected = 4.0 * WEIGHT**2 * late.sum() / 4.0
     beyond = np.median(q / (expected / 4.0)) * expected - expected
-    share = (expected + STATE * np.log1p(beyond / STATE)) / (expected + beyond)
+    share = (expected + SETTINGS.noise.ensemble.state_size * np.log1p(beyond / SETTINGS.noise.ensemble.state_size)) / (
+        expected + beyond
+    )
     assert found.share == pytest.approx(share, rel=1e-12)
     assert is_other(found)
 
@@ -206,7 +209,11 @@ def test_no_more_is_forgiven_than_there_is() -> None:
     late = np.tile(e.recording.time >= IMPACT, 5)
     expected = WEIGHT**2 * late.sum()
     x = float(w[late] @ w[late]) - expected
-    wanted = float(w[~late] @ w[~late]) + expected + STATE * np.log1p(x / STATE)
+    wanted = (
+        float(w[~late] @ w[~late])
+        + expected
+        + SETTINGS.noise.ensemble.state_size * np.log1p(x / SETTINGS.noise.ensemble.state_size)
+    )
     assert counted(e, w) == pytest.approx(wanted, rel=1e-12)
 
 
@@ -236,7 +243,7 @@ def test_sums_of_squares_touch_what_another_course_counts_and_lie_above_it() -> 
 @pytest.mark.parametrize("fall", [-100.0, 1.0, 50.0, 500.0, 550.0])
 def test_what_is_gained_along_a_line_is_the_fall_of_what_a_course_counts(fall: float) -> None:
     """E + x falls by `fall`: (D9) by d ln((d + x)/(d + x - fall)) down to x = 0; beyond, samples count in full."""
-    x, d = 500.0, float(STATE)
+    x, d = 500.0, float(SETTINGS.noise.ensemble.state_size)
     slope = d / (d + x)
     within = min(fall, x)
     wanted = d * np.log((d + x) / (d + x - within)) + (fall - within)

@@ -11,10 +11,11 @@ from rollover.diagnosis.data.dataset import Dataset, dataset_of
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.local_search import ended
 from rollover.diagnosis.fit.parameterisation import coordinate, followed
-from rollover.diagnosis.fit.time_shift import BELIEVED, align, by_clock, by_first_contact, mistimed
+from rollover.diagnosis.fit.time_shift import align, by_clock, by_first_contact, mistimed
 from rollover.diagnosis.forward.forward_model import DropSimulator, simulator_of
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.diagnosis.selection.score_test import score_test
+from rollover.diagnosis.settings import SETTINGS
 from rollover.dynamics.drop_test import DropModel
 from rollover.effects import spoken
 from rollover.recording import Clock
@@ -96,7 +97,7 @@ def test_a_clock_that_would_have_to_be_far_off_is_not_believed_where_its_zero_is
         clock = replace(e.recording.clock, zero="unknown")
         loose.append(replace(e, recording=replace(e.recording, clock=clock)))
     told = [np.nan if v is None else v for v in by_first_contact(Problem(loose), (), ())]
-    far = [abs(v) > BELIEVED * e.shift_prior for v, e in zip(told, loose, strict=True)]
+    far = [abs(v) > SETTINGS.fit.time_shift.believed_width * e.shift_prior for v, e in zip(told, loose, strict=True)]
     assert any(far)
     assert [v is None for v in by_first_contact(problem, (), ())] == far
 

@@ -79,7 +79,7 @@ def test_noise_that_no_filter_made_is_taken_for_even() -> None:
 
 def test_without_a_filter_that_can_be_the_noise_s_own_it_is_taken_for_even(monkeypatch: pytest.MonkeyPatch) -> None:
     """None declared, one too wide for the rate, averages, a longer memory, none weighed; whatever the memory says."""
-    monkeypatch.setattr(autoregression, "AGREES", 1e3)
+    monkeypatch.setattr(autoregression, "TUNING", replace(autoregression.TUNING, filter_errors=1e3))
     e = recorded(behind(np.random.default_rng(5)))
     assert rests([e])[0][CHANNEL].correlation is not None
     others = [

@@ -9,14 +9,13 @@ import pytest
 from scipy.stats import norm
 
 from rollover.diagnosis import account, diagnose
-from rollover.diagnosis.data.dataset import ROUGH, Dataset, dataset_of
+from rollover.diagnosis.data.dataset import Dataset, dataset_of
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.forward_model import simulator_of
 from rollover.diagnosis.inference.adequacy import is_tolerated
 from rollover.diagnosis.inference.discrepancy import (
     MEDIAN,
-    RARELY,
     SPREAD,
     Discrepancy,
     beside,
@@ -28,6 +27,7 @@ from rollover.diagnosis.inference.discrepancy import (
 )
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.noise import autoregression
+from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
 from tests.diagnosis.drops import DEPTH, FORCE, recorded, scenario
 
@@ -67,7 +67,7 @@ def judged(
 
 
 def test_models_are_rarely_better_than_one_percent_and_rarely_worse_than_ten() -> None:
-    below = norm.cdf(np.log(np.array(RARELY) / MEDIAN) / SPREAD)
+    below = norm.cdf(np.log(np.array(SETTINGS.inference.discrepancy.usual_range) / MEDIAN) / SPREAD)
     assert below == pytest.approx([0.05, 0.95], abs=1e-3)
 
 
@@ -143,7 +143,7 @@ def test_a_discrepancy_is_of_its_channel_and_none_is_smaller_than_noise_hides() 
     for e in problem.dataset:
         sizes = {s.channel: e.error_of(s) * s.span / s.noise for s in e.signals}
         assert sizes[DEPTH] == pytest.approx(5.0, rel=0.25)
-        assert sizes[FORCE] == pytest.approx(ROUGH, rel=0.03)
+        assert sizes[FORCE] == pytest.approx(SETTINGS.data.dataset.other_error_share, rel=0.03)
         assert all(e.model_error_dominates(s) for s in e.signals)
 
 

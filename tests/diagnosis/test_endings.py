@@ -15,9 +15,9 @@ from rollover.diagnosis.fit.levenberg_marquardt import Fitted
 from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
-from rollover.diagnosis.forward.budget import DROPS
 from rollover.diagnosis.selection import simplification
 from rollover.diagnosis.selection.context import Inquiry
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
 
 FIRST = "soil-viscous-damping"
@@ -226,7 +226,7 @@ def test_two_thresholds_in_one_place_are_a_threshold_and_a_stiffness(
     there = cast(Inquiry, SimpleNamespace(fits=fits, candidates=[plain, *others, best.candidates[0]], problem=None))
     found = simplification.plainer(there, step(best, rival))
     assert {j.candidates[-1].id for j in asked} == {"soil-stiffness"}
-    ways = [("fit", simplification.SOON), ("fit", None), ("polish", None)]
+    ways = [("fit", SETTINGS.selection.forward_step.short_rounds), ("fit", None), ("polish", None)]
     assert [(j.how, j.rounds) for j in asked] == ways[: 2 + taken]
     assert asked[0].start[:-1] == (0.7,)
     assert (found is not None) is taken
@@ -251,7 +251,7 @@ def test_of_two_thresholds_either_may_be_the_one_that_is_a_stiffness(family: str
     def fits(tasks: Sequence[Task]) -> list[Fitted | None]:
         return [left(j.candidates, j.start, 6.0 if j.candidates[0] == crust else 90.0) for j in tasks]
 
-    problem = SimpleNamespace(fit=lambda c, x, **_: left(c, x, 400.0), effort=DROPS)
+    problem = SimpleNamespace(fit=lambda c, x, **_: left(c, x, 400.0), effort=SETTINGS.forward.drops)
     there = cast(Inquiry, SimpleNamespace(fits=fits, candidates=[layer, crust, plain], problem=problem))
     found = simplification.plainer(there, step(left((layer, crust), (0.4, 0.5, 0.3, 0.6), 5.0)))
     assert (found is not None) is taken

@@ -10,10 +10,11 @@ import pytest
 from numpy.typing import NDArray
 
 from rollover import scenario
-from rollover.diagnosis.forward.averaging import MOST_ROWS, simulated, thinned
+from rollover.diagnosis.forward.averaging import simulated, thinned
 from rollover.diagnosis.forward.discontinuities import DISCONTINUITY_IN
 from rollover.diagnosis.forward.filtering import rows_of
 from rollover.diagnosis.forward.forward_model import DropSimulator
+from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
 
 FAST = np.arange(-1000, 4001) * 1e-4  # 10 kHz
@@ -71,7 +72,7 @@ def test_means_of_rows_behind_a_filter_are_those_of_all_rows(whole: dict[str, ND
     """The filter sees every row that the rig sampled; what is compared is as few as without one."""
     recording = recorded(FAST)
     thin, simulator, many = simulated(scenario.load("drop_test"), recording)
-    assert many == FAST.size // MOST_ROWS
+    assert many == FAST.size // SETTINGS.forward.averaging.most_rows
     assert thin.cfc == recording.cfc
     found = simulator.predict({"effects.mass.added": 3.0}, 2e-4)
     assert found is not None

@@ -23,6 +23,7 @@ from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.forward.discontinuities import about_jumps
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.diagnosis.selection.restarts import _best_middle
+from rollover.diagnosis.settings import SETTINGS
 from rollover.scenario import load
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
@@ -306,18 +307,23 @@ def test_far_from_the_noise_a_fit_ends_where_a_round_gains_a_trifle(monkeypatch:
     problem = judge_of(recorded(LAYER, 3, speeds=(1.2, 2.2, 3.2)))
     ends: dict[tuple[str, float], tuple[tuple[float, ...], float, int]] = {}
     for key, start in (("soil-rate-hardening", (0.5,)), ("soil-layer", (0.6, 0.6))):
-        for trifling in (0.0, levenberg_marquardt.TRIFLING):
-            monkeypatch.setattr(levenberg_marquardt, "TRIFLING", trifling)
+        for trifling in (0.0, SETTINGS.fit.levenberg_marquardt.converged_share):
+            tuning = replace(levenberg_marquardt.TUNING, converged_share=trifling)
+            monkeypatch.setattr(levenberg_marquardt, "TUNING", tuning)
             own = problem.no_jacobian()
             found = own.fit((candidate(problem, key),), start)
             assert found is not None
             ends[key, trifling] = found.x, found.left, own.simulations
-    (x, left, made), (y, more, fewer) = (ends["soil-rate-hardening", t] for t in (0.0, levenberg_marquardt.TRIFLING))
+    (x, left, made), (y, more, fewer) = (
+        ends["soil-rate-hardening", t] for t in (0.0, SETTINGS.fit.levenberg_marquardt.converged_share)
+    )
     assert fewer < made
     assert left <= more < 1.005 * left
     assert y == pytest.approx(x, abs=0.02)
-    (x, left, _), (y, more, _) = (ends["soil-layer", t] for t in (0.0, levenberg_marquardt.TRIFLING))
-    assert more == pytest.approx(left, abs=levenberg_marquardt.ENOUGH)
+    (x, left, _), (y, more, _) = (
+        ends["soil-layer", t] for t in (0.0, SETTINGS.fit.levenberg_marquardt.converged_share)
+    )
+    assert more == pytest.approx(left, abs=SETTINGS.fit.levenberg_marquardt.converged_gain)
     assert y == pytest.approx(x, abs=1e-3)
 
 

@@ -13,6 +13,7 @@ import pytest
 from rollover.diagnosis.fit import model_variants
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
 from tests.diagnosis.drops import linear_blocks
 
@@ -42,9 +43,9 @@ def test_of_fits_that_lead_to_one_place_one_is_followed(ends: tuple[float, ...],
     begun, whole = (0.2, 0.4, 0.6), []
 
     def fit(_: Any, x: Sequence[float], *, rounds: int | None = None, **how: Any) -> Fitted:
-        if rounds == model_variants.SHORT:
+        if rounds == SETTINGS.fit.model_variants.short_rounds:
             return fitted(BENT, x, 10.0 + x[1])
-        if rounds == model_variants.FURTHER:
+        if rounds == SETTINGS.fit.model_variants.meeting_rounds:
             return fitted(BENT, (0.3, ends[begun.index(x[1])]), 9.0 + 0.1 * x[1])
         whole.append(x[1])
         return fitted(BENT, x, 8.0)
@@ -73,9 +74,9 @@ def test_of_short_fits_on_their_way_to_one_place_one_is_gone_on_with(
     begun: list[float] = []
 
     def fit(_: Any, x: Sequence[float], *, rounds: int | None = None, **how: Any) -> Fitted:
-        if rounds == model_variants.SHORT:
+        if rounds == SETTINGS.fit.model_variants.short_rounds:
             return fitted(BENT, x, dict(near)[x[1]])
-        if rounds == model_variants.FURTHER:
+        if rounds == SETTINGS.fit.model_variants.meeting_rounds:
             begun.append(x[1])
         return fitted(BENT, x, 9.0)
 
@@ -95,7 +96,7 @@ def test_far_from_noise_a_shape_is_followed_if_it_soon_takes_part(left: float, s
     whole = []
 
     def fit(_: Any, x: Sequence[float], *, rounds: int | None = None, **how: Any) -> Fitted:
-        whole.extend([] if rounds == model_variants.SHORT else [x])
+        whole.extend([] if rounds == SETTINGS.fit.model_variants.short_rounds else [x])
         return fitted(BENT, x, soon)
 
     problem, start = cast(Problem, SimpleNamespace(fit=fit)), fitted(DAMPING, (0.3,), left)
@@ -110,7 +111,7 @@ def test_where_few_recordings_lead_astray_all_are_fitted_from_where_the_usual_sh
     least = [60.0]
 
     def fit(candidates: Sequence[Candidate], x: Sequence[float], **how: Any) -> Fitted:
-        if how.get("rounds") == model_variants.SHORT:
+        if how.get("rounds") == SETTINGS.fit.model_variants.short_rounds:
             return fitted(candidates[-1], x, 20.0 if tuple(x) == stands else 10.0)
         least[:] = [1.0] if tuple(x) == stands else least
         return fitted(candidates[-1], x, 30.0 if len(x) == 1 else least[0])
@@ -140,7 +141,7 @@ def test_a_shape_is_gone_on_with_if_it_comes_near_what_another_explanation_leave
 
     def fit(_: Any, x: Sequence[float], *, rounds: int | None = None, **how: Any) -> Fitted:
         made.extend([] if rounds else [x])
-        return fitted(BENT, x, soon if rounds == model_variants.SHORT else then)
+        return fitted(BENT, x, soon if rounds == SETTINGS.fit.model_variants.short_rounds else then)
 
     start, lead = fitted(DAMPING, (0.3,), 6.0), fitted(DAMPING, (0.3,), leaves)
     size = sum(b.residual.size for b in lead.blocks)

@@ -15,8 +15,8 @@ from rollover.diagnosis.data.quantisation import digitised
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
-from rollover.diagnosis.forward.budget import DROPS
 from rollover.diagnosis.inference import intervals as stated
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS, Search, possible
 from rollover.proof.generator import make, plan
 from rollover.recording import Recording
@@ -63,7 +63,9 @@ def test_an_interval_reaches_as_far_as_the_misfit_stays_low(flatter: float) -> N
     def clocked(r: int, c: object, x: list[float], s: float, _rounds: int) -> ResidualBlock:
         return block(r, c, x, s, 0.0)
 
-    problem: Any = SimpleNamespace(clocked=clocked, block=block, dataset=(), effort=DROPS, made_ahead=lambda _: None)
+    problem: Any = SimpleNamespace(
+        clocked=clocked, block=block, dataset=(), effort=SETTINGS.forward.drops, made_ahead=lambda _: None
+    )
     candidate = Candidate(id="mass", kind="parameter", family="", search={"added": Search(0, 1)})
     fitted = Fitted(candidates=(candidate,), x=(0.5,), blocks=(block(0, None, [0.5], 0.0, 0.0),))
     found = stated.profile_extents(problem, fitted, np.array([1.0 / J]), 1.0)
@@ -172,7 +174,7 @@ def test_an_interval_follows_a_crooked_valley(profile_extents: float, begun: flo
     fitted: Any = SimpleNamespace(candidates=(c,), x=(0.5, 0.2), blocks=())
     problem: Any = SimpleNamespace(fit=fit)
     assert stated._along_ridge(problem, fitted, 0, 0.04, (100.0, due), begun) == pytest.approx(end, rel=1e-9)
-    assert held_at[0] == (pytest.approx(0.5 + begun * stated.ALONG * 0.04), [0.2])
+    assert held_at[0] == (pytest.approx(0.5 + begun * SETTINGS.inference.intervals.ridge_factor * 0.04), [0.2])
     assert all(x == [0.1] for _, x in held_at[1:])  # each from where the last one ended
 
 
@@ -186,7 +188,7 @@ def test_recordings_that_disagree_widen_an_interval_as_student_says() -> None:
         blocks = [ResidualBlock(residual=x * J[:, 0], J=J, slope=np.zeros(40), shift=0.0, prior=1e-3) for x in each]
         inverse = 1.0 / np.array([[4.0 * float(J[:, 0] @ J[:, 0])]])
         sd = np.sqrt(stated.disagreeing([own] * 4, blocks, inverse)[0])
-        inside.append(abs(each.mean()) < stated.TWO_SIDED * sd)
+        inside.append(abs(each.mean()) < SETTINGS.inference.local_quadratic.normal_quantile * sd)
     assert np.mean(inside) == pytest.approx(0.95, abs=0.014)  # 4 standard errors
     assert np.all(stated.disagreeing([own] * 2, blocks[:2], inverse) == 0.0)  # two are too few
 
@@ -289,6 +291,10 @@ def test_where_slopes_tell_nothing_an_interval_ends_where_too_much_is_left() -> 
     wide = np.array([[0.01, 0.01], [10.0, 10.0]])
     found = stated._within_range(SimpleNamespace(fit=fit), fitted, wide, 1.0)  # type: ignore[arg-type]
     assert asked[0] == 0.0
-    assert 0.3 - 0.61 / 2**stated.HALVINGS < 0.6 - stated.TWO_SIDED * found[1, 0] < 0.3
+    assert (
+        0.3 - 0.61 / 2**SETTINGS.inference.intervals.halvings
+        < 0.6 - SETTINGS.inference.local_quadratic.normal_quantile * found[1, 0]
+        < 0.3
+    )
     assert found[1, 1] == 10.0, "up to the end of the range as little is left"
     np.testing.assert_array_equal(found[0], wide[0])

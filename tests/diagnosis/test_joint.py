@@ -10,8 +10,9 @@ import pytest
 
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.selection import pairs
-from rollover.diagnosis.selection.pair_score import MOST, jointly
+from rollover.diagnosis.selection.pair_score import jointly
 from rollover.diagnosis.selection.score_test import ScoreTest, score_test
+from rollover.diagnosis.settings import SETTINGS
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded
 from tests.diagnosis.test_fits import candidate, judge_of
 from tests.diagnosis.test_pairs import DAMPING, GRADUAL, MASS, NOSE, fitted, inquiry, screened
@@ -64,9 +65,9 @@ def test_of_two_owners_the_best_two_directions_count_and_none_joins_itself() -> 
     D = unit(rng.standard_normal((200, 40)))
     owners = [f"{k // 2}" for k in range(40)]  # two directions each: 190 pairs of owners
     found = jointly(D.T @ rng.standard_normal(200), D.T @ D, owners)
-    assert len(found) == MOST
+    assert len(found) == SETTINGS.selection.pair_score.most_pairs
     told = [frozenset(owners[k] for k in b.places) for b in found]
-    assert len(set(told)) == MOST
+    assert len(set(told)) == SETTINGS.selection.pair_score.most_pairs
     assert all(len(p) == 2 for p in told)
 
 

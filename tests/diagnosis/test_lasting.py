@@ -16,7 +16,6 @@ from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Screened, Step
-from rollover.diagnosis.forward.budget import DROPS, RUNS, Effort
 from rollover.diagnosis.noise.ensemble import HeavyTail
 from rollover.diagnosis.result import Interval
 from rollover.diagnosis.selection import ensemble_validation as believed
@@ -37,6 +36,8 @@ from rollover.diagnosis.selection.ensemble_validation import (
 from rollover.diagnosis.selection.forward_step import _chosen
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.screening import of_same_family
+from rollover.diagnosis.settings import SETTINGS
+from rollover.diagnosis.settings.forward import Effort
 from rollover.effects import Search
 from tests.diagnosis.test_settle import CHANNEL, SLOPE, TIME, N, Rough, candidate, dataset
 
@@ -134,11 +135,11 @@ def test_where_the_first_does_not_last_the_next_one_is_taken() -> None:
 @pytest.mark.parametrize(
     ("missing", "p", "effort", "goes_on"),
     [
-        (8.0, 0.05, RUNS, True),
-        (8.0, 0.2, RUNS, False),
-        (0.0, 0.05, RUNS, False),
-        (0.0, 0.001, RUNS, True),
-        (8.0, 0.05, DROPS, False),
+        (8.0, 0.05, SETTINGS.forward.runs, True),
+        (8.0, 0.2, SETTINGS.forward.runs, False),
+        (0.0, 0.05, SETTINGS.forward.runs, False),
+        (0.0, 0.001, SETTINGS.forward.runs, True),
+        (8.0, 0.05, SETTINGS.forward.drops, False),
     ],
 )
 def test_where_runs_scatter_what_is_missing_for_sure_is_looked_for_though_slopes_could_be_chance(
@@ -181,15 +182,15 @@ def test_with_what_leads_its_kin_gets_a_first_fit() -> None:
     every += [Candidate(id=i, kind="sensor", family="depth", search={}) for i in ("g", "h", "i")]
     screened = [Screened(candidate=c, starts=(), left=float(k), potential=0.0) for k, c in enumerate(every)]
     looked = ScoreTest(score=9.0, scores={c.key: 9.0 - k for k, c in enumerate(every)}, null=np.zeros(9), detectable={})
-    chosen = {s.candidate.key for s in _chosen(screened, RUNS, looked)}
+    chosen = {s.candidate.key for s in _chosen(screened, SETTINGS.forward.runs, looked)}
     assert chosen == {"a", "b", "c", "d", "f", "g", "h", "i"}
     hopeless = replace(looked, scores={**looked.scores, "c": 0.4, "f": 0.4})  # of 9; one is akin to the best
-    assert "c" not in (rest := {s.candidate.key for s in _chosen(screened, RUNS, hopeless)})
+    assert "c" not in (rest := {s.candidate.key for s in _chosen(screened, SETTINGS.forward.runs, hopeless)})
     assert {"a", "b", "f"} < rest
     loud = replace(looked, scores={**looked.scores, "g": 500.0})  # a sensor: those that move the vehicle stay
-    assert {s.candidate.key for s in _chosen(screened, RUNS, loud)} == {"a", "b", "c", "d", "f", "g"}
+    assert {s.candidate.key for s in _chosen(screened, SETTINGS.forward.runs, loud)} == {"a", "b", "c", "d", "f", "g"}
     masked = replace(hopeless, leading=("c",))
-    assert "c" in {s.candidate.key for s in _chosen(screened, RUNS, masked)}
+    assert "c" in {s.candidate.key for s in _chosen(screened, SETTINGS.forward.runs, masked)}
     every[0] = replace(every[0], neutral=(0.5, 0.5))  # it acts everywhere
     assert of_same_family(every, 4, 2) == []
 
@@ -206,7 +207,7 @@ def test_what_admits_a_step_speaks_for_its_best(monkeypatch: pytest.MonkeyPatch,
     score = float(np.quantile(null, 1.0 - (0.06 if p > 0.005 or not kept else p)))
     one = Fitted(candidates=(candidate("slope", "physics", "a"),), x=(0.5,), blocks=())
     looked = ScoreTest(score=score, scores={"slope": score}, null=null, detectable={})
-    inquiry: Any = SimpleNamespace(problem=SimpleNamespace(effort=RUNS), groups=[])
+    inquiry: Any = SimpleNamespace(problem=SimpleNamespace(effort=SETTINGS.forward.runs), groups=[])
     stepwise.upheld(inquiry, Step(base=one, fitted=one, p_value=p, rivals=(one,)), looked)
     assert seen == [kept]
 
@@ -361,7 +362,7 @@ def test_other_courses_are_counted_otherwise_where_nothing_lasts(
         blocks=tuple(replace(no_jacobian, heavy_tail=far if k < others else None) for k in range(4)),
     )
     seen: list[bool] = []
-    problem: Any = SimpleNamespace(heavy_tailed=heavy_tailed, again=lambda f: f, effort=RUNS)
+    problem: Any = SimpleNamespace(heavy_tailed=heavy_tailed, again=lambda f: f, effort=SETTINGS.forward.runs)
     looked = ScoreTest(score=0.0, scores={}, null=np.zeros(9), detectable={})
     made = Step(base=current, fitted=current, p_value=0.0)
 

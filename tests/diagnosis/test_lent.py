@@ -13,9 +13,9 @@ import pytest
 from rollover.diagnosis.fit.jobs import Executor, Task
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.local_search import without
-from rollover.diagnosis.forward.budget import DROPS, RUNS
 from rollover.diagnosis.selection.forward_step import reused_of
 from rollover.diagnosis.selection.scan import look
+from rollover.diagnosis.settings import SETTINGS
 from tests.diagnosis.test_looks import judge_of as looks_of
 from tests.diagnosis.test_slopes import CHANNEL, MASS, SIGMA, SLOPE, TIME, Late, dataset
 
@@ -35,7 +35,7 @@ class Bent(Late):
         return {CHANNEL: 40.0 * (x + self.bend * x**2) * WAVES[0] + 40.0 * o * WAVES[1]}
 
 
-def judge_of(x: float, o: float, bend: float = 0.0, effort: Any = RUNS) -> tuple[Problem, Bent]:
+def judge_of(x: float, o: float, bend: float = 0.0, effort: Any = SETTINGS.forward.runs) -> tuple[Problem, Bent]:
     runs = Bent(bend)
     values = runs.predict({"effects.slope.angle": x, "effects.mass.added": o}, 0.0)[CHANNEL]
     runs.asked.clear()
@@ -45,7 +45,12 @@ def judge_of(x: float, o: float, bend: float = 0.0, effort: Any = RUNS) -> tuple
 def beside(runs: Bent, at: Place) -> set[Place]:
     """Runs to either side of a place, of those that a slope asks for where a fit ends."""
     x, o = at
-    sides = {(x - RUNS.fine, o), (x + RUNS.fine, o), (x, o - RUNS.fine), (x, o + RUNS.fine)}
+    sides = {
+        (x - SETTINGS.forward.runs.fine, o),
+        (x + SETTINGS.forward.runs.fine, o),
+        (x, o - SETTINGS.forward.runs.fine),
+        (x, o + SETTINGS.forward.runs.fine),
+    }
     return {(round(a, 9), round(b, 9)) for a, b in sides} & set(runs.asked)
 
 
@@ -123,7 +128,7 @@ def test_rounds_that_are_too_few_end_with_slopes_of_their_own_too() -> None:
     assert len(beside(runs, (round(x, 9), round(o, 9)))) == 4
 
 
-@pytest.mark.parametrize(("effort", "is_lent"), [(RUNS, True), (DROPS, False)])
+@pytest.mark.parametrize(("effort", "is_lent"), [(SETTINGS.forward.runs, True), (SETTINGS.forward.drops, False)])
 def test_what_is_fitted_without_an_effect_begins_with_the_slopes_of_the_others(effort: Any, is_lent: bool) -> None:
     problem, runs = judge_of(0.5, 0.6, effort=effort)
     whole = problem.fit((SLOPE, MASS), (0.5, 0.6))
@@ -133,7 +138,7 @@ def test_what_is_fitted_without_an_effect_begins_with_the_slopes_of_the_others(e
     assert rest is not None
     assert rest.candidates == (SLOPE,)
     assert all(o == 0.0 for _, o in runs.asked)
-    steps = [effort.fd_steps[0], effort.fd_steps[0] + RUNS.fd_steps[0]]
+    steps = [effort.fd_steps[0], effort.fd_steps[0] + SETTINGS.forward.runs.fd_steps[0]]
     assert any((round(0.5 - step, 9), 0.0) in runs.asked for step in steps) != is_lent
     assert not any(b.J.any() for b in rest.blocks)
 
@@ -147,7 +152,7 @@ def test_slopes_are_lent_where_they_cost_runs_alone() -> None:
     nothing = problem.fit((), ())
     assert nothing is not None
     assert reused_of(problem, nothing) is None
-    cheap, _ = judge_of(0.5, 0.6, effort=DROPS)
+    cheap, _ = judge_of(0.5, 0.6, effort=SETTINGS.forward.drops)
     assert reused_of(cheap, base_at(cheap, 0.45)) is None
 
 

@@ -14,20 +14,12 @@ from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.forward.budget import RUNS
-from rollover.diagnosis.noise.ensemble import STATE, HeavyTail
+from rollover.diagnosis.noise.ensemble import HeavyTail
 from rollover.diagnosis.selection import decision
 from rollover.diagnosis.selection import scan as parallel_map
-from rollover.diagnosis.selection.score_test import (
-    CLOSER,
-    VISIBLE,
-    ScoreTest,
-    _at_odds,
-    _best_along,
-    _visible,
-    score_test,
-)
+from rollover.diagnosis.selection.score_test import ScoreTest, _at_odds, _best_along, _visible, score_test
 from rollover.diagnosis.selection.screening import _begun_at, promising
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
 from rollover.recording import Recording
 from tests.diagnosis import test_fits
@@ -42,7 +34,7 @@ TIME = 0.004 * np.arange(N)
 class Wave:
     """y = x sin before the impact; after it whatever the course says, times x."""
 
-    effort = RUNS
+    effort = SETTINGS.forward.runs
 
     def __init__(self, after: float) -> None:
         self.after, self.runs = after, 0
@@ -118,14 +110,22 @@ def test_what_an_effect_does_before_the_blow_is_looked_at_by_itself() -> None:
     assert with_.score > 10.0 * score_test(blind, base, [SLOPE]).score
     assert with_.score > 100.0
     problem, base = judge_of((10.0,) * 4, (2.0,) * 4)
-    faint = replace(SLOPE, search={"angle": Search(-0.2 * VISIBLE, 0.2 * VISIBLE)})  # its step shows nothing by itself
+    faint = replace(
+        SLOPE,
+        search={
+            "angle": Search(-0.2 * SETTINGS.selection.score_test.visible, 0.2 * SETTINGS.selection.score_test.visible)
+        },
+    )  # its step shows nothing by itself
     assert score_test(problem, base, [faint]).score < 0.1 * with_.score
 
 
 def test_few_recordings_choose_who_is_looked_at_on_more(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[int, list[str]]] = []
     at: dict[str, Any] = {}
-    begun = {RUNS.few: {"c3": ((0.3,),)}, RUNS.looked_at: {"c3": ((0.4,),), "c4": ((0.6,),)}}
+    begun = {
+        SETTINGS.forward.runs.few: {"c3": ((0.3,),)},
+        SETTINGS.forward.runs.looked_at: {"c3": ((0.4,),), "c4": ((0.6,),)},
+    }
 
     def looked(_: Problem, base: Fitted, candidates: Any, only: Any, beside: Any) -> ScoreTest:
         asked.append((len(only), [c.key for c in candidates]))
@@ -140,12 +140,12 @@ def test_few_recordings_choose_who_is_looked_at_on_more(monkeypatch: pytest.Monk
     problem, base = judge_of((0.0,) * 5, (0.0,) * 5)
     every = [replace(SLOPE, id=f"c{k}") for k in range(30)] + [replace(SLOPE, id="c77", kind="sensor")]
     found = parallel_map.look(problem, base, every, [[r] for r in range(5)])
-    assert [n for n, _ in asked] == [RUNS.few, RUNS.looked_at]
+    assert [n for n, _ in asked] == [SETTINGS.forward.runs.few, SETTINGS.forward.runs.looked_at]
     assert len(asked[0][1]) == 31
-    assert asked[1][1] == [f"c{k}" for k in range(RUNS.shortlist)] + ["c77"]
+    assert asked[1][1] == [f"c{k}" for k in range(SETTINGS.forward.runs.shortlist)] + ["c77"]
     assert found.scores["c29"] == 0.0  # passed over
     assert found.detectable["c29"] == 61.0
-    assert found.null[0] == RUNS.looked_at
+    assert found.null[0] == SETTINGS.forward.runs.looked_at
     assert at["c2"] == ((0.7,), (0.1,))  # where it told most, not wherever it could act
     assert at["c5"] == ()
     assert found.starts == {"c3": ((0.4,), (0.3,)), "c4": ((0.6,),)}  # of more recordings first
@@ -167,7 +167,7 @@ def test_a_look_says_where_an_effect_told_most() -> None:
     turned = replace(SLOPE, search={"angle": Search(0.0, 1.0)}, places=every)
     found = score_test(problem, replace(base, blocks=(block, block)), [turned])
     nearest = sorted(every, key=lambda x: abs(x[0] - 0.145))
-    assert found.places[turned.key] == tuple(nearest[:CLOSER])
+    assert found.places[turned.key] == tuple(nearest[: SETTINGS.selection.score_test.close_places])
 
 
 def test_of_places_where_an_effect_may_act_the_best_two_begin_fits() -> None:
@@ -183,7 +183,7 @@ def test_what_led_on_few_recordings_is_tried_where_all_count_in_full(
     """40 by two recordings, 5 by four: where each may take another course four tell more than two, else the better."""
 
     def looked(_: Problem, base: Fitted, candidates: Any, only: Any, beside: Any) -> ScoreTest:
-        scores = {c.key: 40.0 if len(only) == RUNS.few else 5.0 for c in candidates}
+        scores = {c.key: 40.0 if len(only) == SETTINGS.forward.runs.few else 5.0 for c in candidates}
         return ScoreTest(score=max(scores.values()), scores=scores, null=np.ones(10), detectable={})
 
     monkeypatch.setattr(parallel_map, "score_test", looked)
@@ -230,10 +230,16 @@ def test_some_that_move_the_vehicle_are_always_looked_at_closer() -> None:
     """Twenty sensors score more than what makes them all wrong at once."""
     every = [replace(SLOPE, id=f"c{k}", kind="sensor" if k < 20 else "parameter", channel=None) for k in range(30)]
     scores = {c.key: 90.0 - int(c.key[1:]) for c in every}
-    found = promising(every, ScoreTest(score=90.0, scores=scores, null=np.zeros(10), detectable={}), RUNS)
-    assert RUNS.scored is not None
-    assert [c.key for c in found][: RUNS.scored] == [f"c{k}" for k in range(RUNS.scored)]
-    assert [c.key for c in found[RUNS.scored :]] == [f"c{k}" for k in range(20, 20 + RUNS.promising)]
+    found = promising(
+        every, ScoreTest(score=90.0, scores=scores, null=np.zeros(10), detectable={}), SETTINGS.forward.runs
+    )
+    assert SETTINGS.forward.runs.scored is not None
+    assert [c.key for c in found][: SETTINGS.forward.runs.scored] == [
+        f"c{k}" for k in range(SETTINGS.forward.runs.scored)
+    ]
+    assert [c.key for c in found[SETTINGS.forward.runs.scored :]] == [
+        f"c{k}" for k in range(20, 20 + SETTINGS.forward.runs.promising)
+    ]
 
 
 def test_directions_may_be_those_beside_another_fit() -> None:
@@ -335,8 +341,8 @@ def test_a_limit_shows_up_to_the_largest_that_was_tried_and_shows() -> None:
     span = max(s.span for e in problem.dataset for s in e.signals if s.channel == FORCE)
     assert 0.4 * span < found[cell.key] < span
     assert 0.0 < found[strength.key] < 50.0
-    assert _visible(cell, (0.5,), 0.9 * VISIBLE) is None
-    assert _visible(cell, (0.5,), 1.1 * VISIBLE) == cell.values((0.5,))["limit"]
+    assert _visible(cell, (0.5,), 0.9 * SETTINGS.selection.score_test.visible) is None
+    assert _visible(cell, (0.5,), 1.1 * SETTINGS.selection.score_test.visible) == cell.values((0.5,))["limit"]
     no_jacobian = replace(candidate(problem, "co-moving-mass"), own={})
     assert "co-moving-mass" not in score_test(problem, base, [no_jacobian]).detectable
     known = score_test(problem, base, [replace(no_jacobian, own={"fraction": 0.1})]).detectable["co-moving-mass"]
@@ -347,7 +353,7 @@ def test_a_look_goes_as_far_along_a_direction_as_gains_most() -> None:
     """One recording took another course, which a direction explains altogether; the other one has a little of it."""
     rng = np.random.default_rng(2)
     n, expected, beyond = 60, 30.0, 900.0
-    slope = STATE / (STATE + beyond)
+    slope = SETTINGS.noise.ensemble.state_size / (SETTINGS.noise.ensemble.state_size + beyond)
     late = np.arange(n) >= 30
     wave = np.where(late, np.sin(0.7 * np.arange(n)), 0.0)
     wave /= np.sqrt(wave @ wave)
@@ -369,7 +375,9 @@ def test_a_look_goes_as_far_along_a_direction_as_gains_most() -> None:
         """Fall of (D9) of the first, which leaves (E + x)(1 - a/sqrt(E + x))^2, and of squares of the second."""
         plain = (np.sqrt(expected + beyond) - a) ** 2
         x = plain - expected
-        first = STATE * np.log1p(beyond / STATE) - (STATE * np.log1p(x / STATE) if x > 0.0 else x)
+        first = SETTINGS.noise.ensemble.state_size * np.log1p(beyond / SETTINGS.noise.ensemble.state_size) - (
+            SETTINGS.noise.ensemble.state_size * np.log1p(x / SETTINGS.noise.ensemble.state_size) if x > 0.0 else x
+        )
         w = blocks[1].residual
         return float(first + w @ w - (w - a * little) @ (w - a * little))
 

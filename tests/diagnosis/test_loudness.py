@@ -10,7 +10,8 @@ import pytest
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.data.whitening import Whitening
 from rollover.diagnosis.forward.forward_model import simulator_of
-from rollover.diagnosis.noise.heteroscedasticity import SPREAD, with_variance_model
+from rollover.diagnosis.noise.heteroscedasticity import with_variance_model
+from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario, signal
 from tests.diagnosis.test_chaos import CHANNELS as CHASSIS
@@ -46,7 +47,9 @@ def test_its_law_is_told_from_the_samples_alone() -> None:
             assert np.corrcoef(s.level[inside], true[inside])[0, 1] > 0.9, s.channel
             if s.channel == FORCE:  # of the acceleration the least is not at nothing, but somewhere in the fall
                 # a bin's noise is the median of some 190 differences that overlap: told to SPREAD/sqrt(190), 15 %
-                assert s.level.max() == pytest.approx(true.max(), rel=SPREAD / np.sqrt(190.0))
+                assert s.level.max() == pytest.approx(
+                    true.max(), rel=SETTINGS.noise.heteroscedasticity.level_error / np.sqrt(190.0)
+                )
 
 
 def test_noise_alone_does_not_grow_with_itself() -> None:

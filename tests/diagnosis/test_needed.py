@@ -13,11 +13,11 @@ from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
-from rollover.diagnosis.forward.budget import DROPS, RUNS, Effort
 from rollover.diagnosis.result import Interval
 from rollover.diagnosis.selection import decision, ensemble_validation
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.decision import MOST
+from rollover.diagnosis.settings import SETTINGS
+from rollover.diagnosis.settings.forward import Effort
 from rollover.effects import Search
 
 
@@ -60,7 +60,7 @@ def test_beside_effects_in_another_form_the_last_one_is_looked_for_anew(
 
     monkeypatch.setattr(decision, "swapped", swapped)
     monkeypatch.setattr(decision, "backward_elimination", lambda _, f, *__: f)
-    problem = SimpleNamespace(again=lambda f: f, effort=DROPS)
+    problem = SimpleNamespace(again=lambda f: f, effort=SETTINGS.forward.drops)
     taken = [
         Step(base=of(), fitted=of(beside), p_value=0.0),
         Step(base=of(beside), fitted=of(held, CRUST), p_value=0.0),
@@ -75,11 +75,11 @@ def test_beside_effects_in_another_form_the_last_one_is_looked_for_anew(
 @pytest.mark.parametrize(
     ("effort", "beside", "surely", "fitted_again"),
     [
-        (RUNS, ("soil-layer", ("a",)), set(), [0]),
-        (RUNS, LAYER, set(), [0, 1]),
-        (RUNS, LAYER, {0}, [1]),
-        (RUNS, LAYER, {0, 1}, []),
-        (DROPS, ("soil-layer", ("a",)), {0, 1}, [0, 1]),
+        (SETTINGS.forward.runs, ("soil-layer", ("a",)), set(), [0]),
+        (SETTINGS.forward.runs, LAYER, set(), [0, 1]),
+        (SETTINGS.forward.runs, LAYER, {0}, [1]),
+        (SETTINGS.forward.runs, LAYER, {0, 1}, []),
+        (SETTINGS.forward.drops, ("soil-layer", ("a",)), {0, 1}, [0, 1]),
     ],
 )
 def test_of_full_runs_what_is_surely_there_is_not_tried_without_and_the_fit_without_the_last_is_known(
@@ -107,7 +107,7 @@ def left(fitted: Fitted, much: float) -> Fitted:
     return replace(fitted, blocks=(block,))
 
 
-@pytest.mark.parametrize("effort", [RUNS, DROPS])
+@pytest.mark.parametrize("effort", [SETTINGS.forward.runs, SETTINGS.forward.drops])
 def test_the_strongest_is_that_without_which_most_is_left(monkeypatch: pytest.MonkeyPatch, effort: Effort) -> None:
     """Of drops with the other fitted again, of full runs as it stands."""
     asked: list[tuple[list[str], list[float]]] = []
@@ -129,7 +129,7 @@ def test_what_is_not_needed_goes_and_the_rest_has_slopes_again(monkeypatch: pyte
     rest, again = left(of(LAYER), 1.0), left(of(LAYER), 1.0)
     monkeypatch.setattr(decision, "without", lambda *_, **__: rest)
     monkeypatch.setattr(decision, "significant_by_wald", lambda *_: {0})
-    for effort, found in ((RUNS, again), (DROPS, rest)):
+    for effort, found in ((SETTINGS.forward.runs, again), (SETTINGS.forward.drops, rest)):
         problem = cast(Any, SimpleNamespace(again=lambda f: again if f is rest else f, effort=effort))
         assert decision.backward_elimination(problem, left(of(LAYER, CRUST), 1.0)) is found
 
@@ -169,9 +169,12 @@ def test_as_many_effects_as_may_be_that_are_given_for_others_again_and_again_exp
 
     monkeypatch.setattr(decision, "swapped", swapped)
     monkeypatch.setattr(decision, "backward_elimination", backward_elimination)
-    problem = SimpleNamespace(again=lambda f: f, effort=DROPS)
+    problem = SimpleNamespace(again=lambda f: f, effort=SETTINGS.forward.drops)
     order = (LAYER, CRUST, MASS)
-    taken = [Step(base=of(*order[:k]), fitted=of(*order[: k + 1]), p_value=0.0) for k in range(MOST)]
+    taken = [
+        Step(base=of(*order[:k]), fitted=of(*order[: k + 1]), p_value=0.0)
+        for k in range(SETTINGS.selection.flexibility.most_effects)
+    ]
     parts = decision._retained(cast(Inquiry, SimpleNamespace(problem=problem)), taken)
     assert looked == asked
     assert (None if parts is None else {c.id for c in parts[-1].fitted.candidates}) == found
@@ -195,7 +198,7 @@ def test_effects_that_will_be_refused_are_not_looked_for_anew(
     monkeypatch.setattr(decision, "matters", lambda *_: matters)
     monkeypatch.setattr(decision, "is_tolerated", lambda *_: False)
     monkeypatch.setattr(decision, "backward_elimination", lambda *_: of(LAYER, CRUST) if needless else held)
-    problem = cast(Any, SimpleNamespace(again=lambda f: f, effort=DROPS))
+    problem = cast(Any, SimpleNamespace(again=lambda f: f, effort=SETTINGS.forward.drops))
     left = cast(Any, SimpleNamespace(p_value=p_value))
     assert decision.is_open_to_be_named(problem, fitted, left) == is_open
 
@@ -228,7 +231,7 @@ def test_what_ends_with_others_than_it_began_with_has_a_step_for_each(
     monkeypatch.setattr(decision, "swapped", swapped)
     monkeypatch.setattr(decision, "_retained", lambda *_: retained)
     monkeypatch.setattr(decision, "followed", lambda *_: (ended, None))
-    problem = SimpleNamespace(again=lambda f: f, effort=DROPS)
+    problem = SimpleNamespace(again=lambda f: f, effort=SETTINGS.forward.drops)
     parts = decision._ended(cast(Inquiry, SimpleNamespace(problem=problem)), retained)
     assert parts is not None
     assert [s.fitted.candidates[-1].id for s in parts] == ["soil-layer", "soil-stiffness"]

@@ -18,10 +18,11 @@ from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.forward_step import SOON, _from_base
+from rollover.diagnosis.selection.forward_step import _from_base
 from rollover.diagnosis.selection.restarts import begun_otherwise, clocked_alike
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.screening import is_far, screen
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
 from tests.diagnosis.drops import linear_blocks, recorded, scenario
 
@@ -157,7 +158,11 @@ def test_what_was_led_astray_is_begun_anew_and_gone_on_with_if_it_soon_gains() -
 
     def fits(tasks: list[Task]) -> list[Fitted]:
         asked.extend(tasks)
-        ends = {("inertia", SOON): 290.0, ("inertia", None): 250.0, ("air-drag", SOON): 310.0}
+        ends = {
+            ("inertia", SETTINGS.selection.forward_step.short_rounds): 290.0,
+            ("inertia", None): 250.0,
+            ("air-drag", SETTINGS.selection.forward_step.short_rounds): 310.0,
+        }
         return [fitted(j.candidates[-1].id, ends[j.candidates[-1].id, j.rounds], j.start) for j in tasks]
 
     base = fitted("mass", 400.0, (0.5,))

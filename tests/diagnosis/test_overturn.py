@@ -19,6 +19,7 @@ from rollover.diagnosis.forward import full_run
 from rollover.diagnosis.forward.forward_model import DropSimulator, simulator_of
 from rollover.diagnosis.forward.full_run import RunSimulator
 from rollover.diagnosis.forward.run_phases import phases_of
+from rollover.diagnosis.settings import SETTINGS
 from rollover.dynamics import simulate
 from rollover.recording import Clock, Recording, Sensor
 from rollover.recording.filters import filtered
@@ -134,8 +135,8 @@ def test_a_run_that_fails_predicts_nothing() -> None:
 
 def test_a_run_that_loses_its_way_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     simulator = RunSimulator(toss(), recording(Z, until=4.0))
-    monkeypatch.setattr(full_run, "LEAST_TIME", 0.0)
-    monkeypatch.setattr(full_run, "SLOWEST", 0.0)
+    tuning = replace(full_run.TUNING, least_wall_time=0.0, slowest_ratio=0.0)
+    monkeypatch.setattr(full_run, "TUNING", tuning)
     assert simulator.predict({}, 0.0) is not None
 
     def endless(_: Scenario, *, progress: Any) -> Any:
@@ -202,7 +203,7 @@ def test_phases_are_cut_to_the_recording() -> None:
 def test_neighbours_stray_after_the_first_contact_only() -> None:
     simulator = RunSimulator(toss(), recording(Z, ROLL, until=0.5))
     perturbed = simulator.perturbed()
-    assert len(perturbed) == len(full_run.PERTURBATIONS)
+    assert len(perturbed) == len(SETTINGS.forward.run.perturbations)
     assert simulator.runs == 1 + len(perturbed)
     time = simulator.recording.time
     touch = next(at for at, name in simulator.marks() if name == "impact")
@@ -214,10 +215,14 @@ def test_neighbours_stray_after_the_first_contact_only() -> None:
 def test_all_neighbours_may_be_run_in_shorter_steps() -> None:
     simulator = RunSimulator(toss(), recording(Z))
     own = simulator.scenario.simulation.step
-    steps = {simulator.scenario.replaced(simulator._beside(n, 4)).simulation.step for n in full_run.PERTURBATIONS}
+    steps = {
+        simulator.scenario.replaced(simulator._beside(n, 4)).simulation.step for n in SETTINGS.forward.run.perturbations
+    }
     assert steps == {own / 4}
-    steps = {simulator.scenario.replaced(simulator._beside(n)).simulation.step for n in full_run.PERTURBATIONS}
-    assert steps == {own / n.parts for n in full_run.PERTURBATIONS}
+    steps = {
+        simulator.scenario.replaced(simulator._beside(n)).simulation.step for n in SETTINGS.forward.run.perturbations
+    }
+    assert steps == {own / n.parts for n in SETTINGS.forward.run.perturbations}
 
 
 @pytest.mark.parametrize("parts", [1, 4])
@@ -235,7 +240,7 @@ def test_runs_that_scatter_is_told_by_are_made_at_once_for_all_recordings_the_lo
     monkeypatch.setattr(RunSimulator, "predict", lambda own, values, _: asked.append((own, values)) or {})
     for own in runs:
         own.perturbed(changes, parts=parts)
-    assert len(wanted) == len(asked) == 2 * (1 + len(full_run.PERTURBATIONS))
+    assert len(wanted) == len(asked) == 2 * (1 + len(SETTINGS.forward.run.perturbations))
     assert all(any(own is other and one == values for other, one in wanted) for own, values in asked)
 
 
@@ -253,7 +258,7 @@ def test_scatter_is_asked_for_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     made.clear()
     rescattered(problem, nothing, 4)
     left_of_means(problem, nothing)
-    assert [n for n in made if n > 1] == 2 * [1 + len(full_run.PERTURBATIONS)]
+    assert [n for n in made if n > 1] == 2 * [1 + len(SETTINGS.forward.run.perturbations)]
 
 
 def test_the_motion_is_told_though_it_was_not_recorded() -> None:

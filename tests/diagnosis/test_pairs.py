@@ -18,6 +18,7 @@ from rollover.diagnosis.fit.threshold_scan import has_threshold, placed_beside
 from rollover.diagnosis.selection import pairs
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.score_test import ScoreTest
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
 from tests.diagnosis.drops import linear_blocks, recorded
 from tests.diagnosis.test_fits import candidate, judge_of
@@ -63,7 +64,7 @@ def test_what_took_another_form_alone_is_tried_in_its_usual_one_beside_others() 
         screened=(screened(DAMPING), screened(MASS)),
     )  # fmt: skip
     looked = ScoreTest(score=9.0, scores={"mass": 9.0}, null=np.zeros(9), detectable={})
-    found = pairs._partners(inquiry([]), first, (), looked, pairs.SCORED)
+    found = pairs._partners(inquiry([]), first, (), looked, SETTINGS.selection.pairs.scored)
     assert [(c.id, c.form, x) for c, x in found] == [
         ("soil-viscous-damping", {"damping": 0.0}, (0.5,)),
         ("mass", {}, (0.5,)),
@@ -79,7 +80,7 @@ def test_what_is_bent_and_does_not_lead_is_tried_in_its_usual_form_as_well() -> 
         screened=(screened(DAMPING), screened(MASS)),
     )  # fmt: skip
     looked = ScoreTest(score=9.0, scores={"mass": 9.0}, null=np.zeros(9), detectable={})
-    found = pairs._partners(inquiry([]), first, (), looked, pairs.SCORED)
+    found = pairs._partners(inquiry([]), first, (), looked, SETTINGS.selection.pairs.scored)
     assert [(c.id, c.form) for c, _ in found] == [
         ("mass", {}),
         ("soil-viscous-damping", {"damping": 0.0}),

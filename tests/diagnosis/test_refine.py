@@ -31,6 +31,7 @@ from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.pairs import best_subsets
 from rollover.diagnosis.selection.restarts import _combed
 from rollover.diagnosis.selection.score_test import ScoreTest
+from rollover.diagnosis.settings import SETTINGS
 from rollover.dynamics.simulate import run
 from rollover.effects import EFFECTS
 from rollover.proof.generator import Case, make, plan
@@ -332,7 +333,7 @@ def test_a_fit_is_ended_finely_whatever_others_may_leave(monkeypatch: pytest.Mon
     problem = judge_of(recorded(hidden, 2, speeds=(1.6, 2.6), channels=CHANNELS, rate=1500.0, noise=0.005))
     c, begun = candidate(problem, "soil-viscous-damping"), (0.05,)
     usual = problem.fit((c,), begun)
-    monkeypatch.setattr(levenberg_marquardt, "ENOUGH", 1e5)
+    monkeypatch.setattr(levenberg_marquardt, "TUNING", replace(levenberg_marquardt.TUNING, converged_gain=1e5))
     coarse, fine = problem.fit((c,), begun), problem.fit((c,), begun, finely=True)
     assert usual is not None
     assert coarse is not None
@@ -379,4 +380,4 @@ def test_a_recording_whose_clock_is_in_another_dip_is_tried_where_it_began(
 
     problem = cast(Problem, SimpleNamespace(block=block, shifts=[began]))
     found = local_search._tried(problem, 0, (), (), block(0, (), (), 9e-4, 0.0, clock=False))
-    assert found.shift == pytest.approx(met, abs=local_search.SHORTEST)
+    assert found.shift == pytest.approx(met, abs=SETTINGS.fit.local_search.shift_step_least)

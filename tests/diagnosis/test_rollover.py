@@ -14,10 +14,10 @@ import pytest
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.fit.parameterisation import Candidate, physical
 from rollover.diagnosis.forward import full_run
-from rollover.diagnosis.forward.budget import RUNS
 from rollover.diagnosis.forward.full_run import RunSimulator
 from rollover.diagnosis.overlay import series
 from rollover.diagnosis.selection.candidates import candidates_of
+from rollover.diagnosis.settings import SETTINGS
 from rollover.dynamics import simulate
 from rollover.recording import Recording
 from rollover.scenario import Scenario
@@ -133,9 +133,9 @@ def test_values_are_found_by_their_paths() -> None:
 
 
 def test_full_runs_are_looked_at_sparingly() -> None:
-    assert RUNS.is_ensemble
-    assert RUNS.few < 3
-    assert min(RUNS.fd_steps) > 0.005  # below, chance decides
+    assert SETTINGS.forward.runs.is_ensemble
+    assert SETTINGS.forward.runs.few < 3
+    assert min(SETTINGS.forward.runs.fd_steps) > 0.005  # below, chance decides
 
 
 def test_a_wrong_speed_is_looked_for_in_what_drops_alone() -> None:

@@ -14,14 +14,14 @@ from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.fit.time_shift import align
-from rollover.diagnosis.forward.budget import DROPS
 from rollover.diagnosis.inference.lack_of_fit import Cell, Mismatch
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.selection import decision, forward_step, pairs, stepwise
 from rollover.diagnosis.selection.candidates import candidates_of
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.decision import MOST, Explanation, by_the_first, decided
+from rollover.diagnosis.selection.decision import Explanation, by_the_first, decided
 from rollover.diagnosis.selection.score_test import ScoreTest
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded
 from tests.diagnosis.test_fits import judge_of
@@ -71,26 +71,33 @@ def judged(monkeypatch: pytest.MonkeyPatch) -> dict[str, float]:
 
 
 @pytest.mark.parametrize(
-    ("count", "p_value", "named"), [(1, 0.002, 1), (2, 0.002, 2), (2, 1e-4, 0), (MOST, 0.02, 0), (MOST, 0.2, MOST)]
+    ("count", "p_value", "named"),
+    [
+        (1, 0.002, 1),
+        (2, 0.002, 2),
+        (2, 1e-4, 0),
+        (SETTINGS.selection.flexibility.most_effects, 0.02, 0),
+        (SETTINGS.selection.flexibility.most_effects, 0.2, SETTINGS.selection.flexibility.most_effects),
+    ],
 )
 def test_as_many_effects_as_may_be_must_leave_what_chance_leaves(
     count: int, p_value: float, named: int, judged: dict[str, float]
 ) -> None:
     found, verdict = decided(
-        cast(Problem, SimpleNamespace(dataset=(), effort=DROPS)), explanation(count, p_value), [], []
+        cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)), explanation(count, p_value), [], []
     )
     assert len(found.parts) == named
     assert verdict == ("missing-physics" if named else "unexplained")
 
 
-@pytest.mark.parametrize(("local", "named"), [(0.5, MOST), (1e-5, 0)])
+@pytest.mark.parametrize(("local", "named"), [(0.5, SETTINGS.selection.flexibility.most_effects), (1e-5, 0)])
 def test_what_can_be_bent_to_a_curve_must_leave_no_one_place_either(
     local: float, named: int, judged: dict[str, float]
 ) -> None:
     """All places together hide one: chi-square of 960 takes no note of 50 beyond the 12 of one."""
-    found = explanation(MOST, 0.4)
+    found = explanation(SETTINGS.selection.flexibility.most_effects, 0.4)
     found = replace(found, after=replace(found.after, adjusted=(0.9, local)))
-    problem = cast(Problem, SimpleNamespace(dataset=(), effort=DROPS))
+    problem = cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops))
     assert len(decided(problem, found, [], [])[0].parts) == named
     fewer = explanation(2, 0.4)
     assert len(decided(problem, replace(fewer, after=found.after), [], [])[0].parts) == 2
@@ -107,14 +114,17 @@ def test_what_an_effect_too_slight_for_a_name_explains_whole_is_no_mismatch(
     monkeypatch.setattr(decision, "mismatch_of", lambda *_: left(remaining))
     one = explanation(1, 1e-9)
     found = decided(
-        cast(Problem, SimpleNamespace(dataset=(), effort=DROPS)), replace(one, parts=(), fitted=one.base), [], []
+        cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)),
+        replace(one, parts=(), fitted=one.base),
+        [],
+        [],
     )
     assert (found[0].parts, found[1]) == ((), verdict)
 
 
 def test_the_gain_of_one_effect_that_may_be_nothing_tells_nothing_either() -> None:
     """The p-value is that of the misfit then; of several, others may have gained what it seemed to."""
-    problem = cast(Problem, SimpleNamespace(dataset=(), effort=DROPS))
+    problem = cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops))
     one, two = (replace(explanation(count, 0.4), before=left(0.2)) for count in (1, 2))
     assert one.p_value < 1e-6  # of 99 that the best candidate scores
     refused = by_the_first(problem, one, {IDS[0]}, [])
@@ -160,7 +170,7 @@ def test_two_of_one_sensor_must_leave_what_chance_leaves(
     found = explanation(2, 0.002)
     candidates = tuple(replace(c, channel=k) for c, k in zip(found.fitted.candidates, channels, strict=True))
     found = replace(found, fitted=replace(found.fitted, candidates=candidates))
-    problem: Any = SimpleNamespace(dataset=(), effort=DROPS)
+    problem: Any = SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)
     assert len(decided(problem, found, [], [])[0].parts) == named
 
 
@@ -173,7 +183,7 @@ def test_one_that_takes_nearly_all_is_named_with_what_it_leaves_itself(
     """20 times the noise before: of the excess 0.3 or 1.3 % is left, of what is structured 0.1 or 2 %."""
     judged["soil-crust"] = misfit
     monkeypatch.setattr(decision, "mismatch_of", lambda *_: left(1e-9, structure))
-    problem: Any = SimpleNamespace(dataset=(), effort=DROPS)
+    problem: Any = SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)
     found, verdict = decided(problem, explanation(2, 1e-4), [], [])
     assert verdict == ("missing-physics" if named else "unexplained")
     if named:
@@ -198,7 +208,9 @@ def test_what_predicts_held_out_recordings_hardly_better_is_not_named(
 ) -> None:
     """Whatever it leaves of those that it was fitted to."""
     judged |= {"as it is": start, "soil-crust": ahead}
-    found, verdict = decided(cast(Problem, SimpleNamespace(dataset=(), effort=DROPS)), explanation(1, 0.4), [], [])
+    found, verdict = decided(
+        cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)), explanation(1, 0.4), [], []
+    )
     assert (len(found.parts), verdict) == (named, "missing-physics" if named else "unexplained")
 
 
@@ -209,7 +221,9 @@ def test_what_leaves_no_more_than_is_tolerated_is_named(
     monkeypatch.setattr(decision, "is_tolerated", lambda _, f: f.label == "soil-crust")
     for held_out, named, expected in ((1.1, 1, "missing-physics"), (3.5, 0, "unexplained")):
         judged["soil-crust"] = held_out
-        found, verdict = decided(cast(Problem, SimpleNamespace(dataset=(), effort=DROPS)), explanation(1, 1e-9), [], [])
+        found, verdict = decided(
+            cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)), explanation(1, 1e-9), [], []
+        )
         assert (len(found.parts), verdict) == (named, expected)
 
 
@@ -296,9 +310,9 @@ def test_beside_what_rings_in_tune_the_other_of_a_pair_is_looked_for_anew(
 
 
 def test_effects_that_may_be_any_others_are_not_named(judged: dict[str, float]) -> None:
-    problem = cast(Problem, SimpleNamespace(dataset=(), effort=DROPS))
-    found = explanation(MOST, 0.4)
-    assert len(decided(problem, found, [], [])[0].parts) == MOST
+    problem = cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops))
+    found = explanation(SETTINGS.selection.flexibility.most_effects, 0.4)
+    assert len(decided(problem, found, [], [])[0].parts) == SETTINGS.selection.flexibility.most_effects
     refused, verdict = decided(problem, replace(found, settled=False), [], [])
     assert (refused.parts, verdict) == ((), "unexplained")
 
@@ -310,7 +324,9 @@ def test_effects_beside_which_a_sensor_reads_a_curve_are_not_named_together(
     """They leave no more than chance over all, and what is looked for itself: one that takes nearly all is named."""
     monkeypatch.setattr(decision, "is_a_curve", lambda *_: True)
     judged["soil-crust"] = alone
-    found, verdict = decided(cast(Problem, SimpleNamespace(dataset=(), effort=DROPS)), explanation(2, 0.4), [], [])
+    found, verdict = decided(
+        cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops)), explanation(2, 0.4), [], []
+    )
     assert [s.fitted.candidates[-1].id for s in found.parts] == named
     assert verdict == ("missing-physics" if named else "unexplained")
 

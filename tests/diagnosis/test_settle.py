@@ -14,14 +14,15 @@ from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.fit import ensemble_mean
 from rollover.diagnosis.fit.ensemble_mean import along, rescattered, settled, step_of_means
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
-from rollover.diagnosis.fit.linearisation import GENTLE, Fitted, ResidualBlock
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.forward import full_run
-from rollover.diagnosis.forward.budget import DROPS, RUNS, Effort
-from rollover.diagnosis.forward.full_run import CENTRE, PERTURBATIONS, Made, Making, RunSimulator
+from rollover.diagnosis.forward.full_run import CENTRE, Made, Making, RunSimulator
 from rollover.diagnosis.inference import intervals as intervals_of
 from rollover.diagnosis.inference.intervals import intervals, scattered, unshaped
+from rollover.diagnosis.settings import SETTINGS
+from rollover.diagnosis.settings.forward import Effort
 from rollover.diagnosis.statements import by_steps
 from rollover.effects import Search
 from rollover.recording import Recording
@@ -54,7 +55,9 @@ def test_the_run_that_is_like_most_others_stands_for_all(monkeypatch: pytest.Mon
     chosen = simulator.scenario.ground.elements.centre
     assert chosen != own
     made = simulator.runs
-    assert made == len(full_run.ELSEWHERE) + len(PERTURBATIONS)  # one neighbour is one of the places
+    assert made == len(SETTINGS.forward.run.grid_offsets) + len(
+        SETTINGS.forward.run.perturbations
+    )  # one neighbour is one of the places
     found = simulator.predict({}, 0.0)
     assert found is not None
     assert np.max(found[CHANNEL]) < 2.0
@@ -96,12 +99,12 @@ def test_a_shape_that_is_not_fitted_widens_an_interval(monkeypatch: pytest.Monke
 
 def test_no_neighbour_is_the_run_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     simulator = a_toss(monkeypatch, {})
-    place = simulator._place(PERTURBATIONS[0].place)
+    place = simulator._place(SETTINGS.forward.run.perturbations[0].place)
     simulator.scenario = simulator.scenario.replaced({CENTRE: place})
     plain = simulator.scenario
-    others = [plain.replaced(simulator._beside(one)) for one in PERTURBATIONS]
+    others = [plain.replaced(simulator._beside(one)) for one in SETTINGS.forward.run.perturbations]
     assert all(one != plain for one in others)
-    assert len({repr(one) for one in others}) == len(PERTURBATIONS)
+    assert len({repr(one) for one in others}) == len(SETTINGS.forward.run.perturbations)
     assert sorted({round(plain.simulation.step / one.simulation.step) for one in others}) == [1, 2, 3]
     assert any(one.vehicle.contact_spacing < plain.vehicle.contact_spacing for one in others)  # type: ignore[union-attr]
 
@@ -109,7 +112,7 @@ def test_no_neighbour_is_the_run_itself(monkeypatch: pytest.MonkeyPatch) -> None
 class Rough:
     """y = 20 x sin(t) with what chance adds from one x to the next; each neighbour adds its own."""
 
-    effort: Effort = RUNS
+    effort: Effort = SETTINGS.forward.runs
 
     def __init__(self, seed: int, size: float) -> None:
         self.seed, self.size = seed, size
@@ -134,7 +137,9 @@ class Rough:
         return [{CHANNEL: self.predict(each, shift)[CHANNEL] - base} for each in several]
 
 
-def dataset(seed: int, size: float, values: np.ndarray | None = None, effort: Effort = RUNS) -> Dataset:
+def dataset(
+    seed: int, size: float, values: np.ndarray | None = None, effort: Effort = SETTINGS.forward.runs
+) -> Dataset:
     simulator = Rough(seed, size)
     simulator.effort = effort
     signal = Signal(
@@ -172,7 +177,9 @@ def test_a_slope_among_runs_that_scatter_is_that_of_a_wide_step() -> None:
     assert block is not None
     true = float(np.sum((20.0 * np.sin(30.0 * TIME) / 0.1) ** 2))
     assert float(block.J[:, 0] @ block.J[:, 0]) < 1.3 * true
-    narrow = Problem([dataset(3, 0.1, effort=replace(DROPS, fd_steps=(8e-3,)))]).block(0, (SLOPE,), (0.4,), 0.0, 8e-3)
+    narrow = Problem([dataset(3, 0.1, effort=replace(SETTINGS.forward.drops, fd_steps=(8e-3,)))]).block(
+        0, (SLOPE,), (0.4,), 0.0, 8e-3
+    )
     assert narrow is not None
     assert float(narrow.J[:, 0] @ narrow.J[:, 0]) > 1.5 * true
 
@@ -188,7 +195,7 @@ def test_what_moves_little_is_looked_at_over_a_wider_step_but_for_sensors() -> N
 
     problem.dataset[0].simulator.predict = watched  # type: ignore[method-assign]
     gradient(problem, SLOPE)
-    assert max(seen) - min(seen) == pytest.approx(8.0 * RUNS.fine)
+    assert max(seen) - min(seen) == pytest.approx(8.0 * SETTINGS.forward.runs.fine)
     seen.clear()
     gradient(problem, GAIN)
     assert max(seen) - min(seen) < 0.02
@@ -209,7 +216,7 @@ def test_a_step_to_the_mean_of_neighbours_holds_what_it_says() -> None:
             one = dataset(0, 0.0)
             signal = replace(one.signals[0], sigma=1.0)
             every.append(replace(one, signals=(signal,), perturbed=tuple(d[k] - d[1] for k in range(2, 8))))
-        A = sum(b.J.T @ b.J for b in blocks) + GENTLE * np.eye(1)
+        A = sum(b.J.T @ b.J for b in blocks) + SETTINGS.fit.linearisation.weak_prior * np.eye(1)
         dx = step_of_means(every, blocks)
         sd = np.sqrt(scattered(every, blocks, np.linalg.inv(A)))
         inside.append(abs(dx[0]) < 1.96 * sd[0])
@@ -277,10 +284,12 @@ def test_a_value_is_that_of_shorter_steps(size: float, monkeypatch: pytest.Monke
     if not size:  # nothing scatters: nothing is known of what steps do
         assert fine is fitted
         return
-    assert fine.x[0] == pytest.approx(0.4 - LAG / ensemble_mean.PARTS, abs=3e-3)
+    assert fine.x[0] == pytest.approx(0.4 - LAG / SETTINGS.fit.ensemble_mean.finer_parts, abs=3e-3)
     by_itself, whole = intervals(problem, fine, {})[0]["angle"], intervals(problem, fine, {}, fitted)[0]["angle"]
     more = np.sqrt((whole.high - whole.value) ** 2 - (by_itself.high - by_itself.value) ** 2)
-    assert more == pytest.approx(1.96 * (fine.x[0] - fitted.x[0]) / (ensemble_mean.PARTS - 1), rel=1e-6)
+    assert more == pytest.approx(
+        1.96 * (fine.x[0] - fitted.x[0]) / (SETTINGS.fit.ensemble_mean.finer_parts - 1), rel=1e-6
+    )
     assert whole.low < 0.4 < whole.high
     assert (by_itself.as_simulated, whole.as_simulated) == (None, fitted.x[0])
     # how rough the misfit of runs is counts where an interval is stated, not where a side of it is asked for

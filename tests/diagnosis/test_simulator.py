@@ -13,8 +13,9 @@ from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.parameterisation import coordinate
 from rollover.diagnosis.forward.averaging import simulated
 from rollover.diagnosis.forward.discontinuities import DISCONTINUITY_IN
-from rollover.diagnosis.forward.forward_model import SHORTEST, STEP, DropSimulator, set_up, simulator_of
+from rollover.diagnosis.forward.forward_model import DropSimulator, set_up, simulator_of
 from rollover.diagnosis.selection.candidates import candidates_of
+from rollover.diagnosis.settings import SETTINGS
 from rollover.dynamics.drop_test import DropModel
 from rollover.effects.empirical import Empirical
 from rollover.recording import Recording
@@ -105,7 +106,12 @@ def test_what_a_scenario_has_of_sensors_itself_is_read_once_beside_another() -> 
 
 
 @pytest.mark.parametrize(
-    ("is_smooth", "force", "step"), [(True, 300.0, STEP), (False, 300.0, SHORTEST), (False, 0.0, STEP)]
+    ("is_smooth", "force", "step"),
+    [
+        (True, 300.0, SETTINGS.forward.drop.longest_step),
+        (False, 300.0, SETTINGS.forward.drop.shortest_step),
+        (False, 0.0, SETTINGS.forward.drop.longest_step),
+    ],
 )
 def test_a_force_term_that_may_jump_anywhere_takes_the_shortest_steps(
     monkeypatch: pytest.MonkeyPatch, is_smooth: bool, force: float, step: float

@@ -14,11 +14,12 @@ from rollover.diagnosis.fit.jobs import Executor, Task, linearised
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
 from rollover.diagnosis.fit.step import Screened
-from rollover.diagnosis.forward.budget import DROPS, RUNS, Effort
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.forward_step import _first_fits
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.screening import screen
+from rollover.diagnosis.settings import SETTINGS
+from rollover.diagnosis.settings.forward import Effort
 from rollover.effects import Search
 from rollover.recording import Recording
 
@@ -34,7 +35,7 @@ def first_impact(at: float) -> np.ndarray:
 class Late:
     """y = (1 + x + o) g(t - LATER (x + o/2) - tau): x and o make an impact larger and later."""
 
-    effort: Effort = RUNS
+    effort: Effort = SETTINGS.forward.runs
 
     def marks(self) -> tuple[tuple[float, str], ...]:
         return ()
@@ -60,7 +61,7 @@ class Scattering(Late):
         return [{CHANNEL: self.predict({**values, "neighbour": k}, shift)[CHANNEL] - there} for k in range(1, 7)]
 
 
-def dataset(values: np.ndarray, simulator: Any, effort: Effort = RUNS) -> Dataset:
+def dataset(values: np.ndarray, simulator: Any, effort: Effort = SETTINGS.forward.runs) -> Dataset:
     simulator.effort = effort
     signal = Signal(
         channel=CHANNEL, rows=np.arange(TIME.size), values=values, sigma=SIGMA, noise=SIGMA, ar=(), span=1.0
@@ -89,12 +90,14 @@ def test_what_a_clock_explains_tells_nothing_of_a_parameter() -> None:
     """
     x = 0.03  # what it is at 0 comes 3 ms earlier, at 0.06 3 ms later: an impact is 2 ms wide
     expected = float(np.sum((first_impact(0.0) / SIGMA) ** 2)) + (LATER / 1e-3) ** 2
-    found = Problem([dataset((1.0 + x) * first_impact(LATER * x), Late())]).block(0, (SLOPE,), (x,), 0.0, RUNS.fine)
+    found = Problem([dataset((1.0 + x) * first_impact(LATER * x), Late())]).block(
+        0, (SLOPE,), (x,), 0.0, SETTINGS.forward.runs.fine
+    )
     assert found is not None
     assert found.normal()[0][0, 0] == pytest.approx(expected, rel=0.05)
     g = float(found.slope @ found.J[:, 0]) / float(found.slope @ found.slope)
     assert g == pytest.approx(LATER, rel=0.05)  # the clock goes along by as much as the impact comes later
-    plain = Problem([dataset(first_impact(LATER * x), Late(), replace(DROPS, fd_steps=(x, 1e-3)))])
+    plain = Problem([dataset(first_impact(LATER * x), Late(), replace(SETTINGS.forward.drops, fd_steps=(x, 1e-3)))])
     apart = plain.block(0, (SLOPE,), (x,), 0.0, x)
     assert apart is not None
     assert apart.normal()[0][0, 0] > 20.0 * expected
@@ -103,7 +106,7 @@ def test_what_a_clock_explains_tells_nothing_of_a_parameter() -> None:
 @pytest.mark.parametrize(("off", "is_near"), [(0.0, True), (1.0, True), (3.0, False)])
 def test_from_afar_slopes_are_those_of_a_wide_step(off: float, is_near: bool) -> None:
     """What misses a recording by three times its noise is far from an explanation: ripples there lead nowhere."""
-    x, effort = 0.03, replace(DROPS, fd_steps=(2e-2, 5e-3))
+    x, effort = 0.03, replace(SETTINGS.forward.drops, fd_steps=(2e-2, 5e-3))
     problem = Problem([dataset((1.0 + x) * first_impact(LATER * x) + off * SIGMA, Late(), effort)])
     found = problem.block(0, (SLOPE,), (x,), 0.0, effort.fine)
     assert found is not None
@@ -252,7 +255,7 @@ def test_a_leap_to_another_course_on_one_side_is_no_slope() -> None:
             return {CHANNEL: x * np.sin(90.0 * TIME) + (x > 0.52) * np.sin(210.0 * TIME)}
 
     problem = Problem([dataset(0.5 * np.sin(90.0 * TIME), Leaping())])
-    found = problem.block(0, (SLOPE,), (0.5,), 0.0, RUNS.fine)
+    found = problem.block(0, (SLOPE,), (0.5,), 0.0, SETTINGS.forward.runs.fine)
     assert found is not None
     assert found.J[:, 0] == pytest.approx(np.sin(90.0 * TIME) / SIGMA, abs=0.02 / SIGMA)
 
@@ -264,7 +267,9 @@ def test_where_an_effect_ends_its_slope_is_that_of_both_sides() -> None:
         def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
             return {CHANNEL: min(float(changes.get("effects.slope.angle", 0.0)), 0.5) * np.sin(90.0 * TIME)}
 
-    found = Problem([dataset(0.4 * np.sin(90.0 * TIME), Ends())]).block(0, (SLOPE,), (0.5,), 0.0, RUNS.fine)
+    found = Problem([dataset(0.4 * np.sin(90.0 * TIME), Ends())]).block(
+        0, (SLOPE,), (0.5,), 0.0, SETTINGS.forward.runs.fine
+    )
     assert found is not None
     assert found.J[:, 0] == pytest.approx(0.5 * np.sin(90.0 * TIME) / SIGMA, abs=0.01 / SIGMA)
 
@@ -282,9 +287,9 @@ def test_what_tells_only_near_its_place_is_looked_at_over_less() -> None:
             return {CHANNEL: first_impact(LATER * (x - 0.5))}
 
     problem = Problem([dataset(first_impact(0.0), Moving())])
-    found = problem.block(0, (WALL,), (0.5,), 0.0, RUNS.fine)
+    found = problem.block(0, (WALL,), (0.5,), 0.0, SETTINGS.forward.runs.fine)
     assert found is not None
-    h, power = 0.25 * RUNS.fine, float(np.sum((first_impact(0.0) / SIGMA) ** 2))
+    h, power = 0.25 * SETTINGS.forward.runs.fine, float(np.sum((first_impact(0.0) / SIGMA) ** 2))
     expected = (1.0 - np.exp(-2.0 * (LATER * h / WIDTH) ** 2)) * power / (2.0 * h**2)
     assert float(found.J[:, 0] @ found.J[:, 0]) == pytest.approx(expected, rel=1e-6)
     assert expected == pytest.approx(0.872 * (LATER / WIDTH) ** 2 * power, rel=1e-3)
@@ -306,7 +311,9 @@ def test_a_slope_is_told_along_the_valley_in_which_a_wall_is_met_at_one_moment()
             return {CHANNEL: first_impact(0.03 * (np.log(s / 0.15) - np.log((2.0 - mu) / 1.5)))}
 
     at = (coordinate(0.15, LOAD.search["travel"]), 0.5)
-    found = Problem([dataset(first_impact(0.0), Sliding())]).block(0, (SLOPE, LOAD), (0.5, *at), 0.0, RUNS.fd_steps[0])
+    found = Problem([dataset(first_impact(0.0), Sliding())]).block(
+        0, (SLOPE, LOAD), (0.5, *at), 0.0, SETTINGS.forward.runs.fd_steps[0]
+    )
     assert found is not None
     by_travel, by_friction = found.J[:, 1], found.J[:, 2]
     expected = by_travel / (1.5 * np.log(50.0))
@@ -348,7 +355,7 @@ def test_what_two_runs_differ_by_anyway_is_no_slope(early: bool) -> None:
             self.number = number
 
     problem = Problem([replace(dataset(0.5 * wave, Chancy(number)), first_impact=blown) for number in range(40)])
-    found = [problem.block(r, (FLAT,), (0.5,), 0.0, RUNS.fine) for r in range(40)]
+    found = [problem.block(r, (FLAT,), (0.5,), 0.0, SETTINGS.forward.runs.fine) for r in range(40)]
     J = np.array([b.plain_J[:, 0] for b in found if b is not None]) * SIGMA
     late = blown <= TIME
     # twenty waves, six neighbours and one difference tell it to 50 % in a recording, to 8 % in forty

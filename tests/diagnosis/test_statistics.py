@@ -14,14 +14,14 @@ from scipy.stats import kstest
 
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cross_validation import held_out
-from rollover.diagnosis.fit.levenberg_marquardt import GENTLE, Fitted, Problem, ResidualBlock
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
 from rollover.diagnosis.fit.linearisation import without_shift
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
 from rollover.diagnosis.forward.averaging import thinned
-from rollover.diagnosis.forward.budget import DROPS
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.selection.score_test import null_of_the_best, p_value
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
 from rollover.recording import Recording
 from tests.diagnosis.drops import FORCE, linear_blocks, recorded, signal
@@ -92,7 +92,7 @@ def test_holding_out_by_algebra_is_refitting_without_the_recording() -> None:
             rows.append(np.hstack([b.J, shifts]))
             right.append(b.residual)
         rows.append(np.hstack([np.zeros((len(rest), 2)), np.eye(len(rest)) / 0.3]))
-        rows.append(np.hstack([np.sqrt(GENTLE) * np.eye(2), np.zeros((2, len(rest)))]))
+        rows.append(np.hstack([np.sqrt(SETTINGS.fit.linearisation.weak_prior) * np.eye(2), np.zeros((2, len(rest)))]))
         right.append(np.zeros(len(rest) + 2))
         dx = np.linalg.lstsq(np.vstack(rows), np.concatenate(right), rcond=None)[0][:2]
         for r in group:
@@ -134,7 +134,8 @@ def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
     problem = cast(
         Any,
         SimpleNamespace(
-            dataset=(no_jacobian, no_jacobian, no_jacobian), measured=(), samples_per_error=1.0, effort=DROPS,
+            dataset=(no_jacobian, no_jacobian, no_jacobian), measured=(), samples_per_error=1.0,
+            effort=SETTINGS.forward.drops,
             made_ahead=lambda _: None,
             _fixed_shifts=False,
         ),

@@ -10,7 +10,8 @@ import pytest
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.fit.parameterisation import coordinate
 from rollover.diagnosis.selection import decision
-from rollover.diagnosis.selection.flexibility import BENT, bow, drift, is_a_curve, is_one_line, square
+from rollover.diagnosis.selection.flexibility import bow, drift, is_a_curve, is_one_line, square
+from rollover.diagnosis.settings import SETTINGS
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 from tests.diagnosis.test_fits import GAIN, candidate, judge_of
 
@@ -44,7 +45,7 @@ def test_a_curve_is_seen_beside_the_gain_that_meets_it_best() -> None:
     c = candidate(problem, f"sensor-gain:{FORCE}")
     fitted = problem.fit((c,), (coordinate(0.93, c.search["gain"]),))
     assert fitted is not None
-    assert bow(problem, fitted, FORCE) > 3.0 * BENT
+    assert bow(problem, fitted, FORCE) > 3.0 * SETTINGS.selection.flexibility.curve_gain
 
 
 @pytest.mark.parametrize("is_ensemble", [False, True])
@@ -59,7 +60,7 @@ def test_a_gain_that_changes_as_it_warms_is_none(is_ensemble: bool) -> None:
     c = candidate(problem, f"sensor-gain:{FORCE}")
     fitted = problem.fit((c,), (coordinate(1.1, c.search["gain"]),))
     assert fitted is not None
-    assert bow(problem, fitted, FORCE, drift) > 3.0 * BENT
+    assert bow(problem, fitted, FORCE, drift) > 3.0 * SETTINGS.selection.flexibility.curve_gain
     assert is_a_curve(problem, fitted)
 
 

@@ -12,12 +12,12 @@ import pytest
 from rollover.diagnosis.fit.jobs import Executor, Task
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
-from rollover.diagnosis.fit.parameterisation import BESIDE, Candidate
-from rollover.diagnosis.forward.budget import RUNS
+from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.selection import scan
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.forward_step import _smoothly
 from rollover.diagnosis.selection.screening import screen
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
 from tests.diagnosis import test_chaos
 from tests.diagnosis.test_chaos import STEP
@@ -111,7 +111,7 @@ def test_a_strong_effect_is_fitted_with_other_courses_forgiven_and_compared_in_f
     """Before the impact x sets a wave, after it which of many courses is taken: in full the nearest dip ends a fit."""
 
     class Parting:
-        effort = RUNS
+        effort = SETTINGS.forward.runs
 
         def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
             x, time = changes.get("effects.slope.angle", 0.0), STEP * np.arange(test_chaos.N) - shift
@@ -191,4 +191,4 @@ def test_a_limit_begins_where_something_gives_way_though_less_is_left_where_noth
     nothing_yields = [x for x in limit.probes() if abs(x[0] - neutral) < 0.1]
     assert nothing_yields
     assert found.left > sum(b.residual @ b.residual for b in blocks[:2])  # which is what these leave
-    assert found.starts == ((neutral + BESIDE,), (gives_way,))
+    assert found.starts == ((neutral + SETTINGS.fit.parameterisation.zero_step,), (gives_way,))

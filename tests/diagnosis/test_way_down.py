@@ -14,13 +14,13 @@ from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
-from rollover.diagnosis.forward.budget import DROPS
 from rollover.diagnosis.inference.lack_of_fit import Mismatch
 from rollover.diagnosis.pipeline import diagnose
 from rollover.diagnosis.prepared import prepared
 from rollover.diagnosis.selection import truncated_start
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.stepwise import Taken
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
 from rollover.proof.reference_solver import descend
 from rollover.proof.rig import Rig
@@ -94,7 +94,9 @@ def test_what_explains_the_way_down_is_a_beginning_if_it_leads_to_far_less(
         return there if whole else taken(no_jacobian, fit((LAYER, REBOUND) if begun else (LAYER,), above))
 
     reweighted: list[Any] = []
-    problem = SimpleNamespace(dataset=["whole"], effort=DROPS, simulations=3, with_noise_model=reweighted.append)
+    problem = SimpleNamespace(
+        dataset=["whole"], effort=SETTINGS.forward.drops, simulations=3, with_noise_model=reweighted.append
+    )
     early = SimpleNamespace(dataset=["cut"], fit=lambda *_: fit((), 900.0), simulations=4)
     monkeypatch.setattr(truncated_start, "_cut", lambda *_: "cut")
     monkeypatch.setattr(truncated_start, "Problem", lambda _: early)
@@ -149,7 +151,9 @@ def test_what_holds_what_fell_into_it_moves_nothing_on_the_way_back(rig: dict[st
     asking = Inquiry(problem=problem, candidates=(), groups=[], phases=phases, say=lambda _: None, executor=Executor())
     beyond = base.left - sum(b.residual.size for b in base.blocks)
     moved = truncated_start.moving_back(asking, base)
-    assert moved > 0.1 * beyond if is_back else abs(moved) < 0.1 * truncated_start.BACK * beyond
+    assert (
+        moved > 0.1 * beyond if is_back else abs(moved) < 0.1 * SETTINGS.selection.truncated_start.least_share * beyond
+    )
     early = [truncated_start._cut(e, p, truncated_start.ENDS[0]) for e, p in zip(dataset, phases, strict=True)]
     cut = Problem([e for e in early if e is not None])
     above = cut.fit((), ())

@@ -11,8 +11,9 @@ import pytest
 from rollover.diagnosis import diagnose
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.jobs import Executor
-from rollover.diagnosis.noise.offsets import WAVES, Zero, _differ, _own, _stand
+from rollover.diagnosis.noise.offsets import Zero, _differ, _own, _stand
 from rollover.diagnosis.prepared import prepared, with_common_noise
+from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
@@ -105,6 +106,9 @@ def test_zeros_of_all_channels_are_judged_together() -> None:
 
 def test_what_wanders_before_anything_is_hit_has_no_zero() -> None:
     """Chi-square of 9 at 9 and at 30: p = 0.4 and 4e-4."""
-    still, wandering = ([Zero(r=r, k=0, off=9.0 * r, error=1.0, slow=v) for r in range(3)] for v in (WAVES, 10.0))
+    still, wandering = (
+        [Zero(r=r, k=0, off=9.0 * r, error=1.0, slow=v) for r in range(3)]
+        for v in (SETTINGS.noise.offsets.wave_terms, 10.0)
+    )
     assert _stand([still])
     assert not _stand([still, wandering, wandering])

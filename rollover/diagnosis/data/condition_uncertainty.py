@@ -17,13 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Doubt
 from rollover.scenario import Scenario
 from rollover.spec.document import paths
 from rollover.system.errors import Fault, InputError, hint
 
 Array = NDArray[np.float64]
-LEAST = 1e-9  # of the largest: directions below are rounding
+TUNING = SETTINGS.data.condition_uncertainty
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +47,7 @@ def marginalised(columns: Array) -> Marginalised:
     if columns.shape[1] == 0:
         return Marginalised(directions=columns, shares=np.zeros(0))
     U, S, _ = np.linalg.svd(columns, full_matrices=False)
-    kept = LEAST * max(float(S.max(initial=0.0)), 1e-300) < S
+    kept = TUNING.least_singular_value * max(float(S.max(initial=0.0)), 1e-300) < S
     return Marginalised(directions=U[:, kept], shares=1.0 - 1.0 / np.sqrt(1.0 + S[kept] ** 2))
 
 

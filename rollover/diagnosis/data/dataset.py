@@ -15,13 +15,13 @@ from rollover.diagnosis.data.condition_uncertainty import Marginalised, doubts, 
 from rollover.diagnosis.data.whitening import Noise, Whitening
 from rollover.diagnosis.forward.discontinuities import (
     DISCONTINUITY_IN,
-    JUMPS,
     SHOWS,
     about_discontinuities,
     beside_discontinuities,
     masked,
 )
 from rollover.diagnosis.forward.forward_model import Simulator
+from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
 from rollover.recording.noise_floor import LENGTH, USUAL, NoiseFloor, grown, noise_floor
 from rollover.scenario import Scenario
@@ -29,15 +29,8 @@ from rollover.system.errors import Fault
 
 Array = NDArray[np.float64]
 
-MODEL_ERROR = 2e-4  # of a channel's range: what integrators differ by is no mismatch
-ALONE = 0.02  # s, prior of the time shift of a recording whose clock has no zero
-CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is believed
-MANY = 10  # quiet windows from which on a memory of two samples is told
-ROUGH = 0.5  # times the noise, from which on another error has a large part
-HIDDEN = 1.02 * ROUGH  # of the noise: a discrepancy below is hidden by it, and held to be as large
-CORNER = 2.0775  # corner frequency over the filter class, forward and backward, Hz
+TUNING = SETTINGS.data.dataset
 NOTHING: Mapping[str, Array] = MappingProxyType({})
-SHIFT = 1e-3  # s, prior of the time shift of a recording whose zero is known
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +96,7 @@ class Dataset:
     shift_prior: float
     condition: str
     perturbed: tuple[Array, ...] = ()  # stacked, SI: what runs that nobody could tell apart differ by
-    model_error: float = MODEL_ERROR  # of a channel's range
+    model_error: float = TUNING.model_error  # of a channel's range
     discrepancy: Mapping[str, float] = field(default_factory=dict)  # by channel, a share of its range
     memory: Mapping[str, float] = field(default_factory=dict)  # by channel, correlation time of that where known, s
     averaged: int = 1  # samples in one
@@ -158,14 +151,14 @@ class Dataset:
 
         Such an error is one for the whole signal, not one for each sample: within its size it is nothing.
         """
-        known = s.scatter > 0.0 or self.error_of(s) > MODEL_ERROR
-        return known and float(np.hypot(s.scatter, self.error_of(s) * s.span)) > ROUGH * s.noise
+        known = s.scatter > 0.0 or self.error_of(s) > TUNING.model_error
+        return known and float(np.hypot(s.scatter, self.error_of(s) * s.span)) > TUNING.other_error_share * s.noise
 
     def error_of(self, s: Signal) -> float:
         """What the model may miss a signal by, as a share of its range: integrators' error and the discrepancy."""
         if not self.discrepancy:
             return self.model_error
-        beside = max(self.discrepancy.get(s.channel, 0.0), HIDDEN * s.noise / s.span)
+        beside = max(self.discrepancy.get(s.channel, 0.0), TUNING.hidden_discrepancy * s.noise / s.span)
         return float(np.hypot(self.model_error, beside))
 
     def shared(self, s: Signal) -> float:
@@ -207,7 +200,10 @@ class Dataset:
         for s, part in self.spans():
             size = predicted.get(DISCONTINUITY_IN + s.channel)
             if size is not None:
-                found[part] |= size[s.rows] > (SHOWS if self.averaged > 1 else JUMPS) * s.sigma
+                found[part] |= (
+                    size[s.rows]
+                    > (SHOWS if self.averaged > 1 else SETTINGS.forward.discontinuities.deciding_jump) * s.sigma
+                )
         return np.flatnonzero(found)
 
     @cached_property
@@ -298,7 +294,7 @@ def dataset_of(name: str, recording: Recording, simulator: Simulator, averaged: 
         if span <= 0.0:
             continue
         noise, ar = _noise(y - predicted[channel][rows], y, recording.noise.get(channel))
-        sigma = float(np.hypot(noise, MODEL_ERROR * span))
+        sigma = float(np.hypot(noise, TUNING.model_error * span))
         if noise < sigma * 0.7:
             ar = ()  # the model's error is not coloured as the noise is
         signals.append(Signal(channel=channel, rows=rows, values=y, sigma=sigma, noise=noise, ar=ar, span=span))
@@ -311,7 +307,7 @@ def dataset_of(name: str, recording: Recording, simulator: Simulator, averaged: 
         recording=recording,
         simulator=simulator,
         signals=tuple(signals),
-        shift_prior=recording.clock.within or (ALONE if loose else SHIFT + 0.5 * step),
+        shift_prior=recording.clock.within or (TUNING.loose_shift_prior if loose else TUNING.shift_prior + 0.5 * step),
         condition=condition_of(recording.conditions),
         averaged=averaged,
     )
@@ -331,7 +327,7 @@ def _oversampling(recording: Recording, channel: str) -> int:
     if channel not in recording.cfc or recording.time.size < 2:
         return 1
     rate = 1.0 / float(np.median(np.diff(recording.time)))
-    return max(1, int(rate / (2.0 * CORNER * recording.cfc[channel])))
+    return max(1, int(rate / (2.0 * TUNING.corner_per_class * recording.cfc[channel])))
 
 
 def _noise(residual: Array, values: Array, stated: float | None) -> tuple[float, tuple[float, ...]]:
@@ -339,7 +335,7 @@ def _noise(residual: Array, values: Array, stated: float | None) -> tuple[float,
     if values.size < LENGTH:
         return (stated if stated is not None else by_differences(residual)), ()
     best, other = (_floor(v) for v in (residual, values))
-    if other.sigma < CLEARLY * best.sigma:
+    if other.sigma < TUNING.own_noise_below * best.sigma:
         best = other
     return best.sigma, best.ar
 
@@ -347,7 +343,7 @@ def _noise(residual: Array, values: Array, stated: float | None) -> tuple[float,
 def _floor(values: Array) -> NoiseFloor:
     """Noise floor with as short a memory as the samples can tell: longer ones are made of chance."""
     one = noise_floor(values, order=1, strides=(1,))
-    return noise_floor(values, order=2, strides=(1,)) if one.windows >= MANY else one
+    return noise_floor(values, order=2, strides=(1,)) if one.windows >= TUNING.memory_windows else one
 
 
 def by_differences(values: Array) -> float:

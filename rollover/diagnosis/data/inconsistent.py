@@ -24,15 +24,15 @@ from typing import ClassVar
 import numpy as np
 
 from rollover.diagnosis.data.dataset import Dataset, Signal
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import spoken
 from rollover.effects.sensor import is_length
 from rollover.spec.channels import UNITS, describe
 
-ALIKE = 0.7  # |r|, from which on two signals are one but for a factor and what is missing
-NEAR = 0.25  # of its logarithm, that a factor may be off by what is missing
-USUALLY = 0.6  # of that, that all recordings of a channel may be off by
-PLACES = np.linspace(-3.0, 3.0, 61)  # times its prior, where a time shift is looked for
-UNIT = 5.0  # times, or one part of, that a unit must make to be told from what is missing: ground 3 times as stiff
+TUNING = SETTINGS.data.inconsistent
+PLACES = np.linspace(
+    -TUNING.shift_width, TUNING.shift_width, TUNING.shift_steps
+)  # times its prior, where a time shift is looked for
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -98,7 +98,7 @@ def _is_chance(inconsistency: Inconsistency) -> bool:
     if made is None or not perturbed:
         return False
     apart = float(np.median([np.sum(d[channel][rows] ** 2) for d in perturbed]))
-    return apart > (1.0 - ALIKE**2) * float(np.sum(made[channel][rows] ** 2))
+    return apart > (1.0 - TUNING.least_correlation**2) * float(np.sum(made[channel][rows] ** 2))
 
 
 def without(every: Sequence[Dataset], inconsistencies: Sequence[Inconsistency]) -> list[Dataset]:
@@ -122,7 +122,7 @@ def factor_of(e: Dataset, s: Signal, made: np.ndarray) -> float | None:
         power = float(p @ p)
         if size > 0.0 and power > 0.0:
             best = max(best, (abs(float(m @ p)) / (size * power**0.5), float(m @ p) / power))
-    return best[1] if best[0] > ALIKE else None
+    return best[1] if best[0] > TUNING.least_correlation else None
 
 
 def _beside(channel: str, usual: float) -> float:
@@ -132,12 +132,12 @@ def _beside(channel: str, usual: float) -> float:
     """
     known = (1.0, *(abs(cause) for cause, _ in _causes(describe(channel).unit)))
     near = min(known, key=lambda one: _off(usual, one))
-    return usual / near if _off(usual, near) < USUALLY else usual
+    return usual / near if _off(usual, near) < TUNING.common_factor_tolerance else usual
 
 
 def _inconsistency(e: Dataset, s: Signal, factor: float, beside: float) -> Inconsistency | None:
     near = min(_causes(describe(s.channel).unit), key=lambda cause: _off(factor / beside, cause[0]))
-    if _off(factor / beside, near[0]) > NEAR:
+    if _off(factor / beside, near[0]) > TUNING.factor_tolerance:
         return None
     return Inconsistency(dataset=e, signal=s, factor=factor, cause=near[1])
 
@@ -167,7 +167,7 @@ def _each(unit: str) -> Iterator[tuple[float, str]]:
     for name, size in UNITS.get(unit, {}).items():
         sizes.setdefault(size, name)
     for size, name in sizes.items():
-        if max(size, 1.0 / size) < UNIT:
+        if max(size, 1.0 / size) < TUNING.least_unit_factor:
             continue
         for sign, turned in ((1.0, ""), (-1.0, ", and its sign the opposite one")):
             yield sign / size, f"it were in {name} and not in the unit stated{turned}"

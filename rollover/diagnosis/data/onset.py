@@ -12,15 +12,16 @@ from dataclasses import replace
 import numpy as np
 
 from rollover.comparison.onset import CLEAR, IN_A_ROW, QUIET, UntoldError, is_apart, is_quiet, timed
-from rollover.diagnosis.data.dataset import ALONE, Dataset
+from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.forward.forward_model import set_up
+from rollover.diagnosis.settings import SETTINGS
 from rollover.dynamics.drop_test import unfit
 from rollover.recording import Clock, Recording
 from rollover.recording.time_stamps import Zero
 from rollover.scenario import Scenario
 from rollover.system.errors import Fault, InputError
 
-SAME = 0.01  # sigmas: a zero that is where it is stated to be
+TUNING = SETTINGS.data.onset
 
 
 def from_first_contact(
@@ -84,7 +85,7 @@ def _found_off(scenario: Scenario, name: str, recording: Recording) -> Zero | No
 def _moved(scenario: Scenario, name: str, recording: Recording) -> tuple[Recording, Zero | None]:
     under, clock = set_up(scenario, recording), recording.clock
     apart = is_apart(recording, under)
-    if not (apart or clock.zero == "unknown" or (clock.within or 0.0) > ALONE):
+    if not (apart or clock.zero == "unknown" or (clock.within or 0.0) > SETTINGS.data.dataset.loose_shift_prior):
         return recording, None
     try:
         at = timed(name, recording, under, trusting=True)
@@ -95,7 +96,7 @@ def _moved(scenario: Scenario, name: str, recording: Recording) -> tuple[Recordi
     if at.zero is None:
         return recording, None
     loose = Clock(zero="unknown")
-    if abs(at.zero.late) < SAME * at.zero.sigma:
+    if abs(at.zero.late) < TUNING.same_zero * at.zero.sigma:
         return (recording if clock == loose else replace(recording, clock=loose)), None
     return replace(at.recording, clock=loose), at.zero
 

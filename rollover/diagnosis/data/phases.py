@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.result import Place
+from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
-FIRST_CONTACT = 0.005  # s, after the impact
-AROUND_PEAK = 0.10  # of the time to the deepest point, either side
+TUNING = SETTINGS.data.phases
 PEAK = "peak"  # the phase about the deepest point
-SETTLING = 0.06  # s after the deepest point until what is left is rest
 
 
 def phases_of(dataset: Dataset) -> tuple[tuple[float, str], ...]:
@@ -47,10 +46,10 @@ def drop_phases(dataset: Dataset) -> tuple[tuple[float, str], ...]:
     marks = [
         (start, "free-fall"),
         (0.0, "first-contact"),
-        (FIRST_CONTACT, "loading"),
-        ((1.0 - AROUND_PEAK) * deepest, PEAK),
-        ((1.0 + AROUND_PEAK) * deepest, "unloading"),
-        (deepest + SETTLING, "rest"),
+        (TUNING.first_contact, "loading"),
+        ((1.0 - TUNING.around_peak) * deepest, PEAK),
+        ((1.0 + TUNING.around_peak) * deepest, "unloading"),
+        (deepest + TUNING.settling, "rest"),
     ]
     marks = [m for k, m in enumerate(marks) if k == 0 or m[0] > marks[k - 1][0]]
     return tuple(m for k, m in enumerate(marks) if k + 1 == len(marks) or marks[k + 1][0] > start)

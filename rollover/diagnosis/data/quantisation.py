@@ -9,35 +9,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset
+from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
 from rollover.recording.checks.finding import trace
 from rollover.recording.checks.samples import spikes
 
 Array = NDArray[np.float64]
-WHOLE = 0.02  # of a step, by which a level may stray from a whole number of them
-LEVELS = 3  # that a digitised channel has at least
-ALIKE, PILE = 1e-9, 5  # of a value: equal; so often: the end of a range
-DITHERED = 0.03  # of half a step: less in common is none
-REPEATED = 0.5  # of the samples: with so many levels, or more, a channel has no steps that matter
+TUNING = SETTINGS.data.quantisation
 
 
 def resolution(values: Array) -> float:
     """Step (SI) between the levels of a digitised channel (n,); 0 where it takes any value, or each but once."""
     finite = values[np.isfinite(values)]
     levels = np.unique(finite)
-    if not LEVELS <= levels.size < REPEATED * finite.size:
+    if not TUNING.least_levels <= levels.size < TUNING.most_levels * finite.size:
         return 0.0
     apart = np.diff(levels)
     step = float(np.min(apart[apart > 1e-9 * (levels[-1] - levels[0])], initial=np.inf))
     many = apart / step
-    return step if np.all(np.abs(many - np.round(many)) < WHOLE) else 0.0
+    return step if np.all(np.abs(many - np.round(many)) < TUNING.whole_step_tolerance) else 0.0
 
 
 def pile(values: Array) -> float:
     """Size of the largest value (n,) if it is met again and again, to the last digit; 0 if not."""
     sizes = np.abs(values[np.isfinite(values)])
     most = float(np.max(sizes, initial=0.0))
-    return most if most > 0.0 and np.count_nonzero(sizes >= most * (1.0 - ALIKE)) >= PILE else 0.0
+    return (
+        most
+        if most > 0.0 and np.count_nonzero(sizes >= most * (1.0 - TUNING.equal_within)) >= TUNING.least_at_end
+        else 0.0
+    )
 
 
 def digitised(dataset: Sequence[Dataset], recordings: Sequence[Recording]) -> list[Dataset]:
@@ -64,7 +65,7 @@ def digitised(dataset: Sequence[Dataset], recordings: Sequence[Recording]) -> li
         for s in e.signals:
             d = step[s.channel]
             share = np.exp(-2.0 * np.pi**2 * least[s.channel] / d**2) if d > 0.0 else 0.0
-            error, end = (0.5 * d * share if share > DITHERED else 0.0), pile(r.channels[s.channel])
+            error, end = (0.5 * d * share if share > TUNING.least_common_error else 0.0), pile(r.channels[s.channel])
             signals.append(replace(s, step=2.0 * error, scatter=error, sigma=float(np.hypot(s.sigma, error)), end=end))
         found.append(replace(e, signals=tuple(signals)))
     return found

@@ -15,15 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset, groups_of
+from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
-TICK, FINER, PLACES = 1e-3, (1e-4, 1e-5), 21  # s, by which time shifts are tried; then, so many, beside the best
-LATE = 0.1  # s that a clock may be late which says that it is right: then it is the clock that is to be named
-WIDTH = 3.0  # times its prior that a time shift may be
-DISCONTINUITIES = 3  # samples beside a leap
-SHOWS = 1.2  # times the noise, from which on there is scatter
-WORTH_SAYING, CONTRADICTING = 0.02, 0.1  # of the range
-LEAST = 16  # samples in common, below which nothing is said
+TUNING = SETTINGS.data.repeatability
 
 
 def with_scatter(found: Sequence[Dataset]) -> list[Dataset]:
@@ -46,7 +41,7 @@ def with_scatter(found: Sequence[Dataset]) -> list[Dataset]:
         here = [(r, s) for r in group for s in found[r].signals if (r, s.channel) in apart]
         for r, s in here:
             power, floor = float(np.mean(apart[r, s.channel])), noise[s.channel] ** 2
-            own[r, s.channel] = float(np.sqrt(power - floor)) if power > SHOWS**2 * floor else 0.0
+            own[r, s.channel] = float(np.sqrt(power - floor)) if power > TUNING.scatter_above**2 * floor else 0.0
             shares.setdefault(s.channel, []).append(own[r, s.channel] / s.span)
     usual = {channel: float(np.median(values)) for channel, values in shares.items()}
     return [
@@ -64,7 +59,7 @@ def with_scatter(found: Sequence[Dataset]) -> list[Dataset]:
     ]
 
 
-def differing(found: Sequence[Dataset], share: float = WORTH_SAYING) -> list[str]:
+def differing(found: Sequence[Dataset], share: float = TUNING.reported_difference) -> list[str]:
     """Repeats that differ by more than noise and more than a share of the range, a line for each condition, channel."""
     lines = []
     for group in groups_of(found):
@@ -94,15 +89,15 @@ def _difference(a: Dataset, b: Dataset, channel: str) -> float | None:
 
     def left(shift: float) -> float:
         inside = (t - shift >= u[0]) & (t - shift <= u[-1])
-        if inside.sum() < max(LEAST, 0.8 * min(t.size, u.size)):
+        if inside.sum() < max(TUNING.least_samples, 0.8 * min(t.size, u.size)):
             return np.inf
         apart = (x.values[inside] - np.interp(t[inside] - shift, u, y.values)) ** 2
         # a leap lies between two samples of each, and not at the same place
-        return float(np.mean(np.sort(apart)[: apart.size - DISCONTINUITIES]))
+        return float(np.mean(np.sort(apart)[: apart.size - TUNING.ignored_samples]))
 
-    wide = max(WIDTH * float(np.hypot(a.shift_prior, b.shift_prior)), LATE)
-    shifts = np.arange(-wide, wide + TICK, TICK)
-    for finer in FINER:
-        shifts = min(shifts, key=left) + finer * (np.arange(PLACES) - PLACES // 2)
+    wide = max(SETTINGS.fit.time_shift.search_width * float(np.hypot(a.shift_prior, b.shift_prior)), TUNING.most_late)
+    shifts = np.arange(-wide, wide + TUNING.coarse_step, TUNING.coarse_step)
+    for finer in TUNING.fine_steps:
+        shifts = min(shifts, key=left) + finer * (np.arange(TUNING.fine_count) - TUNING.fine_count // 2)
     power = min(map(left, shifts))
     return 0.5 * power if np.isfinite(power) else None

@@ -11,8 +11,8 @@ from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.finite_differences import Point, beside, in_step, in_time, looked_at, wider
 from rollover.diagnosis.fit.notebook import Memory
 from rollover.diagnosis.fit.parameterisation import Candidate, each_with_own, key_at
-from rollover.diagnosis.forward.budget import DROPS
 from rollover.diagnosis.forward.full_run import full_runs, made_ahead, perturbations_of
+from rollover.diagnosis.settings import SETTINGS
 from rollover.system.processes import Children
 
 Array = NDArray[np.float64]
@@ -24,7 +24,9 @@ class Simulations:
 
     def __init__(self, dataset: Sequence[Dataset]) -> None:
         self.dataset = tuple(dataset)
-        self.effort = max((e.simulator.effort for e in self.dataset), key=lambda e: e.is_ensemble, default=DROPS)
+        self.effort = max(
+            (e.simulator.effort for e in self.dataset), key=lambda e: e.is_ensemble, default=SETTINGS.forward.drops
+        )
         self.simulations = 0
         self._fixed_shifts = False
         self._raw, self._known = Memory(), Memory()

@@ -15,13 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.fit.finite_differences import Point
-from rollover.diagnosis.fit.levenberg_marquardt import GENTLE, Fitted, Problem, shift_of
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, shift_of
 from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
+from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
-CROOKED = 1.2  # times what a fit leaves, from which on what slopes foretell of held-out recordings is doubted
-ROUNDS = 3  # of a held-out recording's time shift
-NOISE_ALONE = 1.5  # misfit over the noise up to which the noise's own statistics decide
+TUNING = SETTINGS.fit.cross_validation
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,7 +87,7 @@ def refitted(
     all there is.
     """
     count = sum(b.size for b in fitted.blocks)
-    doubted = min(CROOKED * float(np.sqrt(fitted.left / count)), without)
+    doubted = min(TUNING.nonlinear_above * float(np.sqrt(fitted.left / count)), without)
     if not fitted.x or len(groups) < 2 or held_out(fitted, groups).total < doubted:
         return fitted
     shifts = [b.shift for b in fitted.blocks]
@@ -108,7 +107,7 @@ def _by_the_rest(problem: Problem, group: Sequence[int], *, at: Point, shifts: S
     other = problem.fit(candidates, x, only=rest, shifts=[shifts[r] for r in rest], width=1)
     if other is None:
         return None
-    found = [problem.clocked(r, other.candidates, other.x, shifts[r], ROUNDS) for r in group]
+    found = [problem.clocked(r, other.candidates, other.x, shifts[r], TUNING.shift_rounds) for r in group]
     left = [there.normal()[2] for there in found if there is not None]
     return left if len(left) == len(found) else None
 
@@ -118,7 +117,7 @@ def _without(fitted: Fitted, group: Sequence[int]) -> Array:
     normals, p = [b.normal() for b in fitted.blocks], len(fitted.x)
     rest = [r for r in range(len(normals)) if r not in group] or list(group)
     A, b = sum((normals[r][0] for r in rest), np.zeros((p, p))), sum((normals[r][1] for r in rest), np.zeros(p))
-    return np.asarray(np.linalg.solve(A + GENTLE * np.eye(p), b)) if p else b
+    return np.asarray(np.linalg.solve(A + SETTINGS.fit.linearisation.weak_prior * np.eye(p), b)) if p else b
 
 
 def worse(rival: Fitted, best: Fitted, groups: Sequence[Sequence[int]], shared: float = 1.0) -> tuple[float, float]:
@@ -142,7 +141,7 @@ def worse(rival: Fitted, best: Fitted, groups: Sequence[Sequence[int]], shared: 
     # conditions under which the two say the same decide nothing
     telling = [list(g) for g in groups if apart[list(g)].sum() > 9.0 * dispersion**2]
     logs = np.array([0.5 * np.log(a.left[g].sum() / b.left[g].sum()) for g in telling])
-    if dispersion < NOISE_ALONE or logs.size < 2:
+    if dispersion < TUNING.noise_alone or logs.size < 2:
         return float(first), float(first)
     error = float(np.std(logs, ddof=1) / np.sqrt(logs.size))
     return float(first), float(np.mean(logs) / max(error, 1e-12))

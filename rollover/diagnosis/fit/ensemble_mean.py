@@ -8,8 +8,8 @@ and
 
 is the step to the least squares of the mean. A, J, w as in (D1).
 
-An integrator's error is no chance: where it is of first order, steps of one in `PARTS` have all of it but that share,
-and move parameters by what they had made up for it.
+An integrator's error is no chance: where it is of first order, steps of one in `finer_parts` have all of it but that
+share, and move parameters by what they had made up for it.
 """
 
 from __future__ import annotations
@@ -23,19 +23,14 @@ from numpy.typing import NDArray
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.jobs import linearised
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.fit.linearisation import GENTLE, ResidualBlock, shift_of
+from rollover.diagnosis.fit.linearisation import ResidualBlock, shift_of
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.noise.ensemble import alike, heavy_tail, weighted
+from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
-WHOLE, OTHERS = 1.0, (0.5, 1.5)  # shares of the way: where a run leaps from one course to another beside it
-NEARLY = 1.15  # times the least misfit
-FARTHEST = 0.15  # of a coordinate, that a mean may move it at a time
-STEPS = 5  # at most
-WORTH, PART = 2.0, 0.05  # gain that pays for one, and of what is left beyond noise and scatter: then more is missing
-PARTS = 4  # of the scenario's step
-SHORTER = 2  # steps by runs in shorter ones, each of which costs as many runs as `PARTS` of others
+TUNING = SETTINGS.fit.ensemble_mean
 
 
 def settled(problem: Problem, part: Step) -> Step:
@@ -49,14 +44,16 @@ def settled(problem: Problem, part: Step) -> Step:
     rescattered(problem, part.fitted)
     slopes = problem.again(part.fitted)
     places = [slopes]
-    for _ in range(STEPS):
+    for _ in range(TUNING.most_steps):
         here = places[-1]
         if not any(e.perturbed for e in problem.dataset):
             break
         dx = step_of_means(problem.dataset, here.blocks)
-        if promised(here.blocks, dx) < max(WORTH, PART * (here.left - sum(b.size for b in here.blocks))):
+        if promised(here.blocks, dx) < max(
+            TUNING.least_gain, TUNING.least_gain_share * (here.left - sum(b.size for b in here.blocks))
+        ):
             break
-        there = _onward(problem, here, np.clip(dx, -FARTHEST, FARTHEST))
+        there = _onward(problem, here, np.clip(dx, -TUNING.longest_step, TUNING.longest_step))
         if there is None:
             break
         found = _scattered_at(problem, slopes, *there)
@@ -85,13 +82,13 @@ def in_shorter_steps(problem: Problem, fitted: Fitted) -> Fitted:
     """
     if not any(e.perturbed for e in problem.dataset):
         return fitted
-    rescattered(problem, fitted, PARTS)
+    rescattered(problem, fitted, TUNING.finer_parts)
     here = slopes = problem.again(fitted)
-    for _ in range(SHORTER):
-        dx = np.clip(step_of_means(problem.dataset, here.blocks), -FARTHEST, FARTHEST)
-        if promised(here.blocks, dx) < WORTH:
+    for _ in range(TUNING.finer_steps):
+        dx = np.clip(step_of_means(problem.dataset, here.blocks), -TUNING.longest_step, TUNING.longest_step)
+        if promised(here.blocks, dx) < TUNING.least_gain:
             break
-        there = _scattered_at(problem, slopes, *_moved(here, dx), PARTS)
+        there = _scattered_at(problem, slopes, *_moved(here, dx), TUNING.finer_parts)
         if there is None:
             break
         here, slopes = there
@@ -109,7 +106,7 @@ def _onward(problem: Problem, old: Fitted, dx: Array) -> tuple[Sequence[float], 
     The whole way unless that leaves clearly more: the mean of runs is worth more than the one that happens to be there.
     """
     met: list[tuple[float, tuple[Sequence[float], Sequence[float]]]] = []
-    for shares in ((WHOLE,), OTHERS):
+    for shares in ((TUNING.whole_step,), TUNING.other_steps):
         begun = [_moved(old, share * dx) for share in shares]
         problem.made_ahead((r, old.candidates, x) for x, _ in begun for r in range(len(old.blocks)))
         for x, shifts in begun:
@@ -118,7 +115,7 @@ def _onward(problem: Problem, old: Fitted, dx: Array) -> tuple[Sequence[float], 
         if met[0][0] < old.left:
             return met[0][1]
     least, best = min(met, key=lambda one: one[0])
-    if met[0][0] < NEARLY * min(old.left, least):
+    if met[0][0] < TUNING.accepted_misfit * min(old.left, least):
         return met[0][1]
     return best if least < old.left else None
 
@@ -209,7 +206,7 @@ def along(block: ResidualBlock, e: Dataset, perturbed_run: Array) -> Array:
 def step_of_means(dataset: Sequence[Dataset], blocks: Sequence[ResidualBlock]) -> Array:
     """(D8), (p,)."""
     p = blocks[0].J.shape[1]
-    A = sum((block.normal()[0] for block in blocks), GENTLE * np.eye(p))
+    A = sum((block.normal()[0] for block in blocks), SETTINGS.fit.linearisation.weak_prior * np.eye(p))
     b = sum((pull_of_means(e, block) for e, block in zip(dataset, blocks, strict=True)), np.zeros(p))
     return np.asarray(np.linalg.solve(A, b))
 

@@ -21,19 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.fit.linearisation import WIDEST
 from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
 Point = tuple[Sequence[Candidate], Sequence[float]]
-EXACT = 5e-3  # of a coordinate, for differences that are free of chance
-CLOCKED = 3  # times that a time shift is moved to where it fits
-CLEAR = 12.0  # times the squares that runs scatter by, that a difference should move
-TOLD = 1.0  # times the noise, that a difference should move a recording where a fit ends
-LOUD = 4.0  # times that, above which the step was too wide
-STEEPER = 2.0  # times another slope, above which one is doubted
-DISCONTINUITY = 4.0  # times the squares of one side, that the other moves where a run leaps to another course
-FINER = 0.25  # of a step, for what tells only near its place
+TUNING = SETTINGS.fit.finite_differences
 
 
 def step_reduced(moved: Callable[[float], Array | None], step: float, far: float) -> Array | None:
@@ -47,18 +40,18 @@ def step_reduced(moved: Callable[[float], Array | None], step: float, far: float
     if found is None:
         return None
     size = float(np.linalg.norm(found))
-    if size <= LOUD * TOLD * far:
+    if size <= TUNING.most_change * TUNING.target_change * far:
         return found / step
-    narrow = step * TOLD * far / size
+    narrow = step * TUNING.target_change * far / size
     closer = moved(narrow)
     if closer is None:
         return found / step
     slope = closer / narrow
-    if float(np.linalg.norm(slope)) * abs(step) < STEEPER * size:
+    if float(np.linalg.norm(slope)) * abs(step) < TUNING.doubted_ratio * size:
         return slope
     other = moved(-narrow)
     beyond = slope if other is None else -other / narrow
-    return beyond if STEEPER * float(np.linalg.norm(beyond)) < float(np.linalg.norm(slope)) else slope
+    return beyond if TUNING.doubted_ratio * float(np.linalg.norm(beyond)) < float(np.linalg.norm(slope)) else slope
 
 
 def adaptive_difference(
@@ -82,7 +75,9 @@ def adaptive_difference(
     whole = _whole(sides)
     (quiet, over), (loud, _) = sorted((sides[0], sides[-1]), key=lambda side: float(side[0] @ side[0]))
     # nothing at all on one side is where an effect ends, and no leap
-    discontinuities = physical and widest > 0.0 and 0.0 < DISCONTINUITY * float(quiet @ quiet) < float(loud @ loud)
+    discontinuities = (
+        physical and widest > 0.0 and 0.0 < TUNING.discontinuity_ratio * float(quiet @ quiet) < float(loud @ loud)
+    )
     difference, over = (quiet, over) if discontinuities else (whole, sum(abs(over) for _, over in sides))
     return (but_chance(e, difference, chance) if owner.is_narrow and widest > 0.0 else difference) / over
 
@@ -128,7 +123,7 @@ def _too_narrow(
     if owner_of(candidates, k)[0].kind == "sensor" or 2.0 * fd_step > widest:
         return False
     whole = _whole(sides)
-    return float(whole @ whole) < CLEAR * chance
+    return float(whole @ whole) < TUNING.least_signal * chance
 
 
 def but_chance(e: Dataset, d: Array, chance: float) -> Array:
@@ -162,9 +157,9 @@ def in_time(e: Dataset, changes: Mapping[str, object], shift: float, raw: Array,
 def in_step(e: Dataset, first: Array, last: Array, slope: Array, read: Callable[[float], Array | None]) -> Array:
     """y(d) - s d of (D13), (n,), SI; `last` is y(0), `first` y0, `slope` s, `read` gives y or None."""
     s = e.marginalised(e.whitened(slope))
-    size, most = float(s @ s), WIDEST * e.shift_prior
+    size, most = float(s @ s), SETTINGS.fit.linearisation.widest_shift * e.shift_prior
     found, at, w = last, 0.0, e.marginalised(e.whitened(last - first))
-    for _ in range(CLOCKED if size > 0.0 else 0):
+    for _ in range(TUNING.shift_rounds if size > 0.0 else 0):
         there = min(max(at - float(s @ w) / size, -most), most)
         y = read(there)
         if y is None:
@@ -191,7 +186,11 @@ def ridge_at(at: Point, k: int) -> tuple[int, float] | None:
 def fd_stepped(candidates: Sequence[Candidate], k: int, fd_step: float) -> float:
     """How far the k-th coordinate is moved where others are by `fd_step`."""
     owner, own = owner_of(candidates, k)
-    return min(fd_step, EXACT) if owner.kind == "sensor" else fd_step * (FINER if owner.is_fine(own) else 1.0)
+    return (
+        min(fd_step, TUNING.sensor_step)
+        if owner.kind == "sensor"
+        else fd_step * (TUNING.fine_share if owner.is_fine(own) else 1.0)
+    )
 
 
 def beside(

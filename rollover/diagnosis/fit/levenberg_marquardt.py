@@ -12,23 +12,14 @@ from numpy.typing import NDArray
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cache import NONE, Simulations
 from rollover.diagnosis.fit.finite_differences import Point, adaptive_difference, moved_to, ridge_at, step_reduced
-from rollover.diagnosis.fit.linearisation import GENTLE, Fitted, ResidualBlock, bounded, shift_of, total_of
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock, bounded, shift_of, total_of
 from rollover.diagnosis.fit.parameterisation import Candidate, key_at
 from rollover.diagnosis.noise.ensemble import heavy_tail
 from rollover.diagnosis.noise.truncation import soon
+from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
-FAR = 3.0  # misfit over the noise from which on a step may be lengthened
-STRIDE, STRIDES = 2.0, 6  # by what factor, how often
-TRIES = 4  # of a step, each damped more
-NEAR = 2.0  # misfit over the noise, up to which slopes are those of the place itself
-KEPT = 0.7  # of the gain that slopes promise, which a step must make for those of what is held to be kept
-SLOW = 0.01  # of what is left, that a step must gain for the same
-SHORTER = (0.5, 0.0)  # of the way of a time shift, tried where all of it leads nowhere
-ENOUGH, FINELY = 0.3, 1e-3  # gain of a round below which a search narrows; where a fit is ended
-TRIFLING = 1e-3  # of what is left beyond the noise: the same of drops, where much is
-PROMISING, HARDLY = 0.3, 0.1  # of such a gain, and of what is enough where more is left, that slopes must promise
-NOISE_LEFT = 1.04  # misfit over the noise that needs no further search
+TUNING = SETTINGS.fit.levenberg_marquardt
 
 
 class Problem(Simulations):
@@ -161,7 +152,7 @@ class Problem(Simulations):
         worth = e.worth(discontinuities)
         residual = e.marginalised(worth * (self.measured[r] - y))
         far = max(1.0, float(np.sqrt(np.mean(residual * residual)))) if 0.0 < fd_step <= self.effort.fine else np.inf
-        far = far if far < NEAR else np.inf  # from afar a wide step leads over ripples
+        far = far if far < TUNING.local_slopes_below else np.inf  # from afar a wide step leads over ripples
 
         def off(end: Point) -> Array | None:
             return self.moved(r, (candidates, x), end, shift, None if self._fixed_shifts else slope)
@@ -228,7 +219,8 @@ class Problem(Simulations):
         if after is None or after.total <= before.total:
             return after
         later = after.shift - before.shift
-        found = [self.block(r, candidates, x, before.shift + f * later, 0.0, clock=False) for f in SHORTER if later]
+        shares = TUNING.shorter_shifts if later else ()
+        found = [self.block(r, candidates, x, before.shift + f * later, 0.0, clock=False) for f in shares]
         return min([after, *(b for b in found if b is not None)], key=lambda b: b.total)
 
     def fit(
@@ -254,7 +246,15 @@ class Problem(Simulations):
         """
         with self.held(fixed_shifts=fixed_shifts):
             return self._fit(
-                candidates, start, rounds, only, shifts, width, no_jacobian, FINELY if finely else ENOUGH, reused
+                candidates,
+                start,
+                rounds,
+                only,
+                shifts,
+                width,
+                no_jacobian,
+                TUNING.converged_gain_fine if finely else TUNING.converged_gain,
+                reused,
             )
 
     def _fit(
@@ -291,16 +291,17 @@ class Problem(Simulations):
             for block in blocks:
                 Ar, br, _ = block.normal()
                 A, b = A + Ar, b + br
-            improved, enough, total = False, max(least, FINELY * 1e-2 * best, self.effort.least), best
-            if least > FINELY and not self.effort.is_ensemble:
-                enough = max(enough, TRIFLING * (best - sum(k.residual.size for k in blocks)))
+            improved, total = False, best
+            enough = max(least, TUNING.converged_gain_fine * 1e-2 * best, self.effort.least)
+            if least > TUNING.converged_gain_fine and not self.effort.is_ensemble:
+                enough = max(enough, TUNING.converged_share * (best - sum(k.residual.size for k in blocks)))
             due = 0.0  # gain of a step by these slopes
-            for _ in range(TRIES):
+            for _ in range(TUNING.step_retries):
                 dx = bounded(A, b, np.array(x), damping)
                 trial = [float(v) for v in np.clip(np.array(x) + dx, 0.0, 1.0)]
                 moved = np.array(trial) - np.array(x)
                 due = 2.0 * float(b @ moved) - float(moved @ A @ moved)
-                if width and due < max(PROMISING * least, HARDLY * enough):
+                if width and due < max(TUNING.least_promise * least, TUNING.least_promise_far * enough):
                     break  # nothing more is to be had, by these slopes
                 steps = [shift_of(block, moved) for block in blocks]
                 self.made_ahead((r, candidates, trial) for r in use)
@@ -316,7 +317,7 @@ class Problem(Simulations):
                         total = total_of([a for a in after if a is not None])
                     if total < best:
                         improved = True
-                        if total > FAR**2 * sum(k.residual.size for k in blocks):
+                        if total > TUNING.lengthen_above**2 * sum(k.residual.size for k in blocks):
                             trial, after, total = self._further(use, candidates, x, trial, after, total)
                         break
                 damping = max(30.0 * damping, 1e-2)
@@ -336,7 +337,7 @@ class Problem(Simulations):
             # what is held already moves little: its slopes are worked out anew only where the search narrows, or where
             # they lead astray or not far, as those of another place along a valley do; where a run is dear a short fit
             # keeps all that foretold well, and another ends with those of a place beside it
-            slow = gain < KEPT * due or gain < SLOW * best
+            slow = gain < TUNING.reuse_least_share * due or gain < TUNING.reuse_least_gain * best
             anew = fresh or (slow and not self.effort.is_ensemble)
             kept = 0 if anew else len(x) if no_jacobian and self.effort.is_ensemble and not slow else fixed
             if last and self.effort.is_ensemble and told is not None and self.is_beside(x, told):
@@ -377,8 +378,8 @@ class Problem(Simulations):
     ) -> tuple[list[float], list[ResidualBlock | None], float]:
         """Go on the way of a step as long as that helps: events that come too late count for more than their slope."""
         dx = np.array(trial) - np.array(x)
-        for _ in range(STRIDES):
-            dx = STRIDE * dx
+        for _ in range(TUNING.most_lengthenings):
+            dx = TUNING.lengthen_factor * dx
             there = [float(v) for v in np.clip(np.array(x) + dx, 0.0, 1.0)]
             self.made_ahead((r, candidates, there) for r in use)
             found = [
@@ -393,4 +394,4 @@ class Problem(Simulations):
         return trial, after, total
 
 
-__all__ = ["GENTLE", "Fitted", "Problem", "ResidualBlock", "shift_of"]
+__all__ = ["Fitted", "Problem", "ResidualBlock", "shift_of"]

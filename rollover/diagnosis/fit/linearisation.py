@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.noise.ensemble import HeavyTail
+from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
-WIDEST = 4.0  # times its prior that a time shift may be
-GENTLE = 1e-4  # prior of a coordinate (1/variance): keeps what nothing determines where it is
+TUNING = SETTINGS.fit.linearisation
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,9 +149,9 @@ def turned(fitted: Fitted) -> Fitted:
 
 
 def shift_of(block: ResidualBlock, dx: Array) -> float:
-    """Change of the time shift that goes with dx; it stays within `WIDEST` of its prior."""
+    """Change of the time shift that goes with dx; it stays within `widest_shift` of its prior."""
     g = float(block.slope @ (block.residual - block.J @ dx)) - block.shift * block.prior**-2
-    most = WIDEST * block.prior
+    most = TUNING.widest_shift * block.prior
     return min(max(block.shift + g / block.weight, -most), most) - block.shift
 
 
@@ -170,7 +170,7 @@ def bounded(A: Array, b: Array, x: Array, damping: float) -> Array:
             break
         M = A[np.ix_(free, free)].copy()
         M[np.diag_indices_from(M)] *= 1.0 + damping
-        M[np.diag_indices_from(M)] += GENTLE
+        M[np.diag_indices_from(M)] += TUNING.weak_prior
         target = b[free] - A[np.ix_(free, ~free)] @ dx[~free]
         dx[free] = np.linalg.solve(M, target)
         out = free & ((x + dx < 0.0) | (x + dx > 1.0))

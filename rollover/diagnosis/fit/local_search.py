@@ -11,25 +11,14 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import doubted_beside
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
-from rollover.diagnosis.fit.linearisation import WIDEST, Fitted, ResidualBlock
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate, each_with_own, physical
+from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
-GRID_SCAN, COMBED, BESIDE = (
-    11,
-    0.05,
-    20,
-)  # places on a first coordinate, within so much of its fit; on the other, over all
-WAVES, OCTAVES = 57, 0.225  # frequencies, within so much of a coordinate of its fit: three octaves
-QUIETLY = (0.3, 0.5)  # coordinates of a damping that lets it ring
-SPREAD = (np.arange(6) + 0.5) / 6  # places of a shape that goes along with them
-STARTS, APART = 3, 0.06  # of the best places, so far apart
-SCANNED = (np.arange(40) + 0.5) / 40  # places of a shape
-TICK, SHORTEST, NARROWER = 8e-5, 5e-6, 0.4  # s, by which a time shift is tried to either side; then less, by a factor
-BEHIND = 2.0  # times what another explanation leaves, beyond which none is gone on with
-TRIED = 40  # at most so many
-ROUNDS = 3  # of a fit with the errors of the conditions as they act beside it
-TWICE, LITTLE = 2, 1.0  # how often; a gain that is not worth another time
+TUNING = SETTINGS.fit.local_search
+SPREAD = (np.arange(TUNING.coarse_shapes) + 0.5) / TUNING.coarse_shapes  # places of a shape that goes along with them
+SCANNED = (np.arange(TUNING.fine_shapes) + 0.5) / TUNING.fine_shapes  # places of a shape
 
 
 def left_at(
@@ -101,8 +90,12 @@ def grid_scan(fitted: Fitted) -> list[tuple[float, ...]]:
     What hops leaves a misfit full of cliffs: a frequency is found soon, what damps it may lie far off behind one.
     """
     at = len(fitted.x) - 2
-    firsts = np.clip(fitted.x[at] + COMBED * np.linspace(-1.0, 1.0, GRID_SCAN), 0.0, 1.0)
-    return [(*fitted.x[:at], float(a), float(b)) for a in firsts for b in (np.arange(BESIDE) + 0.5) / BESIDE]
+    firsts = np.clip(fitted.x[at] + TUNING.first_half_width * np.linspace(-1.0, 1.0, TUNING.first_count), 0.0, 1.0)
+    return [
+        (*fitted.x[:at], float(a), float(b))
+        for a in firsts
+        for b in (np.arange(TUNING.second_count) + 0.5) / TUNING.second_count
+    ]
 
 
 def frequency_scan(last: Candidate, own: Sequence[float]) -> tuple[Candidate, list[tuple[float, ...]]]:
@@ -111,16 +104,18 @@ def frequency_scan(last: Candidate, own: Sequence[float]) -> tuple[Candidate, li
     One that was fitted beside a wrong frequency hardly rings any more: what it rings by is not to be seen from there.
     """
     whole = replace(last.whole(), along=tuple(last.shapes))
-    firsts = np.clip(own[0] + OCTAVES * np.linspace(-1.0, 1.0, WAVES), 0.0, 1.0)
+    firsts = np.clip(own[0] + TUNING.frequency_half_width * np.linspace(-1.0, 1.0, TUNING.frequency_count), 0.0, 1.0)
     shapes = itertools.product(*(SPREAD for _ in last.shapes))
-    return whole, [(float(a), b, *map(float, shape)) for shape in shapes for a in firsts for b in QUIETLY]
+    return whole, [(float(a), b, *map(float, shape)) for shape in shapes for a in firsts for b in TUNING.light_damping]
 
 
 def apart(met: Sequence[tuple[float, tuple[float, ...]]]) -> list[tuple[float, ...]]:
     """Of places, each with what it leaves, the best that are not beside each other."""
     chosen: list[tuple[float, ...]] = []
     for _, x in sorted(met):
-        if len(chosen) < STARTS and all(max(abs(a - b) for a, b in zip(x, c, strict=True)) > APART for c in chosen):
+        if len(chosen) < TUNING.starts and all(
+            max(abs(a - b) for a, b in zip(x, c, strict=True)) > TUNING.start_distance for c in chosen
+        ):
             chosen.append(x)
     return chosen
 
@@ -159,13 +154,13 @@ def timed(problem: Problem, fitted: Fitted) -> Fitted:
     Where one channel has a clock of its own all shifts are tried against that first: the edges of the channel stay.
     """
     best = fitted
-    for _ in range(TWICE):
+    for _ in range(TUNING.repeats):
         x, shifts = _against(problem, best)
         moved = [problem.block(r, best.candidates, x, s, 0.0, clock=False) for r, s in enumerate(shifts)]
         blocks = [b if b is None else _tried(problem, r, best.candidates, x, b) for r, b in enumerate(moved)]
         shifts = [s if b is None else b.shift for s, b in zip(shifts, blocks, strict=True)]
         again = problem.fit(best.candidates, x, rounds=3, shifts=shifts, width=2)
-        if again is None or again.left > best.left - LITTLE:
+        if again is None or again.left > best.left - TUNING.least_gain:
             break
         best = again
     return best
@@ -174,11 +169,11 @@ def timed(problem: Problem, fitted: Fitted) -> Fitted:
 def ended(problem: Problem, fitted: Fitted) -> Fitted:
     """The fit gone on with over narrow steps as long as that gains: its rounds may have been too few; never worse."""
     best = fitted
-    for _ in range(TWICE):
+    for _ in range(TUNING.repeats):
         again = problem.fit(best.candidates, best.x, shifts=[b.shift for b in best.blocks], width=2, finely=True)
         if again is None or again.left > best.left:
             break
-        is_there = again.left > best.left - LITTLE
+        is_there = again.left > best.left - TUNING.least_gain
         best = again
         if is_there:
             break
@@ -191,8 +186,8 @@ def _against(problem: Problem, fitted: Fitted) -> tuple[tuple[float, ...], list[
     for c, own in each_with_own(fitted.candidates):
         if c.id != "sensor-clock-offset":
             continue
-        k, step, search = own.start, TICK, c.search["offset"]
-        while step > SHORTEST:
+        k, step, search = own.start, TUNING.shift_step, c.search["offset"]
+        while step > TUNING.shift_step_least:
             for d in (step, -step):
                 moved = coordinate(physical(best[0][k], search) - d, search)
                 x, shifts = (*best[0][:k], moved, *best[0][k + 1 :]), [s + d for s in best[1]]
@@ -202,7 +197,7 @@ def _against(problem: Problem, fitted: Fitted) -> tuple[tuple[float, ...], list[
                     best, left = (x, shifts), there
                     break
             else:
-                step *= NARROWER
+                step *= TUNING.shift_step_factor
     return best
 
 
@@ -216,16 +211,20 @@ def _tried(
     for there in (0.0, problem.shifts[r]):
         other = problem.block(r, candidates, x, there, 0.0, clock=False)
         block = other if other is not None and other.total < block.total else block
-    step, tried = TICK, 0
-    while step > SHORTEST and tried < TRIED:
+    step, tried = TUNING.shift_step, 0
+    while step > TUNING.shift_step_least and tried < TUNING.most_shift_trials:
         for there in (block.shift + step, block.shift - step):
             tried += 1
             other = problem.block(r, candidates, x, there, 0.0, clock=False)
-            if other is not None and other.total < block.total and abs(there) < WIDEST * other.prior:
+            if (
+                other is not None
+                and other.total < block.total
+                and abs(there) < SETTINGS.fit.linearisation.widest_shift * other.prior
+            ):
                 block = other
                 break
         else:
-            step *= NARROWER
+            step *= TUNING.shift_step_factor
     return block
 
 
@@ -240,7 +239,7 @@ def conditioned(problem: Problem, fitted: Fitted) -> Fitted:
     What an error of a condition does was seen on the scenario as it is: a mass in doubt moves a spike there, and
     beside a spring that was found its frequency.
     """
-    for _ in range(ROUNDS):
+    for _ in range(TUNING.condition_rounds):
         beside = problem.changes(fitted.candidates, fitted.x)
         shifts = [b.shift for b in fitted.blocks]
         problem.with_noise_model([doubted_beside(e, beside, s) for e, s in zip(problem.dataset, shifts, strict=True)])

@@ -8,24 +8,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from rollover.diagnosis.fit.levenberg_marquardt import NOISE_LEFT, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
-from rollover.diagnosis.fit.local_search import BEHIND, STARTS, by_what_is_left, few_of, polish, shifts_told
+from rollover.diagnosis.fit.local_search import by_what_is_left, few_of, polish, shifts_told
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
+from rollover.diagnosis.settings import SETTINGS
 
-WORTH = 12.0  # gain that pays for a shape
-SHORT = 4  # rounds of a fit that tells where to begin
-ABREAST = 1.5  # times what the best of short fits leaves, up to which others are followed
-FAR = 2.0  # misfit over the noise, from which on much is left
-SOON = 0.95  # times what an effect leaves as it is, that the shape which it has must then leave after a short fit
-THERE = 0.003  # of a coordinate, within which two short fits came to one place
-AS_MUCH = 0.01  # of what it leaves, within which another one near it is on the way to one place with it
-ASTRAY = 1.2  # times what another explanation leaves, above which a crooked valley is not followed
-FURTHER, ALIKE = 3, 0.1  # rounds of all recordings, after which fits within so much of a coordinate go to one place
-# of the samples, by which a short fit, and one gone on with, may leave more than another explanation that leaves noise
-NEARBY, NEARER = 0.5, 0.35
-BESIDE_FORM = np.linspace(-0.1, 0.05, 13)  # of a coordinate: where a threshold of another form may lie
-ELSEWHERE = (0.2, 0.35, 0.5, 0.65, 0.8)  # coordinates of a number that only this form has
+TUNING = SETTINGS.fit.model_variants
+BESIDE_FORM = np.linspace(
+    TUNING.threshold_low, TUNING.threshold_high, TUNING.threshold_count
+)  # of a coordinate: where a threshold of another form may lie
 
 
 def shaped(problem: Problem, f: Fitted, leaves: Sequence[float]) -> Fitted | None:
@@ -48,7 +40,7 @@ def shaped(problem: Problem, f: Fitted, leaves: Sequence[float]) -> Fitted | Non
         found = min((one for one in (found, onward) if one is not None), key=lambda one: one.left)
     if found.left > _reach_of_all(f, leaves):
         return None
-    found = found if is_noise(found) or found.left > ASTRAY * sum(leaves) else polish(problem, found)
+    found = found if is_noise(found) or found.left > TUNING.no_valley_above * sum(leaves) else polish(problem, found)
     (whole, x), shifts = found.candidates[-1].plain(found.own), [b.shift for b in found.blocks]
     bent = problem.fit((*f.candidates[:-1], whole), (*found.x[:at], *x), shifts=shifts, width=2)
     own = dict(zip(found.candidates[-1].search, found.own, strict=True))
@@ -68,21 +60,23 @@ def in_form(problem: Problem, f: Fitted, last: Candidate, leaves: Sequence[float
     for name, search in last.search.items():
         there = coordinate(known[name], search) if name in known else None
         several = [there + float(d) for d in BESIDE_FORM] if there is not None and not axes else [there]
-        axes.append(list(ELSEWHERE) if there is None else [v for v in several if v is not None and 0.0 < v < 1.0])
+        axes.append(
+            list(TUNING.new_places) if there is None else [v for v in several if v is not None and 0.0 < v < 1.0]
+        )
     places = [(*f.x[:at], *own) for own in itertools.product(*axes)]
     met = by_what_is_left(problem, (*f.candidates[:-1], last), places, shifts, few_of(f))
-    found = _best_of(problem, f, last, met[: 2 * STARTS], leaves)
+    found = _best_of(problem, f, last, met[: 2 * SETTINGS.fit.local_search.starts], leaves)
     return found if found is not None and found.left < _reach_of_all(f, leaves) else None
 
 
 def enough(left: float, size: int) -> float:
     """The gain that pays for a shape where so much is left of so many samples."""
-    return WORTH * max(1.0, left / size)
+    return TUNING.least_gain * max(1.0, left / size)
 
 
 def is_noise(fitted: Fitted) -> bool:
     """Whether a fit needs no further search."""
-    return fitted.left < NOISE_LEFT**2 * sum(b.residual.size for b in fitted.blocks)
+    return fitted.left < SETTINGS.fit.levenberg_marquardt.noise_left**2 * sum(b.residual.size for b in fitted.blocks)
 
 
 def _best_of(
@@ -97,22 +91,29 @@ def _best_of(
     """
     candidates, few = (*f.candidates[:-1], last), few_of(f)
     at = [f.blocks[r].shift for r in few]
-    short = [problem.fit(candidates, x, rounds=SHORT, shifts=at, only=few, no_jacobian=True) for x in places]
+    short = [
+        problem.fit(candidates, x, rounds=TUNING.short_rounds, shifts=at, only=few, no_jacobian=True) for x in places
+    ]
     # fitted alone these soon leave less than beside all others
     own = sum(f.blocks[r].total for r in few)
-    most = min(ABREAST * own, reach([leaves[r] for r in few], sum(f.blocks[r].residual.size for r in few), NEARBY))
-    if sum(leaves) > FAR**2 * sum(b.residual.size for b in f.blocks):
-        most = min(most, SOON * own)
+    most = min(
+        TUNING.followed_misfit * own,
+        reach([leaves[r] for r in few], sum(f.blocks[r].residual.size for r in few), TUNING.short_excess),
+    )
+    if sum(leaves) > TUNING.much_left**2 * sum(b.residual.size for b in f.blocks):
+        most = min(most, TUNING.shape_misfit * own)
     begun: list[Fitted] = []
     for one in sorted((one for one in short if one is not None and one.total < most), key=lambda one: one.total):
-        if begun and one.total > ABREAST * begun[0].total:
+        if begun and one.total > TUNING.followed_misfit * begun[0].total:
             break
-        if len(begun) < STARTS and not any(_is_there(one, other) for other in begun):
+        if len(begun) < SETTINGS.fit.local_search.starts and not any(_is_there(one, other) for other in begun):
             begun.append(one)
     begun = [one for k, one in enumerate(begun) if not any(_is_one_ridge(one, other) for other in begun[:k])]
     held = [b.shift for b in f.blocks]
     again = [
-        problem.fit(candidates, one.x, shifts=shifts_told(held, one, few), rounds=FURTHER, no_jacobian=True)
+        problem.fit(
+            candidates, one.x, shifts=shifts_told(held, one, few), rounds=TUNING.meeting_rounds, no_jacobian=True
+        )
         for one in begun
     ]
     best: Fitted | None = None
@@ -121,7 +122,9 @@ def _best_of(
     for one in sorted((one for one in again if one is not None), key=lambda one: one.total):
         if one.total > most:
             return best or one
-        if any(_is_there(one, other, ALIKE) for other in done) or (best and one.total > ABREAST * best.left):
+        if any(_is_there(one, other, TUNING.meeting_distance) for other in done) or (
+            best and one.total > TUNING.followed_misfit * best.left
+        ):
             continue
         done.append(one)
         ended = problem.fit(candidates, one.x, shifts=[b.shift for b in one.blocks])
@@ -137,19 +140,22 @@ def reach(leaves: Sequence[float], size: int, part: float) -> float:
     As far again from the noise as that is, or `part` of the samples.
     """
     left = sum(leaves)
-    return left + max((BEHIND - 1.0) * (left - size), part * size)
+    return left + max((SETTINGS.fit.local_search.abandon_above - 1.0) * (left - size), part * size)
 
 
 def _reach_of_all(f: Fitted, leaves: Sequence[float]) -> float:
     """The same of a fit to all recordings that was gone on with."""
-    return reach(leaves, sum(b.residual.size for b in f.blocks), NEARER)
+    return reach(leaves, sum(b.residual.size for b in f.blocks), TUNING.followed_excess)
 
 
 def _is_one_ridge(one: Fitted, other: Fitted) -> bool:
     """Whether two short fits are on their way to one place, and as far."""
-    return _is_there(one, other, ALIKE) and abs(one.total - other.total) < AS_MUCH * other.total
+    return (
+        _is_there(one, other, TUNING.meeting_distance)
+        and abs(one.total - other.total) < TUNING.same_misfit * other.total
+    )
 
 
-def _is_there(one: Fitted, other: Fitted, within: float = THERE) -> bool:
+def _is_there(one: Fitted, other: Fitted, within: float = TUNING.same_place) -> bool:
     """Whether two fits ended in one place."""
     return max(abs(a - b) for a, b in zip(one.x, other.x, strict=True)) < within

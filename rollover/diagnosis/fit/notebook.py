@@ -7,14 +7,16 @@ from collections.abc import Hashable
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.settings import SETTINGS
+
 Array = NDArray[np.float64]
-MOST = 5 * 10**8  # bytes
+TUNING = SETTINGS.fit.notebook
 
 
 class Memory:
     """Arrays by key, of at most so many bytes: beyond that the older half of them is let go of, never the newest."""
 
-    def __init__(self, most: int = MOST) -> None:
+    def __init__(self, most: int = TUNING.most_bytes) -> None:
         self._most, self._bytes = most, 0
         self._arrays: dict[Hashable, Array | None] = {}
 

@@ -13,23 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.forward.forward_model import EDGES
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS, Search, nth
 
 Array = NDArray[np.float64]
 
-PLACES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of a shape, at which a fit of it begins
-BESIDE = 0.01  # of a coordinate: how far from its zero an effect is looked at
-FURTHER = (0.08, 0.16, 0.3)  # of a coordinate: how far a clock is looked at
-THRESHOLDS = 10  # places at which something that has no zero is looked at
-ONE = (5,)
-SEVERAL = (8, 4, 3)  # places on the axes of an effect's parameters
-WIDE = 0.08  # of a coordinate: a step off what changes nothing, where each place costs a full run
-LIMITS = (0.12, 0.3)  # more places of what may be a limit
-STRONG, ENDS = (0.35, 0.9), (0.0, 1.0)  # of the way from what changes nothing to an end
-SPREAD = (0.12, 0.3, 0.6)  # places of a depth, a length: where nothing is known to change nothing
+TUNING = SETTINGS.fit.parameterisation
 LIMIT_NAMES = ("limit", "yield_force", "stiffness", "angle")  # what acts the more the lower it is
-EDGE = 0.01  # of a coordinate, that a start keeps from its ends
-STEEP = 2.0  # tangent of the tilt at which a load slides
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,7 +89,7 @@ class Candidate:
         if not self.is_narrow or names[k] != "friction":
             return None
         travel, friction = self.search["travel"], self.search["friction"]
-        slope = -(friction.high - friction.low) / (STEEP - physical(x[k], friction))
+        slope = -(friction.high - friction.low) / (TUNING.sliding_tilt - physical(x[k], friction))
         return names.index("travel"), slope / math.log(travel.high / travel.low)
 
     def changes(self, x: Sequence[float], number: int = 1) -> dict[str, Any]:
@@ -134,7 +124,9 @@ class Candidate:
         if self.neutral is not None:
             return self._beside(self.neutral)
         axes = []
-        for s, many in zip(self.search.values(), ONE if len(self.search) == 1 else SEVERAL, strict=False):
+        for s, many in zip(
+            self.search.values(), TUNING.grid_of_one if len(self.search) == 1 else TUNING.grid_of_several, strict=False
+        ):
             inside = [(k + 0.5) / many for k in range(many)]
             if len(self.search) == 1 and s.scale == "linear" and s.low < 0.0 < s.high:
                 middle, near = -s.low / (s.high - s.low), (0.05, 0.4)
@@ -151,23 +143,23 @@ class Candidate:
         known = [k for k, n in enumerate(neutral) if n is not None]
         if len(known) == len(neutral):
             at = [float(n) for n in neutral if n is not None]
-            steps = [(k, sign * WIDE) for k in known for sign in (1.0, -1.0)]
+            steps = [(k, sign * TUNING.run_step) for k in known for sign in (1.0, -1.0)]
             beside = [tuple(a + (d if a + d < 1.0 else -d) * (j == k) for j, a in enumerate(at)) for k, d in steps]
             # what the scenario has may be far above what ever acts: a yield force, a stop
             is_limit = len(at) == 1 and None in EFFECTS[self.id].null.values()
-            return [*beside, *((x,) for x in LIMITS if is_limit)]
+            return [*beside, *((x,) for x in TUNING.limit_places if is_limit)]
         axes, narrow = [], EFFECTS[self.id].narrow
         for n, (name, search) in zip(neutral, self.search.items(), strict=True):
             if n is not None:
-                axes.append([min(n + 2.0 * WIDE, 0.9)])
+                axes.append([min(n + 2.0 * TUNING.run_step, 0.9)])
             elif name in narrow:
                 axes.append(list(narrow[name]))
             elif EFFECTS[self.id].null.get(name) == 0.0 or any(len(a) > 1 for a in axes):
                 # a strength, or more than one place: what is usual shows the direction
                 usual = coordinate(getattr(EFFECTS[self.id](), name), search)
-                axes.append([min(max(usual, WIDE), 1.0 - WIDE)])
+                axes.append([min(max(usual, TUNING.run_step), 1.0 - TUNING.run_step)])
             else:
-                axes.append(list(SPREAD))
+                axes.append(list(TUNING.length_places))
         return list(itertools.product(*axes))
 
     def strong(self) -> list[tuple[float, ...]]:
@@ -178,10 +170,18 @@ class Candidate:
         if self.neutral is None:
             return []
         beside = self._beside(self.neutral)
-        ways = [(k, end, way, n) for k, n in enumerate(self.neutral) if n is not None for end in ENDS for way in STRONG]
+        ways = [
+            (k, end, way, n)
+            for k, n in enumerate(self.neutral)
+            if n is not None
+            for end in TUNING.range_ends
+            for way in TUNING.strong_shares
+        ]
         if not ways:
             nulls = EFFECTS[self.id].null
-            ways = [(k, 1.0, STRONG[-1], 0.0) for k, name in enumerate(self.search) if nulls.get(name) == 0.0][:1]
+            ways = [
+                (k, 1.0, TUNING.strong_shares[-1], 0.0) for k, name in enumerate(self.search) if nulls.get(name) == 0.0
+            ][:1]
         found = list(beside)
         for place in beside:
             usual = [p if n is None else n for p, n in zip(place, self.neutral, strict=True)]
@@ -218,7 +218,7 @@ class Candidate:
         """Coordinates of `whole` at which its fit may begin: the shape's default, and others."""
         kind: Any = EFFECTS[self.id]()
         default = [_begun(getattr(kind, n), s) for n, s in self.shapes.items()]
-        places = [tuple(default), *itertools.product(*[PLACES] * len(default))]
+        places = [tuple(default), *itertools.product(*[TUNING.shape_starts] * len(default))]
         return [(*x, *place) for place in places]
 
     def probes(self) -> list[tuple[float, ...]]:
@@ -232,11 +232,11 @@ class Candidate:
             null = EFFECTS[self.id].null.get(name)
             at = coordinate(null, s) if isinstance(null, (int, float)) and (s.scale != "log" or null > 0.0) else None
             if at is not None and 0.0 < at < 1.0:
-                axes.append([at + BESIDE])
+                axes.append([at + TUNING.zero_step])
             elif null is not None:
                 axes.append([0.1, 0.6])
             else:
-                many = (THRESHOLDS if len(self.search) > 1 else 4) if not axes else 1
+                many = (TUNING.threshold_count if len(self.search) > 1 else 4) if not axes else 1
                 told = [] if s.told is None else [coordinate(s.told, s)]
                 axes.append([(k + 0.5) / many for k in range(many)] + told)
         return list(itertools.product(*axes))
@@ -252,7 +252,7 @@ class Candidate:
         null = EFFECTS[self.id].null[name]
         if null is None or not s.low < null < s.high:
             return []
-        return [(coordinate(null, s) + sign * f,) for f in FURTHER for sign in (1.0, -1.0)]
+        return [(coordinate(null, s) + sign * f,) for f in TUNING.clock_steps for sign in (1.0, -1.0)]
 
 
 def each_with_own(candidates: Sequence[Candidate]) -> Iterator[tuple[Candidate, slice]]:
@@ -339,4 +339,4 @@ def followed(c: Candidate, x: Sequence[float], factor: float) -> tuple[float, ..
     search, at = c.search[name], list(c.search).index(name)
     value = null + factor * (physical(x[at], search) - null)
     inside = coordinate(min(max(value, search.low), search.high), search)
-    return (*x[:at], min(max(inside, EDGE), 1.0 - EDGE), *x[at + 1 :])
+    return (*x[:at], min(max(inside, TUNING.end_distance), 1.0 - TUNING.end_distance), *x[at + 1 :])

@@ -10,11 +10,12 @@ from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, without_shift
 from rollover.diagnosis.fit.local_search import blocks_at, few_of, left_at
 from rollover.diagnosis.fit.parameterisation import Candidate, followed, strength_parameter
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS
 
-AFAR, NEAR = (np.arange(80) + 0.5) / 80, 0.002 * np.arange(-20, 21)  # places of a threshold, all along and about a fit
-VALLEYS = 3  # of these to either side in which a fit begins
-SHORT = 4  # rounds of a fit that tells whether one is worth while
+TUNING = SETTINGS.fit.threshold_scan
+AFAR = (np.arange(TUNING.wide_count) + 0.5) / TUNING.wide_count
+NEAR = TUNING.near_step * np.arange(-TUNING.near_count, TUNING.near_count + 1)
 CLOCKS = ("sensor-clock-offset", "sensor-clock-drift")
 
 Stretch = tuple[int, float, float]  # a coordinate of a fit, and from where to where it is tried
@@ -99,7 +100,7 @@ def traced(problem: Problem, fitted: Fitted, stretch: Stretch) -> Fitted:
         left = None if x is None else left_at(problem, fitted.candidates, x, shifts, few)
         if x is not None and left is not None:
             met.append((left, x))
-    for x in _soonest(problem, fitted, _valleys(met)[:VALLEYS], few):
+    for x in _soonest(problem, fitted, _valleys(met)[: TUNING.valleys], few):
         again = problem.fit(fitted.candidates, x, shifts=shifts, width=1)
         best = again if again is not None and again.left < best.left else best
     return best
@@ -111,7 +112,7 @@ def _soonest(
     """Of several places those from which a short fit to `few` recordings comes to less than one from where a fit is."""
     at = [fitted.blocks[r].shift for r in few]
     short = [
-        problem.fit(fitted.candidates, x, rounds=SHORT, only=few, shifts=at, width=1, no_jacobian=True)
+        problem.fit(fitted.candidates, x, rounds=TUNING.short_rounds, only=few, shifts=at, width=1, no_jacobian=True)
         for x in (fitted.x, *places)
     ]
     own = np.inf if short[0] is None else short[0].total
@@ -127,7 +128,7 @@ def _in_tune(problem: Problem, fitted: Fitted, stretch: Stretch) -> Fitted:
     few = few_of(fitted)
     met = [(left, y) for y in there if (left := left_at(problem, candidates, y, shifts, few)) is not None]
     best = fitted
-    for y in _valleys(met)[:VALLEYS]:
+    for y in _valleys(met)[: TUNING.valleys]:
         new = problem.fit(candidates, y, shifts=shifts, width=1)
         if new is not None:
             plain = (*new.x[:at], *bent.plain(new.own)[1])

@@ -1,8 +1,8 @@
 """When a recording's clock began: by all that was recorded, or by its first contact alone.
 
 A time shift that is fitted to a whole recording bends towards whatever the simulation misses. The first contact hardly
-depends on that: an error of the model grows with the force, so that samples after it are trusted to `TRUSTED` of what
-they have changed since the start, and none later than `SOON`.
+depends on that: an error of the model grows with the force, so that samples after it are trusted to `model_error` of
+what they have changed since the start, and none later than `early_window`.
 
 It is sought before by what hardly asks for a model: until then a body falls, then it does something else (`onset`).
 
@@ -26,22 +26,11 @@ from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import spoken
 
 Array = NDArray[np.float64]
-WIDTH = 3.0  # times its prior, within which a time shift is sought
-PLACES = 241  # time shifts that are tried
-NEAR, AT_THE_END = 1e-3, 0.9  # s, about a first contact found without a model; of that, from which on it ends there
-QUIET = 2.0  # noise units, that the middle sample of a fall may miss
-SOON, LEAST = 8e-3, 4  # s after the first contact, and samples, that tell of it
-TRUSTED = 0.1  # of a change of a channel, by which the model may be off
-BELIEVED = 2.0  # times its prior: a shift beyond is the model's fault, where the clock's zero is known
-FURTHEST = 0.25  # s, that a clock may be off where it should not be
-MOST = 0.5  # of a recording that must be left to compare
-MEETS, BEFORE = 2.0, 4.0  # times the noise's power, that is left there at most, and of that, at least where it stands
-FALLS = 30.0  # times less than where it stands: as good, for rows that are means about another contact
-# s that no physics imitates: beyond, so many times less will do beside what is missing; and as far aside, so many more
-ASIDE, FALLS_FAR, SHARP = 0.02, 10.0, 1.5
+TUNING = SETTINGS.fit.time_shift
 UNKNOWN = 1e30  # power of what cannot be compared
 
 Made = Callable[[float], Array | None]
@@ -67,21 +56,31 @@ def _by_contact(problem: Problem, r: int, *, beside: Point) -> float | None:
     e = problem.dataset[r]
     at = _first_contact(problem, r, partial(problem.edged, r, *beside))
     known = e.recording.clock.zero != "unknown"
-    return None if at is None or (known and abs(at) > BELIEVED * e.shift_prior) else at
+    return None if at is None or (known and abs(at) > TUNING.believed_width * e.shift_prior) else at
 
 
 def _first_contact(problem: Problem, r: int, made: Made) -> float | None:
     """Time shift (s) of recording r by its first contact: found without a model, then beside there by the model."""
     e = problem.dataset[r]
     places = _places(e)
-    places = places[places + e.simulator.contact > e.recording.time[LEAST]]  # what never fell tells of no contact
+    places = places[
+        places + e.simulator.contact > e.recording.time[TUNING.early_samples]
+    ]  # what never fell tells of no contact
     if not (np.isfinite(e.simulator.contact) and places.size):
         return None
     about = _best(problem, r, made, partial(onset, problem, r), places)
     if about is None or not _falls(problem, r, made(about), about):
         return None
-    at = _best(problem, r, made, partial(_early, problem, r), about + NEAR * np.linspace(-1.0, 1.0, PLACES))
-    return about if at is None or abs(at - about) > AT_THE_END * NEAR else at  # the model leads away from it
+    at = _best(
+        problem,
+        r,
+        made,
+        partial(_early, problem, r),
+        about + TUNING.contact_window * np.linspace(-1.0, 1.0, TUNING.search_count),
+    )
+    return (
+        about if at is None or abs(at - about) > TUNING.end_share * TUNING.contact_window else at
+    )  # the model leads away from it
 
 
 def mistimed(problem: Problem, fitted: Fitted, parallel_map: ParallelMap = serial_map) -> list[tuple[str, float]]:
@@ -94,7 +93,7 @@ def is_all_by_clocks(problem: Problem, fitted: Fitted, parallel_map: ParallelMap
     """Whether such shifts are all that separates the recordings from a fit: each else is met as it stands."""
     late = {name for name, _ in mistimed(problem, fitted, parallel_map)}
     others = [b for e, b in zip(problem.dataset, fitted.blocks, strict=True) if e.name not in late]
-    return bool(late) and all(b.normal()[2] < MEETS * b.residual.size for b in others)
+    return bool(late) and all(b.normal()[2] < TUNING.accepted_power * b.residual.size for b in others)
 
 
 def by_clock(found: Sequence[tuple[str, float]]) -> str:
@@ -121,15 +120,27 @@ def _elsewhere(problem: Problem, r: int, *, fitted: Fitted) -> float | None:
         raw = made(float(shift))
         return UNKNOWN if raw is None else _left(e, raw, float(shift), whole=falls)
 
-    about = _best(problem, r, made, partial(_left, e), np.arange(-FURTHEST, FURTHEST, min(e.shift_prior, ASIDE)))
-    shown = [at for at in first_shown(e) if abs(at) > ASIDE] if falls else []
+    about = _best(
+        problem,
+        r,
+        made,
+        partial(_left, e),
+        np.arange(-TUNING.largest_error, TUNING.largest_error, min(e.shift_prior, TUNING.no_physics)),
+    )
+    shown = [at for at in first_shown(e) if abs(at) > TUNING.no_physics] if falls else []
     starts = [*([] if about is None else [about]), *shown]
     if not starts:
         return None
     there, least = min((_lowest(left, start, e.shift_prior) for start in starts), key=lambda found: found[1])
     here = left(fitted.blocks[r].shift)
-    bound = max(min(MEETS, here / BEFORE), here / (FALLS_FAR if abs(there) > ASIDE else FALLS))
-    if least >= bound or min(left(there - ASIDE), left(there + ASIDE)) < SHARP * least:
+    bound = max(
+        min(TUNING.accepted_power, here / TUNING.least_improvement),
+        here / (TUNING.least_fall_far if abs(there) > TUNING.no_physics else TUNING.least_fall),
+    )
+    if (
+        least >= bound
+        or min(left(there - TUNING.no_physics), left(there + TUNING.no_physics)) < TUNING.least_rise * least
+    ):
         return None
     return there
 
@@ -154,7 +165,7 @@ def _left(e: Dataset, raw: Array, shift: float, *, whole: bool = False) -> float
         time = e.recording.time[s.rows]
         known[part] = whole | ((time - shift >= time[0]) & (time - shift <= time[-1]))
         signals.append(s if s.weight is None else replace(s, weight=np.interp(time - shift, time, s.weight)))
-    if known.mean() < MOST or not np.all(np.isfinite(raw[known])):
+    if known.mean() < TUNING.least_overlap or not np.all(np.isfinite(raw[known])):
         return UNKNOWN
     moved = replace(e, signals=tuple(signals))
     misfit = np.where(known, np.concatenate([s.values for s in signals]) - e.masked(raw, e.discontinuities(raw)), 0.0)
@@ -164,7 +175,7 @@ def _left(e: Dataset, raw: Array, shift: float, *, whole: bool = False) -> float
 
 def _places(e: Dataset) -> Array:
     """Time shifts (s) that a recording's may be."""
-    return np.asarray(WIDTH * e.shift_prior * np.linspace(-1.0, 1.0, PLACES))
+    return np.asarray(TUNING.search_width * e.shift_prior * np.linspace(-1.0, 1.0, TUNING.search_count))
 
 
 def _best(problem: Problem, r: int, made: Made, cost: Cost, shifts: Array) -> float | None:
@@ -218,7 +229,7 @@ def _falls(problem: Problem, r: int, raw: Array | None, shift: float) -> bool:
         ((s.values - raw[part]) / s.sigma)[e.recording.time[s.rows] <= e.simulator.contact + shift]
         for s, part in e.spans()
     ]
-    return bool(np.median(np.abs(np.concatenate([np.zeros(1), *z]))) < QUIET)
+    return bool(np.median(np.abs(np.concatenate([np.zeros(1), *z]))) < TUNING.quiet_median)
 
 
 def _worth(s: Signal) -> float:
@@ -232,8 +243,8 @@ def _early(problem: Problem, r: int, raw: Array, shift: float) -> float:
     total = (shift / e.shift_prior) ** 2
     for s, part in e.spans():
         time = e.recording.time[s.rows] - shift - e.simulator.contact
-        after = time[time > 0.0][LEAST - 1 : LEAST]
-        inside = time < max([SOON, *after])  # a record may end before
-        sigma = np.hypot(s.sigma, TRUSTED * (raw[part] - raw[part][0]))
+        after = time[time > 0.0][TUNING.early_samples - 1 : TUNING.early_samples]
+        inside = time < max([TUNING.early_window, *after])  # a record may end before
+        sigma = np.hypot(s.sigma, TUNING.model_error * (raw[part] - raw[part][0]))
         total += _worth(s) * float(np.sum((((s.values - raw[part]) / sigma)[inside]) ** 2))
     return total

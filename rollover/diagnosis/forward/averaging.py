@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.forward.budget import Effort
 from rollover.diagnosis.forward.discontinuities import DISCONTINUITY_IN, within_means
 from rollover.diagnosis.forward.forward_model import Simulator, simulator_of
 from rollover.diagnosis.forward.full_run import full_runs
+from rollover.diagnosis.settings import SETTINGS
+from rollover.diagnosis.settings.forward import Effort
 from rollover.recording import Recording
 from rollover.recording.attitude import beside, has_attitude
 from rollover.recording.filters import least_rate
@@ -22,10 +23,7 @@ from rollover.spec.initiation import Drop
 
 Array = NDArray[np.float64]
 
-MOST_ROWS = 500  # of a recording that are looked at
-FEW = 4  # stamps in a mean that are all simulated; for more, two times away from the first contact
-CLEARLY = 1.05  # times the rate that a filter class needs
-KNOWN, UNKNOWN = 4e-3, 30e-3  # s, by which a clock's zero may be off
+TUNING = SETTINGS.forward.averaging
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,7 +120,7 @@ def compared(scenario: Scenario, recording: Recording) -> tuple[Recording, Recor
 def simulated(
     scenario: Scenario, recording: Recording, reference: Recording | None = None
 ) -> tuple[Recording, Simulator, int]:
-    """The recording at no more than `MOST_ROWS` rows, what simulates it, and how many samples are in a row.
+    """The recording at no more than `most_rows` rows, what simulates it, and how many samples are in a row.
 
     `reference` is the attitude beside whose branch those of all runs are put. Raises `InputError`.
     """
@@ -134,9 +132,9 @@ def simulated(
         return recording, referred(simulator_of(scenario, recording), reference), 1
     many = inside.shape[1]
     # a filter needs all stamps, and so does the kink of the force at the first contact
-    near = UNKNOWN if recording.clock.zero == "unknown" else KNOWN
+    near = TUNING.unknown_zero_error if recording.clock.zero == "unknown" else TUNING.known_zero_error
     whole = np.abs(thin.time) < near + many * float(np.median(np.diff(recording.time)))
-    if recording.cfc or many <= FEW or not is_drop:
+    if recording.cfc or many <= TUNING.few_stamps or not is_drop:
         whole[:] = True
     # two times at the standard deviation about the mean have the mean of any cubic
     times = recording.time[inside]
@@ -160,16 +158,16 @@ def referred(simulator: Simulator, reference: Recording | None) -> Simulator:
 
 
 def thinned(recording: Recording, slowest: float = 0.0) -> tuple[Recording, NDArray[np.int64] | None]:
-    """The recording at no more than `MOST_ROWS` rows, means of neighbours, none across a gap, and which these are.
+    """The recording at no more than `most_rows` rows, means of neighbours, none across a gap, and which these are.
 
     (rows, many), None where there are few enough as it is, or would be fewer than `slowest` asks for, Hz. What is
     averaged keeps its information while noise falls with the root of the number.
     """
     n = recording.time.size
     step = float(np.median(np.diff(recording.time))) if n > 1 else 1.0
-    most = int(n // MOST_ROWS)
+    most = int(n // TUNING.most_rows)
     if slowest:
-        most = min(most, int(1.0 / (step * CLEARLY * slowest)))
+        most = min(most, int(1.0 / (step * TUNING.rate_margin * slowest)))
     if most < 2:
         return recording, None
     inside = np.arange(n // most * most).reshape(-1, most)

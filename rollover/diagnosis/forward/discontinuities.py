@@ -10,15 +10,17 @@ from typing import Any
 import numpy as np
 
 from ground.compiled import compiled, leaf
+from rollover.diagnosis.settings import SETTINGS
 
 DISCONTINUITY_IN = (
     "leap in "  # before the name of a channel: how far it leaps about each sample, or within each mean, SI
 )
-DISCONTINUITY, WITHIN = 4.0, 2.5  # times the steps beside it: of samples, and within a mean of some
-SHOWS = 3.0  # times the noise, from which on a step may be a leap
-JUMPS = 5.0  # times the noise, from which on a known jump between two samples decides a fit
-LARGE = 50.0  # times the noise: a leap whose instant is not believed to the sample
-BESIDE = 3  # samples to either side, between whose values one about a leap may be
+TUNING = SETTINGS.forward.discontinuities
+DISCONTINUITY = TUNING.sample_ratio
+WITHIN = TUNING.mean_ratio
+SHOWS = TUNING.visible_step  # times the noise, from which on a step may be a leap
+LARGE = TUNING.large_jump  # times the noise: a leap whose instant is not believed to the sample
+BESIDE = TUNING.neighbours  # samples to either side, between whose values one about a leap may be
 
 
 @compiled

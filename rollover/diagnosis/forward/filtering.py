@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
 from rollover.recording.filters import filtered, least_rate
 
 Array = NDArray[np.float64]
-CLOSE = 1e-3  # of a row's distance, within which an even row is a stamp
-UNEVEN = 0.02  # of the usual distance of two stamps, up to which they are even
+TUNING = SETTINGS.forward.filtering
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,13 +49,13 @@ def rows_of(recording: Recording) -> Rows:
         return Rows(times=stamps, stamps=all_of_them, even=all_of_them, step=step)
     least = max(least_rate(cfc) for cfc in recording.cfc.values())
     parts = max(1, math.ceil(least * step * (1.0 - 1e-9)))
-    is_even = apart.size == 0 or bool(np.max(np.abs(apart - step)) <= UNEVEN * step)
+    is_even = apart.size == 0 or bool(np.max(np.abs(apart - step)) <= TUNING.even_tolerance * step)
     if is_even and parts == 1:
         return Rows(times=stamps, stamps=all_of_them, even=all_of_them, step=step)
     fine = step / parts
     even = stamps[0] + fine * np.arange(math.ceil((stamps[-1] - stamps[0]) / fine - 1e-6) + 1)
-    beside = stamps[np.clip(np.searchsorted(stamps, even - CLOSE * fine), 0, stamps.size - 1)]
-    even = np.where(np.abs(even - beside) <= CLOSE * fine, beside, even)
+    beside = stamps[np.clip(np.searchsorted(stamps, even - TUNING.same_stamp * fine), 0, stamps.size - 1)]
+    even = np.where(np.abs(even - beside) <= TUNING.same_stamp * fine, beside, even)
     times, back = np.unique(np.concatenate([stamps, even]), return_inverse=True)
     return Rows(times=times, stamps=back[: stamps.size], even=back[stamps.size :], step=fine)
 

@@ -10,10 +10,11 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.forward.budget import DROPS, Effort
 from rollover.diagnosis.forward.discontinuities import DISCONTINUITY_IN, about_jumps
 from rollover.diagnosis.forward.filtering import Rows, behind_filters, rows_of
 from rollover.diagnosis.forward.full_run import SENSORS, RunSimulator
+from rollover.diagnosis.settings import SETTINGS
+from rollover.diagnosis.settings.forward import Effort
 from rollover.dynamics.drop_test import BESIDE, DropFailedError, DropModel, Track, channels_of, unfit
 from rollover.effects import every, read
 from rollover.recording import Recording
@@ -24,11 +25,7 @@ from rollover.spec.initiation import Drop
 Array = NDArray[np.float64]
 T = TypeVar("T")
 EDGES = ("sensor-lag", "sensor-clock-offset", "sensor-clock-drift")
-# s: longest step of a drop, within 6e-5 of the range; and of one with abrupt effects, within 8e-4 where it rings
-STEP, SHORT = 2e-3, 1e-3
-SHORTEST = 2e-4  # s: with a force term of one's own, which may jump where nothing knows of it
-KEPT, TRACKS = 128, 16  # of one recording: what it is predicted to be, and falls that this is read from
-MARGIN = 0.02  # s, by which a fall is longer than it is asked for: clocks move on
+TUNING = SETTINGS.forward.drop
 
 
 class Simulator(Protocol):
@@ -74,7 +71,7 @@ def first_impact_of(simulator: Simulator) -> float:
 class DropSimulator:
     """A drop test by its own integrator: two milliseconds a run."""
 
-    effort = DROPS
+    effort = SETTINGS.forward.drops
 
     def __init__(self, scenario: Scenario, recording: Recording, *, discontinuities: bool = True) -> None:
         self.model = DropModel(scenario=scenario)
@@ -193,7 +190,7 @@ class DropSimulator:
         if values not in self._raw:
             at = times - shift
             rows = self._track(physical, float(at[-1]) if at.size else 0.0).rows(at)
-            self._keep(self._raw, values, channels_of(rows, self.recording.channels), KEPT)
+            self._keep(self._raw, values, channels_of(rows, self.recording.channels), TUNING.kept_predictions)
         return self._raw[values]
 
     def _track(self, physical: Mapping[str, Any], until: float) -> Track:
@@ -201,8 +198,8 @@ class DropSimulator:
         key = tuple(sorted(physical.items()))
         found = self._tracks.pop(key, None)
         if found is None or found.until < until:
-            found = self._model(physical).track(until + MARGIN)
-        self._keep(self._tracks, key, found, TRACKS)
+            found = self._model(physical).track(until + TUNING.track_margin)
+        self._keep(self._tracks, key, found, TUNING.kept_tracks)
         return found
 
     def _model(self, changes: Mapping[str, Any]) -> DropModel:
@@ -213,8 +210,8 @@ class DropSimulator:
             has_own = own.ground.law.advance is not None  # states of its own are second order in the step
             is_abrupt = has_own or any(effect.is_abrupt for effect in own.effects.values())
             may_jump = any(effect.force_terms() and not effect.is_smooth for effect in own.effects.values())
-            step = SHORTEST if may_jump else SHORT if is_abrupt else STEP
-            self._keep(self._models, key, DropModel(scenario=own, step=step), KEPT)
+            step = TUNING.shortest_step if may_jump else TUNING.abrupt_step if is_abrupt else TUNING.longest_step
+            self._keep(self._models, key, DropModel(scenario=own, step=step), TUNING.kept_predictions)
         return self._models[key]
 
     @staticmethod

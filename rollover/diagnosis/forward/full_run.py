@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.comparison.misfit import as_measured
-from rollover.diagnosis.forward.budget import RUNS
 from rollover.diagnosis.forward.run_phases import phases_of
+from rollover.diagnosis.settings import SETTINGS
+from rollover.diagnosis.settings.forward import Perturbation
 from rollover.effects import read
 from rollover.recording import Recording, attitude
 from rollover.recording.filters import filtered, least_rate
@@ -27,37 +28,12 @@ from rollover.system.processes import Children, map_cases
 Array = NDArray[np.float64]
 SENSORS = "sensor-"
 CENTRE = "ground.elements.centre"
-KEPT = 600  # runs of one recording: a third of a megabyte each
-AHEAD = 0.06  # s that a filter sees beyond the last stamp, where the recording went on
-BEYOND, FAR_BEYOND = 0.01, 0.06  # s by which a run goes on past the last stamp: time shifts, known zero or not
-SLOWEST = 20.0  # times the first run's wall time, and
-LEAST_TIME = 2.0  # s: a run that takes longer has lost its way in ever shorter steps
-# of an element, by which neighbours lie elsewhere on the grid
-ELSEWHERE = ((0.34, 0.28), (-0.41, 0.17), (0.12, -0.37), (-0.22, -0.15))
+TUNING = SETTINGS.forward.run
 MOTION = ("chassis/", "striker/", "axle/front/angle", "ground/sinkage")  # what an instrument's place is worked out from
 
 
 class _TooSlowError(Exception):
     """A run takes far longer than the first."""
-
-
-class Perturbation(NamedTuple):
-    """Where the grid lies, of an element; its spacing and that of contact points over their own; parts of a step."""
-
-    place: tuple[float, float]
-    spacing: float = 1.0
-    points: float = 1.0
-    parts: int = 1
-
-
-PERTURBATIONS = (
-    Perturbation((0.34, 0.28)),
-    Perturbation((-0.41, 0.17), spacing=0.9),
-    Perturbation((0.12, -0.37), points=0.8),
-    Perturbation((-0.22, -0.15), spacing=0.93, points=0.87),
-    Perturbation((0.45, -0.08), parts=2),
-    Perturbation((-0.07, 0.43), spacing=0.9, points=0.8, parts=3),
-)
 
 
 class Making(NamedTuple):
@@ -106,7 +82,7 @@ def make(making: Making) -> Made:
 class RunSimulator:
     """Any scenario by full runs."""
 
-    effort = RUNS
+    effort = SETTINGS.forward.runs
 
     def __init__(self, scenario: Scenario, recording: Recording) -> None:
         self.recording = recording
@@ -148,7 +124,7 @@ class RunSimulator:
         applied, run = known
         key = _key(changes)
         if key not in self._behind:
-            if len(self._behind) >= KEPT:
+            if len(self._behind) >= TUNING.kept_runs:
                 self._behind.pop(next(iter(self._behind)))
             seen = as_measured(applied, run, self.recording)
             self._behind[key] = (
@@ -159,7 +135,7 @@ class RunSimulator:
         spoiled = {e.channel for name, e in chosen.effects.items() if name.startswith(SENSORS)}
         misread = read(chosen.effects, seen) if spoiled else seen
         at = self.recording.time - shift
-        outside = (at < seen.time[0] - FAR_BEYOND) | (at > seen.time[-1] + FAR_BEYOND)
+        outside = (at < seen.time[0] - TUNING.end_margin_unknown) | (at > seen.time[-1] + TUNING.end_margin_unknown)
         found = {}
         for name, values in behind.items():
             values = self._filtered(misread, name) if name in spoiled else values
@@ -217,7 +193,7 @@ class RunSimulator:
 
     def perturbations(self, changes: Mapping[str, Any], parts: int = 1) -> list[dict[str, Any]]:
         """Changes of all neighbours of a run with `changes`, see `perturbed`."""
-        return [{**changes, **self._beside(one, parts)} for one in PERTURBATIONS]
+        return [{**changes, **self._beside(one, parts)} for one in TUNING.perturbations]
 
     def settle(self) -> None:
         """Lay the grid where the run is the most like all others: of two ways that runs go, it takes the common one.
@@ -227,7 +203,7 @@ class RunSimulator:
         """
         places = self._places()
         own = [{CENTRE: place} for place in places]
-        others = [values for values in map(self._beside, PERTURBATIONS) if values not in own]
+        others = [values for values in map(self._beside, TUNING.perturbations) if values not in own]
         self.predict(own[0], 0.0)  # how long one takes
         made_ahead(self.children, [(self, values) for values in (*own, *others)])
         runs = {place: self.predict({CENTRE: place}, 0.0) for place in places}
@@ -262,7 +238,9 @@ class RunSimulator:
             return self._shorter[n]
         found = self._shorter[n] = RunSimulator(self.scenario, self.recording.until(n))
         settings = found.scenario.simulation
-        ahead = settings.output_step * np.ceil(AHEAD / settings.output_step) if self.recording.cfc else 0.0
+        ahead = (
+            settings.output_step * np.ceil(TUNING.filter_ahead / settings.output_step) if self.recording.cfc else 0.0
+        )
         longer = min(round(settings.duration + float(ahead), 9), self.scenario.simulation.duration)
         found.scenario = replace(found.scenario, simulation=replace(settings, duration=longer))
         found._centre, found.children, found._made = self._centre, self.children, self._made
@@ -271,7 +249,7 @@ class RunSimulator:
 
     def _places(self) -> list[tuple[float, ...]]:
         """Where the grid may lie as well, where the scenario has it first."""
-        return [self._place(fraction) for fraction in ((0.0, 0.0), *ELSEWHERE)]
+        return [self._place(fraction) for fraction in ((0.0, 0.0), *TUNING.grid_offsets)]
 
     def _beside(self, one: Perturbation, parts: int = 1) -> dict[str, Any]:
         """Values of a neighbour, its step parted in at least so many `parts`."""
@@ -304,10 +282,10 @@ class RunSimulator:
         self._made.runs += 1
         self._made.seconds += made.seconds
         if made.run is not None and self._limit == np.inf:
-            self._limit = max(SLOWEST * made.seconds, LEAST_TIME)
+            self._limit = max(TUNING.slowest_ratio * made.seconds, TUNING.least_wall_time)
         if made.run is not None and all(path == CENTRE for path, _ in making.key):
             self._phases[making.scenario.ground.elements.centre] = made.phases
-        if len(self._known) >= KEPT:
+        if len(self._known) >= TUNING.kept_runs:
             self._known.pop(next(iter(self._known)))
         self._known[making.key] = made.run
 
@@ -378,7 +356,9 @@ def _covering(scenario: Scenario, recording: Recording) -> Scenario:
     It does not stop at rest: what rests stays in the rows that later stamps are compared with.
     """
     settings = scenario.simulation
-    end = float(recording.time[-1]) + (FAR_BEYOND if recording.clock.zero == "unknown" else BEYOND)
+    end = float(recording.time[-1]) + (
+        TUNING.end_margin_unknown if recording.clock.zero == "unknown" else TUNING.end_margin
+    )
     rows = max(1, int(np.ceil(end / settings.output_step)))
     duration = round(min(rows * settings.output_step, 120.0), 9)
     return replace(scenario, simulation=replace(settings, duration=duration, stop_at_rest=False))

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
-from rollover.diagnosis.inference.lack_of_fit import SURE, Mismatch
+from rollover.diagnosis.inference.lack_of_fit import Mismatch
+from rollover.diagnosis.settings import SETTINGS
 
-NEGLIGIBLE = 0.001  # of a channel's range: what moves nothing by more is not worth a name
+TUNING = SETTINGS.inference.adequacy
 
 
 def is_enough(problem: Problem, fitted: Fitted, left: Mismatch) -> bool:
     """Whether what a fit leaves is no more than chance, or not worth a word."""
-    return left.p_value > SURE or not matters(problem, fitted, left)
+    return left.p_value > SETTINGS.inference.lack_of_fit.p_value or not matters(problem, fitted, left)
 
 
 def matters(problem: Problem, base: Fitted, before: Mismatch) -> bool:
@@ -24,7 +25,7 @@ def matters(problem: Problem, base: Fitted, before: Mismatch) -> bool:
             chance = sum(c.rows.size if e.model_error_dominates(signal) else c.expected for c in cells)
             power = (sum(c.structured for c in cells) - chance) / max(sum(c.rows.size for c in cells), 1)
             most = max(most, float(np.sqrt(max(power, 0.0))) * signal.sigma / signal.span)
-    return most > NEGLIGIBLE
+    return most > TUNING.negligible
 
 
 def is_tolerated(problem: Problem, fitted: Fitted) -> bool:

@@ -18,13 +18,14 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.result import Degree
+from rollover.diagnosis.settings import SETTINGS
 from rollover.scenario import Scenario
 from rollover.spec.vehicle import Striker, chassis_of
 
 Array = NDArray[np.float64]
 AXES = "xyz"
 ALONG, ABOUT = "chassis/acceleration_", "chassis/angular_velocity_"
-SMOOTHED = 0.012  # s, over which a gyroscope is differentiated
+TUNING = SETTINGS.inference.chassis
 
 
 def degrees_of(
@@ -74,7 +75,7 @@ def _rate(values: Array, time: Array) -> Array:
     from scipy.signal import savgol_filter
 
     step = float(np.median(np.diff(time)))
-    n = max(5, 2 * round(0.5 * SMOOTHED / step) + 1)
+    n = max(5, 2 * round(0.5 * TUNING.smoothing / step) + 1)
     if values.size <= n:
         return np.asarray(np.gradient(values, time))
     return np.asarray(savgol_filter(values, n, 2, deriv=1, delta=step))

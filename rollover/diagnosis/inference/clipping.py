@@ -13,16 +13,15 @@ from typing import Any
 import numpy as np
 
 from rollover.diagnosis.data.phases import placed
-from rollover.diagnosis.inference.intervals import KNOWN
 from rollover.diagnosis.result import Interval, Named, Place
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS, MOST, units_of
 from rollover.recording import Recording
 from rollover.recording.checks.finding import Finding, trace
 from rollover.recording.checks.samples import clipping
 
 ID = "sensor-clipping"
-CHANCE = 1e-3  # that a clean channel shows a flat top
-SAME = 1e-6  # of a value: one end of a range
+TUNING = SETTINGS.inference.clipping
 
 Found = dict[str, list[tuple[int, Finding]]]
 
@@ -48,7 +47,7 @@ def _tops(recordings: Sequence[Recording]) -> Found:
     return {
         channel: tops
         for channel, tops in every.items()
-        if tops and all(most[channel] - abs(f.value) <= SAME * most[channel] for _, f in tops)
+        if tops and all(most[channel] - abs(f.value) <= TUNING.same_limit * most[channel] for _, f in tops)
     }
 
 
@@ -61,11 +60,16 @@ def _named(channel: str, tops: Sequence[tuple[int, Finding]]) -> Named:
         kind=kind.kind,
         statement=kind(channel=channel, limit=limit).says(),
         parameters={
-            "limit": Interval(value=limit, low=(1.0 - KNOWN) * limit, high=(1.0 + KNOWN) * limit, unit=unit),
+            "limit": Interval(
+                value=limit,
+                low=(1.0 - SETTINGS.inference.intervals.end_error) * limit,
+                high=(1.0 + SETTINGS.inference.intervals.end_error) * limit,
+                unit=unit,
+            ),
         },
         settings={"channel": channel, "limit": limit},
         channel=channel,
-        p_value=CHANCE ** len({r for r, _ in tops}),
+        p_value=TUNING.flat_top_chance ** len({r for r, _ in tops}),
         indistinguishable_from=(),
         discriminating_test=next(iter(kind.rivals.values())),
     )

@@ -10,19 +10,20 @@ from numpy.typing import NDArray
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.phases import whole
 from rollover.diagnosis.result import Place
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import spoken
 from rollover.spec.channels import describe
 
 Array = NDArray[np.float64]
-FINEST = 0.05  # of a channel's range in all recordings: steps of its digits that are worth a verdict
+TUNING = SETTINGS.inference.coarse_sampling
 
 
 def coarse(dataset: Sequence[Dataset], phases: Sequence[Sequence[tuple[float, str]]]) -> tuple[Place, ...]:
-    """Where channels are recorded in steps of more than `FINEST` of their range and more than their noise."""
+    """Where channels are recorded in steps of more than `least_step` of their range and more than their noise."""
     values: dict[str, list[Array]] = {}
     for s in (s for e in dataset for s in e.signals):
         values.setdefault(s.channel, []).append(s.values)
-    least = {channel: FINEST * float(np.ptp(np.concatenate(v))) for channel, v in values.items()}
+    least = {channel: TUNING.least_step * float(np.ptp(np.concatenate(v))) for channel, v in values.items()}
     rough = [(r, e, s) for r, e in enumerate(dataset) for s in e.signals if s.step > least[s.channel]]
     return tuple(whole(e, s, phases[r], 1.0 / len(rough)) for r, e, s in rough)
 

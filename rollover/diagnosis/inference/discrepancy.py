@@ -8,20 +8,21 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import ROUGH, Dataset
+from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.result import Scale
+from rollover.diagnosis.settings import SETTINGS
 from rollover.spec.channels import describe
 
 Array = NDArray[np.float64]
-RARELY = (0.01, 0.10)  # of a channel's range: models are rarely closer to what they are a model of, and rarely further
-NORMAL_95 = 1.645  # 95 % of a normal distribution lie below so many standard deviations
-MEDIAN = float(np.sqrt(RARELY[0] * RARELY[1]))
-SPREAD = float(np.log(RARELY[1] / RARELY[0]) / (2.0 * NORMAL_95))  # of ln s, by these quantiles of 5 and 95 %
-SCALES = np.geomspace(1e-4, 1.0, 801)  # s that are tried: steps of 1.2 %, the widest that no digit of a report shows
-LESS = 0.7  # times a scale, that another estimate must come to for it to be worth another fit
-USUAL = 0.05  # of a channel's range: three quarters of all models miss less, by `MEDIAN` and `SPREAD`
-DRAWS = 2.0  # of a discrepancy in a channel: what is loaded, and what unloads and rests; each drop repeats them
+TUNING = SETTINGS.inference.discrepancy
+MEDIAN = float(np.sqrt(TUNING.usual_range[0] * TUNING.usual_range[1]))
+SPREAD = float(
+    np.log(TUNING.usual_range[1] / TUNING.usual_range[0]) / (2.0 * TUNING.normal_quantile)
+)  # of ln s, by these quantiles of 5 and 95 %
+SCALES = np.geomspace(
+    TUNING.least_scale, TUNING.largest_scale, TUNING.scale_count
+)  # s that are tried: steps of 1.2 %, the widest that no digit of a report shows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,11 +37,11 @@ class Discrepancy:
     @property
     def is_usual(self) -> bool:
         """Whether it is no larger than what models usually miss."""
-        return max(self.scales.values(), default=0.0) <= USUAL
+        return max(self.scales.values(), default=0.0) <= TUNING.usual_most
 
     def is_clearly_above(self, other: Discrepancy) -> bool:
         """Whether another estimate is clearly smaller in any channel."""
-        return any(other.scales.get(c, s) < LESS * s for c, s in self.scales.items())
+        return any(other.scales.get(c, s) < TUNING.refit_below * s for c, s in self.scales.items())
 
     def told(self, dataset: Sequence[Dataset]) -> dict[str, Scale]:
         """Scale of each channel in its unit, and its correlation time where it is known."""
@@ -57,7 +58,7 @@ class Discrepancy:
         }
 
 
-def posterior(left: float, draws: float = DRAWS) -> tuple[float, float]:
+def posterior(left: float, draws: float = TUNING.draws) -> tuple[float, float]:
     """Most probable s (share of a range) and log probability of a remainder of rms `left` in some draws, (D17)."""
     log_p = -draws * (np.log(SCALES) + 0.5 * (left / SCALES) ** 2) - 0.5 * (np.log(SCALES / MEDIAN) / SPREAD) ** 2
     best = int(np.argmax(log_p))
@@ -108,8 +109,13 @@ def estimated(problem: Problem, base: Fitted, tried: Sequence[Fitted]) -> Discre
 def taught(problem: Problem, base: Fitted) -> Discrepancy | None:
     """The discrepancy of recordings in which nothing is missing, a draw each; None if noise hides it everywhere."""
     left = left_beyond_noise(problem, base)
-    scales = {c: posterior(v, DRAWS * len(problem.dataset))[0] for c, v in left.items()}
-    hidden = {s.channel for e in problem.dataset for s in e.signals if scales[s.channel] * s.span > ROUGH * s.noise}
+    scales = {c: posterior(v, TUNING.draws * len(problem.dataset))[0] for c, v in left.items()}
+    hidden = {
+        s.channel
+        for e in problem.dataset
+        for s in e.signals
+        if scales[s.channel] * s.span > SETTINGS.data.dataset.other_error_share * s.noise
+    }
     return Discrepancy(scales=scales, times=correlation_times(problem, base), by_none=left) if hidden else None
 
 

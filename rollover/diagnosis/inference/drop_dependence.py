@@ -24,21 +24,12 @@ from rollover.diagnosis.fit.time_shift import by_first_contact
 from rollover.diagnosis.inference.bases import ACCELERATION, DEPTH, SPEED, TIME, linear_b_splines
 from rollover.diagnosis.inference.lack_of_fit import Mismatch
 from rollover.diagnosis.inference.residual_force import WHERES, Descent, Where, channels_of, descent
+from rollover.diagnosis.settings import SETTINGS
 from rollover.scenario import Scenario
 
 Array = NDArray[np.float64]
 IMPACT, VALUE = "initiation.speed", "value"
-KNOTS = (2, 3, 6, 12, 24, 48)
-FINE = (6, 24, 96, 192)  # of what a sensor does with its own values
-FADES = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16)  # s, of a force that fades
-WORTH = 0.3  # of the excess over the noise, that a quantity must explain to be named
-MOSTLY = 0.5  # and where one channel goes its own way: what it depends on would explain all
-STEADY = 1e-5  # prior of steps between knots: beyond what was seen a function stays as it ends
-ALONE = 0.1  # of the excess over the noise that channels beside a faulty one may have
-NEAR = 0.05  # of its prior: a time shift that is as good as another
-SHIFTS = 4  # that are tried
-RATHER = 0.5  # of what the best force leaves
-BY_CHANCE = 2.0  # standard deviations of a sum of squares, by which it exceeds what is expected
+TUNING = SETTINGS.inference.drop_dependence
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +45,7 @@ class Dependence:
     @property
     def on(self) -> str | None:
         """The quantity, where it explains a good part; what a sensor does without any comes and goes in time."""
-        if self.shares and self.shares[0][1] > (WORTH if self.channel is None else MOSTLY):
+        if self.shares and self.shares[0][1] > (TUNING.least_share if self.channel is None else TUNING.sensor_share):
             return self.shares[0][0]
         return None if self.channel is None else TIME
 
@@ -63,7 +54,7 @@ class Dependence:
 
         In tests that begin alike all goes in time, what the vehicle does too; a sensor's fault goes with no attitude.
         """
-        tells = bool(motion.shares) and motion.shares[0][0] != TIME and motion.shares[0][1] > MOSTLY
+        tells = bool(motion.shares) and motion.shares[0][0] != TIME and motion.shares[0][1] > TUNING.sensor_share
         return self.on == TIME and tells
 
 
@@ -93,7 +84,7 @@ def _steady(N: Array) -> Array:
     k = N.shape[0]
     D = np.diff(np.eye(k), axis=0)
     size = float(np.trace(N)) / k
-    return np.asarray(STEADY * size * (D.T @ D) + 1e-10 * max(size, 1e-300) * np.eye(k))
+    return np.asarray(TUNING.smoothness * size * (D.T @ D) + 1e-10 * max(size, 1e-300) * np.eye(k))
 
 
 def dependence(
@@ -115,8 +106,10 @@ def dependence_of_one(problem: Problem, base: Fitted, before: Mismatch) -> Depen
         by[c.channel] = by.get(c.channel, 0.0) + c.excess
     most = max(by, key=lambda channel: by[channel], default="")
     others = [c for c in before.telling if c.channel != most]
-    chance = BY_CHANCE * float(np.sqrt(2.0 * sum(c.rows.size for c in others)))
-    if not others or sum(c.excess for c in others) > min(ALONE * by[most] + chance, RATHER * by[most]):
+    chance = TUNING.chance * float(np.sqrt(2.0 * sum(c.rows.size for c in others)))
+    if not others or sum(c.excess for c in others) > min(
+        TUNING.others_excess * by[most] + chance, TUNING.better_than_force * by[most]
+    ):
         return None
     return Dependence(shares=_added(*_of_channel(most, problem, base)), channel=most)
 
@@ -145,9 +138,9 @@ def _way(
     blocks, best = [b], descent(scenario, e, b)
     tried = [b.shift]
     shift = 0.0 if e.recording.clock.zero != "unknown" else b.shift
-    for turn in range(SHIFTS):
+    for turn in range(TUNING.most_shifts):
         shift = told if turn == 1 and told is not None else shift
-        if min(abs(shift - other) for other in tried) > NEAR * b.prior:
+        if min(abs(shift - other) for other in tried) > TUNING.same_shift * b.prior:
             there = problem.block(r, base.candidates, base.x, shift, 0.0)
             other = None if there is None else descent(scenario, e, there)
             tried.append(shift)
@@ -172,7 +165,7 @@ def alone(
             many += int(rows.sum())
         if many and beside < best:
             best, alone_on = beside, channel
-    return alone_on if best < min(ALONE * total, RATHER * free) else None
+    return alone_on if best < min(TUNING.others_excess * total, TUNING.better_than_force * free) else None
 
 
 def _left(b: ResidualBlock, rows: NDArray[np.bool_]) -> float:
@@ -199,14 +192,14 @@ def _of_forces(
         functions: list[tuple[str, list[Array]]] = []
         for on in (TIME, DEPTH, SPEED, ACCELERATION):
             x = [_quantity(d, on) for d in found]
-            for many in KNOTS:
+            for many in TUNING.force_knots:
                 knots = _knots(np.concatenate(x), many)
                 basis = [linear_b_splines(one, knots) for one in x]
                 functions.append((on, basis))
                 if where == "ground" and on != ACCELERATION:
                     functions.append((on, [b * s for b, s in zip(basis, strength, strict=True)]))
         faded = [_fading(d) for d in found]
-        functions += [(TIME, [f[:, k : k + 2] for f in faded]) for k in range(len(FADES) - 1)]
+        functions += [(TIME, [f[:, k : k + 2] for f in faded]) for k in range(len(TUNING.decay_times) - 1)]
         functions.append((DEPTH, strength))  # the ground all the way, by a factor
         if where == "push":  # friction: the sign of the speed, which stays the same
             functions.append((SPEED, [np.ones((d.way.time.size, 1)) for d in found]))
@@ -253,7 +246,7 @@ def _of_channel(channel: str, problem: Problem, base: Fitted) -> tuple[list[Mode
         models.append(Model(on=on, columns=tuple(columns)))
 
     size = max(float(np.abs(np.concatenate(values)).max()), 1e-300)
-    for many in FINE:
+    for many in TUNING.sensor_knots:
         edges = np.linspace(0.0, 1.0, many)
         both = np.concatenate(values)
         add(VALUE, [linear_b_splines(v, both.min() + np.ptp(both) * edges) * size for v in values])
@@ -307,9 +300,9 @@ def _knots(x: Array, many: int) -> Array:
 def _fading(d: Descent) -> Array:
     """integral exp(-(t - s)/tau) v ds for some tau, (n, k): a force that forgets the way."""
     w = d.way
-    h, tau = float(w.time[1] - w.time[0]), np.array(FADES)
+    h, tau = float(w.time[1] - w.time[0]), np.array(TUNING.decay_times)
     fade = np.exp(-h / tau)
     y = np.zeros((w.time.size, tau.size))
     for i in range(1, w.time.size):
         y[i] = y[i - 1] * fade + 0.5 * h * (w.speed[i - 1] * fade + w.speed[i])
-    return np.asarray(y / FADES)
+    return np.asarray(y / TUNING.decay_times)

@@ -9,29 +9,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollover.diagnosis.data.dataset import MODEL_ERROR, Dataset
-from rollover.diagnosis.fit.ensemble_mean import PARTS, along, left_of_means, pull_of_means, step_of_means
-from rollover.diagnosis.fit.finite_differences import CLOCKED
+from rollover.diagnosis.data.dataset import Dataset
+from rollover.diagnosis.fit.ensemble_mean import along, left_of_means, pull_of_means, step_of_means
 from rollover.diagnosis.fit.jobs import linearised
-from rollover.diagnosis.fit.levenberg_marquardt import GENTLE, Fitted, Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.linearisation import ResidualBlock, at_an_end, shift_of
 from rollover.diagnosis.fit.parameterisation import Candidate, each_with_own, physical
-from rollover.diagnosis.inference.local_quadratic import TWO_SIDED, by_student, over_roughness
+from rollover.diagnosis.inference.local_quadratic import by_student, over_roughness
 from rollover.diagnosis.result import Interval
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS, possible, units_of
 
 Array = NDArray[np.float64]
-OUTSIDE = 1.0  # ranges beyond an end, where an interval ends at the latest: what tells nothing has no end of its own
-NEAR = 0.1  # of a value, by which the end of a range may lie beside the fit
-KNOWN = 1e-3  # of such an end, by which it is known
-CLEARLY = 0.4  # of the rise that is due, and
-ROUGH = 8.0  # rise that is no chance: from place to place the misfit of a mean of runs differs by 3 (1 sd)
-FURTHER, FARTHEST = 2.0, 30.0  # factors by which one goes on at a time, and at most
-LOCAL_MINIMA = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)  # factors at which one looks behind a rise
-BEYOND = 1.2  # factor below which an interval that is too narrow is chance
-FEWEST = 3  # recordings that can disagree
-HALVINGS = 7  # of the way to the end of a range
-ALONG, RIDGE, FEW_ROUNDS = 1.3, 9, 8  # a factor, how often, and rounds of a fit with one coordinate held
+TUNING = SETTINGS.inference.intervals
+TWO_SIDED = SETTINGS.inference.local_quadratic.normal_quantile
+GENTLE = SETTINGS.fit.linearisation.weak_prior
 EVENLY = 12.0**-0.5  # standard deviation of what is spread evenly from 0 to 1
 BOTH = (-1.0, 1.0)
 
@@ -60,7 +52,7 @@ def disagreeing(dataset: Sequence[Dataset], blocks: Sequence[ResidualBlock], inv
     (t/1.96)^2 R/(R - 1) A^-1 [sum_r (g_r - g)(g_r - g)'] A^-1, g_r recording r's part of A dx of (D8), g their mean.
     """
     number = len(blocks)
-    if number < FEWEST:
+    if number < TUNING.least_recordings:
         return np.zeros(inverse.shape[0])
     pulls = np.array([pull_of_means(e, block) for e, block in zip(dataset, blocks, strict=True)])
     moved = (pulls - pulls.mean(axis=0)) @ inverse
@@ -124,7 +116,7 @@ def profile_extents(
     that scatter it is the misfit of their mean, which is rough by itself. With `sides` these alone are looked at.
     """
     found, due = np.ones((own.size, 2)), TWO_SIDED**2 * dispersion
-    enough = max(CLEARLY * due, ROUGH if any(e.perturbed for e in problem.dataset) else 0.0)
+    enough = max(TUNING.least_rise * due, TUNING.rough_rise if any(e.perturbed for e in problem.dataset) else 0.0)
     if sides is not None and not any(sides.values()):
         return found
     start = _misfit(problem, fitted, np.zeros(len(fitted.x)))
@@ -136,7 +128,7 @@ def profile_extents(
             if sides is not None and sign not in sides.get(k, ()):
                 continue
             far = 1.0
-            while far < FARTHEST:
+            while far < TUNING.widen_most:
                 x = np.array(fitted.x) + sign * far * way
                 there = _misfit(problem, fitted, sign * far * way) if np.all((x >= 0.0) & (x <= 1.0)) else None
                 if there is None:
@@ -144,11 +136,11 @@ def profile_extents(
                 if there - start > enough:
                     far *= float(np.sqrt(due / (there - start)))
                     break
-                far *= FURTHER
+                far *= TUNING.widen_factor
             if k in rippled:
                 far = max(far, _over_local_minima(problem, fitted, sign * way, k, start + due))
                 far = _along_ridge(problem, fitted, k, sign * TWO_SIDED * own[k], (start, due), far)
-            found[k, side] = far if far > BEYOND else 1.0
+            found[k, side] = far if far > TUNING.widen_above else 1.0
     return found
 
 
@@ -174,7 +166,9 @@ def _over_local_minima(problem: Problem, fitted: Fitted, way: Array, k: int, mos
     """
     reached, begun = 1.0, np.array(fitted.x)
     end = ((1.0 if way[k] > 0.0 else 0.0) - begun[k]) / way[k]
-    for far in sorted({*(f for f in LOCAL_MINIMA if f < end), min(max(end, LOCAL_MINIMA[0]), LOCAL_MINIMA[-1])}):
+    for far in sorted(
+        {*(f for f in TUNING.scan_factors if f < end), min(max(end, TUNING.scan_factors[0]), TUNING.scan_factors[-1])}
+    ):
         there = _misfit(problem, fitted, np.clip(begun + far * way, 0.0, 1.0) - begun)
         if there is not None and there <= most:
             reached = far
@@ -194,12 +188,12 @@ def _along_ridge(
     if any(len(c.search) == 1 for c, place in each_with_own(fitted.candidates) if place.start <= k < place.stop):
         return far
     inside, beyond = (far, due), far
-    for _ in range(RIDGE):
-        beyond = beyond * ALONG
+    for _ in range(TUNING.ridge_steps):
+        beyond = beyond * TUNING.ridge_factor
         at = fitted.x[k] + beyond * way
         if not 0.0 < at < 1.0:
             break
-        found = problem.fit(held_at(fitted, k, at), x, rounds=FEW_ROUNDS, shifts=shifts, width=1)
+        found = problem.fit(held_at(fitted, k, at), x, rounds=TUNING.held_rounds, shifts=shifts, width=1)
         if found is None:
             break
         if found.left - start > due:
@@ -230,7 +224,7 @@ def _within_range(problem: Problem, fitted: Fitted, wide: Array, dispersion: flo
 
     def is_met(k: int, at: float) -> bool:
         others = [v for j, v in enumerate(fitted.x) if j != k]
-        there = problem.fit(held_at(fitted, k, at), others, rounds=FEW_ROUNDS, shifts=shifts, width=1)
+        there = problem.fit(held_at(fitted, k, at), others, rounds=TUNING.held_rounds, shifts=shifts, width=1)
         return there is None or there.left - fitted.left < due
 
     for k, x in enumerate(fitted.x):
@@ -238,7 +232,7 @@ def _within_range(problem: Problem, fitted: Fitted, wide: Array, dispersion: flo
             if abs(end - x) >= TWO_SIDED * wide[k, side] or is_met(k, end):
                 continue
             inside, beyond = x, end
-            for _ in range(HALVINGS):
+            for _ in range(TUNING.halvings):
                 middle = 0.5 * (inside + beyond)
                 inside, beyond = (middle, beyond) if is_met(k, middle) else (inside, middle)
             found[k, side] = abs(beyond - x) / TWO_SIDED
@@ -285,7 +279,9 @@ def _clocked(problem: Problem, fitted: Fitted, way: Array) -> Fitted | None:
     x = [float(v) for v in np.array(fitted.x) + way]
     problem.made_ahead((r, fitted.candidates, x) for r in range(len(fitted.blocks)))
     found = [
-        problem.clocked(r, fitted.candidates, x, there.shift + shift_of(there, way), CLOCKED)
+        problem.clocked(
+            r, fitted.candidates, x, there.shift + shift_of(there, way), SETTINGS.fit.finite_differences.shift_rounds
+        )
         for r, there in enumerate(fitted.blocks)
     ]
     blocks = [b for b in found if b is not None]
@@ -310,7 +306,7 @@ def intervals(
     """For each effect, its parameters with 95 % intervals.
 
     cov = phi A^-1, phi the misfit left per sample (at least 1); beside it, in quadrature, what a gain error of the
-    model of `MODEL_ERROR` in any one channel would do, A^-1 J'(error): integrators differ, noise or not. Where runs
+    model of `model_error` in any one channel would do, A^-1 J'(error): integrators differ, noise or not. Where runs
     that nobody could tell apart scatter and samples are weighed by that, cov = phi A^-1 N A^-1 with N the covariance
     that the noise alone gives J'w; beside it stand `scattered` and `unshaped`. Elsewhere shapes that were not fitted
     are in A, see `with_secondary`; an end of a range is read off where samples pile up there. How far the misfit stays
@@ -336,7 +332,7 @@ def intervals(
             for signal, part in problem.dataset[r].spans():
                 if signal.channel == channel:
                     y = block.counted(problem.measured[r] - block.plain_residual)[part]
-                    pull += block.J[part].T @ (MODEL_ERROR * y)
+                    pull += block.J[part].T @ (SETTINGS.data.dataset.model_error * y)
         moved += (inverse @ pull) ** 2
     # a fit that ended before it was at rest is off by what the next step would have been
     rest = inverse @ sum((b.normal()[1] for b in fitted.blocks), np.zeros(p))
@@ -344,7 +340,7 @@ def intervals(
         moved += scattered(problem.dataset, fitted.blocks, inverse) + unshaped(problem, fitted, inverse)
         rest = step_of_means(problem.dataset, fitted.blocks)
     moved += rest**2
-    moved[kept] += ((np.array(told.x) - np.array(coarse.x)) / (PARTS - 1)) ** 2
+    moved[kept] += ((np.array(told.x) - np.array(coarse.x)) / (SETTINGS.fit.ensemble_mean.finer_parts - 1)) ** 2
     variance = sd**2 + moved
     if strayed:
         variance = np.maximum(variance, disagreeing(problem.dataset, fitted.blocks, inverse))
@@ -367,8 +363,10 @@ def intervals(
             x = told.x[at]
             values[name] = Interval(
                 value=physical(x, search),
-                low=possible(kind, name, physical(max(x - TWO_SIDED * wide[at, 0], -OUTSIDE), search)),
-                high=possible(kind, name, physical(min(x + TWO_SIDED * wide[at, 1], 1.0 + OUTSIDE), search)),
+                low=possible(kind, name, physical(max(x - TWO_SIDED * wide[at, 0], -TUNING.outside_range), search)),
+                high=possible(
+                    kind, name, physical(min(x + TWO_SIDED * wide[at, 1], 1.0 + TUNING.outside_range), search)
+                ),
                 unit=units.get(name, ""),
                 at_bound=at_an_end(x),
                 as_simulated=physical(coarse.x[at], search) if coarse.x[at] != x else None,
@@ -389,6 +387,6 @@ def end_of(dataset: Sequence[Dataset], channel: str | None) -> float | None:
 
 def read_off(fitted: Interval, end: float | None) -> Interval:
     """The limit that the recordings themselves show, beside one fitted to it: noise that is cut off bends the fit."""
-    if end is None or abs(end - fitted.value) > NEAR * end:
+    if end is None or abs(end - fitted.value) > TUNING.near_end * end:
         return fitted
-    return replace(fitted, value=end, low=(1.0 - KNOWN) * end, high=(1.0 + KNOWN) * end)
+    return replace(fitted, value=end, low=(1.0 - TUNING.end_error) * end, high=(1.0 + TUNING.end_error) * end)

@@ -27,14 +27,13 @@ from numpy.typing import NDArray
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.noise.autoregression import Rest, line_spectra, rests
-from rollover.diagnosis.noise.ensemble import FEW, SENT, is_other, shares, too_many, unseen
+from rollover.diagnosis.noise.ensemble import is_other, shares, too_many, unseen
 from rollover.diagnosis.noise.outliers import too_often
 from rollover.diagnosis.noise.spectral_lines import basis as line
+from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
-SURE = 1e-3  # p-value below which there is a mismatch
-LOUD = 4.0  # times the noise's power, above which what is rough is no noise
-MOST_WAVES = 12  # of the slow basis of a cell
+TUNING = SETTINGS.inference.lack_of_fit
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,7 +122,9 @@ def mismatch_of(
         by_channel.setdefault(c.channel, []).append(blocks[c.recording].valued[c.rows])
     p = min(_p_value(telling, len(blocks)), too_often(np.concatenate(w) for w in by_channel.values()))
     sent = too_many(sum(other), len(other))
-    p = min(p, sent) if sent <= SENT else p  # one may, not all of them: whole numbers, and no p-value until they tell
+    p = (
+        min(p, sent) if sent <= SETTINGS.noise.ensemble.other_course_p_value else p
+    )  # one may, not all of them: whole numbers, and no p-value until they tell
     return Mismatch(cells=tuple(cells), telling=tuple(telling), p_value=p, adjusted=_holm([c.p_value for c in cells]))
 
 
@@ -167,7 +168,9 @@ def _p_value(cells: Sequence[Cell], clocks: int) -> float:
         return 1.0
     if all(c.noise[0] == c.waves for c in cells):
         # noise may be underrated, but not by so much: what is rough and far beyond it is no noise either
-        return float(fdtrc(waves, count, (structured / waves) / min(max(rough / count, 1e-300), LOUD)))
+        return float(
+            fdtrc(waves, count, (structured / waves) / min(max(rough / count, 1e-300), TUNING.most_dispersion))
+        )
     expected = sum(c.expected for c in cells)
     variance = sum(2.0 * c.noise[0] * (1.0 + 2.0 * (c.expected - c.noise[0]) / c.waves) for c in cells)
     unsure = 2.0 * expected**2 / count
@@ -175,10 +178,10 @@ def _p_value(cells: Sequence[Cell], clocks: int) -> float:
         each = [c.strayed[:, 0] for c in cells if c.recording == r and len(c.strayed)]
         apart = np.sum(each, axis=0) if each else np.zeros(1)
         if apart.size > 1:
-            scatter = FEW * float(np.var(apart, ddof=1))
+            scatter = SETTINGS.noise.ensemble.few_factor * float(np.var(apart, ddof=1))
             variance += scatter
             unsure += scatter / apart.size  # a mean is known as well as so many tell
-    level = min(max(rough / max(sum(c.rest for c in cells), 1e-300), 1.0), LOUD)
+    level = min(max(rough / max(sum(c.rest for c in cells), 1e-300), 1.0), TUNING.most_dispersion)
     known = 2.0 * expected**2 / unsure
     return float(fdtrc(2.0 * expected**2 / variance, known, structured / expected / level))
 
@@ -197,7 +200,7 @@ def _cell(
 
     w, s = block.valued[rows], block.slope[rows]
     n = rows.size
-    waves = int(min(MOST_WAVES, max(1, n // 6)))
+    waves = int(min(TUNING.most_waves, max(1, n // 6)))
     phase_of = (np.arange(n) + 0.5) / n
     basis = np.cos(np.pi * phase_of[:, None] * np.arange(waves))
     heard = tuple(f for f in humming if f * (time[-1] - time[0]) > 1.0 and n > waves + 4 * len(humming))

@@ -30,15 +30,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.fit.linearisation import ResidualBlock, total_of
+from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
-STAGES = ((1.0, 2.0, 3.0, 4.0), (6.0, 8.0), (12.0, 16.0), (24.0, 32.0))  # places on either side, the nearest first
-CLEAR = 10.0  # times what scatter alone makes of it, by which a slope is told well (Staiger and Stock 1997)
-TOLD = 1.0  # the same, by which it is told at all
-FEWEST = 6  # places that tell one
-KEPT = 0.8  # of slopes at the fit, from which on they are those of the mean too
-STEEPER, DISCONTINUITY = 4.0, 10.0  # times what slopes foretell, and what is due: beyond both a run took another course
-TWO_SIDED = 1.96
+TUNING = SETTINGS.inference.local_quadratic
 
 Runs = Callable[
     [Sequence[float]], Sequence[Sequence[ResidualBlock] | None]
@@ -49,7 +44,7 @@ def by_student(free: float) -> float:
     """(t/1.96)^2: how much wider squares are told by so few degrees of freedom."""
     from scipy.special import stdtrit
 
-    return (float(stdtrit(free, 0.975)) / TWO_SIDED) ** 2
+    return (float(stdtrit(free, 0.975)) / TUNING.normal_quantile) ** 2
 
 
 def over_roughness(runs: Runs, slopes: Sequence[Array], due: float) -> tuple[float, float] | None:
@@ -61,28 +56,30 @@ def over_roughness(runs: Runs, slopes: Sequence[Array], due: float) -> tuple[flo
     """
     met: list[tuple[float, Sequence[ResidualBlock]]] = []
     best = Slope(clear=0.0)
-    for stage in STAGES:
+    for stage in TUNING.stages:
         places = [side * at for at in stage for side in (-1.0, 1.0)]
         met += [(at, blocks) for at, blocks in zip(places, runs(places), strict=True) if blocks is not None]
-        if len(met) < FEWEST:
+        if len(met) < TUNING.least_places:
             continue
         t = np.array([at for at, _ in met])
-        nearest = [int(k) for k in np.argsort([total_of(blocks) for _, blocks in met])[:FEWEST]]
+        nearest = [int(k) for k in np.argsort([total_of(blocks) for _, blocks in met])[: TUNING.least_places]]
         each = zip(*(blocks for _, blocks in met), strict=True)
         recordings = [_alike(blocks, nearest, J) for blocks, J in zip(each, slopes, strict=True)]
         squares = sum(np.sum(left**2, axis=1) for left, _ in recordings)
-        low = np.sort(squares)[FEWEST // 2 - 1]  # not the least: one run may take the recording's own course
-        kept = np.abs(squares - low) < STEEPER * due * t**2 + DISCONTINUITY * due
-        if np.sum(kept) < FEWEST:
+        low = np.sort(squares)[
+            TUNING.least_places // 2 - 1
+        ]  # not the least: one run may take the recording's own course
+        kept = np.abs(squares - low) < TUNING.outlier_ratio * due * t**2 + TUNING.outlier_rise * due
+        if np.sum(kept) < TUNING.least_places:
             continue
         found = _slope(t[kept], [(left[kept], J) for left, J in recordings], due)
-        if found.clear > TOLD and found.flat < stage[-1]:
+        if found.clear > TUNING.some_slope and found.flat < stage[-1]:
             best = found
-            if found.clear > CLEAR:
+            if found.clear > TUNING.clear_slope:
                 break
-    if best.share < KEPT:
-        return (best.down, best.up) if best.clear > TOLD else None
-    return (0.0, 0.0) if best.clear > CLEAR else None
+    if best.share < TUNING.same_slope:
+        return (best.down, best.up) if best.clear > TUNING.some_slope else None
+    return (0.0, 0.0) if best.clear > TUNING.clear_slope else None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,7 +132,7 @@ def _slope(t: Array, recordings: Sequence[tuple[Array, Array]], due: float) -> S
     variance = (1.0 + h[0, 0] + 2.0 * middle * h[0, 1] + middle**2 * h[1, 1]) * whole / c**2
     if whole > 0.0:
         variance *= by_student((t.size - 3) * whole**2 / sum(p**2 for p in pulled))
-    half = float(np.hypot(flat, TWO_SIDED * np.sqrt(variance)))
+    half = float(np.hypot(flat, TUNING.normal_quantile * np.sqrt(variance)))
     share = along / steep if steep > 0.0 else 0.0
     clear = c / chance if chance > 0.0 else np.inf
     return Slope(clear=clear, share=share, flat=flat, down=half - middle, up=half + middle)

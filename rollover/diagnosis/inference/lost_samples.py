@@ -10,12 +10,13 @@ from collections.abc import Iterator, Sequence
 
 from rollover.diagnosis.data.phases import placed
 from rollover.diagnosis.result import Place
+from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
 from rollover.recording.checks.finding import trace
 from rollover.recording.checks.leaps import leaping
 from rollover.recording.checks.samples import stuck
 
-AGAIN = 2  # places of one channel, at least
+TUNING = SETTINGS.inference.lost_samples
 
 
 def lost(
@@ -26,7 +27,7 @@ def lost(
     for r, recording in enumerate(recordings):
         for channel in recording.channels:
             found.setdefault(channel, []).extend((r, *where) for where in _breaks(recording, channel))
-    often = {channel: breaks for channel, breaks in found.items() if len(breaks) >= AGAIN}
+    often = {channel: breaks for channel, breaks in found.items() if len(breaks) >= TUNING.least_breaks}
     return placed(names, phases, ((c, *where, "time") for c, breaks in often.items() for where in breaks))
 
 

@@ -11,9 +11,9 @@ from rollover.diagnosis.data.phases import phases_of, whole
 from rollover.diagnosis.fit.step import Phases
 from rollover.diagnosis.inference.clipping import cut_off
 from rollover.diagnosis.inference.coarse_sampling import by_digits, coarse
-from rollover.diagnosis.inference.lack_of_fit import SURE
 from rollover.diagnosis.inference.lost_samples import by_loss, lost
 from rollover.diagnosis.result import Named, Place, Verdict
+from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
 
 
@@ -74,7 +74,7 @@ def agreeing_but(effects: Sequence[Named], recordings: int, p_value: float) -> s
 
 
 def _unexplained(places: tuple[Place, ...], said: str, recordings: int, p_value: float) -> RecordingFault:
-    agree = _within(p_value) if p_value > SURE else "hardly differ"
+    agree = _within(p_value) if p_value > SETTINGS.inference.lack_of_fit.p_value else "hardly differ"
     said = _otherwise(said, recordings, agree)
     return RecordingFault(verdict="unexplained", effects=(), places=places, sentence=said, p_value=0.0)
 

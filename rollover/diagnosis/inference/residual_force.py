@@ -23,6 +23,7 @@ from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.levenberg_marquardt import ResidualBlock
 from rollover.diagnosis.forward.filtering import behind_filters, rows_of
 from rollover.diagnosis.inference.bases import linear_b_splines
+from rollover.diagnosis.settings import SETTINGS
 from rollover.dynamics.drop_test import DropModel
 from rollover.scenario import Scenario
 from rollover.spec.initiation import Drop
@@ -32,15 +33,7 @@ Array = NDArray[np.float64]
 Moves = tuple[Array, Array, Array, Array]  # changes of depth, speed, acceleration, load cell, (n, k) each
 Where = Literal["ground", "push"]
 WHERES: tuple[Where, ...] = ("ground", "push")
-STEP = 5e-4  # s
-LATEST = 0.4  # s
-STOPPED = 0.03  # of the speed just after the impact
-FREE = 56  # knots of a force that may be anything
-FD_STEP = 1e-4  # m, of a tangent
-EARLY = 1.6  # power of the spacing of these knots: what the impact does is over soon
-GIVES = 1.0  # prior of a free force, of the largest on the way
-FASTER = 0.1  # prior of the speed just after the impact, of itself
-TURNS = 2  # of the way that was measured, by the stiffness on it
+TUNING = SETTINGS.inference.residual_force
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +67,7 @@ class Way:
         sign = -1.0 if where == "ground" else 1.0
         z, v, a = (np.zeros(f.shape) for _ in range(3))
         v[0] = faster
-        pushed(np.ascontiguousarray(sign * f / self.whole), self.stiffness / self.whole, STEP, z, v, a)
+        pushed(np.ascontiguousarray(sign * f / self.whole), self.stiffness / self.whole, TUNING.step, z, v, a)
         felt = -self.mass * a if where == "ground" else f - self.mass * a
         return z, v, a, felt
 
@@ -105,7 +98,7 @@ def channels_of(way: Way, moves: Moves, e: Dataset, shift: float) -> Array:
     rows = rows_of(e.recording)
     stamps = rows.times - shift
     at = np.clip(np.searchsorted(way.time, stamps) - 1, 0, way.time.size - 2)
-    ahead = np.clip((stamps - way.time[at]) / STEP, 0.0, 1.0)[:, None]
+    ahead = np.clip((stamps - way.time[at]) / TUNING.step, 0.0, 1.0)[:, None]
     begun = (stamps >= 0.0)[:, None]
     nothing = np.zeros((stamps.size, z.shape[1]))
     found = {}
@@ -149,11 +142,11 @@ def descent(scenario: Scenario, e: Dataset, block: ResidualBlock) -> Descent | N
     striker, start = scenario.vehicle, scenario.initiation
     if not isinstance(striker, Striker) or not isinstance(start, Drop) or striker.nose == "cone":
         return None
-    time = np.arange(0.0, LATEST, STEP)
+    time = np.arange(0.0, TUNING.duration, TUNING.step)
     run = DropModel(scenario=scenario).run(time)
     z, v = run.channels["ground/sinkage"], -run.channels["striker/velocity_z"]
     v[0] = v[1]
-    going = v > STOPPED * v[1]
+    going = v > TUNING.stopped_speed * v[1]
     n = int(np.argmin(going)) if not going.all() else time.size
     if n < 12:
         return None
@@ -166,29 +159,31 @@ def descent(scenario: Scenario, e: Dataset, block: ResidualBlock) -> Descent | N
         return area * along(scenario.ground.law, np.maximum(depth, 0.0), speed, speed=touch)
 
     force = spring(z, v)
-    tangent = (spring(z + FD_STEP, v) - force) / FD_STEP
+    tangent = (spring(z + TUNING.tangent_step, v) - force) / TUNING.tangent_step
     way = Way(
         time=time, depth=z, speed=v, acceleration=np.gradient(v, time), force=force, stiffness=tangent, mass=mass,
         whole=(1.0 + share) * mass, touch=touch, gravity=scenario.gravity,
     )  # fmt: skip
     stamps = np.concatenate([e.recording.time[s.rows] for s in e.signals]) - block.shift
     rows = stamps <= time[-1]
-    knots = time[-1] * np.linspace(0.0, 1.0, FREE) ** EARLY
-    f = linear_b_splines(time, knots) * GIVES * float(force.max())
+    knots = time[-1] * np.linspace(0.0, 1.0, TUNING.free_knots) ** TUNING.knot_power
+    f = linear_b_splines(time, knots) * TUNING.force_prior * float(force.max())
     measured = way
-    for _ in range(TURNS):
+    for _ in range(TUNING.stiffness_rounds):
         x, _, _ = _free(measured, f, "ground", e, block, rows)
         dz, dv, da = (m @ x[:-1] for m in _all_moves(measured, f, "ground")[:3])
         depth = np.maximum(z + dz, 0.0)
         there = spring(depth, v)
         adaptive_difference = np.where(
-            np.abs(dz) > FD_STEP, (there - force) / np.where(np.abs(dz) > FD_STEP, dz, 1.0), tangent
+            np.abs(dz) > TUNING.tangent_step,
+            (there - force) / np.where(np.abs(dz) > TUNING.tangent_step, dz, 1.0),
+            tangent,
         )
         measured = replace(
             way, depth=depth, speed=v + dv, acceleration=way.acceleration + da, force=there,
             stiffness=np.clip(adaptive_difference, 0.0, None),
         )  # fmt: skip
-    on = measured.speed > STOPPED * v[1]
+    on = measured.speed > TUNING.stopped_speed * v[1]
     n = int(np.argmin(on)) if not on.all() else n
     if n < 12:
         return None
@@ -207,9 +202,9 @@ def descent(scenario: Scenario, e: Dataset, block: ResidualBlock) -> Descent | N
 
 
 def _all_moves(way: Way, f: Array, where: Where) -> Moves:
-    """Changes by each force, and by a speed that is `FASTER`, (n, k + 1) each."""
+    """Changes by each force, and by a speed that is `speed_prior`, (n, k + 1) each."""
     forced = way.moved(f, where)
-    faster = way.moved(np.zeros((f.shape[0], 1)), where, FASTER * way.touch)
+    faster = way.moved(np.zeros((f.shape[0], 1)), where, TUNING.speed_prior * way.touch)
     z, v, a, felt = (np.hstack([one, other]) for one, other in zip(forced, faster, strict=True))
     return z, v, a, felt
 

@@ -23,17 +23,13 @@ from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.inference.weak_form import Balance, balances
 from rollover.diagnosis.result import Law, LawTerm
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
 from rollover.effects.empirical import PARTS, Empirical
 from rollover.scenario import Scenario
 
 Array = NDArray[np.float64]
-TRIED = 3  # sets of terms that are simulated
-PAYS = 0.15  # of the logarithm of the held-out error: the least that a further term must gain
-ERRORS = 2.0  # standard errors that a gain must exceed
-LEAST_GAIN = 0.1  # ln(E_before/E_after) on held-out conditions, below which a law is not worth offering
-RIDGE = 1e-6
-WIDER = 1.5  # search: beyond the regression's force to either side, of itself
+TUNING = SETTINGS.inference.residual_law
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +72,7 @@ def proposed(
     before, after = held_out(base, groups), held_out(best, groups)
     gains = np.array([0.5 * np.log(before.left[list(g)].sum() / after.left[list(g)].sum()) for g in groups])
     gain, error = float(gains.mean()), float(gains.std(ddof=1) / np.sqrt(gains.size))
-    if gain < max(LEAST_GAIN, ERRORS * error):
+    if gain < max(TUNING.least_law_gain, TUNING.least_errors * error):
         return None
     return _law(problem, best, gain, error, before.total, after.total)
 
@@ -105,7 +101,7 @@ def best_subsets(found: Sequence[Balance], depth: float, speed: float) -> list[S
     chosen = by_size[0]
     for larger in by_size[1:]:
         gains = 0.5 * np.log(np.maximum(chosen[0].left, 1e-300) / np.maximum(larger[0].left, 1e-300))
-        if gains.mean() > max(PAYS, gains.std(ddof=1) / np.sqrt(gains.size)):
+        if gains.mean() > max(TUNING.least_term_gain, gains.std(ddof=1) / np.sqrt(gains.size)):
             chosen = larger
     return chosen
 
@@ -122,14 +118,14 @@ def _of_size(size: int, G: Array, h: Array, power: Array) -> list[Subset]:
     forces = _solved(G.sum(axis=0), h.sum(axis=0), sets)
     return [
         Subset(terms=tuple(int(t) for t in sets[k]), forces=forces[k], left=left[k])
-        for k in np.argsort(np.mean(np.log(np.maximum(left, 1e-300)), axis=1))[:TRIED]
+        for k in np.argsort(np.mean(np.log(np.maximum(left, 1e-300)), axis=1))[: TUNING.simulated_sets]
     ]
 
 
 def _solved(G: Array, h: Array, sets: NDArray[np.int64]) -> Array:
     A = G[sets[:, :, None], sets[:, None, :]]
     size = np.maximum(np.einsum("sii->si", A), 1e-300)
-    A = A + RIDGE * np.einsum("si,ij->sij", size, np.eye(sets.shape[1]))
+    A = A + TUNING.ridge * np.einsum("si,ij->sij", size, np.eye(sets.shape[1]))
     return np.asarray(np.linalg.solve(A, h[sets][..., None])[..., 0])
 
 
@@ -140,7 +136,7 @@ def _candidate(subset: Subset, depth: float, speed: float) -> tuple[Candidate, l
     fixed: dict[str, Any] = {part: names[t] for part, t in zip(PARTS, subset.terms, strict=False)}
     search, x = {}, []
     for part, force in zip(PARTS, subset.forces, strict=False):
-        reach = WIDER * abs(float(force)) + 0.3 * largest
+        reach = TUNING.search_width * abs(float(force)) + 0.3 * largest
         search[f"{part}_force"] = Search(float(force) - reach, float(force) + reach)
         x.append(coordinate(float(force), search[f"{part}_force"]))
     family = Empirical.family

@@ -13,9 +13,9 @@ from rollover.diagnosis.fit.cross_validation import Held, held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, shift_of
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.result import Score
+from rollover.diagnosis.settings import SETTINGS
 
-SAMPLES = 1500  # that a rating is worked out on
-FEWEST = 24  # samples before an impact, of fewer nothing is said
+TUNING = SETTINGS.inference.scores
 FORCES = ("ground/force_normal", "rops/force", "striker/acceleration_z", "chassis/acceleration_z")
 
 
@@ -61,7 +61,7 @@ def before_an_impact(dataset: Sequence[Dataset], fitted: Fitted) -> float | None
         return None
     early = np.concatenate([b.plain_residual[e.early] for e, b in zip(dataset, fitted.blocks, strict=True)])
     telling = early[early != 0.0]
-    return float(np.sqrt(np.mean(telling**2))) if telling.size >= FEWEST else None
+    return float(np.sqrt(np.mean(telling**2))) if telling.size >= TUNING.least_samples else None
 
 
 def predicted(problem: Problem, fitted: Fitted, rounds: int = 5) -> Fitted | None:
@@ -90,7 +90,7 @@ def _rated(problem: Problem, fitted: Fitted, r: int) -> tuple[list[float], list[
     ratings, peaks = [], []
     for signal in e.signals:
         time, y = e.recording.time[signal.rows], predicted[signal.channel][signal.rows]
-        rating = iso18571(time, signal.values, y, most=SAMPLES)
+        rating = iso18571(time, signal.values, y, most=TUNING.rating_samples)
         if isinstance(rating, Iso18571):
             ratings.append(rating.overall)
     force = next((s for name in FORCES for s in e.signals if s.channel == name), None)

@@ -18,13 +18,12 @@ from numpy.typing import NDArray
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.inference.bases import TIME, linear_b_splines
 from rollover.diagnosis.inference.chassis import ABOUT, ALONG
+from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
 STATE = ("chassis/roll", "chassis/pitch", "chassis/velocity_y", "chassis/velocity_z", "chassis/angular_velocity_x")
 FURTHER = ("ground/sinkage", "axle/front/angle")  # where there is ground to sink into, and an axle
-KNOTS = 7
-MOST = 2  # quantities
-WORTH = 0.05  # of the excess, that a second one must add
+TUNING = SETTINGS.inference.vehicle_dependence
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +53,7 @@ def dependency(problem: Problem, base: Fitted) -> tuple[tuple[str, float], ...]:
     models = [(name, _columns(problem, base, seen, name, grown)) for name, grown in _ways(seen, most.startswith(ABOUT))]
     held: list[Array] | None = None
     shares: list[tuple[str, float]] = []
-    for _ in range(MOST):
+    for _ in range(TUNING.most_quantities):
         before = sum(share for _, share in shares)
         taken = [name for name, _ in shares]
         tried = []
@@ -63,7 +62,7 @@ def dependency(problem: Problem, base: Fitted) -> tuple[tuple[str, float], ...]:
                 both = columns if held is None else [np.hstack(pair) for pair in zip(held, columns, strict=True)]
                 tried.append((min(_predicted(seen, both) / excess[most], 1.0) - before, name, both))
         added, name, columns = max(tried, key=lambda one: one[0])
-        if added <= (WORTH if shares else 0.0):
+        if added <= (TUNING.least_second_share if shares else 0.0):
             break
         shares.append((name, added))
         held = columns
@@ -99,7 +98,7 @@ def _ways(seen: Sequence[Seen], turns: bool) -> list[tuple[str, bool]]:
 
 def _columns(problem: Problem, base: Fitted, seen: Sequence[Seen], name: str, grown: bool) -> list[Array]:
     """What functions of a quantity do to the whitened channel, (n, k) each."""
-    knots = np.unique(np.quantile(np.concatenate([s.of[name] for s in seen]), np.linspace(0.0, 1.0, KNOTS)))
+    knots = np.unique(np.quantile(np.concatenate([s.of[name] for s in seen]), np.linspace(0.0, 1.0, TUNING.knots)))
     found = []
     for s in seen:
         basis, e = linear_b_splines(s.of[name], knots), problem.dataset[s.recording]

@@ -20,17 +20,13 @@ from ground.empirical import TERMS, shape
 from ground.law import REFERENCE_AREA, along
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.inference.bases import motion
+from rollover.diagnosis.settings import SETTINGS
 from rollover.scenario import Scenario
 from rollover.spec.initiation import Drop
 from rollover.spec.vehicle import Striker
 
 Array = NDArray[np.float64]
-WINDOWS = 18  # for each recording
-OVERLAP = 2  # marks from a window's centre to its ends
-EARLY = 1.5  # power of the spacing: what happens at the contact is over soon
-LEAST_HALF = 3.0  # of a half width, in steps
-FEWEST_ROWS = 40  # while the ground is pushed deeper
-MOST_ROWS = 240
+TUNING = SETTINGS.inference.weak_form
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,12 +62,12 @@ def _balance(scenario: Scenario, e: Dataset) -> Balance | None:
         return None
     time, z, v, a = state
     rows = np.flatnonzero((z > 0.0) & (v > 0.02 * touch) & (time > 0.0))
-    if rows.size < FEWEST_ROWS:
+    if rows.size < TUNING.least_rows:
         return None
     rows = rows[rows <= rows[0] + int(np.argmax(np.append(np.diff(rows) > 1, True)))]  # the first way down alone
-    if rows.size < FEWEST_ROWS:
+    if rows.size < TUNING.least_rows:
         return None
-    rows = rows[:: max(1, rows.size // MOST_ROWS)]
+    rows = rows[:: max(1, rows.size // TUNING.most_rows)]
     t, dt = time[rows], np.gradient(time[rows])
     dispersion, curved = _tests(t)
     weights = dispersion * dt
@@ -96,10 +92,10 @@ def _balance(scenario: Scenario, e: Dataset) -> Balance | None:
 
 def _tests(t: Array) -> tuple[Array, Array]:
     """phi and phi'' of the windows at times t, (k, n) each: cos^4 of half a turn, short after the contact."""
-    marks = t[0] + (t[-1] - t[0]) * np.linspace(0.0, 1.0, WINDOWS + 2 * OVERLAP) ** EARLY
-    centres = marks[OVERLAP:-OVERLAP]
-    half = np.minimum(marks[2 * OVERLAP :] - centres, centres - marks[: -2 * OVERLAP])
-    wide = half > LEAST_HALF * float(np.median(np.diff(t)))
+    marks = t[0] + (t[-1] - t[0]) * np.linspace(0.0, 1.0, TUNING.windows + 2 * TUNING.overlap) ** TUNING.window_power
+    centres = marks[TUNING.overlap : -TUNING.overlap]
+    half = np.minimum(marks[2 * TUNING.overlap :] - centres, centres - marks[: -2 * TUNING.overlap])
+    wide = half > TUNING.least_half_width * float(np.median(np.diff(t)))
     centres, half = centres[wide, None], half[wide, None]
     c = np.cos(0.5 * np.pi * np.clip((t[None] - centres) / half, -1.0, 1.0))
     rate = 0.5 * np.pi / half

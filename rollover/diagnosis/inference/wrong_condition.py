@@ -21,15 +21,11 @@ import numpy as np
 
 from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.data.inconsistent import Aside, factor_of
-from rollover.diagnosis.fit.time_shift import WIDTH
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import spoken
 
 SPEED, DEPTH = "initiation.speed", "ground/sinkage"
-FEWEST = 4  # recordings: three on a line, and the one beside it
-LEAST, SURE = 0.15, 5.0  # of d, at least, and over its error
-STEADY = 0.015  # of the error of ln a, at least
-OTHER, FURTHEST = 0.1, 0.8  # of its logarithm, that the speed is another, at least and at most
-ALIKE, FALLS = 4.0, 4.0  # times the power that the others miss, at most, and less than at the stated speed, at least
+TUNING = SETTINGS.inference.wrong_condition
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,24 +48,24 @@ class WrongCondition(Aside):
 def wrong_conditions(every: Sequence[Dataset]) -> list[WrongCondition]:
     """The one recording, if any, that contradicts the speed that it states and all others."""
     known = [e for e in every if _speed(e) > 0.0 and np.isfinite(e.simulator.contact)]
-    if not FEWEST <= len(known) == len(every):
+    if not TUNING.least_recordings <= len(known) == len(every):
         return []
     told = [(e, s, a) for e in known for s in e.signals if s.channel == DEPTH and (a := _factor(e, s)) > 0.0]
-    if len(told) < FEWEST:
+    if len(told) < TUNING.least_recordings:
         return []
     x, y = np.log([_speed(e) for e, *_ in told]), np.log([a for *_, a in told])
     off = [_off(r, x, y) for r in range(x.size)]
     r = int(np.argmax([abs(d) / error for d, error in off]))
     d, error = off[r]
-    if abs(d) < max(LEAST, SURE * error):
+    if abs(d) < max(TUNING.least_deviation, TUNING.least_errors * error):
         return []
     e, signal, _ = told[r]
     best = [_dropped(other) for other, *_ in told]
     more, _ = _off(r, x, np.array([log_ for log_, _ in best]))
     _, left = best[r]
     stated = _missed(e, _speed(e))
-    alike = left < ALIKE * max(power for k, (_, power) in enumerate(best) if k != r)
-    if more * d < 0.0 or abs(more) < OTHER or not alike or left > stated / FALLS:
+    alike = left < TUNING.most_power * max(power for k, (_, power) in enumerate(best) if k != r)
+    if more * d < 0.0 or abs(more) < TUNING.least_speed_change or not alike or left > stated / TUNING.least_fall:
         return []
     return [WrongCondition(dataset=e, signal=signal, speed=_speed(e) * math.exp(more))]
 
@@ -81,8 +77,8 @@ def _dropped(e: Dataset) -> tuple[float, float]:
     def left(log_: float) -> float:
         return _missed(e, _speed(e) * math.exp(log_))
 
-    about = min(np.linspace(-FURTHEST, FURTHEST, 9), key=left)
-    beside = about + FURTHEST / 4.0 * np.array([-1.0, 1.0])
+    about = min(np.linspace(-TUNING.most_speed_change, TUNING.most_speed_change, 9), key=left)
+    beside = about + TUNING.most_speed_change / 4.0 * np.array([-1.0, 1.0])
     found = minimize_scalar(left, bounds=beside, method="bounded", options={"xatol": 3e-3})
     return float(found.x), float(found.fun)
 
@@ -98,7 +94,7 @@ def _missed(e: Dataset, speed: float) -> float:
         misfit = np.concatenate([s.values - made[s.channel][s.rows] for s in e.signals])
         return float(np.mean(e.whitened(misfit) ** 2)) + (shift / e.shift_prior) ** 2 / misfit.size
 
-    wide = WIDTH * e.shift_prior
+    wide = SETTINGS.fit.time_shift.search_width * e.shift_prior
     return float(minimize_scalar(left, bounds=(-wide, wide), method="bounded", options={"maxiter": 12}).fun)
 
 
@@ -110,7 +106,7 @@ def _off(r: int, x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
     A = np.column_stack([np.ones(x.size), x])
     line, *_ = np.linalg.lstsq(A[rest], y[rest], rcond=None)
     left = y[rest] - A[rest] @ line
-    scatter = max(STEADY, math.sqrt(float(left @ left) / (left.size - 2)))
+    scatter = max(TUNING.least_scatter, math.sqrt(float(left @ left) / (left.size - 2)))
     wide = float(A[r] @ np.linalg.solve(A[rest].T @ A[rest], A[r]))
     return float(y[r] - A[r] @ line), scatter * math.sqrt(1.0 + wide)
 

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from rollover.diagnosis.data.dataset import Dataset, Signal, by_differences
 from rollover.diagnosis.forward.forward_model import first_impact_of
 from rollover.diagnosis.noise.drift import is_recorders
-from rollover.diagnosis.noise.outliers import LOUDER, without_outliers
+from rollover.diagnosis.noise.outliers import without_outliers
 from rollover.diagnosis.noise.spectral_lines import lines, without
+from rollover.diagnosis.settings import SETTINGS
 from rollover.recording.filters import attenuation, least_rate
 from rollover.recording.noise_floor import LENGTH, NoiseFloor, grown, noise_floor
 
@@ -26,25 +27,8 @@ Array = NDArray[np.float64]
 Member = tuple[int, int, Signal, slice]  # a recording, the place of a signal of it, that, and its part of the stack
 Told = tuple[int, int, Signal, float, tuple[float, ...]]  # the same with a noise and its memory
 Memory = Callable[[Sequence[Array]], tuple[float, tuple[float, ...]]]
-ALIKE = 0.05  # of the logarithm of the rate: recordings so close were taken alike
-CLEARLY = 0.75  # of the misfit's noise: below, the channel's own noise is believed
-OWN = 1.5  # times the common noise: beyond, a recording has its own
-UNLIKE = 4.0  # standard errors by which levels differ that are not one recorder's
-SURELY = 4  # quiet windows from which on that is believed
-ENOUGH = 2 * SURELY * LENGTH  # samples that have as many
-UNSURE_LEVEL, BY_CHANCE = 1.6, 1e-4  # standard error of ln sigma by sqrt(n); p-value of levels that are not alike
-LONGEST = 8  # samples of memory
-AKAIKE = 2.0  # what a coefficient costs by Akaike: octaves far off say little each, and count
-OCTAVES = (1, 2, 4, 8, 16, 32, 64)  # samples that the memory of a noise of 1/f reaches back
-NOT_COLOURED = 0.7  # of the whole error that is noise: below, the model's own error prevails, which is no process
-RINGING = 0.9  # largest complex root
-SLOWER = 0.4  # of the logarithm of the slow noise's level, by which a misfit may exceed what is quiet
-CHANCE = 4.0  # standard errors that come to that
-LONG = 0.7  # memory that windows of 48 samples tell too short: by this
-UNSURE = 0.8  # of what a misfit may exceed it by, for each sample of such a memory
-STEADY = 0.995  # largest root of a memory
-AGREES = 2.0  # standard errors within which a memory is that of a filter
-BANDS = 2048  # frequencies that the noise behind a filter is summed over
+TUNING = SETTINGS.noise.autoregression
+ENOUGH = 2 * TUNING.least_windows * LENGTH  # samples that have as many
 
 
 def quiet(dataset: Sequence[Dataset], residuals: Sequence[Array]) -> list[Dataset]:
@@ -65,7 +49,9 @@ def quiet(dataset: Sequence[Dataset], residuals: Sequence[Array]) -> list[Datase
             continue  # too short: what each says by itself stands
         for (r, k, s, _), misfit, value, size in zip(members, misfits, values, sizes, strict=True):
             own = _quieter([misfit], [value])
-            loud = own is not None and own.windows >= SURELY and own.sigma > OWN * common.sigma
+            loud = (
+                own is not None and own.windows >= TUNING.least_windows and own.sigma > TUNING.own_level * common.sigma
+            )
             best = own if own is not None and loud else common
             found[r][k] = replace(s, noise=best.sigma * size, ar=best.ar)
     found = [
@@ -89,9 +75,9 @@ def unlike(misfits: Sequence[Array], values: Sequence[Array]) -> Array:
     levels = np.array([min(map(by_differences, both)) for both in zip(misfits, values, strict=True)])
     if len(misfits) == 1 or levels.min() <= 0.0:
         return even
-    worth = np.array([v.size for v in misfits]) / UNSURE_LEVEL**2
+    worth = np.array([v.size for v in misfits]) / TUNING.level_error**2
     apart = np.log(levels) - np.average(np.log(levels), weights=worth)
-    return np.exp(apart) if chdtrc(len(misfits) - 1, float(worth @ apart**2)) < BY_CHANCE else even
+    return np.exp(apart) if chdtrc(len(misfits) - 1, float(worth @ apart**2)) < TUNING.level_p_value else even
 
 
 def _before_the_impact(e: Dataset, s: Signal) -> slice:
@@ -137,7 +123,7 @@ def _told(members: Sequence[Member], parts: Sequence[Array], memory: Memory) -> 
     # of one recorder unless they differ by more than so few samples can, each worth less for its memory
     worth = np.array([p.size for p in parts]) * max(1.0 - sum(ar), 0.02) / (1.0 + max(sum(ar), 0.0))
     common = float(np.sqrt(np.sum(levels**2 * worth) / worth.sum()))
-    if not np.any(np.abs(np.log(levels / common)) > UNLIKE / np.sqrt(2.0 * worth)):
+    if not np.any(np.abs(np.log(levels / common)) > TUNING.level_errors / np.sqrt(2.0 * worth)):
         levels = np.full(levels.size, common)  # a level of each by itself would make the memory too short
     sigma, ar = memory([p / level for p, level in zip(parts, levels, strict=True)])
     # where samples are weighed what is left is the model's error as well
@@ -174,7 +160,9 @@ def slower(told: Sequence[Told]) -> set[str]:
             more = np.log(level_of(sigma, ar) / level_of(noise, own))
             # what is only louder was not quiet there: all of it, what is rough too
             more -= max(np.log(sigma / grown(ar) / (noise / grown(own))), 0.0)
-            by.setdefault(s.channel, []).append((float(more), min(max(sum(own), 0.0), STEADY), s.rows.size))
+            by.setdefault(s.channel, []).append(
+                (float(more), min(max(sum(own), 0.0), TUNING.largest_root), s.rows.size)
+            )
     slow = set()
     for channel, each in by.items():
         weights = [float(n) for *_, n in each]
@@ -189,19 +177,23 @@ def tolerated(memory: float, count: float) -> float:
 
     A memory a, told by `count` samples with a standard error of sqrt((1 - a^2)/count), moves that by its (1 - a)th.
     """
-    if memory > LONG:
-        return SLOWER * (1.0 + UNSURE * memory / (1.0 - memory))
-    return SLOWER + CHANCE * float(np.sqrt((1.0 + memory) / ((1.0 - memory) * max(count, 1.0))))
+    if memory > TUNING.long_memory:
+        return TUNING.level_tolerance * (1.0 + TUNING.memory_tolerance * memory / (1.0 - memory))
+    return TUNING.level_tolerance + TUNING.level_chance * float(
+        np.sqrt((1.0 + memory) / ((1.0 - memory) * max(count, 1.0)))
+    )
 
 
 def is_bursting(s: Signal, misfit: Array, level: float) -> bool:
     """Whether a misfit (n,) is much less beside its bursts; digits that leap are none."""
-    return s.step == 0.0 and level > LOUDER * float(np.sqrt(np.mean(without_outliers(misfit) ** 2)))
+    return s.step == 0.0 and level > SETTINGS.noise.outliers.burst_ratio * float(
+        np.sqrt(np.mean(without_outliers(misfit) ** 2))
+    )
 
 
 def level_of(sigma: float, ar: tuple[float, ...]) -> float:
     """Level of what is slow in a noise: sqrt of its spectral density at no frequency, per sample."""
-    return sigma / grown(ar) / max(1.0 - sum(ar), 1.0 - STEADY)
+    return sigma / grown(ar) / max(1.0 - sum(ar), 1.0 - TUNING.largest_root)
 
 
 def alike(dataset: Sequence[Dataset]) -> list[list[Member]]:
@@ -215,7 +207,7 @@ def alike(dataset: Sequence[Dataset]) -> list[list[Member]]:
             what = (s.channel, e.recording.cfc.get(s.channel), e.averaged)
             rate = -float(np.log(np.median(np.diff(e.recording.time[s.rows]))))
             for other, at, members in groups:
-                if other == what and abs(at - rate) < ALIKE:
+                if other == what and abs(at - rate) < TUNING.same_rate:
                     members.append((r, k, s, part))
                     break
             else:
@@ -263,7 +255,7 @@ def rests(dataset: Sequence[Dataset]) -> list[dict[str, Rest]]:
             if 1.0 / step < least_rate(cfc):
                 continue
             filtered = _correlation(step, float(np.median(np.diff(s.rows))), cfc)
-            if abs(s.ar[0] - filtered[1]) * np.sqrt(told) < AGREES:
+            if abs(s.ar[0] - filtered[1]) * np.sqrt(told) < TUNING.filter_errors:
                 found[r][s.channel] = Rest(correlation=filtered, ar=s.ar)
     return found
 
@@ -271,13 +263,13 @@ def rests(dataset: Sequence[Dataset]) -> list[dict[str, Rest]]:
 @functools.lru_cache(maxsize=64)
 def _correlation(step: float, every: float, cfc: int) -> Array:
     """Autocorrelation (LONGEST + 1,) of white noise behind a filter class, of so many samples one, `step` s apart."""
-    f = (np.arange(BANDS) + 0.5) / (2.0 * BANDS * step)
+    f = (np.arange(TUNING.bands) + 0.5) / (2.0 * TUNING.bands * step)
     power = np.array([attenuation(float(v), step, cfc) for v in f]) ** 2
-    covariance = np.cos(2.0 * np.pi * every * step * np.outer(np.arange(LONGEST + 1), f)) @ power
+    covariance = np.cos(2.0 * np.pi * every * step * np.outer(np.arange(TUNING.longest_memory + 1), f)) @ power
     return np.asarray(covariance / covariance[0])
 
 
-def autoregression(series: Sequence[Array], most: int = LONGEST) -> tuple[float, tuple[float, ...]]:
+def autoregression(series: Sequence[Array], most: int = TUNING.longest_memory) -> tuple[float, tuple[float, ...]]:
     """Standard deviation and coefficients of one autoregression behind several series; its order by BIC."""
     most = min(most, max(0, min(v.size for v in series) // 8))
     return _driven(series, [(k, k) for k in range(1, most + 1)])
@@ -289,7 +281,7 @@ def long_memory(series: Sequence[Array]) -> tuple[float, tuple[float, ...]]:
     Heterogeneous autoregression, Corsi (2009), in octaves.
     """
     most = min(v.size for v in series) // 8
-    return _driven(series, [(k // 2 + 1, k) for k in OCTAVES if k <= most], AKAIKE)
+    return _driven(series, [(k // 2 + 1, k) for k in TUNING.octaves if k <= most], TUNING.coefficient_cost)
 
 
 def _driven(
@@ -316,7 +308,10 @@ def _driven(
         b = np.linalg.lstsq(X, y, rcond=None)[0] if order else np.zeros(0)
         a = np.concatenate([np.full(k - j + 1, v / (k - j + 1)) for v, (j, k) in zip(b, lags, strict=False)] or [b])
         roots = np.roots([1.0, *(-a)])
-        if order and (np.max(np.abs(roots)) > STEADY or np.any((np.abs(roots) > RINGING) & (np.abs(roots.imag) > 0.0))):
+        if order and (
+            np.max(np.abs(roots)) > TUNING.largest_root
+            or np.any((np.abs(roots) > TUNING.oscillating_root) & (np.abs(roots.imag) > 0.0))
+        ):
             continue  # no process, or one that rings at one frequency: hum is no noise
         power = float(np.mean((y - X @ b) ** 2)) * n / max(n - order, 1)
         score = n * np.log(max(power, 1e-300)) + order * (np.log(n) if dear is None else dear)
@@ -330,7 +325,7 @@ def _driven(
 def with_noise(s: Signal, noise: float, ar: tuple[float, ...], model_error: float) -> Signal:
     """The signal held against another noise."""
     sigma = float(np.hypot(np.hypot(noise, model_error * s.span), s.scatter))
-    return replace(s, noise=noise, sigma=sigma, ar=ar if noise >= NOT_COLOURED * sigma else ())
+    return replace(s, noise=noise, sigma=sigma, ar=ar if noise >= TUNING.least_noise_share * sigma else ())
 
 
 def _quieter(misfits: Sequence[Array], own: Sequence[Array]) -> NoiseFloor | None:
@@ -338,9 +333,9 @@ def _quieter(misfits: Sequence[Array], own: Sequence[Array]) -> NoiseFloor | Non
     if sum(v.size // LENGTH for v in misfits) < 1:
         return None
     best, other = _floor(misfits), _floor(own)
-    best = other if other.sigma < CLEARLY * best.sigma else best
+    best = other if other.sigma < SETTINGS.data.dataset.own_noise_below * best.sigma else best
     beside = _floor([without_outliers(v) for v in misfits])
-    return beside if 0.0 < LOUDER * beside.sigma < best.sigma else best
+    return beside if 0.0 < SETTINGS.noise.outliers.burst_ratio * beside.sigma < best.sigma else best
 
 
 def _floor(values: Sequence[Array]) -> NoiseFloor:

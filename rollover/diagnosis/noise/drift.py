@@ -22,32 +22,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset, Signal
+from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
-TERMS = 5  # cosines of a stretch, the first of them its mean
-SHARED = 8  # of all that comes after the contact
-LEAST = 24  # samples of an approach
-FEWEST = 3  # recordings, to tell what they share
-MORE = 1.5  # times what is expected, at least
-SLOW, LOUDER, ALIKE = 0.01, 0.01, 0.02  # p-values of (A1), below, of (A2) and (A3), above
-STEADY = 0.99  # memory of a quiet noise, at most
+TUNING = SETTINGS.noise.drift
 
 
 def is_recorders(told: Sequence[tuple[Dataset, Signal, Array]]) -> bool:
     """Whether slow misfits (n,) of a channel, one of each recording, are its recorder's noise; not if none can tell."""
     ends = [int(np.searchsorted(e.recording.time[s.rows], e.simulator.contact)) for e, s, _ in told]
-    if len(told) < FEWEST or any(n < LEAST or w.size < 2 * n for n, (_, _, w) in zip(ends, told, strict=True)):
+    if len(told) < TUNING.least_recordings or any(
+        n < TUNING.least_samples or w.size < 2 * n for n, (_, _, w) in zip(ends, told, strict=True)
+    ):
         return False
     if any(s.quiet[0] <= 0.0 for _, s, _ in told):
         return False  # next to no noise at all everything is slow and loud
-    before = np.array([along(s, w[:n], TERMS) for n, (_, s, w) in zip(ends, told, strict=True)])
+    before = np.array([along(s, w[:n], TUNING.approach_terms) for n, (_, s, w) in zip(ends, told, strict=True)])
     if not is_slow(before):
         return False
-    after = [along(s, part, TERMS) for n, (_, s, w) in zip(ends, told, strict=True) for part in _windows(w[n:], n)]
+    after = [
+        along(s, part, TUNING.approach_terms)
+        for n, (_, s, w) in zip(ends, told, strict=True)
+        for part in _windows(w[n:], n)
+    ]
     if is_louder(before, np.array(after)):
         return False
-    whole = [along(s, w[n:], SHARED) for n, (_, s, w) in zip(ends, told, strict=True)]
-    plain = [cosines(w.size - n, SHARED) @ w[n:] / math.sqrt(w.size - n) for n, (*_, w) in zip(ends, told, strict=True)]
+    whole = [along(s, w[n:], TUNING.contact_terms) for n, (_, s, w) in zip(ends, told, strict=True)]
+    plain = [
+        cosines(w.size - n, TUNING.contact_terms) @ w[n:] / math.sqrt(w.size - n)
+        for n, (*_, w) in zip(ends, told, strict=True)
+    ]
     # over the noise of each, or as it was read: the same offset is not as many times two noises
     return not (is_shared(np.array(whole)) or is_shared(np.array(plain)))
 
@@ -67,7 +71,7 @@ def along(s: Signal, misfit: Array, terms: int) -> Array:
 
     ways = cosines(misfit.size, terms)
     noise, ar = s.quiet
-    past = lfilter([1.0], [1.0, -min(max(sum(ar), 0.0), STEADY)], ways, axis=1)
+    past = lfilter([1.0], [1.0, -min(max(sum(ar), 0.0), TUNING.largest_memory)], ways, axis=1)
     power = np.sum(ways * (2.0 * past - ways), axis=1)
     return np.asarray(ways @ misfit / (noise * np.sqrt(np.maximum(power, 1e-12))))
 
@@ -85,7 +89,7 @@ def is_slow(before: Array) -> bool:
 
     c = _beside_an_offset(before)
     total, freedom = float(np.sum(c * c)), c.size - 1
-    return total > MORE * freedom and float(chdtrc(freedom, total)) < SLOW
+    return total > TUNING.least_ratio * freedom and float(chdtrc(freedom, total)) < TUNING.slow_p_value
 
 
 def is_louder(before: Array, after: Array) -> bool:
@@ -96,7 +100,7 @@ def is_louder(before: Array, after: Array) -> bool:
     powers = np.concatenate([first, then]).mean(axis=0)
     carry = float(powers.sum() ** 2 / np.sum(powers**2))
     ratio = float(then.mean() / first.mean())
-    return float(fdtrc(carry * len(then), carry * len(first), ratio)) < LOUDER
+    return float(fdtrc(carry * len(then), carry * len(first), ratio)) < TUNING.louder_p_value
 
 
 def _beside_an_offset(c: Array) -> Array:
@@ -109,4 +113,4 @@ def is_shared(whole: Array) -> bool:
     from scipy.special import fdtrc
 
     t = whole.mean(axis=0) ** 2 * len(whole) / np.maximum(whole.var(axis=0, ddof=1), 1e-300)
-    return bool(whole.shape[1] * float(fdtrc(1, len(whole) - 1, t.max())) < ALIKE)
+    return bool(whole.shape[1] * float(fdtrc(1, len(whole) - 1, t.max())) < TUNING.shared_p_value)

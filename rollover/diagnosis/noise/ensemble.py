@@ -38,19 +38,10 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.forward.forward_model import first_impact_of
+from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
-WINDOW = 0.02  # s, over which the neighbours' squares are averaged: what is off by a little in time is off in size
-FEW = 1.5  # c, for six neighbours
-LONGEST = 0.1  # s, that scatter goes together
-UNTOUCHED = 0.99  # weights all above need no mention
-STATE = 14  # d
-ALONE = 3  # channels below which none is told from a course
-OTHER = 0.5  # of what it would count, below which a recording took another course
-OFTEN = 0.15  # of recordings that may
-SENT = 0.02  # p-value of so many recordings on other courses, below which chance alone sends fewer there
-OTHERS = 2  # neighbours at least that tell how far one more may go
-FAR = 9.0  # times the middle power of neighbours, beyond which one took another course
+TUNING = SETTINGS.noise.ensemble
 
 
 def weighted(e: Dataset, perturbed: Sequence[Mapping[str, Array]]) -> Dataset:
@@ -70,7 +61,7 @@ def alike(e: Dataset, perturbed: Sequence[Mapping[str, Array]], first_impact: fl
     """Neighbours without those that took a clearly other course after the `first_impact` (s): (D9) is for these."""
     late = [(s, s.rows[e.recording.time[s.rows] >= first_impact]) for s in e.signals]
     power = [sum(float(np.nansum((d[s.channel][rows] / s.sigma) ** 2)) for s, rows in late) for d in perturbed]
-    most = FAR * float(np.median(power)) if power else 0.0
+    most = TUNING.outlier_power * float(np.median(power)) if power else 0.0
     return [d for d, p in zip(perturbed, power, strict=True) if p <= most]
 
 
@@ -81,14 +72,14 @@ def _weighted(e: Dataset, s: Signal, perturbed: Array) -> Signal:
         return s
     time = e.recording.time[s.rows]
     scatter = averaged(np.mean(perturbed**2, axis=0), time)
-    together = min(memory(perturbed), max(1.0, LONGEST / float(np.median(np.diff(time)))))
-    weight = s.sigma / np.sqrt(s.sigma**2 + FEW * together * scatter)
-    return s if weight.min() > UNTOUCHED else replace(s, weight=weight)
+    together = min(memory(perturbed), max(1.0, TUNING.longest_memory / float(np.median(np.diff(time)))))
+    weight = s.sigma / np.sqrt(s.sigma**2 + TUNING.few_factor * together * scatter)
+    return s if weight.min() > TUNING.full_weight else replace(s, weight=weight)
 
 
 def averaged(squares: Array, time: Array) -> Array:
-    """Running mean of (n,) over `WINDOW`, centred, fewer values at the ends."""
-    half = max(1, round(0.5 * WINDOW / float(np.median(np.diff(time)))))
+    """Running mean of (n,) over `window`, centred, fewer values at the ends."""
+    half = max(1, round(0.5 * TUNING.window / float(np.median(np.diff(time)))))
     sums = np.concatenate([[0.0], np.cumsum(squares)])
     k = np.arange(squares.size)
     low, high = np.maximum(k - half, 0), np.minimum(k + half + 1, squares.size)
@@ -133,7 +124,7 @@ def heavy_tail(e: Dataset, residual: Array) -> HeavyTail | None:
         return None
     expected, beyond, inside = found
     share = _share(expected, beyond)
-    slope = STATE / (STATE + beyond)
+    slope = TUNING.state_size / (TUNING.state_size + beyond)
     left = float(np.sum(residual[inside] ** 2))
     return HeavyTail(samples=np.where(inside, np.sqrt(slope), 1.0), share=share, more=(share - slope) * left)
 
@@ -144,7 +135,9 @@ def unseen(e: Dataset) -> Array:
     for k, perturbed_run in enumerate(e.perturbed):
         others = [d for j, d in enumerate(e.perturbed) if j != k]
         alone = tuple(
-            _weighted(e, replace(s, weight=None), np.stack([d[part] for d in others])) if len(others) >= OTHERS else s
+            _weighted(e, replace(s, weight=None), np.stack([d[part] for d in others]))
+            if len(others) >= TUNING.least_neighbours
+            else s
             for s, part in e.spans()
         )
         found.append(e.marginalised(replace(e, signals=alone).whitened(perturbed_run)))
@@ -159,7 +152,7 @@ def shares(e: Dataset, perturbed: Array) -> Array:
 
 def _share(expected: float, beyond: float) -> float:
     """(D9) over the plain sum of squares."""
-    return float((expected + STATE * np.log1p(beyond / STATE)) / (expected + beyond))
+    return float((expected + TUNING.state_size * np.log1p(beyond / TUNING.state_size)) / (expected + beyond))
 
 
 def _beyond(e: Dataset, squares: Array) -> tuple[float, float, NDArray[np.bool_]] | None:
@@ -167,7 +160,7 @@ def _beyond(e: Dataset, squares: Array) -> tuple[float, float, NDArray[np.bool_]
 
     None too of a recording that begins after it: nothing shows that it came to the impact as its run did.
     """
-    if len(e.signals) < ALONE or not any(s.weight is not None for s in e.signals) or not e.early.any():
+    if len(e.signals) < TUNING.least_channels or not any(s.weight is not None for s in e.signals) or not e.early.any():
         return None
     over, expected, inside = [], 0.0, np.zeros(squares.size, dtype=bool)
     for s, part in e.spans():
@@ -178,7 +171,7 @@ def _beyond(e: Dataset, squares: Array) -> tuple[float, float, NDArray[np.bool_]
         own = max(float(np.sum(e.due[part][later])), 1.0)
         over.append(float(np.sum(squares[part][later])) / own)
         expected += own
-    if len(over) < ALONE:
+    if len(over) < TUNING.least_channels:
         return None
     left = float(np.sum(squares[inside]))
     beyond = min(float(np.median(over)) * expected, left) - expected  # never more than there is
@@ -189,18 +182,18 @@ def gained(less: Array, slope: float) -> Array:
     """(D12): gains by sums of squares (m,) that fall by `less` where they count `slope` (D11); all where that is 1."""
     if slope == 1.0:
         return less
-    most = (1.0 - slope) * STATE  # all of x
+    most = (1.0 - slope) * TUNING.state_size  # all of x
     within = np.minimum(less, most)
-    return np.asarray(-STATE * np.log1p(-within / STATE) + (less - within) / slope)
+    return np.asarray(-TUNING.state_size * np.log1p(-within / TUNING.state_size) + (less - within) / slope)
 
 
 def is_other(found: HeavyTail | None) -> bool:
     """Whether a recording took a clearly other course than its run."""
-    return found is not None and found.share < OTHER
+    return found is not None and found.share < TUNING.other_course
 
 
 def too_many(others: int, of: int) -> float:
-    """p-value of so many recordings that took another course, where each may in `OFTEN` of all cases."""
+    """p-value of so many recordings that took another course, where each may in `other_course_rate` of all cases."""
     from scipy.special import bdtrc
 
-    return float(bdtrc(others - 1, of, OFTEN)) if others else 1.0
+    return float(bdtrc(others - 1, of, TUNING.other_course_rate)) if others else 1.0

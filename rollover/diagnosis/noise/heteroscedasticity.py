@@ -20,17 +20,11 @@ from numpy.typing import NDArray
 from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.forward.forward_model import first_impact_of
 from rollover.diagnosis.noise.autoregression import alike
+from rollover.diagnosis.settings import SETTINGS
 from rollover.recording.noise_floor import LENGTH, USUAL
 
 Array = NDArray[np.float64]
-BINS = 12
-FEWEST = 14  # samples of a bin
-TWICE = float(np.log(2.0))  # by how much the noise of the largest quarter must exceed that of the smallest
-SURELY = 4.0  # standard errors by which it must
-FAR = 8.0  # times the noise, that large values lie beyond small ones
-EVEN = 0.02  # of the sampling interval, by which stamps may stray
-SPREAD = 1.17 * 3.0**0.5  # standard error of ln s times sqrt(samples): of a median, of differences that overlap
-SMOOTHED = 9  # samples, over which the value is averaged
+TUNING = SETTINGS.noise.heteroscedasticity
 
 
 def with_variance_model(dataset: Sequence[Dataset]) -> list[Dataset]:
@@ -51,9 +45,9 @@ def _told(e: Dataset, s: Signal) -> tuple[Array, Array] | None:
     """Values (n,) of a signal and the size of its noise there; None of too few or unevenly spaced samples."""
     s = s.cut(e.recording.time[s.rows] < first_impact_of(e.simulator))
     stamps = np.diff(e.recording.time[s.rows])
-    if s.values.size < max(BINS * FEWEST, LENGTH) or s.scatter > 0.0:
+    if s.values.size < max(TUNING.bins * TUNING.least_samples, LENGTH) or s.scatter > 0.0:
         return None  # the steps of digits are no noise
-    if np.mean(np.abs(stamps - np.median(stamps)) > EVEN * np.median(stamps)) > EVEN:
+    if np.mean(np.abs(stamps - np.median(stamps)) > TUNING.even_tolerance * np.median(stamps)) > TUNING.even_tolerance:
         return None
     return s.values[2:-2], np.abs(np.diff(s.values, 4)) / np.sqrt(70.0)
 
@@ -61,7 +55,7 @@ def _told(e: Dataset, s: Signal) -> tuple[Array, Array] | None:
 def _sizes(told: Sequence[tuple[Array, Array]], by: Array) -> tuple[Array, Array, int]:
     """Median value and size in bins of equally many samples, sorted `by`; samples of one."""
     values, sizes = (np.concatenate(each) for each in zip(*told, strict=True))
-    parts = np.array_split(np.argsort(by, kind="stable"), BINS)
+    parts = np.array_split(np.argsort(by, kind="stable"), TUNING.bins)
     found = np.array([[np.median(values[p]), USUAL * np.median(sizes[p])] for p in parts])
     return found[:, 0], found[:, 1], parts[0].size
 
@@ -69,7 +63,7 @@ def _sizes(told: Sequence[tuple[Array, Array]], by: Array) -> tuple[Array, Array
 def _varies(values: Array, sizes: Array) -> bool:
     """Whether values (n,) are more than noise of `sizes` (n,): sorted by itself, noise seems to grow with its size."""
     low, high = np.quantile(np.abs(values), (0.125, 0.875))
-    return bool(high - low > FAR * USUAL * np.median(sizes))
+    return bool(high - low > TUNING.least_range * USUAL * np.median(sizes))
 
 
 def _grows(told: Sequence[tuple[Array, Array]]) -> bool:
@@ -81,8 +75,10 @@ def _grows(told: Sequence[tuple[Array, Array]]) -> bool:
             return False
         ratios.append(float(np.log(np.median(size[-3:]) / np.median(size[:3]))))
         weights.append(count)
-    error = SPREAD / np.sqrt(sum(weights))
-    return bool(np.median(ratios) > TWICE and np.average(ratios, weights=weights) > SURELY * error)
+    error = TUNING.level_error / np.sqrt(sum(weights))
+    return bool(
+        np.median(ratios) > TUNING.least_rise and np.average(ratios, weights=weights) > TUNING.least_errors * error
+    )
 
 
 def _law(told: Sequence[tuple[Array, Array]]) -> tuple[Array, float]:
@@ -95,6 +91,6 @@ def _law(told: Sequence[tuple[Array, Array]]) -> tuple[Array, float]:
 
 
 def _smoothed(values: Array) -> Array:
-    """Running mean (n,) of `SMOOTHED` samples, of fewer at the ends."""
-    kernel = np.ones(min(SMOOTHED, values.size))
+    """Running mean (n,) of `smoothing` samples, of fewer at the ends."""
+    kernel = np.ones(min(TUNING.smoothing, values.size))
     return np.asarray(np.convolve(values, kernel, "same") / np.convolve(np.ones(values.size), kernel, "same"))

@@ -20,16 +20,12 @@ from numpy.typing import NDArray
 from rollover.diagnosis.data.dataset import Dataset, Signal
 from rollover.diagnosis.noise.autoregression import level_of
 from rollover.diagnosis.noise.drift import along
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import spoken
 from rollover.spec.channels import describe
 
 Array = NDArray[np.float64]
-EARLY = 0.6  # of the time before the first contact that is looked at: clocks may be off
-LEAST, FEWEST = 8, 3  # samples of it; recordings, to tell what they have in common
-WAVES, SLOW = 3, 0.01  # cosines beyond the mean; p-value of these, below which a channel wanders
-FLAT = 0.5  # times the noise, that what is predicted there may change by
-CHANCE, SHARED = 1e-4, 0.01  # p-value of (Z1); of a mean that is no chance of zeros which differ so
-SHOWS = 1.5  # times its error, by which zeros differ that are worth a line
+TUNING = SETTINGS.noise.offsets
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,13 +45,18 @@ def with_zeros(dataset: Sequence[Dataset], residuals: Sequence[Array], shifts: S
     for r, (e, residual, shift) in enumerate(zip(dataset, residuals, shifts, strict=True)):
         for k, (s, part) in enumerate(e.spans()):
             before = _before(e, s, shift)
-            if before is not None and float(np.ptp((s.values - residual[part])[before])) < FLAT * s.sigma:
+            if (
+                before is not None
+                and float(np.ptp((s.values - residual[part])[before])) < TUNING.flat_prediction * s.sigma
+            ):
                 error = level_of(s.noise, s.ar) / np.sqrt(before.stop)
                 early = residual[part][before]
-                slow = float(np.sum(along(s, early, 1 + WAVES)[1:] ** 2)) if error > 0.0 else np.inf
+                slow = float(np.sum(along(s, early, 1 + TUNING.wave_terms)[1:] ** 2)) if error > 0.0 else np.inf
                 zero = Zero(r=r, k=k, off=float(early.mean()), error=float(error), slow=slow)
                 by.setdefault(s.channel, []).append(zero)
-    able = [zeros for zeros in by.values() if len(zeros) >= FEWEST and all(z.error > 0.0 for z in zeros)]
+    able = [
+        zeros for zeros in by.values() if len(zeros) >= TUNING.least_recordings and all(z.error > 0.0 for z in zeros)
+    ]
     found = [list(e.signals) for e in dataset]
     if _differ(able) and _stand(able):
         for z, off in ((z, off) for zeros in able for z, off in zip(zeros, _own(zeros), strict=True)):
@@ -74,7 +75,7 @@ def by_zeros(dataset: Sequence[Dataset]) -> list[str]:
         f"{channel}: its zero differs from recording to recording, by {spoken(spread[channel])} "
         f"{describe(channel).unit} (1 sigma); each was set by what it reads before the first contact"
         for channel, each in by.items()
-        if spread[channel] > SHOWS * float(np.mean([s.zero_error for s in each]))
+        if spread[channel] > TUNING.reported_ratio * float(np.mean([s.zero_error for s in each]))
     ]
 
 
@@ -83,7 +84,7 @@ def _stand(every: Sequence[Sequence[Zero]]) -> bool:
     from scipy.special import chdtrc
 
     slow = [z.slow for zeros in every for z in zeros]
-    return float(chdtrc(WAVES * len(slow), sum(slow))) > SLOW
+    return float(chdtrc(TUNING.wave_terms * len(slow), sum(slow))) > TUNING.slow_p_value
 
 
 def _differ(every: Sequence[Sequence[Zero]]) -> bool:
@@ -91,7 +92,7 @@ def _differ(every: Sequence[Sequence[Zero]]) -> bool:
     from scipy.special import chdtrc
 
     squares = sum(float(np.sum((apart / error) ** 2)) for apart, error in map(_off, every))
-    return bool(every) and float(chdtrc(sum(len(zeros) - 1 for zeros in every), squares)) < CHANCE
+    return bool(every) and float(chdtrc(sum(len(zeros) - 1 for zeros in every), squares)) < TUNING.differ_p_value
 
 
 def _own(zeros: Sequence[Zero]) -> list[float]:
@@ -100,7 +101,7 @@ def _own(zeros: Sequence[Zero]) -> list[float]:
 
     off, n = np.array([z.off for z in zeros]), len(zeros)
     chance = 2.0 * float(t.sf(abs(off.mean()) * np.sqrt(n) / max(float(off.std(ddof=1)), 1e-300), n - 1))
-    return [float(v) for v in (_off(zeros)[0] if chance < SHARED else off)]
+    return [float(v) for v in (_off(zeros)[0] if chance < TUNING.shared_p_value else off)]
 
 
 def _off(zeros: Sequence[Zero]) -> tuple[Array, Array]:
@@ -114,5 +115,5 @@ def _before(e: Dataset, s: Signal, shift: float) -> slice | None:
     time, contact = e.recording.time[s.rows], e.simulator.contact + shift
     if not np.isfinite(contact) or e.simulator.effort.is_ensemble:
         return None
-    n = int(np.searchsorted(time, time[0] + EARLY * (contact - time[0])))
-    return slice(n) if n >= LEAST else None
+    n = int(np.searchsorted(time, time[0] + TUNING.early_share * (contact - time[0])))
+    return slice(n) if n >= TUNING.least_samples else None

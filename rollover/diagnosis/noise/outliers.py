@@ -7,14 +7,11 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.settings import SETTINGS
 from rollover.recording.noise_floor import LENGTH, USUAL
 
 Array = NDArray[np.float64]
-ABOUT = 13  # samples, that a value is compared with the middle one of
-FAR = 5.0  # times the usual distance from it, beyond which a sample is in a burst
-LOUDER = 1.5  # times the noise beside bursts, from which on they are no noise
-FEWEST = 0.7  # of the samples, that lie beside the bursts
-RARE = 0.01  # of a channel's samples, that may lie far off by any noise
+TUNING = SETTINGS.noise.outliers
 
 
 def without_outliers(values: Array) -> Array:
@@ -26,11 +23,11 @@ def without_outliers(values: Array) -> Array:
 
     if values.size < LENGTH:
         return values
-    middle = median_filter(values, ABOUT, mode="nearest")
+    middle = median_filter(values, TUNING.median_width, mode="nearest")
     apart = np.abs(values - middle)
     usual = USUAL * float(np.median(apart))
-    far = apart > FAR * usual
-    return np.where(far, middle, values) if usual > 0.0 and far.mean() < 1.0 - FEWEST else values
+    far = apart > TUNING.outlier_distance * usual
+    return np.where(far, middle, values) if usual > 0.0 and far.mean() < 1.0 - TUNING.least_clean_share else values
 
 
 def too_often(channels: Iterable[Array]) -> float:
@@ -40,6 +37,6 @@ def too_often(channels: Iterable[Array]) -> float:
     found = []
     for w in channels:
         if w.size:
-            far = np.abs(w) > FAR * max(1.0, USUAL * float(np.median(np.abs(w))))
-            found.append(float(bdtrc(far.sum() - 1, w.size, RARE)))
+            far = np.abs(w) > TUNING.outlier_distance * max(1.0, USUAL * float(np.median(np.abs(w))))
+            found.append(float(bdtrc(far.sum() - 1, w.size, TUNING.outlier_rate)))
     return min([1.0, *(len(found) * p for p in found)])

@@ -11,22 +11,21 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.settings import SETTINGS
+
 Array = NDArray[np.float64]
-PADDED = 4
-BESIDE = 12  # places of a periodogram on either side, of the running median
-SLOWEST = 8.0  # periods in a recording, fewer are no line but a course
-FASTEST = 0.4  # times the rate
-CHANCE = 1e-6
-MOST = 3  # lines
-FEWEST = 64  # samples
-FINE = 17  # frequencies about the best
+TUNING = SETTINGS.noise.spectral_lines
 
 
 def lines(times: Sequence[Array], misfits: Sequence[Array]) -> tuple[float, ...]:
     """Frequencies (Hz) of lines in misfits (n_r,) at stamps (s), of one channel, the strongest first."""
-    use = [(t, w - w.mean()) for t, w in zip(times, misfits, strict=True) if w.size >= FEWEST and np.ptp(w) > 0.0]
+    use = [
+        (t, w - w.mean())
+        for t, w in zip(times, misfits, strict=True)
+        if w.size >= TUNING.least_samples and np.ptp(w) > 0.0
+    ]
     found: list[float] = []
-    while use and len(found) < MOST:
+    while use and len(found) < TUNING.most_lines:
         f = _strongest(use)
         if f is None:
             break
@@ -37,7 +36,7 @@ def lines(times: Sequence[Array], misfits: Sequence[Array]) -> tuple[float, ...]
 
 def without(t: Array, w: Array, frequencies: Sequence[float]) -> Array:
     """What is left of a misfit beside sines at these frequencies, by least squares."""
-    if not frequencies or w.size < FEWEST:
+    if not frequencies or w.size < TUNING.least_samples:
         return w
     return w - fitted(t, w, frequencies)
 
@@ -60,17 +59,17 @@ def _strongest(use: Sequence[tuple[Array, Array]]) -> float | None:
     from scipy.special import gammaincc
 
     spans = [float(t[-1] - t[0]) for t, _ in use]
-    low = SLOWEST / min(spans)
-    high = min(FASTEST * (t.size - 1) / span for (t, _), span in zip(use, spans, strict=True))
-    step = 1.0 / (PADDED * max(spans))
-    if high - low < 4.0 * BESIDE * step:
+    low = TUNING.least_periods / min(spans)
+    high = min(TUNING.highest_frequency * (t.size - 1) / span for (t, _), span in zip(use, spans, strict=True))
+    step = 1.0 / (TUNING.padding * max(spans))
+    if high - low < 4.0 * TUNING.median_half_width * step:
         return None
     at = np.arange(low, high, step)
     S = np.sum([_over_median(t, w, at) for t, w in use], axis=0)
     k = int(np.argmax(S))
-    if gammaincc(len(use), S[k]) * at.size / PADDED > CHANCE:
+    if gammaincc(len(use), S[k]) * at.size / TUNING.padding > TUNING.p_value:
         return None
-    near = at[k] + np.linspace(-1.0, 1.0, FINE) * step * 0.75
+    near = at[k] + np.linspace(-1.0, 1.0, TUNING.fine_count) * step * 0.75
     power = [sum(float(np.sum(fitted(t, w, (float(f),)) ** 2)) for t, w in use) for f in near]
     return float(near[int(np.argmax(power))])
 
@@ -81,7 +80,7 @@ def _over_median(t: Array, w: Array, at: Array) -> Array:
 
     n = t.size
     even = np.linspace(t[0], t[-1], n)
-    P = np.abs(np.fft.rfft(np.interp(even, t, w) * np.hanning(n), PADDED * n)) ** 2
-    usual = median_filter(P, 2 * PADDED * BESIDE + 1, mode="nearest") / np.log(2.0)
-    f = np.arange(P.size) / (PADDED * n * (even[1] - even[0]))
+    P = np.abs(np.fft.rfft(np.interp(even, t, w) * np.hanning(n), TUNING.padding * n)) ** 2
+    usual = median_filter(P, 2 * TUNING.padding * TUNING.median_half_width + 1, mode="nearest") / np.log(2.0)
+    f = np.arange(P.size) / (TUNING.padding * n * (even[1] - even[0]))
     return np.asarray(np.interp(at, f, P / np.maximum(usual, 1e-300)))

@@ -12,12 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.diagnosis.data.dataset import Dataset
+from rollover.diagnosis.settings import SETTINGS
 
-VALIDATED = 0.6  # s after the impact that are always kept
-SHORT = 0.1  # s that are not worth cutting off
-COUNTS = 0.3  # of what it would, on the average, from which on the end is kept
-BEYOND = 3.0  # times what noise and scatter leave, that the end is missed by and kept
-FEWEST = 8  # samples of a signal
+TUNING = SETTINGS.noise.truncation
 
 
 def shortened(e: Dataset, *, alone: bool = False) -> Dataset:
@@ -27,25 +24,25 @@ def shortened(e: Dataset, *, alone: bool = False) -> Dataset:
     that is `alone` nothing after the impact is kept: whether an effect or another course of the run did it, only a
     second one could tell.
     """
-    time, end = e.recording.time, e.first_impact + (0.0 if alone else VALIDATED)
-    if not time[-1] > end + SHORT:
+    time, end = e.recording.time, e.first_impact + (0.0 if alone else TUNING.kept_after_impact)
+    if not time[-1] > end + TUNING.least_cut:
         return e
     late = np.concatenate([time[s.rows] > end for s in e.signals])
-    if not alone and (float(np.mean(e.due[late])) > COUNTS or _differs(e, late)):
+    if not alone and (float(np.mean(e.due[late])) > TUNING.least_weight or _differs(e, late)):
         return e
     return up_to(e, end) or e
 
 
 def soon(e: Dataset) -> Dataset:
-    """The evidence up to `VALIDATED` after the impact, the simulation's and the recording's; itself if it is no longer.
+    """The evidence up to `kept_after_impact` after the simulation's impact and the recording's; itself if no longer.
 
     What happens later hangs on what happened until then. The recording's is when half of its channels have gone half of
     their range.
     """
     time = e.recording.time
     gone = [time[s.rows[np.argmax(2.0 * np.abs(s.values - s.values[0]) >= np.ptp(s.values))]] for s in e.signals]
-    end = max(e.first_impact, float(np.median(gone))) + VALIDATED
-    return (up_to(e, end) or e) if time[-1] > end + SHORT else e
+    end = max(e.first_impact, float(np.median(gone))) + TUNING.kept_after_impact
+    return (up_to(e, end) or e) if time[-1] > end + TUNING.least_cut else e
 
 
 def up_to(e: Dataset, end: float, beyond: float = 0.0) -> Dataset | None:
@@ -55,7 +52,7 @@ def up_to(e: Dataset, end: float, beyond: float = 0.0) -> Dataset | None:
     """
     time = e.recording.time
     kept = [time[s.rows] <= end for s in e.signals]
-    if any(inside.sum() < FEWEST for inside in kept):
+    if any(inside.sum() < TUNING.least_samples for inside in kept):
         return None
     n = int(np.searchsorted(time, end + beyond, side="right"))
     return replace(e.cut(kept), recording=e.recording.until(n), simulator=e.simulator.until(n))
@@ -67,7 +64,7 @@ def _differs(e: Dataset, late: NDArray[np.bool_]) -> bool:
     if predicted is None:
         return False
     missed = (e.measured() - e.stacked(predicted))[late]
-    return float(missed @ missed) > BEYOND * e.by_chance(late)
+    return float(missed @ missed) > TUNING.least_misfit * e.by_chance(late)
 
 
 def left_aside(every: Sequence[Dataset], found: Sequence[Dataset]) -> list[str]:

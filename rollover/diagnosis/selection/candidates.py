@@ -13,14 +13,14 @@ from ground.law import REFERENCE_AREA, REFERENCE_MASS
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.parameterisation import Candidate, coordinate, physical
 from rollover.diagnosis.forward.forward_model import set_up
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS, Heard, Search, effects
 from rollover.scenario import Scenario
 from rollover.spec.document import value_at
 from rollover.spec.vehicle import Striker
 
 Array = NDArray[np.float64]
-TURNED = 0.8  # correlation with what is simulated, the other way round, from which on a channel is turned round
-FAINT = 20.0  # times weaker than an effect usually is, and still looked for
+TUNING = SETTINGS.selection.candidates
 
 
 def size_of(scenario: Scenario) -> tuple[float, float]:
@@ -135,7 +135,7 @@ def _sized(search: Search, powers: tuple[float, float] | None, size: tuple[float
 
 def _widened(search: Search, null: float | None) -> Search:
     """The range with strengths that only a low noise shows."""
-    return search._replace(low=search.low / FAINT) if search.scale == "log" and null == 0.0 else search
+    return search._replace(low=search.low / TUNING.faintest) if search.scale == "log" and null == 0.0 else search
 
 
 def _times(dataset: Sequence[Dataset]) -> dict[str, float]:
@@ -150,6 +150,8 @@ def _times(dataset: Sequence[Dataset]) -> dict[str, float]:
             made = predicted[s.channel][s.rows] if s.channel in predicted else np.zeros(1)
             simulated = float(np.ptp(made))
             if simulated > 0.0 and math.isfinite(simulated):
-                turned = float(s.values @ made) < -TURNED * float(np.linalg.norm(s.values) * np.linalg.norm(made))
+                turned = float(s.values @ made) < -TUNING.reversed_correlation * float(
+                    np.linalg.norm(s.values) * np.linalg.norm(made)
+                )
                 found.setdefault(s.channel, []).append((-1.0 if turned else 1.0) * float(np.ptp(s.values)) / simulated)
     return {channel: float(np.median(each)) for channel, each in found.items()}

@@ -13,25 +13,21 @@ from rollover.diagnosis.fit.linearisation import at_an_end, turned
 from rollover.diagnosis.fit.local_search import but_one, left_at, without
 from rollover.diagnosis.fit.parameterisation import Candidate, each_with_own, is_one_sensor
 from rollover.diagnosis.fit.step import Groups, Phases, Step
-from rollover.diagnosis.inference.adequacy import NEGLIGIBLE, is_enough, is_tolerated, matters
-from rollover.diagnosis.inference.lack_of_fit import SURE, Mismatch, mismatch_of
+from rollover.diagnosis.inference.adequacy import is_enough, is_tolerated, matters
+from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
 from rollover.diagnosis.result import Verdict
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.ensemble_validation import F_THRESHOLD, significant_by_wald, unforgiven
-from rollover.diagnosis.selection.flexibility import MOST, is_a_curve, is_one_line, is_over_flexible, is_pliant
-from rollover.diagnosis.selection.forward_step import NEARLY_NOISE, moves
+from rollover.diagnosis.selection.ensemble_validation import significant_by_wald, unforgiven
+from rollover.diagnosis.selection.flexibility import is_a_curve, is_one_line, is_over_flexible, is_pliant
+from rollover.diagnosis.selection.forward_step import moves
 from rollover.diagnosis.selection.pairs import best_subsets, swapped
 from rollover.diagnosis.selection.score_test import ScoreTest
-from rollover.diagnosis.selection.simplification import MANY, followed, mirrored
+from rollover.diagnosis.selection.simplification import followed, mirrored
 from rollover.diagnosis.selection.stepwise import as_conditioned, one_by_one
 from rollover.diagnosis.selection.truncated_start import down_first
+from rollover.diagnosis.settings import SETTINGS
 
-SCATTERED = 0.05  # share of all errors that the look at candidates may make where runs scatter
-CERTAIN = 1.0 - 1e-12  # largest p-value whose logarithm is taken
-PARTLY = 0.005  # of the excess over the noise that one effect may leave, were it structured, and still be named
-LITTLE = 0.1  # of the excess over the noise, that effects must take which leave far more than noise
-AGAIN = 1  # times that one of as many effects as may be is given for a better one, beyond which any would do
-HARDLY_MORE = 1.2  # times a tolerance, that an explanation leaves of held-out recordings
+TUNING = SETTINGS.selection.decision
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,9 +64,9 @@ class Explanation:
         """
         if self.refuted:
             return self.before.p_value
-        share = SCATTERED if any(b.expected is not None for b in self.base.blocks) else 0.5
+        share = TUNING.look_share if any(b.expected is not None for b in self.base.blocks) else 0.5
         tests = ((self.before.p_value, 1.0 - share), (self.looked.p_value(), share))
-        return float(min(-np.expm1(np.log1p(-min(p, CERTAIN)) / a) for p, a in tests))
+        return float(min(-np.expm1(np.log1p(-min(p, TUNING.largest_p_value)) / a) for p, a in tests))
 
 
 def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
@@ -82,7 +78,9 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     found = down_first(inquiry, one_by_one(inquiry, base))
     base, taken, left, current = found.base, list(found.steps), found.left, found.fitted
     is_whole = is_enough(problem, current, left)
-    is_open = not (problem.effort.is_ensemble or found.paired) and (not is_whole or len(taken) == MOST)
+    is_open = not (problem.effort.is_ensemble or found.paired) and (
+        not is_whole or len(taken) == SETTINGS.selection.flexibility.most_effects
+    )
     if found.first is not None and is_open:
         # two that leave what chance leaves are preferred to three that do
         both = best_subsets(inquiry, taken or [found.first], found.at_first, current, is_whole=is_whole)
@@ -115,11 +113,18 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
 
 def is_open_to_be_named(problem: Problem, fitted: Fitted, left: Mismatch) -> bool:
     """Whether several effects may be named: as many as may be leave no more than `decided` asks, or one is needless."""
-    if problem.effort.is_ensemble or len(fitted.candidates) < MOST or left.p_value > MANY:
+    if (
+        problem.effort.is_ensemble
+        or len(fitted.candidates) < SETTINGS.selection.flexibility.most_effects
+        or left.p_value > SETTINGS.selection.simplification.full_p_value
+    ):
         return True
     if not matters(problem, fitted, left) or is_tolerated(problem, fitted):
         return True
-    return len(backward_elimination(problem, problem.again(fitted)).candidates) < MOST
+    return (
+        len(backward_elimination(problem, problem.again(fitted)).candidates)
+        < SETTINGS.selection.flexibility.most_effects
+    )
 
 
 def _ended(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
@@ -175,9 +180,12 @@ def _retained(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
         if found is None:
             return _one_each(inquiry, taken)
         current = backward_elimination(problem, found.fitted)
-        if found.fitted.candidates[-1].key != taken_out and exchanged < MOST:
+        if found.fitted.candidates[-1].key != taken_out and exchanged < SETTINGS.selection.flexibility.most_effects:
             parts, exchanged = [], exchanged + 1  # those before were looked for beside what is no more
-            if exchanged > AGAIN and len(current.candidates) == MOST:
+            if (
+                exchanged > TUNING.most_exchanges
+                and len(current.candidates) == SETTINGS.selection.flexibility.most_effects
+            ):
                 return None
         parts = [*parts, found] if len(current.candidates) == len(found.fitted.candidates) else []
     return [s.again(problem) for s in parts]
@@ -204,7 +212,7 @@ def backward_elimination(problem: Problem, fitted: Fitted, base: Fitted | None =
             losses.append((rest.left - fitted.left if rest is not None else np.inf, k, rest))
         loss, _, rest = min(losses, key=lambda one: one[0])
         dispersion = max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks))
-        if rest is None or loss / dispersion > F_THRESHOLD:
+        if rest is None or loss / dispersion > SETTINGS.selection.ensemble_validation.least_gain:
             break
         fitted = problem.again(rest) if problem.effort.is_ensemble else rest
     return fitted
@@ -231,16 +239,24 @@ def decided(problem: Problem, found: Explanation, groups: Groups, phases: Phases
     held, is_curved = found.fitted.candidates, is_a_curve(problem, found.fitted)
     if not found.settled or is_over_flexible(held) or (is_curved and is_one_line(held)):
         return found.refused(), "unexplained"
-    is_bending = len(found.parts) == MOST or is_one_sensor(held) or is_pliant(held)
-    is_whole = found.after.p_value > (MANY if is_bending else SURE)
+    is_bending = (
+        len(found.parts) == SETTINGS.selection.flexibility.most_effects or is_one_sensor(held) or is_pliant(held)
+    )
+    is_whole = found.after.p_value > (
+        SETTINGS.selection.simplification.full_p_value if is_bending else SETTINGS.inference.lack_of_fit.p_value
+    )
     if is_bending and not problem.effort.is_ensemble:
         # what is bent to a curve nearly everywhere leaves what it cannot be bent to in one place
-        is_whole = is_whole and min(found.after.adjusted, default=1.0) > SURE
+        is_whole = is_whole and min(found.after.adjusted, default=1.0) > SETTINGS.inference.lack_of_fit.p_value
     is_whole = is_whole or not matters(problem, found.fitted, found.after)
     start, ahead = held_out(found.base, groups).total, held_out(found.fitted, groups).total
-    is_whole = is_whole and not (ahead > NEARLY_NOISE and takes_little(found, groups)) and not is_curved
+    is_whole = (
+        is_whole
+        and not (ahead > SETTINGS.selection.forward_step.nearly_noise and takes_little(found, groups))
+        and not is_curved
+    )
     # what a tolerance allows has structure too
-    is_whole = is_whole or (is_tolerated(problem, found.fitted) and ahead < HARDLY_MORE)
+    is_whole = is_whole or (is_tolerated(problem, found.fitted) and ahead < TUNING.held_out_ratio)
     if found.parts and is_whole and ahead < start:
         return found, kind_of(strongest(problem, found.base, found.fitted))
     if found.first is not None and found.parts:
@@ -248,16 +264,21 @@ def decided(problem: Problem, found: Explanation, groups: Groups, phases: Phases
         end = held_out(one.fitted, groups).total
         inside = not any(at_an_end(v) for v in one.fitted.x)
         after = mismatch_of(problem.dataset, one.fitted.blocks, phases)
-        is_nearly_all = end**2 - 1.0 < PARTLY * (start**2 - 1.0) and after.structure <= PARTLY * found.before.structure
+        is_nearly_all = (
+            end**2 - 1.0 < TUNING.left_structure * (start**2 - 1.0)
+            and after.structure <= TUNING.left_structure * found.before.structure
+        )
         if is_nearly_all and inside:
             return replace(found, parts=(one,), fitted=one.fitted, after=after), kind_of(one.fitted.candidates[-1])
-    significant = found.before.p_value < SURE and matters(problem, found.base, found.before)
+    significant = found.before.p_value < SETTINGS.inference.lack_of_fit.p_value and matters(
+        problem, found.base, found.before
+    )
     significant = significant and not is_tolerated(problem, found.base) and not is_slight(problem, found.first, phases)
     verdict: Verdict = "unexplained" if significant or found.parts else "no-mismatch"
     return found.refused(), verdict
 
 
-def takes_little(found: Explanation, groups: Groups, share: float = LITTLE) -> bool:
+def takes_little(found: Explanation, groups: Groups, share: float = TUNING.little_share) -> bool:
     """Whether an explanation takes less than a share of what was beyond the noise in held-out recordings."""
     start, ahead = held_out(found.base, groups).total, held_out(found.fitted, groups).total
     return start**2 - ahead**2 < share * (start**2 - 1.0)
@@ -282,7 +303,10 @@ def done_by_others(problem: Problem, found: Explanation, ids: Collection[str]) -
             for place in other.with_secondary(x) if other.shapes else ():
                 way = [*others[:j], (other.whole(), place), *others[j + 1 :]]
                 fits.append(problem.fit([o for o, _ in way], [v for _, at in way for v in at], shifts=shifts))
-        if min((f.left for f in fits if f is not None), default=np.inf) - fitted.left < F_THRESHOLD * dispersion:
+        if (
+            min((f.left for f in fits if f is not None), default=np.inf) - fitted.left
+            < SETTINGS.selection.ensemble_validation.least_gain * dispersion
+        ):
             done.add(c.id)
     return done
 
@@ -325,6 +349,6 @@ def strongest(problem: Problem, base: Fitted, fitted: Fitted) -> Candidate:
 
 def is_slight(problem: Problem, first: Step | None, phases: Phases) -> bool:
     """Whether all that separates simulation and recordings is the work of an effect that moves nothing worth a name."""
-    if first is None or moves(problem, first.base, first.fitted) >= NEGLIGIBLE:
+    if first is None or moves(problem, first.base, first.fitted) >= SETTINGS.inference.adequacy.negligible:
         return False
-    return mismatch_of(problem.dataset, first.fitted.blocks, phases).p_value > SURE
+    return mismatch_of(problem.dataset, first.fitted.blocks, phases).p_value > SETTINGS.inference.lack_of_fit.p_value

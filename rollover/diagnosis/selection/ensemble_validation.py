@@ -15,19 +15,15 @@ from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate, physical, same_family
 from rollover.diagnosis.fit.step import Groups, Step
 from rollover.diagnosis.inference.intervals import intervals
-from rollover.diagnosis.noise.ensemble import SENT, is_other, too_many
+from rollover.diagnosis.noise.ensemble import is_other, too_many
 from rollover.diagnosis.result import Interval
 from rollover.diagnosis.selection.score_test import ScoreTest, p_value
 from rollover.diagnosis.selection.screening import begun
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS
 
 Array = NDArray[np.float64]
-SPOKEN = 0.05  # p-value of a candidate's own score, beyond which its fit to runs that scatter is one to chance
-RIVAL = 0.5  # of the best's gain, by the mean of its runs, that a rival must have
-# times an interval by slopes, beyond which no run is needed to tell a strength from none, and the effect is needed
-SURELY, INDEED = 4.0, 10.0
-F_THRESHOLD = 25.0  # gain, over what is left per sample, that an effect must bring beside all the others
-SHARED = 9.0  # of that, what all recordings but one must bring together
+TUNING = SETTINGS.selection.ensemble_validation
 
 
 def begun_anew(problem: Problem, base: Fitted) -> Fitted:
@@ -57,7 +53,10 @@ def astray(problem: Problem, fitted: Fitted) -> Fitted:
     """
     problem.heavy_tailed = True
     found = problem.again(fitted)
-    if too_many(sum(is_other(b.heavy_tail) for b in found.blocks), len(found.blocks)) > SENT:
+    if (
+        too_many(sum(is_other(b.heavy_tail) for b in found.blocks), len(found.blocks))
+        > SETTINGS.noise.ensemble.other_course_p_value
+    ):
         return found
     problem.heavy_tailed = False
     return problem.again(fitted)
@@ -73,7 +72,7 @@ def unforgiven(problem: Problem, base: Fitted) -> Fitted:
     return found
 
 
-def backed(found: Step, looked: ScoreTest, spoken: float = SPOKEN) -> Step:
+def backed(found: Step, looked: ScoreTest, spoken: float = TUNING.own_p_value) -> Step:
     """A step without rivals that nothing spoke for when looked at, by a p-value: their runs met them by chance.
 
     What speaks for one that acts somewhere speaks for its kin; for a strong one its runs did.
@@ -95,9 +94,9 @@ def ensemble_validated(problem: Problem, found: Step, groups: Groups) -> Step | 
         id(f): max(a - b for a, b in zip(start, left_of_means(problem, f), strict=True)) for f in found.rivals
     }  # what shows before the impact need not outweigh what chance does after it
     best = max(gains.values(), default=0.0)
-    near = [f for f in found.rivals if gains[id(f)] > RIVAL * best]
+    near = [f for f in found.rivals if gains[id(f)] > TUNING.rival_share * best]
     for rival in sorted(near, key=lambda f: -gains[id(f)]):
-        if gains[id(rival)] < F_THRESHOLD:
+        if gains[id(rival)] < TUNING.least_gain:
             return None
         one = settled(problem, replace(found, fitted=rival, rivals=tuple(near)))
         ahead = replace(one, rivals=()).cross_validated(problem, groups)
@@ -145,13 +144,15 @@ def is_there(problem: Problem, fitted: Fitted) -> bool:
         return False  # runs only widen it
     first, values = len(fitted.x) - len(last.search), last.values(fitted.x[-len(last.search) :])
     sides = {first + k: (-1.0 if values[n] > nulls[n] else 1.0,) for k, n in enumerate(last.search) if n in nulls}
-    return _is_apart(by_slopes, nulls, SURELY) or _is_apart(intervals(problem, fitted, sides)[-1], nulls, 1.0)
+    return _is_apart(by_slopes, nulls, TUNING.sure_width) or _is_apart(
+        intervals(problem, fitted, sides)[-1], nulls, 1.0
+    )
 
 
 def significant_by_wald(problem: Problem, fitted: Fitted) -> set[int]:
     """Places of the effects that no run is needed to tell that something would be missing without: by slopes alone."""
     each = zip(map(_nulls, fitted.candidates), intervals(problem, fitted, {}), strict=True)
-    return {k for k, (nulls, by_slopes) in enumerate(each) if _is_apart(by_slopes, nulls, INDEED)}
+    return {k for k, (nulls, by_slopes) in enumerate(each) if _is_apart(by_slopes, nulls, TUNING.needed_width)}
 
 
 def _nulls(c: Candidate) -> dict[str, float]:
@@ -170,7 +171,7 @@ def _is_apart(found: Mapping[str, Interval], nulls: Mapping[str, float], times: 
 
 def is_validated(found: Step, groups: Groups) -> bool:
     """Whether an effect predicts what was held out better by more than chance, under the scatter of its own runs."""
-    return bool(_gains(found, groups).sum() > F_THRESHOLD)
+    return bool(_gains(found, groups).sum() > TUNING.least_gain)
 
 
 def is_shared(found: Step, groups: Groups) -> bool:
@@ -179,7 +180,7 @@ def is_shared(found: Step, groups: Groups) -> bool:
     Of a single recording nobody can tell.
     """
     gains = _gains(found, groups)
-    return gains.size == 1 or bool(gains.sum() - gains.max() > SHARED)
+    return gains.size == 1 or bool(gains.sum() - gains.max() > TUNING.shared_gain)
 
 
 def _gains(found: Step, groups: Groups) -> Array:

@@ -10,18 +10,22 @@ from numpy.typing import NDArray
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.linearisation import without_shift
 from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
 LINES = ("sensor-gain", "sensor-scale", "sensor-bias")
 BACK = ("soil-elastic-rebound", "soil-adhesion")  # effects of the soil that act on the way back alone
-MOST = 3  # effects in one explanation
-BENT = 16.0  # gain of a curve or a drift beside a line, of four standard errors
+TUNING = SETTINGS.selection.flexibility
 
 
 def is_a_curve(problem: Problem, fitted: Fitted) -> bool:
     """Whether effects that make a straight line of a channel leave a curve of it, or one that drifts."""
     channels = {str(c.channel) for c in fitted.candidates if c.id in LINES}
-    return any(bow(problem, fitted, channel, term) > BENT for channel in sorted(channels) for term in (square, drift))
+    return any(
+        bow(problem, fitted, channel, term) > TUNING.curve_gain
+        for channel in sorted(channels)
+        for term in (square, drift)
+    )
 
 
 def is_one_line(candidates: Sequence[Candidate]) -> bool:
@@ -74,7 +78,7 @@ def is_over_flexible(candidates: Sequence[Candidate]) -> bool:
     """
     subjects = [c.channel or _subject(c) for c in candidates]
     bent = [s for s, c in zip(subjects, candidates, strict=True) if c.is_bent]
-    return (len(candidates) == MOST and len(set(subjects)) == 1) or len(set(bent)) < len(bent)
+    return (len(candidates) == TUNING.most_effects and len(set(subjects)) == 1) or len(set(bent)) < len(bent)
 
 
 def _subject(c: Candidate) -> str:

@@ -10,31 +10,21 @@ from numpy.typing import NDArray
 
 from rollover.diagnosis.fit.cross_validation import held_out, refitted, worse
 from rollover.diagnosis.fit.jobs import Task
-from rollover.diagnosis.fit.levenberg_marquardt import NOISE_LEFT, Fitted, Problem, ResidualBlock
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
 from rollover.diagnosis.fit.linearisation import at_an_end
 from rollover.diagnosis.fit.local_search import shifts_told
 from rollover.diagnosis.fit.step import Groups, Phases, Screened, Step
-from rollover.diagnosis.forward.budget import Effort
-from rollover.diagnosis.inference.lack_of_fit import SURE, mismatch_of
+from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.restarts import begun_otherwise, from_there, one_each, shaped_too, timed_too
 from rollover.diagnosis.selection.score_test import ScoreTest, p_value
-from rollover.diagnosis.selection.screening import ELSEWHERE, begun, is_far, of_same_family, promising, screen, spread
+from rollover.diagnosis.selection.screening import begun, is_far, of_same_family, promising, screen, spread
+from rollover.diagnosis.settings import SETTINGS
+from rollover.diagnosis.settings.forward import Effort
 
 Array = NDArray[np.float64]
-WITHIN = 6.0  # times what the best leaves, up to which a first fit is followed up
-RIVALS = 0.4  # of the best's gain: a first fit that gains less is no rival, where fits cost much
-HOPEFUL = 0.05  # of the best score, below which none is fitted where fits cost much
-CROOKED = 100.0  # times what the best leaves, up to which a fit of two parameters is polished
-ROUGHNESS = 0.002  # of the misfit
-WITHIN_ONE = 1.0  # standard errors within which the simpler one is preferred
-APART = 2.0  # standard errors beyond which a rival is excluded
-ALIKE = 0.3  # of the summed misfit, which fits end short of: two no further apart are one and the same
-SOON, PART = 4, 0.5  # rounds, by which a fit begun anew must gain a part of what the best gains
-NEARLY_NOISE = 1.3  # misfit over the noise up to which its own colour is believed
-
-LIKE_NOISE = 2.2  # misfit over the noise up to which it may be noise that was underrated
+TUNING = SETTINGS.selection.forward_step
 
 
 def step(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> Step | None:
@@ -67,9 +57,13 @@ def step(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> Step | None:
     if not problem.effort.is_ensemble:
         fits = begun_otherwise(inquiry, base, fits, looked, shifts)
     # where a threshold makes the way crooked, the nearer ones are followed to the end; of what explains the best alone
-    able = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < CROOKED * fits[0].left]
+    able = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < TUNING.polished_misfit * fits[0].left]
     alone = [f for f in able[:1] if f is fits[0] and not base.candidates]
-    near = able[: problem.effort.polishes] if fits[0].left > NOISE_LEFT**2 * count else alone
+    near = (
+        able[: problem.effort.polishes]
+        if fits[0].left > SETTINGS.fit.levenberg_marquardt.noise_left**2 * count
+        else alone
+    )
     if near and problem.effort.polishes:
         polished = inquiry.fits([from_there(f, "polish") for f in near])
         others = [f for f in fits if not any(f is one for one in near)]
@@ -119,9 +113,11 @@ def _from_base(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: S
     for f in fits:
         if f.left > base.left:
             begin = looked.starts.get(f.candidates[-1].key, (f.own,))[0]
-            tasks.append(Task(candidates=f.candidates, start=(*base.x, *begin), shifts=shifts, rounds=SOON))
+            tasks.append(
+                Task(candidates=f.candidates, start=(*base.x, *begin), shifts=shifts, rounds=TUNING.short_rounds)
+            )
     short = [f for f in inquiry.fits(tasks) if f is not None]
-    able = [f for f in short if base.left - f.total > PART * (base.left - least)]
+    able = [f for f in short if base.left - f.total > TUNING.short_share * (base.left - least)]
     ended = [f for f in inquiry.fits([from_there(f, "fit") for f in able]) if f is not None]
     return ended + [inquiry.problem.again(f) for f in short if not any(f is one for one in able)]
 
@@ -129,13 +125,16 @@ def _from_base(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted], looked: S
 def reweighted(problem: Problem, fitted: Fitted, phases: Phases) -> bool:
     """Weigh the recordings by all that a fit leaves, if that is noise: as little as seen, or more without structure."""
     left, count = fitted.left, sum(b.residual.size for b in fitted.blocks)
-    if left > LIKE_NOISE**2 * count:
+    if left > TUNING.like_noise**2 * count:
         return False
     before = problem.dataset
     problem.with_noise_model(autoregression.whole(before, problem.residuals(fitted)))
-    if left < NEARLY_NOISE**2 * count:
+    if left < TUNING.nearly_noise**2 * count:
         return True
-    if mismatch_of(problem.dataset, problem.again(fitted).blocks, phases).p_value > SURE:
+    if (
+        mismatch_of(problem.dataset, problem.again(fitted).blocks, phases).p_value
+        > SETTINGS.inference.lack_of_fit.p_value
+    ):
         return True
     problem.with_noise_model(before)
     return False
@@ -171,7 +170,9 @@ def _first_fits(
         key, size = one.candidates[-1].key, sum(b.residual.size for b in one.blocks)
         told[key] = min(told.get(key, np.inf), float(np.sqrt(one.left / size)))
     fits.sort(key=lambda f: f.left)
-    worth = [f for k, f in enumerate(fits) if k < problem.effort.leaders or f.left < WITHIN * fits[0].left]
+    worth = [
+        f for k, f in enumerate(fits) if k < problem.effort.leaders or f.left < TUNING.followed_misfit * fits[0].left
+    ]
     if problem.effort.is_ensemble and fits:
         worth = one_each(worth) + _elsewhere(worth)
         before = [problem.block(r, base.candidates, base.x, shifts[r], 0.0) for r in few]  # clocks where they are held
@@ -180,7 +181,8 @@ def _first_fits(
         worth = [
             f
             for f in worth
-            if as_it_is - f.left >= RIVALS * (as_it_is - fits[0].left) or f.candidates[-1].key == looked.best
+            if as_it_is - f.left >= TUNING.rival_share * (as_it_is - fits[0].left)
+            or f.candidates[-1].key == looked.best
         ]
     worth = worth[: problem.effort.most_leaders]
     # a first fit may lead astray what scored most
@@ -225,7 +227,7 @@ def _chosen(screened: Sequence[Screened], effort: Effort, looked: ScoreTest) -> 
 
     able = []
     for own in (moving, reading):
-        least = HOPEFUL * max(map(score, own), default=0.0)
+        least = TUNING.least_score * max(map(score, own), default=0.0)
         begun_well = [s for s in by_start if s in own]
         able += [
             s for s in (*begun_well, *own[: effort.promising]) if score(s) >= least or s.candidate.key in looked.leading
@@ -237,7 +239,11 @@ def _elsewhere(fits: Sequence[Fitted]) -> list[Fitted]:
     """Of the candidate that leads, best first, the best fit that came to another place."""
     lead = fits[0]
     same = [f for f in fits[1:] if f.candidates[-1].key == lead.candidates[-1].key]
-    return [f for f in same if max(abs(a - b) for a, b in zip(f.x, lead.x, strict=True)) > 0.5 * ELSEWHERE][:1]
+    return [
+        f
+        for f in same
+        if max(abs(a - b) for a, b in zip(f.x, lead.x, strict=True)) > 0.5 * SETTINGS.selection.screening.start_distance
+    ][:1]
 
 
 def moves(problem: Problem, base: Fitted, fitted: Fitted) -> float:
@@ -281,11 +287,11 @@ def simplest(fits: Sequence[Fitted], groups: Groups, shared: float) -> list[Fitt
     near = [
         f
         for f in fits
-        if worse(f, fits[0], groups, shared)[0] < WITHIN_ONE
-        or held_out(f, groups).left.sum() < (1.0 + ROUGHNESS) * least
+        if worse(f, fits[0], groups, shared)[0] < TUNING.simpler_errors
+        or held_out(f, groups).left.sum() < (1.0 + TUNING.roughness) * least
     ]
     first = min(near, key=lambda f: len(f.x))
-    twins = [f for f in near if len(f.x) == len(first.x) and abs(f.left - first.left) < ALIKE]
+    twins = [f for f in near if len(f.x) == len(first.x) and abs(f.left - first.left) < TUNING.same_misfit]
     first = min(twins, key=lambda f: f.candidates[-1].strength(f.own))
     return [first, *(f for f in fits if f is not first)]
 
@@ -301,11 +307,13 @@ def confusion(step_: Step, groups: Groups, shared: float = 1.0) -> list[Fitted]:
     found = [best]
     for rival in step_.rivals:
         explains = base.left - rival.left > 0.5 * (base.left - best.left)
-        as_well = len(rival.x) <= len(best.x) and rival.left < best.left + APART**2
-        becomes_best = len(rival.x) > len(best.x) and rival.left > best.left - APART**2 and is_at_an_end(rival)
+        as_well = len(rival.x) <= len(best.x) and rival.left < best.left + TUNING.excluded_errors**2
+        becomes_best = (
+            len(rival.x) > len(best.x) and rival.left > best.left - TUNING.excluded_errors**2 and is_at_an_end(rival)
+        )
         if rival is best or becomes_best or not explains:
             continue
-        if as_well or min(worse(rival, best, groups, shared)) < APART:
+        if as_well or min(worse(rival, best, groups, shared)) < TUNING.excluded_errors:
             found.append(rival)
     return found
 

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.settings import SETTINGS
+
 Array = NDArray[np.float64]
-ALIKE = 1e-3  # of the sine squared between two directions, below which they are one and the same
-MOST = 40  # pairs that are told of
+TUNING = SETTINGS.selection.pair_score
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +32,7 @@ def jointly(along: Array, cosines: Array, owners: Sequence[str]) -> list[Both]:
     """
     z, c = along, np.clip(cosines, -1.0, 1.0)
     rest = 1.0 - c**2
-    able = rest > ALIKE
+    able = rest > TUNING.same_direction
     rest = np.where(able, rest, 1.0)
     gains = np.where(able, (z[:, None] ** 2 + z[None, :] ** 2 - 2.0 * c * np.outer(z, z)) / rest, 0.0)
     best: dict[frozenset[str], Both] = {}
@@ -42,6 +43,6 @@ def jointly(along: Array, cosines: Array, owners: Sequence[str]) -> list[Both]:
         if len(pair) == 2 and pair not in best:
             far = ((z[i] - c[i, j] * z[j]) / rest[i, j], (z[j] - c[i, j] * z[i]) / rest[i, j])
             best[pair] = Both(places=(i, j), gain=float(gains[i, j]), along=(float(far[0]), float(far[1])))
-            if len(best) == MOST:
+            if len(best) == TUNING.most_pairs:
                 break
     return list(best.values())

@@ -10,29 +10,23 @@ from functools import partial
 from rollover.diagnosis.fit.jobs import Task
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.linearisation import turned
-from rollover.diagnosis.fit.local_search import BEHIND, few_of, shifts_told, without
+from rollover.diagnosis.fit.local_search import few_of, shifts_told, without
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.fit.threshold_scan import has_threshold, placed_beside, stretches
 from rollover.diagnosis.inference.adequacy import is_enough
-from rollover.diagnosis.inference.lack_of_fit import SURE, Mismatch, mismatch_of
+from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.ensemble_validation import F_THRESHOLD
 from rollover.diagnosis.selection.flexibility import is_over_flexible
-from rollover.diagnosis.selection.forward_step import NEARLY_NOISE, reweighted, step
+from rollover.diagnosis.selection.forward_step import reweighted, step
 from rollover.diagnosis.selection.restarts import from_there, shaped_too
 from rollover.diagnosis.selection.scan import look
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.screening import is_far
 from rollover.diagnosis.selection.simplification import followed, mirror_images, simpler, unbent
+from rollover.diagnosis.settings import SETTINGS
 
-LEADING, FOLLOWING = 4, 4  # of the first effects, and of later ones each, that are tried two by two
-SCORED = 16  # so many more, by what they scored at first
-ROUNDS = ((2, 40), (2, 14), (6, 6))  # of a short fit to few recordings, and how many of these are gone on with
-PLACED, PLACES = 1.5, 2  # times what the best of them leaves, up to which so many are tried with their places elsewhere
-LITTLE = 0.1  # of what the best effect alone leaves beyond the noise, that a pair must take to be gone on with
-BETTER = 0.5  # of what is left beyond the noise, that another explanation may leave
-ALIKE = 2.0  # times what the best of them leaves, up to which the shape of what rings may make another the best
+TUNING = SETTINGS.selection.pairs
 
 Start = tuple[tuple[Candidate, ...], tuple[float, ...]]  # two effects, and where a fit of them begins
 
@@ -57,12 +51,14 @@ def best_subsets(
         other = swapped(inquiry, ringing)
         if other is not None and other.fitted.left < found.fitted.left:
             found, left = followed(inquiry, other)
-    if is_whole and costs(problem, found.fitted, current) > F_THRESHOLD:
+    if is_whole and costs(problem, found.fitted, current) > SETTINGS.selection.ensemble_validation.least_gain:
         return None  # noise that such a pair tells of would hold the third effect
     if not is_enough(problem, found.fitted, left) and reweighted(problem, found.fitted, inquiry.phases):
         found = found.again(problem)
         left = mismatch_of(problem.dataset, found.fitted.blocks, inquiry.phases)
-    if not (left.p_value > SURE if is_whole else is_better(found.fitted, left, current)):
+    if not (
+        left.p_value > SETTINGS.inference.lack_of_fit.p_value if is_whole else is_better(found.fitted, left, current)
+    ):
         problem.with_noise_model(held)
         return None
     return [replace(taken[0], fitted=found.base), found], left
@@ -80,12 +76,12 @@ def is_better(other: Fitted, left: Mismatch, current: Fitted, *, scattered: bool
     Far less of what is beyond the noise, or of all where runs are `scattered`, so that nobody knows what chance leaves.
     Instead of any curve, which will be refused, as much more will do.
     """
-    if left.p_value > SURE:
+    if left.p_value > SETTINGS.inference.lack_of_fit.p_value:
         return other.left < current.left
     if scattered:
-        return other.left < BETTER * current.left
+        return other.left < TUNING.better_share * current.left
     chance = sum(b.residual.size for b in other.blocks)
-    part = 1.0 / BETTER if is_over_flexible(current.candidates) else BETTER
+    part = 1.0 / TUNING.better_share if is_over_flexible(current.candidates) else TUNING.better_share
     return other.left - chance < part * (current.left - chance)
 
 
@@ -107,7 +103,9 @@ def swapped(inquiry: Inquiry, current: Fitted) -> Step | None:
     looked = look(problem, rest, inquiry.free(rest), inquiry.groups, parallel_map=inquiry.executor.parallel_map)
     found = step(inquiry, rest, looked)
     held = problem.again(turned(current))
-    if found is None or found.fitted.left > held.left + F_THRESHOLD:  # on the way back nothing came as far
+    if (
+        found is None or found.fitted.left > held.left + SETTINGS.selection.ensemble_validation.least_gain
+    ):  # on the way back nothing came as far
         rivals = () if found is None else found.rivals
         beside = tuple(f for f in rivals if f.candidates[-1].key != held.candidates[-1].key)
         back = Step(base=problem.again(rest), fitted=held, p_value=looked.p_value(), rivals=(held, *beside))
@@ -126,12 +124,12 @@ def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: ScoreTest) -> Ste
     few, shifts = few_of(lead), tuple(b.shift for b in lead.blocks)
     at, fixed_shifts = tuple(shifts[r] for r in few), is_far(problem, first.base)
     # slopes tell what two do together where these are not far off
-    partners = _partners(inquiry, first, taken, looked, SCORED if fixed_shifts else 0)
+    partners = _partners(inquiry, first, taken, looked, TUNING.scored if fixed_shifts else 0)
     two = itertools.combinations(partners, 2)
     short: list[Start] = [((a, b), (*x, *y)) for (a, x), (b, y) in two if _may_explain(a, b)]
     short += _placed_anew(inquiry, partners, few, shifts) if fixed_shifts else _together(inquiry, looked)
     inquiry.say(f"{len(short)} pairs of effects")
-    for rounds, most in ROUNDS:
+    for rounds, most in TUNING.short_fits:
         tasks = [
             Task(candidates=both, start=x, shifts=at, only=tuple(few), rounds=rounds, fixed_shifts=fixed_shifts)
             for both, x in short
@@ -146,7 +144,7 @@ def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: ScoreTest) -> Ste
         return None
     best = min([*fits, *_in_tune(inquiry, fits), *_traced(inquiry, fits)], key=lambda f: f.left)
     best = min([best, *_mirrored(inquiry, best)], key=lambda f: f.left)
-    if best.left < BEHIND * taken[-1].fitted.left:
+    if best.left < SETTINGS.fit.local_search.abandon_above * taken[-1].fitted.left:
         ways = (best, problem.again(turned(best)))
         tasks = [Task(candidates=p.candidates[:-1], start=p.x[: -len(p.own)], shifts=shifts) for p in ways]
         for pair, alone in zip(ways, inquiry.fits(tasks), strict=True):
@@ -179,7 +177,7 @@ def _placed_anew(
     Alone, for all that is missing, it may have ended elsewhere, or nowhere.
     """
     able = [c for c, _ in partners if has_threshold(c) and not c.is_bent]
-    ways = [(a, x, c) for a, x in partners[:LEADING] for c in able if c.key != a.key]
+    ways = [(a, x, c) for a, x in partners[: TUNING.leading] for c in able if c.key != a.key]
     found = inquiry.parallel_map(partial(placed_beside, few=tuple(few), shifts=tuple(shifts)), ways)
     return [((a, c), x) for (a, _, c), x in zip(ways, found, strict=True) if x is not None]
 
@@ -190,7 +188,10 @@ def _takes_little(lead: Fitted, pair: Fitted, few: Sequence[int]) -> bool:
     Where that is little itself none does for sure: the place of a threshold decides, and is looked for later.
     """
     alone, size = sum(lead.blocks[r].total for r in few), sum(lead.blocks[r].residual.size for r in few)
-    return alone > NEARLY_NOISE**2 * size and alone - pair.total < LITTLE * (alone - size)
+    return (
+        alone > SETTINGS.selection.forward_step.nearly_noise** 2 * size
+        and alone - pair.total < TUNING.least_share * (alone - size)
+    )
 
 
 def _in_tune(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fitted]:
@@ -200,7 +201,7 @@ def _in_tune(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fitted]:
     """
     able = [f if f.candidates[-1].rings else inquiry.problem.again(turned(f)) for f in pairs if _rings(f)]
     lead = min(pairs, key=lambda f: f.left)
-    near = [f for f in able if f.left < ALIKE * lead.left and f.candidates[-1].shapes]
+    near = [f for f in able if f.left < TUNING.same_misfit * lead.left and f.candidates[-1].shapes]
     leaves = tuple(b.total for b in lead.blocks)
     made = inquiry.fits([replace(from_there(f, "shape"), leaves=leaves) for f in near])
     return [f for f in made if f is not None]
@@ -212,11 +213,14 @@ def _traced(inquiry: Inquiry, pairs: Sequence[Fitted]) -> list[Fitted]:
     None where the best leaves no more than noise.
     """
     ranked = sorted(pairs, key=lambda f: f.left)
-    if mismatch_of(inquiry.problem.dataset, ranked[0].blocks, inquiry.phases).p_value > SURE:
+    if (
+        mismatch_of(inquiry.problem.dataset, ranked[0].blocks, inquiry.phases).p_value
+        > SETTINGS.inference.lack_of_fit.p_value
+    ):
         return []
-    near = (f for f in ranked if f.left < PLACED * ranked[0].left)
+    near = (f for f in ranked if f.left < TUNING.placed_misfit * ranked[0].left)
     ways = (way for f in near for way in (f, inquiry.problem.again(turned(f))))
-    able = itertools.islice((way for way in ways if stretches(way) and not way.candidates[-1].rings), PLACES)
+    able = itertools.islice((way for way in ways if stretches(way) and not way.candidates[-1].rings), TUNING.placed)
     tasks = [replace(from_there(f, "trace"), stretch=s) for f in able for s in stretches(f)]
     return [f for f in inquiry.fits(tasks) if f is not None]
 
@@ -245,8 +249,8 @@ def _partners(
 
     Those that led, and of the others so many that `scored` most at first.
     """
-    leading = sorted((inquiry.problem.again(f) for f in first.rivals), key=lambda f: f.left)[:LEADING]
-    later = [f for s in taken[1:] for f in sorted(s.rivals, key=lambda f: f.left)[:FOLLOWING]]
+    leading = sorted((inquiry.problem.again(f) for f in first.rivals), key=lambda f: f.left)[: TUNING.leading]
+    later = [f for s in taken[1:] for f in sorted(s.rivals, key=lambda f: f.left)[: TUNING.following]]
     found: dict[tuple[str, bool], tuple[Candidate, tuple[float, ...]]] = {}
     for f in (*leading, *later):
         last = f.candidates[-1]

@@ -13,8 +13,6 @@ from rollover.diagnosis.fit.jobs import How, Task
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.linearisation import ResidualBlock
 from rollover.diagnosis.fit.local_search import (
-    BEHIND,
-    LITTLE,
     along_secondary,
     apart,
     few_of,
@@ -23,27 +21,16 @@ from rollover.diagnosis.fit.local_search import (
     least_of,
     left_at,
 )
-from rollover.diagnosis.fit.model_variants import WORTH, enough, is_noise
+from rollover.diagnosis.fit.model_variants import enough, is_noise
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.threshold_scan import is_clock, stretches
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.score_test import ScoreTest
+from rollover.diagnosis.settings import SETTINGS
 
-RUGGED = 2.0  # misfit over the noise that the best leaves, from which on there may be something behind a cliff
-LEADS = 1.5  # times what the best leaves, up to which it is looked for
-MOSTLY = 0.25  # of what the middle recording is left with by the best, below which an effect is the better one there
-PROMISED = 0.5  # of the best score: what has it, and gains less than half of its own, may have another shape
-TIED = 1.2  # times what the best leaves, up to which time shifts are tried out
-BY_CHANCE = 0.01  # p-value of what is left, above which no other form of an effect is looked for
-TOLD = 2e-5  # s, by which time shifts are told apart
-PARTS = 4  # into which places are split for those who look
-HEARD = 60  # places of what rings, of all that one recording was asked for, that a few are
+TUNING = SETTINGS.selection.restarts
 FOLLOWED: tuple[How, ...] = ("polish", "time")  # how what rings is gone on with
-# of what the base leaves beyond the noise, that an effect must take before its shape is fitted too; of what the best
-# takes, before its time shifts are tried out
-LEAST = 0.1
-SHAPED = 4.0  # times what the best leaves, up to which an effect's shape is fitted too
 
 
 def begun_otherwise(
@@ -51,7 +38,7 @@ def begun_otherwise(
 ) -> list[Fitted]:
     """The fits, best first, with those that another beginning or another shape makes of what did not come far."""
     count = sum(b.residual.size for b in base.blocks)
-    if fits[0].left > RUGGED**2 * count:
+    if fits[0].left > TUNING.rugged_above**2 * count:
         return _but_for_some(inquiry, base, _combed(inquiry, fits, looked, shifts), looked, shifts)
     return _as_promised(inquiry, base, fits, looked, shifts)
 
@@ -64,7 +51,10 @@ def _as_promised(
     places = []
     for c in (c for c in inquiry.free(base) if c.shapes):
         score = looked.scores.get(c.key, 0.0)
-        if score > max(PROMISED * looked.score, WORTH) and gains.get(c.key, 0.0) < PROMISED * score:
+        if (
+            score > max(TUNING.promised_share * looked.score, SETTINGS.fit.model_variants.least_gain)
+            and gains.get(c.key, 0.0) < TUNING.promised_share * score
+        ):
             places.append((c, (*base.x, *looked.starts.get(c.key, c.starts())[0])))
     return _with_secondary(inquiry, base, fits, places, shifts)
 
@@ -74,7 +64,7 @@ def _combed(inquiry: Inquiry, fits: Sequence[Fitted], looked: ScoreTest, shifts:
 
     It leads by what it leaves, or by its score: its frequency may have been found beside a wrong damping.
     """
-    near = [f for f in fits if f.left < LEADS * fits[0].left or f.candidates[-1].key == looked.best]
+    near = [f for f in fits if f.left < TUNING.leading_misfit * fits[0].left or f.candidates[-1].key == looked.best]
     old = next((f for f in near if f.candidates[-1].rings and len(f.own) == 2), None)
     if old is None:
         return list(fits)
@@ -97,7 +87,7 @@ def _by_frequency(
     at = old.x[: len(old.x) - len(old.own)]
     whole, places = frequency_scan(last, old.own)
     candidates, worst = (*beside, whole), max(few, key=lambda r: old.blocks[r].total)
-    heard = _met(inquiry, candidates, [(*at, *own) for own in places], shifts, (worst,))[:HEARD]
+    heard = _met(inquiry, candidates, [(*at, *own) for own in places], shifts, (worst,))[: TUNING.most_oscillations]
     plain = [whole.plain(x[len(at) :]) for x in apart(_met(inquiry, candidates, [x for _, x in heard], shifts, few))]
     return [((*beside, c), (*at, *own)) for c, own in plain]
 
@@ -137,7 +127,7 @@ def _but_for_some(
     """
     able = [c for c in inquiry.free(base) if c.shapes]
     begun = [tuple((*base.x, *start) for start in (*looked.starts.get(c.key, ()), *c.starts())) for c in able]
-    most = MOSTLY * _middle(fits[0].blocks)
+    most = TUNING.better_share * _middle(fits[0].blocks)
     look = partial(_best_middle, beside=base.candidates, shifts=tuple(shifts), most=most)
     met = zip(able, inquiry.parallel_map(look, list(zip(able, begun, strict=True))), strict=True)
     places = [(c, x) for c, x in met if x is not None]
@@ -157,15 +147,15 @@ def _with_secondary(
     fit leaves is not gone on with.
     """
     sets = [((*base.candidates, c.whole()), along_secondary(c, x)) for c, x in places]
-    parts = [(candidates, tuple(every[k::PARTS])) for candidates, every in sets for k in range(PARTS)]
+    parts = [(candidates, tuple(every[k :: TUNING.parts])) for candidates, every in sets for k in range(TUNING.parts)]
     met = inquiry.parallel_map(partial(least_of, shifts=tuple(shifts)), parts)
     tasks = []
     for k, (candidates, _) in enumerate(sets):
-        least = min((one for one in met[k * PARTS : (k + 1) * PARTS] if one is not None), default=None)
+        least = min((one for one in met[k * TUNING.parts : (k + 1) * TUNING.parts] if one is not None), default=None)
         if least is not None:
             tasks.append(Task(candidates=candidates, start=least[1], shifts=tuple(shifts), width=1))
     begun = [f for f in inquiry.fits(tasks) if f is not None]
-    near = [f for f in begun if f.left <= BEHIND * fits[0].left]
+    near = [f for f in begun if f.left <= SETTINGS.fit.local_search.abandon_above * fits[0].left]
     followed = zip(inquiry.fits([from_there(f, "polish") for f in near]), near, strict=True)
     others = [f for f in begun if not any(f is one for one in near)]
     return sorted([*fits, *others, *(new or old for new, old in followed)], key=lambda f: f.left)
@@ -220,11 +210,11 @@ def shaped_too(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[F
     lead = min(fits, key=lambda f: f.left)
     best, size = lead.left, sum(b.residual.size for b in fits[0].blocks)
     held = [held_out(f, inquiry.groups).total ** 2 for f in fits]
-    is_whole = mismatch_of(inquiry.problem.dataset, lead.blocks, inquiry.phases).p_value > BY_CHANCE
+    is_whole = mismatch_of(inquiry.problem.dataset, lead.blocks, inquiry.phases).p_value > TUNING.chance_p_value
     ways: list[tuple[int, Task]] = []
     for k, (f, ahead) in enumerate(zip(fits, held, strict=True)):
-        is_near = f.left < SHAPED * best or ahead < SHAPED * min(held)
-        if not is_near or base.left - f.left < LEAST * (base.left - size):
+        is_near = f.left < TUNING.shaped_misfit * best or ahead < TUNING.shaped_misfit * min(held)
+        if not is_near or base.left - f.left < TUNING.least_share * (base.left - size):
             continue
         tasks = [from_there(f, "shape")] if f.candidates[-1].shapes else []
         tasks += [] if is_whole else [replace(from_there(f, "shape"), form=c) for c in f.candidates[-1].forms()]
@@ -244,7 +234,11 @@ def shaped_too(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[F
 def _polished(inquiry: Inquiry, fits: Sequence[Fitted | None], best: float) -> list[Fitted | None]:
     """Fits, those in another form that come near the best of all and leave more than noise followed on."""
     least = min([best, *(f.left for f in fits if f is not None)])
-    near = [f for f in fits if f is not None and f.candidates[-1].form and f.left < LEADS * least and not is_noise(f)]
+    near = [
+        f
+        for f in fits
+        if f is not None and f.candidates[-1].form and f.left < TUNING.leading_misfit * least and not is_noise(f)
+    ]
     followed = inquiry.fits([from_there(f, "polish") for f in near])
     better = {id(old): new for old, new in zip(near, followed, strict=True)}
     return [better.get(id(f)) or f for f in fits]
@@ -263,7 +257,11 @@ def timed_too(inquiry: Inquiry, base: Fitted, fits: Sequence[Fitted]) -> list[Fi
     Beside what is hardly met at all everything is near: an effect must gain a share of what the best does.
     """
     least = min(f.left for f in fits)
-    near = [f for f in fits if f.left < TIED * least and base.left - f.left >= LEAST * (base.left - least)]
+    near = [
+        f
+        for f in fits
+        if f.left < TUNING.tied_misfit * least and base.left - f.left >= TUNING.least_share * (base.left - least)
+    ]
     others = [f for f in fits if not any(f is one for one in near)]
     traced = [traced_too(inquiry, f) if is_clock(f) else f for f in near]
     timed = [new or f for new, f in zip(inquiry.fits([from_there(f, "time") for f in traced]), traced, strict=True)]
@@ -288,9 +286,9 @@ def _shifts_beside(problem: Problem, fitted: Fitted, lead: Fitted) -> tuple[floa
     """Time shifts (s) of all recordings, those of `lead` where they leave less; None if they do nowhere."""
     shifts = [b.shift for b in fitted.blocks]
     for r, (own, other) in enumerate(zip(fitted.blocks, lead.blocks, strict=True)):
-        if abs(other.shift - own.shift) > TOLD:
+        if abs(other.shift - own.shift) > TUNING.same_shift:
             there = problem.block(r, fitted.candidates, fitted.x, other.shift, 0.0, clock=False)
-            if there is not None and there.total < own.total - LITTLE:
+            if there is not None and there.total < own.total - SETTINGS.fit.local_search.least_gain:
                 shifts[r] = other.shift
     return tuple(shifts) if any(s != b.shift for s, b in zip(shifts, fitted.blocks, strict=True)) else None
 

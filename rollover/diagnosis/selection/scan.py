@@ -13,12 +13,12 @@ from rollover.diagnosis.fit.local_search import left_at
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
 from rollover.diagnosis.fit.step import Groups
-from rollover.diagnosis.selection.ensemble_validation import SPOKEN, unbent
+from rollover.diagnosis.selection.ensemble_validation import unbent
 from rollover.diagnosis.selection.score_test import ScoreTest, p_value, score_test
 from rollover.diagnosis.selection.screening import begun, spread
+from rollover.diagnosis.settings import SETTINGS
 
-HINTED = 0.2  # p-value beyond which what candidates move elsewhere tells that none is looked for here
-CLEARLY = 0.8  # of what is left without it, up to which a strong effect is followed
+TUNING = SETTINGS.selection.scan
 
 
 def look(
@@ -53,7 +53,11 @@ def look(
     moving = [c for c in candidates if c.kind != "sensor"]
     with problem.held(heavy_tailed=True):  # a part that gives way shows in how it does, not in where all else goes then
         masked = _step_reduced(problem, problem.recounted(base), moving, few, more, beside)[-1]
-    able = [c.key for c in masked.ranked(moving) if p_value(masked.scores.get(c.key, 0.0), masked.null) < SPOKEN]
+    able = [
+        c.key
+        for c in masked.ranked(moving)
+        if p_value(masked.scores.get(c.key, 0.0), masked.null) < SETTINGS.selection.ensemble_validation.own_p_value
+    ]
     scores = {key: max(score, masked.scores.get(key, 0.0)) for key, score in scores.items()}
     far = strongly(problem, base, moving, few) if beside is None else {}
     leading = [key for both in zip_longest(far, able[: effort.leaders]) for key in both if key is not None]
@@ -86,7 +90,7 @@ def strongly(
         usual, met = left((), (), few), dict[str, tuple[float, tuple[float, ...]]]()
         for c, x in able:
             met[c.key] = min(met.get(c.key, (np.inf, ())), (left((c,), x, few), x))
-        best = sorted((least, key, x) for key, (least, x) in met.items() if least < CLEARLY * usual)
+        best = sorted((least, key, x) for key, (least, x) in met.items() if least < TUNING.clear_share * usual)
         return [(key, x) for _, key, x in best[: problem.effort.leaders]]
 
     with problem.held(heavy_tailed=True):
@@ -146,6 +150,6 @@ def look_again(
     """
     if base is not None and problem.effort.is_ensemble:
         hinted = look(problem, current, candidates, groups, base, first.only)
-        if hinted.p_value() > HINTED:
+        if hinted.p_value() > TUNING.hint_p_value:
             return hinted
     return look(problem, current, candidates, groups, parallel_map=parallel_map)

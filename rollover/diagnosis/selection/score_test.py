@@ -26,17 +26,13 @@ from rollover.diagnosis.fit.parameterisation import (
     zero_of,
 )
 from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
-from rollover.diagnosis.noise.ensemble import FEW, gained
+from rollover.diagnosis.noise.ensemble import gained
 from rollover.diagnosis.selection.pair_score import jointly
+from rollover.diagnosis.settings import SETTINGS
 
 Array = NDArray[np.float64]
 Place = tuple[str, tuple[float, ...]]  # a candidate's key, and coordinates of it
-DRAWS = 4000
-SHOWS = 1e-3  # noise units: a direction that moves the whole by less is arithmetic's
-VISIBLE = 5.0  # standard errors of the noise at which an effect shows
-JITTER = 1e-9
-WAYS = 2  # places of one effect at which fits begin
-CLOSER = 8  # places of one effect that are looked at closer
+TUNING = SETTINGS.selection.score_test
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,9 +98,9 @@ def score_test(
     look = partial(_directions, at=(at.candidates, at.x), blocks=base.blocks, use=tuple(use))
     for c, found in zip(candidates, parallel_map(problem, look, candidates), strict=True):
         for x, d in found:
-            parts = [(d, SHOWS)]
+            parts = [(d, TUNING.least_direction)]
             if c.kind != "sensor" and quiet is not None:
-                parts.append((d * quiet, VISIBLE))
+                parts.append((d * quiet, TUNING.visible))
             for part, least in parts:
                 way = part - own @ (own.T @ part)
                 size = float(np.sqrt(way @ way))
@@ -113,7 +109,7 @@ def score_test(
                     seen_at.append((c, x))
                     sizes.append(size)
     if not columns:
-        return ScoreTest(score=0.0, scores={}, null=np.zeros(DRAWS), detectable={})
+        return ScoreTest(score=0.0, scores={}, null=np.zeros(TUNING.draws), detectable={})
     D = np.stack(columns, axis=1)
     misfit = misfit - own @ (own.T @ misfit)
     along, scores = _best_along(misfit, D, blocks)
@@ -133,7 +129,7 @@ def score_test(
         if x not in (seen := places.setdefault(c.key, [])):
             seen.append(x)
         start = followed(c, x, float(along[k]) / sizes[k])
-        if start is not None and len(ways.setdefault(c.key, [])) < WAYS:
+        if start is not None and len(ways.setdefault(c.key, [])) < TUNING.ways:
             ways[c.key].append(start)
     cosines = D.T @ D
     both = []
@@ -147,7 +143,7 @@ def score_test(
         detectable=detectable,
         starts={key: tuple(each) for key, each in ways.items()},
         only=tuple(only or ()),
-        places={key: tuple(each[:CLOSER]) for key, each in places.items()},
+        places={key: tuple(each[: TUNING.close_places]) for key, each in places.items()},
         both=tuple(both),
     )
 
@@ -223,7 +219,7 @@ def _trust(problem: Problem, blocks: Sequence[ResidualBlock], use: Sequence[int]
             for r, block in zip(use, blocks, strict=True)
         ]
         found += (D.T @ np.concatenate(perturbed)) ** 2
-    return np.asarray(FEW * found / max(many, 1))
+    return np.asarray(SETTINGS.noise.ensemble.few_factor * found / max(many, 1))
 
 
 def _directions(
@@ -250,18 +246,18 @@ def _direction(
 
 
 def _visible(c: Candidate, x: Sequence[float], size: float) -> float | None:
-    """How far from its null an effect's parameter must be for a trace `VISIBLE` times the noise's, by that at x.
+    """How far from its null an effect's parameter must be for a trace `visible` times the noise's, by that at x.
 
     Of a limit its value at x if that shows, else None; so where no value is known to be none.
     """
     name, zero = zero_of(c)
     value = c.values(x)[name]
     if zero is not None:
-        return abs(value - zero) * VISIBLE / size
-    return value if is_limit(c) and size >= VISIBLE else None
+        return abs(value - zero) * TUNING.visible / size
+    return value if is_limit(c) and size >= TUNING.visible else None
 
 
-def null_of_the_best(directions: Sequence[Array], draws: int = DRAWS, seed: int = 0) -> Array:
+def null_of_the_best(directions: Sequence[Array], draws: int = TUNING.draws, seed: int = 0) -> Array:
     """Largest gain on noise (draws,), sorted; `directions` are, for each recording, arrays (n_r, m)."""
     m = directions[0].shape[1] if len(directions) else 0
     if m == 0:
@@ -269,11 +265,11 @@ def null_of_the_best(directions: Sequence[Array], draws: int = DRAWS, seed: int 
     return null_by(sum((np.asarray(d).T @ np.asarray(d) for d in directions), np.zeros((m, m))), draws, seed)
 
 
-def null_by(G: Array, draws: int = DRAWS, seed: int = 0) -> Array:
+def null_by(G: Array, draws: int = TUNING.draws, seed: int = 0) -> Array:
     """The same by the scalar products of the directions (m, m)."""
     m = len(G)
     size = np.sqrt(np.maximum(np.diag(G), 1e-300))
-    root = np.linalg.cholesky(G / np.outer(size, size) + JITTER * m * np.eye(m))
+    root = np.linalg.cholesky(G / np.outer(size, size) + TUNING.jitter * m * np.eye(m))
     z = np.random.default_rng(seed).standard_normal((draws, m)) @ root.T
     return np.asarray(np.sort(np.max(z * z, axis=1)))
 

@@ -11,22 +11,19 @@ import numpy as np
 from rollover.diagnosis.fit.finite_differences import Point
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem, ResidualBlock
 from rollover.diagnosis.fit.linearisation import without_shift
-from rollover.diagnosis.fit.parameterisation import BESIDE, Candidate, same_family
+from rollover.diagnosis.fit.parameterisation import Candidate, same_family
 from rollover.diagnosis.fit.scan_jobs import ParallelMap, serial_map
 from rollover.diagnosis.fit.step import Screened
 from rollover.diagnosis.fit.time_shift import by_first_contact
-from rollover.diagnosis.forward.budget import DROPS, Effort
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.score_test import WAYS, ScoreTest
+from rollover.diagnosis.selection.score_test import ScoreTest
+from rollover.diagnosis.settings import SETTINGS
+from rollover.diagnosis.settings.forward import Effort
 
-SCORED = 18  # candidates looked at closer, by their score
-BENT = 1.2  # misfit over the noise from which on time shifts fitted to it are bent by what is missing
-FAR = 3.0  # and from which on they are not fitted beside a first look
-ELSEWHERE = 0.2  # of a coordinate: starts so far apart are two
-STILL = 1e-12  # sum of squares over the noise, up to which a start moves nothing
+TUNING = SETTINGS.selection.screening
 
 
-def spread(base: Fitted, groups: Sequence[Sequence[int]], few: int = DROPS.few) -> list[int]:
+def spread(base: Fitted, groups: Sequence[Sequence[int]], few: int = SETTINGS.forward.drops.few) -> list[int]:
     """Few recordings that stand for all: of the conditions that are met worst, best, and in the middle."""
     left = [b.normal()[2] / b.residual.size for b in base.blocks]
     members = [max(g, key=lambda r: left[r]) for g in groups if g]
@@ -38,7 +35,7 @@ def spread(base: Fitted, groups: Sequence[Sequence[int]], few: int = DROPS.few) 
 
 def is_far(problem: Problem, base: Fitted) -> bool:
     """Whether a base is so far off that its time shifts tell of what is missing; beside a tolerance that is soon."""
-    far = FAR if problem.samples_per_error == 1.0 else 1.0
+    far = TUNING.fixed_shifts if problem.samples_per_error == 1.0 else 1.0
     return base.left > far**2 * sum(b.residual.size for b in base.blocks)
 
 
@@ -52,7 +49,7 @@ def begun(problem: Problem, base: Fitted, parallel_map: ParallelMap = serial_map
         told: list[float | None] = [None] * len(base.blocks)
         if not problem.effort.is_ensemble and not is_far(problem, base):
             return [b.shift for b in base.blocks]
-    elif base.left < BENT**2 * count:
+    elif base.left < TUNING.biased_shifts**2 * count:
         return [b.shift for b in base.blocks]
     else:
         told = by_first_contact(problem, base.candidates, base.x, parallel_map)
@@ -129,7 +126,7 @@ def _screened(
             size += float(free[:, 0] @ free[:, 0])
         if count < len(blocks):
             continue
-        is_still = size <= STILL
+        is_still = size <= TUNING.no_change
         if not is_still:
             potential = max(potential, along * along / size)
         looked_at.append((is_still, left, start))
@@ -150,9 +147,9 @@ def _begun_at(c: Candidate, met: Sequence[tuple[float, tuple[float, ...]]]) -> t
     """Where fits begin: the best starts; of few and far ones the first, or the best and beside what changes nothing."""
     if c.neutral is None:
         return _apart(met)
-    neutral = [n + BESIDE for n in c.neutral if n is not None]
+    neutral = [n + SETTINGS.fit.parameterisation.zero_step for n in c.neutral if n is not None]
     if len(neutral) < len(c.neutral):
-        return tuple(start for _, start in met[:WAYS])
+        return tuple(start for _, start in met[: SETTINGS.selection.score_test.ways])
     return (tuple(neutral), met[0][1])
 
 
@@ -161,11 +158,13 @@ def _apart(met: Sequence[tuple[float, tuple[float, ...]]]) -> tuple[tuple[float,
     best = met[0][1]
     if len(best) < 2:
         return (best,)
-    other = [s for _, s in met if max(abs(a - b) for a, b in zip(s, best, strict=True)) > ELSEWHERE]
+    other = [s for _, s in met if max(abs(a - b) for a, b in zip(s, best, strict=True)) > TUNING.start_distance]
     return (best, *other[:1])
 
 
-def promising(candidates: Sequence[Candidate], looked: ScoreTest, effort: Effort = DROPS) -> list[Candidate]:
+def promising(
+    candidates: Sequence[Candidate], looked: ScoreTest, effort: Effort = SETTINGS.forward.drops
+) -> list[Candidate]:
     """Those that scored best, and of two parameters all: beside their thresholds a score tells little.
 
     Where each costs runs, of these only the kin of what leads, and a few that move the vehicle in any case.
@@ -175,4 +174,4 @@ def promising(candidates: Sequence[Candidate], looked: ScoreTest, effort: Effort
         moving = [c for c in ranked if c.kind != "sensor"][: effort.promising]
         related = of_same_family(ranked, effort.scored, effort.leaders)
         return list({c.key: c for c in (*ranked[: effort.scored], *moving, *related)}.values())
-    return [c for k, c in enumerate(ranked) if k < SCORED or len(c.search) > 1]
+    return [c for k, c in enumerate(ranked) if k < TUNING.scored or len(c.search) > 1]

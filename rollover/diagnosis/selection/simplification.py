@@ -14,15 +14,12 @@ from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.flexibility import is_over_flexible
-from rollover.diagnosis.selection.forward_step import NEARLY_NOISE, SOON, is_at_an_end
-from rollover.diagnosis.selection.restarts import LEADS, from_there, traced_too
+from rollover.diagnosis.selection.forward_step import is_at_an_end
+from rollover.diagnosis.selection.restarts import from_there, traced_too
+from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS
 
-MANY = 0.05  # p-value of what as many effects as may be leave, below which they are no explanation
-BESIDE = 3  # rivals of a step that are begun anew beside a better fit of what came before
-SIMPLER = 4  # rivals of fewer numbers that are begun anew beside a fit at an end of its range
-PLAINER = 3  # effects of fewer numbers, of all, that are gone on with after a short fit
-TELLS = 10.8  # chi-square of one number, p = 0.001
+TUNING = SETTINGS.selection.simplification
 
 
 def followed(inquiry: Inquiry, found: Step) -> tuple[Step, Mismatch]:
@@ -34,12 +31,12 @@ def followed(inquiry: Inquiry, found: Step) -> tuple[Step, Mismatch]:
     """
     problem, phases, old = inquiry.problem, inquiry.phases, found.fitted
     left = mismatch_of(problem.dataset, old.blocks, phases)
-    is_near = old.left < NEARLY_NOISE**2 * sum(b.residual.size for b in old.blocks)
+    is_near = old.left < SETTINGS.selection.forward_step.nearly_noise**2 * sum(b.residual.size for b in old.blocks)
     if problem.effort.is_ensemble or not is_near:
         return found, left
     if not is_over_flexible(old.candidates):  # as they stand these will be refused, however well they fit
         new = traced_too(inquiry, old)
-        if new.left < old.left or len(old.candidates) > 1 or left.p_value < MANY:
+        if new.left < old.left or len(old.candidates) > 1 or left.p_value < TUNING.full_p_value:
             new = timed(problem, polish(problem, new))
         new = ended(problem, new)
         if new.left < old.left:
@@ -62,7 +59,7 @@ def simpler(inquiry: Inquiry, found: Step) -> Step | None:
     begun = list(_become(inquiry, best))
     if is_at_an_end(best):
         able = sorted(found.rivals, key=lambda f: f.left)
-        able = [f for f in able if len(f.own) < len(best.own) and f.left < found.base.left][:SIMPLER]
+        able = [f for f in able if len(f.own) < len(best.own) and f.left < found.base.left][: TUNING.simpler_rivals]
         begun += [((*beside, f.candidates[-1]), f.own) for f in able]
     shifts = tuple(b.shift for b in best.blocks)
     tasks = [Task(candidates=candidates, start=(*shared, *own), shifts=shifts, width=1) for candidates, own in begun]
@@ -92,7 +89,7 @@ def _with_rivals(inquiry: Inquiry, found: Step) -> Step:
     best, beside, shared = found.fitted, *_shared(found.fitted)
     if not beside:
         return found
-    shifts, near = tuple(b.shift for b in best.blocks), sorted(found.rivals, key=lambda f: f.left)[:BESIDE]
+    shifts, near = tuple(b.shift for b in best.blocks), sorted(found.rivals, key=lambda f: f.left)[: TUNING.rivals]
     begun = [f for f in near if f is not best]
     tasks = [
         Task(candidates=(*beside, f.candidates[-1]), start=(*shared, *f.own), shifts=shifts, width=1) for f in begun
@@ -147,11 +144,19 @@ def _plainer_last(inquiry: Inquiry, found: Step) -> Step | None:
     if not beside or not able:
         return None
     shifts = tuple(b.shift for b in best.blocks)
-    tasks = [Task(candidates=(*beside, c), start=(*shared, *c.probes()[0]), shifts=shifts, rounds=SOON) for c in able]
-    short = sorted((f for f in inquiry.fits(tasks) if f is not None), key=lambda f: f.total)[:PLAINER]
+    tasks = [
+        Task(
+            candidates=(*beside, c),
+            start=(*shared, *c.probes()[0]),
+            shifts=shifts,
+            rounds=SETTINGS.selection.forward_step.short_rounds,
+        )
+        for c in able
+    ]
+    short = sorted((f for f in inquiry.fits(tasks) if f is not None), key=lambda f: f.total)[: TUNING.simpler_effects]
     whole = inquiry.fits([from_there(f, "fit") for f in short])
     one = min((f for f in whole if f is not None), key=lambda f: f.left, default=None)
-    if one is None or one.left > LEADS * best.left:
+    if one is None or one.left > SETTINGS.selection.restarts.leading_misfit * best.left:
         return None
     one = inquiry.fits([from_there(one, "polish")])[0] or one
     return _led_by(one, found) if _is_as_good(one, best) else None
@@ -222,4 +227,4 @@ def _led_by(new: Fitted, found: Step) -> Step:
 def _is_as_good(simple: Fitted, best: Fitted) -> bool:
     """Whether a fit of fewer numbers leaves hardly more than the best."""
     dispersion = max(1.0, best.left / sum(b.residual.size for b in best.blocks))
-    return simple.left < best.left + dispersion * TELLS * (len(best.x) - len(simple.x))
+    return simple.left < best.left + dispersion * TUNING.chi_square * (len(best.x) - len(simple.x))

@@ -10,29 +10,20 @@ from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.local_search import conditioned, is_doubtful, timed
 from rollover.diagnosis.fit.step import Phases, Step
 from rollover.diagnosis.fit.time_shift import is_all_by_clocks
-from rollover.diagnosis.inference.adequacy import NEGLIGIBLE, is_enough, is_tolerated
+from rollover.diagnosis.inference.adequacy import is_enough, is_tolerated
 from rollover.diagnosis.inference.lack_of_fit import Mismatch, mismatch_of
 from rollover.diagnosis.noise.ensemble import is_other
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.ensemble_validation import SPOKEN, astray, backed, begun_anew, ensemble_validated
-from rollover.diagnosis.selection.flexibility import MOST, is_over_flexible
+from rollover.diagnosis.selection.ensemble_validation import astray, backed, begun_anew, ensemble_validated
+from rollover.diagnosis.selection.flexibility import is_over_flexible
 from rollover.diagnosis.selection.forward_step import does, moves, reweighted, step
 from rollover.diagnosis.selection.pairs import best_subsets, with_another_first
 from rollover.diagnosis.selection.scan import look, look_again
 from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.simplification import followed
+from rollover.diagnosis.settings import SETTINGS
 
-CHANCE = 0.005  # p-value of the best of all candidates that admits one
-BY_SCATTER = 0.1  # the same where runs scatter and there is a mismatch: fits decide, and gains that last
-PART = 0.25  # of what moves something, that a part of more must move
-# misfit over the noise that two effects leave and a third is not looked for, and the share of what was beyond the
-# noise that is little all the same, of drops and of full runs, of which a third effect asks for many
-HOPELESS, HARDLY_ANY = 2.0, (0.1, 0.01)
-# times what the second effect took, that two leave beyond the noise and no third is looked for: it would have to take
-# that, and the one that takes more comes first
-UNLIKELY = 3.0
-SEVERAL = 2  # recordings on another course, after which they are not forgiven if a candidate scores beyond chance
-ABLE = 0.7  # of what there was beyond the noise, above which two leave so much that no exchange of one will end it
+TUNING = SETTINGS.selection.stepwise
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,10 +83,10 @@ def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = (), *, pa
         left = mismatch_of(problem.dataset, current.blocks, phases)
         looked = beside(current, left)
     refuted = paired = False
-    for _ in range(MOST - len(begun)):
+    for _ in range(SETTINGS.selection.flexibility.most_effects - len(begun)):
         if is_tolerated(problem, current):
             break
-        if looked.p_value() > CHANCE and is_enough(problem, current, left):
+        if looked.p_value() > TUNING.admitting_p_value and is_enough(problem, current, left):
             break
         if (
             not taken
@@ -125,7 +116,7 @@ def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = (), *, pa
             other = None
             if pairs and not problem.effort.is_ensemble:
                 other, paired = best_subsets(inquiry, taken, first_look, current), True
-            elif problem.effort.is_ensemble and current.left - count < ABLE * (base.left - count):
+            elif problem.effort.is_ensemble and current.left - count < TUNING.hopeless_share * (base.left - count):
                 other = with_another_first(inquiry, taken, current)
             if other is not None:
                 (taken, left), current = other, other[0][-1].fitted
@@ -152,14 +143,14 @@ def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = (), *, pa
 
 def is_hopeless(problem: Problem, base: Fitted, current: Fitted) -> bool:
     """Whether two effects leave far more than noise, and no small part of what there was beyond it."""
-    count, hardly_any = sum(b.residual.size for b in current.blocks), HARDLY_ANY[problem.effort.is_ensemble]
-    return current.left > HOPELESS**2 * count and current.left - count > hardly_any * (base.left - count)
+    count, hardly_any = sum(b.residual.size for b in current.blocks), TUNING.little_noise[problem.effort.is_ensemble]
+    return current.left > TUNING.hopeless**2 * count and current.left - count > hardly_any * (base.left - count)
 
 
 def is_unlikely(problem: Problem, last: Step, current: Fitted) -> bool:
     """Whether a third effect, of drops, would have to take far more than the second did for nothing to be left."""
     beyond = current.left - sum(b.residual.size for b in current.blocks)
-    return not problem.effort.is_ensemble and beyond > UNLIKELY * max(last.base.left - current.left, 0.0)
+    return not problem.effort.is_ensemble and beyond > TUNING.no_third_above * max(last.base.left - current.left, 0.0)
 
 
 def is_beyond_chance(found: Step | None, problem: Problem, phases: Phases) -> TypeGuard[Step]:
@@ -169,14 +160,20 @@ def is_beyond_chance(found: Step | None, problem: Problem, phases: Phases) -> Ty
     part of what is not negligible as a whole. Where runs scatter, slopes say less than the fits do: what is missing for
     sure is looked for though the best slopes could be chance.
     """
-    if found is None or found.p_value > (BY_SCATTER if problem.effort.is_ensemble else CHANCE):
+    if found is None or found.p_value > (
+        TUNING.admitting_p_value_runs if problem.effort.is_ensemble else TUNING.admitting_p_value
+    ):
         return False
-    if found.p_value > CHANCE and not is_missed(found.base, problem, phases):
+    if found.p_value > TUNING.admitting_p_value and not is_missed(found.base, problem, phases):
         return False
     moved = moves(problem, found.base, found.fitted)
-    if moved >= NEGLIGIBLE or moved < PART * NEGLIGIBLE or problem.effort.is_ensemble:
-        return moved >= NEGLIGIBLE
-    if found.base.candidates and does(problem, found.fitted) >= NEGLIGIBLE:
+    if (
+        moved >= SETTINGS.inference.adequacy.negligible
+        or moved < TUNING.negligible_share * SETTINGS.inference.adequacy.negligible
+        or problem.effort.is_ensemble
+    ):
+        return moved >= SETTINGS.inference.adequacy.negligible
+    if found.base.candidates and does(problem, found.fitted) >= SETTINGS.inference.adequacy.negligible:
         return True
     return is_missed(found.base, problem, phases)
 
@@ -189,7 +186,11 @@ def is_missed(fitted: Fitted, problem: Problem, phases: Phases) -> bool:
 def upheld(inquiry: Inquiry, found: Step, looked: ScoreTest) -> Step | None:
     """A step as it is to be taken; None where runs scatter and its gain does not outlast that."""
     problem = inquiry.problem
-    spoken = SPOKEN if found.p_value <= CHANCE else BY_SCATTER  # what admitted the step speaks for its best
+    spoken = (
+        SETTINGS.selection.ensemble_validation.own_p_value
+        if found.p_value <= TUNING.admitting_p_value
+        else TUNING.admitting_p_value_runs
+    )  # what admitted the step speaks for its best
     return (
         ensemble_validated(problem, backed(found, looked, spoken), inquiry.groups)
         if problem.effort.is_ensemble
@@ -205,7 +206,7 @@ def counted_otherwise(inquiry: Inquiry, current: Fitted) -> Step | None:
     """
     problem = inquiry.problem
     before = problem.heavy_tailed
-    if before and sum(is_other(b.heavy_tail) for b in current.blocks) < SEVERAL:
+    if before and sum(is_other(b.heavy_tail) for b in current.blocks) < TUNING.most_other_courses:
         return None
     problem.heavy_tailed = not before
     base = problem.again(current)

@@ -14,37 +14,37 @@ from dataclasses import replace
 import numpy as np
 
 from rollover.diagnosis.data.dataset import Dataset
-from rollover.diagnosis.data.phases import AROUND_PEAK, PEAK
+from rollover.diagnosis.data.phases import PEAK
 from rollover.diagnosis.fit.jobs import Task
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.step import Step
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.noise.truncation import up_to
 from rollover.diagnosis.selection.context import Inquiry
-from rollover.diagnosis.selection.forward_step import NEARLY_NOISE
 from rollover.diagnosis.selection.pairs import is_better
-from rollover.diagnosis.selection.stepwise import HOPELESS, Taken, one_by_one
+from rollover.diagnosis.selection.stepwise import Taken, one_by_one
+from rollover.diagnosis.settings import SETTINGS
 
-BEYOND = 0.05  # s that are simulated after an end, for filters that look ahead
-RIVALS = 5  # that are held against the best over the whole way
+TUNING = SETTINGS.selection.truncated_start
 # of the time to the deepest point: before it, as the ground springs back, and before what bounces comes down again
-ENDS = (1.0 - AROUND_PEAK, 1.2, 2.0)
-# of the time to the deepest point, after which what rests does not move any more; how near to its deepest that is; and
-# of what is left beyond the noise, that must move there for the way back to be a reason
-AT_REST, DEEPEST, BACK = 1.2, 0.999, 0.02
+ENDS = (1.0 - SETTINGS.data.phases.around_peak, *TUNING.later_ends)
 
 
 def down_first(inquiry: Inquiry, found: Taken) -> Taken:
     """What was found, or a better one begun with what explains the way down alone; only where much is left."""
     problem, base = inquiry.problem, found.base
-    if problem.effort.is_ensemble or found.fitted.left < HOPELESS**2 * found.count:
+    if problem.effort.is_ensemble or found.fitted.left < SETTINGS.selection.stepwise.hopeless**2 * found.count:
         return found
-    if moving_back(inquiry, base) < BACK * (found.fitted.left - found.count):
+    if moving_back(inquiry, base) < TUNING.least_share * (found.fitted.left - found.count):
         return found  # it came to rest as the simulation does, wherever that was
     steps: Sequence[Step] = ()
     for end in ENDS:
         above = _until(inquiry, end, steps)
-        if above is None or not above.steps or above.fitted.left > NEARLY_NOISE**2 * above.count:
+        if (
+            above is None
+            or not above.steps
+            or above.fitted.left > SETTINGS.selection.forward_step.nearly_noise**2 * above.count
+        ):
             break
         steps = above.steps
     begun, held = _over_all(inquiry, base, steps), problem.dataset
@@ -69,8 +69,8 @@ def moving_back(inquiry: Inquiry, base: Fitted) -> float:
         peaks = [start for start, name in phases if name == PEAK]
         if depth is None or not peaks:
             return np.inf
-        own = float(e.recording.time[int(np.argmax(depth >= DEEPEST * depth.max()))])
-        rest = AT_REST * max(peaks[0] / (1.0 - AROUND_PEAK), own)
+        own = float(e.recording.time[int(np.argmax(depth >= TUNING.deepest * depth.max()))])
+        rest = TUNING.rest * max(peaks[0] / (1.0 - SETTINGS.data.phases.around_peak), own)
         for signal, part in e.spans():
             late = block.plain_residual[part][e.recording.time[signal.rows] > rest]
             if late.size:
@@ -101,7 +101,7 @@ def _cut(e: Dataset, phases: Sequence[tuple[float, str]], end: float) -> Dataset
     peaks = [start for start, name in phases if name == PEAK]
     if not peaks:
         return None
-    return up_to(e, end * peaks[0] / (1.0 - AROUND_PEAK), BEYOND)
+    return up_to(e, end * peaks[0] / (1.0 - SETTINGS.data.phases.around_peak), TUNING.filter_ahead)
 
 
 def _over_all(inquiry: Inquiry, base: Fitted, steps: Sequence[Step]) -> list[Step]:
@@ -109,7 +109,7 @@ def _over_all(inquiry: Inquiry, base: Fitted, steps: Sequence[Step]) -> list[Ste
     made: list[Step] = []
     beside = base
     for s in steps:
-        near = [s.fitted, *sorted((f for f in s.rivals if f is not s.fitted), key=lambda f: f.left)[:RIVALS]]
+        near = [s.fitted, *sorted((f for f in s.rivals if f is not s.fitted), key=lambda f: f.left)[: TUNING.rivals]]
         tasks = [Task(candidates=f.candidates, start=f.x, shifts=tuple(b.shift for b in f.blocks)) for f in near]
         best, *rivals = inquiry.fits(tasks)
         if best is None:

@@ -1,0 +1,85 @@
+"""Verdicts, grades and sentences."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Conclusion:
+    """Verdict of a diagnosis."""
+
+    # share of the excess misfit: effects that take less may be all of it beside a channel that breaks off; chosen
+    main_share: float = 0.5
+    least_samples: int = 24  # samples in all: with fewer nothing is said; chosen
+
+
+@dataclass(frozen=True, kw_only=True)
+class Grades:
+    """Grades of an answer."""
+
+    # share of a load's peak: effects that change no load by more are of no consequence; chosen
+    immaterial: float = 0.01
+    load_quantile: float = 0.99  # quantile of a load's change; jumps beyond it depend on a clock; chosen
+    half_share: float = 0.5  # share of the mismatch: the least that is called a part of it; chosen
+    # share of the mismatch that the true effects explain at least; what resembles an unlisted effect leaves more;
+    # chosen
+    nearly_all: float = 0.95
+    # share of a channel's range: usual discrepancy of a model; about the median of `inference.discrepancy`
+    usual_discrepancy: float = 0.03
+    one_sided_confidence: float = 0.975  # probability: one side of a 95 % interval; definition
+
+
+@dataclass(frozen=True, kw_only=True)
+class Invariants:
+    """Checks of an answer against itself."""
+
+    at_noise: float = 1.05  # misfit over the noise: below it a sentence gives 1.0; rounding to one decimal
+    halvings: int = 6  # bisections of the way to an effect's zero; known to a 64th of the way
+    rival_share: float = 0.5  # share of the best effect's gain that a rival must have; chosen
+
+
+@dataclass(frozen=True, kw_only=True)
+class Power:
+    """What a test could have shown."""
+
+    # share of the effects that would not have shown: above it nothing can be concluded; chosen
+    blind_share: float = 0.6
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorsFirst:
+    """Faults of sensors."""
+
+    spelt_out: int = 3  # findings of one kind and channel that are spelt out; chosen
+
+
+@dataclass(frozen=True, kw_only=True)
+class Statements:
+    """Sentences."""
+
+    notable_change: float = 0.1  # share of an interval: change with the time step that is reported; chosen
+    # standard deviations of a recording's clock: up to it one channel may be late, or all others early; chosen
+    clock_errors: float = 3.0
+    # share of a strength: the end of a logarithmic interval is lowered by it in the comparison with none; chosen
+    near_zero: float = 0.2
+
+
+@dataclass(frozen=True, kw_only=True)
+class LateClocks:
+    """Late clocks."""
+
+    most_channels: int = 3  # channels that may be late each by itself; chosen
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """Verdicts, grades and sentences."""
+
+    conclusion: Conclusion = Conclusion()  # verdict of a diagnosis
+    grades: Grades = Grades()  # grades of an answer
+    invariants: Invariants = Invariants()  # checks of an answer against itself
+    power: Power = Power()  # what a test could have shown
+    sensors_first: SensorsFirst = SensorsFirst()  # faults of sensors
+    statements: Statements = Statements()  # sentences
+    late_clocks: LateClocks = LateClocks()  # late clocks
