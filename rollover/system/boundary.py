@@ -63,7 +63,12 @@ def reading(path: Path | str, what: str, cure: str = CURE) -> Iterator[None]:
     except Exception as e:  # every library has its own
         if isinstance(e, OSError) and e.errno in _MACHINE:
             raise
-        raise InputError(Fault(file=str(path), message=f"not a readable {what}: {worded(e)}; {cure}")) from None
+        raise unreadable(path, what, e, cure) from None
+
+
+def unreadable(path: Path | str, what: str, e: Exception, cure: str) -> InputError:
+    """The one line for what was raised while a file was read."""
+    return InputError(Fault(file=str(path), message=f"not a readable {what}: {worded(e)}; {cure}"))
 
 
 def bounded(function: Callable[Concatenate[Path, P], R], what: str) -> Callable[Concatenate[Path, P], R]:

@@ -30,9 +30,8 @@ from rollover.effects.sensor import is_length
 from rollover.spec.channels import UNITS, describe
 
 TUNING = SETTINGS.data.inconsistent
-PLACES = np.linspace(
-    -TUNING.shift_width, TUNING.shift_width, TUNING.shift_steps
-)  # times its prior, where a time shift is looked for
+# times its prior, where a time shift is looked for
+PLACES = np.linspace(-TUNING.shift_width, TUNING.shift_width, TUNING.shift_steps)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

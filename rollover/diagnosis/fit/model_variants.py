@@ -15,9 +15,8 @@ from rollover.diagnosis.fit.parameterisation import Candidate, coordinate
 from rollover.diagnosis.settings import SETTINGS
 
 TUNING = SETTINGS.fit.model_variants
-BESIDE_FORM = np.linspace(
-    TUNING.threshold_low, TUNING.threshold_high, TUNING.threshold_count
-)  # of a coordinate: where a threshold of another form may lie
+# of a coordinate: where a threshold of another form may lie
+BESIDE_FORM = np.linspace(TUNING.threshold_low, TUNING.threshold_high, TUNING.threshold_count)
 
 
 def shaped(problem: Problem, f: Fitted, leaves: Sequence[float]) -> Fitted | None:

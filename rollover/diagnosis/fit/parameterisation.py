@@ -174,7 +174,7 @@ class Candidate:
             (k, end, way, n)
             for k, n in enumerate(self.neutral)
             if n is not None
-            for end in TUNING.range_ends
+            for end in (0.0, 1.0)
             for way in TUNING.strong_shares
         ]
         if not ways:

@@ -14,6 +14,7 @@ from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import EFFECTS
 
 TUNING = SETTINGS.fit.threshold_scan
+# places of a threshold, over its whole range and about a fit
 AFAR = (np.arange(TUNING.wide_count) + 0.5) / TUNING.wide_count
 NEAR = TUNING.near_step * np.arange(-TUNING.near_count, TUNING.near_count + 1)
 CLOCKS = ("sensor-clock-offset", "sensor-clock-drift")

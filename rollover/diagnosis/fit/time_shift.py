@@ -63,9 +63,8 @@ def _first_contact(problem: Problem, r: int, made: Made) -> float | None:
     """Time shift (s) of recording r by its first contact: found without a model, then beside there by the model."""
     e = problem.dataset[r]
     places = _places(e)
-    places = places[
-        places + e.simulator.contact > e.recording.time[TUNING.early_samples]
-    ]  # what never fell tells of no contact
+    # what never fell tells of no contact
+    places = places[places + e.simulator.contact > e.recording.time[TUNING.early_samples]]
     if not (np.isfinite(e.simulator.contact) and places.size):
         return None
     about = _best(problem, r, made, partial(onset, problem, r), places)

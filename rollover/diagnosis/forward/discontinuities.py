@@ -16,6 +16,7 @@ DISCONTINUITY_IN = (
     "leap in "  # before the name of a channel: how far it leaps about each sample, or within each mean, SI
 )
 TUNING = SETTINGS.forward.discontinuities
+# compiled functions read globals
 DISCONTINUITY = TUNING.sample_ratio
 WITHIN = TUNING.mean_ratio
 SHOWS = TUNING.visible_step  # times the noise, from which on a step may be a leap

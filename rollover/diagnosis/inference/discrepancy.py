@@ -17,12 +17,10 @@ from rollover.spec.channels import describe
 Array = NDArray[np.float64]
 TUNING = SETTINGS.inference.discrepancy
 MEDIAN = float(np.sqrt(TUNING.usual_range[0] * TUNING.usual_range[1]))
-SPREAD = float(
-    np.log(TUNING.usual_range[1] / TUNING.usual_range[0]) / (2.0 * TUNING.normal_quantile)
-)  # of ln s, by these quantiles of 5 and 95 %
-SCALES = np.geomspace(
-    TUNING.least_scale, TUNING.largest_scale, TUNING.scale_count
-)  # s that are tried: steps of 1.2 %, the widest that no digit of a report shows
+# of ln s, by these quantiles of 5 and 95 %
+SPREAD = float(np.log(TUNING.usual_range[1] / TUNING.usual_range[0]) / (2.0 * TUNING.normal_quantile))
+# s that are tried: steps of 1.2 %, the widest that no digit of a report shows
+SCALES = np.geomspace(TUNING.least_scale, TUNING.largest_scale, TUNING.scale_count)
 
 
 @dataclass(frozen=True, kw_only=True)

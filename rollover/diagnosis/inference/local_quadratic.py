@@ -66,9 +66,8 @@ def over_roughness(runs: Runs, slopes: Sequence[Array], due: float) -> tuple[flo
         each = zip(*(blocks for _, blocks in met), strict=True)
         recordings = [_alike(blocks, nearest, J) for blocks, J in zip(each, slopes, strict=True)]
         squares = sum(np.sum(left**2, axis=1) for left, _ in recordings)
-        low = np.sort(squares)[
-            TUNING.least_places // 2 - 1
-        ]  # not the least: one run may take the recording's own course
+        # not the least: one run may take the recording's own course
+        low = np.sort(squares)[TUNING.least_places // 2 - 1]
         kept = np.abs(squares - low) < TUNING.outlier_ratio * due * t**2 + TUNING.outlier_rise * due
         if np.sum(kept) < TUNING.least_places:
             continue

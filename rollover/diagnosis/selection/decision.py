@@ -28,6 +28,10 @@ from rollover.diagnosis.selection.truncated_start import down_first
 from rollover.diagnosis.settings import SETTINGS
 
 TUNING = SETTINGS.selection.decision
+MOST_EFFECTS = SETTINGS.selection.flexibility.most_effects
+P_VALUE = SETTINGS.inference.lack_of_fit.p_value
+FULL_P_VALUE = SETTINGS.selection.simplification.full_p_value
+LEAST_GAIN = SETTINGS.selection.ensemble_validation.least_gain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,9 +82,7 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
     found = down_first(inquiry, one_by_one(inquiry, base))
     base, taken, left, current = found.base, list(found.steps), found.left, found.fitted
     is_whole = is_enough(problem, current, left)
-    is_open = not (problem.effort.is_ensemble or found.paired) and (
-        not is_whole or len(taken) == SETTINGS.selection.flexibility.most_effects
-    )
+    is_open = not (problem.effort.is_ensemble or found.paired) and (not is_whole or len(taken) == MOST_EFFECTS)
     if found.first is not None and is_open:
         # two that leave what chance leaves are preferred to three that do
         both = best_subsets(inquiry, taken or [found.first], found.at_first, current, is_whole=is_whole)
@@ -113,18 +115,11 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
 
 def is_open_to_be_named(problem: Problem, fitted: Fitted, left: Mismatch) -> bool:
     """Whether several effects may be named: as many as may be leave no more than `decided` asks, or one is needless."""
-    if (
-        problem.effort.is_ensemble
-        or len(fitted.candidates) < SETTINGS.selection.flexibility.most_effects
-        or left.p_value > SETTINGS.selection.simplification.full_p_value
-    ):
+    if problem.effort.is_ensemble or len(fitted.candidates) < MOST_EFFECTS or left.p_value > FULL_P_VALUE:
         return True
     if not matters(problem, fitted, left) or is_tolerated(problem, fitted):
         return True
-    return (
-        len(backward_elimination(problem, problem.again(fitted)).candidates)
-        < SETTINGS.selection.flexibility.most_effects
-    )
+    return len(backward_elimination(problem, problem.again(fitted)).candidates) < MOST_EFFECTS
 
 
 def _ended(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
@@ -180,12 +175,9 @@ def _retained(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
         if found is None:
             return _one_each(inquiry, taken)
         current = backward_elimination(problem, found.fitted)
-        if found.fitted.candidates[-1].key != taken_out and exchanged < SETTINGS.selection.flexibility.most_effects:
+        if found.fitted.candidates[-1].key != taken_out and exchanged < MOST_EFFECTS:
             parts, exchanged = [], exchanged + 1  # those before were looked for beside what is no more
-            if (
-                exchanged > TUNING.most_exchanges
-                and len(current.candidates) == SETTINGS.selection.flexibility.most_effects
-            ):
+            if exchanged > TUNING.most_exchanges and len(current.candidates) == MOST_EFFECTS:
                 return None
         parts = [*parts, found] if len(current.candidates) == len(found.fitted.candidates) else []
     return [s.again(problem) for s in parts]
@@ -212,7 +204,7 @@ def backward_elimination(problem: Problem, fitted: Fitted, base: Fitted | None =
             losses.append((rest.left - fitted.left if rest is not None else np.inf, k, rest))
         loss, _, rest = min(losses, key=lambda one: one[0])
         dispersion = max(1.0, fitted.left / sum(b.residual.size for b in fitted.blocks))
-        if rest is None or loss / dispersion > SETTINGS.selection.ensemble_validation.least_gain:
+        if rest is None or loss / dispersion > LEAST_GAIN:
             break
         fitted = problem.again(rest) if problem.effort.is_ensemble else rest
     return fitted
@@ -239,15 +231,11 @@ def decided(problem: Problem, found: Explanation, groups: Groups, phases: Phases
     held, is_curved = found.fitted.candidates, is_a_curve(problem, found.fitted)
     if not found.settled or is_over_flexible(held) or (is_curved and is_one_line(held)):
         return found.refused(), "unexplained"
-    is_bending = (
-        len(found.parts) == SETTINGS.selection.flexibility.most_effects or is_one_sensor(held) or is_pliant(held)
-    )
-    is_whole = found.after.p_value > (
-        SETTINGS.selection.simplification.full_p_value if is_bending else SETTINGS.inference.lack_of_fit.p_value
-    )
+    is_bending = len(found.parts) == MOST_EFFECTS or is_one_sensor(held) or is_pliant(held)
+    is_whole = found.after.p_value > (FULL_P_VALUE if is_bending else P_VALUE)
     if is_bending and not problem.effort.is_ensemble:
         # what is bent to a curve nearly everywhere leaves what it cannot be bent to in one place
-        is_whole = is_whole and min(found.after.adjusted, default=1.0) > SETTINGS.inference.lack_of_fit.p_value
+        is_whole = is_whole and min(found.after.adjusted, default=1.0) > P_VALUE
     is_whole = is_whole or not matters(problem, found.fitted, found.after)
     start, ahead = held_out(found.base, groups).total, held_out(found.fitted, groups).total
     is_whole = (
@@ -270,9 +258,7 @@ def decided(problem: Problem, found: Explanation, groups: Groups, phases: Phases
         )
         if is_nearly_all and inside:
             return replace(found, parts=(one,), fitted=one.fitted, after=after), kind_of(one.fitted.candidates[-1])
-    significant = found.before.p_value < SETTINGS.inference.lack_of_fit.p_value and matters(
-        problem, found.base, found.before
-    )
+    significant = found.before.p_value < P_VALUE and matters(problem, found.base, found.before)
     significant = significant and not is_tolerated(problem, found.base) and not is_slight(problem, found.first, phases)
     verdict: Verdict = "unexplained" if significant or found.parts else "no-mismatch"
     return found.refused(), verdict
@@ -303,10 +289,7 @@ def done_by_others(problem: Problem, found: Explanation, ids: Collection[str]) -
             for place in other.with_secondary(x) if other.shapes else ():
                 way = [*others[:j], (other.whole(), place), *others[j + 1 :]]
                 fits.append(problem.fit([o for o, _ in way], [v for _, at in way for v in at], shifts=shifts))
-        if (
-            min((f.left for f in fits if f is not None), default=np.inf) - fitted.left
-            < SETTINGS.selection.ensemble_validation.least_gain * dispersion
-        ):
+        if min((f.left for f in fits if f is not None), default=np.inf) - fitted.left < LEAST_GAIN * dispersion:
             done.add(c.id)
     return done
 
@@ -351,4 +334,4 @@ def is_slight(problem: Problem, first: Step | None, phases: Phases) -> bool:
     """Whether all that separates simulation and recordings is the work of an effect that moves nothing worth a name."""
     if first is None or moves(problem, first.base, first.fitted) >= SETTINGS.inference.adequacy.negligible:
         return False
-    return mismatch_of(problem.dataset, first.fitted.blocks, phases).p_value > SETTINGS.inference.lack_of_fit.p_value
+    return mismatch_of(problem.dataset, first.fitted.blocks, phases).p_value > P_VALUE

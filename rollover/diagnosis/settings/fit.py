@@ -156,7 +156,6 @@ class Parameterisation:
     end_distance: float = 0.01  # coordinate (0 to 1): distance of a start from the ends of its range; chosen
     sliding_tilt: float = 2.0  # tangent of the tilt at which a load slides; chosen
     strong_shares: tuple[float, ...] = (0.35, 0.9)  # shares of the way from an effect's zero to an end; chosen
-    range_ends: tuple[float, ...] = (0.0, 1.0)  # coordinates of the ends of a range; definition
 
 
 @dataclass(frozen=True, kw_only=True)

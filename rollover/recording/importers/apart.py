@@ -17,11 +17,13 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from rollover.system import budget
-from rollover.system.boundary import worded
+from rollover.system.boundary import unreadable
 from rollover.system.errors import Fault, InputError
 from rollover.system.processes import Children, Failure, limited, map_cases
 
 V = TypeVar("V")
+
+CURE = "a sound file is needed"
 
 _children = Children(1, bare=True)
 _alone = threading.Lock()  # the child has one file at a time
@@ -103,8 +105,7 @@ def _work(task: _Task) -> Any:
     except MemoryError:
         raise
     except Exception as e:  # every library has its own
-        message = f"not a readable {task.what} file: {worded(e)}; a sound file is needed"
-        return InputError(Fault(file=str(task.path), message=message))
+        return unreadable(task.path, f"{task.what} file", e, CURE)
 
 
 def _told(failure: Failure, what: str, task: _Task, wall: float) -> str:
@@ -117,4 +118,4 @@ def _told(failure: Failure, what: str, task: _Task, wall: float) -> str:
     if failure.kind == "crash":
         cure = "the file is damaged, or of a kind that it does not know: write it anew, or as CSV"
         return f"not read: the reader of {what} crashed, {failure.sentence}; {cure}"
-    return f"not a readable {what} file: {failure.sentence.splitlines()[0][:160]}; a sound file is needed"
+    return f"not a readable {what} file: {failure.sentence.splitlines()[0][:160]}; {CURE}"
