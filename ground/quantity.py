@@ -83,6 +83,11 @@ class Grid:
 
 
 @dataclass(frozen=True)
+class IfAny:
+    """Marks a list that counts in a hash only where something stands in it."""
+
+
+@dataclass(frozen=True)
 class Label:
     """A name that paths and channels are built from: letters, digits, ``_`` and ``-``, a letter first."""
 

@@ -11,9 +11,10 @@ from ground.array import CoMovingMass, Elements
 from ground.friction import Coulomb
 from ground.kinds import ByKey, ByKind
 from ground.law import GroundLaw
-from ground.quantity import Quantity, parameters
+from ground.quantity import IfAny, Quantity, parameters
 from ground.surface import Plane, Surface
 from rollover.effects import EFFECTS, entries, nothing
+from rollover.inputs import Input, check_inputs
 from rollover.recording.filters import least_rate
 from rollover.spec import document
 from rollover.spec.estimates import Estimate, wheel_estimates
@@ -125,6 +126,7 @@ class Scenario:
     initiation: Initiation
     simulation: Simulation
     excitation: Annotated[Excitation | None, "what drives a striker besides its weight"] = None
+    inputs: Annotated[tuple[Input, ...], IfAny(), "what is prescribed over time, by signals"] = ()
     loads: Loads = Loads()
     gravity: Annotated[float, Quantity("m/s2", "acceleration of free fall, along -z", least=0, most=30)] = 9.81
     effects: Annotated[
@@ -154,6 +156,7 @@ class Scenario:
                 f"excitation: drives a striker only, got a vehicle of kind {self.vehicle.kind!r}; 'striker' is allowed"
             )
         _check_start(self.vehicle, self.initiation)
+        check_inputs(self.inputs, self.vehicle, self.initiation)
 
     @property
     def own_code(self) -> dict[str, dict[str, dict[str, str]]]:

@@ -47,6 +47,7 @@ _ENERGY = {
     "lashing": "stored and lost in the lashings of a test stand",
     "effects": "taken by effects on the bodies: guide, air, a compliant striker",
     "drive": "taken by the brakes, less what the engine gave",
+    "input": "taken by prescribed forces, motion of the ground and steering, less what they put in",
     "residual": "what the ledger does not explain",
 }
 
@@ -95,6 +96,11 @@ CHANNELS: dict[str, Channel] = {
         Channel(name="wheel/NAME/spin", unit="rad/s", meaning="of a wheel that turns by itself, forward"),
         Channel(name="axle/front/angle", unit="rad", meaning="of the front axle about its pivot", period=TURN),
         Channel(name="axle/front/impulse", unit="N m s", meaning="of the axle on its stops, accumulated"),
+        Channel(name="input/NAME/angle", unit="rad", meaning="prescribed: of the front wheels, or of a tilt table"),
+        Channel(name="input/NAME/force", unit="N", meaning="prescribed, on a body"),
+        Channel(name="input/NAME/torque", unit="N m", meaning="prescribed: of the engine, or limit of a brake"),
+        Channel(name="input/NAME/displacement", unit="m", meaning="prescribed, of the shaken ground"),
+        Channel(name="input/NAME/acceleration", unit="m/s2", meaning="prescribed, of the shaken ground"),
         *[Channel(name=f"energy/{name}", unit="J", meaning=meaning) for name, meaning in _ENERGY.items()],
     ]
 }

@@ -90,7 +90,10 @@ class Throw:
 class Drive:
     """What turns the wheels of an axle: a torque that rises from zero and is taken back at the engine's limit."""
 
-    torque: Annotated[float, Quantity("N m", "on the axle's wheels together, forward", least=-1e6, most=1e6)]
+    torque: Annotated[
+        float | None,
+        Quantity("N m", "on the axle's wheels together, forward; null: by an input", least=-1e6, most=1e6),
+    ] = None
     axle: Annotated[Literal["rear", "front", "all"], "whose wheels it drives"] = "rear"
     differential: Annotated[Literal["open", "locked"], "open: equal torques; locked: equal rates"] = "open"
     rise_time: Annotated[float, Quantity("s", "from zero to all of it", least=0)] = 0.1
@@ -104,7 +107,7 @@ class Drive:
 class Brake:
     """Holds wheels up to a limit; a large one locks them."""
 
-    torque: Annotated[float, Quantity("N m", "limit, of each wheel", above=0)]
+    torque: Annotated[float | None, Quantity("N m", "limit, of each wheel; null: by an input", above=0)] = None
     axle: Annotated[Literal["rear", "front", "all"], "whose wheels it holds"] = "all"
     against: Annotated[
         Literal["vehicle", "ground"], "what it holds them to: the ground, where they are dug in, frozen in or chained"

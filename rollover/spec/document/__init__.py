@@ -12,19 +12,21 @@ from typing import Any
 from rollover.spec.document.annotated import annotated
 from rollover.spec.document.check import check
 from rollover.spec.document.exchange import Itself, exchanged, value_at
-from rollover.spec.document.include import expand, find, headings, named, shipped_folder
+from rollover.spec.document.include import beside, expand, find, headings, named, shipped_folder
 from rollover.spec.document.replace import parse_setting, replaced
 from rollover.spec.document.resolved import Leaf, content_hash, dump, paths, to_mapping, unit_at
 from rollover.spec.document.schema import schema
-from rollover.spec.document.slot import slot_of
-from rollover.spec.document.tree import Node, read
+from rollover.spec.document.slot import Written, slot_of
+from rollover.spec.document.tree import Node, planted, read
 from rollover.spec.document.tree import write as dump_mapping
 
 __all__ = [
     "Itself",
     "Leaf",
     "Node",
+    "Written",
     "annotated",
+    "beside",
     "check",
     "content_hash",
     "dump",
@@ -36,6 +38,7 @@ __all__ = [
     "named",
     "parse_setting",
     "paths",
+    "planted",
     "read",
     "replaced",
     "schema",

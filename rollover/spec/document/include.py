@@ -96,6 +96,8 @@ def expand(node: Node, slot: Slot, chain: tuple[Path, ...], path: str = "", unde
         return _included(node, slot, chain, path)
     if slot.grid and isinstance(node.value, str) and node.value.endswith(GRIDS):
         return _grid(node, path)
+    if slot.written is not None and (found := slot.written.read(node, path, slot.written.unit)) is not None:
+        return found
     if isinstance(node.value, tuple):
         elements = [
             expand(child, slot.element(i) or Slot(type=object), chain, _join(path, str(i)))
@@ -152,11 +154,14 @@ def _name(element: Node) -> str | None:
     return found.value if found is not None and isinstance(found.value, str) else None
 
 
+def beside(name: str, node: Node) -> Path | None:
+    """The file that a node names: beside the one in which it stands, or a shipped one; None where there is none."""
+    return next((f / name for f in (node.place.folder, shipped_folder()) if (f / name).is_file()), None)
+
+
 def _grid(node: Node, path: str) -> Node:
     """Heights from a file beside the one that names it, or among the shipped ones."""
-    name = Path(str(node.value))
-    folders = (node.place.folder, shipped_folder())
-    file = next((f / name for f in folders if (f / name).is_file()), None)
+    file = beside(str(node.value), node)
     if file is None:
         raise node.place.fault(path, f"no such file, got {node.value!r}; a .csv or .npy file beside this one is needed")
     return grids.read(file, node, path)

@@ -48,8 +48,13 @@ def dump(thing: Any, head: str = "") -> str:
 
 
 def content_hash(thing: Any) -> str:
-    """SHA-256 over all values, whatever the order of keys and the files they came from."""
-    text = json.dumps(to_mapping(thing), sort_keys=True, separators=(",", ":"), allow_nan=False)
+    """SHA-256 over all values, whatever the order of keys and the files they came from.
+
+    A list that `IfAny` marks counts where something stands in it: what never had one keeps the hash that it had.
+    """
+    known = slots(type(thing))
+    stated = {key: value for key, value in to_mapping(thing).items() if value or not known[key].if_any}
+    text = json.dumps(stated, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 

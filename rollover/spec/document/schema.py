@@ -76,7 +76,11 @@ class _Writer:
                 "properties": {key: self.slot(slot_of(member), suffix) for key, member in sorted(table.items())},
             }
         if slot.kinds:
-            return self.one_of(slot, suffix)
+            whole = self.one_of(slot, suffix)
+            if slot.written is None:
+                return whole
+            forms = [{"$ref": f"#/$defs/{self._define(form, '', by_kind=False)}"} for form in slot.written.forms]
+            return {"anyOf": [{"type": "number"}, *forms, whole]}
         if typing.get_origin(slot.type) is Literal:
             return {"enum": list(typing.get_args(slot.type))}
         if slot.type is str:

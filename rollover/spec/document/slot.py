@@ -5,12 +5,27 @@ from __future__ import annotations
 import functools
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from typing import Annotated, Any, Literal
 
 from ground.kinds import ByKey, ByKind
-from ground.quantity import Grid, Label, Quantity
+from ground.quantity import Grid, IfAny, Label, Quantity
+
+
+@dataclass(frozen=True, kw_only=True)
+class Written:
+    """Marks what a file may write in other ways too: ``Annotated[Signal, Written(read=..., ...)]``.
+
+    `read` (node, its path, unit) gives the node that the class needs, or None for one that is written so already;
+    it raises `InputError`. `unit` is that of the numbers, `forms` are the parameter classes of the other mappings.
+    """
+
+    unit: str
+    meaning: str
+    read: Callable[[Any, str, str], Any]
+    forms: tuple[type, ...] = ()
+    allowed: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,11 +40,13 @@ class Slot:
     by_kind: ByKind | None = None
     by_key: ByKey | None = None
     grid: Grid | None = None
+    written: Written | None = None
+    if_any: bool = False
 
     @property
     def unit(self) -> str:
         """Unit of the number or numbers here, or nothing."""
-        return self.quantity.unit if self.quantity else self.grid.unit if self.grid else ""
+        return next((m.unit for m in (self.quantity, self.grid, self.written) if m is not None), "")
 
     @property
     def kinds(self) -> Mapping[str, type]:
@@ -85,6 +102,8 @@ class Slot:
     def _allowed(self, kind: object) -> str:
         if self.grid:
             return f"rows of numbers in {self.unit}, or the name of a .csv or .npy file,"
+        if self.written:
+            return f"a number in {self.unit}, {self.written.allowed}"
         if self.is_list:
             first = self.element(0)
             inside = first.allowed() if first else ""
@@ -130,15 +149,18 @@ def slot_of(annotation: Any) -> Slot:
         inner = Slot(type=bare) if by_kind else slot_of(bare)
         quantity = next((m for m in metadata if isinstance(m, Quantity)), inner.quantity)
         grid = next((m for m in metadata if isinstance(m, Grid)), None)
+        written = next((m for m in metadata if isinstance(m, Written)), None)
         label = next((m for m in metadata if isinstance(m, Label)), None)
         text = next((m for m in metadata if isinstance(m, str)), "")
         return Slot(
             **{
                 **vars(inner),
                 "quantity": quantity,
-                "meaning": text or next((m.meaning for m in (grid, label, quantity, inner) if m), ""),
+                "meaning": text or next((m.meaning for m in (grid, written, label, quantity, inner) if m), ""),
                 "label": label is not None or inner.label,
                 "grid": grid or inner.grid,
+                "written": written or inner.written,
+                "if_any": any(isinstance(m, IfAny) for m in metadata) or inner.if_any,
                 "by_kind": by_kind or inner.by_kind,
                 "by_key": next((m for m in metadata if isinstance(m, ByKey)), inner.by_key),
             }
