@@ -147,6 +147,11 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
         device_q=np.zeros((0, 6 * nb)),
         device_x=np.zeros((nb, 6)),
         device_out=np.zeros(c.OUT_COLUMNS),
+        input_i=np.zeros((0, 0), dtype=np.int64),
+        input_f=np.zeros((0, 0)),
+        input_memory=np.zeros((0, 0)),
+        input_q=np.zeros((0, 6 * nb)),
+        pieces=np.zeros((0, 0)),
     )
 
 

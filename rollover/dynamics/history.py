@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,11 @@ from numpy.typing import NDArray
 from ground.compiled import compiled
 from ground.kernel import AREA, CELL, LINE_Z, ROW, SINKAGE
 from rollover.dynamics.bodies import Body
+from rollover.dynamics.prescribed import ground_acceleration, quantity, steered_kinetic
+from rollover.inputs import Shake
 from rollover.kernels import tables as c
 from rollover.kernels.elements import kinetic_of_soil
+from rollover.kernels.inputs import V_NOW
 from rollover.kernels.tables import (
     ACTIVE,
     E_FORCE,
@@ -77,6 +80,9 @@ def write_row(t: Any, q: Any, qd: Any, qdd: Any, row: Any) -> None:
     row[k + 2] = t.counts[FLAGS_NOW]
     row[k + 3] = footprint
     k += 4
+    for i in range(t.input_i.shape[0]):
+        row[k] = t.input_memory[i, V_NOW]
+        k += 1
     if t.device_i.shape[0] > 0:
         for j in range(OUT_COLUMNS):
             row[k + j] = t.device_out[j]
@@ -87,7 +93,7 @@ def row_length(t: Tables) -> int:
     n = len(t.spin_mass)
     out = OUT_COLUMNS if len(t.device_i) else 0
     parts = len(t.pose) * RESULTANT_COLUMNS + 10 * len(t.wheel_i) + 12 * len(t.mount_f)
-    return int(3 * n + parts + 2 + WORKS + 1 + 3 + out)
+    return int(3 * n + parts + 2 + WORKS + 1 + 3 + len(t.input_i) + out)
 
 
 @dataclass
@@ -141,6 +147,7 @@ class States:
     sinkage: Array
     flags: NDArray[np.int64]
     footprint: Array
+    prescribed: Array  # (n, ni) what the inputs were
     device: Array  # (n, OUT_COLUMNS), or (n, 0) without a test stand
 
 
@@ -171,6 +178,7 @@ def states(rows: Array, t: Tables) -> States:
         sinkage=take(),
         flags=take().astype(np.int64),
         footprint=take(),
+        prescribed=take(len(t.input_i)),
         device=rows[:, at:],
     )
 
@@ -188,6 +196,8 @@ def energies(s: States, t: Tables, bodies: tuple[Body, ...], gravity: float) -> 
         # I (spin + omega . e)^2/2 of the wheels that turn; t.mass is without them
         whole = np.concatenate([flat, s.spin], axis=1)
         kinetic += 0.5 * np.einsum("ni,ij,nj->n", whole, t.spin_mass, whole)
+        if len(t.input_i):
+            kinetic += steered_kinetic(t, s.prescribed, s.qd, s.spin)
     masses = np.array([body.inertia.mass for body in bodies])
     potential = gravity * s.q[:, :, 2] @ masses
     ledger = {
@@ -205,13 +215,20 @@ def energies(s: States, t: Tables, bodies: tuple[Body, ...], gravity: float) -> 
     if len(t.device_i):
         ledger["device"] = s.work[:, c.DEVICE]
         ledger["lashing"] = s.work[:, c.LASHING]
+    if len(t.input_i):
+        ledger["input"] = s.work[:, c.INPUT]
     total = np.sum(list(ledger.values()), axis=0)
     ledger["residual"] = np.asarray(total[0] - total)
     return ledger
 
 
-def channels(scenario: Scenario, s: States, t: Tables, bodies: tuple[Body, ...]) -> dict[str, Array]:
+def channels(scenario: Scenario, time: Array, s: States, t: Tables, bodies: tuple[Body, ...]) -> dict[str, Array]:
     """All channels of a run by their names, SI, each (n,)."""
+    if any(isinstance(one, Shake) for one in scenario.inputs):
+        # the run's own are against the ground
+        qdd = s.qdd.copy()
+        qdd[:, :, :3] += ground_acceleration(scenario.inputs, time)[:, None, :]
+        s = replace(s, qdd=qdd)
     row = {body.name: b for b, body in enumerate(bodies)}
     n, uneven = t.plane[:3], len(t.relief) > 0
     normal = s.resultant[:, :, c.R_NORMAL : c.R_NORMAL + 3].sum(axis=1)
@@ -243,6 +260,8 @@ def channels(scenario: Scenario, s: States, t: Tables, bodies: tuple[Body, ...])
             found["axle/front/angle"] = s.axle[:, 0]
             if vehicle.front_axle.stop == "impact":
                 found["axle/front/impulse"] = s.axle[:, 1]
+    for k, one in enumerate(scenario.inputs):
+        found[f"input/{one.name}/{quantity(one)}"] = s.prescribed[:, k]
     for k, name in enumerate(("force", "deflection", "energy") if s.device.size else ()):
         found[f"device/{name}"] = s.device[:, k]
     for name, values in energies(s, t, bodies, scenario.gravity).items():

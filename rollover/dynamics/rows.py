@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollover.dynamics.bodies import Body, loose
+from rollover.dynamics.prescribed import first_angle
 from rollover.effects.vehicle import TankSlosh
+from rollover.inputs import Steering
 from rollover.kernels import tables as c
 from rollover.kernels import terms
 from rollover.scenario import Scenario
@@ -98,14 +100,17 @@ def turning_rows(scenario: Scenario, wheel_f: Array, first: int) -> tuple[Index,
     drive = np.array([0.0, 1e9, 0.0, 0.0])
     if not isinstance(start, Driving) or not isinstance(vehicle, Vehicle):
         return spin_i, spin_f, drive
-    steer = math.radians(start.steer_deg)
+    steered = first_angle(scenario.inputs, Steering)
+    steer = math.radians(start.steer_deg) if steered is None else steered
     for w, wheel in enumerate(vehicle.wheels):
         spin_i[w] = first + w
         spin_f[w] = [
             turning_inertia(vehicle, wheel),
-            start.brake.torque if start.brake and vehicle.on_axle(wheel, start.brake.axle) else 0.0,
+            (start.brake.torque or 0.0) if start.brake and vehicle.on_axle(wheel, start.brake.axle) else 0.0,
             float(start.drive is not None and vehicle.on_axle(wheel, start.drive.axle)),
             float(start.brake is not None and start.brake.against == "ground"),
+            float(start.brake is not None and vehicle.on_axle(wheel, start.brake.axle)),
+            float(steered is not None and vehicle.on_axle(wheel, "front")),
         ]
         wheel_f[w, c.W_ROLLS] = 0.0
         if vehicle.on_axle(wheel, "front"):

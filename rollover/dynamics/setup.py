@@ -12,6 +12,8 @@ from rollover.dynamics.assembly import tables_of
 from rollover.dynamics.bodies import Body, bodies_of
 from rollover.dynamics.equilibrium import Equilibrium
 from rollover.dynamics.placement import Start, place
+from rollover.dynamics.prescribed import first_angle, with_inputs
+from rollover.inputs import TableAngle
 from rollover.kernels import stand_devices as d
 from rollover.kernels.tables import E_FORCE_NOW, Tables
 from rollover.scenario import Scenario
@@ -49,6 +51,11 @@ class Rig:
 
 def set_up(scenario: Scenario) -> Rig:
     """Bodies, tables and start of a run. Raises ``ValueError`` for a start that does not exist."""
+    rig = _put_down(scenario)
+    return replace(rig, tables=with_inputs(scenario, rig.bodies, rig.tables))
+
+
+def _put_down(scenario: Scenario) -> Rig:
     bodies = bodies_of(scenario.vehicle, scenario.ground.elements, scenario.effects)
     t = tables_of(scenario, bodies)
     begin = scenario.initiation
@@ -65,6 +72,8 @@ def set_up(scenario: Scenario) -> Rig:
         f[d.D_WAY : d.D_WAY + 3] = 0.0, 1.0, 0.0
         f[d.D_START], f[d.D_RATE] = math.radians(begin.from_deg), math.radians(begin.rate_deg)
         f[d.D_MOST], f[d.D_K] = math.radians(begin.to_deg), scenario.gravity
+        if (given := first_angle(scenario.inputs, TableAngle)) is not None:
+            f[d.D_START], f[d.D_RATE], f[d.D_MOST] = given, 0.0, math.inf
         return Rig(bodies=bodies, tables=t, start=_on_table(scenario, begin, bodies, t))
     if scenario.excitation is not None:
         t = with_devices(t, 1)
@@ -112,8 +121,8 @@ def _on_table(scenario: Scenario, tilt: TiltTable, bodies: tuple[Body, ...], t: 
     if u is None or not np.all(t.wheel_memory[:, E_FORCE_NOW] > 0.0):
         raise InputError(
             Fault(
-                path="initiation.from_deg",
-                message=f"not on all its wheels on a table so steep, got {tilt.from_deg:g} deg; less",
+                path="inputs" if scenario.inputs else "initiation.from_deg",
+                message=f"not on all its wheels on a table so steep, got {math.degrees(first):g} deg; less",
             )
         )
     return Start(q=statics.coordinates(u), qd=np.zeros(6 * len(bodies)), time=0.0)
@@ -154,7 +163,7 @@ def _pendulum(scenario: Scenario, blow: PendulumBlow, bodies: tuple[Body, ...]) 
     t.wheel_memory[:], t.mount_memory[:] = alone.wheel_memory, alone.mount_memory
     _lash(blow.lashings, row, bodies, start, t, 1)
     points = np.flatnonzero(t.point_body == row["rops"])
-    t.device_i[0] = d.FACE, row["rops"], len(bodies), points[0], points[-1] + 1
+    t.device_i[0, : d.D_END + 1] = d.FACE, row["rops"], len(bodies), points[0], points[-1] + 1
     f = t.device_f[0]
     f[d.D_POINT : d.D_POINT + 3], f[d.D_WAY : d.D_WAY + 3] = 0.5 * blow.depth * way, way
     f[d.D_K], f[d.D_C], f[d.D_SIZE] = blow.contact_stiffness, blow.contact_damping, blow.face

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ground.compiled import mark_warm
-from rollover.dynamics import history, model
+from rollover.dynamics import history, model, prescribed
 from rollover.dynamics.assembly import grown
 from rollover.dynamics.bodies import Body
 from rollover.dynamics.history import History, States
@@ -76,6 +76,8 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
     past = History(scenario=scenario, bodies=bodies, time=np.zeros(len(rows)), rows=rows)
     live = model.Live(tables=t, handle=handle(t))
     Q = np.zeros(len(t.spin_mass))
+    t.clock[1] = start.time
+    changing = prescribed.over(scenario.inputs)
     generalised_forces(live.handle, start.q, start.qd, Q)
     keep_strain(live.handle)
     generalised_forces(live.handle, start.q, start.qd, Q)
@@ -117,7 +119,7 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
                 past.add_track(now, live.tables)
             state["rows"] = k + 1
         settled = largest(qd[: len(t.mass)]) < REST_SPEED and (touched or not seen.isdisjoint(landed))
-        state["quiet"] = state["quiet"] + dt if settled else 0.0
+        state["quiet"] = state["quiet"] + dt if settled and now > changing else 0.0
         if progress is not None and k % 20 == 0 and clock.perf_counter() >= state["next"]:
             progress(now, clock.perf_counter() - began)
             state["next"] = clock.perf_counter() + 0.25
@@ -159,7 +161,7 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
 def _throttle(scenario: Scenario, t: Tables, now: float) -> None:
     """What the engine may give in the next step."""
     start = scenario.initiation
-    if isinstance(start, Driving) and start.drive is not None:
+    if isinstance(start, Driving) and start.drive is not None and start.drive.torque is not None:
         if start.drive.until is not None and now >= start.drive.until:
             t.drive[c.D_TORQUE] = 0.0
             return
@@ -179,7 +181,10 @@ def _runaway(scenario: Scenario, t: Tables) -> str:
     if not fast:
         return ""
     w = max(fast, key=lambda k: rate[k])
-    name, torque = vehicle.wheels[w].name, start.drive.torque
+    name, torque = (
+        vehicle.wheels[w].name,
+        float(t.drive[c.D_TORQUE]) if start.drive.torque is None else start.drive.torque,
+    )
     return (
         f"wheel {name} runs away at t = {t.clock[1]:.4f} s: it turns at {rate[w]:.0f} rad/s, "
         f"driven with {torque:g} N m and no limit; initiation.drive.limit_rate (rad/s) is needed"
@@ -231,7 +236,7 @@ def _result(
     count = max(past.count, 1)
     time = past.time[:count].copy()
     s = history.states(past.rows[:count], t)
-    found = history.channels(scenario, s, t, bodies)
+    found = history.channels(scenario, time, s, t, bodies)
     wanted = np.arange(time[0], time[-1] + 1e-9, 1.0 / FRAME_RATE)
     frames = np.unique(np.minimum(np.searchsorted(time, wanted - 1e-9), count - 1))
     track_time, element, sinkage = past.sinkage(t)
@@ -264,7 +269,7 @@ def _result(
 def _released(found: dict[str, Array]) -> float:
     """Energy that the run had to give, J: kinetic at the start, the deepest fall, what a device or an engine put in."""
     start = found["energy/kinetic"][0] + found["energy/collision"][0]
-    put_in = -found["energy/device"].min() if "energy/device" in found else 0.0
+    put_in = sum(-float(found[e].min()) for e in ("energy/device", "energy/input") if e in found)
     return float(start - found["energy/potential"].min() - found["energy/drive"].min() + put_in)
 
 

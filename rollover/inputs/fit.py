@@ -1,4 +1,4 @@
-"""Whether what is prescribed fits the vehicle and the start; and who gives the angles and torques that a start leaves."""
+"""Whether what is prescribed fits the vehicle and the start, and nothing is given twice or not at all."""
 
 from __future__ import annotations
 
@@ -59,7 +59,8 @@ def _check_table(one: TableAngle, start: Initiation) -> None:
     for key in ("from_deg", "to_deg", "rate_deg", "creep"):
         if getattr(start, key) != getattr(usual, key):
             raise ValueError(
-                f"initiation.{key}: the input {one.name!r} gives the angle, got {getattr(start, key)!r} too; leave it out"
+                f"initiation.{key}: the input {one.name!r} gives the angle, got {getattr(start, key)!r} too; "
+                "leave it out"
             )
 
 

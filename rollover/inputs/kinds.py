@@ -113,7 +113,7 @@ class DriveTorque:
 
 @parameters
 class BrakeTorque:
-    """The limit of the brakes' torque over time, on the wheels of `initiation.brake`. Straight lines between samples."""
+    """The limit of the brakes' torque over time, on the wheels of `initiation.brake`. Straight lines between."""
 
     kind: Literal["brake-torque"] = "brake-torque"
     name: Annotated[str, Label("of the input in results")]

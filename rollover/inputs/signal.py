@@ -1,4 +1,4 @@
-"""A signal: a quantity at instants. From a number, from a table in the file, or from a recording in a file beside it."""
+"""A signal: a quantity at instants, from a number, from a table, or from a recording in a file beside."""
 
 from __future__ import annotations
 

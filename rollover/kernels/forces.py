@@ -13,6 +13,7 @@ import numpy as np
 from ground.compiled import compiled, leaf
 from ground.kernel import BODY, MASS_B, NORMAL, OFFSET, OWNER_R, PLACE, ROW, SHEAR, SPREAD, friction_force, normal_force
 from rollover.kernels.compliant_joints import try_mounts
+from rollover.kernels.inputs import read_inputs, try_inputs
 from rollover.kernels.stand_devices import try_devices
 from rollover.kernels.tables import (
     A_C,
@@ -21,12 +22,18 @@ from rollover.kernels.tables import (
     A_SWING,
     ACTIVE,
     E_ANCHOR,
+    E_DAMPING,
     E_DAMPING_NOW,
+    E_DEPTH,
     E_DEPTH_NOW,
+    E_ENERGY,
     E_ENERGY_NOW,
+    E_FORCE,
     E_FORCE_NOW,
+    E_FRICTION,
     E_FRICTION_NOW,
     E_MOVED,
+    E_NORMAL,
     E_NORMAL_NOW,
     E_PLACE,
     E_POINT,
@@ -251,6 +258,18 @@ def try_wheels(t: Any, Q: Any) -> None:
 
 
 @leaf
+def keep_tyres(t: Any) -> None:
+    """What was found of the tyres is what the next step starts from."""
+    for w in range(t.wheel_i.size):
+        g = t.wheel_memory[w]
+        g[E_DEPTH], g[E_FORCE], g[E_DAMPING] = g[E_DEPTH_NOW], g[E_FORCE_NOW], g[E_DAMPING_NOW]
+        g[E_ENERGY] = g[E_ENERGY_NOW]
+        for k in range(3):
+            g[E_FRICTION + k] = g[E_FRICTION_NOW + k]
+            g[E_NORMAL + k] = g[E_NORMAL_NOW + k]
+
+
+@leaf
 def try_axle(t: Any, Q: Any) -> None:
     """Torque of the front axle's stops about the pivot (chassis x)."""
     if t.axle_f.size == 0:
@@ -288,6 +307,7 @@ def generalised_forces(t: Any, q: Any, qd: Any, Q: Any) -> None:
         Q[k] = 0.0
     read_poses(t.pose, q, qd)
     read_spins(t, q, qd)
+    read_inputs(t)
     try_elements(t, Q)
     try_wheels(t, Q)
     try_spins(t, Q)
@@ -295,6 +315,7 @@ def generalised_forces(t: Any, q: Any, qd: Any, Q: Any) -> None:
     try_axle(t, Q)
     try_devices(t, Q)
     try_terms(t, Q)
+    try_inputs(t, Q)
 
 
 @compiled

@@ -13,8 +13,9 @@ from ground.compiled import leaf
 from rollover.kernels.tables import OMEGA, X
 from rollover.kernels.vectors import add_force, place, to_body, to_world, velocity
 
-# columns of device_i: kind, body, the body that carries a face, first and end of the contact points that it can meet
-D_KIND, D_BODY, D_CARRIER, D_FIRST, D_END, DEVICE_INTEGERS = 0, 1, 2, 3, 4, 5
+# columns of device_i: kind, body, the body that carries a face, first and end of the contact points that it can meet;
+# 1 + the row of the input that gives a table's angle, or 0
+D_KIND, D_BODY, D_CARRIER, D_FIRST, D_END, D_INPUT, DEVICE_INTEGERS = 0, 1, 2, 3, 4, 5, 6
 OFF, BEAM, FORCE, ROPE, FACE, TILT = 0, 1, 2, 3, 4, 5
 
 # columns of device_f: point about the body's centre of mass; direction or anchor (world), or normal of a face (axes of
@@ -141,6 +142,8 @@ def try_tilt(t: Any, i: int, Q: Any) -> None:
     """Gravity of a table that is tilted by an angle a: m g (sin a downhill + (1 - cos a) up) besides the weight."""
     f = t.device_f[i]
     angle = level(f, t.clock[1])
+    if t.device_i[i, D_INPUT] > 0:
+        angle = t.input_memory[t.device_i[i, D_INPUT] - 1, 0]
     along, up = f[D_K] * math.sin(angle), f[D_K] * (1.0 - math.cos(angle))
     t.device_memory[i, K_ALONG_NOW] = angle
     for b in range(t.pose.shape[0]):
@@ -151,21 +154,25 @@ def try_tilt(t: Any, i: int, Q: Any) -> None:
 
 
 @leaf
+def book_work(t: Any, now: Any, before: Any, h: float, account: int) -> None:
+    """Work of generalised forces (6 nb,) on the bodies over a step, into a place of `work`; `before` becomes `now`."""
+    for b in range(t.pose.shape[0]):
+        for k in range(3):
+            j = 6 * b + k
+            t.work[account] -= 0.5 * (now[j] + before[j]) * (t.pose[b, X + k] - t.device_x[b, k])
+            turned = 0.5 * h * (t.pose[b, OMEGA + k] + t.device_x[b, 3 + k])
+            t.work[account] -= 0.5 * (now[j + 3] + before[j + 3]) * turned
+    for k in range(now.shape[0]):
+        before[k] = now[k]
+
+
+@leaf
 def finish_devices(t: Any, h: float, first: int) -> None:
     """Work of the devices on the bodies over a step; `first` is the place of their accounts in `work`."""
     if t.device_i.shape[0] == 0:
         return
-    n = t.device_q.shape[1]
     for a in range(ACCOUNTS):
-        now, before = t.device_q[a], t.device_q[ACCOUNTS + a]
-        for b in range(t.pose.shape[0]):
-            for k in range(3):
-                j = 6 * b + k
-                t.work[first + a] -= 0.5 * (now[j] + before[j]) * (t.pose[b, X + k] - t.device_x[b, k])
-                turned = 0.5 * h * (t.pose[b, OMEGA + k] + t.device_x[b, 3 + k])
-                t.work[first + a] -= 0.5 * (now[j + 3] + before[j + 3]) * turned
-        for k in range(n):
-            before[k] = now[k]
+        book_work(t, t.device_q[a], t.device_q[ACCOUNTS + a], h, first + a)
     for i in range(t.device_i.shape[0]):
         m = t.device_memory[i]
         m[K_WORK] += 0.5 * (m[K_FORCE] + m[K_FORCE_NOW]) * (m[K_ALONG_NOW] - m[K_ALONG])
@@ -175,7 +182,7 @@ def finish_devices(t: Any, h: float, first: int) -> None:
 @leaf
 def keep_poses(t: Any) -> None:
     """Remember where the next step starts, after all that changes velocities."""
-    if t.device_i.shape[0] == 0:
+    if t.device_i.shape[0] == 0 and t.input_i.shape[0] == 0:
         return
     for b in range(t.pose.shape[0]):
         for k in range(3):

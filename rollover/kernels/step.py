@@ -17,9 +17,11 @@ from ground.kernel import (
 from rollover.kernels.applied_forces import A_TANGENT, NOW, finish_applied
 from rollover.kernels.contact_state import note_event, touch
 from rollover.kernels.elements import finish_elements, settle
-from rollover.kernels.forces import along_axle, generalised_forces, read_poses
+from rollover.kernels.forces import along_axle, generalised_forces, keep_tyres, read_poses
 from rollover.kernels.impact import strike_stop
+from rollover.kernels.inputs import finish_inputs
 from rollover.kernels.stand_devices import finish_devices, keep_poses
+from rollover.kernels.steering import steer
 from rollover.kernels.tables import (
     A_IMPACT,
     A_SWING,
@@ -39,9 +41,7 @@ from rollover.kernels.tables import (
     E_ENERGY_NOW,
     E_FORCE,
     E_FORCE_NOW,
-    E_FRICTION,
     E_FRICTION_NOW,
-    E_NORMAL,
     E_NORMAL_NOW,
     E_PLACE,
     E_POINT,
@@ -97,6 +97,7 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
     finish_mounts(t)
     finish_axle(t)
     finish_devices(t, h, DEVICE)
+    finish_inputs(t, h)
     finish_terms(t, h)
     finish_spins(t, h)
     start_step(t)
@@ -109,6 +110,7 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
     t.velocity[:] = qd
     settle(t)
     read_poses(t.pose, q, qd)  # the impact changed the velocities
+    steer(t, qd)
     keep_poses(t)
 
 
@@ -236,13 +238,7 @@ def start_step(t: Any) -> None:
     The elements' part is in `finish_elements`: a contact that changes after the step enters the solver, and so the
     ledger, with the force that it has at the end of its first step.
     """
-    for w in range(t.wheel_i.size):
-        g = t.wheel_memory[w]
-        g[E_DEPTH], g[E_FORCE], g[E_DAMPING] = g[E_DEPTH_NOW], g[E_FORCE_NOW], g[E_DAMPING_NOW]
-        g[E_ENERGY] = g[E_ENERGY_NOW]
-        for k in range(3):
-            g[E_FRICTION + k] = g[E_FRICTION_NOW + k]
-            g[E_NORMAL + k] = g[E_NORMAL_NOW + k]
+    keep_tyres(t)
     for i in range(t.mount_f.shape[0]):
         g = t.mount_memory[i]
         for k in range(6):

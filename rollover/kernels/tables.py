@@ -30,8 +30,8 @@ E_MOVED, E_SLIP, E_POINT, E_WHERE = 23, 26, 29, 32
 E_NORMAL, E_NORMAL_NOW, EDGE_COLUMNS = 35, 38, 41
 
 # columns of spin_f: inertia about the axle, limit of the brake's torque, whether the drive turns this wheel,
-# whether the brake holds it against the ground instead of its carrier
-P_INERTIA, P_BRAKE, P_DRIVEN, P_HELD, SPIN_COLUMNS = 0, 1, 2, 3, 4
+# whether the brake holds it against the ground instead of its carrier, whether it has a brake, whether it is steered
+P_INERTIA, P_BRAKE, P_DRIVEN, P_HELD, P_BRAKED, P_STEERED, SPIN_COLUMNS = 0, 1, 2, 3, 4, 5, 6
 # columns of spin_memory: angle, torque and strain of the brake at the start of the step; angle, rate and torque now
 P_ANGLE, P_TORQUE, P_STRAIN, P_ANGLE_NOW, P_RATE_NOW, P_TORQUE_NOW = 0, 1, 2, 3, 4, 5
 # torque of the ground that holds it and its rate spin + omega . e, at the start of the step and now
@@ -69,7 +69,7 @@ SLOTS, ACTIVE, EVENTS, OUTSIDE, FLAGS_NOW, COUNTS = 0, 1, 2, 3, 4, 5
 
 # places in work (J taken from the vehicle since the start)
 SOIL, TYRE, ROPS, FRICTION_WORK, COLLISION, AXLE, DEVICE, LASHING = 0, 1, 2, 3, 4, 5, 6, 7
-EXTRA_WORK, DRIVE, WORKS = 8, 9, 10
+EXTRA_WORK, DRIVE, INPUT, WORKS = 8, 9, 10, 11
 
 # columns of trial: what the last evaluation found for each active element
 Z, ZDOT, FN, FT, MOVED, TRIAL_COLUMNS = 0, 1, 2, 3, 6, 9
@@ -164,6 +164,12 @@ class Tables(NamedTuple):
     device_q: Any  # (2 ACCOUNTS, 6 nb) generalised forces now, then at the start of the step
     device_x: Any  # (nb, 6) positions and angular velocities at the start of the step
     device_out: Any  # (OUT_COLUMNS,) force, deflection, energy, point, way: what is recorded
+    # what is prescribed over time, see rollover.kernels.inputs; ni inputs, none until the bodies are placed
+    input_i: Any  # (ni, INPUT_INTEGERS)
+    input_f: Any  # (ni, INPUT_COLUMNS)
+    input_memory: Any  # (ni, INPUT_MEMORY)
+    input_q: Any  # (2, 6 nb) generalised forces now, then at the start of the step
+    pieces: Any  # (np, PIECE_COLUMNS) of all signals
 
 
 @register
@@ -244,4 +250,9 @@ def handle(t: Any) -> Any:
         t.device_q,
         t.device_x,
         t.device_out,
+        t.input_i,
+        t.input_f,
+        t.input_memory,
+        t.input_q,
+        t.pieces,
     )
