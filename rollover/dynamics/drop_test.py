@@ -206,6 +206,8 @@ def unfit(scenario: Scenario) -> str:
     """Why a scenario is no drop test that can be run by itself, or nothing."""
     if not isinstance(scenario.vehicle, Striker):
         return f"vehicle.kind: not a drop test, got {scenario.vehicle.kind!r}; 'striker' is needed"
+    if scenario.inputs:
+        return f"inputs: prescribed over time, got {scenario.inputs[0].name!r}; a drop test by itself has none"
     slope = scenario.effects.get("slope")
     surface = scenario.ground.surface
     if not is_flat(surface) or any(gradient(surface)) or (slope is not None and slope.angle != 0.0):

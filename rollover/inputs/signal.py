@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from ground.quantity import Quantity, parameters
 from rollover.recording import Recording
-from rollover.recording.importers import read_recording
 from rollover.spec.channels import describe
 from rollover.spec.document import Node, Written, beside, check, planted
 from rollover.system.errors import InputError, hint
@@ -112,6 +111,8 @@ def _recording(given: SignalFile, keys: Mapping[str, Node], path: str) -> Record
         if found[key] is None:
             message = f"no such file, got {name!r}; a file beside this one is needed"
             raise keys[key].place.fault(f"{path}.{key}", message)
+    from rollover.recording.importers import read_recording  # slow to import, and few scenarios read a file
+
     file = found["file"]
     assert file is not None  # refused above
     return read_recording(file, profile=found.get("profile"), test=given.test or "")
