@@ -124,6 +124,7 @@ def _reached(classes: Sequence[type], stop: frozenset[type]) -> list[type]:
                 below = inner
             if not below.by_key:  # effects have a page of their own
                 wanted += list(below.kinds.values())
+                wanted += below.written.forms if below.written else ()
     return found
 
 

@@ -19,6 +19,7 @@ from ground.soils import soils
 from rollover import scenario as scenarios
 from rollover import studies
 from rollover.cli import catalogue
+from rollover.recording.importers import read_recording
 from rollover.scenario import Scenario, load, schema
 from rollover.spec import document
 from rollover.spec.document import Leaf
@@ -28,7 +29,8 @@ from rollover.spec.shapes import Tube
 from rollover.spec.vehicle import Striker, Vehicle, chassis_of, pitch_inertia
 
 FOLDER = document.shipped_folder()
-FILES = sorted(path for path in FOLDER.rglob("*.yaml") if path.name != "excluded.yaml")
+SIGNALS = sorted((FOLDER / "signals").glob("*.csv"))  # with a sidecar each
+FILES = sorted(p for p in FOLDER.rglob("*.yaml") if p.name != "excluded.yaml" and p.parent.name != "signals")
 SCENARIOS = [path for path in FILES if path.parent == FOLDER]
 VEHICLES = [path for path in FILES if path.parent.name == "vehicles"]
 SOILS = [path for path in FILES if path.parent.name == "soils"]
@@ -58,6 +60,14 @@ def test_every_file_is_in_order(path: Path) -> None:
         path.parent.name, "scenario"
     )
     assert catalogue.check(str(path)) == sort
+
+
+@pytest.mark.parametrize("path", SIGNALS, ids=name_of)
+def test_every_signal_is_a_recording_that_a_scenario_names_and_says_what_it_is(path: Path) -> None:
+    assert read_recording(path).source.startswith("made up: ")
+    assert path.read_text(encoding="utf-8").startswith("# Made up, not measured: ")
+    assert any(f"file: {name_of(path)}.csv" in p.read_text(encoding="utf-8") for p in SCENARIOS)
+    assert len(list(path.parent.glob(f"{path.stem}.*"))) == 2
 
 
 @pytest.mark.parametrize("path", FILES, ids=name_of)

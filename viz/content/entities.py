@@ -35,6 +35,7 @@ LEDGER = {
     "axle": 0x8FCB6BFF,
     "device": 0xFF8C26FF,
     "lashing": 0x9FB4CCFF,
+    "input": 0xF4D35EFF,
     "residual": 0xF5F5F5FF,
 }
 BODY = {  # a body's ground force, in the plots and as the arrow in the scene
@@ -81,7 +82,7 @@ class Series:
     """How one channel is shown: value for people = value in SI x `factor`, in `unit`."""
 
     channel: str
-    group: str  # first part of the path: loads, wheels, mounts, sinkage, motion, energy, other
+    group: str  # first part of the path: loads, wheels, mounts, sinkage, motion, energy, inputs, other
     path: str  # without the source
     name: str  # without the unit, which stands in the title of a plot
     legend: str  # shorter, where the title says the rest
@@ -159,6 +160,8 @@ def _describe(channel: str) -> tuple[str, str, int]:
             group = {"force": "loads", "deflection": "sinkage", "energy": "energy"}[what]
             name = "energy put in" if what == "energy" else what
             return group, f"test stand, {name}", MEASURED
+        case ["input", name, what]:
+            return "inputs", f"{name.replace('_', ' ')}, {what}", MEASURED
         case ["rops", *rest]:
             return _describe_rops(channel, rest)
         case ["ground", "force_normal"]:

@@ -40,6 +40,11 @@ LOADS: _Plots = (
     ("Contact area, cm\N{SUPERSCRIPT TWO}", ("ground/contact_area",)),
 )
 MOTION: _Plots = (
+    ("Input: angle, deg", ("input/*/angle",)),
+    ("Input: force, kN", ("input/*/force",)),
+    ("Input: torque, kN m", ("input/*/torque",)),
+    ("Input: displacement, m", ("input/*/displacement",)),
+    ("Input: acceleration, m/s\N{SUPERSCRIPT TWO}", ("input/*/acceleration",)),
     ("Roll, deg", ("chassis/roll",)),
     ("Striker acceleration, m/s\N{SUPERSCRIPT TWO}", ("striker/acceleration_z",)),
     ("Energy, kJ", ("energy/*", "rops/energy", "device/energy")),
