@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 
 from rollover.assessment.rolling import (
     G,
@@ -75,6 +76,8 @@ def test_a_turn_keeps_energy_and_stops_below_the_top() -> None:
     # a slope tilts the whole: 0.6 rad of it and nothing is to be lifted
     assert turn(inertia, m, centre, 0.6, 0.1).needed == pytest.approx(0.0, abs=1e-9)
     assert turn(inertia, m, centre, 0.3, -0.1).rate is None
+    # what ends beyond the top has to get over it
+    assert turn(inertia, m, centre, 0.0, 0.999 * least, 1.3).rate is None
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.3, -0.8, 1.5])
@@ -151,8 +154,30 @@ def test_first_velocity_without_swing_and_with_thin_tyres() -> None:
 
 
 def test_the_axle_swings_the_chassis_down() -> None:
-    """Over the axle's stop the centre of gravity stands lower than without swing, so it falls by less."""
-    assert calculate(NARROW)["G3"] < calculate(replace(NARROW, D0=0.0))["G3"]
+    """The centre of gravity turned by D0 about the line from the lower rear wheel to the pivot, as a vector."""
+    t = NARROW
+    wheel, pivot = np.array([0.0, 0.5 * t.S, 0.0]), np.array([t.L2 + t.L3, 0.0, t.H0])  # forward, to the side, up
+    axis = Rotation.from_rotvec(-t.D0 * (pivot - wheel) / np.linalg.norm(pivot - wheel))
+    centre = wheel + axis.apply(np.array([t.L3, 0.0, t.H1]) - wheel)
+    assert 0.0 < centre[1] < 0.5 * t.S
+    assert calculate(t)["W0"] == pytest.approx(math.hypot(centre[2], 0.5 * t.S - centre[1]), rel=1e-12)
+
+
+@pytest.mark.parametrize(("back", "wheel"), [(0.0, "front"), (-0.6, "rear")])
+def test_the_blow_is_taken_beside_the_centre_and_turns_about_the_new_line(back: float, wheel: str) -> None:
+    """In the section of the centre of gravity the line from wheel to ROPS stands where the two are interpolated."""
+    t = replace(NARROW, L6=back)
+    found = calculate(t)
+    ends, centre = [found.positions[3][name] for name in (wheel, "rops")], found.positions[3]["G"]
+    share = (centre[1] - ends[0][1]) / (ends[1][1] - ends[0][1])
+    x = ends[0][0] + share * (ends[1][0] - ends[0][0])
+    after = after_impact(found["Q3"], t.Mc, (centre[0], centre[2]), (centre[0] - x, centre[2] + share * t.T), t.U)
+    assert found["O4"] == pytest.approx(found["O3"] * after, rel=1e-9)
+    # of an angular velocity, the part along a line: by the angle between this line and the one before
+    way = ends[1] - ends[0]
+    assert found["O5"] == pytest.approx(found["O4"] * abs(way[1]) / math.hypot(way[0], way[1]), rel=1e-9)
+    first = found.positions[1]["front"] - found.positions[1]["rear"]
+    assert found["O2"] == pytest.approx(found["O1"] * first[1] / math.hypot(first[0], first[1]), rel=1e-9)
 
 
 def test_low_and_round_rolls_on_high_and_wide_is_stopped() -> None:
