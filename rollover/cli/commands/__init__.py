@@ -19,6 +19,7 @@ from rollover.cli.commands import synthesize
 from rollover.cli.commands import diagnose
 from rollover.cli.commands import prove
 from rollover.cli.commands import stability
+from rollover.cli.commands import rolling
 from rollover.cli.commands import study
 
 __all__ = [
@@ -32,6 +33,7 @@ __all__ = [
     "new",
     "prove",
     "regress",
+    "rolling",
     "root",
     "run",
     "schema",

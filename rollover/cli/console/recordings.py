@@ -1,4 +1,4 @@
-"""What comparisons, calibrations, diagnoses and stability answer, on standard output: tables and sentences."""
+"""What comparisons, calibrations, diagnoses, stability and rolling answer, on standard output: tables and sentences."""
 
 from __future__ import annotations
 
@@ -163,4 +163,26 @@ def stability(answer: Mapping[str, Any], folder: str) -> None:
         f"{limit['limit_deg']:g} deg asked of narrow tractors ({limit['confidence']}).",
         style="bold",
     )
+    out.print(f"Results: {folder}")
+
+
+def rolling(answer: Mapping[str, Any], folder: str) -> None:
+    """Verdict of the planar calculation of rolling, beside every number on the way."""
+    out = terminal.out()
+    out.print(excerpt(answer["vehicle"]), style="bold")
+    table = Table(box=None, pad_edge=False)
+    table.add_column("step")
+    table.add_column("what")
+    table.add_column("value", justify="right")
+    table.add_column("unit")
+    table.add_column("basis")
+    for s in answer["steps"]:
+        table.add_row(s["symbol"], s["what"], f"{s['value']:.4g}", s["unit"], s["basis"])
+    out.print(table)
+    for said in answer["outside"]:
+        out.print(said, style="yellow")
+    out.print(
+        f"{answer['verdict'].capitalize()} rolling (version {answer['version']}): {answer['sentence']}.", style="bold"
+    )
+    out.print(f"{answer['source']}.")
     out.print(f"Results: {folder}")
