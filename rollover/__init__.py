@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from rollover.comparison.compared import Comparison
     from rollover.comparison.recordings import Recordings
     from rollover.comparison.synthesis import synthesize
+    from rollover.diagnosis.own_model.declaration import ForwardModel, Parameter, Term
     from rollover.diagnosis.result import Diagnosis
     from rollover.recording.record import Recording
     from rollover.scenario import Scenario
@@ -38,21 +39,24 @@ if TYPE_CHECKING:
 
     __version__: str
 
-__all__ = ["Calibration", "Comparison", "Diagnosis", "Identification", "InputError", "PeakLoad", "Recording"]
-__all__ += ["Regression", "Run", "Scenario", "Stability", "__version__", "calibrate", "compare", "diagnose"]
-__all__ += ["identify", "load", "read", "regress", "run", "stability", "study", "synthesize"]
+__all__ = ["Calibration", "Comparison", "Diagnosis", "ForwardModel", "Identification", "InputError", "Parameter"]
+__all__ += ["PeakLoad", "Recording", "Regression", "Run", "Scenario", "Stability", "Term", "__version__"]
+__all__ += ["calibrate", "compare", "diagnose", "identify", "load", "read", "regress", "run", "stability", "study", "synthesize"]
 
 _ELSEWHERE = {  # what stands in a package by itself, imported when it is asked for
     "Calibration": "calibration.calibrate",
     "Comparison": "comparison.compared",
     "Diagnosis": "diagnosis.result",
+    "ForwardModel": "diagnosis.own_model.declaration",
     "Identification": "calibration.identification",
     "InputError": "system.errors",
+    "Parameter": "diagnosis.own_model.declaration",
     "PeakLoad": "assessment.loads",
     "Recording": "recording.record",
     "Regression": "studies.baseline:Answer",
     "Run": "assessment.assessed:AssessedRun",
     "Scenario": "scenario",
+    "Term": "diagnosis.own_model.declaration",
     "Stability": "assessment.standing",
     "identify": "calibration.identification",
     "regress": "studies.regression",
