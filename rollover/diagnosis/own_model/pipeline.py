@@ -52,7 +52,13 @@ def diagnose_model(
             return nothing_told(every, list(recordings), notes, began)
         problem, executor = Problem(found), executor or Executor()
         asked = Asked(
-            scenario=None, recordings=recordings, hold_out=hold_out, say=say, executor=executor, began=began
+            scenario=None,
+            recordings=recordings,
+            hold_out=hold_out,
+            say=say,
+            executor=executor,
+            began=began,
+            estimates=True,  # what may as well be nothing, or stands at an end of its range, is not named
         )
         executor.begin(problem)
         base = begun(model, problem)

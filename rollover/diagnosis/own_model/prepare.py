@@ -11,14 +11,17 @@ from numpy.typing import NDArray
 from rollover.diagnosis.data.dataset import Dataset, Signal, dataset_of
 from rollover.diagnosis.data.quantisation import digitised, without_spikes
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.local_search import ended
 from rollover.diagnosis.noise import autoregression
 from rollover.diagnosis.own_model.declaration import ForwardModel, conditions_of
 from rollover.diagnosis.own_model.simulator import ModelSimulator
 from rollover.diagnosis.own_model.tables import baseline_of
+from rollover.diagnosis.settings import SETTINGS
 from rollover.recording import Recording
 from rollover.system.errors import Fault, InputError, hint
 
 Array = NDArray[np.float64]
+TUNING = SETTINGS.fit.own_model
 
 
 def prepared_for(model: ForwardModel, recordings: Mapping[str, Recording]) -> tuple[list[Dataset], list[str]]:
@@ -71,8 +74,21 @@ def _stated(s: Signal, noise: float, e: Dataset) -> Signal:
 
 
 def begun(model: ForwardModel, problem: Problem) -> Fitted | None:
-    """The model as it is fitted to recordings; None if nothing can be simulated there."""
-    return problem.fit(*baseline_of(model))
+    """The model as it is fitted to recordings, to the end; None if nothing can be simulated there.
+
+    Begun at its start and to either side of that in each parameter, the way that soon leaves least followed: from far
+    off a resonance is met by another one.
+    """
+    baseline, start = baseline_of(model)
+    beside = [(*start[:k], min(max(x + d, 0.0), 1.0), *start[k + 1 :]) for k, x in enumerate(start) for d in TUNING.beside]
+    short = [problem.fit(baseline, x, rounds=problem.effort.short, no_jacobian=True) for x in (start, *beside)]
+    best = min((f for f in short if f is not None), key=lambda f: f.left, default=None)
+    for _ in range(TUNING.repeats if best is not None else 0):
+        again = problem.fit(baseline, best.x)
+        if again is None or again.left > best.left - TUNING.least_gain:
+            break
+        best = again
+    return None if best is None else ended(problem, problem.again(best))
 
 
 def _unfit(model: ForwardModel, name: str, r: Recording) -> Iterator[Fault]:
