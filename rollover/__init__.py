@@ -41,7 +41,19 @@ if TYPE_CHECKING:
 
 __all__ = ["Calibration", "Comparison", "Diagnosis", "ForwardModel", "Identification", "InputError", "Parameter"]
 __all__ += ["PeakLoad", "Recording", "Regression", "Run", "Scenario", "Stability", "Term", "__version__"]
-__all__ += ["calibrate", "compare", "diagnose", "identify", "load", "read", "regress", "run", "stability", "study", "synthesize"]
+__all__ += [
+    "calibrate",
+    "compare",
+    "diagnose",
+    "identify",
+    "load",
+    "read",
+    "regress",
+    "run",
+    "stability",
+    "study",
+    "synthesize",
+]
 
 _ELSEWHERE = {  # what stands in a package by itself, imported when it is asked for
     "Calibration": "calibration.calibrate",
@@ -312,7 +324,13 @@ def diagnose(
         within("tolerance", share, 0.0, 0.5)
     if not (isinstance(scenario, (str, Path)) and Path(scenario).suffix != ".py") and not hasattr(scenario, "vehicle"):
         return _diagnose_model(
-            scenario, recordings, hold_out, tolerance, refused=bool(reference) or estimate, profile=profile, workers=workers
+            scenario,
+            recordings,
+            hold_out,
+            tolerance,
+            refused=bool(reference) or estimate,
+            profile=profile,
+            workers=workers,
         )
     chosen, known = given(scenario)[0], measured(recordings, profile)
     check(chosen, known)

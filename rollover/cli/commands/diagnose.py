@@ -242,9 +242,7 @@ def _diagnose_model(
     results.claim_account(folder, FORMAT, about, (JSON,), force=force, say=console.say)
     about_fits = json.dumps([about, results.versions()], sort_keys=True)
     with Executor(cores() if workers is None else workers, notes(folder), about_fits) as executor:
-        found = diagnose_model(
-            model, measured, hold_out=held, tolerance=allowed, say=console.say, executor=executor
-        )
+        found = diagnose_model(model, measured, hold_out=held, tolerance=allowed, say=console.say, executor=executor)
     answer = account(model, found, about)
     with results.whole(folder) as part:
         results.write_json(part / JSON, answer)

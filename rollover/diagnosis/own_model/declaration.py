@@ -75,9 +75,7 @@ class ForwardModel(Protocol):
     parameters: Mapping[str, Parameter]
     terms: Sequence[Term]
 
-    def simulate(
-        self, time: Array, inputs: Mapping[str, Array], values: Mapping[str, float]
-    ) -> Mapping[str, Array]:
+    def simulate(self, time: Array, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Mapping[str, Array]:
         """Outputs (n,) by channel at the stamps `time` (n,), s, of inputs (n,) by channel, all in SI.
 
         `values` has all parameters by name, those of a term as "TERM.PARAMETER", at their nulls (or starts, without
@@ -185,7 +183,10 @@ def _wrong_channels(model: ForwardModel) -> Iterator[tuple[str, str]]:
             if part == "conditions":
                 continue
             if name == "time" or not CHANNEL.fullmatch(name):
-                yield path, f"not a channel's name, got {name!r}; words with '/' between, such as 'axis/force', are allowed"
+                yield (
+                    path,
+                    f"not a channel's name, got {name!r}; words with '/' between, such as 'axis/force', are allowed",
+                )
             elif is_known(name) and describe(name).unit != q.unit:
                 yield path, f"a channel of another unit, got {q.unit!r}; {describe(name).unit!r}, or another name"
 
@@ -197,8 +198,14 @@ def _wrong_parameter(path: str, name: object, p: object, *, is_always: bool) -> 
         return
     if not isinstance(name, str) or not NAME.fullmatch(name) or hasattr(Effect, name):
         yield path, f"not to be used as a name, got {name!r}; letters, digits and '_', no word that effects use"
-    numbers = {n: v for n, v in (("low", p.low), ("high", p.high), ("start", p.start), ("null", p.null)) if v is not None}
-    bad = {n: v for n, v in numbers.items() if isinstance(v, bool) or not isinstance(v, (int, float)) or not math.isfinite(v)}
+    numbers = {
+        n: v for n, v in (("low", p.low), ("high", p.high), ("start", p.start), ("null", p.null)) if v is not None
+    }
+    bad = {
+        n: v
+        for n, v in numbers.items()
+        if isinstance(v, bool) or not isinstance(v, (int, float)) or not math.isfinite(v)
+    }
     for n, v in bad.items():
         yield f"{path}.{n}", f"not a finite number, got {v!r}; a number in {p.unit} is needed"
     if bad:

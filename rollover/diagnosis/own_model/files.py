@@ -40,4 +40,8 @@ def hashes(path: Path) -> dict[str, str]:
 
 def _examined(module: ModuleType) -> str:
     """What is wrong with a module that should hold a model."""
-    return "" if hasattr(module, NAME) else f"holds no model; an object named {NAME!r} is needed, see rollover.ForwardModel"
+    return (
+        ""
+        if hasattr(module, NAME)
+        else f"holds no model; an object named {NAME!r} is needed, see rollover.ForwardModel"
+    )

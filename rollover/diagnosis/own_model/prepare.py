@@ -38,7 +38,9 @@ def prepared_for(model: ForwardModel, recordings: Mapping[str, Recording]) -> tu
         gaps = {channel: int(np.isnan(whole[channel]).sum()) for channel in model.inputs}
         of = whole.time.size
         notes += [f"{name}: {c}: {n} of {of} stamps without a value, interpolated" for c, n in gaps.items() if n]
-        cleaned, spiked = without_spikes(replace(whole, channels={c: whole[c] for c in model.outputs if c in whole.channels}))
+        cleaned, spiked = without_spikes(
+            replace(whole, channels={c: whole[c] for c in model.outputs if c in whole.channels})
+        )
         notes += [f"{name}: {line}" for line in spiked]
         simulator = ModelSimulator(model, replace(cleaned, title=name), inputs)
         _tried(simulator)
@@ -80,7 +82,9 @@ def begun(model: ForwardModel, problem: Problem) -> Fitted | None:
     off a resonance is met by another one.
     """
     baseline, start = baseline_of(model)
-    beside = [(*start[:k], min(max(x + d, 0.0), 1.0), *start[k + 1 :]) for k, x in enumerate(start) for d in TUNING.beside]
+    beside = [
+        (*start[:k], min(max(x + d, 0.0), 1.0), *start[k + 1 :]) for k, x in enumerate(start) for d in TUNING.beside
+    ]
     short = [problem.fit(baseline, x, rounds=problem.effort.short, no_jacobian=True) for x in (start, *beside)]
     best = min((f for f in short if f is not None), key=lambda f: f.left, default=None)
     for _ in range(TUNING.repeats if best is not None else 0):
@@ -98,7 +102,9 @@ def _unfit(model: ForwardModel, name: str, r: Recording) -> Iterator[Fault]:
             message = f"missing, got {', '.join(r.channels) or 'no channel'}; each input of the model is needed"
             yield Fault(file=name, path=channel, message=message)
         elif not np.isfinite(r[channel][[0, -1]]).all():
-            message = "without a value at the first or the last stamp; an input is needed from end to end: cut the recording"
+            message = (
+                "without a value at the first or the last stamp; an input is needed from end to end: cut the recording"
+            )
             yield Fault(file=name, path=channel, message=message)
     if not set(model.outputs) & set(r.channels):
         message = f"no output of the model, got {', '.join(r.channels)}; one of {', '.join(model.outputs)} is needed"
@@ -106,7 +112,11 @@ def _unfit(model: ForwardModel, name: str, r: Recording) -> Iterator[Fault]:
     known = conditions_of(model)
     for path, value in r.conditions.items():
         if path not in known:
-            yield Fault(file=name, path=f"conditions.{path}", message=f"no condition of the model, got {path!r}; {hint(path, known)}")
+            yield Fault(
+                file=name,
+                path=f"conditions.{path}",
+                message=f"no condition of the model, got {path!r}; {hint(path, known)}",
+            )
         elif isinstance(value, bool) or not isinstance(value, (int, float)):
             message = f"not a number, got {value!r}; a number in {known[path].unit} is needed"
             yield Fault(file=name, path=f"conditions.{path}", message=message)
@@ -115,7 +125,9 @@ def _unfit(model: ForwardModel, name: str, r: Recording) -> Iterator[Fault]:
             message = f"missing; the model needs it of each recording, in {known[path].unit}"
             yield Fault(file=name, path=f"conditions.{path}", message=message)
     if r.clock.zero == "unknown":
-        yield Fault(file=name, path="clock.zero", message="got unknown; inputs and outputs share one clock: known is needed")
+        yield Fault(
+            file=name, path="clock.zero", message="got unknown; inputs and outputs share one clock: known is needed"
+        )
     for channel in r.cfc:
         if channel in model.outputs:
             message = f"got class {r.cfc[channel]}; the model has no filter: apply it in simulate and leave cfc out"
@@ -145,4 +157,6 @@ def _tried(simulator: ModelSimulator) -> None:
         beside = {f"{term.id}.{n}": p.low for n, p in term.parameters.items() if p.null is None}
         nothing = simulator.run({**beside, **nulls})
         if nothing is None or any(not np.array_equal(first[c], nothing[c]) for c in first):
-            raise simulator.refused(f"{term.id} does something at its null; with its strength there no output may change")
+            raise simulator.refused(
+                f"{term.id} does something at its null; with its strength there no output may change"
+            )

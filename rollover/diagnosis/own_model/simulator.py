@@ -89,7 +89,9 @@ class ModelSimulator:
         """A fault of the model's file, at the line where an exception began if there was one."""
         file = file_of(self.model)
         lines = [f.lineno for f in traceback.extract_tb(e.__traceback__) if f.filename == file] if e else []
-        return InputError(Fault(file=file, line=lines[-1] if lines else None, path=self.recording.title, message=message))
+        return InputError(
+            Fault(file=file, line=lines[-1] if lines else None, path=self.recording.title, message=message)
+        )
 
     def _wrong(self, made: object) -> Iterator[str]:
         """What is wrong with what a model returned."""

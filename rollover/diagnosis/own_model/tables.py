@@ -41,9 +41,7 @@ def enter(model: ForwardModel) -> None:
         CHANNELS.setdefault(name, Channel(name=name, unit=q.unit, meaning=q.meaning))
     for id in [id for id, kind in EFFECTS.items() if kind.kind != "sensor"]:
         del EFFECTS[id]
-    baseline = Term(
-        id=BASELINE, family="the model itself", equation="", kind="parameter", parameters=model.parameters
-    )
+    baseline = Term(id=BASELINE, family="the model itself", equation="", kind="parameter", parameters=model.parameters)
     for term in (baseline, *model.terms):
         _effect_of(term)
 
@@ -60,7 +58,8 @@ def _effect_of(term: Term) -> type[Effect]:
         "kind": term.kind,
         "family": term.family,
         "equation": term.equation,
-        "sentence": term.sentence or f"There is {term.family}: {term.equation.replace('{', '{{').replace('}', '}}')} ({said}).",
+        "sentence": term.sentence
+        or f"There is {term.family}: {term.equation.replace('{', '{{').replace('}', '}}')} ({said}).",
         "rivals": dict(term.rivals),
         "competes": term.id != BASELINE,
         "null": {n: float(p.null) for n, p in each.items() if p.null is not None},
