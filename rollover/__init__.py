@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from rollover.comparison.compared import Comparison
     from rollover.comparison.recordings import Recordings
     from rollover.comparison.synthesis import synthesize
+    from rollover.diagnosis.own_model.declaration import ForwardModel, Parameter, Term
     from rollover.diagnosis.result import Diagnosis
     from rollover.recording.record import Recording
     from rollover.scenario import Scenario
@@ -38,21 +39,36 @@ if TYPE_CHECKING:
 
     __version__: str
 
-__all__ = ["Calibration", "Comparison", "Diagnosis", "Identification", "InputError", "PeakLoad", "Recording"]
-__all__ += ["Regression", "Run", "Scenario", "Stability", "__version__", "calibrate", "compare", "diagnose"]
-__all__ += ["identify", "load", "read", "regress", "run", "stability", "study", "synthesize"]
+__all__ = ["Calibration", "Comparison", "Diagnosis", "ForwardModel", "Identification", "InputError", "Parameter"]
+__all__ += ["PeakLoad", "Recording", "Regression", "Run", "Scenario", "Stability", "Term", "__version__"]
+__all__ += [
+    "calibrate",
+    "compare",
+    "diagnose",
+    "identify",
+    "load",
+    "read",
+    "regress",
+    "run",
+    "stability",
+    "study",
+    "synthesize",
+]
 
 _ELSEWHERE = {  # what stands in a package by itself, imported when it is asked for
     "Calibration": "calibration.calibrate",
     "Comparison": "comparison.compared",
     "Diagnosis": "diagnosis.result",
+    "ForwardModel": "diagnosis.own_model.declaration",
     "Identification": "calibration.identification",
     "InputError": "system.errors",
+    "Parameter": "diagnosis.own_model.declaration",
     "PeakLoad": "assessment.loads",
     "Recording": "recording.record",
     "Regression": "studies.baseline:Answer",
     "Run": "assessment.assessed:AssessedRun",
     "Scenario": "scenario",
+    "Term": "diagnosis.own_model.declaration",
     "Stability": "assessment.standing",
     "identify": "calibration.identification",
     "regress": "studies.regression",
@@ -261,7 +277,7 @@ def calibrate(
 
 
 def diagnose(
-    scenario: str | Path | Scenario,
+    scenario: str | Path | Scenario | ForwardModel,
     recordings: Recordings,
     *,
     hold_out: str | Sequence[str] = (),
@@ -276,7 +292,7 @@ def diagnose(
     Parameters
     ----------
     scenario, recordings, profile
-        As in `compare`.
+        As in `compare`; or a model of one's own that recorded inputs drive: the path of its Python file, or the object.
     hold_out
         Names of recordings to judge by; none: each condition in turn.
     tolerance
@@ -306,6 +322,16 @@ def diagnose(
 
     for share in [tolerance] if isinstance(tolerance, (int, float)) else tolerance.values():
         within("tolerance", share, 0.0, 0.5)
+    if not (isinstance(scenario, (str, Path)) and Path(scenario).suffix != ".py") and not hasattr(scenario, "vehicle"):
+        return _diagnose_model(
+            scenario,
+            recordings,
+            hold_out,
+            tolerance,
+            refused=bool(reference) or estimate,
+            profile=profile,
+            workers=workers,
+        )
     chosen, known = given(scenario)[0], measured(recordings, profile)
     check(chosen, known)
     held = held_out(list(known), listed(hold_out)) if hold_out else []
@@ -321,6 +347,35 @@ def diagnose(
             estimate=estimate,
             executor=executor,
         )
+
+
+def _diagnose_model(
+    model: str | Path | ForwardModel,
+    recordings: Recordings,
+    hold_out: str | Sequence[str],
+    tolerance: float | Mapping[str, float],
+    *,
+    refused: bool,
+    profile: str | Path | None,
+    workers: int,
+) -> Diagnosis:
+    from rollover.comparison.recordings import held_out, measured
+    from rollover.diagnosis.fit.jobs import Executor
+    from rollover.diagnosis.own_model import diagnose_model, load_model
+    from rollover.diagnosis.own_model.declaration import declared
+    from rollover.diagnosis.own_model.tables import tables
+    from rollover.system.arguments import listed
+    from rollover.system.errors import Fault, InputError
+
+    if refused or not isinstance(tolerance, (int, float)):
+        message = "not of a model of one's own; one tolerance for all channels is allowed, no reference, no estimate"
+        raise InputError(Fault(path="diagnose", message=message))
+    chosen = load_model(Path(model)) if isinstance(model, (str, Path)) else declared(model)
+    with tables(chosen):
+        known = measured(recordings, profile)
+    held = held_out(list(known), listed(hold_out)) if hold_out else []
+    with Executor(workers) as executor:
+        return diagnose_model(chosen, known, hold_out=held, tolerance=tolerance, executor=executor)
 
 
 def study(

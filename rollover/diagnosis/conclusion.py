@@ -12,7 +12,7 @@ from rollover.diagnosis.data.inconsistent import Aside, by_inconsistencies
 from rollover.diagnosis.data.phases import phases_of
 from rollover.diagnosis.data.repeatability import differing
 from rollover.diagnosis.fit.jobs import Executor
-from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.local_search import conditioned, is_doubtful
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Groups
@@ -60,7 +60,7 @@ class Asked:
     `discrepancy` is what the scenario may miss beside what it lacks, once that is stated, taught or estimated.
     """
 
-    scenario: Scenario
+    scenario: Scenario | None  # None of a model of one's own
     recordings: Mapping[str, Recording]
     hold_out: Sequence[str]
     say: Callable[[str], None]
@@ -92,6 +92,7 @@ class Conclusion:
     groups: Groups
     candidates: Sequence[Candidate]
     acts: str
+    set_ups: tuple[Scenario, ...]  # under the conditions of each recording
     is_cross_validated: bool
     inconsistencies: tuple[Aside, ...]
     notes: tuple[str, ...]
@@ -106,8 +107,9 @@ def concluded(
     asked: Asked, every: Sequence[Dataset], inconsistencies: Sequence[Aside], notes: Sequence[str]
 ) -> Conclusion | Diagnosis:
     """What recordings without what was left aside say; the diagnosis itself where there is too little to judge."""
-    scenario, recordings, hold_out = asked.scenario, asked.recordings, asked.hold_out
+    scenario, hold_out = asked.scenario, asked.hold_out
     executor, began, names = asked.executor, asked.began, list(asked.recordings)
+    assert scenario is not None
     notes = [*notes, *(inconsistency.says() for inconsistency in inconsistencies)]
     found = trusted(scenario, [e for e in every if e.name not in hold_out])
     kept = [e for e in trusted(scenario, every) if e.name in hold_out] if hold_out else []
@@ -126,11 +128,41 @@ def concluded(
     if base is None:
         return nothing_told(every, names, [*notes, "the scenario itself could not be simulated"], began)
     phases = [phases_of(e) for e in found]
-    acts = "rollover" if any(unfit(set_up(scenario, e.recording)) for e in found) else "drop"
-    candidates = candidates_of(found, scenario.effects, acts, scenario, size_of(set_up(scenario, found[0].recording)))
+    set_ups = tuple(set_up(scenario, e.recording) for e in found)
+    acts = "rollover" if any(map(unfit, set_ups)) else "drop"
+    candidates = candidates_of(found, scenario.effects, acts, scenario, size_of(set_ups[0]))
     inquiry = Inquiry(
         problem=problem, candidates=candidates, groups=groups, phases=phases, say=asked.say, executor=executor
     )
+    return weighed(
+        asked,
+        inquiry,
+        base,
+        kept,
+        acts=acts,
+        set_ups=set_ups,
+        inconsistencies=inconsistencies,
+        notes=notes,
+    )
+
+
+def weighed(
+    asked: Asked,
+    inquiry: Inquiry,
+    base: Fitted,
+    kept: Sequence[Dataset],
+    *,
+    acts: str,
+    set_ups: tuple[Scenario, ...] = (),
+    inconsistencies: Sequence[Aside] = (),
+    notes: Sequence[str] = (),
+) -> Conclusion:
+    """What an inquiry comes to beside a base: an explanation, whether it is named, and how much of all it explains.
+
+    `kept` are recordings that were held out, `acts` what kind of test they are of.
+    """
+    problem, groups, phases, recordings = inquiry.problem, inquiry.groups, inquiry.phases, asked.recordings
+    found, notes = list(problem.dataset), list(notes)
     is_beside = asked.discrepancy is not None and asked.discrepancy.is_estimated
     if asked.discrepancy is not None and is_beside:
         explanation = tried = explained_by_one(inquiry, base, usual=asked.discrepancy.is_usual)
@@ -196,9 +228,10 @@ def concluded(
         shown=shown,
         kept=tuple(kept),
         groups=groups,
-        candidates=candidates,
+        candidates=inquiry.candidates,
         acts=acts,
-        is_cross_validated=is_cross_validated,
+        set_ups=set_ups,
+        is_cross_validated=len(groups) > 1 or bool(kept),
         inconsistencies=tuple(inconsistencies),
         notes=tuple(notes),
     )

@@ -167,6 +167,7 @@ def _set_right(found: Conclusion, every: Sequence[Dataset], notes: Sequence[str]
         return None
     own = {e.name: e for e in every}
     moved = {n: replace(r, time=r.time - late.get(n, 0.0)) for n, r in asked.recordings.items() if n in own}
+    assert asked.scenario is not None
     again, _ = prepared(asked.scenario, list(moved.items()), asked.executor)
     again = [
         replace(e, model_error=own[e.name].model_error, discrepancy=own[e.name].discrepancy, memory=own[e.name].memory)

@@ -10,7 +10,6 @@ from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.inconsistent import by_inconsistencies
 from rollover.diagnosis.data.repeatability import against_itself, differing
 from rollover.diagnosis.fit.time_shift import by_clock, mistimed
-from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.forward.full_run import full_runs
 from rollover.diagnosis.grades import answer_of
 from rollover.diagnosis.inference.adequacy import is_enough, is_tolerated
@@ -47,16 +46,15 @@ def reported(c: Conclusion) -> Diagnosis:
         c.verdict,
         c.effects,
     )
-    scenario, executor, groups, found = asked.scenario, asked.executor, c.groups, list(problem.dataset)
+    executor, groups, found, set_ups = asked.executor, c.groups, list(problem.dataset), c.set_ups
     before, after = explanation.before, explanation.after
-    set_ups = [set_up(scenario, e.recording) for e in found]
     is_mismatch = verdict not in ("no-mismatch", "cannot-tell") and shown is None
     asked.say("what the mismatch depends on")
     depends_on = Dependence()
     degrees: tuple[Degree, ...] = ()
     if c.acts == "drop" and is_mismatch:
         depends_on = dependence(problem, set_ups, explanation.base, executor.parallel_map)
-    elif c.acts != "drop":
+    elif c.acts == "rollover":
         degrees = degrees_of(set_ups, found, [b.shift for b in explanation.base.blocks])
         of_one = dependence_of_one(problem, explanation.base, before) if is_mismatch else None
         of_motion = Dependence(shares=dependency(problem, explanation.base))

@@ -170,6 +170,7 @@ class Diagnosis:
     discrepancy: Mapping[str, Scale] = field(default_factory=dict)  # by channel, where it was estimated or stated
     checked: tuple[str, ...] = ()  # invariants that were checked
     broken: tuple[str, ...] = ()  # those of them that do not hold
+    baseline: Mapping[str, Interval] = field(default_factory=dict)  # what a model of one's own is always fitted by
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the sentence, the effects that are named with their intervals, what the fit gains."""

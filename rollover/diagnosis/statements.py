@@ -37,7 +37,7 @@ def named(problem: Problem, found: Explanation, groups: Sequence[Sequence[int]])
     settings = {c.key: s for c, s in zip(fitted.candidates, told, strict=True)}
     by_key = {s.fitted.candidates[-1].key: s for s in found.parts}
     effects = []
-    for c in fitted.candidates:
+    for c in fitted.effects:
         kind = EFFECTS[c.id]
         parameters = settings[c.key]
         values: dict[str, Any] = {name: i.value for name, i in parameters.items()}

@@ -227,7 +227,7 @@ UNITS: dict[str, dict[str, float]] = {
 def factor(unit: str, channel: str) -> float:
     """What one `unit` is in the channel's own unit. Raises ``ValueError`` that lists what fits the channel."""
     own = describe(channel).unit
-    known = UNITS[own]
+    known = UNITS.get(own, {own: 1.0})  # of a model of one's own may be any unit
     found = units.find(unit, known, {other: table for other, table in UNITS.items() if other != own})
     if found is None:
         raise ValueError(f"unit does not fit {channel}, got {unit!r}; {hint(unit, known, most_listed=99)}")

@@ -21,7 +21,7 @@ from typing import Any
 
 from rollover.system.errors import Fault, InputError, excerpt
 
-KINDS = {"effects": "ROLLOVER_EFFECTS", "laws": "ROLLOVER_LAWS"}
+KINDS = {"effects": "ROLLOVER_EFFECTS", "laws": "ROLLOVER_LAWS", "models": "ROLLOVER_MODELS"}
 
 
 def add(kind: str, files: Sequence[Path]) -> None:
@@ -55,6 +55,11 @@ def load(kind: str, examine: Callable[[ModuleType], str] = lambda module: "") ->
         if wrong := examine(module):
             del sys.modules[name]
             raise InputError(Fault(file=str(path), message=wrong))
+
+
+def module_of(kind: str, path: Path) -> ModuleType:
+    """The module of a file that was loaded."""
+    return sys.modules[_module(kind, path.resolve())]
 
 
 def hashes(kind: str) -> dict[str, str]:

@@ -24,15 +24,27 @@ MOST_TOLERATED = 0.5  # of a range: what may miss half of it is no model of it
 @app.command(
     epilog=manual(
         "diagnose drop_test rec --out out/diagnosis",
-        writes="diagnosis.json, scenario-diagnosed.yaml (it runs), report.html, diagnosis.rrd.",
+        "diagnose --model duffing rec --out out/model",
+        writes="diagnosis.json, scenario-diagnosed.yaml (it runs), report.html, diagnosis.rrd; of a model diagnosis.json.",
     )
 )
 @answering
 def diagnose(
-    scenario: Annotated[str, typer.Argument(help="A scenario file, or the name of a shipped one.")],
-    recordings: Annotated[
-        list[str], typer.Argument(help="Recordings with their conditions, or folders of them.", metavar="RECORDING...")
+    scenario: Annotated[
+        str, typer.Argument(help="A scenario file, or the name of a shipped one; with --model a recording as well.")
     ],
+    recordings: Annotated[
+        list[str] | None,
+        typer.Argument(help="Recordings with their conditions, or folders of them.", metavar="RECORDING..."),
+    ] = None,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE",
+            help="A Python file with a model of your own (`rollover.ForwardModel`), or the name of a shipped one, "
+            "instead of a scenario: recorded inputs drive it.",
+        ),
+    ] = None,
     hold_out: Annotated[
         list[str] | None,
         typer.Option(
@@ -80,6 +92,23 @@ def diagnose(
 
     from rollover.system.processes import begin_server, cores
 
+    if model is not None:
+        given = {"--set": set_, "--reference": reference, "--estimate": estimate}
+        _diagnose_model(
+            model,
+            [scenario, *(recordings or [])],
+            [name for name, value in given.items() if value],
+            hold_out=hold_out or [],
+            tolerance=tolerance or [],
+            profile=profile,
+            out=out,
+            workers=workers,
+            force=force,
+            as_json=as_json,
+        )
+        return
+    if not recordings:
+        raise InputError(Fault(path="RECORDING", message="missing, got a scenario alone; at least one is needed"))
     workers = cores() if workers is None else workers
     if workers > 1:
         # as `Executor` does, but beside all that is imported and read here
@@ -160,6 +189,63 @@ def diagnose(
             )
             (part / PAGE).write_text(text, encoding="utf-8")
             drawn.result()
+    executor.close()
+    if as_json:
+        print(json.dumps(answer, indent=2))
+    else:
+        console.diagnosis(found, str(folder))
+
+
+def _diagnose_model(
+    name: str,
+    paths: Sequence[str],
+    refused: Sequence[str],
+    *,
+    hold_out: Sequence[str],
+    tolerance: Sequence[str],
+    profile: Path | None,
+    out: Path | None,
+    workers: int | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Diagnose a model of one's own; `refused` are options that only a scenario has."""
+    from rollover.assessment import results
+    from rollover.cli import console
+    from rollover.comparison.recordings import held_out, read
+    from rollover.diagnosis.fit.jobs import Executor
+    from rollover.diagnosis.io import FORMAT, JSON
+    from rollover.diagnosis.own_model import account, diagnose_model, files
+    from rollover.diagnosis.own_model.tables import tables
+    from rollover.system.processes import cores
+    from rollover.system.writing import notes
+
+    if refused:
+        raise InputError(Fault(file=refused[0], message="beside --model, got both; it is of scenarios alone"))
+    path = files.found_at(name)
+    model = files.load_model(path)
+    with tables(model):
+        measured = read(paths, profile)
+    held = held_out(list(measured), hold_out, "--hold-out") if hold_out else []
+    allowed = tolerances(tolerance, measured)
+    if not isinstance(allowed, float):
+        message = f"by channel, got {tolerance[0]!r}; beside --model one share for all is allowed"
+        raise InputError(Fault(file="--tolerance", message=message))
+    folder = out or Path("out", "diagnose", path.stem)
+    about: dict[str, Any] = {
+        "own_code": {files.KIND: files.hashes(path)},
+        "recordings": list(measured),
+        "hold_out": held,
+        "tolerance": allowed,
+        "origin": results.origin(path, folder),
+    }
+    results.claim_account(folder, FORMAT, about, (JSON,), force=force, say=console.say)
+    about_fits = json.dumps([about, results.versions()], sort_keys=True)
+    with Executor(cores() if workers is None else workers, notes(folder), about_fits) as executor:
+        found = diagnose_model(model, measured, hold_out=held, tolerance=allowed, say=console.say, executor=executor)
+    answer = account(model, found, about)
+    with results.whole(folder) as part:
+        results.write_json(part / JSON, answer)
     executor.close()
     if as_json:
         print(json.dumps(answer, indent=2))

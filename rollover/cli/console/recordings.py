@@ -113,6 +113,9 @@ def diagnosis(found: Diagnosis, folder: str) -> None:
                 bound = " (at the end of its range)" if i.at_bound else ""
                 table.add_row(e.id, e.channel or "", name, *values, f"{i.unit}{bound}")
         out.print(table)
+    for name, i in found.baseline.items():
+        bound = " (at the end of its range)" if i.at_bound else ""
+        out.print(f"{name}: {i.value:.5g} ({i.low:.5g} to {i.high:.5g}) {i.unit}{bound}")
     for which, names in (("training", found.training), ("held_out", found.held_out)):
         if which not in found.before or which not in found.after:
             continue

@@ -108,6 +108,8 @@ class Simulations:
         if found is None:
             return None
         y, predicted = found
+        if not self.effort.is_timed:
+            return y
         discontinuities = self.dataset[r].discontinuities(y, predicted)
         if discontinuities.size:
             self._discontinuities[key_at(r, candidates, x, shift)] = discontinuities

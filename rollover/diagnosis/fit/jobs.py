@@ -26,7 +26,8 @@ from rollover.diagnosis.fit.model_variants import in_form, shaped
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.scan_jobs import serial_map
 from rollover.diagnosis.fit.threshold_scan import Stretch, traced
-from rollover.system.processes import Children, begin_server, map_cases
+from rollover.system.errors import Fault, InputError
+from rollover.system.processes import Children, Failure, begin_server, map_cases
 from rollover.system.writing import scratch
 
 WARM = "rollover.diagnosis.fit.warmup"
@@ -157,7 +158,7 @@ class Executor:
         for outcome in outcomes:
             k = rest[outcome.index]
             if outcome.failure is not None:
-                raise RuntimeError(f"a fit of {tasks[k].candidates[-1].key}: {outcome.failure.sentence}")
+                raise _failed(f"a fit of {tasks[k].candidates[-1].key}", outcome.failure)
             fitted, made = outcome.value if outcome.value is not None else (None, 0)
             problem.simulations += made
             ended(k, fitted)
@@ -186,7 +187,7 @@ class Executor:
         for outcome in map_cases(function, things, children=self.children):
             if outcome.failure is not None:
                 name = getattr(function, "__name__", "a child").strip("_")
-                raise RuntimeError(f"{name}: {outcome.failure.sentence}")
+                raise _failed(name, outcome.failure)
             found[outcome.index] = cast(R, outcome.value)
         return [found[k] for k in range(len(things))]
 
@@ -213,6 +214,14 @@ class Executor:
             self.notebook.parent.mkdir(parents=True, exist_ok=True)
             with open(self.notebook, "a", encoding="utf-8", opener=_no_link) as file:
                 file.write(json.dumps({"key": key, "fit": row}) + "\n")
+
+
+def _failed(what: str, failure: Failure) -> Exception:
+    """What a child's failure is here: what it refuses as wrong input is that, the line as it stands."""
+    kind, _, line = failure.sentence.partition(": ")
+    if kind == InputError.__name__:
+        return InputError(Fault(message=line))
+    return RuntimeError(f"{what}: {failure.sentence}")
 
 
 def _no_link(path: str, flags: int) -> int:

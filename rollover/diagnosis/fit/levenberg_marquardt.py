@@ -144,7 +144,7 @@ class Problem(Simulations):
         J = np.zeros((y.size, len(x)))
         if known is not None:
             J[:, : known.shape[1]] = known
-        clock = clock and not (self._fixed_shifts and e.recording.clock.zero != "unknown")
+        clock = clock and self.effort.is_timed and not (self._fixed_shifts and e.recording.clock.zero != "unknown")
         slope = np.zeros_like(raw)
         if clock:
             slope = self._in_time(r, candidates, x, shift, raw)

@@ -112,6 +112,16 @@ class Fitted:
     cross_validated: tuple[float, ...] | None = None
 
     @property
+    def effects(self) -> tuple[Candidate, ...]:
+        """Candidates that explain something: all but a baseline, which is fitted beside them and stands first."""
+        return tuple(c for c in self.candidates if not c.is_baseline)
+
+    @property
+    def first(self) -> int:
+        """Place of the first effect among the candidates."""
+        return len(self.candidates) - len(self.effects)
+
+    @property
     def own(self) -> tuple[float, ...]:
         """Coordinates of the last effect."""
         return self.x[len(self.x) - len(self.candidates[-1].search) :]
@@ -129,7 +139,7 @@ class Fitted:
     @property
     def label(self) -> str:
         """Keys of the effects."""
-        return " + ".join(c.key for c in self.candidates) or "as it is"
+        return " + ".join(c.key for c in self.effects) or "as it is"
 
 
 def total_of(blocks: Sequence[ResidualBlock]) -> float:
@@ -138,11 +148,12 @@ def total_of(blocks: Sequence[ResidualBlock]) -> float:
 
 
 def turned(fitted: Fitted) -> Fitted:
-    """The same fit with its first effect last."""
-    first = len(fitted.candidates[0].search)
-    order = np.roll(np.arange(len(fitted.x)), -first)
+    """The same fit with its first effect last; a baseline stays where it is."""
+    k = fitted.first
+    held, first = (sum(len(c.search) for c in cs) for cs in (fitted.candidates[:k], fitted.candidates[k : k + 1]))
+    order = np.concatenate([np.arange(held), held + np.roll(np.arange(len(fitted.x) - held), -first)])
     return Fitted(
-        candidates=(*fitted.candidates[1:], fitted.candidates[0]),
+        candidates=(*fitted.candidates[:k], *fitted.candidates[k + 1 :], fitted.candidates[k]),
         x=tuple(fitted.x[k] for k in order),
         blocks=tuple(replace(b, J=b.J[:, order]) for b in fitted.blocks),
     )

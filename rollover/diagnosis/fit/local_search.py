@@ -154,7 +154,7 @@ def timed(problem: Problem, fitted: Fitted) -> Fitted:
     Where one channel has a clock of its own all shifts are tried against that first: the edges of the channel stay.
     """
     best = fitted
-    for _ in range(TUNING.repeats):
+    for _ in range(TUNING.repeats if problem.effort.is_timed else 0):
         x, shifts = _against(problem, best)
         moved = [problem.block(r, best.candidates, x, s, 0.0, clock=False) for r, s in enumerate(shifts)]
         blocks = [b if b is None else _tried(problem, r, best.candidates, x, b) for r, b in enumerate(moved)]

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rollover.diagnosis.fit.finite_differences import Point
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, without_shift
 from rollover.diagnosis.fit.local_search import blocks_at, few_of, left_at
@@ -59,20 +60,22 @@ def placed_beside(
     *,
     few: Sequence[int],
     shifts: Sequence[float],
+    base: Point = ((), ()),
 ) -> tuple[float, ...] | None:
-    """Where a fit of two effects may begin: the first as it is, the second where least of few recordings is left.
+    """Where a fit of two effects beside a base may begin: the first as it is, the second where least of few recordings is left.
 
     The second has a threshold, and is as strong at each place as these ask for there. None where it helps nowhere.
     """
-    first, x, second = pair
-    blocks = blocks_at(problem, (first,), x, shifts, few)
+    first, second = (*base[0], pair[0]), pair[2]
+    x = (*base[1], *pair[1])
+    blocks = blocks_at(problem, first, x, shifts, few)
     if blocks is None:
         return None
-    alone = Fitted(candidates=(first,), x=x, blocks=tuple(blocks))
+    alone = Fitted(candidates=first, x=x, blocks=tuple(blocks))
     best, least = None, alone.total
     for place in second.probes():
         there = _as_strong(problem, alone, second, (*x, *place), few)
-        left = None if there is None else left_at(problem, (first, second), there, shifts, few)
+        left = None if there is None else left_at(problem, (*first, second), there, shifts, few)
         if left is not None and left < least:
             best, least = there, left
     return best

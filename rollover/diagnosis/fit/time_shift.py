@@ -39,7 +39,7 @@ Cost = Callable[[Array, float], float]
 
 def align(problem: Problem) -> None:
     """Begin with the time shift at which each recording meets the scenario best."""
-    for r, e in enumerate(problem.dataset):
+    for r, e in enumerate(problem.dataset if problem.effort.is_timed else ()):
         found = _best(problem, r, partial(problem.raw, r, (), ()), partial(_whole, problem, r), _places(e))
         problem.shifts[r] = problem.shifts[r] if found is None else found
 
@@ -84,6 +84,8 @@ def _first_contact(problem: Problem, r: int, made: Made) -> float | None:
 
 def mistimed(problem: Problem, fitted: Fitted, parallel_map: ParallelMap = serial_map) -> list[tuple[str, float]]:
     """Recordings that would meet a fit if they came later by a shift (s) far beyond what their clocks may be off by."""
+    if not problem.effort.is_timed:
+        return []
     found = parallel_map(problem, partial(_elsewhere, fitted=fitted), range(len(problem.dataset)))
     return [(e.name, at) for e, at in zip(problem.dataset, found, strict=True) if at is not None]
 

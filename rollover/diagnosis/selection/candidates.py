@@ -44,32 +44,14 @@ def candidates_of(
     `size` is that of what falls, see `size_of`.
     """
     effects()
-    spans: dict[str, float] = {}
-    ends: dict[str, float] = {}
-    for e in dataset:
-        for s in e.signals:
-            spans[s.channel] = max(spans.get(s.channel, 0.0), s.span)
-            ends[s.channel] = max(ends.get(s.channel, 0.0), s.end)
-    found, times = [], _times(dataset)
+    found, heard = [], of_sensors(dataset)
     tried = set_up(scenario, dataset[0].recording) if scenario is not None and dataset else scenario
     in_fluid = scenario is not None and scenario.ground.law.fluid
     for name, kind in EFFECTS.items():
         if name in switched_on or acts not in kind.acts or not kind.competes or (kind.solid and in_fluid):
             continue
         if kind.kind == "sensor":
-            heard = [Heard(channel, spans, times.get(channel, 1.0), ends[channel]) for channel in spans]
-            found += [
-                Candidate(
-                    id=name,
-                    kind=kind.kind,
-                    family=kind.family,
-                    search={p: s for p, s in ranges.items() if p not in kind.shapes},
-                    shapes={p: s for p, s in ranges.items() if p in kind.shapes},
-                    channel=of.channel,
-                )
-                for of in heard
-                if (ranges := kind.looked_for_on(of)) is not None
-            ]
+            found += [c for c in heard if c.id == name]
             continue
         sized = {p: _sized(s, kind.grows.get(p), size) for p, s in kind.search.items()}
         wide = {p: s if p in kind.shapes else _widened(s, kind.null.get(p)) for p, s in sized.items()}
@@ -87,6 +69,32 @@ def candidates_of(
             )
         )
     return found
+
+
+def of_sensors(dataset: Sequence[Dataset]) -> list[Candidate]:
+    """Effects of sensors that can act on what was recorded, once for each channel."""
+    spans: dict[str, float] = {}
+    ends: dict[str, float] = {}
+    for e in dataset:
+        for s in e.signals:
+            spans[s.channel] = max(spans.get(s.channel, 0.0), s.span)
+            ends[s.channel] = max(ends.get(s.channel, 0.0), s.end)
+    times = _times(dataset)
+    heard = [Heard(channel, spans, times.get(channel, 1.0), ends[channel]) for channel in spans]
+    return [
+        Candidate(
+            id=name,
+            kind=kind.kind,
+            family=kind.family,
+            search={p: s for p, s in ranges.items() if p not in kind.shapes},
+            shapes={p: s for p, s in ranges.items() if p in kind.shapes},
+            channel=of.channel,
+        )
+        for name, kind in EFFECTS.items()
+        if kind.kind == "sensor"
+        for of in heard
+        if (ranges := kind.looked_for_on(of)) is not None
+    ]
 
 
 def _neutral(kind: Any, parameter: str, search: Search, scenario: Any) -> float | None:

@@ -115,11 +115,11 @@ def explained(inquiry: Inquiry, base: Fitted) -> Explanation:
 
 def is_open_to_be_named(problem: Problem, fitted: Fitted, left: Mismatch) -> bool:
     """Whether several effects may be named: as many as may be leave no more than `decided` asks, or one is needless."""
-    if problem.effort.is_ensemble or len(fitted.candidates) < MOST_EFFECTS or left.p_value > FULL_P_VALUE:
+    if problem.effort.is_ensemble or len(fitted.effects) < MOST_EFFECTS or left.p_value > FULL_P_VALUE:
         return True
     if not matters(problem, fitted, left) or is_tolerated(problem, fitted):
         return True
-    return len(backward_elimination(problem, problem.again(fitted)).candidates) < MOST_EFFECTS
+    return len(backward_elimination(problem, problem.again(fitted)).effects) < MOST_EFFECTS
 
 
 def _ended(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
@@ -136,7 +136,7 @@ def _one_each(inquiry: Inquiry, steps: Sequence[Step]) -> list[Step]:
     known = {s.fitted.candidates[-1].key: s.again(inquiry.problem) for s in steps}
     if not steps:
         return []
-    *others, last = known[steps[-1].fitted.candidates[-1].key].fitted.candidates
+    *others, last = known[steps[-1].fitted.candidates[-1].key].fitted.effects
     found: list[Step] = []
     current = known[last.key].fitted
     for c in others:
@@ -161,25 +161,25 @@ def _retained(inquiry: Inquiry, taken: Sequence[Step]) -> list[Step] | None:
     problem = inquiry.problem
     last = taken[-1]
     current = backward_elimination(problem, problem.again(last.fitted), last.base)
-    if (problem.effort.is_ensemble or is_over_flexible(current.candidates)) and len(current.candidates) == len(taken):
+    if (problem.effort.is_ensemble or is_over_flexible(current.effects)) and len(current.effects) == len(taken):
         return _one_each(inquiry, taken)  # the second will be refused, whichever came first
     parts: list[Step] = []
     exchanged = 0
-    while len(parts) < len(current.candidates):
-        whole = len(parts) == len(current.candidates) - 1 and not is_elsewhere(last)
-        whole = whole and current.candidates[0].key == last.fitted.candidates[-1].key
+    while len(parts) < len(current.effects):
+        whole = len(parts) == len(current.effects) - 1 and not is_elsewhere(last)
+        whole = whole and current.effects[0].key == last.fitted.candidates[-1].key
         if whole and {c.token for c in current.candidates} == {c.token for c in last.fitted.candidates}:
             parts.append(last)  # found beside just these others
             break
-        found, taken_out = swapped(inquiry, current), current.candidates[0].key
+        found, taken_out = swapped(inquiry, current), current.effects[0].key
         if found is None:
             return _one_each(inquiry, taken)
         current = backward_elimination(problem, found.fitted)
         if found.fitted.candidates[-1].key != taken_out and exchanged < MOST_EFFECTS:
             parts, exchanged = [], exchanged + 1  # those before were looked for beside what is no more
-            if exchanged > TUNING.most_exchanges and len(current.candidates) == MOST_EFFECTS:
+            if exchanged > TUNING.most_exchanges and len(current.effects) == MOST_EFFECTS:
                 return None
-        parts = [*parts, found] if len(current.candidates) == len(found.fitted.candidates) else []
+        parts = [*parts, found] if len(current.effects) == len(found.fitted.effects) else []
     return [s.again(problem) for s in parts]
 
 
@@ -196,10 +196,10 @@ def backward_elimination(problem: Problem, fitted: Fitted, base: Fitted | None =
 
     `base` is the fit beside which the last one was found. Of full runs, those that are surely there are not tried.
     """
-    while len(fitted.candidates) > 1:
+    while len(fitted.effects) > 1:
         losses: list[tuple[float, int, Fitted | None]] = [(np.inf, -1, None)]
         surely = significant_by_wald(problem, fitted) if problem.effort.is_ensemble else set()
-        for k in {*range(len(fitted.candidates))} - surely:
+        for k in {*range(fitted.first, len(fitted.candidates))} - surely:
             rest = _rest(problem, fitted, k, base)
             losses.append((rest.left - fitted.left if rest is not None else np.inf, k, rest))
         loss, _, rest = min(losses, key=lambda one: one[0])
@@ -228,7 +228,7 @@ def decided(problem: Problem, found: Explanation, groups: Groups, phases: Phases
     as may be, or two of one sensor, or of a soil that is bent, more surely so: they can be bent to more. One alone also
     where it takes nearly all.
     """
-    held, is_curved = found.fitted.candidates, is_a_curve(problem, found.fitted)
+    held, is_curved = found.fitted.effects, is_a_curve(problem, found.fitted)
     if not found.settled or is_over_flexible(held) or (is_curved and is_one_line(held)):
         return found.refused(), "unexplained"
     is_bending = len(found.parts) == MOST_EFFECTS or is_one_sensor(held) or is_pliant(held)
@@ -314,9 +314,9 @@ def kind_of(c: Candidate) -> Verdict:
 
 def strongest(problem: Problem, base: Fitted, fitted: Fitted) -> Candidate:
     """The effect without which most would be left; of full runs, where fits are dear, with the others as they stand."""
-    best, loss = fitted.candidates[0], -np.inf
-    for k, c in enumerate(fitted.candidates):
-        if len(fitted.candidates) == 1:
+    best, loss = fitted.effects[0], -np.inf
+    for k, c in enumerate(fitted.effects, fitted.first):
+        if len(fitted.effects) == 1:
             return c
         if problem.effort.is_ensemble:
             others, columns = but_one(fitted, k)

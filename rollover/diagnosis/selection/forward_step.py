@@ -58,7 +58,7 @@ def step(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> Step | None:
         fits = begun_otherwise(inquiry, base, fits, looked, shifts)
     # where a threshold makes the way crooked, the nearer ones are followed to the end; of what explains the best alone
     able = [f for f in fits if len(f.candidates[-1].search) > 1 and f.left < TUNING.polished_misfit * fits[0].left]
-    alone = [f for f in able[:1] if f is fits[0] and not base.candidates]
+    alone = [f for f in able[:1] if f is fits[0] and not base.effects]
     near = (
         able[: problem.effort.polishes]
         if fits[0].left > SETTINGS.fit.levenberg_marquardt.noise_left**2 * count

@@ -25,10 +25,11 @@ from rollover.diagnosis.selection.score_test import ScoreTest
 from rollover.diagnosis.selection.screening import is_far
 from rollover.diagnosis.selection.simplification import followed, mirror_images, simpler, unbent
 from rollover.diagnosis.settings import SETTINGS
+from rollover.effects import EFFECTS
 
 TUNING = SETTINGS.selection.pairs
 
-Start = tuple[tuple[Candidate, ...], tuple[float, ...]]  # two effects, and where a fit of them begins
+Start = tuple[tuple[Candidate, ...], tuple[float, ...]]  # two effects beside a base, and where their fit begins
 
 
 def best_subsets(
@@ -81,7 +82,7 @@ def is_better(other: Fitted, left: Mismatch, current: Fitted, *, scattered: bool
     if scattered:
         return other.left < TUNING.better_share * current.left
     chance = sum(b.residual.size for b in other.blocks)
-    part = 1.0 / TUNING.better_share if is_over_flexible(current.candidates) else TUNING.better_share
+    part = 1.0 / TUNING.better_share if is_over_flexible(current.effects) else TUNING.better_share
     return other.left - chance < part * (current.left - chance)
 
 
@@ -97,7 +98,7 @@ def with_another_first(inquiry: Inquiry, taken: Sequence[Step], current: Fitted)
 def swapped(inquiry: Inquiry, current: Fitted) -> Step | None:
     """The first effect of an explanation taken out and looked for anew beside the rest: it comes back, or a better."""
     problem = inquiry.problem
-    rest = without(problem, current, 0)
+    rest = without(problem, current, current.first)
     if rest is None:
         return None
     looked = look(problem, rest, inquiry.free(rest), inquiry.groups, parallel_map=inquiry.executor.parallel_map)
@@ -126,8 +127,9 @@ def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: ScoreTest) -> Ste
     # slopes tell what two do together where these are not far off
     partners = _partners(inquiry, first, taken, looked, TUNING.scored if fixed_shifts else 0)
     two = itertools.combinations(partners, 2)
-    short: list[Start] = [((a, b), (*x, *y)) for (a, x), (b, y) in two if _may_explain(a, b)]
-    short += _placed_anew(inquiry, partners, few, shifts) if fixed_shifts else _together(inquiry, looked)
+    base = first.base
+    short: list[Start] = [((*base.candidates, a, b), (*base.x, *x, *y)) for (a, x), (b, y) in two if _may_explain(a, b)]
+    short += _placed_anew(inquiry, base, partners, few, shifts) if fixed_shifts else _together(inquiry, base, looked)
     inquiry.say(f"{len(short)} pairs of effects")
     for rounds, most in TUNING.short_fits:
         tasks = [
@@ -159,15 +161,16 @@ def _may_explain(one: Candidate, other: Candidate) -> bool:
     return one.key != other.key and not is_over_flexible((one, other))
 
 
-def _together(inquiry: Inquiry, looked: ScoreTest) -> list[Start]:
+def _together(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> list[Start]:
     """Pairs of candidates that gain most together by their slopes, in their usual shapes, from where these lead."""
     usual = {c.key: c for c in inquiry.candidates}
     begun = [(usual[key], x, usual[other], y) for (key, x), (other, y) in looked.both]
-    return [((a, b), (*x, *y)) for a, x, b, y in begun if _may_explain(a, b)]
+    return [((*base.candidates, a, b), (*base.x, *x, *y)) for a, x, b, y in begun if _may_explain(a, b)]
 
 
 def _placed_anew(
     inquiry: Inquiry,
+    base: Fitted,
     partners: Sequence[tuple[Candidate, tuple[float, ...]]],
     few: Sequence[int],
     shifts: Sequence[float],
@@ -178,8 +181,9 @@ def _placed_anew(
     """
     able = [c for c, _ in partners if has_threshold(c) and not c.is_bent]
     ways = [(a, x, c) for a, x in partners[: TUNING.leading] for c in able if c.key != a.key]
-    found = inquiry.parallel_map(partial(placed_beside, few=tuple(few), shifts=tuple(shifts)), ways)
-    return [((a, c), x) for (a, _, c), x in zip(ways, found, strict=True) if x is not None]
+    look = partial(placed_beside, few=tuple(few), shifts=tuple(shifts), base=(base.candidates, base.x))
+    each = zip(ways, inquiry.parallel_map(look, ways), strict=True)
+    return [((*base.candidates, a, c), x) for (a, _, c), x in each if x is not None]
 
 
 def _takes_little(lead: Fitted, pair: Fitted, few: Sequence[int]) -> bool:
@@ -232,6 +236,8 @@ def _mirrored(inquiry: Inquiry, pair: Fitted) -> list[Fitted]:
     """
     usual, found = {c.key: c for c in inquiry.candidates}, []
     for way in (pair, turned(pair)):
+        if not EFFECTS[way.candidates[-1].id].mirrors:
+            continue
         other = way.candidates[0]
         (other, _), x = unbent(way, usual, (0,) if usual[other.key].search.keys() <= other.search.keys() else ())
         found += mirror_images(inquiry, way, (other,), x[: len(other.search)])

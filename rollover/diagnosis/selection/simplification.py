@@ -34,9 +34,9 @@ def followed(inquiry: Inquiry, found: Step) -> tuple[Step, Mismatch]:
     is_near = old.left < SETTINGS.selection.forward_step.nearly_noise**2 * sum(b.residual.size for b in old.blocks)
     if problem.effort.is_ensemble or not is_near:
         return found, left
-    if not is_over_flexible(old.candidates):  # as they stand these will be refused, however well they fit
+    if not is_over_flexible(old.effects):  # as they stand these will be refused, however well they fit
         new = traced_too(inquiry, old)
-        if new.left < old.left or len(old.candidates) > 1 or left.p_value < TUNING.full_p_value:
+        if new.left < old.left or len(old.effects) > 1 or left.p_value < TUNING.full_p_value:
             new = timed(problem, polish(problem, new))
         new = ended(problem, new)
         if new.left < old.left:
@@ -87,7 +87,7 @@ def _become(inquiry: Inquiry, best: Fitted) -> Iterator[tuple[tuple[Candidate, .
 def _with_rivals(inquiry: Inquiry, found: Step) -> Step:
     """A step with its nearest rivals begun anew beside what they share with its best, which was followed alone."""
     best, beside, shared = found.fitted, *_shared(found.fitted)
-    if not beside:
+    if len(best.effects) < 2:
         return found
     shifts, near = tuple(b.shift for b in best.blocks), sorted(found.rivals, key=lambda f: f.left)[: TUNING.rivals]
     begun = [f for f in near if f is not best]
@@ -106,7 +106,7 @@ def _straightened(inquiry: Inquiry, found: Step) -> Step | None:
     """
     best, usual = found.fitted, {c.key: c for c in inquiry.candidates}
     bent = [k for k, c in enumerate(best.candidates) if c.is_bent and usual[c.key].search.keys() <= c.search.keys()]
-    if len(best.candidates) < 2 or not bent:
+    if len(best.effects) < 2 or not bent:
         return None
     shifts, ways = tuple(b.shift for b in best.blocks), [bent, *([k] for k in bent if len(bent) > 1)]
     tasks = [Task(candidates=c, start=x, shifts=shifts, width=1) for c, x in (unbent(best, usual, w) for w in ways)]
@@ -129,10 +129,10 @@ def plainer(inquiry: Inquiry, found: Step) -> Step | None:
 def _ways(problem: Problem, found: Step) -> Iterator[Step]:
     """A step, and of two effects of one family, of several numbers each, the same with the first for its last."""
     yield found
-    each = found.fitted.candidates
+    each = found.fitted.effects
     if len(each) == 2 and len({c.family for c in each}) == 1 and all(len(c.search) > 1 for c in each):
         around = turned(found.fitted)
-        base = without(problem, around, 1)
+        base = without(problem, around, around.first + 1)
         if base is not None:
             yield Step(base=base, fitted=around, p_value=found.p_value, rivals=(around,))
 
@@ -141,7 +141,7 @@ def _plainer_last(inquiry: Inquiry, found: Step) -> Step | None:
     best, beside, shared = found.fitted, *_shared(found.fitted)
     held = {c.key for c in best.candidates}
     able = [c for c in inquiry.candidates if c.kind != "sensor" and len(c.search) < len(best.own) and c.key not in held]
-    if not beside or not able:
+    if len(best.effects) < 2 or not able:
         return None
     shifts = tuple(b.shift for b in best.blocks)
     tasks = [

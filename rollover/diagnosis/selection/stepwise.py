@@ -121,7 +121,7 @@ def one_by_one(inquiry: Inquiry, base: Fitted, begun: Sequence[Step] = (), *, pa
             if other is not None:
                 (taken, left), current = other, other[0][-1].fitted
         is_lost = len(taken) > 1 and (is_hopeless(problem, base, current) or is_unlikely(problem, taken[-1], current))
-        if is_lost or is_over_flexible(current.candidates):
+        if is_lost or is_over_flexible(current.effects):
             break
         looked = beside(current, left)
     if not problem.heavy_tailed:
@@ -173,7 +173,7 @@ def is_beyond_chance(found: Step | None, problem: Problem, phases: Phases) -> Ty
         or problem.effort.is_ensemble
     ):
         return moved >= SETTINGS.inference.adequacy.negligible
-    if found.base.candidates and does(problem, found.fitted) >= SETTINGS.inference.adequacy.negligible:
+    if found.base.effects and does(problem, found.fitted) >= SETTINGS.inference.adequacy.negligible:
         return True
     return is_missed(found.base, problem, phases)
 

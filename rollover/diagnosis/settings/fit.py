@@ -195,6 +195,15 @@ class TimeShift:
 
 
 @dataclass(frozen=True, kw_only=True)
+class OwnModel:
+    """First fits of a model of one's own."""
+
+    beside: tuple[float, ...] = (-0.1, 0.1)  # coordinate (0 to 1): starts to either side of the stated one; chosen
+    repeats: int = 10  # fits that go on where the one before ended, at most; chosen
+    least_gain: float = 0.1  # sum of squares over the noise: with less a fit has ended; 1/40 of what decides (3.84)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Fit:
     """Least-squares fits of parameters."""
 
@@ -209,3 +218,4 @@ class Fit:
     parameterisation: Parameterisation = Parameterisation()  # coordinates of an effect and where its fits begin
     threshold_scan: ThresholdScan = ThresholdScan()  # scan over a threshold
     time_shift: TimeShift = TimeShift()  # time shift of a recording against its simulation
+    own_model: OwnModel = OwnModel()  # first fits of a model of one's own

@@ -25,6 +25,7 @@ class Effort:
     least: float = 0.0  # gain of a round below which a search narrows
     later: float = 5e-5  # s, by which a clock is moved to see what that does
     clocked: int = 0  # times that a trial's time shifts are moved to where they fit: reading a run again costs little
+    is_timed: bool = True  # whether a recording's clock may be off, and edges lie on either side of a sample
     is_ensemble: bool = False  # looks at few recordings, fits no shapes, and stops where nothing but noise is left
 
     @property
@@ -127,6 +128,10 @@ class Forward:
     run: Run = Run()  # simulated full runs
     phases: Phases = Phases()  # phases of a full run
     drops: Effort = Effort()  # limits of a search by drops, which cost two milliseconds each
+    models: Effort = Effort(is_timed=False)  # limits of a search by a model that recorded inputs drive: one clock
+    # samples of a part of a recording of such a model, in which 12 cosines reach 1/12 of the sampling rate; derived:
+    # 12/(2 * 72)
+    model_part: int = 72
     # limits of a search by full runs, which cost a hundred times that; runs with many contacts differ by chance
     # beside what a parameter does: over a narrow step that is all of the slope
     runs: Effort = Effort(

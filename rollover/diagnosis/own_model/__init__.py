@@ -1,0 +1,9 @@
+"""A model of one's own: what recorded inputs drive, diagnosed by the same steps as a scenario."""
+
+from __future__ import annotations
+
+from rollover.diagnosis.own_model.declaration import ForwardModel, Parameter, Term
+from rollover.diagnosis.own_model.files import load_model
+from rollover.diagnosis.own_model.pipeline import account, diagnose_model
+
+__all__ = ["ForwardModel", "Parameter", "Term", "account", "diagnose_model", "load_model"]

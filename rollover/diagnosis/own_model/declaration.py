@@ -1,0 +1,224 @@
+"""What a model of one's own declares: channels, parameters that are always fitted, terms that may be missing."""
+
+from __future__ import annotations
+
+import inspect
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ground.quantity import Quantity
+from rollover.effects import Effect
+from rollover.effects.sensor import ORDER as SENSORS
+from rollover.spec.channels import UNITS, describe, is_known
+from rollover.system.errors import Fault, InputError, hint
+
+Array = NDArray[np.float64]
+
+BASELINE = "baseline"  # id under which what is always fitted stands
+CHANNEL = re.compile(r"[A-Za-z][A-Za-z0-9_-]*(/[A-Za-z][A-Za-z0-9_-]*)*")
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+ID = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """A number of a model, in `unit`: looked for from `low` to `high`, in even steps of it or of its logarithm.
+
+    `start` is where a fit begins, of a term's parameter its typical value. At `null` a term changes nothing, by not one
+    bit; a parameter of a term that says where it acts has none, and changes nothing while another one is at its null.
+    """
+
+    unit: str
+    low: float
+    high: float
+    start: float
+    null: float | None = None
+    scale: Literal["linear", "log"] = "linear"
+    meaning: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Term:
+    """A candidate: physics that the model may lack, or a stated value that may be wrong (`kind` "parameter").
+
+    `family` is what a report names before the member: "a stiffness that grows with deflection". `sentence` may hold
+    values as ``{parameter}`` or ``{parameter:more|less}``; `rivals` say by id which test tells a look-alike apart.
+    """
+
+    id: str
+    family: str
+    equation: str
+    parameters: Mapping[str, Parameter]
+    kind: Literal["physics", "parameter"] = "physics"
+    sentence: str = ""
+    rivals: Mapping[str, str] = field(default_factory=dict)
+
+
+@runtime_checkable
+class ForwardModel(Protocol):
+    """A model that recorded inputs drive, by channel: what a recording should have shown.
+
+    `inputs` and `outputs` are channels with unit (SI) and meaning; `parameters` are fitted in every explanation, with
+    the terms or without. A model may also have `conditions`, numbers that each recording states beside its channels,
+    and `sensors`, ids of the sensor effects that compete as explanations of outputs (all of them without it).
+    """
+
+    title: str
+    inputs: Mapping[str, Quantity]
+    outputs: Mapping[str, Quantity]
+    parameters: Mapping[str, Parameter]
+    terms: Sequence[Term]
+
+    def simulate(self, time: Array, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Mapping[str, Array]:
+        """Outputs (n,) by channel at the stamps `time` (n,), s, of inputs (n,) by channel, all in SI.
+
+        `values` has all parameters by name, those of a term as "TERM.PARAMETER", at their nulls (or starts, without
+        one) where the term is not there, and the recording's conditions. The same arguments give the same outputs. What
+        is not finite, and an ``ArithmeticError``, says that there is no solution for these values.
+        """
+
+
+def conditions_of(model: ForwardModel) -> Mapping[str, Quantity]:
+    """Numbers that each recording states for a model."""
+    found: Mapping[str, Quantity] = getattr(model, "conditions", {})
+    return found
+
+
+def sensors_of(model: ForwardModel) -> tuple[str, ...]:
+    """Ids of the sensor effects that compete beside a model's terms."""
+    return tuple(getattr(model, "sensors", SENSORS))
+
+
+def values_of(model: ForwardModel) -> dict[str, float]:
+    """Values of a model where fits begin, all terms at their nulls."""
+    found = {name: p.start for name, p in model.parameters.items()}
+    for term in model.terms:
+        found |= {f"{term.id}.{n}": p.start if p.null is None else p.null for n, p in term.parameters.items()}
+    return found
+
+
+def file_of(model: ForwardModel) -> str:
+    """The file in which a model's class stands; the class's name where there is none."""
+    try:
+        return inspect.getfile(type(model))
+    except (TypeError, OSError):
+        return type(model).__qualname__
+
+
+def declared(model: object, file: str = "") -> ForwardModel:
+    """The model, if what it declares can be used. Raises `InputError` with a line for each fault."""
+    where = file or file_of(model)  # type: ignore[arg-type]
+    faults = [Fault(file=where, path=path, message=message) for path, message in _wrong(model)]
+    if faults:
+        raise InputError(*faults)
+    assert isinstance(model, ForwardModel)
+    return model
+
+
+def _wrong(model: object) -> Iterator[tuple[str, str]]:
+    """What is wrong with a declaration: where, and in words."""
+    kinds: dict[str, Any] = {
+        "title": str, "inputs": Mapping, "outputs": Mapping, "parameters": Mapping, "terms": Sequence
+    }  # fmt: skip
+    missing = [name for name in (*kinds, "simulate") if not hasattr(model, name)]
+    if missing:
+        yield "", f"no forward model: without {', '.join(missing)}; {', '.join((*kinds, 'simulate'))} are needed"
+        return
+    wrong = [(n, type(getattr(model, n)).__name__) for n, k in kinds.items() if not isinstance(getattr(model, n), k)]
+    for name, got in wrong:
+        yield name, f"not of the right type, got {got}; a {kinds[name].__name__.lower()} is needed"
+    if wrong:
+        return
+    assert isinstance(model, ForwardModel)
+    yield from _wrong_channels(model)
+    if not callable(model.simulate):
+        yield "simulate", f"not a method, got {model.simulate!r}; simulate(time, inputs, values) is needed"
+    for name, p in model.parameters.items():
+        yield from _wrong_parameter(f"parameters.{name}", name, p, is_always=True)
+    ids = [getattr(t, "id", None) for t in model.terms]
+    if not ids:
+        yield "terms", "empty; at least one term that may be missing is needed"
+    for k, term in enumerate(model.terms):
+        if not isinstance(term, Term):
+            yield f"terms[{k}]", f"not a term, got {type(term).__name__}; rollover.Term(...) is needed"
+            continue
+        if not ID.fullmatch(term.id) or term.id == BASELINE or term.id in SENSORS:
+            yield f"terms[{k}].id", f"not to be used, got {term.id!r}; lower-case words joined by '-' are allowed"
+        if ids.count(term.id) > 1:
+            yield f"terms[{k}].id", f"given twice, got {term.id!r}; once is allowed"
+        if term.kind not in ("physics", "parameter"):
+            yield f"terms[{k}].kind", f"unknown kind, got {term.kind!r}; physics or parameter is allowed"
+        for name, p in term.parameters.items():
+            yield from _wrong_parameter(f"terms[{k}].parameters.{name}", name, p, is_always=False)
+        known = [p for p in term.parameters.values() if isinstance(p, Parameter)]
+        if all(p.null is None for p in known):
+            yield f"terms[{k}].parameters", "none with a null; the one that says how strong it is needs null=..."
+    for sensor in sensors_of(model):
+        if sensor not in SENSORS:
+            yield "sensors", f"unknown sensor effect, got {sensor!r}; {hint(sensor, SENSORS)}"
+
+
+def _wrong_channels(model: ForwardModel) -> Iterator[tuple[str, str]]:
+    """What is wrong with channels and conditions."""
+    if not model.outputs:
+        yield "outputs", "empty; at least one channel that is simulated is needed"
+    for name in {*model.inputs} & {*model.outputs}:
+        yield f"outputs.{name}", f"an input as well, got {name!r}; one of the two is allowed"
+    for part, channels in (("inputs", model.inputs), ("outputs", model.outputs), ("conditions", conditions_of(model))):
+        for name, q in channels.items():
+            path = f"{part}.{name}"
+            if not isinstance(q, Quantity):
+                yield path, f"no unit and meaning, got {type(q).__name__}; Quantity(unit, meaning) is needed"
+                continue
+            si = next((own for own, known in UNITS.items() if q.unit in known and known[q.unit] == 1.0), None)
+            other = next((own for own, known in UNITS.items() if q.unit in known), None)
+            if q.unit not in UNITS and si is None and other is not None:
+                yield path, f"not an SI unit, got {q.unit!r}; {other!r} is needed"
+            if part == "conditions":
+                continue
+            if name == "time" or not CHANNEL.fullmatch(name):
+                yield (
+                    path,
+                    f"not a channel's name, got {name!r}; words with '/' between, such as 'axis/force', are allowed",
+                )
+            elif is_known(name) and describe(name).unit != q.unit:
+                yield path, f"a channel of another unit, got {q.unit!r}; {describe(name).unit!r}, or another name"
+
+
+def _wrong_parameter(path: str, name: object, p: object, *, is_always: bool) -> Iterator[tuple[str, str]]:
+    """What is wrong with one parameter."""
+    if not isinstance(p, Parameter):
+        yield path, f"not a parameter, got {type(p).__name__}; rollover.Parameter(...) is needed"
+        return
+    if not isinstance(name, str) or not NAME.fullmatch(name) or hasattr(Effect, name):
+        yield path, f"not to be used as a name, got {name!r}; letters, digits and '_', no word that effects use"
+    numbers = {
+        n: v for n, v in (("low", p.low), ("high", p.high), ("start", p.start), ("null", p.null)) if v is not None
+    }
+    bad = {
+        n: v
+        for n, v in numbers.items()
+        if isinstance(v, bool) or not isinstance(v, (int, float)) or not math.isfinite(v)
+    }
+    for n, v in bad.items():
+        yield f"{path}.{n}", f"not a finite number, got {v!r}; a number in {p.unit} is needed"
+    if bad:
+        return
+    if p.scale not in ("linear", "log"):
+        yield f"{path}.scale", f"unknown scale, got {p.scale!r}; linear or log is allowed"
+    if not p.low < p.high:
+        yield path, f"an empty range, got low {p.low:g}, high {p.high:g}; low < high is needed"
+    elif p.scale == "log" and p.low <= 0.0:
+        yield f"{path}.low", f"no logarithm, got {p.low:g}; above 0 with scale 'log', or scale 'linear'"
+    elif not p.low <= p.start <= p.high or (is_always and p.start in (p.low, p.high)):
+        yield f"{path}.start", f"outside its range, got {p.start:g}; between {p.low:g} and {p.high:g} is needed"
+    if is_always and p.null is not None:
+        yield f"{path}.null", f"of a parameter that is always fitted, got {p.null:g}; a null is a term's"
+    if not is_always and p.null is not None and p.null == p.start:
+        yield f"{path}.start", f"the same as its null, got {p.start:g}; a typical value of the term is needed"
