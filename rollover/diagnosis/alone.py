@@ -2,36 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from rollover.diagnosis.fit.cross_validation import held_out
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.local_search import timed
-from rollover.diagnosis.fit.step import Groups
-from rollover.diagnosis.grades import shares
+from rollover.diagnosis.fit.step import Groups, Step
+from rollover.diagnosis.grades import share_of, shares
 from rollover.diagnosis.inference.adequacy import is_tolerated
 from rollover.diagnosis.inference.lack_of_fit import mismatch_of
+from rollover.diagnosis.inference.residual_law import fitted_law
 from rollover.diagnosis.result import Verdict
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.diagnosis.selection.decision import Explanation, kind_of
-from rollover.diagnosis.selection.forward_step import confusion, step
+from rollover.diagnosis.selection.forward_step import confusion, is_at_an_end, step
 from rollover.diagnosis.selection.scan import look
 from rollover.diagnosis.selection.stepwise import as_conditioned
 from rollover.diagnosis.settings import SETTINGS
+from rollover.scenario import Scenario
+
+TUNING = SETTINGS.report.grades
 
 
-def explained_by_one(inquiry: Inquiry, base: Fitted, *, usual: bool = True) -> Explanation:
+def explained_by_one(inquiry: Inquiry, base: Fitted) -> Explanation:
     """The best single effect beside a discrepancy, if any can be fitted.
 
-    Nothing where the discrepancy is enough and `usual`: a larger one may be what effects leave that are badly fitted.
+    It is looked for though the discrepancy may be enough: that was estimated from what an effect leaves as well.
     """
     problem, groups, phases = inquiry.problem, inquiry.groups, inquiry.phases
     base = timed(problem, base)
     before = mismatch_of(problem.dataset, base.blocks, phases)
     looked = look(problem, base, inquiry.candidates, groups, parallel_map=inquiry.executor.parallel_map)
-    none = Explanation(
-        base=base, fitted=base, parts=(), looked=looked, detectable=looked.detectable, before=before, after=before
-    )
-    first = None if usual and is_tolerated(problem, base) else step(inquiry, base, looked)
+    first = step(inquiry, base, looked)
     if first is None:
-        return none
+        return Explanation(
+            base=base, fitted=base, parts=(), looked=looked, detectable=looked.detectable, before=before, after=before
+        )
     first, left = as_conditioned(problem, first, mismatch_of(problem.dataset, first.fitted.blocks, phases), phases)
     first = first.again(problem).cross_validated(problem, groups, inquiry.executor.parallel_map)
     return Explanation(
@@ -49,18 +55,45 @@ def explained_by_one(inquiry: Inquiry, base: Fitted, *, usual: bool = True) -> E
 def decided_beside(problem: Problem, found: Explanation, groups: Groups) -> tuple[Explanation, Verdict]:
     """The verdict on what one effect explains beside a discrepancy.
 
-    It is named where it leaves no more than that, or surely explains half and its family is not to be mistaken.
+    An effect predicts recordings that were held out, a discrepancy does not carry over to them but for what is common
+    to all: it is named where it surely predicts half of what the scenario misses there. Nothing is said to be there
+    otherwise where the scenario alone leaves no more than the discrepancy.
     """
-    if is_tolerated(problem, found.base):
-        return found.refused(), "no-mismatch"
+    nothing: Verdict = "no-mismatch" if is_tolerated(problem, found.base) else "unexplained"
     if not found.parts or found.parts[0].p_value > SETTINGS.inference.lack_of_fit.p_value:
-        return found.refused(), "unexplained"
+        return found.refused(), nothing
     whole, _ = shares(problem, found, groups)
     families = {f.candidates[-1].family for f in confusion(found.parts[0], groups, problem.samples_per_error)}
-    is_enough = (
-        is_tolerated(problem, found.fitted) and whole is not None and whole.share >= SETTINGS.report.grades.half_share
-    )
-    is_sure = whole is not None and whole.low >= SETTINGS.report.grades.half_share and len(families) == 1
-    if is_enough or is_sure:
+    is_sure = whole is not None and whole.low >= TUNING.half_share
+    if is_sure and (is_tolerated(problem, found.fitted) or len(families) == 1):
         return found, kind_of(found.fitted.candidates[-1])
-    return found.refused(), "unexplained"
+    return found.refused(), nothing
+
+
+def alike_beside(problem: Problem, one: Step, groups: Groups) -> list[Fitted]:
+    """The best and what cannot be told from it beside a discrepancy that was estimated.
+
+    That was estimated from what the best leaves, whose form need not be the right one: a rival that explains nearly all
+    that the best does is not excluded where it leaves no more than the discrepancy, or is of the same family.
+    """
+    near = confusion(one, groups, problem.samples_per_error)
+    best, start = one.fitted, float(held_out(one.base, groups).left.sum())
+    least = TUNING.nearly_all * (start - float(held_out(best, groups).left.sum()))
+    for rival in one.rivals:
+        becomes_best = len(rival.x) > len(best.x) and is_at_an_end(rival)
+        if becomes_best or any(rival is f for f in near):
+            continue
+        is_akin = is_tolerated(problem, rival) or rival.candidates[-1].family == best.candidates[-1].family
+        if is_akin and start - float(held_out(rival, groups).left.sum()) >= least:
+            near.append(rival)
+    return near
+
+
+def follows_a_law(problem: Problem, base: Fitted, scenarios: Sequence[Scenario], groups: Groups) -> bool:
+    """Whether a law without a name surely predicts half of what a base misses of recordings that were held out.
+
+    That is what an effect is asked for; `scenarios` are those of the recordings' conditions.
+    """
+    fitted = fitted_law(problem, base, scenarios, problem.dataset, groups)
+    share = None if fitted is None else share_of(problem, base, fitted, groups)
+    return share is not None and share.low >= TUNING.half_share

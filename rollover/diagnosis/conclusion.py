@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from rollover.diagnosis.alone import decided_beside, explained_by_one
+from rollover.diagnosis.alone import alike_beside, decided_beside, explained_by_one
 from rollover.diagnosis.data.dataset import Dataset, doubted_beside, left_out
 from rollover.diagnosis.data.inconsistent import Aside, by_inconsistencies
 from rollover.diagnosis.data.phases import phases_of
@@ -15,7 +15,7 @@ from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.local_search import conditioned, is_doubtful
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.fit.step import Groups
+from rollover.diagnosis.fit.step import Groups, Step
 from rollover.diagnosis.fit.time_shift import align
 from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.grades import graded, with_shares
@@ -164,16 +164,20 @@ def weighed(
     problem, groups, phases, recordings = inquiry.problem, inquiry.groups, inquiry.phases, asked.recordings
     found, notes = list(problem.dataset), list(notes)
     is_beside = asked.discrepancy is not None and asked.discrepancy.is_estimated
-    if asked.discrepancy is not None and is_beside:
-        explanation = tried = explained_by_one(inquiry, base, usual=asked.discrepancy.is_usual)
+    if is_beside:
+        explanation = tried = explained_by_one(inquiry, base)
     else:
         explanation = tried = explained(inquiry, base)
 
     def decide(found: Explanation) -> tuple[Explanation, Verdict]:
         return decided_beside(problem, found, groups) if is_beside else decided(problem, found, groups, phases)
 
+    def name_all(found: Explanation, verdict: str) -> tuple[Explanation, tuple[Named, ...], list[Dataset]]:
+        alike = partial(alike_beside, problem, groups=groups) if is_beside else None
+        return _named_beside(problem, found, verdict, kept, groups, phases, alike)
+
     explanation, verdict = decide(explanation)
-    held, named_so = problem.dataset, _named_beside(problem, explanation, verdict, kept, groups, phases)
+    held, named_so = problem.dataset, name_all(explanation, verdict)
     nothing: set[str] = set()
     while (
         more := done_by_others(problem, named_so[0], interval_contains_null(named_so[1], problem.effort.is_ensemble))
@@ -184,12 +188,12 @@ def weighed(
         problem.with_noise_model(held)
         alone = by_the_first(problem, explanation, nothing, phases)
         explanation, verdict = decide(alone)
-        named_so = _named_beside(problem, explanation, verdict, kept, groups, phases)
+        named_so = name_all(explanation, verdict)
     while asked.estimates and (more := barred(problem, named_so[0], named_so[1], groups) - nothing):
         nothing |= more
         problem.with_noise_model(held)
         explanation, verdict = decide(next_best(problem, explanation, nothing, groups, phases))
-        named_so = _named_beside(problem, explanation, verdict, kept, groups, phases)
+        named_so = name_all(explanation, verdict)
     explanation, effects, kept = named_so
     effects = clear_of_null(problem, explanation, effects) if asked.estimates else effects
     found = list(problem.dataset)
@@ -244,10 +248,11 @@ def _named_beside(
     kept: Sequence[Dataset],
     groups: Sequence[Sequence[int]],
     phases: Sequence[Sequence[tuple[float, str]]],
+    alike: Callable[[Step], Sequence[Fitted]] | None,
 ) -> tuple[Explanation, tuple[Named, ...], list[Dataset]]:
     """An explanation eased beside its effects, these with their numbers if the verdict names any, and the kept ones."""
     whole, kept = marginalised_beside(problem, explanation, kept, phases)
-    return whole, named(problem, whole, groups) if verdict in NAMING else (), kept
+    return whole, named(problem, whole, groups, alike) if verdict in NAMING else (), kept
 
 
 def marginalised_beside(

@@ -27,18 +27,31 @@ def shares(problem: Problem, found: Explanation, groups: Groups) -> tuple[Share 
 
     1 - (L_after - N)/(L_before - N) with L the held-out sums of squares, N what noise alone leaves of them, (D20).
     """
-    noise = np.array([_by_noise(e) for e in problem.dataset])
-    before, after = held_out(found.base, groups).left, held_out(found.fitted, groups).left
-    if not found.parts or float(np.sum(before - noise)) <= 0.0:
+    whole = share_of(problem, found.base, found.fitted, groups) if found.parts else None
+    if whole is None:
         return None, {}
-    whole = jackknifed(before - after, before - noise, groups)
     if len(found.parts) == 1:
         return whole, {found.parts[0].fitted.candidates[-1].key: whole}
+    due = _due(problem, found.base, groups)
     each = {}
     for step in found.parts:
         without, with_ = held_out(step.base, groups).left, held_out(step.fitted, groups).left
-        each[step.fitted.candidates[-1].key] = jackknifed(without - with_, before - noise, groups)
+        each[step.fitted.candidates[-1].key] = jackknifed(without - with_, due, groups)
     return whole, each
+
+
+def share_of(problem: Problem, base: Fitted, fitted: Fitted, groups: Groups) -> Share | None:
+    """Share of the held-out mismatch of a base that a fit explains, (D20); None where noise leaves as much."""
+    due = _due(problem, base, groups)
+    if float(np.sum(due)) <= 0.0:
+        return None
+    return jackknifed(held_out(base, groups).left - held_out(fitted, groups).left, due, groups)
+
+
+def _due(problem: Problem, base: Fitted, groups: Groups) -> Array:
+    """What a base leaves of each recording held out beyond what noise does, (recordings,)."""
+    noise = np.array([_by_noise(e) for e in problem.dataset])
+    return np.asarray(held_out(base, groups).left - noise)
 
 
 def jackknifed(gained: Array, due: Array, groups: Groups) -> Share:

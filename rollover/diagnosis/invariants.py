@@ -172,7 +172,8 @@ def checked(found: Diagnosis) -> Diagnosis:
             e.moves is None or e.moves >= SETTINGS.report.grades.immaterial or e.kind == "sensor" for e in found.effects
         ),
         "smallest_detectable is above 0": all(v > 0.0 for v in found.smallest_detectable.values()),
-        "unexplained is more than 1.0 times the noise": found.verdict != "unexplained"
+        "unexplained is more than 1.0 times the noise, or shown without a simulation": found.verdict != "unexplained"
+        or found.by_itself
         or not found.where
         or before is None
         or before >= TUNING.at_noise,

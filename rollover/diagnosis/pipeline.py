@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rollover.diagnosis.alone import follows_a_law
 from rollover.diagnosis.conclusion import Asked, Conclusion, concluded
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.inconsistent import Aside, inconsistencies_of, without
@@ -16,6 +17,7 @@ from rollover.diagnosis.data.rounding import to_the_last_digit
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.time_shift import align, is_all_by_clocks, mistimed
+from rollover.diagnosis.forward.forward_model import set_up
 from rollover.diagnosis.inference.discrepancy import Discrepancy, beside, estimated, taught
 from rollover.diagnosis.inference.wrong_condition import wrong_conditions
 from rollover.diagnosis.invariants import checked
@@ -136,8 +138,15 @@ def _beside(found: Conclusion, every: Sequence[Dataset], notes: Sequence[str]) -
             other = concluded(replace(asked, discrepancy=learned), beside(every, learned), found.inconsistencies, notes)
     if isinstance(other, Diagnosis):
         return None
-    is_told = bool(other.effects) or (other.verdict == "no-mismatch" and learned.is_usual)
+    is_told = bool(other.effects) or (other.verdict == "no-mismatch" and learned.is_usual and not _is_lawful(other))
     return reported(other) if is_told else None
+
+
+def _is_lawful(found: Conclusion) -> bool:
+    """Whether what nothing explains follows a law that carries over to recordings that were held out."""
+    problem, scenario = found.problem, found.asked.scenario
+    scenarios = [set_up(scenario, e.recording) for e in problem.dataset]
+    return follows_a_law(problem, found.explanation.base, scenarios, found.groups)
 
 
 def _rivals(tried: Explanation) -> tuple[Fitted, ...]:

@@ -135,6 +135,7 @@ def reported(c: Conclusion) -> Diagnosis:
             verdict, c.grade, explanation.p_value, slight=bool(c.slight), is_beside=asked.discrepancy is not None
         ),
         discrepancy=told_of,
+        by_itself=shown is not None,
     )
 
 

@@ -168,6 +168,7 @@ class Diagnosis:
     empirical: Law | None = None  # where no effect explains the mismatch
     answer: Answer = "cannot-tell"
     discrepancy: Mapping[str, Scale] = field(default_factory=dict)  # by channel, where it was estimated or stated
+    by_itself: bool = False  # whether the verdict is on what recordings show without any simulation
     checked: tuple[str, ...] = ()  # invariants that were checked
     broken: tuple[str, ...] = ()  # those of them that do not hold
     baseline: Mapping[str, Interval] = field(default_factory=dict)  # what a model of one's own is always fitted by

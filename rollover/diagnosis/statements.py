@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,8 +10,9 @@ import numpy as np
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.cross_validation import Held, held_out
 from rollover.diagnosis.fit.ensemble_mean import in_shorter_steps
-from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.fit.step import Groups, Step
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.inference.lack_of_fit import Mismatch
 from rollover.diagnosis.result import Considered, Named, Place, Scale, Verdict
@@ -23,9 +24,12 @@ from rollover.effects import EFFECTS, spoken
 TUNING = SETTINGS.report.statements
 
 
-def named(problem: Problem, found: Explanation, groups: Sequence[Sequence[int]]) -> tuple[Named, ...]:
+def named(
+    problem: Problem, found: Explanation, groups: Groups, alike: Callable[[Step], Sequence[Fitted]] | None = None
+) -> tuple[Named, ...]:
     """Effects of an explanation with their intervals and look-alikes, the strongest first.
 
+    `alike` says of a step what cannot be told from its best; by default all that predict no worse (`confusion`).
     Values are those of shorter steps, where runs are integrated: what the scenario's steps take for it is no property
     of what was recorded.
     """
@@ -43,8 +47,10 @@ def named(problem: Problem, found: Explanation, groups: Sequence[Sequence[int]])
         values: dict[str, Any] = {name: i.value for name, i in parameters.items()}
         if c.channel is not None:
             values["channel"] = c.channel
-        alike = (f.candidates[-1] for f in confusion(by_key[c.key], groups, problem.samples_per_error))
-        rivals = [r for r in alike if r.key not in settings]  # what was named too is told apart by being beside it
+        own = by_key[c.key]
+        near = confusion(own, groups, problem.samples_per_error) if alike is None else alike(own)
+        # what was named too is told apart by being beside it
+        rivals = [r for r in (f.candidates[-1] for f in near) if r.key not in settings]
         effect = kind(**values)
         same = {id: said for id, said in effect.same_as().items() if id not in settings}
         tests = [kind.rivals[id] for id in (*(r.id for r in rivals), *same) if id in kind.rivals]
@@ -56,7 +62,7 @@ def named(problem: Problem, found: Explanation, groups: Sequence[Sequence[int]])
                 parameters=parameters,
                 settings=values,
                 channel=c.channel,
-                p_value=by_key[c.key].p_value,
+                p_value=own.p_value,
                 indistinguishable_from=tuple(dict.fromkeys([*(r.id for r in rivals if r.id != c.id), *same])),
                 discriminating_test=tests[0] if tests else next(iter(kind.rivals.values()), ""),
             )

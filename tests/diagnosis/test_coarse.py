@@ -31,6 +31,7 @@ def test_a_channel_in_coarse_steps_is_unexplained_there(channel: str) -> None:
     assert {p.depends_on for p in found.where} == {"value"}
     assert sum(p.share for p in found.where) == pytest.approx(1.0)
     assert found.remaining_significant
+    assert found.broken == ()  # though all else is met to the noise
     assert f"{channel} in steps of {step:.3g}"[:-1] in found.sentence
 
 

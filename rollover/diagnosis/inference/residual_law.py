@@ -54,6 +54,23 @@ def proposed(
     groups: Sequence[Sequence[int]],
 ) -> Law | None:
     """The law that predicts held-out conditions best, if any does; `scenarios` under the conditions of `dataset`."""
+    best = fitted_law(problem, base, scenarios, dataset, groups)
+    if best is None:
+        return None
+    gains = gains_of(base, best, groups)
+    error = float(gains.std(ddof=1) / np.sqrt(gains.size))
+    before, after = held_out(base, groups), held_out(best, groups)
+    return _law(problem, best, float(gains.mean()), error, before.total, after.total)
+
+
+def fitted_law(
+    problem: Problem,
+    base: Fitted,
+    scenarios: Sequence[Scenario],
+    dataset: Sequence[Dataset],
+    groups: Sequence[Sequence[int]],
+) -> Fitted | None:
+    """The fit of the law that predicts held-out conditions best, if it gains more than its standard error allows."""
     found = balances(scenarios, dataset)
     if len({b.condition for b in found}) < 3 or len(groups) < 3:
         return None
@@ -69,12 +86,15 @@ def proposed(
     if not fits:
         return None
     best = min(fits, key=lambda f: held_out(f, groups).total)
-    before, after = held_out(base, groups), held_out(best, groups)
-    gains = np.array([0.5 * np.log(before.left[list(g)].sum() / after.left[list(g)].sum()) for g in groups])
+    gains = gains_of(base, best, groups)
     gain, error = float(gains.mean()), float(gains.std(ddof=1) / np.sqrt(gains.size))
-    if gain < max(TUNING.least_law_gain, TUNING.least_errors * error):
-        return None
-    return _law(problem, best, gain, error, before.total, after.total)
+    return None if gain < max(TUNING.least_law_gain, TUNING.least_errors * error) else best
+
+
+def gains_of(base: Fitted, fitted: Fitted, groups: Sequence[Sequence[int]]) -> Array:
+    """Held-out gain ln(E_before/E_after) of each condition, (conditions,)."""
+    before, after = held_out(base, groups).left, held_out(fitted, groups).left
+    return np.array([0.5 * np.log(before[list(g)].sum() / after[list(g)].sum()) for g in groups])
 
 
 def offered(law: Law | None) -> str:

@@ -1,0 +1,111 @@
+"""One effect beside an estimated discrepancy: when it is named, when the discrepancy forgives, what is alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from rollover.diagnosis.alone import alike_beside, decided_beside
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.fit.step import Step
+from rollover.diagnosis.selection.decision import Explanation
+from rollover.effects import EFFECTS, Search
+
+DROPS, SAMPLES = 6, 40
+GROUPS = [[r] for r in range(DROPS)]
+# noise is a tenth of what is tolerated of each sample, so that next to nothing of the squares is noise
+SIGNAL = SimpleNamespace(rows=np.arange(SAMPLES), noise=0.1, sigma=1.0, channel="ground/force_normal")
+PROBLEM = cast(
+    Problem,
+    SimpleNamespace(
+        dataset=[SimpleNamespace(signals=[SIGNAL], model_error_dominates=lambda s: True)] * DROPS,
+        samples_per_error=10.0,
+        effort=SimpleNamespace(is_ensemble=False),
+    ),
+)
+
+
+def fitted(id: str, left: Sequence[float], numbers: int = 1, x: float = 0.5) -> Fitted:
+    """A fit that leaves these mean squares of each drop, held out as well; other ids leave it in other samples."""
+    rng = np.random.default_rng(sum(id.encode()))
+    blocks = []
+    for mean_square in left:
+        w = rng.standard_normal(SAMPLES)
+        w *= np.sqrt(mean_square * SAMPLES / (w @ w))
+        blocks.append(
+            ResidualBlock(residual=w, J=np.zeros((SAMPLES, numbers)), slope=np.zeros(SAMPLES), shift=0.0, prior=1.0)
+        )
+    search = {f"n{k}": Search(0.0, 1.0) for k in range(numbers)}
+    candidate = Candidate(id=id, kind=EFFECTS[id].kind, family=EFFECTS[id].family, search=search, fixed={})
+    return Fitted(
+        candidates=(candidate,),
+        x=(x,) * numbers,
+        blocks=tuple(blocks),
+        cross_validated=tuple(SAMPLES * v for v in left),
+    )
+
+
+def nothing(left: Sequence[float]) -> Fitted:
+    found = fitted("mass", left)
+    return Fitted(candidates=(), x=(), blocks=found.blocks, cross_validated=found.cross_validated)
+
+
+def explanation(base: Sequence[float], best: Fitted, *rivals: Fitted, p_value: float = 1e-9) -> Explanation:
+    one = Step(base=nothing(base), fitted=best, p_value=p_value, rivals=(best, *rivals))
+    empty: Any = None
+    return Explanation(
+        base=one.base, fitted=best, parts=(one,), looked=empty, detectable={}, before=empty, after=empty, first=one
+    )
+
+
+SOME = (0.8, 0.9, 1.0, 0.9, 1.0, 0.8)  # of which a discrepancy of unit size leaves as much
+
+
+@pytest.mark.parametrize(
+    ("base", "left", "p_value", "verdict"),
+    [
+        (SOME, (0.2, 0.2, 0.3, 0.2, 0.3, 0.2), 1e-9, "missing-physics"),  # three quarters, of each drop
+        (SOME, (0.5, 0.5, 0.6, 0.5, 0.6, 0.5), 1e-9, "no-mismatch"),  # less than half: what drops have in common
+        (SOME, (0.05, 0.9, 0.1, 1.0, 0.1, 0.05), 1e-9, "no-mismatch"),  # two thirds, of some drops alone: not sure
+        (SOME, (0.2, 0.2, 0.3, 0.2, 0.3, 0.2), 0.2, "no-mismatch"),  # the best of all does as much by chance
+        ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (0.5,) * 6, 1e-9, "missing-physics"),
+        ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (5.0,) * 6, 1e-9, "unexplained"),
+        ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (0.9, 0.9, 0.9, 7.0, 7.0, 0.9), 1e-9, "unexplained"),
+    ],
+)
+def test_an_effect_is_named_where_it_surely_predicts_half_and_else_forgiven_where_a_discrepancy_is_enough(
+    base: tuple[float, ...], left: tuple[float, ...], p_value: float, verdict: str
+) -> None:
+    found, said = decided_beside(PROBLEM, explanation(base, fitted("soil-layer", left), p_value=p_value), GROUPS)
+    assert said == verdict
+    assert bool(found.parts) == (verdict == "missing-physics")
+
+
+def test_what_leaves_no_more_than_the_discrepancy_or_is_akin_is_not_excluded_and_the_rest_is() -> None:
+    best = fitted("soil-layer", (0.5,) * DROPS)
+    rivals = {
+        "soil-crust": (4.5,) * DROPS,  # of the same family, and explains nearly all
+        "soil-stiffness": (2.0,) * DROPS,  # leaves what the discrepancy leaves
+        "soil-viscous-damping": (4.5,) * DROPS,  # leaves more, and is of another family
+        "guide-friction": (40.0,) * DROPS,
+    }
+    fits = [fitted(id, left) for id, left in rivals.items()]
+    step = explanation((100.0,) * DROPS, best, *fits).parts[0]
+    assert [f.candidates[-1].id for f in alike_beside(PROBLEM, step, GROUPS)] == [
+        "soil-layer",
+        "soil-crust",
+        "soil-stiffness",
+    ]
+    # one that becomes the best at the end of its range is the best itself
+    at_an_end = fitted("soil-crust", (0.6,) * DROPS, numbers=2, x=1.0)
+    step = explanation((100.0,) * DROPS, fitted("soil-layer", (0.5,) * DROPS), at_an_end).parts[0]
+    assert [f.candidates[-1].id for f in alike_beside(PROBLEM, step, GROUPS)] == ["soil-layer"]
+    # where there is little to explain, one that explains less of it is excluded though it leaves little
+    step = explanation(SOME, fitted("soil-layer", (0.2,) * DROPS), fitted("guide-friction", (0.7,) * DROPS)).parts[0]
+    assert [f.candidates[-1].id for f in alike_beside(PROBLEM, step, GROUPS)] == ["soil-layer"]
