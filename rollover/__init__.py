@@ -260,9 +260,9 @@ def calibrate(
     from rollover.calibration.request import Request
     from rollover.comparison.recordings import measured
     from rollover.scenario import given
-    from rollover.system.arguments import listed, within
+    from rollover.system.arguments import MOST_CLOCK, listed, within
 
-    within("clock_sigma", clock_sigma, 0.0)
+    within("clock_sigma", clock_sigma, 0.0, MOST_CLOCK)
     within("starts", starts, 0)
     chosen, file = given(scenario)
     request = Request.of(chosen, measured(recordings, profile), listed(fit), listed(hold_out))
@@ -419,11 +419,11 @@ def study(
     from rollover.assessment.results import plain
     from rollover.studies.carry_out import prepared
     from rollover.studies.runner import Way
-    from rollover.system.arguments import one_of, within
+    from rollover.system.arguments import LONGEST, MOST_MEMORY, one_of, within
     from viz.pages.study import page
 
-    within("time_limit", time_limit, 0.1)
-    within("memory_limit", memory_limit, 1e6)
+    within("time_limit", time_limit, 0.1, LONGEST)
+    within("memory_limit", memory_limit, 1e6, MOST_MEMORY)
     one_of("retry", retry, ("", "failed"))
     ready = prepared(studies.find(study), None if out is None else Path(out), force=force)
     way = Way(workers=workers, time_limit=time_limit, memory_limit=memory_limit, retry=retry)

@@ -47,7 +47,8 @@ class Patch:
     def validate(self) -> None:
         """Refuse a rectangle turned inside out."""
         if self.low[0] >= self.high[0] or self.low[1] >= self.high[1]:
-            raise ValueError(f"high: must lie beyond low on both axes, got {list(self.high)} against {list(self.low)}")
+            got = f"got {list(self.high)} against {list(self.low)}"
+            raise ValueError(f"high: must lie beyond low on both axes, {got}; larger x and y than those are needed")
 
 
 @parameters

@@ -16,7 +16,7 @@ from rollover.recording.time_stamps import Zero
 from rollover.scenario import Scenario, given
 from rollover.spec.document import dump
 from rollover.spec.vehicle import Striker
-from rollover.system.arguments import one_of, within
+from rollover.system.arguments import MOST_FORCE, one_of, within
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,7 +80,7 @@ def identify(
         For wrong input, and where no drop is usable.
     """
     within("fraction", 0.0 if fraction is None else fraction, 0.0, 10.0)
-    within("buoyancy", buoyancy, 0.0)
+    within("buoyancy", buoyancy, 0.0, MOST_FORCE)
     one_of("law", law, ("ye-2006", "bearing"))
     one_of("striker_mass", striker_mass, ("reference", "effective"))
     return identified(

@@ -14,7 +14,7 @@ from rollover.recording import Recording
 from rollover.recording.filters import filtered
 from rollover.scenario import Scenario, given
 from rollover.spec import document
-from rollover.system.arguments import within
+from rollover.system.arguments import MOST_LATE, within
 from rollover.system.errors import Fault, InputError, hint
 
 DROP = ("ground/force_normal", "ground/sinkage", "striker/acceleration_z")
@@ -40,6 +40,13 @@ def usual(simulated: Recording) -> tuple[str, ...]:
         return DROP
     x, y = (float(np.ptp(simulated[kind[1]])) for kind in (SIDEWAYS, BACKWARD))
     return tuple(c for c in (BACKWARD if y > x else SIDEWAYS) if c in simulated.channels)
+
+
+def check_clock(rate: float, late: float) -> None:
+    """Refuse a clock so late that a double cannot tell its stamps at `rate` Hz apart. Raises `InputError`."""
+    if np.spacing(abs(late)) * rate > 0.25:  # of a step: they are also rounded to a ns
+        message = f"stamps cannot be told apart at {rate:g} Hz, got {late:g} s; a lower rate, or a clock less late"
+        raise InputError(Fault(path="late", message=f"{message} is needed"))
 
 
 def synthetic(
@@ -72,7 +79,10 @@ def synthetic(
         values = simulated[name] if cfc is None else filtered(simulated[name], step, cfc)
         noise[name] = given.get(name, share * float(np.ptp(values)))
         random = np.random.default_rng([seed, k]).normal(size=count)
-        made[name] = np.interp(time, simulated.time, values) + noise[name] * random
+        with np.errstate(over="ignore"):
+            made[name] = np.interp(time, simulated.time, values) + noise[name] * random
+        if not np.all(np.isfinite(made[name])):
+            raise ValueError(f"noise: beyond all numbers, got {noise[name]:g} for {name}; a smaller one is needed")
     return Recording(
         title=f"Synthetic recording of: {simulated.title}",
         source=f"rollover synthesize, seed {seed}",
@@ -169,6 +179,8 @@ def synthesize(
     """
     within("rate", rate, 1.0, 1e6)
     within("seed", seed, 0)
+    within("late", late, -MOST_LATE, MOST_LATE)
+    check_clock(rate, late)
     for name, sigma in {"noise": noise, **(sigmas or {})}.items():
         within(name, sigma, 0.0)
     base, file = given(scenario)

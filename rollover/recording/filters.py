@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ground.compiled import leaf
+from rollover.recording.record import CFC, CLASSES
 
-CFC = Literal[60, 180, 600, 1000]
+__all__ = ["CFC", "CLASSES", "ISO_6487", "J211", "filtered", "least_rate"]
+
 J211, ISO_6487 = 2.0775, 1.25 / 0.6
-CLASSES = (60, 180, 600, 1000)
 
 
 def least_rate(cfc: int) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,8 @@ from rollover.spec.frames import from_angles
 
 Array = NDArray[np.float64]
 Point = tuple[float, float, float]
+CFC = Literal[60, 180, 600, 1000]  # channel filter classes
+CLASSES: tuple[int, ...] = get_args(CFC)
 Doubt = float | tuple[float, ...]  # 1 sigma of a value, or of each number of a list
 
 
@@ -89,7 +91,8 @@ class Recording:
             raise ValueError(f"time: empty or not one column, got shape {self.time.shape}; at least one stamp")
         if not np.all(np.diff(self.time) > 0):
             at = int(np.argmin(np.diff(self.time)))
-            raise ValueError(f"time: does not increase, got {self.time[at + 1]!r} after {self.time[at]!r}")
+            before, after = float(self.time[at]), float(self.time[at + 1])
+            raise ValueError(f"time: does not increase, got {after!r} after {before!r}; a larger stamp is needed")
         for name, values in self.channels.items():
             if values.shape != self.time.shape:
                 raise ValueError(f"{name}: got {values.shape} values for {self.time.shape} time stamps; one each")

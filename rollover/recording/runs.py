@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rollover.recording.record import Clock, Recording, Sensor
+from rollover.recording.record import CLASSES, Clock, Recording, Sensor
 from rollover.recording.tables import numbers, open_parquet
 from rollover.spec.channels import describe
 from rollover.system.boundary import CURE, worded
@@ -114,6 +114,8 @@ def _check(about: Any) -> None:
     for key in ("title", "source", "notes", "conditions", "uncertainty", "noise", "cfc", "clock", "sensors"):
         if key in about and not isinstance(about[key], kinds.get(key, dict)):
             raise TypeError(key)
+    if not set(about.get("cfc", {}).values()) <= {0, *CLASSES}:
+        raise TypeError("cfc")
     numbers_of = [*about.get("noise", {}).values(), *about.get("cfc", {}).values()]
     if not all(isinstance(n, (int, float)) and not isinstance(n, bool) and math.isfinite(n) for n in numbers_of):
         raise TypeError("noise, cfc")

@@ -29,7 +29,8 @@ class Box:
     def validate(self) -> None:
         """Refuse a box turned inside out."""
         if any(a >= b for a, b in zip(self.low, self.high, strict=True)):
-            raise ValueError(f"high: must lie beyond low on every axis, got {list(self.high)} against {list(self.low)}")
+            got = f"got {list(self.high)} against {list(self.low)}"
+            raise ValueError(f"high: must lie beyond low on every axis, {got}; larger x, y and z than those are needed")
 
 
 @parameters

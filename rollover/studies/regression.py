@@ -12,7 +12,7 @@ from rollover.spec import document
 from rollover.studies import baseline as baselines
 from rollover.studies.baseline import Answer, Baseline
 from rollover.studies.ensemble import Extreme, Observed, neighbours, observed
-from rollover.system.arguments import within
+from rollover.system.arguments import LONGEST, within
 from rollover.system.errors import Fault, InputError
 from rollover.system.processes import Outcome, map_cases
 
@@ -64,7 +64,7 @@ def regress(
     InputError
         For scenarios and baselines that cannot be read.
     """
-    within("time_limit", time_limit, 1.0)
+    within("time_limit", time_limit, 1.0, LONGEST)
     names = [scenarios] if isinstance(scenarios, (str, Path)) else scenarios
     return tuple(compared(chosen([str(name) for name in names]), workers=workers, time_limit=time_limit))
 

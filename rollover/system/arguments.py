@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf, isnan
+from math import inf, isfinite
 
 from rollover.system.errors import Fault, InputError, hint
 
+# how large a number may be that nothing else bounds: beyond, it is a slip
+MOST_LATE = 1e10  # s: stamps of an epoch's seconds, now 1.8e9, until the year 2286
+MOST_CLOCK = 1e3  # s: no recording of a rollover or a drop lasts so long, and no offset within it is longer
+MOST_FORCE = 1e6  # N: the weight of 100 t, more than any striker's
+LONGEST = 1e7  # s: 116 days of wall time
+MOST_MEMORY = 1.4e14  # bytes: the 47 bits of address space that a process has
+
 
 def within(name: str, value: float, least: float, most: float = inf) -> None:
-    """Refuse a number outside its bounds. Raises `InputError`."""
-    if isnan(value) or not least <= value <= most:
+    """Refuse a number that is not finite or outside its bounds. Raises `InputError`."""
+    if not isfinite(value) or not least <= value <= most:
         allowed = f"at least {least:g}" if most == inf else f"{least:g} to {most:g}"
         raise InputError(Fault(path=name, message=f"out of bounds, got {value!r}; {allowed} is allowed"))
 

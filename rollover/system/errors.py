@@ -15,7 +15,7 @@ MOST_SAID = 1500  # characters of a message, which holds a value or two, what is
 # what to do instead, behind what is wrong: what is allowed, needed or meant
 _CURE = re.compile(r"; \S|\bdid you mean\b|\b(?:is|are) (?:needed|allowed)\b|\ballowed: |--[a-z]")
 _JOINERS = "\u200c\u200d"  # without a picture of their own, but Persian and Hindi are not spelt without them
-_QUOTED = re.compile(rf"'[^']{{{MOST_SHOWN},}}'|\"[^\"]{{{MOST_SHOWN},}}\"|[^\s'\"]{{{MOST_SHOWN},}}")
+_QUOTED = re.compile(rf"'[^']{{{MOST_SHOWN},}}'|\"[^\"]{{{MOST_SHOWN},}}\"|[^\s'\"]{{{MOST_SHOWN - 1},}}[^\s'\";]")
 
 
 def unseen(character: str) -> bool:
@@ -60,7 +60,8 @@ class Fault:
     path: str = ""
 
     def __str__(self) -> str:
-        where = self.file if self.line is None else f"{self.file}:{self.line}"
+        file = self.file if self.file is None or self.file.strip() else repr(self.file)  # nothing to see is a name too
+        where = file if self.line is None else f"{file}:{self.line}"
         return ": ".join(
             part for part in (where and excerpt(where, MOST_SAID), excerpt(self.path), sentence(self.message)) if part
         )

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rollover.cli.commands.common import BROKE, AsJson, Force, Setting, answering, app, manual, settings
+from rollover.system.arguments import MOST_CLOCK
 from rollover.system.errors import InputError
 
 if TYPE_CHECKING:
@@ -40,7 +41,9 @@ def calibrate(
     ] = None,
     set_: Setting = None,
     channel: Annotated[list[str] | None, typer.Option("--channel", help="Use these channels only.")] = None,
-    clock_sigma: Annotated[float, typer.Option(help="Prior of each recording's clock offset, s.", min=0.0)] = 1e-3,
+    clock_sigma: Annotated[
+        float, typer.Option(help="Prior of each recording's clock offset, s.", min=0.0, max=MOST_CLOCK)
+    ] = 1e-3,
     starts: Annotated[int, typer.Option(help="Random starts that are screened.", min=0)] = 8,
     seed: Annotated[int, typer.Option(help="Of the random starts.")] = 0,
     profile: Annotated[Path | None, typer.Option(help="What the columns of foreign files are.")] = None,

@@ -7,6 +7,7 @@ that is full, memory that is not there), 130 interrupted.
 from __future__ import annotations
 
 import functools
+import math
 import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor
@@ -51,7 +52,16 @@ def _without_type(params: list[Any]) -> list[Any]:
 
 
 class Plain(TyperCommand):
-    """A command in whose help a flag has no type."""
+    """A command in whose help a flag has no type, and whose numbers are numbers."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the words; what is not a number passes every bound, and what is infinite those that are open."""
+        rest = super().parse_args(ctx, args)
+        for option in self.params:
+            value = ctx.params.get(option.name)
+            if isinstance(value, float) and not math.isfinite(value):
+                raise typer.BadParameter(f"{value} is not a finite number", ctx=ctx, param=option)
+        return rest
 
     def get_params(self, ctx: Any) -> Any:
         """Its parameters, `--help` among them."""

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from rollover.cli.commands.common import AsJson, Force, Setting, answering, app, manual, settings
+from rollover.system.arguments import MOST_FORCE
 from rollover.system.errors import Fault, InputError
 
 SOIL, ANSWER = "soil.yaml", "identify.json"
@@ -48,7 +49,9 @@ def identify_(
         float | None, typer.Option(min=0.0, max=10.0, help="m_b1/m_s", show_default="the scenario's co-moving mass")
     ] = None,
     striker_mass: Annotated[StrikerMass, typer.Option(help="m_s in eq (5).")] = StrikerMass.reference,
-    buoyancy: Annotated[float, typer.Option(min=0.0, help="Of the striker in what it falls through, N.")] = 0.0,
+    buoyancy: Annotated[
+        float, typer.Option(min=0.0, max=MOST_FORCE, help="Of the striker in what it falls through, N.")
+    ] = 0.0,
     terminal_speed: Annotated[
         bool, typer.Option("--terminal-speed", help="It fell at terminal speed: take the drag from there.")
     ] = False,

@@ -120,9 +120,14 @@ def _recordings(
 
 def _write(made: Mapping[Path, Recording]) -> None:
     """All recordings, or none. Raises `InputError`."""
+    from dataclasses import replace
+
     from rollover.recording.importers import write_recording
     from rollover.system.writing import together
 
     with together(list(made)[-1]) as part:
         for target, recording in made.items():
-            write_recording(recording, part / target.name)
+            try:
+                write_recording(recording, part / target.name)
+            except InputError as e:  # which names the file that stands there for a while only
+                raise InputError(*(replace(fault, file=str(target)) for fault in e.faults)) from None

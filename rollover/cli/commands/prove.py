@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rollover.cli.commands.common import FAILED, AsJson, Force, answering, app, manual
+from rollover.system.arguments import LONGEST
 from rollover.system.errors import Fault, InputError
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def prove(
             "drawn with --kinds background.",
         ),
     ] = None,
-    time_limit: Annotated[float, typer.Option(help="Wall time for each diagnosis, s.", min=1.0)] = 600.0,
+    time_limit: Annotated[float, typer.Option(help="Wall time for each diagnosis, s.", min=1.0, max=LONGEST)] = 600.0,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:

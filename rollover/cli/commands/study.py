@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rollover.cli.commands.common import COMPILING, FAILED, AsJson, Force, answering, app, manual
+from rollover.system.arguments import LONGEST, MOST_MEMORY
 
 if TYPE_CHECKING:
     from rollover.studies.runner import Conducted
@@ -41,8 +42,10 @@ def study(
         str, typer.Option(metavar="ADDRESS", help="Of a dask scheduler: tcp://HOST:PORT, local or slurm.")
     ] = "",
     retry: Annotated[Retry | None, typer.Option(help="Run failed cases again.")] = None,
-    time_limit: Annotated[float, typer.Option(help="Wall time for each case, s.", min=0.1)] = 600.0,
-    memory_limit: Annotated[float, typer.Option(help="Memory that each case may take, MB.", min=1.0)] = 4000.0,
+    time_limit: Annotated[float, typer.Option(help="Wall time for each case, s.", min=0.1, max=LONGEST)] = 600.0,
+    memory_limit: Annotated[
+        float, typer.Option(help="Memory that each case may take, MB.", min=1.0, max=1e-6 * MOST_MEMORY)
+    ] = 4000.0,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:

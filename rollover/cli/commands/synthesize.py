@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from rollover.cli.commands.common import BROKE, FAILED, AsJson, Force, Setting, answering, app, manual, settings
+from rollover.system.arguments import MOST_LATE
 from rollover.system.errors import Fault, InputError
 
 
@@ -45,7 +46,9 @@ def synthesize(
     ] = None,
     rate: Annotated[float, typer.Option(help="Sampling rate, Hz.", min=1.0, max=1e6)] = 1000.0,
     cfc: Annotated[int | None, typer.Option(help="Filter class that the instruments apply.")] = None,
-    late: Annotated[float, typer.Option(help="How late the instruments' clock is, s.")] = 0.0,
+    late: Annotated[
+        float, typer.Option(help="How late the instruments' clock is, s.", min=-MOST_LATE, max=MOST_LATE)
+    ] = 0.0,
     seed: Annotated[int | None, typer.Option(help="Of the noise", min=0, show_default="another for each name")] = None,
     force: Force = False,
     as_json: AsJson = False,
@@ -53,13 +56,14 @@ def synthesize(
     """Simulate a scenario and write what instruments with noise would have recorded of it."""
     from rollover import scenario as scenarios
     from rollover.cli import console
-    from rollover.comparison.synthesis import instrumented
+    from rollover.comparison.synthesis import check_clock, instrumented
     from rollover.dynamics import simulate
     from rollover.recording.importers import write_recording
     from rollover.spec import document
     from rollover.system.names import inside
     from rollover.system.writing import hold
 
+    check_clock(rate, late)
     path = document.find(scenario)
     stated, unstated = settings(set_ or []), settings(hidden or [], "--hide")
     chosen = scenarios.load(path).replaced(stated, origin="--set").replaced(unstated, origin="--hide")

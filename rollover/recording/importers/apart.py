@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from rollover.system import budget
-from rollover.system.boundary import unreadable
+from rollover.system.boundary import quiet, unreadable
 from rollover.system.errors import Fault, InputError
 from rollover.system.processes import Children, Failure, limited, map_cases
 
@@ -86,9 +86,10 @@ def apart(read: Callable[..., V], path: Path, *more: Any, what: str, modules: Se
 
 
 def _imported(modules: tuple[str, ...]) -> None:
-    for name in modules:
-        with suppress(ImportError):  # the reader says so
-            importlib.import_module(name)
+    with quiet():
+        for name in modules:
+            with suppress(ImportError):  # the reader says so
+                importlib.import_module(name)
 
 
 def _work(task: _Task) -> Any:
@@ -98,7 +99,7 @@ def _work(task: _Task) -> Any:
     if task.folder:
         os.chdir(task.folder)
     try:
-        with limited(task.memory, task.processor):
+        with quiet(), limited(task.memory, task.processor):  # what it writes to standard error would be seen
             return task.read(task.path, *task.more)
     except InputError as e:
         return e

@@ -22,7 +22,7 @@ from rollover.recording.importers.apart import apart
 from rollover.recording.importers.importer import Collection, reading
 from rollover.recording.importers.mat_claims import check_claims
 from rollover.recording.importers.npz import arrays_of
-from rollover.recording.importers.signals import check_time, check_values
+from rollover.recording.importers.soundness import check_time, check_values
 from rollover.system.errors import Fault, InputError
 
 Array = NDArray[np.float64]

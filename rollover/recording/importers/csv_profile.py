@@ -25,7 +25,8 @@ from rollover.recording.importers.date_times import (
 )
 from rollover.recording.importers.importer import Importer
 from rollover.recording.importers.sidecar import DATE_TIME, Column, Described, Profile
-from rollover.recording.importers.signals import RATE_INSTEAD, Signal, assemble
+from rollover.recording.importers.signals import Signal, assemble
+from rollover.recording.importers.soundness import RATE_INSTEAD
 from rollover.recording.tables import csv_heading, first_rows, is_number, line_of_row, read_columns
 from rollover.recording.text_rows import Dialect
 from rollover.system.errors import Fault, InputError

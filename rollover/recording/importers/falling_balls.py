@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rollover.recording import Clock, Recording
 from rollover.recording.importers.importer import Collection
-from rollover.recording.importers.signals import check_time, check_values
+from rollover.recording.importers.soundness import check_time, check_values
 from rollover.recording.importers.workbook import Row, read_workbook
 from rollover.recording.tables import read_csv, read_words
 from rollover.system.boundary import worded

@@ -13,6 +13,7 @@ from typing import Any
 
 from rollover.recording import Recording
 from rollover.recording.importers.sidecar import Described
+from rollover.recording.importers.soundness import check_recording, sound
 from rollover.system import boundary
 from rollover.system.boundary import bounded
 from rollover.system.budget import Budget
@@ -38,11 +39,11 @@ class Importer:
         """Put every reader behind the boundary, those of other packages too; a file that `sniff` trips over is none."""
         what = f"{self.name} file"
         object.__setattr__(self, "sniff", _sure(self.sniff))
-        object.__setattr__(self, "read", bounded(self.read, what))
+        object.__setattr__(self, "read", bounded(sound(self.read), what))
         if self.tests is not None:
             object.__setattr__(self, "tests", bounded(self.tests, what))
         if self.read_test is not None:
-            object.__setattr__(self, "read_test", bounded(self.read_test, what))
+            object.__setattr__(self, "read_test", bounded(sound(self.read_test), what))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +66,10 @@ class Collection:
         read = self.read
 
         def whole(path: Path, select: Sequence[str]) -> Iterator[tuple[str, Recording]]:
-            return iter(list(read(path, select)))
+            found = list(read(path, select))
+            for name, recording in found:
+                check_recording(path / name, recording)
+            return iter(found)
 
         object.__setattr__(self, "read", bounded(whole, f"{self.name} set"))
 

@@ -25,12 +25,14 @@ from rollover.recording.importers.mme_listing import promised
 from rollover.recording.importers.polarity import sign
 from rollover.recording.importers.sidecar import Described
 from rollover.recording.importers.signals import Signal, assemble, left_out
+from rollover.recording.importers.soundness import check_recording
 from rollover.spec.channels import describe, factor, is_known
-from rollover.system.errors import Fault, InputError
+from rollover.system.errors import Fault, InputError, seen
 from rollover.system.names import inside
 from rollover.system.writing import put, whole
 
 NOVALUE = "NOVALUE"
+MOST_STEP = 1e6  # s, 12 days: a longer interval is a unit misread, as microseconds for seconds
 _HEADER = re.compile(r"([^:]*?)\s*:(.*)")
 _CHANNEL_FILE = re.compile(r"(.*)\.\d{3,}$")
 _NUMBER = re.compile(r"\s*[-+]?(\d|\.\d|nan|inf|novalue)", re.IGNORECASE)
@@ -153,12 +155,17 @@ def _signals(place: Path, channels: list[_Channel], profile: Described | None) -
 def write(recording: Recording, path: Path, *, force: bool = False) -> None:
     """Write a recording as an ISO-MME test: a folder, or one file where `path` ends in .zip. Raises `InputError`.
 
-    The whole test stands there at the end or nothing; numbers keep every bit. The name of our channel goes into
+    The whole test stands there at the end or nothing; numbers keep every bit. What could not be read back is refused:
+    the channels of instruments, whose place a test has no word for, among it. The name of our channel goes into
     `Name of the channel`, so that reading the test gives the same channels again.
     """
     if path.exists() and not force:
         raise InputError(Fault(file=str(path), message="exists; --force replaces it, another name leaves it"))
     inside(path.parent, path.name)
+    check_recording(path, recording)
+    if placed := [n for n in recording.channels if n.startswith("sensor/")]:
+        what = f"no place in an ISO-MME test for where an instrument sits, got {', '.join(placed)}"
+        _refuse(path, f"{what}; csv or parquet has one, or leave such channels out")
     name = path.name.removesuffix(".zip").removesuffix(".mme")
     if path.suffix == ".zip":
         put(path, lambda at: _packed(_files(recording, name), at))
@@ -178,7 +185,8 @@ def _packed(files: Mapping[str, str], path: Path) -> None:
 def _files(recording: Recording, name: str) -> dict[str, str]:
     time = recording.time
     step = (time[-1] - time[0]) / (time.size - 1) if time.size > 1 else 1.0
-    regular = bool(np.all(np.abs(time - (time[0] + step * np.arange(time.size))) < 1e-12))
+    even = bool(np.all(np.abs(time - (time[0] + step * np.arange(time.size))) < 1e-12))
+    regular = even and step < MOST_STEP
     table = {n: sign(n) * values for n, values in recording.channels.items()}
     if not regular:
         table = {"time": time, **table}
@@ -206,8 +214,8 @@ def _files(recording: Recording, name: str) -> dict[str, str]:
 
 def _test(recording: Recording) -> dict[str, str]:
     return {
-        "Laboratory name": " ".join(recording.source.split()) or NOVALUE,
-        "Title": " ".join(recording.title.split()) or NOVALUE,
+        "Laboratory name": seen(" ".join(recording.source.split())) or NOVALUE,
+        "Title": seen(" ".join(recording.title.split())) or NOVALUE,
         "Type of the test": "rollover",
         "Name of test object 1": "vehicle",
     }
@@ -304,7 +312,7 @@ def _time(place: Path, channel: _Channel, channels: list[_Channel]) -> NDArray[n
     except (KeyError, ValueError):
         got = head.get("sampling interval", "nothing")
         _refuse(place, f"{channel.file}: Sampling interval: got {got!r}; a time in s, or an explicit reference channel")
-    if not (np.isfinite(start) and 0.0 < step < 1e6):
+    if not (np.isfinite(start) and 0.0 < step < MOST_STEP):
         _refuse(place, f"{channel.file}: Sampling interval: got {step!r}; a time greater than 0 s")
     return np.asarray(start + step * np.arange(channel.values.size))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from rollover.recording import Clock, Recording, Sensor, is_run, read_parquet
 from rollover.recording.importers.sidecar import Described, Sidecar, read_described
 from rollover.recording.importers.signals import Signal, assemble
+from rollover.recording.importers.soundness import check_recording
 from rollover.recording.tables import (
     csv_heading,
     line_of_row,
@@ -66,7 +68,7 @@ def read(path: Path, profile: Described | None = None) -> Recording:
 def write(recording: Recording, path: Path, *, force: bool = False) -> None:
     """Write a recording, SI, to the last bit: `path` ends in .csv or .parquet. Raises `InputError`.
 
-    Both files stand there at the end or neither; `force` replaces what is there.
+    Both files stand there at the end or neither; `force` replaces what is there. What `read` would refuse is refused.
     """
     if path.suffix not in TABLES:
         raise InputError(Fault(file=str(path), message=f"no such table, got {path.suffix!r}; .csv or .parquet"))
@@ -76,10 +78,15 @@ def write(recording: Recording, path: Path, *, force: bool = False) -> None:
             raise InputError(Fault(file=str(target), message="exists; --force replaces it, another name leaves it"))
     inside(path.parent, path.name)
     inside(path.parent, sidecar.name)
+    check_recording(path, recording)
     with together(path) as part:
         columns = {"time": recording.time, **recording.channels}
         text = f"# {seen(_one_line(recording.title))}\n" + dump_mapping(_about(recording))
         (part / sidecar.name).write_text(text, encoding="utf-8")
+        try:
+            read_described(part / sidecar.name, Sidecar)
+        except InputError as e:
+            raise InputError(*(replace(fault, file=str(sidecar), line=None) for fault in e.faults)) from None
         (write_csv if path.suffix == ".csv" else write_parquet_columns)(columns, part / path.name)
 
 

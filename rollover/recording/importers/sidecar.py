@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from ground.quantity import Quantity, parameters
 from rollover.recording import Clock, Doubt, Sensor
 from rollover.recording.importers.conditions import ByFile, ConditionsFrom, read_by_file
+from rollover.recording.record import CFC
 from rollover.recording.text_rows import WHITESPACE
 from rollover.spec import document
 from rollover.spec.channels import describe, factor
@@ -32,7 +33,7 @@ class Column:
     channel: Annotated[str, "see `rollover list channels`"]
     unit: Annotated[str | None, "of the column; a profile may leave it to a file that says so itself"] = None
     noise: Annotated[float | None, Quantity("", "1 sigma, in the unit", least=0)] = None
-    cfc: Annotated[Literal[60, 180, 600, 1000] | None, "filter class already applied"] = None
+    cfc: Annotated[CFC | None, "filter class already applied"] = None
     sensor: Annotated[Sensor | None, "where it was measured"] = None
     scale: Annotated[float, Quantity("1", "factor on the file's numbers")] = 1.0
     offset: Annotated[float, Quantity("", "added after the factor, in the unit")] = 0.0
@@ -47,7 +48,8 @@ class Column:
     def validate(self) -> None:
         """Refuse what is no channel, a unit of another dimension, and an instrument without a place."""
         if self.is_stamp and self.channel != "time":
-            raise ValueError(f"{'rest' if self.rest else 'unit'}: of channel time alone, got channel {self.channel}")
+            what = "rest" if self.rest else "unit"
+            raise ValueError(f"{what}: of channel time alone, got channel {self.channel}; leave it out")
         if self.rest_unit and not self.rest:
             raise ValueError("rest_unit: without rest; the column of the fraction is needed, rest: [NAME]")
         if self.rest and self.unit not in (DATE_TIME, "s"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,14 +14,13 @@ from numpy.typing import NDArray
 from rollover.recording import Clock, Recording
 from rollover.recording.importers import stamps
 from rollover.recording.importers.sidecar import DATE_TIME, Column, Described, Profile, Sidecar, doubts_of
+from rollover.recording.importers.soundness import Line, check_time, check_values
 from rollover.spec.channels import factor, is_known
 from rollover.system.errors import Fault, InputError, nearest
 
 Array = NDArray[np.float64]
-RATE_INSTEAD = "; a clock too coarse for its samples: `rate` in Hz in a profile, and no column of time"
 SAME_UNIT = 1e-6  # units differ by more than this, spellings of a constant such as g by less
 SAME_INSTANT = 1e-9  # s: stamps of different clocks that lie closer are one row
-Line = Callable[[int], int | None]  # row of a channel -> line of the file, for messages
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -301,47 +300,6 @@ def _instead(name: str, signals: Mapping[str, Signal]) -> str:
 def _listed(names: Sequence[str], most: int = 24) -> str:
     shown = ", ".join(names[:most]) or "none"
     return f"{shown} and {len(names) - most} more" if len(names) > most else shown
-
-
-def check_time(path: Path, time: Array, line: Line = lambda row: None, other: str = "") -> None:
-    """Refuse stamps that are missing, infinite, repeated or run backwards. Raises `InputError` with the line.
-
-    `other` names a column of stamps that could be taken instead.
-    """
-    if time.size == 0:
-        raise InputError(Fault(file=str(path), message="empty, got no time stamps"))
-    wrong = np.flatnonzero(~np.isfinite(time))
-    if wrong.size:
-        row = int(wrong[0])
-        raise _at(path, line, row, f"time: not a finite number, got {time[row]}; every row needs a stamp")
-    wrong = np.flatnonzero(np.diff(time) <= 0.0)
-    if wrong.size:
-        row = int(wrong[0]) + 1
-        what = "repeated stamp" if time[row] == time[row - 1] else "runs backwards"
-        cure = RATE_INSTEAD if time[row] == time[row - 1] else ""
-        if other:
-            cure = f", or a profile takes other stamps: {{{other!r}: {{channel: time}}}}"
-        got = f"got {float(time[row])!r} after {float(time[row - 1])!r}"
-        raise _at(path, line, row, f"time: {what}, {got}; it must increase{cure}")
-
-
-def check_values(path: Path, name: str, values: Array, line: Line = lambda row: None) -> None:
-    """Refuse a column without a single number, and infinities. Raises `InputError` with the line."""
-    total = float(np.sum(values))  # one pass finds any gap or infinity
-    if np.isfinite(total):
-        return
-    wrong = np.flatnonzero(np.isinf(values))
-    if wrong.size:
-        row = int(wrong[0])
-        raise _at(path, line, row, f"column {name}: not a finite number, got {values[row]}; a number or an empty cell")
-    if np.isnan(values).all():
-        raise _at(path, line, 0, f"column {name}: all gaps, got not one number; leave the column out")
-
-
-def _at(path: Path, line: Line, row: int, message: str) -> InputError:
-    number = line(row)
-    message = message if number is not None else f"sample {row}: {message}"
-    return InputError(Fault(file=str(path), line=number, message=message))
 
 
 def _unit(name: str, signal: Signal, by: Described) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import io
 import re
-import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,7 +12,7 @@ from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
-from ruamel.yaml.error import MarkedYAMLError, ReusedAnchorWarning, YAMLError
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 from ruamel.yaml.representer import RoundTripRepresenter
 from ruamel.yaml.scalarstring import DoubleQuotedScalarString, SingleQuotedScalarString
@@ -25,8 +24,6 @@ from rollover.system.errors import Fault, InputError, cured
 CURE = "plain values, lists and mappings of them are allowed"
 SYNTAX = "quote text that holds : # [ ] { } & * ! %, and indent with blanks"
 _TAG = "tag:yaml.org,2002:"
-
-warnings.simplefilter("ignore", ReusedAnchorWarning)  # YAML allows it, the later one counts
 
 Scalar = str | int | float | bool | None
 

@@ -15,7 +15,7 @@ from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 from ruamel.yaml.scanner import Scanner
 from ruamel.yaml.tokens import ScalarToken
 
-from rollover.system import budget
+from rollover.system import boundary, budget
 
 ROW_STYLE = "["
 LEAST = 2  # numbers in a row that is read as one
@@ -43,7 +43,8 @@ def compose(text: str) -> Any:
         raise TooMuchError("nested too deeply; a few levels are needed", _line(text, deep))
     yaml = YAML(typ="safe", pure=True)
     yaml.Scanner, yaml.Composer = _Scanner, _Composer
-    root = yaml.compose(text)
+    with boundary.quiet():  # an anchor may be used again, of which ruamel warns: the later one counts
+        root = yaml.compose(text)
     if root is not None:
         budget.check_count(_size(root, {}), budget.VALUES, TooMuchError, "values, aliases counted in full")
     return root

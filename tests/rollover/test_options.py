@@ -1,0 +1,77 @@
+"""Options that are numbers: refused where they are read, in one line that names them, before anything else is done."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import get_args, get_type_hints
+
+import numpy as np
+import pytest
+import typer.main
+from typer.testing import CliRunner
+
+import rollover as ro
+from rollover.cli.main import app
+from rollover.comparison.synthesis import check_clock
+from rollover.recording import Recording
+from rollover.system.errors import InputError
+from tests.fuzz.oracle import is_whole
+
+COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+
+
+def numbers() -> Iterator[tuple[str, str]]:
+    """Command and option of every number with a point that a command takes."""
+    for name, command in sorted(COMMANDS.items()):
+        hints = get_type_hints(command.callback)
+        for option in command.params:
+            if float in (hints[option.name], *get_args(hints[option.name])):
+                yield name, option.opts[0]
+
+
+NUMBERS = list(numbers())
+
+
+def test_there_are_such_options() -> None:
+    assert {("synthesize", "--late"), ("identify", "--buoyancy"), ("study", "--memory-limit")} <= set(NUMBERS)
+    assert len(NUMBERS) >= 9
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "-inf", "1e300", "-1e300", "1e30", "NaN"])
+@pytest.mark.parametrize(("name", "option"), NUMBERS)
+def test_a_number_beyond_all_bounds_is_refused(name: str, option: str, value: str) -> None:
+    words = ["nothing" for p in COMMANDS[name].params if p.param_type_name == "argument" and p.required]
+    required = [
+        w for p in COMMANDS[name].params if p.param_type_name == "option" and p.required for w in (p.opts[0], "x")
+    ]
+    result = CliRunner().invoke(app, [name, *words, *required, f"{option}={value}"])
+    assert result.exit_code == 2, result.output
+    (line,) = result.stderr.splitlines()
+    assert f"'{option}'" in line
+    assert is_whole(line) == ""
+    assert "np.float" not in line
+
+
+@pytest.mark.parametrize(("rate", "late"), [(1e6, 1e10), (1e6, -1e10), (1e3, 1e13)])
+def test_stamps_that_a_double_cannot_tell_apart(rate: float, late: float) -> None:
+    with pytest.raises(InputError, match="late: stamps cannot be told apart"):
+        check_clock(rate, late)
+
+
+@pytest.mark.parametrize(("rate", "late"), [(1e3, 1.8e9), (1e5, 1e9), (1e6, 1e5), (1e3, -1e9)])
+def test_clocks_of_an_epoch_are_told_apart(rate: float, late: float) -> None:
+    check_clock(rate, late)
+    Recording(title="", time=np.round(late + np.arange(1000) / rate, 9), channels={})  # which refuses equal stamps
+
+
+@pytest.mark.parametrize("late", [float("nan"), float("inf"), 1e30])
+def test_scripts_are_held_to_the_same(late: float) -> None:
+    with pytest.raises(InputError, match="late: out of bounds"):
+        ro.synthesize("drop_test", late=late)
+    with pytest.raises(InputError, match="clock_sigma: out of bounds"):
+        ro.calibrate("drop_test", [], fit="vehicle.mass", clock_sigma=late)
+
+
+def test_noise_beyond_all_numbers_is_refused() -> None:
+    with pytest.raises(InputError, match=r"noise: beyond all numbers, got .* for ground/force_normal; a smaller"):
+        ro.synthesize("drop_test", sigmas={"ground/force_normal": 1e308})
