@@ -27,8 +27,7 @@ from rollover.recording.importers.sidecar import Described
 from rollover.recording.importers.signals import Signal, assemble, left_out
 from rollover.spec.channels import describe, factor, is_known
 from rollover.system.errors import Fault, InputError
-from rollover.system.names import inside
-from rollover.system.writing import put, whole
+from rollover.system.writing import check_free, put, whole
 
 NOVALUE = "NOVALUE"
 _HEADER = re.compile(r"([^:]*?)\s*:(.*)")
@@ -156,9 +155,7 @@ def write(recording: Recording, path: Path, *, force: bool = False) -> None:
     The whole test stands there at the end or nothing; numbers keep every bit. The name of our channel goes into
     `Name of the channel`, so that reading the test gives the same channels again.
     """
-    if path.exists() and not force:
-        raise InputError(Fault(file=str(path), message="exists; --force replaces it, another name leaves it"))
-    inside(path.parent, path.name)
+    check_free(path, force=force)
     name = path.name.removesuffix(".zip").removesuffix(".mme")
     if path.suffix == ".zip":
         put(path, lambda at: _packed(_files(recording, name), at))
