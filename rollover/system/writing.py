@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import Any
 
 from rollover.system.errors import Fault, InputError
+from rollover.system.names import inside
 
 PART, OLD, COMMIT = ".part", ".old", ".commit"
 NOTES = "fits"  # what a diagnosis has fitted so far, for a next start to go on with
@@ -69,6 +70,15 @@ def hold(target: Path) -> None:
             stack.enter_context(_unmade(target.parent))
             stack.enter_context(_holding(target))
             _work.targets[target] = stack.pop_all()
+
+
+def check_free(*targets: Path, force: bool = False) -> None:
+    """Refuse targets that exist, unless with `force`, and names that are none of a file. Raises `InputError`."""
+    for target in targets:
+        if target.exists() and not force:
+            raise InputError(Fault(file=str(target), message="exists; --force replaces it, another name leaves it"))
+    for target in targets:
+        inside(target.parent, target.name)
 
 
 @contextlib.contextmanager

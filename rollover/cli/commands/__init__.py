@@ -9,6 +9,7 @@ from rollover.cli.commands import view
 from rollover.cli.commands import listing
 from rollover.cli.commands import check
 from rollover.cli.commands import importing
+from rollover.cli.commands import exporting
 from rollover.cli.commands import new
 from rollover.cli.commands import schema
 from rollover.cli.commands import regress
@@ -27,6 +28,7 @@ __all__ = [
     "check",
     "compare",
     "diagnose",
+    "exporting",
     "identify",
     "importing",
     "listing",

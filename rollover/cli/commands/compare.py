@@ -40,7 +40,8 @@ JSON, PAGE, PICTURE = "compare.json", "report.html", "compare.rrd"
     epilog=manual(
         "compare drop_test rec/d3.csv",
         "compare out/run/side_overturn out/vineyard",
-        writes="compare.json, report.html, compare.rrd (one for each recording; two runs in one).",
+        writes="compare.json, report.html, compare.rrd (one for each recording; two runs in one); of recordings also "
+        "measured.parquet and simulated.parquet, the histories as they were rated.",
         status=BROKE,
     )
 )
@@ -79,6 +80,7 @@ def compare(
     from rollover.assessment import results
     from rollover.cli import console
     from rollover.comparison.compared import FORMAT, account, compared
+    from rollover.comparison.curves import curve_files, files_of, write_curves
     from rollover.comparison.recordings import read
     from rollover.comparison.run_pair import is_result
     from rollover.spec import document
@@ -93,14 +95,15 @@ def compare(
         chosen = chosen.replaced(settings(set_), origin="--set")
     measured = read(recordings, profile)
     folder = out or Path("out", "compare", path.stem)
-    pictures = _pictures(list(measured))
+    pictures, curves = files_of(list(measured), "compare", ".rrd"), curve_files(list(measured))
     about: dict[str, Any] = {
         "scenario_hash": document.content_hash(chosen),
         **chosen.own_code,
         "recordings": list(measured),
     }
     about["origin"] = results.origin(path, folder, set_ or [])
-    results.claim_account(folder, FORMAT, about, [JSON, PAGE, *pictures.values()], force=force, say=console.say)
+    files = [JSON, PAGE, *pictures.values(), *curves.values()]
+    results.claim_account(folder, FORMAT, about, files, force=force, say=console.say)
     _say_compiling()
     done = compared(chosen, measured, file=path, cfc=cfc, watch=_watched)
     found, runs = done.misfits, done.runs
@@ -120,6 +123,7 @@ def compare(
             versions=results.versions(),
         )
         (part / PAGE).write_text(text, encoding="utf-8")
+        write_curves(found, curves, part)
         draw = _picture()
         for each in found if draw is not None else ():
             assert draw is not None
@@ -203,16 +207,6 @@ def _watched(name: str, under: Scenario) -> Iterator[Progress]:
     lead = getattr(under.initiation, "lead_time", 0.0)
     with console.progress(f"simulating {name}", -lead, under.simulation.duration) as show:
         yield show
-
-
-def _pictures(names: list[str]) -> dict[str, str]:
-    """A picture for each recording; a single one has the plain name."""
-    from rollover.system.names import distinct
-
-    if len(names) == 1:
-        return dict.fromkeys(names, PICTURE)
-    made = distinct((f"compare-{name}" for name in names), ".rrd", file="rollover compare")
-    return {name: f"{made[f'compare-{name}']}.rrd" for name in names}
 
 
 def _picture() -> Callable[[Run, Misfit, Path], None] | None:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rollover.recording import Recording
-from rollover.recording.importers import iso_mme, plain
+from rollover.recording.importers import iso_mme, mat, plain, xlsx
 from rollover.recording.importers.cone_drops import CONE_DROPS
 from rollover.recording.importers.csv_profile import CSV
 from rollover.recording.importers.cube_tosses import CUBE_TOSSES
@@ -20,7 +20,6 @@ from rollover.recording.importers.ide import IDE
 from rollover.recording.importers.impack import IMPACK
 from rollover.recording.importers.importer import Collection, Importer, with_channels
 from rollover.recording.importers.lvm import LVM
-from rollover.recording.importers.mat import MAT
 from rollover.recording.importers.mcap import MCAP
 from rollover.recording.importers.mdf import MDF
 from rollover.recording.importers.netcdf import NETCDF
@@ -37,14 +36,15 @@ __all__ += ["name_of", "names_of_tests", "read_named", "with_channels", "write_r
 NOT_RECORDINGS = (".yaml", ".yml", ".json", ".md", ".txt")
 ENDINGS = (  # what a name loses: in Messung_3.0.csv only the last of two, in drop.001 none
     *(".mme.zip", ".mme", ".csv", ".parquet", ".txt", ".asc", ".dat", ".tsv", ".lvm", ".log", ".yaml", ".yml"),
-    *(".mat", ".tdms", ".mdf", ".mf4", ".h5", ".hdf5", ".nc", ".mcap", ".bag", ".db3", ".ide"),
+    *(".mat", ".xlsx", ".tdms", ".mdf", ".mf4", ".h5", ".hdf5", ".nc", ".mcap", ".bag", ".db3", ".ide"),
     *(".zip", ".tar", ".tar.gz", ".tar.bz2", ".tar.xz", ".tgz"),
 )
 
 PLAIN = Importer(name="plain", meaning="CSV or Parquet with a sidecar", sniff=plain.sniff, read=plain.read)
-_FORMATS = (PLAIN, NHTSA, iso_mme.ISO_MME, MAT, TDMS, MDF, HDF5, NETCDF, MCAP, IDE, LVM, DTS, CSV)
+_FORMATS = (PLAIN, NHTSA, iso_mme.ISO_MME, mat.MAT, xlsx.XLSX, TDMS, MDF, HDF5, NETCDF, MCAP, IDE, LVM, DTS, CSV)
 _OWN = {i.name: i for i in _FORMATS}
 _SETS = (CUBE_TOSSES, ELBOW_TOSSES, FALLING_BALLS, SOIL_PENETROMETER, CONE_DROPS, IMPACK)
+_WRITERS = {".mme.zip": iso_mme.write, ".mme": iso_mme.write, ".mat": mat.write, ".xlsx": xlsx.write}
 COLLECTIONS: dict[str, Collection] = {c.name: c for c in _SETS}
 ENTRY_POINTS = "rollover.importers"
 
@@ -111,14 +111,19 @@ def _there(path: str | Path) -> Path:
     return path
 
 
-def write_recording(recording: Recording, path: str | Path, *, force: bool = False) -> None:
-    """Write `NAME.csv` or `NAME.parquet` with its sidecar, or an ISO-MME test (`NAME.mme.zip`, or a folder `NAME.mme`).
+def write_recording(recording: Recording, path: str | Path, *, force: bool = False, with_units: bool = False) -> None:
+    """Write `NAME.csv` or `NAME.parquet` with its sidecar, an ISO-MME test (`NAME.mme.zip`, or a folder `NAME.mme`), a
+    MATLAB file (`NAME.mat`) or a workbook (`NAME.xlsx`).
 
-    Whole or not at all, over nothing without `force`. Raises `InputError`.
+    Whole or not at all, over nothing without `force`. Names of columns have the unit behind them `with_units`, those
+    of a workbook always, those of MATLAB never. Raises `InputError`.
     """
     path = Path(path)
-    is_mme = path.name.endswith((".mme.zip", ".mme"))
-    (iso_mme.write if is_mme else plain.write)(recording, path, force=force)
+    own = next((write for ending, write in _WRITERS.items() if path.name.endswith(ending)), None)
+    if own is not None:
+        own(recording, path, force=force)
+    else:
+        plain.write(recording, path, force=force, with_units=with_units)
 
 
 def recordings_at(path: Path, profile: Described | None = None) -> list[Path]:

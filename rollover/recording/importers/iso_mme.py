@@ -28,8 +28,7 @@ from rollover.recording.importers.signals import Signal, assemble, left_out
 from rollover.recording.importers.soundness import check_recording
 from rollover.spec.channels import describe, factor, is_known
 from rollover.system.errors import Fault, InputError, seen
-from rollover.system.names import inside
-from rollover.system.writing import put, whole
+from rollover.system.writing import check_free, put, whole
 
 NOVALUE = "NOVALUE"
 MOST_STEP = 1e6  # s, 12 days: a longer interval is a unit misread, as microseconds for seconds
@@ -159,9 +158,7 @@ def write(recording: Recording, path: Path, *, force: bool = False) -> None:
     the channels of instruments, whose place a test has no word for, among it. The name of our channel goes into
     `Name of the channel`, so that reading the test gives the same channels again.
     """
-    if path.exists() and not force:
-        raise InputError(Fault(file=str(path), message="exists; --force replaces it, another name leaves it"))
-    inside(path.parent, path.name)
+    check_free(path, force=force)
     check_recording(path, recording)
     if placed := [n for n in recording.channels if n.startswith("sensor/")]:
         what = f"no place in an ISO-MME test for where an instrument sits, got {', '.join(placed)}"

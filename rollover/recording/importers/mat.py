@@ -1,8 +1,13 @@
-"""MATLAB files up to version 7: `name`, `name[1]` of a matrix, `structure.field`, `structure[2].field` of an array."""
+"""MATLAB files up to version 7: `name`, `name[1]` of a matrix, `structure.field`, `structure[2].field` of an array.
+
+What is written is one structure `recording`: `time` and `channels` (columns, SI), `names` and `units` of the channels
+under the same fields, `about`, the sidecar's text, by which it is read back without a profile.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +18,84 @@ from rollover.recording.importers.apart import apart
 from rollover.recording.importers.columns import is_wanted, matrix, no_numbers
 from rollover.recording.importers.importer import Importer, reading, starts_with
 from rollover.recording.importers.mat_claims import check_claims
-from rollover.recording.importers.sidecar import Described
+from rollover.recording.importers.plain import FORMAT, sidecar_of
+from rollover.recording.importers.sidecar import Described, described_inside
 from rollover.recording.importers.signals import Signal, assemble, left_out
+from rollover.spec.channels import describe
+from rollover.system.writing import check_free, put
 
+LONGEST_NAME = 63  # characters of a name in MATLAB
+_OWN, _ABOUT = "recording", "about"
 _OPAQUE = "function_workspace"  # under this name MATLAB keeps what its tables and objects hold
 
 
+def write(recording: Recording, path: Path, *, force: bool = False) -> None:
+    """Write a recording as one structure, to the last bit. Raises `InputError`."""
+    check_free(path, force=force)
+    fields = legal_names(recording.channels)
+    about = sidecar_of(recording, {"time": "time", **{channel: f"channels.{fields[channel]}" for channel in fields}})
+    structure = {
+        "title": recording.title,
+        "source": recording.source,
+        "time": recording.time,
+        "channels": {fields[channel]: values for channel, values in recording.channels.items()},
+        "names": {field: channel for channel, field in fields.items()},
+        "units": {"time": "s", **{field: describe(channel).unit for channel, field in fields.items()}},
+        _ABOUT: about,
+    }
+
+    def save(at: Path) -> None:
+        from scipy.io import savemat
+
+        savemat(at, {_OWN: structure}, appendmat=False, long_field_names=True, do_compression=True, oned_as="column")
+
+    put(path, save)
+
+
+def legal_names(channels: Iterable[str]) -> dict[str, str]:
+    """Each channel with a name that MATLAB allows: letters, digits and _, at most 63, no two the same."""
+    found: dict[str, str] = {}
+    for channel in channels:
+        bare = re.sub(r"[^A-Za-z0-9_]", "_", channel)
+        made, n = bare[:LONGEST_NAME], 1
+        while made in found.values():
+            n += 1
+            made = f"{bare[: LONGEST_NAME - 1 - len(str(n))]}_{n}"
+        found[channel] = made
+    return found
+
+
 def _read(path: Path, profile: Described | None) -> Recording:
-    return assemble(path, apart(_signals, path, profile, what="MATLAB 5", modules=("scipy.io",)), profile)
+    about, signals = apart(_held, path, profile, what="MATLAB 5", modules=("scipy.io",))
+    return assemble(path, signals, described_inside(path, about) if about and profile is None else profile)
+
+
+def _held(path: Path, profile: Described | None) -> tuple[str, dict[str, Signal]]:
+    """The sidecar in a file that was written here, else nothing; and its columns."""
+    if profile is None and (own := _own(path)):
+        return own
+    return "", _signals(path, profile)
+
+
+def _own(path: Path) -> tuple[str, dict[str, Signal]] | None:
+    """What `write` wrote, if that is all there is."""
+    from scipy.io import loadmat, whosmat
+
+    with reading(path, "MATLAB 5"):
+        check_claims(path)
+        if [(name, kind) for name, _, kind in whosmat(str(path))] != [(_OWN, "struct")]:
+            return None
+        found = loadmat(str(path), squeeze_me=False, struct_as_record=True)[_OWN]
+        names = set(found.dtype.names or ())
+        if found.size != 1 or not {_ABOUT, "time", "channels"} <= names:
+            return None
+        one = found.ravel()[0]
+        about = "".join(map(str, one[_ABOUT].ravel()))
+        channels = one["channels"].ravel()
+        if f"format: {FORMAT}" not in about or channels.size != 1 or channels.dtype.names is None:
+            return None
+        columns = {"time": one["time"], **{f"channels.{n}": channels[0][n] for n in channels.dtype.names}}
+        return about, {n: Signal(values=np.asarray(v, dtype=np.float64).ravel()) for n, v in columns.items()}
 
 
 def _signals(path: Path, profile: Described | None) -> dict[str, Signal]:

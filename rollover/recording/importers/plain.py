@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rollover.recording import Clock, Recording, Sensor, is_run, read_parquet
 from rollover.recording.importers.sidecar import Described, Sidecar, read_described
@@ -24,11 +26,11 @@ from rollover.recording.tables import (
 from rollover.spec.channels import describe
 from rollover.spec.document import dump_mapping, to_mapping
 from rollover.system.errors import Fault, InputError, seen
-from rollover.system.names import inside
-from rollover.system.writing import together
+from rollover.system.writing import check_free, together
 
 FORMAT = "rollover-recording/1"
 TABLES = (".csv", ".parquet")
+Array = NDArray[np.float64]
 
 
 def sniff(path: Path) -> bool:
@@ -65,29 +67,43 @@ def read(path: Path, profile: Described | None = None) -> Recording:
     )
 
 
-def write(recording: Recording, path: Path, *, force: bool = False) -> None:
+def write(recording: Recording, path: Path, *, force: bool = False, with_units: bool = False) -> None:
     """Write a recording, SI, to the last bit: `path` ends in .csv or .parquet. Raises `InputError`.
 
-    Both files stand there at the end or neither; `force` replaces what is there. What `read` would refuse is refused.
+    Both files stand there at the end or neither; `force` replaces what is there. Columns bear the names of their
+    channels, with the unit behind them `with_units`. What `read` would refuse is refused.
     """
     if path.suffix not in TABLES:
         raise InputError(Fault(file=str(path), message=f"no such table, got {path.suffix!r}; .csv or .parquet"))
     sidecar = path.with_suffix(".yaml")
-    for target in (path, sidecar):
-        if target.exists() and not force:
-            raise InputError(Fault(file=str(target), message="exists; --force replaces it, another name leaves it"))
-    inside(path.parent, path.name)
-    inside(path.parent, sidecar.name)
+    check_free(path, sidecar, force=force)
     check_recording(path, recording)
+    names = columns_of(recording, with_units=with_units)
     with together(path) as part:
-        columns = {"time": recording.time, **recording.channels}
-        text = f"# {seen(_one_line(recording.title))}\n" + dump_mapping(_about(recording))
-        (part / sidecar.name).write_text(text, encoding="utf-8")
+        columns = {names[channel]: values for channel, values in table_of(recording).items()}
+        (part / sidecar.name).write_text(sidecar_of(recording, names), encoding="utf-8")
         try:
             read_described(part / sidecar.name, Sidecar)
         except InputError as e:
             raise InputError(*(replace(fault, file=str(sidecar), line=None) for fault in e.faults)) from None
         (write_csv if path.suffix == ".csv" else write_parquet_columns)(columns, part / path.name)
+
+
+def table_of(recording: Recording) -> dict[str, Array]:
+    """Time and channels by name, each (n,)."""
+    return {"time": recording.time, **recording.channels}
+
+
+def columns_of(recording: Recording, *, with_units: bool = True) -> dict[str, str]:
+    """Name of the column of each channel, of time too: `ground/sinkage [m]`."""
+    return {name: f"{name} [{describe(name).unit}]" if with_units else name for name in table_of(recording)}
+
+
+def sidecar_of(recording: Recording, columns: Mapping[str, str]) -> str:
+    """Text of the sidecar of a table whose columns are named so, by channel."""
+    about = _about(recording)
+    about["channels"] = {columns[name]: entry for name, entry in about["channels"].items()}
+    return f"# {seen(_one_line(recording.title))}\n" + dump_mapping(about)
 
 
 def _table(path: Path) -> Path:

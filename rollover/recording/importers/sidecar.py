@@ -204,12 +204,27 @@ def read_described(path: Path, kind: type[Sidecar] | type[Profile]) -> Described
         raise InputError(
             Fault(file=str(path), message=f"cannot be read: {worded(e)}; a file that may be read is needed")
         ) from None
+    _check_text(path, size, path.read_bytes() if 0 < size <= MOST_BYTES else b"")
+    return _described(path, document.read(path), kind)
+
+
+def described_inside(path: Path, text: str) -> Described:
+    """What a file says by the sidecar that it holds itself. Raises `InputError` with all faults, each with its line."""
+    _check_text(path, len(text.encode()), text.encode())
+    start = document.Place(file=document.shown(path), line=1, folder=path.parent)
+    return _described(path, document.parse(text, start), Sidecar)
+
+
+def _check_text(path: Path, size: int, data: bytes) -> None:
+    """Refuse what is no sidecar by its length, or would take long to be refused. Raises `InputError`."""
     if size > MOST_BYTES:
         raise InputError(Fault(file=str(path), message=f"too long, got {size} bytes; at most {MOST_BYTES} are allowed"))
-    if size and (deep := _DEEP.search(path.read_bytes())):
-        line = path.read_bytes()[: deep.start()].count(b"\n") + 1
+    if deep := _DEEP.search(data):
+        line = data[: deep.start()].count(b"\n") + 1
         raise InputError(Fault(file=str(path), line=line, message="nested too deeply; a few levels are needed"))
-    root = document.read(path)
+
+
+def _described(path: Path, root: Node, kind: type[Sidecar] | type[Profile]) -> Described:
     if not isinstance(root.value, Mapping):
         raise root.place.fault("", f"not a mapping, got {str(root.plain)[:40]!r}; format, channels are needed")
     faults: list[Fault] = []

@@ -1,17 +1,19 @@
-"""Sheets of an Excel workbook as rows of plain values; the only home of openpyxl."""
+"""Sheets of an Excel workbook as rows of plain values, read and written; the only home of openpyxl."""
 
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from rollover.recording.importers.apart import apart
 from rollover.recording.importers.importer import check_library, library, reading
 from rollover.system.budget import Budget
+from rollover.system.errors import Fault, InputError
 
 IN_CELLS = 5  # bytes in memory of a byte of XML: a cell has some 30 there and 150 as an object
+MOST_ROWS = 1_048_576  # of a sheet, in the file format itself
 MOST_EMPTY = 100  # rows without a value, after which a sheet is over; programs write 65536 of them
 
 Row = tuple[Any, ...]
@@ -24,6 +26,36 @@ def read_workbook(path: Path) -> Mapping[str, list[Row]]:
     """
     check_library("openpyxl", "xlsx", path)
     return apart(_rows, path, what="Excel", modules=("openpyxl",))
+
+
+def write_workbook(sheets: Mapping[str, Sequence[Row]], path: Path, *, named: Path) -> None:
+    """Write rows of numbers and texts, whatever a text looks like; `named` is the file in messages.
+
+    Raises `InputError` for what a sheet has no room for, and where the library is missing.
+    """
+    openpyxl = library("openpyxl", "xlsx", named)
+    for sheet, rows in sheets.items():
+        if len(rows) > MOST_ROWS:
+            got = f"sheet {sheet}: too long, got {len(rows)} rows; a sheet has {MOST_ROWS}, csv and mat any number"
+            raise InputError(Fault(file=str(named), message=got))
+    book = openpyxl.Workbook(write_only=True)
+    for sheet, rows in sheets.items():
+        page = book.create_sheet(sheet)
+        page.freeze_panes = "B2"
+        for row in rows:
+            page.append([_cell(page, value) for value in row])
+    book.save(path)
+
+
+def _cell(page: Any, value: Any) -> Any:
+    """A value as it is: a text that begins with = is no formula."""
+    if not isinstance(value, str) or not value.startswith("="):
+        return value
+    from openpyxl.cell import WriteOnlyCell
+
+    cell = WriteOnlyCell(page, value)
+    cell.data_type = "s"
+    return cell
 
 
 def _rows(path: Path) -> dict[str, list[Row]]:

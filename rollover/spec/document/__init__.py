@@ -17,13 +17,14 @@ from rollover.spec.document.replace import parse_setting, replaced
 from rollover.spec.document.resolved import Leaf, content_hash, dump, paths, to_mapping, unit_at
 from rollover.spec.document.schema import schema
 from rollover.spec.document.slot import Written, slot_of
-from rollover.spec.document.tree import Node, planted, read
+from rollover.spec.document.tree import Node, Place, parse, planted, read, shown
 from rollover.spec.document.tree import write as dump_mapping
 
 __all__ = [
     "Itself",
     "Leaf",
     "Node",
+    "Place",
     "Written",
     "annotated",
     "beside",
@@ -36,6 +37,7 @@ __all__ = [
     "headings",
     "load",
     "named",
+    "parse",
     "parse_setting",
     "paths",
     "planted",
@@ -43,6 +45,7 @@ __all__ = [
     "replaced",
     "schema",
     "shipped_folder",
+    "shown",
     "slot_of",
     "to_mapping",
     "unit_at",
