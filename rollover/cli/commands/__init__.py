@@ -17,6 +17,7 @@ from rollover.cli.commands import compare
 from rollover.cli.commands import calibrate
 from rollover.cli.commands import synthesize
 from rollover.cli.commands import diagnose
+from rollover.cli.commands import plan
 from rollover.cli.commands import prove
 from rollover.cli.commands import stability
 from rollover.cli.commands import study
@@ -30,6 +31,7 @@ __all__ = [
     "importing",
     "listing",
     "new",
+    "plan",
     "prove",
     "regress",
     "root",
