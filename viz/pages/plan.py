@@ -50,8 +50,8 @@ def page(
     ]
     basis = (
         f"{len(found.conditions)} recordings at {found.rate:g} Hz; beside the noise a model misses "
-        f"{found.tolerance:.1%} of each channel's range, and each gain is off by {found.gain:.1%} (1 sigma). Each of all "
-        f"effects is tested at a size of {found.size:.2%}, so that noise alone shows any of them with "
+        f"{found.tolerance:.1%} of each channel's range, and each gain is off by {found.gain:.1%} (1 sigma). Each of "
+        f"all effects is tested at a size of {found.size:.2%}, so that noise alone shows any of them with "
         f"{found.false_alarm:.0%}; detectable is what is then seen with {found.power:.0%}, a noncentrality of "
         f"{found.noncentrality:.1f}."
     )

@@ -31,8 +31,8 @@ class Planning:
     # share: a noncentrality that exceeds by more what is asked for is met at an end of a range; far beyond `close`
     at_an_end: float = 0.2
     close: float = 0.02  # share: a noncentrality this near to the one that is asked for is it; chosen
-    # ratios of a next condition to the scenario's; from 3 m/s as far as drops are made that soils are identified by, and
-    # to twice the speed; chosen
+    # ratios of a next condition to the scenario's: from 3 m/s down to the gentlest drop that soils are identified by,
+    # and up to twice the speed; chosen
     ratios: tuple[float, ...] = (0.33, 0.5, 0.67, 1.0, 1.2, 1.5, 2.0)
     faster: float = 4.0  # ratio: a higher sampling rate that is tried last; chosen
     few: int = 3  # pairs for which a next test is looked for where none are named; chosen
