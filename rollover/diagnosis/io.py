@@ -85,6 +85,7 @@ def _effect(effect: Named) -> dict[str, Any]:
         "p_value": effect.p_value,
         "indistinguishable_from": list(effect.indistinguishable_from),
         "discriminating_test": effect.discriminating_test,
+        **({} if effect.next_test is None else {"next_test": asdict(effect.next_test)}),
     }
 
 

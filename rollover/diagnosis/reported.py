@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Sequence
+from dataclasses import replace
 
 from rollover.diagnosis.conclusion import Conclusion
 from rollover.diagnosis.data.dataset import Dataset
@@ -18,8 +19,9 @@ from rollover.diagnosis.inference.drop_dependence import Dependence, dependence,
 from rollover.diagnosis.inference.residual_law import offered, proposed
 from rollover.diagnosis.inference.scores import before_an_impact, judged
 from rollover.diagnosis.inference.vehicle_dependence import dependency
+from rollover.diagnosis.planning.by_fits import next_test
 from rollover.diagnosis.power import is_weak
-from rollover.diagnosis.result import Degree, Diagnosis
+from rollover.diagnosis.result import Degree, Diagnosis, Named
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.statements import (
     as_models_miss,
@@ -110,7 +112,7 @@ def reported(c: Conclusion) -> Diagnosis:
         p_value=explanation.p_value if shown is None else shown.p_value,
         noise=noise(found),
         where=places(before, found, depends_on.on) if is_mismatch else by_itself,
-        effects=effects,
+        effects=_with_next_test(c),
         remaining_significant=is_left or bool(lost),
         remaining_p_value=after.p_value,
         remaining_where=places(after, found, None) if is_left else lost,
@@ -137,6 +139,18 @@ def reported(c: Conclusion) -> Diagnosis:
         discrepancy=told_of,
         by_itself=shown is not None,
     )
+
+
+def _with_next_test(c: Conclusion) -> tuple[Named, ...]:
+    """The effects, and where two names are in the set what would choose between them, by their fits."""
+    if len(c.effects) != 1 or c.shown is not None or not c.explanation.parts:
+        return c.effects
+    (effect,), step = c.effects, c.explanation.parts[0]
+    rivals = [f for f in step.rivals if f.candidates[-1].id in effect.indistinguishable_from]
+    if len(effect.indistinguishable_from) != 1 or not rivals or len(c.explanation.fitted.candidates) != 1:
+        return c.effects
+    found = next_test(c.asked.scenario, c.problem.dataset, c.explanation.fitted, min(rivals, key=lambda f: f.left))
+    return (replace(effect, next_test=found),)
 
 
 def _grids(dataset: Sequence[Dataset]) -> dict[str, tuple[float, ...]]:

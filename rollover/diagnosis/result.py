@@ -75,11 +75,31 @@ class Scale:
 
 
 @dataclass(frozen=True, kw_only=True)
+class NextTest:
+    """One more test: a value of the scenario by path, its channels, rate (Hz), probability of telling two apart."""
+
+    path: str
+    value: float
+    unit: str
+    channels: tuple[str, ...]
+    rate: float
+    probability: float
+
+    def says(self) -> str:
+        """The sentence."""
+        value = f"{self.value:g} {self.unit}".rstrip()
+        return (
+            f"{self.path} {value} at {self.rate:.4g} Hz with {', '.join(self.channels)} would tell them apart with "
+            f"{self.probability:.0%}"
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
 class Named:
     """An effect that was found, with what it cannot be told apart from and how to.
 
     `explains` is its share of the held-out mismatch, `moves` the most by which it moves a load, of its peak; None where
-    it moves none.
+    it moves none. `next_test` is what would tell it from the only other one in the set, by these recordings.
     """
 
     id: str
@@ -94,6 +114,7 @@ class Named:
     answer: Answer = "whole"
     explains: Share | None = None
     moves: float | None = None
+    next_test: NextTest | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -215,6 +215,8 @@ def _next(found: Diagnosis) -> list[Block]:
             blocks.append(Note(text=text, warning=True))
             if e.discriminating_test:
                 blocks.append(Note(text=f"Measure next: {e.discriminating_test}."))
+            if e.next_test is not None:
+                blocks.append(Note(text=f"By these recordings: {e.next_test.says()}."))
         else:
             confirm = f" To confirm it: {e.discriminating_test}." if e.discriminating_test else ""
             blocks.append(Note(text=f"{own}: no other candidate predicts the held-out recordings as well.{confirm}"))

@@ -18,6 +18,7 @@ from rollover.cli.commands import compare
 from rollover.cli.commands import calibrate
 from rollover.cli.commands import synthesize
 from rollover.cli.commands import diagnose
+from rollover.cli.commands import plan
 from rollover.cli.commands import prove
 from rollover.cli.commands import stability
 from rollover.cli.commands import rolling
@@ -33,6 +34,7 @@ __all__ = [
     "importing",
     "listing",
     "new",
+    "plan",
     "prove",
     "regress",
     "rolling",

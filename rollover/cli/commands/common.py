@@ -189,3 +189,22 @@ def settings(given: list[str], option: str = "--set") -> dict[str, Any]:
             raise InputError(Fault(file=option, path=path, message="given twice; once is allowed"))
         settings[path] = value
     return settings
+
+
+def noises(given: list[str]) -> tuple[float, dict[str, float]]:
+    """Share of the range for all, and 1 sigma for some channels. Raises `InputError`."""
+    share, sigmas = 0.005, {}
+    for text in given:
+        channel, equals, number = text.rpartition("=")
+        try:
+            value = float(number)
+        except ValueError:
+            value = -1.0
+        if not 0.0 <= value < float("inf"):
+            message = f"not a noise, got {text!r}; SHARE or CHANNEL=SIGMA, at least 0"
+            raise InputError(Fault(file="--noise", message=message))
+        if equals:
+            sigmas[channel] = value
+        else:
+            share = value
+    return share, sigmas

@@ -9,9 +9,8 @@ from typing import Annotated
 
 import typer
 
-from rollover.cli.commands.common import BROKE, FAILED, AsJson, Force, Setting, answering, app, manual, settings
+from rollover.cli.commands.common import BROKE, FAILED, AsJson, Force, Setting, answering, app, manual, noises, settings
 from rollover.system.arguments import MOST_LATE
-from rollover.system.errors import Fault, InputError
 
 
 @app.command(
@@ -71,7 +70,7 @@ def synthesize(
         console.say(f"{path}: {line}")
     target = inside(out, f"{name or path.stem}.csv", file="--name")
     hold(target)  # before a run that may take minutes
-    share, sigmas = _noise(noise or [])
+    share, sigmas = noises(noise or [])
     with document.named(path):
         done = simulate.run(chosen)
     if done.status == "failed":
@@ -94,22 +93,3 @@ def synthesize(
         print(json.dumps({"recording": str(target), "samples": made.time.size, "noise": dict(made.noise)}, indent=2))
     else:
         console.tell(f"{made.time.size} samples of {len(made.channels)} channels: {target}")
-
-
-def _noise(given: list[str]) -> tuple[float, dict[str, float]]:
-    """Share of the range for all, and 1 sigma for some channels. Raises `InputError`."""
-    share, sigmas = 0.005, {}
-    for text in given:
-        channel, equals, number = text.rpartition("=")
-        try:
-            value = float(number)
-        except ValueError:
-            value = -1.0
-        if not 0.0 <= value < float("inf"):
-            message = f"not a noise, got {text!r}; SHARE or CHANNEL=SIGMA, at least 0"
-            raise InputError(Fault(file="--noise", message=message))
-        if equals:
-            sigmas[channel] = value
-        else:
-            share = value
-    return share, sigmas

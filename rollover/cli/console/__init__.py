@@ -1,5 +1,6 @@
 """What people read while a command works and when it is done: progress, tables, sentences. The only home of rich."""
 
+from rollover.cli.console.plans import plan
 from rollover.cli.console.recordings import calibration, comparison, diagnosis, rolling, stability
 from rollover.cli.console.runs import regression, report
 from rollover.cli.console.terminal import EVERY, QUIET, Plain, counting, progress, readable, say, tell
@@ -12,6 +13,7 @@ __all__ = [
     "comparison",
     "counting",
     "diagnosis",
+    "plan",
     "progress",
     "readable",
     "regression",

@@ -132,6 +132,8 @@ def diagnosis(found: Diagnosis, folder: str) -> None:
             out.print(f"{e.id}: {e.answer}, {stated}")
         if e.indistinguishable_from:
             out.print(f"{e.id} or {', '.join(e.indistinguishable_from)}: measure next: {e.discriminating_test}")
+        if e.next_test is not None:
+            out.print(f"By these recordings: {e.next_test.says()}.")
     for note in found.notes:
         out.print(note, style="yellow")
     out.print(f"Results: {folder}")

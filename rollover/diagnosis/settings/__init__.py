@@ -13,6 +13,7 @@ from rollover.diagnosis.settings.fit import Fit
 from rollover.diagnosis.settings.forward import Forward
 from rollover.diagnosis.settings.inference import Inference
 from rollover.diagnosis.settings.noise import Noise
+from rollover.diagnosis.settings.planning import Planning
 from rollover.diagnosis.settings.report import Report
 from rollover.diagnosis.settings.selection import Selection
 
@@ -28,6 +29,7 @@ class Settings:
     inference: Inference = field(default_factory=Inference)  # tests, intervals and what a mismatch depends on
     selection: Selection = field(default_factory=Selection)  # which effects explain a mismatch
     report: Report = field(default_factory=Report)  # verdicts, grades and sentences
+    planning: Planning = field(default_factory=Planning)  # tests that are planned
 
 
 SETTINGS = Settings()

@@ -1,0 +1,135 @@
+"""The cheapest test that tells two effects apart: condition, then one more sensor, then a higher rate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from rollover.diagnosis.data.dataset import Dataset
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.planning.planned import Instruments, planned
+from rollover.diagnosis.planning.separation import Tests
+from rollover.diagnosis.result import NextTest
+from rollover.diagnosis.settings import SETTINGS
+from rollover.dynamics.drop_test import COLUMNS
+from rollover.effects import EFFECTS
+from rollover.scenario import Scenario
+from rollover.spec.document import paths, value_at
+from rollover.spec.initiation import Release
+from rollover.system.errors import InputError
+
+TUNING = SETTINGS.planning
+Placed = tuple[Candidate, tuple[float, ...]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Advice:
+    """A pair, how surely the planned tests tell it apart, the cheapest test that does, and all that were looked at.
+
+    `best` is the one that does best where none is sure enough; None where nothing is needed. `known` is the fixed
+    advice that goes with the pair, if there is one.
+    """
+
+    effects: tuple[str, str]
+    probability: float
+    best: NextTest | None
+    is_enough: bool
+    tried: tuple[NextTest, ...]
+    known: str
+
+    def says(self) -> str:
+        """The sentence."""
+        one, other = self.effects
+        now = f"{one} and {other}: told apart with {self.probability:.0%}"
+        if self.best is None:
+            return f"{now} as planned."
+        seldom = "" if self.is_enough else "; no single test that was looked at is sure to"
+        return f"{now} as planned; beside it {self.best.says()}{seldom}."
+
+
+@dataclass(frozen=True, kw_only=True)
+class Grid:
+    """What may be tested beside what is planned: the scenario with another value at `path`, these instruments."""
+
+    scenario: Scenario
+    dataset: tuple[Dataset, ...]
+    instruments: Instruments
+    path: str
+
+    def values(self) -> list[float]:
+        """Values of the condition, the gentlest first; those that the scenario does not admit are left out."""
+        now = float(value_at(self.scenario, self.path))
+        found = []
+        for value in sorted({float(f"{ratio * now:.2g}") for ratio in TUNING.ratios}):
+            try:
+                self.scenario.replaced({self.path: value}, origin="plan")
+            except InputError:
+                continue
+            found.append(value)
+        return found
+
+    def test(self, value: float, channels: tuple[str, ...], rate: float, probability: float) -> NextTest:
+        """A test at another value."""
+        unit = next(leaf.unit for leaf in paths(self.scenario) if leaf.path == self.path)
+        return NextTest(path=self.path, value=value, unit=unit, channels=channels, rate=rate, probability=probability)
+
+    def levels(self) -> Iterator[list[Instruments]]:
+        """Instruments, the cheapest first: those that are planned, these with one channel more, these faster."""
+        own = self.instruments
+        yield [own]
+        full = planned(self.scenario, {}, replace(own, noise=dict.fromkeys(COLUMNS, 1.0), gain=0.0))
+        spans = {} if full is None else {s.channel: s.span for s in full.signals}
+        more = {c: TUNING.noise * span for c, span in spans.items() if c not in own.noise}
+        yield [replace(own, noise={**own.noise, c: sigma}) for c, sigma in more.items()]
+        yield [replace(own, rate=TUNING.faster * own.rate)]
+
+
+def varied(scenario: Scenario) -> str:
+    """Path of the value by which a drop is made harder: its speed at contact, or the height it is let go at."""
+    return "initiation.height" if isinstance(scenario.initiation, Release) else "initiation.speed"
+
+
+def cheapest(tried: Sequence[NextTest]) -> NextTest | None:
+    """The gentlest test that is sure enough, else the surest; None of none."""
+    sure = [t for t in tried if t.probability >= TUNING.told_apart]
+    return min(sure, key=lambda t: t.value) if sure else max(tried, key=lambda t: t.probability, default=None)
+
+
+def advice(grid: Grid, one: Placed, other: Placed, probability: float) -> Advice:
+    """What to measure beside the planned tests so that two effects, at their places, are told apart."""
+    a, b = one[0], other[0]
+    known = EFFECTS[a.id].rivals.get(b.id) or EFFECTS[b.id].rivals.get(a.id) or ""
+    tried: list[NextTest] = []
+    if probability >= TUNING.told_apart:
+        return _told((a.key, b.key), probability, None, tried, known)
+    for level in grid.levels():
+        for instruments in level:
+            for value in grid.values():
+                extra = planned(grid.scenario, {grid.path: value}, instruments)
+                if extra is None:
+                    continue
+                chance = chance_of([*grid.dataset, extra], one, other)
+                channels = tuple(instruments.noise)
+                tried.append(grid.test(value, channels, instruments.rate, chance))
+        best = cheapest(tried)
+        if best is not None and best.probability >= TUNING.told_apart:
+            break
+    return _told((a.key, b.key), probability, cheapest(tried), tried, known)
+
+
+def chance_of(dataset: Sequence[Dataset], one: Placed, other: Placed) -> float:
+    """Probability that recordings choose the right one of two effects that are as likely to be the true one."""
+    tests = Tests(dataset)
+    found = [tests.apart(*one, other[0]), tests.apart(*other, one[0])]
+    known = [f.probability for f in found if f is not None]
+    return sum(known) / len(known) if known else 0.5
+
+
+def _told(
+    effects: tuple[str, str], probability: float, best: NextTest | None, tried: Sequence[NextTest], known: Any
+) -> Advice:
+    is_enough = max(probability, 0.0 if best is None else best.probability) >= TUNING.told_apart
+    return Advice(
+        effects=effects, probability=probability, best=best, is_enough=is_enough, tried=tuple(tried), known=known
+    )

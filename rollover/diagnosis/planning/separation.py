@@ -1,0 +1,131 @@
+"""How far an effect stays from a rival that is refitted to it, over several recordings, in noise units."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.diagnosis.data.dataset import Dataset
+from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
+from rollover.diagnosis.fit.linearisation import without_shift
+from rollover.diagnosis.fit.parameterisation import Candidate
+from rollover.diagnosis.planning.chances import choice, spread_of
+from rollover.diagnosis.planning.planned import showing
+from rollover.diagnosis.planning.strength import scaled
+from rollover.diagnosis.settings import SETTINGS
+
+Array = NDArray[np.float64]
+TUNING = SETTINGS.planning
+
+
+@dataclass(frozen=True, kw_only=True)
+class Apart:
+    """A true effect beside a rival: noncentrality, probability that the misfit chooses the true one, the rival's x."""
+
+    noncentrality: float
+    probability: float
+    x: tuple[float, ...]
+
+
+class Tests:
+    """Planned recordings, and what effects would make of them; what was simulated is kept."""
+
+    def __init__(self, dataset: Sequence[Dataset]) -> None:
+        self.dataset = tuple(dataset)
+        self.problem = Problem(self.dataset)
+        self._moved: dict[tuple[str, tuple[float, ...]], Array | None] = {}
+        self._shown: dict[tuple[str, tuple[float, ...]], tuple[Problem, float] | None] = {}
+
+    @cached_property
+    def _base(self) -> Fitted:
+        """The scenario as it is, with the slopes of all clocks."""
+        blocks = [self.problem.block(r, (), (), 0.0, 0.0) for r in range(len(self.dataset))]
+        return Fitted(candidates=(), x=(), blocks=tuple(b for b in blocks if b is not None))
+
+    def moved(self, c: Candidate, x: tuple[float, ...]) -> Array | None:
+        """What an effect changes of all recordings, (n,), whitened and freed of clocks; None if it cannot be made."""
+        key = (c.key, x)
+        if key not in self._moved:
+            parts = [self.problem.moved(r, ((), ()), ((c,), x), 0.0) for r in range(len(self.dataset))]
+            self._moved[key] = (
+                None
+                if any(p is None for p in parts)
+                else np.concatenate(
+                    [
+                        without_shift(p[:, None], b)[:, 0]
+                        for p, b in zip(parts, self._base.blocks, strict=True)
+                        if p is not None
+                    ]
+                )
+            )
+        return self._moved[key]
+
+    def shown(self, c: Candidate, x: tuple[float, ...]) -> tuple[Problem, float] | None:
+        """The recordings as they would be with an effect and without noise, and what nothing leaves of it there.
+
+        None if it cannot be simulated.
+        """
+        key = (c.key, x)
+        if key not in self._shown:
+            raws = [self.problem.edged(r, (c,), x, 0.0) for r in range(len(self.dataset))]
+            made = [showing(e, raw) for e, raw in zip(self.dataset, raws, strict=True) if raw is not None]
+            problem = Problem(made)
+            nothing = problem.fit((), (), rounds=TUNING.rounds) if len(made) == len(raws) else None
+            self._shown[key] = None if nothing is None else (problem, nothing.left)
+        return self._shown[key]
+
+    def unexplained(self, c: Candidate, x: tuple[float, ...]) -> float:
+        """Noncentrality of an effect beside nothing but clocks, gains and uncertain values; 0 if it cannot be made."""
+        shown = self.shown(c, x)
+        return 0.0 if shown is None else shown[1]
+
+    def apart(self, c: Candidate, x: tuple[float, ...], rival: Candidate) -> Apart | None:
+        """An effect at x through a rival that is refitted; None where the effect cannot be simulated.
+
+        Secants from nothing say where the rival's fits begin, and are the answer where these are beyond doubt.
+        """
+        found = self.shown(c, x)
+        if found is None:
+            return None
+        shown, far = found
+        nearest = self._nearest(c, x, rival)
+        if not nearest or nearest[0][0] > TUNING.beyond_doubt:
+            least = min([far, *(left for left, _ in nearest)])
+            return Apart(noncentrality=least, probability=choice(least), x=nearest[0][1] if nearest else ())
+        fits = [shown.fit((rival,), place, rounds=TUNING.rounds, width=1) for _, place in nearest[: TUNING.starts]]
+        best = min((f for f in fits if f is not None), key=lambda f: f.left, default=None)
+        if best is None:
+            return Apart(noncentrality=far, probability=choice(far), x=())
+        least = min(best.left, far)
+        own = [shown.block(r, (c,), x, 0.0, shown.effort.fine) for r in range(len(self.dataset))]
+        spread = 0.0
+        if all(b is not None for b in own):
+            J, other = (
+                np.concatenate([without_shift(b.J, b) for b in blocks if b is not None])
+                for blocks in (own, best.blocks)
+            )
+            spread = spread_of(J, other)
+        return Apart(noncentrality=least, probability=choice(least, spread), x=best.x)
+
+    def _nearest(self, c: Candidate, x: tuple[float, ...], rival: Candidate) -> list[tuple[float, tuple[float, ...]]]:
+        """What the rival leaves of an effect along the secants to its places, the least first, and where these lead."""
+        d = self.moved(c, x)
+        if d is None:
+            return []
+        found = []
+        for place in dict.fromkeys([*rival.starts(), *rival.probes()]):
+            s = self.moved(rival, place)
+            size = 0.0 if s is None else float(s @ s)
+            if s is None or size <= 0.0:
+                continue
+            along = float(d @ s) / size
+            there = scaled(rival, place, along)
+            if there is None:  # nothing to scale from: the place itself
+                found.append((float((d - s) @ (d - s)), place))
+            else:
+                found.append((float(d @ d) - along**2 * size, there))
+        return sorted(found)

@@ -1,0 +1,89 @@
+"""How strong an effect must be for a test to show it: the place in its range with a given noncentrality."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from rollover.diagnosis.fit.parameterisation import (
+    Candidate,
+    coordinate,
+    coordinates,
+    followed,
+    is_limit,
+    physical,
+    zero_of,
+)
+from rollover.diagnosis.settings import SETTINGS
+from rollover.effects import EFFECTS, units_of
+from rollover.effects.effect import CHANNELS_OWN
+
+TUNING = SETTINGS.planning
+Place = tuple[float, ...]
+Shows = Callable[[Place], float]
+
+
+def usual(c: Candidate) -> Place | None:
+    """Coordinates of an effect as strong as it usually is; None where that depends on the channel alone."""
+    kind: Any = EFFECTS[c.id]
+    own = kind() if c.channel is None else kind(channel=c.channel)
+    values = {name: getattr(own, name) for name in c.search}
+    if any(units_of(kind)[name] == CHANNELS_OWN or value is None for name, value in values.items()):
+        return None
+    if any(c.search[name].scale == "log" and value <= 0.0 for name, value in values.items()):
+        return None
+    return coordinates(values, c.search)
+
+
+def scaled(c: Candidate, x: Place, factor: float) -> Place | None:
+    """`followed`, and the same of what has the scenario's own value for its zero; None where no value is known."""
+    name, zero = zero_of(c)
+    if zero is None or EFFECTS[c.id].null.get(name) is not None:
+        return followed(c, x, factor)
+    search, at = c.search[name], list(c.search).index(name)
+    value = zero + factor * (physical(x[at], search) - zero)
+    inside = coordinate(min(max(value, search.low), search.high), search)
+    return (*x[:at], inside, *x[at + 1 :])
+
+
+def place_where_it_acts(c: Candidate, shows: Shows) -> Place | None:
+    """Its usual place, or the first of its starts that does anything in a test; None where none does."""
+    own = usual(c)
+    places = [*([] if own is None else [own]), *c.starts(), *c.probes()]
+    return next((x for x in places if shows(x) > TUNING.nothing), None)
+
+
+def strength_with(c: Candidate, at: Place, shows: Shows, noncentrality: float) -> Place | None:
+    """Coordinates of the effect that has this noncentrality, from a place where it acts; None: its range ends before.
+
+    What has a zero is made weaker or stronger by the root of what is asked for; of a limit the value itself is sought.
+    """
+    if scaled(c, at, 1.0) is None:
+        return _limit_with(c, at, shows, noncentrality)
+    low, high, x, factor = 0.0, math.inf, at, 1.0
+    for _ in range(TUNING.approaches):
+        found = shows(x)
+        if abs(found / noncentrality - 1.0) < TUNING.close:
+            return x
+        low, high = (factor, high) if found < noncentrality else (low, factor)
+        guess = factor * math.sqrt(noncentrality / max(found, 1e-6 * noncentrality))
+        factor = guess if low < guess < high else math.sqrt(max(low, 1e-6 * high) * high) if high < math.inf else guess
+        there = scaled(c, at, factor)
+        if there is None or there == x:
+            break
+        x = there
+    return x if shows(x) > noncentrality * (1.0 - TUNING.close) else None
+
+
+def _limit_with(c: Candidate, at: Place, shows: Shows, noncentrality: float) -> Place | None:
+    """The same for a limit, by halving: the lower, the stronger; others as at one of their starts that shows enough."""
+    if not is_limit(c):
+        return min((x for x in [at, *c.starts()] if shows(x) >= noncentrality), key=shows, default=None)
+    low, high = 0.0, 1.0
+    if shows((low, *at[1:])) < noncentrality:
+        return None
+    for _ in range(TUNING.approaches):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if shows((middle, *at[1:])) >= noncentrality else (low, middle)
+    return (low, *at[1:])

@@ -1,0 +1,287 @@
+"""What a planned test promises holds: in closed form, in simulated campaigns, and beside a diagnosis' own fits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import binomtest, norm
+
+from rollover.diagnosis.data.dataset import Dataset, Signal
+from rollover.diagnosis.data.whitening import Whitening
+from rollover.diagnosis.fit.jobs import Executor
+from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.fit.parameterisation import Candidate, coordinates
+from rollover.diagnosis.planning import chances
+from rollover.diagnosis.planning.by_fits import next_test
+from rollover.diagnosis.planning.plan import plan, usual_noise
+from rollover.diagnosis.planning.planned import Instruments, coloured, only, planned, showing
+from rollover.diagnosis.planning.separation import Tests as PlannedTests
+from rollover.diagnosis.planning.strength import place_where_it_acts, strength_with
+from rollover.diagnosis.prepared import prepared
+from rollover.diagnosis.selection.candidates import candidates_of, size_of
+from rollover.diagnosis.settings import SETTINGS
+from rollover.effects import Search
+from rollover.recording import Recording
+from rollover.system.errors import InputError
+from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
+
+CHANNELS = (FORCE, DEPTH, ACCELERATION)
+DAMPING, DRAG = "soil-viscous-damping", "soil-inertial-drag"
+
+
+class Linear:
+    """A simulator whose channel is linear in the strengths of two effects, and that no clock moves."""
+
+    effort = SETTINGS.forward.drops
+    contact = math.inf
+
+    def __init__(self, columns: np.ndarray) -> None:
+        self.columns = columns
+
+    def predict(self, changes: Mapping[str, Any], shift: float) -> dict[str, np.ndarray]:
+        strengths = [changes.get("effects.mass.added", 0.0), changes.get("effects.sensor-bias.bias", 0.0)]
+        return {FORCE: self.columns @ np.array(strengths)}
+
+
+MASS = Candidate(id="mass", kind="parameter", family="", search={"added": Search(-100.0, 300.0)})
+BIAS = Candidate(id="sensor-bias", kind="sensor", family="", search={"bias": Search(-500.0, 500.0)}, channel=FORCE)
+
+
+def linear(cosine: float, sigma: float = 2.0, n: int = 400) -> PlannedTests:
+    """Two effects whose traces have this cosine and unit length, under white noise."""
+    rng = np.random.default_rng(5)
+    u, v = np.linalg.qr(rng.standard_normal((n, 2)))[0].T
+    columns = np.column_stack([u, cosine * u + math.sqrt(1.0 - cosine**2) * v])
+    recording = Recording(title="linear", time=np.arange(n) * 1e-3, channels={FORCE: np.zeros(n)})
+    signal = Signal(channel=FORCE, rows=np.arange(n), values=np.zeros(n), sigma=sigma, noise=sigma, ar=(), span=1.0)
+    simulator: Any = Linear(columns)
+    e = Dataset(
+        name="linear", recording=recording, simulator=simulator, signals=(signal,), shift_prior=1e-3, condition=""
+    )
+    return PlannedTests([e])
+
+
+def drops(*speeds: float, noise: float = 0.005, rate: float = 300.0, **more: Any) -> list[Dataset]:
+    known = usual_noise(scenario(), CHANNELS, noise)
+    made = [planned(scenario(), {"initiation.speed": v}, Instruments(noise=known, rate=rate, **more)) for v in speeds]
+    return [e for e in made if e is not None]
+
+
+def effects_of(dataset: list[Dataset]) -> dict[str, Candidate]:
+    return {c.key: c for c in candidates_of(dataset, (), "drop", scenario(), size_of(scenario()))}
+
+
+def at(c: Candidate, **values: float) -> tuple[float, ...]:
+    return coordinates(values, c.search)
+
+
+def test_probabilities_in_closed_form() -> None:
+    assert chances.choice(9.0) == pytest.approx(norm.cdf(1.5), rel=1e-12)
+    assert chances.choice(0.0) == 0.5
+    # one number: the normal test to both sides
+    quantile = norm.isf(0.025)
+    assert chances.detection(4.0, 0.05) == pytest.approx(norm.sf(quantile - 2.0) + norm.cdf(-quantile - 2.0), rel=1e-9)
+    assert chances.needed(0.9, 0.05) == pytest.approx(10.507, abs=1e-3)
+    assert chances.of_one(0.05, 10) == pytest.approx(1.0 - 0.95**0.1, rel=1e-12)
+
+
+def test_the_choice_between_two_that_are_fitted_scatters_more_the_less_they_share() -> None:
+    J = np.eye(50)[:, :2]
+    assert chances.spread_of(J, J @ [[1.0, 2.0], [0.0, 1.0]]) == pytest.approx(0.0, abs=1e-12)
+    assert chances.spread_of(J, np.eye(50)[:, 2:5]) == pytest.approx(5.0)
+    rng = np.random.default_rng(3)
+    d = np.zeros(50)
+    d[10] = 3.0
+    own, other = np.eye(50)[:, [10]], np.eye(50)[:, [20]]
+    noisy = d + rng.standard_normal((40_000, 50))
+    D = (noisy @ own)[:, 0] ** 2 - (noisy @ other)[:, 0] ** 2
+    # refitted, the true effect takes up the noise along itself; lambda is what the rival leaves
+    assert np.mean(D > 0.0) == pytest.approx(chances.choice(9.0, chances.spread_of(own, other)), abs=0.02)
+
+
+@pytest.mark.parametrize("cosine", [0.0, 0.6, 0.97])
+def test_a_linear_model_has_the_noncentrality_of_its_projection(cosine: float) -> None:
+    tests = linear(cosine)
+    strength = 40.0
+    assert tests.unexplained(MASS, at(MASS, added=strength)) == pytest.approx((strength / 2.0) ** 2, rel=1e-6)
+    found = tests.apart(MASS, at(MASS, added=strength), BIAS)
+    assert found is not None
+    expected = (strength / 2.0) ** 2 * (1.0 - cosine**2)
+    assert found.noncentrality == pytest.approx(expected, rel=1e-4)
+    assert found.probability == pytest.approx(
+        chances.choice(expected, 2.0 - 2.0 * cosine**2 if expected < 400.0 else 0.0), abs=1e-3
+    )
+
+
+def test_the_least_strength_is_the_one_that_shows_as_often_as_asked_for() -> None:
+    tests = linear(0.0)
+
+    def shows(x: tuple[float, ...]) -> float:
+        return tests.unexplained(MASS, x)
+
+    place = place_where_it_acts(MASS, shows)
+    assert place is not None
+    found = strength_with(MASS, place, shows, 10.507)
+    assert found is not None
+    assert MASS.values(found)["added"] == pytest.approx(2.0 * math.sqrt(10.507), rel=0.015)
+    assert strength_with(MASS, place, shows, 1e6) is None, "its range ends at 300"
+
+
+def test_less_noise_more_strength_more_drops_tell_more_and_a_discrepancy_less() -> None:
+    c = effects_of(drops(2.0))[DAMPING]
+    usual, strong = at(c, damping=20.0), at(c, damping=40.0)
+    plain = PlannedTests(drops(2.0)).unexplained(c, usual)
+    assert plain > 10.0
+    assert PlannedTests(drops(2.0, noise=0.01)).unexplained(c, usual) < 0.3 * plain
+    assert PlannedTests(drops(2.0)).unexplained(c, strong) == pytest.approx(4.0 * plain, rel=0.1)
+    assert PlannedTests(drops(2.0, 3.0)).unexplained(c, usual) > 1.5 * plain
+    assert PlannedTests(drops(2.0, rate=1200.0)).unexplained(c, usual) == pytest.approx(4.0 * plain, rel=0.25)
+    assert PlannedTests(drops(2.0, tolerance=0.02)).unexplained(c, usual) < 0.2 * plain
+    some = [only(e, [DEPTH]) for e in drops(2.0)]
+    assert PlannedTests(some).unexplained(c, usual) < plain
+
+
+def test_what_instruments_and_conditions_leave_open_shows_no_effect() -> None:
+    known = effects_of(drops(2.0))
+    gain = known[f"sensor-gain:{FORCE}"]
+    exact, open_ = (PlannedTests(drops(2.0, gain=g)).unexplained(gain, at(gain, gain=1.02)) for g in (0.0, 0.02))
+    assert exact > 100.0
+    assert open_ < 1.0, "one standard deviation of the gain is a noncentrality of one at most"
+    speed = known["impact-speed"]
+    told, unsure = (
+        PlannedTests(drops(2.0, uncertain=u)).unexplained(speed, at(speed, scale=1.01))
+        for u in ({}, {"initiation.speed": 0.02})
+    )
+    assert told > 100.0
+    assert unsure == pytest.approx(1.0, abs=0.1)
+
+
+def test_noise_beside_a_discrepancy_is_whitened() -> None:
+    rng = np.random.default_rng(2)
+    n, white, miss, memory = 60_000, 1.0, 3.0, 40.0
+    keep = math.exp(-1.0 / memory)
+    from scipy.signal import lfilter
+
+    drift = lfilter([miss * math.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal(n))
+    signal = Signal(
+        channel=FORCE, rows=np.arange(n), values=np.zeros(n), sigma=math.hypot(white, miss), noise=white,
+        ar=coloured(white, miss, memory, SETTINGS.planning.order), span=1.0,
+    )  # fmt: skip
+    w = Whitening([signal.spread])(drift + white * rng.standard_normal(n))[SETTINGS.planning.order :]
+    assert np.std(w) == pytest.approx(1.0, abs=0.02)
+    assert abs(np.mean(w[1:] * w[:-1])) < 0.03
+
+
+def test_a_promise_is_kept_in_simulated_campaigns() -> None:
+    """Noise, clocks, gains drawn anew; both effects fitted to it; the smaller misfit chooses."""
+    dataset = drops(1.0, 3.5)
+    known = effects_of(dataset)
+    a, b = known[DAMPING], known[DRAG]
+    tests = PlannedTests(dataset)
+
+    def shows(x: tuple[float, ...]) -> float:
+        return tests.unexplained(a, x)
+
+    place = place_where_it_acts(a, shows)
+    assert place is not None
+    x = strength_with(a, place, shows, 45.0)
+    assert x is not None
+    promised = tests.apart(a, x, b)
+    assert promised is not None
+    assert 0.7 < promised.probability < 0.95, "a promise that can be broken"
+    rng, right, count = np.random.default_rng(4), 0, 100
+    for _ in range(count):
+        noisy, clocks = [], []
+        for e in dataset:
+            late = float(rng.normal(0.0, 1e-3))
+            raw = e.raw(e.simulator.predict(Problem.changes([a], x), late) or {})
+            assert e.doubts is not None
+            raw = raw + e.doubts @ rng.standard_normal(e.doubts.shape[1])
+            raw = raw + np.concatenate([rng.normal(0.0, s.sigma, s.rows.size) for s in e.signals])
+            noisy.append(showing(e, raw))
+            clocks.append(late)
+        problem = Problem(noisy)
+        fits = [problem.fit((c,), start, rounds=8, width=1, shifts=clocks) for c, start in ((a, x), (b, promised.x))]
+        assert fits[0] is not None
+        assert fits[1] is not None
+        right += fits[0].left < fits[1].left
+    interval = binomtest(right, count).proportion_ci(0.99)
+    assert interval.low <= promised.probability <= interval.high
+
+
+def test_another_speed_is_what_tells_damping_from_drag() -> None:
+    """At one speed they are nearly alike, over a range of speeds they are not."""
+    known = Instruments(noise=usual_noise(scenario(), (FORCE, DEPTH)), rate=300.0)
+    found = plan(scenario(), instruments=known, between=[(DAMPING, DRAG)])
+    (advice,) = found.next_tests
+    assert advice.probability < 0.8
+    assert advice.best is not None
+    assert advice.best.probability > advice.probability + 0.1
+    again = next(t for t in advice.tried if t.value == 3.0 and t.rate == 300.0)
+    assert advice.best.probability > again.probability, "another speed tells more than the same once more"
+    assert advice.known.startswith("drops over a range of speeds")
+    drawn = {e.effect: e for e in found.effects}
+    assert drawn[DAMPING].least is not None
+    assert drawn[DAMPING].power == pytest.approx(1.0, abs=1e-6)
+    over = plan(
+        scenario(),
+        conditions=[{"initiation.speed": v} for v in (1.0, 2.0, 3.5)],
+        instruments=known,
+        between=[(DAMPING, DRAG)],
+    )
+    one, several = found.of(DAMPING, DRAG), over.of(DAMPING, DRAG)
+    assert one is not None
+    assert several is not None
+    assert several > one
+
+
+def test_an_effect_that_never_acts_is_said_never_to_show() -> None:
+    """A striker that stays in the ground is not held back as it lifts off."""
+    names = [("soil-adhesion", "soil-stiffness")]
+    found = plan(
+        scenario(), instruments=Instruments(noise=usual_noise(scenario(), (FORCE,)), rate=300.0), between=names
+    )
+    adhesion = next(e for e in found.effects if e.effect == "soil-adhesion")
+    assert adhesion.least is None
+    assert adhesion.judged is None
+    assert adhesion.least_in_words == "never within its range"
+    assert found.of("soil-adhesion", "soil-stiffness") is None
+
+
+def test_what_cannot_be_planned_is_refused() -> None:
+    with pytest.raises(InputError, match="no effect that this test can have, got 'sensor-gain'; one of sensor-gain:"):
+        plan(scenario(), between=[("sensor-gain", DAMPING)])
+    with pytest.raises(InputError, match="did you mean 'ground/force_normal'"):
+        usual_noise(scenario(), ("ground/force_norma",))
+
+
+def test_a_diagnosis_asks_for_the_drop_that_its_own_fits_differ_in() -> None:
+    """Hardening beside stiffness after drops at 2 and 3 m/s: a drop far slower tells, and a repeat does not."""
+    changes = {"effects.soil-rate-hardening.per_decade": 0.02}
+    made = recorded(changes, 1, speeds=(2.0, 3.0))
+    dataset, _ = prepared(scenario(), made, Executor())
+    known, problem = effects_of(dataset), Problem(dataset)
+    hardening, stiffness = known["soil-rate-hardening"], known["soil-stiffness"]
+    one = problem.fit((hardening,), at(hardening, per_decade=0.02))
+    other = problem.fit((stiffness,), at(stiffness, scale=1.05))
+    assert one is not None
+    assert other is not None
+    counted = problem.simulations
+    found = next_test(scenario(), dataset, one, other)
+    assert problem.simulations == counted, "the account of a diagnosis is not touched"
+    assert found is not None
+    assert found.path == "initiation.speed"
+    assert found.value < 2.0
+    assert found.probability > 0.9
+    assert found.channels == (FORCE, DEPTH)
+    assert found.rate == pytest.approx(300.0)
+    assert found.says().endswith(f"would tell them apart with {found.probability:.0%}")
+    loud = [replace(e, signals=tuple(replace(s, noise=10.0 * s.noise) for s in e.signals)) for e in dataset]
+    less = next_test(scenario(), loud, one, other)
+    assert less is not None
+    assert less.probability < 0.8
