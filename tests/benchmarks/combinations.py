@@ -3,7 +3,7 @@
     python -m tests.benchmarks.combinations [DURATION]
 
 DURATION (0.3) s of each, at most what the scenario has. Laws without typical coefficients take those of a shipped
-soil, and are left out where there is none. Prints a line for each that is not done and the largest residual of the ledger.
+soil, and are left out where there is none. Prints a line for each that is not done, and the largest ledger residual.
 """
 
 from __future__ import annotations
