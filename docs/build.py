@@ -25,6 +25,7 @@ SITE = {  # caption -> pages, in the order of the menu
     "How to": [
         "docs/how_to_add",
         "docs/engineers_day",
+        "docs/inputs",
         "docs/viewing",
         "docs/commands",
         "docs/python",

@@ -254,14 +254,12 @@ def test_the_work_of_steering_is_booked_where_wheels_turn_fast_and_the_axle_roll
 def test_a_torque_history_drives_and_brakes() -> None:
     """v = integral of T/r over m and what the wheels' inertia adds; the brakes' limit takes it back."""
     time, value = [0.2, 0.6, 1.0, 1.4], [0.0, 3000.0, 3000.0, 0.0]
-    base = driving({"initiation.drive": {}}, duration=2.0)
-    pushed = driven(base, {"kind": "drive-torque", "torque": {"time": time, "value": value}})
+    push = {"kind": "drive-torque", "torque": {"time": time, "value": value}}
+    pushed = driven(driving({}, duration=2.0), push, **{"initiation.drive": {}})
     gained = float(np.ptp(pushed.recording["chassis/velocity_x"][[0, -1]]))
     assert gained == pytest.approx(np.trapezoid(value, time) / 0.70 / (MASS + ROLLING), rel=0.02)
-    held = driven(
-        driving({"initiation.speed": 6.0, "initiation.brake": {"axle": "rear"}}, duration=2.0),
-        {"kind": "brake-torque", "torque": {"time": time, "value": [0.5 * v for v in value]}},
-    )
+    hold = {"kind": "brake-torque", "torque": {"time": time, "value": [0.5 * v for v in value]}}
+    held = driven(driving({"initiation.speed": 6.0}, duration=2.0), hold, **{"initiation.brake": {"axle": "rear"}})
     lost = float(np.ptp(held.recording["chassis/velocity_x"][[0, -1]]))
     assert lost == pytest.approx(np.trapezoid(value, time) / 0.70 / (MASS + ROLLING), rel=0.02)
     assert held.ledger["drive"] > 0.0

@@ -34,6 +34,7 @@ RUN = [
     "README.md",
     *(f"docs/tutorials/{n}.md" for n in ("first_overturn", "own_tractor", "design_load", "logger_data", "ci_gate")),
     "docs/commands.md",
+    "docs/inputs.md",
     "docs/viewing.md",
     "docs/python.md",
     "docs/proof.md",
