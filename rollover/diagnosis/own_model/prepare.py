@@ -92,7 +92,12 @@ def begun(model: ForwardModel, problem: Problem) -> Fitted | None:
         if again is None or again.left > best.left - TUNING.least_gain:
             break
         best = again
-    return None if best is None else ended(problem, problem.again(best))
+    if best is None or not baseline:
+        return best
+    alone = [problem.fit(baseline, best.x, only=[r]) for r in range(len(problem.dataset))]
+    met = min((f for f in alone if f is not None), key=lambda f: f.left / f.blocks[0].residual.size, default=best)
+    placed = replace(baseline[0], places=tuple(dict.fromkeys([start, met.x])))
+    return ended(problem, problem.again(replace(best, candidates=(placed,))))
 
 
 def _unfit(model: ForwardModel, name: str, r: Recording) -> Iterator[Fault]:
