@@ -42,24 +42,38 @@ def load(kind: str, examine: Callable[[ModuleType], str] = lambda module: "") ->
     `examine` says what is wrong with a module that was loaded, and nothing if it is well.
     """
     for path in named(kind):
-        name = _module(kind, path)
-        if name in sys.modules:
-            continue
-        if not path.is_file():
-            raise InputError(Fault(file=str(path), message=f"no such file of {kind}; a Python file is needed"))
-        try:
-            module = importlib.import_module(name)
-        except Exception as e:
-            sys.modules.pop(name, None)
-            raise InputError(Fault(file=str(path), line=_line(e, path), message=_worded(e))) from e
-        if wrong := examine(module):
-            del sys.modules[name]
-            raise InputError(Fault(file=str(path), message=wrong))
+        _load(kind, path, examine)
 
 
-def module_of(kind: str, path: Path) -> ModuleType:
-    """The module of a file that was loaded."""
-    return sys.modules[_module(kind, path.resolve())]
+def load_one(kind: str, path: Path, examine: Callable[[ModuleType], str] = lambda module: "") -> ModuleType:
+    """Name and load one file of a kind; one that cannot be used is not named any more. Raises `InputError`."""
+    before, path = os.environ.get(KINDS[kind]), path.resolve()
+    if path not in named(kind):
+        add(kind, [path])
+    try:
+        _load(kind, path, examine)
+    except InputError:
+        del os.environ[KINDS[kind]]
+        if before is not None:
+            os.environ[KINDS[kind]] = before
+        raise
+    return sys.modules[_module(kind, path)]
+
+
+def _load(kind: str, path: Path, examine: Callable[[ModuleType], str]) -> None:
+    name = _module(kind, path)
+    if name in sys.modules:
+        return
+    if not path.is_file():
+        raise InputError(Fault(file=str(path), message=f"no such file of {kind}; a Python file is needed"))
+    try:
+        module = importlib.import_module(name)
+    except Exception as e:
+        sys.modules.pop(name, None)
+        raise InputError(Fault(file=str(path), line=_line(e, path), message=_worded(e))) from e
+    if wrong := examine(module):
+        del sys.modules[name]
+        raise InputError(Fault(file=str(path), message=wrong))
 
 
 def hashes(kind: str) -> dict[str, str]:

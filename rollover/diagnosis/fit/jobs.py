@@ -26,7 +26,7 @@ from rollover.diagnosis.fit.model_variants import in_form, shaped
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.scan_jobs import serial_map
 from rollover.diagnosis.fit.threshold_scan import Stretch, traced
-from rollover.system.errors import Fault, InputError
+from rollover.diagnosis.forward.failed_model import FailedModelError
 from rollover.system.processes import Children, Failure, begin_server, map_cases
 from rollover.system.writing import scratch
 
@@ -217,10 +217,10 @@ class Executor:
 
 
 def _failed(what: str, failure: Failure) -> Exception:
-    """What a child's failure is here: what it refuses as wrong input is that, the line as it stands."""
+    """What a child's failure is here: that of a model of one's own is that, its line as it stands."""
     kind, _, line = failure.sentence.partition(": ")
-    if kind == InputError.__name__:
-        return InputError(Fault(message=line))
+    if kind == FailedModelError.__name__:
+        return FailedModelError(line)
     return RuntimeError(f"{what}: {failure.sentence}")
 
 

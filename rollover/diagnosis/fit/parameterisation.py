@@ -38,7 +38,8 @@ class Candidate:
     own: Mapping[str, float] = field(default_factory=dict)  # the scenario's values, where no number is an effect's null
     places: tuple[tuple[float, ...], ...] = ()  # where it is looked at, if not wherever its `probes` are
     along: tuple[str, ...] = ()  # of a fitted shape, at whose default all other coordinates are held: `Effect.bent`
-    is_baseline: bool = False  # no effect: what any explanation is fitted beside, see `Fitted.effects`
+    # no effect: what any explanation is fitted beside, see `Fitted.effects`; fits begin from its `places` as well
+    is_baseline: bool = False
 
     @property
     def key(self) -> str:

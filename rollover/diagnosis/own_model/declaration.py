@@ -150,7 +150,7 @@ def _wrong(model: object) -> Iterator[tuple[str, str]]:
             continue
         if not ID.fullmatch(term.id) or term.id == BASELINE or term.id in SENSORS:
             yield f"terms[{k}].id", f"not to be used, got {term.id!r}; lower-case words joined by '-' are allowed"
-        if ids.count(term.id) > 1:
+        if term.id in ids[:k]:
             yield f"terms[{k}].id", f"given twice, got {term.id!r}; once is allowed"
         if term.kind not in ("physics", "parameter"):
             yield f"terms[{k}].kind", f"unknown kind, got {term.kind!r}; physics or parameter is allowed"

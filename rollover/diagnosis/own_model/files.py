@@ -27,9 +27,7 @@ def found_at(name: str | Path) -> Path:
 
 def load_model(path: Path) -> ForwardModel:
     """The object `model` of a Python file, checked. Raises `InputError`."""
-    own_code.add(KIND, [path])
-    own_code.load(KIND, _examined)
-    return declared(getattr(own_code.module_of(KIND, path), NAME), str(path))
+    return declared(getattr(own_code.load_one(KIND, path, _examined), NAME), str(path))
 
 
 def hashes(path: Path) -> dict[str, str]:

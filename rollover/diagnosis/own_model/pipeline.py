@@ -15,6 +15,7 @@ from rollover.diagnosis.data.dataset import left_out
 from rollover.diagnosis.data.phases import phases_of
 from rollover.diagnosis.fit.jobs import Executor
 from rollover.diagnosis.fit.levenberg_marquardt import Problem
+from rollover.diagnosis.forward.failed_model import FailedModelError
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.invariants import checked
 from rollover.diagnosis.own_model.declaration import BASELINE, ForwardModel, declared
@@ -25,6 +26,7 @@ from rollover.diagnosis.reported import reported
 from rollover.diagnosis.result import Diagnosis
 from rollover.diagnosis.selection.context import Inquiry
 from rollover.recording import Recording
+from rollover.system.errors import Fault, InputError
 
 
 def diagnose_model(
@@ -42,47 +44,55 @@ def diagnose_model(
     each is left out in turn; `tolerance` is the share of a channel's range by which a model that lacks nothing may miss
     it. Raises `InputError` for a declaration, a recording or an output that cannot be used.
     """
-    began = clock.perf_counter()
     declared(model)
+    asked = Asked(
+        scenario=None,
+        recordings=recordings,
+        hold_out=hold_out,
+        say=say,
+        executor=executor or Executor(),
+        began=clock.perf_counter(),
+        estimates=True,  # what may as well be nothing, or stands at an end of its range, is not named
+    )
     with tables(model):
-        every, notes = prepared_for(model, recordings)
-        every = with_noise(model, [replace(e, model_error=float(np.hypot(e.model_error, tolerance))) for e in every])
-        found, kept = ([e for e in every if (e.name in hold_out) == held] for held in (False, True))
-        if sum(e.count for e in found) < TUNING.least_samples:
-            return nothing_told(every, list(recordings), notes, began)
-        problem, executor = Problem(found), executor or Executor()
-        asked = Asked(
-            scenario=None,
-            recordings=recordings,
-            hold_out=hold_out,
-            say=say,
-            executor=executor,
-            began=began,
-            estimates=True,  # what may as well be nothing, or stands at an end of its range, is not named
-        )
-        executor.begin(problem)
-        base = begun(model, problem)
-        if base is None:
-            return nothing_told(every, list(recordings), [*notes, "the model could not be fitted"], began)
-        groups = left_out(found)
-        if len(groups) < 2 and not kept:
-            notes.append("one recording only: what stands as held out is predicted by the fit to it")
-        inquiry = Inquiry(
-            problem=problem,
-            candidates=candidates_of_model(model, found),
-            groups=groups,
-            phases=[phases_of(e) for e in found],
-            say=say,
-            executor=executor,
-        )
-        concluded = weighed(asked, inquiry, base, kept, acts="model", notes=notes)
-        fitted = concluded.explanation.fitted
-        always = dict(zip([c.id for c in fitted.candidates], intervals(problem, fitted), strict=True)).get(BASELINE, {})
-        told = checked(replace(reported(concluded), baseline=always))
-        return replace(told, seconds=clock.perf_counter() - began)
+        try:
+            found = checked(_diagnosed(model, asked, tolerance))
+        except FailedModelError as e:
+            raise InputError(Fault(message=str(e))) from e
+    return replace(found, seconds=clock.perf_counter() - asked.began)
+
+
+def _diagnosed(model: ForwardModel, asked: Asked, tolerance: float) -> Diagnosis:
+    """The diagnosis, within the tables of the model."""
+    names, executor = list(asked.recordings), asked.executor
+    every, notes = prepared_for(model, asked.recordings)
+    every = with_noise(model, [replace(e, model_error=float(np.hypot(e.model_error, tolerance))) for e in every])
+    found, kept = ([e for e in every if (e.name in asked.hold_out) == held] for held in (False, True))
+    if sum(e.count for e in found) < TUNING.least_samples:
+        return nothing_told(every, names, notes, asked.began)
+    problem = Problem(found)
+    executor.begin(problem)
+    base = begun(model, problem)
+    if base is None:
+        return nothing_told(every, names, [*notes, "the model could not be fitted"], asked.began)
+    groups = left_out(found)
+    if len(groups) < 2 and not kept:
+        notes.append("one recording only: what stands as held out is predicted by the fit to it")
+    inquiry = Inquiry(
+        problem=problem,
+        candidates=candidates_of_model(model, found),
+        groups=groups,
+        phases=[phases_of(e) for e in found],
+        say=asked.say,
+        executor=executor,
+    )
+    concluded = weighed(asked, inquiry, base, kept, acts="model", notes=notes)
+    fitted = concluded.explanation.fitted
+    always = dict(zip([c.id for c in fitted.candidates], intervals(problem, fitted), strict=True)).get(BASELINE, {})
+    return replace(reported(concluded), baseline=always)
 
 
 def account(model: ForwardModel, found: Diagnosis, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """What diagnosis.json says of a model of one's own, bare JSON values; as of a scenario, and the fitted model."""
-    fitted = {name: asdict(i) for name, i in found.baseline.items()}
+    fitted = {name: {k: v for k, v in asdict(i).items() if v is not None} for name, i in found.baseline.items()}
     return {**io.account(found, about), "model": {"title": model.title, "parameters": fitted}}

@@ -27,7 +27,7 @@ TUNING = SETTINGS.fit.own_model
 def prepared_for(model: ForwardModel, recordings: Mapping[str, Recording]) -> tuple[list[Dataset], list[str]]:
     """Recordings as evidence, and what is to be said of them. Raises `InputError` for all that cannot drive the model.
 
-    Also for a model that fails, or does not keep to what it declares, where fits begin.
+    Raises `FailedModelError` for a model that fails, or does not keep to what it declares, where fits begin.
     """
     faults = [f for name, r in recordings.items() for f in _unfit(model, name, r)]
     if faults:
@@ -92,7 +92,12 @@ def begun(model: ForwardModel, problem: Problem) -> Fitted | None:
         if again is None or again.left > best.left - TUNING.least_gain:
             break
         best = again
-    return None if best is None else ended(problem, problem.again(best))
+    if best is None or not baseline:
+        return best
+    alone = [problem.fit(baseline, best.x, only=[r]) for r in range(len(problem.dataset))]
+    met = min((f for f in alone if f is not None), key=lambda f: f.left / f.blocks[0].residual.size, default=best)
+    placed = replace(baseline[0], places=tuple(dict.fromkeys([start, met.x])))
+    return ended(problem, problem.again(replace(best, candidates=(placed,))))
 
 
 def _unfit(model: ForwardModel, name: str, r: Recording) -> Iterator[Fault]:
@@ -141,7 +146,7 @@ def _everywhere(r: Recording, channel: str) -> Array:
 
 
 def _tried(simulator: ModelSimulator) -> None:
-    """Try a model as it is, twice, and each of its terms. Raises `InputError` for what does not keep its word."""
+    """Try a model as it is, twice, and each of its terms. Raises `FailedModelError` for what does not keep its word."""
     model = simulator.model
     first, again = simulator.run({}), simulator.called({})
     if first is None:

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.diagnosis.forward.failed_model import FailedModelError
 from rollover.diagnosis.own_model.declaration import BASELINE, ForwardModel, conditions_of, file_of, values_of
 from rollover.diagnosis.own_model.tables import enter, stretches
 from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import entries, read
 from rollover.recording import Recording
-from rollover.system.errors import Fault, InputError
+from rollover.system.errors import Fault
 
 Array = NDArray[np.float64]
 PREFIX = "effects."
@@ -61,7 +62,7 @@ class ModelSimulator:
         return dict(read(acting, made).channels)
 
     def run(self, values: Mapping[str, float]) -> dict[str, Array] | None:
-        """Outputs before sensors with values exchanged; None where there is no solution. Raises `InputError`."""
+        """Outputs before sensors with values exchanged; None where there is no solution. Raises `FailedModelError`."""
         key = tuple(sorted(values.items()))
         if key not in self._runs:
             if len(self._runs) >= KEPT:
@@ -85,13 +86,12 @@ class ModelSimulator:
         found = {name: np.array(made[name], dtype=np.float64) for name in self.model.outputs}
         return found if all(np.isfinite(v).all() for v in found.values()) else None
 
-    def refused(self, message: str, e: Exception | None = None) -> InputError:
+    def refused(self, message: str, e: Exception | None = None) -> FailedModelError:
         """A fault of the model's file, at the line where an exception began if there was one."""
         file = file_of(self.model)
         lines = [f.lineno for f in traceback.extract_tb(e.__traceback__) if f.filename == file] if e else []
-        return InputError(
-            Fault(file=file, line=lines[-1] if lines else None, path=self.recording.title, message=message)
-        )
+        fault = Fault(file=file, line=lines[-1] if lines else None, path=self.recording.title, message=message)
+        return FailedModelError(str(fault))
 
     def _wrong(self, made: object) -> Iterator[str]:
         """What is wrong with what a model returned."""

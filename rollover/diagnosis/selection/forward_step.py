@@ -157,11 +157,12 @@ def _first_fits(
     fixed_shifts = problem.effort.is_ensemble or is_far(problem, base)
     tasks = [
         Task(
-            candidates=(*base.candidates, s.candidate), start=(*base.x, *start), shifts=at, only=tuple(few),
+            candidates=(*base.candidates, s.candidate), start=(*x, *start), shifts=at, only=tuple(few),
             rounds=problem.effort.short, fixed_shifts=fixed_shifts, reused=reused_of(problem, base, few),
         )
         for s in chosen.values()
         for start in s.starts
+        for x in (base.x, *_elsewhere_of(base))
     ]  # fmt: skip
     far = [] if problem.heavy_tailed else [task for task in tasks if task.candidates[-1].key in looked.far]
     fits = [f for f in inquiry.fits([task for task in tasks if task not in far]) if f is not None]
@@ -189,6 +190,15 @@ def _first_fits(
     if all(f.candidates[-1].key != looked.best for f in worth):
         worth += [f for f in fits if f.candidates[-1].key == looked.best][:1]
     return [replace(s, nrmse=told.get(s.candidate.key, 0.0)) for s in screened], worth
+
+
+def _elsewhere_of(base: Fitted) -> list[tuple[float, ...]]:
+    """Coordinates of a base whose baseline, if it has one, stands where that may be without what is missing.
+
+    Fitted alone it was bent to what is missing, and from there no way may lead back.
+    """
+    held, effects = (sum(len(c.search) for c in part) for part in (base.candidates[: base.first], base.effects))
+    return [(*at, *base.x[len(base.x) - effects :]) for c in base.candidates[: base.first] for at in c.places if held]
 
 
 def _smoothly(inquiry: Inquiry, tasks: Sequence[Task], few: Sequence[int]) -> list[Fitted]:

@@ -128,7 +128,9 @@ class Forward:
     run: Run = Run()  # simulated full runs
     phases: Phases = Phases()  # phases of a full run
     drops: Effort = Effort()  # limits of a search by drops, which cost two milliseconds each
-    models: Effort = Effort(is_timed=False)  # limits of a search by a model that recorded inputs drive: one clock
+    # limits of a search by a model that recorded inputs drive: one clock, and longer fits, as its own parameters move
+    # along with each effect
+    models: Effort = Effort(is_timed=False, short=12, rounds=40)
     # samples of a part of a recording of such a model, in which 12 cosines reach 1/12 of the sampling rate; derived:
     # 12/(2 * 72)
     model_part: int = 72
