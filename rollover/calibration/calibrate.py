@@ -180,14 +180,15 @@ def calibrate(
     result = _calibration(scenario, plain, final, u, found, given, ready, list(recordings), outliers, agreeing)
     if posterior == 0:
         return result
-    drawn = sampled(partial(log_likelihood, final, found.widening), u, found.covariance, draws=posterior, seed=seed)
+    clocks = [final.parts(k, u)[1] for k in range(len(final.cases))]
+    density = partial(log_likelihood, final, found.widening, clocks)
+    drawn = sampled(density, u, found.covariance, draws=posterior, seed=seed)
     return replace(result, posterior=drawn, warnings=(*result.warnings, *_unmixed(drawn)))
 
 
-def log_likelihood(objective: Objective, widening: float, u: Array) -> float:
-    """Log likelihood of `u` (p,), but for a constant: clocks at their best, widened by the misfit over the noise."""
-    r = objective.residuals(u)
-    return -0.5 * float(r @ r) / widening
+def log_likelihood(objective: Objective, widening: float, clocks: Sequence[float], u: Array) -> float:
+    """Log likelihood of `u` (p,), but for a constant, widened by the misfit over the noise; `clocks` (s) are near."""
+    return -0.5 * objective.squares(u, clocks) / widening
 
 
 def _unmixed(drawn: Posterior) -> list[str]:

@@ -22,7 +22,7 @@ LogDensity = Callable[[Array], float]
 
 DRAWS = 3000
 LEAST_WALKERS = 16  # and at least twice as many as parameters, which jumps along differences ask for
-WARM_UP = 0.25  # share of the steps that are thrown away
+WARM_UP = 0.1  # share of the steps that are thrown away: walkers start from the jumps' density, near to the posterior's
 FREEDOM = 5.0  # of the Student's t that jumps are drawn by: heavier tails than those of any quadratic approximation
 WIDER = 1.15  # times as wide as that: what is too narrow never gets into the tails
 WIDEST = 0.3  # standard deviation of jumps in ranges: about that of a uniform prior, 1/sqrt(12)
@@ -87,7 +87,8 @@ def sampled(
     start = np.clip(jump.drawn(walkers, random), 1e-6, 1.0 - 1e-6)
     chains.run_mcmc(start, warm_up + steps, skip_initial_state_check=True)
     kept = np.asarray(chains.get_chain(discard=warm_up))  # (steps, walkers, p)
-    told = emcee.autocorr.integrated_time(kept, tol=0)  # what is too short for it shows in R-hat
+    with np.errstate(invalid="ignore"):  # of a walker that never moved
+        told = emcee.autocorr.integrated_time(kept, tol=0)  # what is too short for it shows in R-hat
     worth = np.where(np.isfinite(told), np.clip(told, 1.0, steps), steps)
     return Posterior(
         draws=kept.reshape(-1, centre.size)[:draws],

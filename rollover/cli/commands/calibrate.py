@@ -23,7 +23,8 @@ DRAWS = "posterior.csv"
 @app.command(
     epilog=manual(
         "calibrate drop_test rec/d2.csv rec/d3.csv --fit vehicle.mass --fit ground.law.stiffness_scale=0.3:3",
-        writes="calibrate.json, override.yaml, scenario-calibrated.yaml (it runs), report.html, posterior.csv on demand.",
+        writes="calibrate.json, override.yaml, scenario-calibrated.yaml (it runs), report.html; with --posterior "
+        "posterior.csv.",
         status=BROKE,
     )
 )
