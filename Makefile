@@ -7,7 +7,7 @@ PYTHON ?= python3
 UV := $(shell command -v uv 2>/dev/null || echo .tools/bin/uv)
 READY := .venv/.ready
 TESTED := .venv/.tested
-GROUPS := --group formats --group oracle --group studies --group browser --group docs
+GROUPS := --group formats --group oracle --group studies --group posterior --group browser --group docs
 CORE := .venv/core
 
 .PHONY: demo test test-core docs view setup lint bench clean

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rollover.calibration.identifiability import Determination, determine
 from rollover.calibration.objective import Case, Noise, Objective, Parameter, Simulate, case, check_free
+from rollover.calibration.posterior import Posterior, sampled
 from rollover.comparison import alignment
 from rollover.comparison.rating import Iso18571, Rating, rate
 from rollover.dynamics import drop_test, simulate
@@ -106,6 +107,16 @@ class Calibration:
     widening: float
     starts_agreeing: tuple[int, int]
     warnings: tuple[str, ...]
+    parameters: tuple[Parameter, ...] = ()
+    posterior: Posterior | None = None
+
+    @property
+    def draws(self) -> Array:
+        """Draws (n, p) of the fitted values, SI; none where no posterior was asked for."""
+        if self.posterior is None:
+            return np.zeros((0, len(self.parameters)))
+        columns = zip(self.parameters, self.posterior.draws.T, strict=True)
+        return np.column_stack([[p.value(float(u)) for u in column] for p, column in columns])
 
     @property
     def override(self) -> dict[str, float]:
@@ -135,11 +146,13 @@ def calibrate(
     starts: int = STARTS,
     seed: int = 0,
     workers: int = 0,
+    posterior: int = 0,
 ) -> Calibration:
     """Fit parameters to recordings, all at once, each under its own conditions.
 
     `noise(recording, channel)` gives 1 sigma where a recording states none. `clock_sigma` s is the width of the
-    prior of each recording's clock offset, 0 for exact clocks. `workers` child processes follow the starts, 0 none.
+    prior of each recording's clock offset, 0 for exact clocks. `workers` child processes follow the starts, 0 none;
+    `posterior` draws of what stays open are made, 0 none.
     Raises `InputError` for a fitted parameter that a recording states as its condition, ``ValueError`` for a
     recording of which nothing can be compared.
     """
@@ -164,7 +177,25 @@ def calibrate(
     # the residual of the last fit decides how many of its samples are independent
     final = replace(weighted.correlated(u), weights=weighted.weights)
     found = determine(final, u)
-    return _calibration(scenario, plain, final, u, found, given, ready, list(recordings), outliers, agreeing)
+    result = _calibration(scenario, plain, final, u, found, given, ready, list(recordings), outliers, agreeing)
+    if posterior == 0:
+        return result
+    clocks = [final.parts(k, u)[1] for k in range(len(final.cases))]
+    density = partial(log_likelihood, final, found.widening, clocks)
+    drawn = sampled(density, u, found.covariance, draws=posterior, seed=seed)
+    return replace(result, posterior=drawn, warnings=(*result.warnings, *_unmixed(drawn)))
+
+
+def log_likelihood(objective: Objective, widening: float, clocks: Sequence[float], u: Array) -> float:
+    """Log likelihood of `u` (p,), but for a constant, widened by the misfit over the noise; `clocks` (s) are near."""
+    return -0.5 * objective.squares(u, clocks) / widening
+
+
+def _unmixed(drawn: Posterior) -> list[str]:
+    if drawn.is_mixed:
+        return []
+    worst = float(np.max(drawn.r_hat))
+    return [f"the walkers of the posterior do not agree, R-hat {worst:.3g}: more draws, or narrower bounds"]
 
 
 def follow(task: tuple[Objective, Array, Literal["linear", "soft_l1"]]) -> tuple[Array, float]:
@@ -317,6 +348,7 @@ def _calibration(
         widening=found.widening,
         starts_agreeing=agreeing,
         warnings=(),
+        parameters=final.parameters,
     )
     return replace(result, warnings=tuple(_warnings(result, fine, beyond)))
 

@@ -212,6 +212,22 @@ class Objective:
             return at(0.0), 0.0
         return _profiled(at, width)
 
+    def squares(self, u: Array, clocks: Sequence[float]) -> float:
+        """Sum of squared `residuals` with each clock at its best by its slope about `clocks` (s), one for each case."""
+        found, first = 0.0, 0
+        for k, (case, late) in enumerate(zip(self.cases, clocks, strict=True)):
+            at, width = self._by_clock(k, u), self.width(case)
+            is_held = self.held or width <= 0.0
+            r = np.concatenate(at(0.0 if is_held else late))
+            w = 1.0 if self.weights is None else self.weights[first : first + r.size]
+            first, r = first + r.size, w * r
+            found += float(r @ r)
+            if not is_held:
+                h = 0.05 * width
+                s = w * (np.concatenate(at(late + h)) - np.concatenate(at(late - h))) / (2.0 * h)
+                found -= float(s @ r) ** 2 / float(s @ s)
+        return found
+
     def _by_clock(self, k: int, u: Array) -> Callable[[float], list[Array]]:
         """The residuals of case `k` as a function of its clock offset, s."""
         case = self.cases[k]

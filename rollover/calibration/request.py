@@ -8,6 +8,7 @@ from pathlib import Path
 
 from rollover.calibration.calibrate import STARTS, Calibration, calibrate
 from rollover.calibration.objective import Parameter, parameter
+from rollover.calibration.posterior import installed
 from rollover.comparison.misfit import estimated_noise
 from rollover.comparison.recordings import held_out
 from rollover.recording import Recording
@@ -55,8 +56,11 @@ class Request:
         starts: int = STARTS,
         seed: int = 0,
         workers: int = 0,
+        posterior: int = 0,
     ) -> Calibration:
         """Fit, see `calibrate`. Raises `InputError`, for what cannot be fitted about `file`, the scenario's."""
+        if posterior:
+            installed()
         every = self.recordings.items()
         try:
             return calibrate(
@@ -70,6 +74,7 @@ class Request:
                 starts=starts,
                 seed=seed,
                 workers=workers,
+                posterior=posterior,
             )
         except InputError:
             raise

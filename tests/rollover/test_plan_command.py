@@ -56,7 +56,7 @@ def test_a_plan_is_written_said_and_drawn(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("side_overturn", "not a drop test, got 'tractor'"),
+        ("side_overturn", "not a drop test, got 'vehicle'; 'striker' is needed"),
         ("drop_test --between soil-layer", "not two effects, got 'soil-layer'"),
         ("drop_test --between soil-layer,soil-layer", "not two effects"),
         ("drop_test --between soil-layer,soil-crusty", "did you mean 'soil-crust'"),

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from rollover.calibration.calibrate import Calibration, Estimate, Score
-from viz.content.blocks import Block, Cell, Footer, Headline, Note, Section, Table
+from rollover.calibration.posterior import Posterior
+from viz.content.blocks import Block, Cell, Figure, Footer, Headline, Note, Section, Table
 from viz.content.differences import differences_section
+from viz.figures.corner import corner
 from viz.pages.page import render
 
 
@@ -41,6 +45,8 @@ def page(c: Calibration, *, command: str, scenario_hash: str = "", versions: Map
         caption = f"Condition number of the Jacobian with columns scaled to one: {c.condition:.3g}."
         correlations = Table(columns=["", *names], rows=cells, numeric=range(1, len(names) + 1), caption=caption)
         blocks.append(Section(title="Correlations", blocks=[correlations]))
+    if c.posterior is not None:
+        blocks.append(Section(title="What stays open", blocks=_posterior(c, c.posterior)))
     clocks: list[list[str | Cell]] = [
         [name, f"{1e3 * late:+.{12 if abs(late) > 1.0 else 3}g}", f"{1e3 * c.clock_errors[name]:.2g}"]
         for name, late in c.clocks.items()
@@ -72,6 +78,30 @@ def headline(c: Calibration) -> Headline:
         detail=f"{which} went from {judged.before.over_noise:.3g} to {judged.after.over_noise:.3g} times the noise.",
         state="pass" if len(known) == len(c.estimates) and not c.warnings else "warn",
     )
+
+
+def _posterior(c: Calibration, drawn: Posterior) -> list[Block]:
+    """The draws pair by pair, and what they say of each value."""
+    values = c.draws
+    names = [f"{p.path}, {p.unit}" if p.unit else p.path for p in c.parameters]
+    figure = Figure(
+        svg=corner(names, values, [e.value for e in c.estimates]),
+        caption="Draws of the posterior: 68 % and 95 % lie within the shades; lines are the fitted values.",
+    )
+    columns = ["parameter", "mean", "deviation", "2.5 %", "median", "97.5 %", "R-hat", "steps worth one", "independent"]
+    rows: list[list[str | Cell]] = []
+    for k, p in enumerate(c.parameters):
+        low, median, high = np.quantile(values[:, k], [0.025, 0.5, 0.975])
+        told = (values[:, k].mean(), values[:, k].std(ddof=1), low, median, high)
+        each = drawn.r_hat[k], drawn.autocorrelation[k], drawn.effective[k]
+        agree = Cell(f"{each[0]:.3f}", "" if drawn.is_mixed else "warn")
+        rows.append([p.path, *(f"{v:.5g}" for v in told), agree, f"{each[1]:.2g}", f"{each[2]:.0f}"])
+    text = (
+        f"{len(values)} draws by {drawn.sampler}: {drawn.walkers} walkers, {drawn.steps} steps after {drawn.warm_up}, "
+        f"{drawn.acceptance:.0%} of the jumps accepted. Prior: uniform between the bounds, of the logarithm where they "
+        "are spaced logarithmically. The draws are posterior.csv."
+    )
+    return [figure, Table(columns=columns, rows=rows, numeric=range(1, 9)), Note(text=text)]
 
 
 def _row(e: Estimate) -> list[str | Cell]:

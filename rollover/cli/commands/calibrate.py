@@ -18,12 +18,14 @@ if TYPE_CHECKING:
     from rollover.calibration.calibrate import Calibration
 
 JSON, OVERRIDE, SCENARIO, PAGE = "calibrate.json", "override.yaml", "scenario-calibrated.yaml", "report.html"
+DRAWS = "posterior.csv"
 
 
 @app.command(
     epilog=manual(
         "calibrate drop_test rec/d2.csv rec/d3.csv --fit vehicle.mass --fit ground.law.stiffness_scale=0.3:3",
-        writes="calibrate.json, override.yaml, scenario-calibrated.yaml (it runs), report.html.",
+        writes="calibrate.json, override.yaml, scenario-calibrated.yaml (it runs), report.html; with --posterior "
+        "posterior.csv.",
         status=BROKE,
     )
 )
@@ -46,6 +48,10 @@ def calibrate(
     ] = 1e-3,
     starts: Annotated[int, typer.Option(help="Random starts that are screened.", min=0)] = 8,
     seed: Annotated[int, typer.Option(help="Of the random starts.")] = 0,
+    posterior: Annotated[
+        bool, typer.Option("--posterior/--no-posterior", help="Sample what the recordings leave open of the values.")
+    ] = False,
+    draws: Annotated[int, typer.Option(help="Draws of the posterior.", min=500, max=1_000_000)] = 3000,
     profile: Annotated[Path | None, typer.Option(help="What the columns of foreign files are.")] = None,
     out: Annotated[Path | None, typer.Option(help="Results folder", show_default="out/calibrate/NAME")] = None,
     workers: Annotated[int, typer.Option(help="Starts followed at once; 0 for this process.", min=0)] = 0,
@@ -55,7 +61,8 @@ def calibrate(
     """Fit values of a scenario to recordings, with intervals, and say what the recordings cannot determine."""
     from rollover import scenario as scenarios
     from rollover.assessment import results
-    from rollover.calibration.account import FORMAT, account
+    from rollover.calibration.account import FORMAT, account, table
+    from rollover.calibration.posterior import installed
     from rollover.calibration.request import Request
     from rollover.cli import console
     from rollover.comparison.recordings import read
@@ -73,19 +80,31 @@ def calibrate(
         "recordings": list(request.recordings),
         "fitted": fit,
         "held_out": request.held_out,
+        **({"draws": draws} if posterior else {}),
     }
+    if posterior:
+        installed()
     about["origin"] = results.origin(path, folder, set_ or [])
-    results.claim_account(folder, FORMAT, about, [JSON, OVERRIDE, SCENARIO, PAGE], force=force, say=console.say)
+    results.claim_account(folder, FORMAT, about, [JSON, OVERRIDE, SCENARIO, PAGE, DRAWS], force=force, say=console.say)
     found = request.calibrated(
-        file=path, clock_sigma=clock_sigma, channels=channel, starts=starts, seed=seed, workers=workers
+        file=path,
+        clock_sigma=clock_sigma,
+        channels=channel,
+        starts=starts,
+        seed=seed,
+        workers=workers,
+        posterior=draws if posterior else 0,
     )
     answer = account(found, about)
     with results.whole(folder) as part:
         results.write_json(part / JSON, answer)
+        if posterior:
+            (part / DRAWS).write_text(table(found), encoding="utf-8")
         _write_scenario(part, folder, path, settings(set_ or []), found)
         from viz.pages.calibration import page
 
         options = [*_options(fit, hold_out), *(["--profile", str(profile)] if profile else [])]
+        options += ["--posterior", "--draws", str(draws)] if posterior else []
         command = " ".join(map(shlex.quote, ["rollover", "calibrate", scenario, *recordings, *options]))
         text = page(found, command=command, scenario_hash=about["scenario_hash"], versions=results.versions())
         (part / PAGE).write_text(text, encoding="utf-8")

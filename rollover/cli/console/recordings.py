@@ -94,6 +94,12 @@ def calibration(found: Calibration, folder: str) -> None:
         if name in found.clocks:
             late = in_digits(found.clocks[name], found.clock_errors[name])
             out.print(f"{name}: fitted {late} s, 1 sigma {1e3 * found.clock_errors[name]:.2g} ms", style="yellow")
+    if (drawn := found.posterior) is not None:
+        worst, least = float(drawn.r_hat.max()), float(drawn.effective.min())
+        out.print(
+            f"posterior: {len(drawn.draws)} draws by {drawn.sampler}, R-hat up to {worst:.3f}, autocorrelation time up "
+            f"to {float(drawn.autocorrelation.max()):.2g} steps, {least:.0f} independent draws at least"
+        )
     for warning in found.warnings:
         out.print(warning, style="yellow")
     out.print(f"Results: {folder}")

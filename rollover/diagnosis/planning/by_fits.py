@@ -53,7 +53,7 @@ def _refitted(dataset: Sequence[Dataset], fitted: Fitted) -> float | None:
     shifts = [b.shift for b in fitted.blocks]
     shifts += [0.0] * (len(dataset) - len(shifts))
     found = Problem(dataset).fit(fitted.candidates, fitted.x, rounds=TUNING.rounds, shifts=shifts, width=1)
-    return None if found is None else found.left
+    return None if found is None else found.total
 
 
 def _as_recorded(dataset: Sequence[Dataset]) -> Instruments:

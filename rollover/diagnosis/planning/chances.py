@@ -4,20 +4,16 @@ Recordings whitened, y = s_A(t) + n. What stays of the effect A at strength t wh
 errors are refitted is d = (1 - P_B) s_A(t), and lambda = |d|^2 its noncentrality.
 
     detection  the gain of A over nothing is chi^2(k, lambda); seen if above the quantile of the false alarms    (P1)
-    choice     D = |r_B|^2 - |r_A|^2 after both are refitted, less its mean k_A - k_B at lambda = 0:
-               E D = lambda,  var D = 4 lambda + 2 tr (P_A - P_B)^2,  P(A) = Phi(E D/sqrt(var D))                 (P2)
+    choice     D = |r_B|^2 - |r_A|^2 after one number of each is refitted; with L = |s_A|^2 beside nothing and
+               c^2 = 1 - lambda/L the squared cosine of the two, D is a product of two independent normal numbers:
+               P(A) = Phi(g) Phi(h) + Phi(-g) Phi(-h),  g^2 = L (1 - c)/2,  h^2 = L (1 + c)/2                    (P2)
 
-Between two fixed hypotheses, which fit nothing, (P2) is Phi(sqrt(lambda)/2).
+Of two that are nearly alike, or where nothing is fitted, (P2) is Phi(sqrt(lambda)/2).
 """
 
 from __future__ import annotations
 
 import math
-
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
 
 
 def of_one(false_alarm: float, many: int) -> float:
@@ -41,21 +37,16 @@ def needed(power: float, size: float, freedoms: int = 1) -> float:
     return float(brentq(lambda v: detection(v, size, freedoms) - power, 0.0, 1e4))
 
 
-def choice(noncentrality: float, spread: float = 0.0) -> float:
-    """(P2): probability that the misfit chooses the right one of two; `spread` is tr (P_A - P_B)^2."""
-    deviation = math.sqrt(4.0 * noncentrality + 2.0 * spread)
-    return 0.5 * math.erfc(-noncentrality / (deviation * math.sqrt(2.0))) if deviation > 0.0 else 0.5
+def choice(noncentrality: float, beside_nothing: float = math.inf) -> float:
+    """(P2): probability that the misfit chooses the right one of two; `beside_nothing` is L, of the effect alone."""
+    if math.isinf(beside_nothing):
+        return _normal(0.5 * math.sqrt(noncentrality))
+    cosine = math.sqrt(max(1.0 - noncentrality / beside_nothing, 0.0)) if beside_nothing > 0.0 else 1.0
+    # 1 - c without the rounding of a difference
+    g = math.sqrt(0.5 * min(noncentrality, beside_nothing) / (1.0 + cosine))
+    h = math.sqrt(0.5 * beside_nothing * (1.0 + cosine))
+    return _normal(g) * _normal(h) + _normal(-g) * _normal(-h)
 
 
-def spread_of(J: Array, other: Array) -> float:
-    """tr (P - P_other)^2 of the projections on the columns of two Jacobians (n, p) and (n, q), whitened."""
-    Q, R = (_basis(v) for v in (J, other))
-    shared = float(np.sum((Q.T @ R) ** 2))
-    return max(Q.shape[1] + R.shape[1] - 2.0 * shared, 0.0)
-
-
-def _basis(J: Array) -> Array:
-    """Orthonormal columns that span those of J; what is rounding beside the largest spans nothing."""
-    U, S, _ = np.linalg.svd(J, full_matrices=False)
-    rounding = max(J.shape) * np.finfo(float).eps * max(float(S.max(initial=0.0)), 1e-300)
-    return np.asarray(U[:, rounding < S])
+def _normal(z: float) -> float:
+    return 0.5 * math.erfc(-z / math.sqrt(2.0))

@@ -13,7 +13,7 @@ from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.linearisation import without_shift
 from rollover.diagnosis.fit.parameterisation import Candidate
-from rollover.diagnosis.planning.chances import choice, spread_of
+from rollover.diagnosis.planning.chances import choice
 from rollover.diagnosis.planning.planned import showing
 from rollover.diagnosis.planning.strength import scaled
 from rollover.diagnosis.settings import SETTINGS
@@ -75,7 +75,7 @@ class Tests:
             made = [showing(e, raw) for e, raw in zip(self.dataset, raws, strict=True) if raw is not None]
             problem = Problem(made)
             nothing = problem.fit((), (), rounds=TUNING.rounds) if len(made) == len(raws) else None
-            self._shown[key] = None if nothing is None else (problem, nothing.left)
+            self._shown[key] = None if nothing is None else (problem, nothing.total)
         return self._shown[key]
 
     def unexplained(self, c: Candidate, x: tuple[float, ...]) -> float:
@@ -95,21 +95,12 @@ class Tests:
         nearest = self._nearest(c, x, rival)
         if not nearest or nearest[0][0] > TUNING.beyond_doubt:
             least = min([far, *(left for left, _ in nearest)])
-            return Apart(noncentrality=least, probability=choice(least), x=nearest[0][1] if nearest else ())
-        fits = [shown.fit((rival,), place, rounds=TUNING.rounds, width=1) for _, place in nearest[: TUNING.starts]]
-        best = min((f for f in fits if f is not None), key=lambda f: f.left, default=None)
-        if best is None:
-            return Apart(noncentrality=far, probability=choice(far), x=())
-        least = min(best.left, far)
-        own = [shown.block(r, (c,), x, 0.0, shown.effort.fine) for r in range(len(self.dataset))]
-        spread = 0.0
-        if all(b is not None for b in own):
-            J, other = (
-                np.concatenate([without_shift(b.J, b) for b in blocks if b is not None])
-                for blocks in (own, best.blocks)
-            )
-            spread = spread_of(J, other)
-        return Apart(noncentrality=least, probability=choice(least, spread), x=best.x)
+            x_rival = nearest[0][1] if nearest else ()
+        else:
+            fits = [shown.fit((rival,), place, rounds=TUNING.rounds, width=1) for _, place in nearest[: TUNING.starts]]
+            best = min((f for f in fits if f is not None), key=lambda f: f.total, default=None)
+            least, x_rival = (far, ()) if best is None else (min(best.total, far), best.x)
+        return Apart(noncentrality=least, probability=choice(least, far), x=x_rival)
 
     def _nearest(self, c: Candidate, x: tuple[float, ...], rival: Candidate) -> list[tuple[float, tuple[float, ...]]]:
         """What the rival leaves of an effect along the secants to its places, the least first, and where these lead."""

@@ -1,0 +1,143 @@
+"""Samples of what recordings leave open of the fitted values: the posterior beside a uniform prior within the bounds.
+
+The likelihood is that of the fit: residuals over noise with correlated samples worth one, each clock at its best
+under its prior, and all of it wider by the misfit over the noise where that is above 1. Walkers jump independently, by
+a heavy-tailed copy of the quadratic approximation at the fit, and now and then along the differences of two others, by
+which they follow what is no ellipse.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rollover.system.errors import Fault, InputError
+
+Array = NDArray[np.float64]
+LogDensity = Callable[[Array], float]
+
+DRAWS = 3000
+LEAST_WALKERS = 16  # and at least twice as many as parameters, which jumps along differences ask for
+WARM_UP = 0.1  # share of the steps that are thrown away: walkers start from the jumps' density, near to the posterior's
+FREEDOM = 5.0  # of the Student's t that jumps are drawn by: heavier tails than those of any quadratic approximation
+WIDER = 1.15  # times as wide as that: what is too narrow never gets into the tails
+WIDEST = 0.3  # standard deviation of jumps in ranges: about that of a uniform prior, 1/sqrt(12)
+ALONG = 0.2  # share of steps along differences
+MIXED = 1.05  # R-hat above which walkers do not agree; 1.01 is asked of tail quantiles, 1.1 was once of means
+
+
+@dataclass(frozen=True, kw_only=True)
+class Posterior:
+    """Draws (n, p) in `u`, of `walkers` side by side, `steps` each; convergence of each parameter (p,).
+
+    `r_hat` is 1 where walkers agree, `autocorrelation` the steps that are worth one, `effective` the independent draws.
+    """
+
+    draws: Array
+    r_hat: Array
+    autocorrelation: Array
+    effective: Array
+    acceptance: float
+    walkers: int
+    steps: int
+    warm_up: int
+    seed: int
+    sampler: str
+
+    @property
+    def is_mixed(self) -> bool:
+        """Whether the walkers agree."""
+        return bool(np.all(self.r_hat < MIXED))
+
+
+def installed() -> None:
+    """Raise `InputError` with the cure where emcee is missing."""
+    try:
+        import emcee  # noqa: F401
+    except ImportError:
+        message = "emcee is not installed; pip install 'rollover[posterior]' brings it, or leave --posterior out"
+        raise InputError(Fault(file="--posterior", message=message)) from None
+
+
+def sampled(
+    log_density: LogDensity, centre: Array, covariance: Array, *, draws: int = DRAWS, seed: int = 0
+) -> Posterior:
+    """Draws of a density on the unit box whose best point and covariance there, (p,) and (p, p), are roughly known.
+
+    `log_density` is asked inside the box only. The same `seed` gives the same draws.
+    """
+    import emcee
+
+    jump = _Independent(centre, covariance)
+    walkers = max(LEAST_WALKERS, 2 * centre.size + 2)
+    steps = -(-draws // walkers)
+    warm_up = max(int(np.ceil(WARM_UP * steps)), 1)
+    random = np.random.RandomState(seed)
+
+    def inside(u: Array) -> float:
+        return log_density(u) if np.all((u >= 0.0) & (u <= 1.0)) else -np.inf
+
+    moves = [(emcee.moves.MHMove(jump.proposed), 1.0 - ALONG), (emcee.moves.DEMove(), ALONG)]
+    chains = emcee.EnsembleSampler(walkers, centre.size, inside, moves=moves)
+    chains.random_state = random.get_state()
+    start = np.clip(jump.drawn(walkers, random), 1e-6, 1.0 - 1e-6)
+    chains.run_mcmc(start, warm_up + steps, skip_initial_state_check=True)
+    kept = np.asarray(chains.get_chain(discard=warm_up))  # (steps, walkers, p)
+    with np.errstate(invalid="ignore"):  # of a walker that never moved
+        told = emcee.autocorr.integrated_time(kept, tol=0)  # what is too short for it shows in R-hat
+    worth = np.where(np.isfinite(told), np.clip(told, 1.0, steps), steps)
+    return Posterior(
+        draws=kept.reshape(-1, centre.size)[:draws],
+        r_hat=r_hat(kept),
+        autocorrelation=worth,
+        effective=steps * walkers / worth,
+        acceptance=float(np.mean(chains.acceptance_fraction)),
+        walkers=walkers,
+        steps=steps,
+        warm_up=warm_up,
+        seed=seed,
+        sampler=f"emcee {emcee.__version__}",
+    )
+
+
+class _Independent:
+    """Jumps that do not depend on where a walker stands: Student's t about the centre."""
+
+    def __init__(self, centre: Array, covariance: Array) -> None:
+        size, directions = np.linalg.eigh(covariance)
+        self.spread = WIDER * np.clip(np.sqrt(np.maximum(size, 0.0)), 1e-9, WIDEST)
+        self.centre, self.directions = centre, directions
+
+    def drawn(self, count: int, random: Any) -> Array:
+        """Places (count, p)."""
+        z = random.standard_normal((count, self.centre.size))
+        scale = np.sqrt(random.chisquare(FREEDOM, count) / FREEDOM)
+        return np.asarray(self.centre + (z / scale[:, None] * self.spread) @ self.directions.T)
+
+    def log_density(self, places: Array) -> Array:
+        """Log density (count,), but for a constant."""
+        z = (places - self.centre) @ self.directions / self.spread
+        p = self.centre.size
+        return np.asarray(-0.5 * (FREEDOM + p) * np.log1p(np.sum(z**2, axis=1) / FREEDOM))
+
+    def proposed(self, places: Array, random: Any) -> tuple[Array, Array]:
+        """New places, and what the odds of coming back are over those of going there, as a logarithm."""
+        new = self.drawn(len(places), random)
+        return new, self.log_density(places) - self.log_density(new)
+
+
+def r_hat(chains: Array) -> Array:
+    """Split R-hat (p,) of chains (steps, walkers, p): spread of all halves over the spread within each."""
+    half = chains.shape[0] // 2
+    if half < 2:
+        return np.full(chains.shape[2], np.inf)
+    parts = np.concatenate([chains[:half], chains[-half:]], axis=1)
+    within = np.mean(np.var(parts, axis=0, ddof=1), axis=0)
+    between = np.var(np.mean(parts, axis=0), axis=0, ddof=1)
+    stuck = within <= 0.0
+    ratio = (half - 1) / half + between / np.where(stuck, 1.0, within)
+    return np.where(stuck, np.inf, np.sqrt(ratio))
