@@ -56,16 +56,23 @@ def decided_beside(problem: Problem, found: Explanation, groups: Groups) -> tupl
     """The verdict on what one effect explains beside a discrepancy.
 
     An effect predicts recordings that were held out, a discrepancy does not carry over to them but for what is common
-    to all: it is named where it surely predicts half of what the scenario misses there. Nothing is said to be there
-    otherwise where the scenario alone leaves no more than the discrepancy.
+    to all. So it is named where it predicts half of what the scenario misses there, surely some of it, and leaves no
+    more than the discrepancy; or surely half, and its family is not to be mistaken. Otherwise nothing is said to be
+    there where the scenario alone leaves no more than the discrepancy.
     """
     nothing: Verdict = "no-mismatch" if is_tolerated(problem, found.base) else "unexplained"
     if not found.parts or found.parts[0].p_value > SETTINGS.inference.lack_of_fit.p_value:
         return found.refused(), nothing
     whole, _ = shares(problem, found, groups)
     families = {f.candidates[-1].family for f in confusion(found.parts[0], groups, problem.samples_per_error)}
-    is_sure = whole is not None and whole.low >= TUNING.half_share
-    if is_sure and (is_tolerated(problem, found.fitted) or len(families) == 1):
+    is_enough = (
+        whole is not None
+        and whole.share >= TUNING.half_share
+        and whole.low > 0.0
+        and is_tolerated(problem, found.fitted)
+    )
+    is_sure = whole is not None and whole.low >= TUNING.half_share and len(families) == 1
+    if is_enough or is_sure:
         return found, kind_of(found.fitted.candidates[-1])
     return found.refused(), nothing
 

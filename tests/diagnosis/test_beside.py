@@ -72,14 +72,16 @@ SOME = (0.8, 0.9, 1.0, 0.9, 1.0, 0.8)  # of which a discrepancy of unit size lea
     [
         (SOME, (0.2, 0.2, 0.3, 0.2, 0.3, 0.2), 1e-9, "missing-physics"),  # three quarters, of each drop
         (SOME, (0.5, 0.5, 0.6, 0.5, 0.6, 0.5), 1e-9, "no-mismatch"),  # less than half: what drops have in common
-        (SOME, (0.05, 0.9, 0.1, 1.0, 0.1, 0.05), 1e-9, "no-mismatch"),  # two thirds, of some drops alone: not sure
+        (SOME, (0.01, 1.2, 0.01, 1.3, 0.01, 0.01), 1e-9, "no-mismatch"),  # half, of some drops alone: maybe none
+        (SOME, (0.05, 0.9, 0.1, 1.0, 0.1, 0.05), 1e-9, "missing-physics"),  # three fifths, and surely some of it
         (SOME, (0.2, 0.2, 0.3, 0.2, 0.3, 0.2), 0.2, "no-mismatch"),  # the best of all does as much by chance
         ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (0.5,) * 6, 1e-9, "missing-physics"),
         ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (5.0,) * 6, 1e-9, "unexplained"),
-        ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (0.9, 0.9, 0.9, 7.0, 7.0, 0.9), 1e-9, "unexplained"),
+        ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (3.0,) * DROPS, 1e-9, "missing-physics"),  # leaves more, and is surely half
+        ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (3.0, 3.0, 3.0, 7.0, 7.0, 3.0), 1e-9, "unexplained"),
     ],
 )
-def test_an_effect_is_named_where_it_surely_predicts_half_and_else_forgiven_where_a_discrepancy_is_enough(
+def test_an_effect_is_named_where_it_predicts_half_and_else_forgiven_where_a_discrepancy_is_enough(
     base: tuple[float, ...], left: tuple[float, ...], p_value: float, verdict: str
 ) -> None:
     found, said = decided_beside(PROBLEM, explanation(base, fitted("soil-layer", left), p_value=p_value), GROUPS)
