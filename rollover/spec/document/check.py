@@ -133,7 +133,7 @@ class _Where:
     def follow(self, location: tuple[Any, ...]) -> _Where:
         steps = list(location)
         while steps:
-            value, kind = self.node.value, self.node.kind
+            value, kind = self.node.value, self.slot.kind(self.node.kind)
             if self.slot.by_kind and isinstance(value, Mapping) and steps[0] == kind:
                 steps.pop(0)  # the validator names the chosen kind as a step of its own
                 continue
