@@ -45,7 +45,7 @@ class Sheared:
         tried = shear_force(self.strength, self.modulus, row[SHEARED], shear, moved, n)
         commit_shear(self.modulus, row, moved)
         still = shear_force(self.strength, self.modulus, row[SHEARED], shear, np.zeros(3), n)
-        assert tried == pytest.approx(still, rel=1e-9, abs=1e-9)  # what was tried is what stands
+        assert np.allclose(tried, still, rtol=1e-9, atol=1e-9)  # what was tried is what stands
         return np.array(tried)
 
 
@@ -81,11 +81,11 @@ def test_it_turns_round_by_its_first_slope_and_goes_on_where_it_left_the_curve()
     assert plate.row[SHEARED] == pytest.approx(0.015, rel=1e-9)
 
 
-@settings(max_examples=100, deadline=None)
-@given(st.lists(st.tuples(st.floats(-0.05, 0.05), st.floats(-0.05, 0.05)), min_size=1, max_size=12))
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.tuples(st.floats(-0.05, 0.05), st.floats(-0.05, 0.05)), min_size=1, max_size=6))
 def test_a_closed_way_never_gives_energy(moves: list[tuple[float, float]]) -> None:
     """Work over any way in the plane is at least the energy in the spring, F_max e^2/(2 K), so never negative."""
-    K, most, pieces = 0.02, 800.0, 200
+    K, most, pieces = 0.02, 800.0, 50
     plate, work, before = Sheared(most, K), 0.0, np.zeros(2)
     for dx, dy in moves:
         for _ in range(pieces):
@@ -259,3 +259,34 @@ def test_wrong_friction_is_told_for_the_kind_that_was_meant(value: dict[str, obj
     with pytest.raises(InputError) as refused:
         load("side_overturn").replaced({"ground.friction": value})
     assert said in str(refused.value)
+
+
+def test_the_effect_of_friction_takes_the_place_of_shear() -> None:
+    sheared = sliding(SAND).replaced({"effects.ground-friction.coefficient": 0.3})
+    assert sheared.applied().ground.friction == Coulomb(coefficient=0.3)
+    assert sliding(SAND).replaced({"effects.ground-friction.coefficient": None}).applied().ground.friction == SAND
+
+
+# ---------------------------------------------------------------- soil trip
+
+
+def tripped(changes: dict[str, object]) -> tuple[float, float]:
+    """Largest lean (deg) of the shipped load on its way, and the ledger's largest residual."""
+    done = run(load("soil_trip").replaced(changes))
+    assert done.status == "done", done.sentence
+    return float(np.degrees(np.abs(done.recording["chassis/roll"])).max()), closure(done).largest
+
+
+def test_a_tall_load_trips_where_the_soil_holds_with_more_than_s_over_h() -> None:
+    """s/h = 0.5: 0.83 of the weight turns it over, 0.36 lets it slide to rest; so does a speed below that by energy."""
+    s, h, inertia = 0.4, 0.8, 160.0 / 600.0
+    r2 = s * s + h * h
+    least = math.sqrt(2.0 * 9.81 * (inertia + r2) * (math.sqrt(r2) - h)) / h
+    over, ledger = tripped({})
+    assert over > 80.0
+    assert ledger < 0.005
+    weak, ledger = tripped({"ground.friction.cohesion": 0.0, "ground.friction.friction_angle_deg": 20.0})
+    assert weak < 5.0
+    assert ledger < 0.005
+    slow, _ = tripped({"initiation.velocity": [0.0, 0.9 * least, 0.0]})
+    assert slow < 45.0
