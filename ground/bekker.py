@@ -38,7 +38,7 @@ class BekkerWong(GroundLaw):
             raise ValueError("frictional_modulus: no resistance at all, got 0 beside cohesive_modulus 0; one of both")
 
     @property
-    def unloading(self) -> tuple[float, float]:
+    def unloading_line(self) -> tuple[float, float]:
         """k_0 (N/m) and A_u (N/m2) on the reference face."""
         return REFERENCE_AREA * self.unloading_stiffness, REFERENCE_AREA * self.unloading_growth
 

@@ -214,7 +214,7 @@ def steepness(law: Any, p: Any, f: float, z: float) -> float:
     if k > 0.0 or grows > 0.0:
         own, rebound = max(k + grows * z, f / z), p[law[EFFECTS] + RECOVERY]
         return min(own, f / (rebound * z)) if rebound > 0.0 else own  # type: ignore[no-any-return]
-    return f / (springs_back(law, p) * z)  # type: ignore[no-any-return]
+    return f / (springs_back(law, p) * z)
 
 
 @leaf

@@ -105,7 +105,8 @@ def finish_elements(t: Any, h: float) -> None:
         # half of the work that sets more soil moving is that soil's kinetic energy
         t.work[SOIL] -= 0.5 * (m[MASS_B] - along) * trial[ZDOT] * trial[ZDOT]
         if t.soil[row, MODULUS] > 0.0:
-            commit_shear(t.soil[row, MODULUS], m, trial[MOVED : MOVED + 3])
+            if trial[FN] > 0.0:  # what slides above a rut shears nothing
+                commit_shear(t.soil[row, MODULUS], m, trial[MOVED : MOVED + 3])
         else:
             commit_friction(t.soil[row, STICK], m[SHEAR : SHEAR + 3], trial[MOVED : MOVED + 3], m[NORMAL : NORMAL + 3])
         for k in range(3):
