@@ -1,9 +1,22 @@
-"""Tangential laws: Coulomb friction whose stick is a short spring, so that what should stand still does."""
+"""Tangential laws: Coulomb friction on a short stick spring, and soil that shears with the memory of how far it has.
+
+Janosi and Hanamoto (1961), after the peakless curves of loose sand, wet clay and disturbed soil:
+
+    tau = (c + sigma tan phi)(1 - exp(-j/K))
+
+with the shear displacement j since the member came over the element. Where the motion turns round the soil springs back
+by the slope that the curve has at its start, (c + sigma tan phi)/K, and yields again where it left the curve. As a
+spring of strain e, |e| <= R(j) = K (1 - exp(-j/K)), and what goes beyond R is what j grows by; on the way out this is
+the curve itself. On landing anew j begins from zero: the same displacement is needed again, as in repeated shear tests
+(recalled after Wong, Theory of Ground Vehicles, medium confidence).
+"""
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
+from ground.kinds import ByKind
 from ground.quantity import Quantity, parameters
 
 
@@ -18,3 +31,21 @@ class Coulomb:
     coefficient: Annotated[float, Quantity("1", "mu", least=0, most=2)] = 0.0
     stick_displacement: Annotated[float, Quantity("m", "shear displacement d_s at which it slips", above=0)] = 0.002
     stick_relaxation: Annotated[float, Quantity("s", "dashpot over spring while it sticks", least=0)] = 0.005
+
+
+@parameters
+class JanosiHanamoto:
+    """Shear stress (c + sigma tan phi)(1 - exp(-j/K)): soil that has to be sheared before it resists in full."""
+
+    kind: Literal["janosi-hanamoto"] = "janosi-hanamoto"
+    cohesion: Annotated[float, Quantity("Pa", "c", least=0)]
+    friction_angle_deg: Annotated[float, Quantity("deg", "phi, angle of internal friction", least=0, below=60)]
+    shear_modulus: Annotated[float, Quantity("m", "K, shear displacement at 63 % of the strength", above=0)]
+
+    @property
+    def coefficient(self) -> float:
+        """Its tan(phi)."""
+        return math.tan(math.radians(self.friction_angle_deg))
+
+
+Friction = Annotated[Coulomb | JanosiHanamoto, ByKind(usual="coulomb")]

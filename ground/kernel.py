@@ -34,7 +34,8 @@ FRICTION = 21  # 21, 22, 23: friction force at the start of the step, N
 TOUCH_SPEED = 24  # latched normal impact speed, m/s
 SPREAD = 25  # how far the mean of the covered area stands above its deepest point, m
 GROWING = 26  # 1 while the co-moving mass may still grow with depth
-COLUMNS = 27
+SHEARED = 27  # shear displacement j since the touch, of ground that shears, m
+COLUMNS = 28
 
 # columns of state (int)
 # which element, body above it, mode, domain flags, touches so far, row of its law and friction
@@ -65,7 +66,8 @@ PROPORTION, POWER = 21, 22  # J of a resistance that adds J v times itself, s/m;
 SLOWEST = 23  # rate below which that power goes no further, m/s
 CLINGS = 24  # 1: the soil that moves along stays on the face when it lifts off, and is not hit anew
 CRUST_REMAINS = 25  # share of what a crust adds at its end that stays below it
-EFFECT_PLACES = 26  # numbers of the compiled terms follow, TERM_PLACES for each
+UNLOADING_STIFFNESS, UNLOADING_GROWTH = 26, 27  # k_0, N/m, and A_u, N/m2, of a law with a line of its own; 0: recovery
+EFFECT_PLACES = 28  # numbers of the compiled terms follow, TERM_PLACES for each
 TERM_PLACES = 8
 
 DOUBLED, HALVED = 12, 50  # times, of the way from a rut to where its line meets another curve
@@ -202,13 +204,26 @@ def rut_depth(row: Any) -> float:
     return max(row[LINE_Z] - row[LINE_F] / row[LINE_K], 0.0)  # type: ignore[no-any-return]
 
 
+@inlined
+def steepness(law: Any, p: Any, f: float, z: float) -> float:
+    """K_u of the line of unloading from (z, f), N/m: k_0 + A_u z of the law, never below the secant, or by recovery.
+
+    An effect that lets more spring back than the law's own line does takes its place.
+    """
+    k, grows = p[law[EFFECTS] + UNLOADING_STIFFNESS], p[law[EFFECTS] + UNLOADING_GROWTH]
+    if k > 0.0 or grows > 0.0:
+        own, rebound = max(k + grows * z, f / z), p[law[EFFECTS] + RECOVERY]
+        return min(own, f / (rebound * z)) if rebound > 0.0 else own  # type: ignore[no-any-return]
+    return f / (springs_back(law, p) * z)
+
+
 @leaf
 def set_line(law: Any, p: Any, s: Any, row: Any, z: float) -> None:
     """Start the unloading line at (z, F(z)) with K_u = K'(z)/recovery."""
     f = loading_force(law, p, s, max(z - row[SPREAD], 0.0), 0.0)
     row[LINE_Z] = z
     row[LINE_F] = f
-    row[LINE_K] = f / (springs_back(law, p) * z) if z > 0.0 else 0.0
+    row[LINE_K] = steepness(law, p, f, z) if z > 0.0 else 0.0
 
 
 @leaf
@@ -254,7 +269,7 @@ def enter_from_the_side(law: Any, p: Any, s: Any, row: Any, z: float, force: flo
     f = loading_force(law, p, s, max(z - row[SPREAD], 0.0), 0.0)
     if f <= per_reference or z <= 0.0:
         return
-    row[LINE_K] = f / (springs_back(law, p) * z)
+    row[LINE_K] = steepness(law, p, f, z)
     row[LINE_Z] = z + (f - per_reference) / row[LINE_K]
     row[LINE_F] = f
     row[LINE_C] = 0.0

@@ -11,9 +11,13 @@ from typing import Any
 
 @dataclass(frozen=True)
 class ByKind:
-    """Classes told apart by `kind`: ``Annotated[Plane | Slope, ByKind()]``; `table` gives those of an open set."""
+    """Classes told apart by `kind`: ``Annotated[Plane | Slope, ByKind()]``; `table` gives those of an open set.
+
+    `usual` is the kind of what does not say which it is; without it each has to.
+    """
 
     table: Callable[[], Mapping[str, type]] | None = None
+    usual: str | None = None
 
     def classes(self, union: Any) -> dict[str, type]:
         """Map each kind to its class; `union` is the annotated type."""
@@ -25,7 +29,12 @@ class ByKind:
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> dict[str, Any]:
         """Let the validator of files choose by `kind`, so that faults are told for the class that was meant."""
         choices = {kind: handler.generate_schema(member) for kind, member in self.classes(source).items()}
-        return {"type": "tagged-union", "discriminator": "kind", "choices": choices}
+        by: Any = "kind" if self.usual is None else self.kind_of
+        return {"type": "tagged-union", "discriminator": by, "choices": choices}
+
+    def kind_of(self, value: Any) -> Any:
+        """The kind that a mapping says it is, or the usual one; None for what is no mapping."""
+        return value.get("kind", self.usual) if isinstance(value, Mapping) else None
 
 
 @dataclass(frozen=True)

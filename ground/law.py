@@ -136,6 +136,11 @@ class GroundLaw:
         return np.array([v for v in values if isinstance(v, (int, float)) and not isinstance(v, bool)], dtype=float)
 
     @property
+    def unloading_line(self) -> tuple[float, float]:
+        """k_0 (N/m) and A_u (N/m2) of K_u = k_0 + A_u z_max on the reference face; both 0: by `recovery`."""
+        return 0.0, 0.0
+
+    @property
     def unloads_at_rest_stiffness(self) -> bool:
         """Whether the literal eq (6) replaces plastic unloading."""
         return False

@@ -38,6 +38,7 @@ def settings(
     """
     own = law.p
     numbers = NULL.copy()
+    numbers[[k.UNLOADING_STIFFNESS, k.UNLOADING_GROWTH]] = law.unloading_line
     for place, value in (effects or {}).items():
         numbers[place] = value
     tail = np.zeros(k.TERM_PLACES * len(terms))

@@ -11,6 +11,8 @@ from typing import Literal
 
 import numpy as np
 
+from ground.bekker import BekkerWong
+from ground.friction import JanosiHanamoto
 from ground.law import GroundLaw
 from ground.ye import MULTIPLE_CORRELATION, Ye2006, first_branch, second_branch
 
@@ -18,16 +20,19 @@ from ground.ye import MULTIPLE_CORRELATION, Ye2006, first_branch, second_branch
 # recalled: from memory, never compared with the print
 Confidence = Literal["printed", "derived", "recalled"]
 
+PLATE_WIDTH = 0.1  # m: b of a member of a frame with its soil, or of a narrow tyre on its shoulder; a choice
+
 # m at each drop speed (m/s), the deepest sinkage of 132 kg under Ye2006 itself, to the millimetre
 _DEEPEST = {1.0: 0.067, 2.0: 0.163, 3.0: 0.327, 3.5: 0.436}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Soil:
-    """One named soil: its law, a title for people, and the standing of its numbers."""
+    """One named soil: its law, a title for people, and the standing of its numbers; how it shears, where known."""
 
     name: str
     law: GroundLaw
+    friction: JanosiHanamoto | None = None
     title: str
     source: str
     confidence: Confidence
@@ -80,4 +85,32 @@ def soils() -> dict[str, Soil]:
             confidence="derived",
         ),
     )
-    return {soil.name: soil for soil in listed}
+    return {soil.name: soil for soil in (*listed, *_of_plates())}
+
+
+# moisture, %: n, k_c (kN/m^(n+1)), k_phi (kN/m^(n+2)), c (kPa), phi (deg), K (m)
+_PLATES = {
+    "dry-sand": ("dry sand", 0, 1.1, 0.99, 1528.43, 1.04, 28.0, 0.025),
+    "sandy-loam": ("sandy loam of 15 % moisture", 15, 0.7, 5.27, 1515.04, 1.72, 29.0, 0.015),
+    "wet-clay": ("clayey soil of 38 % moisture", 38, 0.5, 13.19, 692.15, 4.14, 13.0, 0.006),
+}
+_PLATE_SOURCE = (
+    "Wong, Theory of Ground Vehicles, table of terrain values (Land Locomotion Laboratory; clayey soil from Thailand): "
+    "recalled with high confidence, those of dry sand also seen as another program cites them; K recalled as typical "
+    "(firm sand 0.01, loose sand 0.025, compressed clay 0.006 m) with medium confidence"
+)
+
+
+def _of_plates() -> tuple[Soil, ...]:
+    """Soils of plate and shear tests."""
+    return tuple(
+        Soil(
+            name=name,
+            law=BekkerWong(cohesive_modulus=1e3 * kc, frictional_modulus=1e3 * kphi, exponent=n, width=PLATE_WIDTH),
+            friction=JanosiHanamoto(cohesion=1e3 * c, friction_angle_deg=phi, shear_modulus=K),
+            title=title,
+            source=_PLATE_SOURCE,
+            confidence="recalled",
+        )
+        for name, (title, _, n, kc, kphi, c, phi, K) in _PLATES.items()
+    )

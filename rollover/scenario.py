@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from ground.array import CoMovingMass, Elements
-from ground.friction import Coulomb
+from ground.friction import Coulomb, Friction
 from ground.kinds import ByKey, ByKind
 from ground.law import GroundLaw
 from ground.quantity import IfAny, Quantity, parameters
@@ -42,7 +42,7 @@ class Patch:
     low: Annotated[tuple[float, float], Quantity("m", "corner with the smallest x and y")]
     high: Annotated[tuple[float, float], Quantity("m", "corner with the largest x and y")]
     law: AnyLaw
-    friction: Annotated[Coulomb | None, "null: that of the ground around it"] = None
+    friction: Annotated[Friction | None, "null: that of the ground around it"] = None
 
     def validate(self) -> None:
         """Refuse a rectangle turned inside out."""
@@ -58,7 +58,7 @@ class Ground:
     surface: Surface = Plane()
     elements: Elements
     law: AnyLaw
-    friction: Coulomb = Coulomb()
+    friction: Friction = Coulomb()
     co_moving_mass: CoMovingMass = CoMovingMass()
     striker_mass: Annotated[
         Literal["reference", "effective", "clamped"],

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ground.friction import Coulomb
 from ground.kernel import COLUMNS, EFFECTS, GROWTH, STATE_COLUMNS
 from ground.law import HIDDEN, REFERENCE_MASS, GroundLaw
 from ground.settings import settings
@@ -67,11 +68,14 @@ def tables_of(scenario: Scenario, bodies: tuple[Body, ...]) -> Tables:
     numbers = np.zeros((len(rows), max(len(p) for _, p in told)))
     for k, (_, p) in enumerate(told):
         numbers[k, : len(p)] = p
-    # nothing of the ground moves along, or could begin to
+    # nothing of the ground moves along, or could begin to, and it does not remember shear
     still = ground.co_moving_mass.share == 0.0
     memoryless = [
-        law.memoryless and still and p[whole[EFFECTS] + GROWTH] == 0.0
-        for (law, _), (whole, p) in zip(rows, told, strict=True)
+        law.memoryless
+        and still
+        and p[whole[EFFECTS] + GROWTH] == 0.0
+        and isinstance(place.friction or ground.friction, Coulomb)
+        for (law, place), (whole, p) in zip(rows, told, strict=True)
     ]
     return Tables(
         mass=mass,
@@ -197,15 +201,20 @@ def _box(surface: SurfacePoints, centre: Array) -> list[float]:
 def _soil(ground: Ground, law: GroundLaw, place: Ground | Patch, share: float, is_free: bool) -> list[float]:
     rule = {"reference": c.RULE_REFERENCE, "effective": c.RULE_EFFECTIVE, "clamped": c.RULE_CLAMPED}
     friction = place.friction or ground.friction
+    sticks, shears = (0.0, 0.0), (0.0, 0.0)
+    if isinstance(friction, Coulomb):
+        sticks = friction.stick_displacement, friction.stick_relaxation
+    else:
+        shears = friction.cohesion, friction.shear_modulus
     return [
         friction.coefficient,
-        friction.stick_displacement,
-        friction.stick_relaxation,
+        *sticks,
         ground.co_moving_mass.share / share,  # of the whole striker, though its nose alone hits
         rule[ground.striker_mass],
         REFERENCE_MASS,
         law.domain.momentum_most,
         float(is_free),
+        *shears,
     ]
 
 

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar
 
 from ground import kernel as k
+from ground.friction import Coulomb
 from ground.law import REFERENCE_AREA
 from ground.quantity import Quantity, parameters
 from rollover.effects.effect import Effect, Form, Search
@@ -387,5 +388,9 @@ class GroundFriction(Effect):
     search: ClassVar[Mapping[str, Search]] = {"coefficient": Search(0.05, 1.2)}
 
     def changes(self, scenario: Any) -> Mapping[str, Any]:
-        """The scenario's coefficient of friction."""
-        return {} if self.coefficient is None else {"ground.friction.coefficient": self.coefficient}
+        """The scenario's coefficient of friction; Coulomb friction in the place of ground that shears."""
+        if self.coefficient is None:
+            return {}
+        if isinstance(scenario.ground.friction, Coulomb):
+            return {"ground.friction.coefficient": self.coefficient}
+        return {"ground.friction": Coulomb(coefficient=self.coefficient)}

@@ -37,6 +37,7 @@ from ground.kernel import (
     commit_friction,
 )
 from ground.law import REFERENCE_AREA
+from ground.shear import commit_shear
 from rollover.kernels.applied_forces import A_NORMAL, A_TANGENT, NOW
 from rollover.kernels.contact_state import drop_mass, meet, note_event
 from rollover.kernels.dense import dot, times
@@ -47,6 +48,7 @@ from rollover.kernels.tables import (
     FLAGS_NOW,
     FN,
     FT,
+    MODULUS,
     MOVED,
     OUT_OF_AREA,
     R_NORMAL,
@@ -102,7 +104,11 @@ def finish_elements(t: Any, h: float) -> None:
         )
         # half of the work that sets more soil moving is that soil's kinetic energy
         t.work[SOIL] -= 0.5 * (m[MASS_B] - along) * trial[ZDOT] * trial[ZDOT]
-        commit_friction(t.soil[row, STICK], m[SHEAR : SHEAR + 3], trial[MOVED : MOVED + 3], m[NORMAL : NORMAL + 3])
+        if t.soil[row, MODULUS] > 0.0:
+            if trial[FN] > 0.0:  # what slides above a rut shears nothing
+                commit_shear(t.soil[row, MODULUS], m, trial[MOVED : MOVED + 3])
+        else:
+            commit_friction(t.soil[row, STICK], m[SHEAR : SHEAR + 3], trial[MOVED : MOVED + 3], m[NORMAL : NORMAL + 3])
         for k in range(3):
             m[PLACE + k] += trial[MOVED + k]
         if outcome & MET:

@@ -11,7 +11,22 @@ from typing import Any
 import numpy as np
 
 from ground.compiled import compiled, leaf
-from ground.kernel import BODY, MASS_B, NORMAL, OFFSET, OWNER_R, PLACE, ROW, SHEAR, SPREAD, friction_force, normal_force
+from ground.kernel import (
+    AREA,
+    BODY,
+    MASS_B,
+    NORMAL,
+    OFFSET,
+    OWNER_R,
+    PLACE,
+    ROW,
+    SHEAR,
+    SHEARED,
+    SPREAD,
+    friction_force,
+    normal_force,
+)
+from ground.shear import shear_force
 from rollover.kernels.compliant_joints import try_mounts
 from rollover.kernels.inputs import read_inputs, try_inputs
 from rollover.kernels.stand_devices import try_devices
@@ -21,6 +36,7 @@ from rollover.kernels.tables import (
     A_K,
     A_SWING,
     ACTIVE,
+    COHESION,
     E_ANCHOR,
     E_DAMPING,
     E_DAMPING_NOW,
@@ -46,6 +62,7 @@ from rollover.kernels.tables import (
     M_FREE,
     M_REACH,
     M_TORQUE_NOW,
+    MODULUS,
     MOVED,
     MU,
     OMEGA,
@@ -117,7 +134,12 @@ def try_elements(t: Any, Q: Any) -> None:
         force = normal_force(t.law[law], t.p[law], t.s[i], m, depth, rate)
         trial[Z], trial[ZDOT], trial[FN] = depth, rate, force
         trial[MOVED], trial[MOVED + 1], trial[MOVED + 2] = x - m[PLACE], y - m[PLACE + 1], z - m[PLACE + 2]
-        f = friction_force(mu, stick, relaxation, force, m[SHEAR : SHEAR + 3], trial[MOVED : MOVED + 3], v, n)
+        modulus = t.soil[law, MODULUS]
+        if modulus > 0.0:
+            strength = t.soil[law, COHESION] * m[AREA] + mu * force if force > 0.0 else 0.0
+            f = shear_force(strength, modulus, m[SHEARED], m[SHEAR : SHEAR + 3], trial[MOVED : MOVED + 3], n)
+        else:
+            f = friction_force(mu, stick, relaxation, force, m[SHEAR : SHEAR + 3], trial[MOVED : MOVED + 3], v, n)
         trial[FT], trial[FT + 1], trial[FT + 2] = f
         if m[MASS_B] > 0.0:
             # the co-moving mass is in the mass matrix; what its centripetal acceleration takes stands here

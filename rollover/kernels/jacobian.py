@@ -32,6 +32,7 @@ from rollover.kernels.tables import (
     A_C,
     A_K,
     ACTIVE,
+    COHESION,
     E_DEPTH_NOW,
     E_FORCE_NOW,
     E_NORMAL_NOW,
@@ -39,6 +40,7 @@ from rollover.kernels.tables import (
     FN,
     M_TORQUE_NOW,
     MEMORYLESS,
+    MODULUS,
     MOVED,
     MU,
     RELAXATION,
@@ -157,7 +159,10 @@ def stiffness(t: Any, f: float, fd: float, K: Any) -> None:
         if soil[MEMORYLESS] > 0.0:
             add_tangent(K, t.pose[b], b, m, trial, soil, normal, f + fd * soil[RELAXATION])
             continue
-        stick = soil[MU] * trial[FN] / soil[STICK]
+        if soil[MODULUS] > 0.0:
+            stick = (soil[COHESION] * m[AREA] + soil[MU] * trial[FN]) / soil[MODULUS]
+        else:
+            stick = soil[MU] * trial[FN] / soil[STICK]
         add_point(
             K,
             t.pose[b],

@@ -61,7 +61,9 @@ PIVOT, GUIDE = 0, 1
 # places in soil
 MU, STICK, RELAXATION, FRACTION, MASS_RULE, MASS_GIVEN, MOMENTUM_MOST = 0, 1, 2, 3, 4, 5, 6
 # 1: the ground remembers nothing and nothing of it moves along: each point of a body is a contact of its own
-MEMORYLESS, SOIL_COLUMNS = 7, 8
+MEMORYLESS = 7
+# of soil that shears: c, Pa, and K, m, 0 for Coulomb friction; `MU` is tan(phi)
+COHESION, MODULUS, SOIL_COLUMNS = 8, 9, 10
 RULE_REFERENCE, RULE_EFFECTIVE, RULE_CLAMPED = 0, 1, 2
 
 # places in counts

@@ -1,4 +1,4 @@
-"""Planar calculation of rolling beside the dynamic run on the same slope: `python -m tests.benchmarks.rolling [VEHICLE ...]`.
+"""Planar calculation of rolling beside the dynamic run: `python -m tests.benchmarks.rolling [VEHICLE ...]`.
 
 Each shipped vehicle that the calculation covers tips over on a slope of 1 : 1.5; it rolls on if its roll passes half a
 turn. Prints both verdicts, the roll (deg) at the end, and the ledger (%).

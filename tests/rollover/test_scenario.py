@@ -18,7 +18,7 @@ SPEED = "a number greater than 0 and at most 20 m/s is allowed"
 SIMULATION = "duration, step, output_step, spectral_radius, stop_at_rest"
 DROP = "kind, speed, lead_time, roll_deg, pitch_deg, yaw_deg, position"
 ROOT = "format, title, vehicle, ground, initiation, simulation, excitation, inputs, loads, gravity, effects"
-LAWS = "bearing, compaction, fluid-entry, hard, press, treated, ye-2006"
+LAWS = "bearing, bekker-wong, compaction, fluid-entry, hard, press, treated, ye-2006"
 PAIR = "a list of 2, each a number greater than 0 m,"
 
 
@@ -93,7 +93,7 @@ ONE_FAULT: dict[str, tuple[str | bytes, str]] = {
     "number for a mapping": (
         without("{kind: ye-2006}", "5"),
         "bad.yaml:5: ground.law: not a mapping, got 5; "
-        "a mapping (kind: bearing or compaction or fluid-entry or hard or press or treated or ye-2006) "
+        "a mapping (kind: bearing or bekker-wong or compaction or fluid-entry or hard or press or treated or ye-2006) "
         "or the name of a .yaml file is allowed",
     ),
     "too short": (
@@ -220,11 +220,11 @@ def test_a_fault_in_an_included_file_names_that_file() -> None:
     ]
     missing = (
         "soil.yaml:1: ground.law.kind: missing; "
-        "one of bearing, compaction, fluid-entry, hard, press, treated, ye-2006 is needed"
+        "one of bearing, bekker-wong, compaction, fluid-entry, hard, press, treated, ye-2006 is needed"
     )
     assert faults_of(text, soil="recovery: 0.1\n") == [missing]
     wrong = (
-        "a mapping (kind: bearing or compaction or fluid-entry or hard or press or treated or ye-2006) "
+        "a mapping (kind: bearing or bekker-wong or compaction or fluid-entry or hard or press or treated or ye-2006) "
         "or the name of a .yaml file is needed"
     )
     assert faults_of(text, soil="- 3\n") == [f"soil.yaml:1: not a mapping, got a list; {wrong}"]

@@ -134,7 +134,7 @@ class _Where:
         steps = list(location)
         told: Node | None = None  # whose kind was a step: a key below may bear the same name
         while steps:
-            value, kind = self.node.value, self.node.kind
+            value, kind = self.node.value, self.slot.kind(self.node.kind)
             if self.slot.by_kind and isinstance(value, Mapping) and steps[0] == kind and told is not self.node:
                 steps.pop(0)  # the validator names the chosen kind as a step of its own
                 told = self.node

@@ -52,9 +52,10 @@ class _Writer:
 
     def one_of(self, slot: Slot, suffix: str, file: bool = True) -> dict[str, Any]:
         """Schema of a choice between parameter classes, told apart by `kind` where there are several."""
+        by = slot.by_kind
         choices: list[dict[str, Any]] = [
-            {"$ref": f"#/$defs/{self._define(member, suffix, by_kind=slot.by_kind is not None)}"}
-            for member in slot.kinds.values()
+            {"$ref": f"#/$defs/{self._define(member, suffix, by_kind=by is not None and kind != by.usual)}"}
+            for kind, member in slot.kinds.items()
         ]
         choices += [_FILE] if file and self.entries is None else []
         return choices[0] if len(choices) == 1 else {"anyOf": choices}

@@ -74,12 +74,16 @@ class Slot:
         inner = slot_of(arguments[0 if self.length is None else index])
         return Slot(**{**vars(inner), "quantity": inner.quantity or self.quantity})
 
+    def kind(self, said: object) -> object:
+        """The kind that is meant: what is said, or the usual one."""
+        return self.by_kind.usual if said is None and self.by_kind else said
+
     def child(self, key: str, kind: object = None) -> Slot | None:
         """What may stand under a key of a mapping of this kind; None where the key is not known."""
         if self.by_key:
             member = self.by_key.table().get(key)
             return None if member is None else slot_of(member)
-        kinds = self.kinds
+        kinds, kind = self.kinds, self.kind(kind)
         chosen = [kinds[kind]] if isinstance(kind, str) and kind in kinds else kinds.values()
         for member in chosen:
             if key in slots(member):
@@ -90,7 +94,7 @@ class Slot:
         """Keys of a mapping here."""
         if self.by_key:
             return list(self.by_key.table())
-        kinds = self.kinds
+        kinds, kind = self.kinds, self.kind(kind)
         chosen = [kinds[kind]] if isinstance(kind, str) and kind in kinds else list(kinds.values())
         return list(dict.fromkeys(key for member in chosen for key in slots(member)))
 
