@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -52,8 +53,6 @@ def import_(
     as_json: AsJson = False,
 ) -> None:
     """Turn recordings of other formats into rollover-recording/1 files."""
-    from dataclasses import replace
-
     from rollover.cli import console
     from rollover.recording.importers import COLLECTIONS, name_of, with_channels
     from rollover.system.names import distinct, inside
@@ -115,13 +114,11 @@ def _recordings(
     known = [*importers(), *COLLECTIONS]
     if kind and kind not in known:
         raise InputError(Fault(file="--as", message=f"no such format, got {kind!r}; {hint(kind, known)}"))
-    return {**read_named([source], profile_of(profile), kind, select)}
+    return {**read_named([source], profile_of(profile), kind, select or ())}
 
 
 def _write(made: Mapping[Path, Recording]) -> None:
     """All recordings, or none. Raises `InputError`."""
-    from dataclasses import replace
-
     from rollover.recording.importers import write_recording
     from rollover.system.writing import together
 
