@@ -186,10 +186,8 @@ def read_named(
             try:
                 found[name] = (file, read_recording(file, profile=given, kind=kind, test=test))
             except InputError as e:
-                others = [n for n, f, _ in named if f != file]
-                faults += (
-                    [_or_left_out(f, file, is_selected=select is not None) for f in e.faults] if others else e.faults
-                )
+                is_alone = all(other == file for _, other, _ in named)
+                faults += e.faults if is_alone else [_or_left_out(f, file, select is not None) for f in e.faults]
     if faults:
         raise InputError(*faults)
     if not found:
@@ -200,7 +198,7 @@ def read_named(
     return found
 
 
-def _or_left_out(fault: Fault, file: Path, *, is_selected: bool) -> Fault:
+def _or_left_out(fault: Fault, file: Path, is_selected: bool) -> Fault:
     """A fault of one file among others, which may be no recording at all, with what takes these alone."""
     how = "--select with the names of the others" if is_selected else "name the others one by one"
     return replace(fault, message=f"{fault.message}; or leave {file.name} out: {how}")
