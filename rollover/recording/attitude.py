@@ -25,7 +25,7 @@ from scipy.spatial.transform import Rotation
 
 from rollover.recording import Recording
 from rollover.spec.channels import CHANNELS, TURN
-from rollover.spec.frames import SAME, one_branch, other_branch, unwrapped, wrapped
+from rollover.spec.frames import SAME, across_wraps, one_branch, other_branch, unwrapped, wrapped
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -45,10 +45,12 @@ HALF = 0.5 * math.pi  # rad between samples: of twice that, whole turns cannot b
 def continuous(recording: Recording) -> Recording:
     """The recording with its attitude on one branch along time, by itself; the same one if nothing is to be changed.
 
-    A note says where it turns so far between samples that whole turns cannot be told.
+    A note says where it turns so far between samples that whole turns cannot be told. Samples that a logger averaged
+    over a wrap say nothing of where it was: they become gaps, which a note says too.
     """
     if not has_attitude(recording):
         return recording
+    recording = _without_means(recording)
     own, found = recording.channels, {}
     for name in PERIODIC.difference(ANGLES).intersection(own):
         found[name] = unwrapped(own[name])
@@ -66,6 +68,21 @@ def continuous(recording: Recording) -> Recording:
     if not changed and not notes:
         return recording
     return replace(recording, channels={**own, **changed}, notes=(*recording.notes, *notes))
+
+
+def _without_means(recording: Recording) -> Recording:
+    """The recording with gaps for samples that are means over a wrap."""
+    channels, notes = dict(recording.channels), list(recording.notes)
+    for name in sorted(PERIODIC.intersection(channels)):
+        means = across_wraps(channels[name])
+        if count := int(means.sum()):
+            channels[name] = np.where(means, np.nan, channels[name])
+            first = float(recording.time[np.argmax(means)])
+            what = "a sample is a mean" if count == 1 else f"{count} samples are means"
+            notes.append(f"{name}: {what} over a wrap of its range, first at {first:.6g} s, and taken as gaps")
+    return (
+        recording if len(notes) == len(recording.notes) else replace(recording, channels=channels, notes=tuple(notes))
+    )
 
 
 def beside(recording: Recording, reference: Recording | None) -> Recording:

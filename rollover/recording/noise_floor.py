@@ -175,7 +175,7 @@ def _autoregression(values: Array, stride: int, at_stride: Array, wanted: int | 
 
 @functools.lru_cache(maxsize=256)
 def grown(ar: tuple[float, ...]) -> float:
-    """Standard deviation of an autoregression over that of what drives it."""
+    """Standard deviation of an autoregression, whose roots lie within the unit circle, over that of what drives it."""
     if not ar:
         return 1.0
     from scipy.signal import lfilter

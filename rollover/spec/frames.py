@@ -14,6 +14,8 @@ from scipy.spatial.transform import Rotation
 Array = NDArray[np.float64]
 
 LOCKED = 1e-6  # cosine of a pitch at which rounding (1e-16) leaves roll and yaw no better than 1e-10
+NEXT = 0.5  # rad between neighbours: those of a sample that turn by more do not say where the wrap was
+OFF = 0.25  # rad, 1/25 of a turn: a mean of up to 25 samples of which one lies beyond the wrap is off by so much
 SAME = 1e-9  # rad, and rad2 of what is squared: differences that rounding makes
 
 
@@ -96,6 +98,40 @@ def unwrapped(angle: Array) -> Array:
     known = np.isfinite(angle)
     found = angle.copy()
     found[known] = np.unwrap(angle[known])
+    return found
+
+
+def across_wraps(angle: Array) -> Array:
+    """Which angles (n,) are means over a wrap, as of a logger that averages: between its ends, on neither side; masks.
+
+    The mean of +179 and -179 degrees is 0: one sample, or two side by side, that lie between neighbours of either end
+    of the range, which are next to each other on the circle. Where its value was cannot be told from it, and its steps
+    of half a turn lose the branch. Alone it is one where it lies off its neighbours by more than `OFF` and by more than
+    thrice what these differ, two where all three steps are larger than a quarter of a turn.
+    """
+    found = np.zeros(angle.size, dtype=bool)
+    known = np.flatnonzero(np.isfinite(angle))
+    values = angle[known]
+    for count in (1, 2):
+        steps = np.diff(values)
+        before, after = values[: -count - 1], values[count + 1 :]
+        apart = after - before
+        arc = np.abs(wrapped(apart))
+        rows = (arc < NEXT) & (np.abs(apart) > math.pi)
+        turned = np.abs(wrapped(np.concatenate([[np.nan], steps, [np.nan]])))
+        around = np.column_stack([turned[: before.size], turned[turned.size - before.size :]])
+        rows &= np.any(around < NEXT, axis=1) & ~np.any(around > NEXT, axis=1)  # what turns fast anyway is not told
+        inside = np.column_stack([values[k : values.size - count - 1 + k] for k in range(1, count + 1)])
+        low, high = np.minimum(before, after)[:, None], np.maximum(before, after)[:, None]
+        rows &= np.all((low < inside) & (inside < high), axis=1)
+        if count == 1:
+            off = np.minimum(np.abs(wrapped(inside[:, 0] - before)), np.abs(wrapped(inside[:, 0] - after)))
+            rows &= off > np.maximum(OFF, 3.0 * arc)
+        else:
+            each = np.column_stack([steps[k : steps.size - count + k] for k in range(count + 1)])
+            rows &= np.all(each * np.sign(apart)[:, None] > 0.5 * math.pi, axis=1)
+        for row in np.flatnonzero(rows):
+            found[known[row + 1 : row + 1 + count]] = True
     return found
 
 

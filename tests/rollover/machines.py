@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import subprocess
 import sys
@@ -15,6 +16,8 @@ from typer.testing import CliRunner, Result
 from rollover.cli.main import app
 from rollover.recording import Recording
 from rollover.recording.importers import write_recording
+from rollover.spec import document
+from tests.ground.recorded_drops import recorded as recorded_drops
 from tests.rollover import studies
 
 WRONG, MACHINE = 2, 74
@@ -42,7 +45,10 @@ def commands(folder: Path) -> dict[str, tuple[list[object], Path]]:
     """Command lines by name, and what they write."""
     recording = recorded(folder / "given")
     study = studies.drops(folder / "given", ("count: 20", "count: 4"))
+    regressed = baseline_of(folder / "given")
+    (folder / "given" / "a.rrd").write_bytes(b"rrd")
     out = folder / "out"
+    shown = out / "v.html"
     return {
         "run": (["run", "drop_test", "--no-half-step", "--out", out / "a"], out / "a"),
         "import": (["import", recording, "--out", out], out),
@@ -51,10 +57,60 @@ def commands(folder: Path) -> dict[str, tuple[list[object], Path]]:
         "synthesize": (["synthesize", "drop_test", "--out", out, "--name", "d"], out),
         "compare": (["compare", "drop_test", recording, "--out", out / "a"], out / "a"),
         "study": (["study", study, "--workers", "0", "--out", out / "a"], out / "a"),
+        "diagnose": (["diagnose", "drop_test", recording, "--workers", "0", "--out", out / "a"], out / "a"),
+        "calibrate": (
+            ["calibrate", "drop_test", recording, "--fit", "vehicle.mass", "--starts", "0", "--out", out / "a"],
+            out / "a",
+        ),
+        "identify": (["identify", *drops(folder / "given"), "--out", out / "a"], out / "a"),
+        "prove": (["prove", "--cases", "1", "--kinds", "null", "--workers", "0", "--out", out / "a"], out / "a"),
+        "regress": (["regress", regressed, "--workers", "0", "--out", out / "a"], out / "a"),
+        "stability": (["stability", "side_overturn", "--headings", "1", "--out", out / "a"], out / "a"),
+        "view": (["view", folder / "given" / "a.rrd", "--html", shown], shown),
+        "new": (["new", "recording", out / "mine"], out),
     }
 
 
 NAMES = ("run", "import", "import parquet", "import mme", "synthesize", "compare", "study")
+NAMES += ("diagnose", "calibrate", "identify", "prove", "regress", "stability", "view", "new")
+
+
+def baseline_of(folder: Path) -> Path:
+    """A scenario with its baseline, both as they are shipped."""
+    shipped = document.shipped_folder()
+    (folder / "baselines").mkdir(parents=True, exist_ok=True)
+    for name in ("drop_test.yaml", "baselines/drop_test.yaml"):
+        (folder / name).write_bytes((shipped / name).read_bytes())
+    for path in (shipped / "soils").glob("*.yaml"):
+        (folder / "soils").mkdir(exist_ok=True)
+        (folder / "soils" / path.name).write_bytes(path.read_bytes())
+    return folder / "drop_test.yaml"
+
+
+def drops(folder: Path) -> list[Path]:
+    """Drops of which a ground law can be identified."""
+    paths = []
+    for drop in recorded_drops(2, noise=0.005, speeds=(1.0, 2.0, 3.0, 3.5)):
+        channels = {"ground/force_normal": drop.force, "ground/sinkage": drop.sinkage}
+        conditions = {"initiation.speed": drop.speed}
+        made = Recording(title=drop.name, time=drop.time, channels=channels, conditions=conditions)  # type: ignore[arg-type]
+        paths.append(folder / f"s{drop.speed:g}.csv")
+        write_recording(made, paths[-1], force=True)
+    return paths
+
+
+def once(monkeypatch: pytest.MonkeyPatch, *names: str) -> None:
+    """Let functions that take long work once, and give that answer again."""
+    for name in names:
+        module, _, function = name.rpartition(".")
+        real, known = getattr(importlib.import_module(module), function), []
+
+        def call(*args: Any, real: Any = real, known: list[Any] = known, **more: Any) -> Any:
+            if not known:
+                known.append(real(*args, **more))
+            return known[0]
+
+        monkeypatch.setattr(name, call)
 
 
 def other_process(words: list[object]) -> subprocess.CompletedProcess[str]:

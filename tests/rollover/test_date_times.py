@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from rollover.recording import Recording
 from rollover.recording.importers import read_recording
-from rollover.recording.importers.date_times import NotAStampError, is_moment, moment, spelt
+from rollover.recording.importers.date_times import NotAStampError, instant, is_moment, moment, spelt
+from rollover.recording.importers.stamps import since
 from rollover.system.errors import InputError
 
 HOUR = 3_600 * 10**9
@@ -192,3 +193,29 @@ def test_stamps_are_for_text_files_by_a_profile(tmp_path: Path) -> None:
     )
     with pytest.raises(InputError, match=r"a.yaml:3: channels.t: unit: date-times .* with a profile"):
         read_recording(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"),
+    [
+        ("2024-05-01", 1714521600.0),
+        ("2024-5-1 10:0", 1714557600.0),
+        ("2024-05-01 10:00 +2", 1714550400.0),
+        ("2024-05-01 10:00:00 -4:30", 1714573800.0),
+        ("2024-05-01 +02:00", 1714514400.0),
+        ("1970-1-1 0:0:0 UTC", 0.0),
+        ("1969-12-31T23:59:59,25", -0.75),
+        ("01.05.2024 10:00:00.5", 1714557600.5),
+    ],
+)
+def test_dates_of_cf_units_are_read_by_the_same_rules(text: str, seconds: float) -> None:
+    assert instant(text) == round(seconds * 10**9)
+    assert since(f"ms since {text}") == (10**6, instant(text))
+
+
+@pytest.mark.parametrize(
+    "text", ["10:00", "x", "2024-13-01", "2024-02-30", "2024-05-01 25:00", "2024-05-01 10:00:75", ""]
+)
+def test_what_is_no_date_of_a_cf_unit(text: str) -> None:
+    with pytest.raises(NotAStampError, match=r"not a (date|time of day), got"):
+        instant(text)

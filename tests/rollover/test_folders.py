@@ -247,3 +247,25 @@ def test_folders_of_folders_hold_their_tests(tmp_path: Path) -> None:
     assert list(read_named([tmp_path / "mme"])) == ["a_1.5", "b_1.5"]
     code, said, _ = ask("check", tmp_path / "mme", "--json")
     assert (code, len(json.loads(said)["files"])) == (0, 2)
+
+
+@pytest.mark.parametrize(("name", "text"), [("notes.txt", "Notes of the day:\nwind, rain\n"), ("rig.jpg", "\0\1\n")])
+def test_what_is_no_recording_is_left_out_by_select(name: str, text: str, tmp_path: Path) -> None:
+    profile = bench(tmp_path, ["d1.csv", "d2.csv"])
+    (tmp_path / "raw" / name).write_text(text)
+    words = ("import", tmp_path / "raw", "--profile", profile, "--out", tmp_path / "rec")
+    code, said, faults = ask(*words)
+    assert (code, said, len(faults.splitlines())) == (2, "", 1)
+    assert faults.endswith(f"; or leave {name} out: --select with the names of the others\n")
+    assert not (tmp_path / "rec").exists()
+    assert ask(*words, "--select", "d*")[0] == 0
+    code, said, faults = ask("compare", "drop_test", tmp_path / "raw", "--profile", profile, "--out", tmp_path / "out")
+    assert (code, said, len(faults.splitlines())) == (2, "", 1)
+    assert faults.endswith(f"; or leave {name} out: name the others one by one\n")
+
+
+def test_a_fault_of_a_file_alone_says_nothing_of_others(tmp_path: Path) -> None:
+    profile = bench(tmp_path, ["d1.csv"])
+    (tmp_path / "raw" / "d1.csv").write_text("no table\n")
+    code, _, faults = ask("import", tmp_path / "raw", "--profile", profile, "--out", tmp_path / "rec")
+    assert (code, "--select" in faults) == (2, False)

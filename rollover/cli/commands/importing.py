@@ -80,4 +80,4 @@ def _recordings(
     known = [*importers(), *COLLECTIONS]
     if kind and kind not in known:
         raise InputError(Fault(file="--as", message=f"no such format, got {kind!r}; {hint(kind, known)}"))
-    return {**read_named([source], profile_of(profile), kind, select)}
+    return {**read_named([source], profile_of(profile), kind, select or ())}

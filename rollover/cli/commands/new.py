@@ -38,7 +38,7 @@ def new(
         raise InputError(Fault(file="rollover new", path="NAME", message=message))
     from rollover.cli import templates
     from rollover.cli.console import tell
-    from rollover.system.writing import put
+    from rollover.system.writing import hold, together
 
     texts = {place.with_name(file): text for file, text in templates.written(kind, stem).items()}
     there = [path for path in texts if path.exists() or path.is_symlink()]
@@ -46,8 +46,10 @@ def new(
         raise InputError(
             *(Fault(file=str(p), message="exists, and is not replaced; another NAME is needed") for p in there)
         )
-    for path, text in texts.items():
-        put(path, lambda part, text=text: part.write_text(text, encoding="utf-8"))  # type: ignore[misc]
+    hold(next(iter(texts)))
+    with together(next(iter(texts))) as part:
+        for path, text in texts.items():
+            (part / path.name).write_text(text, encoding="utf-8")
     if as_json:
         print(json.dumps({"kind": kind, "files": [str(path) for path in texts]}, indent=2))
         return

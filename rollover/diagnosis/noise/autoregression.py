@@ -317,6 +317,8 @@ def _driven(
         score = n * np.log(max(power, 1e-300)) + order * (np.log(n) if dear is None else dear)
         if best is None or score < best[0]:
             fair = 1.0 + 2.0 / n if order == 1 else 1.0  # least squares makes the memory too short by 2/n of itself
+            if order == 1 and abs(fair * a[0]) >= 1.0:  # of a short series beyond every process
+                fair = TUNING.largest_root / abs(a[0])
             best = (score, power, tuple(float(v) for v in fair * a))
     assert best is not None
     return float(np.sqrt(best[1])) * grown(best[2]), best[2]

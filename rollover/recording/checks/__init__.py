@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from rollover.recording import Recording
 from rollover.recording.attitude import continuous
-from rollover.recording.checks.angles import wraps
+from rollover.recording.checks.angles import is_of_means, wraps
 from rollover.recording.checks.finding import Finding, Trace, instant, trace, when
 from rollover.recording.checks.kinematic import disagreements
 from rollover.recording.checks.leaps import leaps
@@ -59,7 +59,7 @@ def prechecks(
             *polarity(t, unit),
             *lost(t, unit),
             *stuck(t, unit),
-            *gaps(t),
+            *(g for g in gaps(t) if name not in as_read or not is_of_means(g, as_read[name])),
             *spikes(t, unit, among_contacts=is_vehicle and not name.endswith(MOVING)),
             *leaps(t, unit, recording.cfc.get(name)),
         ]

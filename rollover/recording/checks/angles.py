@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rollover.recording.checks.finding import Finding, Trace
 from rollover.recording.noise_floor import noise_floor
 from rollover.spec.channels import describe
+from rollover.spec.frames import across_wraps
 
 CLOSE = 8.0  # noise levels, by which a step may miss a whole turn
 TURN = 2.0 * math.pi
@@ -17,9 +20,13 @@ QUICK = 0.5  # rad a sample: a step that misses a turn by more is no wrap
 
 
 def wraps(t: Trace) -> Iterator[Finding]:
-    """Whole turns in a trace as it was read, not unwrapped."""
+    """Whole turns in a trace as it was read, not unwrapped, and means over them."""
     if describe(t.channel).unit != "rad" or float(np.ptp(t.values)) > TURN * 1.001:
         return
+    means = across_wraps(t.values)
+    if means.any():
+        yield _averaged(t, means)
+        t = replace(t, time=t.time[~means], values=t.values[~means])
     steps = np.diff(t.values)
     over = np.flatnonzero(np.abs(steps) > 0.5 * TURN)
     if not over.size:
@@ -43,4 +50,25 @@ def wraps(t: Trace) -> Iterator[Finding]:
         error=None,
         sentence=f"wrapped at {span} degrees in {over.size} place{'s' if over.size > 1 else ''}: "
         "a wrap-around of the angle's range, information and no fault",
+    )
+
+
+def is_of_means(gap: Finding, t: Trace) -> bool:
+    """Whether a gap is one that samples averaged over a wrap of a trace, as it was read, have become."""
+    at = t.time[across_wraps(t.values)]
+    return bool(np.any((gap.start <= at) & (at <= gap.end)))
+
+
+def _averaged(t: Trace, means: NDArray[np.bool_]) -> Finding:
+    count, at = int(means.sum()), np.flatnonzero(means)
+    return Finding(
+        check="wrap-around",
+        channel=t.channel,
+        start=float(t.time[at[0]]),
+        end=float(t.time[at[-1]]),
+        value=float(count),
+        unit="",
+        error=None,
+        sentence=f"{count} sample{'s' if count > 1 else ''} averaged over a wrap-around, as by a logger that takes "
+        "means: taken as gaps, information and no fault",
     )

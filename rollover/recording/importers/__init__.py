@@ -5,6 +5,7 @@ from __future__ import annotations
 import fnmatch
 import functools
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rollover.recording import Recording
@@ -164,7 +165,8 @@ def read_named(
 ) -> dict[str, tuple[Path, Recording]]:
     """Path and recording by name, of files, of all in folders and of all tests in archives.
 
-    All are read with the profile, if one is given; `select` has patterns of names. Raises `InputError` for all faults
+    All are read with the profile, if one is given; `select` has patterns of names, None where a user has no such
+    choice. Raises `InputError` for all faults
     at once, and for two recordings of one name.
     """
     given = profile if isinstance(profile, Described) or profile is None else read_profile(profile)
@@ -189,7 +191,8 @@ def read_named(
             try:
                 found[name] = (file, read_recording(file, profile=given, kind=kind, test=test))
             except InputError as e:
-                faults += e.faults
+                is_alone = all(other == file for _, other, _ in named)
+                faults += e.faults if is_alone else [_or_left_out(f, file, select is not None) for f in e.faults]
     if faults:
         raise InputError(*faults)
     if not found:
@@ -198,6 +201,12 @@ def read_named(
             Fault(file="--select", message=f"nothing fits, got {' '.join(select or ())}; there are {names}")
         )
     return found
+
+
+def _or_left_out(fault: Fault, file: Path, is_selected: bool) -> Fault:
+    """A fault of one file among others, which may be no recording at all, with what takes these alone."""
+    how = "--select with the names of the others" if is_selected else "name the others one by one"
+    return replace(fault, message=f"{fault.message}; or leave {file.name} out: {how}")
 
 
 def _named(file: Path, kind: str) -> list[tuple[str, Path, str]]:

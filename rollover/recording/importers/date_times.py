@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 SECOND = 10**9  # ns
 DAY = 86_400 * SECOND
 IN_NS = {"s": SECOND, "ms": 10**6, "us": 10**3, "ns": 1}
+EPOCH = dt.date(1970, 1, 1).toordinal() * DAY
 EXACT = 2**53  # ns: the longest time (104 days) that float64 holds to the nanosecond
 FORMS = "such as 2020-11-11 13:25:02.005, 2020-11-11T13:25:02Z, 11.11.2020 13:25:02,005 or 13:25:02.005"
 _DATE = re.compile(
@@ -24,11 +25,11 @@ _DATE = re.compile(
     r"|(?P<d4>\d{1,2})[- ](?P<m4>[A-Za-z]{3})[- ](?P<y4>\d{4})"
 )
 _CLOCK = re.compile(
-    r"(?P<h>\d{1,2}):(?P<min>\d{2})(?::(?P<s>\d{2})(?:[.,](?P<f>\d+)|:(?P<ms>\d{3}))?)?(?:\s*(?P<half>[AaPp])\.?[Mm]\.?)?"
+    r"(?P<h>\d{1,2}):(?P<min>\d{1,2})(?::(?P<s>\d{1,2})(?:[.,](?P<f>\d+)|:(?P<ms>\d{3}))?)?(?:\s*(?P<half>[AaPp])\.?[Mm]\.?)?"
     r"|(?P<h2>\d{2})(?P<min2>\d{2})(?P<s2>\d{2})(?:[.,](?P<f2>\d+))?"
 )
 _FRACTION = re.compile(r"(.*:\d{2}:\d{2})[.,](\d+)(Z?)")
-_ZONE = re.compile(r"\s*(?:(?P<utc>Z|UTC|GMT)|(?P<sign>[+-])(?P<h>\d{2}):?(?P<m>\d{2})?)")
+_ZONE = re.compile(r"\s*(?:(?P<utc>Z|UTC|GMT)|(?P<sign>[+-])(?P<h>\d{1,2})(?::?(?P<m>\d{2}))?)")
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 
 
@@ -56,6 +57,25 @@ def moment(text: str) -> Stamp:
 
 @functools.lru_cache(maxsize=4096)  # many samples share a second
 def _moment(text: str) -> Stamp:
+    found = _read(text)
+    if found is None:
+        raise NotAStampError(f"not a date-time, got {text!r}; {FORMS}")
+    return found
+
+
+def instant(text: str) -> int:
+    """Nanoseconds since 1970 of a date with or without time, as ISO 8601 and UDUNITS write it; UTC where none is said.
+
+    Raises `NotAStampError`.
+    """
+    found = _read(text, alone=True)
+    if found is None or not found.dated:
+        raise NotAStampError(f"not a date, got {text!r}; such as 2024-05-01T10:00:00.5Z")
+    return found.ns - EPOCH
+
+
+def _read(text: str, *, alone: bool = False) -> Stamp | None:
+    """A moment, None for none; with `alone` a date without a time of day is one. Raises `NotAStampError`."""
     rest = text.strip()
     day = 0
     date = _DATE.match(rest)
@@ -70,12 +90,13 @@ def _moment(text: str) -> Stamp:
     elif re.match(r"\d{1,2}/\d{1,2}/\d{2,4}", rest):
         raise NotAStampError(f"not clear which is the day and which the month, got {text!r}; {FORMS}")
     clock = _CLOCK.match(rest)
-    if clock is None:
-        raise NotAStampError(f"not a date-time, got {text!r}; {FORMS}")
-    zone = _ZONE.fullmatch(rest[clock.end() :])
-    if rest[clock.end() :].strip() and zone is None:
-        raise NotAStampError(f"not a date-time, got {text!r}; {FORMS}")
-    ns = day * DAY + _of_day(clock, text)
+    if clock is None and not (alone and date):
+        return None
+    rest = rest[clock.end() :] if clock else rest
+    zone = _ZONE.fullmatch(rest)
+    if rest.strip() and zone is None:
+        return None
+    ns = day * DAY + (_of_day(clock, text) if clock else 0)
     if zone and zone["sign"]:
         away = (int(zone["h"]) * 60 + int(zone["m"] or 0)) * 60 * SECOND
         ns -= away if zone["sign"] == "+" else -away

@@ -10,6 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rollover.recording.importers.date_times import instant
+
+__all__ = ["CALENDAR", "NANO", "clock_digits", "instant", "said", "seconds_from_first", "since"]
+
 Array = NDArray[np.float64]
 NANO = 1_000_000_000
 CALENDAR = 10 * 365.25 * 86400.0  # s: no recorder counts ten years from its own start; such stamps count from 1970
@@ -24,27 +28,6 @@ _STEP = {  # ns; spellings of UDUNITS, which the CF conventions refer to
     **dict.fromkeys(("nanoseconds", "nanosecond", "nanosecs", "nanosec", "ns"), 1),
 }
 _SINCE = re.compile(r"\s*(\S+)\s+since\s+(.+?)\s*", re.IGNORECASE)
-_DATE = re.compile(
-    r"(\d{4})-(\d{1,2})-(\d{1,2})(?:[T\s]+(\d{1,2}):(\d{1,2})(?::(\d{1,2})(?:[.,](\d+))?)?)?"
-    r"\s*(?:(Z|UTC|GMT)|([+-])(\d{1,2})(?::?(\d{2}))?)?",
-    re.IGNORECASE,
-)
-
-
-def instant(text: str) -> int:
-    """Nanoseconds since 1970 of a date with or without time, as ISO 8601 and UDUNITS write it; UTC where none is said.
-
-    Raises ``ValueError``.
-    """
-    match = _DATE.fullmatch(text.strip())
-    if match is None:
-        raise ValueError(f"not a date, got {text!r}; such as 2024-05-01T10:00:00.5Z")
-    year, month, day, hour, minute, second, fraction, _, sign, offset_h, offset_min = match.groups()
-    moment = datetime(int(year), int(month), int(day), int(hour or 0), int(minute or 0), tzinfo=UTC)
-    whole = (moment - _EPOCH) // timedelta(seconds=1) + int(second or 0)
-    east = 3600 * int(offset_h or 0) + 60 * int(offset_min or 0)
-    whole -= -east if sign == "-" else east
-    return whole * NANO + int((fraction or "").ljust(9, "0")[:9])
 
 
 def since(unit: str) -> tuple[int, int] | None:
