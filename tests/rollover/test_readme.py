@@ -18,6 +18,7 @@ import pytest
 from ruamel.yaml import YAML
 from typer.testing import CliRunner
 
+import rollover as rollover_package
 from rollover.cli.main import app
 from rollover.spec.document import shipped_folder
 from tests.viz.picture import has_software_driver
@@ -199,6 +200,10 @@ def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
     for page in (tmp_path / "site").rglob("*.html"):
         fetched = re.findall(r"<(?:script|img|link|iframe)[^>]+(?:src|href)=\"(?:https?:)?//[^\"]*", page.read_text())
         assert not fetched, f"{page}: {fetched}"
+    python = (tmp_path / "site" / "reference" / "python.html").read_text()
+    for name in set(rollover_package.__all__) - {"__version__"}:
+        assert f"<h2>{name}<" in python, f"{name}: a public name that the reference does not have"
+    assert "Path of a YAML file, or a name such as" in python
     rops = (tmp_path / "site" / "reference" / "rops.html").read_text()
     assert "upper corner whose deflection is reported" in rops
 

@@ -22,27 +22,22 @@ STILL = 0.3  # m, of way of the centre of mass below which there is none to show
 def way_section(run: Run) -> list[Block]:
     """The strip of a run in which a vehicle moves; nothing for a striker, a test stand and a failed run."""
     vehicle = run.scenario.vehicle
-    if run.tests or not isinstance(vehicle, Vehicle) or "chassis" not in run.pose or run.status != "done":
+    if run.tests or not isinstance(vehicle, Vehicle) or "chassis" not in run.motion or run.status != "done":
         return []
-    origin = run.pose["chassis"].origin
+    origin = run.motion["chassis"].origin
     across = int(np.argmax(np.ptp(origin[:, :2], axis=0)))
     if float(np.linalg.norm(np.ptp(origin, axis=0))) < STILL:
         return []
-    time = run.recording.time
-    at = _instants(time, origin)
+    at = _instants(origin)
     shapes: list[Outline] = []
     for n, k in enumerate(at):
-        for body, outlines in _bodies(run, vehicle).items():
-            R = from_quaternions(run.pose[body].quaternion[k : k + 1])[0]
-            for closed, points in outlines:
-                placed = points @ R.T + run.pose[body].origin[k]
-                flat = placed[:, [across, 2]]
-                shapes.append(
-                    Outline(
-                        name="", points=_hull(flat) if closed else flat, closed=closed,
-                        role="muted" if body == "chassis" else plots.CYCLE[n % 4],
-                    )
-                )  # fmt: skip
+        for body, lines in _bodies(run, vehicle).items():
+            R = from_quaternions(run.motion[body].quaternion[k : k + 1])[0]
+            role: plots.Role = "muted" if body == "chassis" else plots.CYCLE[n % 4]
+            for points in lines:
+                flat = (points @ R.T + run.motion[body].origin[k])[:, [across, 2]]
+                is_hull = len(points) > 2
+                shapes.append(Outline(name="", points=_hull(flat) if is_hull else flat, closed=is_hull, role=role))
     seen = np.vstack([shape.points for shape in shapes])
     x = np.linspace(seen[:, 0].min() - 0.5, seen[:, 0].max() + 0.5, 200)
     middle = float(np.mean(origin[at, 1 - across]))
@@ -50,23 +45,24 @@ def way_section(run: Run) -> list[Block]:
     z = height(run.scenario.ground.surface, *((x, rest) if across == 0 else (rest, x)))
     shapes.append(Outline(name="", points=np.column_stack([x, z]), role="second", closed=False))
     svg = plots.outlines([View(title="", across=f"world {'xy'[across]}, m", up="world z, m", shapes=shapes)])
-    stamps = ", ".join(f"{time[k]:.2f}" for k in at)
-    caption = f"The way at {stamps} s: outline of the vehicle (grey), its ROPS (coloured), the undisturbed ground."
+    stamps = ", ".join(f"{run.frame_time[k]:.2f}" for k in at)
+    caption = f"At {stamps} s: hull of the vehicle's outline (grey), its ROPS (a colour each), the undisturbed ground."
     return [Section(title="How it went", blocks=[Figure(svg=svg, caption=caption)])]
 
 
-def _instants(time: Array, origin: Array) -> list[int]:
-    """Rows a like way of the centre of mass apart, the first and the last among them."""
+def _instants(origin: Array) -> list[int]:
+    """Frames a like way apart, the first and the last among them."""
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(origin, axis=0), axis=1))])
-    return sorted({int(np.searchsorted(way, w)) for w in np.linspace(0.0, way[-1], INSTANTS)} & set(range(time.size)))
+    return sorted({min(int(np.searchsorted(way, w)), way.size - 1) for w in np.linspace(0.0, way[-1], INSTANTS)})
 
 
-def _bodies(run: Run, vehicle: Vehicle) -> dict[str, list[tuple[bool, Array]]]:
-    """Outline of each body in its own axes: corners of boxes, whose hull is drawn, and axes of tubes."""
-    found = {"chassis": [(True, _corners(shape)) for shape in vehicle.outline if isinstance(shape, Box)]}
-    if vehicle.rops is not None and "rops" in run.pose:
+def _bodies(run: Run, vehicle: Vehicle) -> dict[str, list[Array]]:
+    """Points (k, 3) of each body in its own axes: corners of all boxes, whose hull is drawn, and axes of tubes."""
+    boxes = [_corners(shape) for shape in vehicle.outline if isinstance(shape, Box)]
+    found = {"chassis": [np.vstack(boxes)] if boxes else []}
+    if vehicle.rops is not None and "rops" in run.motion:
         members = [m for m in vehicle.rops.members if isinstance(m, Tube)]
-        found["rops"] = [(False, np.array([m.start, m.end])) for m in members]
+        found["rops"] = [np.array([m.start, m.end]) for m in members]
     return found
 
 
