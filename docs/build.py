@@ -24,6 +24,7 @@ SITE = {  # caption -> pages, in the order of the menu
     ],
     "How to": [
         "docs/how_to_add",
+        "docs/own_law",
         "docs/engineers_day",
         "docs/inputs",
         "docs/viewing",

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import MISSING, fields
 from typing import Any, cast
 
+import api
 import typer
 
 from ground.law import laws
@@ -44,7 +45,8 @@ ROOTS: dict[str, tuple[str, str, Sequence[type]]] = {  # page -> its title, what
 
 def pages() -> dict[str, str]:
     """Markdown of every reference page by its name."""
-    found = {"commands": commands(), "channels": channels(), "effects": effects_(), "standards": standards()}
+    found = {"commands": commands(), "python": api.page(plain, code, table), "channels": channels()}
+    found |= {"effects": effects_(), "standards": standards()}
     ours: dict[str, set[type]] = {name: set(classes) for name, (_, _, classes) in ROOTS.items()}
     for name, (title, meaning, classes) in ROOTS.items():
         others = {k: c for k, c in ours.items() if k != name and name not in ("recording", "profile")}

@@ -194,20 +194,31 @@ def inlined(function: F) -> F:
 
 def force_law(function: Callable[..., float]) -> Any:
     """Compile ``force(p, s, z, v) -> F`` of a ground law so that kernels can call it by address."""
+    _check_takes(function, "force(p, s, z, v)")
     with _own_cache(function):
         return numba.cfunc(FORCE, cache=True, error_model="numpy")(function)
 
 
 def advance_law(function: Callable[..., None]) -> Any:
     """Compile ``advance(p, s, z, v, h)`` of a law with hidden states of its own."""
+    _check_takes(function, "advance(p, s, z, v, h)")
     with _own_cache(function):
         return numba.cfunc(ADVANCE, cache=True, error_model="numpy")(function)
 
 
 def begin_law(function: Callable[..., None]) -> Any:
     """Compile ``begin(p, s)``: what a law works out once for each touch."""
+    _check_takes(function, "begin(p, s)")
     with _own_cache(function):
         return numba.cfunc(BEGIN, cache=True, error_model="numpy")(function)
+
+
+def _check_takes(function: Callable[..., Any], form: str) -> None:
+    """Refuse a function of another number of arguments, before the compiler does so at length. Raises ``TypeError``."""
+    code = function.__code__
+    if code.co_argcount != form.count(",") + 1 or code.co_kwonlyargcount or code.co_flags & 0x0C:  # *args, **kwargs
+        got = ", ".join(code.co_varnames[: code.co_argcount])
+        raise TypeError(f"arguments of another number, got {function.__name__}({got}); {form} is needed")
 
 
 def mark_warm() -> None:

@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping
+from dataclasses import fields
+from types import ModuleType
 from typing import Any
 
+from ground.promises import broken_by_term
 from ground.settings import ForceTerm
 from rollover.effects import empirical, ground, parameter, sensor, striker, vehicle
 from rollover.effects.effect import EFFECTS, Effect, Form, Heard, Search, nothing, possible, spoken, units_of
@@ -36,8 +39,38 @@ MOST = 3  # sensor effects of one id in a scenario, each on its own channel
 
 def effects() -> dict[str, type[Effect]]:
     """Every effect that exists, by its id; those of one's own files last. Raises `InputError`."""
-    own_code.load("effects")
+    own_code.load("effects", _wrong)
     return dict(EFFECTS)
+
+
+def _wrong(module: ModuleType) -> str:
+    """What is wrong with a file of effects; nothing if it is well."""
+    own = [e for e in EFFECTS.values() if e.__module__ == module.__name__]
+    if not own:
+        return "no effect, got no class derived from Effect; one is needed (`rollover new effect` writes one)"
+    found = ((effect, _broken(effect)) for effect in own)
+    wrong = next((f"{effect.__name__}: {why}" for effect, why in found if why), "")
+    if wrong:
+        for effect in own:  # the file is not taken: neither is any of it
+            del EFFECTS[effect.id]
+    return wrong
+
+
+def _broken(effect: type[Effect]) -> str:
+    """What an effect does not keep of what an effect must."""
+    if "__dataclass_fields__" not in vars(effect):
+        return "no parameters; @parameters is needed above the class"
+    names = {f.name for f in fields(effect)}
+    if not effect.null or not set(effect.null) <= names:
+        return (
+            f"null: {'of no parameter' if effect.null else 'missing'}, got {dict(effect.null)!r}; the value of a "
+            f"parameter ({', '.join(sorted(names))}) at which it changes nothing is needed"
+        )
+    for chosen, is_null in ((effect(), False), (nothing(effect), True)):
+        for force, p in chosen.force_terms():
+            if why := broken_by_term(force, p, is_null=is_null):
+                return why
+    return ""
 
 
 def acting(chosen: Mapping[str, Any]) -> tuple[dict[int, float], tuple[ForceTerm, ...]]:

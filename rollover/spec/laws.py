@@ -6,10 +6,12 @@ environment variable ROLLOVER_LAWS (several files as in PATH); it then stands be
 
 from __future__ import annotations
 
+from dataclasses import MISSING, fields
 from types import ModuleType
 
 from ground.law import GroundLaw
 from ground.law import laws as known_laws
+from ground.promises import broken_by_law
 from rollover.system import own_code
 
 
@@ -39,4 +41,10 @@ def _wrong(module: ModuleType) -> str:
         known_laws()
     except TypeError as e:
         return f"{e}; another `kind` is needed"
-    return ""
+    wrong = ((law, broken_by_law(law())) for law in own if _has_defaults(law))
+    return next((f"{law.__name__}: {why}" for law, why in wrong if why), "")
+
+
+def _has_defaults(law: type[GroundLaw]) -> bool:
+    """Whether a law can be tried without numbers of a soil."""
+    return all(f.default is not MISSING or f.default_factory is not MISSING for f in fields(law) if f.init)

@@ -197,7 +197,7 @@ def against(baseline: Baseline, scenario: Scenario, ensemble: Sequence[Sequence[
     notes = []
     if baseline.scenario_hash != document.content_hash(scenario):
         notes.append("the scenario's own values have changed since its baseline")
-    if (mine := _versions()) != baseline.versions:
+    if (mine := _versions(scenario)) != baseline.versions:
         new, old = set(mine) - set(baseline.versions), set(baseline.versions) - set(mine)
         notes.append(f"made with {', '.join(sorted(old))}, compared with {', '.join(sorted(new))}")
     changed = [d for d in differences if not d.same]
@@ -301,7 +301,7 @@ def drawn_up(
     new = Baseline(
         scenario=name,
         scenario_hash=document.content_hash(scenario),
-        versions=_versions(),
+        versions=_versions(scenario),
         reason=reason,
         starts=starts,
         loads=tuple(loads),
@@ -386,5 +386,7 @@ def _rounded(value: float) -> float:
     return float(f"{math.ceil(value / digit) * digit:.3g}")
 
 
-def _versions() -> tuple[str, ...]:
-    return tuple(f"{name} {version}" for name, version in versions().items())
+def _versions(scenario: Scenario) -> tuple[str, ...]:
+    """Of all that loads depend on: of files of one's own, which have no version, a part of their hash."""
+    own = [(f, h) for files in scenario.own_code.get("own_code", {}).values() for f, h in files.items()]
+    return (*(f"{name} {version}" for name, version in versions().items()), *(f"{f} {h[:12]}" for f, h in own))

@@ -57,6 +57,18 @@ def test_a_study_takes_a_law_of_ones_own_to_its_workers_and_runs_again_when_it_c
         ('"peat"', '"ye-2006"', "'ye-2006' is taken by"),
         ("p[1] * z", 'p[1] * "z"', "peat.py:{line}: cannot be used: TypingError: "),
         ("\n\n@parameters\n", "\n\n", "peat.py: Peat: no parameters; @parameters"),
+        (
+            "force(p, s, z, v)",
+            "force(p, s, z)",
+            "peat.py:{line}: cannot be used: TypeError: arguments of another number",
+        ),
+        ("force(p, s, z, v)", "force(p, s, z, *v)", "peat.py:{line}: cannot be used: TypeError: arguments of another"),
+        ("return p[1] * z", "return 5.0 + p[1] * z", "peat.py: Peat: force without any sinkage, got 5 N at z = 0 m"),
+        ("return p[1] * z", "return p[3] * z", "peat.py: Peat: force is not finite at z = 0 m"),
+        ("return p[1] * z", "return s[3] + p[1] * z", "peat.py: Peat: force is not finite at z = 0 m"),
+        ("return p[1] * z", "return -p[1] * z", "peat.py: Peat: force -3e-05 N at z = 1e-09 m"),
+        ("return p[1] * z", "s[0] = 1.0\n        return p[1] * z", "peat.py: Peat: force writes to p or s"),
+        ("return p[1] * z", "return p[1] * z / (z - 0.1)", "peat.py: Peat: force -"),
     ],
 )
 def test_a_wrong_file_of_laws_is_one_line_with_its_place(peat: Path, old: str, new: str, said: str) -> None:
@@ -71,6 +83,56 @@ def test_a_wrong_file_of_laws_is_one_line_with_its_place(peat: Path, old: str, n
     if after:
         line = done.stderr.partition(before)[2].partition(":")[0]
         assert line.isdecimal(), done.stderr
+
+
+def test_a_baseline_names_the_file_of_a_law_and_regress_says_that_it_was_another(peat: Path, tmp_path: Path) -> None:
+    (folder := tmp_path / "gate").mkdir()
+    scenario = "base: drop_test.yaml\ntitle: A drop on peat\nground: {law: {kind: peat}}\nsimulation: {duration: 0.1}\n"
+    (folder / "peat_drop.yaml").write_text(scenario, encoding="utf-8")
+
+    def regress(*words: str) -> tuple[int, str]:
+        done = outside("-m", "tests.rollover.command", "--laws", str(peat), "regress", str(folder), *words)
+        return done.returncode, done.stdout + done.stderr
+
+    status, said = regress("--update", "--reason", "first", "--out", str(tmp_path / "a"))
+    assert status == 0, said
+    assert "peat.py " in (folder / "baselines" / "peat_drop.yaml").read_text()
+    same, said = regress("--out", str(tmp_path / "b"))
+    assert same == 0, said
+    assert "made with" not in said
+    peat.write_text(peat.read_text() + "# a word more\n", encoding="utf-8")  # the same numbers by another file
+    same, said = regress("--out", str(tmp_path / "c"))
+    assert same == 0, said
+    assert "made with peat.py " in " ".join(said.split())
+    peat.write_text(peat.read_text().replace("return p[1] * z", "return 1.5 * p[1] * z"), encoding="utf-8")
+    changed, said = regress("--out", str(tmp_path / "d"))
+    assert changed == 1, said
+
+
+EFFECT = {
+    "p[0] * z if z < p[1] else 0.0": {
+        "p[2] * z": "force is not finite at z = 0 m",
+        "7.0": "force without any sinkage, got 7 N",
+        "p[0] * z + 3.0 * z": "at the null; no force is needed",
+    },
+    'null: ClassVar = {"stiffness": 0.0}': {"pass": "null: missing", 'null: ClassVar = {"x": 0.0}': "null: of no"},
+    "def term(p, s, z, v)": {"def term(p, z)": "TypeError: arguments of another number, got term(p, z)"},
+    "\n\n@parameters\n": {"\n\n": "no parameters; @parameters"},
+    "(Effect)": {"": "no effect, got no class derived from Effect"},
+}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"), [(a, b, c) for a, changes in EFFECT.items() for b, c in changes.items()]
+)
+def test_a_wrong_file_of_effects_is_one_line_too(old: str, new: str, said: str, tmp_path: Path) -> None:
+    text = templates.written("effect", "weed")["weed.py"]
+    assert text.count(old) == 1
+    (path := tmp_path / "weed.py").write_text(text.replace(old, new), encoding="utf-8")
+    done = outside("-m", "tests.rollover.command", "--effects", str(path), "list", "effects")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stdout + done.stderr
+    assert "weed.py" in done.stderr
+    assert said in done.stderr
 
 
 def test_a_file_of_laws_that_is_not_there_or_holds_none_is_one_line(tmp_path: Path) -> None:

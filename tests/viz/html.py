@@ -6,6 +6,8 @@ import re
 from dataclasses import dataclass, field
 from html.parser import HTMLParser
 
+from viz.pages.page import TEMPLATES
+
 _VOID = {"meta", "br", "hr", "img", "link", "input"}
 
 
@@ -53,7 +55,9 @@ class Parts(HTMLParser):
 
     def fetched(self) -> list[str]:
         """Everything that a browser would load or run from elsewhere."""
-        found = [t for t, _ in self.tags if t in ("script", "link", "img", "iframe", "object", "embed", "base")]
+        reader = f"<script>\n{(TEMPLATES / 'reader.js').read_text(encoding='utf-8')}</script>"  # ours, to the letter
+        found = ["script"] * (sum(t == "script" for t, _ in self.tags) - self.text.count(reader))
+        found += [t for t, _ in self.tags if t in ("link", "img", "iframe", "object", "embed", "base")]
         for _, attributes in self.tags:
             found += [v for k, v in attributes.items() if k in ("src", "srcset", "data", "action", "poster")]
             found += [v for k, v in attributes.items() if k.endswith("href") and not v.startswith("#")]

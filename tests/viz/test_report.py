@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from rollover.assessment.clearance import approaches
 from rollover.assessment.criteria import Criterion
 from rollover.assessment.loads import PeakLoad, peak_loads
 from rollover.cli.main import app
@@ -147,6 +149,39 @@ def test_the_verdict_says_what_it_rests_on(overturn: Run, peaks: tuple[PeakLoad,
     assert "5 neighbouring starts scatter by 1.5 %" in head(starts=5, mean=1.0, scatter=0.015).detail
     missed = head([ZONE], domain_flags=())
     assert (missed.state, "not met: distance of the structure" in missed.detail) == ("fail", True)
+
+
+def test_loads_and_their_domain_come_before_the_standards_and_the_way_before_both(
+    overturn: Run, peaks: tuple[PeakLoad, ...]
+) -> None:
+    text = report.page(overturn, peaks, ANSWER, rows=[SIDE, ZONE])
+    order = re.findall(r"<h2>(.*?)</h2>", text)
+    assert order[:4] == ["How it went", "Peak loads", "Calibrated domain", "Against standards"]
+    strip = text[text.index("<h2>How it went") : text.index("<h2>Peak loads")]
+    told = re.search(r"At ([\d., ]+) s: hull", strip)
+    assert told is not None
+    stamps = [float(x) for x in told[1].split(", ")]
+    assert (stamps[0], stamps[-1]) == pytest.approx((overturn.frame_time[0], overturn.frame_time[-1]), abs=0.006)
+    assert stamps == sorted(stamps)
+    assert "How it went" not in report.page(example.drop(), (), ANSWER), "a striker goes straight down"
+
+
+def test_a_test_stand_answers_whether_all_is_met_and_how_near_it_was(
+    overturn: Run, peaks: tuple[PeakLoad, ...]
+) -> None:
+    tested = replace(overturn, tests=({"kind": "tilt", "name": "x"},))
+    near = min(a.least for a in approaches(overturn))
+    met, missed = replace(SIDE, verdict="met", margin=0.1), replace(SIDE, verdict="not met")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(report, "findings", lambda _: None)
+        good = report.headline(tested, peaks, [met, met, SIDE])
+        bad = report.headline(tested, peaks, [met, missed])
+        untold = report.headline(tested, peaks, [replace(SIDE, verdict="no verdict")])
+    assert good.sentence.startswith(f"All 2 requirements are met; least clearance {1e3 * near:.0f} mm, to the ")
+    assert "ROPS force: at most" in good.detail
+    assert (bad.sentence[:28], bad.state) == ("1 of 2 requirements are met;", "fail")
+    assert untold.sentence.startswith("ROPS force: at most")
+    assert report.headline(overturn, peaks, [met]).sentence.startswith("ROPS force: at most"), "an overturn is no test"
 
 
 def test_a_failed_run_has_a_page_without_peaks() -> None:

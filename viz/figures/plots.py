@@ -16,6 +16,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from viz.figures.reading import marked, readable
+from viz.figures.reading import thinned as thinned
 from viz.figures.svg import cleaned, number_label
 
 Array = NDArray[np.float64]
@@ -33,7 +35,6 @@ COLOURS: dict[str, str] = {
     "grid": "#d5dae0",
 }
 CYCLE: tuple[Role, ...] = ("first", "second", "third", "fourth", "muted")
-MOST_POINTS = 1600  # of a curve, a few for each pixel across
 LETTERS = 14  # of a legend to an inch
 PHASE_LETTERS, LINE = 16, 9.5  # of the names of phases to an inch; from one line of these to the next, points
 WIDTH, HEIGHT = 7.2, 2.7  # inch
@@ -81,25 +82,6 @@ class View:
     across: str
     up: str
     shapes: Sequence[Outline]
-
-
-def thinned(x: Array, y: Array, most: int = MOST_POINTS) -> tuple[Array, Array]:
-    """At most about `most` points, among them the extremes of x and of y in every stretch: a spike of one sample stays.
-
-    Points (n,) each are taken by stretches of equal count; gaps (NaN) stay gaps.
-    """
-    n = len(x)
-    if n <= most:
-        return x, y
-    kept = {0, n - 1}
-    for part in np.array_split(np.arange(n), max(1, most // 5)):
-        good = part[np.isfinite(x[part]) & np.isfinite(y[part])]
-        if len(good) < len(part):
-            kept.add(int(part[~(np.isfinite(x[part]) & np.isfinite(y[part]))][0]))
-        if len(good):
-            kept |= {int(good[f(v[good])]) for v in (x, y) for f in (np.argmin, np.argmax)}
-    at = np.array(sorted(kept))
-    return x[at], y[at]
 
 
 def history(
@@ -155,7 +137,8 @@ def overlay(
         rest = model - measured.y if turned else measured.y - model
         _draw(below, [Curve(name="difference" if turned else "residual", x=measured.x, y=rest, role="muted")])
         below.axhline(0.0, color=COLOURS["ink"], lw=0.6)
-        finish(below, "time, s", "difference" if turned else "residual", margins=(0.0, 0.1))
+        unit = label.rpartition(", ")[2]
+        finish(below, "time, s", f"{'difference' if turned else 'residual'}, {unit}", margins=(0.0, 0.1))
         _shade(below, [(start, "") for start, _ in phases])
     return svg.text
 
@@ -179,7 +162,8 @@ def before_after(
         above, below = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [3, 1.8], **MARGINS})
         simulated = [_roled(before, "limit"), *([] if after is None else [_roled(after, "first")])]
         x, y = thinned(measured.x, measured.y)  # wide and pale: what covers it can still be told from it
-        above.plot(x, y, color=COLOURS["second"], lw=3.2, alpha=0.55, label=measured.name)
+        (line,) = above.plot(x, y, color=COLOURS["second"], lw=3.2, alpha=0.55, label=measured.name)
+        marked(above, line)
         _draw(above, simulated)
         finish(above, "", label, margins=(0.0, 0.08))
         _shade(above, phases)
@@ -217,6 +201,21 @@ def bars(values: Mapping[str, float], *, label: str, roles: Mapping[str, Role] |
                 ha="right" if left else "left", va="center", color=COLOURS["ink"],
             )  # fmt: skip
         finish(axes, label, "", margins=(0.14, 0.02))
+        axes.grid(axis="y", visible=False)
+    return svg.text
+
+
+def spans(names: Sequence[str], wide: Array, narrow: Array, was: Array, found: Array, *, label: str) -> str:
+    """For each name an interval and a narrower one within it, (n, 2) each, with a value before and after, (n,)."""
+    with _axes(height=0.8 + 0.32 * len(names)) as (axes, svg):
+        rows = np.arange(len(names))
+        axes.hlines(rows, *wide.T, color=COLOURS["muted"], lw=2.0, label="95 %")
+        axes.hlines(rows, *narrow.T, color=COLOURS["first"], lw=6.0, label="95 %, if the others were known")
+        for values, mark, role, name in ((was, "|", "second", "was"), (found, "o", "ink", "is")):
+            axes.plot(values, rows, ls="", marker=mark, ms=5 if mark == "o" else 11, color=COLOURS[role], label=name)
+        axes.set_yticks(rows, names)
+        axes.invert_yaxis()
+        finish(axes, label, "", margins=(0.03, 0.25))
         axes.grid(axis="y", visible=False)
     return svg.text
 
@@ -306,7 +305,8 @@ def _draw(axes: Any, curves: Sequence[Curve]) -> None:
     for curve in curves:
         x, y = thinned(curve.x, curve.y)
         width, alpha = (0.7, 0.55) if curve.thin else (1.4, 1.0)
-        axes.plot(x, y, color=COLOURS[curve.role], lw=width, alpha=alpha, label=curve.name)
+        (line,) = axes.plot(x, y, color=COLOURS[curve.role], lw=width, alpha=alpha, label=curve.name)
+        marked(axes, line)
 
 
 def _level(axes: Any, levels: Sequence[Level]) -> None:
@@ -387,7 +387,7 @@ def canvas(
         yield figure, svg
         stream = io.StringIO()
         figure.savefig(stream, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
-    svg.text = cleaned(stream.getvalue(), COLOURS)
+    svg.text = readable(cleaned(stream.getvalue(), COLOURS), figure)
 
 
 @contextmanager

@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from rollover.calibration.calibrate import Calibration, Estimate, Score
 from rollover.calibration.posterior import Posterior
-from viz.content.blocks import Block, Cell, Figure, Footer, Headline, Note, Section, Table
+from rollover.comparison.misfit import Misfit
+from viz.content.blocks import Block, Cell, Details, Figure, Footer, Headline, Note, Section, Table
 from viz.content.differences import differences_section
+from viz.content.entities import series
+from viz.figures import plots
 from viz.figures.corner import corner
+from viz.figures.heat_map import heat_map
+from viz.figures.plots import Curve
 from viz.pages.page import render
 
+OPEN = 4  # figures of curves that are not folded away
 
-def page(c: Calibration, *, command: str, scenario_hash: str = "", versions: Mapping[str, str] | None = None) -> str:
-    """HTML of a calibration."""
+
+def page(
+    c: Calibration,
+    *,
+    curves: Sequence[tuple[Misfit, Misfit]] = (),
+    command: str,
+    scenario_hash: str = "",
+    versions: Mapping[str, str] | None = None,
+) -> str:
+    """HTML of a calibration; `curves` are the comparisons of each recording before and after."""
     columns = ["parameter", "unit", "was", "is", "from", "to", "interval", "if the others were known", ""]
     table = Table(
         columns=columns,
@@ -23,7 +37,11 @@ def page(c: Calibration, *, command: str, scenario_hash: str = "", versions: Map
         numeric=(2, 3, 4, 5),
         caption="95 % intervals: quadratic, from the Jacobian, or by profile likelihood where that disagrees.",
     )
-    blocks: list[Block] = [*differences_section(c.scenario), Section(title="Parameters", blocks=[table])]
+    blocks: list[Block] = [
+        *differences_section(c.scenario),
+        *_curves(curves),
+        Section(title="Parameters", blocks=[*_spans(c), table]),
+    ]
     blocks += [Note(text=f"{w[:1].upper()}{w[1:]}.", warning=True) for w in c.warnings]
     scores = [("fitted", c.training), *([("held out", c.held_out)] if c.held_out is not None else [])]
     rows: list[list[str | Cell]] = [
@@ -44,7 +62,7 @@ def page(c: Calibration, *, command: str, scenario_hash: str = "", versions: Map
         ]
         caption = f"Condition number of the Jacobian with columns scaled to one: {c.condition:.3g}."
         correlations = Table(columns=["", *names], rows=cells, numeric=range(1, len(names) + 1), caption=caption)
-        blocks.append(Section(title="Correlations", blocks=[correlations]))
+        blocks.append(Section(title="Correlations", blocks=[_correlation(c, names), correlations]))
     if c.posterior is not None:
         blocks.append(Section(title="What stays open", blocks=_posterior(c, c.posterior)))
     clocks: list[list[str | Cell]] = [
@@ -66,6 +84,63 @@ def page(c: Calibration, *, command: str, scenario_hash: str = "", versions: Map
         blocks=blocks,
         footer=Footer(command=command, scenario_hash=scenario_hash, versions=versions),
     )
+
+
+def _curves(curves: Sequence[tuple[Misfit, Misfit]]) -> list[Block]:
+    """Each channel of each recording before and after; the first few at once, the others folded away."""
+    figures: list[Block] = []
+    for before, after in curves:
+        later = {channel.channel: channel for channel in after.channels}
+        for was in before.channels:
+            s, now = series(was.channel), later.get(was.channel)
+            curve = None
+            if now is not None:
+                simulated = np.interp(was.time, now.time, now.simulated)
+                curve = Curve(name="after", x=was.time, y=simulated * s.factor)
+            svg = plots.before_after(
+                Curve(name="measured", x=was.time, y=was.measured * s.factor),
+                Curve(name="before", x=was.time, y=was.simulated * s.factor),
+                curve,
+                label=f"{s.name}, {s.unit}" if s.unit else was.channel,
+                noise=s.factor * (was.noise or 0.01 * float(np.ptp(was.measured)) or 1.0),
+                phases=before.phases,
+            )
+            over = "noise" if was.noise else "1 % of the range, as no noise is known"
+            text = f"{before.recording}, {was.channel}; below, measured less simulated over the {over}."
+            figures.append(Figure(svg=svg, caption=text))
+    if not figures:
+        return []
+    rest = [Details(summary=f"{len(figures) - OPEN} more channels", blocks=figures[OPEN:])] if figures[OPEN:] else []
+    return [Section(title="Before and after", blocks=[*figures[:OPEN], *rest])]
+
+
+def _spans(c: Calibration) -> list[Block]:
+    """What is known of each parameter, in its allowed range."""
+    if not c.estimates:
+        return []
+
+    def share(e: Estimate, *values: float) -> list[float]:
+        low, high = e.bounds
+        return [100.0 * min(max((v - low) / (high - low), 0.0), 1.0) for v in values]
+
+    svg = plots.spans(
+        [e.path for e in c.estimates],
+        np.array([share(e, e.low, e.high) for e in c.estimates]),
+        np.array([share(e, e.alone_low, e.alone_high) for e in c.estimates]),
+        np.array([share(e, e.start)[0] for e in c.estimates]),
+        np.array([share(e, e.value)[0] for e in c.estimates]),
+        label="place in the allowed range, %",
+    )
+    ranges = "; ".join(f"{e.path} {e.bounds[0]:.4g} to {e.bounds[1]:.4g} {e.unit}".strip() for e in c.estimates)
+    return [Figure(svg=svg, caption=f"Value and 95 % interval of each parameter in its allowed range ({ranges}).")]
+
+
+def _correlation(c: Calibration, names: list[str]) -> Figure:
+    """Correlation of every two estimates as a map."""
+    labels = np.array([name for name in names for _ in names], dtype=object)
+    across = np.array(names * len(names), dtype=object)
+    svg = heat_map(across, labels, c.correlation.ravel(), across="", up="", label="correlation")
+    return Figure(svg=svg, caption="Correlation of the estimates: near +1 or -1, two of them are known together only.")
 
 
 def headline(c: Calibration) -> Headline:

@@ -16,8 +16,11 @@ from viz.pages.page import render
 from viz.recordings.comparison import sentences
 
 STATES: Mapping[str, State] = {"good": "pass", "fair": "warn", "poor": "fail"}
-COLUMNS = ["channel", "verdict", "CFC", "ISO/TS 18571", "grade", "Z", "E_P", "E_M", "E_S", "M, %", "P, %"]
-COLUMNS += ["RMS / range, %", "RMS / noise", "peak, %", "peak later, ms"]
+COLUMNS = ["channel", "verdict", "CFC", "ISO/TS 18571", "RMS / noise", "peak, %"]
+GROUPS: Mapping[str, Sequence[str]] = {  # what stands folded, a narrow table each: nothing is cut off on paper
+    "ISO/TS 18571: Z corridor, E_P phase, E_M magnitude, E_S slope": ["rating", "grade", "Z", "E_P", "E_M", "E_S"],
+    "Sprague and Geers, residual, peak": ["M, %", "P, %", "RMS / range, %", "RMS / noise", "peak, %", "peak later, ms"],
+}
 
 
 def page(
@@ -32,14 +35,13 @@ def page(
     """HTML of one comparison for each recording."""
     blocks: list[Block] = [
         *(differences_section(scenario) if scenario is not None else []),
+        *(Section(title=each.recording, blocks=_recording(each)) for each in found),
         Note(
             text="Each recording is compared at its own stamps with a run under its own conditions, both through the "
             "same filter class. Nothing was shifted in time but an uncertain clock, where that is stated. "
             "ISO/TS 18571 and peaks are over the event, from first contact to rest."
         ),
     ]
-    for each in found:
-        blocks.append(Section(title=each.recording, blocks=_recording(each)))
     return render(
         title=title,
         subtitle="Measured against simulated",
@@ -82,20 +84,18 @@ def _recording(found: Misfit) -> list[Block]:
     table = Table(
         columns=COLUMNS,
         rows=[_row(c.channel, c.cfc, c.rating) for c in found.channels],
-        numeric=(3, *range(5, len(COLUMNS))),
-        caption="Z corridor, E_P phase, E_M magnitude, E_S slope of ISO/TS 18571; M, P Sprague-Geers. "
-        "Verdict: the worst of the rating, the peak (fair beyond 10 %, poor beyond 21 %, as the standard scores a "
-        "magnitude error) and the residual (fair beyond twice the noise and 5 % of the signal's RMS together, "
+        numeric=(3, 4, 5),
+        caption="Verdict: the worst of the rating, the peak (fair beyond 10 %, poor beyond 21 %, as the standard "
+        "scores a magnitude error) and the residual (fair beyond twice the noise and 5 % of the signal's RMS together, "
         "poor with 21 %).",
     )
-    blocks: list[Block] = [Note(text=found.title), table]
+    blocks: list[Block] = [Note(text=found.title), *(_figure(c, found) for c in found.channels), table]
     why = [
         Note(text=f"{c.channel}: not rated by ISO/TS 18571: {reason}")
         for c in found.channels
         if (reason := _reason(c.rating))
     ]
     blocks += why + [Note(text=f"{line[:1].upper()}{line[1:]}.") for line in sentences(found)]
-    blocks += [_figure(c, found) for c in found.channels]
     rows: list[list[str | Cell]] = [
         [
             c.channel,
@@ -119,31 +119,46 @@ def _recording(found: Misfit) -> list[Block]:
         numeric=range(2, len(columns)),
         caption="Share: of the recording's squared residual over noise.",
     )
-    return [*blocks, Details(summary="By phase", blocks=[phases])]
+    groups = [Details(summary=title, blocks=[_group(heads, found)]) for title, heads in GROUPS.items()]
+    return [*blocks, *groups, Details(summary="By phase", blocks=[phases])]
+
+
+def _group(heads: Sequence[str], found: Misfit) -> Table:
+    """Some of the numbers of all channels that were rated."""
+    rows = [[c.channel, *(_numbers(c.rating)[name] for name in heads)] for c in found.channels]
+    return Table(columns=["channel", *heads], rows=rows, numeric=range(1, len(heads) + 1))
 
 
 def _row(channel: str, cfc: int | None, rating: Rating | NotRateable) -> list[str | Cell]:
     used = "none" if cfc is None else str(cfc)
     if isinstance(rating, NotRateable):
-        return [channel, Cell(rating.reason, "muted"), used, *[""] * (len(COLUMNS) - 3)]
-    iso, sg, peak = rating.iso18571, rating.sprague_geers, rating.peak
-    judged = verdict(rating)
-    scores: list[str | Cell] = [Cell("not rated", "muted"), "", "", "", "", ""]
-    if isinstance(iso, Iso18571):
-        parts = (iso.corridor, iso.phase, iso.magnitude, iso.slope)
-        scores = [f"{iso.overall:.3f}", iso.grade, *(f"{p:.3f}" for p in parts)]
-    geers = [f"{100.0 * v:.3g}" for v in (sg.magnitude, sg.phase)] if isinstance(sg, SpragueGeers) else ["", ""]
+        return [channel, Cell(rating.reason, "muted"), used, "", "", ""]
+    judged, numbers = verdict(rating), _numbers(rating)
+    iso = Cell("not rated", "muted") if not numbers["rating"] else f"{numbers['rating']} {numbers['grade']}"
     return [
         channel,
         Cell(judged.in_words, STATES[judged.grade]),
         used,
-        *scores,
-        *geers,
-        _number(rating.nrmse, 100.0),
-        _number(rating.over_noise),
-        "" if peak.relative_error is None else f"{100.0 * peak.relative_error:+.3g}",
-        f"{1e3 * peak.time_error:+.3g}",
+        iso,
+        numbers["RMS / noise"],
+        numbers["peak, %"],
     ]
+
+
+def _numbers(rating: Rating | NotRateable) -> dict[str, str]:
+    """Every number of a rating by its heading; empty where there is none."""
+    found = dict.fromkeys([name for heads in GROUPS.values() for name in heads], "")
+    if isinstance(rating, NotRateable):
+        return found
+    iso, sg, peak = rating.iso18571, rating.sprague_geers, rating.peak
+    if isinstance(iso, Iso18571):
+        parts = {"rating": iso.overall, "Z": iso.corridor, "E_P": iso.phase, "E_M": iso.magnitude, "E_S": iso.slope}
+        found |= {name: f"{value:.3f}" for name, value in parts.items()} | {"grade": iso.grade}
+    if isinstance(sg, SpragueGeers):
+        found |= {"M, %": f"{100.0 * sg.magnitude:.3g}", "P, %": f"{100.0 * sg.phase:.3g}"}
+    found |= {"RMS / range, %": _number(rating.nrmse, 100.0), "RMS / noise": _number(rating.over_noise)}
+    relative = "" if peak.relative_error is None else f"{100.0 * peak.relative_error:+.3g}"
+    return found | {"peak, %": relative, "peak later, ms": f"{1e3 * peak.time_error:+.3g}"}
 
 
 def _reason(rating: Rating | NotRateable) -> str:

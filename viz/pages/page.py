@@ -1,6 +1,8 @@
 """Report pages: one look for all of them, one file each, readable without a network, without JavaScript and on paper.
 
-Only a table of many cases brings a script, inside the page; without it the first rows are there all the same.
+Two scripts may stand in a page: a table of many cases is sorted by one, figures are read off and enlarged by another.
+Without them the first rows and the figures are there all the same. No plot library is brought along: the smallest
+that is kept well has hundreds of kilobytes for each page, and would draw a second picture beside the printed one.
 
 A page is a headline, blocks and a footer; a block is one of the dataclasses of `viz.content.blocks`. Text is
 escaped, figures are the ``<svg>`` of `viz.figures.plots`. The same content gives the same bytes.
@@ -16,6 +18,7 @@ from typing import Any
 from viz.content.blocks import Block, Footer, Headline
 from viz.content.embedded import policy
 
+SCRIPTS = ("cases.js", "reader.js")  # the only ones that a page runs
 TEMPLATES = Path(__file__).parent / "templates"
 NOT_APPROVAL = "This is a simulation study, not type approval."
 
@@ -34,17 +37,17 @@ def render(
             blocks=blocks,
             footer=footer,
             disclaimer=NOT_APPROVAL if study else "",
-            policy=policy([f"\n{_script()}"]),
-            script=_script(),
+            policy=policy([f"\n{_script(name)}" for name in SCRIPTS]),
+            script=_script("cases.js"),
+            reader=_script("reader.js"),
         )
     )
     return page
 
 
 @functools.cache
-def _script() -> str:
-    """What lets a reader sort and filter a table: the only script that a page runs."""
-    return (TEMPLATES / "cases.js").read_text(encoding="utf-8")
+def _script(name: str) -> str:
+    return (TEMPLATES / name).read_text(encoding="utf-8")
 
 
 @functools.cache

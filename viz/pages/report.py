@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from rollover.assessment.clearance import approaches
 from rollover.assessment.criteria import Criterion
 from rollover.assessment.criteria import in_words as standards_in_words
 from rollover.assessment.ledger import closure
@@ -23,6 +24,7 @@ from viz.figures import plots
 from viz.figures.clearance_view import clearance_figure
 from viz.figures.plots import Curve, Level
 from viz.figures.stand_view import stand_section
+from viz.figures.way_view import way_section
 from viz.pages.page import render
 
 ONE_PER_TABLE = 60  # events that are listed
@@ -40,10 +42,12 @@ def page(
     blocks: list[Block] = [
         *_warnings(run, answer),
         *differences_section(run.scenario),
+        *way_section(run),
         *stand_section(run, rows),
+        *_peaks(run, peaks),
+        *_domain(run, peaks),
         *_standards(run, rows),
     ]
-    blocks += [*_peaks(run, peaks), *_domain(run, peaks)]
     blocks += [*_histories(run, peaks), *_structure(run, rows), *_ledger(run), *_course(run, answer)]
     return render(
         title=run.scenario.title,
@@ -64,10 +68,12 @@ def headline(run: Run, peaks: Sequence[PeakLoad], rows: Sequence[Criterion] = ()
     peak, found = leading(peaks), findings(run.tests)
     if peak is None:
         return Headline(sentence=found.sentence if found else "No load was recorded", state="warn")
-    sentence = f"{title_of(peak)}: at most {raw(peak)} (raw), {filtered(peak) or 'none'} (CFC {peak.cfc})"
+    sentence = load = f"{title_of(peak)}: at most {raw(peak)} (raw), {filtered(peak) or 'none'} (CFC {peak.cfc})"
     if isinstance(run.scenario.initiation, TiltTable) and found is not None:
         sentence = found.sentence  # what turns there is the weight: no load answers the question
     parts = [standing(peak.domain_flags) if rests_on_ground(run) else "the ground law took no part"]
+    if judged := _judged(run, rows):
+        sentence, parts = judged, [load, *parts]
     # what the whole run rests on concerns its answer, also where the peak itself came from a tyre
     unsure = bool(peak.domain_flags) or "uncalibrated" in run.domain_flags
     change = peak.half_step_change
@@ -88,6 +94,20 @@ def headline(run: Run, peaks: Sequence[PeakLoad], rows: Sequence[Criterion] = ()
     text = "; ".join(parts)
     state: State = "fail" if missed else "warn" if unsure else "pass"
     return Headline(sentence=f"{sentence}.", detail=f"{text[0].upper()}{text[1:]}.", state=state)
+
+
+def _judged(run: Run, rows: Sequence[Criterion]) -> str:
+    """What a test on a stand is made for: whether its requirements are met, with the least clearance; else nothing."""
+    asked = [row for row in rows if row.verdict != "compared"]
+    if not run.tests or not asked or all(row.verdict == "no verdict" for row in asked):
+        return ""
+    met = sum(row.verdict == "met" for row in asked)
+    count = f"all {len(asked)}" if met == len(asked) else f"{met} of {len(asked)}"
+    found = min(approaches(run), key=lambda a: a.least, default=None)
+    if found is None:
+        return f"{count.capitalize()} requirements are met"
+    which = "the structure" if found.what == "structure" else "the ground"
+    return f"{count.capitalize()} requirements are met; least clearance {1e3 * found.least:.0f} mm, to {which}"
 
 
 def _warnings(run: Run, answer: Mapping[str, Any]) -> list[Block]:

@@ -15,7 +15,12 @@ from rollover.system.arguments import MOST_CLOCK
 from rollover.system.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from rollover.calibration.calibrate import Calibration
+    from rollover.comparison.misfit import Misfit
+    from rollover.recording import Recording
+    from rollover.scenario import Scenario
 
 JSON, OVERRIDE, SCENARIO, PAGE = "calibrate.json", "override.yaml", "scenario-calibrated.yaml", "report.html"
 DRAWS = "posterior.csv"
@@ -106,12 +111,23 @@ def calibrate(
         options = [*_options(fit, hold_out), *(["--profile", str(profile)] if profile else [])]
         options += ["--posterior", "--draws", str(draws)] if posterior else []
         command = " ".join(map(shlex.quote, ["rollover", "calibrate", scenario, *recordings, *options]))
-        text = page(found, command=command, scenario_hash=about["scenario_hash"], versions=results.versions())
+        curves = _curves(chosen, found, request.recordings)
+        text = page(
+            found, curves=curves, command=command, scenario_hash=about["scenario_hash"], versions=results.versions()
+        )
         (part / PAGE).write_text(text, encoding="utf-8")
     if as_json:
         print(json.dumps(results.plain(answer), indent=2))
     else:
         console.calibration(found, str(folder))
+
+
+def _curves(chosen: Scenario, found: Calibration, recordings: Mapping[str, Recording]) -> list[tuple[Misfit, Misfit]]:
+    """Each recording against the scenario before and after."""
+    from rollover.comparison.compared import compared
+
+    before, after = (compared(each, recordings).misfits for each in (chosen, found.calibrated))
+    return list(zip(before, after, strict=True))
 
 
 def _options(fit: list[str], hold_out: list[str] | None) -> list[str]:
