@@ -79,6 +79,11 @@ class Simulation:
     step: Annotated[float, Quantity("s", "of the solver", above=0, most=0.01)] = 0.001
     output_step: Annotated[float, Quantity("s", "between rows of the channels; a multiple of step", above=0)] = 0.001
     spectral_radius: Annotated[float, Quantity("1", "of generalized-alpha at infinity", least=0, most=1)] = 0.7
+    integrator: Annotated[
+        Literal["exudyn", "compiled"],
+        "who makes the steps: Exudyn, or the same scheme with the same contact forces in one compiled loop, which "
+        "takes no test stand and no excitation",
+    ] = "exudyn"
     stop_at_rest: Annotated[bool, "end early once everything has come to rest"] = False
 
     def validate(self) -> None:
