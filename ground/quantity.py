@@ -96,6 +96,15 @@ class Label:
         return {**handler(source), "pattern": self.pattern}
 
 
+@dataclass(frozen=True)
+class Later:
+    """A key that joined its class later: at its default it is no part of a content's hash, which stays what it was."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> dict[str, Any]:
+        """Ask for nothing more of a file."""
+        return handler(source)  # type: ignore[no-any-return]
+
+
 def quantity_of(annotation: object) -> Quantity | None:
     """Find the `Quantity` an annotation carries, also inside ``X | None`` and tuples."""
     if typing.get_origin(annotation) is Annotated:

@@ -11,7 +11,7 @@ from ground.array import CoMovingMass, Elements
 from ground.friction import Coulomb
 from ground.kinds import ByKey, ByKind
 from ground.law import GroundLaw
-from ground.quantity import Quantity, parameters
+from ground.quantity import Later, Quantity, parameters
 from ground.surface import Plane, Surface
 from rollover.effects import EFFECTS, entries, nothing
 from rollover.recording.filters import least_rate
@@ -83,6 +83,7 @@ class Simulation:
         Literal["exudyn", "compiled"],
         "who makes the steps: Exudyn, or the same scheme with the same contact forces in one compiled loop, which "
         "takes no test stand and no excitation",
+        Later(),
     ] = "exudyn"
     stop_at_rest: Annotated[bool, "end early once everything has come to rest"] = False
 
@@ -159,6 +160,8 @@ class Scenario:
                 f"excitation: drives a striker only, got a vehicle of kind {self.vehicle.kind!r}; 'striker' is allowed"
             )
         _check_start(self.vehicle, self.initiation)
+        if self.simulation.integrator == "compiled":
+            _check_loop(self.initiation, self.excitation)
 
     @property
     def own_code(self) -> dict[str, dict[str, dict[str, str]]]:
@@ -215,6 +218,20 @@ class Scenario:
             if changes:
                 changed = document.exchanged(changed, changes)
         return changed
+
+
+def _check_loop(start: Initiation, excitation: Excitation | None) -> None:
+    """Refuse what the compiled loop does not do: a stand and an exciter look in after each step, in Python."""
+    if isinstance(start, (StaticTest, PendulumBlow, TiltTable)):
+        raise ValueError(
+            f"simulation.integrator: 'compiled' runs no test stand, got initiation.kind {start.kind!r}; "
+            "'exudyn' is allowed"
+        )
+    if excitation is not None:
+        raise ValueError(
+            f"simulation.integrator: 'compiled' drives no striker, got excitation.kind {excitation.kind!r}; "
+            "'exudyn' is allowed"
+        )
 
 
 def _check_start_of_striker(start: Initiation) -> None:

@@ -10,7 +10,7 @@ from dataclasses import MISSING, dataclass, fields, is_dataclass
 from typing import Annotated, Any, Literal
 
 from ground.kinds import ByKey, ByKind
-from ground.quantity import Grid, Label, Quantity
+from ground.quantity import Grid, Label, Later, Quantity
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,6 +25,7 @@ class Slot:
     by_kind: ByKind | None = None
     by_key: ByKey | None = None
     grid: Grid | None = None
+    later: bool = False
 
     @property
     def unit(self) -> str:
@@ -139,6 +140,7 @@ def slot_of(annotation: Any) -> Slot:
                 "meaning": text or next((m.meaning for m in (grid, label, quantity, inner) if m), ""),
                 "label": label is not None or inner.label,
                 "grid": grid or inner.grid,
+                "later": any(isinstance(m, Later) for m in metadata),
                 "by_kind": by_kind or inner.by_kind,
                 "by_key": next((m for m in metadata if isinstance(m, ByKey)), inner.by_key),
             }
