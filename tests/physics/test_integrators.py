@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import concurrent.futures
 import math
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy import stats
 
+from rollover.assessment import results
 from rollover.assessment.ledger import closure
 from rollover.dynamics import simulate
 from rollover.dynamics.result import Run
 from rollover.scenario import Scenario, load
-from rollover.spec.document import content_hash, shipped_folder
+from rollover.spec.document import content_hash, shipped_folder, to_mapping
 from rollover.studies.ensemble import extremes, neighbours, spreads
 from rollover.system.errors import InputError
 
@@ -88,3 +89,72 @@ def test_the_same_motion_and_the_same_loads(name: str) -> None:
     for spread in spreads(ensemble):
         allowed = WITHIN * spread.scatter * abs(spread.mean) + FLOOR * abs(spread.mean)
         assert abs(exudyn[spread.load, spread.filter] - spread.mean) <= allowed, spread
+
+
+def test_events_and_rest_are_those_of_the_engine() -> None:
+    engine, loop = both(short("drop_test", **{"simulation.duration": 1.5, "simulation.stop_at_rest": True}))
+    assert [e.kind for e in loop.events] == ["first-touch", "branch-change", "unloading", "rest"]
+    assert [(e.time, e.kind, e.subject, e.detail) for e in loop.events] == [
+        (e.time, e.kind, e.subject, e.detail) for e in engine.events
+    ]
+    assert loop.stop_time == engine.stop_time < 1.5
+    assert np.array_equal(loop.track.time, engine.track.time)
+    assert loop.track.sinkage == pytest.approx(engine.track.sinkage, rel=1e-9)
+
+
+def test_a_run_that_leaves_the_array_ends_with_the_same_words() -> None:
+    away = {"ground.elements.length": 0.3, "ground.elements.centre": [0.0, 0.0]}
+    engine, loop = both(short("cube_toss", **away))
+    assert loop.status == engine.status == "failed"
+    assert loop.sentence == engine.sentence
+    assert loop.sentence.startswith("left the array of ground elements at t = ")
+    assert loop.stop_time == engine.stop_time < DURATIONS["cube_toss"]
+
+
+def test_a_run_that_breaks_off_keeps_what_it_had() -> None:
+    # where nothing is a state any more, how it ends is chance: at which iteration, by which of two sentences
+    engine, loop = both(short("rops_drop", **{"ground.law.stiffness_scale": 1e14}))
+    assert loop.status == engine.status == "failed"
+    assert "at t = 0.03" in loop.sentence
+    assert loop.stop_time == pytest.approx(engine.stop_time, abs=2e-3)
+    assert all(np.isfinite(v).all() for v in loop.recording.channels.values())
+
+
+def test_runs_side_by_side_in_threads_are_those_one_after_another() -> None:
+    own = [short("drop_test", **{"initiation.speed": v, "simulation.integrator": "compiled"}) for v in (1.0, 2.0, 3.0)]
+    own += [short("cube_toss", **{"simulation.integrator": "compiled"})]
+    alone = [simulate.run(s).recording for s in own]
+    with ThreadPoolExecutor(4) as pool:
+        together = [run.recording for run in pool.map(simulate.run, own)]
+    for one, other in zip(alone, together, strict=True):
+        assert all(np.array_equal(one[channel], other[channel]) for channel in one.channels)
+
+
+def test_a_file_that_asks_for_it_on_a_stand_is_told_the_line(tmp_path: Path) -> None:
+    text = (Path(shipped_folder()) / "tilt_table.yaml").read_text(encoding="utf-8")
+    folder = Path(shipped_folder())
+    text = text.replace("simulation: {", "simulation: {integrator: compiled, ").replace(
+        "vehicles/", f"{folder.as_posix()}/vehicles/"
+    )
+    file = tmp_path / "mine.yaml"
+    file.write_text(text.replace("soils/", f"{folder.as_posix()}/soils/"), encoding="utf-8")
+    line = next(k for k, row in enumerate(text.splitlines(), 1) if "integrator" in row)
+    with pytest.raises(
+        InputError, match=rf"mine\.yaml:{line}: simulation\.integrator: .* got initiation.kind 'tilt-table'"
+    ):
+        load(file)
+
+
+def test_the_key_at_its_default_changes_no_hash() -> None:
+    scenario = load("drop_test")
+    mapping = to_mapping(scenario)
+    assert mapping["simulation"].pop("integrator") == "exudyn"
+    assert to_mapping(scenario, hashed=True) == mapping
+    compiled = scenario.replaced({"simulation.integrator": "compiled"})
+    assert content_hash(compiled) != content_hash(scenario)
+    assert content_hash(compiled.replaced({"simulation.integrator": "exudyn"})) == content_hash(scenario)
+
+
+def test_results_say_which_integrator_made_them() -> None:
+    engine, loop = both(short("drop_test", **{"simulation.duration": 0.02}))
+    assert [results.account(run, [])["integrator"] for run in (engine, loop)] == ["exudyn", "compiled"]
