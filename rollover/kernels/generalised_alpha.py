@@ -142,17 +142,20 @@ def predict(s: Any, w: Any, bodies: int, h: float) -> None:
 @compiled
 def residual_of(t: Any, s: Any, w: Any) -> float:
     """Residuals of the equations of motion and of the joints at the state of `s`; returns their norm."""
-    n, c = s.q.size, w.joint.size
+    n, c, bodies = s.q.size, w.joint.size, t.mass.shape[0]
     generalised_forces(t, s.q, s.qd, w.force)
     s.whole[FORCES] += 1
     joint_rows(t, w.rows)
     for i in range(n):
+        # an element touches one body only: without turning wheels the mass matrix is one of blocks
+        first, end = (i - i % 6, i - i % 6 + 6) if n == bodies else (0, n)
         total = -w.force[i]
-        for k in range(n):
+        for k in range(first, end):
             total += w.mass[i, k] * s.qdd[k]
-        for k in range(c):
-            total += w.rows[k, i] * w.joint[k]
         w.residual[i] = total
+    for k in range(c):
+        for i in range(n):
+            w.residual[i] += w.rows[k, i] * w.joint[k]
     for b in range(t.pose.shape[0]):
         at = 6 * b
         w.residual[at + 2] += s.real[GRAVITY] * t.mass[at, at]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from ground.compiled import compiled, released
+from ground.compiled import compiled, leaf, released
 from rollover.kernels.dense import largest
 from rollover.kernels.forces import added_mass
 from rollover.kernels.generalised_alpha import (
@@ -54,13 +54,15 @@ class Watch(NamedTuple):
     whole: Any  # (COUNTED,)
 
 
-@compiled
+@leaf
 def whole_mass(t: Any, s: Any, w: Any) -> None:
     """Mass matrix of the step that begins: bodies, co-moving masses, turning wheels."""
-    n = t.mass.shape[0]
     for i in range(w.mass.shape[0]):
         for k in range(w.mass.shape[1]):
-            w.mass[i, k] = s.added[i, k] + t.mass[i, k] if i < n and k < n else s.added[i, k]
+            w.mass[i, k] = s.added[i, k]
+    for i in range(t.mass.shape[0]):
+        for k in range(i - i % 6, i - i % 6 + 6):
+            w.mass[i, k] += t.mass[i, k]
 
 
 @compiled
