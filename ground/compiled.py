@@ -155,9 +155,13 @@ def _kept_at() -> Path:
 KEPT = _kept_at()
 
 
-def is_warm() -> bool:
-    """Whether a run with kernels of these very sources has finished on this machine before."""
-    return (KEPT / "warm").exists()
+def is_warm(integrator: str = "exudyn") -> bool:
+    """Whether a run of this integrator with kernels of these very sources has finished on this machine before."""
+    return (KEPT / _warm(integrator)).exists()
+
+
+def _warm(integrator: str) -> str:
+    return "warm" if integrator == "exudyn" else f"warm-{integrator}"
 
 
 @contextmanager
@@ -217,11 +221,11 @@ def begin_law(function: Callable[..., None]) -> Any:
         return numba.cfunc(BEGIN, cache=True, error_model="numpy")(function)
 
 
-def mark_warm() -> None:
-    """Note that all kernels have been compiled; where nothing can be written the next run compiles anew."""
+def mark_warm(integrator: str = "exudyn") -> None:
+    """Note that an integrator's kernels have been compiled; where nothing can be written the next run compiles anew."""
     with suppress(OSError):
         KEPT.mkdir(parents=True, exist_ok=True)
-        (KEPT / "warm").touch()
+        (KEPT / _warm(integrator)).touch()
 
 
 def _by_address(signature: Any) -> Any:

@@ -91,7 +91,7 @@ def run(scenario: Scenario, *, progress: Callable[[float, float], None] | None =
         sentence = str(reason)
     if sentence and (why := _runaway(scenario, live.tables)):
         sentence = f"{why} ({sentence})"
-    mark_warm()
+    mark_warm(settings.integrator)
     done = _result(scenario, recorder, sentence, clock.perf_counter() - began)
     if start.note and not done.sentence:
         done = replace(done, sentence=start.note)

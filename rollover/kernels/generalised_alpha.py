@@ -166,7 +166,7 @@ def residual_of(t: Any, s: Any, w: Any) -> float:
         w.residual[at + 4] += y
         w.residual[at + 5] += z
     joint_errors(t, s.anchor, w.residual[n:])
-    return norm(w.residual)  # type: ignore[no-any-return]
+    return norm(w.residual)
 
 
 @leaf
@@ -217,7 +217,7 @@ def new_matrix(t: Any, s: Any, w: Any, h: float) -> bool:
             w.matrix[i, k] = 0.0
     add_gyroscopic(t, s, damping, w.matrix)
     s.whole[MATRICES] += 1
-    return factorise(w.matrix, w.order)  # type: ignore[no-any-return]
+    return factorise(w.matrix, w.order)
 
 
 @compiled
@@ -238,7 +238,7 @@ def improve(t: Any, s: Any, w: Any, h: float) -> float:
     for k in range(w.joint.size):
         w.joint[k] -= w.change[n + k] / scale
     place_bodies(s, w, t.pose.shape[0])
-    return residual_of(t, s, w)  # type: ignore[no-any-return]
+    return residual_of(t, s, w)
 
 
 @leaf

@@ -10,14 +10,18 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from rollover import studies
 from rollover.assessment import results
 from rollover.assessment.ledger import closure
 from rollover.dynamics import simulate
 from rollover.dynamics.result import Run
 from rollover.scenario import Scenario, load
 from rollover.spec.document import content_hash, shipped_folder, to_mapping
+from rollover.studies.case_store import Row
 from rollover.studies.ensemble import extremes, neighbours, spreads
+from rollover.studies.runner import Way, conduct
 from rollover.system.errors import InputError
+from tests.rollover.studies import drops
 
 # s: the first impact, the peak of the loads and what rocks after it
 DURATIONS = {
@@ -158,3 +162,21 @@ def test_the_key_at_its_default_changes_no_hash() -> None:
 def test_results_say_which_integrator_made_them() -> None:
     engine, loop = both(short("drop_test", **{"simulation.duration": 0.02}))
     assert [results.account(run, [])["integrator"] for run in (engine, loop)] == ["exudyn", "compiled"]
+
+
+def test_a_study_gives_the_same_bits_whatever_the_number_of_workers(tmp_path: Path) -> None:
+    file = drops(
+        tmp_path,
+        ("scenario: drop_test.yaml", "scenario: {base: drop_test.yaml, simulation: {integrator: compiled}}"),
+        ("simulator: drop", "simulator: full"),
+        ("count: 20", "count: 4"),
+    )
+    study = studies.load(file)
+    here = conduct(study, tmp_path / "here", Way(workers=0))
+    apart = conduct(study, tmp_path / "apart", Way(workers=2))
+
+    def told(row: Row) -> tuple[str, object]:
+        return row.status, dict(row.measures)
+
+    assert [told(row) for row in here.rows] == [told(row) for row in apart.rows]
+    assert {row.status for row in here.rows} == {"done"}
