@@ -36,6 +36,7 @@ SITE = {  # caption -> pages, in the order of the menu
     ],
     "Explanation": [
         "ground/README",
+        "docs/integrators",
         "docs/estimation",
         "docs/validation",
         "docs/proof",

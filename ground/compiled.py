@@ -49,6 +49,7 @@ __all__ = [
     "leaf",
     "mark_warm",
     "register",
+    "released",
 ]
 
 VARIABLE = "NUMBA_CACHE_DIR"
@@ -154,9 +155,13 @@ def _kept_at() -> Path:
 KEPT = _kept_at()
 
 
-def is_warm() -> bool:
-    """Whether a run with kernels of these very sources has finished on this machine before."""
-    return (KEPT / "warm").exists()
+def is_warm(integrator: str = "exudyn") -> bool:
+    """Whether a run of this integrator with kernels of these very sources has finished on this machine before."""
+    return (KEPT / _warm(integrator)).exists()
+
+
+def _warm(integrator: str) -> str:
+    return "warm" if integrator == "exudyn" else f"warm-{integrator}"
 
 
 @contextmanager
@@ -174,6 +179,12 @@ def compiled(function: F) -> F:
     """Compile at the first call and keep the machine code on disk."""
     with _own_cache(function):
         return numba.njit(cache=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+
+
+def released(function: F) -> F:
+    """The same as `compiled`, with Python's lock released while it runs: several may run at once, in threads."""
+    with _own_cache(function):
+        return numba.njit(cache=True, error_model="numpy", nogil=True)(function)  # type: ignore[no-any-return]
 
 
 def leaf(function: F) -> F:
@@ -221,11 +232,11 @@ def _check_takes(function: Callable[..., Any], form: str) -> None:
         raise TypeError(f"arguments of another number, got {function.__name__}({got}); {form} is needed")
 
 
-def mark_warm() -> None:
-    """Note that all kernels have been compiled; where nothing can be written the next run compiles anew."""
+def mark_warm(integrator: str = "exudyn") -> None:
+    """Note that an integrator's kernels have been compiled; where nothing can be written the next run compiles anew."""
     with suppress(OSError):
         KEPT.mkdir(parents=True, exist_ok=True)
-        (KEPT / "warm").touch()
+        (KEPT / _warm(integrator)).touch()
 
 
 def _by_address(signature: Any) -> Any:

@@ -83,11 +83,6 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class IfAny:
-    """Marks a list that counts in a hash only where something stands in it."""
-
-
-@dataclass(frozen=True)
 class Label:
     """A name that paths and channels are built from: letters, digits, ``_`` and ``-``, a letter first."""
 
@@ -99,6 +94,15 @@ class Label:
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> dict[str, Any]:
         """Hand the pattern to the validator of files."""
         return {**handler(source), "pattern": self.pattern}
+
+
+@dataclass(frozen=True)
+class Later:
+    """A key that joined its class later: at its default it is no part of a content's hash, which stays what it was."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> dict[str, Any]:
+        """Ask for nothing more of a file."""
+        return handler(source)  # type: ignore[no-any-return]
 
 
 def quantity_of(annotation: object) -> Quantity | None:

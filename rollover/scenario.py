@@ -11,7 +11,7 @@ from ground.array import CoMovingMass, Elements
 from ground.friction import Coulomb, Friction
 from ground.kinds import ByKey, ByKind
 from ground.law import GroundLaw
-from ground.quantity import IfAny, Quantity, parameters
+from ground.quantity import Later, Quantity, parameters
 from ground.surface import Plane, Surface
 from rollover.effects import EFFECTS, entries, nothing
 from rollover.inputs import Input, check_inputs
@@ -81,6 +81,12 @@ class Simulation:
     step: Annotated[float, Quantity("s", "of the solver", above=0, most=0.01)] = 0.001
     output_step: Annotated[float, Quantity("s", "between rows of the channels; a multiple of step", above=0)] = 0.001
     spectral_radius: Annotated[float, Quantity("1", "of generalized-alpha at infinity", least=0, most=1)] = 0.7
+    integrator: Annotated[
+        Literal["exudyn", "compiled"],
+        "who makes the steps: Exudyn, or the same scheme with the same contact forces in one compiled loop, which "
+        "takes no test stand and no excitation",
+        Later(),
+    ] = "exudyn"
     stop_at_rest: Annotated[bool, "end early once everything has come to rest"] = False
 
     def validate(self) -> None:
@@ -127,7 +133,7 @@ class Scenario:
     initiation: Initiation
     simulation: Simulation
     excitation: Annotated[Excitation | None, "what drives a striker besides its weight"] = None
-    inputs: Annotated[tuple[Input, ...], IfAny(), "what is prescribed over time, by signals"] = ()
+    inputs: Annotated[tuple[Input, ...], Later(), "what is prescribed over time, by signals"] = ()
     loads: Loads = Loads()
     gravity: Annotated[float, Quantity("m/s2", "acceleration of free fall, along -z", least=0, most=30)] = 9.81
     effects: Annotated[
@@ -158,6 +164,8 @@ class Scenario:
             )
         _check_start(self.vehicle, self.initiation)
         check_inputs(self.inputs, self.vehicle, self.initiation)
+        if self.simulation.integrator == "compiled":
+            _check_loop(self.initiation, self.excitation)
 
     @property
     def own_code(self) -> dict[str, dict[str, dict[str, str]]]:
@@ -214,6 +222,20 @@ class Scenario:
             if changes:
                 changed = document.exchanged(changed, changes)
         return changed
+
+
+def _check_loop(start: Initiation, excitation: Excitation | None) -> None:
+    """Refuse what the compiled loop does not do: a stand and an exciter look in after each step, in Python."""
+    if isinstance(start, (StaticTest, PendulumBlow, TiltTable)):
+        raise ValueError(
+            f"simulation.integrator: 'compiled' runs no test stand, got initiation.kind {start.kind!r}; "
+            "'exudyn' is allowed"
+        )
+    if excitation is not None:
+        raise ValueError(
+            f"simulation.integrator: 'compiled' drives no striker, got excitation.kind {excitation.kind!r}; "
+            "'exudyn' is allowed"
+        )
 
 
 def _check_start_of_striker(start: Initiation) -> None:

@@ -3,36 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ground.compiled import compiled
-from ground.kernel import AREA, CELL, LINE_Z, ROW, SINKAGE
+from ground.kernel import CELL, LINE_Z, ROW, SINKAGE
 from rollover.dynamics.bodies import Body
 from rollover.dynamics.prescribed import ground_acceleration, quantity, steered_kinetic
 from rollover.inputs import Shake
 from rollover.kernels import tables as c
-from rollover.kernels.elements import kinetic_of_soil
-from rollover.kernels.inputs import V_NOW
-from rollover.kernels.tables import (
-    ACTIVE,
-    E_FORCE,
-    E_FRICTION,
-    E_NORMAL,
-    E_WHERE,
-    FLAGS_NOW,
-    M_ANGLE,
-    M_IMPULSE,
-    OUT_COLUMNS,
-    RESULTANT_COLUMNS,
-    S_DELTA_NOW,
-    S_FORCE_NOW,
-    WORKS,
-    Handle,
-    Tables,
-)
+from rollover.kernels.tables import OUT_COLUMNS, RESULTANT_COLUMNS, WORKS, Tables
+from rollover.kernels.time_loop import ROWS, Watch
 from rollover.scenario import Scenario
 from rollover.spec.frames import angles, matrices, quaternions
 from rollover.spec.rops import Rops
@@ -41,55 +22,8 @@ from rollover.spec.vehicle import Striker
 Array = NDArray[np.float64]
 
 
-@compiled
-def write_row(t: Any, q: Any, qd: Any, qdd: Any, row: Any) -> None:
-    """State, contact resultants, wheel, mount and hinge forces, axle, work, soil's kinetic energy, sinkage, flags."""
-    n, nb = q.size, t.pose.shape[0]
-    for j in range(n):
-        row[j], row[n + j], row[2 * n + j] = q[j], qd[j], qdd[j]
-    k = 3 * n
-    for b in range(nb):
-        for j in range(RESULTANT_COLUMNS):
-            row[k] = t.resultant[b, j]
-            k += 1
-    for w in range(t.wheel_i.size):
-        g = t.wheel_memory[w]
-        row[k] = g[E_FORCE]
-        for j in range(3):
-            row[k + 1 + j] = g[E_FRICTION + j]
-            row[k + 4 + j] = g[E_WHERE + j]
-            row[k + 7 + j] = g[E_NORMAL + j]
-        k += 10
-    for i in range(t.mount_f.shape[0]):
-        for j in range(6):
-            row[k + j] = t.mount_memory[i, S_FORCE_NOW + j]
-            row[k + 6 + j] = t.mount_memory[i, S_DELTA_NOW + j]
-        k += 12
-    row[k], row[k + 1] = t.axle_memory[M_ANGLE], t.axle_memory[M_IMPULSE]
-    k += 2
-    for j in range(WORKS):
-        row[k] = t.work[j]
-        k += 1
-    row[k] = kinetic_of_soil(t)
-    deepest, footprint = 0.0, 0.0
-    for a in range(t.counts[ACTIVE]):
-        deepest = max(deepest, t.memory[t.active[a], SINKAGE])
-        if t.memory[t.active[a], SINKAGE] > 0.0:  # not those that are near
-            footprint += t.memory[t.active[a], AREA]
-    row[k + 1] = deepest
-    row[k + 2] = t.counts[FLAGS_NOW]
-    row[k + 3] = footprint
-    k += 4
-    for i in range(t.input_i.shape[0]):
-        row[k] = t.input_memory[i, V_NOW]
-        k += 1
-    if t.device_i.shape[0] > 0:
-        for j in range(OUT_COLUMNS):
-            row[k + j] = t.device_out[j]
-
-
 def row_length(t: Tables) -> int:
-    """Columns that `write_row` fills."""
+    """Columns that `rollover.kernels.record.write_row` fills."""
     n = len(t.spin_mass)
     out = OUT_COLUMNS if len(t.device_i) else 0
     parts = len(t.pose) * RESULTANT_COLUMNS + 10 * len(t.wheel_i) + 12 * len(t.mount_f)
@@ -102,17 +36,21 @@ class History:
 
     scenario: Scenario
     bodies: tuple[Body, ...]
-    time: Array
-    rows: Array
-    count: int = 0
+    watch: Watch
+    start: float  # s, the scenario's time at which the solver's is zero
     track_time: list[float] = field(default_factory=list)
     track: list[Array] = field(default_factory=list)
 
-    def add(self, time: float, t: Handle, q: Any, qd: Any, qdd: Any) -> None:
-        """Write one row."""
-        self.time[self.count] = time
-        write_row(t, q, qd, qdd, self.rows[self.count])
-        self.count += 1
+    @property
+    def rows(self) -> Array:
+        """Rows so far, the first one at least."""
+        return np.asarray(self.watch.rows[: len(self.time)])
+
+    @property
+    def time(self) -> Array:
+        """Their times, s: those of the steps are sums, 0.6 and not 0.5999999999999643."""
+        count = max(int(self.watch.whole[ROWS]), 1)
+        return np.array([round(self.start + float(x), 9) for x in self.watch.time[:count]])
 
     def add_track(self, time: float, t: Tables) -> None:
         """Keep the deepest sinkage of all touched elements at this instant."""

@@ -17,10 +17,11 @@ import numpy as np
 from rollover.dynamics import interrupts
 from rollover.dynamics.bodies import Body
 from rollover.dynamics.placement import Start
+from rollover.dynamics.recorder import Live
 from rollover.dynamics.setup import Hinge
 from rollover.kernels.forces import added_mass, generalised_forces
 from rollover.kernels.jacobian import stiffness
-from rollover.kernels.tables import ACTIVE, PIVOT, Handle, Tables
+from rollover.kernels.tables import ACTIVE, PIVOT, Tables
 from rollover.spec.frames import matrices
 
 os.environ.setdefault("EXUDYN_NO_USER_SETTINGS", "1")  # a user's settings file must not change results
@@ -43,11 +44,9 @@ exu.config.suppressWarnings = True
 
 
 @dataclass
-class Live:
-    """What the callbacks share; both are replaced when the memory grows."""
+class _Shared:
+    """What the callbacks share."""
 
-    tables: Tables
-    handle: Handle
     time: float = 0.0  # of the last accepted step
     tried: float = 0.0  # time at which forces were last tried
     error: BaseException | None = None
@@ -112,14 +111,15 @@ def solve(
     newton = exu.MatrixContainer()
     newton.SetWithDenseMatrix(M, useDenseMatrix=True)
     views: list[Any] = []
+    shared = _Shared()
 
     clock, zero = live.tables.clock, start.time
 
     def force(_mbs: Any, t: float, _item: int, _q: Any, _qd: Any) -> list[float]:
-        if t < live.tried:
+        if t < shared.tried:
             clock[2] += 1.0  # Newton's iteration failed: once more, with half the step
-        live.tried = t
-        clock[0], clock[1] = t - live.time, zero + t
+        shared.tried = t
+        clock[0], clock[1] = t - shared.time, zero + t
         generalised_forces(live.handle, views[0], views[1], Q)
         return Q.tolist()
 
@@ -136,14 +136,14 @@ def solve(
             return False
         try:
             goes_on = after_step(t, views[0], views[1], views[2])
-            live.time, clock[2] = t, 0.0
+            shared.time, clock[2] = t, 0.0
             # like the contact set, the soil's mass matrix is that of the step's start
             if live.tables.counts[ACTIVE] > 0 or M.any():
                 added_mass(live.handle, views[0], M)
                 added.SetWithDenseMatrix(M, useDenseMatrix=True)
             return goes_on
         except BaseException as error:
-            live.error = error
+            shared.error = error
             return False
 
     mbs.AddObject(
@@ -190,8 +190,8 @@ def solve(
         views.clear()
         mbs.Reset()
         container.Reset()
-    if live.error is not None:
-        raise live.error
+    if shared.error is not None:
+        raise shared.error
     return failure
 
 

@@ -5,34 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ground.kernel import ROW, SINKAGE
 from ground.law import GroundLaw
 from rollover.kernels import tables as c
-from rollover.kernels.tables import Tables
 
-UNCALIBRATED, DEEP = 1 << 16, 1 << 17  # bits beyond those of the kernels
-FLAG_NAMES = {**c.FLAG_NAMES, UNCALIBRATED: "uncalibrated", DEEP: "deep-sinkage"}
+FLAG_NAMES = {**c.FLAG_NAMES, c.UNCALIBRATED: "uncalibrated", c.DEEP: "deep-sinkage"}
 
 
-class Told:
-    """Flags of the elements in contact that follow from their laws alone: nothing measured behind it, or too deep."""
-
-    def __init__(self, laws: Sequence[GroundLaw]) -> None:
-        domains = [law.domain for law in laws]
-        self.uncalibrated = np.array([not domain.calibrated for domain in domains])
-        self.deepest = np.array([domain.sinkage_most for domain in domains])
-        self.any = bool(self.uncalibrated.any() or np.isfinite(self.deepest).any())
-
-    def now(self, t: Tables) -> int:
-        """Bits of `FLAG_NAMES` for the contacts of this moment."""
-        count = int(t.counts[c.ACTIVE])
-        if not self.any or not count:
-            return 0
-        slots = t.active[:count]
-        row, depth = t.state[slots, ROW], t.memory[slots, SINKAGE]
-        flags = UNCALIBRATED if self.uncalibrated[row].any() else 0
-        return flags | (DEEP if (depth > self.deepest[row]).any() else 0)
+def told_by_laws(laws: Sequence[GroundLaw]) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    """Of each law (nr,) whether nothing measured stands behind it, and how deep what was measured went, m."""
+    domains = [law.domain for law in laws]
+    return np.array([not domain.calibrated for domain in domains]), np.array([float(d.sinkage_most) for d in domains])
 
 
 def flag_names(flags: int) -> tuple[str, ...]:

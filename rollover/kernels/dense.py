@@ -41,6 +41,43 @@ def solve_in_place(K: Any, B: Any) -> None:
             B[c, k] = total / K[c, c]
 
 
+@leaf
+def factorise(A: Any, order: Any) -> bool:
+    """Triangular factors of A (n, n) in place, rows exchanged as `order` (n,) says; False where A is singular."""
+    n = A.shape[0]
+    for c in range(n):
+        best = c
+        for r in range(c + 1, n):
+            if abs(A[r, c]) > abs(A[best, c]):
+                best = r
+        order[c] = best
+        if not abs(A[best, c]) > 0.0:  # NaN is no pivot either
+            return False
+        if best != c:
+            for k in range(n):
+                A[c, k], A[best, k] = A[best, k], A[c, k]
+        for r in range(c + 1, n):
+            if A[r, c] != 0.0:
+                A[r, c] /= A[c, c]
+                for k in range(c + 1, n):
+                    A[r, k] -= A[r, c] * A[c, k]
+    return True
+
+
+@leaf
+def substitute(A: Any, order: Any, x: Any) -> None:
+    """x (n,) <- A^-1 x with the factors of `factorise`."""
+    n = A.shape[0]
+    for c in range(n):
+        x[c], x[order[c]] = x[order[c]], x[c]
+        for k in range(c):
+            x[c] -= A[c, k] * x[k]
+    for c in range(n - 1, -1, -1):
+        for k in range(c + 1, n):
+            x[c] -= A[c, k] * x[k]
+        x[c] /= A[c, c]
+
+
 @compiled
 def times(A: Any, x: Any) -> Any:
     """A x."""

@@ -84,6 +84,12 @@ def end_of_step(t: Any, q: Any, qd: Any, qdd: Any, h: float, Q: Any) -> None:
     """Book, commit, renew the contacts, exchange momentum with what was newly hit (writes qd)."""
     t.clock[0] = h
     generalised_forces(t, q, qd, Q)
+    finish_step(t, q, qd, qdd, h)
+
+
+@compiled
+def finish_step(t: Any, q: Any, qd: Any, qdd: Any, h: float) -> None:
+    """The same, where the forces of (q, qd) are those that were tried last."""
     for b in range(t.pose.shape[0]):
         for k in range(3):
             t.pose[b, ACC + k] = qdd[6 * b + k]

@@ -84,10 +84,12 @@ O_FORCE, O_DEFLECTION, O_ENERGY, O_POINT, O_WAY, OUT_COLUMNS = 0, 1, 2, 3, 6, 9
 
 # columns of event: time is added by the caller
 EV_KIND, EV_SUBJECT, EV_PLACE, EV_VALUE, EVENT_COLUMNS = 0, 1, 2, 5, 6
-TOUCH, BRANCH_CHANGE, TURN, WHEEL_OFF, WHEEL_ON, AXLE_STOP, HINGE, AXLE_BLOW = 0, 1, 2, 3, 4, 5, 6, 7
+TOUCH, BRANCH_CHANGE, TURN, WHEEL_OFF, WHEEL_ON, AXLE_STOP, HINGE, AXLE_BLOW, EVENT_KINDS = 0, 1, 2, 3, 4, 5, 6, 7, 8
 
 # bits of an element's domain flags, and their names
 OUT_OF_SPEED, OUT_OF_MOMENTUM, OUT_OF_AREA, NOT_VIRGIN, OBLIQUE = 1, 2, 4, 8, 16
+# bits that follow from an element's law alone
+UNCALIBRATED, DEEP = 1 << 16, 1 << 17
 FLAG_NAMES = {
     OUT_OF_SPEED: "impact-speed",
     OUT_OF_MOMENTUM: "momentum",

@@ -42,7 +42,21 @@ from rollover.kernels.vectors import cross, to_body
 
 BRAKE_STIFFNESS = 2e6  # N m/rad: a brake holds like a spring until its limit
 BRAKE_RELAXATION = 0.002  # s, dashpot over that spring
+# places in what an engine is told: torque, time over which it rises, time at which it ends
+FULL_TORQUE, RISE, UNTIL, DRIVE_NUMBERS = 0, 1, 2, 3
 DROOP = 0.1  # share of the rate limit over which a governor takes the torque back
+
+
+@leaf
+def throttle(t: Any, drive: Any, now: float) -> None:
+    """What the engine may give in the next step; `drive` (DRIVE_NUMBERS,), or empty without an engine."""
+    if drive.size == 0:
+        return
+    if now >= drive[UNTIL]:
+        t.drive[D_TORQUE] = 0.0
+        return
+    rising = now / drive[RISE] if drive[RISE] > 0.0 else 1.0
+    t.drive[D_TORQUE] = drive[FULL_TORQUE] * min(max(rising, 0.0), 1.0)
 
 
 @leaf

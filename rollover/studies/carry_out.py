@@ -115,6 +115,7 @@ def _head(name: str, chosen: Study, status: str) -> dict[str, Any]:
         "status": status,
         "scenario_hash": content_hash(chosen.scenario),
         **chosen.scenario.own_code,
+        "integrator": chosen.scenario.simulation.integrator,
         "plan": chosen.plan.kind,
         "versions": versions(),
     }

@@ -96,14 +96,14 @@ def own_files(kind: Literal["effects", "laws"]) -> str:
     return " ".join(own_code.hashes(kind).values())
 
 
-def warm_up(simulator: Simulator = "full") -> None:
+def warm_up(simulator: Simulator = "full", integrator: str = "exudyn") -> None:
     """Load what a case needs, kernels too, by a drop of its own, so that the first case is not charged for it."""
     effects()
     drop = load("drop_test")
     if simulator == "drop":
         _dropped(drop)
     else:
-        _simulated(drop.replaced({"simulation.duration": 0.005}), clearance=False)
+        _simulated(drop.replaced({"simulation.duration": 0.005, "simulation.integrator": integrator}), clearance=False)
 
 
 class WrongVersionsError(Exception):

@@ -19,7 +19,6 @@ from rollover.studies.case import (
     CLEARANCE,
     Case,
     Result,
-    Simulator,
     case_of,
     key_of,
     own_files,
@@ -168,7 +167,7 @@ def _worked_off(
             asked.append(key)
             yield case
 
-    outcomes = _outcomes(cases(), way, builder.study.simulator)
+    outcomes = _outcomes(cases(), way, builder.study)
     try:
         for outcome in outcomes:
             key = asked[outcome.index]
@@ -179,11 +178,11 @@ def _worked_off(
     return rows, len(todo)
 
 
-def _outcomes(cases: Iterator[Case], way: Way, simulator: Simulator) -> Iterator[Outcome[Case, Result]]:
+def _outcomes(cases: Iterator[Case], way: Way, study: Study) -> Iterator[Outcome[Case, Result]]:
     limits: dict[str, Any] = {
         "time_limit": way.time_limit,
         "memory_limit": way.memory_limit,
-        "warm_up": partial(warm_up, simulator),
+        "warm_up": partial(warm_up, study.simulator, study.scenario.simulation.integrator),
     }
     if way.scheduler:
         from rollover.studies.cluster import map_on_cluster

@@ -23,6 +23,7 @@ from ground.compiled import compiled
 from rollover.dynamics import model, simulate
 from rollover.dynamics.assembly import grown
 from rollover.kernels.forces import added_mass, generalised_forces
+from rollover.kernels.generalised_alpha import turn
 from rollover.kernels.impact import constraints
 from rollover.kernels.step import end_of_step
 from rollover.kernels.tables import ACTIVE, EVENTS, OMEGA, OUTSIDE, SLOTS, Tables, handle
@@ -137,23 +138,6 @@ def accelerations(t: Any, q: Any, v: Any, Q: Any, gravity: float, room: Any, a: 
         for r in range(5):
             for k in range(6):
                 a[at + k] -= Y[side - 1, r, k] * g[r]
-
-
-@compiled
-def turn(r: Any, x: float, y: float, z: float) -> None:
-    """R(r) <- R(r) R(x, y, z) for a rotation vector r (3,), by unit quaternions."""
-    c = math.sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2])
-    s = 0.5 if c < 1e-9 else math.sin(0.5 * c) / c
-    w0, a0, b0, c0 = math.cos(0.5 * c), s * r[0], s * r[1], s * r[2]
-    c = math.sqrt(x * x + y * y + z * z)
-    s = 0.5 if c < 1e-9 else math.sin(0.5 * c) / c
-    w1, a1, b1, c1 = math.cos(0.5 * c), s * x, s * y, s * z
-    a2, b2, c2 = cross(a0, b0, c0, a1, b1, c1)
-    w = w0 * w1 - a0 * a1 - b0 * b1 - c0 * c1
-    a2, b2, c2 = a2 + w0 * a1 + w1 * a0, b2 + w0 * b1 + w1 * b0, c2 + w0 * c1 + w1 * c0
-    size = math.sqrt(a2 * a2 + b2 * b2 + c2 * c2)
-    s = 2.0 if size < 1e-12 else 2.0 * math.atan2(size, w) / size
-    r[0], r[1], r[2] = s * a2, s * b2, s * c2
 
 
 @compiled

@@ -63,7 +63,7 @@ def bench(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Bench:
     bench = Bench()
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(simulate, "run", bench.run)
-    monkeypatch.setattr("ground.compiled.is_warm", lambda: True)
+    monkeypatch.setattr("ground.compiled.is_warm", lambda *_: True)
     log, report = types.ModuleType("viz.recordings.log"), types.ModuleType("viz.pages.report")
     log.write_rrd = lambda run, path, peaks: path.write_bytes(b"rrd")  # type: ignore[attr-defined]
     report.page = lambda run, peaks, answer, rows, command: f"<p>{command}</p>"  # type: ignore[attr-defined]
@@ -250,12 +250,12 @@ def test_an_interrupt_leaves_nothing(bench: Bench, monkeypatch: pytest.MonkeyPat
 
 
 def test_the_first_run_says_that_it_compiles(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ground.compiled.is_warm", lambda: False)
+    monkeypatch.setattr("ground.compiled.is_warm", lambda *_: False)
     done = rollover("run", "drop_test")
     assert done.stderr.startswith("Compiling the contact kernels, once per installation: about ")
     assert done.stderr.count("\n") == 1
     assert "(most of it compiling, once)" in done.stdout, "its time tells no speed"
-    monkeypatch.setattr("ground.compiled.is_warm", lambda: True)
+    monkeypatch.setattr("ground.compiled.is_warm", lambda *_: True)
     assert "x real time)" in rollover("run", "drop_test", "--force").stdout
 
 

@@ -43,6 +43,7 @@ RUN = [
     "docs/proof.md",
     "docs/validation.md",
     "docs/estimation.md",
+    "docs/integrators.md",
     "rollover/README.md",
 ]
 ELSEWHERE = {  # page -> its blocks that are not run here, and why

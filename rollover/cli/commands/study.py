@@ -67,7 +67,7 @@ def study(
         memory_limit=1e6 * memory_limit,
         retry="failed" if retry else "",
     )
-    if not is_warm() and chosen.simulator == "full":
+    if not is_warm(chosen.scenario.simulation.integrator) and chosen.simulator == "full":
         console.say(f"Compiling the contact kernels, once per installation: about {COMPILING} s.")
     command = " ".join(map(shlex.quote, ["rollover", "study", name, *(["--out", str(out)] if out else [])]))
 

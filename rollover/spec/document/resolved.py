@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import is_dataclass
+from dataclasses import MISSING, fields, is_dataclass
 from typing import Any, NamedTuple
 
 from rollover.spec.document.slot import Slot, slot_of, slots
@@ -22,20 +22,24 @@ class Leaf(NamedTuple):
     meaning: str
 
 
-def to_mapping(thing: Any) -> dict[str, Any]:
-    """Every value of an object, defaults included, as dicts, lists, text and numbers."""
+def to_mapping(thing: Any, *, hashed: bool = False) -> dict[str, Any]:
+    """Every value of an object, defaults included, as dicts, lists, text and numbers; `hashed` see `Later`."""
     kind: Any = type(thing)
-    return {name: plain(getattr(thing, name), slot) for name, slot in slots(kind).items()}
+    found = {name: plain(getattr(thing, name), slot, hashed=hashed) for name, slot in slots(kind).items()}
+    if hashed:
+        at_default = {f.name for f in fields(kind) if f.default is not MISSING and getattr(thing, f.name) == f.default}
+        found = {n: v for n, v in found.items() if not (slots(kind)[n].later and n in at_default)}
+    return found
 
 
-def plain(value: Any, slot: Slot) -> Any:
+def plain(value: Any, slot: Slot, *, hashed: bool = False) -> Any:
     """Dicts, lists, text and numbers for whatever stands at one place."""
     if is_dataclass(value):
-        return to_mapping(value)
+        return to_mapping(value, hashed=hashed)
     if isinstance(value, (tuple, list)):
-        return [plain(item, slot.element(i) or slot) for i, item in enumerate(value)]
+        return [plain(item, slot.element(i) or slot, hashed=hashed) for i, item in enumerate(value)]
     if isinstance(value, Mapping):
-        return {key: plain(item, slot) for key, item in value.items()}
+        return {key: plain(item, slot, hashed=hashed) for key, item in value.items()}
     if slot.type is float and value is not None:
         return float(value) + 0.0  # 132 and 132.0 are one number, and so are 0.0 and -0.0
     return value
@@ -48,13 +52,8 @@ def dump(thing: Any, head: str = "") -> str:
 
 
 def content_hash(thing: Any) -> str:
-    """SHA-256 over all values, whatever the order of keys and the files they came from.
-
-    A list that `IfAny` marks counts where something stands in it: what never had one keeps the hash that it had.
-    """
-    known = slots(type(thing))
-    stated = {key: value for key, value in to_mapping(thing).items() if value or not known[key].if_any}
-    text = json.dumps(stated, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    """SHA-256 over all values, whatever the order of keys and the files they came from."""
+    text = json.dumps(to_mapping(thing, hashed=True), sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 

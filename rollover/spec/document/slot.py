@@ -10,7 +10,7 @@ from dataclasses import MISSING, dataclass, fields, is_dataclass
 from typing import Annotated, Any, Literal
 
 from ground.kinds import ByKey, ByKind
-from ground.quantity import Grid, IfAny, Label, Quantity
+from ground.quantity import Grid, Label, Later, Quantity
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +41,7 @@ class Slot:
     by_key: ByKey | None = None
     grid: Grid | None = None
     written: Written | None = None
-    if_any: bool = False
+    later: bool = False
 
     @property
     def unit(self) -> str:
@@ -164,7 +164,7 @@ def slot_of(annotation: Any) -> Slot:
                 "label": label is not None or inner.label,
                 "grid": grid or inner.grid,
                 "written": written or inner.written,
-                "if_any": any(isinstance(m, IfAny) for m in metadata) or inner.if_any,
+                "later": any(isinstance(m, Later) for m in metadata),
                 "by_kind": by_kind or inner.by_kind,
                 "by_key": next((m for m in metadata if isinstance(m, ByKey)), inner.by_key),
             }

@@ -1,0 +1,182 @@
+"""Both integrators on every shipped scenario that the compiled one takes: the same motion, the same loads."""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from rollover import studies
+from rollover.assessment import results
+from rollover.assessment.ledger import closure
+from rollover.dynamics import simulate
+from rollover.dynamics.result import Run
+from rollover.scenario import Scenario, load
+from rollover.spec.document import content_hash, shipped_folder, to_mapping
+from rollover.studies.case_store import Row
+from rollover.studies.ensemble import extremes, neighbours, spreads
+from rollover.studies.runner import Way, conduct
+from rollover.system.errors import InputError
+from tests.rollover.studies import drops
+
+# s: the first impact, the peak of the loads and what rocks after it
+DURATIONS = {
+    "ball_drop": 2.7,
+    "bank_overturn": 3.0,
+    "cone_drop": 0.01,
+    "cube_toss": 0.4,
+    "drop_test": 0.4,
+    "field_upset_side": 1.5,
+    "kerb_trip": 0.6,
+    "multiple_roll": 1.2,
+    "penetrometer_drop": 0.3,
+    "rear_overturn": 1.3,
+    "rops_drop": 0.5,
+    "side_overturn": 1.0,
+    "side_overturn_slope": 1.0,
+    "tractor_drop_corner": 0.5,
+}
+REFUSED = {"driven_pile", "pendulum", "static_rops_test", "tilt_table", "vibrating_plate"}
+EQUAL = 1e-6  # of the largest value of a channel, before the first impact
+# m/s2: Exudyn finds a turn of x by arccos, to 4 eps/x, here 4e-12 rad for the 1e-4 rad by which a vehicle that stands
+# leans; that on an arm of 1 m over beta h^2 is what the pivot's equations make of it at 1 ms
+ACCELERATION = 1e-5
+STARTS = 5
+# An exudyn run is one more draw beside the compiled ensemble: |x - mean| < t s sqrt(1 + 1/n) but for one in 1000.
+WITHIN = float(stats.t.ppf(1.0 - 0.0005, STARTS - 1)) * math.sqrt(1.0 + 1.0 / STARTS)
+# what the scatter of a load that hardly scatters leaves to rounding
+FLOOR = 1e-6
+
+
+def both(scenario: Scenario) -> tuple[Run, Run]:
+    made = [simulate.run(scenario.replaced({"simulation.integrator": i})) for i in ("exudyn", "compiled")]
+    return made[0], made[1]
+
+
+def short(name: str, **changes: object) -> Scenario:
+    return load(name).replaced({"simulation.duration": DURATIONS[name], **changes})
+
+
+def test_every_shipped_scenario_is_run_through_both_or_refused() -> None:
+    names = {path.stem for path in Path(shipped_folder()).glob("*.yaml")}
+    assert names == set(DURATIONS) | REFUSED
+    for name in REFUSED:
+        with pytest.raises(InputError, match=r"simulation\.integrator: 'compiled' .*'exudyn' is allowed"):
+            load(name).replaced({"simulation.integrator": "compiled"})
+
+
+@pytest.mark.parametrize("name", sorted(DURATIONS))
+def test_the_same_motion_and_the_same_loads(name: str) -> None:
+    scenario = short(name)
+    engine, loop = both(scenario)
+    assert (engine.status, loop.status) == ("done", "done")
+    assert np.array_equal(engine.recording.time, loop.recording.time)
+    assert set(engine.recording.channels) == set(loop.recording.channels)
+    # until a contact first begins or ends: there the smallest difference decides in which step it does
+    first = min((e.time for e in engine.events), default=math.inf)
+    before = engine.recording.time < first - 0.5 * scenario.simulation.step
+    energy = max(engine.released, 1.0)
+    for channel, values in engine.recording.channels.items():
+        most = energy if channel.startswith("energy/") else max(float(np.abs(values).max()), 1e-9)
+        allowed = max(EQUAL * most, ACCELERATION if "/acceleration_" in channel else 0.0)
+        apart = float(np.abs(values - loop.recording[channel])[before].max(initial=0.0))
+        assert apart <= allowed, channel
+    assert [(e.kind, e.subject) for e in engine.events][:1] == [(e.kind, e.subject) for e in loop.events][:1]
+    assert engine.domain_flags == loop.domain_flags
+    assert closure(loop).largest <= max(1.5 * closure(engine).largest, 1e-4)
+    ensemble = [extremes(simulate.run(s)) for s in neighbours(loop.scenario, STARTS)]
+    exudyn = {e.key: e.value for e in extremes(engine)}
+    for spread in spreads(ensemble):
+        allowed = WITHIN * spread.scatter * abs(spread.mean) + FLOOR * abs(spread.mean)
+        assert abs(exudyn[spread.load, spread.filter] - spread.mean) <= allowed, spread
+
+
+def test_events_and_rest_are_those_of_the_engine() -> None:
+    engine, loop = both(short("drop_test", **{"simulation.duration": 1.5, "simulation.stop_at_rest": True}))
+    assert [e.kind for e in loop.events] == ["first-touch", "branch-change", "unloading", "rest"]
+    assert [(e.time, e.kind, e.subject, e.detail) for e in loop.events] == [
+        (e.time, e.kind, e.subject, e.detail) for e in engine.events
+    ]
+    assert loop.stop_time == engine.stop_time < 1.5
+    assert np.array_equal(loop.track.time, engine.track.time)
+    assert loop.track.sinkage == pytest.approx(engine.track.sinkage, rel=1e-9)
+
+
+def test_a_run_that_leaves_the_array_ends_with_the_same_words() -> None:
+    away = {"ground.elements.length": 0.3, "ground.elements.centre": [0.0, 0.0]}
+    engine, loop = both(short("cube_toss", **away))
+    assert loop.status == engine.status == "failed"
+    assert loop.sentence == engine.sentence
+    assert loop.sentence.startswith("left the array of ground elements at t = ")
+    assert loop.stop_time == engine.stop_time < DURATIONS["cube_toss"]
+
+
+def test_a_run_that_breaks_off_keeps_what_it_had() -> None:
+    # where nothing is a state any more, how it ends is chance: at which iteration, by which of two sentences
+    engine, loop = both(short("rops_drop", **{"ground.law.stiffness_scale": 1e14}))
+    assert loop.status == engine.status == "failed"
+    assert "at t = 0.03" in loop.sentence
+    assert loop.stop_time == pytest.approx(engine.stop_time, abs=2e-3)
+    assert all(np.isfinite(v).all() for v in loop.recording.channels.values())
+
+
+def test_runs_side_by_side_in_threads_are_those_one_after_another() -> None:
+    own = [short("drop_test", **{"initiation.speed": v, "simulation.integrator": "compiled"}) for v in (1.0, 2.0, 3.0)]
+    own += [short("cube_toss", **{"simulation.integrator": "compiled"})]
+    alone = [simulate.run(s).recording for s in own]
+    with ThreadPoolExecutor(4) as pool:
+        together = [run.recording for run in pool.map(simulate.run, own)]
+    for one, other in zip(alone, together, strict=True):
+        assert all(np.array_equal(one[channel], other[channel]) for channel in one.channels)
+
+
+def test_a_file_that_asks_for_it_on_a_stand_is_told_the_line(tmp_path: Path) -> None:
+    text = (Path(shipped_folder()) / "tilt_table.yaml").read_text(encoding="utf-8")
+    folder = Path(shipped_folder())
+    text = text.replace("simulation: {", "simulation: {integrator: compiled, ").replace(
+        "vehicles/", f"{folder.as_posix()}/vehicles/"
+    )
+    file = tmp_path / "mine.yaml"
+    file.write_text(text.replace("soils/", f"{folder.as_posix()}/soils/"), encoding="utf-8")
+    line = next(k for k, row in enumerate(text.splitlines(), 1) if "integrator" in row)
+    with pytest.raises(
+        InputError, match=rf"mine\.yaml:{line}: simulation\.integrator: .* got initiation.kind 'tilt-table'"
+    ):
+        load(file)
+
+
+def test_the_key_at_its_default_changes_no_hash() -> None:
+    scenario = load("drop_test")
+    mapping = to_mapping(scenario)
+    assert mapping["simulation"].pop("integrator") == "exudyn"
+    assert to_mapping(scenario, hashed=True) == mapping
+    compiled = scenario.replaced({"simulation.integrator": "compiled"})
+    assert content_hash(compiled) != content_hash(scenario)
+    assert content_hash(compiled.replaced({"simulation.integrator": "exudyn"})) == content_hash(scenario)
+
+
+def test_results_say_which_integrator_made_them() -> None:
+    engine, loop = both(short("drop_test", **{"simulation.duration": 0.02}))
+    assert [results.account(run, [])["integrator"] for run in (engine, loop)] == ["exudyn", "compiled"]
+
+
+def test_a_study_gives_the_same_bits_whatever_the_number_of_workers(tmp_path: Path) -> None:
+    file = drops(
+        tmp_path,
+        ("scenario: drop_test.yaml", "scenario: {base: drop_test.yaml, simulation: {integrator: compiled}}"),
+        ("simulator: drop", "simulator: full"),
+        ("count: 20", "count: 4"),
+    )
+    study = studies.load(file)
+    here = conduct(study, tmp_path / "here", Way(workers=0))
+    apart = conduct(study, tmp_path / "apart", Way(workers=2))
+
+    def told(row: Row) -> tuple[str, object]:
+        return row.status, dict(row.measures)
+
+    assert [told(row) for row in here.rows] == [told(row) for row in apart.rows]
+    assert {row.status for row in here.rows} == {"done"}
