@@ -119,9 +119,10 @@ def _on_table(scenario: Scenario, tilt: TiltTable, bodies: tuple[Body, ...], t: 
         u = statics.solve(u) if u is not None else None
     f[d.D_START] = first
     if u is None or not np.all(t.wheel_memory[:, E_FORCE_NOW] > 0.0):
+        turned = [i for i in scenario.inputs if isinstance(i, TableAngle)]
         raise InputError(
             Fault(
-                path="inputs" if scenario.inputs else "initiation.from_deg",
+                path=next((f"inputs.{i.name}.angle_deg" for i in turned), "initiation.from_deg"),
                 message=f"not on all its wheels on a table so steep, got {math.degrees(first):g} deg; less",
             )
         )

@@ -12,12 +12,13 @@ from scipy.integrate import solve_ivp
 
 from rollover.dynamics.assembly import tables_of
 from rollover.dynamics.bodies import bodies_of
-from rollover.dynamics.prescribed import lines, spline, value_at
+from rollover.dynamics.prescribed import lines, spline, steered_kinetic, value_at, with_inputs
 from rollover.dynamics.result import Run
 from rollover.dynamics.simulate import run
-from rollover.kernels.forces import read_poses
+from rollover.kernels.forces import generalised_forces, read_poses
 from rollover.kernels.inputs import try_turning
-from rollover.kernels.tables import OMEGA, VEL, X, handle
+from rollover.kernels.steering import steer
+from rollover.kernels.tables import INPUT, OMEGA, P_INERTIA, VEL, W_AXIS, X, handle
 from rollover.scenario import Scenario
 from rollover.spec.frames import from_angles, matrices, rotation_vector
 from rollover.spec.initiation import Release, Standing
@@ -238,6 +239,53 @@ def test_a_steering_history_turns_the_tractor_as_its_angle_does() -> None:
         turned = rec["chassis/angular_velocity_z"][part].mean()
         assert turned == pytest.approx(speed.mean() * math.tan(math.radians(deg)) / L, rel=0.1)
     assert abs(result.ledger["input"]) > 0.0
+
+
+def test_turning_an_axle_keeps_its_momentum_books_its_energy_and_leans_on_its_carrier() -> None:
+    """Against L = I (s + omega . e) e and T = sum of the whole mass matrix, before and after the axles have turned."""
+    signal = {"name": "steer", "kind": "steering", "angle_deg": {"time": [0.0, 1.0], "value": [0.0, 30.0]}}
+    scenario = driving({"inputs": [signal]})
+    bodies = bodies_of(scenario.vehicle, scenario.ground.elements, {})
+    t = with_inputs(scenario, bodies, tables_of(scenario, bodies))
+    kernels, n, axle = handle(t), len(t.spin_mass), 6 * [b.name for b in bodies].index("front_axle")
+    q, qd = np.zeros(n), np.random.default_rng(1).normal(size=n)
+    q[2 : len(t.mass) : 6] = 50.0  # no tyre touches
+    t.clock[1] = 0.9
+    generalised_forces(kernels, q, qd, np.zeros(n))
+    spun, front = n - 4, [w for w in range(4) if t.wheel_i[w] == axle // 6]
+
+    def told() -> tuple[float, Array, Array]:
+        M = t.spin_mass.copy()
+        M[: len(t.mass), : len(t.mass)] += t.mass
+        e = t.wheel_f[front, W_AXIS : W_AXIS + 3]
+        return (
+            0.5 * float(qd @ M @ qd),
+            t.spin_f[front, P_INERTIA] * (qd[spun:][front] + e @ qd[axle + 3 : axle + 6]),
+            e,
+        )
+
+    before, momentum, _ = told()
+    s = qd[None, spun:].copy()
+    steer(kernels, qd)
+    after, kept, new = told()
+    turned = math.radians(27.0)
+    np.testing.assert_allclose(new, [[-math.sin(turned), math.cos(turned), 0.0]] * 2)
+    np.testing.assert_allclose(kept, momentum, rtol=1e-12)
+    assert abs(after - before) > 0.01
+    assert t.work[INPUT] == pytest.approx(before - after, abs=1e-8)  # rounding of 3 kJ
+    # what a row of an earlier instant held is told from the axles as they are now
+    whole = np.concatenate([qd[:spun], s[0]])
+    M = t.spin_mass.copy()
+    M[: len(t.mass), : len(t.mass)] += t.mass
+    missing = steered_kinetic(t, np.zeros((1, 1)), qd[None, :spun].reshape(1, -1, 6), s)
+    assert 0.5 * whole @ M @ whole + missing[0] == pytest.approx(before, rel=1e-12)
+    # wheels that roll forward, turned to the left, lean their carrier to the right: -dL/dt = I s rate x, for e = y
+    t.wheel_f[front, W_AXIS : W_AXIS + 3] = 0.0, 1.0, 0.0
+    qd[:] = 0.0
+    qd[spun:] = 20.0
+    generalised_forces(kernels, q, qd, np.zeros(n))
+    moment = float(t.spin_f[front, P_INERTIA].sum()) * 20.0 * math.radians(30.0)
+    np.testing.assert_allclose(t.input_q[0, axle : axle + 6], [0.0, 0.0, 0.0, moment, 0.0, 0.0], atol=1e-9)
 
 
 def test_the_work_of_steering_is_booked_where_wheels_turn_fast_and_the_axle_rolls() -> None:
