@@ -25,7 +25,7 @@ TUNING = SETTINGS.fit.own_model
 
 
 def prepared_for(model: ForwardModel, recordings: Mapping[str, Recording]) -> tuple[list[Dataset], list[str]]:
-    """Recordings as evidence, and what is to be said of them. Raises `InputError` for all that cannot drive the model.
+    """Recordings as evidence, and what is to be said of them. Raises `InputError` for those that cannot drive it.
 
     Raises `FailedModelError` for a model that fails, or does not keep to what it declares, where fits begin.
     """
@@ -54,7 +54,7 @@ def prepared_for(model: ForwardModel, recordings: Mapping[str, Recording]) -> tu
 
 
 def with_noise(model: ForwardModel, every: Sequence[Dataset]) -> list[Dataset]:
-    """The evidence with the noise of its channels: as recordings state it, else from quiet stretches of all together."""
+    """The evidence with its noise: as recordings state it, else from quiet stretches of all together."""
     problem = Problem(every)
     base = begun(model, problem)
     if base is None:
