@@ -101,11 +101,16 @@ def test_a_model_without_parameters_of_its_own_is_held_as_it_is() -> None:
     assert diagnose_model(Fixed(), measured(2.5, -0.7)).verdict == "no-mismatch"
 
 
-def test_noise_that_a_recording_states_is_believed() -> None:
-    told = {n: replace(r, noise={OUT: 0.2}) for n, r in measured(2.5, -0.7, bend=0.01).items()}
-    found = diagnose_model(model, told)
-    assert found.noise == {OUT: 0.2}
-    assert found.effects == ()  # a bend of 0.01 V is far below that
+def test_noise_that_a_recording_states_is_believed_beside_what_nothing_explains() -> None:
+    recordings = {}
+    for name, r in measured(0.0, 0.0, count=3).items():  # noise alone, to which a fast input adds
+        u = np.sin(2.0 * np.pi * 11.0 * r.time)
+        channels = {IN: u, OUT: r[OUT] + 2.5 * u + 0.3 * np.sin(6.0 * u)}
+        recordings[name] = replace(r, channels=channels, noise={OUT: 0.01})
+    found = diagnose_model(model, recordings)
+    assert (found.verdict, dict(found.noise)) == ("unexplained", {OUT: 0.01})
+    unstated = diagnose_model(model, {n: replace(r, noise={}) for n, r in recordings.items()})
+    assert unstated.noise[OUT] > 0.03  # what is missing is no slower than a noise
 
 
 def test_two_terms_are_named_beside_the_parameters() -> None:
