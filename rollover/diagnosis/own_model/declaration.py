@@ -122,7 +122,7 @@ def declared(model: object, file: str = "") -> ForwardModel:
     return model
 
 
-def _wrong(model: object) -> Iterator[tuple[str, str]]:
+def _wrong(model: Any) -> Iterator[tuple[str, str]]:
     """What is wrong with a declaration: where, and in words."""
     kinds: dict[str, Any] = {
         "title": str, "inputs": Mapping, "outputs": Mapping, "parameters": Mapping, "terms": Sequence
@@ -136,7 +136,6 @@ def _wrong(model: object) -> Iterator[tuple[str, str]]:
         yield name, f"not of the right type, got {got}; a {kinds[name].__name__.lower()} is needed"
     if wrong:
         return
-    assert isinstance(model, ForwardModel)
     yield from _wrong_channels(model)
     if not callable(model.simulate):
         yield "simulate", f"not a method, got {model.simulate!r}; simulate(time, inputs, values) is needed"
@@ -150,7 +149,7 @@ def _wrong(model: object) -> Iterator[tuple[str, str]]:
             yield "sensors", f"unknown sensor effect, got {sensor!r}; {hint(sensor, SENSORS)}"
 
 
-def _wrong_terms(model: ForwardModel) -> Iterator[tuple[str, str]]:
+def _wrong_terms(model: Any) -> Iterator[tuple[str, str]]:
     """What is wrong with terms."""
     ids = [getattr(t, "id", None) for t in model.terms]
     if not ids:
@@ -179,7 +178,7 @@ def _wrong_terms(model: ForwardModel) -> Iterator[tuple[str, str]]:
             yield f"terms[{k}].sentence", f"no such parameter, got {name!r}; {hint(name, term.parameters)}"
 
 
-def _wrong_channels(model: ForwardModel) -> Iterator[tuple[str, str]]:
+def _wrong_channels(model: Any) -> Iterator[tuple[str, str]]:
     """What is wrong with channels and conditions."""
     if not model.outputs:
         yield "outputs", "empty; at least one channel that is simulated is needed"

@@ -87,13 +87,13 @@ def begun(model: ForwardModel, problem: Problem) -> Fitted | None:
     ]
     short = [problem.fit(baseline, x, rounds=problem.effort.short, no_jacobian=True) for x in (start, *beside)]
     best = min((f for f in short if f is not None), key=lambda f: f.left, default=None)
-    for _ in range(TUNING.repeats if best is not None else 0):
+    if best is None or not baseline:
+        return best
+    for _ in range(TUNING.repeats):
         again = problem.fit(baseline, best.x)
         if again is None or again.left > best.left - TUNING.least_gain:
             break
         best = again
-    if best is None or not baseline:
-        return best
     alone = [problem.fit(baseline, best.x, only=[r]) for r in range(len(problem.dataset))]
     met = min((f for f in alone if f is not None), key=lambda f: f.left / f.blocks[0].residual.size, default=best)
     placed = replace(baseline[0], places=tuple(dict.fromkeys([start, met.x])))
