@@ -20,7 +20,8 @@ ROOT = Path(__file__).resolve().parents[1]
 HERE = ROOT / "docs"
 SITE = {  # caption -> pages, in the order of the menu
     "Tutorials": [
-        f"docs/tutorials/{n}" for n in ("first_overturn", "own_tractor", "design_load", "logger_data", "ci_gate")
+        f"docs/tutorials/{n}"
+        for n in ("first_overturn", "own_tractor", "design_load", "logger_data", "own_model", "ci_gate")
     ],
     "How to": [
         "docs/how_to_add",

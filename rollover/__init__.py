@@ -317,20 +317,17 @@ def diagnose(
     from rollover.comparison.recordings import held_out, measured
     from rollover.diagnosis.fit.jobs import Executor
     from rollover.diagnosis.sensors_first import check, diagnosed, prechecked
-    from rollover.scenario import given
+    from rollover.scenario import Scenario, given
     from rollover.system.arguments import listed, within
 
     for share in [tolerance] if isinstance(tolerance, (int, float)) else tolerance.values():
         within("tolerance", share, 0.0, 0.5)
-    if not (isinstance(scenario, (str, Path)) and Path(scenario).suffix != ".py") and not hasattr(scenario, "vehicle"):
+    if not isinstance(scenario, (str, Path, Scenario)) or (
+        isinstance(scenario, (str, Path)) and Path(scenario).suffix == ".py"
+    ):
+        refused = bool(reference) or estimate
         return _diagnose_model(
-            scenario,
-            recordings,
-            hold_out,
-            tolerance,
-            refused=bool(reference) or estimate,
-            profile=profile,
-            workers=workers,
+            scenario, recordings, hold_out, tolerance, refused=refused, profile=profile, workers=workers
         )
     chosen, known = given(scenario)[0], measured(recordings, profile)
     check(chosen, known)

@@ -41,7 +41,8 @@ def _oscillate(dt, force, p, out):  # type: ignore[no-untyped-def]
 
 
 ORDER = (
-    "mass", "damping", "stiffness", "cubic-stiffness.coefficient", "quadratic-stiffness.coefficient", "dry-friction.force"
+    "mass", "damping", "stiffness", "cubic-stiffness.coefficient", "quadratic-stiffness.coefficient",
+    "dry-friction.force",
 )  # fmt: skip
 
 

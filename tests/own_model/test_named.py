@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -84,6 +85,59 @@ def test_a_recording_that_is_held_out_is_foretold_by_the_others() -> None:
     best, error = least_squares({n: r for n, r in recordings.items() if n != "r4"}, (1, 0, 2))
     assert found.effects[0].parameters["coefficient"].value == pytest.approx(best[2], abs=0.2 * error[2])
     assert found.after["held_out"].nrmse < 1.1 < found.before["held_out"].nrmse
+
+
+def test_a_model_without_parameters_of_its_own_is_held_as_it_is() -> None:
+    class Fixed(Line):
+        parameters: Mapping[str, ro.Parameter] = {}
+
+        def simulate(
+            self, time: Array, inputs: Mapping[str, Array], values: Mapping[str, float]
+        ) -> Mapping[str, Array]:
+            return Line.simulate(self, time, inputs, {**values, "slope": 2.5, "level": -0.7})
+
+    found = diagnose_model(Fixed(), measured(2.5, -0.7, bend=0.05))
+    assert ([e.id for e in found.effects], dict(found.baseline)) == (["bend"], {})
+    assert diagnose_model(Fixed(), measured(2.5, -0.7)).verdict == "no-mismatch"
+
+
+def test_noise_that_a_recording_states_is_believed_beside_what_nothing_explains() -> None:
+    recordings = {}
+    for name, r in measured(0.0, 0.0, count=3).items():  # noise alone, to which a fast input adds
+        u = np.sin(2.0 * np.pi * 11.0 * r.time)
+        channels = {IN: u, OUT: r[OUT] + 2.5 * u + 0.3 * np.sin(6.0 * u)}
+        recordings[name] = replace(r, channels=channels, noise={OUT: 0.01})
+    found = diagnose_model(model, recordings)
+    assert (found.verdict, dict(found.noise)) == ("unexplained", {OUT: 0.01})
+    unstated = diagnose_model(model, {n: replace(r, noise={}) for n, r in recordings.items()})
+    assert unstated.noise[OUT] > 0.03  # what is missing is no slower than a noise
+
+
+def test_two_terms_are_named_beside_the_parameters() -> None:
+    class Wavy(Line):
+        terms = (
+            *Line.terms,
+            ro.Term(
+                id="kink", family="a kink", equation="y = step |u|",
+                parameters={"step": ro.Parameter(unit="V/N", low=-1.0, high=1.0, start=0.1, null=0.0)},
+            ),
+        )  # fmt: skip
+
+        def simulate(
+            self, time: Array, inputs: Mapping[str, Array], values: Mapping[str, float]
+        ) -> Mapping[str, Array]:
+            return {OUT: Line.simulate(self, time, inputs, values)[OUT] + values["kink.step"] * np.abs(inputs[IN])}
+
+    recordings = {
+        n: replace(r, channels={IN: r[IN], OUT: r[OUT] + 0.1 * np.abs(r[IN])})
+        for n, r in measured(2.5, -0.7, 0.1).items()
+    }
+    found = diagnose_model(Wavy(), recordings)
+    assert {e.id for e in found.effects} == {"bend", "kink"}
+    told = {e.id: next(iter(e.parameters.values())) for e in found.effects}
+    assert told["bend"].low < 0.1 < told["bend"].high
+    assert told["kink"].low < 0.1 < told["kink"].high
+    assert found.baseline["slope"].low < 2.5 < found.baseline["slope"].high
 
 
 def test_nothing_of_a_model_stays_in_the_tables() -> None:

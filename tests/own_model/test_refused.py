@@ -138,6 +138,12 @@ DECLARED: dict[str, tuple[dict[str, Any], str]] = {
         "the same as its null",
     ),
     "an id that no report can hold": ({"terms": (replace(TERM, id="Bend 2"),)}, "not to be used, got 'Bend 2'"),
+    "a sentence without its value": (
+        {"terms": (replace(TERM, sentence="{curve} of it"),)},
+        "no such parameter, got 'curve'",
+    ),
+    "braces in a sentence": ({"terms": (replace(TERM, sentence="{coefficient"),)}, "braces that do not fit"),
+    "a condition that is a parameter": ({"conditions": {"slope": Quantity("V", "")}}, "a parameter as well"),
     "a sensor effect that is none": ({"sensors": ("sensor-bais",)}, "sensor-bias"),
     "terms that are none": ({"terms": 3}, "terms: not of the right type, got int"),
 }

@@ -34,7 +34,10 @@ COMMANDS = {c.name or c.callback.__name__ for c in app.registered_commands if c.
 BLOCK = re.compile(r"(^<!-- not run: .*? -->\n)?^```(\w+)\n(.*?)^```$", flags=re.MULTILINE | re.DOTALL)
 RUN = [
     "README.md",
-    *(f"docs/tutorials/{n}.md" for n in ("first_overturn", "own_tractor", "design_load", "logger_data", "ci_gate")),
+    *(
+        f"docs/tutorials/{n}.md"
+        for n in ("first_overturn", "own_tractor", "design_load", "logger_data", "own_model", "ci_gate")
+    ),
     "docs/commands.md",
     "docs/inputs.md",
     "docs/own_law.md",

@@ -25,7 +25,7 @@ MOST_TOLERATED = 0.5  # of a range: what may miss half of it is no model of it
     epilog=manual(
         "diagnose drop_test rec --out out/diagnosis",
         "diagnose --model duffing rec --out out/model",
-        writes="diagnosis.json, scenario-diagnosed.yaml (it runs), report.html, diagnosis.rrd; of a model diagnosis.json.",
+        writes="diagnosis.json, scenario-diagnosed.yaml (it runs), report.html, diagnosis.rrd; of a model the first.",
     )
 )
 @answering

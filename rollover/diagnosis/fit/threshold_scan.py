@@ -62,7 +62,7 @@ def placed_beside(
     shifts: Sequence[float],
     base: Point = ((), ()),
 ) -> tuple[float, ...] | None:
-    """Where a fit of two effects beside a base may begin: the first as it is, the second where least of few recordings is left.
+    """Where a fit of two effects beside a base may begin: the first as it is, the second where least of few is left.
 
     The second has a threshold, and is as strong at each place as these ask for there. None where it helps nowhere.
     """

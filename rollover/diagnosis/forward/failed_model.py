@@ -1,4 +1,4 @@
-"""A model of one's own that failed: not a value without a solution, which a fit goes around, but a fault of its file."""
+"""A model of one's own that failed: no value without a solution, which a fit goes around, but a fault of its file."""
 
 from __future__ import annotations
 

@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from string import Formatter
 from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
@@ -121,7 +122,7 @@ def declared(model: object, file: str = "") -> ForwardModel:
     return model
 
 
-def _wrong(model: object) -> Iterator[tuple[str, str]]:
+def _wrong(model: Any) -> Iterator[tuple[str, str]]:
     """What is wrong with a declaration: where, and in words."""
     kinds: dict[str, Any] = {
         "title": str, "inputs": Mapping, "outputs": Mapping, "parameters": Mapping, "terms": Sequence
@@ -135,12 +136,21 @@ def _wrong(model: object) -> Iterator[tuple[str, str]]:
         yield name, f"not of the right type, got {got}; a {kinds[name].__name__.lower()} is needed"
     if wrong:
         return
-    assert isinstance(model, ForwardModel)
     yield from _wrong_channels(model)
     if not callable(model.simulate):
         yield "simulate", f"not a method, got {model.simulate!r}; simulate(time, inputs, values) is needed"
     for name, p in model.parameters.items():
         yield from _wrong_parameter(f"parameters.{name}", name, p, is_always=True)
+    for name in {*model.parameters} & {*conditions_of(model)}:
+        yield f"conditions.{name}", f"a parameter as well, got {name!r}; another name is needed"
+    yield from _wrong_terms(model)
+    for sensor in sensors_of(model):
+        if sensor not in SENSORS:
+            yield "sensors", f"unknown sensor effect, got {sensor!r}; {hint(sensor, SENSORS)}"
+
+
+def _wrong_terms(model: Any) -> Iterator[tuple[str, str]]:
+    """What is wrong with terms."""
     ids = [getattr(t, "id", None) for t in model.terms]
     if not ids:
         yield "terms", "empty; at least one term that may be missing is needed"
@@ -159,12 +169,16 @@ def _wrong(model: object) -> Iterator[tuple[str, str]]:
         known = [p for p in term.parameters.values() if isinstance(p, Parameter)]
         if all(p.null is None for p in known):
             yield f"terms[{k}].parameters", "none with a null; the one that says how strong it is needs null=..."
-    for sensor in sensors_of(model):
-        if sensor not in SENSORS:
-            yield "sensors", f"unknown sensor effect, got {sensor!r}; {hint(sensor, SENSORS)}"
+        try:
+            asked = {name for _, name, _, _ in Formatter().parse(term.sentence) if name is not None}
+        except ValueError as e:
+            yield f"terms[{k}].sentence", f"braces that do not fit, got {e}; {{parameter}} is allowed"
+            continue
+        for name in sorted(asked - {*term.parameters}):
+            yield f"terms[{k}].sentence", f"no such parameter, got {name!r}; {hint(name, term.parameters)}"
 
 
-def _wrong_channels(model: ForwardModel) -> Iterator[tuple[str, str]]:
+def _wrong_channels(model: Any) -> Iterator[tuple[str, str]]:
     """What is wrong with channels and conditions."""
     if not model.outputs:
         yield "outputs", "empty; at least one channel that is simulated is needed"

@@ -88,7 +88,9 @@ def _diagnosed(model: ForwardModel, asked: Asked, tolerance: float) -> Diagnosis
     )
     concluded = weighed(asked, inquiry, base, kept, acts="model", notes=notes)
     fitted = concluded.explanation.fitted
-    always = dict(zip([c.id for c in fitted.candidates], intervals(problem, fitted), strict=True)).get(BASELINE, {})
+    if not model.parameters:
+        return reported(concluded)
+    always = dict(zip([c.id for c in fitted.candidates], intervals(problem, fitted), strict=True))[BASELINE]
     return replace(reported(concluded), baseline=always)
 
 

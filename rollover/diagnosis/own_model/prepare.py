@@ -25,7 +25,7 @@ TUNING = SETTINGS.fit.own_model
 
 
 def prepared_for(model: ForwardModel, recordings: Mapping[str, Recording]) -> tuple[list[Dataset], list[str]]:
-    """Recordings as evidence, and what is to be said of them. Raises `InputError` for all that cannot drive the model.
+    """Recordings as evidence, and what is to be said of them. Raises `InputError` for those that cannot drive it.
 
     Raises `FailedModelError` for a model that fails, or does not keep to what it declares, where fits begin.
     """
@@ -54,7 +54,7 @@ def prepared_for(model: ForwardModel, recordings: Mapping[str, Recording]) -> tu
 
 
 def with_noise(model: ForwardModel, every: Sequence[Dataset]) -> list[Dataset]:
-    """The evidence with the noise of its channels: as recordings state it, else from quiet stretches of all together."""
+    """The evidence with its noise: as recordings state it, else from quiet stretches of all together."""
     problem = Problem(every)
     base = begun(model, problem)
     if base is None:
@@ -87,13 +87,13 @@ def begun(model: ForwardModel, problem: Problem) -> Fitted | None:
     ]
     short = [problem.fit(baseline, x, rounds=problem.effort.short, no_jacobian=True) for x in (start, *beside)]
     best = min((f for f in short if f is not None), key=lambda f: f.left, default=None)
-    for _ in range(TUNING.repeats if best is not None else 0):
+    if best is None or not baseline:
+        return best
+    for _ in range(TUNING.repeats):
         again = problem.fit(baseline, best.x)
         if again is None or again.left > best.left - TUNING.least_gain:
             break
         best = again
-    if best is None or not baseline:
-        return best
     alone = [problem.fit(baseline, best.x, only=[r]) for r in range(len(problem.dataset))]
     met = min((f for f in alone if f is not None), key=lambda f: f.left / f.blocks[0].residual.size, default=best)
     placed = replace(baseline[0], places=tuple(dict.fromkeys([start, met.x])))

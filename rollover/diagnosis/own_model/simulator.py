@@ -100,7 +100,8 @@ class ModelSimulator:
             return
         for name in self.model.outputs:
             if name not in made:
-                yield f"simulate returned no {name}, got {', '.join(map(str, made)) or 'nothing'}; each output is needed"
+                got = ", ".join(map(str, made)) or "nothing"
+                yield f"simulate returned no {name}, got {got}; each output is needed"
                 continue
             try:
                 values = np.asarray(made[name], dtype=np.float64)
@@ -108,7 +109,8 @@ class ModelSimulator:
                 yield f"simulate returned no numbers as {name}, got {made[name]!r}; floats are needed"
                 continue
             if values.shape != self.recording.time.shape:
-                yield f"simulate returned {name} of shape {values.shape}; {self.recording.time.shape} is needed, one a stamp"
+                needed = self.recording.time.shape
+                yield f"simulate returned {name} of shape {values.shape}; {needed} is needed, one a stamp"
 
     def perturbed(
         self, changes: Mapping[str, Any] | None = None, shift: float = 0.0, parts: int = 1
