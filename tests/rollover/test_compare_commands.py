@@ -88,7 +88,8 @@ def test_compare_writes_its_folder(folder: Path, tmp_path: Path) -> None:
     # a stiffer soil: the recorded peak is higher than the simulated one
     assert force["rating"]["peak"]["relative_error"] < -0.1
     assert [cell["phase"] for cell in force["cells"]][:3] == ["approach", "loading", "unloading"]
-    assert sorted(p.name for p in (tmp_path / "c").iterdir()) == ["compare.json", "compare.rrd", "report.html"]
+    files = ["compare.json", "compare.rrd", "measured.parquet", "report.html", "simulated.parquet"]
+    assert sorted(p.name for p in (tmp_path / "c").iterdir()) == files
     answers_first_in_the_viewer(tmp_path / "c" / "compare.rrd")
     page = (tmp_path / "c" / "report.html").read_text()
     assert "ISO/TS 18571" in page

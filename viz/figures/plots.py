@@ -135,10 +135,10 @@ def overlay(
         good = np.isfinite(simulated.x) & np.isfinite(simulated.y)
         model = np.interp(measured.x, simulated.x[good], simulated.y[good], left=np.nan, right=np.nan)
         rest = model - measured.y if turned else measured.y - model
-        _draw(below, [Curve(name="difference" if turned else "residual", x=measured.x, y=rest, role="muted")])
+        what, (_, comma, unit) = "difference" if turned else "residual", label.rpartition(", ")
+        _draw(below, [Curve(name=what, x=measured.x, y=rest, role="muted")])
         below.axhline(0.0, color=COLOURS["ink"], lw=0.6)
-        unit = label.rpartition(", ")[2]
-        finish(below, "time, s", f"{'difference' if turned else 'residual'}, {unit}", margins=(0.0, 0.1))
+        finish(below, "time, s", f"{what}{comma}{unit if comma else ''}", margins=(0.0, 0.1))
         _shade(below, [(start, "") for start, _ in phases])
     return svg.text
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
+from numpy.typing import NDArray
 
 from rollover.comparison.misfit import ChannelMisfit, Misfit
 from rollover.comparison.rating import Iso18571, Rating, verdict, worst_verdict
@@ -15,6 +16,8 @@ from viz.content.entities import CYCLE, MEASURED, PHASE, series
 from viz.recordings.blueprint import Beside
 from viz.recordings.log import write_rrd
 from viz.recordings.stream import Stream, colour
+
+Array = NDArray[np.float64]
 
 
 def write_comparison(run: Run, found: Misfit, path: Path) -> None:
@@ -40,15 +43,12 @@ def _beside(out: Stream, found: Misfit) -> None:
     min_max = rr.components.AggregationPolicy.MinMax
     for k, c in enumerate(found.channels):
         s, own = series(c.channel), CYCLE[k % len(CYCLE)]  # two channels in one plot are told apart
-        measured = rr.SeriesLines(
-            names=[f"{s.legend}, measured"], colors=colour(MEASURED), widths=[1.5], aggregation_policy=min_max
-        )
         residual = rr.SeriesLines(names=[s.name], colors=colour(own), widths=[1.0], aggregation_policy=min_max)
         out.static(s.simulated, rr.SeriesLines.from_fields(names=[f"{s.legend}, simulated"]))
-        out.static(s.measured, measured)
         out.static(s.residual, residual)
-        _columns(out, s.measured, c, c.measured * s.factor)
-        _columns(out, s.residual, c, c.residual / (c.noise or 0.01 * float(np.ptp(c.measured)) or 1.0))
+        _measured(out, c)
+        time, values = _broken(c, c.residual / (c.noise or 0.01 * float(np.ptp(c.measured)) or 1.0))
+        out.columns(s.residual, time, rr.Scalars.columns(scalars=values))
     marks = [(at, phase if phase in PHASE else "impact") for at, phase in found.phases]
     out.static(
         "phase_measured", rr.StateConfiguration(values=list(PHASE), labels=list(PHASE), colors=colour(*PHASE.values()))
@@ -59,12 +59,26 @@ def _beside(out: Stream, found: Misfit) -> None:
     out.static("report/comparison", rr.TextDocument(markdown(found), media_type=rr.MediaType.MARKDOWN))
 
 
-def _columns(out: Stream, path: str, c: ChannelMisfit, values: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
-    """Values with a gap where the recording has one: a line is not drawn over it."""
+def _measured(out: Stream, c: ChannelMisfit) -> None:
+    """The measured curve, with a band of 1 sigma of its noise to each side where that is known."""
+    s = series(c.channel)
+    time, values = _broken(c, c.measured * s.factor)
+    look = {"names": [f"{s.legend}, measured"], "colors": colour(MEASURED), "widths": [1.5]}
+    policy = rr.components.AggregationPolicy.MinMax
+    if not c.noise:
+        out.static(s.measured, rr.SeriesLines(**look, aggregation_policy=policy))
+        out.columns(s.measured, time, rr.Scalars.columns(scalars=values))
+        return
+    out.static(s.measured, rr.Measurements.from_fields(**look, units=[s.unit], aggregation_policy=policy))
+    variances = np.full(values.size, (c.noise * s.factor) ** 2)
+    out.columns(s.measured, time, rr.Measurements.columns(values=values, variances=variances))
+
+
+def _broken(c: ChannelMisfit, values: Array) -> tuple[Array, Array]:
+    """Stamps and values with a gap where the recording has one: a line is not drawn over it."""
     step = np.diff(c.time)
     breaks = np.flatnonzero(step > 2.5 * float(np.median(step))) + 1
-    time = np.insert(c.time, breaks, c.time[breaks] - 1e-6)
-    out.columns(path, time, rr.Scalars.columns(scalars=np.insert(values, breaks, np.nan)))
+    return np.insert(c.time, breaks, c.time[breaks] - 1e-6), np.insert(values, breaks, np.nan)
 
 
 def markdown(found: Misfit) -> str:

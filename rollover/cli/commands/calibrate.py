@@ -124,9 +124,14 @@ def calibrate(
 
 def _curves(chosen: Scenario, found: Calibration, recordings: Mapping[str, Recording]) -> list[tuple[Misfit, Misfit]]:
     """Each recording against the scenario before and after."""
+    from rollover.cli import console
     from rollover.comparison.compared import compared
 
-    before, after = (compared(each, recordings).misfits for each in (chosen, found.calibrated))
+    try:
+        before, after = (compared(each, recordings).misfits for each in (chosen, found.calibrated))
+    except InputError as e:  # the fit stands; what cannot be rated is not drawn
+        console.say(f"{PAGE} is without curves before and after: {e.faults[0]}")
+        return []
     return list(zip(before, after, strict=True))
 
 

@@ -42,7 +42,8 @@ ENDINGS = (  # what a name loses: in Messung_3.0.csv only the last of two, in dr
 )
 
 PLAIN = Importer(name="plain", meaning="CSV or Parquet with a sidecar", sniff=plain.sniff, read=plain.read)
-_FORMATS = (PLAIN, NHTSA, iso_mme.ISO_MME, mat.MAT, xlsx.XLSX, TDMS, MDF, HDF5, NETCDF, MCAP, IDE, LVM, DTS, CSV)
+_BINARY = (mat.MAT, xlsx.XLSX, TDMS, MDF, HDF5, NETCDF, MCAP, IDE)
+_FORMATS = (PLAIN, NHTSA, iso_mme.ISO_MME, *_BINARY, LVM, DTS, CSV)
 _OWN = {i.name: i for i in _FORMATS}
 _SETS = (CUBE_TOSSES, ELBOW_TOSSES, FALLING_BALLS, SOIL_PENETROMETER, CONE_DROPS, IMPACK)
 _WRITERS = {".mme.zip": iso_mme.write, ".mme": iso_mme.write, ".mat": mat.write, ".xlsx": xlsx.write}

@@ -1,0 +1,91 @@
+"""Pages that answer first: curves before tables, tables that fit a sheet of paper, noise as a band."""
+
+from __future__ import annotations
+
+import html
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rollover.comparison.misfit import Misfit, misfit
+from rollover.dynamics.result import Run
+from rollover.recording import Recording
+from tests.viz.html import Parts
+from tests.viz.test_injection import calibrated
+from viz.content.entities import series
+from viz.pages import calibration, comparison
+from viz.recordings.comparison import write_comparison
+from viz.recordings.verify import read_column, read_entities
+
+FORCE = "ground/force_normal"
+NOISE = 200.0  # N
+WIDEST = 8  # columns that fit between the margins of A4 at the size of print
+
+
+def compared(drop: Run, factor: float = 1.1, noise: float | None = NOISE) -> Misfit:
+    measured = Recording(title="Drop", time=drop.recording.time, channels={FORCE: factor * drop.recording[FORCE]})
+    found = misfit(drop, measured, name="drop 1", noise=lambda r, c: NOISE)
+    return found if noise else replace(found, channels=tuple(replace(c, noise=None) for c in found.channels))
+
+
+def test_a_comparison_opens_with_its_curves_and_no_table_is_wider_than_paper(drop: Run) -> None:
+    found = compared(drop)
+    text = comparison.page([found], title="Drop", command="rollover compare")
+    body = text[text.index("<main>") :]
+    assert body.index("<svg") < body.index("<table")
+    heads = [re.findall(r"<th[^>]*>(.*?)</th>", table) for table in re.findall(r"<thead>(.*?)</thead>", body)]
+    assert max(map(len, heads)) <= WIDEST
+    folded = re.findall(r"<summary>(.*?)</summary>", body)
+    assert [f.partition(":")[0] for f in folded] == ["ISO/TS 18571", "Sprague and Geers, residual, peak", "By phase"]
+    (channel,) = found.channels
+    rating = channel.rating
+    shown = [row for row in Parts(text).rows if row and row[0] == FORCE]
+    everything = " ".join(" ".join(row) for row in shown)
+    for value in (rating.iso18571.corridor, rating.iso18571.phase, rating.iso18571.slope):
+        assert f"{value:.3f}" in everything, "folded, not dropped"
+    assert f"{100.0 * rating.sprague_geers.magnitude:.3g}" in everything
+    assert f"{1e3 * rating.peak.time_error:+.3g}" in everything
+    assert "residual, kN" in html.unescape(text), "the residual's axis bears its unit"
+
+
+def test_a_calibration_shows_curves_before_and_after_intervals_and_correlations(drop: Run) -> None:
+    marked = calibrated()
+    names = ("vehicle.mass", "ground.law.stiffness_scale")
+    estimates = tuple(
+        replace(e, path=name, bounds=(0.5, 4.5), low=1.5, high=2.5, value=2.0, unit="kg")
+        for e, name in zip(marked.estimates, names, strict=True)
+    )
+    c = replace(marked, estimates=estimates, correlation=np.array([[1.0, -0.87], [-0.87, 1.0]]))
+    before, after = compared(drop, 1.3), compared(drop, 1.02)
+    text = calibration.page(c, curves=[(before, after)], command="rollover calibrate")
+    order = re.findall(r"<h2>(.*?)</h2>", text)
+    assert order[:2] == ["Before and after", "Parameters"]
+    first = text[text.index("<h2>Before and after") : text.index("<h2>Parameters")]
+    for word in ("measured", "before", "after", "residual / noise"):
+        assert f">{word}<" in first, word
+    assert "drop 1, ground/force_normal" in first
+    second = text[text.index("<h2>Parameters") : text.index("<h2>Correlations")]
+    assert "place in the allowed range, %" in second
+    assert "vehicle.mass 0.5 to 4.5 kg" in second
+    third = text[text.index("<h2>Correlations") :]
+    assert third.index("<svg") < third.index("<table")
+    assert ">-0.87<" in third[: third.index("</svg>")].replace("\u2212", "-")
+
+
+def test_a_known_noise_is_a_band_in_the_viewer_and_an_unknown_one_none(drop: Run, tmp_path: Path) -> None:
+    s, found = series(FORCE), compared(drop)
+    write_comparison(drop, found, tmp_path / "a.rrd")
+    here = f"/{s.measured}"
+    _, values = read_column(tmp_path / "a.rrd", here, "Measurements:values")
+    _, variances = read_column(tmp_path / "a.rrd", here, "Measurements:variances")
+    assert np.nanmax(np.array(values, dtype=float)) == pytest.approx(s.factor * found.channels[0].measured.max())
+    assert set(np.sqrt(np.array(variances, dtype=float)).round(9).ravel()) == {round(s.factor * NOISE, 9)}
+    _, units = read_column(tmp_path / "a.rrd", here, "Measurements:units")
+    assert units == [[s.unit]]
+    write_comparison(drop, compared(drop, noise=None), tmp_path / "b.rrd")
+    assert not any("Measurements" in name for name in read_entities(tmp_path / "b.rrd")[here])
+    _, bare = read_column(tmp_path / "b.rrd", here, "Scalars:scalars")
+    assert np.array(bare, dtype=float) == pytest.approx(np.array(values, dtype=float))
