@@ -47,8 +47,8 @@ class History:
     @property
     def time(self) -> Array:
         """Their times, s: those of the steps are sums, 0.6 and not 0.5999999999999643."""
-        count = max(int(self.watch.whole[ROWS]), 1)
-        return np.array([round(self.start + float(x), 9) for x in self.watch.time[:count]])
+        count = int(self.watch.whole[ROWS])
+        return np.array([round(self.start + float(x), 9) for x in self.watch.time[:count]] or [0.0])
 
     def add_track(self, time: float, t: Tables) -> None:
         """Keep the deepest sinkage of all touched elements at this instant."""
