@@ -44,13 +44,13 @@ class History:
     @property
     def rows(self) -> Array:
         """Rows so far, the first one at least."""
-        return np.asarray(self.watch.rows[: len(self.time)])
+        return np.asarray(self.watch.rows[: max(int(self.watch.whole[ROWS]), 1)])
 
     @property
     def time(self) -> Array:
         """Their times, s: those of the steps are sums, 0.6 and not 0.5999999999999643."""
-        count = max(int(self.watch.whole[ROWS]), 1)
-        return np.array([round(self.start + float(x), 9) for x in self.watch.time[:count]])
+        count = int(self.watch.whole[ROWS])
+        return np.rint((self.start + self.watch.time[:count]) * 1e9) / 1e9 if count else np.zeros(1)
 
     def add_track(self, time: float, t: Tables) -> None:
         """Keep the deepest sinkage of all touched elements at this instant."""

@@ -1,9 +1,8 @@
 """Both integrators beside the limit, and what each step of theirs is worth.
 
-The first table is the tractor's side overturn with wide elements, which few
-contact points do for, and as shipped: CPU
-time of the time loop over its steps, over that of the limit; both integrators and the limit in turn, in one process.
-The ratio is that of the best times, its spread that of the repetitions.
+The first table is the tractor's side overturn, on elements so wide that few contact points do, and as shipped: CPU time
+of the time loop over its steps, over that of the limit; both integrators and the limit in turn, in one process. The
+ratio is that of the best times, its spread that of the repetitions.
 
 The second is work against precision: the striker's drop and the side overturn until its first touch at 1.6 to 0.1 ms,
 against the same integrator at a much smaller step. One order is a factor of 2 in a row, two are 4.

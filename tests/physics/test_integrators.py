@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,9 @@ from rollover import studies
 from rollover.assessment import results
 from rollover.assessment.ledger import closure
 from rollover.dynamics import simulate
+from rollover.dynamics.assembly import grown, tables_of
 from rollover.dynamics.result import Run
+from rollover.kernels.tables import Tables
 from rollover.scenario import Scenario, load
 from rollover.spec.document import content_hash, shipped_folder, to_mapping
 from rollover.studies.case_store import Row
@@ -122,6 +125,31 @@ def test_a_run_that_breaks_off_keeps_what_it_had() -> None:
     assert "at t = 0.03" in loop.sentence
     assert loop.stop_time == pytest.approx(engine.stop_time, abs=2e-3)
     assert all(np.isfinite(v).all() for v in loop.recording.channels.values())
+
+
+@pytest.mark.parametrize("integrator", ["exudyn", "compiled"])
+def test_memory_that_grows_in_a_run_changes_nothing(integrator: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario = short("penetrometer_drop", **{"simulation.integrator": integrator})
+    wide = simulate.run(scenario)
+    sizes: list[int] = []
+
+    def tight(*given: Any) -> Tables:
+        t = tables_of(*given)
+        room = len(t.point_a) + 1  # none is left once an element is touched
+        sizes.append(room)
+        names = ("memory", "state", "s", "active", "trial", "found")
+        return t._replace(**{name: getattr(t, name)[:room].copy() for name in names})
+
+    def larger(t: Tables) -> Tables:
+        sizes.append(len(t.memory))
+        return grown(t)
+
+    monkeypatch.setattr("rollover.dynamics.setup.tables_of", tight)
+    monkeypatch.setattr("rollover.dynamics.recorder.grown", larger)
+    own = simulate.run(scenario)
+    assert len(sizes) == 2
+    assert sizes[0] == sizes[1]
+    assert all(np.array_equal(wide.recording[c], own.recording[c]) for c in wide.recording.channels)
 
 
 def test_runs_side_by_side_in_threads_are_those_one_after_another() -> None:

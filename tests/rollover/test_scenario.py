@@ -15,7 +15,7 @@ from rollover.system.errors import InputError
 from tests.rollover.example import TEXT
 
 SPEED = "a number greater than 0 and at most 20 m/s is allowed"
-SIMULATION = "duration, step, output_step, spectral_radius, stop_at_rest"
+SIMULATION = "duration, step, output_step, spectral_radius, integrator, stop_at_rest"
 DROP = "kind, speed, lead_time, roll_deg, pitch_deg, yaw_deg, position"
 ROOT = "format, title, vehicle, ground, initiation, simulation, excitation, inputs, loads, gravity, effects"
 LAWS = "bearing, bekker-wong, compaction, fluid-entry, hard, press, treated, ye-2006"
