@@ -24,6 +24,7 @@ SITE = {  # caption -> pages, in the order of the menu
     ],
     "How to": [
         "docs/how_to_add",
+        "docs/plan_next_test",
         "docs/engineers_day",
         "docs/viewing",
         "docs/commands",
