@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rollover.calibration.identifiability import Determination, determine
 from rollover.calibration.objective import Case, Noise, Objective, Parameter, Simulate, case, check_free
-from rollover.calibration.posterior import Posterior, sampled
+from rollover.calibration.posterior import Posterior, of_fit
 from rollover.comparison import alignment
 from rollover.comparison.rating import Iso18571, Rating, rate
 from rollover.dynamics import drop_test, simulate
@@ -180,22 +180,8 @@ def calibrate(
     result = _calibration(scenario, plain, final, u, found, given, ready, list(recordings), outliers, agreeing)
     if posterior == 0:
         return result
-    clocks = [final.parts(k, u)[1] for k in range(len(final.cases))]
-    density = partial(log_likelihood, final, found.widening, clocks)
-    drawn = sampled(density, u, found.covariance, draws=posterior, seed=seed)
-    return replace(result, posterior=drawn, warnings=(*result.warnings, *_unmixed(drawn)))
-
-
-def log_likelihood(objective: Objective, widening: float, clocks: Sequence[float], u: Array) -> float:
-    """Log likelihood of `u` (p,), but for a constant, widened by the misfit over the noise; `clocks` (s) are near."""
-    return -0.5 * objective.squares(u, clocks) / widening
-
-
-def _unmixed(drawn: Posterior) -> list[str]:
-    if drawn.is_mixed:
-        return []
-    worst = float(np.max(drawn.r_hat))
-    return [f"the walkers of the posterior do not agree, R-hat {worst:.3g}: more draws, or narrower bounds"]
+    drawn = of_fit(final, u, found, draws=posterior, seed=seed)
+    return replace(result, posterior=drawn, warnings=(*result.warnings, *drawn.warnings))
 
 
 def follow(task: tuple[Objective, Array, Literal["linear", "soft_l1"]]) -> tuple[Array, float]:
@@ -386,19 +372,10 @@ def _combination(objective: Objective, direction: Array, spread: float) -> str:
     parts.sort(key=lambda part: -abs(part[1]))
     if len(parts) == 1:
         return f"{parts[0][0].path} alone is not observable in these recordings"
-    lead, size = parts[0][0], _shown(*parts[0])
-    words = [f"{lead.path} by +1 {_step_unit(lead)}"]
-    words += [f"{p.path} by {_shown(p, d) / size:+.3g} {_step_unit(p)}" for p, d in parts[1:]]
+    lead, size = parts[0][0], parts[0][0].change(parts[0][1])
+    words = [f"{lead.path} by +1 {lead.change_unit}"]
+    words += [f"{p.path} by {p.change(d) / size:+.3g} {p.change_unit}" for p, d in parts[1:]]
     return "changed together these are not observable: " + ", ".join(words)
-
-
-def _shown(p: Parameter, d: float) -> float:
-    """A change of `u` in percent where the parameter is spaced logarithmically, else in its own unit."""
-    return 100.0 * d * float(np.log(p.high / p.low)) if p.logarithmic else d * (p.high - p.low)
-
-
-def _step_unit(p: Parameter) -> str:
-    return "%" if p.logarithmic else p.unit or "units"
 
 
 def _warnings(c: Calibration, fine: Mapping[str, float], beyond: Sequence[str]) -> list[str]:

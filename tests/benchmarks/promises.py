@@ -1,6 +1,6 @@
 """What `rollover plan` promises against what is reached: noise, clocks, gains drawn anew; the smaller misfit chooses.
 
-`python -m tests.benchmarks.promises [DRAWS]`: for each of 8 pairs DRAWS (25) campaigns of drops at 1 and 3.5 m/s, 200 in
+`python -m tests.benchmarks.promises [DRAWS]`: for each of 8 pairs DRAWS (25) campaigns, drops at 1 and 3.5 m/s, 200 in
 all. Held against each promise is the 90 % interval of Clopper and Pearson: an exact promise is in nine times of ten.
 """
 
