@@ -113,10 +113,8 @@ class Calibration:
     @property
     def draws(self) -> Array:
         """Draws (n, p) of the fitted values, SI; none where no posterior was asked for."""
-        if self.posterior is None:
-            return np.zeros((0, len(self.parameters)))
-        columns = zip(self.parameters, self.posterior.draws.T, strict=True)
-        return np.column_stack([[p.value(float(u)) for u in column] for p, column in columns])
+        drawn = np.zeros((0, len(self.parameters))) if self.posterior is None else self.posterior.draws
+        return np.column_stack([[p.value(float(u)) for u in c] for p, c in zip(self.parameters, drawn.T, strict=True)])
 
     @property
     def override(self) -> dict[str, float]:
@@ -152,9 +150,8 @@ def calibrate(
 
     `noise(recording, channel)` gives 1 sigma where a recording states none. `clock_sigma` s is the width of the
     prior of each recording's clock offset, 0 for exact clocks. `workers` child processes follow the starts, 0 none;
-    `posterior` draws of what stays open are made, 0 none.
-    Raises `InputError` for a fitted parameter that a recording states as its condition, ``ValueError`` for a
-    recording of which nothing can be compared.
+    `posterior` draws of what stays open are made. Raises `InputError` for a fitted parameter that a recording states
+    as its condition, ``ValueError`` for a recording of which nothing can be compared.
     """
     everything = {**recordings, **(held_out or {})}
     check_free(parameters, {name: r.conditions for name, r in everything.items()})
@@ -178,7 +175,7 @@ def calibrate(
     final = replace(weighted.correlated(u), weights=weighted.weights)
     found = determine(final, u)
     result = _calibration(scenario, plain, final, u, found, given, ready, list(recordings), outliers, agreeing)
-    if posterior == 0:
+    if not posterior:
         return result
     drawn = of_fit(final, u, found, draws=posterior, seed=seed)
     return replace(result, posterior=drawn, warnings=(*result.warnings, *drawn.warnings))
