@@ -26,6 +26,7 @@ SITE = {  # caption -> pages, in the order of the menu
     "How to": [
         "docs/how_to_add",
         "docs/own_law",
+        "docs/plan_next_test",
         "docs/engineers_day",
         "docs/inputs",
         "docs/viewing",

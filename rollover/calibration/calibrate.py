@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rollover.calibration.identifiability import Determination, determine
 from rollover.calibration.objective import Case, Noise, Objective, Parameter, Simulate, case, check_free
-from rollover.calibration.posterior import Posterior, sampled
+from rollover.calibration.posterior import Posterior, of_fit
 from rollover.comparison import alignment
 from rollover.comparison.rating import Iso18571, Rating, rate
 from rollover.dynamics import drop_test, simulate
@@ -113,10 +113,8 @@ class Calibration:
     @property
     def draws(self) -> Array:
         """Draws (n, p) of the fitted values, SI; none where no posterior was asked for."""
-        if self.posterior is None:
-            return np.zeros((0, len(self.parameters)))
-        columns = zip(self.parameters, self.posterior.draws.T, strict=True)
-        return np.column_stack([[p.value(float(u)) for u in column] for p, column in columns])
+        drawn = np.zeros((0, len(self.parameters))) if self.posterior is None else self.posterior.draws
+        return np.column_stack([[p.value(float(u)) for u in c] for p, c in zip(self.parameters, drawn.T, strict=True)])
 
     @property
     def override(self) -> dict[str, float]:
@@ -152,9 +150,8 @@ def calibrate(
 
     `noise(recording, channel)` gives 1 sigma where a recording states none. `clock_sigma` s is the width of the
     prior of each recording's clock offset, 0 for exact clocks. `workers` child processes follow the starts, 0 none;
-    `posterior` draws of what stays open are made, 0 none.
-    Raises `InputError` for a fitted parameter that a recording states as its condition, ``ValueError`` for a
-    recording of which nothing can be compared.
+    `posterior` draws of what stays open are made. Raises `InputError` for a fitted parameter that a recording states
+    as its condition, ``ValueError`` for a recording of which nothing can be compared.
     """
     everything = {**recordings, **(held_out or {})}
     check_free(parameters, {name: r.conditions for name, r in everything.items()})
@@ -178,24 +175,10 @@ def calibrate(
     final = replace(weighted.correlated(u), weights=weighted.weights)
     found = determine(final, u)
     result = _calibration(scenario, plain, final, u, found, given, ready, list(recordings), outliers, agreeing)
-    if posterior == 0:
+    if not posterior:
         return result
-    clocks = [final.parts(k, u)[1] for k in range(len(final.cases))]
-    density = partial(log_likelihood, final, found.widening, clocks)
-    drawn = sampled(density, u, found.covariance, draws=posterior, seed=seed)
-    return replace(result, posterior=drawn, warnings=(*result.warnings, *_unmixed(drawn)))
-
-
-def log_likelihood(objective: Objective, widening: float, clocks: Sequence[float], u: Array) -> float:
-    """Log likelihood of `u` (p,), but for a constant, widened by the misfit over the noise; `clocks` (s) are near."""
-    return -0.5 * objective.squares(u, clocks) / widening
-
-
-def _unmixed(drawn: Posterior) -> list[str]:
-    if drawn.is_mixed:
-        return []
-    worst = float(np.max(drawn.r_hat))
-    return [f"the walkers of the posterior do not agree, R-hat {worst:.3g}: more draws, or narrower bounds"]
+    drawn = of_fit(final, u, found, draws=posterior, seed=seed)
+    return replace(result, posterior=drawn, warnings=(*result.warnings, *drawn.warnings))
 
 
 def follow(task: tuple[Objective, Array, Literal["linear", "soft_l1"]]) -> tuple[Array, float]:
@@ -386,19 +369,10 @@ def _combination(objective: Objective, direction: Array, spread: float) -> str:
     parts.sort(key=lambda part: -abs(part[1]))
     if len(parts) == 1:
         return f"{parts[0][0].path} alone is not observable in these recordings"
-    lead, size = parts[0][0], _shown(*parts[0])
-    words = [f"{lead.path} by +1 {_step_unit(lead)}"]
-    words += [f"{p.path} by {_shown(p, d) / size:+.3g} {_step_unit(p)}" for p, d in parts[1:]]
+    lead, size = parts[0][0], parts[0][0].change(parts[0][1])
+    words = [f"{lead.path} by +1 {lead.change_unit}"]
+    words += [f"{p.path} by {p.change(d) / size:+.3g} {p.change_unit}" for p, d in parts[1:]]
     return "changed together these are not observable: " + ", ".join(words)
-
-
-def _shown(p: Parameter, d: float) -> float:
-    """A change of `u` in percent where the parameter is spaced logarithmically, else in its own unit."""
-    return 100.0 * d * float(np.log(p.high / p.low)) if p.logarithmic else d * (p.high - p.low)
-
-
-def _step_unit(p: Parameter) -> str:
-    return "%" if p.logarithmic else p.unit or "units"
 
 
 def _warnings(c: Calibration, fine: Mapping[str, float], beyond: Sequence[str]) -> list[str]:

@@ -62,6 +62,15 @@ class Parameter:
             return math.log(value / self.low) / math.log(self.high / self.low)
         return (value - self.low) / (self.high - self.low)
 
+    def change(self, d: float) -> float:
+        """A change of `u` in `change_unit`."""
+        return 100.0 * d * float(np.log(self.high / self.low)) if self.logarithmic else d * (self.high - self.low)
+
+    @property
+    def change_unit(self) -> str:
+        """Percent where the parameter is spaced logarithmically, else its own unit."""
+        return "%" if self.logarithmic else self.unit or "units"
+
     @property
     def step(self) -> float:
         """Of differences, in `u`."""

@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rollover.calibration.identifiability import Determination
+from rollover.calibration.objective import Objective
 from rollover.system.errors import Fault, InputError
 
 Array = NDArray[np.float64]
@@ -52,6 +54,24 @@ class Posterior:
     def is_mixed(self) -> bool:
         """Whether the walkers agree."""
         return bool(np.all(self.r_hat < MIXED))
+
+    @property
+    def warnings(self) -> list[str]:
+        """What is to be said of draws that cannot be trusted."""
+        if self.is_mixed:
+            return []
+        worst = float(np.max(self.r_hat))
+        return [f"the walkers of the posterior do not agree, R-hat {worst:.3g}: more draws, or narrower bounds"]
+
+
+def of_fit(objective: Objective, u: Array, found: Determination, *, draws: int = DRAWS, seed: int = 0) -> Posterior:
+    """Draws about a fit that ended at `u` (p,)."""
+    clocks = [objective.parts(k, u)[1] for k in range(len(objective.cases))]
+
+    def log_density(v: Array) -> float:
+        return -0.5 * objective.squares(v, clocks) / found.widening
+
+    return sampled(log_density, u, found.covariance, draws=draws, seed=seed)
 
 
 def installed() -> None:

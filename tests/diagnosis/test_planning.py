@@ -19,7 +19,7 @@ from rollover.diagnosis.fit.parameterisation import Candidate, coordinates
 from rollover.diagnosis.planning import chances
 from rollover.diagnosis.planning.by_fits import next_test
 from rollover.diagnosis.planning.plan import plan, usual_noise
-from rollover.diagnosis.planning.planned import Instruments, coloured, only, planned, showing
+from rollover.diagnosis.planning.planned import Instruments, coloured, only, planned
 from rollover.diagnosis.planning.separation import Tests as PlannedTests
 from rollover.diagnosis.planning.strength import place_where_it_acts, strength_with
 from rollover.diagnosis.prepared import prepared, trusted
@@ -28,6 +28,7 @@ from rollover.diagnosis.settings import SETTINGS
 from rollover.effects import Search
 from rollover.recording import Recording
 from rollover.system.errors import InputError
+from tests.benchmarks.promises import chosen_rightly
 from tests.diagnosis.drops import ACCELERATION, DEPTH, FORCE, recorded, scenario
 
 CHANNELS = (FORCE, DEPTH, ACCELERATION)
@@ -187,22 +188,8 @@ def test_a_promise_is_kept_in_simulated_campaigns() -> None:
     promised = tests.apart(a, x, b)
     assert promised is not None
     assert 0.7 < promised.probability < 0.95, "a promise that can be broken"
-    rng, right, count = np.random.default_rng(4), 0, 100
-    for _ in range(count):
-        noisy, clocks = [], []
-        for e in dataset:
-            late = float(rng.normal(0.0, 1e-3))
-            raw = e.raw(e.simulator.predict(Problem.changes([a], x), late) or {})
-            assert e.doubts is not None
-            raw = raw + e.doubts @ rng.standard_normal(e.doubts.shape[1])
-            raw = raw + np.concatenate([rng.normal(0.0, s.sigma, s.rows.size) for s in e.signals])
-            noisy.append(showing(e, raw))
-            clocks.append(late)
-        problem = Problem(noisy)
-        fits = [problem.fit((c,), start, rounds=8, width=1, shifts=clocks) for c, start in ((a, x), (b, promised.x))]
-        assert fits[0] is not None
-        assert fits[1] is not None
-        right += fits[0].total < fits[1].total
+    count = 100
+    right = chosen_rightly(dataset, a, x, b, promised.x, count)
     interval = binomtest(right, count).proportion_ci(0.99)
     assert interval.low <= promised.probability <= interval.high
 

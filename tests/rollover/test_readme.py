@@ -47,6 +47,7 @@ RUN = [
     "docs/validation.md",
     "docs/estimation.md",
     "docs/integrators.md",
+    "docs/plan_next_test.md",
     "rollover/README.md",
 ]
 ELSEWHERE = {  # page -> its blocks that are not run here, and why

@@ -30,11 +30,12 @@ def page(
     """HTML of a plan."""
     blocks: list[Block] = [Section(title="What is detectable", blocks=[_strengths(found)])]
     acting = [e.effect for e in found.effects if e.judged is not None]
-    cells = [(a, b, found.of(a, b)) for a in acting for b in acting]
-    if any(p is not None for _, _, p in cells):
+    chances = [found.of(a, b) for a in acting for b in acting]
+    if any(p is not None for p in chances):
         places = {name: str(k) for k, name in enumerate((e.effect for e in found.effects), 1)}
-        rows, columns = (np.array([places[c[k]] for c in cells], dtype=object) for k in (0, 1))
-        values = np.array([np.nan if p is None else 100.0 * p for *_, p in cells])
+        numbers = np.array([places[name] for name in acting], dtype=np.object_)
+        rows, columns = np.repeat(numbers, len(acting)), np.tile(numbers, len(acting))
+        values = np.array([np.nan if p is None else 100.0 * p for p in chances])
         svg = heat_map(columns, rows, values, across="rival", up="true effect", label="chosen rightly, %")
         picture = Figure(svg=svg, caption="Numbers are those of the table above; a cross: not held against each other.")
         blocks.append(
