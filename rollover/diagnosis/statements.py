@@ -159,8 +159,8 @@ def as_models_miss(
         )
     return (
         f"Simulation and {recordings} recordings differ by more than noise, but by no more than models usually miss "
-        f"(root mean square, of the range: {each}), and none that could be named predicts half of that on recordings "
-        f"that were held out (p = {p_value:.2g} of noise alone).{some}"
+        f"(root mean square, of the range: {each}), and no effect that could be named predicts half of that on "
+        f"recordings that were held out (p = {p_value:.2g} of noise alone).{some}"
     )
 
 
