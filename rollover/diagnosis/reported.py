@@ -10,9 +10,10 @@ from rollover.diagnosis.conclusion import Conclusion
 from rollover.diagnosis.data.dataset import Dataset
 from rollover.diagnosis.data.inconsistent import by_inconsistencies
 from rollover.diagnosis.data.repeatability import against_itself, differing
+from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.time_shift import by_clock, mistimed
 from rollover.diagnosis.forward.full_run import full_runs
-from rollover.diagnosis.grades import answer_of
+from rollover.diagnosis.grades import answer_of, share_of
 from rollover.diagnosis.inference.adequacy import is_enough, is_tolerated
 from rollover.diagnosis.inference.chassis import degrees_of
 from rollover.diagnosis.inference.drop_dependence import Dependence, dependence, dependence_of_one
@@ -21,7 +22,7 @@ from rollover.diagnosis.inference.scores import before_an_impact, judged
 from rollover.diagnosis.inference.vehicle_dependence import dependency
 from rollover.diagnosis.planning.by_fits import next_test
 from rollover.diagnosis.power import is_weak
-from rollover.diagnosis.result import Degree, Diagnosis, Named
+from rollover.diagnosis.result import Degree, Diagnosis, Named, Share
 from rollover.diagnosis.settings import SETTINGS
 from rollover.diagnosis.statements import (
     as_models_miss,
@@ -87,7 +88,7 @@ def reported(c: Conclusion) -> Diagnosis:
             if shown is not None
             else of_no_consequence(c.slight)
             if c.slight
-            else as_models_miss(asked.discrepancy.by_none, explanation.p_value, len(found))
+            else as_models_miss(asked.discrepancy.by_none, explanation.p_value, len(found), _most(c))
             if verdict == "no-mismatch" and asked.discrepancy is not None and c.is_beside
             else sentence(
                 verdict,
@@ -151,6 +152,13 @@ def _with_next_test(c: Conclusion) -> tuple[Named, ...]:
         return c.effects
     found = next_test(c.asked.scenario, c.problem.dataset, c.explanation.fitted, min(rivals, key=lambda f: f.left))
     return (replace(effect, next_test=found),)
+
+
+def _most(c: Conclusion) -> tuple[Candidate, Share] | None:
+    """The effect that predicts most of the mismatch of recordings that were held out, and its share of that."""
+    first = c.explanation.first
+    share = None if first is None else share_of(c.problem, first.base, first.fitted, c.groups)
+    return None if first is None or share is None else (first.fitted.candidates[-1], share)
 
 
 def _grids(dataset: Sequence[Dataset]) -> dict[str, tuple[float, ...]]:

@@ -15,7 +15,7 @@ from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Groups, Step
 from rollover.diagnosis.inference.intervals import intervals
 from rollover.diagnosis.inference.lack_of_fit import Mismatch
-from rollover.diagnosis.result import Considered, Named, Place, Scale, Verdict
+from rollover.diagnosis.result import Considered, Named, Place, Scale, Share, Verdict
 from rollover.diagnosis.selection.decision import Explanation, strongest
 from rollover.diagnosis.selection.forward_step import confusion
 from rollover.diagnosis.settings import SETTINGS
@@ -142,13 +142,25 @@ def by_share(effects: Sequence[Named], scales: Mapping[str, Scale]) -> str:
     return said
 
 
-def as_models_miss(left: Mapping[str, float], p_value: float, recordings: int) -> str:
-    """The sentence where what a scenario leaves, a share of each channel's range, is what models usually miss."""
+def as_models_miss(
+    left: Mapping[str, float], p_value: float, recordings: int, best: tuple[Candidate, Share] | None = None
+) -> str:
+    """The sentence where what a scenario leaves, a share of each channel's range, is what models usually miss.
+
+    `best` is the effect that predicts most of it, with its share, which is told where it surely predicts some.
+    """
     each = ", ".join(f"{share:.1%} of {channel}" for channel, share in left.items())
+    some = ""
+    if best is not None and best[1].low > 0.0:
+        candidate, found = best
+        of = f" of {candidate.channel}" if candidate.channel else ""
+        some = (
+            f" Part of it is predicted by {candidate.id}{of}: {found.share:.0%} ({found.low:.0%} to {found.high:.0%})."
+        )
     return (
         f"Simulation and {recordings} recordings differ by more than noise, but by no more than models usually miss "
-        f"(root mean square, of the range: {each}), and nothing explains that better than chance (p = {p_value:.2g} of "
-        "noise alone)."
+        f"(root mean square, of the range: {each}), and no effect that could be named predicts half of that on "
+        f"recordings that were held out (p = {p_value:.2g} of noise alone).{some}"
     )
 
 

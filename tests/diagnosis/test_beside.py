@@ -14,7 +14,9 @@ from rollover.diagnosis.fit.levenberg_marquardt import Problem
 from rollover.diagnosis.fit.linearisation import Fitted, ResidualBlock
 from rollover.diagnosis.fit.parameterisation import Candidate
 from rollover.diagnosis.fit.step import Step
+from rollover.diagnosis.result import Share
 from rollover.diagnosis.selection.decision import Explanation
+from rollover.diagnosis.statements import as_models_miss
 from rollover.effects import EFFECTS, Search
 
 DROPS, SAMPLES = 6, 40
@@ -111,3 +113,12 @@ def test_what_leaves_no_more_than_the_discrepancy_or_is_akin_is_not_excluded_and
     # where there is little to explain, one that explains less of it is excluded though it leaves little
     step = explanation(SOME, fitted("soil-layer", (0.2,) * DROPS), fitted("guide-friction", (0.7,) * DROPS)).parts[0]
     assert [f.candidates[-1].id for f in alike_beside(PROBLEM, step, GROUPS)] == ["soil-layer"]
+
+
+@pytest.mark.parametrize(("low", "is_told"), [(0.12, True), (-0.05, False)])
+def test_a_part_that_is_surely_predicted_is_told_though_it_is_forgiven(low: float, is_told: bool) -> None:
+    candidate = fitted("sensor-bias", SOME).candidates[-1]
+    best = (candidate, Share(share=0.35, low=low, high=0.58))
+    said = as_models_miss({"ground/sinkage": 0.021}, 1e-9, 6, best)
+    assert "2.1% of ground/sinkage" in said
+    assert ("predicted by sensor-bias: 35% (12% to 58%)" in said) is is_told

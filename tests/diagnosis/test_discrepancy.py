@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -34,15 +33,11 @@ from tests.diagnosis.drops import DEPTH, FORCE, recorded, scenario
 
 
 def bent(
-    share: float,
-    seed: int = 0,
-    noise: float = 0.003,
-    changes: dict[str, float] | None = None,
-    speeds: Sequence[float] = (1.5, 2.2, 3.0),
+    share: float, seed: int = 0, noise: float = 0.003, changes: dict[str, float] | None = None
 ) -> list[tuple[str, Recording]]:
     """Drops with a slow wave after the contact, of `share` of each channel's range (rms), other in each by some."""
     rng, found = np.random.default_rng(seed), []
-    for name, r in recorded(changes or {}, seed, speeds=speeds, noise=noise):
+    for name, r in recorded(changes or {}, seed, speeds=(1.5, 2.2, 3.0), noise=noise):
         channels = {}
         for c, v in r.channels.items():
             wave = np.where(r.time > 0.0, np.sin(2.0 * np.pi * r.time / 0.23) * np.minimum(r.time / 0.02, 1.0), 0.0)
