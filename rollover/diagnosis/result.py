@@ -76,7 +76,7 @@ class Scale:
 
 @dataclass(frozen=True, kw_only=True)
 class Named:
-    """An effect that was found, with what it cannot be told apart from and how to.
+    """An effect that was found, with what it cannot be distinguished from and how it could.
 
     `explains` is its share of the held-out mismatch, `moves` the most by which it moves a load, of its peak; None where
     it moves none.
