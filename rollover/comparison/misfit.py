@@ -181,7 +181,7 @@ def misfit(
 
 
 def phases_of(run: Run) -> tuple[tuple[float, str], ...]:
-    """Start and name of each phase; what hits a drop rig's ground is told apart into loading and unloading."""
+    """Start and name of each phase; what hits a drop rig's ground has loading and unloading apart."""
     turn = min((e.time for e in run.events if e.kind == "unloading"), default=None)
     if not isinstance(run.scenario.vehicle, Striker):
         return run.phases

@@ -45,7 +45,7 @@ def usual(simulated: Recording) -> tuple[str, ...]:
 def check_clock(rate: float, late: float) -> None:
     """Refuse a clock so late that a double cannot tell its stamps at `rate` Hz apart. Raises `InputError`."""
     if np.spacing(abs(late)) * rate > 0.25:  # of a step: they are also rounded to a ns
-        message = f"stamps cannot be told apart at {rate:g} Hz, got {late:g} s; a lower rate, or a clock less late"
+        message = f"stamps cannot be distinguished at {rate:g} Hz, got {late:g} s; a lower rate, or a clock less late"
         raise InputError(Fault(path="late", message=f"{message} is needed"))
 
 

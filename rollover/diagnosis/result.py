@@ -96,7 +96,7 @@ class NextTest:
 
 @dataclass(frozen=True, kw_only=True)
 class Named:
-    """An effect that was found, with what it cannot be told apart from and how to.
+    """An effect that was found, with what it cannot be distinguished from and how it could.
 
     `explains` is its share of the held-out mismatch, `moves` the most by which it moves a load, of its peak; None where
     it moves none. `next_test` is what would tell it from the only other one in the set, by these recordings.

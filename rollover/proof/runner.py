@@ -7,6 +7,7 @@ rig: the proof imports nothing of them.
 from __future__ import annotations
 
 import importlib
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +25,7 @@ FORMAT = "rollover-proof/1"
 DIAGNOSIS = "rollover.diagnosis:diagnose_folder"
 RIGS = {"drop": "rollover.proof.generator", "overturn": "rollover.proof.overturns.generator"}  # with `plan` and `make`
 Diagnose = Callable[..., dict[str, Any]]
+_OF_FILES = re.compile(r"(?:InputError|OSError): (?:\[Errno \d+\] )?(.*)", re.DOTALL)  # a case's that cannot be written
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,7 +89,7 @@ def prove(
     `rig` is one of `RIGS`; a `background` (share of the range, or ``drawn``) is put on every case, of drops only.
 
     Cases stand in a temporary folder, the truth in another one until it is opened. Raises ``ValueError`` for what
-    cannot be planned and ``RuntimeError`` if a case cannot be made.
+    cannot be planned or has no room for its files, and ``RuntimeError`` if a case cannot be made.
     """
     if rig not in RIGS:
         raise ValueError(f"rig: no such rig, got {rig!r}; {', '.join(RIGS)} are allowed")
@@ -102,7 +104,10 @@ def prove(
         for outcome in map_cases(made, makings, workers=workers):
             if outcome.value is None:
                 sentence = outcome.failure.sentence if outcome.failure else "no reason given"
-                raise RuntimeError(f"{orders[outcome.index].name} could not be made: {sentence}")
+                what = f"{orders[outcome.index].name} could not be made"
+                if (refused := _OF_FILES.match(sentence)) is not None:
+                    raise ValueError(f"{what}: {refused[1]}; room for temporary files is needed")
+                raise RuntimeError(f"{what}: {sentence}")
             truths[outcome.index] = outcome.value
         ordered = [truths[i] for i in range(len(orders))]
         seal = sealed(ordered)

@@ -80,9 +80,9 @@ def _without_means(recording: Recording) -> Recording:
             first = float(recording.time[np.argmax(means)])
             what = "a sample is a mean" if count == 1 else f"{count} samples are means"
             notes.append(f"{name}: {what} over a wrap of its range, first at {first:.6g} s, and taken as gaps")
-    return (
-        recording if len(notes) == len(recording.notes) else replace(recording, channels=channels, notes=tuple(notes))
-    )
+    if len(notes) == len(recording.notes):
+        return recording
+    return replace(recording, channels=channels, notes=tuple(notes))
 
 
 def beside(recording: Recording, reference: Recording | None) -> Recording:
@@ -191,7 +191,7 @@ def _too_fast(recording: Recording, found: Mapping[str, Array]) -> Iterator[str]
         if most > HALF:
             yield (
                 f"{name}: turns by up to {math.degrees(most):.0f} degrees from one sample to the next; whole turns in "
-                "between are not told by it, and are taken from what it is compared with"
+                "between are not determined by it, and are taken from what it is compared with"
             )
 
 

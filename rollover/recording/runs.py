@@ -109,7 +109,7 @@ def read_parquet(path: Path) -> Recording:
 
 
 def _check(about: Any) -> None:
-    """Look at the types of what is told of a run. Raises ``TypeError``."""
+    """Look at the types of what is stated of a run. Raises ``TypeError``."""
     kinds: dict[str, type | tuple[type, ...]] = {"title": str, "source": str, "notes": list}
     for key in ("title", "source", "notes", "conditions", "uncertainty", "noise", "cfc", "clock", "sensors"):
         if key in about and not isinstance(about[key], kinds.get(key, dict)):

@@ -87,7 +87,7 @@ def rounding(time: Array) -> float:
 
 
 def _counted(since: Array, off: float) -> Array:
-    """How many steps each stamp lies behind the first one, the step being told by ever more of them."""
+    """How many steps each stamp lies behind the first one, the step being estimated from ever more of them."""
     step, reach = float(np.median(np.diff(since))), 1
     while True:
         # as many steps as `off` in the last ones lets count surely

@@ -101,7 +101,7 @@ def unwrapped(angle: Array) -> Array:
     return found
 
 
-def across_wraps(angle: Array) -> Array:
+def across_wraps(angle: Array) -> NDArray[np.bool_]:
     """Which angles (n,) are means over a wrap, as of a logger that averages: between its ends, on neither side; masks.
 
     The mean of +179 and -179 degrees is 0: one sample, or two side by side, that lie between neighbours of either end

@@ -56,7 +56,7 @@ def test_a_tenth_is_answered_as_it_was(id: str, anew: dict[str, Any]) -> None:
     assert [now["p_value"], now["remaining"]] == pytest.approx([was["p_value"], was["remaining"]], abs=TOLERANCE)
 
 
-def test_kinds_are_as_many_as_they_were_planned_and_any_beginning_holds_each() -> None:
+def test_kinds_are_as_planned_and_any_beginning_holds_each() -> None:
     cases = [job for job in plan() if job.task == "prove"]
     drops = [job.kind for job in cases if job.rig == "drop"]
     overturns = [job.kind for job in cases if job.rig == "overturn"]
@@ -95,7 +95,7 @@ def test_what_changed_is_named(change: dict[str, Any], said: str) -> None:
     assert line.startswith(said)
 
 
-def test_the_last_bit_of_an_interval_is_a_difference_with_its_size() -> None:
+def test_a_last_bit_of_an_interval_is_a_difference() -> None:
     old = _corpus("drop-001-single")["entries"]["drop-001-single"]
     new = copy.deepcopy(old)
     value, low, high = new["names"][0]["values"]["damping"]
@@ -105,7 +105,7 @@ def test_the_last_bit_of_an_interval_is_a_difference_with_its_size() -> None:
     assert line.endswith("e-16)")
 
 
-def test_an_entry_that_lacks_is_a_difference_unless_nobody_asked_for_it() -> None:
+def test_a_missing_entry_is_a_difference_if_asked_for() -> None:
     ids = [job.id for job in plan(0.001)]
     old = _corpus("drop-001-single", share=0.001)
     old["entries"] = dict.fromkeys(ids, old["entries"]["drop-001-single"])
@@ -132,7 +132,7 @@ def test_counts_have_their_intervals() -> None:
     assert "drop: cases with a false name" in text
 
 
-def test_numbers_are_hashed_to_the_last_bit_and_without_their_names() -> None:
+def test_numbers_are_hashed_to_the_last_bit_without_names() -> None:
     tree = {"a": [0.1, {"b": 2}], "c": "prose", "d": True}
     assert digest(tree) == digest([{"z": 2}, 0.1, "other prose"])
     assert digest(tree) != digest({"a": [0.1 + 2e-17, {"b": 2}]})

@@ -90,7 +90,7 @@ def test_an_end_that_counts_is_kept() -> None:
 
 
 @pytest.mark.parametrize(("off", "is_kept"), [(0.0, False), (1.5, False), (2.5, True)])
-def test_an_end_that_hardly_counts_is_kept_where_it_differs_by_more_than_chance(off: float, is_kept: bool) -> None:
+def test_a_light_end_is_kept_where_it_differs_significantly(off: float, is_kept: bool) -> None:
     """Samples of noise 1 that count 0.3, of runs that differ by 1: (0.3 off)^2 against 3 (0.3^2 + 0.3^2)."""
     whole = dataset(0.3, off=off)
     one = np.ones(whole.signals[0].rows.size)
@@ -107,7 +107,7 @@ def test_of_one_recording_alone_nothing_after_the_blow_counts() -> None:
     assert shortened(without, alone=True) is without
 
 
-def test_a_shorter_run_is_the_same_run_and_its_filter_looks_ahead() -> None:
+def test_a_truncated_run_is_the_same_and_its_filter_looks_ahead() -> None:
     whole = dataset(0.3, cfc=60)
     found = shortened(whole)
     assert isinstance(found.simulator, RunSimulator)
@@ -149,9 +149,7 @@ def a_step_at(moment: float) -> Dataset:
 @pytest.mark.parametrize(
     ("moved", "first_impact", "end"), [(0.2, 0.5, 1.1), (0.8, 0.5, 1.4), (1.4, 0.5, END), (0.2, 1.4, END)]
 )
-def test_looks_see_what_comes_soon_after_the_blow_of_simulation_and_recording(
-    moved: float, first_impact: float, end: float
-) -> None:
+def test_screening_sees_shortly_after_both_first_impacts(moved: float, first_impact: float, end: float) -> None:
     whole = replace(a_step_at(moved), first_impact=first_impact)
     found = soon(whole)
     assert found.recording.time[-1] == pytest.approx(min(end, END - STEP), abs=STEP)  # stamps are a step apart
@@ -159,7 +157,7 @@ def test_looks_see_what_comes_soon_after_the_blow_of_simulation_and_recording(
     assert soon(whole).simulator is found.simulator  # its runs are known
 
 
-def test_who_looks_soon_after_the_blow_holds_recordings_as_they_are_held() -> None:
+def test_truncated_data_keep_the_noise_model_of_the_whole() -> None:
     problem = Problem([dataset(0.9)])
     near = problem.near()
     assert near is not problem
@@ -181,7 +179,7 @@ def test_who_looks_soon_after_the_blow_holds_recordings_as_they_are_held() -> No
     assert alone.near() is alone
 
 
-def test_who_looks_soon_after_the_blow_has_the_slopes_of_the_whole_as_far_as_it_sees() -> None:
+def test_truncated_data_have_the_jacobian_rows_of_the_whole() -> None:
     friction = Candidate(id="ground-friction", kind="physics", family="", search={"coefficient": Search(0.1, 0.6)})
     problem = Problem([dataset(0.9, cfc=60)])
     base = problem.fit((friction,), (0.2,), rounds=0, width=1)
@@ -200,7 +198,7 @@ def test_who_looks_soon_after_the_blow_has_the_slopes_of_the_whole_as_far_as_it_
     assert short.beginning(base) == (short, base)
 
 
-def test_looks_and_first_fits_are_made_soon_after_the_blow_and_fits_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_screening_and_first_fits_are_truncated_final_fits_not(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = Problem([dataset(0.9), dataset(0.9)])
     base = problem.fit((), ())
     assert base is not None

@@ -57,7 +57,7 @@ def test_cosines_are_orthonormal_and_expected_of_noise() -> None:
     np.testing.assert_allclose(np.mean(found, axis=0), 1.0, atol=0.05)
 
 
-def test_of_a_channel_that_is_silent_at_rest_nothing_is_its_recorder_s() -> None:
+def test_a_channel_silent_at_rest_has_no_recorder_noise() -> None:
     """Over no noise everything is slow, and as loud before as after: no number to go by."""
     rng = np.random.default_rng(1)
     with np.errstate(divide="raise", invalid="raise"):
@@ -111,7 +111,7 @@ def test_one_offset_is_shared_by_recordings_of_unlike_noise() -> None:
     assert share(make) == 0.0
 
 
-def test_nothing_is_told_of_two_recordings_or_of_a_short_approach() -> None:
+def test_two_recordings_or_a_short_approach_show_no_drift() -> None:
     rng = np.random.default_rng(2)
     every = told([pink(rng) for _ in range(6)], 0.6)
     assert is_recorders(every)

@@ -98,7 +98,7 @@ def test_a_weight_is_applied_behind_the_whitening() -> None:
     assert w.perturbed[0].shape == (N,)
 
 
-def test_what_neighbours_differ_by_is_no_mismatch_and_more_than_that_is_one() -> None:
+def test_ensemble_scatter_is_no_mismatch_and_more_is_one() -> None:
     rng = np.random.default_rng(3)
     t = np.linspace(0.0, 1.0, N)
     wave = np.where(t > 0.5, np.sin(2.0 * np.pi * 6.0 * t), 0.0)
@@ -223,7 +223,7 @@ def counted(e: Dataset, w: np.ndarray, held: HeavyTail | None = None) -> float:
     return float(w @ w) if found is None else float(np.sum((found.samples * w) ** 2)) + found.more
 
 
-def test_sums_of_squares_touch_what_another_course_counts_and_lie_above_it() -> None:
+def test_a_quadratic_majorises_the_heavy_tailed_misfit() -> None:
     """What is left of all channels, scaled by a^2: its slope at a = 1 is that of (D9), elsewhere the sum is larger."""
     e = blown()
     w = misfit(e, [6.0] * 4)
@@ -241,7 +241,7 @@ def test_sums_of_squares_touch_what_another_course_counts_and_lie_above_it() -> 
 
 
 @pytest.mark.parametrize("fall", [-100.0, 1.0, 50.0, 500.0, 550.0])
-def test_what_is_gained_along_a_line_is_the_fall_of_what_a_course_counts(fall: float) -> None:
+def test_gain_along_a_line_is_the_fall_of_the_robust_misfit(fall: float) -> None:
     """E + x falls by `fall`: (D9) by d ln((d + x)/(d + x - fall)) down to x = 0; beyond, samples count in full."""
     x, d = 500.0, float(SETTINGS.noise.ensemble.state_size)
     slope = d / (d + x)
@@ -361,7 +361,7 @@ def of_courses(others: int) -> float:
     return mismatch_of([blown()] * 4, blocks, [((0.0, "tipping"), (IMPACT, "sliding"))] * 4).p_value
 
 
-def test_one_recording_may_take_another_course_but_not_all_of_them() -> None:
+def test_one_recording_may_diverge_but_not_all_of_them() -> None:
     assert of_courses(0) > 0.05
     assert of_courses(1) > 0.05
     assert of_courses(1) != pytest.approx(too_many(1, 4))  # so few tell nothing: a p-value of whole numbers is none

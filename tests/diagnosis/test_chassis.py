@@ -52,7 +52,7 @@ def test_a_force_along_one_axis_is_found_with_its_size() -> None:
     assert first.rms == pytest.approx(expected, rel=0.02)
 
 
-def test_a_moment_is_the_inertia_times_what_the_turn_speeds_up_by() -> None:
+def test_a_moment_is_inertia_times_angular_acceleration() -> None:
     own, e = thrown(0.7, {ABOUT[2]: "6.0 * t"})
     degrees = degrees_of([own], [e], [0.0])
     assert degrees[0].axis == "about z"

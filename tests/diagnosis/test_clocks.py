@@ -60,7 +60,7 @@ def known(problem: Problem, changes: dict[str, object]) -> np.ndarray:
 
 
 @pytest.mark.parametrize("missing", [HARDPAN, CRUST], ids=["hardpan", "crust"])
-def test_the_first_contact_is_not_bent_by_what_the_simulation_misses(missing: dict[str, object]) -> None:
+def test_the_onset_is_not_biased_by_missing_physics(missing: dict[str, object]) -> None:
     problem = judge_of(missing, late=0.5e-3)
     truth = known(problem, missing)
     align(problem)
@@ -86,11 +86,11 @@ def test_the_onset_of_contact_is_found_whatever_happens_then(late: float) -> Non
     assert np.abs(early).max() < 1.3e-3  # the clocks themselves stray by half a millisecond
 
 
-def test_a_recording_that_began_in_the_ground_tells_of_no_contact() -> None:
+def test_a_recording_that_begins_in_contact_has_no_onset() -> None:
     assert by_first_contact(without_zero(judge_of({}), since=0.012), (), ()) == [None, None, None]
 
 
-def test_a_clock_that_would_have_to_be_far_off_is_not_believed_where_its_zero_is_known() -> None:
+def test_a_large_offset_of_a_known_clock_is_not_believed() -> None:
     problem = judge_of({}, late=5.0e-3)
     loose = []
     for e in problem.dataset:
@@ -165,7 +165,7 @@ def test_the_score_test_leads_to_where_the_effect_is() -> None:
     assert any(abs(v["depth"] - 0.08) < 0.025 and 1.03 < v["stiffness_ratio"] < 1.07 for v in values), values
 
 
-def test_a_way_from_no_effect_is_followed_in_the_parameter_itself() -> None:
+def test_a_path_from_the_null_value_is_followed_linearly() -> None:
     problem = judge_of({})
     by_id = {c.key: c for c in candidates_of(problem.dataset, (), "drop")}
     layer = by_id["soil-layer"]
@@ -189,7 +189,7 @@ def one_late(problem: Problem, late: float) -> Problem:
 
 
 @pytest.mark.parametrize("late", [0.05, -0.03])
-def test_a_clock_that_is_far_off_is_told_by_where_the_simulation_meets_the_recording(late: float) -> None:
+def test_a_large_offset_is_estimated_by_alignment_of_the_run(late: float) -> None:
     problem = one_late(judge_of({}), late)
     base = problem.fit((), (), rounds=3)
     assert base is not None
@@ -221,7 +221,7 @@ def cut_at(problem: Problem, until: float) -> Problem:
 
 
 @pytest.mark.parametrize(("until", "told"), [(0.18, [0.15]), (0.14, [])])
-def test_a_clock_is_told_by_a_contact_however_short_and_not_without_one(until: float, told: list[float]) -> None:
+def test_any_contact_gives_a_time_shift_and_none_gives_none(until: float, told: list[float]) -> None:
     """150 ms late: of 30 ms after it most samples come before all that is simulated at the stamps as they are."""
     short = cut_at(one_late(judge_of({}), 0.15), until)
     base = short.fit((), (), rounds=3)
@@ -230,7 +230,7 @@ def test_a_clock_is_told_by_a_contact_however_short_and_not_without_one(until: f
 
 
 @pytest.mark.parametrize("late", [0.4, -0.1, 7.0])
-def test_a_clock_is_told_beside_what_is_missing_however_far_off_it_is(late: float) -> None:
+def test_a_time_shift_is_estimated_beside_missing_physics(late: float) -> None:
     """What rests long before or after its impact is met by most samples at many a clock: 0.4 s was called 0.243."""
     problem = one_late(judge_of({"effects.soil-viscous-damping.damping": 250.0}), late)
     base = problem.fit((), (), rounds=3)
@@ -260,7 +260,7 @@ def test_milliseconds_that_are_many_are_spoken_in_full() -> None:
     assert " 6,990 ms late (d)" in by_clock([("d", 6.99)])
 
 
-def test_a_channel_that_comes_far_too_early_is_looked_at_there_where_runs_are_dear() -> None:
+def test_a_channel_far_too_early_is_screened_in_full_runs_too() -> None:
     """An impact of 20 ms that one channel shows 30 ms early: what a millisecond would do has nothing to do with it."""
     problem = judge_of(
         {"effects.sensor-clock-offset.channel": ACCELERATION, "effects.sensor-clock-offset.offset": -0.03}
@@ -280,7 +280,7 @@ def test_a_channel_that_comes_far_too_early_is_looked_at_there_where_runs_are_de
     assert {c.id for c in every if c.further()} == {"sensor-clock-offset", "sensor-clock-drift"}
 
 
-def test_a_record_that_ends_at_the_contact_tells_no_first_contact_and_is_no_crash() -> None:
+def test_a_record_that_ends_at_contact_has_no_onset() -> None:
     ended = [
         dataset_of(n, r, simulator_of(scenario(), r))
         for n, r in recorded({}, 3, channels=(ACCELERATION, "striker/position_z"), rate=1000.0, until=0.001)

@@ -77,7 +77,7 @@ def test_noise_that_no_filter_made_is_taken_for_even() -> None:
     assert each[:, 0].sum() / each[:, 1].sum() == pytest.approx(1.0, abs=0.04)
 
 
-def test_without_a_filter_that_can_be_the_noise_s_own_it_is_taken_for_even(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_noise_that_fits_no_filter_is_taken_for_white(monkeypatch: pytest.MonkeyPatch) -> None:
     """None declared, one too wide for the rate, averages, a longer memory, none weighed; whatever the memory says."""
     monkeypatch.setattr(autoregression, "TUNING", replace(autoregression.TUNING, filter_errors=1e3))
     e = recorded(behind(np.random.default_rng(5)))
@@ -117,7 +117,7 @@ def test_short_recordings_of_one_level_are_told_to_be_alike() -> None:
     assert sum(bool(np.any(sizes != 1.0)) for sizes in found) <= 1  # one in ten thousand by chance
 
 
-def test_an_amplifier_set_for_each_test_is_seen_in_few_samples_beside_what_is_measured() -> None:
+def test_gains_set_for_each_test_show_in_few_samples() -> None:
     """Levels of 1, 2 and 4 on a slow pulse a hundred times as large: what is rough is the noise."""
     pulse = 100.0 * np.sin(np.linspace(0.0, np.pi, 110))
     random, told = np.random.default_rng(3), []
@@ -128,7 +128,7 @@ def test_an_amplifier_set_for_each_test_is_seen_in_few_samples_beside_what_is_me
     assert np.mean(told, axis=0) == pytest.approx([0.5, 1.0, 2.0], rel=0.05)
 
 
-def test_noise_that_goes_with_each_recordings_range_is_no_mismatch() -> None:
+def test_noise_in_proportion_to_the_range_is_no_mismatch() -> None:
     found = [diagnose(drop(), dropped({}, seed, rate=300.0)) for seed in range(4)]
     assert {f.verdict for f in found} == {"no-mismatch"}
 
@@ -146,7 +146,7 @@ def pulses(random: np.random.Generator, sigma: float, n: int = 1200, width: int 
 
 
 @pytest.mark.parametrize(("loud", "slow", "taken"), [(1.0, 0.0, True), (2.4, 0.0, True), (1.0, 2.2, False)])
-def test_only_noise_that_is_louder_in_all_it_holds_is_taken_for_noise(loud: float, slow: float, taken: bool) -> None:
+def test_only_noise_louder_at_all_frequencies_is_noise(loud: float, slow: float, taken: bool) -> None:
     """Noise with a memory of 0.34, 2.4 times as loud as at rest: by itself, or with pulses of 2.2 times its size.
 
     Both have a standard deviation of 2.4. What drives the noise, its rough part, is louder in the first and much as it

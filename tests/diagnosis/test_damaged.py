@@ -78,7 +78,7 @@ DAMAGES: tuple[Callable[[Recordings], Recordings], ...] = (
 
 
 @pytest.mark.parametrize("damaged", DAMAGES, ids=lambda d: d.__name__)
-def test_damaged_recordings_of_what_the_scenario_says_give_no_name(damaged: Callable[[Recordings], Recordings]) -> None:
+def test_damaged_recordings_of_the_scenario_name_no_effect(damaged: Callable[[Recordings], Recordings]) -> None:
     found = diagnose(scenario(), damaged(recorded({}, 21, speeds=SPEEDS)))
     assert found.verdict in ("no-mismatch", "cannot-tell"), (found.verdict, found.sentence)
     assert not found.effects
@@ -122,13 +122,11 @@ def test_recordings_that_contradict_each_other_are_not_explained() -> None:
         ({"rops-plasticity": 1.0, "mass": 1.0}, True),  # of a limit, and of a value, nothing is usual
     ],
 )
-def test_recordings_are_too_weak_where_usual_strengths_would_not_show(
-    detectable: dict[str, float], is_weak: bool
-) -> None:
+def test_recordings_that_show_no_usual_strength_are_too_weak(detectable: dict[str, float], is_weak: bool) -> None:
     assert power.is_weak(detectable) is is_weak
 
 
-def test_millimetres_that_say_they_are_metres_are_the_scale_of_their_channel() -> None:
+def test_millimetres_stated_as_metres_are_a_channels_scale() -> None:
     made = recorded({}, 25, speeds=(1.0, 2.0, 3.0))
     found = diagnose(scenario(), [(n, replace(r, channels={**r.channels, DEPTH: 1e3 * r[DEPTH]})) for n, r in made])
     assert [(e.id, e.channel) for e in found.effects] == [("sensor-scale", DEPTH)], found.sentence

@@ -54,7 +54,7 @@ def told(own: Scenario, recordings: Sequence[tuple[str, Recording]]) -> Dependen
     return dependence(problem, [set_up(own, e.recording) for e in problem.dataset], base)
 
 
-def test_a_constant_push_on_a_spring_swings_about_where_it_would_rest() -> None:
+def test_a_spring_under_constant_force_swings_about_its_rest() -> None:
     """z'' = p - w^2 z from z = 0, z' = u: z = p/w^2 (1 - cos wt) + u/w sin wt, by Newmark's rule to (w h)^2/12."""
     h, w, many = 5e-4, np.array([40.0]), 400
     p, u, t = np.array([3.0, -1.0]), 0.2, 5e-4 * np.arange(many)[:, None]
@@ -97,7 +97,7 @@ def test_a_force_does_to_every_channel_what_the_simulation_says() -> None:
         ("coarse", 31, VALUE, "own"),
     ],
 )
-def test_what_is_in_no_table_is_put_down_to_what_it_was_made_from(
+def test_a_residual_law_is_stated_in_its_own_quantities(
     kind: str, seed: int, wanted: str, channel: str | None, tmp_path: Path
 ) -> None:
     case = make(Order(index=seed, seed=5102, kind="outside", ids=(f"outside:{kind}",)))
@@ -110,7 +110,7 @@ def test_what_is_in_no_table_is_put_down_to_what_it_was_made_from(
     assert sum(share for _, share in found.shares) <= 1.0 + 1e-9
 
 
-def test_the_way_down_is_told_by_the_first_contact_where_a_base_ate_what_is_missing_by_its_clocks(
+def test_loading_starts_at_onset_where_shifts_absorbed_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Nobody timed these drops, and a base is 30 ms late: from there no slope leads over the edge of the contact."""
@@ -130,7 +130,7 @@ def test_the_way_down_is_told_by_the_first_contact_where_a_base_ate_what_is_miss
     assert worst() > 3.0
 
 
-def test_a_sensor_that_drops_out_is_told_from_a_force_and_comes_and_goes_in_time() -> None:
+def test_a_sensor_dropout_is_told_from_a_force_by_its_timing() -> None:
     rng, made = np.random.default_rng(3), []
     for name, r in recorded({}, channels=THREE, rate=1000.0, noise=0.005):
         y = r.channels[drops.FORCE].copy()
@@ -142,7 +142,7 @@ def test_a_sensor_that_drops_out_is_told_from_a_force_and_comes_and_goes_in_time
     assert found.on == TIME
 
 
-def test_a_channel_that_goes_its_own_way_is_told_by_what_the_others_leave() -> None:
+def test_a_deviating_channel_is_found_by_the_others_residuals() -> None:
     """y = x (1 + 0.3 x/x_max) of one channel; the same that drops out; and a force, which moves them all."""
 
     def of_one(made: Sequence[tuple[str, Recording]]) -> Dependence | None:
@@ -166,7 +166,7 @@ def test_a_channel_that_goes_its_own_way_is_told_by_what_the_others_leave() -> N
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.9])
-def test_a_line_is_found_in_coloured_noise_and_nothing_where_there_is_none(memory: float) -> None:
+def test_a_spectral_line_is_found_only_where_there_is_one(memory: float) -> None:
     rng, alarms = np.random.default_rng(4), 0
     for _ in range(40):
         times = [np.arange(n) / 900.0 for n in (300, 420, 500)]
@@ -195,7 +195,7 @@ def held(misfit: np.ndarray, quiet: float, ar: tuple[float, ...], count: int = 3
     return [replace(one, recording=recording, signals=(s,)) for _ in range(count)]
 
 
-def test_noise_with_a_memory_is_weighed_by_all_that_is_left_and_a_drift_is_not() -> None:
+def test_autocorrelated_noise_uses_all_residuals_drift_not() -> None:
     rng, n = np.random.default_rng(5), 400
     white = rng.standard_normal(3 * n)
     slow = noise(rng, 3 * n, 0.6)
@@ -209,7 +209,7 @@ def test_noise_with_a_memory_is_weighed_by_all_that_is_left_and_a_drift_is_not()
     ) == pytest.approx(0.6, abs=0.08)
 
 
-def test_levels_that_are_off_are_no_memory_of_the_noise_however_often_it_is_weighed() -> None:
+def test_offsets_are_no_autocorrelation_of_the_noise() -> None:
     """What two effects of one sensor leave of a curved one: 1.4 sigma too little at first, 0.8 too much later on."""
     rng, n = np.random.default_rng(6), 800
     still = noise(rng, 3 * n, 0.6)
@@ -225,7 +225,7 @@ def test_levels_that_are_off_are_no_memory_of_the_noise_however_often_it_is_weig
             assert (after[0].signals[0] is dataset[0].signals[0]) == kept
 
 
-def test_a_hum_is_a_mismatch_however_fast_and_its_channel_is_named() -> None:
+def test_a_hum_of_any_frequency_is_a_mismatch_of_its_channel() -> None:
     """At 130 Hz it is beyond the slow waves of every phase."""
     made = []
     for name, r in recorded({}, channels=THREE, rate=1000.0, noise=0.005):
@@ -240,7 +240,7 @@ def test_a_hum_is_a_mismatch_however_fast_and_its_channel_is_named() -> None:
         assert s.noise < 0.007 * s.span  # what hums was left out of it
 
 
-def test_three_effects_of_one_sensor_or_of_the_soil_are_any_curve_and_two_are_not() -> None:
+def test_three_effects_of_one_kind_are_over_flexible_two_not() -> None:
     def on(id: str, channel: str | None) -> Candidate:
         return Candidate(id=id, kind="sensor", family="", search={}, channel=channel)
 
@@ -265,7 +265,7 @@ def test_three_effects_of_one_sensor_or_of_the_soil_are_any_curve_and_two_are_no
     assert not is_pliant([shaped, on("mass", None)])
 
 
-def test_what_explains_little_is_not_named_and_a_sensor_without_a_quantity_goes_by_time() -> None:
+def test_a_small_gain_is_not_named_and_a_sensor_goes_by_time() -> None:
     assert Dependence(shares=((SPEED, 0.2),)).on is None
     assert Dependence(shares=((SPEED, 0.4),)).on == SPEED
     assert Dependence(shares=((VALUE, 0.4),), channel=drops.FORCE).on == TIME
@@ -281,7 +281,7 @@ def test_what_explains_little_is_not_named_and_a_sensor_without_a_quantity_goes_
         (VALUE, ("chassis/roll", 0.9), False),  # of what tips over a rate goes with the angle: so does its error
     ],
 )
-def test_what_the_vehicle_does_goes_in_time_too_where_tests_begin_alike(
+def test_vehicle_residuals_go_by_time_where_tests_begin_alike(
     one: str, motion: tuple[str, float], yields: bool
 ) -> None:
     of_one = Dependence(shares=((one, 0.99),), channel="chassis/angular_velocity_x")

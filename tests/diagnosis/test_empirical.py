@@ -167,7 +167,7 @@ def unlisted() -> list[tuple[str, Recording]]:
     return found
 
 
-def test_physics_that_nobody_listed_is_given_as_a_law_that_predicts(
+def test_unlisted_physics_is_given_as_a_law_that_predicts(
     unlisted: list[tuple[str, Recording]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     few = ("soil-viscous-damping", "soil-crust", "mass")  # that the law is asked for at all, not who competes

@@ -42,7 +42,7 @@ def step(best: Fitted, *rivals: Fitted) -> Step:
     return Step(base=base, fitted=best, p_value=0.0, rivals=(best, *rivals))
 
 
-def test_rivals_are_begun_anew_beside_what_the_best_was_followed_to() -> None:
+def test_rivals_restart_beside_where_the_best_fit_ended() -> None:
     """A threshold that was followed beside the best alone leaves its rivals where they were."""
     asked: list[tuple[str, tuple[float, ...]]] = []
 
@@ -56,7 +56,7 @@ def test_rivals_are_begun_anew_beside_what_the_best_was_followed_to() -> None:
     assert [f.left for f in after.rivals] == [1.0, 4.0]
 
 
-def test_rivals_are_begun_anew_beside_what_the_best_holds_in_the_form_that_it_has_there() -> None:
+def test_rivals_restart_beside_the_best_models_variant() -> None:
     """A damping that stood in two numbers beside its rivals was straightened beside the best."""
     asked: list[tuple[int, tuple[float, ...]]] = []
 
@@ -182,7 +182,7 @@ def test_what_draws_any_curve_is_not_followed_but_straightened(
     assert traced == ([] if is_a_curve else [best])
 
 
-def test_a_damping_is_tried_as_the_drag_that_it_becomes_with_the_square_of_the_speed() -> None:
+def test_a_damping_is_tried_as_drag_of_squared_speed() -> None:
     """1/2 C rho A v^2 = d v^2: C = 2 d/(rho A), whatever a drag that was fitted from afar came to."""
     asked: list[Task] = []
 
@@ -207,9 +207,7 @@ def test_a_damping_is_tried_as_the_drag_that_it_becomes_with_the_square_of_the_s
 
 
 @pytest.mark.parametrize(("leaves", "polished", "taken"), [(7.0, 6.9, True), (7.0, 4.0, True), (20.0, 4.0, False)])
-def test_two_thresholds_in_one_place_are_a_threshold_and_a_stiffness(
-    leaves: float, polished: float, taken: bool
-) -> None:
+def test_two_thresholds_at_one_place_are_one_and_a_stiffness(leaves: float, polished: float, taken: bool) -> None:
     """A crust of two numbers beside a layer leaves 5; one number is saved for chi-square of 10.8, of what comes near.
 
     Sensors are not asked, nor what has as many numbers; the best of those that are is followed along its valley.
@@ -235,7 +233,7 @@ def test_two_thresholds_in_one_place_are_a_threshold_and_a_stiffness(
 
 
 @pytest.mark.parametrize(("family", "taken"), [("depth", True), ("damping", False)])
-def test_of_two_thresholds_either_may_be_the_one_that_is_a_stiffness(family: str, taken: bool) -> None:
+def test_either_of_two_thresholds_may_be_a_stiffness(family: str, taken: bool) -> None:
     """Beside the layer a stiffness leaves 90 where both leave 5; beside the crust it leaves 6."""
     two = {"depth": Search(0, 1), "ratio": Search(0, 1)}
     layer, crust = (

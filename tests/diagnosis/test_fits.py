@@ -74,7 +74,7 @@ def test_about_a_jump_lie_the_samples_that_it_may_fall_to() -> None:
     assert found.tolist() == [5.0, 3.0, 3.0, 4.0]
 
 
-def test_a_nose_that_meets_the_ground_again_is_forgiven_at_any_clock() -> None:
+def test_a_second_contact_is_masked_at_any_time_shift() -> None:
     """Its force jumps by a third of the peak between two samples whose steps are as large: no two of them show it."""
     ringing = {
         "effects.structural-compliance.stiffness": 1.54e6,
@@ -102,7 +102,7 @@ def test_a_clock_goes_less_far_where_all_of_its_way_leaves_more() -> None:
     assert problem._less_far(0, (), (), before, None) is None
 
 
-def test_a_block_says_whether_another_course_would_have_counted_for_less() -> None:
+def test_a_linearised_residual_knows_its_robust_weight() -> None:
     problem = judge_of(recorded({}, speeds=(2.0,), noise=1e-3))
     for heavy_tailed in (True, False):
         problem.heavy_tailed = heavy_tailed
@@ -129,7 +129,7 @@ def test_a_stiffness_far_off_is_found_from_every_start() -> None:
         assert c.values(fitted.x)["scale"] == pytest.approx(1.4, rel=0.01), start
 
 
-def test_a_first_fit_ends_without_slopes_and_where_it_would_with_them() -> None:
+def test_a_first_fit_ends_alike_with_and_without_jacobian() -> None:
     """Central or not, each slope at its end is a simulation of each recording."""
     recordings = recorded({"effects.soil-stiffness.scale": 1.4}, speeds=(1.2, 3.2), noise=5e-3)
     c = candidate(judge_of(recordings), "soil-stiffness")
@@ -202,7 +202,7 @@ def test_what_was_fitted_is_taken_up_again(tmp_path: Path) -> None:
     assert not notebook.exists()
 
 
-def test_one_sensor_effect_on_two_channels_stands_twice_in_the_scenario(tmp_path: Path) -> None:
+def test_a_sensor_effect_on_two_channels_is_written_twice(tmp_path: Path) -> None:
     changes = {
         "effects.sensor-bias.channel": FORCE,
         "effects.sensor-bias.bias": 200.0,
@@ -222,7 +222,7 @@ def test_one_sensor_effect_on_two_channels_stands_twice_in_the_scenario(tmp_path
     }
 
 
-def test_an_accelerometer_alone_on_its_axis_may_be_turned_or_read_low() -> None:
+def test_a_lone_accelerometer_may_be_turned_or_read_low() -> None:
     """cos(0.25) = 0.969: without the channel across both read the same; a gain of 3 % is common, 14 degrees are not."""
     turned = {"effects.sensor-misalignment.channel": ACCELERATION, "effects.sensor-misalignment.angle": 0.25}
     found = diagnose(scenario(), recorded(turned, 10, speeds=(1.2, 2.2, 3.2), channels=(FORCE, ACCELERATION)))
@@ -299,7 +299,7 @@ def test_a_fit_in_another_form_is_taken_up_from_the_notebook(tmp_path: Path) -> 
     assert made < 20
 
 
-def test_far_from_the_noise_a_fit_ends_where_a_round_gains_a_trifle(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_far_from_noise_a_fit_stops_at_a_small_gain(monkeypatch: pytest.MonkeyPatch) -> None:
     """A layer fitted as a rate leaves 3.7 times the noise: the last thousandths of what is beyond it tell nothing.
 
     What is met is fitted as far as ever.
@@ -364,7 +364,7 @@ def test_one_condition_alone_says_that_nothing_was_held_out() -> None:
     assert "With one condition nothing can be held out" in named.sentence
 
 
-def test_a_rebound_is_looked_for_from_what_the_law_springs_back_by_itself() -> None:
+def test_a_rebound_is_searched_from_the_laws_own_restitution() -> None:
     recordings = recorded({"effects.soil-elastic-rebound.recovery": 0.0222}, speeds=(1.5, 3.0), noise=5e-3)
     problem = judge_of(recordings)
     own = scenario().ground.law.recovery

@@ -60,7 +60,7 @@ def cut(share: float) -> tuple[list[tuple[str, Recording]], float]:
     return [(n, replace(r, channels={**r.channels, FORCE: np.minimum(r[FORCE], end)})) for n, r in made], end
 
 
-def test_a_range_that_cuts_off_little_is_named_where_all_else_agrees() -> None:
+def test_slight_clipping_is_named_where_all_else_agrees() -> None:
     made, end = cut(0.93)
     found = diagnose(scenario(), made)
     (named,) = found.effects

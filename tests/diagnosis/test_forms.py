@@ -67,9 +67,7 @@ def test_of_fits_that_lead_to_one_place_one_is_followed(ends: tuple[float, ...],
         ([(0.20, 10.0), (0.25, 10.05), (0.60, 10.06), (0.90, 10.2)], [0.20, 0.60]),
     ],
 )
-def test_of_short_fits_on_their_way_to_one_place_one_is_gone_on_with(
-    near: list[tuple[float, float]], gone_on_with: list[float]
-) -> None:
+def test_of_short_fits_to_one_minimum_one_goes_on(near: list[tuple[float, float]], gone_on_with: list[float]) -> None:
     """Begun at places that leave so much after a short fit."""
     begun: list[float] = []
 
@@ -88,7 +86,7 @@ def test_of_short_fits_on_their_way_to_one_place_one_is_gone_on_with(
 @pytest.mark.parametrize(
     ("left", "soon", "is_followed"), [(30.0, 29.0, False), (30.0, 28.0, True), (3.0, 2.99, True), (3.0, 2.6, True)]
 )
-def test_far_from_noise_a_shape_is_followed_if_it_soon_takes_part(left: float, soon: float, is_followed: bool) -> None:
+def test_far_from_noise_a_variant_that_soon_gains_is_followed(left: float, soon: float, is_followed: bool) -> None:
     """Short fits leave so much of what the usual shape leaves: three in a hundred is nothing, seven is a part of it.
 
     Near noise, at three times what chance leaves, any little may be all there is.
@@ -104,7 +102,7 @@ def test_far_from_noise_a_shape_is_followed_if_it_soon_takes_part(left: float, s
     assert (best is not None) is bool(whole) is is_followed
 
 
-def test_where_few_recordings_lead_astray_all_are_fitted_from_where_the_usual_shape_stands() -> None:
+def test_misled_variants_restart_from_the_usual_one_on_all() -> None:
     """From other places short fits to three recordings leave least, and whole ones from there far more than before."""
     usual = replace(DAMPING, shapes={"exponent": Search(0, 1)})
     start, stands = fitted(usual, (0.3,), 30.0), usual.with_secondary((0.3,))[0]
@@ -133,9 +131,7 @@ def test_where_few_recordings_lead_astray_all_are_fitted_from_where_the_usual_sh
         (3.0, 5.1, 4.9, 0),
     ],
 )
-def test_a_shape_is_gone_on_with_if_it_comes_near_what_another_explanation_leaves(
-    leaves: float, soon: float, then: float, whole: int
-) -> None:
+def test_a_variant_near_its_rivals_misfit_is_followed(leaves: float, soon: float, then: float, whole: int) -> None:
     """Times what chance leaves: after a short fit to few recordings, and after a few rounds of all."""
     made = []
 

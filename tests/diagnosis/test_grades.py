@@ -35,7 +35,7 @@ def share(value: float) -> Share:
     return Share(share=value, low=value - 0.05, high=min(value + 0.05, 1.0))
 
 
-def test_a_share_is_that_of_all_recordings_and_its_interval_that_of_leaving_each_out() -> None:
+def test_a_share_is_of_all_recordings_its_interval_jackknifed() -> None:
     before = np.array([10.0, 20.0, 30.0, 40.0])
     even = jackknifed(0.8 * before, before, [[0], [1], [2], [3]])
     assert (even.share, even.low, even.high) == pytest.approx((0.8, 0.8, 0.8))
@@ -75,7 +75,7 @@ def test_the_answer_says_how_much_of_it_is_explained(
     assert [e.id for e in told] == [e.id for e in effects]
 
 
-def test_what_is_of_no_consequence_is_no_mismatch_and_not_nothing() -> None:
+def test_a_negligible_effect_is_no_mismatch_but_reported() -> None:
     told = {"slight": False, "is_beside": False}
     assert answer_of("no-mismatch", "immaterial", 1e-9, slight=True, is_beside=False) == "immaterial"
     assert answer_of("no-mismatch", "whole", 1e-9, **told) == "immaterial"  # sure, and too small for a word
@@ -93,7 +93,7 @@ def test_loads_are_forces_moments_and_what_tells_them() -> None:
     ]
 
 
-def test_a_value_at_a_bound_is_no_finding_but_a_shape_may_lie_there() -> None:
+def test_a_value_at_a_bound_is_no_result_but_a_shape_may_be() -> None:
     assert at_bounds([effect(at_bound=True), effect("mass", "added")]) == {"soil-viscous-damping"}
     assert at_bounds([effect(name="exponent", at_bound=True)]) == set()
 
@@ -161,9 +161,7 @@ def test_no_layer_is_sought_in_water_and_one_is_in_clay() -> None:
         (5.0, -0.01, False),  # air that brakes a ball as it falls
     ],
 )
-def test_what_is_hardly_more_than_noise_is_no_mismatch_and_a_fall_that_is_braked_is_one(
-    total: float, end: float, is_noise: bool
-) -> None:
+def test_near_noise_is_no_mismatch_and_a_braked_fall_is_one(total: float, end: float, is_noise: bool) -> None:
     block = SimpleNamespace(size=100.0, normal=lambda: (np.zeros((0, 0)), np.zeros(0), 100.0 * total**2))
     base = Fitted(candidates=(), x=(), blocks=(block,))  # type: ignore[arg-type]
     before = SimpleNamespace(cells=[SimpleNamespace(recording=0, end=end)], adjusted=[1e-9])

@@ -20,7 +20,7 @@ from tests.diagnosis.drops import FORCE, recorded
 from tests.diagnosis.test_fits import GAIN, candidate, judge_of
 
 
-def test_held_out_recordings_are_foretold_by_fits_where_slopes_mislead() -> None:
+def test_held_out_data_are_predicted_by_refits_if_nonlinear() -> None:
     """Slopes a hundred times too flat send the fit without a recording far off: by 0.01 J'w/(0.01 |J|)^2."""
     problem = judge_of(recorded(GAIN, 12, speeds=(1.2, 2.2, 3.2)))
     fitted = problem.fit((candidate(problem, "sensor-gain:" + FORCE),), (0.5,))
@@ -42,7 +42,7 @@ def test_held_out_recordings_are_foretold_by_fits_where_slopes_mislead() -> None
     assert held_out(again, groups).total == pytest.approx(ahead, rel=0.01)
 
 
-def test_what_leaves_least_is_foretold_by_fits_where_by_slopes_another_foretells_better() -> None:
+def test_the_best_fit_is_cross_validated_by_refits_in_doubt() -> None:
     """Of a threshold slopes may foretell less than a fit does, and no less than 1.2 times what it leaves."""
     problem = judge_of(recorded(GAIN, 12, speeds=(1.2, 2.2, 3.2)))
     fitted = problem.fit((candidate(problem, "sensor-gain:" + FORCE),), (0.5,))

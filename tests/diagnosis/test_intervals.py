@@ -32,7 +32,7 @@ def fit(problem: Problem, c: Candidate) -> Fitted:
     return found
 
 
-def test_an_exponent_that_was_not_fitted_widens_the_interval_of_the_strength() -> None:
+def test_an_unfitted_exponent_widens_the_strengths_interval() -> None:
     """c v^0.9 fitted as c v: at 2 m/s, 7 % of the strength goes to the exponent, more than the noise leaves open."""
     changes = {"effects.soil-viscous-damping.damping": 60.0, "effects.soil-viscous-damping.exponent": 0.9}
     problem = judge_of(recorded(changes, speeds=(1.0, 1.5, 2.0), noise=0.01))
@@ -76,9 +76,7 @@ def test_an_interval_reaches_as_far_as_the_misfit_stays_low(flatter: float) -> N
 
 
 @pytest.mark.parametrize(("start", "places"), [(0.5, 8), (0.08, 7)])
-def test_where_misfits_are_rough_an_interval_reaches_as_far_as_places_beside_the_fit_say(
-    start: float, places: int
-) -> None:
+def test_rough_misfits_give_intervals_by_nearby_points(start: float, places: int) -> None:
     """The same three times flatter than slopes say, but for the fit itself, which stands in a dip.
 
     One width is 1.96/40 = 0.049: from 0.08 on one place lies below the fit, and of five nothing is told yet.
@@ -128,7 +126,7 @@ def test_an_interval_looks_behind_the_ripples_of_a_threshold(
     assert all(np.all((x >= 0.0) & (x <= 1.0 + 1e-12)) for x in seen if x[0] <= 1.0)
 
 
-def test_the_thresholds_of_effects_with_their_shape_are_looked_behind() -> None:
+def test_profiles_look_beyond_thresholds_of_shaped_effects() -> None:
     problem = judge_of(recorded({}, speeds=(2.0,)))
     layer, mass = candidate(problem, "soil-layer"), candidate(problem, "mass")
     for candidates, expected in (
@@ -178,7 +176,7 @@ def test_an_interval_follows_a_crooked_valley(profile_extents: float, begun: flo
     assert all(x == [0.1] for _, x in held_at[1:])  # each from where the last one ended
 
 
-def test_recordings_that_disagree_widen_an_interval_as_student_says() -> None:
+def test_disagreeing_recordings_widen_intervals_by_student_t() -> None:
     """w_r = J x_r, x_r normal about the truth: the mean of R over its own scatter is t of R - 1, 95 % of it inside."""
     rng = np.random.default_rng(6)
     J, inside = rng.standard_normal((40, 1)), []
@@ -193,7 +191,7 @@ def test_recordings_that_disagree_widen_an_interval_as_student_says() -> None:
     assert np.all(stated.disagreeing([own] * 2, blocks[:2], inverse) == 0.0)  # two are too few
 
 
-def test_what_full_runs_do_not_tell_lies_in_its_range_and_is_possible() -> None:
+def test_an_unidentified_value_of_full_runs_keeps_its_range() -> None:
     """y = g(t - c ln s) tells no friction: a half, give or take 1.96/sqrt(12) of 0 to 1, and none below 0."""
 
     class Indifferent(Late):
@@ -216,7 +214,7 @@ def test_what_full_runs_do_not_tell_lies_in_its_range_and_is_possible() -> None:
     assert found["travel"].low < 0.15 < found["travel"].high
 
 
-def test_what_tells_nothing_of_a_depth_ends_a_range_beyond_where_it_is_looked_for() -> None:
+def test_an_unidentified_depth_has_an_open_interval() -> None:
     """y = g(t - c ln ratio) tells no depth: 1.96 times a deviation of 100 ranges would be no number."""
 
     class Deep(Late):
@@ -273,7 +271,7 @@ def test_a_peak_that_is_met_once_is_no_end_of_a_range() -> None:
     assert stated.end_of(problem.dataset, FORCE) is None
 
 
-def test_where_slopes_tell_nothing_an_interval_ends_where_too_much_is_left() -> None:
+def test_without_slopes_an_interval_ends_by_the_misfit() -> None:
     """A pull that holds up to 0.3 of its range and more pulls no further above it: below, it lets go."""
     asked: list[float] = []
 

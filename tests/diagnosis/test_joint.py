@@ -22,7 +22,7 @@ def unit(D: np.ndarray) -> np.ndarray:
     return np.asarray(D / np.sqrt(np.sum(D**2, axis=0)))
 
 
-def test_gain_and_way_of_two_directions_are_those_of_least_squares() -> None:
+def test_pair_gain_and_step_are_those_of_least_squares() -> None:
     rng = np.random.default_rng(1)
     D = unit(rng.standard_normal((60, 6)))
     misfit = 3.0 * rng.standard_normal(60)
@@ -52,7 +52,7 @@ def test_two_that_gain_nothing_alone_may_gain_all_together() -> None:
     assert np.max((D.T @ misfit) ** 2) < 0.011 * 900.0
 
 
-def test_directions_that_are_one_and_the_same_gain_nothing_by_their_difference() -> None:
+def test_collinear_directions_gain_nothing_together() -> None:
     first, across = np.eye(40)[:2]
     D = np.stack([first, np.cos(0.01) * first + np.sin(0.01) * across], axis=1)
     misfit = 5.0 * across
@@ -60,7 +60,7 @@ def test_directions_that_are_one_and_the_same_gain_nothing_by_their_difference()
     assert all(b.gain == 0.0 for b in found)
 
 
-def test_of_two_owners_the_best_two_directions_count_and_none_joins_itself() -> None:
+def test_pairs_take_the_best_directions_of_two_effects() -> None:
     rng = np.random.default_rng(3)
     D = unit(rng.standard_normal((200, 40)))
     owners = [f"{k // 2}" for k in range(40)]  # two directions each: 190 pairs of owners
@@ -91,7 +91,7 @@ def test_a_gate_leads_to_two_that_hide_each_other() -> None:
         assert told[next(iter(c.search))] == pytest.approx(true, rel=0.15)  # by slopes beside none: 11 % short
 
 
-def test_slopes_lead_to_two_near_the_noise_and_any_curve_is_not_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_near_noise_slopes_suggest_pairs_but_no_any_curve(monkeypatch: pytest.MonkeyPatch) -> None:
     """Far off what scored is tried two by two; near, those that led, and what gains most together."""
     asked: list[Any] = []
     leading = fitted((MASS,), 2.0)

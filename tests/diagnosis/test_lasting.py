@@ -53,13 +53,13 @@ def in_four(rng: np.random.Generator, sizes: Sequence[float]) -> Step:
     return Step(base=as_it_is, fitted=Fitted(candidates=(SLOPE,), x=(0.5,), blocks=tuple(ends)), p_value=0.0)
 
 
-def test_what_gains_no_more_than_chance_on_held_out_recordings_is_not_taken() -> None:
+def test_a_chance_gain_on_held_out_data_is_not_taken() -> None:
     rng, groups = np.random.default_rng(2), [[k] for k in range(4)]
     assert not any(is_validated(in_four(rng, 4 * [0.0]), groups) for _ in range(50))
     assert all(is_validated(in_four(rng, 4 * [0.6]), groups) for _ in range(50))
 
 
-def test_what_one_recording_asks_for_alone_may_be_the_course_that_its_run_took() -> None:
+def test_one_recordings_demand_may_be_its_runs_divergence() -> None:
     """An effect of 3 noise units in one of four, foretold by a fit to all of them, or in each."""
     rng, groups = np.random.default_rng(4), [[k] for k in range(4)]
 
@@ -85,7 +85,7 @@ def _first(fitted: Fitted) -> Fitted:
     )
 
 
-def test_runs_foretell_what_was_held_out_where_slopes_hold_only_near_the_fit() -> None:
+def test_runs_predict_held_out_data_where_slopes_hold_nearby() -> None:
     """Four recordings, all w = J d off the fit by one step d; the fourth's slopes are eight times too steep.
 
     Without it the others ask for d, or, as runs scatter, for a d: of what J d explains its slopes foretell (1 - 8 a)^2
@@ -142,7 +142,7 @@ def test_where_the_first_does_not_last_the_next_one_is_taken() -> None:
         (8.0, 0.05, SETTINGS.forward.drops, False),
     ],
 )
-def test_where_runs_scatter_what_is_missing_for_sure_is_looked_for_though_slopes_could_be_chance(
+def test_a_sure_mismatch_is_searched_though_slopes_scatter(
     missing: float, p: float, effort: Effort, goes_on: bool
 ) -> None:
     rng = np.random.default_rng(3)

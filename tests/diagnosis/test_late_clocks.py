@@ -11,7 +11,7 @@ from rollover.diagnosis.io import diagnosed_scenario
 from tests.diagnosis.drops import recorded, scenario
 
 
-def test_clocks_that_explain_all_are_a_sensors_fault_and_not_unexplained() -> None:
+def test_time_shifts_that_explain_all_are_a_sensor_fault() -> None:
     late = [(name, replace(r, time=r.time + 0.019)) for name, r in recorded({}, 7, noise=0.004)]
     found = diagnose(scenario(), late, estimate=True)
     assert (found.verdict, found.answer, found.broken) == ("sensor", "whole", ())

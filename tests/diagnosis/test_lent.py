@@ -68,7 +68,7 @@ def fitted(problem: Problem, start: Place, base: Fitted | None) -> Fitted:
 
 
 @pytest.mark.parametrize("is_lent", [True, False])
-def test_a_fit_beside_what_is_held_begins_with_the_slopes_of_that_and_ends_with_its_own(is_lent: bool) -> None:
+def test_a_fit_starts_with_reused_columns_and_ends_with_own(is_lent: bool) -> None:
     problem, runs = judge_of(0.5, 0.6, bend=0.5)
     base = base_at(problem, 0.45)
     runs.asked.clear()
@@ -119,7 +119,7 @@ def test_a_fit_ends_with_the_slopes_of_a_place_beside_it(is_beside: bool, monkey
     assert all(b.J.any(axis=0).all() for b in found.blocks)
 
 
-def test_rounds_that_are_too_few_end_with_slopes_of_their_own_too() -> None:
+def test_a_fit_cut_short_ends_with_its_own_jacobian() -> None:
     problem, runs = judge_of(0.5, 0.6)
     reused = reused_of(problem, base_at(problem, 0.2))
     found = problem.fit((SLOPE, MASS), (0.2, 0.2), width=1, rounds=1, reused=reused)
@@ -129,7 +129,7 @@ def test_rounds_that_are_too_few_end_with_slopes_of_their_own_too() -> None:
 
 
 @pytest.mark.parametrize(("effort", "is_lent"), [(SETTINGS.forward.runs, True), (SETTINGS.forward.drops, False)])
-def test_what_is_fitted_without_an_effect_begins_with_the_slopes_of_the_others(effort: Any, is_lent: bool) -> None:
+def test_a_reduced_fit_starts_with_the_others_columns(effort: Any, is_lent: bool) -> None:
     problem, runs = judge_of(0.5, 0.6, effort=effort)
     whole = problem.fit((SLOPE, MASS), (0.5, 0.6))
     assert whole is not None
@@ -216,7 +216,7 @@ def test_no_run_is_announced_beside_what_is_lent(monkeypatch: pytest.MonkeyPatch
     assert not {(0.42, 0.2), (0.48, 0.2)} & set(wanted)
 
 
-def test_a_look_that_forgives_other_courses_has_the_slopes_of_one_that_does_not(
+def test_a_robust_screening_shares_the_jacobian_of_a_plain(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     problem, base = looks_of((0.0,) * 4, (0.0,) * 4)

@@ -79,7 +79,7 @@ def judge_of(
     return problem, Fitted(candidates=(), x=(), blocks=blocks)
 
 
-def test_recordings_that_agree_count_in_full_and_one_alone_hardly() -> None:
+def test_agreeing_recordings_count_in_full_a_lone_one_hardly() -> None:
     rng = np.random.default_rng(0)
     d = rng.standard_normal((4, 50))
     D = (d / np.sqrt(np.sum(d * d))).reshape(-1, 1)
@@ -93,7 +93,7 @@ def test_recordings_that_agree_count_in_full_and_one_alone_hardly() -> None:
     assert wanted > 10.0
 
 
-def test_an_effect_of_all_recordings_beats_one_that_a_single_course_asks_for() -> None:
+def test_an_effect_of_all_beats_one_of_a_divergent_recording() -> None:
     problem, base = judge_of((0.0,) * 4, (2.0,) * 4)
     everywhere = score_test(problem, base, [SLOPE])
     problem, base = judge_of((0.0,) * 4, (4.0, 0.0, 0.0, 0.0))  # as much in all
@@ -102,7 +102,7 @@ def test_an_effect_of_all_recordings_beats_one_that_a_single_course_asks_for() -
     assert alone.score < 0.1 * everywhere.score
 
 
-def test_what_an_effect_does_before_the_blow_is_looked_at_by_itself() -> None:
+def test_an_effect_before_the_impact_is_screened_by_itself() -> None:
     """After the impact the run with the effect goes ten times as far the wrong way."""
     problem, base = judge_of((10.0,) * 4, (2.0,) * 4)
     with_ = score_test(problem, base, [SLOPE])
@@ -170,14 +170,14 @@ def test_a_look_says_where_an_effect_told_most() -> None:
     assert found.places[turned.key] == tuple(nearest[: SETTINGS.selection.score_test.close_places])
 
 
-def test_of_places_where_an_effect_may_act_the_best_two_begin_fits() -> None:
+def test_the_best_two_scan_points_of_an_effect_start_fits() -> None:
     placed = replace(SLOPE, neutral=(None,))
     met = [(3.0, (0.1,)), (4.0, (0.9,)), (5.0, (0.5,)), (6.0, (0.3,))]
     assert _begun_at(placed, met) == ((0.1,), (0.9,))
 
 
 @pytest.mark.parametrize(("heavy_tailed", "kept"), [(True, 5.0), (False, 40.0)])
-def test_what_led_on_few_recordings_is_tried_where_all_count_in_full(
+def test_a_leader_on_few_recordings_is_tried_on_all(
     heavy_tailed: bool, kept: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """40 by two recordings, 5 by four: where each may take another course four tell more than two, else the better."""
@@ -194,7 +194,7 @@ def test_what_led_on_few_recordings_is_tried_where_all_count_in_full(
     assert found.score == 5.0  # what is claimed is claimed by all
 
 
-def test_what_leads_where_other_courses_are_forgiven_is_tried_first(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_leader_of_the_robust_screening_is_tried_first(monkeypatch: pytest.MonkeyPatch) -> None:
     """In full c0 to c9 score best in turn, forgiven c5 and then c7, and c8 by chance: these take turns."""
     asked: list[tuple[bool, set[str]]] = []
 
@@ -257,7 +257,7 @@ def test_directions_may_be_those_beside_another_fit() -> None:
 
 
 @pytest.mark.parametrize(("hint", "is_ensemble", "looks_made"), [(0.9, True, 1), (0.01, True, 2), (0.9, False, 1)])
-def test_no_look_is_made_beside_an_explanation_where_known_runs_tell_nothing(
+def test_no_screening_beside_a_model_without_usable_runs(
     hint: float, is_ensemble: bool, looks_made: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[tuple[Any, Any]] = []
@@ -303,7 +303,7 @@ def test_what_was_refuted_tells_nothing() -> None:
 
 
 @pytest.mark.parametrize("expected", [None, 1.0])
-def test_of_two_tests_the_smaller_p_value_is_uniform_for_the_shares_of_errors_they_may_make(
+def test_the_smaller_of_two_split_p_values_is_uniform(
     expected: float | None,
 ) -> None:
     """Kolmogorov's statistic of 2000 draws of two uniform p-values, at most 1.63/sqrt(n) in 99 of 100 cases.
@@ -330,7 +330,7 @@ def test_of_two_tests_the_smaller_p_value_is_uniform_for_the_shares_of_errors_th
     assert told(0.0, 1.0) == 0.0
 
 
-def test_a_limit_shows_up_to_the_largest_that_was_tried_and_shows() -> None:
+def test_a_limit_shows_up_to_the_largest_scan_point() -> None:
     """A force cell that ends at three quarters of its range shows, at more than the range it does not."""
     problem = test_fits.judge_of(recorded({}, noise=0.01, speeds=(1.5, 2.5)))
     base = problem.fit((), ())

@@ -112,7 +112,7 @@ def test_where_channels_break_off_again_they_are_said_to() -> None:
     assert lost("abc", [whole[0], made(holed), whole[2]], PHASES) == ()  # once may be anything
 
 
-def test_what_breaks_off_where_the_signal_is_small_is_unexplained() -> None:
+def test_a_break_off_in_a_small_signal_is_unexplained() -> None:
     """Exact zeros in the approach, where a load cell reads nothing but its noise."""
     sound = recorded({}, 4, rate=1000.0, channels=(FORCE, DEPTH), noise=0.02)
     assert diagnose(scenario(), sound).verdict == "no-mismatch"

@@ -18,7 +18,7 @@ from rollover.diagnosis.fit.step import Step
 from tests.diagnosis.test_slopes import CHANNEL, MASS, SLOPE, TIME, Scattering, dataset
 
 
-def test_an_explanation_that_is_far_from_the_mean_goes_more_than_one_step() -> None:
+def test_a_model_far_from_the_ensemble_mean_takes_more_steps() -> None:
     """y = 20 x^2 sin(30 t) measured at x = 0.6, begun at 0.2: no step is longer than 0.15 of a coordinate."""
 
     class Bent(Scattering):
@@ -74,9 +74,7 @@ def steps(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
 
 @pytest.mark.parametrize(("missing", "least"), [(0.0, 2), (1.0, 1), (4.0, 0)])
-def test_an_explanation_that_is_not_the_whole_is_not_moved_for_little(
-    missing: float, least: int, steps: list[Any]
-) -> None:
+def test_a_partial_model_is_not_moved_for_a_small_gain(missing: float, least: int, steps: list[Any]) -> None:
     """Begun 0.02 off: (0.4/1)^2 of what cos(400 t) beside it leaves, (0.4/4)^2 of what four times that does."""
     problem, off = begun_at(0.58, 12.0 * np.sin(30.0 * TIME) + missing * np.cos(400.0 * TIME))
     found = settled(problem, off).fitted.x
@@ -84,9 +82,7 @@ def test_an_explanation_that_is_not_the_whole_is_not_moved_for_little(
 
 
 @pytest.mark.parametrize(("begun", "is_beside"), [(0.58, True), (0.5, False)])
-def test_slopes_are_told_anew_beyond_the_step_over_which_they_were_told(
-    begun: float, is_beside: bool, steps: list[Any]
-) -> None:
+def test_slopes_are_renewed_beyond_their_difference_step(begun: float, is_beside: bool, steps: list[Any]) -> None:
     problem, off = begun_at(begun, 12.0 * np.sin(30.0 * TIME))
     found = settled(problem, off).fitted
     assert found.x[0] == pytest.approx(0.6, abs=2e-3)
@@ -110,7 +106,7 @@ def test_slopes_are_told_anew_beyond_the_step_over_which_they_were_told(
         ((120.0, 110.0, 101.0), None),
     ],
 )
-def test_the_whole_way_is_gone_unless_a_share_of_it_leaves_clearly_less(
+def test_a_full_step_is_taken_unless_a_part_is_clearly_better(
     lefts: tuple[float, ...], found: float | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Begun where 100 are left; shares are tried only where the whole way leaves more than that."""
@@ -130,7 +126,7 @@ def test_the_whole_way_is_gone_unless_a_share_of_it_leaves_clearly_less(
     assert there == (None if found is None else ([pytest.approx(found)], [1.0]))
 
 
-def test_rivals_of_an_explanation_are_not_run_once_more_where_it_settles() -> None:
+def test_rivals_are_not_run_again_in_the_ensemble_refit() -> None:
     problem, off = begun_at(0.58, 12.0 * np.sin(30.0 * TIME))
     rival = problem.fit((MASS,), (0.3,), rounds=0)
     assert rival is not None

@@ -8,7 +8,7 @@ import pytest
 from rollover.diagnosis.fit.finite_differences import step_reduced
 
 
-def test_what_moves_a_recording_far_beyond_its_noise_is_told_over_a_narrower_step() -> None:
+def test_a_steep_parameter_has_a_smaller_difference_step() -> None:
     """y(h) = 200 tanh(h/1e-3) moves it by 200 times its noise over 5e-3, and by 40 of a slope of 200,000.
 
     At a misfit of 100 times the noise that is what is asked for, and over 1e-5 it is the slope itself.

@@ -42,7 +42,7 @@ BENT = ("soil-layer", ("a", "b", "width"))
          ["soil-layer", "soil-crust", "soil-layer"]),
     ],
 )  # fmt: skip
-def test_beside_effects_in_another_form_the_last_one_is_looked_for_anew(
+def test_the_last_effect_is_searched_anew_beside_variants(
     monkeypatch: pytest.MonkeyPatch, beside: Any, held: Any, answers: dict[str, Any], asked: list[str]
 ) -> None:
     """A layer that was bent to do a stiffness's work as well left little to it: a crust came, the layer is straight.
@@ -82,7 +82,7 @@ def test_beside_effects_in_another_form_the_last_one_is_looked_for_anew(
         (SETTINGS.forward.drops, ("soil-layer", ("a",)), {0, 1}, [0, 1]),
     ],
 )
-def test_of_full_runs_what_is_surely_there_is_not_tried_without_and_the_fit_without_the_last_is_known(
+def test_full_runs_keep_sure_effects_and_reuse_the_last_fit(
     monkeypatch: pytest.MonkeyPatch, effort: Effort, beside: Any, surely: set[int], fitted_again: list[int]
 ) -> None:
     """Without either 9 per sample more is left: both are needed."""
@@ -151,7 +151,7 @@ MASS, SPEED, RATE, DRAG = ((i, ("a",)) for i in ("mass", "impact-speed", "soil-r
          {"impact-speed", "soil-rate-hardening"}),
     ],
 )  # fmt: skip
-def test_as_many_effects_as_may_be_that_are_given_for_others_again_and_again_explain_nothing(
+def test_a_full_set_swapped_again_and_again_is_no_answer(
     monkeypatch: pytest.MonkeyPatch, answers: list[Any], needless: str, asked: list[str], found: set[str] | None
 ) -> None:
     looked: list[str] = []
@@ -211,7 +211,7 @@ def test_effects_that_will_be_refused_are_not_looked_for_anew(
         (None, ["soil-layer"]),  # nothing can be simulated without it
     ],
 )
-def test_what_ends_with_others_than_it_began_with_has_a_step_for_each(
+def test_a_set_that_was_swapped_has_a_step_for_each_member(
     monkeypatch: pytest.MonkeyPatch, back: Any, rivals: list[str]
 ) -> None:
     """A crust with a layer on it is followed to a layer on another stiffness: none of the steps was the layer's."""
@@ -241,7 +241,7 @@ def test_what_ends_with_others_than_it_began_with_has_a_step_for_each(
     assert looked == ["soil-layer"]
 
 
-def test_what_is_surely_there_keeps_ten_times_its_interval_away_from_none(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_sure_effect_lies_ten_intervals_from_its_null(monkeypatch: pytest.MonkeyPatch) -> None:
     """2 +- 0.05 is 20 half intervals away from 1; what has no number for none is not told without a run."""
     layer = of(("soil-layer", ("stiffness_ratio",))).candidates[0]
     friction = of(("ground-friction", ("coefficient",))).candidates[0]  # what the scenario has is not said

@@ -57,7 +57,7 @@ def test_what_is_eased_has_the_covariance_of_noise_alone() -> None:
     assert marginalised(np.zeros((40, 0)))(w) is w
 
 
-def test_speeds_that_are_uncertain_explain_what_they_can_and_no_more() -> None:
+def test_uncertain_speeds_explain_what_they_can_and_no_more() -> None:
     left = {}
     for sigma in (0.0, 0.06):
         found = dataset(wrong_conditions({}, sigma))
@@ -91,7 +91,7 @@ def test_an_effect_is_fitted_better_beside_speeds_that_are_wrong(monkeypatch: py
     assert off[0.08] < 0.3 * off[0.0]
 
 
-def test_each_number_of_a_list_is_uncertain_by_itself_and_a_wrong_path_is_one_line() -> None:
+def test_list_uncertainty_is_per_number_a_wrong_path_one_line() -> None:
     cube = shipped("cube_toss")
     found = doubts(cube, {"initiation.velocity": (0.1, 0.2, 0.3)})
     x, y, z = cube.initiation.velocity  # type: ignore[union-attr]
@@ -102,7 +102,7 @@ def test_each_number_of_a_list_is_uncertain_by_itself_and_a_wrong_path_is_one_li
             doubts(cube, wrong, "r1")
 
 
-def test_repeats_that_differ_are_scatter_and_what_was_done_once_is_given_it() -> None:
+def test_repeats_give_scatter_to_tests_made_once() -> None:
     one = recorded({}, 1, speeds=(2.0, 3.0), noise=0.003)
     stiff = recorded({"effects.soil-stiffness.scale": 1.15}, 2, speeds=(2.0,), noise=0.003)
     found = with_scatter(dataset([*one, ("again", stiff[0][1])]))
@@ -116,7 +116,7 @@ def test_repeats_that_differ_are_scatter_and_what_was_done_once_is_given_it() ->
     assert all(s.scatter == 0.0 for e in with_scatter(dataset(one)) for s in e.signals)
 
 
-def test_repeats_whose_clocks_are_apart_do_not_differ_by_their_leaps() -> None:
+def test_repeats_with_shifted_clocks_do_not_differ_by_jumps() -> None:
     """Accelerations that jump between two samples, 60 ms apart in time: neither is scatter."""
     channels = (DEPTH, "striker/acceleration_z")
     one, two = (recorded({}, seed, speeds=(3.0,), channels=channels, noise=0.003)[0][1] for seed in (1, 2))

@@ -81,7 +81,7 @@ def test_p_values_are_uniform_where_there_is_only_noise(memory: float) -> None:
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.5, 0.9])
-def test_level_and_memory_of_the_noise_come_from_all_recordings_together(memory: float) -> None:
+def test_noise_level_and_memory_come_from_all_recordings(memory: float) -> None:
     rng = np.random.default_rng(11)
     sigma, ar = autoregression.autoregression([2.0 * noise(rng, 300, memory) for _ in range(6)])
     assert sigma == pytest.approx(2.0, rel=0.12)
@@ -93,7 +93,7 @@ def behind_a_filter(rng: np.random.Generator, count: int) -> np.ndarray:
     return filtered(rng.standard_normal(2 * count + 400), 1.0 / 2000.0, 180)[200:-200:2]
 
 
-def test_a_memory_is_told_without_bias_though_each_recording_has_a_level() -> None:
+def test_noise_memory_is_unbiased_though_levels_differ() -> None:
     """0.01 too little of a memory of 0.8 makes what is slow 7 % too strong, and p-values too small."""
     rng, drops = np.random.default_rng(19), silent()
     found = []
@@ -109,7 +109,7 @@ def test_a_memory_is_told_without_bias_though_each_recording_has_a_level() -> No
     assert np.mean(found) == pytest.approx(0.8, abs=0.0025)
 
 
-def test_noise_behind_a_filter_is_as_strong_where_it_is_slow_as_elsewhere_once_whitened() -> None:
+def test_filtered_noise_is_flat_once_whitened() -> None:
     rng = np.random.default_rng(23)
     series = [behind_a_filter(rng, 1200) for _ in range(6)]
     sigma, ar = autoregression.autoregression(series)
@@ -151,7 +151,7 @@ def test_after_a_blow_nothing_is_quiet() -> None:
             assert s.noise == pytest.approx(spans[s.channel], rel=0.15), s.channel
 
 
-def test_quiet_noise_is_found_beneath_a_misfit_many_times_as_large() -> None:
+def test_quiet_noise_is_found_beneath_a_large_misfit() -> None:
     rng, drops = np.random.default_rng(13), silent()
     dataset = noisy(drops, rng, 0.0)
     off = [np.concatenate([0.7 * s.values for s in e.signals]) for e in dataset]  # a scenario that says a third

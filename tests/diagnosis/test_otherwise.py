@@ -62,13 +62,11 @@ def begun(promised: float, gained: float) -> list[str]:
 
 
 @pytest.mark.parametrize(("promised", "gained", "scanned"), [(35.0, 5.0, 1), (35.0, 30.0, 0), (15.0, 0.0, 0)])
-def test_what_promised_much_and_gained_little_is_fitted_with_its_shape(
-    promised: float, gained: float, scanned: int
-) -> None:
+def test_a_disappointing_candidate_is_fitted_with_its_shape(promised: float, gained: float, scanned: int) -> None:
     assert begun(promised, gained) == ["fit soil-adhesion ['reach', 'stress'] (0.7, 0.9875)"] * scanned
 
 
-def test_what_is_sudden_is_looked_at_in_all_its_places_and_not_where_its_slopes_lead() -> None:
+def test_a_discontinuous_effect_is_scanned_not_linearised() -> None:
     """The least of adhesion does something already: what moves along stays on the face."""
     known = {"effects.soil-elastic-rebound.recovery": 0.1, "effects.soil-elastic-rebound.damping_ratio": 0.1}
     made = recorded({**known, "effects.soil-adhesion.stress": 4.6e4}, speeds=(1.5, 2.5), rate=1000.0, noise=0.1)
@@ -92,7 +90,7 @@ def test_what_is_sudden_is_looked_at_in_all_its_places_and_not_where_its_slopes_
 
 
 @pytest.mark.parametrize(("score", "combed"), [(50.0, True), (30.0, False)])
-def test_what_rings_and_scored_most_is_combed_though_its_fit_went_astray(score: float, combed: bool) -> None:
+def test_the_best_oscillatory_effect_is_scanned_in_frequency(score: float, combed: bool) -> None:
     rings = replace(
         PLAIN, id="structural-compliance", search={"stiffness": Search(1e4, 1e7, "log"), "damping": Search(1.0, 1e4)}
     )
@@ -117,7 +115,7 @@ def test_what_rings_and_scored_most_is_combed_though_its_fit_went_astray(score: 
     assert asked == ["polish structural-compliance", "time structural-compliance"] * combed
 
 
-def test_a_recordings_clock_is_that_of_the_fit_that_leaves_least_where_another_ended_in_a_dip() -> None:
+def test_a_time_shift_is_that_of_the_lowest_minimum() -> None:
     made = recorded({}, speeds=(1.5, 2.5), rate=1000.0, noise=0.01)
     found = [dataset_of(name, *simulated(scenario(), r)) for name, r in made]
     problem = Problem([e for e in found if e is not None])
@@ -145,7 +143,7 @@ def test_a_recordings_clock_is_that_of_the_fit_that_leaves_least_where_another_e
     assert moved.left < late.left
 
 
-def test_what_was_led_astray_is_begun_anew_and_gone_on_with_if_it_soon_gains() -> None:
+def test_a_misled_fit_restarts_and_goes_on_if_it_soon_gains() -> None:
     """The base leaves 400 and the best 200: one comes to 290 in a few rounds and to 250 in the end, one to 310."""
     asked: list[Task] = []
 

@@ -226,9 +226,7 @@ def test_all_neighbours_may_be_run_in_shorter_steps() -> None:
 
 
 @pytest.mark.parametrize("parts", [1, 4])
-def test_runs_that_scatter_is_told_by_are_made_at_once_for_all_recordings_the_longest_first(
-    parts: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_ensemble_runs_are_made_at_once_the_longest_first(parts: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """All that `perturbed` asks for; a drop has none."""
     drop = DropSimulator(shipped("drop_test"), recording("ground/sinkage"))
     runs = [RunSimulator(toss(), recording(Z, until=until)) for until in (0.1, 0.2)]

@@ -23,7 +23,7 @@ MAKE = (
 )
 
 
-def test_a_law_in_a_file_of_ones_own_is_named_among_all_candidates(tmp_path: Path) -> None:
+def test_an_own_law_is_named_among_all_candidates(tmp_path: Path) -> None:
     folder = tmp_path / "recordings"
     folder.mkdir()
     made = outside("-c", MAKE, json.dumps(HIDDEN), str(folder), ROLLOVER_EFFECTS=str(OWN))

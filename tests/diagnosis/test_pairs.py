@@ -56,7 +56,7 @@ def inquiry(asked: list[Any]) -> Inquiry:
     return cast(Inquiry, SimpleNamespace(fits=fits, problem=SimpleNamespace(again=lambda f: f, dataset=()), phases=()))
 
 
-def test_what_took_another_form_alone_is_tried_in_its_usual_one_beside_others() -> None:
+def test_a_lone_variant_is_tried_in_its_usual_form_in_pairs() -> None:
     """A form may make up for the second effect: a damping in proportion to the force for a little more mass."""
     alone = fitted((PROPORTION,), 1.1)
     first = Step(
@@ -72,7 +72,7 @@ def test_what_took_another_form_alone_is_tried_in_its_usual_one_beside_others() 
     ]
 
 
-def test_what_is_bent_and_does_not_lead_is_tried_in_its_usual_form_as_well() -> None:
+def test_a_trailing_variant_is_tried_in_its_usual_form_too() -> None:
     """Damping with a layer is neither by itself: a layer from the top on leads, a proportional damping comes next."""
     lead, bent = fitted((MASS,), 4.0), fitted((PROPORTION,), 6.0)
     first = Step(
@@ -88,7 +88,7 @@ def test_what_is_bent_and_does_not_lead_is_tried_in_its_usual_form_as_well() -> 
     ]
 
 
-def test_of_pairs_with_a_part_that_rings_all_are_fitted_with_its_share() -> None:
+def test_all_oscillatory_pairs_are_fitted_with_their_share() -> None:
     """With a wrong share of the nose the wrong other effect may lead, as a mass before an impact speed."""
     asked: list[Any] = []
     bent = replace(MASS, id="soil-adhesion", shapes={"reach": Search(1, 2)})
@@ -107,7 +107,7 @@ def test_of_pairs_with_a_part_that_rings_all_are_fitted_with_its_share() -> None
     assert {len(j.leaves) for j in asked} == {2}
 
 
-def test_places_of_the_best_pairs_are_tried_all_along_unless_nothing_but_noise_is_left(
+def test_best_pairs_are_scanned_fully_until_noise_is_left(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The depth of a layer is one valley of many: fitted at 0.02 m, its pair leaves more than the wrong one."""
@@ -140,9 +140,7 @@ def test_places_of_the_best_pairs_are_tried_all_along_unless_nothing_but_noise_i
         (1.6, 1.59, False),  # not much is left: what takes all of it may not be met yet
     ],
 )
-def test_a_pair_that_takes_next_to_nothing_of_much_is_not_gone_on_with(
-    alone: float, pair: float, takes_little: bool
-) -> None:
+def test_a_pair_that_gains_next_to_nothing_is_dropped(alone: float, pair: float, takes_little: bool) -> None:
     lead, both = leaving((DAMPING,), alone), leaving((DAMPING, MASS), pair)
     assert pairs._takes_little(lead, both, (0, 1)) is takes_little
     # of few recordings the pair was fitted to these alone
@@ -210,7 +208,7 @@ def layered(ratio: float, depth: float = DEPTH) -> Problem:
 
 
 @pytest.mark.parametrize(("ratio", "lost"), [(0.7, 500.0), (1.3, 0.0)])
-def test_what_sets_in_somewhere_is_begun_where_it_helps_beside_the_other(ratio: float, lost: float) -> None:
+def test_a_threshold_starts_where_it_helps_beside_the_other(ratio: float, lost: float) -> None:
     """Alone a softer layer ends elsewhere than under ground that hardens: from there a fit of both leads nowhere."""
     problem = layered(ratio)
     rate, layer = candidate(problem, "soil-rate-hardening"), candidate(problem, "soil-layer")
@@ -231,7 +229,7 @@ def test_what_sets_in_somewhere_is_begun_where_it_helps_beside_the_other(ratio: 
     assert led[1].left > lost * count
 
 
-def test_of_the_places_beside_another_one_that_leaves_least_is_taken() -> None:
+def test_the_scan_point_of_least_misfit_beside_it_is_taken() -> None:
     """Two more are reached by the fastest drop, and leave more."""
     shallow = 0.07
     problem = layered(0.7, shallow)
@@ -248,7 +246,7 @@ def test_what_sets_in_somewhere_says_how_strong_it_is_and_where() -> None:
     assert [has_threshold(candidate(problem, i)) for i in (*able, *others)] == [True, True, False, False, False]
 
 
-def test_what_led_and_what_sets_in_somewhere_are_placed_two_by_two(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_leaders_and_thresholds_are_scanned_in_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
     search = {"depth": Search(0.01, 1.0, "log"), "stiffness_ratio": Search(0.2, 5.0, "log")}
     layer = Candidate(id="soil-layer", kind="physics", family="", search=search)
     bent = replace(layer, id="soil-crust", form={"a": 1.0})
@@ -324,7 +322,7 @@ def test_far_less_is_far_less_beyond_the_noise(
 
 
 @pytest.mark.parametrize(("left", "taken"), [(1.2, True), (1.5, False)])
-def test_three_are_given_for_two_only_where_the_third_is_not_needed(
+def test_three_become_two_only_where_the_third_is_not_needed(
     left: float, taken: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Weighed as noise by all that a pair leaves, what the third effect takes would be noise: it takes 40 of 80."""

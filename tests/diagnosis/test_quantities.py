@@ -32,7 +32,7 @@ def judged(dataset: list[Dataset]) -> tuple[Problem, Fitted]:
     return problem, base
 
 
-def test_what_a_force_is_a_function_of_predicts_it_in_conditions_left_out() -> None:
+def test_a_forces_quantity_predicts_it_in_held_out_conditions() -> None:
     found = told({ALONG[1]: f"4.0 * {FALLING}"})
     assert found[0][0] == "chassis/velocity_z"
     assert found[0][1] > 0.95

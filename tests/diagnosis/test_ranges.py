@@ -23,7 +23,7 @@ def looked_for(name: str, mass: float, side: float) -> dict[str, Search]:
     return dict(next(c for c in candidates_of((), (), "drop", changed, size_of(changed)) if c.id == name).search)
 
 
-def test_ranges_shrink_with_small_strikers_and_widen_with_large_ones() -> None:
+def test_ranges_scale_with_the_size_of_the_striker() -> None:
     """F_c and an error of the mass go with m, damping of the reference face with m over the face."""
     assert looked_for("guide-friction", 0.5, 1.0)["force"].high == pytest.approx(0.5 * FORCE.high)
     assert looked_for("guide-friction", 4.0, 1.0)["force"].high == pytest.approx(4.0 * FORCE.high)

@@ -67,7 +67,7 @@ def test_noise_makes_the_rounding_of_each_sample_its_own(noise: float, shared: f
     assert force.scatter == pytest.approx(shared * step, rel=1e-6)
 
 
-def test_a_digit_that_flips_beside_an_edge_is_no_noise_of_its_own() -> None:
+def test_a_digit_flipping_at_an_edge_is_no_noise() -> None:
     """Of two recordings of one channel the quieter one tells how much noise there is before the steps."""
     name, r = recorded({}, speeds=(2.0,), noise=0.0, rate=1000.0)[0]
     one = dataset_of(name, r, simulator_of(scenario(), r))

@@ -75,7 +75,7 @@ def test_a_damping_behind_a_cliff_is_found() -> None:
     assert c.values(found.x)["damping"] == pytest.approx(true["damping"], rel=0.1)
 
 
-def test_a_nose_that_was_fitted_beside_a_wrong_frequency_is_found_by_what_it_rings_by(
+def test_a_misfitted_nose_is_found_by_its_ringing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Damped until it hardly rings, as a share of the mass that it has not: nothing leads from there to what it is."""
@@ -149,7 +149,7 @@ def test_a_nose_is_found_along_the_valley_of_its_frequency(tmp_path: Path) -> No
         assert told.high - told.low < 0.05 * true[name]
 
 
-def test_what_goes_along_with_the_share_of_a_nose_keeps_frequency_and_damping() -> None:
+def test_a_noses_share_moves_at_constant_frequency_and_damping() -> None:
     """w^2 = k/(M s (1 - s)), 2 zeta w = c/(M s (1 - s)): what rings freely moves the reduced mass."""
     effect = EFFECTS["structural-compliance"]
     before = {"stiffness": 2e6, "damping": 300.0, "nose_share": 0.1}
@@ -168,7 +168,7 @@ def test_what_goes_along_with_the_share_of_a_nose_keeps_frequency_and_damping() 
     assert w[1] == pytest.approx(w[0], rel=1e-12)
 
 
-def test_how_much_of_a_striker_its_nose_is_is_found_where_nobody_weighed_it() -> None:
+def test_the_share_of_an_unweighed_nose_is_found() -> None:
     true = {"stiffness": 1e6, "damping": 500.0, "nose_share": 0.2}
     hidden = {f"effects.structural-compliance.{name}": value for name, value in true.items()}
     problem = judge_of(recorded(hidden, 3, speeds=(1.2, 2.0, 2.8), channels=CHANNELS, rate=1500.0, noise=0.005))
@@ -269,7 +269,7 @@ def test_a_shape_that_one_recording_alone_hangs_on_is_found() -> None:
     assert found.after["held_out"].nrmse == pytest.approx(1.0, abs=0.03)
 
 
-def test_what_is_abrupt_is_led_around_its_cliffs_by_its_smooth_shape(tmp_path: Path) -> None:
+def test_an_abrupt_effect_is_led_by_its_smooth_shape(tmp_path: Path) -> None:
     """A crust whose end leaps past samples: a fit that is stuck far from the truth comes there, another stays."""
     case = make(plan(63, 20263301, ("single",))[43])
     [true] = [e["parameters"] for e in case.truth["effects"]]
@@ -290,7 +290,7 @@ def test_what_is_abrupt_is_led_around_its_cliffs_by_its_smooth_shape(tmp_path: P
     assert max(gains) > 4000.0
 
 
-def test_two_effects_of_which_neither_comes_first_are_tried_together() -> None:
+def test_two_effects_without_a_first_are_tried_together() -> None:
     """A heavier striker on a guide that rubs: a stiffness and the mass led, and friction beside the first."""
     hidden = {"effects.mass.added": 2.3, "effects.guide-friction.force": 31.0}
     problem = judge_of(recorded(hidden, 1, speeds=(1.4, 2.0, 2.6, 3.2), rate=1000.0, noise=0.003, channels=CHANNELS))
@@ -343,7 +343,7 @@ def test_a_fit_is_ended_finely_whatever_others_may_leave(monkeypatch: pytest.Mon
     assert ended(problem, coarse).left < fine.left + 0.05
 
 
-def test_a_place_is_gone_on_with_if_it_soon_leaves_less_than_where_the_fit_stands() -> None:
+def test_a_start_that_soon_beats_the_fit_goes_on() -> None:
     """Short fits to few recordings, one from the fit itself: what it gains on these alone others must gain too."""
     block = SimpleNamespace(shift=0.0)
     fitted = cast(Fitted, SimpleNamespace(candidates=(), x=(0.5,), blocks=(block, block, block)))
@@ -369,9 +369,7 @@ def test_a_place_is_gone_on_with_if_it_soon_leaves_less_than_where_the_fit_stand
         ((5e-4, 9e-4), 1.2e-3, 9e-4),  # nowhere near a better one: where it was
     ],
 )
-def test_a_recording_whose_clock_is_in_another_dip_is_tried_where_it_began(
-    dips: tuple[float, float], began: float, met: float
-) -> None:
+def test_a_time_shift_in_another_minimum_restarts(dips: tuple[float, float], began: float, met: float) -> None:
     """Edges leave it in the second of two dips, 0.1 ms to either side, that leaves 11 where the first leaves 10."""
 
     def block(_r: int, _c: Any, _x: Any, shift: float, _nudge: float, *, clock: bool) -> Any:

@@ -78,7 +78,7 @@ def test_what_does_not_rise_within_32_places_is_not_told(of: Callable[[float], l
     assert len(seen) == 20
 
 
-def test_a_run_that_meets_the_recording_much_further_by_chance_is_one_of_another_course() -> None:
+def test_a_run_that_fits_much_better_by_chance_diverged() -> None:
     """At one place the 1e4 that all others leave are met: the others tell the mean."""
 
     def left(t: float) -> list[Array]:
@@ -97,7 +97,7 @@ def test_slopes_that_the_mean_of_runs_has_too_are_believed(share: float, is_look
 
 
 @pytest.mark.parametrize(("scatter", "is_told"), [(0.0, True), (57.0, False)])
-def test_slopes_that_the_mean_of_runs_may_have_by_chance_are_not_believed(scatter: float, is_told: bool) -> None:
+def test_chance_slopes_of_the_ensemble_mean_are_not_believed(scatter: float, is_told: bool) -> None:
     """The mean keeps all of J, |J|^2 = 1.96^2, but h_11 = 1/4260 of what runs scatter by is a fifth of that.
 
     They do to one side at half the places, 1, 4, 8, 12, 32 on either side, and to the other at the rest.
@@ -162,7 +162,7 @@ def test_a_slope_that_scatter_makes_is_none() -> None:
 
 
 @pytest.mark.parametrize(("scatter", "widest"), [(1.0, 1.9), (4.0, 2.3)])
-def test_intervals_hold_where_a_fit_ends_in_the_lowest_of_many_dips(scatter: float, widest: float) -> None:
+def test_intervals_hold_at_the_lowest_of_many_minima(scatter: float, widest: float) -> None:
     """Four recordings y = (x - truth) J + e + noise, e of each run six smooth deviations; slopes say a quarter.
 
     Both are whitened together, noise as 1 and e as `scatter`. A fit that knew J would tell x to sqrt(J'N J)/J'J, N of

@@ -46,7 +46,7 @@ def test_phases_need_no_depth_gauge() -> None:
 
 
 @pytest.mark.parametrize(("p", "said"), [(0.3, "agree within the noise (p = 0.3)"), (1e-9, "less than 0.1%")])
-def test_what_is_sure_and_too_small_to_matter_is_not_called_noise(p: float, said: str) -> None:
+def test_a_sure_but_negligible_effect_is_not_called_noise(p: float, said: str) -> None:
     nothing = Held(left=np.ones(1), count=np.ones(1))
     assert said in sentence("no-mismatch", (), p, nothing, nothing, [])
 
@@ -90,7 +90,7 @@ def test_of_few_samples_before_the_blow_nothing_is_said(told: int, said: float |
     assert before_an_impact(scattering, fitted) == said
 
 
-def test_a_misfit_that_scatter_takes_part_in_or_that_is_not_all_met_is_said_to_be_one() -> None:
+def test_a_misfit_with_scatter_or_a_remainder_is_reported() -> None:
     first, last = (Held(left=np.array([left]), count=np.ones(1)) for left in (1.44, 0.64))
     tilted = Named(
         id="slope", kind="parameter", statement="The ground is inclined.", parameters={}, settings={}, channel=None,

@@ -184,7 +184,7 @@ def test_a_slope_among_runs_that_scatter_is_that_of_a_wide_step() -> None:
     assert float(narrow.J[:, 0] @ narrow.J[:, 0]) > 1.5 * true
 
 
-def test_what_moves_little_is_looked_at_over_a_wider_step_but_for_sensors() -> None:
+def test_weak_parameters_have_larger_steps_but_sensors_not() -> None:
     seen: list[float] = []
     problem = Problem([dataset(3, 0.5)])
     predict = problem.dataset[0].simulator.predict

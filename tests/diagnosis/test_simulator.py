@@ -45,7 +45,7 @@ ENOUGH = 1e-4  # of the range, root mean square: half of what counts as an error
     ids=str,
 )
 @pytest.mark.parametrize("speed", [1.3, 3.2])
-def test_a_drop_of_a_diagnosis_is_that_of_a_hundredth_of_its_step(changes: dict[str, Any], speed: float) -> None:
+def test_a_diagnosis_drop_equals_one_at_a_hundredth_step(changes: dict[str, Any], speed: float) -> None:
     ((_, recording),) = recorded({}, speeds=(speed,), rate=1000.0, channels=(FORCE, DEPTH, ACCELERATION), noise=0.0)
     model = DropModel(scenario=scenario(), step=1e-5).with_({"initiation.speed": speed, **changes})
     shift = 1.3e-4  # no stamp is an instant of the drop's own
@@ -82,7 +82,7 @@ def test_the_mean_of_many_stamps_is_that_of_two_times() -> None:
     assert np.sqrt(np.mean(off**2)) < 1e-4 * np.ptp(exact)
 
 
-def test_stamps_may_lie_as_far_apart_as_a_clock_is_moved_for_its_slope() -> None:
+def test_stamps_may_lie_as_close_as_a_shifts_difference_step() -> None:
     stamps = np.arange(200) * 2.0**-14  # exact in binary: each, a step less, is the one before
     recording = Recording(title="drop", time=stamps, channels={FORCE: 0.0 * stamps})
     simulator = DropSimulator(scenario(), recording)
@@ -93,7 +93,7 @@ def test_stamps_may_lie_as_far_apart_as_a_clock_is_moved_for_its_slope() -> None
     np.testing.assert_array_equal(later[FORCE][1:], now[FORCE][:-1])
 
 
-def test_what_a_scenario_has_of_sensors_itself_is_read_once_beside_another() -> None:
+def test_a_scenarios_own_sensor_effects_are_applied_once() -> None:
     stamps = np.arange(-20, 900) * 1e-3
     recording = Recording(title="drop", time=stamps, channels={FORCE: 0.0 * stamps})
     own = scenario().replaced({"effects.sensor-gain.gain": 1.5, "effects.sensor-lag.time": 0.004})
@@ -113,7 +113,7 @@ def test_what_a_scenario_has_of_sensors_itself_is_read_once_beside_another() -> 
         (False, 0.0, SETTINGS.forward.drop.longest_step),
     ],
 )
-def test_a_force_term_that_may_jump_anywhere_takes_the_shortest_steps(
+def test_a_discontinuous_force_term_takes_the_shortest_steps(
     monkeypatch: pytest.MonkeyPatch, is_smooth: bool, force: float, step: float
 ) -> None:
     """Roots of 30 kN/m that tear at 50 mm are 0.5 mm off at 2 ms, 0.01 mm at 0.2 ms: the kernel knows of no jump."""
@@ -157,7 +157,7 @@ def test_a_clock_of_its_own_is_simulated_at_its_own_stamps() -> None:
     assert DISCONTINUITY_IN + FORCE not in behind  # which makes a kink of it
 
 
-def test_a_clock_that_drifts_is_forgiven_for_the_side_of_a_contact_that_a_sample_lies_on() -> None:
+def test_a_drifting_clock_is_masked_at_contact_samples() -> None:
     """The load cell's clock loses 0.3 %, and one of its samples lies at the contact: 10 us to either side are alike."""
     (name, made), *_ = recorded({}, speeds=(1.4,), rate=1000.0)
     time, rng = np.arange(-30, 350) * 1e-3 + 1e-6, np.random.default_rng(4)

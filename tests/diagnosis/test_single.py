@@ -12,7 +12,7 @@ from rollover.recording.filters import filtered
 
 @pytest.mark.parametrize("many", [2, 5, 9, 20])
 @pytest.mark.parametrize("ar", [0.0, 0.5, 0.9])
-def test_single_samples_of_a_coloured_noise_are_not_louder_by_the_root_of_their_number(ar: float, many: int) -> None:
+def test_autocorrelated_samples_do_not_average_as_white_noise(ar: float, many: int) -> None:
     noise = lfilter([1.0], [1.0, -ar], np.random.default_rng(many).standard_normal(60_000))
     means = noise[: noise.size // many * many].reshape(-1, many).mean(axis=1)
     found = single(noise, float(np.std(means)), many)
@@ -21,7 +21,7 @@ def test_single_samples_of_a_coloured_noise_are_not_louder_by_the_root_of_their_
         assert found < 0.8 * np.sqrt(many) * np.std(means)
 
 
-def test_behind_a_filter_class_and_beside_what_is_missing_at_a_contact() -> None:
+def test_single_samples_behind_a_filter_and_at_a_contact() -> None:
     """CFC 600 at 10 kHz: a tenth of the samples, at the impact, hold a misfit of twenty times the noise."""
     noise = filtered(np.random.default_rng(1).standard_normal(5000), 1e-4, 600)
     means = noise.reshape(-1, 10).mean(axis=1)
@@ -30,6 +30,6 @@ def test_behind_a_filter_class_and_beside_what_is_missing_at_a_contact() -> None
     assert single(noise + first_impact, float(np.std(means)), 10) == pytest.approx(np.std(noise), rel=0.1)
 
 
-def test_where_nothing_is_averaged_the_noise_is_that_of_the_samples() -> None:
+def test_without_averaging_the_noise_is_that_of_samples() -> None:
     assert single(np.arange(9.0), 0.3, 1) == 0.3
     assert single(np.arange(3.0), 0.3, 9) == 0.3

@@ -40,7 +40,7 @@ def mistaken(made: Drops, channel: str, factor: float, which: int | None = 1) ->
         (DEPTH, 1000.0, "it were in mm and not in the unit stated"),
     ],
 )
-def test_a_slip_is_unexplained_in_its_recording_and_said_to_be_one(channel: str, factor: float, said: str) -> None:
+def test_a_unit_error_is_unexplained_and_named_as_one(channel: str, factor: float, said: str) -> None:
     found = diagnose(scenario(), mistaken(recorded({}, 4, speeds=(1.5, 2.0, 2.5), channels=CHANNELS), channel, factor))
     assert (found.verdict, found.effects) == ("unexplained", ())
     assert [(p.recording, p.channel, p.share) for p in found.where] == [("v2.0", channel, 1.0)]
@@ -70,7 +70,7 @@ def test_what_all_are_too_large_by_is_a_gain(factor: float) -> None:
     assert "it was excluded" not in found.sentence
 
 
-def test_where_nothing_else_was_recorded_it_is_what_cannot_be_told() -> None:
+def test_without_other_recordings_it_cannot_be_distinguished() -> None:
     found = diagnose(scenario(), mistaken(recorded({}, 4, channels=(DEPTH,)), DEPTH, -1.0, None))
     assert (found.verdict, found.effects) == ("cannot-tell", ())
     assert found.sentence.count("its sign were the opposite one") == 3
@@ -111,7 +111,7 @@ def test_what_neighbouring_runs_do_as_well_is_no_slip(apart: float, is_slip: boo
     assert [inconsistency.signal.channel for inconsistency in inconsistencies_of(every)[0]] == [FORCE] * is_slip
 
 
-def test_ground_that_is_three_times_as_stiff_makes_no_feet_of_metres() -> None:
+def test_ground_three_times_as_stiff_is_no_unit_error() -> None:
     """Sinkages of 0.4 to 0.6 times what is simulated: the layer's work, more so the faster the drop."""
     hard = {"effects.soil-layer.depth": 0.04, "effects.soil-layer.stiffness_ratio": 3.2}
     speeds = (1.1, 1.6, 2.1, 2.6, 3.1)

@@ -123,7 +123,7 @@ def test_from_afar_slopes_are_those_of_a_wide_step(off: float, is_near: bool) ->
         np.testing.assert_allclose(found.J[:, 0], adaptive_difference, rtol=1e-12)
 
 
-def test_a_rival_is_measured_by_clocks_that_are_held_as_its_own_are() -> None:
+def test_a_rival_is_compared_with_equally_fixed_time_shifts() -> None:
     """A base whose clock has eaten an impact that comes 3 ms late has nothing to gain: beside it none is a rival."""
     rng = np.random.default_rng(3)
     measured = [1.03 * first_impact(LATER * 0.03) + SIGMA * rng.standard_normal(TIME.size) for _ in range(2)]
@@ -146,7 +146,7 @@ def leading(problem: Problem, base: Fitted, scores: Mapping[str, float]) -> set[
     return {f.candidates[-1].key for f in leaders}
 
 
-def test_what_leads_by_its_score_is_fitted_whatever_another_gains() -> None:
+def test_the_leader_by_score_is_fitted_whatever_others_gain() -> None:
     """The impact is 9 % too strong, of which a mass by its slope has hardly any; only its score may speak for it."""
     rng = np.random.default_rng(4)
     measured = [1.09 * first_impact(LATER * 0.09) + SIGMA * rng.standard_normal(TIME.size) for _ in range(2)]
@@ -298,7 +298,7 @@ def test_what_tells_only_near_its_place_is_looked_at_over_less() -> None:
 LOAD = replace(WALL, search={"travel": Search(0.02, 1.0, "log"), "friction": Search(0.0, 1.0)})
 
 
-def test_a_slope_is_told_along_the_valley_in_which_a_wall_is_met_at_one_moment() -> None:
+def test_a_slope_is_taken_along_the_ridge_of_equal_contact() -> None:
     """y = g(t - c u), u = ln s - ln(2 - mu): what slides late and not far meets its wall when what slides far does.
 
     dy/dmu = dy/ds' ds'/du / (2 - mu) with s' the coordinate of ln s. Over 0.06 of mu alone the impact moves by 0.7 of

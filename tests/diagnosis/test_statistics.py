@@ -77,7 +77,7 @@ def candidate() -> Candidate:
     return Candidate(id="soil-layer", kind="physics", family="", search=search)
 
 
-def test_holding_out_by_algebra_is_refitting_without_the_recording() -> None:
+def test_linearised_cross_validation_equals_a_refit() -> None:
     blocks = linear_blocks(np.random.default_rng(1), 4, 30, np.array([0.05, -0.04]))
     fitted = Fitted(candidates=(candidate(),), x=(0.5, 0.5), blocks=tuple(blocks))
     held = held_out(fitted, [[0], [1, 2], [3]])

@@ -48,7 +48,7 @@ def tipped(size: float) -> tuple[Problem, Fitted]:
     return problem, replace(base, blocks=tuple(blocks))
 
 
-def test_what_only_a_strong_effect_does_is_found_though_a_little_of_it_tells_nothing() -> None:
+def test_an_effect_that_shows_only_when_strong_is_found() -> None:
     problem, base = tipped(20.0)
     mass, groups = MASS, [[r] for r in range(4)]
     found = scan.look(problem, base, [mass, SLOPE], groups)
@@ -77,7 +77,7 @@ def test_where_known_runs_must_do_no_strong_effect_is_tried() -> None:
     assert problem.simulations > known
 
 
-def test_what_leaves_more_of_the_worst_recording_is_tried_in_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_start_worse_on_the_worst_recording_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
     """x beyond 60 tips as was recorded, any other place moves what no recording did."""
     problem, base = tipped(20.0)
     problem.measured[2] = 1.5 * problem.measured[2]
@@ -96,7 +96,7 @@ def test_what_leaves_more_of_the_worst_recording_is_tried_in_no_other(monkeypatc
 
 
 @pytest.mark.parametrize(("full", "masked"), [(5.0, 20.0), (20.0, 5.0), (20.0, 20.0)])
-def test_what_leaves_less_of_it_in_full_or_forgiven_is_tried_in_all(
+def test_a_start_better_on_the_worst_recording_goes_to_all(
     full: float, masked: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def left_at(problem: Problem, candidates: Any, x: Any, *_: Any) -> float:
@@ -107,7 +107,7 @@ def test_what_leaves_less_of_it_in_full_or_forgiven_is_tried_in_all(
     assert scan.strongly(problem, base, [SLOPE], [1, 2]) == ({} if full == masked else {"slope": ((0.95,),)})
 
 
-def test_a_strong_effect_is_fitted_with_other_courses_forgiven_and_compared_in_full() -> None:
+def test_a_strong_effect_is_fitted_robustly_compared_in_full() -> None:
     """Before the impact x sets a wave, after it which of many courses is taken: in full the nearest dip ends a fit."""
 
     class Parting:
@@ -150,7 +150,7 @@ def test_a_strong_effect_is_fitted_with_other_courses_forgiven_and_compared_in_f
     assert not problem.heavy_tailed
 
 
-def test_an_effect_is_strong_at_both_ends_or_at_the_one_that_it_has() -> None:
+def test_an_effect_is_strong_at_each_end_of_its_range() -> None:
     assert SLOPE.strong() == [(0.58,), (0.42,), (0.5 - 0.175,), (0.5 - 0.45,), (0.5 + 0.175,), (0.5 + 0.45,)]
     assert replace(SLOPE, neutral=None).strong() == []
     tank = Candidate(
@@ -163,7 +163,7 @@ def test_an_effect_is_strong_at_both_ends_or_at_the_one_that_it_has() -> None:
     assert {y for _, y in places} == {y for _, y in tank.probes()}
 
 
-def test_a_limit_begins_where_something_gives_way_though_less_is_left_where_nothing_does() -> None:
+def test_a_limit_starts_where_it_is_reached_despite_its_misfit() -> None:
     """Peaks of 20 N and a limit of 17 N; fits may begin beside the scenario's own of 30 N, or where 4 or 10 N yield."""
     neutral, gives_way = 0.9, 0.3
 

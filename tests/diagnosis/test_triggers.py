@@ -26,9 +26,7 @@ def drops(
 
 @pytest.mark.parametrize("clock", [Clock(zero="unknown"), Clock(within=8.0)])
 @pytest.mark.parametrize("late", [LATE, (0.05, -0.05, 0.0)])
-def test_a_drop_that_nobody_timed_begins_where_it_shows_its_contact(
-    clock: Clock, late: tuple[float, float, float]
-) -> None:
+def test_an_untimed_drop_begins_at_its_contact(clock: Clock, late: tuple[float, float, float]) -> None:
     """`recorded` makes clocks late by half a millisecond itself, and the soil here is the scenario's."""
     plain = recorded({}, 3, channels=(FORCE, DEPTH, ACCELERATION), rate=1000.0)
     found, notes = from_first_contact(scenario(), drops(clock, late))
@@ -43,7 +41,7 @@ def test_a_drop_that_nobody_timed_begins_where_it_shows_its_contact(
 
 
 @pytest.mark.parametrize("clock", [Clock(), Clock(within=0.01)])
-def test_a_clock_that_is_known_is_left_as_it_is_while_a_scenario_lasts(clock: Clock) -> None:
+def test_a_known_clock_stays_while_the_scenario_lasts(clock: Clock) -> None:
     given = drops(clock, (0.38, -0.1, 0.02))
     assert from_first_contact(scenario(), given) == (given, [])
     beyond = drops(clock, (7.0, 100.0, 1.7e9))
@@ -53,7 +51,7 @@ def test_a_clock_that_is_known_is_left_as_it_is_while_a_scenario_lasts(clock: Cl
 
 
 @pytest.mark.parametrize("late", [(0.02, -0.05, 0.1), (0.0, 0.3, 0.0), (0.0, 1e-3, -1e-3)])
-def test_a_clock_that_is_said_to_be_right_and_is_not_is_told_with_the_line_that_frees_it(
+def test_a_wrong_known_clock_is_reported_with_its_cure(
     late: tuple[float, float, float],
 ) -> None:
     given = drops(Clock(), late)
@@ -69,7 +67,7 @@ def test_a_clock_that_is_said_to_be_right_and_is_not_is_told_with_the_line_that_
     assert not list(about_clocks(scenario(), drops(Clock(within=0.01), late), {}))  # the fitted shift has room for it
 
 
-def test_a_diagnosis_tells_a_stated_clock_that_is_off_and_is_right_once_it_is_freed() -> None:
+def test_a_diagnosis_reports_a_wrong_clock_and_frees_it() -> None:
     given = drops(Clock(), (0.03, 0.03, 0.03))
     kept = diagnose(scenario(), given)
     assert kept.verdict == "unexplained"
@@ -90,7 +88,7 @@ def test_what_begins_within_its_blow_is_laid_over_the_simulation() -> None:
     assert [r.time[0] for _, r in found] == pytest.approx([r.time[0] - 0.4 for _, r in given], abs=2e-3)
 
 
-def test_a_clock_beyond_the_scenario_that_nothing_tells_is_refused_by_name() -> None:
+def test_a_clock_beyond_the_scenario_is_refused_by_name() -> None:
     """Nothing but the fall, an hour after a zero: where it ends nobody knows."""
     (name, one), *_ = drops(Clock(), (3600.0, 0.0, 0.0))
     rows = one.time < 3600.0 - 2e-3

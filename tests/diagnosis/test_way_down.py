@@ -81,7 +81,7 @@ def taken(base: Fitted, found: Fitted) -> Taken:
         (40.0, 9_900.0, False),  # it explains the way down, and hardly less is left over all
     ],
 )
-def test_what_explains_the_way_down_is_a_beginning_if_it_leads_to_far_less(
+def test_a_truncated_fit_is_a_start_if_it_gains_much(
     above: float, over_all: float, better: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     base, asked = fit((), 40_000.0), []
@@ -142,7 +142,7 @@ def test_the_way_down_ends_before_the_deepest_point() -> None:
         ({"recovery": 0.05, "unloading_ratio": 0.06}, True),
     ],
 )
-def test_what_holds_what_fell_into_it_moves_nothing_on_the_way_back(rig: dict[str, float], is_back: bool) -> None:
+def test_holding_ground_moves_nothing_during_unloading(rig: dict[str, float], is_back: bool) -> None:
     dataset, _ = prepared(load("drop_test"), recordings(rig), Executor())
     problem = Problem(dataset)
     base = problem.fit((), ())

@@ -22,7 +22,7 @@ def test_coordinates_go_from_low_to_high_and_back(search: Search) -> None:
     assert coordinate(physical(0.37, search), search) == pytest.approx(0.37)
 
 
-def test_sensor_effects_compete_for_each_channel_and_only_where_they_can_be() -> None:
+def test_sensor_effects_compete_only_in_channels_they_fit() -> None:
     own = scenario()
     name, recording = recorded({}, speeds=(2.0,))[0]
     e = dataset_of(name, recording, simulator_of(own, recording))

@@ -32,7 +32,7 @@ def test_a_stack_is_whitened_signal_by_signal() -> None:
     assert np.array_equal(y[10:12], np.zeros(2)), "no past to whiten with"
 
 
-def test_what_grows_is_divided_by_its_own_noise_and_weighed_behind_its_colour() -> None:
+def test_growing_noise_is_scaled_before_whitening() -> None:
     rng = np.random.default_rng(2)
     x, loud, weight = rng.standard_normal(12), np.linspace(1.0, 3.0, 12), np.linspace(1.0, 0.1, 12)
     y = stack(Noise(count=12, sigma=2.0, ar=(0.6,), loud=loud, weight=weight))(x)
@@ -56,7 +56,7 @@ def test_a_signal_shorter_than_its_memory_tells_nothing() -> None:
     assert np.array_equal(stack(short, short)(np.ones(2)), np.zeros(2))
 
 
-def test_samples_whose_past_was_forgiven_are_as_wide_as_the_noise_within_their_own_signal() -> None:
+def test_samples_after_masked_ones_have_the_full_noise() -> None:
     """Two of a memory of two follow each leap, none of the other signal, and none that leaps itself."""
     ar = (0.5, 0.2)
     wide = 1.0 / grown(ar)

@@ -45,7 +45,7 @@ def reweighted(made: Drops) -> list[Dataset]:
 
 
 @pytest.mark.parametrize("hidden", [{}, LAYER])
-def test_zeros_are_told_to_their_standard_error_whatever_is_missing(hidden: dict[str, float]) -> None:
+def test_offsets_are_estimated_despite_missing_physics(hidden: dict[str, float]) -> None:
     made, off = moved(drops(hidden), dict.fromkeys(CHANNELS, 3.0), 0.0)
     z = [(s.zero - o[s.channel]) / s.zero_error for e, o in zip(reweighted(made), off, strict=True) for s in e.signals]
     assert len(z) == 3 * len(SPEEDS)
@@ -59,7 +59,7 @@ def test_where_zeros_are_one_none_is_touched() -> None:
 
 
 @pytest.mark.filterwarnings("error")
-def test_digits_that_show_no_noise_before_anything_is_hit_tell_no_zero() -> None:
+def test_quantised_rest_without_noise_gives_no_offset() -> None:
     """Sinkage in steps of 30 mm reads 0 there, in which noise of 3 mm never shows: no error to tell a zero to."""
     made = [(n, replace(r, channels={**r.channels, DEPTH: 0.03 * np.round(r[DEPTH] / 0.03)})) for n, r in drops({})]
     coarse = [s for e in reweighted(made) for s in e.signals if s.channel == DEPTH]
@@ -68,7 +68,7 @@ def test_digits_that_show_no_noise_before_anything_is_hit_tell_no_zero() -> None
 
 
 @pytest.mark.parametrize("size", [0.5, 3.0])
-def test_zeros_that_differ_are_no_mismatch_and_are_said_to_differ(size: float) -> None:
+def test_offsets_that_differ_are_reported_and_no_mismatch(size: float) -> None:
     made, _ = moved(drops({}), {FORCE: size, DEPTH: 0.0, ACCELERATION: size}, 0.0)
     found = diagnose(scenario(), made)
     assert (found.verdict, found.effects) == ("no-mismatch", ()), found.sentence
@@ -89,7 +89,7 @@ def of(off: Sequence[float]) -> list[Zero]:
     return [Zero(r=r, k=0, off=v, error=1.0) for r, v in enumerate(off)]
 
 
-def test_a_mean_is_left_only_where_such_zeros_have_none_by_chance() -> None:
+def test_a_mean_offset_remains_only_if_significant() -> None:
     """Student's t of four: a mean of 20 times its standard error is an offset, one of 1.3 times is not."""
     far, near = (40.0, 41.0, 44.0, 47.0), (-3.0, 1.0, 4.0, 6.0)
     assert np.sum(_own(of(far))) == pytest.approx(0.0, abs=1e-9)

@@ -16,7 +16,7 @@ def test_at_rest_it_is_the_static_pressure() -> None:
     assert evaluate(SOIL, 0.4, 0.0, speed=1.0) == pytest.approx(REFERENCE_AREA * (2e3 + 1e4 * 2.0), rel=1e-12)
 
 
-def test_ten_times_the_rate_gives_a_fifth_of_the_static_pressure_more() -> None:
+def test_ten_times_the_rate_adds_a_fifth_of_static_pressure() -> None:
     static = evaluate(SOIL, 0.1, 0.0, speed=1.0)
     # asinh(x/2) = ln x + 1/x^2 + ... for x = v/v_0 of 50 and 500
     step = evaluate(SOIL, 0.1, 10.0, speed=1.0) - evaluate(SOIL, 0.1, 1.0, speed=1.0)

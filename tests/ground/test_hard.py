@@ -57,7 +57,7 @@ def test_a_dropped_body_rebounds_so_in_the_array(e: float) -> None:
     assert result.ledger["soil"] == pytest.approx(0.5 * 20.0 * 4.0 * (1.0 - e**2), rel=0.01)
 
 
-def test_slow_touches_are_damped_as_if_they_came_at_the_slow_speed() -> None:
+def test_slow_contacts_are_damped_as_at_the_slow_speed() -> None:
     law = Hard(restitution=0.5, slow_speed=0.1)
     assert touched(law, speed=0.0)[HIDDEN] == touched(law, speed=0.1)[HIDDEN]
     assert touched(law, speed=0.2)[HIDDEN] == pytest.approx(0.5 * touched(law, speed=0.1)[HIDDEN], rel=1e-12)

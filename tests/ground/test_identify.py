@@ -98,7 +98,7 @@ def test_noise_at_the_surface_does_not_bend_the_first_stiffness() -> None:
 
 
 @pytest.mark.parametrize("missing", ["force", "acceleration", "sinkage"])
-def test_a_channel_that_was_not_recorded_is_made_up_from_the_others_and_said(missing: str) -> None:
+def test_a_missing_channel_is_derived_from_others_and_noted(missing: str) -> None:
     drops = [replace(drop, **{missing: None}) for drop in recorded(0)]
     found = identify(drops)
     for name, rel in {"second_stiffness": 0.02, "sinkage_exponent": 0.02, "momentum_base": 0.02}.items():
@@ -138,7 +138,7 @@ def test_masses_are_told_apart_only_if_the_law_takes_them() -> None:
     assert reference["momentum_base"].origin == "neutral"
 
 
-def test_drops_that_differ_by_more_than_noise_widen_the_intervals() -> None:
+def test_drops_that_differ_beyond_noise_widen_intervals() -> None:
     def of(scatter: float) -> Identified:
         drops = recorded(5, noise=0.005, speeds=(1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 3.5, 3.5))
         rng = np.random.default_rng(1)

@@ -97,7 +97,7 @@ def test_the_cone_covers_its_area_with_the_square_of_the_depth() -> None:
     assert np.all(mean_depth(face, z) == z)
 
 
-def test_the_form_with_the_rate_wins_on_drops_left_out_and_predicts_them() -> None:
+def test_the_rate_dependent_form_predicts_held_out_drops() -> None:
     drops = [prepared(v, k) for k, v in enumerate((3.0, 4.5, 6.0))]
     found = fit_forms(drops)
     best = chosen(found)
@@ -137,7 +137,7 @@ def test_handling_on_deck_is_no_drop() -> None:
         found_contact(replace(drop, acceleration=shaken + np.where(np.abs(t - 2.1) < 0.02, 30.0, 0.0)))
 
 
-def test_drag_needs_a_terminal_speed_and_leaving_out_needs_three_drops() -> None:
+def test_drag_needs_terminal_speed_holding_out_three_drops() -> None:
     falling = recorded(4.0)
     assert falling.acceleration is not None
     accelerating = replace(falling, time=falling.time - 10.0, speed=4.0, acceleration=falling.acceleration + 5.0)

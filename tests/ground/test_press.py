@@ -59,7 +59,7 @@ def test_the_stepped_law_converges_to_the_dynamic_stiffness(omega: float, rate_a
     assert errors[-1] < (1e-2 if order == 1.0 else 1e-4)
 
 
-def test_the_dynamic_stiffness_is_the_side_branch_beside_spring_and_dashpot() -> None:
+def test_dynamic_stiffness_is_spring_dashpot_and_side_branch() -> None:
     omega = np.array([0.0, 0.1, 7.0, 50.0, 400.0])
     assert dynamic_stiffness(LAW, omega) == pytest.approx(np.array([exact(w) for w in omega]), rel=1e-13)
     bare = Press(stiffness=2.0e5, damping=900.0, side_damping=0.0, side_mass=12.0)
@@ -110,7 +110,7 @@ def test_the_disk_by_hand() -> None:
     assert wet.trapped_mass == pytest.approx(0.15 * 8.0 * 1800.0 * 0.027, rel=1e-12)
 
 
-def test_the_coefficients_are_parameters_that_say_they_are_recalled() -> None:
+def test_coefficients_are_parameters_marked_as_recalled() -> None:
     assert CLAY.coefficients.confidence == "recalled"
     assert "memory" in CLAY.coefficients.source
     other = Disk(

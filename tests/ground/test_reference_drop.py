@@ -117,7 +117,7 @@ def test_the_dense_curves_belong_to_the_same_motion(speed: float) -> None:
     assert float(drop.z(drop.branch_time)) == pytest.approx(drop.branch_sinkage, rel=1e-9)
 
 
-def test_a_face_of_twice_the_area_under_twice_the_mass_sinks_alike() -> None:
+def test_twice_the_area_under_twice_the_mass_sinks_alike() -> None:
     """The law is per area: mass, weight and force double together."""
     one, two = solve(3.0), solve(3.0, mass=264.0, area_ratio=2.0)
     assert two.z_max == pytest.approx(one.z_max, rel=1e-10)

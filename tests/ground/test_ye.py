@@ -85,7 +85,7 @@ def test_eq_10_refuses_a_share_that_is_none(share: float) -> None:
 
 
 @pytest.mark.parametrize(("speed", "millimetres"), BRANCH_SINKAGES)
-def test_the_branches_cross_where_they_should_and_the_force_goes_on(speed: float, millimetres: float) -> None:
+def test_the_branches_cross_and_the_force_is_continuous(speed: float, millimetres: float) -> None:
     change = float(touched(LAW, speed=speed)[BRANCH])
     assert 1e3 * change == pytest.approx(millimetres, abs=0.005)
     assert first_branch(LAW, speed) == pytest.approx(second_branch(LAW, change, speed), rel=1e-12)

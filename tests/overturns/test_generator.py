@@ -46,7 +46,7 @@ def test_what_there_are_no_overturns_of_is_refused(kinds: list[str], effects: li
         plan(3, 1, kinds, effects)
 
 
-def test_a_yield_in_another_form_is_written_into_the_mounts_and_told() -> None:
+def test_another_form_of_yield_is_written_into_the_mounts() -> None:
     """Forces of mounts drawn apart: hardening lifts them behind the yield, a rate too, two yields bend twice."""
     assert {o.ids for o in plan(3, 3, ["foreign-form"])} == {("rops-plasticity",)}
     with pytest.raises(ValueError, match="none of kind foreign-form, got slope"):
@@ -90,7 +90,7 @@ def test_pairs_are_two_and_what_is_outside_comes_in_turn() -> None:
         plan(3, 1, ["pair"], ["slope"])
 
 
-def test_every_effect_is_one_that_acts_in_overturns_with_the_parameters_of_its_name() -> None:
+def test_every_effect_acts_in_overturns_by_its_parameters() -> None:
     random = np.random.default_rng(0)
     spans = dict.fromkeys(CHANNELS, 10.0)
     for id, draw in {**library.EFFECTS, **library.NEGLIGIBLE}.items():
@@ -136,7 +136,7 @@ def test_the_folder_holds_nothing_of_the_truth(tmp_path: Path) -> None:
             assert word not in path.read_text(encoding="utf-8")
 
 
-def test_a_case_is_the_same_for_the_same_order_and_its_noise_is_as_told() -> None:
+def test_a_case_repeats_and_its_noise_is_as_stated() -> None:
     order = Order(index=2, seed=5, kind="null")
     a, b = make(order), make(order)
     for one, other in zip(a.recordings, b.recordings, strict=True):
@@ -150,7 +150,7 @@ def test_a_case_is_the_same_for_the_same_order_and_its_noise_is_as_told() -> Non
     assert 0.4 * sigma < np.std(quiet - trend) < 1.6 * sigma
 
 
-def test_an_effect_is_seen_where_it_acts_and_a_sensor_s_fault_in_its_channel_alone() -> None:
+def test_an_effect_shows_where_it_acts_a_fault_in_its_channel() -> None:
     strong = make(Order(index=1, seed=5, kind="single", ids=("slope",)))
     assert strong.truth["verdict"] == "parameter"
     assert strong.truth["over_noise"] > 0.0
@@ -163,7 +163,7 @@ def test_an_effect_is_seen_where_it_acts_and_a_sensor_s_fault_in_its_channel_alo
     assert plain.truth["effects"] == []
 
 
-def test_each_of_two_effects_is_as_strong_as_what_the_other_leaves_to_it() -> None:
+def test_two_effects_share_the_strength_that_is_left() -> None:
     case = make(Order(index=3, seed=5, kind="pair", ids=("sensor-gain", "sensor-bias")))
     gain, bias = case.truth["effects"]
     assert gain["channel"] != bias["channel"]

@@ -115,7 +115,7 @@ def test_second_hit_starts_from_the_rut() -> None:
 
 
 @pytest.mark.parametrize("speed", [0.5, 2.0, 3.4])
-def test_a_second_hit_climbs_the_line_of_the_first_to_its_own_curve(speed: float) -> None:
+def test_a_second_hit_reloads_along_the_first_unloading_line(speed: float) -> None:
     """Below, the ground does not know the new speed: K_u (z - z_r) up to where it meets z K'(z, v_s) of this hit."""
     from ground.kernel import LINE_K, LINE_Z, TOUCH_SPEED, begin, normal_force
     from ground.law import touched

@@ -86,7 +86,7 @@ def test_each_law_goes_under_a_structure_or_asks_for_its_values(kind: str) -> No
     assert run.recording["ground/force_normal"].max() > 0.0
 
 
-def test_the_notice_stands_in_the_terminal_the_results_and_on_the_page(tmp_path: Path) -> None:
+def test_the_notice_stands_in_terminal_results_and_page(tmp_path: Path) -> None:
     own = tmp_path / "own.yaml"
     own.write_text(f"base: {document.find('kerb_trip').resolve()}\nvehicle: vehicles/vineyard_tractor.yaml\n")
     out = tmp_path / "out"
@@ -116,7 +116,7 @@ def test_the_notice_stands_in_the_terminal_the_results_and_on_the_page(tmp_path:
         ),
     ],
 )
-def test_a_start_that_does_not_exist_is_told_by_its_cause_and_file(tmp_path: Path, lines: str, told: str) -> None:
+def test_an_impossible_start_names_its_cause_and_file(tmp_path: Path, lines: str, told: str) -> None:
     own = tmp_path / "own.yaml"
     own.write_text(f"# mine\nbase: {document.find('field_upset_side').resolve()}\n{lines}")
     done = CliRunner().invoke(app, ["run", str(own), "--out", str(tmp_path / "out")])
@@ -126,7 +126,7 @@ def test_a_start_that_does_not_exist_is_told_by_its_cause_and_file(tmp_path: Pat
     assert not (tmp_path / "out").exists()
 
 
-def test_a_frame_held_by_little_more_than_its_weight_asks_for_stands() -> None:
+def test_a_frame_held_by_barely_enough_stiffness_stands() -> None:
     base = load("tilt_table")
     path = "vehicle.rops.mounts.*.rotational_stiffness"
     with pytest.raises(InputError, match=r"more than (\d+) N m/rad together") as refused:

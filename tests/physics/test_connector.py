@@ -212,7 +212,7 @@ def test_a_hinge_carries_its_plastic_moment_and_keeps_its_set() -> None:
     assert t.work[ROPS] - start == pytest.approx(M_y * (angles[-1] - 0.5 * M_y / k), rel=1e-3)
 
 
-def test_forces_of_a_hinge_that_turns_far_do_the_work_of_its_springs() -> None:
+def test_a_far_turned_hinge_does_the_work_of_its_springs() -> None:
     """Virtual power, any attitude: Q . v = -sum over the six axes of F d(deflection)/dt, by differences."""
     rng = np.random.default_rng(3)
     t, q, bodies = hinged(yield_moment=(None, 1e9, None))
@@ -252,7 +252,7 @@ def _matrix(w: Array) -> Array:
 # ---------------------------------------------------------------- measured and in a run
 
 
-def test_the_mf_178_rops_loaded_from_the_side_gives_its_measured_curve() -> None:
+def test_the_mf_178_rops_gives_its_measured_side_load_curve() -> None:
     """Published side test: 34 kN at most, 5437 J at 213 mm (one specimen, +-5 %); here the kernel, displaced slowly."""
     scenario = shipped("side_overturn").replaced({"vehicle": "vehicles/mf178.yaml"})
     bodies = bodies_of(scenario.vehicle, scenario.ground.elements)

@@ -119,7 +119,7 @@ def test_both_paths_give_the_same_drop_and_the_ledger_closes(name: str) -> None:
 
 
 @pytest.mark.parametrize("step", [1e-3, 4.1e-4])
-def test_a_flight_after_a_rebound_lasts_as_long_as_gravity_says_whatever_the_step(step: float) -> None:
+def test_flight_time_after_rebound_is_that_of_gravity(step: float) -> None:
     """Thrown up at v from the rut, the striker is back at the rut after 2 v/g; its steps end at both places."""
     scenario = scene({"effects.soil-elastic-rebound.recovery": 0.1, "effects.soil-elastic-rebound.damping_ratio": 0.1})
     at = np.arange(0.15, 0.5, 1e-5)
@@ -134,7 +134,7 @@ def test_a_flight_after_a_rebound_lasts_as_long_as_gravity_says_whatever_the_ste
 
 
 @pytest.mark.parametrize("effect", ["soil-crust", "soil-layer", "soil-adhesion"])
-def test_a_jump_of_the_force_is_met_where_it_is_whatever_the_step(effect: str) -> None:
+def test_a_force_jump_is_located_whatever_the_step(effect: str) -> None:
     rebound = {"effects.soil-elastic-rebound.recovery": 0.1, "effects.soil-elastic-rebound.damping_ratio": 0.1}
     changes: dict[str, dict[str, Any]] = {
         "soil-crust": {"effects.soil-crust.thickness": 0.0794, "effects.soil-crust.stiffness_ratio": 2.405},
@@ -211,7 +211,7 @@ FALL = T < -1e-9
         {"effects.soil-rate-hardening.per_decade": 0.1},
     ],
 )
-def test_what_grows_with_speed_adds_force_early_none_at_rest_and_stops_sooner(changes: dict[str, Any]) -> None:
+def test_rate_dependence_adds_early_force_and_stops_sooner(changes: dict[str, Any]) -> None:
     force = residual(changes, "ground/force_normal")
     assert np.all(force[EARLY] > 0.0)
     assert abs(force[-1]) < 1.0
@@ -255,7 +255,7 @@ def test_rebound_shows_only_after_the_deepest_point() -> None:
     assert -changed["striker/position_z"][-1] < 0.99 * -BASE.run(T)["striker/position_z"][-1]
 
 
-def test_growing_mass_starts_with_less_impulse_and_brakes_in_mid_stroke() -> None:
+def test_growing_mass_has_less_impulse_and_brakes_mid_stroke() -> None:
     """As much mass at the end as the constant one has throughout, but none at the start."""
     changes = {"effects.soil-added-mass-growth.rate": 13.2 / 0.3, "effects.co-moving-mass.fraction": 0.0}
     assert residual(changes, "ground/impulse_normal")[-1] < -30.0
@@ -263,7 +263,7 @@ def test_growing_mass_starts_with_less_impulse_and_brakes_in_mid_stroke() -> Non
     assert residual(changes, "ground/force_normal")[middle].mean() > 50.0
 
 
-def test_guide_and_air_show_in_the_free_fall_and_stiffness_does_not() -> None:
+def test_guide_friction_and_air_show_in_free_fall() -> None:
     guide = residual({"effects.guide-friction.force": 100.0}, "striker/acceleration_z")
     assert guide[FALL] == pytest.approx(100.0 / 132.0, rel=1e-9)
     air = residual({"effects.air-drag.area": 0.05}, "striker/acceleration_z")
@@ -297,7 +297,7 @@ def test_a_damping_with_the_square_of_the_speed_is_a_drag() -> None:
 
 
 @pytest.mark.parametrize("id", [id for id, effect in EFFECTS.items() if effect.mirrors])
-def test_what_mirrors_an_effect_does_the_same_beside_another_stiffness_of_all_the_ground(id: str) -> None:
+def test_mirrored_effects_agree_beside_another_stiffness(id: str) -> None:
     """K' r below and K' above are (r K') / r above and r K' below: with s a scale, (d, r, s) and (d, 1/r, r s)."""
     own = {name: 0.06 if getattr(EFFECTS[id](), name) < 1.0 else 1.7 for name in list(EFFECTS[id].search)[:2]}
     t = np.linspace(0.0, 0.4, 300)

@@ -46,7 +46,7 @@ def motion(model: DropModel, times: Array) -> tuple[Array, Array, Array, Array]:
     return -r["striker/position_z"], -r["striker/velocity_z"], a, r["ground/force_normal"] - m_b * a
 
 
-def test_viscous_damping_on_linear_ground_is_the_damped_oscillator() -> None:
+def test_viscous_damping_on_linear_ground_is_an_oscillator() -> None:
     """M z'' + d z' + K z = m g: z = z_s + e^(-delta t)(A cos w t + B sin w t), until z' = 0."""
     K, d, v0 = 2e4, 1500.0, 3.0 / 1.1
     delta = d / (2 * M)

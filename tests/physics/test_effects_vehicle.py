@@ -135,7 +135,7 @@ def test_play_lets_the_frame_move_before_its_mounts_bear() -> None:
     assert max(np.abs(loose.recording[n][small]).max() for n in names) < 4.0 * damping * max(rate, 0.1)
 
 
-def test_mounts_take_the_stiffness_and_yield_they_are_given_together() -> None:
+def test_mounts_take_stiffness_and_yield_together() -> None:
     base = shipped("side_overturn")
     mounts = base.vehicle.rops.mounts  # type: ignore[union-attr]
     soft = base.replaced(

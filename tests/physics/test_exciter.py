@@ -56,7 +56,7 @@ def test_settlement_grows_and_slows_down() -> None:
     assert result.track.sinkage.max() > 0.9 * depth[-1]
 
 
-def test_no_lasting_settlement_where_the_force_stays_below_what_was_there() -> None:
+def test_no_settlement_below_the_earlier_force() -> None:
     """One turn of a weak exciter sets the plate; the others run on the elastic line: F_max rules the rut."""
     law = Compaction(elastic_stiffness=2e6, plastic_stiffness=2e5, damping=200.0)
     exciter = Harmonic(eccentric_moment=300.0 / (2 * math.pi * 20) ** 2, frequency=20.0, start=0.4)

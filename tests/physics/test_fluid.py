@@ -70,7 +70,7 @@ def test_water_that_moves_along_takes_its_share_of_the_momentum() -> None:
     assert np.all(a[z > 1.01 * h] == 0.0)
 
 
-def test_the_mass_grows_up_to_a_stated_reach_and_with_depth_on_a_face() -> None:
+def test_added_mass_grows_to_a_reach_and_with_depth_on_a_face() -> None:
     rate, reach = 12.0, 0.009
     changes = {RATE: rate, "effects.soil-added-mass-growth.reach": reach, "gravity": 0.0}
     z, v, _ = motion(cone(nothing(), changes))
@@ -81,7 +81,7 @@ def test_the_mass_grows_up_to_a_stated_reach_and_with_depth_on_a_face() -> None:
     assert v == pytest.approx(v0 * m / (m + rate * z), rel=1e-6)
 
 
-def test_growth_that_dies_out_behind_the_base_is_its_own_momentum_and_that_of_the_full_run() -> None:
+def test_fading_added_mass_conserves_momentum_in_both_models() -> None:
     """m_a = rate/A_ref (V(h) + A l (1 - exp(-(z - h)/l))) behind the base, and m v is kept as before."""
     rate, fade = 12.0, 0.004
     scenario = cone(nothing(), {RATE: rate, "effects.soil-added-mass-growth.fade": fade, "gravity": 0.0})
@@ -146,7 +146,7 @@ def test_buoyancy_is_the_weight_of_the_displaced_volume() -> None:
     assert v.min() < 0.95
 
 
-def test_the_body_on_its_spring_rings_with_both_masses_and_carries_the_instruments() -> None:
+def test_a_sprung_body_rings_with_the_reduced_mass() -> None:
     """A blow takes the nose's speed down by w; body b and nose n + m_b on a spring k, from rest against each other:
 
     body's deceleration = k w/(omega b) sin(omega t), omega^2 = k (1/(n + m_b) + 1/b), while the spring is compressed.
@@ -234,7 +234,7 @@ def test_a_ball_falls_through_air_as_the_closed_form_says() -> None:
     assert np.all(full["ground/force_normal"] == 0.0)
 
 
-def test_a_release_lands_like_a_drop_with_the_speed_of_its_height() -> None:
+def test_a_release_lands_with_the_speed_of_its_height() -> None:
     """At t = (u + sqrt(u^2 + 2 g H))/g, thrown up with u, and with sqrt(u^2 + 2 g H)."""
     H, u = 0.3, 0.5
     speed = math.sqrt(u * u + 2.0 * g * H)

@@ -67,7 +67,7 @@ def rows(t: Tables, R: Array) -> tuple[Array, Array]:
     wy=st.floats(-2, 2),
     fraction=st.sampled_from([0.05, 0.1, 0.33, 4.0]),
 )
-def test_oblique_multi_point_hit_is_the_plastic_impact_of_rigid_bodies(
+def test_an_oblique_hit_is_the_plastic_rigid_body_impact(
     roll: float, pitch: float, vx: float, vz: float, wx: float, wy: float, fraction: float
 ) -> None:
     """M (v+ - v-) = -sum J' p with p_i = m_i J_i v+ (masses at rest before, no separation), lost = T- - T+."""

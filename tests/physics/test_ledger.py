@@ -137,7 +137,7 @@ def test_a_bouncing_ball_loses_its_share_at_each_bounce() -> None:
     assert closure(done).largest < CLOSED
 
 
-def test_a_spinning_disc_is_stopped_by_friction_that_takes_its_energy() -> None:
+def test_friction_stops_a_spinning_disc_and_takes_its_energy() -> None:
     """Eight points at r under the weight: mu m g r slows J, it stops at J w/(mu m g r), and J w^2/2 has gone."""
     mu, r, spin, inertia = 0.2, 0.04, 12.0, 5e-4
     angles = 2.0 * math.pi * np.arange(8) / 8.0

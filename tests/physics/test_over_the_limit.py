@@ -49,7 +49,7 @@ def test_just_below_the_limit_a_tip_over_goes_over(vehicle: str, slope: float) -
     assert np.all(np.diff(roll) > -1e-3)
 
 
-def test_the_share_of_a_study_that_begins_from_rest_is_that_of_the_slopes_above_the_limit(tmp_path: Path) -> None:
+def test_starts_from_rest_are_the_slopes_above_the_limit(tmp_path: Path) -> None:
     """Uniform from 32 to 37 deg: P = (37 - limit)/5, the limit by the relaxation of `rollover stability`."""
     path = tmp_path / "limit.yaml"
     path.write_text(STUDY)

@@ -45,7 +45,7 @@ def test_block_falls_as_a_pendulum(side_: str, angle: float, height: float) -> N
     assert speed == pytest.approx(math.sqrt(2 * 9.81 * height), rel=5e-3)
 
 
-def test_swing_through_the_lowest_point_without_a_vehicle_in_the_way() -> None:
+def test_a_free_swing_through_the_lowest_point() -> None:
     """sqrt(2 g H) at the lowest point, and the energy of the block kept all the way."""
     scenario = shipped("pendulum").replaced({"initiation.point": [-0.10, 6.0, 2.46], "simulation.duration": 1.6})
     result = run(scenario)

@@ -67,7 +67,7 @@ def test_a_rotation_vector_is_found_for_any_turn(axis: tuple[float, ...], angle:
     np.testing.assert_allclose(Rotation.from_rotvec(v).as_matrix(), R, atol=1e-12)
 
 
-def test_the_pace_of_all_and_of_the_bodies_and_of_what_is_no_number() -> None:
+def test_the_pace_of_all_of_bodies_and_of_no_number() -> None:
     qd = np.array([0.5, -2.0, 1.0, 30.0])
     assert (largest(qd), largest(qd[:3])) == (30.0, 2.0)
     assert (largest(qd), largest(qd[:4])) == (30.0, 30.0)

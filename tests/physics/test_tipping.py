@@ -109,7 +109,7 @@ def test_tip_angle_with_the_stop_engaged() -> None:
     assert found == pytest.approx(expected, rel=0.01)
 
 
-def test_balance_on_two_wheels_is_where_the_centre_of_mass_stands_over_the_edge() -> None:
+def test_balance_is_with_the_centre_of_mass_over_the_edge() -> None:
     """Flat ground, rigid: roll = atan(s/h)."""
     scenario = rigid_tractor(swing_deg=None).replaced(
         {"initiation": {"kind": "tip-over", "side": "left", "excess_deg": 0.0}}
@@ -233,7 +233,7 @@ def test_tyre_forces_are_the_gradient_of_their_energy(camber_deg: float) -> None
         assert Q[3 + k] == pytest.approx(-(spun[0] - spun[1]) / (2 * eps), rel=1e-5, abs=1e-2)
 
 
-def test_above_the_static_limit_an_overturn_starts_from_rest_as_it_would_stand() -> None:
+def test_above_the_static_limit_it_starts_from_rest() -> None:
     """Below 35 deg this tractor balances on two wheels; above it neither stands nor balances and is let go."""
     slope = load("side_overturn_slope").replaced({"simulation.duration": 0.4})
     for angle, side, stands in ((34.0, "left", True), (35.5, "left", False), (50.0, "left", False)):

@@ -142,7 +142,7 @@ def test_on_a_plane_it_is_the_plane_s_law(degrees: float) -> None:
     assert compared > 40
 
 
-def test_a_tyre_that_rolls_against_a_steep_kerb_gives_back_what_it_took() -> None:
+def test_a_tyre_against_a_kerb_gives_back_its_energy() -> None:
     """Turned through the face's own slope with its side to it: the work of the force is the change of its energy."""
     tyres = Tyres(SURFACES[1])
     angle = np.radians(np.linspace(0.0, -88.0, 4001))

@@ -99,7 +99,7 @@ def test_a_million_uneven_elements_cost_what_is_touched() -> None:
     np.testing.assert_allclose(many.recording["chassis/roll"], few.recording["chassis/roll"], atol=1e-7)
 
 
-def test_what_is_nowhere_near_the_ground_is_passed_over_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_shapes_far_from_the_ground_are_skipped(monkeypatch: pytest.MonkeyPatch) -> None:
     """A tractor pushed into a bank in many attitudes: by pieces of its patches as by patches whole."""
     scenario, found = load("bank_overturn").applied(), []
     for piece in (0.2, 100.0):

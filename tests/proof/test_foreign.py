@@ -67,7 +67,7 @@ def test_a_seed_draws_the_form_and_the_truth_names_it() -> None:
     assert json.dumps(make(order).truth) == json.dumps(make(order).truth)
 
 
-def test_a_plan_of_foreign_forms_takes_turns_and_refuses_what_has_none() -> None:
+def test_foreign_forms_take_turns_and_unknown_ones_are_refused() -> None:
     orders = plan(36, 5, ["foreign-form"])
     counts = [sum(o.ids == (id,) for o in orders) for id in foreign.FORMS]
     assert counts == [2] * len(foreign.FORMS)
@@ -197,7 +197,7 @@ def test_mass_times_acceleration_is_the_sum_of_the_forces(id: str, form: Form) -
     assert checked >= 15
 
 
-def test_bristles_hold_what_rests_and_slip_under_the_level_of_the_speed() -> None:
+def test_bristles_stick_at_rest_and_slip_at_the_speeds_level() -> None:
     form = next(f for f in foreign.FORMS["guide-friction"] if f.name == "lugre")
     change = drawn("guide-friction", form, 3)
     p, drop = change.told, dropped(change)
@@ -358,7 +358,7 @@ def test_no_instrument_is_off_by_the_products_own_law(id: str, form: Form) -> No
     assert apart(off, own, starts) > (0.015 if id == "sensor-lag" else 0.03)
 
 
-def test_a_dashpot_of_both_ways_brakes_the_way_back_and_never_pulls() -> None:
+def test_a_two_way_dashpot_brakes_unloading_and_never_pulls() -> None:
     """M a + m_b1 a = m g - max(line + chi z^1.5 v, 0): less than the line while it rises."""
     forms = foreign.FORMS["soil-viscous-damping"]
     for name in ("hunt-crossley", "kelvin-voigt-with-cut-off"):

@@ -113,7 +113,7 @@ BEFORE: dict[tuple[int, str, tuple[str, ...]], tuple[float, float, float]] = {
 
 
 @pytest.mark.parametrize("which", BEFORE, ids=lambda which: f"{which[1]} {'+'.join(which[2])}".strip())
-def test_a_seed_makes_the_case_that_it_made_before_newer_kinds_came(which: tuple[int, str, tuple[str, ...]]) -> None:
+def test_a_seed_makes_the_same_case_after_newer_kinds(which: tuple[int, str, tuple[str, ...]]) -> None:
     index, kind, ids = which
     case = make(Order(index=index, seed=51, kind=kind, ids=ids))
     samples = [values for r in case.recordings for values in r.channels.values()]

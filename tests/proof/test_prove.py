@@ -82,9 +82,7 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert "--force" in other.stderr
 
 
-def test_a_background_is_asked_for_told_and_part_of_what_the_folder_is_about(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_background_is_asked_for_reported_and_recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runner, "DIAGNOSIS", BY_HAND + "says_nothing")
     out = tmp_path / "proof"
     asked = ["prove", "--cases", "1", "--kinds", "background", "--workers", "0", "--out", str(out)]

@@ -61,7 +61,7 @@ def test_two_solvers_one_drop(name: str) -> None:
         assert np.quantile(apart, 0.99) < 1e-3, f"{channel}: {np.quantile(apart, 0.99):.2e} of its range"
 
 
-def test_soil_that_is_pulled_at_for_less_than_a_step_stays_behind() -> None:
+def test_soil_pulled_for_less_than_a_step_stays_behind() -> None:
     """A nose that rings pulls for 0.1 ms here; an event at the end of a step alone misses that."""
     gives = {"stiffness": 651346.0, "damping": 191.95, "nose_share": 0.060934}
     changes = {f"effects.structural-compliance.{key}": value for key, value in gives.items()}
@@ -75,7 +75,7 @@ def test_soil_that_is_pulled_at_for_less_than_a_step_stays_behind() -> None:
 
 
 @pytest.mark.parametrize("step", [5e-4, 2e-3])
-def test_a_striker_that_bounces_meets_the_ground_again_at_the_same_times(step: float) -> None:
+def test_a_bouncing_striker_lands_at_the_same_times(step: float) -> None:
     """Where the dashpot of a line lets go before the rut is reached the force has a kink, which no step may lie across.
 
     With steps across it these were up to 0.3 us off at 0.5 ms and 7 us at 2 ms, and ten times as much over a layer.

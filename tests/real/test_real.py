@@ -27,7 +27,7 @@ def folder(name: str) -> Path:
     return path
 
 
-def test_cube_tosses_give_the_published_friction_and_beat_wrong_numbers_on_tosses_left_out() -> None:
+def test_cube_tosses_give_the_published_friction() -> None:
     found = cube_tosses.study(str(folder("cube_tosses") / "cube_tosses.npz"), 40, starts=((0.3, 0.4),))
     # published 0.15 to 0.18; twenty tosses narrow it to some 10 % (0.195, 0.176 to 0.216)
     assert 0.12 < found["friction"]["value"] < 0.22
@@ -38,7 +38,7 @@ def test_cube_tosses_give_the_published_friction_and_beat_wrong_numbers_on_tosse
     assert found["start"]["velocity_error"] < 0.005
 
 
-def test_the_sea_bed_resists_with_depth_and_rate_and_handling_is_left_out() -> None:
+def test_the_sea_bed_resists_with_depth_and_rate() -> None:
     refused, forms = penetrometer.study(folder("soil_penetrometer"))
     assert len(refused) == 1
     assert refused[0].startswith("bLog0D39: ")
@@ -51,7 +51,7 @@ def test_the_sea_bed_resists_with_depth_and_rate_and_handling_is_left_out() -> N
     assert [round(d.depth[0], 1) for d in best.held_out] == [0.5, 0.5, 0.5]
 
 
-def test_a_law_from_two_drops_predicts_the_third_in_the_simulator_as_far_as_one_sea_bed_is_another() -> None:
+def test_a_law_of_two_drops_predicts_the_third() -> None:
     for run in penetrometer.held_out(folder("soil_penetrometer")):
         # measured: errors of 10, 27 and 21 % of the range, depths within 15 %
         assert run.error < 0.30, run
@@ -59,7 +59,7 @@ def test_a_law_from_two_drops_predicts_the_third_in_the_simulator_as_far_as_one_
 
 
 @pytest.mark.parametrize("angle", [60, 80])
-def test_the_water_that_a_rigid_cone_takes_along_shows_at_every_height_left_out(angle: int) -> None:
+def test_a_rigid_cones_added_mass_shows_at_held_out_heights(angle: int) -> None:
     found = cone_drops.rigid(folder("cone_drops"), angle, repeats=1)
     without, with_mass = found["without"]["error"], found["with"]["error"]
     for height in set(without) & set(cone_drops.HELD_OUT):
@@ -98,7 +98,7 @@ def test_air_brakes_light_balls_and_dense_ones_next_to_nothing() -> None:
         assert min(found[ball]["held_out"]) > 0.8 * min(found[ball]["without"]), ball
 
 
-def test_the_command_makes_a_soil_of_the_imported_drops_that_the_scenario_takes(tmp_path: Path) -> None:
+def test_identify_makes_a_soil_that_the_scenario_takes(tmp_path: Path) -> None:
     source = str(folder("soil_penetrometer"))
     call = CliRunner().invoke
     imported, soil = tmp_path / "drops", tmp_path / "soil"
@@ -137,7 +137,7 @@ def written(name: str) -> Any:
     return json.loads(diagnoses.RESULTS.read_text(encoding="utf-8"))[name]
 
 
-def test_every_number_in_the_file_of_results_is_from_the_commands_that_stand_there() -> None:
+def test_every_number_in_the_results_is_from_its_commands() -> None:
     known = json.loads(diagnoses.RESULTS.read_text(encoding="utf-8"))
     assert list(known) == list(diagnoses.SETS)
     for name, one in diagnoses.SETS.items():
@@ -145,7 +145,7 @@ def test_every_number_in_the_file_of_results_is_from_the_commands_that_stand_the
 
 
 @pytest.mark.parametrize("name", NAMED)
-def test_what_was_left_out_of_a_scenario_stands_first_in_the_diagnosis_of_real_recordings(name: str) -> None:
+def test_a_left_out_effect_comes_first_on_real_recordings(name: str) -> None:
     found = written(name)
     assert found["verdict"] == "missing-physics"
     assert found["effects"][0]["id"] == NAMED[name] == found["left_out"]
@@ -153,7 +153,7 @@ def test_what_was_left_out_of_a_scenario_stands_first_in_the_diagnosis_of_real_r
     assert found["after"]["iso18571"] > found["before"]["iso18571"] + 0.1
 
 
-def test_the_written_spring_covers_the_authors_and_stands_below_it() -> None:
+def test_the_reported_spring_covers_the_authors_value() -> None:
     value, low, high = written("cones, firm spring, 60 deg")["effects"][0]["parameters"]["stiffness"]
     assert low < cone_drops.SPRING < high
     assert 0.8 * cone_drops.SPRING < value < cone_drops.SPRING
@@ -165,7 +165,7 @@ def test_the_written_friction_covers_what_is_published(name: str) -> None:
     assert low < 0.165 < high  # 0.15 to 0.18
 
 
-def test_what_was_left_out_of_the_rigid_cones_is_one_of_those_that_cannot_be_told_apart() -> None:
+def test_rigid_cones_missing_effect_is_in_the_confusion_set() -> None:
     found = written("cones, rigid, 45 deg")["effects"][0]
     assert "soil-added-mass-growth" in (found["id"], *found["indistinguishable_from"])
 
@@ -175,7 +175,7 @@ def test_where_nothing_is_left_out_that_matters_nothing_is_named(name: str) -> N
     assert written(name)["verdict"] == "no-mismatch"
 
 
-def test_a_diagnosis_of_real_recordings_is_made_again_as_it_was_written() -> None:
+def test_a_diagnosis_of_real_recordings_is_reproduced() -> None:
     again = diagnoses.study(folder("published"), "yellow-whiffle-ball")
     known = written("yellow-whiffle-ball")
     assert again["verdict"] == known["verdict"]

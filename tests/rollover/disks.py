@@ -36,9 +36,9 @@ class Disk:
         monkeypatch.setattr(Path, "open", open_)
         monkeypatch.setattr(Path, "mkdir", mkdir_)
         for name in ("mkdtemp", "mkstemp"):
-            monkeypatch.setattr(tempfile, name, self.watched(name, getattr(tempfile, name), lambda a, m: m["dir"]))
+            monkeypatch.setattr(tempfile, name, self.watched(name, getattr(tempfile, name), _folder))
         monkeypatch.setattr(pq, "write_table", self.watched("write_table", pq.write_table, lambda a, m: a[1]))
-        monkeypatch.setattr(os, "ftruncate", self.watched("lock", os.ftruncate, lambda a, m: self.folder / "lock"))
+        monkeypatch.setattr(os, "ftruncate", self.watched("lock", os.ftruncate, _file))
 
     def watched(self, name: str, real: Callable[..., Any], where: Callable[..., Any]) -> Callable[..., Any]:
         def call(*args: Any, **more: Any) -> Any:
@@ -57,3 +57,14 @@ class Disk:
 
     def full(self, from_: int) -> None:
         self.count, self.full_from = 0, from_
+
+
+def _folder(given: tuple[Any, ...], named: dict[str, Any]) -> Any:
+    """The folder that something temporary is made in, if one is given: ``mkdtemp(suffix, prefix, dir)``."""
+    return named.get("dir") or (given[2] if len(given) > 2 else None)
+
+
+def _file(given: tuple[Any, ...], named: dict[str, Any]) -> Any:
+    """The file of a descriptor, where the system says so."""
+    link = Path(f"/proc/self/fd/{given[0]}")
+    return os.readlink(link) if link.exists() else None

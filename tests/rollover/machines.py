@@ -47,7 +47,7 @@ def commands(folder: Path) -> dict[str, tuple[list[object], Path]]:
     study = studies.drops(folder / "given", ("count: 20", "count: 4"))
     regressed = baseline_of(folder / "given")
     (folder / "given" / "a.rrd").write_bytes(b"rrd")
-    out = folder / "out"
+    out, as_is = folder / "out", folder / "given" / "as_is.csv"
     shown = out / "v.html"
     return {
         "run": (["run", "drop_test", "--no-half-step", "--out", out / "a"], out / "a"),
@@ -57,7 +57,10 @@ def commands(folder: Path) -> dict[str, tuple[list[object], Path]]:
         "synthesize": (["synthesize", "drop_test", "--out", out, "--name", "d"], out),
         "compare": (["compare", "drop_test", recording, "--out", out / "a"], out / "a"),
         "study": (["study", study, "--workers", "0", "--out", out / "a"], out / "a"),
-        "diagnose": (["diagnose", "drop_test", recording, "--workers", "0", "--out", out / "a"], out / "a"),
+        "diagnose": (
+            ["diagnose", "drop_test", as_is, "--workers", "0", "--out", out / "a"],
+            out / "a",
+        ),
         "calibrate": (
             ["calibrate", "drop_test", recording, "--fit", "vehicle.mass", "--starts", "0", "--out", out / "a"],
             out / "a",
@@ -73,6 +76,12 @@ def commands(folder: Path) -> dict[str, tuple[list[object], Path]]:
 
 NAMES = ("run", "import", "import parquet", "import mme", "synthesize", "compare", "study")
 NAMES += ("diagnose", "calibrate", "identify", "prove", "regress", "stability", "view", "new")
+
+
+def as_it_is(folder: Path) -> None:
+    """A recording of a scenario that lacks nothing, in `given`: a diagnosis of it is soon done."""
+    words = ("synthesize", "drop_test", "--set", "initiation.speed=3", "--seed", "1", "--name", "as_is")
+    assert rollover(*words, "--out", folder / "given").exit_code == 0
 
 
 def baseline_of(folder: Path) -> Path:

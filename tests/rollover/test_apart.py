@@ -72,9 +72,7 @@ def test_a_reader_that_hangs_is_ended(file: Path, monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="platform: no limit of the processor's time")
-def test_a_reader_that_calculates_for_ever_is_ended_by_the_time_of_the_processor(
-    file: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_reader_that_never_ends_is_ended_by_processor_time(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(budget, "PROCESSOR", 0.5)
     began = os.times().elapsed
     assert "the reader of TEST takes too long" in refused(file, "busy")
@@ -93,7 +91,7 @@ def test_memory_is_bounded_by_the_size_of_the_file(file: Path, monkeypatch: pyte
     assert apart(reader, file, "eat", what="TEST") == 3_000_000_000
 
 
-def test_faults_of_the_file_come_back_as_they_are_and_others_in_one_line(file: Path) -> None:
+def test_file_faults_come_back_unchanged_others_in_one_line(file: Path) -> None:
     with pytest.raises(InputError) as caught:
         apart(reader, file, "refuse", what="TEST")
     assert str(caught.value) == f"{file}: F: no\nb: neither"
@@ -137,7 +135,7 @@ print(read_recording("a.h5")["ground/force_normal"].tolist(), "h5py" in sys.modu
 
 
 @pytest.mark.skipif(importlib.util.find_spec("h5py") is None, reason="h5py is not installed: HDF5 is not tested")
-def test_a_script_without_a_guard_is_not_run_again_and_does_not_load_the_reader(tmp_path: Path) -> None:
+def test_a_script_without_a_guard_is_not_run_again(tmp_path: Path) -> None:
     import h5py
 
     with h5py.File(tmp_path / "a.h5", "w") as made:

@@ -86,7 +86,7 @@ def alike(one: Any, other: Any) -> bool:
 
 @pytest.mark.parametrize("otherwise", OTHERWISE)
 @pytest.mark.parametrize("scene", SCENES)
-def test_a_comparison_does_not_hang_on_how_the_attitude_is_written(
+def test_a_comparison_is_independent_of_attitude_notation(
     scene: str, otherwise: Callable[[Recording], Recording]
 ) -> None:
     made = recorded(scene, *ANGLES, *QUATERNION, rate=RATES[scene])
@@ -132,7 +132,7 @@ def test_an_objective_does_not_hang_on_it(scene: str, otherwise: Callable[[Recor
     np.testing.assert_allclose(both[0], both[1], atol=1e-6)  # over a noise of 0.005: 1e-9 of the channel
 
 
-def test_a_gap_in_which_it_turns_over_is_bridged_by_the_simulation() -> None:
+def test_a_gap_with_a_turn_is_bridged_by_the_simulation() -> None:
     made = recorded("multiple_roll", ROLL, *QUATERNION, rate=100.0)
     roll = run("multiple_roll").recording[ROLL]
     gap = (made.time > 1.2) & (made.time < 3.4)
@@ -143,7 +143,7 @@ def test_a_gap_in_which_it_turns_over_is_bridged_by_the_simulation() -> None:
         np.testing.assert_allclose(found[name], made[name], atol=1e-9)
 
 
-def test_what_turns_over_between_two_samples_follows_the_simulation_and_is_said() -> None:
+def test_turns_between_samples_follow_the_simulation() -> None:
     """At 1 Hz it turns by more than half a turn: nothing in the samples themselves says how far."""
     made = recorded("multiple_roll", ROLL, SPIN, rate=1.0, share=0.0005)
     assert np.abs(np.diff(made[ROLL])).max() > math.pi

@@ -38,7 +38,7 @@ def drawn(ensemble: list[tuple[Extreme, ...]], before: Baseline | None = None, r
     return drawn_up("drop_test", SCENARIO, ensemble, finer, reason, before)
 
 
-def test_smooth_loads_need_one_start_and_hold_to_what_half_the_step_changes() -> None:
+def test_smooth_loads_need_one_start_and_hold_to_half_step() -> None:
     made = drawn(SMOOTH)
     force, impulse, quiet = made.loads
     assert made.starts == 1
@@ -68,7 +68,7 @@ def test_chaotic_loads_are_compared_by_their_mean() -> None:
     assert not against(made, SCENARIO, other).ok
 
 
-def test_two_ensembles_of_the_same_physics_differ_by_more_than_the_tolerance_once_in_a_thousand() -> None:
+def test_equal_ensembles_exceed_tolerance_once_in_a_thousand() -> None:
     # 20 000 pairs: 20 are expected, with a standard deviation of 4.5
     draw = np.random.default_rng(7).normal(1.0, 0.015, size=(20_000, 3, 5))
     was, finer, now = draw[:, 0], draw[:, 1], draw[:, 2]
@@ -111,7 +111,7 @@ def test_a_tolerance_below_the_discretisation_error_is_refused(tmp_path: Path) -
     assert [(f.file, f.line is not None) for f in e.value.faults] == [(str(path), True)]
 
 
-def test_a_tolerance_set_by_hand_outlives_updates_until_it_is_too_small() -> None:
+def test_a_manual_tolerance_lasts_until_it_is_too_small() -> None:
     made = drawn(SMOOTH)
     by_hand = replace(made.loads[0], tolerance=0.05, reason="the customer's criterion")
     kept = replace(made, loads=(by_hand, *made.loads[1:]))
@@ -154,9 +154,7 @@ def test_an_update_that_breaks_off_leaves_the_old_file(
     assert [p.name for p in tmp_path.iterdir()] == ["drop_test.yaml"]
 
 
-def test_an_update_that_breaks_off_before_the_last_file_writes_none(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_update_that_breaks_off_writes_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     dump, asked = document.dump, []
 
     def breaks_the_second_time(thing: object, head: str = "") -> str:
@@ -192,7 +190,7 @@ def test_scatter_of_nothing_is_none() -> None:
     assert replace(one, mean=0.0, values=(0.0, 0.0)).scatter == 0.0
 
 
-def test_every_shipped_scenario_has_a_baseline_or_a_reason_for_none() -> None:
+def test_every_shipped_scenario_has_a_baseline_or_a_reason() -> None:
     choice = regression.chosen([])
     assert [a.sentence for a in choice.answers] == []
     left_out = baselines.excluded(document.shipped_folder())

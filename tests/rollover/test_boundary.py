@@ -168,7 +168,7 @@ def test_whatever_a_reader_raises(tmp_path: Path, raised: Exception) -> None:
         assert str(caught.value).startswith(f"{path}: ")
 
 
-def test_what_a_library_says_of_the_file_is_kept_and_a_full_disk_stays_one(tmp_path: Path) -> None:
+def test_a_librarys_words_are_kept_and_a_full_disk_stays_one(tmp_path: Path) -> None:
     said = r"a\.x: not a readable X file: bad header; a whole, undamaged one is needed"
     with pytest.raises(InputError, match=said), boundary.reading("a.x", "X file"):
         raise ValueError("bad header.\nmore")

@@ -32,7 +32,7 @@ def fitted(
     return calibrate(base, recordings, parameters, held_out=held_out, noise=stated, simulate=drop, starts=starts)
 
 
-def test_the_stated_intervals_hold_the_truth_as_often_as_they_say() -> None:
+def test_stated_intervals_have_their_coverage() -> None:
     """8 random truths of 3 parameters, 2 drops each, clocks off by 0.3 ms: 95 % of 24 intervals.
 
     Errors over their stated sigma are to be standard normal: their squares sum to chi-squared with 24 degrees of
@@ -63,7 +63,7 @@ def test_the_stated_intervals_hold_the_truth_as_often_as_they_say() -> None:
     assert 8.1 < squares < 51.2
 
 
-def test_recovery_is_not_determined_if_the_recording_ends_before_unloading() -> None:
+def test_recovery_is_undetermined_without_unloading() -> None:
     rng = np.random.default_rng(5)
     made = {"short": recorded(scene(), {"initiation.speed": 3.0}, rng, until=0.12)}
     found = fitted(made, STIFFNESS, RECOVERY)
@@ -222,7 +222,7 @@ def test_outliers_do_not_move_the_answer() -> None:
     assert found.estimates[1].value == pytest.approx(132.0, rel=0.01)
 
 
-def test_a_far_start_is_left_for_a_better_one_and_what_was_held_out_is_scored() -> None:
+def test_a_far_start_is_replaced_and_held_out_data_scored() -> None:
     rng = np.random.default_rng(12)
     world = scene({"ground.law.stiffness_scale": 2.4, "vehicle.mass": 150.0})
     drops = {f"at {v}": recorded(world, {"initiation.speed": v}, rng, every=8) for v in (1.5, 2.5, 3.3)}

@@ -152,7 +152,7 @@ def test_a_sound_mat_file_claims_what_it_holds(tmp_path: Path, monkeypatch: pyte
 
 
 @pytest.mark.skipif(h5py_missing, reason="h5py is not installed: HDF5 is not tested")
-def test_hdf5_claims_are_summed_over_columns_with_chunks_that_are_not_there(tmp_path: Path, cheap: None) -> None:
+def test_hdf5_claims_are_summed_over_missing_chunks(tmp_path: Path, cheap: None) -> None:
     import h5py
 
     with h5py.File(tmp_path / "a.h5", "w") as file:

@@ -198,7 +198,7 @@ def test_wrong_input_is_2_and_nothing_is_run_or_written(bench: Bench, arguments:
     assert not Path("out").exists()
 
 
-def test_another_runs_results_are_kept_before_anything_is_simulated(bench: Bench) -> None:
+def test_other_results_are_kept_before_any_simulation(bench: Bench) -> None:
     assert rollover("run", "drop_test").exit_code == 0
     again = rollover("run", "drop_test")
     assert again.exit_code == 0  # the same run

@@ -41,7 +41,7 @@ def test_an_address_without_a_scheduler(monkeypatch: pytest.MonkeyPatch) -> None
         list(cluster.map_on_cluster(odd, [1], address="tcp://127.0.0.1:9"))
 
 
-def test_what_goes_wrong_costs_one_case_and_so_does_a_lost_worker() -> None:
+def test_a_fault_or_a_lost_worker_costs_one_case() -> None:
     pytest.importorskip("distributed", reason="the extra cluster is not installed")
     from rollover.studies.cluster import map_on_cluster
 
@@ -59,7 +59,7 @@ def test_what_goes_wrong_costs_one_case_and_so_does_a_lost_worker() -> None:
     assert [found[i].value for i in (0, 5, 6, 7, 8)] == [4, 100, 121, 144, 169]
 
 
-def test_what_waited_beside_the_case_that_killed_its_worker_is_done() -> None:
+def test_cases_waiting_beside_a_killed_worker_are_done() -> None:
     pytest.importorskip("distributed", reason="the extra cluster is not installed")
     from rollover.studies.cluster import map_on_cluster
 

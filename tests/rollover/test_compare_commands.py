@@ -53,7 +53,7 @@ def test_a_synthetic_recording_states_what_it_may(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("option", ["--set", "--hide"])
-def test_what_is_wrong_with_a_value_is_said_of_the_option_that_gave_it(option: str, tmp_path: Path) -> None:
+def test_a_wrong_value_is_reported_at_its_option(option: str, tmp_path: Path) -> None:
     wrong = {
         "effects.soil-viscous-damping.coefficient=180": "effects.soil-viscous-damping.coefficient: unknown key, got",
         "vehicle.mass": "not a setting, got 'vehicle.mass'; PATH=VALUE is needed",
@@ -129,7 +129,7 @@ def test_compare_refuses_and_writes_nothing(folder: Path, tmp_path: Path) -> Non
     assert "a second recording by this name" in twice.stderr
 
 
-def test_calibrate_finds_the_truth_and_writes_a_scenario_that_runs(folder: Path, tmp_path: Path) -> None:
+def test_calibrate_finds_the_truth_and_writes_a_scenario(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "fit"
     words = ["calibrate", "drop_test", folder / "d1.5.csv", folder / "d3.0.csv", "--hold-out", "d3.0", "--starts", 2]
     done = rollover(*words, "--fit", "ground.law.stiffness_scale=0.3:3", "--fit", "vehicle.mass=90:200", "--out", out)

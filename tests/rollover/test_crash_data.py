@@ -161,7 +161,7 @@ def test_nhtsa_two_vehicles_are_refused_with_both(tmp_path: Path) -> None:
         read_recording(path)
 
 
-def test_nhtsa_a_broken_curve_is_refused_if_it_is_needed_and_else_left_out(tmp_path: Path) -> None:
+def test_nhtsa_a_broken_curve_is_refused_only_if_needed(tmp_path: Path) -> None:
     broken = curve(1.0).replace("\r\n", "\r\noops\r\n", 1)
     path = folder_of(tmp_path, ev5(*TWO), n001=curve(1.0), n002=broken)
     found = read_recording(path)
@@ -176,7 +176,7 @@ def test_nhtsa_a_broken_curve_is_refused_if_it_is_needed_and_else_left_out(tmp_p
         read_recording(path)
 
 
-def test_nhtsa_a_curve_over_millimetres_is_no_recording_over_time(tmp_path: Path) -> None:
+def test_nhtsa_a_curve_over_millimetres_is_no_recording(tmp_path: Path) -> None:
     crush = instrument(2, "LC", "ROOF", "ZL", "NWT").replace("|SEC|", "|MM|")
     found = read_recording(folder_of(tmp_path, ev5(TWO[0], crush), n001=curve(1.0), n002=curve(2.0)))
     assert any("X is no time" in note and note.endswith(": 002") for note in found.notes)

@@ -123,7 +123,7 @@ def test_an_effect_at_its_null_changes_no_bit_of_a_rollover(effect: type[Effect]
 
 
 @each
-def test_an_effect_at_its_default_changes_what_it_says_it_acts_on(effect: type[Effect]) -> None:
+def test_a_default_effect_changes_what_it_acts_on(effect: type[Effect]) -> None:
     scenario = dropped() if "drop" in effect.acts else rolled()
     changed = run(with_effect(scenario, effect()))
     assert changed.status == "done", changed.sentence
@@ -155,7 +155,7 @@ def test_an_effect_tells_what_it_is(effect: type[Effect]) -> None:
 
 
 @each
-def test_the_numbers_of_an_effect_have_units_bounds_and_ranges_to_search(effect: type[Effect]) -> None:
+def test_effect_numbers_have_units_bounds_and_search_ranges(effect: type[Effect]) -> None:
     kind: Any = effect
     declared = quantities(kind)
     assert effect.null
@@ -179,7 +179,7 @@ def test_the_numbers_of_an_effect_have_units_bounds_and_ranges_to_search(effect:
 
 
 @each
-def test_what_an_effect_says_of_its_fit_is_of_parameters_that_are_fitted(effect: type[Effect]) -> None:
+def test_fit_traits_are_of_fitted_parameters(effect: type[Effect]) -> None:
     assert set(effect.shapes) < set(effect.search), "a strength is left to fit"
     assert set(effect.narrow) <= set(effect.search)
     assert all(0.0 <= place <= 1.0 for places in effect.narrow.values() for place in places)
@@ -223,14 +223,14 @@ def outside(*arguments: str, **variables: str) -> subprocess.CompletedProcess[st
     return subprocess.run([sys.executable, *arguments], capture_output=True, text=True, env=env, cwd=root, check=False)
 
 
-def test_an_effect_of_ones_own_is_one_short_file_and_keeps_every_promise() -> None:
+def test_an_own_effect_is_one_short_file_and_keeps_the_contract() -> None:
     assert len(OWN.read_text(encoding="utf-8").splitlines()) <= 40
     program = (
         "import numpy as np\n"
         "from tests.rollover import test_effects_contract as contract\n"
         "roots = contract.TABLE['soil-roots']\n"
         "contract.test_an_effect_at_its_null_changes_no_bit_of_a_drop(roots)\n"
-        "contract.test_the_numbers_of_an_effect_have_units_bounds_and_ranges_to_search(roots)\n"
+        "contract.test_effect_numbers_have_units_bounds_and_search_ranges(roots)\n"
         "contract.test_naming_one_parameter_switches_an_effect_on(roots)\n"
         "from rollover.dynamics.drop_test import DropModel\n"
         "model = DropModel(scenario=contract.dropped())\n"
@@ -261,7 +261,7 @@ def test_the_command_line_takes_a_file_of_effects(tmp_path: Path) -> None:
     assert "--effects stands before the command: rollover --effects FILE list ..." in " ".join(late.stderr.split())
 
 
-def test_a_file_of_effects_can_be_imported_under_its_own_name_before_and_after(tmp_path: Path) -> None:
+def test_a_file_of_effects_imports_under_its_own_name(tmp_path: Path) -> None:
     """Its machine code is kept for each name that it is loaded under."""
     (tmp_path / "mine.py").write_text(OWN.read_text(encoding="utf-8"), encoding="utf-8")
     kept = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")}
@@ -316,7 +316,7 @@ def test_a_sentence_says_which_way_and_by_how_much(id: str, values: dict[str, An
 
 
 @pytest.mark.parametrize("effect", [e for e in TABLE.values() if "rollover" not in e.acts], ids=lambda e: e.id)
-def test_an_effect_on_what_a_vehicle_has_not_changes_no_bit_of_its_landing_and_says_so(effect: type[Effect]) -> None:
+def test_an_effect_on_a_missing_part_changes_nothing_and_says(effect: type[Effect]) -> None:
     landed = shipped("rops_drop").replaced({"simulation.duration": 0.03})
     with_it = with_effect(landed, effect())
     assert float(np.max(run(landed).recording["ground/force_normal"])) > 1e4
@@ -325,7 +325,7 @@ def test_an_effect_on_what_a_vehicle_has_not_changes_no_bit_of_its_landing_and_s
     assert not with_effect(landed, nothing(effect)).idle
 
 
-def test_a_rate_of_another_reference_speed_is_a_stiffness_and_a_rate_of_the_usual_one() -> None:
+def test_a_rate_at_another_speed_is_stiffness_and_usual_rate() -> None:
     """1 + a log(v/v_1) = (1 - a log(v_1/v_0)) (1 + b log(v/v_0)): the very same way down while v > v_1."""
     rate, slow = TABLE["soil-rate-hardening"], 0.3
     factor = 1.0 - 0.2 * math.log10(slow / 0.01)

@@ -13,7 +13,7 @@ def driven(vehicle: str) -> Scenario:
     return load("kerb_trip").replaced({"vehicle": f"vehicles/{vehicle}.yaml"})
 
 
-def test_wheels_of_no_stated_inertia_have_that_of_their_tyres_size() -> None:
+def test_wheels_without_inertia_take_that_of_their_tyre_size() -> None:
     found = {e.path: e for e in driven("large_tractor").estimates}
     front, rear = 500.0 * 0.7 * 0.45, 500.0 * 0.95 * 0.58
     assert {path: e.value for path, e in found.items()} == pytest.approx(
@@ -36,7 +36,7 @@ def test_the_estimate_is_near_what_the_utility_tractor_states() -> None:
     assert [e.value for e in bare.estimates] == pytest.approx([6.3, 45.0], rel=0.05)  # rounded sizes
 
 
-def test_only_what_turns_by_itself_and_states_nothing_is_estimated() -> None:
+def test_only_free_wheels_without_inertia_are_estimated() -> None:
     assert load("side_overturn").replaced({"vehicle": "vehicles/large_tractor.yaml"}).estimates == ()
     assert driven("light_vehicle").estimates == ()
     one = driven("large_tractor").replaced({"vehicle.wheels.rear_left.inertia": 120.0})

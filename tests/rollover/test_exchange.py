@@ -40,7 +40,7 @@ def test_what_is_exchanged_is_what_is_replaced(name: str, changes: Mapping[str, 
 @pytest.mark.parametrize(
     "order", [*itertools.permutations(["effects.soil-layer", "effects.soil-layer.depth", "gravity"])]
 )
-def test_a_part_and_a_value_in_it_are_exchanged_whatever_comes_first(order: tuple[str, ...]) -> None:
+def test_a_part_and_its_value_are_exchanged_in_any_order(order: tuple[str, ...]) -> None:
     kind: Any = EFFECTS["soil-layer"]
     layer = kind(stiffness_ratio=3.0)
     values = {"effects.soil-layer": layer, "effects.soil-layer.depth": 0.05, "gravity": 1.6}
@@ -105,7 +105,7 @@ def test_a_part_is_told_from_another_by_what_its_values_are() -> None:
         assert type(exchanged(load(DROP), {"effects.mass.added": value}).effects["mass"].added) is type(value)
 
 
-def test_a_value_that_cannot_be_looked_up_is_exchanged_all_the_same() -> None:
+def test_an_unhashable_value_is_exchanged_all_the_same() -> None:
     class Loose(float):
         __hash__ = None  # type: ignore[assignment]
 

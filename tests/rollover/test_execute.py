@@ -57,7 +57,7 @@ def test_what_goes_wrong_costs_one_case() -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="platform: no limit of the address space")
-def test_memory_beyond_the_limit_is_a_failure_and_the_child_goes_on() -> None:
+def test_memory_beyond_the_limit_fails_but_the_child_goes_on() -> None:
     found = {o.index: o for o in map_cases(odd, [2, "eat", 3], workers=1, memory_limit=1e9)}
     assert found[1].failure is not None
     assert (found[1].failure.kind, found[1].failure.sentence) == ("memory-limit", "needed more memory than it may have")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import os
 import subprocess
 import sys
 import warnings
@@ -73,14 +74,14 @@ def test_an_anchor_used_again_is_no_warning(tmp_path: Path) -> None:
         assert tree.read(tmp_path / "a.yaml").plain == {"a": 1, "b": 2, "c": 2}
 
 
-def alone(*words: object, cwd: Path, **env: str) -> subprocess.CompletedProcess[str]:
-    import os
+def run(line: list[str], folder: Path, **env: str) -> subprocess.CompletedProcess[str]:
+    """A process of its own."""
+    own = {**os.environ, "PYTHONPATH": str(ROOT), **env}
+    return subprocess.run(line, cwd=folder, env=own, capture_output=True, text=True, timeout=300, check=False)
 
-    line = [sys.executable, "-m", "tests.rollover.command", *map(str, words)]
-    paths = {"PYTHONPATH": str(ROOT), **env}
-    return subprocess.run(
-        line, cwd=cwd, env={**os.environ, **paths}, capture_output=True, text=True, timeout=300, check=False
-    )
+
+def alone(*words: object, cwd: Path, **env: str) -> subprocess.CompletedProcess[str]:
+    return run([sys.executable, "-m", "tests.rollover.command", *map(str, words)], cwd, **env)
 
 
 def test_a_readers_child_writes_nothing_beside(tmp_path: Path) -> None:
@@ -92,10 +93,13 @@ def test_a_readers_child_writes_nothing_beside(tmp_path: Path) -> None:
             variable = file.createVariable(name, kind, ("time",))
             variable[:] = values
             variable.units = "s" if name == "time" else "N"
-        variable.valid_max = 1e300  # beyond a float of four bytes, of which numpy warns
+        variable.valid_max = b"1e300"  # beyond a float of four bytes, of which numpy warns
     (tmp_path / "p.yaml").write_text(
         "format: rollover-profile/1\nchannels: {time: {channel: time}, F: {channel: ground/force_normal}}\n"
     )
+    script = "from rollover.recording.importers import read_recording as r; print(r('a.nc', profile='p.yaml').time[-1])"
+    done = run([sys.executable, "-c", script], tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "3.0\n", "")
     done = alone("import", "a.nc", "--profile", "p.yaml", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
 

@@ -75,7 +75,7 @@ def test_a_name_keeps_all_but_its_ending(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("command", ["import", "compare", "calibrate", "diagnose", "identify"])
-def test_two_recordings_of_one_name_are_refused_before_anything_is_written(tmp_path: Path, command: str) -> None:
+def test_two_recordings_of_one_name_are_refused_unwritten(tmp_path: Path, command: str) -> None:
     profile = bench(tmp_path, ["a.csv", "a.lvm", "b.csv"])
     words: dict[str, list[Any]] = {
         "compare": ["drop_test"],

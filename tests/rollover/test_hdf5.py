@@ -104,7 +104,7 @@ def test_what_was_never_written_is_a_gap(tmp_path: Path) -> None:
     assert "F: 3 of 6 values are gaps: 3 fill value" in found.notes
 
 
-def test_a_scale_of_no_convention_is_refused_unless_the_profile_states_it(tmp_path: Path) -> None:
+def test_an_unknown_scale_is_refused_unless_the_profile_has_it(tmp_path: Path) -> None:
     raw = np.arange(6, dtype="i2")
     with pytest.raises(InputError, match=r"channels.F: whole numbers beside gain 0.25, which no convention defines"):
         force(tmp_path / "a.h5", raw, gain=0.25)
@@ -260,7 +260,7 @@ def test_matlab_7_3(tmp_path: Path) -> None:
         assert reason in said
 
 
-def test_a_square_matrix_of_matlab_7_3_has_its_columns_along_the_last_axis(tmp_path: Path) -> None:
+def test_a_square_matlab_7_3_matrix_has_columns_last(tmp_path: Path) -> None:
     there = np.array([[0.0, 5.0], [1.0, 6.0]])  # two samples of time and force, as MATLAB shows them
     path = write(tmp_path / "a.h5", {"data": there.T, "other": there}, data={"MATLAB_class": np.bytes_("double")})
     names = {"data[0]": "time, unit: s", "data[1]": f"{FORCE}, unit: N", "other[1]": f"{SINKAGE}, unit: m"}
@@ -306,6 +306,6 @@ def test_all_that_a_file_holds_is_counted(tmp_path: Path) -> None:
         named(tmp_path / "b.h5", {"t": "time, unit: s", "gaps": f"{FORCE}, unit: N"})
 
 
-def test_the_profiles_column_of_time_comes_before_a_step_in_the_attributes(tmp_path: Path) -> None:
+def test_a_profiles_time_comes_before_an_attributes_step(tmp_path: Path) -> None:
     assert force(tmp_path / "a.h5", TIME, dt=0.09).time == pytest.approx(TIME)
     assert named(tmp_path / "a.h5", {"F": FORCE}).time == pytest.approx(0.09 * np.arange(6))

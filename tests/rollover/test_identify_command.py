@@ -77,7 +77,7 @@ def test_json_has_curves_intervals_and_covariance(tmp_path: Path) -> None:
     assert answer["drops"][2]["rest_stiffness"] == pytest.approx(3965, rel=0.01)
 
 
-def test_what_slow_drops_leave_open_is_said_and_kept_only_on_demand(tmp_path: Path) -> None:
+def test_what_slow_drops_leave_open_is_kept_on_demand(tmp_path: Path) -> None:
     names = files(tmp_path, noise=0.007, speeds=(1.0, 1.5, 2.0, 2.5))
     said = call(*names, "--out", str(tmp_path / "a")).output
     assert "speed_exponent: not determined by these drops" in said

@@ -170,7 +170,7 @@ def test_a_missing_library_names_its_extra(
 # ---- ISO-MME
 
 
-def test_turning_the_axes_twice_gives_them_back_and_keeps_them_right_handed() -> None:
+def test_turning_axes_twice_is_identity_and_right_handed() -> None:
     assert np.array_equal(J211_TO_ISO8855 @ J211_TO_ISO8855, np.eye(3))
     assert np.linalg.det(J211_TO_ISO8855) == 1.0
     assert pytest.approx([0.0, 0.0, -1.0]) == J211_TO_ISO8855 @ [0.0, 0.0, 1.0]  # down is minus up

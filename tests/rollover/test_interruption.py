@@ -21,7 +21,7 @@ class StoppedError(Exception):
 
 @pytest.mark.parametrize("callback", ["generalised_forces", "stiffness", "added_mass"])
 @pytest.mark.parametrize("number", interrupts.SIGNALS)
-def test_a_signal_within_a_callback_ends_the_run_and_is_no_failure(
+def test_a_signal_in_a_callback_ends_the_run_without_failure(
     callback: str, number: signal.Signals, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     called, inner = [0], getattr(model, callback)

@@ -49,7 +49,7 @@ def test_a_second_start_is_told_of_the_first(name: str, tmp_path: Path) -> None:
 
 
 @posix
-def test_the_lock_dies_with_its_process_and_what_it_left_is_swept(tmp_path: Path) -> None:
+def test_a_lock_ends_with_its_process_and_leftovers_go(tmp_path: Path) -> None:
     target = tmp_path / "out" / "a"
     script = f"""
 import os, signal, sys
@@ -104,7 +104,7 @@ def test_a_table_and_its_sidecar_go_together(killed_at: int, tmp_path: Path, mon
 
 
 @posix
-def test_killed_at_random_moments_nothing_is_lost_and_nothing_left(tmp_path: Path) -> None:
+def test_kills_at_random_moments_lose_and_leave_nothing(tmp_path: Path) -> None:
     from tests.benchmarks.kills import kill_runs
 
     assert kill_runs(tmp_path, 3, seed=3) == []

@@ -14,7 +14,7 @@ def peak(channel: str, raw: float = 1e3, change: float | None = 0.001) -> PeakLo
     )  # fmt: skip
 
 
-def test_the_device_comes_before_the_rops_and_the_rops_before_the_ground() -> None:
+def test_loads_are_of_device_then_rops_then_ground() -> None:
     peaks = [peak("wheel/front_left/force_normal"), peak("ground/force_normal"), peak("rops/force")]
     assert leading(peaks) is peaks[2]
     assert leading([*peaks, device := peak("device/force")]) is device

@@ -204,7 +204,7 @@ def test_refused(tmp_path: Path, old: str, new: str, said: str) -> None:
     assert len(caught.value.faults) == 1
 
 
-def test_a_channel_that_the_file_has_not_is_refused_with_those_it_has(tmp_path: Path) -> None:
+def test_a_missing_channel_is_refused_with_those_there(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"channels.G: no such column in a.lvm, got 'G'; the file holds: X_Value"):
         read(tmp_path, even(), f"channels:\n  G: {{channel: {FORCE}, unit: N}}\n")
     with pytest.raises(InputError, match=r"channels.Comment: not a column of numbers over time: empty"):

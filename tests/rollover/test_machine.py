@@ -6,6 +6,7 @@ import errno
 import os
 import subprocess
 import sys
+import tempfile
 from concurrent.futures import BrokenExecutor
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from tests.rollover.machines import (
     MACHINE,
     NAMES,
     WRONG,
+    as_it_is,
     commands,
     once,
     posix,
@@ -29,7 +31,19 @@ from tests.rollover.machines import (
 from viz.pages.web_page import Viewer
 
 QUICK = ("import", "import parquet", "import mme", "synthesize", "view", "new")
-PROGRESS = ("ompil", "cases", "simulating", "sensors", "fitting", "runs", "headings", "Sealed", "explain", "left out")
+PROGRESS = (
+    "ompil",
+    "cases",
+    "simulating",
+    "runs",
+    "headings",
+    "Sealed",
+    "sensors",
+    "looking at",
+    "fits of",
+    "fitted",
+    "depends",
+)
 WORK = (
     "rollover.diagnosis.sensors_first.diagnosed",
     "rollover.diagnosis.overlay.series",
@@ -50,6 +64,8 @@ def test_a_disk_that_is_full_from_any_write_on_is_one_line(
     once(monkeypatch, *WORK)
     if name == "view":  # which asks the viewer for its parts
         monkeypatch.setattr("viz.pages.web_page.installed", lambda: Viewer(script="", program=b""))
+    if name == "diagnose":
+        as_it_is(tmp_path)
     disk = Disk(out, monkeypatch)
     whole = 0
     # a run takes a second: each write of the quick commands, some of a run's and a study's
@@ -74,6 +90,23 @@ def test_a_disk_that_is_full_from_any_write_on_is_one_line(
         disk.places.clear()
     assert whole > 3, "it was never refused"
     assert result.exit_code == 0, result.output
+
+
+@pytest.mark.parametrize("k", [1, 4, 6, 9])
+def test_a_full_disk_of_temporary_files_is_one_line(k: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "tmp").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "tmp"))
+    words, target = commands(tmp_path)["prove"]
+    disk = Disk(tmp_path / "tmp", monkeypatch)
+    disk.full(k)
+    result = rollover(*words)
+    disk.full(10**9)
+    assert result.exit_code in (WRONG, MACHINE), f"{result.output} {result.exception!r}"
+    *before, last = result.stderr.splitlines()
+    assert "o space left on device" in last
+    assert all("Sealed" in line or "cases" in line for line in before), before
+    assert not target.exists()
+    assert list((tmp_path / "tmp").iterdir()) == []
 
 
 @posix

@@ -116,7 +116,7 @@ def test_what_is_mistyped_gets_its_cure_and_nothing_is_written(here: Path, words
     assert sorted(here.rglob("*")) == before
 
 
-def test_a_path_that_leads_nowhere_is_put_right_where_it_goes_wrong(here: Path) -> None:
+def test_a_wrong_path_is_corrected_where_it_goes_wrong(here: Path) -> None:
     wanted = here / "recordings" / "drop3.csv"
     assert absent(here / "recording" / "drop3.csv") == f"no such file; did you mean {str(wanted)!r}?"
     assert absent(here / "recordings" / "zzz.txt") == "no such file"

@@ -98,7 +98,7 @@ def test_serial_stamps_of_whole_numbers_keep_their_nanoseconds(tmp_path: Path) -
     assert found.clock.zero == "unknown"
 
 
-def test_columns_of_the_only_matrix_go_by_number_as_in_a_file_without_names(tmp_path: Path) -> None:
+def test_columns_of_a_lone_matrix_go_by_number(tmp_path: Path) -> None:
     # the matrix bears the name of the test: one profile serves all of them
     for name in ("SR450251", "SR450252"):
         table = np.column_stack([TIME, 10.0 * TIME, -TIME])

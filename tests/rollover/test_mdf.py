@@ -109,7 +109,7 @@ def test_formulas_that_cannot_be_computed_are_refused(formula: str) -> None:
         computed(formula, np.ones(3))
 
 
-def test_a_caret_is_a_power_of_real_numbers_and_refused_of_whole_ones() -> None:
+def test_a_caret_is_a_power_of_reals_and_refused_of_integers() -> None:
     assert computed("X1^2", np.array([0.5, 3.0])) == pytest.approx([0.25, 9.0])
     with pytest.raises(ValueError, match=r"a power or exclusive or; pow\(\) is clear"):
         computed("X1^2", np.array([1, 3]))
@@ -199,7 +199,7 @@ def test_all_that_a_file_holds_is_counted(tmp_path: Path) -> None:
     assert left_out(named(tmp_path / "again.mf4", {"F": FORCE})) == (2, 4)
 
 
-def test_a_channel_that_the_profile_calls_time_holds_for_its_group(tmp_path: Path) -> None:
+def test_a_profiles_time_channel_holds_for_its_group(tmp_path: Path) -> None:
     gps = signal("gps", 1.7e9 + 2.0 * TIME, unit="s")
     path = write(tmp_path / "a.mf4", ("", [gps, signal("F")]), ("", [signal("z", unit="m")]))
     found = named(path, {"gps": "time", "F": FORCE})

@@ -34,7 +34,7 @@ def free(*joints: Joint) -> tuple[FreeMotion, ...]:
     return free_motions({"rops": FRAME}, joints)
 
 
-def test_one_mount_without_torsional_stiffness_leaves_all_three_turns_about_itself() -> None:
+def test_one_mount_without_torsion_leaves_three_turns() -> None:
     found = free(mount("only", (0.2, 0.1, 1.0)))
     assert [m.axis for m in found] == [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
     assert all(m.turns and m.point == (0.2, 0.1, 1.0) and m.stiffness < 1e-6 for m in found)
@@ -59,13 +59,13 @@ def test_two_mounts_leave_the_turn_about_the_line_through_them(
     assert {j.connector.name for j in found.joints} == {"a", "b"}
 
 
-def test_a_third_mount_off_their_line_holds_without_torsional_stiffness() -> None:
+def test_a_third_mount_off_the_line_holds_without_torsion() -> None:
     two = mount("left", (0.0, 0.4, 1.0)), mount("right", (0.0, -0.4, 1.0))
     assert len(free(*two, mount("middle", (0.0, 0.0, 1.0)))) == 1
     assert free(*two, mount("front", (0.3, 0.0, 1.0))) == ()
 
 
-def test_a_turn_counts_as_free_until_its_stiffness_outdoes_the_frame_s_weight() -> None:
+def test_a_turn_is_free_until_stiffness_outdoes_weight() -> None:
     two = (0.0, 0.4, 1.0), (0.0, -0.4, 1.0)
     (found,) = free(*(mount(f"m{y}", at, turn=1.0) for y, at in enumerate(two)))
     # 80 kg at 0.5 m would topple below m g h; the bound is its radius of gyration about the mounts instead of h
@@ -84,7 +84,7 @@ def refused(changes: Mapping[str, Any], file: str = "two_post_folding_2t") -> st
     return f"{fault.path}: {fault.message}"
 
 
-def test_hinges_without_torsional_stiffness_leave_the_upper_part_alone_its_turn() -> None:
+def test_hinges_without_torsion_leave_the_upper_part_its_turn() -> None:
     told = refused({"upper.hinges.*.rotational_stiffness": [6e5, 0.0, 4e5]})
     assert told.startswith("upper.hinges: rops_upper turns freely about y through [-0.08, 0, 1.45] m, got ")
     assert "got rotational_stiffness 0 N m/rad about y at left and right; more than" in told

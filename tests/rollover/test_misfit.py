@@ -91,7 +91,7 @@ def test_with_the_clock_right_setting_it_gains_nothing(of_noise: Misfit) -> None
     assert of_noise.clock.gain < 0.01
 
 
-def test_a_filter_already_applied_goes_over_the_simulation_and_not_twice_over_the_recording() -> None:
+def test_an_applied_filter_goes_over_the_simulation_alone() -> None:
     base = run()
     smooth = filtered(base.recording[FORCE], 2.5e-4, 60)
     made = Recording(title="CFC 60", time=base.recording.time, channels={FORCE: smooth}, cfc={FORCE: 60})

@@ -71,7 +71,7 @@ def import_(*words: str | Path) -> tuple[int, str]:
 # ---- one column is one channel
 
 
-def test_two_objects_are_refused_by_both_codes_and_the_profile_chooses(tmp_path: Path) -> None:
+def test_two_objects_are_refused_and_the_profile_chooses(tmp_path: Path) -> None:
     shutil.copytree(CASES / "mme_objects", tmp_path / "t")
     with pytest.raises(
         InputError, match=rf"two columns mean {Z}, got '{UP}' and '21VEHCCG0000ACZA'; a profile chooses"
@@ -175,7 +175,7 @@ def test_a_channel_in_no_unit_is_left_out_and_the_rest_is_read(tmp_path: Path) -
     assert read(path, f"  {UP}: {{channel: {Z}, unit: g}}\n")[Z] == pytest.approx([-9.80665, -2 * 9.80665])
 
 
-def test_a_test_of_nothing_but_such_channels_is_refused_with_the_reason(tmp_path: Path) -> None:
+def test_a_test_of_such_channels_alone_is_refused(tmp_path: Path) -> None:
     path = made(tmp_path, channel(UP, [1, 2], unit="V"))
     with pytest.raises(InputError, match=rf"no column is a channel, got {UP} \(unit 'V' does not fit {Z}\); --profile"):
         read(path)
@@ -199,7 +199,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("name", BROKEN)
-def test_a_broken_channel_that_is_not_needed_is_left_out_with_its_reason(tmp_path: Path, name: str) -> None:
+def test_an_unneeded_broken_channel_is_left_out_with_reason(tmp_path: Path, name: str) -> None:
     text, said, key = BROKEN[name]
     path = made(tmp_path, channel(UP, [1, 2]), text)
     found = read(path)
@@ -254,7 +254,7 @@ def test_some_of_several_tests(tmp_path: Path) -> None:
     assert not (tmp_path / "no").exists()
 
 
-def test_what_reads_one_recording_refuses_several_with_their_names() -> None:
+def test_a_single_reader_refuses_several_with_their_names() -> None:
     with pytest.raises(InputError, match=r"2 tests, got mme_ang, mme_exp; rollover import two_tests.zip makes a rec"):
         read_recording(CASES / "two_tests.zip")
     with pytest.raises(InputError, match=r"no such test, got 'mme_exo'; did you mean 'mme_exp'\?"):
@@ -271,7 +271,7 @@ def both(tmp_path: Path) -> Path:
     return place
 
 
-def test_a_tar_of_two_tests_and_what_a_file_manager_puts_beside_them(tmp_path: Path) -> None:
+def test_a_tar_of_two_tests_beside_a_file_managers_entries(tmp_path: Path) -> None:
     place = both(tmp_path)
     for folder in ("A1", "B2"):
         (place / folder / f"._{folder}.mme").write_bytes(b"\0\5\x16\7")

@@ -95,7 +95,7 @@ def test_stamps_of_any_clock_are_one_recording() -> None:
 
 
 @pytest.mark.parametrize("rate", [1000.0, 3000.0, 2048.0, 44100.0])
-def test_stamps_that_are_a_grid_within_their_rounding_are_that_grid(rate: float) -> None:
+def test_stamps_on_a_grid_within_rounding_are_that_grid(rate: float) -> None:
     count = np.delete(np.arange(700), slice(100, 130))  # with a gap
     for offset in (0.0, 0.3, 1e6, 1.7e9):
         np.testing.assert_allclose(from_first(count / rate + offset), count / rate, rtol=1e-15, atol=0.0)
@@ -113,7 +113,7 @@ def test_a_clock_that_is_said_to_be_right_and_is_stays_as_it_is() -> None:
 
 
 @pytest.mark.parametrize("late", [0.02, 0.3, -0.02, -1.0])
-def test_a_clock_that_is_clearly_off_is_set_though_nobody_doubts_it(late: float) -> None:
+def test_a_clearly_wrong_clock_is_set_though_stated_known(late: float) -> None:
     made = drop()
     zero = timed("d", on(made, late, Clock()), under(made)).zero
     assert zero is not None
@@ -133,7 +133,7 @@ def test_one_late_channel_is_no_late_clock() -> None:
     assert timed("d", replace(made, channels={**made.channels, **both}), under(made)).zero is None
 
 
-def test_what_hangs_before_it_falls_is_not_in_contact_when_it_is_let_go() -> None:
+def test_a_hanging_weights_release_is_no_contact() -> None:
     made = drop(channels=(ACCELERATION,))
     held = np.arange(-200, 0) * 1e-3 + made.time[0]
     values = np.concatenate([np.random.default_rng(5).normal(0.0, made.noise[ACCELERATION], 200), made[ACCELERATION]])
@@ -281,7 +281,7 @@ def test_identify_tells_the_clock(tmp_path: Path) -> None:
     assert answer["multiple_correlation"] > 0.999
 
 
-def test_check_gives_times_from_the_first_stamp_of_a_clock_far_away(tmp_path: Path) -> None:
+def test_check_counts_a_far_clock_from_its_first_stamp(tmp_path: Path) -> None:
     name = files(tmp_path / "r", 1.7e9, Clock())[0]
     plain = rollover("check", name).stdout
     assert "480 samples, 0 to 0.479 s from its first stamp at 1700000000" in plain

@@ -54,7 +54,7 @@ def test_a_number_beyond_all_bounds_is_refused(name: str, option: str, value: st
 
 @pytest.mark.parametrize(("rate", "late"), [(1e6, 1e10), (1e6, -1e10), (1e3, 1e13)])
 def test_stamps_that_a_double_cannot_tell_apart(rate: float, late: float) -> None:
-    with pytest.raises(InputError, match="late: stamps cannot be told apart"):
+    with pytest.raises(InputError, match="late: stamps cannot be distinguished"):
         check_clock(rate, late)
 
 

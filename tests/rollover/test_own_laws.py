@@ -26,9 +26,7 @@ def peat(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_study_takes_a_law_of_ones_own_to_its_workers_and_runs_again_when_it_changes(
-    peat: Path, tmp_path: Path
-) -> None:
+def test_a_study_takes_own_laws_to_workers_and_sees_changes(peat: Path, tmp_path: Path) -> None:
     """F = k z (1 + c v) at the same point: twice the stiffness of the file's own formula, other forces."""
     (study := tmp_path / "study.yaml").write_text(STUDY, encoding="utf-8")
 
@@ -135,7 +133,7 @@ def test_a_wrong_file_of_effects_is_one_line_too(old: str, new: str, said: str, 
     assert said in done.stderr
 
 
-def test_a_file_of_laws_that_is_not_there_or_holds_none_is_one_line(tmp_path: Path) -> None:
+def test_a_missing_or_empty_file_of_laws_is_one_line(tmp_path: Path) -> None:
     (empty := tmp_path / "empty.py").write_text("x = 1\n")
     for path, said in ((tmp_path / "no.py", "no such file of laws"), (empty, "no ground law, got no class")):
         done = outside("-m", "tests.rollover.command", "--laws", str(path), "list", "laws")

@@ -215,13 +215,13 @@ def digitised(seed: int) -> np.ndarray:
     return np.round((TRUE[A] + 0.05 * slow / slow.std()) / 0.02) * 0.02
 
 
-def test_levels_of_a_slow_digitised_signal_are_no_repeated_samples() -> None:
+def test_levels_of_a_quantised_signal_are_no_repeats() -> None:
     clean = drop(0)
     stuck = [seed for seed in range(20) if prechecks(replace(clean, channels={A: digitised(seed)}))]
     assert len(stuck) < 2
 
 
-def test_where_a_slow_digitised_signal_turns_is_no_end_of_a_range() -> None:
+def test_a_quantised_turning_point_is_no_rail() -> None:
     """Flanks of 0.6 digits a sample, a parabola of 0.02 digits a sample squared between them: 20 samples at the top."""
     away = np.abs(np.arange(N) - 0.5 * N)
     turn = np.round(np.where(away < 30.0, 1009.3 - 0.01 * away**2, 1018.3 - 0.6 * away))

@@ -33,7 +33,7 @@ def test_help_imports_nothing_heavy() -> None:
     assert done.stdout.splitlines()[-1] == "[]", done.stderr
 
 
-def test_a_diagnosis_reads_its_recordings_without_what_it_does_not_need(tmp_path: Path) -> None:
+def test_a_diagnosis_imports_nothing_it_does_not_need(tmp_path: Path) -> None:
     """pyarrow's own way to NumPy imports pandas: a second for each process."""
     recording = run_of(load("drop_test")).recording
     runs.write_parquet(recording, tmp_path / "run.parquet")

@@ -84,7 +84,7 @@ def test_what_is_no_drop_of_a_cone_is_refused(tmp_path: Path, name: str, rows: n
     assert says in refused(lambda: read("cone-drops", tmp_path))
 
 
-def test_the_published_cones_are_those_that_an_independent_reading_gives() -> None:
+def test_published_cones_match_an_independent_reading() -> None:
     folder = published("cones")
     found = read("cone-drops", folder)
     count = {series: sum(name.startswith(series) for name in found) for series in ("SR45", "SS25", "SF60")}
@@ -116,7 +116,7 @@ def write_balls(folder: Path, **more: object) -> None:
     )
 
 
-def test_balls_come_from_a_workbook_that_is_named_as_an_older_one(tmp_path: Path) -> None:
+def test_balls_come_from_a_workbook_with_an_older_ending(tmp_path: Path) -> None:
     pytest.importorskip("openpyxl")
     write_balls(tmp_path)
     found = read("falling-balls", tmp_path)
@@ -155,7 +155,7 @@ def test_what_is_no_workbook_of_balls_is_refused(tmp_path: Path) -> None:
     assert "no falling balls in this folder" in refused(lambda: read("falling-balls", tmp_path))
 
 
-def test_the_published_balls_are_eleven_and_stop_before_they_land() -> None:
+def test_the_eleven_published_balls_stop_before_landing() -> None:
     pytest.importorskip("openpyxl")
     found = read("falling-balls", published("balls"))
     balls = {name.rpartition("-")[0] for name in found}
@@ -182,7 +182,7 @@ def write_drop(folder: Path, offset: float = 0.0, **books: object) -> None:
     files.write_book(folder / "BlueDrop_Calibration_Factors.xlsx", {k: v for k, v in sheets.items() if v is not None})
 
 
-def test_a_log_of_the_penetrometer_is_read_with_the_factors_of_its_own_instrument(tmp_path: Path) -> None:
+def test_a_penetrometer_log_takes_its_instruments_factors(tmp_path: Path) -> None:
     pytest.importorskip("openpyxl")
     write_drop(tmp_path)
     drop = read("soil-penetrometer", tmp_path)["bLog0A01"]
@@ -214,7 +214,7 @@ def test_logs_without_factors_and_other_bytes_are_refused(tmp_path: Path) -> Non
     assert "row 11 is out of order" in refused(lambda: read("soil-penetrometer", tmp_path))
 
 
-def test_the_published_drops_of_the_penetrometer_are_found_in_their_minute() -> None:
+def test_published_penetrometer_drops_are_found_in_time() -> None:
     pytest.importorskip("openpyxl")
     folder = published("penetrometer")
     found = read("soil-penetrometer", folder)
@@ -246,7 +246,7 @@ def test_a_water_entry_has_its_speed_from_its_fall() -> None:
     assert np.diff(cone.time) == pytest.approx(5e-5, rel=0.5)
 
 
-def test_any_ide_file_is_read_by_a_profile_and_a_cut_one_is_refused(tmp_path: Path) -> None:
+def test_an_ide_file_is_read_by_profile_and_a_cut_one_refused(tmp_path: Path) -> None:
     idelib = pytest.importorskip("idelib")
     source = published("impact_ide") / "2mps_sphere_1.ide"
     profile = tmp_path / "profile.yaml"
@@ -273,7 +273,7 @@ def test_any_ide_file_is_read_by_a_profile_and_a_cut_one_is_refused(tmp_path: Pa
 # the commands
 
 
-def test_the_folder_is_imported_by_the_command_and_taken_by_its_scenario(tmp_path: Path) -> None:
+def test_the_imported_folder_is_taken_by_its_scenario(tmp_path: Path) -> None:
     files.write_old_pt(tmp_path / "4.pt", files.as_tensor(files.cube_rows()))
     write_cone(tmp_path / "SF60150.mat", SF601502=cone_drop(peak=20.0))
     for name, scenario in (("cube-tosses", "cube_toss"), ("cone-drops", "cone_drop")):
@@ -285,7 +285,7 @@ def test_the_folder_is_imported_by_the_command_and_taken_by_its_scenario(tmp_pat
         assert checked.exit_code == 0, checked.output
 
 
-def test_an_empty_folder_is_refused_with_the_files_that_are_needed(tmp_path: Path) -> None:
+def test_an_empty_folder_is_refused_with_needed_files(tmp_path: Path) -> None:
     for name in COLLECTIONS:
         asked = CliRunner().invoke(app, ["import", str(tmp_path), "--as", name, "--out", str(tmp_path / "out")])
         assert asked.exit_code == 2, name
@@ -293,7 +293,7 @@ def test_an_empty_folder_is_refused_with_the_files_that_are_needed(tmp_path: Pat
     assert not (tmp_path / "out").exists()
 
 
-def test_an_import_keeps_the_channels_that_are_asked_for_and_tells_which_it_left_out(tmp_path: Path) -> None:
+def test_an_import_keeps_asked_channels_and_names_the_rest(tmp_path: Path) -> None:
     files.write_old_pt(tmp_path / "4.pt", files.as_tensor(files.cube_rows()))
 
     def imported(name: str, *options: str) -> Recording:

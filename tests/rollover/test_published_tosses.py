@@ -74,7 +74,7 @@ def test_a_call_of_the_right_name_with_other_things_is_refused(tmp_path: Path) -
     ],
 )
 @pytest.mark.parametrize("write", [files.write_new_pt, files.write_old_pt])
-def test_a_tensor_that_claims_more_than_the_file_holds_is_refused(
+def test_a_tensor_claiming_more_than_its_file_is_refused(
     tmp_path: Path, pickled: bytes, says: str, write: Callable[..., None]
 ) -> None:
     if write is files.write_old_pt:
@@ -99,7 +99,7 @@ def test_a_compressed_part_and_a_cut_file_are_refused(tmp_path: Path) -> None:
 # cube
 
 
-def test_a_published_toss_comes_in_metres_with_the_start_of_its_flight(tmp_path: Path) -> None:
+def test_a_published_toss_is_in_metres_from_its_flight(tmp_path: Path) -> None:
     rows = files.cube_rows()
     files.write_old_pt(tmp_path / "7.pt", files.as_tensor(rows))
     files.write_new_pt(tmp_path / "12.pt", files.as_tensor(rows)[0])
@@ -122,7 +122,7 @@ def test_a_published_toss_comes_in_metres_with_the_start_of_its_flight(tmp_path:
         assert any("cut off" in note for note in toss.notes)
 
 
-def test_a_quaternion_begins_as_a_simulation_does_and_does_not_jump(tmp_path: Path) -> None:
+def test_a_quaternion_begins_as_simulated_without_jumps(tmp_path: Path) -> None:
     rows = files.cube_rows()
     rows[:, 3:7] *= -1.0
     rows[5:9, 3:7] *= -1.0
@@ -146,7 +146,7 @@ def test_what_is_no_toss_of_the_cube_is_refused(tmp_path: Path, change: Callable
     assert says in refused(lambda: read("cube-tosses", tmp_path))
 
 
-def test_the_published_tosses_are_those_that_an_independent_reading_gives() -> None:
+def test_published_tosses_match_an_independent_reading() -> None:
     folder = published("cubes")
     found = read("cube-tosses", folder)
     assert list(found) == [f"toss00{k}" for k in range(10)]

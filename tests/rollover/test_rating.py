@@ -219,7 +219,7 @@ def test_the_verdict_is_that_of_the_worst_measure() -> None:
     assert judged(0.5, 5.0).grade == "poor"
 
 
-def test_a_rating_called_good_with_a_residual_of_many_times_the_noise_is_not_green() -> None:
+def test_a_good_rating_far_above_the_noise_is_not_green() -> None:
     t = np.arange(0.0, 0.2, 1e-4)
     measured = 1e4 * np.where(t < 0.1, np.sin(np.pi * t / 0.1), 0.0)
     found = rate(t, measured, np.roll(measured, 20), noise=9.0)  # 2 ms late

@@ -96,9 +96,7 @@ def test_nothing_is_lost_on_the_way(tmp_path: Path, ending: str) -> None:
         assert getattr(found, part) == getattr(made, part), part
 
 
-def test_writing_is_refused_over_what_is_there_and_leaves_nothing_half_done(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_writing_over_results_is_refused_and_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made = read_recording(written(tmp_path))
     with pytest.raises(InputError, match=r"d\.csv: exists; --force replaces it"):
         write_recording(made, tmp_path / "d.csv")

@@ -127,7 +127,7 @@ def test_a_perturbation_of_the_last_digits_passes(folder: Path) -> None:
         assert moved < 1e-6
 
 
-def test_the_shipped_overturn_passes_on_a_machine_that_rounds_otherwise() -> None:
+def test_the_shipped_overturn_passes_under_other_rounding() -> None:
     # 1e-12 of gravity is as good as another processor: each start falls otherwise, the mean stays
     scenario = load("side_overturn")
     known = baselines.read(baselines.path_of(regression.chosen(["side_overturn"]).files[0]))
@@ -193,7 +193,7 @@ def test_a_failed_scenario_costs_itself_and_stops_an_update(folder: Path) -> Non
     assert kept(folder) == before
 
 
-def test_an_update_names_what_changed_and_the_next_comparison_passes(folder: Path) -> None:
+def test_an_update_names_changes_and_the_next_run_passes(folder: Path) -> None:
     path = folder / "drop.yaml"
     path.write_text(path.read_text() + "initiation: {speed: 2.9}\n")
     done = regress(path, "--update", "--reason", "slower")
@@ -204,7 +204,7 @@ def test_an_update_names_what_changed_and_the_next_comparison_passes(folder: Pat
     assert regress(path).exit_code == 0
 
 
-def test_an_update_of_what_is_as_it_was_writes_nothing_and_says_so(folder: Path) -> None:
+def test_an_update_without_change_writes_nothing(folder: Path) -> None:
     before = kept(folder)
     done = regress(folder, "--update", "--reason", "no reason at all")
     assert done.exit_code == 0

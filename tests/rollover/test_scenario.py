@@ -287,7 +287,7 @@ def test_an_included_part_takes_overrides_and_a_file_replaces_it() -> None:
     assert load("swapped.yaml").ground.law == Ye2006(stiffness_scale=2.0)
 
 
-def test_files_are_looked_for_beside_the_including_file_and_then_among_the_shipped() -> None:
+def test_includes_are_found_beside_the_file_then_shipped() -> None:
     Path("mine").mkdir()
     Path("mine/soil.yaml").write_text("kind: ye-2006\nrecovery: 0.3\n")
     Path("mine/a.yaml").write_text(TEXT.replace("{kind: ye-2006}", "soil.yaml"))
@@ -299,7 +299,7 @@ def test_files_are_looked_for_beside_the_including_file_and_then_among_the_shipp
     assert load("mine/b.yaml").ground.law.recovery == 0.4
 
 
-def test_elements_of_a_list_are_overridden_by_name_as_set_addresses_them() -> None:
+def test_list_elements_are_overridden_by_name() -> None:
     shipped = load("side_overturn")
     Path("mine.yaml").write_text("base: utility_tractor\nwheels: {front_left: {inertia: 2.5, tyre: {friction: 0.1}}}\n")
     Path("a.yaml").write_text("base: side_overturn\nvehicle: mine.yaml\n")

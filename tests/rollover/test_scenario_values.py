@@ -101,7 +101,7 @@ def test_the_hash_does_not_depend_on_the_layout_of_files() -> None:
     assert len({content_hash(load(f"{name}.yaml")) for name in "abc"}) == 1
 
 
-def test_the_hash_takes_whole_numbers_and_minus_zero_from_python_as_the_numbers_they_are() -> None:
+def test_the_hash_takes_integers_and_minus_zero_as_floats() -> None:
     assert content_hash(Slope(angle_deg=5, direction_deg=-0.0)) == content_hash(Slope(angle_deg=5.0, direction_deg=0.0))
 
 
@@ -361,7 +361,7 @@ def test_a_change_reaches_into_what_another_one_brought() -> None:
     assert found.vehicle.name == "Compact tractor, two-post rear ROPS"
 
 
-def test_a_key_that_the_brought_file_lacks_may_be_set_and_is_checked() -> None:
+def test_a_key_missing_in_an_included_file_may_be_set() -> None:
     scenario = load("side_overturn")
     law = {"ground.law": "soils/natural_clay_soft.yaml"}
     assert scenario.replaced({**law, "ground.law.recovery": 0.02}).ground.law == Ye2006(

@@ -54,7 +54,7 @@ def test_only_a_striker_is_driven() -> None:
         replace(load("rops_drop"), excitation=Harmonic(eccentric_moment=0.1, frequency=50.0))
 
 
-def test_law_whose_recovery_follows_from_its_springs_is_replaced_like_any_other() -> None:
+def test_a_law_with_derived_recovery_is_replaced_alike() -> None:
     """What follows from other values is no key of a file: a scenario with such a law can be written and read again."""
     scenario = load("driven_pile")
     finer = scenario.replaced({"simulation.step": 5e-5})

@@ -60,7 +60,7 @@ def test_order_and_side_of_the_static_loads() -> None:
     assert by_name(code_4(Tractor(mass=3000.0, folding=True)), "second longitudinal load, front").value == 1050.0
 
 
-def test_pendulum_heights_meet_at_2000_kg_and_the_rear_formulae_at_0378() -> None:
+def test_pendulum_heights_meet_at_2000_kg() -> None:
     """25 + 0.2 M = 125 + 0.15 M = 425 mm, 25 + 0.07 M = 165 mm = 125 + 0.02 M at 2000 kg; I = 0.378 M L^2."""
     for just_below, at in ((1999.999, 2000.0),):
         assert side_height(just_below) == pytest.approx(side_height(at), abs=1e-3)
@@ -133,7 +133,7 @@ def test_iso_3471_worked_value_and_scope() -> None:
     assert excavator(10_000.0)["vertical force"] == pytest.approx(127_500.0)
 
 
-def test_every_requirement_says_where_it_stands_and_how_sure_it_is() -> None:
+def test_every_requirement_has_a_source_and_a_grade() -> None:
     tractor = Tractor(mass=3000.0, wheelbase=2.25, pitch_inertia=5430.0, width=1.9, rops_width=1.2, folding=True)
     rows = [r for standard in STANDARDS.values() for r in standard(tractor)]
     rows += [r for name in MACHINES for r in iso_3471_requirements(name, 12_000.0)]

@@ -206,9 +206,7 @@ def test_how_a_channel_was_measured_survives_too(tmp_path: Path) -> None:
     assert (again.clock, again.sensors, again.notes) == (recording.clock, recording.sensors, recording.notes)
 
 
-def test_ones_own_result_of_an_older_scenario_is_replaced_and_that_is_said(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_own_older_result_is_replaced_with_a_note(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("mine.yaml").write_text("base: drop_test.yaml\ntitle: Mine\nsimulation: {duration: 0.05}\n")
 
@@ -230,7 +228,7 @@ def test_ones_own_result_of_an_older_scenario_is_replaced_and_that_is_said(
     assert "holds another run, got 'Mine'" in refused.stderr
 
 
-def test_an_account_of_an_edited_scenario_is_ones_own_and_of_another_file_is_not(tmp_path: Path) -> None:
+def test_results_of_an_edited_scenario_are_ones_own(tmp_path: Path) -> None:
     folder = tmp_path / "out"
     said: list[str] = []
     about = {"scenario_hash": "a", "recordings": ["d"], "origin": results.origin(tmp_path / "x.yaml", folder)}

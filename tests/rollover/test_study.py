@@ -263,7 +263,7 @@ def test_a_damaged_file_is_run_again(tmp_path: Path) -> None:
     assert (tmp_path / "out" / case_store.TABLE).read_bytes() == before
 
 
-def test_a_point_that_is_no_scenario_is_a_row_and_failed_ones_are_retried(tmp_path: Path) -> None:
+def test_an_invalid_point_is_a_row_and_failures_are_retried(tmp_path: Path) -> None:
     (tmp_path / "points.csv").write_text("speed\n2.0\n-1.0\n3.0\n")
     path = tmp_path / "rows.yaml"
     path.write_text(

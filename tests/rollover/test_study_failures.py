@@ -71,7 +71,7 @@ def grid(tmp_path: Path) -> Any:
     return studies.load(tmp_path / "grid.yaml")
 
 
-def test_failures_at_one_end_of_an_axis_are_said_and_bound_the_probability(tmp_path: Path) -> None:
+def test_failures_at_an_axis_end_bound_the_probability(tmp_path: Path) -> None:
     study = studies.load(drops(tmp_path, ("count: 20", "count: 24")))
     conducted = done(study, lambda values: values["speed"] > 2.5)
     account, html = told(study, conducted)
@@ -91,7 +91,7 @@ def test_failures_at_one_end_of_an_axis_are_said_and_bound_the_probability(tmp_p
         assert f"{100.0 * share:.3g} %" in Parts(html).said
 
 
-def test_failures_at_both_ends_or_of_one_word_are_no_chance_and_scattered_ones_are() -> None:
+def test_clustered_failures_are_no_chance_scattered_ones_are() -> None:
     x = np.linspace(0.0, 1.0, 40)
     words = np.array(["clay", "sand"] * 20, dtype=object)
     ends = along_axes({"x": x}, np.abs(x - 0.5) > 0.4)
@@ -104,7 +104,7 @@ def test_failures_at_both_ends_or_of_one_word_are_no_chance_and_scattered_ones_a
     assert along_axes({"x": x}, np.zeros(40, dtype=bool)) == []
 
 
-def test_a_grid_has_a_map_and_units_but_no_quantiles_and_no_probability(tmp_path: Path) -> None:
+def test_a_grid_has_a_map_but_no_quantiles_or_probability(tmp_path: Path) -> None:
     study = grid(tmp_path)
     account, html = told(study, done(study, lambda values: values["slope"] > 55.0 and values["speed"] > 2.5))
     said = Parts(html).said + "\n".join(sentences(account))

@@ -38,7 +38,7 @@ def wave(**more: Any) -> dict[str, Any]:
     return {"wf_increment": 1e-3, "unit_string": "N", **more}
 
 
-def test_two_groups_of_the_same_time_are_refused_by_both_names_and_one_may_be_chosen(tmp_path: Path) -> None:
+def test_two_groups_of_one_time_are_refused_or_chosen(tmp_path: Path) -> None:
     path = Path(shutil.copy(CASES / "twogroups.tdms", tmp_path))
     with pytest.raises(InputError, match=r"got 'run1/ground/force_normal' and 'run2/ground/force_normal'; a profile"):
         read_recording(path)
@@ -46,7 +46,7 @@ def test_two_groups_of_the_same_time_are_refused_by_both_names_and_one_may_be_ch
     assert peak(named(path, {"run2/ground/force_normal": FORCE})) == pytest.approx(1799.06, abs=0.1)
 
 
-def test_groups_one_after_another_are_joined_also_by_the_name_that_they_share(tmp_path: Path) -> None:
+def test_successive_groups_are_joined_by_shared_name_too(tmp_path: Path) -> None:
     later = wave(wf_start_time=START + np.timedelta64(2, "s"))
     parts = [("b", "F", [5.0, 6.0], later), ("a", "F", [1.0, 2.0, 3.0], wave(wf_start_time=START))]
     found = named(write(tmp_path / "a.tdms", *parts), {"F": FORCE})
@@ -93,7 +93,7 @@ def test_scales_that_are_well_defined(tmp_path: Path) -> None:
     assert named(path, {"g/gone": FORCE})[FORCE] == pytest.approx(RAW)
 
 
-def test_a_scale_whose_numbers_are_missing_is_the_columns_fault_not_the_files(tmp_path: Path) -> None:
+def test_an_incomplete_scale_is_its_columns_fault(tmp_path: Path) -> None:
     path = write(tmp_path / "a.tdms", ("g", FORCE, RAW, scaled("Linear")), ("g", SINKAGE, [0.0, 1.0], wave()))
     with pytest.raises(
         InputError, match=r"column g/ground/force_normal: its scale cannot be applied: it lacks 'NI_Scale"

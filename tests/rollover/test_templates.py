@@ -50,7 +50,7 @@ def test_a_template_passes_its_check(kind: str, tmp_path: Path, monkeypatch: pyt
     assert f"{kind}, valid" in said
 
 
-def test_what_is_there_is_not_overwritten_and_nothing_is_written_beside_it(tmp_path: Path) -> None:
+def test_existing_files_are_kept_and_nothing_is_written(tmp_path: Path) -> None:
     (tmp_path / "rig.csv").write_text("mine\n")
     status, _, wrong = called("new", "recording", str(tmp_path / "rig"))
     assert status == 2
@@ -112,7 +112,7 @@ def test_the_annotated_objects_come_back_to_the_last_bit(tmp_path: Path) -> None
     assert document.load(tmp_path / "rops.yaml", Rops) == rops
 
 
-def test_a_study_and_a_profile_from_a_template_are_used_by_their_commands(tmp_path: Path) -> None:
+def test_template_study_and_profile_work_in_their_commands(tmp_path: Path) -> None:
     for kind in ("study", "profile"):
         assert called("new", kind, str(tmp_path / kind))[0] == 0
     status, said, wrong = called(
@@ -127,7 +127,7 @@ def test_a_study_and_a_profile_from_a_template_are_used_by_their_commands(tmp_pa
     assert force.max() == pytest.approx(3500.0)  # N of the 3.5 kN that a comma divides
 
 
-def test_a_law_and_an_effect_from_a_template_are_run_and_stated_by_their_hash(tmp_path: Path) -> None:
+def test_template_law_and_effect_run_and_state_their_hash(tmp_path: Path) -> None:
     assert called("new", "law", str(tmp_path / "peat"))[0] == 0
     assert called("new", "effect", str(tmp_path / "soil-mat"))[0] == 0
     law, effect = str(tmp_path / "peat.py"), str(tmp_path / "soil_mat.py")

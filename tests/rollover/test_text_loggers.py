@@ -56,7 +56,7 @@ def test_a_file_without_names_and_with_any_ending(tmp_path: Path, name: str, csv
     assert found.notes == (() if "names_row" in csv else said)
 
 
-def test_names_that_are_numbers_are_names_where_the_profile_has_them(tmp_path: Path) -> None:
+def test_numeric_names_are_names_where_the_profile_has_them(tmp_path: Path) -> None:
     # channels 0 and 7 of a logger: the first row is no sample
     channels = '  "0": {channel: time, unit: s}\n  "7": {channel: rops/force, unit: N}\n'
     assert read(tmp_path, "a.csv", "0,7\n1,5\n2,6\n", channels)[FORCE].tolist() == [5.0, 6.0]
@@ -212,7 +212,7 @@ def test_cells_that_the_profile_calls_gaps_are_gaps_and_counted(tmp_path: Path, 
     assert found.notes == ("F: 2 of 4 values are gaps",)
 
 
-def test_a_word_among_numbers_is_refused_with_the_line_that_makes_it_a_gap(tmp_path: Path) -> None:
+def test_a_word_among_numbers_is_refused_with_its_cure(tmp_path: Path) -> None:
     channels = "  t: {channel: time, unit: s}\n  F: {channel: rops/force, unit: N}\n"
     with pytest.raises(InputError, match=r"a.csv:3: column F: not a number, got 'OVER'; .*csv: \{gaps: \['OVER'\]\}"):
         read(tmp_path, "a.csv", "t,F\n0.0,1\n0.1,OVER\n0.2,3\n", channels)

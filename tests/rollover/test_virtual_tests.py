@@ -57,7 +57,7 @@ def rows_of(run: Run) -> dict[str, Criterion]:
     return {row.requirement.name: row for row in criteria(run)}
 
 
-def test_each_load_answers_to_the_requirement_of_the_vehicles_mass() -> None:
+def test_each_load_is_judged_by_the_vehicles_mass() -> None:
     """3000 kg: 4200 J from the rear, 60 kN, 5250 J from the side, 60 kN, 1050 J from the front, whatever was given."""
     rows = rows_of(made(load("static_rops_test"), *SEQUENCE))
     asked = {
@@ -95,7 +95,7 @@ def one_load(come_from: str) -> Scenario:
     return load("static_rops_test").replaced({"initiation.loads": [point]})
 
 
-def test_a_load_that_was_not_told_to_go_far_enough_has_no_verdict() -> None:
+def test_a_load_that_stops_too_early_has_no_verdict() -> None:
     """4000 J were asked for and reached where the code asks for 5250 J: nothing is known about the frame."""
     scenario = load("static_rops_test").replaced({"initiation.loads.side.energy": 4000.0})
     entry = pushed("side", "left", required_energy=5250.0, energy=4001.0, overload=NOT_DUE)
@@ -192,7 +192,7 @@ def test_structure_that_enters_the_zone_fails_the_test() -> None:
     assert row.margin < 0.0
 
 
-def test_a_blow_is_as_high_as_asked_and_springs_back_no_more_than_allowed() -> None:
+def test_a_blow_has_its_height_and_allowed_rebound() -> None:
     """3000 kg: 575 mm from the side; of 400 mm at most 160 +- 10 mm are left: 240 mm are elastic, of 250 allowed."""
     scenario = load("pendulum")
     n = made(scenario).recording.time.size

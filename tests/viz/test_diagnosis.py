@@ -62,7 +62,7 @@ def test_a_page_is_the_same_whoever_draws_its_figures() -> None:
     assert channels == 2 * [[FORCE], ["ground/sinkage"]]
 
 
-def test_what_no_fit_had_seen_is_shown_beside_how_well_it_is_followed() -> None:
+def test_held_out_data_are_shown_with_their_prediction() -> None:
     """Of several the one that is missed most; not where the mismatch is looked for, and not twice."""
     one, two = told()
     worse = replace(two, recording="three", tracks=(replace(two.tracks[0], before=0.9 * two.tracks[0].before),))

@@ -73,7 +73,7 @@ def test_every_channel_is_plotted_with_its_own_values_and_times(
         np.testing.assert_array_equal(plotted, values * s.factor)
 
 
-def test_a_peak_of_one_sample_is_there_and_is_drawn_as_high_as_it_is(overturn_rrd: Path) -> None:
+def test_a_peak_of_one_sample_is_drawn_in_full_height(overturn_rrd: Path) -> None:
     s = series("rops/force")
     time, plotted = flat(overturn_rrd, "/" + s.simulated)
     at = int(plotted.argmax())
@@ -95,7 +95,7 @@ def test_a_peak_of_one_sample_is_there_and_is_drawn_as_high_as_it_is(overturn_rr
         assert policy == [rr.components.AggregationPolicy.MinMax.value], entity
 
 
-def test_stamps_round_to_the_nearest_nanosecond_before_and_after_zero() -> None:
+def test_stamps_round_to_the_nearest_ns_around_zero() -> None:
     time = np.arange(-2000, 2000) * 1e-3
     np.testing.assert_array_equal(stamps(time).astype(np.int64), np.arange(-2000, 2000) * 1_000_000)
 

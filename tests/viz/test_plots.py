@@ -66,7 +66,7 @@ def test_a_figure_is_whole_and_its_colours_are_the_pages(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", FIGURES)
-def test_the_same_data_gives_the_same_bytes_whatever_the_users_settings(name: str) -> None:
+def test_equal_data_give_equal_bytes_under_any_settings(name: str) -> None:
     first = FIGURES[name]()
     with mpl.rc_context({"font.size": 21.0, "lines.linewidth": 9.0, "xtick.major.size": 12.0, "svg.fonttype": "path"}):
         assert FIGURES[name]() == first
@@ -85,7 +85,7 @@ def points_of(svg: str, role: str) -> Array:
 
 
 @pytest.mark.parametrize("at", [0, 1, 4_999, 123_456, 199_998, 200_000])
-def test_a_spike_of_one_sample_among_many_is_drawn_as_high_as_it_is(at: int) -> None:
+def test_a_spike_among_many_samples_is_drawn_in_full_height(at: int) -> None:
     time = np.linspace(0.0, 4.0, 200_001)
     force = np.where(np.arange(time.size) == at, 63.2, 0.0)
     drawn = points_of(plots.history([Curve(name="raw", x=time, y=force)], label="kN"), "first")
@@ -141,7 +141,7 @@ def test_names_of_short_phases_do_not_run_into_each_other() -> None:
     assert line["unloading"] > line["peak"] + 8.0
 
 
-def test_rounding_error_is_labelled_zero_beside_what_it_is_the_error_of() -> None:
+def test_rounding_errors_are_labelled_zero() -> None:
     words = re.findall(r"<text[^>]*>([^<]*)</text>", plots.bars({"a": 12.5, "b": 1.69e-17, "c": -0.0}, label="kJ"))
     assert words.count("0") >= 2
     assert not [w for w in words if "e-1" in w or w == "-0"]

@@ -119,7 +119,7 @@ def test_a_confusion_is_red_and_what_is_right_green() -> None:
     ]
 
 
-def test_what_is_real_and_how_sure_it_was_stand_there_when_there_is_any(account: dict[str, Any]) -> None:
+def test_reality_and_certainty_are_shown_where_there_is_any(account: dict[str, Any]) -> None:
     assert "Foreign forms" not in made(account).said
     assert "Probabilities over names" not in made(account).said
     formed = {"form": "force-stays", "background": 0.03, "over_background": 2.0, "grades": ["part"]}

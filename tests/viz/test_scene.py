@@ -166,7 +166,7 @@ def test_a_run_without_frames_still_has_an_extent() -> None:
     assert radius > 0.0
 
 
-def test_an_upper_part_and_what_is_carried_hang_under_their_own_bodies(overturn: Run) -> None:
+def test_upper_and_carried_parts_hang_under_their_bodies(overturn: Run) -> None:
     vehicle = load("side_overturn").replaced({"vehicle": "vehicles/compact_tractor_folding.yaml"}).vehicle
     assert isinstance(vehicle, Vehicle)
     found = by_path(with_vehicle(overturn, vehicle))
@@ -206,7 +206,7 @@ def body(run: Run, *at: Point) -> dict[str, object]:
     return by_path(dataclasses.replace(run, scenario=scenario))
 
 
-def test_a_body_given_by_its_corners_is_drawn_whole_with_every_side_outward(overturn: Run) -> None:
+def test_a_body_of_corners_is_drawn_with_outward_sides(overturn: Run) -> None:
     corners = [(x, y, z) for x in (-1.0, 1.0) for y in (-0.5, 0.5) for z in (-0.25, 0.25)]
     hull = body(overturn, *corners)["world/chassis/corners"]
     assert isinstance(hull, Hull)

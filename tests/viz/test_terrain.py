@@ -104,7 +104,7 @@ def test_frames_keep_changes_only_and_how_the_ground_was_left() -> None:
     assert time[frames(track, late)[0]] >= 0.7
 
 
-def test_frames_of_a_large_picture_are_thinned_but_the_last_stays() -> None:
+def test_frames_of_a_large_picture_are_thinned_to_the_last() -> None:
     time = np.arange(0.0, 4.0, 0.02)
     track = GroundTrack(time=time, element=np.array([27]), sinkage=np.linspace(0.0, 0.1, time.size)[:, None])
     (patch,) = terrain(Plane(), ARRAY, track.element).patches
@@ -117,7 +117,7 @@ def test_frames_of_a_large_picture_are_thinned_but_the_last_stays() -> None:
     assert terrain(Plane(), ARRAY, empty.element).patches == ()
 
 
-def test_section_begins_at_the_first_touched_row_and_keeps_places() -> None:
+def test_a_section_begins_at_the_first_touched_row() -> None:
     touched = np.array([5 * 20 + 7, 6 * 20 + 12], dtype=np.int64)
     section, moved = cut_open(ARRAY, touched)
     assert section.count == (20, 13)

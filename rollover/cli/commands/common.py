@@ -60,7 +60,7 @@ class Plain(TyperCommand):
         for option in self.params:
             value = ctx.params.get(option.name)
             if isinstance(value, float) and not math.isfinite(value):
-                raise typer.BadParameter(f"{value} is not a finite number", ctx=ctx, param=option)
+                raise typer.BadParameter(f"{value} is not a finite number", ctx=ctx, param_hint=f"'{option.opts[0]}'")
         return rest
 
     def get_params(self, ctx: Any) -> Any:

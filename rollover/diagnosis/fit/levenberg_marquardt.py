@@ -104,7 +104,7 @@ class Problem(Simulations):
         return replace(fitted, blocks=tuple(b or old for b, old in zip(new, fitted.blocks, strict=True)))
 
     def is_beside(self, x: Sequence[float], there: Sequence[float]) -> bool:
-        """Whether a place is as near to another as the step is wide over which slopes are told where a fit ends."""
+        """Whether a place is as near to another as the finite-difference step with which a fit ends."""
         return max((abs(a - b) for a, b in zip(x, there, strict=True)), default=0.0) < self.effort.fine
 
     @property

@@ -41,7 +41,7 @@ Runs = Callable[
 
 
 def by_student(free: float) -> float:
-    """(t/1.96)^2: how much wider squares are told by so few degrees of freedom."""
+    """(t/1.96)^2: how much wider squares are, estimated with so few degrees of freedom."""
     from scipy.special import stdtrit
 
     return (float(stdtrit(free, 0.975)) / TUNING.normal_quantile) ** 2

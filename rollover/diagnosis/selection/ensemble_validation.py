@@ -134,7 +134,7 @@ def is_there_as_held(problem: Problem, fitted: Fitted) -> bool:
 
 
 def is_there(problem: Problem, fitted: Fitted) -> bool:
-    """Whether the strength of the last effect is told from none: its interval keeps away from what changes nothing."""
+    """Whether the strength of the last effect differs significantly from its null value: its interval keeps away."""
     last = fitted.candidates[-1]
     nulls = _nulls(last)
     if not nulls:

@@ -167,8 +167,7 @@ def read_named(
     """Path and recording by name, of files, of all in folders and of all tests in archives.
 
     All are read with the profile, if one is given; `select` has patterns of names, None where a user has no such
-    choice. Raises `InputError` for all faults
-    at once, and for two recordings of one name.
+    choice. Raises `InputError` for all faults at once, and for two recordings of one name.
     """
     given = profile if isinstance(profile, Described) or profile is None else read_profile(profile)
     found: dict[str, tuple[Path, Recording]] = {}

@@ -29,7 +29,7 @@ _CLOCK = re.compile(
     r"|(?P<h2>\d{2})(?P<min2>\d{2})(?P<s2>\d{2})(?:[.,](?P<f2>\d+))?"
 )
 _FRACTION = re.compile(r"(.*:\d{2}:\d{2})[.,](\d+)(Z?)")
-_ZONE = re.compile(r"\s*(?:(?P<utc>Z|UTC|GMT)|(?P<sign>[+-])(?P<h>\d{1,2})(?::?(?P<m>\d{2}))?)")
+_ZONE = re.compile(r"\s*(?:(?P<utc>Z|UTC|GMT)|(?P<sign>[+-])(?P<h>\d{1,2})(?::?(?P<m>\d{2}))?)", re.IGNORECASE)
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 
 
@@ -86,7 +86,7 @@ def _read(text: str, *, alone: bool = False) -> Stamp | None:
             day = dt.date(int(parts["y"]), int(month), int(parts["d"])).toordinal()
         except ValueError as e:
             raise NotAStampError(f"not a date, got {text!r}: {e}") from None
-        rest = re.sub(r"^\s*[T_]?\s*", "", rest[date.end() :])
+        rest = re.sub(r"^\s*[Tt_]?\s*", "", rest[date.end() :])
     elif re.match(r"\d{1,2}/\d{1,2}/\d{2,4}", rest):
         raise NotAStampError(f"not clear which is the day and which the month, got {text!r}; {FORMS}")
     clock = _CLOCK.match(rest)

@@ -89,7 +89,7 @@ def _sure(sniff: Callable[[Path], bool]) -> Callable[[Path], bool]:
 
 
 def with_channels(recording: Recording, patterns: Sequence[str], file: str) -> Recording:
-    """The recording with those channels alone that fit a pattern; the others are told in its notes.
+    """The recording with those channels alone that fit a pattern; the others are named in its notes.
 
     Raises `InputError` for a pattern that fits none.
     """

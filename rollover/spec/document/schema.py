@@ -51,7 +51,7 @@ class _Writer:
         return {**found, "description": text.strip()} if text else found
 
     def one_of(self, slot: Slot, suffix: str, file: bool = True) -> dict[str, Any]:
-        """Schema of a choice between parameter classes, told apart by `kind` where there are several."""
+        """Schema of a choice between parameter classes, distinguished by `kind` where there are several."""
         by = slot.by_kind
         choices: list[dict[str, Any]] = [
             {"$ref": f"#/$defs/{self._define(member, suffix, by_kind=by is not None and kind != by.usual)}"}
