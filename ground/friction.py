@@ -8,8 +8,7 @@ with the shear displacement j since the member came over the element. Where the 
 by the slope that the curve has at its start, (c + sigma tan phi)/K, and yields again where it left the curve. As a
 spring of strain e, |e| <= R(j) = K (1 - exp(-j/K)), and what goes beyond R is what j grows by; on the way out this is
 the curve itself. On landing anew j begins from zero: the same displacement is needed again, as in repeated shear tests
-(recalled after Wong, Theory of Ground Vehicles, medium confidence). Nothing damps the spring: what the soil has stopped
-swings on it.
+(recalled after Wong, Theory of Ground Vehicles, medium confidence).
 """
 
 from __future__ import annotations
