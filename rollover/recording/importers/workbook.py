@@ -43,17 +43,15 @@ def write_workbook(sheets: Mapping[str, Sequence[Row]], path: Path, *, named: Pa
         page = book.create_sheet(sheet)
         page.freeze_panes = "B2"
         for row in rows:
-            page.append([_cell(page, value) for value in row])
+            page.append([_cell(openpyxl, page, value) for value in row])
     book.save(path)
 
 
-def _cell(page: Any, value: Any) -> Any:
+def _cell(openpyxl: Any, page: Any, value: Any) -> Any:
     """A value as it is: a text that begins with = is no formula."""
     if not isinstance(value, str) or not value.startswith("="):
         return value
-    from openpyxl.cell import WriteOnlyCell
-
-    cell = WriteOnlyCell(page, value)
+    cell = openpyxl.cell.WriteOnlyCell(page, value)
     cell.data_type = "s"
     return cell
 
