@@ -314,65 +314,18 @@ def diagnose(
     InputError
         For wrong input, an unknown condition, recordings without any channel that is simulated.
     """
-    from rollover.comparison.recordings import held_out, measured
-    from rollover.diagnosis.fit.jobs import Executor
-    from rollover.diagnosis.sensors_first import check, diagnosed, prechecked
-    from rollover.scenario import Scenario, given
-    from rollover.system.arguments import listed, within
+    from rollover.diagnosis.asked import diagnosed
 
-    for share in [tolerance] if isinstance(tolerance, (int, float)) else tolerance.values():
-        within("tolerance", share, 0.0, 0.5)
-    if not isinstance(scenario, (str, Path, Scenario)) or (
-        isinstance(scenario, (str, Path)) and Path(scenario).suffix == ".py"
-    ):
-        refused = bool(reference) or estimate
-        return _diagnose_model(
-            scenario, recordings, hold_out, tolerance, refused=refused, profile=profile, workers=workers
-        )
-    chosen, known = given(scenario)[0], measured(recordings, profile)
-    check(chosen, known)
-    held = held_out(list(known), listed(hold_out)) if hold_out else []
-    with Executor(workers) as executor:
-        findings = prechecked(chosen, known)
-        return diagnosed(
-            chosen,
-            known,
-            findings,
-            hold_out=held,
-            tolerance=tolerance,
-            reference=listed(reference),
-            estimate=estimate,
-            executor=executor,
-        )
-
-
-def _diagnose_model(
-    model: str | Path | ForwardModel,
-    recordings: Recordings,
-    hold_out: str | Sequence[str],
-    tolerance: float | Mapping[str, float],
-    *,
-    refused: bool,
-    profile: str | Path | None,
-    workers: int,
-) -> Diagnosis:
-    from rollover.comparison.recordings import held_out, measured
-    from rollover.diagnosis.fit.jobs import Executor
-    from rollover.diagnosis.own_model import diagnose_model, load_model
-    from rollover.diagnosis.own_model.declaration import declared
-    from rollover.diagnosis.own_model.tables import tables
-    from rollover.system.arguments import listed
-    from rollover.system.errors import Fault, InputError
-
-    if refused or not isinstance(tolerance, (int, float)):
-        message = "not of a model of one's own; one tolerance for all channels is allowed, no reference, no estimate"
-        raise InputError(Fault(path="diagnose", message=message))
-    chosen = load_model(Path(model)) if isinstance(model, (str, Path)) else declared(model)
-    with tables(chosen):
-        known = measured(recordings, profile)
-    held = held_out(list(known), listed(hold_out)) if hold_out else []
-    with Executor(workers) as executor:
-        return diagnose_model(chosen, known, hold_out=held, tolerance=tolerance, executor=executor)
+    return diagnosed(
+        scenario,
+        recordings,
+        hold_out=hold_out,
+        tolerance=tolerance,
+        reference=reference,
+        estimate=estimate,
+        profile=profile,
+        workers=workers,
+    )
 
 
 def study(

@@ -19,13 +19,13 @@ STEPS = 4  # of a sampling interval
 HIGHEST = 2.0  # m, of a rim that nothing reaches
 
 
-@njit(cache=True)
+@njit
 def _flows(upper, lower, pumped, k1, k2, k3, k4, leak):  # type: ignore[no-untyped-def]
     root, other = math.sqrt(max(upper, 0.0)), math.sqrt(max(lower, 0.0))
     return k4 * pumped - k1 * root - leak * upper, k2 * root - k3 * other
 
 
-@njit(cache=True)
+@njit
 def _fill(dt, voltage, upper, lower, p, out):  # type: ignore[no-untyped-def]
     """Levels (n, 2) at the stamps; p in the order of `ORDER`."""
     k1, k2, k3, k4, rim, leak, lag = p

@@ -18,13 +18,13 @@ STEPS = 2  # of a sampling interval
 SHARP = 1e-3  # m/s, over which dry friction changes its direction
 
 
-@njit(cache=True)
+@njit
 def _acceleration(x, v, force, p):  # type: ignore[no-untyped-def]
     mass, damping, stiffness, cubic, square, friction = p
     return (force - damping * v - (stiffness + (square + cubic * x) * x) * x - friction * math.tanh(v / SHARP)) / mass
 
 
-@njit(cache=True)
+@njit
 def _oscillate(dt, force, p, out):  # type: ignore[no-untyped-def]
     """Deflection (n,) at the stamps, from rest; p in the order of `ORDER`."""
     x, v = 0.0, 0.0

@@ -19,7 +19,7 @@ STEPS = 4  # of a sampling interval
 SHARP = 1e-9  # m/s, below which friction has no direction
 
 
-@njit(cache=True)
+@njit
 def _axis(dt, force, q0, p, out):  # type: ignore[no-untyped-def]
     """Position and velocity (n, 2) at the stamps, from rest at q0; p in the order of `ORDER`."""
     mass, viscous, coulomb, offset, asymmetry, extra, slow, quadratic, stiffness, play = p

@@ -15,7 +15,7 @@ from rollover import Parameter, Term
 STEPS = 6  # of a sampling interval
 
 
-@njit(cache=True)
+@njit
 def _rates(x, v, w, force, p):  # type: ignore[no-untyped-def]
     mass, damping, stiffness, strength, travel, cubic, drag = p
     pull = (stiffness + cubic * x * x) * x + strength * w
@@ -23,7 +23,7 @@ def _rates(x, v, w, force, p):  # type: ignore[no-untyped-def]
     return v, (force - pull - (damping + drag * abs(v)) * v) / mass, v / travel * (1.0 - yielding)
 
 
-@njit(cache=True)
+@njit
 def _oscillate(dt, force, p, out):  # type: ignore[no-untyped-def]
     """Deflection (n,) at the stamps, from rest; p in the order of `ORDER`."""
     x, v, w = 0.0, 0.0, 0.0

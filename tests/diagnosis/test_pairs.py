@@ -264,7 +264,7 @@ def test_leaders_and_thresholds_are_scanned_in_pairs(monkeypatch: pytest.MonkeyP
         ("soil-viscous-damping", (0.2,), "soil-layer"),
         ("soil-crust", (0.5, 0.6), "soil-layer"),
     ]
-    assert tried == [({"few": (0, 2), "shifts": (1e-3, 0.0, 0.0)}, ways)]
+    assert tried == [({"few": (0, 2), "shifts": (1e-3, 0.0, 0.0), "base": ((), ())}, ways)]
     assert [([c.id for c in both], x) for both, x in found] == [
         (["soil-viscous-damping", "soil-layer"], (0.2, 0.8, 0.9)),
         (["soil-crust", "soil-layer"], (0.5, 0.6, 0.8, 0.9)),

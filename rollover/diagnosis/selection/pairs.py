@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
+from rollover.diagnosis.fit.finite_differences import Point
 from rollover.diagnosis.fit.jobs import Task
 from rollover.diagnosis.fit.levenberg_marquardt import Fitted, Problem
 from rollover.diagnosis.fit.linearisation import turned
@@ -129,7 +130,11 @@ def best_pair(inquiry: Inquiry, taken: Sequence[Step], looked: ScoreTest) -> Ste
     two = itertools.combinations(partners, 2)
     base = first.base
     short: list[Start] = [((*base.candidates, a, b), (*base.x, *x, *y)) for (a, x), (b, y) in two if _may_explain(a, b)]
-    short += _placed_anew(inquiry, base, partners, few, shifts) if fixed_shifts else _together(inquiry, base, looked)
+    short += (
+        _placed_anew(inquiry, partners, few, shifts, (base.candidates, base.x))
+        if fixed_shifts
+        else _together(inquiry, base, looked)
+    )
     inquiry.say(f"{len(short)} pairs of effects")
     for rounds, most in TUNING.short_fits:
         tasks = [
@@ -170,10 +175,10 @@ def _together(inquiry: Inquiry, base: Fitted, looked: ScoreTest) -> list[Start]:
 
 def _placed_anew(
     inquiry: Inquiry,
-    base: Fitted,
     partners: Sequence[tuple[Candidate, tuple[float, ...]]],
     few: Sequence[int],
     shifts: Sequence[float],
+    base: Point = ((), ()),
 ) -> list[Start]:
     """Pairs of an effect that led and one with a threshold, begun where that leaves least beside it.
 
@@ -181,9 +186,9 @@ def _placed_anew(
     """
     able = [c for c, _ in partners if has_threshold(c) and not c.is_bent]
     ways = [(a, x, c) for a, x in partners[: TUNING.leading] for c in able if c.key != a.key]
-    look = partial(placed_beside, few=tuple(few), shifts=tuple(shifts), base=(base.candidates, base.x))
+    look = partial(placed_beside, few=tuple(few), shifts=tuple(shifts), base=base)
     each = zip(ways, inquiry.parallel_map(look, ways), strict=True)
-    return [((*base.candidates, a, c), x) for (a, _, c), x in each if x is not None]
+    return [((*base[0], a, c), x) for (a, _, c), x in each if x is not None]
 
 
 def _takes_little(lead: Fitted, pair: Fitted, few: Sequence[int]) -> bool:

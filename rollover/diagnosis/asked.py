@@ -1,0 +1,61 @@
+"""A diagnosis as it is asked for from Python: files or objects, recordings from anywhere, a scenario or a model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from rollover.comparison.recordings import Recordings, held_out, measured
+from rollover.diagnosis import sensors_first
+from rollover.diagnosis.fit.jobs import Executor
+from rollover.diagnosis.own_model import ForwardModel, diagnose_model, load_model
+from rollover.diagnosis.own_model.declaration import declared
+from rollover.diagnosis.own_model.tables import tables
+from rollover.diagnosis.result import Diagnosis
+from rollover.scenario import Scenario, given
+from rollover.system.arguments import listed, within
+from rollover.system.errors import Fault, InputError
+
+
+def diagnosed(
+    scenario: str | Path | Scenario | ForwardModel,
+    recordings: Recordings,
+    *,
+    hold_out: str | Sequence[str],
+    tolerance: float | Mapping[str, float],
+    reference: str | Sequence[str],
+    estimate: bool,
+    profile: str | Path | None,
+    workers: int,
+) -> Diagnosis:
+    """See `rollover.diagnose`. Raises `InputError`, also for what is asked of a model and is of scenarios alone."""
+    for share in [tolerance] if isinstance(tolerance, (int, float)) else tolerance.values():
+        within("tolerance", share, 0.0, 0.5)
+    is_file = isinstance(scenario, (str, Path)) and Path(scenario).suffix == ".py"
+    if is_file or not isinstance(scenario, (str, Path, Scenario)):
+        if reference or estimate or not isinstance(tolerance, (int, float)):
+            message = (
+                "not of a model of one's own; one tolerance for all channels is allowed, no reference, no estimate"
+            )
+            raise InputError(Fault(path="diagnose", message=message))
+        model = load_model(Path(scenario)) if isinstance(scenario, (str, Path)) else declared(scenario)
+        with tables(model):
+            known = measured(recordings, profile)
+        held = held_out(list(known), listed(hold_out)) if hold_out else []
+        with Executor(workers) as executor:
+            return diagnose_model(model, known, hold_out=held, tolerance=tolerance, executor=executor)
+    chosen, known = given(scenario)[0], measured(recordings, profile)
+    sensors_first.check(chosen, known)
+    held = held_out(list(known), listed(hold_out)) if hold_out else []
+    with Executor(workers) as executor:
+        findings = sensors_first.prechecked(chosen, known)
+        return sensors_first.diagnosed(
+            chosen,
+            known,
+            findings,
+            hold_out=held,
+            tolerance=tolerance,
+            reference=listed(reference),
+            estimate=estimate,
+            executor=executor,
+        )
