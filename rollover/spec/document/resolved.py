@@ -52,7 +52,8 @@ def content_hash(thing: Any) -> str:
 
     A list that `IfAny` marks counts where something stands in it: what never had one keeps the hash that it had.
     """
-    known = slots(type(thing))
+    kind: Any = type(thing)
+    known = slots(kind)
     stated = {key: value for key, value in to_mapping(thing).items() if value or not known[key].if_any}
     text = json.dumps(stated, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
