@@ -101,7 +101,7 @@ def _sources_hash() -> str:
         for path in sorted((root / folder).rglob("*.py")):
             text = path.read_bytes()
             # all of ground/: its constants are frozen into the laws' kernels, also those of files that compile nothing
-            if folder == "ground" or b"compiled" in text:
+            if folder == "ground" or b"ground.compiled" in text:
                 digest.update(path.name.encode() + text)
     return digest.hexdigest()[:16]
 

@@ -194,7 +194,11 @@ def test_turning_axes_add_what_a_free_body_does_not_feel() -> None:
     bodies = bodies_of(scenario.vehicle, scenario.ground.elements, {})
     t = tables_of(scenario, bodies)
     m, J = t.mass[0, 0], t.mass[3:6, 3:6]
-    angle = lambda s: 0.3 + 0.8 * s + 0.5 * s**2  # noqa: E731  of the axes about their x
+
+    def angle(s: float) -> float:
+        """Of the axes about their x, rad."""
+        return 0.3 + 0.8 * s + 0.5 * s**2
+
     pivot = np.array([0.0, 0.7, -0.4])
     start, speed, o0 = np.array([0.5, 1.0, 2.0]), np.array([1.0, -2.0, 0.7]), np.array([0.9, -1.1, 1.7])
     R0 = from_angles(0.4, -0.2, 1.1)

@@ -11,6 +11,7 @@ import pytest
 
 from rollover.dynamics import drop_test
 from rollover.dynamics.simulate import run
+from rollover.inputs import Signal
 from rollover.recording import Recording
 from rollover.recording.importers import write_recording
 from rollover.scenario import Scenario, load
@@ -143,6 +144,13 @@ def test_no_input_leaves_the_hash_as_it_was() -> None:
     plain = load("drop_test")
     assert document.content_hash(plain) == document.content_hash(plain.replaced({"inputs": []}))
     assert document.content_hash(plain) != document.content_hash(scenario("0.0"))
+
+
+def test_a_signal_of_more_samples_than_a_scenario_can_hold_is_refused() -> None:
+    many = tuple(0.001 * k for k in range(50_001))
+    assert Signal(time=many[1:], value=many[1:]).at(1.5) == pytest.approx(1.5)
+    with pytest.raises(ValueError, match=r"^time: too many samples, got 50001; at most 50000, a lower rate$"):
+        Signal(time=many, value=many)
 
 
 def test_offset_and_factor_are_values_like_others() -> None:

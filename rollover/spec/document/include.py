@@ -96,8 +96,9 @@ def expand(node: Node, slot: Slot, chain: tuple[Path, ...], path: str = "", unde
         return _included(node, slot, chain, path)
     if slot.grid and isinstance(node.value, str) and node.value.endswith(GRIDS):
         return _grid(node, path)
-    if slot.written is not None and (found := slot.written.read(node, path, slot.written.unit)) is not None:
-        return found
+    read_so: Node | None = None if slot.written is None else slot.written.read(node, path, slot.written.unit)
+    if read_so is not None:
+        return read_so
     if isinstance(node.value, tuple):
         elements = [
             expand(child, slot.element(i) or Slot(type=object), chain, _join(path, str(i)))
