@@ -55,6 +55,8 @@ def wraps(t: Trace) -> Iterator[Finding]:
 
 def is_of_means(gap: Finding, t: Trace) -> bool:
     """Whether a gap is one that samples averaged over a wrap of a trace, as it was read, have become."""
+    if describe(t.channel).unit != "rad":
+        return False
     at = t.time[across_wraps(t.values)]
     return bool(np.any((gap.start <= at) & (at <= gap.end)))
 
