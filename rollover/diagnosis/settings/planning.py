@@ -17,8 +17,7 @@ class Planning:
     # share, standard deviation: error of a channel's gain; typical errors of gains are 1 to 5 %
     gain: float = 0.01
     memory: float = 0.1  # share of the record: time over which a discrepancy is one error; of the order of a contact
-    # samples: memory of the autoregression that stands for noise and discrepancy; from 4 to 16 it changes a
-    # noncentrality by less than 2 %
+    # samples: memory of the autoregression that stands for noise and discrepancy; chosen
     order: int = 8
     rounds: int = 8  # rounds of a rival's fit to another effect's traces; chosen
     starts: int = 2  # places at which a rival's fit begins; chosen
