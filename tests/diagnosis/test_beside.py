@@ -83,7 +83,7 @@ SOME = (0.8, 0.9, 1.0, 0.9, 1.0, 0.8)  # of which a discrepancy of unit size lea
         ((9.0, 8.0, 9.0, 8.0, 9.0, 8.0), (3.0, 3.0, 3.0, 7.0, 7.0, 3.0), 1e-9, "unexplained"),
     ],
 )
-def test_an_effect_is_named_where_it_predicts_half_and_else_forgiven_where_a_discrepancy_is_enough(
+def test_an_effect_is_named_where_it_predicts_half_else_forgiven(
     base: tuple[float, ...], left: tuple[float, ...], p_value: float, verdict: str
 ) -> None:
     found, said = decided_beside(PROBLEM, explanation(base, fitted("soil-layer", left), p_value=p_value), GROUPS)
@@ -91,7 +91,7 @@ def test_an_effect_is_named_where_it_predicts_half_and_else_forgiven_where_a_dis
     assert bool(found.parts) == (verdict == "missing-physics")
 
 
-def test_what_leaves_no_more_than_the_discrepancy_or_is_akin_is_not_excluded_and_the_rest_is() -> None:
+def test_rivals_akin_or_within_the_discrepancy_are_kept() -> None:
     best = fitted("soil-layer", (0.5,) * DROPS)
     rivals = {
         "soil-crust": (4.5,) * DROPS,  # of the same family, and explains nearly all
@@ -116,7 +116,7 @@ def test_what_leaves_no_more_than_the_discrepancy_or_is_akin_is_not_excluded_and
 
 
 @pytest.mark.parametrize(("low", "is_told"), [(0.12, True), (-0.05, False)])
-def test_a_part_that_is_surely_predicted_is_told_though_it_is_forgiven(low: float, is_told: bool) -> None:
+def test_a_part_surely_predicted_is_told_though_forgiven(low: float, is_told: bool) -> None:
     candidate = fitted("sensor-bias", SOME).candidates[-1]
     best = (candidate, Share(share=0.35, low=low, high=0.58))
     said = as_models_miss({"ground/sinkage": 0.021}, 1e-9, 6, best)

@@ -66,12 +66,12 @@ def judged(
     return problem
 
 
-def test_models_are_rarely_better_than_one_percent_and_rarely_worse_than_ten() -> None:
+def test_model_error_is_rarely_below_1_or_above_10_percent() -> None:
     below = norm.cdf(np.log(np.array(SETTINGS.inference.discrepancy.usual_range) / MEDIAN) / SPREAD)
     assert below == pytest.approx([0.05, 0.95], abs=1e-3)
 
 
-def test_a_scale_lies_between_what_is_left_and_what_is_usual_the_nearer_the_more_draws_there_are() -> None:
+def test_a_scale_lies_between_the_residual_and_the_usual() -> None:
     for left in (0.003, 0.2):
         few, many = (posterior(left, draws)[0] for draws in (1.0, 30.0))
         assert abs(np.log(many / left)) < abs(np.log(few / left))
@@ -92,7 +92,7 @@ def test_what_is_left_beyond_noise_is_the_wave_that_was_added() -> None:
     assert max(left_beyond_noise(nothing, base).values()) < 0.002
 
 
-def test_a_wave_of_the_estimated_scale_is_no_mismatch_and_one_of_five_times_that_is() -> None:
+def test_a_wave_of_the_estimated_scale_is_no_mismatch() -> None:
     problem = judged(bent(0.02))
     base = problem.fit((), ())
     assert base is not None
@@ -116,7 +116,7 @@ def test_an_error_of_half_a_wave_is_one_for_as_long() -> None:
     assert times[DEPTH] == pytest.approx(0.23 / 6.0 / np.log(2.0), rel=0.35)
 
 
-def test_references_teach_the_scale_and_say_nothing_where_noise_hides_it() -> None:
+def test_references_teach_the_scale_unless_noise_hides_it() -> None:
     problem = judged(bent(0.02))
     base = problem.fit((), ())
     assert base is not None
@@ -129,7 +129,7 @@ def test_references_teach_the_scale_and_say_nothing_where_noise_hides_it() -> No
     assert taught(loud, base) is None
 
 
-def test_as_many_samples_share_one_error_as_two_correlation_times_hold() -> None:
+def test_samples_of_two_correlation_times_share_one_error() -> None:
     shares = {FORCE: 0.1, DEPTH: 0.1}
     whole, some = (judged(recorded({}, 3, noise=0.01), shares, t) for t in (None, {FORCE: 0.02, DEPTH: 0.04}))
     sizes = [s.rows.size for e in whole.dataset for s in e.signals]
@@ -138,7 +138,7 @@ def test_as_many_samples_share_one_error_as_two_correlation_times_hold() -> None
     assert judged(recorded({}, 3, noise=0.01)).samples_per_error == 1.0
 
 
-def test_a_discrepancy_is_of_its_channel_and_none_is_smaller_than_noise_hides() -> None:
+def test_a_discrepancy_is_of_its_channel_and_above_the_noise() -> None:
     problem = judged(recorded({}, 3, noise=0.01), {DEPTH: 0.05})
     for e in problem.dataset:
         sizes = {s.channel: e.error_of(s) * s.span / s.noise for s in e.signals}
@@ -147,7 +147,7 @@ def test_a_discrepancy_is_of_its_channel_and_none_is_smaller_than_noise_hides() 
         assert all(e.model_error_dominates(s) for s in e.signals)
 
 
-def test_a_slow_wave_alone_is_said_to_be_what_models_miss_and_nothing_is_named() -> None:
+def test_a_slow_wave_alone_is_usual_model_error() -> None:
     found = diagnose(scenario(), bent(0.012), estimate=True)
     assert (found.verdict, found.answer, found.effects, found.broken) == ("no-mismatch", "nothing", (), ())
     assert "models usually miss" in found.sentence
@@ -157,7 +157,7 @@ def test_a_slow_wave_alone_is_said_to_be_what_models_miss_and_nothing_is_named()
     assert 0.01 < scale["correlation_time"] < 0.2
 
 
-def test_an_effect_is_named_beside_a_slow_wave_that_no_effect_makes() -> None:
+def test_an_effect_is_named_beside_a_slow_wave() -> None:
     layer = {"effects.soil-layer.depth": 0.1, "effects.soil-layer.stiffness_ratio": 1.8}
     found = diagnose(scenario(), bent(0.01, changes=layer), estimate=True)
     assert [e.id for e in found.effects] == ["soil-layer"]

@@ -123,7 +123,7 @@ def test_what_breaks_an_invariant_is_said_by_name(changed: dict[str, Any], broke
     assert set(broken) <= set(found.checked)
 
 
-def test_unexplained_is_more_than_noise_unless_recordings_show_it_by_themselves() -> None:
+def test_unexplained_is_more_than_noise_or_shown_by_recordings() -> None:
     place = Place(recording="a", channel=FORCE, phase="all", start=0.0, end=0.3, share=1.0, depends_on="coarse steps")
     for nrmse, by_itself, holds in ((1.0, False, False), (1.0, True, True), (1.3, False, True)):
         score = Score(nrmse=nrmse, iso18571=None, peak_force_error=None)

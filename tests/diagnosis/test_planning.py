@@ -92,7 +92,7 @@ def test_probabilities_in_closed_form() -> None:
 
 
 @pytest.mark.parametrize(("cosine", "strength"), [(0.0, 1.5), (0.0, 3.0), (0.8, 3.0), (0.97, 8.0)])
-def test_the_choice_between_two_that_are_fitted_is_right_as_often_as_said(cosine: float, strength: float) -> None:
+def test_a_choice_between_fits_is_right_as_often_as_said(cosine: float, strength: float) -> None:
     rng = np.random.default_rng(3)
     own, other = np.array([1.0, 0.0]), np.array([cosine, math.sqrt(1.0 - cosine**2)])
     noisy = strength * own + rng.standard_normal((40_000, 2))
@@ -112,7 +112,7 @@ def test_a_linear_model_has_the_noncentrality_of_its_projection(cosine: float) -
     assert found.probability == pytest.approx(chances.choice(expected, (strength / 2.0) ** 2), abs=1e-4)
 
 
-def test_the_least_strength_is_the_one_that_shows_as_often_as_asked_for() -> None:
+def test_the_least_strength_shows_as_often_as_asked_for() -> None:
     tests = linear(0.0)
 
     def shows(x: tuple[float, ...]) -> float:
@@ -126,7 +126,7 @@ def test_the_least_strength_is_the_one_that_shows_as_often_as_asked_for() -> Non
     assert strength_with(MASS, place, shows, 1e6) is None, "its range ends at 300"
 
 
-def test_less_noise_more_strength_more_drops_tell_more_and_a_discrepancy_less() -> None:
+def test_less_noise_and_more_drops_distinguish_more() -> None:
     c = effects_of(drops(2.0))[DAMPING]
     usual, strong = at(c, damping=5.0), at(c, damping=10.0)
     plain = PlannedTests(drops(2.0)).unexplained(c, usual)
@@ -140,7 +140,7 @@ def test_less_noise_more_strength_more_drops_tell_more_and_a_discrepancy_less() 
     assert PlannedTests(some).unexplained(c, usual) < plain
 
 
-def test_what_instruments_and_conditions_leave_open_shows_no_effect() -> None:
+def test_nuisance_parameters_hide_an_effect_like_them() -> None:
     known = effects_of(drops(2.0))
     gain = known[f"sensor-gain:{FORCE}"]
     exact, open_ = (PlannedTests(drops(2.0, gain=g)).unexplained(gain, at(gain, gain=1.02)) for g in (0.0, 0.02))
@@ -240,7 +240,7 @@ def test_what_cannot_be_planned_is_refused() -> None:
         usual_noise(scenario(), ("ground/force_norma",))
 
 
-def test_a_diagnosis_asks_for_the_drop_that_its_own_fits_differ_in() -> None:
+def test_a_diagnosis_asks_for_the_drop_where_its_fits_differ() -> None:
     """Hardening beside stiffness after drops at 2 and 3 m/s: a drop far slower tells, and a repeat does not."""
     changes = {"effects.soil-rate-hardening.per_decade": 0.02}
     made = recorded(changes, 1, speeds=(2.0, 3.0))

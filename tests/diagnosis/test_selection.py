@@ -91,7 +91,7 @@ def test_as_many_effects_as_may_be_must_leave_what_chance_leaves(
 
 
 @pytest.mark.parametrize(("local", "named"), [(0.5, SETTINGS.selection.flexibility.most_effects), (1e-5, 0)])
-def test_what_can_be_bent_to_a_curve_must_leave_no_one_place_either(
+def test_flexible_effects_must_leave_no_single_place(
     local: float, named: int, judged: dict[str, float]
 ) -> None:
     """All places together hide one: chi-square of 960 takes no note of 50 beyond the 12 of one."""
@@ -107,7 +107,7 @@ def test_what_can_be_bent_to_a_curve_must_leave_no_one_place_either(
     ("moved", "remaining", "verdict"),
     [(1e-4, 0.4, "no-mismatch"), (1e-4, 1e-9, "unexplained"), (0.1, 0.4, "unexplained")],
 )
-def test_what_an_effect_too_slight_for_a_name_explains_whole_is_no_mismatch(
+def test_what_a_slight_effect_explains_whole_is_no_mismatch(
     moved: float, remaining: float, verdict: str, judged: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(decision, "moves", lambda *_: moved)
@@ -122,7 +122,7 @@ def test_what_an_effect_too_slight_for_a_name_explains_whole_is_no_mismatch(
     assert (found[0].parts, found[1]) == ((), verdict)
 
 
-def test_the_gain_of_one_effect_that_may_be_nothing_tells_nothing_either() -> None:
+def test_the_gain_of_an_effect_that_may_be_null_tells_nothing() -> None:
     """The p-value is that of the misfit then; of several, others may have gained what it seemed to."""
     problem = cast(Problem, SimpleNamespace(dataset=(), effort=SETTINGS.forward.drops))
     one, two = (replace(explanation(count, 0.4), before=left(0.2)) for count in (1, 2))
@@ -133,7 +133,7 @@ def test_the_gain_of_one_effect_that_may_be_nothing_tells_nothing_either() -> No
 
 
 @pytest.mark.parametrize(("second_order", "offset", "done"), [(0.0, -4e-4, False), (0.25, 0.0, True)])
-def test_what_may_be_nothing_is_another_effects_work_only_if_that_does_it(
+def test_a_maybe_null_effect_is_dropped_if_another_does_its_work(
     second_order: float, offset: float, done: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A sensor of second order comes late, as one of first does whose clock is off.
@@ -177,7 +177,7 @@ def test_two_of_one_sensor_must_leave_what_chance_leaves(
 @pytest.mark.parametrize(
     ("misfit", "structure", "named"), [(1.5, 100.0, True), (1.5, 2000.0, False), (2.5, 100.0, False)]
 )
-def test_one_that_takes_nearly_all_is_named_with_what_it_leaves_itself(
+def test_an_effect_that_takes_nearly_all_is_named(
     misfit: float, structure: float, named: bool, judged: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """20 times the noise before: of the excess 0.3 or 1.3 % is left, of what is structured 0.1 or 2 %."""
@@ -203,7 +203,7 @@ def test_one_that_takes_nearly_all_is_named_with_what_it_leaves_itself(
         (1.25, 1.26, 0),
     ],
 )
-def test_what_predicts_held_out_recordings_hardly_better_is_not_named(
+def test_an_effect_that_hardly_predicts_better_is_not_named(
     start: float, ahead: float, named: int, judged: dict[str, float]
 ) -> None:
     """Whatever it leaves of those that it was fitted to."""
@@ -228,7 +228,7 @@ def test_what_leaves_no_more_than_is_tolerated_is_named(
 
 
 @pytest.mark.parametrize(("more", "numbers", "named"), [(3.0, 1, True), (3.0, 3, False), (5.0, 1, False)])
-def test_a_simpler_rival_that_meets_all_recordings_as_well_is_named_beside(
+def test_a_simpler_rival_that_fits_as_well_is_named_beside(
     more: float, numbers: int, named: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Held out it does worse by far; to all recordings it leaves 3 (or 5) more than the best's 100, of 1000."""
@@ -249,7 +249,7 @@ def test_a_simpler_rival_that_meets_all_recordings_as_well_is_named_beside(
 
 
 @pytest.mark.parametrize(("beside", "taken"), [(0.4, True), (1e-9, False)])
-def test_errors_of_conditions_beside_an_effect_count_where_they_leave_chance_alone(
+def test_condition_errors_count_where_they_leave_chance_alone(
     beside: float, taken: bool, judged: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A wrong effect would bend them too: then they stay as they act on the scenario as it is."""
@@ -271,7 +271,7 @@ def test_errors_of_conditions_beside_an_effect_count_where_they_leave_chance_alo
 @pytest.mark.parametrize(
     ("other", "p_value", "exchanged"), [(50.0, 1e-9, True), (90.0, 1e-9, False), (50.0, 0.5, False)]
 )
-def test_beside_what_rings_in_tune_the_other_of_a_pair_is_looked_for_anew(
+def test_beside_a_resonance_the_other_of_a_pair_is_refitted(
     monkeypatch: pytest.MonkeyPatch, other: float, p_value: float, exchanged: bool
 ) -> None:
     """With a wrong share of the nose all that stands beside it is met as badly: the second was chosen in the dark."""
@@ -318,7 +318,7 @@ def test_effects_that_may_be_any_others_are_not_named(judged: dict[str, float]) 
 
 
 @pytest.mark.parametrize(("alone", "named"), [(3.5, []), (1.5, ["soil-crust"])])
-def test_effects_beside_which_a_sensor_reads_a_curve_are_not_named_together(
+def test_effects_beside_a_curved_sensor_are_not_named_together(
     alone: float, named: list[str], judged: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They leave no more than chance over all, and what is looked for itself: one that takes nearly all is named."""
@@ -341,7 +341,7 @@ def test_effects_beside_which_a_sensor_reads_a_curve_are_not_named_together(
         (100.0, 50.0, False),
     ],
 )
-def test_a_third_effect_is_not_looked_for_that_would_have_to_take_far_more_than_the_second(
+def test_no_third_effect_that_must_take_far_more_than_the_second(
     before: float, after: float, unlikely: bool
 ) -> None:
     base, current = leaving(before), leaving(after)
@@ -363,7 +363,7 @@ def test_a_third_effect_is_not_looked_for_that_would_have_to_take_far_more_than_
         (1040.0, 150.0, False, False),  # less than twice the noise, though 110 of 1000 are left
     ],
 )
-def test_two_that_leave_a_small_part_of_much_may_have_a_third_beside_them(
+def test_two_that_leave_a_small_part_may_have_a_third(
     before: float, after: float, is_ensemble: bool, hopeless: bool
 ) -> None:
     problem = cast(Problem, SimpleNamespace(effort=SimpleNamespace(is_ensemble=is_ensemble)))

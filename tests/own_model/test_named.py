@@ -27,7 +27,7 @@ def least_squares(recordings: dict[str, ro.Recording], powers: tuple[int, ...]) 
     return np.linalg.lstsq(X, y, rcond=None)[0], error
 
 
-def test_parameters_of_a_line_are_those_of_least_squares_with_their_errors() -> None:
+def test_parameters_of_a_line_are_those_of_least_squares() -> None:
     recordings = measured(2.5, -0.7)
     found = diagnose_model(model, recordings)
     assert (found.verdict, found.effects) == ("no-mismatch", ())
@@ -61,7 +61,7 @@ def test_what_no_term_has_is_unexplained_with_its_places() -> None:
     assert {p.channel for p in found.where} == {OUT}
 
 
-def test_a_fault_of_an_output_is_its_sensors_where_sensors_compete() -> None:
+def test_a_fault_of_an_output_is_its_sensors() -> None:
     class Sensed(Line):
         parameters = {"slope": Line.parameters["slope"]}  # noqa: RUF012 - of one test
         sensors = ("sensor-bias",)
@@ -101,7 +101,7 @@ def test_a_model_without_parameters_of_its_own_is_held_as_it_is() -> None:
     assert diagnose_model(Fixed(), measured(2.5, -0.7)).verdict == "no-mismatch"
 
 
-def test_noise_that_a_recording_states_is_believed_beside_what_nothing_explains() -> None:
+def test_stated_noise_is_believed() -> None:
     recordings = {}
     for name, r in measured(0.0, 0.0, count=3).items():  # noise alone, to which a fast input adds
         u = np.sin(2.0 * np.pi * 11.0 * r.time)

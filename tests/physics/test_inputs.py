@@ -95,7 +95,7 @@ def test_a_null_signal_changes_no_bit() -> None:
         np.testing.assert_array_equal(without[name], with_[name], err_msg=name)
 
 
-def test_a_constant_steering_signal_is_the_angle_itself_to_the_bit() -> None:
+def test_a_constant_steering_signal_is_the_angle_itself() -> None:
     fixed = run(driving({"initiation.steer_deg": 10.0})).recording
     signal = {"kind": "steering", "angle_deg": {"time": [0.0, 0.4, 0.8], "value": [10.0, 10.0, 10.0]}}
     given = driven(driving({}), signal).recording
@@ -147,7 +147,7 @@ def test_nothing_rests_for_good_before_the_shaking_is_over() -> None:
     assert np.ptp(shaken.recording["chassis/position_z"]) > 1e-3
 
 
-def test_a_spline_starts_and_ends_at_rest_and_its_acceleration_is_smooth() -> None:
+def test_a_spline_starts_and_ends_at_rest_and_is_smooth() -> None:
     time = np.arange(0.0, 1.0001, 0.05)
     pieces = spline(time, 1.0 - np.cos(2.0 * np.pi * time))
     for t in (-1.0, 0.0, 0.33, 1.0, 2.0):
@@ -170,7 +170,7 @@ def ramp(to_deg: float, first: float = 0.0) -> dict[str, Any]:
     }
 
 
-def test_it_tips_when_the_recorded_angle_is_that_of_the_closed_form() -> None:
+def test_it_tips_at_the_angle_of_the_closed_form() -> None:
     """tan b1 = s (1 - a/L)/(h - h_p a/L): the uphill rear wheel lifts at the instant at which the table is there."""
     expected = math.degrees(math.atan(S * (1 - A / L) / (H - HP * A / L)))
     flat = {f"vehicle.wheels.{e}_{s}.tyre.crown": 2e-5 for e in ("rear", "front") for s in ("left", "right")}
@@ -245,7 +245,7 @@ def test_a_steering_history_turns_the_tractor_as_its_angle_does() -> None:
     assert abs(result.ledger["input"]) > 0.0
 
 
-def test_turning_an_axle_keeps_its_momentum_books_its_energy_and_leans_on_its_carrier() -> None:
+def test_steering_keeps_momentum_and_books_its_energy() -> None:
     """Against L = I (s + omega . e) e and T = sum of the whole mass matrix, before and after the axles have turned."""
     signal = {"name": "steer", "kind": "steering", "angle_deg": {"time": [0.0, 1.0], "value": [0.0, 30.0]}}
     scenario = driving({"inputs": [signal]})
@@ -292,7 +292,7 @@ def test_turning_an_axle_keeps_its_momentum_books_its_energy_and_leans_on_its_ca
     np.testing.assert_allclose(t.input_q[0, axle : axle + 6], [0.0, 0.0, 0.0, moment, 0.0, 0.0], atol=1e-9)
 
 
-def test_the_work_of_steering_is_booked_where_wheels_turn_fast_and_the_axle_rolls() -> None:
+def test_the_work_of_steering_fast_wheels_is_booked() -> None:
     """Turned in the air at a constant rate, a spinning wheel's axle lifts its carrier: the ledger knows by what."""
     history = {"kind": "steering", "angle_deg": {"time": [0.02, 0.12], "value": [0.0, 40.0]}}
     result = driven(driving({"initiation.speed": 15.0, "vehicle.wheels.*.inertia": 8.0}, duration=0.3), history)

@@ -152,7 +152,7 @@ def test_memory_that_grows_in_a_run_changes_nothing(integrator: str, monkeypatch
     assert all(np.array_equal(wide.recording[c], own.recording[c]) for c in wide.recording.channels)
 
 
-def test_runs_side_by_side_in_threads_are_those_one_after_another() -> None:
+def test_runs_in_threads_are_those_one_after_another() -> None:
     own = [short("drop_test", **{"initiation.speed": v, "simulation.integrator": "compiled"}) for v in (1.0, 2.0, 3.0)]
     own += [short("cube_toss", **{"simulation.integrator": "compiled"})]
     alone = [simulate.run(s).recording for s in own]
@@ -192,7 +192,7 @@ def test_results_say_which_integrator_made_them() -> None:
     assert [results.account(run, [])["integrator"] for run in (engine, loop)] == ["exudyn", "compiled"]
 
 
-def test_a_study_gives_the_same_bits_whatever_the_number_of_workers(tmp_path: Path) -> None:
+def test_a_study_is_the_same_whatever_the_number_of_workers(tmp_path: Path) -> None:
     file = drops(
         tmp_path,
         ("scenario: drop_test.yaml", "scenario: {base: drop_test.yaml, simulation: {integrator: compiled}}"),

@@ -164,7 +164,7 @@ def test_the_axle_swings_the_chassis_down() -> None:
 
 
 @pytest.mark.parametrize(("back", "wheel"), [(0.0, "front"), (-0.6, "rear")])
-def test_the_blow_is_taken_beside_the_centre_and_turns_about_the_new_line(back: float, wheel: str) -> None:
+def test_the_blow_turns_the_vehicle_about_the_new_line(back: float, wheel: str) -> None:
     """In the section of the centre of gravity the line from wheel to ROPS stands where the two are interpolated."""
     t = replace(NARROW, L6=back)
     found = calculate(t)

@@ -67,7 +67,7 @@ def test_a_plate_pulled_one_way_follows_the_curve(step: float) -> None:
     assert work == pytest.approx(most * (j + K * math.expm1(-j / K)), abs=step**2 / 12.0 * most / K * 1.1)
 
 
-def test_it_turns_round_by_its_first_slope_and_goes_on_where_it_left_the_curve() -> None:
+def test_shear_reverses_by_its_first_slope_and_resumes_the_curve() -> None:
     K, most = 0.02, 1000.0
     plate = Sheared(most, K)
     top = -plate.move(0.01)[0]
@@ -189,7 +189,7 @@ class Pressed:
         return force / REFERENCE_AREA
 
 
-def test_it_unloads_by_the_slope_of_wong_and_loads_again_up_to_where_it_was() -> None:
+def test_it_unloads_and_reloads_by_the_slope_of_wong() -> None:
     """p = p_u - (k_0 + A_u z_u)(z_u - z), by another slope from deeper; the rut stays."""
     k0, grows = 2e6, 5.03e8
     law = replace(PLATE, unloading_stiffness=k0, unloading_growth=grows)
@@ -284,7 +284,7 @@ def tripped(changes: dict[str, object]) -> tuple[float, float]:
     return float(np.degrees(np.abs(done.recording["chassis/roll"])).max()), closure(done).largest
 
 
-def test_a_tall_load_trips_where_the_soil_holds_with_more_than_s_over_h() -> None:
+def test_a_tall_load_trips_where_soil_holds_more_than_s_over_h() -> None:
     """s/h = 0.5: 0.83 of the weight turns it over, 0.36 lets it slide to rest; so does a speed below that by energy."""
     s, h, inertia = 0.4, 0.8, 160.0 / 600.0
     r2 = s * s + h * h

@@ -53,7 +53,7 @@ def run(request: pytest.FixtureRequest, runs: dict[str, Recording]) -> Recording
 
 
 @pytest.mark.parametrize("run", SCENARIOS, indirect=True, ids=SCENARIOS)
-def test_every_channel_of_every_shipped_scenario_comes_back_from_every_format(run: Recording, tmp_path: Path) -> None:
+def test_every_shipped_channel_comes_back_from_every_format(run: Recording, tmp_path: Path) -> None:
     for to in FORMATS:
         folder = tmp_path / to
         folder.mkdir()
@@ -110,7 +110,7 @@ def test_a_single_sample_is_a_recording_too(to: str, tmp_path: Path) -> None:
     assert (found.time.tolist(), found["ground/sinkage"].tolist()) == ([0.25], [0.1])
 
 
-def test_a_matlab_structure_has_legal_names_and_the_original_ones_beside(tmp_path: Path) -> None:
+def test_a_matlab_structure_has_legal_and_original_names(tmp_path: Path) -> None:
     from scipy.io import loadmat
 
     write_recording(odd(), tmp_path / "a.mat")
@@ -202,7 +202,7 @@ def test_a_comparison_gives_both_sides_of_each_recording(tmp_path: Path) -> None
         (("old",), "old: no measured.parquet there; `rollover compare` writes it anew"),
     ],
 )
-def test_what_cannot_be_exported_is_one_line_and_nothing_is_written(
+def test_what_cannot_be_exported_is_one_line(
     words: tuple[str, ...], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -63,7 +63,7 @@ def test_every_file_is_in_order(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", SIGNALS, ids=name_of)
-def test_every_signal_is_a_recording_that_a_scenario_names_and_says_what_it_is(path: Path) -> None:
+def test_every_signal_is_a_recording_named_by_a_scenario(path: Path) -> None:
     assert read_recording(path).source.startswith("made up: ")
     assert path.read_text(encoding="utf-8").startswith("# Made up, not measured: ")
     assert any(f"file: {name_of(path)}.csv" in p.read_text(encoding="utf-8") for p in SCENARIOS)

@@ -108,7 +108,7 @@ def test_every_format_gives_the_same_run_and_the_same_hash() -> None:
         np.testing.assert_array_equal(one[name], other[name], err_msg=name)
 
 
-def test_the_unit_of_the_column_is_converted_and_degrees_stay_degrees() -> None:
+def test_the_unit_of_the_column_is_converted() -> None:
     Path("raw.csv").write_text("t,f\n0,0.1\n1,0.3\n")
     found = document.value_at(
         scenario("{file: raw.csv, channel: input/pull/force, profile: p.yaml}"), "inputs.pull.force"
@@ -124,7 +124,7 @@ def test_the_unit_of_the_column_is_converted_and_degrees_stay_degrees() -> None:
     np.testing.assert_allclose(document.value_at(load("t.yaml"), "inputs.table.angle_deg").value, [10.0, 20.0])
 
 
-def test_a_changed_sample_is_another_hash_and_the_resolved_scenario_needs_no_file() -> None:
+def test_a_changed_sample_is_another_hash_without_the_file() -> None:
     before = scenario(PLAIN)
     Path("resolved.yaml").write_text(document.dump(before))
     changed = FORCE.copy()
@@ -146,7 +146,7 @@ def test_no_input_leaves_the_hash_as_it_was() -> None:
     assert document.content_hash(plain) != document.content_hash(scenario("0.0"))
 
 
-def test_a_signal_of_more_samples_than_a_scenario_can_hold_is_refused() -> None:
+def test_a_signal_of_too_many_samples_is_refused() -> None:
     many = tuple(0.001 * k for k in range(50_001))
     assert Signal(time=many[1:], value=many[1:]).at(1.5) == pytest.approx(1.5)
     with pytest.raises(ValueError, match=r"^time: too many samples, got 50001; at most 50000, a lower rate$"):

@@ -83,7 +83,7 @@ def test_a_wrong_file_of_laws_is_one_line_with_its_place(peat: Path, old: str, n
         assert line.isdecimal(), done.stderr
 
 
-def test_a_baseline_names_the_file_of_a_law_and_regress_says_that_it_was_another(peat: Path, tmp_path: Path) -> None:
+def test_regress_says_that_a_law_was_of_another_file(peat: Path, tmp_path: Path) -> None:
     (folder := tmp_path / "gate").mkdir()
     scenario = "base: drop_test.yaml\ntitle: A drop on peat\nground: {law: {kind: peat}}\nsimulation: {duration: 0.1}\n"
     (folder / "peat_drop.yaml").write_text(scenario, encoding="utf-8")

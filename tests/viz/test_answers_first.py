@@ -31,7 +31,7 @@ def compared(drop: Run, factor: float = 1.1, noise: float | None = NOISE) -> Mis
     return found if noise else replace(found, channels=tuple(replace(c, noise=None) for c in found.channels))
 
 
-def test_a_comparison_opens_with_its_curves_and_no_table_is_wider_than_paper(drop: Run) -> None:
+def test_a_comparison_opens_with_its_curves(drop: Run) -> None:
     found = compared(drop)
     text = comparison.page([found], title="Drop", command="rollover compare")
     body = text[text.index("<main>") :]
@@ -51,7 +51,7 @@ def test_a_comparison_opens_with_its_curves_and_no_table_is_wider_than_paper(dro
     assert "residual, kN" in html.unescape(text), "the residual's axis bears its unit"
 
 
-def test_a_calibration_shows_curves_before_and_after_intervals_and_correlations(drop: Run) -> None:
+def test_a_calibration_shows_curves_and_correlations(drop: Run) -> None:
     marked = calibrated()
     names = ("vehicle.mass", "ground.law.stiffness_scale")
     estimates = tuple(
@@ -75,7 +75,7 @@ def test_a_calibration_shows_curves_before_and_after_intervals_and_correlations(
     assert ">-0.87<" in third[: third.index("</svg>")].replace("\u2212", "-")
 
 
-def test_a_known_noise_is_a_band_in_the_viewer_and_an_unknown_one_none(drop: Run, tmp_path: Path) -> None:
+def test_a_known_noise_is_a_band_in_the_viewer(drop: Run, tmp_path: Path) -> None:
     s, found = series(FORCE), compared(drop)
     write_comparison(drop, found, tmp_path / "a.rrd")
     here = f"/{s.measured}"

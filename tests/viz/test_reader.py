@@ -84,7 +84,7 @@ def test_values_under_the_pointer_are_those_of_the_data(page: Path) -> None:
 
 
 @needs_browser
-def test_a_part_is_enlarged_by_dragging_and_the_whole_is_back_for_print(page: Path) -> None:
+def test_dragging_enlarges_and_printing_shows_the_whole(page: Path) -> None:
     with opened(page) as tab:
         svg = tab.locator("figure svg").first
         svg.scroll_into_view_if_needed()

@@ -151,7 +151,7 @@ def test_the_verdict_says_what_it_rests_on(overturn: Run, peaks: tuple[PeakLoad,
     assert (missed.state, "not met: distance of the structure" in missed.detail) == ("fail", True)
 
 
-def test_loads_and_their_domain_come_before_the_standards_and_the_way_before_both(
+def test_trajectory_then_loads_then_standards(
     overturn: Run, peaks: tuple[PeakLoad, ...]
 ) -> None:
     text = report.page(overturn, peaks, ANSWER, rows=[SIDE, ZONE])
@@ -166,7 +166,7 @@ def test_loads_and_their_domain_come_before_the_standards_and_the_way_before_bot
     assert "How it went" not in report.page(example.drop(), (), ANSWER), "a striker goes straight down"
 
 
-def test_a_test_stand_answers_whether_all_is_met_and_how_near_it_was(
+def test_a_test_stand_answers_whether_all_is_met(
     overturn: Run, peaks: tuple[PeakLoad, ...]
 ) -> None:
     tested = replace(overturn, tests=({"kind": "tilt", "name": "x"},))
