@@ -145,6 +145,8 @@ def _beside(found: Conclusion, every: Sequence[Dataset], notes: Sequence[str]) -
 def _is_lawful(found: Conclusion) -> bool:
     """Whether what nothing explains follows a law that carries over to recordings that were held out."""
     problem, scenario = found.problem, found.asked.scenario
+    if scenario is None:
+        return False
     scenarios = [set_up(scenario, e.recording) for e in problem.dataset]
     return follows_a_law(problem, found.explanation.base, scenarios, found.groups)
 

@@ -144,7 +144,7 @@ def reported(c: Conclusion) -> Diagnosis:
 
 def _with_next_test(c: Conclusion) -> tuple[Named, ...]:
     """The effects, and where two names are in the set what would choose between them, by their fits."""
-    if len(c.effects) != 1 or c.shown is not None or not c.explanation.parts:
+    if c.asked.scenario is None or len(c.effects) != 1 or c.shown is not None or not c.explanation.parts:
         return c.effects
     (effect,), step = c.effects, c.explanation.parts[0]
     rivals = [f for f in step.rivals if f.candidates[-1].id in effect.indistinguishable_from]
